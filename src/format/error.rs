@@ -1,0 +1,127 @@
+//! What can be wrong with an `.ltm` file.
+
+use thiserror::Error;
+
+use crate::transport::GeometryError;
+
+/// Why bytes are not a readable `.ltm` file.
+#[derive(Debug, Error)]
+pub enum FormatError {
+    /// The magic is not there.
+    #[error("this is not an .ltm file: it begins with {found:02x?}")]
+    Magic {
+        /// First bytes found.
+        found: Vec<u8>,
+    },
+    /// The magic was damaged by a transfer in text mode.
+    #[error(
+        "line ends in this .ltm file were converted, as a text-mode transfer does; transfer it again as binary"
+    )]
+    TextMode,
+    /// A version this reader does not know.
+    #[error(
+        "the file has format version {major}.{minor}; this reader knows version 0: get a newer one"
+    )]
+    Version {
+        /// Major version found.
+        major: u16,
+        /// Minor version found.
+        minor: u16,
+    },
+    /// Bytes do not match their checksum.
+    #[error("the {part} is damaged: its checksum does not match; copy or export the file again")]
+    Checksum {
+        /// Header, directory, metadata or which tile.
+        part: Part,
+    },
+    /// The geometry cannot be.
+    #[error("the header is invalid: {0}")]
+    Geometry(#[from] GeometryError),
+    /// A directory entry does not fit the file.
+    #[error("the directory is invalid: tile {tile} lies outside the file or over other data")]
+    Entry {
+        /// Tile number.
+        tile: usize,
+    },
+    /// The metadata is not JSON of the expected form.
+    #[error("the metadata is invalid: {0}")]
+    Metadata(serde_json::Error),
+    /// A tile does not decompress to what the geometry asks for.
+    #[error("{part} does not decompress: {reason}")]
+    Decompress {
+        /// Which tile.
+        part: Part,
+        /// zstd's word for it.
+        reason: String,
+    },
+    /// Decoding would take more memory than allowed.
+    #[error(
+        "the file decodes to {need} bytes, more than the limit of {limit}; raise the limit to open it"
+    )]
+    Limit {
+        /// Bytes needed.
+        need: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
+    /// The file ended early.
+    #[error(
+        "the file is cut short: it ends after {got} of {need} bytes; copy or download it again"
+    )]
+    Truncated {
+        /// Bytes received.
+        got: u64,
+        /// Bytes the file has, as far as is known.
+        need: u64,
+    },
+    /// Bytes were fed that were not next.
+    #[error("bytes from offset {got} were fed where {wanted} was wanted")]
+    Offset {
+        /// Where they came from.
+        got: u64,
+        /// What was next.
+        wanted: u64,
+    },
+    /// Bytes follow the end that the header declares.
+    #[error("the file goes on after its end at byte {end}; copy or export it again")]
+    TrailingBytes {
+        /// Length in the header.
+        end: u64,
+    },
+    /// Writing: zstd failed.
+    #[error("a tile does not compress: {0}")]
+    Compress(std::io::Error),
+    /// Writing: the output failed.
+    #[error("the file cannot be written: {0}")]
+    Write(std::io::Error),
+    /// Writing: the transport has more data than the format can address.
+    #[error("tile {tile} takes more than 4 GiB; use smaller tiles")]
+    TooLarge {
+        /// Tile number.
+        tile: usize,
+    },
+}
+
+/// A part of the file, for messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The fixed header.
+    Header,
+    /// The tile directory.
+    Directory,
+    /// The JSON metadata.
+    Metadata,
+    /// A tile, by number.
+    Tile(usize),
+}
+
+impl std::fmt::Display for Part {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Header => f.write_str("header"),
+            Self::Directory => f.write_str("directory"),
+            Self::Metadata => f.write_str("metadata"),
+            Self::Tile(i) => write!(f, "tile {i}"),
+        }
+    }
+}

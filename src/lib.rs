@@ -1,0 +1,22 @@
+//! Photographs under every light.
+//!
+//! A photograph is one picture under one light. The *light transport matrix* `T` of an object is
+//! its picture under every light: `y = pT`. For nearly planar objects `T` is a band, which can be
+//! recovered from about 80 photographs, kept in a small file and relit at video rate.
+//!
+//! Data flows one way, through one module after the other:
+//!
+//! | module | from | to |
+//! |---|---|---|
+//! | `simulate` (native) | a built-in scene | a capture folder with known transport |
+//! | `capture` (native) | a capture folder | linear measurements |
+//! | `recover` | measurements | light transport functions |
+//! | [`transport`] | – | what the rooms around it share: windows, tiles, the band |
+//! | [`format`] | a transport | an `.ltm` file, and back |
+//! | [`relight`] | a transport and a light | a picture |
+//!
+//! `cli` (native) and `web` (wasm32) are thin faces on them.
+
+pub mod format;
+pub mod relight;
+pub mod transport;

@@ -1,0 +1,246 @@
+//! Lights: what each element of the light plane emits.
+
+use thiserror::Error;
+
+use crate::transport::{Extent, LightPx};
+
+/// Linear emission of every light element, 0 dark to 1 full brightness: R, G, B and an unused
+/// fourth, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Light {
+    extent: Extent,
+    elements: Vec<[f32; 4]>,
+}
+
+/// Where a torch shines and how wide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorchPose {
+    /// Centre of the spot, on the light plane.
+    pub centre: LightPx,
+    /// Distance, in light elements, at which the spot has fallen to 1/√e.
+    pub radius: f64,
+}
+
+impl TorchPose {
+    /// A torch over the middle of the light plane, a seventh of its shorter side wide.
+    pub fn central(light: Extent) -> Self {
+        let (w, h) = (f64::from(light.width), f64::from(light.height));
+        Self {
+            centre: LightPx {
+                u: w / 2.0,
+                v: h / 2.0,
+            },
+            radius: w.min(h) / 7.0,
+        }
+    }
+}
+
+/// The lights every relightable photograph comes with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BuiltinLight {
+    /// All elements at full brightness.
+    Flood,
+    /// A round warm spot.
+    Torch,
+    /// Black and white squares, eight along the shorter side.
+    Checkerboard,
+    /// Vertical black and white stripes, eight periods across.
+    Stripes,
+    /// The rainbow from left to right.
+    Spectrum,
+}
+
+impl BuiltinLight {
+    /// All of them, in the order menus show them.
+    pub const ALL: [Self; 5] = [
+        Self::Flood,
+        Self::Torch,
+        Self::Checkerboard,
+        Self::Stripes,
+        Self::Spectrum,
+    ];
+
+    /// The name by which attributes and commands call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Flood => "flood",
+            Self::Torch => "torch",
+            Self::Checkerboard => "checkerboard",
+            Self::Stripes => "stripes",
+            Self::Spectrum => "spectrum",
+        }
+    }
+
+    /// The light of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|l| l.name() == name)
+    }
+
+    /// This light on a plane of the given extent; a torch stands in the middle.
+    pub fn render(self, extent: Extent) -> Light {
+        let (w, h) = (f64::from(extent.width), f64::from(extent.height));
+        let white = |on: bool| if on { [1.0; 3] } else { [0.0; 3] };
+        match self {
+            Self::Flood => Light::from_fn(extent, |_| [1.0; 3]),
+            Self::Torch => Light::torch(extent, TorchPose::central(extent)),
+            Self::Checkerboard => {
+                let square = (w.min(h) / 8.0).max(1.0);
+                Light::from_fn(extent, |p| {
+                    let (i, j) = ((p.u / square) as u32, (p.v / square) as u32);
+                    white((i + j).is_multiple_of(2))
+                })
+            }
+            Self::Stripes => {
+                let stripe = (w / 16.0).max(1.0);
+                Light::from_fn(extent, |p| white(((p.u / stripe) as u32).is_multiple_of(2)))
+            }
+            Self::Spectrum => Light::from_fn(extent, |p| rainbow(p.u / w)),
+        }
+    }
+}
+
+/// A light that does not fit the photograph.
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum LightError {
+    /// Wrong number of values.
+    #[error("the light has {got} values; a light of {extent} elements in RGB needs {need}")]
+    Length {
+        /// Values given.
+        got: usize,
+        /// Values needed.
+        need: usize,
+        /// The light plane.
+        extent: Extent,
+    },
+    /// Lights cannot be negative, infinite or NaN.
+    #[error("the light has a value that is negative or not a finite number, at element {0}")]
+    Value(usize),
+}
+
+impl Light {
+    /// Builds a light from the emission at each element's centre. Values must be finite and >= 0.
+    fn from_fn(extent: Extent, mut emission: impl FnMut(LightPx) -> [f32; 3]) -> Self {
+        let mut elements = Vec::with_capacity(extent.area());
+        for v in 0..extent.height {
+            for u in 0..extent.width {
+                let [r, g, b] = emission(LightPx {
+                    u: f64::from(u) + 0.5,
+                    v: f64::from(v) + 0.5,
+                });
+                elements.push([r, g, b, 0.0]);
+            }
+        }
+        Self { extent, elements }
+    }
+
+    /// A light from linear RGB values, `[height, width, 3]`.
+    pub fn from_linear_rgb(extent: Extent, values: &[f32]) -> Result<Self, LightError> {
+        let need = extent.area() * 3;
+        if values.len() != need {
+            return Err(LightError::Length {
+                got: values.len(),
+                need,
+                extent,
+            });
+        }
+        if let Some(bad) = values.iter().position(|v| !v.is_finite() || *v < 0.0) {
+            return Err(LightError::Value(bad / 3));
+        }
+        let elements = values.chunks_exact(3).map(|p| [p[0], p[1], p[2], 0.0]);
+        Ok(Self {
+            extent,
+            elements: elements.collect(),
+        })
+    }
+
+    /// A warm Gaussian spot.
+    pub fn torch(extent: Extent, pose: TorchPose) -> Self {
+        const WARM_WHITE: [f64; 3] = [1.0, 0.93, 0.80];
+        let scale = 0.5 / (pose.radius * pose.radius).max(1e-6);
+        Self::from_fn(extent, |p| {
+            let (du, dv) = (p.u - pose.centre.u, p.v - pose.centre.v);
+            let spot = (-(du * du + dv * dv) * scale).exp();
+            WARM_WHITE.map(|c| (c * spot) as f32)
+        })
+    }
+
+    /// Light plane.
+    pub fn extent(&self) -> Extent {
+        self.extent
+    }
+
+    /// Emission of each element, row by row.
+    pub fn elements(&self) -> &[[f32; 4]] {
+        &self.elements
+    }
+}
+
+/// A rainbow over 0..=1, red to violet, as linear RGB: three overlapping cosine lobes.
+fn rainbow(x: f64) -> [f32; 3] {
+    let lobe = |centre: f64| {
+        let d = ((x - centre).abs() / 0.36).min(1.0);
+        (0.5 + 0.5 * (std::f64::consts::PI * d).cos()) as f32
+    };
+    // Violet is blue with a little red coming back.
+    [lobe(0.12) + 0.35 * lobe(1.0), lobe(0.48), lobe(0.82)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLANE: Extent = Extent {
+        width: 32,
+        height: 16,
+    };
+
+    #[test]
+    fn built_in_lights_have_names_and_stay_in_range() {
+        for light in BuiltinLight::ALL {
+            assert_eq!(BuiltinLight::from_name(light.name()), Some(light));
+            let lit = light.render(PLANE);
+            assert_eq!(lit.elements().len(), PLANE.area());
+            for e in lit.elements().iter().flatten() {
+                assert!((0.0..=1.0).contains(e), "{} emits {e}", light.name());
+            }
+        }
+        assert_eq!(BuiltinLight::from_name("moon"), None);
+    }
+
+    #[test]
+    fn torch_peaks_where_it_points() {
+        let centre = LightPx { u: 4.5, v: 9.5 };
+        let light = Light::torch(
+            PLANE,
+            TorchPose {
+                centre,
+                radius: 2.0,
+            },
+        );
+        let brightest = light
+            .elements()
+            .iter()
+            .enumerate()
+            .max_by(|a, b| a.1[0].total_cmp(&b.1[0]))
+            .unwrap();
+        assert_eq!(brightest.0, 9 * 32 + 4);
+    }
+
+    #[test]
+    fn a_light_of_the_wrong_size_or_with_nan_is_refused() {
+        assert!(matches!(
+            Light::from_linear_rgb(PLANE, &[0.0; 5]),
+            Err(LightError::Length {
+                got: 5,
+                need: 1536,
+                ..
+            })
+        ));
+        let mut values = vec![0.5; 1536];
+        values[7] = f32::NAN;
+        assert_eq!(
+            Light::from_linear_rgb(PLANE, &values),
+            Err(LightError::Value(2))
+        );
+    }
+}

@@ -1,0 +1,15 @@
+//! From a transport and a light to a picture: `y = pT` on the CPU, WebGPU and WebGL2.
+//!
+//! Every back end computes the same thing from the same bytes: for each camera pixel and channel,
+//! Σ over its window of `code · step · light`, then exposure and the sRGB curve ([`tone`]).
+//! [`reference`] does it in double precision and is what the others are tested against. The GPU
+//! back ends share one WGSL source, `shaders/relight.wgsl`.
+
+pub mod cpu;
+mod light;
+mod picture;
+pub mod reference;
+pub mod tone;
+
+pub use light::{BuiltinLight, Light, LightError, TorchPose};
+pub use picture::{LinearPicture, Rgba8Picture};

@@ -1,0 +1,40 @@
+//! The display transform: linear light to sRGB and back.
+
+/// sRGB transfer function (IEC 61966-2-1), linear to encoded, clamped to 0..=1.
+pub fn srgb_encode(linear: f64) -> f64 {
+    let y = linear.clamp(0.0, 1.0);
+    if y <= 0.003_130_8 {
+        12.92 * y
+    } else {
+        1.055 * y.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+/// sRGB transfer function, encoded to linear, for 0..=1.
+pub fn srgb_decode(encoded: f64) -> f64 {
+    if encoded <= 0.040_45 {
+        encoded / 12.92
+    } else {
+        ((encoded + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+/// Linear light to the nearest 8-bit sRGB code. NaN is black.
+pub fn srgb8(linear: f64) -> u8 {
+    (srgb_encode(linear) * 255.0).round() as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_survives_the_round_trip() {
+        for code in 0..=255u8 {
+            assert_eq!(srgb8(srgb_decode(f64::from(code) / 255.0)), code);
+        }
+        assert_eq!(srgb8(-1.0), 0);
+        assert_eq!(srgb8(7.0), 255);
+        assert_eq!(srgb8(f64::NAN), 0);
+    }
+}

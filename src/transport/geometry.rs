@@ -1,0 +1,248 @@
+//! Where camera pixels, light elements, windows and tiles lie.
+
+use thiserror::Error;
+
+/// Largest side of a camera or light grid; bounds every later product well inside `u64`.
+pub const MAX_SIDE: u32 = 1 << 15;
+/// Largest window side: past this an object is not nearly planar and a band no longer pays.
+pub const MAX_WINDOW: u32 = 63;
+
+/// Width and height of a grid, in its own pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl Extent {
+    /// Number of grid cells.
+    pub fn area(self) -> usize {
+        self.width as usize * self.height as usize
+    }
+}
+
+impl std::fmt::Display for Extent {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}x{}", self.width, self.height)
+    }
+}
+
+/// A camera pixel; its centre lies at `(x + ½, y + ½)`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CameraPx {
+    /// Column.
+    pub x: u32,
+    /// Row.
+    pub y: u32,
+}
+
+/// A continuous position on the light plane, in light elements: element `m` covers `[m, m + 1)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPx {
+    /// Along columns.
+    pub u: f64,
+    /// Along rows.
+    pub v: f64,
+}
+
+/// A light element by column and row. May lie off the display, where no light is emitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Element {
+    /// Row; first, so that elements sort row by row.
+    pub v: i32,
+    /// Column.
+    pub u: i32,
+}
+
+impl Element {
+    /// Row-major index on a display of this extent, or `None` off it.
+    pub fn index_in(self, light: Extent) -> Option<usize> {
+        let (u, v) = (u32::try_from(self.u).ok()?, u32::try_from(self.v).ok()?);
+        (u < light.width && v < light.height).then(|| (v * light.width + u) as usize)
+    }
+}
+
+/// The map from camera pixels to the light elements straight behind them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Correspondence {
+    /// `u = a·(x+½, y+½, 1)` in row 0, `v` likewise in row 1.
+    pub affine: [[f64; 3]; 2],
+}
+
+impl Correspondence {
+    /// Light-plane position seen by the centre of a camera pixel.
+    pub fn at(&self, pixel: CameraPx) -> LightPx {
+        let (x, y) = (f64::from(pixel.x) + 0.5, f64::from(pixel.y) + 0.5);
+        let row = |[a, b, c]: [f64; 3]| a * x + b * y + c;
+        LightPx {
+            u: row(self.affine[0]),
+            v: row(self.affine[1]),
+        }
+    }
+}
+
+/// A square window of `side x side` light elements, side odd.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    side: u32,
+}
+
+impl Window {
+    /// A window of odd side 1 to [`MAX_WINDOW`].
+    pub fn new(side: u32) -> Result<Self, GeometryError> {
+        if side % 2 == 1 && side <= MAX_WINDOW {
+            Ok(Self { side })
+        } else {
+            Err(GeometryError::Window(side))
+        }
+    }
+
+    /// Elements along one side, `w`.
+    pub fn side(self) -> u32 {
+        self.side
+    }
+
+    /// Elements in the window, `S = w²`.
+    pub fn area(self) -> usize {
+        (self.side * self.side) as usize
+    }
+
+    /// First (top left) element of the window centred on `floor(centre)`.
+    pub fn origin(self, centre: LightPx) -> Element {
+        let half = (self.side / 2) as i32;
+        // A position far off any display saturates: its window is then simply all dark.
+        Element {
+            u: (centre.u.floor() as i32).saturating_sub(half),
+            v: (centre.v.floor() as i32).saturating_sub(half),
+        }
+    }
+}
+
+/// The rectangle of camera pixels one tile covers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileRect {
+    /// Column of the first pixel.
+    pub x: u32,
+    /// Row of the first pixel.
+    pub y: u32,
+    /// Pixels covered; less than a full tile at the right and bottom borders.
+    pub extent: Extent,
+}
+
+impl TileRect {
+    /// The tile's pixels, row by row.
+    pub fn pixels(self) -> impl Iterator<Item = CameraPx> {
+        let TileRect { x, y, extent } = self;
+        (y..y + extent.height)
+            .flat_map(move |y| (x..x + extent.width).map(move |x| CameraPx { x, y }))
+    }
+}
+
+/// Everything about a transport but its values: both grids, the band and its tiling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Geometry {
+    /// Camera grid, `N` pixels.
+    pub camera: Extent,
+    /// Light grid, `M` elements.
+    pub light: Extent,
+    /// Window around each pixel's correspondence.
+    pub window: Window,
+    /// Camera pixels to light elements.
+    pub correspondence: Correspondence,
+    /// Camera pixels along a full tile's side.
+    pub tile_side: u32,
+}
+
+impl Geometry {
+    /// Tile side used when nothing else is asked for: at two camera pixels an element a tile's
+    /// windows overlap by half, and a direct tile still decodes in one cache-sized piece.
+    pub const DEFAULT_TILE_SIDE: u32 = 32;
+
+    /// Checks every field's range. All other code may rely on it.
+    pub fn validate(self) -> Result<Self, GeometryError> {
+        let side = |name, value: u32| match value {
+            1..=MAX_SIDE => Ok(()),
+            _ => Err(GeometryError::Side { name, value }),
+        };
+        side("camera width", self.camera.width)?;
+        side("camera height", self.camera.height)?;
+        side("light width", self.light.width)?;
+        side("light height", self.light.height)?;
+        Window::new(self.window.side)?;
+        if !(8..=256).contains(&self.tile_side) {
+            return Err(GeometryError::TileSide(self.tile_side));
+        }
+        if self
+            .correspondence
+            .affine
+            .iter()
+            .flatten()
+            .all(|a| a.is_finite())
+        {
+            Ok(self)
+        } else {
+            Err(GeometryError::Correspondence)
+        }
+    }
+
+    /// Tiles along a row and down a column.
+    pub fn tile_grid(&self) -> Extent {
+        Extent {
+            width: self.camera.width.div_ceil(self.tile_side),
+            height: self.camera.height.div_ceil(self.tile_side),
+        }
+    }
+
+    /// The tiles, row by row.
+    pub fn tiles(&self) -> impl ExactSizeIterator<Item = TileRect> + use<> {
+        let geometry = *self;
+        (0..self.tile_grid().area()).map(move |i| geometry.tile(i))
+    }
+
+    /// Tile number `index` in row-major order.
+    pub fn tile(&self, index: usize) -> TileRect {
+        let across = self.tile_grid().width;
+        let index = index as u32;
+        let (x, y) = (
+            index % across * self.tile_side,
+            index / across * self.tile_side,
+        );
+        TileRect {
+            x,
+            y,
+            extent: Extent {
+                width: self.tile_side.min(self.camera.width - x),
+                height: self.tile_side.min(self.camera.height - y),
+            },
+        }
+    }
+
+    /// First element of a pixel's window.
+    pub fn window_origin(&self, pixel: CameraPx) -> Element {
+        self.window.origin(self.correspondence.at(pixel))
+    }
+}
+
+/// A geometry no transport can have.
+#[derive(Debug, Error, PartialEq)]
+pub enum GeometryError {
+    /// Zero or absurdly large grid.
+    #[error("{name} is {value}; it must lie between 1 and {MAX_SIDE}")]
+    Side {
+        /// Which side of which grid.
+        name: &'static str,
+        /// The value given.
+        value: u32,
+    },
+    /// Even or too large window.
+    #[error("window side is {0}; it must be odd and at most {MAX_WINDOW}")]
+    Window(u32),
+    /// Tile side out of range.
+    #[error("tile side is {0}; it must lie between 8 and 256")]
+    TileSide(u32),
+    /// Infinite or NaN coefficient.
+    #[error("the correspondence has a coefficient that is not a finite number")]
+    Correspondence,
+}

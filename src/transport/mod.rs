@@ -1,0 +1,22 @@
+//! The light transport matrix of a nearly planar object, kept as a band.
+//!
+//! `y = pT`: light pattern `p` on `M` light elements in, picture `y` of `N` camera pixels out.
+//! Pixel `n` sees only the elements of a square window `W_n` around its correspondence, so its
+//! column of `T` shrinks to a light transport function `τ_n` of `S = w²` values a channel
+//! (Thanikachalam et al. 2014, section 3).
+//!
+//! This is the one room that `recover`, `format` and `relight` all know: where pixels, windows and
+//! tiles lie ([`Geometry`]), what a tile holds ([`DirectTile`]), and how far two transports are
+//! apart ([`TransportError`]).
+
+mod functions;
+mod geometry;
+mod snr;
+mod tile;
+
+pub use functions::TransportFunctions;
+pub use geometry::{
+    CameraPx, Correspondence, Element, Extent, Geometry, GeometryError, LightPx, TileRect, Window,
+};
+pub use snr::{Decibels, TransportError};
+pub use tile::{CHANNELS, DirectTile, TexelCode, Transport};

@@ -1,0 +1,57 @@
+//! How far one transport is from another.
+
+use std::fmt;
+
+/// A ratio in decibels, 20 log10 of an amplitude ratio.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, serde::Serialize)]
+#[serde(transparent)]
+pub struct Decibels(pub f64);
+
+impl fmt::Display for Decibels {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.2} dB", self.0)
+    }
+}
+
+/// Running sums for SNR(T, T̂) = 20 log10(‖T‖_F / ‖T − T̂‖_F) (paper, section 4): feed it every
+/// element either matrix has, in any order.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TransportError {
+    signal: f64,
+    error: f64,
+}
+
+impl TransportError {
+    /// Adds one element: its true value and its estimate.
+    pub fn add(&mut self, truth: f64, estimate: f64) {
+        self.signal += truth * truth;
+        self.error += (truth - estimate) * (truth - estimate);
+    }
+
+    /// Joins sums gathered elsewhere, for instance by another thread.
+    pub fn merge(&mut self, other: Self) {
+        self.signal += other.signal;
+        self.error += other.error;
+    }
+
+    /// The SNR; `None` where there is no error or no signal, for which no decibel figure exists.
+    pub fn snr(&self) -> Option<Decibels> {
+        (self.signal > 0.0 && self.error > 0.0)
+            .then(|| Decibels(10.0 * (self.signal / self.error).log10()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tenth_off_is_twenty_decibels() {
+        let mut e = TransportError::default();
+        for t in [1.0, 2.0, -3.0] {
+            e.add(t, 0.9 * t);
+        }
+        assert!((e.snr().unwrap().0 - 20.0).abs() < 1e-9);
+        assert_eq!(TransportError::default().snr(), None);
+    }
+}

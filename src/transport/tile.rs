@@ -1,0 +1,75 @@
+//! Tiles as they are kept in memory, on disk and on the GPU: quantised light transport functions.
+
+use super::{Geometry, TileRect, TransportFunctions};
+
+/// Camera channels: red, green, blue.
+pub const CHANNELS: usize = 3;
+
+/// Quantised τ of one pixel and element: R, G, B and an unused fourth code, so that a tile is a
+/// ready `rgba16uint` texture and one SIMD load.
+pub type TexelCode = [u16; 4];
+
+/// Highest code written. 12 bits put the quantisation noise of an unsparse pixel (S = 225, all
+/// elements off by step/√12) some 60 dB below it, under what any photograph can tell; 16 would
+/// store noise.
+const TOP_CODE: f32 = 4095.0;
+
+/// A tile that keeps every element of every pixel's window: `τ = code · step`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DirectTile {
+    /// The pixels covered.
+    pub rect: TileRect,
+    /// Value of one code, per channel.
+    pub step: [f32; CHANNELS],
+    /// `[pixel, element]`, pixels row by row, window rows (v) then columns (u).
+    pub codes: Vec<TexelCode>,
+}
+
+impl DirectTile {
+    /// Rounds functions to codes, with a step per channel set by the tile's brightest element.
+    /// Negative and non-finite values, which no light transport function has, become zero.
+    pub fn quantise(functions: &TransportFunctions) -> Self {
+        let mut peak = [0.0f32; CHANNELS];
+        for t in &functions.tau {
+            for c in 0..CHANNELS {
+                if t[c].is_finite() {
+                    peak[c] = peak[c].max(t[c]);
+                }
+            }
+        }
+        let step = peak.map(|p| if p > 0.0 { p / TOP_CODE } else { 1.0 });
+        let code = |t: f32, step: f32| (t / step).round() as u16; // `as` saturates, NaN is 0
+        let codes = functions
+            .tau
+            .iter()
+            .map(|t| {
+                [
+                    code(t[0], step[0]),
+                    code(t[1], step[1]),
+                    code(t[2], step[2]),
+                    0,
+                ]
+            })
+            .collect();
+        Self {
+            rect: functions.rect,
+            step,
+            codes,
+        }
+    }
+
+    /// τ of element `s` of pixel `p` (both in tile order), given the window's area.
+    pub fn tau(&self, area: usize, p: usize, s: usize) -> [f32; CHANNELS] {
+        let code = self.codes[p * area + s];
+        std::array::from_fn(|c| f32::from(code[c]) * self.step[c])
+    }
+}
+
+/// A whole transport in memory: its geometry and every tile, in row-major order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Transport {
+    /// Grids, band and tiling.
+    pub geometry: Geometry,
+    /// One tile for each of [`Geometry::tiles`].
+    pub tiles: Vec<DirectTile>,
+}
