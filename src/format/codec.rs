@@ -1,12 +1,10 @@
 //! One tile to bytes and back.
 
-#[cfg(not(target_arch = "wasm32"))]
 use super::FormatError;
 use crate::transport::{CHANNELS, DirectTile, TexelCode, TileRect};
 
 /// zstd level for writing. 19 is the highest whose window stays within a tile's own size; decoding
 /// speed does not depend on it.
-#[cfg(not(target_arch = "wasm32"))]
 const LEVEL: i32 = 19;
 
 /// Bytes of a tile's planes before compression.
@@ -15,7 +13,6 @@ pub(super) fn plane_bytes(rect: TileRect, area: usize) -> usize {
 }
 
 /// Compresses a tile's codes. A tile that is all dark takes no bytes.
-#[cfg(not(target_arch = "wasm32"))]
 pub(super) fn encode(tile: &DirectTile, area: usize) -> Result<Vec<u8>, FormatError> {
     if tile.codes.iter().all(|code| *code == [0; 4]) {
         return Ok(Vec::new());

@@ -28,7 +28,6 @@ mod header;
 mod limits;
 mod metadata;
 mod reader;
-#[cfg(not(target_arch = "wasm32"))]
 mod writer;
 
 pub use error::{FormatError, Part};
@@ -36,5 +35,4 @@ pub use header::{HEADER_BYTES, Header, TileEntry};
 pub use limits::Limits;
 pub use metadata::Metadata;
 pub use reader::{Progress, Reader};
-#[cfg(not(target_arch = "wasm32"))]
 pub use writer::{EncodedTile, write};
