@@ -9,7 +9,7 @@
 //! | module | from | to |
 //! |---|---|---|
 //! | `simulate` (native) | a built-in scene | a capture folder with known transport |
-//! | `capture` (native) | a capture folder | linear measurements |
+//! | [`capture`] | a capture folder | linear measurements |
 //! | `recover` | measurements | light transport functions |
 //! | [`transport`] | – | what the rooms around it share: windows, tiles, the band |
 //! | [`format`] | a transport | an `.ltm` file, and back |
@@ -17,6 +17,7 @@
 //!
 //! `cli` (native) and `web` (wasm32) are thin faces on them.
 
+pub mod capture;
 pub mod format;
 pub mod relight;
 pub mod transport;

@@ -16,7 +16,8 @@ mod tile;
 
 pub use functions::TransportFunctions;
 pub use geometry::{
-    CameraPx, Correspondence, Element, Extent, Geometry, GeometryError, LightPx, TileRect, Window,
+    CameraPx, Correspondence, Element, Extent, Geometry, GeometryError, LightPx, MAX_SIDE,
+    MAX_WINDOW, TileRect, Window,
 };
 pub use snr::{Decibels, TransportError};
 pub use tile::{CHANNELS, DirectTile, TexelCode, Transport};

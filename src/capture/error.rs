@@ -1,0 +1,68 @@
+//! What can be wrong with a capture folder.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why a capture cannot be used: which file, which field, what to do.
+#[derive(Debug, Error)]
+pub enum CaptureError {
+    /// A file that is not there.
+    #[error("{path}: there is no such file{named_by}; add it or correct its name")]
+    Missing {
+        /// The file looked for.
+        path: PathBuf,
+        /// Where the manifest names it, as " (shots[3].photo in capture.json)"; may be empty.
+        named_by: String,
+    },
+    /// A file that cannot be read.
+    #[error("{path}: cannot be read: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The manifest is not JSON of the expected form.
+    #[error("{path}: {source}")]
+    Json {
+        /// The manifest.
+        path: PathBuf,
+        /// Where and what.
+        source: serde_json::Error,
+    },
+    /// The manifest is of another version.
+    #[error("{path}: \"version\" is {version}; this program reads version 1: get a newer one")]
+    Version {
+        /// The manifest.
+        path: PathBuf,
+        /// The version found.
+        version: u64,
+    },
+    /// A field of the manifest cannot be.
+    #[error("{path}: \"{field}\" {problem}")]
+    Field {
+        /// The manifest.
+        path: PathBuf,
+        /// The field, as a path into the JSON.
+        field: String,
+        /// What is wrong and what to do.
+        problem: String,
+    },
+    /// A picture is not what it must be.
+    #[error("{path}: {problem}")]
+    Image {
+        /// The picture.
+        path: PathBuf,
+        /// What is wrong and what to do.
+        problem: String,
+    },
+    /// The truth folder is not what it must be.
+    #[error("{path}: {problem}")]
+    Truth {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+}

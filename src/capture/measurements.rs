@@ -1,0 +1,50 @@
+//! Linear measurements: what recovery works on.
+
+use crate::transport::{CHANNELS, Correspondence, Extent};
+
+/// The light each element emitted during one shot, 1 at full brightness, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pattern {
+    /// The same for all channels.
+    Grey(Vec<f32>),
+    /// Red, green, blue. A camera channel is taken to see its own primary alone.
+    Rgb([Vec<f32>; CHANNELS]),
+}
+
+impl Pattern {
+    /// The emission that drives camera channel `c`.
+    pub fn plane(&self, c: usize) -> &[f32] {
+        match self {
+            Self::Grey(plane) => plane,
+            Self::Rgb(planes) => &planes[c],
+        }
+    }
+}
+
+/// `Y = PT` as photographed: patterns in, pictures out, all in linear units.
+#[derive(Clone, Debug)]
+pub struct Measurements {
+    /// Camera grid, `N` pixels.
+    pub camera: Extent,
+    /// Light grid, `M` elements.
+    pub light: Extent,
+    /// Camera pixels to light elements.
+    pub correspondence: Correspondence,
+    /// `L` patterns of `M` elements.
+    pub patterns: Vec<Pattern>,
+    /// `L` pictures of `N` pixels, row by row. NaN where a sample was saturated and says nothing.
+    pub pictures: Vec<Vec<[f32; CHANNELS]>>,
+}
+
+impl Measurements {
+    /// Whether every pattern is grey, so that channels share their equations.
+    pub fn grey(&self) -> bool {
+        self.patterns.iter().all(|p| matches!(p, Pattern::Grey(_)))
+    }
+
+    /// Saturated samples, of `L · N · 3`.
+    pub fn saturated(&self) -> usize {
+        let samples = self.pictures.iter().flatten().flatten();
+        samples.filter(|y| y.is_nan()).count()
+    }
+}

@@ -1,0 +1,25 @@
+//! From a capture folder to linear measurements.
+//!
+//! `capture.json` ([`Manifest`]) names the photographs, the patterns shown while each was taken and
+//! what is known of camera and display. [`CaptureFolder`] reads and checks them one by one, so that
+//! whoever has threads can read them at once; [`Measurements`] is what recovery works on.
+
+mod error;
+#[cfg(not(target_arch = "wasm32"))]
+mod folder;
+#[cfg(not(target_arch = "wasm32"))]
+mod images;
+mod manifest;
+mod measurements;
+#[cfg(not(target_arch = "wasm32"))]
+mod truth;
+
+pub use error::CaptureError;
+#[cfg(not(target_arch = "wasm32"))]
+pub use folder::{CaptureFolder, DarkFrame, Exposed};
+pub use manifest::{
+    AffineSpec, CameraSpec, GrayCodeShot, LightSpec, MANIFEST_NAME, Manifest, Shot,
+};
+pub use measurements::{Measurements, Pattern};
+#[cfg(not(target_arch = "wasm32"))]
+pub use truth::{RELIT_FULL_SCALE, Truth};
