@@ -10,7 +10,7 @@
 //! |---|---|---|
 //! | `simulate` (native) | a built-in scene | a capture folder with known transport |
 //! | [`capture`] | a capture folder | linear measurements |
-//! | `recover` | measurements | light transport functions |
+//! | [`recover`] | measurements | light transport functions |
 //! | [`transport`] | – | what the rooms around it share: windows, tiles, the band |
 //! | [`format`] | a transport | an `.ltm` file, and back |
 //! | [`relight`] | a transport and a light | a picture |
@@ -18,6 +18,9 @@
 //! `cli` (native) and `web` (wasm32) are thin faces on them.
 
 pub mod capture;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod cli;
 pub mod format;
+pub mod recover;
 pub mod relight;
 pub mod transport;

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::transport::{Extent, LightPx};
+use crate::transport::{Extent, Geometry, LightPx};
 
 /// Linear emission of every light element, 0 dark to 1 full brightness: R, G, B and an unused
 /// fourth, row by row.
@@ -22,7 +22,10 @@ pub struct TorchPose {
 }
 
 impl TorchPose {
-    /// A torch over the middle of the light plane, a seventh of its shorter side wide.
+    /// A torch's usual radius, as a fraction of the light plane's shorter side.
+    pub const RADIUS: f64 = 1.0 / 7.0;
+
+    /// A torch of the usual radius over the middle of the light plane.
     pub fn central(light: Extent) -> Self {
         let (w, h) = (f64::from(light.width), f64::from(light.height));
         Self {
@@ -30,7 +33,19 @@ impl TorchPose {
                 u: w / 2.0,
                 v: h / 2.0,
             },
-            radius: w.min(h) / 7.0,
+            radius: w.min(h) * Self::RADIUS,
+        }
+    }
+
+    /// A torch of the usual radius straight behind a point of the picture, given as fractions of
+    /// its width and height.
+    pub fn behind(geometry: &Geometry, x: f64, y: f64) -> Self {
+        let Extent { width, height } = geometry.camera;
+        Self {
+            centre: geometry
+                .correspondence
+                .map(x * f64::from(width), y * f64::from(height)),
+            ..Self::central(geometry.light)
         }
     }
 }

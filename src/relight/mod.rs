@@ -9,7 +9,9 @@ pub mod cpu;
 mod light;
 mod picture;
 pub mod reference;
+mod resample;
 pub mod tone;
 
 pub use light::{BuiltinLight, Light, LightError, TorchPose};
 pub use picture::{LinearPicture, Rgba8Picture};
+pub use resample::area_resample;

@@ -22,6 +22,14 @@ pub struct Rgba8Picture {
 }
 
 impl LinearPicture {
+    /// An all-dark picture.
+    pub fn black(extent: Extent) -> Self {
+        Self {
+            extent,
+            pixels: vec![[0.0; 4]; extent.area()],
+        }
+    }
+
     /// Copies one tile's pixels, given row by row, to their place.
     pub fn put(&mut self, rect: TileRect, tile: &[[f32; 4]]) {
         let stride = self.extent.width as usize;

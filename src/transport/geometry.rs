@@ -74,7 +74,11 @@ pub struct Correspondence {
 impl Correspondence {
     /// Light-plane position seen by the centre of a camera pixel.
     pub fn at(&self, pixel: CameraPx) -> LightPx {
-        let (x, y) = (f64::from(pixel.x) + 0.5, f64::from(pixel.y) + 0.5);
+        self.map(f64::from(pixel.x) + 0.5, f64::from(pixel.y) + 0.5)
+    }
+
+    /// Light-plane position behind a continuous camera position; pixel `x` covers `[x, x + 1)`.
+    pub fn map(&self, x: f64, y: f64) -> LightPx {
         let row = |[a, b, c]: [f64; 3]| a * x + b * y + c;
         LightPx {
             u: row(self.affine[0]),

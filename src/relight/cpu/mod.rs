@@ -104,10 +104,7 @@ pub fn relight_tile(
 pub fn relight(transport: &Transport, light: &Light) -> LinearPicture {
     let geometry = &transport.geometry;
     let padded = PaddedLight::new(geometry, light);
-    let mut picture = LinearPicture {
-        extent: geometry.camera,
-        pixels: vec![[0.0; 4]; geometry.camera.area()],
-    };
+    let mut picture = LinearPicture::black(geometry.camera);
     let mut scratch = Vec::new();
     for tile in &transport.tiles {
         scratch.clear();

@@ -1,0 +1,197 @@
+//! `ltm-export evaluate`: an `.ltm` file against what is known of the object.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use anyhow::{Result, ensure};
+use clap::Args;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{files, lights, report};
+use crate::capture::{CaptureFolder, Pattern, Truth};
+use crate::relight::Light;
+use crate::transport::{CHANNELS, Decibels, Element, Geometry, Transport, TransportError, Window};
+
+/// Hold a file against a capture's known transport, relit pictures and unused photographs
+#[derive(Debug, Args)]
+pub struct EvaluateArgs {
+    /// File to evaluate
+    #[arg(value_name = "FILE.ltm")]
+    file: PathBuf,
+    /// Capture folder it was recovered from
+    capture: PathBuf,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report {
+    /// SNR of the whole matrix against the truth; null without truth.
+    snr_db: Option<Decibels>,
+    /// PSNR of relit pictures against true ones, peak 1 in units of the measurement.
+    relit: BTreeMap<String, Option<Decibels>>,
+    /// SNR of predicted against photographed pictures on shots not used in recovery.
+    heldout_snr_db: Option<Decibels>,
+    /// The same by camera channel.
+    heldout_rgb_snr_db: [Option<Decibels>; CHANNELS],
+    heldout_shots: usize,
+    file_bytes: u64,
+}
+
+pub fn run(args: &EvaluateArgs) -> Result<()> {
+    let file = files::read_ltm(&args.file)?;
+    let folder = CaptureFolder::open(&args.capture)?;
+    let (geometry, manifest) = (&file.header.geometry, folder.manifest());
+    for (what, ours, theirs) in [
+        ("camera", geometry.camera, manifest.camera.extent()),
+        ("light", geometry.light, manifest.light.extent()),
+    ] {
+        ensure!(
+            ours == theirs,
+            "{} has {what} {ours}, but {} has {theirs}: it was not recovered from this capture",
+            args.file.display(),
+            args.capture.display(),
+        );
+    }
+    let mut report = Report {
+        snr_db: None,
+        relit: BTreeMap::new(),
+        heldout_snr_db: None,
+        heldout_rgb_snr_db: [None; CHANNELS],
+        heldout_shots: 0,
+        file_bytes: file.header.file_bytes,
+    };
+    if let Some(truth) = folder.truth()? {
+        report.snr_db = against_truth(&file.transport, &truth).snr();
+        for name in truth.lights()? {
+            let light = Light::from_linear_rgb(geometry.light, &truth.light(&name)?)?;
+            let psnr = relit_psnr(&file.transport, &light, &truth.relit(&name)?);
+            report.relit.insert(name, psnr);
+        }
+    }
+    let held: Vec<usize> = (0..manifest.shots.len())
+        .filter(|i| !file.metadata.shots_used.contains(i))
+        .collect();
+    let errors = against_shots(&file.transport, &folder, &held)?;
+    let mut all = TransportError::default();
+    errors.iter().for_each(|&e| all.merge(e));
+    report.heldout_snr_db = all.snr();
+    report.heldout_rgb_snr_db = errors.map(|e| e.snr());
+    report.heldout_shots = held.len();
+    if args.json {
+        return report::print_json(&report);
+    }
+    print(&report);
+    Ok(())
+}
+
+fn print(report: &Report) {
+    let show = |d: Option<Decibels>| d.map_or("-".to_owned(), |d| d.to_string());
+    report::print_line(&format!(
+        "SNR against the truth        {}",
+        show(report.snr_db)
+    ));
+    report::print_line(&format!(
+        "SNR on {:3} held-out shots     {}",
+        report.heldout_shots,
+        show(report.heldout_snr_db)
+    ));
+    for (name, psnr) in &report.relit {
+        report::print_line(&format!("PSNR relit under {name:11} {}", show(*psnr)));
+    }
+    report::print_line(&format!(
+        "File                         {}",
+        report::bytes(report.file_bytes)
+    ));
+}
+
+/// Adds up the error over every element that either transport has for any pixel.
+fn against_truth(transport: &Transport, truth: &Truth) -> TransportError {
+    let geometry = &transport.geometry;
+    let window = geometry.window;
+    let tiles = transport.tiles.par_iter().map(|tile| {
+        let mut sum = TransportError::default();
+        for (p, pixel) in tile.rect.pixels().enumerate() {
+            let n = pixel.y as usize * geometry.camera.width as usize + pixel.x as usize;
+            let (ours, theirs) = (geometry.window_origin(pixel), truth.window_origin(n));
+            let tau = truth.tau(n);
+            for (s, tau) in tau.iter().enumerate() {
+                let here = slot_of(element_at(theirs, truth.window(), s), ours, window);
+                let estimate = here.map_or([0.0; CHANNELS], |s| tile.tau(window.area(), p, s));
+                for c in 0..CHANNELS {
+                    sum.add(tau[c].to_f64(), f64::from(estimate[c]));
+                }
+            }
+            for s in 0..window.area() {
+                let element = element_at(ours, window, s);
+                if slot_of(element, theirs, truth.window()).is_none() {
+                    for estimate in tile.tau(window.area(), p, s) {
+                        sum.add(0.0, f64::from(estimate));
+                    }
+                }
+            }
+        }
+        sum
+    });
+    tiles.reduce(TransportError::default, |mut a, b| {
+        a.merge(b);
+        a
+    })
+}
+
+fn element_at(origin: Element, window: Window, slot: usize) -> Element {
+    let side = window.side() as usize;
+    Element {
+        u: origin.u.saturating_add((slot % side) as i32),
+        v: origin.v.saturating_add((slot / side) as i32),
+    }
+}
+
+fn slot_of(element: Element, origin: Element, window: Window) -> Option<usize> {
+    let side = i64::from(window.side());
+    let u = i64::from(element.u) - i64::from(origin.u);
+    let v = i64::from(element.v) - i64::from(origin.v);
+    ((0..side).contains(&u) && (0..side).contains(&v)).then(|| (v * side + u) as usize)
+}
+
+/// 10 log10(1 / mean squared error) over all pixels and channels.
+fn relit_psnr(transport: &Transport, light: &Light, truth: &[[f64; CHANNELS]]) -> Option<Decibels> {
+    let ours = lights::relight(transport, light);
+    let squares = ours.pixels.iter().zip(truth).flat_map(|(ours, truth)| {
+        (0..CHANNELS).map(move |c| (f64::from(ours[c]) - truth[c]).powi(2))
+    });
+    let mse = squares.sum::<f64>() / (truth.len() * CHANNELS) as f64;
+    (mse > 0.0).then(|| Decibels(-10.0 * mse.log10()))
+}
+
+/// Error of predicted against photographed pictures, by channel.
+fn against_shots(
+    transport: &Transport,
+    folder: &CaptureFolder,
+    shots: &[usize],
+) -> Result<[TransportError; CHANNELS]> {
+    let mut errors = [TransportError::default(); CHANNELS];
+    let dark = folder.read_dark()?;
+    for &i in shots {
+        let shot = folder.read_shot(i, &dark)?;
+        let light = pattern_light(&transport.geometry, &shot.pattern)?;
+        let ours = lights::relight(transport, &light);
+        for (ours, seen) in ours.pixels.iter().zip(&shot.picture) {
+            for c in 0..CHANNELS {
+                if seen[c].is_finite() {
+                    errors[c].add(f64::from(seen[c]), f64::from(ours[c]));
+                }
+            }
+        }
+    }
+    Ok(errors)
+}
+
+fn pattern_light(geometry: &Geometry, pattern: &Pattern) -> Result<Light> {
+    let values: Vec<f32> = (0..geometry.light.area())
+        .flat_map(|m| [0, 1, 2].map(|c| pattern.plane(c)[m]))
+        .collect();
+    Ok(Light::from_linear_rgb(geometry.light, &values)?)
+}

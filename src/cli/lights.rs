@@ -1,0 +1,61 @@
+//! Lights from names and image files, and relighting on all cores.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use image::ImageReader;
+use rayon::prelude::*;
+
+use crate::relight::{BuiltinLight, Light, LinearPicture, area_resample, cpu, tone};
+use crate::transport::{Extent, Transport};
+
+/// The light that `--light` asks for: a built-in one by name, else an image file, taken as sRGB.
+pub fn named(light: &str, plane: Extent) -> Result<Light> {
+    if let Some(builtin) = BuiltinLight::from_name(light) {
+        return Ok(builtin.render(plane));
+    }
+    let path = Path::new(light);
+    if !path.exists() {
+        let names = BuiltinLight::ALL.map(BuiltinLight::name).join(", ");
+        bail!("--light {light}: neither a file nor one of {names}");
+    }
+    let picture = ImageReader::open(path)
+        .and_then(ImageReader::with_guessed_format)
+        .map_err(anyhow::Error::from)
+        .and_then(|reader| Ok(reader.decode()?))
+        .with_context(|| format!("--light {light}: is not a readable picture"))?
+        .into_rgb32f();
+    let extent = Extent {
+        width: picture.width(),
+        height: picture.height(),
+    };
+    let linear: Vec<f32> = picture
+        .into_raw()
+        .into_iter()
+        .map(|code| tone::srgb_decode(f64::from(code)) as f32)
+        .collect();
+    Ok(Light::from_linear_rgb(
+        plane,
+        &area_resample(&linear, extent, plane),
+    )?)
+}
+
+/// [`cpu::relight`] on all cores.
+pub fn relight(transport: &Transport, light: &Light) -> LinearPicture {
+    let geometry = &transport.geometry;
+    let padded = cpu::PaddedLight::new(geometry, light);
+    let tiles: Vec<_> = transport
+        .tiles
+        .par_iter()
+        .map(|tile| {
+            let mut pixels = vec![[0.0; 4]; tile.rect.extent.area()];
+            cpu::relight_tile(geometry, tile, &padded, &mut pixels);
+            (tile.rect, pixels)
+        })
+        .collect();
+    let mut picture = LinearPicture::black(geometry.camera);
+    for (rect, pixels) in tiles {
+        picture.put(rect, &pixels);
+    }
+    picture
+}

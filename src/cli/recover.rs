@@ -1,0 +1,158 @@
+//! `ltm-export recover`: a capture folder to an `.ltm` file.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{files, process, report};
+use crate::capture::{CaptureFolder, Measurements};
+use crate::format::{self, EncodedTile, Metadata};
+use crate::recover::Recovery;
+use crate::transport::{DirectTile, Geometry, Window};
+
+/// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
+const HOLD_OUT_EVERY: usize = 10;
+
+/// Recover the light transport of an object from a folder of photographs
+#[derive(Debug, Args)]
+pub struct RecoverArgs {
+    /// Capture folder: capture.json and the pictures it names
+    capture: PathBuf,
+    /// File to write
+    #[arg(short, long, value_name = "FILE.ltm")]
+    output: PathBuf,
+    /// How each light transport function is recovered
+    #[arg(long, value_enum, default_value_t = Method::Nnls)]
+    method: Method,
+    /// Side of the window of light elements each camera pixel may see; odd
+    #[arg(long, default_value_t = 15)]
+    window: u32,
+    /// Use the first K shots only [default: all but every tenth, which are held out]
+    #[arg(long, value_name = "K")]
+    patterns: Option<usize>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// Recovery methods.
+#[derive(Clone, Copy, Debug, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Method {
+    /// Non-negative least squares
+    Nnls,
+}
+
+#[derive(Serialize)]
+struct Report {
+    seconds: f64,
+    peak_rss_bytes: Option<u64>,
+    method: Method,
+    window: u32,
+    /// None: every tile is direct.
+    rank: Option<u32>,
+    patterns: usize,
+    common_mode: crate::recover::CommonMode,
+    saturated_samples: usize,
+    file_bytes: u64,
+}
+
+pub fn run(args: &RecoverArgs) -> Result<()> {
+    let start = Instant::now();
+    let window = Window::new(args.window).context("--window")?;
+    let folder = CaptureFolder::open(&args.capture)?;
+    let shots = choose_shots(folder.manifest().shots.len(), args.patterns)?;
+    let measurements = read(&folder, &shots)?;
+    let saturated = measurements.saturated();
+    if saturated > 0 {
+        eprintln!("note: {saturated} saturated samples are left out");
+    }
+    let recovery =
+        Recovery::new(&measurements, window).with_context(|| args.capture.display().to_string())?;
+    let geometry = *recovery.geometry();
+    let bar = process::progress("recovering", geometry.tile_grid().area());
+    let tiles = (0..geometry.tile_grid().area())
+        .into_par_iter()
+        .map(|i| {
+            let tile = DirectTile::quantise(&recovery.tile(geometry.tile(i)));
+            let encoded = EncodedTile::new(&geometry, &tile);
+            bar.inc(1);
+            encoded
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    bar.finish_and_clear();
+    let file_bytes = write(args, &geometry, shots.clone(), &tiles)?;
+    let report = Report {
+        seconds: start.elapsed().as_secs_f64(),
+        peak_rss_bytes: process::peak_rss_bytes(),
+        method: args.method,
+        window: args.window,
+        rank: None,
+        patterns: shots.len(),
+        common_mode: recovery.common_mode(),
+        saturated_samples: saturated,
+        file_bytes,
+    };
+    if args.json {
+        return report::print_json(&report);
+    }
+    report::print_line(&format!(
+        "{}: {} camera pixels, {} light elements, window {}, from {} patterns in {:.1} s, {}",
+        args.output.display(),
+        geometry.camera,
+        geometry.light,
+        args.window,
+        report.patterns,
+        report.seconds,
+        report::bytes(file_bytes),
+    ));
+    Ok(())
+}
+
+/// Which of `available` shots to recover from.
+fn choose_shots(available: usize, first: Option<usize>) -> Result<Vec<usize>> {
+    match first {
+        Some(k) if k > available => {
+            bail!("--patterns is {k}, but the capture has {available} shots")
+        }
+        Some(k) => Ok((0..k).collect()),
+        None => Ok((0..available)
+            .filter(|l| l % HOLD_OUT_EVERY != HOLD_OUT_EVERY - 1)
+            .collect()),
+    }
+}
+
+fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
+    let dark = folder.read_dark()?;
+    let bar = process::progress("reading", shots.len());
+    let exposed = shots
+        .par_iter()
+        .map(|&i| {
+            let shot = folder.read_shot(i, &dark);
+            bar.inc(1);
+            shot
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    bar.finish_and_clear();
+    Ok(folder.measurements(exposed)?)
+}
+
+fn write(
+    args: &RecoverArgs,
+    geometry: &Geometry,
+    shots_used: Vec<usize>,
+    tiles: &[EncodedTile],
+) -> Result<u64> {
+    let metadata = Metadata {
+        writer: concat!("ltm-export ", env!("CARGO_PKG_VERSION")).to_owned(),
+        method: "nnls".to_owned(),
+        shots_used,
+    };
+    files::write_whole(&args.output, |out| {
+        Ok(format::write(geometry, &metadata, tiles, out)?)
+    })
+}

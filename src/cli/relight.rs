@@ -1,0 +1,88 @@
+//! `ltm-export relight`: a picture of the object under a light.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, ensure};
+use clap::{Args, ValueEnum};
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+
+use super::{files, lights};
+use crate::relight::{Light, TorchPose, reference};
+
+/// Relight an object and write the picture as an 8-bit sRGB PNG
+#[derive(Debug, Args)]
+pub struct RelightArgs {
+    /// Relightable photograph
+    #[arg(value_name = "FILE.ltm")]
+    file: PathBuf,
+    /// flood, torch, checkerboard, stripes, spectrum, or an image file
+    #[arg(long, value_name = "NAME|IMAGE")]
+    light: String,
+    /// Where a torch shines, as fractions of the picture from its top left corner
+    #[arg(long, value_name = "X,Y", value_parser = parse_position)]
+    at: Option<[f64; 2]>,
+    /// Factor on the picture's brightness
+    #[arg(long, default_value_t = 1.0)]
+    exposure: f32,
+    /// What computes the picture
+    #[arg(long, value_enum, default_value_t = Backend::Cpu)]
+    backend: Backend,
+    /// PNG to write
+    #[arg(short, long, value_name = "OUT.png")]
+    output: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Backend {
+    /// The fast path, in single precision
+    Cpu,
+    /// Double precision, term by term: what the others are tested against
+    Reference,
+}
+
+fn parse_position(text: &str) -> Result<[f64; 2], String> {
+    let parts: Vec<f64> = text
+        .split(',')
+        .map(|part| part.trim().parse::<f64>())
+        .collect::<Result<_, _>>()
+        .map_err(|e| e.to_string())?;
+    match parts[..] {
+        [x, y] if x.is_finite() && y.is_finite() => Ok([x, y]),
+        _ => Err("expected two numbers, as in 0.5,0.25".to_owned()),
+    }
+}
+
+pub fn run(args: &RelightArgs) -> Result<()> {
+    ensure!(
+        args.exposure.is_finite() && args.exposure >= 0.0,
+        "--exposure is {}; it must be 0 or more",
+        args.exposure
+    );
+    let file = files::read_ltm(&args.file)?;
+    let geometry = &file.header.geometry;
+    let light = match args.at {
+        None => lights::named(&args.light, geometry.light)?,
+        Some([x, y]) => {
+            ensure!(args.light == "torch", "--at goes with --light torch");
+            Light::torch(geometry.light, TorchPose::behind(geometry, x, y))
+        }
+    };
+    let picture = match args.backend {
+        Backend::Cpu => lights::relight(&file.transport, &light).tone_map(args.exposure),
+        Backend::Reference => {
+            reference::relight_srgb8(&file.transport, &light, f64::from(args.exposure))
+        }
+    };
+    let rgb: Vec<u8> = picture
+        .pixels
+        .iter()
+        .flat_map(|p| [p[0], p[1], p[2]])
+        .collect();
+    let extent = picture.extent;
+    files::write_whole(&args.output, |out| {
+        PngEncoder::new(out)
+            .write_image(&rgb, extent.width, extent.height, ExtendedColorType::Rgb8)
+            .context("cannot be encoded")
+    })?;
+    Ok(())
+}

@@ -1,0 +1,18 @@
+//! From measurements to light transport functions.
+//!
+//! For each camera pixel and channel, minimise `‖y − P̂τ‖₂` over its window subject to `τ ≥ 0`
+//! (paper, section 3, case (a)). What makes it affordable is that all pixels and channels whose
+//! correspondence falls in the same light element share one window and so one set of normal
+//! equations ([`design`]); what makes it accurate is how the patterns' common mode is weighted
+//! ([`CommonMode`]).
+//!
+//! [`Recovery`] is pure and works tile by tile: whoever has threads runs tiles on them.
+
+mod common_mode;
+mod design;
+mod nnls;
+mod recovery;
+
+pub use common_mode::CommonMode;
+pub use nnls::{Nnls, kkt_violation};
+pub use recovery::{RecoverError, Recovery};

@@ -1,0 +1,236 @@
+//! Recovery of a whole transport, tile by tile.
+
+use std::collections::BTreeMap;
+
+use thiserror::Error;
+
+use super::design::Design;
+use super::{CommonMode, Nnls};
+use crate::capture::Measurements;
+use crate::transport::{
+    CameraPx, Decibels, Element, Geometry, GeometryError, TileRect, TransportError,
+    TransportFunctions, Window,
+};
+
+/// Fewest patterns that recovery makes sense with.
+const FEWEST_PATTERNS: usize = 4;
+/// Every how many patterns one is held out while the common mode's weight is chosen.
+const HOLD_OUT_EVERY: usize = 10;
+/// Windows the choice is made on, spread over the picture: enough that pixels tell candidates apart
+/// by hundredths of a decibel, few enough to cost a second.
+const SAMPLE_WINDOWS: usize = 48;
+
+/// Why a recovery cannot start.
+#[derive(Debug, Error)]
+pub enum RecoverError {
+    /// Too few patterns.
+    #[error(
+        "{0} patterns are too few; recovery needs at least {FEWEST_PATTERNS}, and about 80 to be good"
+    )]
+    FewPatterns(usize),
+    /// The window does not fit.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+    /// The correspondence misses the display.
+    #[error(
+        "no camera pixel looks at the light plane; check \"correspondence\" and \"light\" in the capture's manifest"
+    )]
+    NoLight,
+}
+
+/// A recovery ready to run: measurements, band and settings.
+#[derive(Debug)]
+pub struct Recovery<'a> {
+    measurements: &'a Measurements,
+    geometry: Geometry,
+    common_mode: CommonMode,
+}
+
+impl<'a> Recovery<'a> {
+    /// Prepares recovery by non-negative least squares from all of `measurements`, and chooses how
+    /// far the common mode is trusted on patterns held out.
+    pub fn new(measurements: &'a Measurements, window: Window) -> Result<Self, RecoverError> {
+        let geometry = Geometry {
+            camera: measurements.camera,
+            light: measurements.light,
+            window,
+            correspondence: measurements.correspondence,
+            tile_side: Geometry::DEFAULT_TILE_SIDE,
+        }
+        .validate()?;
+        if measurements.patterns.len() < FEWEST_PATTERNS {
+            return Err(RecoverError::FewPatterns(measurements.patterns.len()));
+        }
+        let mut recovery = Self {
+            measurements,
+            geometry,
+            common_mode: CommonMode::FULL,
+        };
+        recovery.common_mode = recovery.choose_common_mode()?;
+        Ok(recovery)
+    }
+
+    /// Grids, band and tiling of the answer.
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    /// The weight chosen for the common mode.
+    pub fn common_mode(&self) -> CommonMode {
+        self.common_mode
+    }
+
+    /// Recovers the light transport functions of one tile.
+    pub fn tile(&self, rect: TileRect) -> TransportFunctions {
+        let area = self.geometry.window.area();
+        let mut functions = TransportFunctions::zeros(rect, area);
+        let rows: Vec<usize> = (0..self.measurements.patterns.len()).collect();
+        // (number in the tile, pixel) of all pixels by their common window
+        let mut windows: BTreeMap<Element, Vec<(usize, CameraPx)>> = BTreeMap::new();
+        for (p, pixel) in rect.pixels().enumerate() {
+            let origin = self.geometry.window_origin(pixel);
+            windows.entry(origin).or_default().push((p, pixel));
+        }
+        for (origin, pixels) in windows {
+            self.window(
+                origin,
+                &pixels,
+                &rows,
+                self.common_mode,
+                |p, c, slots, x| {
+                    for (&slot, &x) in slots.iter().zip(x) {
+                        functions.tau[p * area + slot][c] = x as f32;
+                    }
+                },
+            );
+        }
+        functions
+    }
+
+    /// Solves for all pixels of one window from the patterns numbered `rows`; `take` gets each
+    /// pixel's number, channel, and solution on the window slots.
+    fn window(
+        &self,
+        origin: Element,
+        pixels: &[(usize, CameraPx)],
+        rows: &[usize],
+        common_mode: CommonMode,
+        mut take: impl FnMut(usize, usize, &[usize], &[f64]),
+    ) {
+        let design = |rows: &[usize], channel| {
+            Design::new(
+                &self.measurements.patterns,
+                rows,
+                channel,
+                self.geometry.light,
+                self.geometry.window,
+                origin,
+                common_mode,
+            )
+        };
+        // Grey patterns drive all channels alike: one design for all of them.
+        let groups: &[&[usize]] = match self.measurements.grey() {
+            true => &[&[0, 1, 2]],
+            false => &[&[0], &[1], &[2]],
+        };
+        for channels in groups {
+            let shared = design(rows, channels[0]);
+            let mut solver = Nnls::new(&shared.gram, shared.unknowns());
+            for &(p, pixel) in pixels {
+                for &c in *channels {
+                    let usable: Vec<usize> = rows
+                        .iter()
+                        .copied()
+                        .filter(|&l| self.sample(l, pixel, c).is_finite())
+                        .collect();
+                    let y: Vec<f64> = usable.iter().map(|&l| self.sample(l, pixel, c)).collect();
+                    if usable.len() == rows.len() {
+                        let x = solver.solve(&shared.right_hand_side(&y));
+                        take(p, c, &shared.slots, &x);
+                    } else if usable.len() >= FEWEST_PATTERNS {
+                        // Saturated samples drop out, and with them the shared equations.
+                        let own = design(&usable, c);
+                        let x =
+                            Nnls::new(&own.gram, own.unknowns()).solve(&own.right_hand_side(&y));
+                        take(p, c, &own.slots, &x);
+                    }
+                }
+            }
+        }
+    }
+
+    fn sample(&self, l: usize, pixel: CameraPx, c: usize) -> f64 {
+        let n = pixel.y as usize * self.measurements.camera.width as usize + pixel.x as usize;
+        f64::from(self.measurements.pictures[l][n][c])
+    }
+
+    /// Tries every candidate on a spread of windows and keeps the one that predicts held-out
+    /// patterns best.
+    fn choose_common_mode(&self) -> Result<CommonMode, RecoverError> {
+        let mut windows: BTreeMap<Element, Vec<(usize, CameraPx)>> = BTreeMap::new();
+        for rect in self.geometry.tiles() {
+            for pixel in rect.pixels() {
+                let origin = self.geometry.window_origin(pixel);
+                let lit = !self.dark(origin);
+                let pixels = windows.entry(origin).or_default();
+                // One pixel a window is enough to choose by.
+                if lit && pixels.is_empty() {
+                    pixels.push((0, pixel));
+                }
+            }
+        }
+        windows.retain(|_, pixels| !pixels.is_empty());
+        if windows.is_empty() {
+            return Err(RecoverError::NoLight);
+        }
+        let every = windows.len().div_ceil(SAMPLE_WINDOWS);
+        let (held, rows): (Vec<usize>, Vec<usize>) = (0..self.measurements.patterns.len())
+            .partition(|l| l % HOLD_OUT_EVERY == HOLD_OUT_EVERY / 2);
+        if held.is_empty() || rows.len() < FEWEST_PATTERNS {
+            return Ok(CommonMode::FULL);
+        }
+        let mut best: Option<(Decibels, CommonMode)> = None;
+        for candidate in CommonMode::CANDIDATES {
+            let mut error = TransportError::default();
+            for (&origin, pixels) in windows.iter().step_by(every) {
+                self.window(origin, pixels, &rows, candidate, |_, c, slots, x| {
+                    for &l in &held {
+                        let y = self.sample(l, pixels[0].1, c);
+                        if y.is_finite() {
+                            error.add(y, self.predict(l, c, origin, slots, x));
+                        }
+                    }
+                });
+            }
+            if let Some(snr) = error.snr()
+                && best.is_none_or(|(most, _)| snr > most)
+            {
+                best = Some((snr, candidate));
+            }
+        }
+        Ok(best.map_or(CommonMode::FULL, |(_, candidate)| candidate))
+    }
+
+    /// What solution `x` says a pixel of the window sees under pattern `l`.
+    fn predict(&self, l: usize, c: usize, origin: Element, slots: &[usize], x: &[f64]) -> f64 {
+        let side = self.geometry.window.side() as usize;
+        let plane = self.measurements.patterns[l].plane(c);
+        let terms = slots.iter().zip(x).filter_map(|(&slot, &x)| {
+            let element = Element {
+                u: origin.u + (slot % side) as i32,
+                v: origin.v + (slot / side) as i32,
+            };
+            let m = element.index_in(self.geometry.light)?;
+            Some(f64::from(plane[m]) * x)
+        });
+        terms.sum()
+    }
+
+    /// Whether all of the window lies off the display.
+    fn dark(&self, origin: Element) -> bool {
+        let side = i64::from(self.geometry.window.side());
+        let misses =
+            |at: i32, length: u32| i64::from(at) + side <= 0 || i64::from(at) >= i64::from(length);
+        misses(origin.u, self.geometry.light.width) || misses(origin.v, self.geometry.light.height)
+    }
+}
