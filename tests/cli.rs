@@ -1,0 +1,415 @@
+//! `ltm-export` as a person meets it: real photographs in, figures and pictures out, and a clear
+//! word when something is wrong.
+#![cfg(not(target_arch = "wasm32"))]
+#![allow(clippy::unwrap_used)] // a test that cannot go on should stop
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use assert_cmd::Command;
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn fixture() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/glass-s")
+}
+
+fn run(args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
+    command.args(args).output().unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+fn json(args: &[&str]) -> Value {
+    let output = run(args);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{args:?}: {errors}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Runs what must fail; returns what it says.
+fn complaint(args: &[&str]) -> String {
+    let output = run(args);
+    assert_eq!(output.status.code(), Some(1), "{args:?}");
+    assert!(output.stdout.is_empty(), "errors go to standard error");
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(!message.contains("panicked"), "{message}");
+    message
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            copy_folder(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+/// A copy of the fixture to spoil, and a place for output.
+fn spoilt(spoil: impl FnOnce(&Path)) -> (TempDir, PathBuf, PathBuf) {
+    let folder = TempDir::new().unwrap();
+    let capture = folder.path().join("capture");
+    copy_folder(&fixture(), &capture);
+    spoil(&capture);
+    let output = folder.path().join("out/photo.ltm");
+    fs::create_dir(output.parent().unwrap()).unwrap();
+    (folder, capture, output)
+}
+
+/// Recovery from a spoilt capture must fail with a message that has all of `words`, and leave
+/// nothing behind.
+fn refuses(spoil: impl FnOnce(&Path), words: &[&str]) {
+    let (_folder, capture, output) = spoilt(spoil);
+    let message = complaint(&[
+        "recover",
+        text(&capture),
+        "-o",
+        text(&output),
+        "--window",
+        "3",
+    ]);
+    for word in words {
+        assert!(message.contains(word), "no {word:?} in: {message}");
+    }
+    let left = fs::read_dir(output.parent().unwrap()).unwrap().count();
+    assert_eq!(left, 0, "files left behind");
+}
+
+fn edit_manifest(capture: &Path, edit: impl FnOnce(&mut Value)) {
+    let path = capture.join("capture.json");
+    let mut manifest: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+    edit(&mut manifest);
+    fs::write(path, manifest.to_string()).unwrap();
+}
+
+/// A small, quickly recovered file.
+fn small_ltm(folder: &Path) -> PathBuf {
+    let file = folder.join("small.ltm");
+    let args = ["--patterns", "12", "--window", "3"];
+    let fixture = fixture();
+    let output = run(&[&["recover", text(&fixture), "-o", text(&file)], &args[..]].concat());
+    assert!(output.status.success());
+    file
+}
+
+#[test]
+fn photographs_become_a_file_that_relights_them() {
+    let folder = TempDir::new().unwrap();
+    let (fixture, file) = (fixture(), folder.path().join("glass.ltm"));
+    let recovered = json(&[
+        "recover",
+        text(&fixture),
+        "-o",
+        text(&file),
+        "--window",
+        "13",
+        "--json",
+    ]);
+    assert_eq!(recovered["method"], "nnls");
+    assert_eq!(recovered["patterns"], 54);
+    assert_eq!(recovered["window"], 13);
+    assert_eq!(recovered["rank"], Value::Null);
+    assert!(recovered["seconds"].as_f64().unwrap() > 0.0);
+    assert!(recovered["peak_rss_bytes"].as_u64().unwrap() > 1 << 20);
+    let bytes = fs::metadata(&file).unwrap().len();
+    assert_eq!(recovered["file_bytes"], bytes);
+
+    // Floors a decibel below what exact NNLS reaches on this noisy, strongly scattering capture.
+    let evaluated = json(&["evaluate", text(&file), text(&fixture), "--json"]);
+    assert!(evaluated["snr_db"].as_f64().unwrap() > 15.7, "{evaluated}");
+    assert!(
+        evaluated["heldout_snr_db"].as_f64().unwrap() > 23.5,
+        "{evaluated}"
+    );
+    assert_eq!(evaluated["heldout_shots"], 6);
+    for light in ["checker", "colour", "fire", "flood", "stripes"] {
+        let psnr = evaluated["relit"][light].as_f64().unwrap();
+        assert!(psnr > 36.0, "{light}: {psnr} dB");
+    }
+    assert_eq!(evaluated["file_bytes"], bytes);
+
+    let inspected = json(&["inspect", text(&file), "--json"]);
+    assert_eq!(inspected["camera"], serde_json::json!([64, 64]));
+    assert_eq!(inspected["window"], 13);
+    assert_eq!(
+        inspected["metadata"]["shots_used"]
+            .as_array()
+            .unwrap()
+            .len(),
+        54
+    );
+    let verified = json(&["verify", text(&file), "--json"]);
+    assert_eq!(verified["ok"], true);
+    assert_eq!(verified["file_bytes"], bytes);
+}
+
+#[test]
+fn recovery_is_reproducible_bit_for_bit() {
+    let folder = TempDir::new().unwrap();
+    let first = fs::read(small_ltm(folder.path())).unwrap();
+    let second = fs::read(small_ltm(folder.path())).unwrap();
+    assert_eq!(first, second);
+}
+
+#[test]
+fn relit_pictures_agree_with_the_reference_and_follow_the_torch() {
+    let folder = TempDir::new().unwrap();
+    let file = small_ltm(folder.path());
+    let relit = |name: &str, args: &[&str]| {
+        let out = folder.path().join(name);
+        let args = [&["relight", text(&file), "-o", text(&out)], args].concat();
+        let output = run(&args);
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        image::open(&out).unwrap().into_rgb8()
+    };
+    for light in ["flood", "torch", "checkerboard", "stripes", "spectrum"] {
+        let fast = relit("a.png", &["--light", light]);
+        let exact = relit("b.png", &["--light", light, "--backend", "reference"]);
+        let apart = fast
+            .iter()
+            .zip(exact.iter())
+            .map(|(a, b)| a.abs_diff(*b))
+            .max();
+        assert!(apart.unwrap() <= 1, "{light}");
+        assert!(fast.iter().any(|&code| code > 40), "{light} shows nothing");
+    }
+    let brightness = |picture: &image::RgbImage, left: bool| -> u32 {
+        let pixels = picture
+            .enumerate_pixels()
+            .filter(|(x, _, _)| (*x < 32) == left);
+        pixels
+            .map(|(_, _, p)| p.0.iter().map(|c| u32::from(*c)).sum::<u32>())
+            .sum()
+    };
+    let left = relit("l.png", &["--light", "torch", "--at", "0.1,0.5"]);
+    let right = relit("r.png", &["--light", "torch", "--at", "0.9,0.5"]);
+    assert!(brightness(&left, true) > 2 * brightness(&left, false));
+    assert!(brightness(&right, false) > 2 * brightness(&right, true));
+    // A picture as the light, larger than the light plane; then half as bright.
+    let white = folder.path().join("white.png");
+    image::RgbImage::from_pixel(90, 50, image::Rgb([255; 3]))
+        .save(&white)
+        .unwrap();
+    let pictured = relit("w.png", &["--light", text(&white)]);
+    assert_eq!(pictured, relit("f.png", &["--light", "flood"]));
+    let dim = relit("d.png", &["--light", "flood", "--exposure", "0.5"]);
+    assert!(brightness(&dim, true) < brightness(&pictured, true));
+}
+
+#[test]
+fn a_missing_photograph_is_named_with_its_field() {
+    refuses(
+        |c| fs::remove_file(c.join("photos/0003.png")).unwrap(),
+        &[
+            "photos/0003.png",
+            "no such file",
+            "shots[3].photo",
+            "add it",
+        ],
+    );
+    refuses(
+        |c| fs::remove_file(c.join("patterns/0000.png")).unwrap(),
+        &["patterns/0000.png", "shots[0].pattern"],
+    );
+    refuses(
+        |c| fs::remove_file(c.join("capture.json")).unwrap(),
+        &["capture.json", "no such file"],
+    );
+}
+
+#[test]
+fn a_picture_of_the_wrong_size_or_depth_is_refused() {
+    refuses(
+        |c| {
+            image::RgbImage::new(64, 63)
+                .save(c.join("photos/0001.png"))
+                .unwrap()
+        },
+        &["photos/0001.png", "64x63", "64x64"],
+    );
+    refuses(
+        |c| {
+            image::RgbImage::new(64, 64)
+                .save(c.join("photos/0001.png"))
+                .unwrap()
+        },
+        &["photos/0001.png", "8-bit RGB", "16-bit linear RGB"],
+    );
+    refuses(
+        |c| fs::write(c.join("photos/0002.png"), b"not a picture").unwrap(),
+        &["photos/0002.png", "not a readable PNG"],
+    );
+    refuses(
+        |c| {
+            let path = c.join("photos/0002.png");
+            let photo = fs::read(&path).unwrap();
+            fs::write(path, &photo[..photo.len() / 2]).unwrap();
+        },
+        &["photos/0002.png", "not a readable PNG"],
+    );
+    refuses(
+        |c| {
+            let picture = image::ImageBuffer::<image::Luma<u16>, _>::new(32, 32);
+            picture.save(c.join("patterns/0001.png")).unwrap();
+        },
+        &["patterns/0001.png", "16-bit grey", "8-bit grey or RGB"],
+    );
+}
+
+#[test]
+fn a_bad_manifest_is_refused_by_field() {
+    refuses(
+        |c| edit_manifest(c, |m| m["version"] = 7.into()),
+        &["capture.json", "\"version\" is 7"],
+    );
+    refuses(
+        |c| fs::write(c.join("capture.json"), "{ \"version\": 1, ").unwrap(),
+        &["capture.json", "line 1"],
+    );
+    refuses(
+        |c| {
+            edit_manifest(c, |m| {
+                drop(m["camera"].as_object_mut().unwrap().remove("white"))
+            })
+        },
+        &["capture.json", "missing field `white`"],
+    );
+    refuses(
+        |c| edit_manifest(c, |m| m["correspondence"]["affine"][0][2] = 1e6.into()),
+        &["correspondence", "no camera pixel"],
+    );
+    refuses(
+        |c| edit_manifest(c, |m| m["shots"].as_array_mut().unwrap().truncate(3)),
+        &["3 patterns are too few"],
+    );
+}
+
+#[test]
+fn options_that_cannot_be_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let (fixture, out) = (fixture(), folder.path().join("x.ltm"));
+    let recover =
+        |args: &[&str]| run(&[&["recover", text(&fixture), "-o", text(&out)], args].concat());
+    let even = recover(&["--window", "4"]);
+    assert_eq!(even.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&even.stderr).contains("odd"));
+    let many = recover(&["--patterns", "61"]);
+    assert!(String::from_utf8_lossy(&many.stderr).contains("60 shots"));
+    assert_eq!(recover(&["--method", "magic"]).status.code(), Some(2));
+    assert_eq!(run(&["recover"]).status.code(), Some(2));
+    assert_eq!(run(&["frobnicate"]).status.code(), Some(2));
+    let nowhere = folder.path().join("no/such/folder/x.ltm");
+    let message = complaint(&[
+        "recover",
+        text(&fixture),
+        "-o",
+        text(&nowhere),
+        "--patterns",
+        "8",
+        "--window",
+        "1",
+    ]);
+    assert!(message.contains("no/such/folder/x.ltm"), "{message}");
+    assert!(message.contains("folder exist"), "{message}");
+    assert!(!out.exists());
+}
+
+#[test]
+fn damaged_files_are_refused_by_every_command() {
+    let folder = TempDir::new().unwrap();
+    let sound = fs::read(small_ltm(folder.path())).unwrap();
+    let file = folder.path().join("damaged.ltm");
+    let (fixture, png) = (fixture(), folder.path().join("x.png"));
+    type Damage = fn(&mut Vec<u8>);
+    let cases: [(Damage, &str); 6] = [
+        (|f| f.truncate(f.len() - 1), "cut short"),
+        (|f| f.clear(), "cut short"),
+        (
+            |f| {
+                let middle = f.len() / 2;
+                f[middle] ^= 4;
+            },
+            "damaged",
+        ),
+        (|f| f[12] = 9, "version 9.0"),
+        (|f| f[..4].copy_from_slice(b"<!DO"), "not an .ltm file"),
+        (|f| f.push(0), "goes on after its end"),
+    ];
+    for (damage, word) in cases {
+        let mut bytes = sound.clone();
+        damage(&mut bytes);
+        fs::write(&file, bytes).unwrap();
+        for args in [
+            &["verify", text(&file)][..],
+            &["inspect", text(&file)],
+            &["relight", text(&file), "--light", "flood", "-o", text(&png)],
+            &["evaluate", text(&file), text(&fixture)],
+        ] {
+            let message = complaint(args);
+            assert!(message.contains(word), "{args:?}: {message}");
+            assert!(message.contains("damaged.ltm"), "{args:?}: {message}");
+        }
+        let verified = run(&["verify", text(&file), "--json"]);
+        assert_eq!(verified.status.code(), Some(1));
+        let report: Value = serde_json::from_slice(&verified.stdout).unwrap();
+        assert_eq!(report["ok"], false);
+        assert!(report["error"].as_str().unwrap().contains(word));
+    }
+    assert!(!png.exists());
+    assert!(complaint(&["verify", "nowhere.ltm"]).contains("nowhere.ltm"));
+}
+
+#[test]
+fn a_file_from_another_capture_is_not_evaluated() {
+    let (folder, capture, _) = spoilt(|c| edit_manifest(c, |m| m["light"]["width"] = 33.into()));
+    let file = small_ltm(folder.path());
+    let message = complaint(&["evaluate", text(&file), text(&capture)]);
+    assert!(message.contains("33x32"), "{message}");
+}
+
+#[test]
+fn exposure_and_saturation_are_accounted_for() {
+    // Halving the codes above black and saying so must not change what is recovered, and samples
+    // at white must be left out, not believed.
+    let recover = |capture: &Path, output: &Path| {
+        let args = ["--patterns", "30", "--window", "5", "--json"];
+        json(&[&["recover", text(capture), "-o", text(output)], &args[..]].concat())
+    };
+    let snr = |file: &Path| {
+        let evaluated = json(&["evaluate", text(file), text(&fixture()), "--json"]);
+        evaluated["snr_db"].as_f64().unwrap()
+    };
+    let (_plain_folder, capture, output) = spoilt(|_| {});
+    let plain = recover(&capture, &output);
+    assert_eq!(plain["saturated_samples"], 0);
+    let expected = snr(&output);
+    let (_folder, capture, output) = spoilt(|c| {
+        let path = c.join("photos/0004.png");
+        let mut photo = image::open(&path).unwrap().into_rgb16();
+        for code in photo.iter_mut() {
+            *code = (512.0 + (f64::from(*code) - 512.0) / 2.0).round() as u16;
+        }
+        photo.save(path).unwrap();
+        let path = c.join("photos/0005.png");
+        let mut photo = image::open(&path).unwrap().into_rgb16();
+        photo.iter_mut().take(300).for_each(|code| *code = 60000);
+        photo.save(path).unwrap();
+        edit_manifest(c, |m| m["shots"][4]["exposure"] = 0.5.into());
+    });
+    let changed = recover(&capture, &output);
+    assert_eq!(changed["saturated_samples"], 300);
+    assert!((snr(&output) - expected).abs() < 0.2);
+}
