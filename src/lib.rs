@@ -10,6 +10,7 @@
 //! |---|---|---|
 //! | `simulate` (native) | a built-in scene | a capture folder with known transport |
 //! | [`capture`] | a capture folder | linear measurements |
+//! | [`calibrate`] | photographs of Gray code | the correspondence |
 //! | [`recover`] | measurements | light transport functions |
 //! | [`transport`] | – | what the rooms around it share: windows, tiles, the band |
 //! | [`format`] | a transport | an `.ltm` file, and back |
@@ -17,6 +18,7 @@
 //!
 //! `cli` (native) and `web` (wasm32) are thin faces on them.
 
+pub mod calibrate;
 pub mod capture;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod cli;

@@ -381,6 +381,65 @@ fn a_file_from_another_capture_is_not_evaluated() {
 }
 
 #[test]
+fn without_a_correspondence_gray_code_gives_it() {
+    let forget = |c: &Path| {
+        edit_manifest(c, |m| {
+            drop(m.as_object_mut().unwrap().remove("correspondence"))
+        })
+    };
+    let (_folder, capture, output) = spoilt(forget);
+    let args = ["--patterns", "20", "--window", "5"];
+    let recovered = run(&[&["recover", text(&capture), "-o", text(&output)], &args[..]].concat());
+    assert!(
+        recovered.status.success(),
+        "{}",
+        String::from_utf8_lossy(&recovered.stderr)
+    );
+    let inspected = json(&["inspect", text(&output), "--json"]);
+    let truth = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
+    for (row, truth) in inspected["correspondence"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(truth)
+    {
+        let row: Vec<f64> = row
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|a| a.as_f64().unwrap())
+            .collect();
+        for (x, y) in [(0.0, 0.0), (64.0, 0.0), (0.0, 64.0), (64.0, 64.0)] {
+            let off = (row[0] - truth[0]) * x + (row[1] - truth[1]) * y + row[2] - truth[2];
+            assert!(off.abs() < 0.35, "{off} elements off: {row:?}");
+        }
+    }
+    refuses(
+        |c| {
+            forget(c);
+            edit_manifest(c, |m| {
+                m["graycode"]
+                    .as_array_mut()
+                    .unwrap()
+                    .retain(|g| g["axis"] != "y")
+            });
+        },
+        &["capture.json", "no bits for axis Y"],
+    );
+    refuses(
+        |c| {
+            forget(c);
+            edit_manifest(c, |m| drop(m["graycode"].as_array_mut().unwrap().remove(3)));
+        },
+        &[
+            "capture.json",
+            "\"graycode\"",
+            "axis x, bit 3, inverted true",
+        ],
+    );
+}
+
+#[test]
 fn exposure_and_saturation_are_accounted_for() {
     // Halving the codes above black and saying so must not change what is recovered, and samples
     // at white must be left out, not believed.

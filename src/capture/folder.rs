@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::images;
 use super::{CaptureError, MANIFEST_NAME, Manifest, Measurements, Pattern, Truth};
+use crate::calibrate::{BitPair, GrayCode};
 use crate::transport::{CHANNELS, Correspondence};
 
 /// An opened capture folder: its manifest is checked, its pictures are not yet read.
@@ -56,23 +57,65 @@ impl CaptureFolder {
         &self.manifest
     }
 
+    /// Where the manifest lies.
+    pub fn manifest_path(&self) -> PathBuf {
+        self.root.join(MANIFEST_NAME)
+    }
+
     /// Known transport, where the folder has any.
     pub fn truth(&self) -> Result<Option<Truth>, CaptureError> {
         Truth::open(&self.root.join("truth"), &self.manifest)
     }
 
-    /// Camera pixels to light elements.
-    pub fn correspondence(&self) -> Result<Correspondence, CaptureError> {
-        match &self.manifest.correspondence {
-            Some(spec) => Ok(spec.into()),
-            None => Err(CaptureError::Field {
-                path: self.root.join(MANIFEST_NAME),
-                field: "correspondence".to_owned(),
-                problem: "is missing; give its \"affine\" map (decoding Gray code is not yet \
-                          supported)"
-                    .to_owned(),
-            }),
-        }
+    /// Camera pixels to light elements, where the manifest gives it.
+    pub fn correspondence(&self) -> Option<Correspondence> {
+        self.manifest.correspondence.as_ref().map(Into::into)
+    }
+
+    /// Reads the photographs of Gray code. Every bit needs its inverse.
+    pub fn read_gray_code(&self, dark: &DarkFrame) -> Result<GrayCode, CaptureError> {
+        let bits = |axis: &str| -> Result<Vec<BitPair>, CaptureError> {
+            let shots = || self.manifest.graycode.iter().enumerate();
+            let mut numbers: Vec<u32> = shots()
+                .filter(|(_, shot)| shot.axis == axis)
+                .map(|(_, shot)| shot.bit)
+                .collect();
+            numbers.sort_unstable();
+            numbers.dedup();
+            let photo = |bit, inverted| {
+                let wanted = shots().find(|(_, shot)| {
+                    shot.axis == axis && shot.bit == bit && shot.inverted == inverted
+                });
+                let Some((i, shot)) = wanted else {
+                    return Err(self.field_error(
+                        "graycode",
+                        format!(
+                            "has no photograph of axis {axis}, bit {bit}, inverted {inverted}; \
+                             add it, or give \"correspondence\""
+                        ),
+                    ));
+                };
+                self.read_photo(&shot.photo, &format!("graycode[{i}].photo"), 1.0, dark)
+            };
+            let pair = |&bit: &u32| {
+                Ok(BitPair {
+                    plain: photo(bit, false)?,
+                    inverted: photo(bit, true)?,
+                })
+            };
+            // Most significant first, and none left out: a gap would shift all bits below it.
+            let highest = numbers.last().map_or(0, |&bit| bit + 1);
+            (0..highest)
+                .rev()
+                .collect::<Vec<_>>()
+                .iter()
+                .map(pair)
+                .collect()
+        };
+        Ok(GrayCode {
+            x: bits("x")?,
+            y: bits("y")?,
+        })
     }
 
     /// Reads the dark frame; without one, nothing is seen in the dark.
@@ -93,7 +136,7 @@ impl CaptureFolder {
     /// If there is no such shot.
     pub fn read_shot(&self, i: usize, dark: &DarkFrame) -> Result<Exposed, CaptureError> {
         let shot = &self.manifest.shots[i];
-        let (light, camera) = (&self.manifest.light, &self.manifest.camera);
+        let light = &self.manifest.light;
         let named = format!("shots[{i}].pattern");
         let planes = images::codes8(&self.root.join(&shot.pattern), light.extent(), &named)?;
         let mut planes = planes.into_iter().map(|codes| {
@@ -107,30 +150,51 @@ impl CaptureFolder {
             (grey, ..) => Pattern::Grey(grey.unwrap_or_default()),
         };
         let named = format!("shots[{i}].photo");
-        let codes = images::rgb16(&self.root.join(&shot.photo), camera.extent(), &named)?;
-        let exposure = shot.exposure.unwrap_or(1.0);
+        let picture = self.read_photo(&shot.photo, &named, shot.exposure.unwrap_or(1.0), dark)?;
+        Ok(Exposed { pattern, picture })
+    }
+
+    /// Reads a photograph as measurement less the dark, NaN where saturated.
+    fn read_photo(
+        &self,
+        name: &str,
+        named_by: &str,
+        exposure: f64,
+        dark: &DarkFrame,
+    ) -> Result<Vec<[f32; CHANNELS]>, CaptureError> {
+        let camera = &self.manifest.camera;
+        let codes = images::rgb16(&self.root.join(name), camera.extent(), named_by)?;
         let picture = codes.into_iter().zip(&dark.0).map(|(codes, dark)| {
             std::array::from_fn(|c| match f64::from(codes[c]) >= camera.white {
                 true => f32::NAN,
                 false => self.linear(codes[c], exposure) - dark[c],
             })
         });
-        Ok(Exposed {
-            pattern,
-            picture: picture.collect(),
-        })
+        Ok(picture.collect())
+    }
+
+    fn field_error(&self, field: &str, problem: String) -> CaptureError {
+        CaptureError::Field {
+            path: self.manifest_path(),
+            field: field.to_owned(),
+            problem,
+        }
     }
 
     /// Joins shots into measurements.
-    pub fn measurements(&self, shots: Vec<Exposed>) -> Result<Measurements, CaptureError> {
+    pub fn measurements(
+        &self,
+        shots: Vec<Exposed>,
+        correspondence: Correspondence,
+    ) -> Measurements {
         let (patterns, pictures) = shots.into_iter().map(|s| (s.pattern, s.picture)).unzip();
-        Ok(Measurements {
+        Measurements {
             camera: self.manifest.camera.extent(),
             light: self.manifest.light.extent(),
-            correspondence: self.correspondence()?,
+            correspondence,
             patterns,
             pictures,
-        })
+        }
     }
 
     /// `(code − black) / (white − black)` at unit exposure. The dark frame holds light, which grows

@@ -228,6 +228,16 @@ impl Manifest {
                 );
             }
         }
+        for (i, shot) in self.graycode.iter().enumerate() {
+            if !["x", "y"].contains(&shot.axis.as_str()) {
+                let problem = format!("is {:?}; it must be \"x\" or \"y\"", shot.axis);
+                return bad(&format!("graycode[{i}].axis"), problem);
+            }
+            if shot.bit > 15 {
+                let problem = format!("is {}; bits are numbered 0 to 15", shot.bit);
+                return bad(&format!("graycode[{i}].bit"), problem);
+            }
+        }
         if let Some(spec) = &self.correspondence {
             let [[a, b, _], [c, d, _]] = spec.affine;
             let finite = spec.affine.iter().flatten().all(|x| x.is_finite());
@@ -273,7 +283,17 @@ mod tests {
     fn a_bad_field_is_named_with_its_file() {
         assert!(manifest(|_| {}).is_ok());
         type Edit = fn(&mut serde_json::Value);
-        let cases: [(Edit, &str); 8] = [
+        let cases: [(Edit, &str); 10] = [
+            (
+                |j| {
+                    j["graycode"] = serde_json::json!([{"photo": "g", "axis": "z", "bit": 0, "inverted": false}])
+                },
+                "\"graycode[0].axis\"",
+            ),
+            (
+                |j| j["graycode"] = serde_json::json!([{"photo": "g", "axis": "x", "bit": 4_000_000_000u32, "inverted": false}]),
+                "\"graycode[0].bit\"",
+            ),
             (|j| j["version"] = 2.into(), "\"version\" is 2"),
             (|j| j["light"]["width"] = 0.into(), "\"light.width\""),
             (|j| j["camera"]["white"] = 512.into(), "\"camera.white\""),

@@ -138,7 +138,14 @@ fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
         })
         .collect::<Result<Vec<_>, _>>()?;
     bar.finish_and_clear();
-    Ok(folder.measurements(exposed)?)
+    let correspondence = match folder.correspondence() {
+        Some(given) => given,
+        None => folder
+            .read_gray_code(&dark)?
+            .correspondence(folder.manifest().camera.extent())
+            .with_context(|| folder.manifest_path().display().to_string())?,
+    };
+    Ok(folder.measurements(exposed, correspondence))
 }
 
 fn write(
