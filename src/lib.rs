@@ -8,7 +8,7 @@
 //!
 //! | module | from | to |
 //! |---|---|---|
-//! | `simulate` (native) | a built-in scene | a capture folder with known transport |
+//! | [`simulate`] (native) | a built-in scene | a capture folder with known transport |
 //! | [`capture`] | a capture folder | linear measurements |
 //! | [`recover`] | measurements | light transport functions |
 //! | [`transport`] | – | what the rooms around it share: windows, tiles, the band |
@@ -23,4 +23,6 @@ pub mod cli;
 pub mod format;
 pub mod recover;
 pub mod relight;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod simulate;
 pub mod transport;
