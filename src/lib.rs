@@ -8,7 +8,7 @@
 //!
 //! | module | from | to |
 //! |---|---|---|
-//! | `simulate` (native) | a built-in scene | a capture folder with known transport |
+//! | [`simulate`] (native) | a built-in scene | a capture folder with known transport |
 //! | [`capture`] | a capture folder | linear measurements |
 //! | [`calibrate`] | photographs of Gray code | the correspondence |
 //! | [`recover`] | measurements | light transport functions |
@@ -25,4 +25,6 @@ pub mod cli;
 pub mod format;
 pub mod recover;
 pub mod relight;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod simulate;
 pub mod transport;

@@ -5,10 +5,12 @@ mod evaluate;
 mod files;
 mod inspect;
 mod lights;
+mod new_folder;
 mod process;
 mod recover;
 mod relight;
 mod report;
+mod simulate;
 mod verify;
 
 use std::process::ExitCode;
@@ -25,6 +27,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Simulate(simulate::SimulateArgs),
     Recover(recover::RecoverArgs),
     Evaluate(evaluate::EvaluateArgs),
     Relight(relight::RelightArgs),
@@ -35,6 +38,7 @@ enum Command {
 /// Parses the command line and runs it. Status: 0 done, 1 failed, 2 wrong usage.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
+        Command::Simulate(args) => simulate::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Relight(args) => relight::run(&args),

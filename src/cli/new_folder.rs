@@ -1,0 +1,113 @@
+//! A folder that appears whole or not at all.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail, ensure};
+
+/// Fills a new folder beside `path` and renames it there once `fill` has succeeded. `path` must be
+/// free or an empty folder: nothing of anyone's is ever replaced.
+pub fn write_folder_whole(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let write = || -> Result<()> {
+        ensure_free(path)?;
+        let parent = match path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".ltm-export-");
+        #[cfg(unix)]
+        {
+            // As any new folder: the umask decides, not tempfile's private default.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o777));
+        }
+        let folder = builder
+            .tempdir_in(parent)
+            .context("cannot be created; does its parent folder exist, and may you write there?")?;
+        fill(folder.path())?;
+        // Looked at again: filling takes a while. An empty folder makes way; `remove_dir` refuses
+        // any other.
+        ensure_free(path)?;
+        if path.exists() {
+            std::fs::remove_dir(path).context("cannot be replaced")?;
+        }
+        std::fs::rename(folder.path(), path).context("cannot be put in place")?;
+        let _ = folder.keep(); // It has moved: there is nothing left to clean up.
+        Ok(())
+    };
+    write().with_context(|| path.display().to_string())
+}
+
+fn ensure_free(path: &Path) -> Result<()> {
+    use std::io::ErrorKind;
+    match std::fs::read_dir(path) {
+        Ok(mut entries) => {
+            ensure!(
+                entries.next().is_none(),
+                "is a folder with something in it; give another name, or empty it first"
+            );
+            Ok(())
+        }
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(()),
+        Err(e) if e.kind() == ErrorKind::NotADirectory => {
+            bail!("is taken by a file; give another name")
+        }
+        Err(e) => Err(e).context("cannot be looked at"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entry = |e: std::io::Result<std::fs::DirEntry>| {
+            e.unwrap().file_name().to_string_lossy().into_owned()
+        };
+        let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(entry).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_folder_appears_whole_or_not_at_all() {
+        let root = tempfile::tempdir().unwrap();
+        let fill = |folder: &Path| Ok(std::fs::write(folder.join("a"), "1")?);
+        let path = root.path().join("new");
+        let failed = write_folder_whole(&path, |folder| {
+            fill(folder)?;
+            bail!("the disk is full")
+        });
+        assert!(format!("{:#}", failed.unwrap_err()).contains("the disk is full"));
+        assert_eq!(names(root.path()), [""; 0]);
+
+        std::fs::create_dir(&path).unwrap();
+        write_folder_whole(&path, fill).unwrap();
+        assert_eq!(names(root.path()), ["new"]);
+        assert_eq!(names(&path), ["a"]);
+    }
+
+    #[test]
+    fn what_is_there_stays_there() {
+        let root = tempfile::tempdir().unwrap();
+        let (folder, file) = (root.path().join("folder"), root.path().join("file"));
+        std::fs::create_dir(&folder).unwrap();
+        std::fs::write(folder.join("mine"), "keep").unwrap();
+        std::fs::write(&file, "keep").unwrap();
+        for (path, reason) in [(&folder, "something in it"), (&file, "taken by a file")] {
+            let refused = write_folder_whole(path, |_| panic!("must not begin"));
+            let message = format!("{:#}", refused.unwrap_err());
+            assert!(message.contains(reason), "{message}");
+        }
+        assert_eq!(
+            std::fs::read_to_string(folder.join("mine")).unwrap(),
+            "keep"
+        );
+        let nowhere = root.path().join("no/where");
+        let refused = write_folder_whole(&nowhere, |_| Ok(())).unwrap_err();
+        assert!(
+            format!("{refused:#}").contains("parent folder"),
+            "{refused:#}"
+        );
+    }
+}

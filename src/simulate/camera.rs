@@ -1,0 +1,124 @@
+//! The camera: light to electrons to codes.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, Normal, NormalError, Poisson};
+
+use crate::transport::CHANNELS;
+
+/// A camera with linear 16-bit codes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Code without light.
+    pub black: f64,
+    /// Code at full scale, where the measurement is 1.
+    pub white: f64,
+    /// Electrons at full scale.
+    pub electrons: f64,
+    /// Standard deviation of the read noise, in electrons.
+    pub read_noise: f64,
+}
+
+/// Which of a capture's independent random sequences to draw from. The same seed and stream yield
+/// the same numbers, whatever else is drawn and in whatever order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoiseStream {
+    /// The elements of pattern number `.0`.
+    Pattern(u32),
+    /// The noise of photograph number `.0`.
+    Photograph(u32),
+}
+
+impl NoiseStream {
+    /// Starts the sequence.
+    pub fn start(self, seed: u64) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(match self {
+            Self::Pattern(i) => u64::from(i) << 1,
+            Self::Photograph(i) => u64::from(i) << 1 | 1,
+        });
+        rng
+    }
+}
+
+impl Camera {
+    /// Takes the photograph of `picture`, in units of the measurement, as codes.
+    pub fn photograph(
+        &self,
+        picture: &[[f32; CHANNELS]],
+        noise: &mut ChaCha8Rng,
+    ) -> Result<Vec<[u16; CHANNELS]>, NormalError> {
+        let read = Normal::new(0.0, self.read_noise)?;
+        let code_per_electron = (self.white - self.black) / self.electrons;
+        let mut code = |measurement: f32| {
+            let mean = f64::from(measurement) * self.electrons;
+            // `new` refuses a mean of zero, for which no electron ever arrives.
+            let caught = Poisson::new(mean).map_or(0.0, |p| p.sample(noise));
+            let electrons = caught + read.sample(noise);
+            (self.black + electrons * code_per_electron).round() as u16 // `as` saturates
+        };
+        Ok(picture.iter().map(|pixel| pixel.map(&mut code)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: Camera = Camera {
+        black: 512.0,
+        white: 60000.0,
+        electrons: 40000.0,
+        read_noise: 8.0,
+    };
+
+    #[test]
+    fn noise_has_the_mean_and_variance_of_shot_and_read_noise() {
+        for measurement in [0.0f32, 0.0001, 0.02, 0.7] {
+            let mut rng = NoiseStream::Photograph(3).start(1);
+            let codes = CAMERA
+                .photograph(&[[measurement; 3]; 40_000], &mut rng)
+                .unwrap();
+            let gain = (60000.0 - 512.0) / 40000.0;
+            let electrons: Vec<f64> = codes
+                .iter()
+                .flatten()
+                .map(|c| (f64::from(*c) - 512.0) / gain)
+                .collect();
+            let n = electrons.len() as f64;
+            let mean = electrons.iter().sum::<f64>() / n;
+            let variance = electrons.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / n;
+            let expected = f64::from(measurement) * 40000.0;
+            let sigma = ((expected + 64.0) / n).sqrt();
+            assert!(
+                (mean - expected).abs() < 5.0 * sigma,
+                "{measurement}: mean {mean}"
+            );
+            let ratio = variance / (expected + 64.0);
+            assert!(
+                (0.97..1.03).contains(&ratio),
+                "{measurement}: variance x{ratio}"
+            );
+        }
+    }
+
+    #[test]
+    fn streams_differ_and_repeat() {
+        let draw = |stream: NoiseStream, seed| {
+            let mut rng = stream.start(seed);
+            CAMERA.photograph(&[[0.5; 3]; 8], &mut rng).unwrap()
+        };
+        let first = draw(NoiseStream::Photograph(0), 1);
+        assert_eq!(first, draw(NoiseStream::Photograph(0), 1));
+        assert_ne!(first, draw(NoiseStream::Photograph(1), 1));
+        assert_ne!(first, draw(NoiseStream::Pattern(0), 1));
+        assert_ne!(first, draw(NoiseStream::Photograph(0), 2));
+    }
+
+    #[test]
+    fn too_much_light_saturates() {
+        let mut rng = NoiseStream::Photograph(0).start(1);
+        let codes = CAMERA.photograph(&[[9.0; 3]], &mut rng).unwrap();
+        assert_eq!(codes, [[u16::MAX; 3]]);
+    }
+}

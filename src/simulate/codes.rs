@@ -1,0 +1,158 @@
+//! What the display is told to show: patterns and Gray code.
+
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal, NormalError, StandardUniform};
+
+use crate::transport::Extent;
+
+/// Emitted light is `(code / 255)^DISPLAY_GAMMA`.
+pub const DISPLAY_GAMMA: f64 = 2.2;
+
+/// Light emitted for a code, 1 at full brightness.
+pub fn emission(code: u8) -> f64 {
+    (f64::from(code) / 255.0).powf(DISPLAY_GAMMA)
+}
+
+/// The code whose emission is nearest to `emitted`, which may leave 0..=1.
+pub(super) fn code_for(emitted: f64) -> u8 {
+    (emitted.clamp(0.0, 1.0).powf(1.0 / DISPLAY_GAMMA) * 255.0).round() as u8
+}
+
+/// 8-bit codes of every light element, row by row.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Codes {
+    /// One code for all three primaries.
+    Grey(Vec<u8>),
+    /// Red, green, blue.
+    Rgb(Vec<[u8; 3]>),
+}
+
+impl Codes {
+    /// The same code everywhere.
+    pub fn uniform(light: Extent, code: u8) -> Self {
+        Self::Grey(vec![code; light.area()])
+    }
+}
+
+/// Random patterns to photograph.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ensemble {
+    /// Emitted light drawn from N(0.5, 0.17²), clipped to 0..=1.
+    Gaussian,
+    /// Each element on or off with equal chance.
+    Bernoulli,
+}
+
+impl Ensemble {
+    /// A pattern, drawn from `stream`.
+    pub fn draw(self, light: Extent, stream: &mut ChaCha8Rng) -> Result<Codes, NormalError> {
+        let codes = match self {
+            Self::Gaussian => {
+                // At 0.17 the clipping takes 0.3 % of the elements.
+                let emitted = Normal::new(0.5, 0.17)?;
+                let code = |_| code_for(emitted.sample(stream));
+                (0..light.area()).map(code).collect()
+            }
+            Self::Bernoulli => {
+                let code = |_| match StandardUniform.sample(stream) {
+                    true => 255,
+                    false => 0,
+                };
+                (0..light.area()).map(code).collect()
+            }
+        };
+        Ok(Codes::Grey(codes))
+    }
+}
+
+/// One picture of the Gray code that tells every column (or row) from the others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GrayCode {
+    /// Whether it numbers columns (`x`) or rows (`y`).
+    pub columns: bool,
+    /// Bit of the Gray code, 0 the least significant.
+    pub bit: u32,
+    /// Whether dark and bright are exchanged.
+    pub inverted: bool,
+}
+
+impl GrayCode {
+    /// All pictures a light plane needs: columns then rows, most significant bit first, each
+    /// followed by its inverse.
+    pub fn all(light: Extent) -> Vec<Self> {
+        let axis = |columns, side: u32| {
+            let bits = u32::BITS - (side - 1).leading_zeros();
+            (0..bits).rev().flat_map(move |bit| {
+                [false, true].map(|inverted| Self {
+                    columns,
+                    bit,
+                    inverted,
+                })
+            })
+        };
+        axis(true, light.width)
+            .chain(axis(false, light.height))
+            .collect()
+    }
+
+    /// `x` or `y`.
+    pub fn axis(self) -> &'static str {
+        if self.columns { "x" } else { "y" }
+    }
+
+    /// What to show.
+    pub fn codes(self, light: Extent) -> Codes {
+        let mut codes = Vec::with_capacity(light.area());
+        for v in 0..light.height {
+            for u in 0..light.width {
+                let n = if self.columns { u } else { v };
+                let on = (n ^ (n >> 1)) >> self.bit & 1 == 1;
+                codes.push(if on != self.inverted { 255 } else { 0 });
+            }
+        }
+        Codes::Grey(codes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbouring_columns_differ_in_one_gray_bit() {
+        let light = Extent {
+            width: 20,
+            height: 3,
+        };
+        let pictures: Vec<_> = GrayCode::all(light)
+            .into_iter()
+            .filter(|g| g.columns && !g.inverted)
+            .collect();
+        assert_eq!(
+            pictures.iter().map(|g| g.bit).collect::<Vec<_>>(),
+            [4, 3, 2, 1, 0]
+        );
+        let column = |u: usize| -> Vec<u8> {
+            let code = |g: &GrayCode| match g.codes(light) {
+                Codes::Grey(c) => c[u],
+                Codes::Rgb(_) => unreachable!(),
+            };
+            pictures.iter().map(code).collect()
+        };
+        for u in 1..20 {
+            let changed = column(u - 1)
+                .iter()
+                .zip(column(u))
+                .filter(|(a, b)| **a != *b)
+                .count();
+            assert_eq!(changed, 1, "column {u}");
+        }
+    }
+
+    #[test]
+    fn codes_invert_the_gamma() {
+        for code in 0..=255 {
+            assert_eq!(code_for(emission(code)), code);
+        }
+    }
+}

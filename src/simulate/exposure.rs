@@ -1,0 +1,88 @@
+//! Many lights at once: `y = pT` for every pattern while a tile's transport is at hand.
+
+use super::codes::{Codes, emission};
+use crate::transport::{CHANNELS, Element, Extent, Geometry, TransportFunctions};
+
+/// The lights a scene is to be seen under, as emitted, laid out so that one element's emission
+/// under all lights is one run of memory: `[M, lights]`.
+#[derive(Clone, Debug)]
+pub struct Exposure {
+    light: Extent,
+    columns: usize,
+    emitted: Vec<f32>,
+    /// The column of each light that feeds each camera channel.
+    channels: Vec<[usize; CHANNELS]>,
+}
+
+impl Exposure {
+    /// Lights for a plane of extent `light`; each must have its length.
+    pub fn new(light: Extent, lights: &[Codes]) -> Self {
+        let mut channels = Vec::with_capacity(lights.len());
+        let mut columns = 0;
+        for codes in lights {
+            match codes {
+                Codes::Grey(_) => channels.push([columns; CHANNELS]),
+                Codes::Rgb(_) => channels.push([columns, columns + 1, columns + 2]),
+            }
+            columns = channels.last().map_or(0, |c| c[CHANNELS - 1]) + 1;
+        }
+        let table: [f32; 256] = std::array::from_fn(|code| emission(code as u8) as f32);
+        let mut emitted = vec![0.0; light.area() * columns];
+        for (codes, channels) in lights.iter().zip(&channels) {
+            for m in 0..light.area() {
+                let row = &mut emitted[m * columns..(m + 1) * columns];
+                match codes {
+                    Codes::Grey(grey) => row[channels[0]] = table[usize::from(grey[m])],
+                    Codes::Rgb(rgb) => {
+                        for (column, code) in channels.iter().zip(rgb[m]) {
+                            row[*column] = table[usize::from(code)];
+                        }
+                    }
+                }
+            }
+        }
+        Self {
+            light,
+            columns,
+            emitted,
+            channels,
+        }
+    }
+
+    /// The tile's pixels under every light, `[lights][pixels]`, in units of the measurement.
+    pub fn expose(
+        &self,
+        geometry: &Geometry,
+        functions: &TransportFunctions,
+    ) -> Vec<Vec<[f32; CHANNELS]>> {
+        let pixels = functions.rect.extent.area();
+        let (side, area) = (geometry.window.side() as usize, geometry.window.area());
+        let mut pictures = vec![vec![[0.0; CHANNELS]; pixels]; self.channels.len()];
+        let mut sums = vec![0.0f32; CHANNELS * self.columns];
+        for (p, pixel) in functions.rect.pixels().enumerate() {
+            sums.fill(0.0);
+            let origin = geometry.window_origin(pixel);
+            for (s, tau) in functions.tau[p * area..(p + 1) * area].iter().enumerate() {
+                if *tau == [0.0; CHANNELS] {
+                    continue;
+                }
+                let element = Element {
+                    u: origin.u + (s % side) as i32,
+                    v: origin.v + (s / side) as i32,
+                };
+                if let Some(m) = element.index_in(self.light) {
+                    let emitted = &self.emitted[m * self.columns..(m + 1) * self.columns];
+                    for (sums, tau) in sums.chunks_exact_mut(self.columns).zip(tau) {
+                        for (sum, e) in sums.iter_mut().zip(emitted) {
+                            *sum += tau * e;
+                        }
+                    }
+                }
+            }
+            for (picture, columns) in pictures.iter_mut().zip(&self.channels) {
+                picture[p] = std::array::from_fn(|c| sums[c * self.columns + columns[c]]);
+            }
+        }
+        pictures
+    }
+}

@@ -1,0 +1,82 @@
+//! Built-in scenes whose transport is known, and the camera that photographs them.
+//!
+//! A [`Scene`] is a picture drawn by formula, in coordinates that do not depend on any resolution,
+//! together with the physics that turns each camera pixel into a light transport function. Lengths
+//! that make the band (scattering widths, refraction, parallax) are given in light elements: with
+//! more elements the same picture stands closer to the display, and the same window holds it.
+//!
+//! Pure computation: no threads, no files, no clock. Whoever has them calls [`Scene::tile`] for
+//! many tiles at once, [`Exposure`] to see them under many lights and [`Camera`] for the noise.
+
+mod camera;
+mod codes;
+mod cookies;
+mod exposure;
+mod lights;
+mod plane;
+mod shapes;
+mod stained_glass;
+mod texture;
+
+pub use camera::{Camera, NoiseStream};
+pub use codes::{Codes, DISPLAY_GAMMA, Ensemble, GrayCode, emission};
+pub use exposure::Exposure;
+pub use lights::TruthLight;
+
+use crate::transport::{
+    Correspondence, Extent, Geometry, GeometryError, TileRect, TransportFunctions, Window,
+};
+
+/// Side of the window that holds every built-in scene's band, in light elements. Scattering and
+/// parallax below are chosen to fit it.
+pub const WINDOW_SIDE: u32 = 15;
+
+/// A scene of known transport.
+pub trait Scene: Sync {
+    /// Grids, band and correspondence.
+    fn geometry(&self) -> &Geometry;
+
+    /// The light transport functions of the pixels in `rect`. Elements off the display have none.
+    fn tile(&self, rect: TileRect) -> TransportFunctions;
+}
+
+/// The built-in scenes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SceneKind {
+    /// A rose window: coloured glass between lead cames, lit from behind.
+    StainedGlass,
+    /// Cookies on a tray under a tilted projector.
+    Cookies,
+}
+
+impl SceneKind {
+    /// The scene seen by `camera` under a light plane of `light` elements.
+    pub fn build(self, camera: Extent, light: Extent) -> Result<Box<dyn Scene>, GeometryError> {
+        let geometry = Geometry {
+            camera,
+            light,
+            window: Window::new(WINDOW_SIDE)?,
+            correspondence: Correspondence {
+                affine: [
+                    [f64::from(light.width) / f64::from(camera.width), 0.0, 0.0],
+                    [0.0, f64::from(light.height) / f64::from(camera.height), 0.0],
+                ],
+            },
+            tile_side: Geometry::DEFAULT_TILE_SIDE,
+        }
+        .validate()?;
+        Ok(match self {
+            Self::StainedGlass => Box::new(stained_glass::StainedGlass::new(geometry)),
+            Self::Cookies => Box::new(cookies::Cookies::new(geometry)),
+        })
+    }
+
+    /// The ensemble that suits the scene: the paper lit glass with Gaussian patterns; sparse
+    /// transport profits most from the higher contrast of binary ones.
+    pub fn ensemble(self) -> Ensemble {
+        match self {
+            Self::StainedGlass => Ensemble::Gaussian,
+            Self::Cookies => Ensemble::Bernoulli,
+        }
+    }
+}
