@@ -1,5 +1,6 @@
 //! Simulated captures: what they promise to whoever recovers from them.
 #![cfg(not(target_arch = "wasm32"))]
+#![allow(clippy::unwrap_used)] // also in the helpers, which clippy does not take for tests
 
 use std::collections::BTreeMap;
 use std::path::Path;

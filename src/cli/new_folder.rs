@@ -29,7 +29,8 @@ pub fn write_folder_whole(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -
         // any other.
         ensure_free(path)?;
         if path.exists() {
-            std::fs::remove_dir(path).context("cannot be replaced")?;
+            std::fs::remove_dir(path)
+                .context("cannot be replaced; give the name of a new folder")?;
         }
         std::fs::rename(folder.path(), path).context("cannot be put in place")?;
         let _ = folder.keep(); // It has moved: there is nothing left to clean up.
