@@ -5,13 +5,23 @@
 //! [`reference`] does it in double precision and is what the others are tested against. The GPU
 //! back ends share one WGSL source, `shaders/relight.wgsl`.
 
+#[cfg(target_arch = "wasm32")]
+pub mod backend;
 pub mod cpu;
 mod light;
 mod picture;
 pub mod reference;
 mod resample;
+pub mod texture_layout;
 pub mod tone;
+#[cfg(target_arch = "wasm32")]
+pub mod webgl2;
+#[cfg(target_arch = "wasm32")]
+pub mod webgpu;
 
 pub use light::{BuiltinLight, Light, LightError, TorchPose};
 pub use picture::{LinearPicture, Rgba8Picture};
 pub use resample::area_resample;
+
+/// The WGSL source of both GPU back ends.
+pub const SHADER: &str = include_str!("shaders/relight.wgsl");
