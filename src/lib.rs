@@ -28,3 +28,9 @@ pub mod relight;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod simulate;
 pub mod transport;
+#[cfg(target_arch = "wasm32")]
+pub mod web;
+
+// Unit tests of wasm32 run where the kernels and canvases are: in a browser.
+#[cfg(all(test, target_arch = "wasm32"))]
+wasm_bindgen_test::wasm_bindgen_test_configure!(run_in_browser);

@@ -1,0 +1,78 @@
+//! Errors as JavaScript programs like them: with a code to decide by and a message to show.
+
+use wasm_bindgen::JsValue;
+
+use crate::format::FormatError;
+use crate::relight::LightError;
+use crate::relight::backend::BackendError;
+
+/// Becomes a JavaScript `Error` with an extra property `code`.
+#[derive(Debug)]
+pub struct CodedError {
+    code: &'static str,
+    message: String,
+}
+
+impl CodedError {
+    pub(super) fn new(code: &'static str, message: impl Into<String>) -> Self {
+        Self {
+            code,
+            message: message.into(),
+        }
+    }
+
+    /// What kind of failure it is, in kebab case.
+    pub fn code(&self) -> &'static str {
+        self.code
+    }
+
+    /// What went wrong and what to do about it, in English.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+}
+
+impl From<CodedError> for JsValue {
+    fn from(error: CodedError) -> Self {
+        let thrown = js_sys::Error::new(&error.message);
+        // Fails only for objects that are frozen or no objects.
+        let _ = js_sys::Reflect::set(&thrown, &"code".into(), &error.code.into());
+        thrown.into()
+    }
+}
+
+impl From<FormatError> for CodedError {
+    fn from(error: FormatError) -> Self {
+        let code = match error {
+            FormatError::Magic { .. } => "format-magic",
+            FormatError::TextMode => "format-text-mode",
+            FormatError::Version { .. } => "format-version",
+            FormatError::Checksum { .. } => "format-checksum",
+            FormatError::Limit { .. } => "format-limit",
+            FormatError::Truncated { .. } => "format-truncated",
+            _ => "format-invalid",
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<LightError> for CodedError {
+    fn from(error: LightError) -> Self {
+        let code = match error {
+            LightError::Length { .. } => "light-size",
+            LightError::Value(_) => "light-value",
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<BackendError> for CodedError {
+    fn from(error: BackendError) -> Self {
+        let code = if error.is_loss() {
+            "backend-lost"
+        } else {
+            "backend-unavailable"
+        };
+        Self::new(code, error.to_string())
+    }
+}
