@@ -230,7 +230,7 @@ pub fn kkt_violation(gram: &[f64], h: &[f64], x: &[f64]) -> f64 {
     worst
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(target_arch = "wasm32")))] // where there is proptest
 mod tests {
     use proptest::prelude::*;
 

@@ -2,6 +2,8 @@
 #![allow(dead_code)] // each test binary uses its own part
 #![allow(clippy::unwrap_used)]
 
+pub mod relit;
+
 use relightable_photo::transport::{
     Correspondence, DirectTile, Extent, Geometry, Transport, TransportFunctions, Window,
 };

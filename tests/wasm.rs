@@ -1,0 +1,406 @@
+//! The JavaScript surface in a real browser: a file is decoded, and each back end draws it into a
+//! canvas, which is read back and compared with the double precision reference.
+//!
+//! Runs under wasm-bindgen-test-runner with ChromeDriver. The flags in webdriver.json give WebGL2
+//! and WebGPU on machines without a GPU, by SwiftShader; without the two about Vulkan, Chromium
+//! has a WebGPU device but no canvas for it.
+#![cfg(target_arch = "wasm32")]
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use common::relit;
+use js_sys::{Object, Reflect};
+use relightable_photo::format::{self, EncodedTile, Metadata};
+use relightable_photo::relight::{Rgba8Picture, reference};
+use relightable_photo::transport::{Extent, Geometry, Transport};
+use relightable_photo::web::{CodedError, Decoder, Light, Photo, Relighter};
+use wasm_bindgen::convert::TryFromJsValue;
+use wasm_bindgen::{JsCast, JsValue};
+use wasm_bindgen_futures::JsFuture;
+use wasm_bindgen_test::{wasm_bindgen_test, wasm_bindgen_test_configure};
+use web_sys::{CanvasRenderingContext2d, HtmlCanvasElement};
+
+wasm_bindgen_test_configure!(run_in_browser);
+
+const BACKENDS: [&str; 3] = ["cpu", "webgl2", "webgpu"];
+
+fn geometry(
+    camera: [u32; 2],
+    light: [u32; 2],
+    window: u32,
+    tile_side: u32,
+    affine: [[f64; 3]; 2],
+) -> Geometry {
+    Geometry {
+        tile_side,
+        ..common::geometry(camera, light, window, affine)
+    }
+}
+
+/// Sizes that no tile divides, windows smaller and larger than the display, correspondences that
+/// turn and shift so that windows hang over every edge, more codes than one texture layer holds,
+/// windows that miss the display.
+fn geometries() -> [Geometry; 6] {
+    [
+        geometry(
+            [37, 23],
+            [19, 14],
+            15,
+            16,
+            [[0.55, -0.12, -1.3], [0.1, 0.6, 0.4]],
+        ),
+        geometry(
+            [40, 9],
+            [13, 21],
+            1,
+            8,
+            [[0.4, 0.2, -2.0], [-0.3, 1.9, 6.6]],
+        ),
+        geometry(
+            [11, 30],
+            [9, 7],
+            17,
+            8,
+            [[-0.8, 0.0, 8.9], [0.0, 0.25, -0.75]],
+        ),
+        geometry(
+            [64, 64],
+            [32, 32],
+            15,
+            32,
+            [[0.0, 0.7, -6.2], [-0.7, 0.0, 38.1]],
+        ),
+        // The second texture layer begins at the middle element of pixel (16, 92)'s window, its
+        // brightest by far.
+        geometry(
+            [152, 140],
+            [64, 64],
+            15,
+            32,
+            [[0.43, 0.0, 0.0], [0.0, 0.45, 0.0]],
+        ),
+        geometry([8, 12], [6, 5], 3, 8, [[0.0, 0.0, 1e300], [0.0, 0.4, 0.0]]),
+    ]
+}
+
+/// The transport of one of the [`geometries`].
+fn transport(i: usize) -> Transport {
+    let geometry = geometries()[i];
+    let mut transport = relit::asymmetric_transport(geometry, i as u64);
+    if geometry.camera.area() > 10_000 {
+        // Dark tiles spare a minute of compression. A column of them stays lit from the first
+        // texture layer to the last.
+        let across = geometry.tile_grid().width as usize;
+        for (i, tile) in transport.tiles.iter_mut().enumerate() {
+            if i % across > 0 {
+                tile.codes.fill([0; 4]);
+            }
+        }
+    }
+    transport
+}
+
+/// Lets the browser, and the driver of this test, have their turn.
+async fn pause() {
+    let later = js_sys::Promise::new(&mut |resolve, _| {
+        let window = web_sys::window().unwrap();
+        window
+            .set_timeout_with_callback_and_timeout_and_arguments_0(&resolve, 0)
+            .unwrap();
+    });
+    JsFuture::from(later).await.unwrap();
+}
+
+fn file(transport: &Transport, metadata: &Metadata) -> Vec<u8> {
+    let geometry = &transport.geometry;
+    let encode = |tile| EncodedTile::new(geometry, tile).unwrap();
+    let tiles: Vec<_> = transport.tiles.iter().map(encode).collect();
+    let mut bytes = Vec::new();
+    format::write(geometry, metadata, &tiles, &mut bytes).unwrap();
+    bytes
+}
+
+fn decode(bytes: &[u8], piece: usize) -> Result<Photo, CodedError> {
+    let mut decoder = Decoder::new(None);
+    for piece in bytes.chunks(piece) {
+        decoder.feed(piece)?;
+    }
+    decoder.finish()
+}
+
+fn photo(transport: &Transport) -> Photo {
+    decode(&file(transport, &Metadata::default()), 1 << 16).unwrap()
+}
+
+fn new_canvas() -> HtmlCanvasElement {
+    let document = web_sys::window().unwrap().document().unwrap();
+    let canvas = document.create_element("canvas").unwrap();
+    document
+        .document_element()
+        .unwrap()
+        .append_child(&canvas)
+        .unwrap();
+    canvas.unchecked_into()
+}
+
+async fn relighter(
+    backend: &str,
+    photo: &Photo,
+    canvas: &HtmlCanvasElement,
+) -> Result<Relighter, JsValue> {
+    let promise = Relighter::create(backend.into(), photo, canvas.clone());
+    JsFuture::from(promise)
+        .await
+        .map(|value| Relighter::try_from_js_value(value).expect("a Relighter"))
+}
+
+/// The canvas as a page gets it by `drawImage`, in the task that rendered it.
+fn read_back(canvas: &HtmlCanvasElement) -> Rgba8Picture {
+    let copy = new_canvas();
+    copy.set_width(canvas.width());
+    copy.set_height(canvas.height());
+    let context = copy.get_context("2d").unwrap().unwrap();
+    let context: CanvasRenderingContext2d = context.unchecked_into();
+    // Transparency would show as red.
+    context.set_fill_style_str("red");
+    let (width, height) = (canvas.width(), canvas.height());
+    context.fill_rect(0.0, 0.0, f64::from(width), f64::from(height));
+    context
+        .draw_image_with_html_canvas_element(canvas, 0.0, 0.0)
+        .unwrap();
+    let data = context.get_image_data(0.0, 0.0, f64::from(width), f64::from(height));
+    let bytes = data.unwrap().data();
+    copy.remove();
+    Rgba8Picture {
+        extent: Extent { width, height },
+        pixels: bytes.as_chunks().0.to_vec(),
+    }
+}
+
+#[track_caller]
+fn code_of(thrown: &JsValue) -> String {
+    assert!(thrown.is_instance_of::<js_sys::Error>(), "{thrown:?}");
+    let message = thrown.unchecked_ref::<js_sys::Error>().message();
+    assert!(message.length() > 10, "a message that helps: {message}");
+    let code = Reflect::get(thrown, &"code".into()).unwrap();
+    code.as_string().expect("a code")
+}
+
+#[track_caller]
+fn coded<T>(result: Result<T, CodedError>) -> String {
+    code_of(&result.err().expect("an error").into())
+}
+
+async fn assert_backend_draws_the_reference(backend: &str) {
+    for (i, geometry) in geometries().into_iter().enumerate() {
+        let transport = transport(i);
+        let photo = photo(&transport);
+        let canvas = new_canvas();
+        let mut relighter = relighter(backend, &photo, &canvas).await.unwrap();
+        assert_eq!(relighter.backend(), backend);
+        for (j, (name, light)) in relit::lights(geometry.light).into_iter().enumerate() {
+            let values: Vec<f32> = light
+                .elements()
+                .iter()
+                .flat_map(|e| [e[0], e[1], e[2]])
+                .collect();
+            let web_light = Light::from_linear_rgb(&photo, &values).unwrap();
+            let exposure = [1.0, 0.4, 2.5][j % 3];
+            relighter.render(&web_light, exposure).unwrap();
+            let want = reference::relight_srgb8(&transport, &light, exposure);
+            let what = format!("{backend} ({}), geometry {i}, {name}", relighter.kernel());
+            relit::assert_within_one_code(&read_back(&canvas), &want, &what);
+            pause().await;
+        }
+        canvas.remove();
+    }
+}
+
+#[wasm_bindgen_test]
+async fn cpu_draws_the_reference() {
+    assert_backend_draws_the_reference("cpu").await;
+}
+
+#[wasm_bindgen_test]
+async fn webgl2_draws_the_reference() {
+    assert_backend_draws_the_reference("webgl2").await;
+}
+
+#[wasm_bindgen_test]
+async fn webgpu_draws_the_reference() {
+    assert_backend_draws_the_reference("webgpu").await;
+}
+
+#[wasm_bindgen_test]
+async fn built_in_lights_reach_the_canvas_by_name() {
+    let transport = transport(0);
+    let photo = photo(&transport);
+    let canvas = new_canvas();
+    let mut relighter = relighter("cpu", &photo, &canvas).await.unwrap();
+    for (name, light) in relit::lights(transport.geometry.light) {
+        match Light::builtin(&photo, name) {
+            Ok(built_in) => relighter.render(&built_in, 1.0).unwrap(),
+            Err(error) => {
+                assert_eq!((name, error.code()), ("random", "light-name"));
+                assert!(error.message().contains("spectrum"), "{}", error.message());
+                continue;
+            }
+        }
+        let want = reference::relight_srgb8(&transport, &light, 1.0);
+        relit::assert_within_one_code(&read_back(&canvas), &want, name);
+    }
+}
+
+#[wasm_bindgen_test]
+async fn the_torch_stands_behind_the_point_of_the_picture_under_the_pointer() {
+    // A quarter turn: picture (x, y) lies before light (y, 1 - x).
+    let affine = [[0.0, 0.5, 0.0], [-0.5, 0.0, 16.0]];
+    let geometry = geometry([32, 32], [16, 16], 3, 8, affine);
+    let photo = photo(&relit::asymmetric_transport(geometry, 4));
+    let canvas = new_canvas();
+    let mut relighter = relighter("cpu", &photo, &canvas).await.unwrap();
+    for (x, y) in [(0.25, 0.75), (0.5, 0.5), (0.8, 0.2)] {
+        let torch = Light::torch(&photo, x, y, Some(0.1)).unwrap();
+        relighter.render(&torch, 1.0).unwrap();
+        let picture = read_back(&canvas);
+        let (mut at, mut all) = ([0.0; 2], 0.0);
+        for (i, [r, ..]) in picture.pixels.iter().enumerate() {
+            let weight = f64::from(*r).powi(4);
+            at[0] += weight * ((i % 32) as f64 + 0.5) / 32.0;
+            at[1] += weight * ((i / 32) as f64 + 0.5) / 32.0;
+            all += weight;
+        }
+        let off = (at[0] / all - x).hypot(at[1] / all - y);
+        assert!(off < 0.05, "torch at ({x}, {y}) shows {off} off");
+    }
+    for (x, y, size) in [
+        (f64::NAN, 0.5, 0.1),
+        (0.5, f64::INFINITY, 0.1),
+        (0.5, 0.5, 0.0),
+        (0.5, 0.5, f64::NAN),
+    ] {
+        assert_eq!(coded(Light::torch(&photo, x, y, Some(size))), "light-value");
+    }
+}
+
+#[wasm_bindgen_test]
+fn a_file_decodes_in_pieces_of_any_size() {
+    let metadata = Metadata {
+        writer: "test".into(),
+        ..Metadata::default()
+    };
+    let bytes = file(&transport(0), &metadata);
+    for piece in [1, 777, bytes.len()] {
+        let photo = decode(&bytes, piece).unwrap();
+        assert_eq!((photo.width(), photo.height()), (37, 23));
+        assert_eq!((photo.light_width(), photo.light_height()), (19, 14));
+        assert_eq!(photo.decoded_bytes(), (37 * 23 * 225 * 8) as f64);
+        assert!(photo.metadata().contains(r#""writer":"test""#));
+    }
+    let mut decoder = Decoder::new(None);
+    assert_eq!((decoder.bytes_fed(), decoder.file_bytes()), (0.0, None));
+    decoder.feed(&bytes[..500]).unwrap();
+    let whole = Some(bytes.len() as f64);
+    assert_eq!((decoder.bytes_fed(), decoder.file_bytes()), (500.0, whole));
+}
+
+#[wasm_bindgen_test]
+fn every_bad_file_has_its_code() {
+    let good = file(&transport(0), &Metadata::default());
+    let damaged = |at: usize, to: u8| {
+        let mut bytes = good.clone();
+        bytes[at] = to;
+        coded(decode(&bytes, 4096))
+    };
+    assert_eq!(
+        coded(decode(b"<!doctype html><title>404</title>", 9)),
+        "format-magic"
+    );
+    assert_eq!(damaged(8, b'\n'), "format-text-mode");
+    assert_eq!(damaged(12, 9), "format-version");
+    assert_eq!(damaged(20, 99), "format-checksum");
+    assert_eq!(
+        damaged(good.len() - 3, !good[good.len() - 3]),
+        "format-checksum"
+    );
+    assert_eq!(
+        coded(decode(&good[..good.len() - 1], 4096)),
+        "format-truncated"
+    );
+    assert_eq!(coded(decode(&[], 1)), "format-truncated");
+    assert_eq!(
+        coded(decode(&[&good[..], b"more"].concat(), 4096)),
+        "format-invalid"
+    );
+    assert_eq!(coded(Decoder::new(Some(1e6)).feed(&good)), "format-limit");
+}
+
+#[wasm_bindgen_test]
+async fn lights_and_exposures_that_cannot_be_are_refused() {
+    let [one, other] = [0, 1].map(|i| photo(&transport(i)));
+    assert_eq!(coded(Light::from_linear_rgb(&one, &[1.0; 5])), "light-size");
+    let mut values = vec![1.0; 19 * 14 * 3];
+    values[30] = -1.0;
+    assert_eq!(coded(Light::from_linear_rgb(&one, &values)), "light-value");
+    for backend in BACKENDS {
+        let mut relighter = relighter(backend, &one, &new_canvas()).await.unwrap();
+        let foreign = Light::builtin(&other, "flood").unwrap();
+        assert_eq!(coded(relighter.render(&foreign, 1.0)), "light-size");
+        let own = Light::builtin(&one, "flood").unwrap();
+        for exposure in [f64::NAN, f64::INFINITY, -1.0] {
+            assert_eq!(coded(relighter.render(&own, exposure)), "light-value");
+        }
+        relighter.render(&own, 1.0).unwrap();
+    }
+}
+
+#[wasm_bindgen_test]
+async fn a_canvas_in_use_and_an_unknown_name_are_refused() {
+    let photo = photo(&transport(0));
+    for (backend, used_for) in [("webgpu", "2d"), ("webgl2", "2d"), ("cpu", "webgl2")] {
+        let canvas = new_canvas();
+        let taken: Option<Object> = canvas.get_context(used_for).unwrap();
+        assert!(taken.is_some());
+        let thrown = relighter(backend, &photo, &canvas).await.err().unwrap();
+        assert_eq!(code_of(&thrown), "backend-unavailable");
+    }
+    let thrown = relighter("vulkan", &photo, &new_canvas())
+        .await
+        .err()
+        .unwrap();
+    assert_eq!(code_of(&thrown), "backend-unavailable");
+}
+
+#[wasm_bindgen_test]
+async fn a_photo_may_go_and_a_canvas_be_used_again() {
+    for backend in BACKENDS {
+        let canvas = new_canvas();
+        for transport in [0, 2].map(transport) {
+            let photo = photo(&transport);
+            let light = Light::builtin(&photo, "spectrum").unwrap();
+            let mut relighter = relighter(backend, &photo, &canvas).await.unwrap();
+            drop(photo);
+            relighter.render(&light, 1.0).unwrap();
+            let (_, light) = relit::lights(transport.geometry.light).swap_remove(4);
+            let want = reference::relight_srgb8(&transport, &light, 1.0);
+            relit::assert_within_one_code(&read_back(&canvas), &want, backend);
+        }
+    }
+}
+
+#[wasm_bindgen_test]
+async fn a_lost_webgl2_context_is_reported() {
+    let photo = photo(&transport(0));
+    let canvas = new_canvas();
+    let mut relighter = relighter("webgl2", &photo, &canvas).await.unwrap();
+    let light = Light::builtin(&photo, "flood").unwrap();
+    relighter.render(&light, 1.0).unwrap();
+    let gl = canvas.get_context("webgl2").unwrap().unwrap();
+    let gl: web_sys::WebGl2RenderingContext = gl.unchecked_into();
+    let extension = gl.get_extension("WEBGL_lose_context").unwrap().unwrap();
+    let lose = Reflect::get(&extension, &"loseContext".into()).unwrap();
+    let lose: js_sys::Function = lose.unchecked_into();
+    lose.call0(&extension).unwrap();
+    assert_eq!(coded(relighter.render(&light, 1.0)), "backend-lost");
+}
