@@ -110,6 +110,9 @@ fn what_is_wrong_is_said() {
         })
         .contains("text-mode")
     );
+    let mangled = [&file[..8], b"\n\x1A\n"].concat();
+    let error = decode(&mangled, 1).unwrap_err();
+    assert!(matches!(error, FormatError::TextMode), "{error}");
     assert!(message(&|f| f[12] = 1).contains("version 1.0"));
     assert!(message(&|f| f[20] ^= 1).contains("header is damaged"));
     assert!(message(&|f| f[HEADER_BYTES + 9] ^= 1).contains("directory is damaged"));

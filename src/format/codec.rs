@@ -31,20 +31,36 @@ pub(super) fn encode(tile: &DirectTile, area: usize) -> Result<Vec<u8>, FormatEr
     zstd::bulk::compress(&planes, LEVEL).map_err(FormatError::Compress)
 }
 
-/// Decompresses a tile's codes. The error is zstd's word for what is wrong.
+/// Why a tile's bytes give no tile.
+#[derive(Debug)]
+pub(super) enum TileError {
+    /// zstd's word for it, or the wrong length.
+    Damaged(String),
+    /// The system has no memory for this many bytes more.
+    Memory(usize),
+}
+
+/// Decompresses a tile's codes.
 pub(super) fn decode(
     bytes: &[u8],
     rect: TileRect,
     area: usize,
     step: [f32; CHANNELS],
-) -> Result<DirectTile, String> {
+) -> Result<DirectTile, TileError> {
     let pixels = rect.extent.area();
-    let mut codes: Vec<TexelCode> = vec![[0; 4]; pixels * area];
+    let mut codes: Vec<TexelCode> = Vec::new();
+    // A browser may refuse what the limits allow; that is an error, not the end of the page.
+    codes
+        .try_reserve_exact(pixels * area)
+        .map_err(|_| TileError::Memory(pixels * area * size_of::<TexelCode>()))?;
+    codes.resize(pixels * area, [0; 4]);
     if !bytes.is_empty() {
         let need = plane_bytes(rect, area);
-        let planes = zstd::bulk::decompress(bytes, need).map_err(|e| e.to_string())?;
+        let planes =
+            zstd::bulk::decompress(bytes, need).map_err(|e| TileError::Damaged(e.to_string()))?;
         if planes.len() != need {
-            return Err(format!("it has {} bytes, not {need}", planes.len()));
+            let reason = format!("it has {} bytes, not {need}", planes.len());
+            return Err(TileError::Damaged(reason));
         }
         let (low, high) = planes.split_at(need / 2);
         for c in 0..CHANNELS {

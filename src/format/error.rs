@@ -64,6 +64,14 @@ pub enum FormatError {
         /// Bytes allowed.
         limit: u64,
     },
+    /// The system refuses memory.
+    #[error(
+        "there is no memory for {need} more bytes of light transport; close other programs or tabs, or use a smaller file"
+    )]
+    Memory {
+        /// Bytes asked for.
+        need: usize,
+    },
     /// The file ended early.
     #[error(
         "the file is cut short: it ends after {got} of {need} bytes; copy or download it again"

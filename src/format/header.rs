@@ -131,15 +131,13 @@ impl Header {
 
 /// Tells a wrong file from a damaged one from the first bytes, however few.
 pub(super) fn check_magic(bytes: &[u8]) -> Result<(), FormatError> {
-    let n = bytes.len().min(MAGIC.len());
-    if bytes[..n] == MAGIC[..n] {
-        Ok(())
-    } else if n == MAGIC.len() && bytes[..8] == MAGIC[..8] {
-        Err(FormatError::TextMode)
-    } else {
-        Err(FormatError::Magic {
-            found: bytes[..n].to_vec(),
-        })
+    match bytes.iter().zip(&MAGIC).position(|(a, b)| a != b) {
+        None => Ok(()),
+        // Past the name: only the line ends that are there to catch this.
+        Some(8..) => Err(FormatError::TextMode),
+        Some(_) => Err(FormatError::Magic {
+            found: bytes[..bytes.len().min(MAGIC.len())].to_vec(),
+        }),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::codec::TileError;
 use super::error::Part;
 use super::header::{self, HEADER_BYTES, Header, TileEntry};
 use super::{FormatError, Limits, Metadata, codec};
@@ -205,11 +206,13 @@ impl Reader {
                 let geometry = &opened.header.geometry;
                 let area = geometry.window.area();
                 let tile = codec::decode(part, geometry.tile(i), area, entry.step);
-                self.tiles
-                    .push(tile.map_err(|reason| FormatError::Decompress {
+                self.tiles.push(tile.map_err(|error| match error {
+                    TileError::Damaged(reason) => FormatError::Decompress {
                         part: Part::Tile(i),
                         reason,
-                    })?);
+                    },
+                    TileError::Memory(need) => FormatError::Memory { need },
+                })?);
                 let next = i + 1;
                 Ok(if next < opened.entries.len() {
                     Stage::Tile(next)

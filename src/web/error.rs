@@ -48,7 +48,7 @@ impl From<FormatError> for CodedError {
             FormatError::TextMode => "format-text-mode",
             FormatError::Version { .. } => "format-version",
             FormatError::Checksum { .. } => "format-checksum",
-            FormatError::Limit { .. } => "format-limit",
+            FormatError::Limit { .. } | FormatError::Memory { .. } => "format-limit",
             FormatError::Truncated { .. } => "format-truncated",
             _ => "format-invalid",
         };
