@@ -1,0 +1,48 @@
+# Sourced by the other scripts, never run: where the tools are. Installs nothing and prints nothing;
+# a tool that is missing leaves its variable empty, for pkg-scripts/setup to deal with.
+
+REPO=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/relightable-photo
+
+# rustup's own place, for shells that were started before it was installed.
+[ -d "${CARGO_HOME:-$HOME/.cargo}/bin" ] && PATH="$PATH:${CARGO_HOME:-$HOME/.cargo}/bin"
+
+# The crate and the command of wasm-bindgen only work together at the same version.
+WASM_BINDGEN_VERSION=$(awk '/^name = "wasm-bindgen"$/ { getline; gsub(/version = |"/, ""); print; exit }' "$REPO/Cargo.lock")
+WASM_BINDGEN_ROOT=$CACHE/wasm-bindgen-$WASM_BINDGEN_VERSION
+PATH="$WASM_BINDGEN_ROOT/bin:$PATH"
+export PATH
+
+first_command() {
+  local name
+  for name; do
+    if command -v "$name"; then return; fi
+  done
+}
+
+clang_targets_wasm() {
+  # The header is part of the question: some packages of clang come without their own.
+  echo '#include <stddef.h>' |
+    "$1" --target=wasm32-unknown-unknown -ffreestanding -x c -c - -o /dev/null 2>/dev/null
+}
+
+# Prints a clang that can target wasm32 and the llvm-ar to go with it.
+find_wasm_c_tools() {
+  local version clang ar
+  for version in "" -22 -21 -20 -19 -18 -17 -16 -15 -14; do
+    clang=$(command -v "clang$version") || continue
+    clang_targets_wasm "$clang" || continue
+    ar=$(first_command "llvm-ar$version" llvm-ar llvm-ar-{22,21,20,19,18,17,16,15,14})
+    [ -n "$ar" ] && echo "$clang $ar" && return
+  done
+}
+
+# For the C code of zstd. Whoever sets these knows better.
+if [ -z "${CC_wasm32_unknown_unknown:-}" ] || [ -z "${AR_wasm32_unknown_unknown:-}" ]; then
+  read -r CC_wasm32_unknown_unknown AR_wasm32_unknown_unknown < <(find_wasm_c_tools) || true
+fi
+export CC_wasm32_unknown_unknown AR_wasm32_unknown_unknown
+
+CHROMIUM=${CHROMIUM:-$(first_command chromium chromium-browser google-chrome google-chrome-stable)}
+CHROMEDRIVER=${CHROMEDRIVER:-$(first_command chromedriver chromium.chromedriver)}
+export CHROMIUM CHROMEDRIVER

@@ -1,0 +1,66 @@
+/** Everything that can go wrong with a photograph, as codes that pages may rely on. */
+
+/** Codes this package's own TypeScript raises. */
+export type PageErrorCode =
+  /** An attribute has a value the element does not know. */
+  | 'attribute'
+  /** There is no `src`. */
+  | 'src-missing'
+  /** The server could not be reached, or its answer may not be read from this page. */
+  | 'http-network'
+  /** The server answered, but not with the file: 404 and the like. */
+  | 'http-status'
+  /** The server sent a web page in the file's place. */
+  | 'http-type'
+  /** The transfer ended before the whole file had come. */
+  | 'http-short'
+  /** Nothing came for a long time. */
+  | 'http-stalled'
+  /** The WebAssembly module beside the script could not be loaded. */
+  | 'wasm-unavailable'
+  /** Something was asked of a photograph that is not loaded yet. */
+  | 'not-loaded'
+  /** A fault in this software. */
+  | 'internal';
+
+/** Codes the WebAssembly module raises. */
+export type EngineErrorCode =
+  | 'format-magic'
+  | 'format-text-mode'
+  | 'format-version'
+  | 'format-checksum'
+  | 'format-invalid'
+  | 'format-limit'
+  | 'format-truncated'
+  | 'light-name'
+  | 'light-size'
+  | 'light-value'
+  | 'backend-unavailable'
+  | 'backend-lost';
+
+/** Any code; a newer WebAssembly module may add some. */
+export type ErrorCode = PageErrorCode | EngineErrorCode | (string & {});
+
+/** A failure with a code for programs and a message for people. */
+export class PhotoError extends Error {
+  readonly code: ErrorCode;
+
+  constructor(code: ErrorCode, message: string, cause?: unknown) {
+    super(message, cause === undefined ? undefined : { cause });
+    this.name = 'PhotoError';
+    this.code = code;
+  }
+}
+
+/** The message of anything thrown. */
+export function messageOf(thrown: unknown): string {
+  return thrown instanceof Error ? thrown.message : String(thrown);
+}
+
+/** Anything thrown as a `PhotoError`: those with a code keep it, others are faults of ours. */
+export function toPhotoError(thrown: unknown): PhotoError {
+  if (thrown instanceof PhotoError) return thrown;
+  const code = thrown instanceof Error ? (thrown as { code?: unknown }).code : undefined;
+  if (typeof code === 'string') return new PhotoError(code, messageOf(thrown), thrown);
+  return new PhotoError('internal', `Something went wrong inside: ${messageOf(thrown)}`, thrown);
+}

@@ -1,0 +1,72 @@
+/** The element's events. All bubble and cross shadow boundaries; none can be cancelled. */
+
+import type { Backend } from './engine.js';
+import type { ErrorCode, PhotoError } from './errors.js';
+import type { LightName, PicturePoint } from './settings.js';
+
+const TRAVELS: EventInit = { bubbles: true, composed: true };
+
+/** `load`: the photograph is there and drawn. */
+export function loadEvent(): Event {
+  return new Event('load', TRAVELS);
+}
+
+/** `progress`: more of the file has come; `total` is 0 until known. */
+export function progressEvent(loaded: number, total: number): ProgressEvent {
+  return new ProgressEvent('progress', { ...TRAVELS, loaded, total, lengthComputable: total > 0 });
+}
+
+/** `error`: something failed; the same message stands inside the element. */
+export class PhotoErrorEvent extends Event {
+  /** For programs. */
+  readonly code: ErrorCode;
+  /** For people. */
+  readonly message: string;
+  /** What was caught, where there was something. */
+  readonly cause: unknown;
+
+  constructor(error: PhotoError) {
+    super('error', TRAVELS);
+    this.code = error.code;
+    this.message = error.message;
+    this.cause = error.cause;
+  }
+}
+
+/** `lightchange`: the light is another, or the torch has moved. */
+export class LightChangeEvent extends Event {
+  readonly light: LightName;
+  /** Where a torch that was moved shines; `null` for one in the middle, and for other lights. */
+  readonly torch: PicturePoint | null;
+
+  constructor(light: LightName, torch: PicturePoint | null) {
+    super('lightchange', TRAVELS);
+    this.light = light;
+    this.torch = torch;
+  }
+}
+
+/** `backendchange`: a back end was taken up, the first one too. */
+export class BackendChangeEvent extends Event {
+  readonly backend: Backend;
+  /** The one it replaces, `null` for the first. */
+  readonly previous: Backend | null;
+  /** Why not the one before it or those preferred to it; empty where it was the first choice. */
+  readonly reason: string;
+
+  constructor(backend: Backend, previous: Backend | null, reason: string) {
+    super('backendchange', TRAVELS);
+    this.backend = backend;
+    this.previous = previous;
+    this.reason = reason;
+  }
+}
+
+/** Events by name, for typed listeners. */
+export interface RelightablePhotoEventMap extends HTMLElementEventMap {
+  load: Event;
+  progress: ProgressEvent<HTMLElement>;
+  error: PhotoErrorEvent & ErrorEvent;
+  lightchange: LightChangeEvent;
+  backendchange: BackendChangeEvent;
+}

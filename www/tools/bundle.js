@@ -1,0 +1,30 @@
+/** Bundles www/src into dist/relightable-photo.js and writes its types to dist/types. */
+
+import { execFileSync } from 'node:child_process';
+import { rmSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { join } from 'node:path';
+import { build } from 'esbuild';
+
+const repository = join(import.meta.dirname, '..', '..');
+
+await build({
+  absWorkingDir: repository,
+  entryPoints: { 'relightable-photo': 'www/src/index.ts' },
+  outdir: 'dist',
+  bundle: true,
+  format: 'esm',
+  target: 'es2022',
+  minify: true,
+  keepNames: true,
+  sourcemap: 'linked',
+  legalComments: 'none',
+  logLevel: 'warning',
+});
+
+rmSync(join(repository, 'dist/types'), { recursive: true, force: true });
+const tsc = createRequire(import.meta.url).resolve('typescript/package.json');
+execFileSync(process.execPath, [join(tsc, '../bin/tsc'), '-p', 'tsconfig.types.json'], {
+  cwd: repository,
+  stdio: 'inherit',
+});
