@@ -1,0 +1,31 @@
+/** Compiles www/src/*.test.ts and runs them in Node. */
+
+import { spawnSync } from 'node:child_process';
+import { readdirSync, rmSync } from 'node:fs';
+import { join } from 'node:path';
+import { build } from 'esbuild';
+
+const repository = join(import.meta.dirname, '..', '..');
+const source = join(repository, 'www/src');
+const out = join(repository, 'target/www-tests');
+const tests = readdirSync(source).filter((name) => name.endsWith('.test.ts'));
+
+rmSync(out, { recursive: true, force: true });
+await build({
+  entryPoints: tests.map((name) => join(source, name)),
+  outdir: out,
+  outExtension: { '.js': '.mjs' },
+  bundle: true,
+  format: 'esm',
+  platform: 'node',
+  target: 'node20',
+  sourcemap: 'inline',
+  logLevel: 'warning',
+});
+
+const files = tests.map((name) => join(out, name.replace(/\.ts$/, '.mjs')));
+const run = spawnSync(process.execPath, ['--enable-source-maps', '--test', ...files], {
+  cwd: repository,
+  stdio: 'inherit',
+});
+process.exitCode = run.status ?? 1;
