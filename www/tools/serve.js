@@ -43,7 +43,7 @@ export async function listen(handler, port) {
 }
 
 if (import.meta.url === pathToFileURL(process.argv[1] ?? '').href) {
-  const photos = resolve(process.argv[2] ?? 'target/demo');
+  const photos = resolve(process.argv[2] ?? 'target/demo/photos');
   const { url } = await listen(site({ photos }), Number(process.env['PORT'] ?? 8080));
   console.log(`Open ${url} in a browser. Stop with Ctrl-C.`);
 }

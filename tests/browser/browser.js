@@ -1,0 +1,201 @@
+/** One Chromium and one server for all tests, and what tests do with them. */
+
+import { after } from 'node:test';
+import { launchChromium } from '../../www/tools/chromium.js';
+import { decodePng } from '../../www/tools/pictures.js';
+import { listen } from '../../www/tools/serve.js';
+import { site } from '../../www/tools/site.js';
+import { FOLDER, glassBytes } from './photos.js';
+
+/** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
+/** @typedef {import('playwright-core').Page} Page */
+/** @typedef {{ type: string } & Record<string, unknown>} Happening an event, as data */
+
+const TRANSFER_PIECE = 1 << 14;
+
+/**
+ * Bad servers, by path.
+ *
+ * @type {Record<string, (response: import('node:http').ServerResponse) => unknown>}
+ */
+const FAULTS = {
+  '/faults/status': (response) => response.writeHead(503, 'Service Unavailable').end('later'),
+  '/faults/html': (response) =>
+    response.writeHead(200, { 'Content-Type': 'text/html' }).end('<h1>Please log in</h1>'),
+  // Says more than it sends, and closes.
+  '/faults/short': (response) => {
+    response.writeHead(200, { 'Content-Length': glassBytes.length });
+    response.write(glassBytes.subarray(0, glassBytes.length / 2), () => response.destroy());
+  },
+  // Chunked, so without a length, and cut in the middle.
+  '/faults/cut': (response) => {
+    response.writeHead(200);
+    response.write(glassBytes.subarray(0, glassBytes.length / 2), () => response.destroy());
+  },
+  // Without a length and without chunks, as HTTP/1.0 had it: a cut looks like an end.
+  '/faults/cut-silently': (response) => {
+    response.useChunkedEncodingByDefault = false;
+    response.shouldKeepAlive = false;
+    response.writeHead(200, { Connection: 'close' });
+    response.end(glassBytes.subarray(0, glassBytes.length / 2));
+  },
+  '/faults/no-answer': (response) => response.destroy(),
+  // Whole, but so slowly that tests can do things meanwhile.
+  '/faults/slow': async (response) => {
+    response.writeHead(200, { 'Content-Length': glassBytes.length });
+    for (let at = 0; at < glassBytes.length && !response.destroyed; at += TRANSFER_PIECE) {
+      response.write(glassBytes.subarray(at, at + TRANSFER_PIECE));
+      await new Promise((resolve) => setTimeout(resolve, 50));
+    }
+    response.end();
+  },
+  '/bench': (response) =>
+    response
+      .writeHead(200, { 'Content-Type': 'text/html' })
+      .end(
+        '<!doctype html><html lang="en"><title>Bench</title><style>body { margin: 0 }</style>' +
+          '<script type="module" src="/relightable-photo/relightable-photo.js"></script>',
+      ),
+};
+
+/** Paths of transfers that the client ended. */
+export const aborted = /** @type {string[]} */ ([]);
+
+const serveSite = site({ photos: FOLDER });
+const server = await listen((request, response) => {
+  const path = request.url ?? '/';
+  response.on('close', () => {
+    if (!response.writableFinished) aborted.push(path);
+  });
+  const fault = FAULTS[path];
+  if (fault) fault(response);
+  else serveSite(request, response);
+}, 0);
+const chromium = await launchChromium();
+
+after(async () => {
+  await chromium.close();
+  await server.close();
+});
+
+export const origin = server.url.replace(/\/$/, '');
+
+/**
+ * A page of its own, closed when the test ends. Anything a page throws or a policy refuses fails it.
+ *
+ * @param {import('node:test').TestContext} test
+ * @param {string} path
+ * @param {import('playwright-core').BrowserContextOptions & { before?: () => void }} [options]
+ *   `before` runs in the page before its own scripts
+ */
+export async function openPage(test, path, { before, ...options } = {}) {
+  const context = await chromium.newContext({ baseURL: origin, ...options });
+  const page = await context.newPage();
+  /** @type {string[]} */
+  const faults = [];
+  page.on('pageerror', (error) => faults.push(String(error)));
+  page.on('console', (message) => {
+    if (/Content Security Policy|panicked/.test(message.text())) faults.push(message.text());
+  });
+  test.after(async () => {
+    await context.close();
+    if (faults.length > 0) throw new Error(`the page complained:\n${faults.join('\n')}`);
+  });
+  if (before) await page.addInitScript(before);
+  await page.goto(path);
+  return page;
+}
+
+/**
+ * Puts an element with these attributes into a bench page and records its events.
+ *
+ * @param {Page} page
+ * @param {Record<string, string>} attributes
+ */
+export async function mount(page, attributes) {
+  await page.evaluate(async (attributes) => {
+    await customElements.whenDefined('relightable-photo');
+    const photo = document.createElement('relightable-photo');
+    /** @type {Happening[]} */
+    const happened = [];
+    for (const type of ['load', 'progress', 'error', 'lightchange', 'backendchange']) {
+      // On the document: events have to travel that far.
+      document.addEventListener(type, (event) => {
+        const fields = ['code', 'message', 'backend', 'previous', 'reason', 'light', 'torch'];
+        const data = [...fields, 'loaded', 'total']
+          .filter((field) => field in event)
+          .map((field) => [field, /** @type {any} */ (event)[field]]);
+        happened.push({ type, ...Object.fromEntries(data) });
+      });
+    }
+    Object.assign(globalThis, { photo, happened });
+    for (const [name, value] of Object.entries(attributes)) photo.setAttribute(name, value);
+    photo.style.width = '64px';
+    document.body.append(photo);
+  }, attributes);
+}
+
+/**
+ * Waits until an event of this type has happened, and gives all that have, from the first on.
+ *
+ * @param {Page} page
+ * @param {string} type
+ * @param {number} [times]
+ * @returns {Promise<Happening[]>}
+ */
+export async function happenedUntil(page, type, times = 1) {
+  await page.waitForFunction(
+    ([type, times]) => {
+      const { happened } = /** @type {any} */ (globalThis);
+      return happened.filter((/** @type {Happening} */ e) => e.type === type).length >= times;
+    },
+    /** @type {const} */ ([type, times]),
+  );
+  return page.evaluate('happened');
+}
+
+/**
+ * Waits for `load`. An error in its place is thrown.
+ *
+ * @param {Page} page
+ */
+export async function loaded(page) {
+  await page.waitForFunction(() => {
+    const { happened } = /** @type {any} */ (globalThis);
+    return happened.some((/** @type {Happening} */ e) => e.type === 'load' || e.type === 'error');
+  });
+  /** @type {Happening[]} */
+  const happened = await page.evaluate('happened');
+  const error = happened.find((event) => event.type === 'error');
+  if (error) throw new Error(`${error['code']}: ${error['message']}`);
+  return happened;
+}
+
+/**
+ * Sets attributes and takes the exact picture.
+ *
+ * @param {Page} page
+ * @param {Record<string, string>} [attributes]
+ * @param {{ x: number, y: number } | null} [torch]
+ */
+export async function picture(page, attributes = {}, torch) {
+  const url = await page.evaluate(
+    async ({ attributes, torch }) => {
+      const photo = /** @type {RelightablePhoto} */ (document.querySelector('relightable-photo'));
+      for (const [name, value] of Object.entries(attributes)) photo.setAttribute(name, value);
+      if (torch !== undefined) photo.torch = torch;
+      const blob = await photo.toBlob();
+      const reader = new FileReader();
+      reader.readAsDataURL(blob);
+      await new Promise((resolve) => reader.addEventListener('load', resolve));
+      return String(reader.result);
+    },
+    { attributes, torch },
+  );
+  return decodePng(Buffer.from(url.slice(url.indexOf(',') + 1), 'base64'));
+}
+
+/** The element's visible message, as people and screen readers get it. @param {Page} page */
+export function message(page) {
+  return page.getByRole('alert');
+}

@@ -1,0 +1,124 @@
+/** A back end that cannot be had, or goes away, is replaced by the next. */
+
+import assert from 'node:assert/strict';
+import { describe, test } from 'node:test';
+import { compare } from '../../www/tools/pictures.js';
+import { happenedUntil, loaded, message, mount, openPage, picture } from './browser.js';
+import { nativePicture } from './photos.js';
+
+const GLASS = { src: '/photos/glass.ltm', light: 'spectrum' };
+
+const withoutWebGpu = () => {
+  Object.defineProperty(Navigator.prototype, 'gpu', { get: () => undefined });
+};
+const withoutGpus = () => {
+  Object.defineProperty(Navigator.prototype, 'gpu', { get: () => undefined });
+  const { getContext } = HTMLCanvasElement.prototype;
+  HTMLCanvasElement.prototype.getContext = /** @type {any} */ (
+    /** @this {HTMLCanvasElement} @param {string} kind @param {any[]} rest */
+    function (kind, ...rest) {
+      return kind === 'webgl2' ? null : Reflect.apply(getContext, this, [kind, ...rest]);
+    }
+  );
+};
+
+/** @param {import('./browser.js').Happening[]} happened */
+const changes = (happened) => happened.filter((event) => event.type === 'backendchange');
+
+/** @param {import('playwright-core').Page} page */
+async function drawsRight(page) {
+  assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
+}
+
+describe('falling back', () => {
+  test('without WebGPU to WebGL2', async (t) => {
+    const page = await openPage(t, '/bench', { before: withoutWebGpu });
+    await mount(page, GLASS);
+    const [change] = changes(await loaded(page));
+    assert.equal(change?.['backend'], 'webgl2');
+    assert.match(String(change?.['reason']), /^WebGPU: /);
+    await drawsRight(page);
+  });
+
+  test('without WebGPU and WebGL2 to the CPU', async (t) => {
+    const page = await openPage(t, '/bench', { before: withoutGpus });
+    await mount(page, GLASS);
+    const [change] = changes(await loaded(page));
+    assert.equal(change?.['backend'], 'cpu');
+    assert.match(String(change?.['reason']), /WebGPU: .*WebGL2: /);
+    await drawsRight(page);
+  });
+
+  test('in the order that is asked for', async (t) => {
+    const page = await openPage(t, '/bench');
+    await mount(page, { ...GLASS, backend: 'cpu webgpu' });
+    assert.equal(changes(await loaded(page))[0]?.['backend'], 'cpu');
+  });
+
+  test('to nothing is an error that can be read, and mended', async (t) => {
+    const page = await openPage(t, '/bench', { before: withoutGpus });
+    await mount(page, { ...GLASS, backend: 'webgpu webgl2' });
+    const happened = await happenedUntil(page, 'error');
+    assert.equal(happened.at(-1)?.['code'], 'backend-unavailable');
+    await message(page).getByText('This browser cannot draw the photograph').waitFor();
+    await page.evaluate("photo.backend = 'webgpu webgl2 cpu'");
+    await happenedUntil(page, 'load');
+    await message(page).waitFor({ state: 'hidden' });
+    await drawsRight(page);
+  });
+
+  test('when WebGL2 is taken away', async (t) => {
+    const page = await openPage(t, '/bench');
+    await mount(page, { ...GLASS, backend: 'webgl2 cpu' });
+    await loaded(page);
+    await page.evaluate(
+      "photo.shadowRoot.querySelector('canvas').getContext('webgl2').getExtension('WEBGL_lose_context').loseContext()",
+    );
+    const change = changes(await happenedUntil(page, 'backendchange', 2)).at(-1);
+    assert.equal(change?.['backend'], 'cpu');
+    assert.equal(change?.['previous'], 'webgl2');
+    assert.match(String(change?.['reason']), /WebGL2 was lost/);
+    await drawsRight(page);
+  });
+
+  test('when the WebGPU device is lost', async (t) => {
+    const page = await openPage(t, '/bench', {
+      before: () => {
+        const adapter = /** @type {any} */ (globalThis).GPUAdapter.prototype;
+        const { requestDevice } = adapter;
+        adapter.requestDevice = /** @this {any} @param {any[]} options */ async function (
+          ...options
+        ) {
+          const device = await Reflect.apply(requestDevice, this, options);
+          Object.assign(globalThis, { device });
+          return device;
+        };
+      },
+    });
+    await mount(page, { ...GLASS, light: 'flood', backend: 'webgpu webgl2 cpu' });
+    await loaded(page);
+    await page.evaluate("device.destroy(), device.lost.then(() => { photo.light = 'spectrum' })");
+    const change = changes(await happenedUntil(page, 'backendchange', 2)).at(-1);
+    assert.equal(change?.['previous'], 'webgpu');
+    assert.equal(change?.['backend'], 'webgl2');
+    await drawsRight(page);
+  });
+
+  test('and back, while the page runs', async (t) => {
+    const page = await openPage(t, '/bench');
+    await mount(page, { ...GLASS, backend: 'cpu' });
+    await loaded(page);
+    for (const backend of ['webgl2', 'webgpu', 'cpu']) {
+      const before = (await page.evaluate('happened')).length;
+      await page.evaluate((backend) => {
+        /** @type {any} */ (globalThis).photo.backend = backend;
+      }, backend);
+      await page.waitForFunction(
+        (n) => /** @type {any} */ (globalThis).happened.length > n,
+        before,
+      );
+      assert.equal(await page.evaluate('photo.activeBackend'), backend);
+      await drawsRight(page);
+    }
+  });
+});

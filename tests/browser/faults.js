@@ -1,0 +1,102 @@
+/** Every failure ends in an event with a code and a message on the screen. */
+
+import assert from 'node:assert/strict';
+import { describe, test } from 'node:test';
+import { happenedUntil, loaded, message, mount, openPage } from './browser.js';
+import { DAMAGED } from './photos.js';
+
+/** @param {import('playwright-core').Page} page @param {string} code */
+async function failsWith(page, code) {
+  const error = (await happenedUntil(page, 'error')).find((event) => event.type === 'error');
+  assert.equal(error?.['code'], code, String(error?.['message']));
+  const text = String(error?.['message']);
+  assert.match(text, /\S+ \S+ \S+/, 'a message people can read');
+  await message(page).getByText(text, { exact: true }).waitFor({ state: 'visible' });
+  await page.getByRole('progressbar').waitFor({ state: 'hidden' });
+  return text;
+}
+
+/** @type {[what: string, src: string, code: string, message: RegExp][]} */
+const ANSWERS = [
+  ['404', '/photos/absent.ltm', 'http-status', /absent\.ltm .*404/],
+  ['503', '/faults/status', 'http-status', /503 Service Unavailable/],
+  ['a web page', '/faults/html', 'http-type', /text\/html/],
+  ['a body shorter than promised', '/faults/short', 'http-short', /incomplete/],
+  ['a body that is cut', '/faults/cut', 'http-short', /incomplete/],
+  [
+    'a body without a length that is cut',
+    '/faults/cut-silently',
+    'http-short',
+    /incomplete.* of \d+ bytes/,
+  ],
+  ['nothing at all', '/faults/no-answer', 'http-network', /cannot be reached/],
+  // Nothing listens on port 9 of this machine.
+  ['no server', 'http://127.0.0.1:9/window.ltm', 'http-network', /window\.ltm .*cannot be reached/],
+];
+
+describe('a server that answers with', () => {
+  for (const [what, src, code, text] of ANSWERS) {
+    test(`${what} is ${code}`, async (t) => {
+      const page = await openPage(t, '/bench');
+      await mount(page, { src });
+      assert.match(await failsWith(page, code), text);
+    });
+  }
+});
+
+describe('a file that is', () => {
+  for (const [name, code] of Object.entries(DAMAGED)) {
+    test(`${name.replace('.ltm', '')} is ${code}`, async (t) => {
+      const page = await openPage(t, '/bench');
+      await mount(page, { src: `/photos/${name}` });
+      await failsWith(page, code);
+    });
+  }
+});
+
+describe('an attribute that is', () => {
+  /** @type {[what: string, attributes: Record<string, string>, code: string, message: RegExp][]} */
+  const cases = [
+    ['an unknown light', { src: '/photos/glass.ltm', light: 'moon' }, 'attribute', /“moon”/],
+    ['an unknown back end', { src: '/photos/glass.ltm', backend: 'gpu' }, 'attribute', /“gpu”/],
+    ['no exposure', { src: '/photos/glass.ltm', exposure: 'much' }, 'attribute', /“much”/],
+    ['no address', { src: 'http://[' }, 'attribute', /“http:\/\/\[”/],
+    ['a missing src', {}, 'src-missing', /src is not set/],
+  ];
+  for (const [what, attributes, code, text] of cases) {
+    test(`${what} is ${code}`, async (t) => {
+      const page = await openPage(t, '/bench');
+      await mount(page, attributes);
+      assert.match(await failsWith(page, code), text);
+    });
+  }
+
+  test('wrong for a while leaves the picture, and its message goes once it is right', async (t) => {
+    const page = await openPage(t, '/bench');
+    await mount(page, { src: '/photos/glass.ltm', light: 'flood' });
+    await loaded(page);
+    await page.evaluate("photo.light = 'moon'");
+    await failsWith(page, 'attribute');
+    assert.equal(await page.locator('relightable-photo canvas').count(), 1);
+    await page.evaluate("photo.light = 'stripes'");
+    await message(page).waitFor({ state: 'hidden' });
+    const happened = await page.evaluate('happened');
+    assert.equal(happened.filter((/** @type {any} */ e) => e.type === 'error').length, 1);
+  });
+});
+
+describe('a page that is', () => {
+  test('without the wasm folder is wasm-unavailable', async (t) => {
+    const page = await openPage(t, '/bench');
+    await page.route('**/wasm/*', (route) => route.fulfill({ status: 404, body: 'gone' }));
+    await mount(page, { src: '/photos/glass.ltm' });
+    await failsWith(page, 'wasm-unavailable');
+  });
+
+  test('asking for a picture too early is told so', async (t) => {
+    const page = await openPage(t, '/bench');
+    await mount(page, { src: '/faults/slow' });
+    const code = await page.evaluate('photo.toBlob().catch((error) => error.code)');
+    assert.equal(code, 'not-loaded');
+  });
+});

@@ -1,0 +1,8 @@
+/** All browser tests, in one process, as they share one Chromium and one server. */
+
+import './relighting.js';
+import './torch.js';
+import './fallback.js';
+import './faults.js';
+import './lifetime.js';
+import './page.js';

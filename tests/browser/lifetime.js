@@ -1,0 +1,143 @@
+/** Elements come, change and go at any time. */
+
+import assert from 'node:assert/strict';
+import { describe, test } from 'node:test';
+import { compare } from '../../www/tools/pictures.js';
+import { aborted, happenedUntil, loaded, mount, openPage, picture } from './browser.js';
+import { glassBytes, nativePicture } from './photos.js';
+
+/** @param {import('./browser.js').Happening[]} happened @param {string} type */
+const count = (happened, type) => happened.filter((event) => event.type === type).length;
+
+/** Waits for something this process sees, not the page. @param {() => boolean} condition */
+async function until(condition) {
+  while (!condition()) await new Promise((resolve) => setTimeout(resolve, 20));
+}
+
+describe('an element', () => {
+  test('tells its progress up to the whole file', async (t) => {
+    const page = await openPage(t, '/bench');
+    await mount(page, { src: '/faults/slow', backend: 'cpu' });
+    await happenedUntil(page, 'progress');
+    await page.getByRole('progressbar', { name: 'Loading the photograph' }).waitFor();
+    const progress = (await loaded(page)).filter((event) => event.type === 'progress');
+    assert.ok(progress.length > 2, `${progress.length} events`);
+    const sizes = progress.map((event) => Number(event['loaded']));
+    assert.deepEqual(
+      sizes,
+      [...sizes].sort((a, b) => a - b),
+    );
+    assert.equal(sizes.at(-1), glassBytes.length);
+    assert.ok(progress.every((event) => event['total'] === glassBytes.length));
+    await page.getByRole('progressbar').waitFor({ state: 'hidden' });
+  });
+
+  test('given another src in the middle of a load drops the first', async (t) => {
+    const page = await openPage(t, '/bench');
+    aborted.length = 0;
+    await mount(page, { src: '/faults/slow', backend: 'cpu', light: 'spectrum' });
+    await happenedUntil(page, 'progress');
+    await page.evaluate("photo.src = '/photos/glass.ltm'");
+    const happened = await loaded(page);
+    assert.equal(count(happened, 'load'), 1);
+    await until(() => aborted.includes('/faults/slow'));
+    assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
+  });
+
+  test('removed in the middle of a load ends the transfer, says nothing, and comes back', async (t) => {
+    const page = await openPage(t, '/bench');
+    aborted.length = 0;
+    await mount(page, { src: '/faults/slow', backend: 'cpu' });
+    await happenedUntil(page, 'progress');
+    await page.evaluate('photo.remove()');
+    await until(() => aborted.includes('/faults/slow'));
+    assert.equal(count(await page.evaluate('happened'), 'error'), 0);
+    await page.evaluate("photo.src = '/photos/glass.ltm', document.body.append(photo)");
+    await loaded(page);
+  });
+
+  test('moved within the page is not loaded again', async (t) => {
+    const page = await openPage(t, '/bench');
+    await mount(page, { src: '/photos/glass.ltm', backend: 'cpu' });
+    await loaded(page);
+    await page.evaluate("document.body.append(document.createElement('hr'), photo)");
+    await picture(page, { light: 'stripes' });
+    assert.equal(count(await page.evaluate('happened'), 'load'), 1);
+  });
+
+  for (const backend of ['webgpu', 'webgl2', 'cpu']) {
+    test(`leaves no memory behind on ${backend}`, async (t) => {
+      const page = await openPage(t, '/bench');
+      await mount(page, { src: '/photos/glass.ltm', backend });
+      await loaded(page);
+      const growth = await page.evaluate(async () => {
+        const { photo } = /** @type {any} */ (globalThis);
+        const module = '/relightable-photo/wasm/relightable_photo.js';
+        const { memory } = await (await import(module)).default();
+        const bytes = () => memory.buffer.byteLength;
+        const again = async () => {
+          photo.remove();
+          await new Promise((resolve) => setTimeout(resolve));
+          const load = new Promise((resolve) =>
+            photo.addEventListener('load', resolve, { once: true }),
+          );
+          document.body.append(photo);
+          await load;
+        };
+        await again();
+        const before = bytes();
+        for (let i = 0; i < 10; i += 1) await again();
+        return { before, after: bytes(), photo: photo.info.decodedBytes };
+      });
+      // Ten loads may cost what an allocator wastes, but not one photograph.
+      assert.ok(growth.after - growth.before < growth.photo, JSON.stringify(growth));
+    });
+  }
+
+  test('with properties set before it was defined takes them up', async (t) => {
+    const page = await openPage(t, '/icon.svg');
+    await page.setContent(`<base href="${new URL('/', page.url())}"><body>`);
+    const light = await page.evaluate(async () => {
+      const early = Object.assign(document.createElement('relightable-photo'), {
+        src: '/photos/glass.ltm',
+        light: 'stripes',
+        backend: 'cpu',
+      });
+      document.body.append(early);
+      const load = new Promise((resolve, reject) => {
+        early.addEventListener('load', resolve);
+        early.addEventListener('error', (event) => reject(new Error(event.message)));
+      });
+      const script = '/relightable-photo/relightable-photo.js';
+      await import(script);
+      await load;
+      return early.getAttribute('light');
+    });
+    assert.equal(light, 'stripes');
+  });
+
+  test('two of them on a page do not disturb each other', async (t) => {
+    const page = await openPage(t, '/bench');
+    await mount(page, { src: '/photos/glass.ltm', light: 'spectrum' });
+    await loaded(page);
+    await page.evaluate(async () => {
+      const other = document.createElement('relightable-photo');
+      Object.assign(other, { src: '/photos/glass.ltm', light: 'flood' });
+      document.body.append(other);
+      await new Promise((resolve) => other.addEventListener('load', resolve));
+      other.remove();
+    });
+    assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
+  });
+
+  test('without alternative text is still an image, with an empty one decoration', async (t) => {
+    const page = await openPage(t, '/bench');
+    await mount(page, { src: '/photos/glass.ltm', alt: 'A window', backend: 'cpu' });
+    await loaded(page);
+    await page.getByRole('img', { name: 'A window' }).waitFor();
+    await page.evaluate("photo.alt = ''");
+    await page.waitForFunction(() =>
+      document.querySelector('relightable-photo')?.shadowRoot?.querySelector('[role=presentation]'),
+    );
+  });
+});
