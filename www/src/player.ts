@@ -132,7 +132,7 @@ export class Player<D extends Drawing> {
     this.#release();
   }
 
-  /** Draws now. Throws where there is nothing to draw. */
+  /** Draws now. Throws where there is nothing to draw, and where drawing fails. */
   renderNow(): D {
     if (!this.#active || !this.#settings) {
       throw new PhotoError(
@@ -140,8 +140,16 @@ export class Player<D extends Drawing> {
         'The photograph is not loaded yet: wait for its load event.',
       );
     }
-    this.#active.drawing.render(this.#settings.light, this.#settings.exposure);
-    return this.#active.drawing;
+    const { drawing } = this.#active;
+    try {
+      drawing.render(this.#settings.light, this.#settings.exposure);
+      return drawing;
+    } catch (thrown) {
+      const error = toPhotoError(thrown);
+      if (error.code === 'backend-lost') this.#lost(drawing, error.message);
+      else this.#fail(error);
+      throw error;
+    }
   }
 
   #begin(src: string | null): void {
@@ -239,14 +247,10 @@ export class Player<D extends Drawing> {
   #render(): void {
     // While a back end is being looked for, the one found will draw.
     if (!this.#held || !this.#active || this.#search) return;
-    const { drawing } = this.#active;
     try {
       this.renderNow();
-    } catch (thrown) {
-      const error = toPhotoError(thrown);
-      if (error.code === 'backend-lost') this.#lost(drawing, error.message);
-      else this.#fail(error);
-      return;
+    } catch {
+      return; // told already
     }
     if (this.#failed) {
       this.#failed = false;
