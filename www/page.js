@@ -26,7 +26,8 @@ backend.value = asked.get('backend') ?? '';
 if (backend.selectedIndex < 0) backend.value = '';
 apply();
 
-form.addEventListener('change', () => {
+// The menu belongs to the form but stands outside of it.
+document.addEventListener('change', () => {
   apply();
   const state = new URLSearchParams({ light: photo.light });
   if (backend.value) state.set('backend', backend.value);

@@ -49,6 +49,10 @@ const FAULTS = {
     }
     response.end();
   },
+  '/blank': (response) =>
+    response
+      .writeHead(200, { 'Content-Type': 'text/html' })
+      .end('<!doctype html><html lang="en"><title>Blank</title>'),
   '/bench': (response) =>
     response
       .writeHead(200, { 'Content-Type': 'text/html' })

@@ -95,8 +95,7 @@ describe('an element', () => {
   }
 
   test('with properties set before it was defined takes them up', async (t) => {
-    const page = await openPage(t, '/icon.svg');
-    await page.setContent(`<base href="${new URL('/', page.url())}"><body>`);
+    const page = await openPage(t, '/blank');
     const light = await page.evaluate(async () => {
       const early = Object.assign(document.createElement('relightable-photo'), {
         src: '/photos/glass.ltm',

@@ -44,7 +44,7 @@ describe('the demo page', () => {
     const light = () => page.evaluate("document.querySelector('relightable-photo').light");
     assert.equal(await light(), 'torch');
     for (const name of ['Flood', 'Checkerboard', 'Stripes', 'Spectrum', 'Torch']) {
-      await page.getByText(name, { exact: true }).click();
+      await page.getByRole('radio', { name }).check();
       assert.equal(await light(), name.toLowerCase());
     }
     await page.keyboard.press('ArrowRight');
@@ -83,7 +83,7 @@ describe('the demo page', () => {
     await drawn(page);
     const means = [];
     for (const name of ['Flood', 'Torch', 'Spectrum']) {
-      await page.getByText(name, { exact: true }).click();
+      await page.getByRole('radio', { name }).check();
       means.push((await onScreen(page)).mean);
       await page
         .locator('.frame')

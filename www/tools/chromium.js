@@ -2,11 +2,17 @@
 
 import { chromium } from 'playwright-core';
 
-/** SwiftShader computes WebGPU and WebGL2 alike on machines without a GPU, and alike on all. */
+/**
+ * SwiftShader computes WebGPU and WebGL2 on machines without a GPU, and the same on all others. With
+ * Vulkan by SwiftShader too, WebGPU can put its frames on the screen; without, Chromium loses the
+ * device at the first one.
+ */
 const ARGUMENTS = [
   '--no-sandbox',
   '--enable-unsafe-webgpu',
   '--use-webgpu-adapter=swiftshader',
+  '--enable-features=Vulkan',
+  '--use-vulkan=swiftshader',
   '--use-angle=swiftshader',
   '--enable-unsafe-swiftshader',
   '--ignore-gpu-blocklist',
