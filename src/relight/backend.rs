@@ -1,5 +1,6 @@
 //! What a page needs to know of a back end, whichever it is.
 
+use js_sys::Promise;
 use thiserror::Error;
 
 use super::Light;
@@ -15,6 +16,13 @@ pub trait Backend {
 
     /// Draws the whole picture under `light`, scaled by `exposure`, before it returns.
     fn render(&mut self, light: &Light, exposure: f32) -> Result<(), BackendError>;
+
+    /// Settles, with an object that has a `message`, when the graphics device goes away: a picture
+    /// that is not drawn again would be blank without anyone knowing. `None` where there is no such
+    /// device, or the canvas itself tells.
+    fn lost(&self) -> Option<Promise> {
+        None
+    }
 }
 
 /// Why a back end does not draw.

@@ -61,6 +61,16 @@ impl Relighter {
         self.backend.kernel()
     }
 
+    /// Settles when the graphics device goes away, after which nothing can be drawn. A WebGL2 canvas
+    /// tells by an event of its own, and a CPU does not go away.
+    #[wasm_bindgen(
+        getter,
+        unchecked_return_type = "Promise<{ readonly message: string }> | undefined"
+    )]
+    pub fn lost(&self) -> Option<Promise> {
+        self.backend.lost()
+    }
+
     /// Draws the picture under `light`, scaled by `exposure`, before it returns. The canvas can be
     /// read until the end of the current task.
     pub fn render(&mut self, light: &Light, exposure: f64) -> Result<(), CodedError> {

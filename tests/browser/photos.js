@@ -69,12 +69,14 @@ damaged('not-ltm.ltm', () => Buffer.from('{"error": "no such photograph"}'));
  * @param {string} light
  * @param {'cpu' | 'reference'} backend
  * @param {number} [exposure]
+ * @param {{ x: number, y: number }} [at] where a torch shines
  */
-export function nativePicture(light, backend, exposure = 1) {
-  const out = join(FOLDER, `${light}-${backend}-${exposure}.png`);
+export function nativePicture(light, backend, exposure = 1, at) {
+  const out = join(FOLDER, 'native.png');
   execFileSync(program, [
     ...['relight', GLASS, '--light', light, '--backend', backend],
     ...['--exposure', String(exposure), '-o', out],
+    ...(at ? ['--at', `${at.x},${at.y}`] : []),
   ]);
   return decodePng(readFileSync(out));
 }

@@ -36,6 +36,8 @@ export interface Decoder extends Freeable {
 export interface Relighter extends Freeable {
   readonly backend: string;
   readonly kernel: string;
+  /** Settles when the graphics device goes away, where there is one to itself. */
+  readonly lost: Promise<{ readonly message: string }> | undefined;
   render(light: Light, exposure: number): void;
 }
 

@@ -26,9 +26,13 @@ export class CanvasDrawing implements Drawing {
     this.#photo = photo;
     this.#relighter = relighter;
     this.canvas = canvas;
-    // WebGL takes its context away without a call being made.
+    // Both kinds of GPU may go away while nothing is being drawn.
+    const { signal } = this.#listening;
     canvas.addEventListener('webglcontextlost', () => lost('the browser took it away.'), {
-      signal: this.#listening.signal,
+      signal,
+    });
+    void relighter.lost?.then(({ message }) => {
+      if (!signal.aborted) lost(message || 'the graphics device is gone.');
     });
   }
 

@@ -59,7 +59,8 @@ async function check() {
   for (const light of LIGHTS) {
     const { worst, psnr } = compare(await drawn(page, light), native(light));
     console.log(`${light.padEnd(12)} PSNR ${psnr.toFixed(2)} dB, worst difference ${worst}/255`);
-    if (!(worst <= TOLERANCE)) wrong.push(`${light} differs by ${worst}/255 from ltm-export relight`);
+    if (!(worst <= TOLERANCE))
+      wrong.push(`${light} differs by ${worst}/255 from ltm-export relight`);
   }
   return wrong;
 }

@@ -4,7 +4,8 @@ mod textures;
 
 use std::sync::{Arc, OnceLock};
 
-use js_sys::Reflect;
+use js_sys::{Promise, Reflect};
+use wasm_bindgen::JsCast;
 use wgpu::util::is_browser_webgpu_supported;
 
 use super::backend::{Backend, BackendError};
@@ -166,6 +167,11 @@ impl Backend for WebGpu {
         self.queue.present(frame);
         Ok(())
     }
+
+    fn lost(&self) -> Option<Promise> {
+        let lost = Reflect::get(self.device.as_webgpu()?, &"lost".into());
+        lost.ok()?.dyn_into().ok()
+    }
 }
 
 impl Drop for WebGpu {
@@ -261,7 +267,7 @@ mod tests {
     use super::*;
     use crate::relight::BuiltinLight;
     use crate::transport::{Correspondence, DirectTile, Geometry, TransportFunctions, Window};
-    use wasm_bindgen::JsCast;
+    use wasm_bindgen_futures::JsFuture;
     use wasm_bindgen_test::wasm_bindgen_test;
 
     #[wasm_bindgen_test]
@@ -289,20 +295,10 @@ mod tests {
         let mut webgpu = WebGpu::new(&transport, &canvas).await.unwrap();
         let light = BuiltinLight::Flood.render(extent);
         webgpu.render(&light, 1.0).unwrap();
+        let lost = webgpu.lost().unwrap();
         webgpu.device.destroy();
         // The browser tells in a task of its own.
-        for _ in 0..100 {
-            if webgpu.lost.get().is_some() {
-                break;
-            }
-            let pause = js_sys::Promise::new(&mut |resolve, _| {
-                let window = web_sys::window().unwrap();
-                window
-                    .set_timeout_with_callback_and_timeout_and_arguments_0(&resolve, 10)
-                    .unwrap();
-            });
-            wasm_bindgen_futures::JsFuture::from(pause).await.unwrap();
-        }
+        JsFuture::from(lost).await.unwrap();
         let error = webgpu.render(&light, 1.0).unwrap_err();
         assert!(error.is_loss(), "{error}");
     }
