@@ -14,6 +14,15 @@ async function until(condition) {
   while (!condition()) await new Promise((resolve) => setTimeout(resolve, 20));
 }
 
+describe('the module', () => {
+  test('can be imported where there are no elements, as on a server', async () => {
+    // By a name the type checker does not follow into the bundle.
+    const bundle = '../../dist/relightable-photo.js';
+    const module = await import(bundle);
+    assert.equal(module.TAG, 'relightable-photo');
+  });
+});
+
 describe('an element', () => {
   test('tells its progress up to the whole file', async (t) => {
     const page = await openPage(t, '/bench');

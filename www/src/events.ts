@@ -63,10 +63,10 @@ export class BackendChangeEvent extends Event {
 }
 
 /** Events by name, for typed listeners. */
-export interface RelightablePhotoEventMap extends HTMLElementEventMap {
+export interface RelightablePhotoEventMap extends Omit<HTMLElementEventMap, 'error'> {
   load: Event;
   progress: ProgressEvent<HTMLElement>;
-  error: PhotoErrorEvent & ErrorEvent;
+  error: PhotoErrorEvent;
   lightchange: LightChangeEvent;
   backendchange: BackendChangeEvent;
 }
