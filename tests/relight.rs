@@ -3,23 +3,10 @@
 
 mod common;
 
-use common::relit;
+use common::{relit, tiled};
 use proptest::prelude::*;
 use relightable_photo::relight::{cpu, reference};
 use relightable_photo::transport::{Geometry, MAX_WINDOW};
-
-fn geometry(
-    camera: [u32; 2],
-    light: [u32; 2],
-    window: u32,
-    tile_side: u32,
-    affine: [[f64; 3]; 2],
-) -> Geometry {
-    Geometry {
-        tile_side,
-        ..common::geometry(camera, light, window, affine)
-    }
-}
 
 /// Grids, windows and tiles of all shapes, with correspondences that turn, mirror and shift the
 /// picture until windows hang over the display's edges, or miss it.
@@ -28,9 +15,7 @@ fn geometries() -> impl Strategy<Value = Geometry> {
     let window = prop_oneof![Just(1), Just(3), Just(15), Just(17), Just(MAX_WINDOW)];
     let row = || (-1.5..1.5, -1.5..1.5, -30.0..40.0).prop_map(|(a, b, c)| [a, b, c]);
     (sides(21), sides(19), window, 8u32..=24, row(), row()).prop_map(
-        |(camera, light, window, tile_side, u, v)| {
-            geometry(camera, light, window, tile_side, [u, v])
-        },
+        |(camera, light, window, tile_side, u, v)| tiled(camera, light, window, tile_side, [u, v]),
     )
 }
 
@@ -56,7 +41,7 @@ proptest! {
 fn a_window_off_the_display_sees_nothing() {
     for shift in [1e300, -1e300, 5e9, -2_147_483_648.0, 2_147_483_647.0] {
         let affine = [[0.5, 0.0, shift], [0.0, 0.5, 0.0]];
-        let geometry = geometry([9, 8], [8, 8], 17, 8, affine);
+        let geometry = tiled([9, 8], [8, 8], 17, 8, affine);
         let transport = relit::asymmetric_transport(geometry, 1);
         for (name, light) in relit::lights(geometry.light) {
             let picture = cpu::relight(&transport, &light).tone_map(1.0);

@@ -74,16 +74,12 @@ fn the_same_seed_writes_the_same_bytes_on_any_number_of_threads() {
 fn picture(folder: &CaptureFolder, light: &[[f64; CHANNELS]]) -> Vec<[f64; CHANNELS]> {
     let truth = folder.truth().unwrap().unwrap();
     let manifest = folder.manifest();
-    let side = truth.window().side() as usize;
     (0..manifest.camera.extent().area())
         .map(|n| {
             let origin = truth.window_origin(n);
             let mut y = [0.0; CHANNELS];
             for (s, tau) in truth.tau(n).iter().enumerate() {
-                let element = Element {
-                    u: origin.u + (s % side) as i32,
-                    v: origin.v + (s / side) as i32,
-                };
+                let element = truth.window().element(origin, s);
                 match element.index_in(manifest.light.extent()) {
                     Some(m) => (0..CHANNELS).for_each(|c| y[c] += tau[c].to_f64() * light[m][c]),
                     None => assert_eq!(tau.map(|t| t.to_f64()), [0.0; 3], "light from nowhere"),

@@ -9,7 +9,7 @@
 
 mod common;
 
-use common::relit;
+use common::{relit, tiled};
 use js_sys::{Object, Reflect};
 use relightable_photo::format::{self, EncodedTile, Metadata};
 use relightable_photo::relight::{Rgba8Picture, reference};
@@ -25,46 +25,33 @@ wasm_bindgen_test_configure!(run_in_browser);
 
 const BACKENDS: [&str; 3] = ["cpu", "webgl2", "webgpu"];
 
-fn geometry(
-    camera: [u32; 2],
-    light: [u32; 2],
-    window: u32,
-    tile_side: u32,
-    affine: [[f64; 3]; 2],
-) -> Geometry {
-    Geometry {
-        tile_side,
-        ..common::geometry(camera, light, window, affine)
-    }
-}
-
 /// Sizes that no tile divides, windows smaller and larger than the display, correspondences that
 /// turn and shift so that windows hang over every edge, more codes than one texture layer holds,
 /// windows that miss the display.
 fn geometries() -> [Geometry; 6] {
     [
-        geometry(
+        tiled(
             [37, 23],
             [19, 14],
             15,
             16,
             [[0.55, -0.12, -1.3], [0.1, 0.6, 0.4]],
         ),
-        geometry(
+        tiled(
             [40, 9],
             [13, 21],
             1,
             8,
             [[0.4, 0.2, -2.0], [-0.3, 1.9, 6.6]],
         ),
-        geometry(
+        tiled(
             [11, 30],
             [9, 7],
             17,
             8,
             [[-0.8, 0.0, 8.9], [0.0, 0.25, -0.75]],
         ),
-        geometry(
+        tiled(
             [64, 64],
             [32, 32],
             15,
@@ -73,14 +60,14 @@ fn geometries() -> [Geometry; 6] {
         ),
         // The second texture layer begins at the middle element of pixel (16, 92)'s window, its
         // brightest by far.
-        geometry(
+        tiled(
             [152, 140],
             [64, 64],
             15,
             32,
             [[0.43, 0.0, 0.0], [0.0, 0.45, 0.0]],
         ),
-        geometry([8, 12], [6, 5], 3, 8, [[0.0, 0.0, 1e300], [0.0, 0.4, 0.0]]),
+        tiled([8, 12], [6, 5], 3, 8, [[0.0, 0.0, 1e300], [0.0, 0.4, 0.0]]),
     ]
 }
 
@@ -256,7 +243,7 @@ async fn built_in_lights_reach_the_canvas_by_name() {
 async fn the_torch_stands_behind_the_point_of_the_picture_under_the_pointer() {
     // A quarter turn: picture (x, y) lies before light (y, 1 - x).
     let affine = [[0.0, 0.5, 0.0], [-0.5, 0.0, 16.0]];
-    let geometry = geometry([32, 32], [16, 16], 3, 8, affine);
+    let geometry = tiled([32, 32], [16, 16], 3, 8, affine);
     let photo = photo(&relit::asymmetric_transport(geometry, 4));
     let canvas = new_canvas();
     let mut relighter = relighter("cpu", &photo, &canvas).await.unwrap();

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::{files, lights, report};
 use crate::capture::{CaptureFolder, Pattern, Truth};
 use crate::relight::Light;
-use crate::transport::{CHANNELS, Decibels, Element, Geometry, Transport, TransportError, Window};
+use crate::transport::{CHANNELS, Decibels, Geometry, Transport, TransportError};
 
 /// Hold a file against a capture's known transport, relit pictures and unused photographs
 #[derive(Debug, Args)]
@@ -118,15 +118,15 @@ fn against_truth(transport: &Transport, truth: &Truth) -> TransportError {
             let (ours, theirs) = (geometry.window_origin(pixel), truth.window_origin(n));
             let tau = truth.tau(n);
             for (s, tau) in tau.iter().enumerate() {
-                let here = slot_of(element_at(theirs, truth.window(), s), ours, window);
+                let here = window.slot(ours, truth.window().element(theirs, s));
                 let estimate = here.map_or([0.0; CHANNELS], |s| tile.tau(window.area(), p, s));
                 for c in 0..CHANNELS {
                     sum.add(tau[c].to_f64(), f64::from(estimate[c]));
                 }
             }
             for s in 0..window.area() {
-                let element = element_at(ours, window, s);
-                if slot_of(element, theirs, truth.window()).is_none() {
+                let element = window.element(ours, s);
+                if truth.window().slot(theirs, element).is_none() {
                     for estimate in tile.tau(window.area(), p, s) {
                         sum.add(0.0, f64::from(estimate));
                     }
@@ -139,21 +139,6 @@ fn against_truth(transport: &Transport, truth: &Truth) -> TransportError {
         a.merge(b);
         a
     })
-}
-
-fn element_at(origin: Element, window: Window, slot: usize) -> Element {
-    let side = window.side() as usize;
-    Element {
-        u: origin.u.saturating_add((slot % side) as i32),
-        v: origin.v.saturating_add((slot / side) as i32),
-    }
-}
-
-fn slot_of(element: Element, origin: Element, window: Window) -> Option<usize> {
-    let side = i64::from(window.side());
-    let u = i64::from(element.u) - i64::from(origin.u);
-    let v = i64::from(element.v) - i64::from(origin.v);
-    ((0..side).contains(&u) && (0..side).contains(&v)).then(|| (v * side + u) as usize)
 }
 
 /// 10 log10(1 / mean squared error) over all pixels and channels.

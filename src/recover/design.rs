@@ -32,14 +32,10 @@ impl Design {
         origin: Element,
         common_mode: CommonMode,
     ) -> Self {
-        let side = window.side() as usize;
         let (slots, elements): (Vec<usize>, Vec<usize>) = (0..window.area())
             .filter_map(|slot| {
-                let element = Element {
-                    u: origin.u.saturating_add((slot % side) as i32),
-                    v: origin.v.saturating_add((slot / side) as i32),
-                };
-                element.index_in(light).map(|m| (slot, m))
+                let m = window.element(origin, slot).index_in(light)?;
+                Some((slot, m))
             })
             .unzip();
         let (k, l) = (slots.len(), rows.len());

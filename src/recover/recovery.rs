@@ -213,13 +213,9 @@ impl<'a> Recovery<'a> {
 
     /// What solution `x` says a pixel of the window sees under pattern `l`.
     fn predict(&self, l: usize, c: usize, origin: Element, slots: &[usize], x: &[f64]) -> f64 {
-        let side = self.geometry.window.side() as usize;
         let plane = self.measurements.patterns[l].plane(c);
         let terms = slots.iter().zip(x).filter_map(|(&slot, &x)| {
-            let element = Element {
-                u: origin.u + (slot % side) as i32,
-                v: origin.v + (slot / side) as i32,
-            };
+            let element = self.geometry.window.element(origin, slot);
             let m = element.index_in(self.geometry.light)?;
             Some(f64::from(plane[m]) * x)
         });

@@ -11,17 +11,14 @@ use crate::transport::{CHANNELS, Transport};
 pub fn relight(transport: &Transport, light: &Light) -> Vec<[f64; CHANNELS]> {
     let geometry = transport.geometry;
     assert_eq!(light.extent(), geometry.light, "a light of another extent");
-    let (side, area) = (geometry.window.side() as i32, geometry.window.area());
+    let area = geometry.window.area();
     let mut picture = vec![[0.0; CHANNELS]; geometry.camera.area()];
     for tile in &transport.tiles {
         for (p, pixel) in tile.rect.pixels().enumerate() {
             let origin = geometry.window_origin(pixel);
             let y = &mut picture[(pixel.y * geometry.camera.width + pixel.x) as usize];
             for s in 0..area {
-                let element = crate::transport::Element {
-                    u: origin.u.saturating_add(s as i32 % side),
-                    v: origin.v.saturating_add(s as i32 / side),
-                };
+                let element = geometry.window.element(origin, s);
                 let Some(m) = element.index_in(geometry.light) else {
                     continue;
                 };

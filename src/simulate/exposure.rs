@@ -1,7 +1,7 @@
 //! Many lights at once: `y = pT` for every pattern while a tile's transport is at hand.
 
 use super::codes::{Codes, emission};
-use crate::transport::{CHANNELS, Element, Extent, Geometry, TransportFunctions};
+use crate::transport::{CHANNELS, Extent, Geometry, TransportFunctions};
 
 /// The lights a scene is to be seen under, as emitted, laid out so that one element's emission
 /// under all lights is one run of memory: `[M, lights]`.
@@ -56,7 +56,7 @@ impl Exposure {
         functions: &TransportFunctions,
     ) -> Vec<Vec<[f32; CHANNELS]>> {
         let pixels = functions.rect.extent.area();
-        let (side, area) = (geometry.window.side() as usize, geometry.window.area());
+        let area = geometry.window.area();
         let mut pictures = vec![vec![[0.0; CHANNELS]; pixels]; self.channels.len()];
         let mut sums = vec![0.0f32; CHANNELS * self.columns];
         for (p, pixel) in functions.rect.pixels().enumerate() {
@@ -66,10 +66,7 @@ impl Exposure {
                 if *tau == [0.0; CHANNELS] {
                     continue;
                 }
-                let element = Element {
-                    u: origin.u + (s % side) as i32,
-                    v: origin.v + (s / side) as i32,
-                };
+                let element = geometry.window.element(origin, s);
                 if let Some(m) = element.index_in(self.light) {
                     let emitted = &self.emitted[m * self.columns..(m + 1) * self.columns];
                     for (sums, tau) in sums.chunks_exact_mut(self.columns).zip(tau) {

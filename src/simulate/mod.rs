@@ -24,7 +24,8 @@ pub use exposure::Exposure;
 pub use lights::TruthLight;
 
 use crate::transport::{
-    Correspondence, Extent, Geometry, GeometryError, TileRect, TransportFunctions, Window,
+    CHANNELS, CameraPx, Correspondence, Extent, Geometry, GeometryError, TileRect,
+    TransportFunctions, Window,
 };
 
 /// Side of the window that holds every built-in scene's band, in light elements. Scattering and
@@ -36,8 +37,19 @@ pub trait Scene: Sync {
     /// Grids, band and correspondence.
     fn geometry(&self) -> &Geometry;
 
-    /// The light transport functions of the pixels in `rect`. Elements off the display have none.
-    fn tile(&self, rect: TileRect) -> TransportFunctions;
+    /// Writes the light transport function of one pixel, `[S]`, over zeros. Elements off the
+    /// display have none.
+    fn function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]);
+
+    /// The light transport functions of the pixels in `rect`.
+    fn tile(&self, rect: TileRect) -> TransportFunctions {
+        let area = self.geometry().window.area();
+        let mut functions = TransportFunctions::zeros(rect, area);
+        for (pixel, tau) in rect.pixels().zip(functions.tau.chunks_exact_mut(area)) {
+            self.function(pixel, tau);
+        }
+        functions
+    }
 }
 
 /// The built-in scenes.

@@ -122,6 +122,23 @@ impl Window {
             v: (centre.v.floor() as i32).saturating_sub(half),
         }
     }
+
+    /// Element in slot `slot` (row by row, 0 to S - 1) of the window that starts at `origin`.
+    pub fn element(self, origin: Element, slot: usize) -> Element {
+        let side = self.side as usize;
+        Element {
+            u: origin.u.saturating_add((slot % side) as i32),
+            v: origin.v.saturating_add((slot / side) as i32),
+        }
+    }
+
+    /// Slot of an element in the window that starts at `origin`, or `None` outside it.
+    pub fn slot(self, origin: Element, element: Element) -> Option<usize> {
+        let side = i64::from(self.side);
+        let u = i64::from(element.u) - i64::from(origin.u);
+        let v = i64::from(element.v) - i64::from(origin.v);
+        ((0..side).contains(&u) && (0..side).contains(&v)).then(|| (v * side + u) as usize)
+    }
 }
 
 /// The rectangle of camera pixels one tile covers.

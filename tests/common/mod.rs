@@ -21,14 +21,25 @@ impl Noise {
     }
 }
 
+/// A geometry with tiles of 8 pixels.
 pub fn geometry(camera: [u32; 2], light: [u32; 2], window: u32, affine: [[f64; 3]; 2]) -> Geometry {
+    tiled(camera, light, window, 8, affine)
+}
+
+pub fn tiled(
+    camera: [u32; 2],
+    light: [u32; 2],
+    window: u32,
+    tile_side: u32,
+    affine: [[f64; 3]; 2],
+) -> Geometry {
     let extent = |[width, height]: [u32; 2]| Extent { width, height };
     Geometry {
         camera: extent(camera),
         light: extent(light),
         window: Window::new(window).unwrap(),
         correspondence: Correspondence { affine },
-        tile_side: 8,
+        tile_side,
     }
     .validate()
     .unwrap()
@@ -43,9 +54,7 @@ pub fn transport(geometry: Geometry, seed: u64) -> Transport {
         for (p, pixel) in rect.pixels().enumerate() {
             let origin = geometry.window_origin(pixel);
             for s in 0..area {
-                let mut element = origin;
-                element.u = element.u.saturating_add((s % side) as i32);
-                element.v = element.v.saturating_add((s / side) as i32);
+                let element = geometry.window.element(origin, s);
                 let lit = i > 0 && element.index_in(geometry.light).is_some();
                 let tau = std::array::from_fn(|_| noise.next().powi(4) as f32 / side as f32);
                 if lit {

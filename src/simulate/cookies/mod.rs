@@ -12,9 +12,7 @@ use relief::{Relief, Spot};
 
 use super::Scene;
 use super::plane::{Vec2, vec2};
-use crate::transport::{
-    CHANNELS, CameraPx, Element, Extent, Geometry, LightPx, TileRect, TransportFunctions,
-};
+use crate::transport::{CHANNELS, CameraPx, Element, Extent, Geometry, LightPx};
 
 /// Samples along each side of a camera pixel.
 const SAMPLES: u32 = 3;
@@ -93,30 +91,6 @@ impl Cookies {
         }
     }
 
-    fn function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
-        let mut window = Band {
-            origin: self.geometry.window_origin(pixel),
-            side: self.geometry.window.side(),
-            light: self.geometry.light,
-            tau,
-        };
-        let weight = EXPOSURE / f64::from(SAMPLES * SAMPLES);
-        let footprint = self.fine.pitch() + vec2(BLUR, BLUR);
-        let mut albedo = [0.0; CHANNELS];
-        for j in 0..SAMPLES {
-            for i in 0..SAMPLES {
-                let spot = self.fine.spot(pixel.x * SAMPLES + i, pixel.y * SAMPLES + j);
-                let light = reflected(&self.fine, &spot);
-                let seen = light.diffuse.map(|d| (d + light.highlight) * weight);
-                window.add_box(beam_through(spot.at, spot.height), footprint, seen);
-                for c in 0..CHANNELS {
-                    albedo[c] += spot.albedo[c] * weight;
-                }
-            }
-        }
-        self.reflections(pixel, albedo, &mut window);
-    }
-
     /// Light that reaches `pixel` by way of the patches around it.
     fn reflections(&self, pixel: CameraPx, albedo: [f64; CHANNELS], window: &mut Band) {
         let middle = SAMPLES / 2;
@@ -164,13 +138,28 @@ impl Scene for Cookies {
         &self.geometry
     }
 
-    fn tile(&self, rect: TileRect) -> TransportFunctions {
-        let area = self.geometry.window.area();
-        let mut functions = TransportFunctions::zeros(rect, area);
-        for (pixel, tau) in rect.pixels().zip(functions.tau.chunks_exact_mut(area)) {
-            self.function(pixel, tau);
+    fn function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
+        let mut window = Band {
+            origin: self.geometry.window_origin(pixel),
+            side: self.geometry.window.side(),
+            light: self.geometry.light,
+            tau,
+        };
+        let weight = EXPOSURE / f64::from(SAMPLES * SAMPLES);
+        let footprint = self.fine.pitch() + vec2(BLUR, BLUR);
+        let mut albedo = [0.0; CHANNELS];
+        for j in 0..SAMPLES {
+            for i in 0..SAMPLES {
+                let spot = self.fine.spot(pixel.x * SAMPLES + i, pixel.y * SAMPLES + j);
+                let light = reflected(&self.fine, &spot);
+                let seen = light.diffuse.map(|d| (d + light.highlight) * weight);
+                window.add_box(beam_through(spot.at, spot.height), footprint, seen);
+                for c in 0..CHANNELS {
+                    albedo[c] += spot.albedo[c] * weight;
+                }
+            }
         }
-        functions
+        self.reflections(pixel, albedo, &mut window);
     }
 }
 

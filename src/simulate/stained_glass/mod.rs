@@ -15,9 +15,7 @@ use window::{Spot, spot};
 use super::Scene;
 use super::plane::{UnitPlane, Vec2, mix, smoothstep, vec2};
 use super::texture::{noise, unit_hash};
-use crate::transport::{
-    CHANNELS, CameraPx, Element, Geometry, LightPx, TileRect, TransportFunctions,
-};
+use crate::transport::{CHANNELS, CameraPx, Element, Geometry, LightPx};
 
 /// Samples along each side of a pixel or element when its coverage by lead is counted.
 const SAMPLES: u32 = 4;
@@ -102,6 +100,12 @@ impl StainedGlass {
             d
         }
     }
+}
+
+impl Scene for StainedGlass {
+    fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
 
     fn function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
         let at = self.geometry.correspondence.at(pixel);
@@ -155,21 +159,6 @@ impl StainedGlass {
                 tau[c] = (share * attenuation[c]) as f32 * self.clear[m];
             }
         }
-    }
-}
-
-impl Scene for StainedGlass {
-    fn geometry(&self) -> &Geometry {
-        &self.geometry
-    }
-
-    fn tile(&self, rect: TileRect) -> TransportFunctions {
-        let area = self.geometry.window.area();
-        let mut functions = TransportFunctions::zeros(rect, area);
-        for (pixel, tau) in rect.pixels().zip(functions.tau.chunks_exact_mut(area)) {
-            self.function(pixel, tau);
-        }
-        functions
     }
 }
 
