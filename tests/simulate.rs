@@ -196,7 +196,11 @@ fn what_cannot_be_is_refused_and_nothing_is_written() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
     let refused: [(&[&str], &str, i32); 8] = [
-        (&["stained-glass", "--patterns", "0"], "--patterns is 0", 1),
+        (
+            &["stained-glass", "--patterns", "0"],
+            "0 is not in 1..=10000",
+            2,
+        ),
         (
             &["cookies", "--patterns", "9999", "--camera", "512x512"],
             "fewer --patterns",

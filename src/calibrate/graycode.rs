@@ -27,7 +27,7 @@ pub enum Axis {
     Y,
 }
 
-/// Photographs of one bit, `[N]` in units of the measurement.
+/// Photographs of one bit, `[N]` in units of the measurement; NaN where saturated.
 #[derive(Clone, Debug)]
 pub struct BitPair {
     /// With the bit shown as it is.
@@ -79,7 +79,9 @@ impl GrayCode {
 
 /// Where each pixel with at least half of its bits clear looks along one axis.
 fn decode(bits: &[BitPair], camera: Extent) -> Vec<Sample> {
-    let sum = |p: &[f32; CHANNELS]| p.iter().filter(|v| v.is_finite()).sum::<f32>();
+    // A saturated sample is at least white.
+    let full = |v: &f32| if v.is_nan() { 1.0 } else { *v };
+    let sum = |p: &[f32; CHANNELS]| p.iter().map(full).sum::<f32>();
     let light = |bit: &BitPair, n: usize| {
         let (plain, inverted) = (sum(&bit.plain[n]), sum(&bit.inverted[n]));
         (plain - inverted, plain + inverted)

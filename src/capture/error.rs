@@ -16,7 +16,7 @@ pub enum CaptureError {
         named_by: String,
     },
     /// A file that cannot be read.
-    #[error("{path}: cannot be read: {source}")]
+    #[error("{path}: cannot be read")]
     Io {
         /// The file.
         path: PathBuf,
@@ -24,7 +24,7 @@ pub enum CaptureError {
         source: std::io::Error,
     },
     /// The manifest is not JSON of the expected form.
-    #[error("{path}: {source}")]
+    #[error("{path}: is not a capture manifest")]
     Json {
         /// The manifest.
         path: PathBuf,

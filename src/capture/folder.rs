@@ -15,13 +15,18 @@ pub struct CaptureFolder {
     emission: [f64; 256],
 }
 
+/// What a photograph saw, `[N]`, in units of the measurement; NaN where saturated.
+pub type Picture = Vec<[f32; CHANNELS]>;
+
 /// One shot, linear.
 #[derive(Clone, Debug)]
 pub struct Exposed {
     /// What was shown.
     pub pattern: Pattern,
-    /// What was seen, `[N]`, in units of the measurement; NaN where saturated.
-    pub picture: Vec<[f32; CHANNELS]>,
+    /// Measurement at which a sample saturates.
+    pub full_scale: f32,
+    /// What was seen.
+    pub picture: Picture,
 }
 
 /// Light seen while the display is dark, `[N]`, in units of the measurement.
@@ -32,7 +37,7 @@ impl CaptureFolder {
     /// Opens the folder `root` and reads its manifest.
     pub fn open(root: &Path) -> Result<Self, CaptureError> {
         let path = root.join(MANIFEST_NAME);
-        let json = std::fs::read_to_string(&path).map_err(|source| match source.kind() {
+        let text = std::fs::read_to_string(&path).map_err(|source| match source.kind() {
             std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory => {
                 CaptureError::Missing {
                     path: path.clone(),
@@ -44,7 +49,9 @@ impl CaptureFolder {
                 source,
             },
         })?;
-        let manifest = Manifest::parse(&json, &path)?;
+        // Some editors put a byte order mark first, which is no JSON.
+        let json = text.strip_prefix('\u{feff}').unwrap_or(&text);
+        let manifest = Manifest::parse(json, &path)?;
         Ok(Self {
             root: root.to_owned(),
             emission: manifest.light.emission(),
@@ -74,14 +81,8 @@ impl CaptureFolder {
 
     /// Reads the photographs of Gray code. Every bit needs its inverse.
     pub fn read_gray_code(&self, dark: &DarkFrame) -> Result<GrayCode, CaptureError> {
-        let bits = |axis: &str| -> Result<Vec<BitPair>, CaptureError> {
+        let bits = |axis: &str, side: u32| -> Result<Vec<BitPair>, CaptureError> {
             let shots = || self.manifest.graycode.iter().enumerate();
-            let mut numbers: Vec<u32> = shots()
-                .filter(|(_, shot)| shot.axis == axis)
-                .map(|(_, shot)| shot.bit)
-                .collect();
-            numbers.sort_unstable();
-            numbers.dedup();
             let photo = |bit, inverted| {
                 let wanted = shots().find(|(_, shot)| {
                     shot.axis == axis && shot.bit == bit && shot.inverted == inverted
@@ -97,24 +98,19 @@ impl CaptureFolder {
                 };
                 self.read_photo(&shot.photo, &format!("graycode[{i}].photo"), 1.0, dark)
             };
-            let pair = |&bit: &u32| {
+            let pair = |bit| {
                 Ok(BitPair {
                     plain: photo(bit, false)?,
                     inverted: photo(bit, true)?,
                 })
             };
             // Most significant first, and none left out: a gap would shift all bits below it.
-            let highest = numbers.last().map_or(0, |&bit| bit + 1);
-            (0..highest)
-                .rev()
-                .collect::<Vec<_>>()
-                .iter()
-                .map(pair)
-                .collect()
+            let numbers = 0..side.next_power_of_two().ilog2().max(1);
+            numbers.rev().map(pair).collect()
         };
         Ok(GrayCode {
-            x: bits("x")?,
-            y: bits("y")?,
+            x: bits("x", self.manifest.light.width)?,
+            y: bits("y", self.manifest.light.height)?,
         })
     }
 
@@ -128,6 +124,14 @@ impl CaptureFolder {
                 .map(|codes| codes.map(|code| self.linear(code, 1.0)))
                 .collect(),
         }))
+    }
+
+    /// Reads the flood photograph, where the manifest names one.
+    pub fn read_flood(&self, dark: &DarkFrame) -> Result<Option<Picture>, CaptureError> {
+        let flood = self.manifest.flood.as_ref();
+        flood
+            .map(|name| self.read_photo(name, "flood", 1.0, dark))
+            .transpose()
     }
 
     /// Reads shot `i`: its pattern as emitted light, its photograph as measurement less the dark.
@@ -150,8 +154,12 @@ impl CaptureFolder {
             (grey, ..) => Pattern::Grey(grey.unwrap_or_default()),
         };
         let named = format!("shots[{i}].photo");
-        let picture = self.read_photo(&shot.photo, &named, shot.exposure.unwrap_or(1.0), dark)?;
-        Ok(Exposed { pattern, picture })
+        let exposure = shot.exposure.unwrap_or(1.0);
+        Ok(Exposed {
+            pattern,
+            full_scale: (1.0 / exposure) as f32,
+            picture: self.read_photo(&shot.photo, &named, exposure, dark)?,
+        })
     }
 
     /// Reads a photograph as measurement less the dark, NaN where saturated.
@@ -161,7 +169,7 @@ impl CaptureFolder {
         named_by: &str,
         exposure: f64,
         dark: &DarkFrame,
-    ) -> Result<Vec<[f32; CHANNELS]>, CaptureError> {
+    ) -> Result<Picture, CaptureError> {
         let camera = &self.manifest.camera;
         let codes = images::rgb16(&self.root.join(name), camera.extent(), named_by)?;
         let picture = codes.into_iter().zip(&dark.0).map(|(codes, dark)| {
@@ -187,12 +195,14 @@ impl CaptureFolder {
         shots: Vec<Exposed>,
         correspondence: Correspondence,
     ) -> Measurements {
+        let full_scale = shots.iter().map(|s| s.full_scale).collect();
         let (patterns, pictures) = shots.into_iter().map(|s| (s.pattern, s.picture)).unzip();
         Measurements {
             camera: self.manifest.camera.extent(),
             light: self.manifest.light.extent(),
             correspondence,
             patterns,
+            full_scale,
             pictures,
         }
     }

@@ -1,8 +1,10 @@
 //! Reading the two kinds of picture a capture has, strictly.
 
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 
-use image::{DynamicImage, ImageReader};
+use image::{DynamicImage, ImageFormat, ImageReader};
 
 use super::CaptureError;
 use crate::transport::Extent;
@@ -26,10 +28,9 @@ fn open(path: &Path, extent: Extent, named_by: &str) -> Result<DynamicImage, Cap
         path: path.to_owned(),
         problem,
     };
-    let picture = ImageReader::open(path)
-        .map_err(io)?
-        .with_guessed_format()
-        .map_err(io)?
+    let file = BufReader::new(File::open(path).map_err(io)?);
+    // PNG and nothing else: what a lossy format gives back is no measurement.
+    let picture = ImageReader::with_format(file, ImageFormat::Png)
         .decode()
         .map_err(|e| bad(format!("is not a readable PNG: {e}")))?;
     let found = Extent {

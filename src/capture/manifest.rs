@@ -318,7 +318,13 @@ mod tests {
             assert!(message.contains("x/capture.json"), "{message}");
         }
         let missing = manifest(|j| j["camera"] = serde_json::json!({"width": 8}));
-        assert!(missing.unwrap_err().to_string().contains("missing field"));
+        let CaptureError::Json { source, .. } = missing.unwrap_err() else {
+            panic!("another error")
+        };
+        assert!(
+            source.to_string().contains("missing field `height`"),
+            "{source}"
+        );
     }
 
     #[test]

@@ -32,6 +32,8 @@ pub struct Measurements {
     pub correspondence: Correspondence,
     /// `L` patterns of `M` elements.
     pub patterns: Vec<Pattern>,
+    /// For each pattern, the measurement at which a sample saturates: 1 over the exposure.
+    pub full_scale: Vec<f32>,
     /// `L` pictures of `N` pixels, row by row. NaN where a sample was saturated and says nothing.
     pub pictures: Vec<Vec<[f32; CHANNELS]>>,
 }

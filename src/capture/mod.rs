@@ -16,7 +16,7 @@ mod truth;
 
 pub use error::CaptureError;
 #[cfg(not(target_arch = "wasm32"))]
-pub use folder::{CaptureFolder, DarkFrame, Exposed};
+pub use folder::{CaptureFolder, DarkFrame, Exposed, Picture};
 pub use manifest::{
     AffineSpec, CameraSpec, GrayCodeShot, LightSpec, MANIFEST_NAME, Manifest, Shot,
 };

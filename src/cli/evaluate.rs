@@ -83,28 +83,27 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
     if args.json {
         return report::print_json(&report);
     }
-    print(&report);
-    Ok(())
+    print(&report)
 }
 
-fn print(report: &Report) {
+fn print(report: &Report) -> Result<()> {
     let show = |d: Option<Decibels>| d.map_or("-".to_owned(), |d| d.to_string());
     report::print_line(&format!(
         "SNR against the truth        {}",
         show(report.snr_db)
-    ));
+    ))?;
     report::print_line(&format!(
         "SNR on {:3} held-out shots     {}",
         report.heldout_shots,
         show(report.heldout_snr_db)
-    ));
+    ))?;
     for (name, psnr) in &report.relit {
-        report::print_line(&format!("PSNR relit under {name:11} {}", show(*psnr)));
+        report::print_line(&format!("PSNR relit under {name:11} {}", show(*psnr)))?;
     }
     report::print_line(&format!(
         "File                         {}",
         report::bytes(report.file_bytes)
-    ));
+    ))
 }
 
 /// Adds up the error over every element that either transport has for any pixel.
@@ -114,7 +113,7 @@ fn against_truth(transport: &Transport, truth: &Truth) -> TransportError {
     let tiles = transport.tiles.par_iter().map(|tile| {
         let mut sum = TransportError::default();
         for (p, pixel) in tile.rect.pixels().enumerate() {
-            let n = pixel.y as usize * geometry.camera.width as usize + pixel.x as usize;
+            let n = geometry.camera.index(pixel);
             let (ours, theirs) = (geometry.window_origin(pixel), truth.window_origin(n));
             let tau = truth.tau(n);
             for (s, tau) in tau.iter().enumerate() {

@@ -2,9 +2,10 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
+use tempfile::NamedTempFile;
 
 use crate::format::{Header, Limits, Metadata, Reader, TileEntry};
 use crate::transport::Transport;
@@ -13,7 +14,7 @@ use crate::transport::Transport;
 const PIECE: usize = 1 << 20;
 /// A workstation has more memory than a browser tab.
 const LIMITS: Limits = Limits {
-    decoded_bytes: 64 << 30,
+    decoded_bytes: 16 << 30,
 };
 
 /// Everything an `.ltm` file holds.
@@ -49,39 +50,58 @@ pub fn read_ltm(path: &Path) -> Result<LtmFile> {
     read().with_context(|| path.display().to_string())
 }
 
-/// Writes a file beside its place and renames it there once whole, so that `path` never holds half
-/// of it. An existing file is replaced. Returns the file's length.
-pub fn write_whole(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<()>,
-) -> Result<u64> {
-    let write = || -> Result<u64> {
-        let folder = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
+/// A file to come: written beside its place and renamed there once whole, so that its path never
+/// holds half of it. An existing file is replaced.
+pub struct Output {
+    path: PathBuf,
+    file: NamedTempFile,
+}
+
+impl Output {
+    /// Makes sure that the file can be written, before any work is done for it.
+    pub fn create(path: &Path) -> Result<Self> {
+        let create = || -> Result<NamedTempFile> {
+            ensure!(!path.is_dir(), "is a folder; give the name of a file");
+            let folder = match path.parent() {
+                Some(parent) if !parent.as_os_str().is_empty() => parent,
+                _ => Path::new("."),
+            };
+            let mut builder = tempfile::Builder::new();
+            builder.prefix(".ltm-export-");
+            #[cfg(unix)]
+            {
+                // As any new file: the umask decides, not tempfile's private default.
+                use std::os::unix::fs::PermissionsExt;
+                builder.permissions(std::fs::Permissions::from_mode(0o666));
+            }
+            builder
+                .tempfile_in(folder)
+                .context("cannot be created; does its folder exist, and may you write there?")
         };
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".ltm-export-");
-        #[cfg(unix)]
-        {
-            // As any new file: the umask decides, not tempfile's private default.
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
-        }
-        let mut file = builder
-            .tempfile_in(folder)
-            .context("cannot be created; does its folder exist, and may you write there?")?;
-        let mut out = BufWriter::new(file.as_file_mut());
-        write(&mut out)?;
-        out.flush().context("cannot be written")?;
-        drop(out);
-        let bytes = file
-            .as_file()
-            .metadata()
-            .context("cannot be read back")?
-            .len();
-        file.persist(path).context("cannot be put in place")?;
-        Ok(bytes)
-    };
-    write().with_context(|| path.display().to_string())
+        let file = create().with_context(|| path.display().to_string())?;
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+        })
+    }
+
+    /// Writes the file and puts it in its place. Returns its length.
+    pub fn finish(
+        mut self,
+        write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<()>,
+    ) -> Result<u64> {
+        let finish = || -> Result<u64> {
+            let mut out = BufWriter::new(self.file.as_file_mut());
+            write(&mut out)?;
+            out.flush().context("cannot be written")?;
+            drop(out);
+            let metadata = self.file.as_file().metadata();
+            let bytes = metadata.context("cannot be read back")?.len();
+            self.file
+                .persist(&self.path)
+                .context("cannot be put in place")?;
+            Ok(bytes)
+        };
+        finish().with_context(|| self.path.display().to_string())
+    }
 }

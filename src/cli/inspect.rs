@@ -95,7 +95,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         ("decoded", report::bytes(report.decoded_bytes)),
         ("file", report::bytes(report.file_bytes)),
     ] {
-        report::print_line(&format!("{name:15} {value}"));
+        report::print_line(&format!("{name:15} {value}"))?;
     }
     Ok(())
 }

@@ -43,6 +43,11 @@ fn ensure_free(path: &Path) -> Result<()> {
     use std::io::ErrorKind;
     match std::fs::read_dir(path) {
         Ok(mut entries) => {
+            let here = std::env::current_dir().and_then(std::fs::canonicalize);
+            ensure!(
+                path.canonicalize().ok() != here.ok(),
+                "is the folder you are in; give the name of a new one"
+            );
             ensure!(
                 entries.next().is_none(),
                 "is a folder with something in it; give another name, or empty it first"

@@ -29,14 +29,19 @@ pub struct RecoverArgs {
     #[arg(long, value_enum, default_value_t = Method::Nnls)]
     method: Method,
     /// Side of the window of light elements each camera pixel may see; odd
-    #[arg(long, default_value_t = 15)]
-    window: u32,
+    #[arg(long, value_name = "W", default_value = "15", value_parser = parse_window)]
+    window: Window,
     /// Use the first K shots only [default: all but every tenth, which are held out]
-    #[arg(long, value_name = "K")]
-    patterns: Option<usize>,
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    patterns: Option<u32>,
     /// Print one JSON object on standard output
     #[arg(long)]
     json: bool,
+}
+
+fn parse_window(text: &str) -> Result<Window, String> {
+    let side = text.parse::<u32>().map_err(|e| e.to_string())?;
+    Window::new(side).map_err(|e| e.to_string())
 }
 
 /// Recovery methods.
@@ -58,12 +63,14 @@ struct Report {
     patterns: usize,
     common_mode: crate::recover::CommonMode,
     saturated_samples: usize,
+    /// Pixels of which nothing but white is known.
+    overexposed_pixels: usize,
     file_bytes: u64,
 }
 
 pub fn run(args: &RecoverArgs) -> Result<()> {
     let start = Instant::now();
-    let window = Window::new(args.window).context("--window")?;
+    let output = files::Output::create(&args.output)?;
     let folder = CaptureFolder::open(&args.capture)?;
     let shots = choose_shots(folder.manifest().shots.len(), args.patterns)?;
     let measurements = read(&folder, &shots)?;
@@ -71,8 +78,15 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     if saturated > 0 {
         eprintln!("note: {saturated} saturated samples are left out");
     }
-    let recovery =
-        Recovery::new(&measurements, window).with_context(|| args.capture.display().to_string())?;
+    let recovery = Recovery::new(&measurements, args.window)
+        .with_context(|| args.capture.display().to_string())?;
+    let overexposed = recovery.overexposed_pixels();
+    if overexposed > 0 {
+        eprintln!(
+            "warning: {overexposed} pixels are saturated in nearly all photographs and will be \
+             white under any light; photograph with less exposure"
+        );
+    }
     let geometry = *recovery.geometry();
     let bar = process::progress("recovering", geometry.tile_grid().area());
     let tiles = (0..geometry.tile_grid().area())
@@ -85,16 +99,17 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         })
         .collect::<Result<Vec<_>, _>>()?;
     bar.finish_and_clear();
-    let file_bytes = write(args, &geometry, shots.clone(), &tiles)?;
+    let file_bytes = write(output, &geometry, shots.clone(), &tiles)?;
     let report = Report {
         seconds: start.elapsed().as_secs_f64(),
         peak_rss_bytes: process::peak_rss_bytes(),
         method: args.method,
-        window: args.window,
+        window: args.window.side(),
         rank: None,
         patterns: shots.len(),
         common_mode: recovery.common_mode(),
         saturated_samples: saturated,
+        overexposed_pixels: overexposed,
         file_bytes,
     };
     if args.json {
@@ -105,17 +120,16 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         args.output.display(),
         geometry.camera,
         geometry.light,
-        args.window,
+        report.window,
         report.patterns,
         report.seconds,
         report::bytes(file_bytes),
-    ));
-    Ok(())
+    ))
 }
 
 /// Which of `available` shots to recover from.
-fn choose_shots(available: usize, first: Option<usize>) -> Result<Vec<usize>> {
-    match first {
+fn choose_shots(available: usize, first: Option<u32>) -> Result<Vec<usize>> {
+    match first.map(|k| k as usize) {
         Some(k) if k > available => {
             bail!("--patterns is {k}, but the capture has {available} shots")
         }
@@ -128,6 +142,8 @@ fn choose_shots(available: usize, first: Option<usize>) -> Result<Vec<usize>> {
 
 fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
     let dark = folder.read_dark()?;
+    // Least squares has no use for it, but a capture that names a flood is not whole without it.
+    folder.read_flood(&dark)?;
     let bar = process::progress("reading", shots.len());
     let exposed = shots
         .par_iter()
@@ -149,7 +165,7 @@ fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
 }
 
 fn write(
-    args: &RecoverArgs,
+    output: files::Output,
     geometry: &Geometry,
     shots_used: Vec<usize>,
     tiles: &[EncodedTile],
@@ -159,7 +175,5 @@ fn write(
         method: "nnls".to_owned(),
         shots_used,
     };
-    files::write_whole(&args.output, |out| {
-        Ok(format::write(geometry, &metadata, tiles, out)?)
-    })
+    output.finish(|out| Ok(format::write(geometry, &metadata, tiles, out)?))
 }

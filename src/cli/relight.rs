@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
-use super::{files, lights};
+use super::{Usage, files, lights};
 use crate::relight::{Light, TorchPose, reference};
 
 /// Relight an object and write the picture as an 8-bit sRGB PNG
@@ -22,7 +22,7 @@ pub struct RelightArgs {
     #[arg(long, value_name = "X,Y", value_parser = parse_position)]
     at: Option<[f64; 2]>,
     /// Factor on the picture's brightness
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, value_parser = |text: &str| super::number_in(text, 0.0, 1e6))]
     exposure: f32,
     /// What computes the picture
     #[arg(long, value_enum, default_value_t = Backend::Cpu)]
@@ -53,19 +53,15 @@ fn parse_position(text: &str) -> Result<[f64; 2], String> {
 }
 
 pub fn run(args: &RelightArgs) -> Result<()> {
-    ensure!(
-        args.exposure.is_finite() && args.exposure >= 0.0,
-        "--exposure is {}; it must be 0 or more",
-        args.exposure
-    );
+    if args.at.is_some() && args.light != "torch" {
+        return Err(Usage("--at goes with --light torch").into());
+    }
+    let output = files::Output::create(&args.output)?;
     let file = files::read_ltm(&args.file)?;
     let geometry = &file.header.geometry;
     let light = match args.at {
         None => lights::named(&args.light, geometry.light)?,
-        Some([x, y]) => {
-            ensure!(args.light == "torch", "--at goes with --light torch");
-            Light::torch(geometry.light, TorchPose::behind(geometry, x, y))
-        }
+        Some([x, y]) => Light::torch(geometry.light, TorchPose::behind(geometry, x, y)),
     };
     let picture = match args.backend {
         Backend::Cpu => lights::relight(&file.transport, &light).tone_map(args.exposure),
@@ -79,7 +75,7 @@ pub fn run(args: &RelightArgs) -> Result<()> {
         .flat_map(|p| [p[0], p[1], p[2]])
         .collect();
     let extent = picture.extent;
-    files::write_whole(&args.output, |out| {
+    output.finish(|out| {
         PngEncoder::new(out)
             .write_image(&rgb, extent.width, extent.height, ExtendedColorType::Rgb8)
             .context("cannot be encoded")

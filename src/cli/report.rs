@@ -1,19 +1,23 @@
 //! What a command says: one JSON object on standard output, or lines for a person.
 
+use std::io::{ErrorKind, Write};
+
 use anyhow::{Context, Result};
 use serde::Serialize;
 
 /// Prints `report` as one JSON object on standard output.
 pub fn print_json(report: &impl Serialize) -> Result<()> {
     let json = serde_json::to_string(report).context("the report cannot be written as JSON")?;
-    print_line(&json);
-    Ok(())
+    print_line(&json)
 }
 
 /// Prints one line on standard output. A reader that has gone away is no failure of ours.
-pub fn print_line(line: &str) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stdout(), "{line}");
+pub fn print_line(line: &str) -> Result<()> {
+    let written = writeln!(std::io::stdout(), "{line}");
+    match written {
+        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("standard output cannot be written"),
+    }
 }
 
 /// A byte count for people.

@@ -29,7 +29,7 @@ const STRIP: u32 = 4;
 const CAMERA_SIDES: [u32; 2] = [8, 1024];
 const LIGHT_SIDES: [u32; 2] = [4, 512];
 /// Files are numbered with four digits.
-const MOST_PATTERNS: usize = 10_000;
+const MOST_PATTERNS: i64 = 10_000;
 /// All photographs are exposed while the transport passes by, so all are in memory.
 const MOST_PICTURE_BYTES: usize = 3 << 30;
 /// Beyond, shot noise is long below a code and Poisson sampling only loses precision.
@@ -51,8 +51,9 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "WxH", default_value = "64x64", value_parser = extent::<1>)]
     light: Extent,
     /// Patterns to photograph
-    #[arg(long, value_name = "N", default_value_t = 80)]
-    patterns: usize,
+    #[arg(long, value_name = "N", default_value_t = 80,
+          value_parser = clap::value_parser!(u32).range(1..=MOST_PATTERNS))]
+    patterns: u32,
     /// Kind of patterns [default: gaussian for stained-glass, bernoulli for cookies]
     #[arg(long, value_enum)]
     ensemble: Option<EnsembleName>,
@@ -98,11 +99,6 @@ fn extent<const KIND: usize>(text: &str) -> Result<Extent, String> {
 }
 
 pub fn run(args: &SimulateArgs) -> Result<()> {
-    ensure!(
-        (1..=MOST_PATTERNS).contains(&args.patterns),
-        "--patterns is {}; it must lie between 1 and {MOST_PATTERNS}",
-        args.patterns
-    );
     let plan = Plan::new(args)?;
     let bytes = plan.lights.len() * args.camera.area() * size_of::<[f32; CHANNELS]>();
     ensure!(
@@ -193,7 +189,7 @@ impl Plan {
         };
         plan.add_calibration(args.light);
         for i in 0..args.patterns {
-            let mut stream = NoiseStream::Pattern(i as u32).start(args.seed);
+            let mut stream = NoiseStream::Pattern(i).start(args.seed);
             let (pattern, photo) = (format!("patterns/{i:04}.png"), format!("photos/{i:04}.png"));
             let codes = ensemble.draw(args.light, &mut stream)?;
             plan.photograph(codes, photo.clone());

@@ -43,7 +43,7 @@ pub fn run(args: &VerifyArgs) -> Result<()> {
     }
     let file = result?;
     if !args.json {
-        report::print_line(&format!(
+        return report::print_line(&format!(
             "{}: sound, {} tiles, {}",
             args.file.display(),
             file.entries.len(),

@@ -14,7 +14,7 @@ pub(super) fn plane_bytes(rect: TileRect, area: usize) -> usize {
 
 /// Compresses a tile's codes. A tile that is all dark takes no bytes.
 pub(super) fn encode(tile: &DirectTile, area: usize) -> Result<Vec<u8>, FormatError> {
-    if tile.codes.iter().all(|code| *code == [0; 4]) {
+    if tile.is_dark() {
         return Ok(Vec::new());
     }
     let pixels = tile.rect.extent.area();
@@ -47,31 +47,42 @@ pub(super) fn decode(
     area: usize,
     step: [f32; CHANNELS],
 ) -> Result<DirectTile, TileError> {
+    if bytes.is_empty() {
+        return Ok(DirectTile {
+            step,
+            ..DirectTile::dark(rect)
+        });
+    }
     let pixels = rect.extent.area();
-    let mut codes: Vec<TexelCode> = Vec::new();
-    // A browser may refuse what the limits allow; that is an error, not the end of the page.
-    codes
-        .try_reserve_exact(pixels * area)
-        .map_err(|_| TileError::Memory(pixels * area * size_of::<TexelCode>()))?;
-    codes.resize(pixels * area, [0; 4]);
-    if !bytes.is_empty() {
-        let need = plane_bytes(rect, area);
-        let planes =
-            zstd::bulk::decompress(bytes, need).map_err(|e| TileError::Damaged(e.to_string()))?;
-        if planes.len() != need {
-            let reason = format!("it has {} bytes, not {need}", planes.len());
-            return Err(TileError::Damaged(reason));
-        }
-        let (low, high) = planes.split_at(need / 2);
-        for c in 0..CHANNELS {
-            for s in 0..area {
-                let at = (c * area + s) * pixels;
-                let plane = low[at..at + pixels].iter().zip(&high[at..at + pixels]);
-                for (p, (&low, &high)) in plane.enumerate() {
-                    codes[p * area + s][c] = u16::from_le_bytes([low, high]);
-                }
+    let need = plane_bytes(rect, area);
+    let mut planes = zeros(need)?;
+    let length = zstd::bulk::decompress_to_buffer(bytes, &mut planes)
+        .map_err(|e| TileError::Damaged(e.to_string()))?;
+    if length != need {
+        let reason = format!("it has {length} bytes, not {need}");
+        return Err(TileError::Damaged(reason));
+    }
+    let mut codes: Vec<TexelCode> = zeros(pixels * area)?;
+    let (low, high) = planes.split_at(need / 2);
+    for c in 0..CHANNELS {
+        for s in 0..area {
+            let at = (c * area + s) * pixels;
+            let plane = low[at..at + pixels].iter().zip(&high[at..at + pixels]);
+            for (p, (&low, &high)) in plane.enumerate() {
+                codes[p * area + s][c] = u16::from_le_bytes([low, high]);
             }
         }
     }
     Ok(DirectTile { rect, step, codes })
+}
+
+/// A vector of `length` zeros. A browser may refuse what the limits allow: that is an error, not
+/// the end of the page.
+fn zeros<T: bytemuck::Zeroable + Clone>(length: usize) -> Result<Vec<T>, TileError> {
+    let mut values = Vec::new();
+    values
+        .try_reserve_exact(length)
+        .map_err(|_| TileError::Memory(length * size_of::<T>()))?;
+    values.resize(length, T::zeroed());
+    Ok(values)
 }

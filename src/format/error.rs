@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::metadata::MAX_METADATA_BYTES;
 use crate::transport::GeometryError;
 
 /// Why bytes are not a readable `.ltm` file.
@@ -36,13 +37,16 @@ pub enum FormatError {
     },
     /// The geometry cannot be.
     #[error("the header is invalid: {0}")]
-    Geometry(#[from] GeometryError),
+    Geometry(GeometryError),
     /// A directory entry does not fit the file.
     #[error("the directory is invalid: tile {tile} lies outside the file or over other data")]
     Entry {
         /// Tile number.
         tile: usize,
     },
+    /// The metadata is too long.
+    #[error("the file has {0} bytes of metadata, more than the {MAX_METADATA_BYTES} allowed")]
+    MetadataLength(u64),
     /// The metadata is not JSON of the expected form.
     #[error("the metadata is invalid: {0}")]
     Metadata(serde_json::Error),
@@ -56,7 +60,7 @@ pub enum FormatError {
     },
     /// Decoding would take more memory than allowed.
     #[error(
-        "the file decodes to {need} bytes, more than the limit of {limit}; raise the limit to open it"
+        "the file decodes to {need} bytes, more than the {limit} this program allows; use a smaller picture or window"
     )]
     Limit {
         /// Bytes needed.
@@ -108,6 +112,13 @@ pub enum FormatError {
         /// Tile number.
         tile: usize,
     },
+}
+
+// By hand, as its text holds all of the source's: a chain of causes would say it twice.
+impl From<GeometryError> for FormatError {
+    fn from(error: GeometryError) -> Self {
+        Self::Geometry(error)
+    }
 }
 
 /// A part of the file, for messages.

@@ -119,7 +119,10 @@ impl Header {
             metadata_crc,
             directory_crc,
         };
-        if metadata_bytes > MAX_METADATA_BYTES || file_bytes < header.tiles_offset() {
+        if metadata_bytes > MAX_METADATA_BYTES {
+            return Err(FormatError::MetadataLength(metadata_bytes.into()));
+        }
+        if file_bytes < header.tiles_offset() {
             return Err(FormatError::Truncated {
                 got: file_bytes,
                 need: header.tiles_offset(),

@@ -6,7 +6,7 @@ use crate::transport::{Geometry, TexelCode};
 /// Bounds on what a reader allocates on a file's word.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Bytes of decoded tiles.
+    /// Bytes of decoded tiles, were none of them dark.
     pub decoded_bytes: u64,
 }
 

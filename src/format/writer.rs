@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use super::header::{ENTRY_BYTES, HEADER_BYTES, Header, TileEntry};
+use super::metadata::MAX_METADATA_BYTES;
 use super::{FormatError, Metadata, codec};
 use crate::transport::{DirectTile, Geometry};
 
@@ -35,6 +36,10 @@ pub fn write(
 ) -> Result<(), FormatError> {
     assert_eq!(tiles.len(), geometry.tile_grid().area(), "one of each tile");
     let metadata = serde_json::to_vec(metadata).map_err(FormatError::Metadata)?;
+    let metadata_bytes = u32::try_from(metadata.len())
+        .ok()
+        .filter(|bytes| *bytes <= MAX_METADATA_BYTES)
+        .ok_or(FormatError::MetadataLength(metadata.len() as u64))?;
     let first = HEADER_BYTES + tiles.len() * ENTRY_BYTES + metadata.len();
     let mut offset = first as u64;
     let mut directory = Vec::with_capacity(tiles.len() * ENTRY_BYTES);
@@ -53,7 +58,7 @@ pub fn write(
     let header = Header {
         geometry: *geometry,
         file_bytes: offset,
-        metadata_bytes: metadata.len() as u32,
+        metadata_bytes,
         metadata_crc: crc32c::crc32c(&metadata),
         directory_crc: crc32c::crc32c(&directory),
     };

@@ -14,5 +14,5 @@ mod nnls;
 mod recovery;
 
 pub use common_mode::CommonMode;
-pub use nnls::{Nnls, kkt_violation};
+pub use nnls::Nnls;
 pub use recovery::{RecoverError, Recovery};

@@ -43,7 +43,7 @@ impl<'a> Nnls<'a> {
     }
 
     /// Minimises `½xᵀGx − hᵀx` subject to `x ≥ 0`, with `h = Aᵀb`, `[k]`. Returns `x`, `[k]`, which
-    /// is feasible always and optimal to rounding (see [`kkt_violation`]).
+    /// is feasible always and optimal to rounding: it satisfies the Karush–Kuhn–Tucker conditions.
     pub fn solve(&mut self, h: &[f64]) -> Vec<f64> {
         let top = h.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         let mut x = vec![0.0; self.k];
@@ -210,31 +210,34 @@ impl<'a> Nnls<'a> {
     }
 }
 
-/// How far `x` is from satisfying the Karush–Kuhn–Tucker conditions of
-/// `min ½xᵀGx − hᵀx, x ≥ 0`, as a share of the largest `|h|`: negative entries, ascent directions,
-/// and gradient where an entry is above zero.
-pub fn kkt_violation(gram: &[f64], h: &[f64], x: &[f64]) -> f64 {
-    let k = h.len();
-    let top = h.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
-    let mut worst = 0.0f64;
-    for j in 0..k {
-        let gx: f64 = gram[j * k..(j + 1) * k]
-            .iter()
-            .zip(x)
-            .map(|(g, x)| g * x)
-            .sum();
-        let gradient = h[j] - gx;
-        let violation = if x[j] > 0.0 { gradient.abs() } else { gradient };
-        worst = worst.max(violation / top).max(-x[j]);
-    }
-    worst
-}
-
 #[cfg(all(test, not(target_arch = "wasm32")))] // where there is proptest
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    /// How far `x` is from satisfying the Karush–Kuhn–Tucker conditions of
+    /// `min ½xᵀGx − hᵀx, x ≥ 0`, as a share of the largest `|h|`: negative entries, ascent directions,
+    /// and gradient where an entry is above zero.
+    fn kkt_violation(gram: &[f64], h: &[f64], x: &[f64]) -> f64 {
+        let k = h.len();
+        let top = h.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
+        let mut worst = 0.0f64;
+        for j in 0..k {
+            let gx: f64 = gram[j * k..(j + 1) * k]
+                .iter()
+                .zip(x)
+                .map(|(g, x)| g * x)
+                .sum();
+            let gradient = h[j] - gx;
+            let violation = if x[j] > 0.0 { gradient.abs() } else { gradient };
+            if !(violation.is_finite() && x[j].is_finite()) {
+                return f64::INFINITY; // `max` would overlook NaN
+            }
+            worst = worst.max(violation / top).max(-x[j]);
+        }
+        worst
+    }
 
     /// Normal equations of a random `[rows, k]` problem.
     fn normal_equations(a: &[f64], b: &[f64], k: usize) -> (Vec<f64>, Vec<f64>) {

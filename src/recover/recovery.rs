@@ -8,7 +8,7 @@ use super::design::Design;
 use super::{CommonMode, Nnls};
 use crate::capture::Measurements;
 use crate::transport::{
-    CameraPx, Decibels, Element, Geometry, GeometryError, TileRect, TransportError,
+    CHANNELS, CameraPx, Decibels, Element, Geometry, GeometryError, TileRect, TransportError,
     TransportFunctions, Window,
 };
 
@@ -85,13 +85,7 @@ impl<'a> Recovery<'a> {
         let area = self.geometry.window.area();
         let mut functions = TransportFunctions::zeros(rect, area);
         let rows: Vec<usize> = (0..self.measurements.patterns.len()).collect();
-        // (number in the tile, pixel) of all pixels by their common window
-        let mut windows: BTreeMap<Element, Vec<(usize, CameraPx)>> = BTreeMap::new();
-        for (p, pixel) in rect.pixels().enumerate() {
-            let origin = self.geometry.window_origin(pixel);
-            windows.entry(origin).or_default().push((p, pixel));
-        }
-        for (origin, pixels) in windows {
+        for (origin, pixels) in self.windows(rect) {
             self.window(
                 origin,
                 &pixels,
@@ -105,6 +99,16 @@ impl<'a> Recovery<'a> {
             );
         }
         functions
+    }
+
+    /// All pixels of a tile by their common window: (number in the tile, pixel).
+    fn windows(&self, rect: TileRect) -> BTreeMap<Element, Vec<(usize, CameraPx)>> {
+        let mut windows: BTreeMap<_, Vec<_>> = BTreeMap::new();
+        for (p, pixel) in rect.pixels().enumerate() {
+            let origin = self.geometry.window_origin(pixel);
+            windows.entry(origin).or_default().push((p, pixel));
+        }
+        windows
     }
 
     /// Solves for all pixels of one window from the patterns numbered `rows`; `take` gets each
@@ -143,13 +147,23 @@ impl<'a> Recovery<'a> {
                         .copied()
                         .filter(|&l| self.sample(l, pixel, c).is_finite())
                         .collect();
-                    let y: Vec<f64> = usable.iter().map(|&l| self.sample(l, pixel, c)).collect();
-                    if usable.len() == rows.len() {
+                    if usable.len() == rows.len() || usable.len() < FEWEST_PATTERNS {
+                        // Of a pixel saturated nearly always, all that is known is that it is at
+                        // least white: it is shown so, not black.
+                        let y: Vec<f64> = rows
+                            .iter()
+                            .map(|&l| match self.sample(l, pixel, c) {
+                                y if y.is_finite() => y,
+                                _ => f64::from(self.measurements.full_scale[l]),
+                            })
+                            .collect();
                         let x = solver.solve(&shared.right_hand_side(&y));
                         take(p, c, &shared.slots, &x);
-                    } else if usable.len() >= FEWEST_PATTERNS {
+                    } else {
                         // Saturated samples drop out, and with them the shared equations.
                         let own = design(&usable, c);
+                        let y: Vec<f64> =
+                            usable.iter().map(|&l| self.sample(l, pixel, c)).collect();
                         let x =
                             Nnls::new(&own.gram, own.unknowns()).solve(&own.right_hand_side(&y));
                         take(p, c, &own.slots, &x);
@@ -159,27 +173,35 @@ impl<'a> Recovery<'a> {
         }
     }
 
+    /// Pixels of which some channel is saturated in so nearly all photographs that nothing but
+    /// white is known of it.
+    pub fn overexposed_pixels(&self) -> usize {
+        let patterns = self.measurements.pictures.len();
+        let hopeless = |n: &usize| {
+            (0..CHANNELS).any(|c| {
+                let pictures = self.measurements.pictures.iter();
+                let saturated = pictures.filter(|picture| picture[*n][c].is_nan()).count();
+                patterns - saturated < FEWEST_PATTERNS
+            })
+        };
+        (0..self.geometry.camera.area()).filter(hopeless).count()
+    }
+
     fn sample(&self, l: usize, pixel: CameraPx, c: usize) -> f64 {
-        let n = pixel.y as usize * self.measurements.camera.width as usize + pixel.x as usize;
-        f64::from(self.measurements.pictures[l][n][c])
+        f64::from(self.measurements.pictures[l][self.geometry.camera.index(pixel)][c])
     }
 
     /// Tries every candidate on a spread of windows and keeps the one that predicts held-out
     /// patterns best.
     fn choose_common_mode(&self) -> Result<CommonMode, RecoverError> {
-        let mut windows: BTreeMap<Element, Vec<(usize, CameraPx)>> = BTreeMap::new();
+        let mut windows = BTreeMap::new();
         for rect in self.geometry.tiles() {
-            for pixel in rect.pixels() {
-                let origin = self.geometry.window_origin(pixel);
-                let lit = !self.dark(origin);
-                let pixels = windows.entry(origin).or_default();
-                // One pixel a window is enough to choose by.
-                if lit && pixels.is_empty() {
-                    pixels.push((0, pixel));
-                }
+            let lit = self.windows(rect).into_iter();
+            for (origin, mut pixels) in lit.filter(|&(origin, _)| !self.dark(origin)) {
+                pixels.truncate(1); // One pixel a window is enough to choose by.
+                windows.insert(origin, pixels);
             }
         }
-        windows.retain(|_, pixels| !pixels.is_empty());
         if windows.is_empty() {
             return Err(RecoverError::NoLight);
         }

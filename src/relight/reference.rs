@@ -13,10 +13,10 @@ pub fn relight(transport: &Transport, light: &Light) -> Vec<[f64; CHANNELS]> {
     assert_eq!(light.extent(), geometry.light, "a light of another extent");
     let area = geometry.window.area();
     let mut picture = vec![[0.0; CHANNELS]; geometry.camera.area()];
-    for tile in &transport.tiles {
+    for tile in transport.tiles.iter().filter(|tile| !tile.is_dark()) {
         for (p, pixel) in tile.rect.pixels().enumerate() {
             let origin = geometry.window_origin(pixel);
-            let y = &mut picture[(pixel.y * geometry.camera.width + pixel.x) as usize];
+            let y = &mut picture[geometry.camera.index(pixel)];
             for s in 0..area {
                 let element = geometry.window.element(origin, s);
                 let Some(m) = element.index_in(geometry.light) else {

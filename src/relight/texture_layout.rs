@@ -159,8 +159,11 @@ impl TextureLayout {
         mut put: impl FnMut(CodeBlock<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let Fold { extent, layers } = self.codes;
-        let mut tiles = transport.tiles.iter().map(|tile| tile.codes.as_slice());
+        let area = self.geometry.window.area();
+        let mut tiles = transport.tiles.iter();
         let mut source: &[TexelCode] = &[];
+        // Texels of dark tiles still to be written: they hold no codes, but have their place.
+        let mut dark = 0;
         let mut texels = Vec::new();
         for layer in 0..layers {
             for row in (0..extent.height).step_by(BLOCK_ROWS as usize) {
@@ -168,13 +171,17 @@ impl TextureLayout {
                 let need = (rows * extent.width) as usize;
                 texels.clear();
                 while texels.len() < need {
-                    if source.is_empty() {
+                    if source.is_empty() && dark == 0 {
                         match tiles.next() {
-                            Some(codes) => source = codes,
+                            Some(tile) if tile.is_dark() => dark = tile.rect.extent.area() * area,
+                            Some(tile) => source = &tile.codes,
                             // Past the last code, where nothing is ever read.
-                            None => texels.resize(need, [0; 4]),
+                            None => dark = need - texels.len(),
                         }
                     }
+                    let zeros = dark.min(need - texels.len());
+                    texels.resize(texels.len() + zeros, [0; 4]);
+                    dark -= zeros;
                     let (now, later) = source.split_at(source.len().min(need - texels.len()));
                     texels.extend_from_slice(now);
                     source = later;
@@ -205,7 +212,7 @@ impl TextureLayout {
         for (i, tile) in self.geometry.tiles().enumerate() {
             for pixel in tile.pixels() {
                 let Element { u, v } = self.geometry.window_origin(pixel);
-                texels[(pixel.y * camera.width + pixel.x) as usize] = [
+                texels[camera.index(pixel)] = [
                     near(u, light.width),
                     near(v, light.height),
                     first_code,
@@ -265,16 +272,19 @@ mod tests {
         }
     }
 
-    /// Codes that tell pixel and element.
+    /// Codes that tell pixel and element; every third tile is dark.
     fn transport(geometry: Geometry) -> Transport {
         let area = geometry.window.area();
-        let tiles = geometry.tiles().map(|rect| DirectTile {
+        let tiles = geometry.tiles().enumerate().map(|(i, rect)| DirectTile {
             rect,
             step: [1.0, 2.0, rect.x as f32],
-            codes: rect
-                .pixels()
-                .flat_map(|p| (0..area).map(move |s| [p.x as u16, p.y as u16, s as u16, 0]))
-                .collect(),
+            codes: match i % 3 {
+                2 => Vec::new(),
+                _ => rect
+                    .pixels()
+                    .flat_map(|p| (0..area).map(move |s| [p.x as u16, p.y as u16, s as u16, 0]))
+                    .collect(),
+            },
         });
         Transport {
             geometry,
@@ -311,7 +321,11 @@ mod tests {
                     assert_eq!(steps[tile as usize][2], (x / 16 * 16) as f32);
                     for s in 0..geometry.window.area() {
                         let code = texture[first as usize + s];
-                        assert_eq!(code, [x as u16, y as u16, s as u16, 0]);
+                        let expected = match transport.tiles[tile as usize].is_dark() {
+                            true => [0; 4],
+                            false => [x as u16, y as u16, s as u16, 0],
+                        };
+                        assert_eq!(code, expected);
                     }
                 }
             }

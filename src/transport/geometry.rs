@@ -17,6 +17,11 @@ pub struct Extent {
 }
 
 impl Extent {
+    /// Row-major index of a pixel of this grid.
+    pub fn index(self, pixel: CameraPx) -> usize {
+        pixel.y as usize * self.width as usize + pixel.x as usize
+    }
+
     /// Number of grid cells.
     pub fn area(self) -> usize {
         self.width as usize * self.height as usize

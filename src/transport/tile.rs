@@ -21,7 +21,8 @@ pub struct DirectTile {
     pub rect: TileRect,
     /// Value of one code, per channel.
     pub step: [f32; CHANNELS],
-    /// `[pixel, element]`, pixels row by row, window rows (v) then columns (u).
+    /// `[pixel, element]`, pixels row by row, window rows (v) then columns (u); empty for a tile
+    /// that is all dark.
     pub codes: Vec<TexelCode>,
 }
 
@@ -36,6 +37,9 @@ impl DirectTile {
                     peak[c] = peak[c].max(t[c]);
                 }
             }
+        }
+        if peak == [0.0; CHANNELS] {
+            return Self::dark(functions.rect);
         }
         let step = peak.map(|p| if p > 0.0 { p / TOP_CODE } else { 1.0 });
         let code = |t: f32, step: f32| (t / step).round() as u16; // `as` saturates, NaN is 0
@@ -58,9 +62,23 @@ impl DirectTile {
         }
     }
 
+    /// A tile from which no light comes, whatever the light.
+    pub fn dark(rect: TileRect) -> Self {
+        Self {
+            rect,
+            step: [1.0; CHANNELS],
+            codes: Vec::new(),
+        }
+    }
+
+    /// Whether the tile is all dark and so holds no codes.
+    pub fn is_dark(&self) -> bool {
+        self.codes.is_empty()
+    }
+
     /// τ of element `s` of pixel `p` (both in tile order), given the window's area.
     pub fn tau(&self, area: usize, p: usize, s: usize) -> [f32; CHANNELS] {
-        let code = self.codes[p * area + s];
+        let code = self.codes.get(p * area + s).unwrap_or(&[0; 4]);
         std::array::from_fn(|c| f32::from(code[c]) * self.step[c])
     }
 }

@@ -85,6 +85,10 @@ pub fn relight_tile(
 ) {
     let (side, area) = (geometry.window.side() as usize, geometry.window.area());
     assert_eq!(out.len(), tile.rect.extent.area(), "one output a pixel");
+    if tile.is_dark() {
+        out.fill([0.0; 4]);
+        return;
+    }
     assert_eq!(tile.codes.len(), out.len() * area, "one code an element");
     let functions = tile.codes.chunks_exact(area);
     for ((pixel, codes), y) in tile.rect.pixels().zip(functions).zip(out) {
