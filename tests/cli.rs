@@ -226,8 +226,38 @@ fn a_missing_photograph_is_named_with_its_field() {
     );
     refuses(
         |c| fs::remove_file(c.join("capture.json")).unwrap(),
-        &["capture.json", "no such file"],
+        &["is not a capture folder", "capture.json"],
     );
+    let out = TempDir::new().unwrap();
+    let output = out.path().join("x.ltm");
+    let recover = |capture: &Path| complaint(&["recover", text(capture), "-o", text(&output)]);
+    assert!(recover(&out.path().join("nowhere")).contains("there is no such folder"));
+    assert!(recover(&fixture().join("capture.json")).contains("is a file"));
+}
+
+#[test]
+fn an_input_named_as_output_is_not_destroyed() {
+    let (folder, capture, _) = spoilt(|_| {});
+    let manifest = capture.join("capture.json");
+    let before = fs::read(&manifest).unwrap();
+    let message = complaint(&["recover", text(&capture), "-o", text(&manifest)]);
+    assert!(message.contains("is not an .ltm file"), "{message}");
+    assert_eq!(fs::read(&manifest).unwrap(), before);
+    let file = small_ltm(folder.path());
+    let before = fs::read(&file).unwrap();
+    let message = complaint(&[
+        "relight",
+        text(&file),
+        "--light",
+        "flood",
+        "-o",
+        text(&file),
+    ]);
+    assert!(message.contains("is not a PNG"), "{message}");
+    assert_eq!(fs::read(&file).unwrap(), before);
+    assert!(complaint(&["verify", text(folder.path())]).contains("is a folder"));
+    // What the program wrote itself is replaced.
+    assert_eq!(small_ltm(folder.path()), file);
 }
 
 #[test]

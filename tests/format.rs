@@ -116,7 +116,7 @@ fn what_is_wrong_is_said() {
     assert!(message(&|f| f[12] = 1).contains("version 1.0"));
     assert!(message(&|f| f[20] ^= 1).contains("header is damaged"));
     assert!(message(&|f| f[HEADER_BYTES + 9] ^= 1).contains("directory is damaged"));
-    assert!(message(&|f| *f.last_mut().unwrap() ^= 1).contains("tile 5 is damaged"));
+    assert!(message(&|f| *f.last_mut().unwrap() ^= 1).contains("(tile 5) is damaged"));
     assert!(message(&|f| f.push(0)).contains("goes on after its end"));
     assert!(message(&|f| f.truncate(50)).contains("cut short"));
 }

@@ -15,6 +15,14 @@ pub enum CaptureError {
         /// Where the manifest names it, as " (shots[3].photo in capture.json)"; may be empty.
         named_by: String,
     },
+    /// Not a capture folder.
+    #[error("{path}: {problem}; give the folder that holds capture.json")]
+    NotACapture {
+        /// What was given.
+        path: PathBuf,
+        /// What it is instead.
+        problem: &'static str,
+    },
     /// A file that cannot be read.
     #[error("{path}: cannot be read")]
     Io {

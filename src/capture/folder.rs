@@ -37,17 +37,21 @@ impl CaptureFolder {
     /// Opens the folder `root` and reads its manifest.
     pub fn open(root: &Path) -> Result<Self, CaptureError> {
         let path = root.join(MANIFEST_NAME);
-        let text = std::fs::read_to_string(&path).map_err(|source| match source.kind() {
-            std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory => {
-                CaptureError::Missing {
-                    path: path.clone(),
-                    named_by: String::new(),
-                }
-            }
-            _ => CaptureError::Io {
-                path: path.clone(),
-                source,
-            },
+        let problem = match (root.exists(), root.is_dir(), path.exists()) {
+            (false, ..) => Some("there is no such folder"),
+            (_, false, _) => Some("is a file"),
+            (.., false) => Some("is not a capture folder: it has no capture.json"),
+            _ => None,
+        };
+        if let Some(problem) = problem {
+            return Err(CaptureError::NotACapture {
+                path: root.to_owned(),
+                problem,
+            });
+        }
+        let text = std::fs::read_to_string(&path).map_err(|source| CaptureError::Io {
+            path: path.clone(),
+            source,
         })?;
         // Some editors put a byte order mark first, which is no JSON.
         let json = text.strip_prefix('\u{feff}').unwrap_or(&text);

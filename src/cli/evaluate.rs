@@ -89,19 +89,19 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
 fn print(report: &Report) -> Result<()> {
     let show = |d: Option<Decibels>| d.map_or("-".to_owned(), |d| d.to_string());
     report::print_line(&format!(
-        "SNR against the truth        {}",
+        "SNR against the truth      {}",
         show(report.snr_db)
     ))?;
     report::print_line(&format!(
-        "SNR on {:3} held-out shots     {}",
+        "SNR on {:3} held-out shots   {}",
         report.heldout_shots,
         show(report.heldout_snr_db)
     ))?;
     for (name, psnr) in &report.relit {
-        report::print_line(&format!("PSNR relit under {name:11} {}", show(*psnr)))?;
+        report::print_line(&format!("PSNR relit under {name:9} {}", show(*psnr)))?;
     }
     report::print_line(&format!(
-        "File                         {}",
+        "File                       {}",
         report::bytes(report.file_bytes)
     ))
 }

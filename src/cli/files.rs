@@ -1,7 +1,7 @@
 //! Reading and writing files whole.
 
 use std::fs::File;
-use std::io::{BufWriter, Read, Write};
+use std::io::{BufWriter, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -28,6 +28,7 @@ pub struct LtmFile {
 /// Reads and checks an `.ltm` file.
 pub fn read_ltm(path: &Path) -> Result<LtmFile> {
     let read = || -> Result<LtmFile> {
+        ensure!(!path.is_dir(), "is a folder, not an .ltm file");
         let mut file = File::open(path).context("cannot be opened")?;
         let mut reader = Reader::new(LIMITS);
         let mut piece = vec![0; PIECE];
@@ -50,8 +51,48 @@ pub fn read_ltm(path: &Path) -> Result<LtmFile> {
     read().with_context(|| path.display().to_string())
 }
 
+/// Kinds of file that commands write, told by how they begin.
+#[derive(Clone, Copy, Debug)]
+pub enum Kind {
+    /// A relightable photograph.
+    Ltm,
+    /// A picture.
+    Png,
+}
+
+impl Kind {
+    fn signature(self) -> &'static [u8] {
+        match self {
+            Self::Ltm => b"\xABLTM",
+            Self::Png => b"\x89PNG",
+        }
+    }
+
+    /// Whether `path` holds a file of this kind, or nothing at all.
+    fn may_replace(self, path: &Path) -> std::io::Result<bool> {
+        let file = match File::open(path) {
+            Ok(file) => file,
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(true),
+            Err(e) => return Err(e),
+        };
+        let mut start = Vec::new();
+        file.take(4).read_to_end(&mut start)?;
+        Ok(start.is_empty() || start == self.signature())
+    }
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Ltm => "an .ltm file",
+            Self::Png => "a PNG",
+        })
+    }
+}
+
 /// A file to come: written beside its place and renamed there once whole, so that its path never
-/// holds half of it. An existing file is replaced.
+/// holds half of it. An existing file of the same kind is replaced; any other is somebody's photograph
+/// or manifest, named by mistake.
 pub struct Output {
     path: PathBuf,
     file: NamedTempFile,
@@ -59,9 +100,16 @@ pub struct Output {
 
 impl Output {
     /// Makes sure that the file can be written, before any work is done for it.
-    pub fn create(path: &Path) -> Result<Self> {
+    pub fn create(path: &Path, kind: Kind) -> Result<Self> {
         let create = || -> Result<NamedTempFile> {
-            ensure!(!path.is_dir(), "is a folder; give the name of a file");
+            ensure!(
+                !path.exists() || path.is_file(),
+                "is a folder or a device; give the name of a file"
+            );
+            ensure!(
+                kind.may_replace(path).context("cannot be looked at")?,
+                "is there already and is not {kind}; give another name"
+            );
             let folder = match path.parent() {
                 Some(parent) if !parent.as_os_str().is_empty() => parent,
                 _ => Path::new("."),
@@ -76,6 +124,7 @@ impl Output {
             }
             builder
                 .tempfile_in(folder)
+                .map_err(|e| std::io::Error::from(e.kind())) // it names the temporary file
                 .context("cannot be created; does its folder exist, and may you write there?")
         };
         let file = create().with_context(|| path.display().to_string())?;
@@ -99,6 +148,7 @@ impl Output {
             let bytes = metadata.context("cannot be read back")?.len();
             self.file
                 .persist(&self.path)
+                .map_err(|e| e.error)
                 .context("cannot be put in place")?;
             Ok(bytes)
         };

@@ -19,9 +19,7 @@ pub fn peak_rss_bytes() -> Option<u64> {
 /// A progress bar on standard error, shown on a terminal only.
 pub fn progress(what: &'static str, steps: usize) -> ProgressBar {
     let bar = ProgressBar::new(steps as u64).with_message(what);
-    if let Ok(style) =
-        ProgressStyle::with_template("{msg:12} {wide_bar} {pos}/{len} {per_sec} {eta} left")
-    {
+    if let Ok(style) = ProgressStyle::with_template("{msg:12} {wide_bar} {pos}/{len} {eta} left") {
         bar.set_style(style);
     }
     bar

@@ -12,10 +12,13 @@ use super::{files, process, report};
 use crate::capture::{CaptureFolder, Measurements};
 use crate::format::{self, EncodedTile, Metadata};
 use crate::recover::Recovery;
-use crate::transport::{DirectTile, Geometry, Window};
+use crate::transport::{CHANNELS, DirectTile, Geometry, Window};
 
 /// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
 const HOLD_OUT_EVERY: usize = 10;
+
+/// Percentage of saturated samples past which a wrong manifest is likelier than a few highlights.
+const MUCH_SATURATED: f64 = 2.0;
 
 /// Recover the light transport of an object from a folder of photographs
 #[derive(Debug, Args)]
@@ -70,13 +73,21 @@ struct Report {
 
 pub fn run(args: &RecoverArgs) -> Result<()> {
     let start = Instant::now();
-    let output = files::Output::create(&args.output)?;
+    let output = files::Output::create(&args.output, files::Kind::Ltm)?;
     let folder = CaptureFolder::open(&args.capture)?;
     let shots = choose_shots(folder.manifest().shots.len(), args.patterns)?;
     let measurements = read(&folder, &shots)?;
     let saturated = measurements.saturated();
     if saturated > 0 {
-        eprintln!("note: {saturated} saturated samples are left out");
+        let samples = shots.len() * measurements.camera.area() * CHANNELS;
+        let percent = 100.0 * saturated as f64 / samples as f64;
+        eprintln!("note: {saturated} saturated samples ({percent:.1} %) are left out");
+        if percent > MUCH_SATURATED {
+            eprintln!(
+                "warning: that is much; check \"camera.white\" in the manifest, or photograph \
+                 with less exposure"
+            );
+        }
     }
     let recovery = Recovery::new(&measurements, args.window)
         .with_context(|| args.capture.display().to_string())?;

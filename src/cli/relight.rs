@@ -18,11 +18,12 @@ pub struct RelightArgs {
     /// flood, torch, checkerboard, stripes, spectrum, or an image file
     #[arg(long, value_name = "NAME|IMAGE")]
     light: String,
-    /// Where a torch shines, as fractions of the picture from its top left corner
-    #[arg(long, value_name = "X,Y", value_parser = parse_position)]
+    /// Where a torch shines, as fractions of the picture from its top left corner [default: over
+    /// the middle of the light]
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = parse_position)]
     at: Option<[f64; 2]>,
     /// Factor on the picture's brightness
-    #[arg(long, default_value_t = 1.0, value_parser = |text: &str| super::number_in(text, 0.0, 1e6))]
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| super::number_in(text, 0.0, 1e6))]
     exposure: f32,
     /// What computes the picture
     #[arg(long, value_enum, default_value_t = Backend::Cpu)]
@@ -47,8 +48,8 @@ fn parse_position(text: &str) -> Result<[f64; 2], String> {
         .collect::<Result<_, _>>()
         .map_err(|e| e.to_string())?;
     match parts[..] {
-        [x, y] if x.is_finite() && y.is_finite() => Ok([x, y]),
-        _ => Err("expected two numbers, as in 0.5,0.25".to_owned()),
+        [x, y] if [x, y].iter().all(|a| (0.0..=1.0).contains(a)) => Ok([x, y]),
+        _ => Err("expected two numbers from 0 to 1, as in 0.5,0.25".to_owned()),
     }
 }
 
@@ -56,7 +57,7 @@ pub fn run(args: &RelightArgs) -> Result<()> {
     if args.at.is_some() && args.light != "torch" {
         return Err(Usage("--at goes with --light torch").into());
     }
-    let output = files::Output::create(&args.output)?;
+    let output = files::Output::create(&args.output, files::Kind::Png)?;
     let file = files::read_ltm(&args.file)?;
     let geometry = &file.header.geometry;
     let light = match args.at {

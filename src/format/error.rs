@@ -51,7 +51,7 @@ pub enum FormatError {
     #[error("the metadata is invalid: {0}")]
     Metadata(serde_json::Error),
     /// A tile does not decompress to what the geometry asks for.
-    #[error("{part} does not decompress: {reason}")]
+    #[error("the {part} does not decompress: {reason}")]
     Decompress {
         /// Which tile.
         part: Part,
@@ -140,7 +140,7 @@ impl std::fmt::Display for Part {
             Self::Header => f.write_str("header"),
             Self::Directory => f.write_str("directory"),
             Self::Metadata => f.write_str("metadata"),
-            Self::Tile(i) => write!(f, "tile {i}"),
+            Self::Tile(i) => write!(f, "picture data (tile {i})"),
         }
     }
 }
