@@ -9,9 +9,20 @@ import { glassBytes, nativePicture } from './photos.js';
 /** @param {import('./browser.js').Happening[]} happened @param {string} type */
 const count = (happened, type) => happened.filter((event) => event.type === type).length;
 
-/** Waits for something this process sees, not the page. @param {() => boolean} condition */
-async function until(condition) {
-  while (!condition()) await new Promise((resolve) => setTimeout(resolve, 20));
+const UNTIL_MS = 10_000;
+
+/**
+ * Waits for something this process sees, not the page.
+ *
+ * @param {() => boolean} condition
+ * @param {string} what is waited for
+ */
+async function until(condition, what) {
+  const deadline = Date.now() + UNTIL_MS;
+  while (!condition()) {
+    if (Date.now() > deadline) throw new Error(`waited ${UNTIL_MS / 1000} s for ${what}`);
+    await new Promise((resolve) => setTimeout(resolve, 20));
+  }
 }
 
 describe('the module', () => {
@@ -49,7 +60,7 @@ describe('an element', () => {
     await page.evaluate("photo.src = '/photos/glass.ltm'");
     const happened = await loaded(page);
     assert.equal(count(happened, 'load'), 1);
-    await until(() => aborted.includes('/faults/slow'));
+    await until(() => aborted.includes('/faults/slow'), 'the transfer to be ended');
     assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
   });
 
@@ -59,7 +70,7 @@ describe('an element', () => {
     await mount(page, { src: '/faults/slow', backend: 'cpu' });
     await happenedUntil(page, 'progress');
     await page.evaluate('photo.remove()');
-    await until(() => aborted.includes('/faults/slow'));
+    await until(() => aborted.includes('/faults/slow'), 'the transfer to be ended');
     assert.equal(count(await page.evaluate('happened'), 'error'), 0);
     await page.evaluate("photo.src = '/photos/glass.ltm', document.body.append(photo)");
     await loaded(page);
