@@ -4,6 +4,9 @@
 REPO=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/relightable-photo
 
+# Scripts and tests look for what cargo built here, wherever the user's own settings would have it.
+export CARGO_TARGET_DIR="$REPO/target"
+
 # rustup's own place, for shells that were started before it was installed.
 [ -d "${CARGO_HOME:-$HOME/.cargo}/bin" ] && PATH="$PATH:${CARGO_HOME:-$HOME/.cargo}/bin"
 
