@@ -105,6 +105,53 @@ describe('falling back', () => {
     await drawsRight(page);
   });
 
+  test('when the WebGPU device is lost before it is used', async (t) => {
+    const page = await openPage(t, '/bench', {
+      before: () => {
+        const adapter = /** @type {any} */ (globalThis).GPUAdapter.prototype;
+        const { requestDevice } = adapter;
+        adapter.requestDevice = /** @this {any} @param {any[]} options */ async function (
+          ...options
+        ) {
+          const device = await Reflect.apply(requestDevice, this, options);
+          device.destroy();
+          await device.lost;
+          return device;
+        };
+      },
+    });
+    await mount(page, { ...GLASS, backend: 'webgpu webgl2 cpu' });
+    const [change] = changes(await loaded(page));
+    assert.equal(change?.['backend'], 'webgl2');
+    assert.match(String(change?.['reason']), /^WebGPU: /);
+    await drawsRight(page);
+  });
+
+  test('when the canvas refuses WebGPU, whose device is given back', async (t) => {
+    const page = await openPage(t, '/bench', {
+      before: () => {
+        const { getContext } = HTMLCanvasElement.prototype;
+        HTMLCanvasElement.prototype.getContext = /** @type {any} */ (
+          /** @this {HTMLCanvasElement} @param {string} kind @param {any[]} rest */
+          function (kind, ...rest) {
+            return kind === 'webgpu' ? null : Reflect.apply(getContext, this, [kind, ...rest]);
+          }
+        );
+        const device = /** @type {any} */ (globalThis).GPUDevice.prototype;
+        const { destroy } = device;
+        device.destroy = /** @this {any} */ function () {
+          Object.assign(globalThis, { destroyed: true });
+          Reflect.apply(destroy, this, []);
+        };
+      },
+    });
+    await mount(page, { ...GLASS, backend: 'webgpu webgl2' });
+    const [change] = changes(await loaded(page));
+    assert.equal(change?.['backend'], 'webgl2');
+    assert.match(String(change?.['reason']), /^WebGPU: the canvas gives no WebGPU context/);
+    assert.equal(await page.evaluate('globalThis.destroyed'), true);
+  });
+
   test('and back, while the page runs', async (t) => {
     const page = await openPage(t, '/bench');
     await mount(page, { ...GLASS, backend: 'cpu' });

@@ -224,6 +224,64 @@ for (const how of ['by the browser', 'at the next drawing']) {
   });
 }
 
+test('a back end lost while another is looked for does not end that search', async () => {
+  const w = await loadedWorld({ ...SETTINGS, backends: ['webgl2'] });
+  w.player.set({ ...SETTINGS, backends: ['webgpu', 'webgl2', 'cpu'] });
+  w.losses[0]?.('the browser took it away.');
+  assert.deepEqual(w.happened(), []);
+  await w.drawn(1);
+  assert.deepEqual(w.happened(), ['free webgl2', 'backend webgl2 -> webgpu', 'webgpu draws flood']);
+});
+
+test('a back end lost while another is looked for is set up anew when its turn comes', async () => {
+  const w = await loadedWorld({ ...SETTINGS, backends: ['webgl2'] });
+  w.player.set({ ...SETTINGS, backends: ['webgpu', 'webgl2', 'cpu'] });
+  w.losses[0]?.('the browser took it away.');
+  await w.drawFails(1, 'no adapter');
+  await w.drawn(2);
+  assert.deepEqual(w.happened(), [
+    'free webgl2',
+    'backend webgl2 -> webgl2 (WebGPU: no adapter.)',
+    'webgl2 draws flood',
+  ]);
+});
+
+test('a back end lost while it is being set up is passed over with its reason', async () => {
+  const w = world();
+  w.player.set(SETTINGS);
+  await w.opened('a.ltm');
+  w.losses[0]?.('the device is gone.');
+  await w.drawn(0);
+  await w.drawn(1);
+  assert.deepEqual(w.happened(), [
+    'loading',
+    'free webgpu',
+    'backend null -> cpu (WebGPU: it was lost while it was being set up: the device is gone.)',
+    'cpu draws flood',
+    'loaded',
+  ]);
+});
+
+test('a back end lost at any moment after it was set up is replaced, and freed once', async () => {
+  for (let ticks = 0; ticks < 10; ticks += 1) {
+    const w = world();
+    w.player.set(SETTINGS);
+    await w.opened('a.ltm');
+    w.draws[0]?.resolve();
+    for (let tick = 0; tick < ticks; tick += 1) await Promise.resolve();
+    w.losses[0]?.('the device is gone.');
+    await settle();
+    await w.drawn(1);
+    const happened = w.happened();
+    const lasting = happened.filter((line) => /^free|^failed|^cpu|loaded/.test(line));
+    const expected = ['free webgpu', 'cpu draws flood', 'loaded'];
+    assert.deepEqual(lasting.sort(), expected.sort(), `after ${ticks} ticks`);
+    const reasons = happened.filter((line) => line.startsWith('backend'));
+    assert.match(reasons.at(-1) ?? '', /-> cpu \(WebGPU.* lost.*: the device is gone\.\)/);
+    assert.equal(w.player.backend, 'cpu');
+  }
+});
+
 test('the last back end lost is backend-lost', async () => {
   const w = await loadedWorld({ ...SETTINGS, backends: ['webgpu'] });
   w.losses[0]?.('the device is gone.');

@@ -56,9 +56,12 @@ export interface Listener<D extends Drawing> {
   recovered(): void;
 }
 
-interface Active<D extends Drawing> {
+/** A back end that was set up. */
+interface SetUp<D extends Drawing> {
   readonly backend: Backend;
   readonly drawing: D;
+  /** Why it no longer works, once it does not. */
+  lost: string | null;
 }
 
 /** A photograph that is freed when the last of its holders lets go. */
@@ -88,7 +91,7 @@ export class Player<D extends Drawing> {
   #load: AbortController | null = null;
   #search: AbortController | null = null;
   #held: Held | null = null;
-  #active: Active<D> | null = null;
+  #active: SetUp<D> | null = null;
   #drawn = false;
   #failed = false;
   #frameAsked = false;
@@ -140,13 +143,14 @@ export class Player<D extends Drawing> {
         'The photograph is not loaded yet: wait for its load event.',
       );
     }
-    const { drawing } = this.#active;
+    const active = this.#active;
+    const { drawing } = active;
     try {
       drawing.render(this.#settings.light, this.#settings.exposure);
       return drawing;
     } catch (thrown) {
       const error = toPhotoError(thrown);
-      if (error.code === 'backend-lost') this.#lost(drawing, error.message);
+      if (error.code === 'backend-lost') this.#lost(active, error.message);
       else this.#fail(error);
       throw error;
     }
@@ -200,16 +204,24 @@ export class Player<D extends Drawing> {
     try {
       const chosen = await firstWorking(
         order,
-        (backend) => this.#draw(backend, held.photo, signal),
+        (backend) => this.#setUp(backend, held.photo, signal),
         () => signal.throwIfAborted(),
       );
       signal.throwIfAborted();
       this.#search = null;
-      if (chosen.value !== this.drawing) {
+      const found = chosen.value;
+      const changed = found !== this.#active;
+      if (changed) {
         this.#dropActive();
-        this.#active = { backend: chosen.backend, drawing: chosen.value };
-        const reason = [why, chosen.reason].filter(Boolean).join(' ');
-        this.#listener.backendChanged(chosen.value, chosen.backend, previous, reason);
+        this.#active = found;
+      }
+      const reason = [why, chosen.reason].filter(Boolean).join(' ');
+      if (found.lost !== null) {
+        this.#replace(found, found.lost, order, previous, reason);
+        return;
+      }
+      if (changed) {
+        this.#listener.backendChanged(found.drawing, found.backend, previous, reason);
       }
       this.#render();
     } catch (thrown) {
@@ -222,17 +234,25 @@ export class Player<D extends Drawing> {
     }
   }
 
-  /** One back end, set up, or the one in use where it is the same. */
-  async #draw(backend: Backend, photo: Photo, signal: AbortSignal): Promise<D> {
-    if (this.#active?.backend === backend) return this.#active.drawing;
+  /** One back end, set up, or the one in use where it is the same and works. */
+  async #setUp(backend: Backend, photo: Photo, signal: AbortSignal): Promise<SetUp<D>> {
+    if (this.#active?.backend === backend && this.#active.lost === null) return this.#active;
+    let done: SetUp<D> | null = null;
+    let lostEarly: string | null = null;
     const drawing = await this.#ports.draw(backend, photo, (reason) => {
-      this.#lost(drawing, reason);
+      if (done) this.#lost(done, reason);
+      else lostEarly ??= reason;
     });
     if (signal.aborted) {
       drawing.free();
       signal.throwIfAborted();
     }
-    return drawing;
+    if (lostEarly !== null) {
+      drawing.free();
+      throw new PhotoError('backend-lost', `it was lost while it was being set up: ${lostEarly}`);
+    }
+    done = { backend, drawing, lost: null };
+    return done;
   }
 
   #askForFrame(): void {
@@ -262,18 +282,30 @@ export class Player<D extends Drawing> {
     }
   }
 
-  /** A back end that stopped working is replaced by the next of the order. */
-  #lost(drawing: D, reason: string): void {
-    const active = this.#active;
-    if (!active || !this.#settings || active.drawing !== drawing) return;
+  /**
+   * A back end that stopped working is replaced by the next of the order. While one is being looked
+   * for, that search goes on, and what it finds is the replacement.
+   */
+  #lost(lost: SetUp<D>, reason: string): void {
+    lost.lost ??= reason;
+    if (this.#active !== lost || this.#search || !this.#settings) return;
+    this.#replace(lost, reason, this.#settings.backends, lost.backend, '');
+  }
+
+  /** Takes up what comes after a lost back end, in the place of `previous`. */
+  #replace(
+    { backend }: SetUp<D>,
+    reason: string,
+    order: readonly Backend[],
+    previous: Backend | null,
+    before: string,
+  ): void {
     this.#dropActive();
-    const rest = after(this.#settings.backends, active.backend);
-    const why = `${BACKEND_TITLES[active.backend]} was lost: ${reason}`;
-    if (rest.length > 0) {
-      void this.#choose(rest, active.backend, why);
-    } else {
-      this.#fail(new PhotoError('backend-lost', `${why} No other back end is left to try.`));
-    }
+    const rest = after(order, backend);
+    const lost = `${BACKEND_TITLES[backend]} was lost: ${reason}`;
+    const why = [before, lost].filter(Boolean).join(' ');
+    if (rest.length > 0) void this.#choose(rest, previous, why);
+    else this.#fail(new PhotoError('backend-lost', `${why} No other back end is left to try.`));
   }
 
   #fail(error: PhotoError): void {

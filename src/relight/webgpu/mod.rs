@@ -95,11 +95,12 @@ impl WebGpu {
         });
         // Scopes are popped on every path, innermost first.
         let errors = [out_of_memory.pop().await, invalid.pop().await];
-        let (surface, pipeline, bindings, textures) = built?;
-        if let Some(error) = errors.into_iter().flatten().next() {
-            device.destroy();
-            return Err(BackendError::Upload(error.to_string()));
-        }
+        let built = built.and_then(|parts| match errors.into_iter().flatten().next() {
+            Some(error) => Err(BackendError::Upload(error.to_string())),
+            None => Ok(parts),
+        });
+        // Not left to the garbage collector, which does not know how much the device holds.
+        let (surface, pipeline, bindings, textures) = built.inspect_err(|_| device.destroy())?;
         Ok(Self {
             layout,
             queue,
