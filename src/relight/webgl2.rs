@@ -4,7 +4,7 @@ use js_sys::{Float32Array, Int32Array, Object, Uint16Array};
 use wasm_bindgen::JsCast;
 use web_sys::{
     HtmlCanvasElement, WebGl2RenderingContext as Gl, WebGlBuffer, WebGlContextAttributes,
-    WebGlProgram, WebGlShader, WebGlTexture,
+    WebGlProgram, WebGlShader, WebGlTexture, WebglLoseContext,
 };
 
 use super::Light;
@@ -44,15 +44,9 @@ impl WebGl2 {
     /// afterwards: a context has to be made to learn what the device can do.
     pub fn new(transport: &Transport, canvas: &HtmlCanvasElement) -> Result<Self, BackendError> {
         let Geometry { camera, light, .. } = transport.geometry;
-        let gl = open(canvas, camera)?;
-        let layout = TextureLayout::new(transport.geometry, limits(&gl))?;
-        let kernel = describe(&gl);
-        let mut context = Context {
-            gl,
-            program: None,
-            textures: Vec::new(),
-            params: None,
-        };
+        let mut context = open(canvas, camera)?;
+        let layout = TextureLayout::new(transport.geometry, limits(&context.gl))?;
+        let kernel = describe(&context.gl);
         context.link()?;
         context.upload(&layout, transport)?;
         let gl = &context.gl;
@@ -123,7 +117,7 @@ const FLOATS: Texel = Texel {
 };
 
 /// A context whose pixels are the picture's bytes and nothing else: opaque, no antialiasing.
-fn open(canvas: &HtmlCanvasElement, camera: Extent) -> Result<Gl, BackendError> {
+fn open(canvas: &HtmlCanvasElement, camera: Extent) -> Result<Context, BackendError> {
     let canvas_error = |reason: &str| BackendError::Canvas {
         api: API,
         reason: reason.into(),
@@ -143,12 +137,20 @@ fn open(canvas: &HtmlCanvasElement, camera: Extent) -> Result<Gl, BackendError> 
         .map_err(|e| canvas_error(&format!("{e:?}")))?
         .and_then(|context| context.dyn_into::<Gl>().ok())
         .ok_or_else(|| canvas_error("WebGL2 is missing, switched off or out of contexts"))?;
+    // From here on, whatever goes wrong gives the context back.
+    let context = Context {
+        gl,
+        program: None,
+        textures: Vec::new(),
+        params: None,
+    };
+    let gl = &context.gl;
     if gl.is_context_lost() {
         return Err(canvas_error("the context is lost"));
     }
     let given = (gl.drawing_buffer_width(), gl.drawing_buffer_height());
     if given == (camera.width as i32, camera.height as i32) {
-        Ok(gl)
+        Ok(context)
     } else {
         Err(canvas_error(&format!(
             "{camera} pixels were asked for, {}x{} given",
@@ -329,6 +331,14 @@ impl Drop for Context {
         }
         self.gl.delete_buffer(self.params.as_ref());
         self.gl.delete_program(self.program.as_ref());
+        // The context itself too: browsers allow a page only so many, sixteen in Chromium, and at the
+        // next one take away the oldest, which may be another photograph's.
+        if let Ok(Some(extension)) = self.gl.get_extension("WEBGL_lose_context") {
+            // Browsers do not show this interface's constructor, so there is no type to check.
+            extension
+                .unchecked_into::<WebglLoseContext>()
+                .lose_context();
+        }
     }
 }
 

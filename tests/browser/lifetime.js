@@ -114,6 +114,32 @@ describe('an element', () => {
     });
   }
 
+  test('loaded again and again leaves the graphics of others alone', async (t) => {
+    const page = await openPage(t, '/bench');
+    await mount(page, { src: '/photos/glass.ltm', backend: 'webgl2 cpu', light: 'spectrum' });
+    await loaded(page);
+    // Chromium has sixteen WebGL contexts for a page, and takes away the oldest for a new one.
+    const backends = await page.evaluate(async () => {
+      const other = document.createElement('relightable-photo');
+      Object.assign(other, { src: '/photos/glass.ltm', backend: 'webgl2 cpu' });
+      document.body.append(other);
+      const used = [];
+      for (let i = 0; i < 20; i += 1) {
+        await new Promise((resolve) => other.addEventListener('load', resolve, { once: true }));
+        used.push(other.activeBackend);
+        if (i < 19) other.setAttribute('src', '/photos/glass.ltm');
+      }
+      // The browser tells of a context taken away in a task of its own.
+      await new Promise((resolve) => setTimeout(resolve, 100));
+      return [...used, /** @type {any} */ (globalThis).photo.activeBackend];
+    });
+    assert.deepEqual(backends, Array(21).fill('webgl2'));
+    const happened = await page.evaluate('happened');
+    assert.equal(count(happened, 'backendchange'), 21);
+    assert.equal(count(happened, 'error'), 0);
+    assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
+  });
+
   test('with properties set before it was defined takes them up', async (t) => {
     const page = await openPage(t, '/blank');
     const light = await page.evaluate(async () => {
