@@ -1,6 +1,7 @@
 /** One Chromium and one server for all tests, and what tests do with them. */
 
 import { after } from 'node:test';
+import { gzipSync } from 'node:zlib';
 import { launchChromium } from '../../www/tools/chromium.js';
 import { decodePng } from '../../www/tools/pictures.js';
 import { listen } from '../../www/tools/serve.js';
@@ -14,7 +15,25 @@ import { FOLDER, glassBytes } from './photos.js';
 const TRANSFER_PIECE = 1 << 14;
 
 /**
- * Bad servers, by path.
+ * A server that compresses, and lets pages of other origins read what it sends.
+ *
+ * @param {number} level
+ * @returns {(response: import('node:http').ServerResponse) => unknown}
+ */
+function gzipped(level) {
+  const bytes = gzipSync(glassBytes, { level });
+  return (response) =>
+    response
+      .writeHead(200, {
+        'Access-Control-Allow-Origin': '*',
+        'Content-Encoding': 'gzip',
+        'Content-Length': bytes.length,
+      })
+      .end(bytes);
+}
+
+/**
+ * Bad servers and odd ones, by path.
  *
  * @type {Record<string, (response: import('node:http').ServerResponse) => unknown>}
  */
@@ -49,6 +68,9 @@ const FAULTS = {
     }
     response.end();
   },
+  '/faults/gzipped': gzipped(9),
+  // Longer than the file itself.
+  '/faults/gzipped-longer': gzipped(0),
   '/blank': (response) =>
     response
       .writeHead(200, { 'Content-Type': 'text/html' })
@@ -66,7 +88,8 @@ const FAULTS = {
 export const aborted = /** @type {string[]} */ ([]);
 
 const serveSite = site({ photos: FOLDER });
-const server = await listen((request, response) => {
+/** @type {import('node:http').RequestListener} */
+const serve = (request, response) => {
   const path = request.url ?? '/';
   response.on('close', () => {
     if (!response.writableFinished) aborted.push(path);
@@ -74,15 +97,18 @@ const server = await listen((request, response) => {
   const fault = FAULTS[path];
   if (fault) fault(response);
   else serveSite(request, response);
-}, 0);
+};
+const [server, otherServer] = await Promise.all([listen(serve, 0), listen(serve, 0)]);
 const chromium = await launchChromium();
 
 after(async () => {
   await chromium.close();
-  await server.close();
+  await Promise.all([server.close(), otherServer.close()]);
 });
 
 export const origin = server.url.replace(/\/$/, '');
+/** Serves the same, but pages come from `origin`. */
+export const otherOrigin = otherServer.url.replace(/\/$/, '');
 
 /**
  * A page of its own, closed when the test ends. Anything a page throws or a policy refuses fails it.

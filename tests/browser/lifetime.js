@@ -3,7 +3,16 @@
 import assert from 'node:assert/strict';
 import { describe, test } from 'node:test';
 import { compare } from '../../www/tools/pictures.js';
-import { aborted, happenedUntil, loaded, mount, openPage, picture } from './browser.js';
+import {
+  aborted,
+  happenedUntil,
+  loaded,
+  mount,
+  openPage,
+  origin,
+  otherOrigin,
+  picture,
+} from './browser.js';
 import { glassBytes, nativePicture } from './photos.js';
 
 /** @param {import('./browser.js').Happening[]} happened @param {string} type */
@@ -51,6 +60,20 @@ describe('an element', () => {
     assert.ok(progress.every((event) => event['total'] === glassBytes.length));
     await page.getByRole('progressbar').waitFor({ state: 'hidden' });
   });
+
+  for (const from of [origin, otherOrigin]) {
+    for (const path of ['/faults/gzipped', '/faults/gzipped-longer']) {
+      const where = from === origin ? 'its own origin' : 'another origin';
+      test(`takes a compressed transfer from ${where}: ${path}`, async (t) => {
+        const page = await openPage(t, '/bench');
+        await mount(page, { src: from + path, backend: 'cpu' });
+        const progress = (await loaded(page)).filter((event) => event.type === 'progress');
+        const { loaded: bytes, total } = /** @type {any} */ (progress.at(-1));
+        assert.deepEqual({ bytes, total }, { bytes: glassBytes.length, total: glassBytes.length });
+        assert.ok(progress.every((event) => Number(event['loaded']) <= Number(event['total'])));
+      });
+    }
+  }
 
   test('given another src in the middle of a load drops the first', async (t) => {
     const page = await openPage(t, '/bench');

@@ -4,7 +4,10 @@ import { messageOf, PhotoError } from './errors.js';
 
 /** What the answer's head says of the body to come. */
 export interface Head {
-  /** Bytes of the body, where the server says so and no compression hides it. */
+  /**
+   * Bytes of the body, as far as can be told. Not to be relied on: scripts may read Content-Length
+   * of another origin's answer but not its Content-Encoding, so these may be compressed bytes.
+   */
   readonly bytes: number | undefined;
 }
 
@@ -59,16 +62,17 @@ export function checkHead(url: string, response: Response): Head {
 }
 
 /**
- * Hands over the body piece by piece. A body that breaks off, is shorter than the head says, or
- * falls silent ends in `http-short` or `http-stalled`.
+ * Hands over the body piece by piece. One that breaks off or falls silent ends in `http-short` or
+ * `http-stalled`. One that ends too early without the browser noticing simply ends: how long the file
+ * is, the head does not say reliably, only the file itself. `fileBytes` gives that, once it is known.
  */
 export async function* body(
   url: string,
   response: Response,
   signal: AbortSignal,
+  fileBytes: () => number | undefined,
   stallMs: number = STALL_MS,
 ): AsyncGenerator<Uint8Array, void> {
-  const expected = checkHead(url, response).bytes;
   let bytes = 0;
   if (!response.body) return;
   const reader = response.body.getReader();
@@ -78,7 +82,7 @@ export async function* body(
         (cause: unknown) => {
           signal.throwIfAborted();
           if (cause instanceof PhotoError) throw cause;
-          throw short(url, bytes, expected, cause);
+          throw short(url, bytes, fileBytes(), cause);
         },
       );
       signal.throwIfAborted();
@@ -90,7 +94,6 @@ export async function* body(
     // Also reached when the caller stops early: the rest of the body is not wanted.
     void reader.cancel().catch(() => {});
   }
-  if (expected !== undefined && bytes < expected) throw short(url, bytes, expected);
 }
 
 /** A file that ended early. `expected` is left out where nothing says how long it is. */

@@ -67,7 +67,7 @@ async function decode(
   let held = true;
   let turn = ports.now();
   try {
-    for await (const piece of body(url, response, signal)) {
+    for await (const piece of body(url, response, signal, () => decoder.fileBytes)) {
       for (let at = 0; at < piece.byteLength; at += SLICE_BYTES) {
         decoder.feed(piece.subarray(at, at + SLICE_BYTES));
         if (ports.now() - turn >= TURN_MS) {
@@ -76,7 +76,7 @@ async function decode(
           turn = ports.now();
         }
       }
-      onProgress(decoder.bytesFed, promised ?? decoder.fileBytes ?? 0);
+      onProgress(decoder.bytesFed, decoder.fileBytes ?? 0);
       signal.throwIfAborted();
     }
     const { bytesFed, fileBytes } = decoder;
@@ -85,10 +85,11 @@ async function decode(
       return decoder.finish();
     } catch (thrown) {
       const error = toPhotoError(thrown);
-      // Where the server did not say how long the file is, an early end of the file cannot be told
-      // from an early end of the transfer, which is the likelier and the curable one.
-      if (error.code === 'format-truncated' && promised === undefined) {
-        throw short(url, bytesFed, fileBytes, thrown);
+      // Only a server that sent all it promised has a file that is short. Of others it cannot be
+      // told whether the file or the transfer ended early; the latter is likelier, and curable.
+      const allCame = promised !== undefined && bytesFed >= promised;
+      if (error.code === 'format-truncated' && !allCame) {
+        throw short(url, bytesFed, fileBytes ?? promised, thrown);
       }
       throw error;
     }
