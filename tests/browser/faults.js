@@ -60,6 +60,12 @@ describe('an attribute that is', () => {
     ['an unknown light', { src: '/photos/glass.ltm', light: 'moon' }, 'attribute', /“moon”/],
     ['an unknown back end', { src: '/photos/glass.ltm', backend: 'gpu' }, 'attribute', /“gpu”/],
     ['no exposure', { src: '/photos/glass.ltm', exposure: 'much' }, 'attribute', /“much”/],
+    [
+      'too much exposure',
+      { src: '/photos/glass.ltm', exposure: '1e300' },
+      'attribute',
+      /“1e300”.* 3\.4e\+38/,
+    ],
     ['no address', { src: 'http://[' }, 'attribute', /“http:\/\/\[”/],
     ['a missing src', {}, 'src-missing', /src is not set/],
   ];

@@ -9,6 +9,12 @@ test('an absent attribute means its default', () => {
   assert.equal(parseExposure(null), 1);
 });
 
+test('an exposure may be as large as the module can take', () => {
+  const largest = new Float32Array(new Uint32Array([0x7f7fffff]).buffer)[0];
+  assert.equal(parseExposure(String(largest)), largest);
+  assert.throws(() => parseExposure('1e300'), /from 0 to 3\.4e\+38/);
+});
+
 test('back ends keep the order they are given in, each once', () => {
   assert.deepEqual(parseBackends('cpu webgl2 cpu'), ['cpu', 'webgl2']);
 });
@@ -17,7 +23,7 @@ test('unknown values are refused with the values known', () => {
   const refused = (message: RegExp) => ({ name: 'PhotoError', code: 'attribute', message });
   assert.throws(() => parseLight('moon'), refused(/“moon”.*flood, torch, checkerboard/));
   assert.throws(() => parseBackends('cpu vulkan'), refused(/“vulkan”.*webgpu, webgl2, cpu/));
-  for (const exposure of ['bright', '-1', 'Infinity', 'NaN']) {
+  for (const exposure of ['bright', '-1', 'Infinity', 'NaN', '1e300', '3.5e38']) {
     assert.throws(() => parseExposure(exposure), refused(new RegExp(`“${exposure}”`)));
   }
 });

@@ -20,6 +20,8 @@ export interface PicturePoint {
 
 const DEFAULT_LIGHT: LightName = 'flood';
 const DEFAULT_EXPOSURE = 1;
+/** What the module, which computes in 32-bit floats, can take. */
+const MAX_EXPOSURE = 2 ** 127 * (2 - 2 ** -23);
 
 /** The `light` attribute; flood where there is none. */
 export function parseLight(value: string | null): LightName {
@@ -54,10 +56,11 @@ export function parseBackends(value: string | null): readonly Backend[] {
 export function parseExposure(value: string | null): number {
   if (value === null || value.trim() === '') return DEFAULT_EXPOSURE;
   const exposure = Number(value);
-  if (Number.isFinite(exposure) && exposure >= 0) return exposure;
+  if (exposure >= 0 && exposure <= MAX_EXPOSURE) return exposure;
   throw new PhotoError(
     'attribute',
-    `The exposure “${value}” is not a number of 0 or more; 1 shows the photograph as taken.`,
+    `The exposure “${value}” is not a number from 0 to ${MAX_EXPOSURE.toPrecision(2)}; ` +
+      '1 shows the photograph as taken.',
   );
 }
 
