@@ -207,5 +207,10 @@ describe('an element', () => {
     await page.waitForFunction(() =>
       document.querySelector('relightable-photo')?.shadowRoot?.querySelector('[role=presentation]'),
     );
+    // What takes the keyboard is no decoration.
+    await page.evaluate("photo.light = 'torch'");
+    await page.getByRole('img').waitFor();
+    await page.evaluate("photo.light = 'flood'");
+    await page.getByRole('img').waitFor({ state: 'detached' });
   });
 });

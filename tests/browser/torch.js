@@ -106,6 +106,15 @@ describe('the torch', () => {
     assert.ok(after.x < before.x - 0.15, `${before.x} to ${after.x}`);
   });
 
+  test('is held where spaces stand around its name', async (t) => {
+    const page = await openPage(t, '/bench');
+    await mount(page, { ...TORCH, light: ' torch ', backend: 'cpu' });
+    await loaded(page);
+    await page.keyboard.press('Tab');
+    await page.keyboard.press('ArrowLeft');
+    assert.deepEqual(await page.evaluate('photo.torch'), { x: 0.45, y: 0.5 });
+  });
+
   test('is not held under other lights', async (t) => {
     const page = await openPage(t, '/bench');
     await mount(page, { ...TORCH, light: 'flood', backend: 'cpu' });

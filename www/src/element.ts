@@ -70,6 +70,7 @@ export class RelightablePhoto extends Base {
   #scheduled = false;
   #attributeFault: string | null = null;
   #playerFault: string | null = null;
+  /** The light of the last attributes that were right. */
   #lit: LightSetting | null = null;
 
   constructor() {
@@ -240,7 +241,6 @@ export class RelightablePhoto extends Base {
       this.#playerFault = null;
       return;
     }
-    this.#view.describe(this.getAttribute('alt'));
     try {
       const name = parseLight(this.getAttribute('light'));
       const backends = parseBackends(this.getAttribute('backend'));
@@ -248,10 +248,10 @@ export class RelightablePhoto extends Base {
       const src = this.#address();
       this.#attributeFault = null;
       this.#showFault();
-      this.#view.holdTorch(name === 'torch');
       const lit = this.#lit;
       const light = { name, torch: name === 'torch' ? this.#torch : null };
       this.#lit = light;
+      this.#describe();
       const reload = this.#reload;
       this.#reload = false;
       this.#player.set({ src, backends, exposure, light }, reload);
@@ -259,11 +259,16 @@ export class RelightablePhoto extends Base {
         this.dispatchEvent(new LightChangeEvent(light.name, light.torch));
       }
     } catch (thrown) {
+      this.#describe();
       const error = toPhotoError(thrown);
       if (error.message === this.#attributeFault) return;
       this.#attributeFault = error.message;
       this.#fail(error);
     }
+  }
+
+  #describe(): void {
+    this.#view.describe(this.getAttribute('alt'), this.#lit?.name === 'torch');
   }
 
   #address(): string | null {
@@ -288,7 +293,7 @@ export class RelightablePhoto extends Base {
 
   #listen(): void {
     const { picture } = this.#view;
-    const holdsTorch = () => this.light === 'torch' && this.activeBackend !== null;
+    const holdsTorch = () => this.#lit?.name === 'torch' && this.activeBackend !== null;
     const follow = (event: PointerEvent) => {
       if (!holdsTorch()) return;
       const { left, top, width, height } = picture.getBoundingClientRect();

@@ -88,17 +88,16 @@ export class View {
     root.append(this.picture, hint, this.#progress, this.#message);
   }
 
-  /** Names the picture for those who cannot see it; an empty text marks it as decoration. */
-  describe(alt: string | null): void {
-    this.picture.setAttribute('role', alt === '' ? 'presentation' : 'img');
+  /**
+   * Names the picture for those who cannot see it, and says whether it holds a torch. An empty text
+   * marks it as decoration, which what holds a torch is not: it takes the keyboard.
+   */
+  describe(alt: string | null, torch: boolean): void {
+    this.picture.setAttribute('role', alt === '' && !torch ? 'presentation' : 'img');
     if (alt) this.picture.setAttribute('aria-label', alt);
     else this.picture.removeAttribute('aria-label');
-  }
-
-  /** Whether the picture takes a torch in hand. */
-  holdTorch(held: boolean): void {
-    this.picture.classList.toggle('torch', held);
-    if (held) {
+    this.picture.classList.toggle('torch', torch);
+    if (torch) {
       this.picture.tabIndex = 0;
       this.picture.setAttribute('aria-describedby', 'hint');
     } else {
