@@ -33,7 +33,7 @@ pub enum BackendError {
     Missing(&'static str),
     /// The canvas gives no context.
     #[error(
-        "the canvas gives no {api} context ({reason}); a canvas already used otherwise cannot: use a new one"
+        "the canvas gives no {api} context ({reason}), nor would one that another interface has used"
     )]
     Canvas {
         /// The interface.

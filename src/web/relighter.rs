@@ -77,7 +77,7 @@ impl Relighter {
         if !(exposure >= 0.0 && exposure <= f64::from(f32::MAX)) {
             return Err(CodedError::new(
                 "light-value",
-                format!("the exposure is {exposure}; it must be a number and not negative"),
+                format!("the exposure is {exposure}; it must be a number from 0 to 3.4e38"),
             ));
         }
         let light = light.inner();

@@ -67,8 +67,9 @@ export function loadEngine(): Promise<Engine> {
     loading = undefined;
     throw new PhotoError(
       'wasm-unavailable',
-      `The relighting module could not be started: ${messageOf(cause)}. ` +
-        'The wasm folder has to lie beside the script, and the page has to allow WebAssembly.',
+      'The relighting module could not be started. Its wasm folder has to lie beside the script, and ' +
+        "a content security policy has to allow 'wasm-unsafe-eval' in script-src. " +
+        `The browser says: ${messageOf(cause)}`,
       cause,
     );
   });

@@ -44,6 +44,11 @@ export async function listen(handler, port) {
 
 if (import.meta.url === pathToFileURL(process.argv[1] ?? '').href) {
   const photos = resolve(process.argv[2] ?? 'target/demo/photos');
-  const { url } = await listen(site({ photos }), Number(process.env['PORT'] ?? 8080));
+  const port = Number(process.env['PORT'] ?? 8080);
+  if (!Number.isInteger(port) || port < 0 || port > 65535) {
+    console.error(`serve: PORT is ${process.env['PORT']}; it must be a number from 0 to 65535`);
+    process.exit(2);
+  }
+  const { url } = await listen(site({ photos }), port);
   console.log(`Open ${url} in a browser. Stop with Ctrl-C.`);
 }
