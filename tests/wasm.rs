@@ -360,10 +360,11 @@ async fn a_canvas_in_use_and_an_unknown_name_are_refused() {
 }
 
 #[wasm_bindgen_test]
-async fn a_photo_may_go_and_a_canvas_be_used_again() {
+async fn a_photo_may_go_and_another_take_its_place() {
     for backend in BACKENDS {
-        let canvas = new_canvas();
         for transport in [0, 2].map(transport) {
+            // A freed WebGL2 back end gives its context up, and the canvas with it.
+            let canvas = new_canvas();
             let photo = photo(&transport);
             let light = Light::builtin(&photo, "spectrum").unwrap();
             let mut relighter = relighter(backend, &photo, &canvas).await.unwrap();

@@ -24,7 +24,7 @@ pub struct Relighter {
 #[wasm_bindgen]
 impl Relighter {
     /// Sets a back end up, and the canvas to the picture's size. `photo` may be freed afterwards.
-    /// After a failure the canvas may be of no use to another back end: give that a new one.
+    /// A canvas serves one `Relighter` only: give the next, also after a failure, a new one.
     #[wasm_bindgen(unchecked_return_type = "Promise<Relighter>")]
     pub fn create(
         #[wasm_bindgen(unchecked_param_type = "\"webgpu\" | \"webgl2\" | \"cpu\"")] backend: String,
