@@ -51,6 +51,25 @@ pub fn read_ltm(path: &Path) -> Result<LtmFile> {
     read().with_context(|| path.display().to_string())
 }
 
+/// What makes temporary files or folders with the permissions of any new one (`mode` less the
+/// umask, not tempfile's private default), and the folder to make them in to be beside `path`.
+pub fn beside(path: &Path, mode: u32) -> (tempfile::Builder<'static, 'static>, &Path) {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".ltm-export-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(mode));
+    }
+    #[cfg(not(unix))]
+    let _ = mode;
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    (builder, folder)
+}
+
 /// Kinds of file that commands write, told by how they begin.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
@@ -110,18 +129,7 @@ impl Output {
                 kind.may_replace(path).context("cannot be looked at")?,
                 "is there already and is not {kind}; give another name"
             );
-            let folder = match path.parent() {
-                Some(parent) if !parent.as_os_str().is_empty() => parent,
-                _ => Path::new("."),
-            };
-            let mut builder = tempfile::Builder::new();
-            builder.prefix(".ltm-export-");
-            #[cfg(unix)]
-            {
-                // As any new file: the umask decides, not tempfile's private default.
-                use std::os::unix::fs::PermissionsExt;
-                builder.permissions(std::fs::Permissions::from_mode(0o666));
-            }
+            let (builder, folder) = beside(path, 0o666);
             builder
                 .tempfile_in(folder)
                 .map_err(|e| std::io::Error::from(e.kind())) // it names the temporary file

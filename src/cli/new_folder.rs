@@ -4,23 +4,14 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 
+use super::files;
+
 /// Fills a new folder beside `path` and renames it there once `fill` has succeeded. `path` must be
 /// free or an empty folder: nothing of anyone's is ever replaced.
 pub fn write_folder_whole(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let write = || -> Result<()> {
         ensure_free(path)?;
-        let parent = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".ltm-export-");
-        #[cfg(unix)]
-        {
-            // As any new folder: the umask decides, not tempfile's private default.
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o777));
-        }
+        let (builder, parent) = files::beside(path, 0o777);
         let folder = builder
             .tempdir_in(parent)
             .context("cannot be created; does its parent folder exist, and may you write there?")?;

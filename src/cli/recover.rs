@@ -48,18 +48,26 @@ fn parse_window(text: &str) -> Result<Window, String> {
 }
 
 /// Recovery methods.
-#[derive(Clone, Copy, Debug, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, ValueEnum)]
 enum Method {
     /// Non-negative least squares
     Nnls,
+}
+
+impl Method {
+    /// The name by which options, reports and files call it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Nnls => "nnls",
+        }
+    }
 }
 
 #[derive(Serialize)]
 struct Report {
     seconds: f64,
     peak_rss_bytes: Option<u64>,
-    method: Method,
+    method: &'static str,
     window: u32,
     /// None: every tile is direct.
     rank: Option<u32>,
@@ -91,7 +99,10 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     }
     let recovery = Recovery::new(&measurements, args.window)
         .with_context(|| args.capture.display().to_string())?;
-    let overexposed = recovery.overexposed_pixels();
+    let overexposed = match saturated {
+        0 => 0,
+        _ => recovery.overexposed_pixels(),
+    };
     if overexposed > 0 {
         eprintln!(
             "warning: {overexposed} pixels are saturated in nearly all photographs and will be \
@@ -110,11 +121,11 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         })
         .collect::<Result<Vec<_>, _>>()?;
     bar.finish_and_clear();
-    let file_bytes = write(output, &geometry, shots.clone(), &tiles)?;
+    let file_bytes = write(output, args.method, &geometry, shots.clone(), &tiles)?;
     let report = Report {
         seconds: start.elapsed().as_secs_f64(),
         peak_rss_bytes: process::peak_rss_bytes(),
-        method: args.method,
+        method: args.method.name(),
         window: args.window.side(),
         rank: None,
         patterns: shots.len(),
@@ -177,13 +188,14 @@ fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
 
 fn write(
     output: files::Output,
+    method: Method,
     geometry: &Geometry,
     shots_used: Vec<usize>,
     tiles: &[EncodedTile],
 ) -> Result<u64> {
     let metadata = Metadata {
         writer: concat!("ltm-export ", env!("CARGO_PKG_VERSION")).to_owned(),
-        method: "nnls".to_owned(),
+        method: method.name().to_owned(),
         shots_used,
     };
     output.finish(|out| Ok(format::write(geometry, &metadata, tiles, out)?))
