@@ -1,6 +1,6 @@
 //! Linear measurements: what recovery works on.
 
-use crate::transport::{CHANNELS, Correspondence, Extent};
+use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent};
 
 /// The light each element emitted during one shot, 1 at full brightness, row by row.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,6 +42,23 @@ impl Measurements {
     /// Whether every pattern is grey, so that channels share their equations.
     pub fn grey(&self) -> bool {
         self.patterns.iter().all(|p| matches!(p, Pattern::Grey(_)))
+    }
+
+    /// What channel `c` of a pixel saw under pattern `l`; NaN where saturated.
+    pub fn sample(&self, l: usize, pixel: CameraPx, c: usize) -> f64 {
+        f64::from(self.pictures[l][self.camera.index(pixel)][c])
+    }
+
+    /// Pixels of which some channel is saturated in so nearly all photographs that fewer than
+    /// `fewest` samples are left of it.
+    pub fn overexposed_pixels(&self, fewest: usize) -> usize {
+        let hopeless = |n: &usize| {
+            (0..CHANNELS).any(|c| {
+                let samples = self.pictures.iter();
+                samples.filter(|picture| !picture[*n][c].is_nan()).count() < fewest
+            })
+        };
+        (0..self.camera.area()).filter(hopeless).count()
     }
 
     /// Saturated samples, of `L · N · 3`.

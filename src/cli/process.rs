@@ -1,6 +1,19 @@
 //! What the process itself has used, and how it shows that it is still at work.
 
 use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+
+use crate::recover::Workers;
+
+/// All of the machine's cores.
+#[derive(Clone, Copy, Debug)]
+pub struct AllCores;
+
+impl Workers for AllCores {
+    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        (0..count).into_par_iter().map(work).collect()
+    }
+}
 
 /// Most memory this process has held at once, in bytes; `None` where the system does not tell.
 pub fn peak_rss_bytes() -> Option<u64> {

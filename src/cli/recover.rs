@@ -8,10 +8,11 @@ use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::process::AllCores;
 use super::{files, process, report};
 use crate::capture::{CaptureFolder, Measurements};
 use crate::format::{self, EncodedTile, Metadata};
-use crate::recover::Recovery;
+use crate::recover::{self, Method, Recovery, Settings};
 use crate::transport::{CHANNELS, DirectTile, Geometry, Window};
 
 /// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
@@ -29,8 +30,8 @@ pub struct RecoverArgs {
     #[arg(short, long, value_name = "FILE.ltm")]
     output: PathBuf,
     /// How each light transport function is recovered
-    #[arg(long, value_enum, default_value_t = Method::Nnls)]
-    method: Method,
+    #[arg(long, value_enum, default_value_t = MethodName::Nnls)]
+    method: MethodName,
     /// Side of the window of light elements each camera pixel may see; odd
     #[arg(long, value_name = "W", default_value = "15", value_parser = parse_window)]
     window: Window,
@@ -47,18 +48,17 @@ fn parse_window(text: &str) -> Result<Window, String> {
     Window::new(side).map_err(|e| e.to_string())
 }
 
-/// Recovery methods.
+/// Recovery methods by name.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Method {
+enum MethodName {
     /// Non-negative least squares
     Nnls,
 }
 
-impl Method {
-    /// The name by which options, reports and files call it.
-    fn name(self) -> &'static str {
-        match self {
-            Self::Nnls => "nnls",
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Nnls => Self::Nnls,
         }
     }
 }
@@ -67,7 +67,7 @@ impl Method {
 struct Report {
     seconds: f64,
     peak_rss_bytes: Option<u64>,
-    method: &'static str,
+    method: Method,
     window: u32,
     /// None: every tile is direct.
     rank: Option<u32>,
@@ -97,11 +97,15 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
             );
         }
     }
-    let recovery = Recovery::new(&measurements, args.window)
+    let settings = Settings {
+        method: args.method.into(),
+        window: args.window,
+    };
+    let recovery = Recovery::prepare(&measurements, settings, &AllCores)
         .with_context(|| args.capture.display().to_string())?;
     let overexposed = match saturated {
         0 => 0,
-        _ => recovery.overexposed_pixels(),
+        _ => measurements.overexposed_pixels(recover::FEWEST_PATTERNS),
     };
     if overexposed > 0 {
         eprintln!(
@@ -114,18 +118,20 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     let tiles = (0..geometry.tile_grid().area())
         .into_par_iter()
         .map(|i| {
-            let tile = DirectTile::quantise(&recovery.tile(geometry.tile(i)));
+            let tile = recovery.tile(&measurements, geometry.tile(i));
+            let functions = tile.functions(&geometry, recovery.basis());
+            let tile = DirectTile::quantise(&functions);
             let encoded = EncodedTile::new(&geometry, &tile);
             bar.inc(1);
             encoded
         })
         .collect::<Result<Vec<_>, _>>()?;
     bar.finish_and_clear();
-    let file_bytes = write(output, args.method, &geometry, shots.clone(), &tiles)?;
+    let file_bytes = write(output, settings.method, &geometry, shots.clone(), &tiles)?;
     let report = Report {
         seconds: start.elapsed().as_secs_f64(),
         peak_rss_bytes: process::peak_rss_bytes(),
-        method: args.method.name(),
+        method: settings.method,
         window: args.window.side(),
         rank: None,
         patterns: shots.len(),

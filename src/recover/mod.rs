@@ -10,9 +10,15 @@
 
 mod common_mode;
 mod design;
+mod direct;
 mod nnls;
 mod recovery;
+mod workers;
 
 pub use common_mode::CommonMode;
 pub use nnls::Nnls;
-pub use recovery::{RecoverError, Recovery};
+pub use recovery::{Method, RecoverError, Recovery, Settings};
+pub use workers::{OneThread, Workers};
+
+/// Fewest patterns that recovery makes sense with.
+pub(crate) const FEWEST_PATTERNS: usize = 4;

@@ -1,24 +1,38 @@
-//! Recovery of a whole transport, tile by tile.
+//! Recovery of a whole transport, tile by tile, by any of the methods.
 
-use std::collections::BTreeMap;
-
+use serde::Serialize;
 use thiserror::Error;
 
-use super::design::Design;
-use super::{CommonMode, Nnls};
+use super::direct::Direct;
+use super::{CommonMode, FEWEST_PATTERNS, Workers};
 use crate::capture::Measurements;
-use crate::transport::{
-    CHANNELS, CameraPx, Decibels, Element, Geometry, GeometryError, TileRect, TransportError,
-    TransportFunctions, Window,
-};
+use crate::transport::{Basis, Geometry, GeometryError, RecoveredTile, TileRect, Window};
 
-/// Fewest patterns that recovery makes sense with.
-const FEWEST_PATTERNS: usize = 4;
-/// Every how many patterns one is held out while the common mode's weight is chosen.
-const HOLD_OUT_EVERY: usize = 10;
-/// Windows the choice is made on, spread over the picture: enough that pixels tell candidates apart
-/// by hundredths of a decibel, few enough to cost a second.
-const SAMPLE_WINDOWS: usize = 48;
+/// How light transport functions are recovered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Non-negative least squares, each pixel and channel on its own (paper, section 3, case (a)).
+    Nnls,
+}
+
+impl Method {
+    /// The name by which options, reports and files call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Nnls => "nnls",
+        }
+    }
+}
+
+/// What is asked of a recovery.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// How.
+    pub method: Method,
+    /// What a camera pixel may see.
+    pub window: Window,
+}
 
 /// Why a recovery cannot start.
 #[derive(Debug, Error)]
@@ -38,22 +52,30 @@ pub enum RecoverError {
     NoLight,
 }
 
-/// A recovery ready to run: measurements, band and settings.
+/// A recovery ready to run: what has been learned or chosen from the measurements as a whole, by
+/// which tiles can then be recovered one by one, in any order.
 #[derive(Debug)]
-pub struct Recovery<'a> {
-    measurements: &'a Measurements,
+pub struct Recovery {
     geometry: Geometry,
-    common_mode: CommonMode,
+    solver: Solver,
 }
 
-impl<'a> Recovery<'a> {
-    /// Prepares recovery by non-negative least squares from all of `measurements`, and chooses how
-    /// far the common mode is trusted on patterns held out.
-    pub fn new(measurements: &'a Measurements, window: Window) -> Result<Self, RecoverError> {
+#[derive(Debug)]
+enum Solver {
+    Direct(Direct),
+}
+
+impl Recovery {
+    /// Learns and chooses from `measurements` whatever the method asks for.
+    pub fn prepare(
+        measurements: &Measurements,
+        settings: Settings,
+        _workers: &impl Workers,
+    ) -> Result<Self, RecoverError> {
         let geometry = Geometry {
             camera: measurements.camera,
             light: measurements.light,
-            window,
+            window: settings.window,
             correspondence: measurements.correspondence,
             tile_side: Geometry::DEFAULT_TILE_SIDE,
         }
@@ -61,13 +83,10 @@ impl<'a> Recovery<'a> {
         if measurements.patterns.len() < FEWEST_PATTERNS {
             return Err(RecoverError::FewPatterns(measurements.patterns.len()));
         }
-        let mut recovery = Self {
-            measurements,
-            geometry,
-            common_mode: CommonMode::FULL,
+        let solver = match settings.method {
+            Method::Nnls => Solver::Direct(Direct::new(measurements, geometry)?),
         };
-        recovery.common_mode = recovery.choose_common_mode()?;
-        Ok(recovery)
+        Ok(Self { geometry, solver })
     }
 
     /// Grids, band and tiling of the answer.
@@ -75,180 +94,27 @@ impl<'a> Recovery<'a> {
         &self.geometry
     }
 
-    /// The weight chosen for the common mode.
+    /// The functions that factored tiles are combined from, if there are such tiles.
+    pub fn basis(&self) -> Option<&Basis> {
+        None
+    }
+
+    /// Weight chosen for the patterns' common mode.
     pub fn common_mode(&self) -> CommonMode {
-        self.common_mode
-    }
-
-    /// Recovers the light transport functions of one tile.
-    pub fn tile(&self, rect: TileRect) -> TransportFunctions {
-        let area = self.geometry.window.area();
-        let mut functions = TransportFunctions::zeros(rect, area);
-        let rows: Vec<usize> = (0..self.measurements.patterns.len()).collect();
-        for (origin, pixels) in self.windows(rect) {
-            self.window(
-                origin,
-                &pixels,
-                &rows,
-                self.common_mode,
-                |p, c, slots, x| {
-                    for (&slot, &x) in slots.iter().zip(x) {
-                        functions.tau[p * area + slot][c] = x as f32;
-                    }
-                },
-            );
-        }
-        functions
-    }
-
-    /// All pixels of a tile by their common window: (number in the tile, pixel).
-    fn windows(&self, rect: TileRect) -> BTreeMap<Element, Vec<(usize, CameraPx)>> {
-        let mut windows: BTreeMap<_, Vec<_>> = BTreeMap::new();
-        for (p, pixel) in rect.pixels().enumerate() {
-            let origin = self.geometry.window_origin(pixel);
-            windows.entry(origin).or_default().push((p, pixel));
-        }
-        windows
-    }
-
-    /// Solves for all pixels of one window from the patterns numbered `rows`; `take` gets each
-    /// pixel's number, channel, and solution on the window slots.
-    fn window(
-        &self,
-        origin: Element,
-        pixels: &[(usize, CameraPx)],
-        rows: &[usize],
-        common_mode: CommonMode,
-        mut take: impl FnMut(usize, usize, &[usize], &[f64]),
-    ) {
-        let design = |rows: &[usize], channel| {
-            Design::new(
-                &self.measurements.patterns,
-                rows,
-                channel,
-                self.geometry.light,
-                self.geometry.window,
-                origin,
-                common_mode,
-            )
-        };
-        // Grey patterns drive all channels alike: one design for all of them.
-        let groups: &[&[usize]] = match self.measurements.grey() {
-            true => &[&[0, 1, 2]],
-            false => &[&[0], &[1], &[2]],
-        };
-        for channels in groups {
-            let shared = design(rows, channels[0]);
-            let mut solver = Nnls::new(&shared.gram, shared.unknowns());
-            for &(p, pixel) in pixels {
-                for &c in *channels {
-                    let usable: Vec<usize> = rows
-                        .iter()
-                        .copied()
-                        .filter(|&l| self.sample(l, pixel, c).is_finite())
-                        .collect();
-                    if usable.len() == rows.len() || usable.len() < FEWEST_PATTERNS {
-                        // Of a pixel saturated nearly always, all that is known is that it is at
-                        // least white: it is shown so, not black.
-                        let y: Vec<f64> = rows
-                            .iter()
-                            .map(|&l| match self.sample(l, pixel, c) {
-                                y if y.is_finite() => y,
-                                _ => f64::from(self.measurements.full_scale[l]),
-                            })
-                            .collect();
-                        let x = solver.solve(&shared.right_hand_side(&y));
-                        take(p, c, &shared.slots, &x);
-                    } else {
-                        // Saturated samples drop out, and with them the shared equations.
-                        let own = design(&usable, c);
-                        let y: Vec<f64> =
-                            usable.iter().map(|&l| self.sample(l, pixel, c)).collect();
-                        let x =
-                            Nnls::new(&own.gram, own.unknowns()).solve(&own.right_hand_side(&y));
-                        take(p, c, &own.slots, &x);
-                    }
-                }
-            }
+        match &self.solver {
+            Solver::Direct(direct) => direct.common_mode(),
         }
     }
 
-    /// Pixels of which some channel is saturated in so nearly all photographs that nothing but
-    /// white is known of it.
-    pub fn overexposed_pixels(&self) -> usize {
-        let patterns = self.measurements.pictures.len();
-        let hopeless = |n: &usize| {
-            (0..CHANNELS).any(|c| {
-                let pictures = self.measurements.pictures.iter();
-                let saturated = pictures.filter(|picture| picture[*n][c].is_nan()).count();
-                patterns - saturated < FEWEST_PATTERNS
-            })
-        };
-        (0..self.geometry.camera.area()).filter(hopeless).count()
+    /// Camera pixels around a tile whose measurements go into it.
+    pub fn halo(&self) -> u32 {
+        0
     }
 
-    fn sample(&self, l: usize, pixel: CameraPx, c: usize) -> f64 {
-        f64::from(self.measurements.pictures[l][self.geometry.camera.index(pixel)][c])
-    }
-
-    /// Tries every candidate on a spread of windows and keeps the one that predicts held-out
-    /// patterns best.
-    fn choose_common_mode(&self) -> Result<CommonMode, RecoverError> {
-        let mut windows = BTreeMap::new();
-        for rect in self.geometry.tiles() {
-            let lit = self.windows(rect).into_iter();
-            for (origin, mut pixels) in lit.filter(|&(origin, _)| !self.dark(origin)) {
-                pixels.truncate(1); // One pixel a window is enough to choose by.
-                windows.insert(origin, pixels);
-            }
+    /// Recovers one tile. `measurements` are those the recovery was prepared from.
+    pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
+        match &self.solver {
+            Solver::Direct(direct) => RecoveredTile::Direct(direct.tile(measurements, rect)),
         }
-        if windows.is_empty() {
-            return Err(RecoverError::NoLight);
-        }
-        let every = windows.len().div_ceil(SAMPLE_WINDOWS);
-        let (held, rows): (Vec<usize>, Vec<usize>) = (0..self.measurements.patterns.len())
-            .partition(|l| l % HOLD_OUT_EVERY == HOLD_OUT_EVERY / 2);
-        if held.is_empty() || rows.len() < FEWEST_PATTERNS {
-            return Ok(CommonMode::FULL);
-        }
-        let mut best: Option<(Decibels, CommonMode)> = None;
-        for candidate in CommonMode::CANDIDATES {
-            let mut error = TransportError::default();
-            for (&origin, pixels) in windows.iter().step_by(every) {
-                self.window(origin, pixels, &rows, candidate, |_, c, slots, x| {
-                    for &l in &held {
-                        let y = self.sample(l, pixels[0].1, c);
-                        if y.is_finite() {
-                            error.add(y, self.predict(l, c, origin, slots, x));
-                        }
-                    }
-                });
-            }
-            if let Some(snr) = error.snr()
-                && best.is_none_or(|(most, _)| snr > most)
-            {
-                best = Some((snr, candidate));
-            }
-        }
-        Ok(best.map_or(CommonMode::FULL, |(_, candidate)| candidate))
-    }
-
-    /// What solution `x` says a pixel of the window sees under pattern `l`.
-    fn predict(&self, l: usize, c: usize, origin: Element, slots: &[usize], x: &[f64]) -> f64 {
-        let plane = self.measurements.patterns[l].plane(c);
-        let terms = slots.iter().zip(x).filter_map(|(&slot, &x)| {
-            let element = self.geometry.window.element(origin, slot);
-            let m = element.index_in(self.geometry.light)?;
-            Some(f64::from(plane[m]) * x)
-        });
-        terms.sum()
-    }
-
-    /// Whether all of the window lies off the display.
-    fn dark(&self, origin: Element) -> bool {
-        let side = i64::from(self.geometry.window.side());
-        let misses =
-            |at: i32, length: u32| i64::from(at) + side <= 0 || i64::from(at) >= i64::from(length);
-        misses(origin.u, self.geometry.light.width) || misses(origin.v, self.geometry.light.height)
     }
 }

@@ -9,11 +9,13 @@
 //! tiles lie ([`Geometry`]), what a tile holds ([`DirectTile`]), and how far two transports are
 //! apart ([`TransportError`]).
 
+mod factored;
 mod functions;
 mod geometry;
 mod snr;
 mod tile;
 
+pub use factored::{Basis, FactoredTile, RecoveredTile};
 pub use functions::TransportFunctions;
 pub use geometry::{
     CameraPx, Correspondence, Element, Extent, Geometry, GeometryError, LightPx, MAX_SIDE,
