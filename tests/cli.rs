@@ -140,6 +140,8 @@ fn photographs_become_a_file_that_relights_them() {
     let inspected = json(&["inspect", text(&file), "--json"]);
     assert_eq!(inspected["camera"], serde_json::json!([64, 64]));
     assert_eq!(inspected["window"], 13);
+    assert_eq!(inspected["factored_tiles"], 0);
+    assert_eq!(inspected["rank"], serde_json::Value::Null);
     assert_eq!(
         inspected["metadata"]["shots_used"]
             .as_array()
@@ -473,7 +475,7 @@ fn damaged_files_are_refused_by_every_command() {
             },
             "damaged",
         ),
-        (|f| f[12] = 9, "version 9.0"),
+        (|f| f[12] = 9, "version 9.1"),
         (|f| f[..4].copy_from_slice(b"<!DO"), "not an .ltm file"),
         (|f| f.push(0), "goes on after its end"),
     ];

@@ -13,7 +13,7 @@ use super::{files, process, report};
 use crate::capture::{CaptureFolder, Measurements};
 use crate::format::{self, EncodedTile, Metadata};
 use crate::recover::{self, Method, Recovery, Settings};
-use crate::transport::{CHANNELS, DirectTile, Geometry, Window};
+use crate::transport::{Basis, CHANNELS, Window};
 
 /// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
 const HOLD_OUT_EVERY: usize = 10;
@@ -70,7 +70,7 @@ struct Report {
     method: Method,
     window: u32,
     /// None: every tile is direct.
-    rank: Option<u32>,
+    rank: Option<usize>,
     patterns: usize,
     common_mode: crate::recover::CommonMode,
     saturated_samples: usize,
@@ -119,21 +119,26 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         .into_par_iter()
         .map(|i| {
             let tile = recovery.tile(&measurements, geometry.tile(i));
-            let functions = tile.functions(&geometry, recovery.basis());
-            let tile = DirectTile::quantise(&functions);
             let encoded = EncodedTile::new(&geometry, &tile);
             bar.inc(1);
             encoded
         })
         .collect::<Result<Vec<_>, _>>()?;
     bar.finish_and_clear();
-    let file_bytes = write(output, settings.method, &geometry, shots.clone(), &tiles)?;
+    let metadata = Metadata {
+        writer: concat!("ltm-export ", env!("CARGO_PKG_VERSION")).to_owned(),
+        method: settings.method.name().to_owned(),
+        shots_used: shots.clone(),
+    };
+    let basis = recovery.basis();
+    let file_bytes =
+        output.finish(|out| Ok(format::write(&geometry, &metadata, basis, &tiles, out)?))?;
     let report = Report {
         seconds: start.elapsed().as_secs_f64(),
         peak_rss_bytes: process::peak_rss_bytes(),
         method: settings.method,
         window: args.window.side(),
-        rank: None,
+        rank: basis.map(Basis::rank),
         patterns: shots.len(),
         common_mode: recovery.common_mode(),
         saturated_samples: saturated,
@@ -190,19 +195,4 @@ fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
             .with_context(|| folder.manifest_path().display().to_string())?,
     };
     Ok(folder.measurements(exposed, correspondence))
-}
-
-fn write(
-    output: files::Output,
-    method: Method,
-    geometry: &Geometry,
-    shots_used: Vec<usize>,
-    tiles: &[EncodedTile],
-) -> Result<u64> {
-    let metadata = Metadata {
-        writer: concat!("ltm-export ", env!("CARGO_PKG_VERSION")).to_owned(),
-        method: method.name().to_owned(),
-        shots_used,
-    };
-    output.finish(|out| Ok(format::write(geometry, &metadata, tiles, out)?))
 }
