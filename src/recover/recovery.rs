@@ -17,6 +17,9 @@ pub enum Method {
 }
 
 impl Method {
+    /// Every method there is.
+    pub const ALL: &[Self] = &[Self::Nnls];
+
     /// The name by which options, reports and files call it.
     pub fn name(self) -> &'static str {
         match self {
