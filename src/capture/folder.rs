@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::images;
-use super::{CaptureError, MANIFEST_NAME, Manifest, Measurements, Pattern, Truth};
+use super::noise::{self, Noise};
+use super::{CaptureError, MANIFEST_NAME, Manifest, Measurements, Pattern, Picture, Truth};
 use crate::calibrate::{BitPair, GrayCode};
 use crate::transport::{CHANNELS, Correspondence};
 
@@ -14,9 +15,6 @@ pub struct CaptureFolder {
     manifest: Manifest,
     emission: [f64; 256],
 }
-
-/// What a photograph saw, `[N]`, in units of the measurement; NaN where saturated.
-pub type Picture = Vec<[f32; CHANNELS]>;
 
 /// One shot, linear.
 #[derive(Clone, Debug)]
@@ -29,9 +27,13 @@ pub struct Exposed {
     pub picture: Picture,
 }
 
-/// Light seen while the display is dark, `[N]`, in units of the measurement.
+/// What is seen while the display is dark.
 #[derive(Clone, Debug)]
-pub struct DarkFrame(Vec<[f32; CHANNELS]>);
+pub struct DarkFrame {
+    light: Picture,
+    /// Variance of a sample without light, by channel.
+    floor: [f64; CHANNELS],
+}
 
 impl CaptureFolder {
     /// Opens the folder `root` and reads its manifest.
@@ -121,13 +123,16 @@ impl CaptureFolder {
     /// Reads the dark frame; without one, nothing is seen in the dark.
     pub fn read_dark(&self) -> Result<DarkFrame, CaptureError> {
         let camera = &self.manifest.camera;
-        Ok(DarkFrame(match &self.manifest.dark {
+        let light = match &self.manifest.dark {
             None => vec![[0.0; CHANNELS]; camera.extent().area()],
             Some(name) => images::rgb16(&self.root.join(name), camera.extent(), "dark")?
                 .into_iter()
                 .map(|codes| codes.map(|code| self.linear(code, 1.0)))
                 .collect(),
-        }))
+        };
+        let code = 1.0 / (camera.white - camera.black);
+        let floor = noise::floor(&light, camera.width, code);
+        Ok(DarkFrame { light, floor })
     }
 
     /// Reads the flood photograph, where the manifest names one.
@@ -176,7 +181,7 @@ impl CaptureFolder {
     ) -> Result<Picture, CaptureError> {
         let camera = &self.manifest.camera;
         let codes = images::rgb16(&self.root.join(name), camera.extent(), named_by)?;
-        let picture = codes.into_iter().zip(&dark.0).map(|(codes, dark)| {
+        let picture = codes.into_iter().zip(&dark.light).map(|(codes, dark)| {
             std::array::from_fn(|c| match f64::from(codes[c]) >= camera.white {
                 true => f32::NAN,
                 false => self.linear(codes[c], exposure) - dark[c],
@@ -193,22 +198,31 @@ impl CaptureFolder {
         }
     }
 
-    /// Joins shots into measurements.
+    /// Joins shots into measurements, and finds out how noisy they are.
     pub fn measurements(
         &self,
         shots: Vec<Exposed>,
         correspondence: Correspondence,
+        dark: &DarkFrame,
+        flood: Option<Picture>,
     ) -> Measurements {
         let full_scale = shots.iter().map(|s| s.full_scale).collect();
         let (patterns, pictures) = shots.into_iter().map(|s| (s.pattern, s.picture)).unzip();
-        Measurements {
+        let mut measurements = Measurements {
             camera: self.manifest.camera.extent(),
             light: self.manifest.light.extent(),
             correspondence,
             patterns,
             full_scale,
             pictures,
-        }
+            flood,
+            noise: Noise {
+                gain: [0.0; CHANNELS],
+                floor: dark.floor,
+            },
+        };
+        measurements.noise = Noise::with_gain_from(&measurements);
+        measurements
     }
 
     /// `(code − black) / (white − black)` at unit exposure. The dark frame holds light, which grows

@@ -1,5 +1,6 @@
 //! Linear measurements: what recovery works on.
 
+use super::Noise;
 use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent};
 
 /// The light each element emitted during one shot, 1 at full brightness, row by row.
@@ -21,6 +22,9 @@ impl Pattern {
     }
 }
 
+/// What a photograph saw, `[N]`, in units of the measurement; NaN where saturated.
+pub type Picture = Vec<[f32; CHANNELS]>;
+
 /// `Y = PT` as photographed: patterns in, pictures out, all in linear units.
 #[derive(Clone, Debug)]
 pub struct Measurements {
@@ -35,7 +39,12 @@ pub struct Measurements {
     /// For each pattern, the measurement at which a sample saturates: 1 over the exposure.
     pub full_scale: Vec<f32>,
     /// `L` pictures of `N` pixels, row by row. NaN where a sample was saturated and says nothing.
-    pub pictures: Vec<Vec<[f32; CHANNELS]>>,
+    pub pictures: Vec<Picture>,
+    /// What every element at full brightness shows together, less the dark, where it was
+    /// photographed; taken at exposure 1.
+    pub flood: Option<Picture>,
+    /// How noisy the samples are.
+    pub noise: Noise,
 }
 
 impl Measurements {
@@ -47,6 +56,12 @@ impl Measurements {
     /// What channel `c` of a pixel saw under pattern `l`; NaN where saturated.
     pub fn sample(&self, l: usize, pixel: CameraPx, c: usize) -> f64 {
         f64::from(self.pictures[l][self.camera.index(pixel)][c])
+    }
+
+    /// Variance of a sample of channel `c` under pattern `l` that came out as `y`.
+    pub fn variance(&self, l: usize, c: usize, y: f64) -> f64 {
+        let exposure = f64::from(self.full_scale[l]).recip();
+        self.noise.variance(c, y, exposure)
     }
 
     /// Pixels of which some channel is saturated in so nearly all photographs that fewer than

@@ -4,6 +4,7 @@
 //! what is known of camera and display. [`CaptureFolder`] reads and checks them one by one, so that
 //! whoever has threads can read them at once; [`Measurements`] is what recovery works on.
 
+mod eigen;
 mod error;
 #[cfg(not(target_arch = "wasm32"))]
 mod folder;
@@ -11,15 +12,17 @@ mod folder;
 mod images;
 mod manifest;
 mod measurements;
+mod noise;
 #[cfg(not(target_arch = "wasm32"))]
 mod truth;
 
 pub use error::CaptureError;
 #[cfg(not(target_arch = "wasm32"))]
-pub use folder::{CaptureFolder, DarkFrame, Exposed, Picture};
+pub use folder::{CaptureFolder, DarkFrame, Exposed};
 pub use manifest::{
     AffineSpec, CameraSpec, GrayCodeShot, LightSpec, MANIFEST_NAME, Manifest, Shot,
 };
-pub use measurements::{Measurements, Pattern};
+pub use measurements::{Measurements, Pattern, Picture};
+pub use noise::Noise;
 #[cfg(not(target_arch = "wasm32"))]
 pub use truth::{RELIT_FULL_SCALE, Truth};

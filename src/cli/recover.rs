@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::process::AllCores;
 use super::{files, process, report};
-use crate::capture::{CaptureFolder, Measurements};
+use crate::capture::{CaptureFolder, Measurements, Noise};
 use crate::format::{self, EncodedTile, Metadata};
 use crate::recover::{self, Method, Recovery, Settings};
 use crate::transport::{Basis, CHANNELS, Window};
@@ -73,6 +73,7 @@ struct Report {
     rank: Option<usize>,
     patterns: usize,
     common_mode: crate::recover::CommonMode,
+    noise: Noise,
     saturated_samples: usize,
     /// Pixels of which nothing but white is known.
     overexposed_pixels: usize,
@@ -141,6 +142,7 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         rank: basis.map(Basis::rank),
         patterns: shots.len(),
         common_mode: recovery.common_mode(),
+        noise: measurements.noise,
         saturated_samples: saturated,
         overexposed_pixels: overexposed,
         file_bytes,
@@ -175,8 +177,7 @@ fn choose_shots(available: usize, first: Option<u32>) -> Result<Vec<usize>> {
 
 fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
     let dark = folder.read_dark()?;
-    // Least squares has no use for it, but a capture that names a flood is not whole without it.
-    folder.read_flood(&dark)?;
+    let flood = folder.read_flood(&dark)?;
     let bar = process::progress("reading", shots.len());
     let exposed = shots
         .par_iter()
@@ -194,5 +195,5 @@ fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
             .correspondence(folder.manifest().camera.extent())
             .with_context(|| folder.manifest_path().display().to_string())?,
     };
-    Ok(folder.measurements(exposed, correspondence))
+    Ok(folder.measurements(exposed, correspondence, &dark, flood))
 }
