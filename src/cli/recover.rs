@@ -12,7 +12,7 @@ use super::process::AllCores;
 use super::{files, process, report};
 use crate::capture::{CaptureFolder, Measurements, Noise};
 use crate::format::{self, EncodedTile, Metadata};
-use crate::recover::{self, Method, Recovery, Settings};
+use crate::recover::{self, Method, Recovery, Settings, SparsityBasis};
 use crate::transport::{Basis, CHANNELS, Window};
 
 /// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
@@ -32,6 +32,9 @@ pub struct RecoverArgs {
     /// How each light transport function is recovered
     #[arg(long, value_enum, default_value_t = MethodName::Nnls)]
     method: MethodName,
+    /// With --method bpdn: where light transport functions are sparse
+    #[arg(long, value_enum, default_value_t = BasisName::Identity)]
+    basis: BasisName,
     /// Side of the window of light elements each camera pixel may see; odd
     #[arg(long, value_name = "W", default_value = "15", value_parser = parse_window)]
     window: Window,
@@ -53,12 +56,30 @@ fn parse_window(text: &str) -> Result<Window, String> {
 enum MethodName {
     /// Non-negative least squares
     Nnls,
+    /// Basis pursuit denoising: the sparsest function that explains the photographs
+    Bpdn,
 }
 
-impl From<MethodName> for Method {
-    fn from(name: MethodName) -> Self {
-        match name {
-            MethodName::Nnls => Self::Nnls,
+/// Bases of `--method bpdn` by name.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum BasisName {
+    /// Light elements themselves, for opaque objects
+    Identity,
+    /// Discrete cosine transform, for translucent ones
+    Dct,
+    /// Haar wavelets
+    Haar,
+}
+
+impl RecoverArgs {
+    fn method(&self) -> Method {
+        match self.method {
+            MethodName::Nnls => Method::Nnls,
+            MethodName::Bpdn => Method::Bpdn(match self.basis {
+                BasisName::Identity => SparsityBasis::Identity,
+                BasisName::Dct => SparsityBasis::Dct,
+                BasisName::Haar => SparsityBasis::Haar,
+            }),
         }
     }
 }
@@ -99,7 +120,7 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         }
     }
     let settings = Settings {
-        method: args.method.into(),
+        method: args.method(),
         window: args.window,
     };
     let recovery = Recovery::prepare(&measurements, settings, &AllCores)

@@ -8,13 +8,19 @@
 //!
 //! [`Recovery`] is pure and works tile by tile: whoever has threads runs tiles on them.
 
+mod bpdn;
 mod common_mode;
 mod design;
 mod direct;
 mod nnls;
+mod passive;
 mod recovery;
+#[cfg(all(test, not(target_arch = "wasm32")))]
+mod test_problems;
+mod vector;
 mod workers;
 
+pub use bpdn::{Constraint, Homotopy, Solution, SparsityBasis, Splitting};
 pub use common_mode::CommonMode;
 pub use nnls::Nnls;
 pub use recovery::{Method, RecoverError, Recovery, Settings};

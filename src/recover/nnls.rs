@@ -5,23 +5,24 @@
 //! right-hand side starts the next: neighbouring pixels and channels light up nearly the same
 //! elements.
 
+use super::passive::PassiveSet;
+use super::vector::{add_rows, vectorised};
+
 /// Solver for right-hand sides that share one Gram matrix.
 #[derive(Debug)]
 pub struct Nnls<'a> {
     /// `[k, k]`, row-major, symmetric.
     gram: &'a [f64],
     k: usize,
-    /// Elements allowed to be above zero, in the order of the factor's rows.
-    passive: Vec<usize>,
-    is_passive: Vec<bool>,
-    /// Lower triangular Cholesky factor of `gram[passive, passive]`, row i in `factor[i·k..]`.
-    factor: Vec<f64>,
-    scratch: Vec<f64>,
+    /// Elements allowed to be above zero; carries the right-hand side.
+    passive: PassiveSet<1>,
+    /// The passive elements' values now, and where least squares on the passive set puts them.
+    x: Vec<f64>,
+    z: Vec<f64>,
+    /// `h − Gx`.
+    gradient: Vec<f64>,
 }
 
-/// A pivot below this share of its diagonal means that the element's column depends linearly on the
-/// passive ones, to the precision of the Gram matrix: letting it in would not lower the residual.
-const DEPENDENT: f64 = 1e-9;
 /// Largest gradient, as a share of the largest right-hand side entry, still taken as zero.
 const TOLERANCE: f64 = 1e-10;
 
@@ -35,178 +36,135 @@ impl<'a> Nnls<'a> {
         Self {
             gram,
             k,
-            passive: Vec::with_capacity(k),
-            is_passive: vec![false; k],
-            factor: vec![0.0; k * k],
-            scratch: vec![0.0; k],
+            passive: PassiveSet::new(k),
+            x: Vec::with_capacity(k),
+            z: Vec::with_capacity(k),
+            gradient: vec![0.0; k],
         }
     }
 
     /// Minimises `½xᵀGx − hᵀx` subject to `x ≥ 0`, with `h = Aᵀb`, `[k]`. Returns `x`, `[k]`, which
     /// is feasible always and optimal to rounding: it satisfies the Karush–Kuhn–Tucker conditions.
     pub fn solve(&mut self, h: &[f64]) -> Vec<f64> {
-        let top = h.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        vectorised(|| self.search(h));
         let mut x = vec![0.0; self.k];
+        for (&j, &value) in self.passive.members().iter().zip(&self.x) {
+            x[j] = value;
+        }
+        x
+    }
+
+    /// Elements above zero in the last solution: the degrees of freedom it spent.
+    pub fn degrees_of_freedom(&self) -> usize {
+        self.passive.members().len()
+    }
+
+    #[inline(always)]
+    fn search(&mut self, h: &[f64]) {
+        let top = h.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         if top == 0.0 {
-            return x;
+            self.passive.clear();
+            self.x.clear();
+            return;
         }
         // Warm start: keep of the last passive set what is positive here.
+        self.passive.carry(0, h);
         loop {
-            let z = self.solve_passive(h);
-            let negative: Vec<usize> = (0..z.len()).filter(|&i| z[i] <= 0.0).collect();
-            if negative.is_empty() {
-                self.scatter(&z, &mut x);
+            self.least_squares();
+            if self.z.iter().all(|&z| z > 0.0) {
                 break;
             }
-            for &i in negative.iter().rev() {
-                self.leave(i);
+            for i in (0..self.z.len()).rev() {
+                if self.z[i] <= 0.0 {
+                    self.passive.leave(i);
+                }
             }
         }
+        self.x.clone_from(&self.z);
         // An element the factor refused, or that left at once, must not be picked again before
         // something else has changed, or rounding could make the search go round in circles.
         let mut refused = vec![false; self.k];
         for _ in 0..10 * self.k {
-            let Some(j) = self.steepest(h, &x, TOLERANCE * top, &refused) else {
+            let Some(j) = self.steepest(h, TOLERANCE * top, &refused) else {
                 break;
             };
-            if !self.enter(j) {
+            if !self.passive.enter(self.gram, j, [h[j]]) {
                 refused[j] = true;
                 continue;
             }
-            let entered_positive = self.descend(h, &mut x);
-            if entered_positive {
+            self.x.push(0.0);
+            self.descend();
+            if self.passive.contains(j) {
                 refused.fill(false);
             } else {
                 refused[j] = true;
             }
         }
-        x
+    }
+
+    /// `z`, the least-squares solution on the passive set.
+    #[inline(always)]
+    fn least_squares(&mut self) {
+        self.z.clear();
+        self.z.extend_from_slice(self.passive.carried(0));
+        self.passive.back_substitute(&mut self.z);
     }
 
     /// Moves from feasible `x` to the least-squares solution on the passive set, elements that would
-    /// turn negative leaving on the way. False if the element that entered last made no progress.
-    fn descend(&mut self, h: &[f64], x: &mut [f64]) -> bool {
-        let entered = self.passive.last().copied();
+    /// turn negative leaving on the way.
+    #[inline(always)]
+    fn descend(&mut self) {
         loop {
-            let z = self.solve_passive(h);
+            self.least_squares();
             // The largest step along x -> z that stays feasible.
             let mut step = 1.0f64;
-            for (&j, &z) in self.passive.iter().zip(&z) {
+            let mut blocked = usize::MAX;
+            for (i, (&x, &z)) in self.x.iter().zip(&self.z).enumerate() {
                 if z <= 0.0 {
-                    step = step.min(x[j] / (x[j] - z).max(f64::MIN_POSITIVE));
+                    let here = x / (x - z).max(f64::MIN_POSITIVE);
+                    if here < step || blocked == usize::MAX {
+                        (step, blocked) = (here.min(step), i);
+                    }
                 }
             }
-            if step >= 1.0 {
-                self.scatter(&z, x);
-                return entered.is_some_and(|j| x[j] > 0.0);
+            if blocked == usize::MAX {
+                self.x.clone_from(&self.z);
+                return;
             }
-            for (&j, &z) in self.passive.iter().zip(&z) {
-                x[j] += step * (z - x[j]);
+            for (x, z) in self.x.iter_mut().zip(&self.z) {
+                *x += step * (z - *x);
             }
-            // Whoever reached zero leaves; at least one does.
-            let blocked = (0..z.len())
-                .filter(|&i| z[i] <= 0.0)
-                .min_by(|&a, &b| x[self.passive[a]].total_cmp(&x[self.passive[b]]));
-            for i in (0..self.passive.len()).rev() {
-                let j = self.passive[i];
-                if Some(i) == blocked || (z[i] <= 0.0 && x[j] <= 0.0) {
-                    x[j] = 0.0;
-                    self.leave(i);
+            // Whoever reached zero leaves; the one that stopped the step does, rounding or not.
+            for i in (0..self.x.len()).rev() {
+                if i == blocked || (self.z[i] <= 0.0 && self.x[i] <= 0.0) {
+                    self.x.remove(i);
+                    self.passive.leave(i);
                 }
             }
         }
     }
 
     /// The element outside the passive set whose growth lowers the residual most steeply.
-    fn steepest(&mut self, h: &[f64], x: &[f64], least: f64, refused: &[bool]) -> Option<usize> {
-        let k = self.k;
-        let gradient = &mut self.scratch;
-        gradient.copy_from_slice(h);
-        for &j in &self.passive {
-            let (xj, row) = (x[j], &self.gram[j * k..(j + 1) * k]);
-            for (g, r) in gradient.iter_mut().zip(row) {
-                *g -= xj * r;
-            }
+    #[inline(always)]
+    fn steepest(&mut self, h: &[f64], least: f64, refused: &[bool]) -> Option<usize> {
+        // The sign is turned twice, so that rows are only ever added.
+        for (g, h) in self.gradient.iter_mut().zip(h) {
+            *g = -h;
         }
+        add_rows(
+            &mut self.gradient,
+            self.gram,
+            self.passive.members(),
+            &self.x,
+        );
         let mut best = None;
         let mut most = least;
-        for j in 0..k {
-            if gradient[j] > most && !self.is_passive[j] && !refused[j] {
-                (best, most) = (Some(j), gradient[j]);
+        for (j, &g) in self.gradient.iter().enumerate() {
+            if -g > most && !self.passive.contains(j) && !refused[j] {
+                (best, most) = (Some(j), -g);
             }
         }
         best
-    }
-
-    /// Solves `G[P, P] z = h[P]` with the factor.
-    fn solve_passive(&self, h: &[f64]) -> Vec<f64> {
-        let (n, k) = (self.passive.len(), self.k);
-        let mut z = Vec::with_capacity(n);
-        for i in 0..n {
-            let row = &self.factor[i * k..i * k + i];
-            let known: f64 = row.iter().zip(&z).map(|(l, z)| l * z).sum();
-            z.push((h[self.passive[i]] - known) / self.factor[i * k + i]);
-        }
-        for i in (0..n).rev() {
-            z[i] /= self.factor[i * k + i];
-            let (above, zi) = (&self.factor[i * k..i * k + i], z[i]);
-            for (z, l) in z.iter_mut().zip(above) {
-                *z -= l * zi;
-            }
-        }
-        z
-    }
-
-    fn scatter(&self, z: &[f64], x: &mut [f64]) {
-        x.fill(0.0);
-        for (&j, &z) in self.passive.iter().zip(z) {
-            x[j] = z;
-        }
-    }
-
-    /// Appends element `j` to the passive set, unless it depends linearly on it.
-    fn enter(&mut self, j: usize) -> bool {
-        let (n, k) = (self.passive.len(), self.k);
-        let mut squares = 0.0;
-        for i in 0..n {
-            let (before, row) = self.factor.split_at_mut(n * k);
-            let l = &before[i * k..i * k + i];
-            let known: f64 = l.iter().zip(&row[..i]).map(|(a, b)| a * b).sum();
-            let value = (self.gram[self.passive[i] * k + j] - known) / before[i * k + i];
-            row[i] = value;
-            squares += value * value;
-        }
-        let diagonal = self.gram[j * k + j];
-        let pivot = diagonal - squares;
-        if pivot <= DEPENDENT * diagonal {
-            return false;
-        }
-        self.factor[n * k + n] = pivot.sqrt();
-        self.passive.push(j);
-        self.is_passive[j] = true;
-        true
-    }
-
-    /// Takes row `i` out of the factor: the rows below lose a column, and Givens rotations make
-    /// them triangular again.
-    fn leave(&mut self, i: usize) {
-        let (n, k) = (self.passive.len(), self.k);
-        self.is_passive[self.passive.remove(i)] = false;
-        for row in i..n - 1 {
-            self.factor
-                .copy_within((row + 1) * k..(row + 1) * k + row + 2, row * k);
-        }
-        for c in i..n - 1 {
-            let (a, b) = (self.factor[c * k + c], self.factor[c * k + c + 1]);
-            let r = a.hypot(b);
-            let (cos, sin) = (a / r, b / r);
-            for row in c..n - 1 {
-                let at = row * k + c;
-                let (a, b) = (self.factor[at], self.factor[at + 1]);
-                self.factor[at] = cos * a + sin * b;
-                self.factor[at + 1] = cos * b - sin * a;
-            }
-        }
     }
 }
 

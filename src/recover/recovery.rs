@@ -4,16 +4,25 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::direct::Direct;
-use super::{CommonMode, FEWEST_PATTERNS, Workers};
+use super::{CommonMode, FEWEST_PATTERNS, SparsityBasis, Workers};
 use crate::capture::Measurements;
 use crate::transport::{Basis, Geometry, GeometryError, RecoveredTile, TileRect, Window};
 
 /// How light transport functions are recovered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(into = "&'static str")]
 pub enum Method {
     /// Non-negative least squares, each pixel and channel on its own (paper, section 3, case (a)).
     Nnls,
+    /// Basis pursuit denoising: of all functions that explain a pixel's measurements to within noise
+    /// the sparsest in this basis (paper, section 3, case (b)).
+    Bpdn(SparsityBasis),
+}
+
+impl From<Method> for &'static str {
+    fn from(method: Method) -> Self {
+        method.name()
+    }
 }
 
 impl Method {
@@ -24,6 +33,7 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::Nnls => "nnls",
+            Self::Bpdn(_) => "bpdn",
         }
     }
 }
@@ -73,7 +83,7 @@ impl Recovery {
     pub fn prepare(
         measurements: &Measurements,
         settings: Settings,
-        _workers: &impl Workers,
+        workers: &impl Workers,
     ) -> Result<Self, RecoverError> {
         let geometry = Geometry {
             camera: measurements.camera,
@@ -87,8 +97,10 @@ impl Recovery {
             return Err(RecoverError::FewPatterns(measurements.patterns.len()));
         }
         let solver = match settings.method {
-            Method::Nnls => Solver::Direct(Direct::new(measurements, geometry)?),
+            Method::Nnls => Direct::least_squares(measurements, geometry, workers)?,
+            Method::Bpdn(basis) => Direct::denoising(measurements, geometry, basis, workers)?,
         };
+        let solver = Solver::Direct(solver);
         Ok(Self { geometry, solver })
     }
 
