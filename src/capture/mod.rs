@@ -4,7 +4,6 @@
 //! what is known of camera and display. [`CaptureFolder`] reads and checks them one by one, so that
 //! whoever has threads can read them at once; [`Measurements`] is what recovery works on.
 
-mod eigen;
 mod error;
 #[cfg(not(target_arch = "wasm32"))]
 mod folder;

@@ -8,7 +8,7 @@
 
 use serde::Serialize;
 
-use super::eigen::symmetric_eigen;
+use crate::eigen::symmetric_eigen;
 use super::{Measurements, Picture};
 use crate::transport::{CHANNELS, CameraPx};
 

@@ -6,7 +6,7 @@ const MOST_SWEEPS: usize = 30;
 /// The eigenvalues of the symmetric `[n, n]` matrix `a`, largest first, and their eigenvectors as
 /// the rows of an `[n, n]` matrix, by cyclic Jacobi rotations (Golub and Van Loan, *Matrix
 /// Computations*, section 8.5).
-pub(super) fn symmetric_eigen(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<f64>) {
+pub(crate) fn symmetric_eigen(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut vectors = vec![0.0; n * n];
     for i in 0..n {
         vectors[i * n + i] = 1.0;
