@@ -1,7 +1,9 @@
 //! The capture `glass-s`, carried in the test program: browsers have no folders.
 
+use std::io::Cursor;
+
 use half::f16;
-use image::DynamicImage;
+use png::{BitDepth, ColorType};
 use relightable_photo::capture::{Manifest, Measurements, Pattern};
 use relightable_photo::transport::{CHANNELS, Window};
 
@@ -50,16 +52,13 @@ pub fn measurements() -> Measurements {
         lit.map(|(codes, dark)| std::array::from_fn(|c| linear(codes[c]) as f32 - dark[c]))
             .collect()
     };
-    let pattern = |png: &[u8]| match image::load_from_memory(png).unwrap() {
-        DynamicImage::ImageLuma8(codes) => {
-            let codes = codes.into_raw().into_iter();
-            Pattern::Grey(
-                codes
-                    .map(|code| emission[usize::from(code)] as f32)
-                    .collect(),
-            )
-        }
-        other => panic!("a pattern is {:?}", other.color()),
+    let pattern = |png: &[u8]| {
+        let codes = read(png, ColorType::Grayscale, BitDepth::Eight).into_iter();
+        Pattern::Grey(
+            codes
+                .map(|code| emission[usize::from(code)] as f32)
+                .collect(),
+        )
     };
     Measurements {
         camera: camera.extent(),
@@ -72,10 +71,23 @@ pub fn measurements() -> Measurements {
 }
 
 fn codes16(png: &[u8]) -> Vec<[u16; CHANNELS]> {
-    match image::load_from_memory(png).unwrap() {
-        DynamicImage::ImageRgb16(picture) => picture.pixels().map(|pixel| pixel.0).collect(),
-        other => panic!("a photograph is {:?}", other.color()),
-    }
+    let bytes = read(png, ColorType::Rgb, BitDepth::Sixteen);
+    let codes: Vec<u16> = bytes
+        .as_chunks()
+        .0
+        .iter()
+        .map(|&code| u16::from_be_bytes(code))
+        .collect();
+    codes.as_chunks().0.to_vec()
+}
+
+/// The samples of a picture, as bytes.
+fn read(png: &[u8], colour: ColorType, depth: BitDepth) -> Vec<u8> {
+    let mut reader = png::Decoder::new(Cursor::new(png)).read_info().unwrap();
+    assert_eq!(reader.output_color_type(), (colour, depth));
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut bytes).unwrap();
+    bytes
 }
 
 /// The window that [`true_functions`] are given on.
