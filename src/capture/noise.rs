@@ -8,8 +8,8 @@
 
 use serde::Serialize;
 
-use crate::eigen::symmetric_eigen;
 use super::{Measurements, Picture};
+use crate::eigen::symmetric_eigen;
 use crate::transport::{CHANNELS, CameraPx};
 
 /// Pixels along a block's side: enough that two pixels an element leave most ranks to noise.

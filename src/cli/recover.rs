@@ -30,7 +30,7 @@ pub struct RecoverArgs {
     #[arg(short, long, value_name = "FILE.ltm")]
     output: PathBuf,
     /// How each light transport function is recovered
-    #[arg(long, value_enum, default_value_t = MethodName::Nnls)]
+    #[arg(long, value_enum, default_value_t = MethodName::Learned)]
     method: MethodName,
     /// With --method bpdn: where light transport functions are sparse
     #[arg(long, value_enum, default_value_t = BasisName::Identity)]
@@ -54,6 +54,8 @@ fn parse_window(text: &str) -> Result<Window, String> {
 /// Recovery methods by name.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum MethodName {
+    /// A prior learned from the photographs themselves
+    Learned,
     /// Non-negative least squares
     Nnls,
     /// Basis pursuit denoising: the sparsest function that explains the photographs
@@ -74,6 +76,7 @@ enum BasisName {
 impl RecoverArgs {
     fn method(&self) -> Method {
         match self.method {
+            MethodName::Learned => Method::Learned,
             MethodName::Nnls => Method::Nnls,
             MethodName::Bpdn => Method::Bpdn(match self.basis {
                 BasisName::Identity => SparsityBasis::Identity,
@@ -93,7 +96,7 @@ struct Report {
     /// None: every tile is direct.
     rank: Option<usize>,
     patterns: usize,
-    common_mode: crate::recover::CommonMode,
+    common_mode: Option<crate::recover::CommonMode>,
     noise: Noise,
     saturated_samples: usize,
     /// Pixels of which nothing but white is known.

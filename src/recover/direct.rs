@@ -88,16 +88,60 @@ impl Direct {
 
     /// Recovers the light transport functions of one tile.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> TransportFunctions {
+        let rows: Vec<usize> = (0..measurements.patterns.len()).collect();
+        self.tile_from(measurements, &rows, rect)
+    }
+
+    /// Squared error of predicting the patterns numbered `held` in one tile from those in `rows`.
+    pub fn held_out_error(
+        &self,
+        measurements: &Measurements,
+        rows: &[usize],
+        held: &[usize],
+        rect: TileRect,
+    ) -> f64 {
+        let functions = self.tile_from(measurements, rows, rect);
+        let (area, light) = (self.geometry.window.area(), self.geometry.light);
+        let mut error = 0.0;
+        for (p, pixel) in rect.pixels().enumerate() {
+            let origin = self.geometry.window_origin(pixel);
+            let tau = &functions.tau[p * area..(p + 1) * area];
+            for &l in held {
+                let mut y = [0.0; CHANNELS];
+                for (slot, tau) in tau.iter().enumerate() {
+                    let element = self.geometry.window.element(origin, slot);
+                    if let Some(m) = element.index_in(light) {
+                        for c in 0..CHANNELS {
+                            y[c] += f64::from(measurements.patterns[l].plane(c)[m] * tau[c]);
+                        }
+                    }
+                }
+                for c in 0..CHANNELS {
+                    let miss = measurements.sample(l, pixel, c) - y[c];
+                    if miss.is_finite() {
+                        error += miss * miss;
+                    }
+                }
+            }
+        }
+        error
+    }
+
+    fn tile_from(
+        &self,
+        measurements: &Measurements,
+        rows: &[usize],
+        rect: TileRect,
+    ) -> TransportFunctions {
         let area = self.geometry.window.area();
         let mut functions = TransportFunctions::zeros(rect, area);
-        let rows: Vec<usize> = (0..measurements.patterns.len()).collect();
         let mut blocks: BTreeMap<_, BTreeMap<_, _>> = BTreeMap::new();
         for (origin, pixels) in windows(&self.geometry, rect) {
             let block = (origin.v.div_euclid(BLOCK), origin.u.div_euclid(BLOCK));
             blocks.entry(block).or_default().insert(origin, pixels);
         }
         for windows in blocks.values() {
-            self.block(measurements, windows, &rows, |_, pixel, c, slots, x| {
+            self.block(measurements, windows, rows, |_, pixel, c, slots, x| {
                 for (&slot, &x) in slots.iter().zip(x) {
                     functions.tau[pixel * area + slot][c] = x as f32;
                 }

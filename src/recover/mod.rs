@@ -12,6 +12,7 @@ mod bpdn;
 mod common_mode;
 mod design;
 mod direct;
+mod learned;
 mod nnls;
 mod passive;
 mod recovery;

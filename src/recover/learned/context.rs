@@ -239,7 +239,10 @@ impl Context {
             });
             let mut total = Expected::new(width, rank);
             parts.iter().for_each(|part| total.add(part));
-            total.moment.iter_mut().for_each(|m| *m /= total.weight.max(1.0));
+            total
+                .moment
+                .iter_mut()
+                .for_each(|m| *m /= total.weight.max(1.0));
             dense::mirror(&mut total.moment, rank);
             context.gaussian = Gaussian::new(&total.moment, rank);
             context.share = (total.weight / total.count.max(1.0)).clamp(0.01, 0.99);
@@ -282,7 +285,11 @@ impl Context {
                 let z = &patch.field.z[member * rank..(member + 1) * rank];
                 let miss: Vec<f64> = z.iter().zip(&mean).map(|(z, m)| z - m).collect();
                 for i in 0..rank {
-                    add_scaled(&mut moment[i * rank + i..(i + 1) * rank], miss[i], &miss[i..]);
+                    add_scaled(
+                        &mut moment[i * rank + i..(i + 1) * rank],
+                        miss[i],
+                        &miss[i..],
+                    );
                 }
                 count += 1.0;
                 if i % 64 == 0 {
@@ -423,7 +430,11 @@ impl Normal {
         }
         let target = &field.z[member * rank..(member + 1) * rank];
         for (n, &(i, a)) in present.iter().enumerate() {
-            for ((r, a), z) in self.right[i * rank..(i + 1) * rank].iter_mut().zip(a).zip(target) {
+            for ((r, a), z) in self.right[i * rank..(i + 1) * rank]
+                .iter_mut()
+                .zip(a)
+                .zip(target)
+            {
                 *r += a * z;
             }
             for &(j, b) in &present[n..] {

@@ -25,7 +25,9 @@ pub(super) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
             }
             log_det += pivot.ln();
             let inverse = pivot.sqrt().recip();
-            a[k * n + k..k * n + n].iter_mut().for_each(|u| *u *= inverse);
+            a[k * n + k..k * n + n]
+                .iter_mut()
+                .for_each(|u| *u *= inverse);
         }
         let (done, rest) = a.split_at_mut(end * n);
         if end - first == BLOCK {
@@ -76,7 +78,10 @@ pub(super) fn invert(u: &[f64], n: usize, scratch: &mut [f64], inverse: &mut [f6
     }
     for i in 0..n {
         for j in i..n {
-            inverse[i * n + j] = dot(&scratch[i * n + j..(i + 1) * n], &scratch[j * n + j..(j + 1) * n]);
+            inverse[i * n + j] = dot(
+                &scratch[i * n + j..(i + 1) * n],
+                &scratch[j * n + j..(j + 1) * n],
+            );
         }
     }
 }
@@ -124,7 +129,9 @@ mod tests {
 
     /// A well-conditioned symmetric matrix.
     fn matrix(n: usize) -> Vec<f64> {
-        let b: Vec<f64> = (0..n * n).map(|i| ((i * 37) % 101) as f64 / 50.0 - 1.0).collect();
+        let b: Vec<f64> = (0..n * n)
+            .map(|i| ((i * 37) % 101) as f64 / 50.0 - 1.0)
+            .collect();
         let mut a = product(&b, &transpose(&b, n), n, n);
         (0..n).for_each(|i| a[i * n + i] += 1.0);
         a

@@ -93,10 +93,18 @@ impl Equations {
             rights: vec![0.0; pixels * CHANNELS * rank],
         };
         for (origin, pixels) in windows(geometry, rect) {
-            let planes: &[usize] = if measurements.grey() { &[0] } else { &[0, 1, 2] };
+            let planes: &[usize] = if measurements.grey() {
+                &[0]
+            } else {
+                &[0, 1, 2]
+            };
             for &plane in planes {
                 let projected = kernels.project(measurements, geometry, origin, plane);
-                let channels = if measurements.grey() { 0..CHANNELS } else { plane..plane + 1 };
+                let channels = if measurements.grey() {
+                    0..CHANNELS
+                } else {
+                    plane..plane + 1
+                };
                 vectorised(
                     #[inline(always)]
                     || {
@@ -282,7 +290,11 @@ impl<'a> Fill<'a> {
         let variance = centred.rows.iter().zip(y);
         let variance = variance.map(|(&l, &y)| self.measurements.variance(l, c, y));
         let deviation = y.iter().map(|y| (y - mean) * (y - mean)).sum::<f64>();
-        let scale = if centred.profile > 0.0 { mean / centred.profile } else { 0.0 };
+        let scale = if centred.profile > 0.0 {
+            mean / centred.profile
+        } else {
+            0.0
+        };
         equations.members[member] = Member {
             gram: centred.gram,
             scale: scale.max(0.0),

@@ -79,8 +79,12 @@ impl Kernels {
         let rows = responses.chunks_exact_mut(self.stride);
         for (pattern, row) in measurements.patterns.iter().zip(rows) {
             let pattern = pattern.plane(plane);
-            for (line, out) in lines.clone().zip(emission.chunks_exact_mut(columns.len().max(1))) {
-                let first = (v + line as i64) as usize * width + (u + columns.start as i64) as usize;
+            for (line, out) in lines
+                .clone()
+                .zip(emission.chunks_exact_mut(columns.len().max(1)))
+            {
+                let first =
+                    (v + line as i64) as usize * width + (u + columns.start as i64) as usize;
                 out.copy_from_slice(&pattern[first..first + columns.len()]);
             }
             vectorised(

@@ -120,7 +120,10 @@ impl Workspace {
         dense::multiply(gram, &self.z, &mut self.image);
         let mut spread = 0.0;
         for i in 0..rank {
-            let (h, p) = (&gram[i * rank + i..(i + 1) * rank], &self.inverse[i * rank + i..(i + 1) * rank]);
+            let (h, p) = (
+                &gram[i * rank + i..(i + 1) * rank],
+                &self.inverse[i * rank + i..(i + 1) * rank],
+            );
             spread += 2.0 * dot(h, p) - h[0] * p[0];
         }
         let f = of.scale;

@@ -61,7 +61,12 @@ impl Prior {
 
     /// One round of expectation–maximisation on all bright members of `patches`. The posterior
     /// covariance is part of the second moment: without it the prior shrinks from round to round.
-    pub fn improve(&mut self, patches: &[Equations], threshold: &Threshold, workers: &impl Workers) {
+    pub fn improve(
+        &mut self,
+        patches: &[Equations],
+        threshold: &Threshold,
+        workers: &impl Workers,
+    ) {
         let rank = self.rank;
         let parts = workers.map(patches.len(), |i| {
             vectorised(
@@ -108,7 +113,13 @@ impl Prior {
         let mut work = Workspace::new(rank);
         for member in (0..patch.members.len()).filter(|&m| bright(patch, m, threshold)) {
             let of = patch.members[member];
-            work.infer(patch, member, self.noise, &self.gaussian, &self.mean[of.phase]);
+            work.infer(
+                patch,
+                member,
+                self.noise,
+                &self.gaussian,
+                &self.mean[of.phase],
+            );
             work.covariance();
             out.count[of.phase] += 1.0;
             add_scaled(&mut out.sum[of.phase], 1.0, &work.z);
