@@ -42,6 +42,8 @@ pub(super) struct Member {
     pub rows: usize,
     /// Sub-element position class.
     pub phase: usize,
+    /// Whether all of its window lies on the display.
+    pub whole: bool,
 }
 
 impl Member {
@@ -84,6 +86,7 @@ impl Equations {
             power: 0.0,
             rows: 0,
             phase: 0,
+            whole: false,
         };
         let mut equations = Self {
             rect,
@@ -155,6 +158,8 @@ pub(super) struct Projected {
     pub stride: usize,
     /// Number of kernels.
     pub rank: usize,
+    /// Whether all of the window lies on the display.
+    pub whole: bool,
 }
 
 impl Projected {
@@ -302,6 +307,7 @@ impl<'a> Fill<'a> {
             power: deviation + weight * mean * mean,
             rows: count,
             phase: phase(self.geometry, pixel),
+            whole: centred.projected.whole,
         };
     }
 }

@@ -93,6 +93,7 @@ impl Kernels {
             );
         }
         Projected {
+            whole: columns.len() == side && lines.len() == side,
             responses,
             stride: self.stride,
             rank: self.rank,

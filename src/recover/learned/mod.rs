@@ -23,14 +23,12 @@ mod start;
 use context::{Context, Field, Patch, REACH};
 use equations::{Equations, windows};
 use kernels::Kernels;
-use prior::{Prior, Threshold, bright};
+use prior::{Prior, Threshold};
 
 use super::direct::Direct;
 use super::{FEWEST_PATTERNS, RecoverError, Workers};
 use crate::capture::Measurements;
-use crate::transport::{
-    Basis, CHANNELS, CameraPx, Extent, FactoredTile, Geometry, RecoveredTile, TileRect,
-};
+use crate::transport::{Basis, CHANNELS, Extent, FactoredTile, Geometry, RecoveredTile, TileRect};
 
 /// Every how many patterns one is held out for choosing.
 const HOLD_OUT_EVERY: usize = 10;
@@ -39,7 +37,7 @@ const RANKS: [usize; 3] = [23, 31, 47];
 /// Squares that the prior is learned from, and their side in pixels.
 const SQUARES: (usize, u32) = (128, 4);
 /// Rounds of expectation–maximisation with all the kernels that learning starts with.
-const ROUNDS: usize = 10;
+const ROUNDS: usize = 20;
 /// Patches that neighbours' part is learned from, and their side in pixels.
 const PATCHES: (usize, u32) = (64, 16);
 /// Rounds of expectation–maximisation on the patches, with the kernels chosen.

@@ -68,10 +68,19 @@ impl Prior {
         workers: &impl Workers,
     ) {
         let rank = self.rank;
+        // Where much of a window lies off the display little is seen of its functions, and learning
+        // from them is slow: they are left out where there are others enough.
+        let whole = patches
+            .iter()
+            .flat_map(|p| &p.members)
+            .filter(|m| m.whole)
+            .count();
+        let all: usize = patches.iter().map(|p| p.members.len()).sum();
+        let only_whole = ENOUGH_WHOLE * whole >= all;
         let parts = workers.map(patches.len(), |i| {
             vectorised(
                 #[inline(always)]
-                || self.expect(&patches[i], threshold),
+                || self.expect(&patches[i], threshold, only_whole),
             )
         });
         let mut total = Expected::new(rank);
@@ -107,12 +116,15 @@ impl Prior {
     }
 
     #[inline(always)]
-    fn expect(&self, patch: &Equations, threshold: &Threshold) -> Expected {
+    fn expect(&self, patch: &Equations, threshold: &Threshold, only_whole: bool) -> Expected {
         let rank = self.rank;
         let mut out = Expected::new(rank);
         let mut work = Workspace::new(rank);
         for member in (0..patch.members.len()).filter(|&m| bright(patch, m, threshold)) {
             let of = patch.members[member];
+            if only_whole && !of.whole {
+                continue;
+            }
             work.infer(
                 patch,
                 member,
@@ -136,6 +148,8 @@ impl Prior {
     }
 }
 
+/// One in how many members must have its whole window on the display for the others to be left out.
+const ENOUGH_WHOLE: usize = 4;
 /// Members of the pooled mean that a class's mean starts from.
 const PULL: f64 = 20.0;
 /// Noise never comes out below this share of its estimate.

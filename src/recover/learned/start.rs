@@ -20,30 +20,47 @@ const CORRELATION: f64 = 1.0;
 const VARIANCE: f64 = 0.3;
 /// Standard deviation, in elements, of the blur that takes the noise from the pooled mean.
 const BLUR: f64 = 1.0;
+/// Rounds of finding brightness and mean function in turn. A brightness that is a few per cent off,
+/// as it is while the function is unknown, shows as light from far off.
+const POOLED_ROUNDS: usize = 3;
+/// How far, as a share of full brightness, a pixel is from what the mean function says of it: what
+/// weighs pixels against each other where noise is less.
+const DEVIATION: f64 = 0.1;
 /// How the mean row is weighted, as in `equations`.
 const MEAN_WEIGHT: f64 = 0.3;
 
-/// Squares of `side` pixels spread evenly over the picture, none over another, at most `most`. Fewer
-/// where the picture is small.
+/// Squares of `side` pixels spread evenly over the picture, none over another, at most `most`: all
+/// there are room for where the picture is small.
 pub(super) fn spread(camera: Extent, side: u32, most: usize) -> Vec<TileRect> {
     let extent = Extent {
         width: side.min(camera.width),
         height: side.min(camera.height),
     };
-    let (free_x, free_y) = (camera.width - extent.width, camera.height - extent.height);
-    let mut squares: Vec<TileRect> = Vec::new();
+    let cells = Extent {
+        width: camera.width / extent.width,
+        height: camera.height / extent.height,
+    };
+    let square = |x: u32, y: u32| TileRect {
+        x: x * extent.width,
+        y: y * extent.height,
+        extent,
+    };
+    if cells.area() <= most {
+        return (0..cells.height)
+            .flat_map(|y| (0..cells.width).map(move |x| square(x, y)))
+            .collect();
+    }
+    let mut squares: Vec<TileRect> = Vec::with_capacity(most);
     // Roberts's R2 sequence: even, and in step with no pattern of the picture.
     for i in 1..=8 * most {
         let at =
-            |step: f64, free: u32| ((0.5 + step * i as f64).fract() * f64::from(free + 1)) as u32;
+            |step: f64, cells: u32| ((0.5 + step * i as f64).fract() * f64::from(cells)) as u32;
         let (x, y) = (
-            at(0.754_877_666_246_69, free_x),
-            at(0.569_840_290_998_05, free_y),
+            at(0.754_877_666_246_69, cells.width),
+            at(0.569_840_290_998_05, cells.height),
         );
-        let apart =
-            |s: &TileRect| x.abs_diff(s.x) >= extent.width || y.abs_diff(s.y) >= extent.height;
-        if squares.iter().all(apart) {
-            squares.push(TileRect { x, y, extent });
+        if !squares.contains(&square(x, y)) {
+            squares.push(square(x, y));
             if squares.len() == most {
                 break;
             }
@@ -62,6 +79,33 @@ pub(super) fn pooled_mean(
     workers: &impl Workers,
 ) -> Option<Vec<f64>> {
     let area = geometry.window.area();
+    let mut mean = vec![1.0 / area as f64; area];
+    for _ in 0..POOLED_ROUNDS {
+        let right = pooled_round(measurements, geometry, rows, squares, &mean, workers);
+        let sum: f64 = right.iter().sum();
+        if sum.is_nan() || sum <= 0.0 {
+            return None;
+        }
+        mean = right.iter().map(|m| m / sum).collect();
+    }
+    Some(mean)
+}
+
+/// One round: brightness as seen with `mean`, then the function that explains all pixels.
+fn pooled_round(
+    measurements: &Measurements,
+    geometry: &Geometry,
+    rows: &[usize],
+    squares: &[TileRect],
+    mean: &[f64],
+    workers: &impl Workers,
+) -> Vec<f64> {
+    let area = geometry.window.area();
+    let whole = |square: &&TileRect| {
+        let mut pixels = square.pixels();
+        pixels.all(|pixel| on_display(geometry, geometry.window_origin(pixel)))
+    };
+    let only_whole = 4 * squares.iter().filter(whole).count() >= squares.len();
     // A fixed number of parts, so that sums do not depend on the number of threads.
     const PARTS: usize = 8;
     let parts = workers.map(PARTS, |part| {
@@ -73,7 +117,17 @@ pub(super) fn pooled_mean(
             for (origin, pixels) in windows(geometry, *square) {
                 vectorised(
                     #[inline(always)]
-                    || sums.add(measurements, geometry, rows, origin, &pixels),
+                    || {
+                        sums.add(
+                            measurements,
+                            geometry,
+                            rows,
+                            mean,
+                            only_whole,
+                            origin,
+                            &pixels,
+                        )
+                    },
                 );
             }
         }
@@ -88,9 +142,14 @@ pub(super) fn pooled_mean(
         add_scaled(&mut total.right, 1.0, &part.right);
     }
     dense::mirror(&mut total.gram, area);
-    let mean = Nnls::new(&total.gram, area).solve(&total.right);
-    let sum: f64 = mean.iter().sum();
-    (sum > 0.0).then(|| mean.iter().map(|m| m / sum).collect())
+    Nnls::new(&total.gram, area).solve(&total.right)
+}
+
+/// Whether all of the window lies on the display.
+fn on_display(geometry: &Geometry, origin: Element) -> bool {
+    let side = i64::from(geometry.window.side());
+    let inside = |at: i32, length: u32| at >= 0 && i64::from(at) + side <= i64::from(length);
+    inside(origin.u, geometry.light.width) && inside(origin.v, geometry.light.height)
 }
 
 struct Pooled {
@@ -106,6 +165,8 @@ impl Pooled {
         measurements: &Measurements,
         geometry: &Geometry,
         rows: &[usize],
+        mean: &[f64],
+        only_whole: bool,
         origin: Element,
         pixels: &[(usize, CameraPx)],
     ) {
@@ -116,6 +177,9 @@ impl Pooled {
                 Some((slot, element.index_in(geometry.light)?))
             })
             .collect();
+        if only_whole && elements.len() < area {
+            return;
+        }
         let count = rows.len();
         let planes = if measurements.grey() { 1 } else { CHANNELS };
         for plane in 0..planes {
@@ -134,7 +198,11 @@ impl Pooled {
                     mean
                 })
                 .collect();
-            let level = means.iter().sum::<f64>() / means.len().max(1) as f64;
+            let level: f64 = elements
+                .iter()
+                .zip(&means)
+                .map(|((s, _), p)| mean[*s] * p)
+                .sum();
             if level <= 0.0 {
                 continue;
             }
@@ -155,13 +223,13 @@ impl Pooled {
                     let mean = y.iter().sum::<f64>() / count as f64;
                     // Also false where some sample is saturated.
                     if mean > 0.0 {
-                        let variance = measurements
-                            .variance(rows[0], c, mean)
-                            .max(f64::MIN_POSITIVE);
+                        let variance = measurements.variance(rows[0], c, mean);
                         let brightness = mean / level;
-                        energy += brightness * brightness / variance;
-                        add_scaled(&mut seen, brightness / variance, &y);
-                        seen_mean += brightness / variance * mean;
+                        let weight =
+                            1.0 / (DEVIATION * DEVIATION + variance / (brightness * brightness));
+                        energy += weight;
+                        add_scaled(&mut seen, weight / brightness, &y);
+                        seen_mean += weight / brightness * mean;
                     }
                 }
             }
