@@ -21,19 +21,21 @@ const PANEL: usize = 12;
 type Lanes = [f64; PANEL];
 const ZERO: Lanes = [0.0; PANEL];
 
-/// Mean eigenvalue that `AAᵀ` is scaled to. The equations then weigh about as much as each of the
-/// other two splits together.
-const MEAN_EIGENVALUE: f64 = 4.0;
+/// Mean eigenvalue that `AAᵀ` is scaled to: how much the equations weigh against the other splits.
+/// Between 10 and 400 it hardly matters.
+const MEAN_EIGENVALUE: f64 = 40.0;
 /// Over-relaxation; 1.5 to 1.8 is usual.
 const RELAXATION: f64 = 1.7;
 /// Iterations between looks at gap and penalty.
 const CHECK_EVERY: usize = 20;
 /// Past this many iterations the best answer so far is taken.
 const MOST_ITERATIONS: usize = 2_000;
-/// Relative duality gap at which a solution is good: far below what noise does to it.
-const GAP: f64 = 2e-3;
-/// 1/ρ to start with, as a share of the function's total: coefficients below hardly matter.
-const INITIAL_SHRINK: f64 = 1e-2;
+/// Relative duality gap at which a solution is good: noise moves the objective by far more.
+const GAP: f64 = 5e-3;
+/// 1/ρ to start with, as a share of the function's total. Too small by far on purpose: the first
+/// iterations then find a feasible point, and the penalty falls from there, which takes a third of
+/// the iterations that starting about right does.
+const INITIAL_SHRINK: f64 = 1e-4;
 
 /// One right-hand side of a [`Splitting`].
 #[derive(Clone, Debug)]
@@ -614,7 +616,7 @@ mod tests {
     use super::*;
     use crate::recover::{Homotopy, Nnls};
 
-    /// Columns, slots and a solver for a window of three elements a side with `missing` first ones
+    /// Columns, slots and a solver for a window of five elements a side with `missing` first ones
     /// off the display.
     fn window(
         basis: SparsityBasis,
@@ -694,7 +696,6 @@ mod tests {
                 let epsilon = least + share * (Problem::energy(y).sqrt() - least);
                 let exact = Homotopy::new(&gram, 25).solve(&h, Problem::energy(y), epsilon);
                 let constraint = Constraint { y, epsilon, least_squares: &least_squares };
-                // The bound of a basis without a constant vector is not this one: only the answer.
                 let found = splitting.solve(&[constraint]).remove(0);
                 let best: f64 = exact.iter().sum();
                 prop_assert!((found.objective - best).abs() <= 0.01 * best + 1e-9);
