@@ -29,7 +29,7 @@ use rayon::prelude::*;
 use relightable_photo::capture::{Measurements, Pattern};
 use relightable_photo::recover::{Method, OneThread, Recovery, Settings, SparsityBasis, Workers};
 use relightable_photo::simulate::{
-    Camera, Codes, Ensemble, Exposure, NoiseStream, Scene, SceneKind, emission,
+    Camera, Codes, Ensemble, Exposure, NoiseStream, SceneKind, emission,
 };
 use relightable_photo::transport::{
     CHANNELS, CameraPx, Extent, TransportError, TransportFunctions, Window,
