@@ -32,9 +32,7 @@ const CHECK_EVERY: usize = 20;
 const MOST_ITERATIONS: usize = 2_000;
 /// Relative duality gap at which a solution is good: noise moves the objective by far more.
 const GAP: f64 = 1e-2;
-/// 1/ρ to start with, as a share of the function's total. Too small by far on purpose: the first
-/// iterations then find a feasible point, and the penalty falls from there, which takes half
-/// the iterations that starting about right does.
+/// 1/ρ to start with, as a share of the function's total; balancing moves it from there.
 const INITIAL_SHRINK: f64 = 1e-3;
 
 /// One right-hand side of a [`Splitting`].
