@@ -12,9 +12,25 @@ use crate::transport::{
 
 /// Every how many patterns one is held out while the settings below are chosen.
 const HOLD_OUT_EVERY: usize = 10;
-/// Windows the choice is made on, spread over the picture: enough that pixels tell candidates apart
-/// by hundredths of a decibel, few enough to cost a second.
-const SAMPLE_WINDOWS: usize = 48;
+/// Windows the choice is made on, spread over the picture, and pixels of each: enough that they tell
+/// candidates apart by hundredths of a decibel, few enough to cost seconds.
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    windows: usize,
+    pixels: usize,
+}
+
+/// For least squares every pixel costs as much as the next, so that all may be far apart.
+const SCATTERED: Sample = Sample {
+    windows: 48,
+    pixels: 1,
+};
+/// Denoising solves for all pixels of a window at about the cost of one.
+const GATHERED: Sample = Sample {
+    windows: 16,
+    pixels: 4,
+};
+
 /// Windows whose origins fall in the same square of this side share their pattern correlations: a
 /// default tile's at two camera pixels an element.
 const BLOCK: i32 = 16;
@@ -51,7 +67,7 @@ impl Direct {
         geometry: Geometry,
         workers: &impl Workers,
     ) -> Result<Self, RecoverError> {
-        let trial = HeldOut::new(measurements, geometry)?;
+        let trial = HeldOut::new(measurements, geometry, SCATTERED)?;
         Ok(trial.choose(
             CommonMode::CANDIDATES.map(|common_mode| Self {
                 geometry,
@@ -70,8 +86,8 @@ impl Direct {
         workers: &impl Workers,
     ) -> Result<Self, RecoverError> {
         let least_squares = Self::least_squares(measurements, geometry, workers)?;
-        let trial = HeldOut::new(measurements, geometry)?;
-        let noise = trial.noise(&least_squares, workers);
+        let noise = HeldOut::new(measurements, geometry, SCATTERED)?.noise(&least_squares, workers);
+        let trial = HeldOut::new(measurements, geometry, GATHERED)?;
         Ok(trial.choose(
             Tolerance::SHARES.map(|share| Self {
                 problem: Problem::Denoising(basis, Tolerance { share, ..noise }),
@@ -325,30 +341,35 @@ fn dark(geometry: &Geometry, origin: Element) -> bool {
     misses(origin.u, geometry.light.width) || misses(origin.v, geometry.light.height)
 }
 
-/// A spread of windows with one pixel each, and the patterns to choose settings by.
+/// A spread of windows with some of their pixels, and the patterns to choose settings by.
 struct HeldOut<'a> {
     measurements: &'a Measurements,
     geometry: Geometry,
-    windows: Vec<(Element, CameraPx)>,
+    windows: Vec<(Element, Vec<CameraPx>)>,
     /// Patterns to predict, and to recover from.
     held: Vec<usize>,
     rows: Vec<usize>,
 }
 
 impl<'a> HeldOut<'a> {
-    fn new(measurements: &'a Measurements, geometry: Geometry) -> Result<Self, RecoverError> {
-        let mut lit = BTreeMap::new();
+    fn new(
+        measurements: &'a Measurements,
+        geometry: Geometry,
+        sample: Sample,
+    ) -> Result<Self, RecoverError> {
+        let mut lit: BTreeMap<_, Vec<_>> = BTreeMap::new();
         for rect in geometry.tiles() {
             for (origin, pixels) in windows(&geometry, rect) {
                 if !dark(&geometry, origin) {
-                    lit.insert(origin, pixels[0].1);
+                    let pixels = pixels.into_iter().take(sample.pixels);
+                    lit.insert(origin, pixels.map(|(_, pixel)| pixel).collect());
                 }
             }
         }
         if lit.is_empty() {
             return Err(RecoverError::NoLight);
         }
-        let every = lit.len().div_ceil(SAMPLE_WINDOWS);
+        let every = lit.len().div_ceil(sample.windows);
         let (held, rows) = (0..measurements.patterns.len())
             .partition(|l| l % HOLD_OUT_EVERY == HOLD_OUT_EVERY / 2);
         Ok(Self {
@@ -368,7 +389,7 @@ impl<'a> HeldOut<'a> {
             return chosen;
         }
         let errors = workers.map(self.windows.len(), |i| {
-            candidates.map(|candidate| self.error(&candidate, self.windows[i]))
+            candidates.map(|candidate| self.error(&candidate, &self.windows[i]))
         });
         let mut best: Option<Decibels> = None;
         for (n, candidate) in candidates.into_iter().enumerate() {
@@ -383,19 +404,24 @@ impl<'a> HeldOut<'a> {
         chosen
     }
 
-    /// Of what a candidate says that one window's pixel sees under the patterns held out.
-    fn error(&self, candidate: &Direct, (origin, pixel): (Element, CameraPx)) -> TransportError {
+    /// Of what a candidate says that one window's pixels see under the patterns held out.
+    fn error(
+        &self,
+        candidate: &Direct,
+        (origin, pixels): &(Element, Vec<CameraPx>),
+    ) -> TransportError {
         let mut error = TransportError::default();
-        let window = BTreeMap::from([(origin, vec![(0, pixel)])]);
+        let numbered = pixels.iter().copied().enumerate().collect();
+        let window = BTreeMap::from([(*origin, numbered)]);
         candidate.block(
             self.measurements,
             &window,
             &self.rows,
-            |_, _, c, slots, x| {
+            |_, pixel, c, slots, x| {
                 for &l in &self.held {
-                    let y = self.measurements.sample(l, pixel, c);
+                    let y = self.measurements.sample(l, pixels[pixel], c);
                     if y.is_finite() {
-                        error.add(y, self.predict(l, c, origin, slots, x));
+                        error.add(y, self.predict(l, c, *origin, slots, x));
                     }
                 }
             },
@@ -419,7 +445,7 @@ impl<'a> HeldOut<'a> {
     fn noise(&self, least_squares: &Direct, workers: &impl Workers) -> Tolerance {
         let rows: Vec<usize> = (0..self.measurements.patterns.len()).collect();
         let pairs = workers.map(self.windows.len(), |i| {
-            let (origin, pixel) = self.windows[i];
+            let (origin, pixel) = (self.windows[i].0, self.windows[i].1[0]);
             let patch = |c| {
                 Patch::new(
                     &self.measurements.patterns,

@@ -1,10 +1,11 @@
 //! From measurements to light transport functions.
 //!
-//! For each camera pixel and channel, minimise `‖y − P̂τ‖₂` over its window subject to `τ ≥ 0`
-//! (paper, section 3, case (a)). What makes it affordable is that all pixels and channels whose
+//! For each camera pixel and channel, over its window and subject to `τ ≥ 0`: minimise `‖y − P̂τ‖₂`
+//! (paper, section 3, case (a); [`Nnls`]), or `‖φᵀτ‖₁` subject to `‖y − P̂τ‖₂ ≤ ε` (case (b);
+//! [`Homotopy`] and [`Splitting`]). What makes it affordable is that all pixels and channels whose
 //! correspondence falls in the same light element share one window and so one set of normal
-//! equations ([`design`]); what makes it accurate is how the patterns' common mode is weighted
-//! ([`CommonMode`]).
+//! equations, and that windows share the patterns' correlations ([`design`]); what makes it accurate
+//! is how the patterns' common mode is weighted ([`CommonMode`]).
 //!
 //! [`Recovery`] is pure and works tile by tile: whoever has threads runs tiles on them.
 

@@ -6,7 +6,7 @@
 //! `‖y − Ax‖ = ε` is a root and no search over λ. At it `x` solves the constrained problem.
 
 use super::super::passive::PassiveSet;
-use super::super::vector::{add_rows, add_scaled, dot, vectorised};
+use super::super::vector::{add_rows, add_scaled, vectorised};
 
 /// Solver for right-hand sides that share one Gram matrix.
 #[derive(Debug)]
@@ -14,18 +14,17 @@ pub struct Homotopy<'a> {
     /// `[k, k]`, row-major, symmetric.
     gram: &'a [f64],
     k: usize,
-    /// Elements above zero; carries the right-hand side and a vector of ones.
+    /// Elements above zero; solves for a vector of ones, and at the end for what rounding left.
     passive: PassiveSet<2>,
-    /// The passive elements' values, and how they change as λ falls.
+    /// The passive elements' values. The set's solution for ones is how they grow as λ falls.
     x: Vec<f64>,
-    direction: Vec<f64>,
     /// `h − Gx`, and how it falls as λ falls: λ and 1 on the passive set.
     correlation: Vec<f64>,
     fall: Vec<f64>,
     refused: Vec<bool>,
 }
 
-/// Number of [`PassiveSet::carried`] vectors.
+/// Right-hand sides of the [`PassiveSet`].
 const RIGHT: usize = 0;
 const ONES: usize = 1;
 /// Correlation, as a share of the largest right-hand side entry, at which the path has ended.
@@ -52,7 +51,6 @@ impl<'a> Homotopy<'a> {
             k,
             passive: PassiveSet::new(k),
             x: Vec::with_capacity(k),
-            direction: Vec::with_capacity(k),
             correlation: vec![0.0; k],
             fall: vec![0.0; k],
             refused: vec![false; k],
@@ -91,39 +89,41 @@ impl<'a> Homotopy<'a> {
         let Some(first) = first.filter(|_| energy > most) else {
             return;
         };
-        self.enter(first, h);
+        self.enter(first);
         // Each event changes the set by one element; paths have about as many as members at the end.
         for _ in 0..10 * self.k {
-            self.direction.clear();
-            self.direction.extend_from_slice(self.passive.carried(ONES));
-            self.passive.back_substitute(&mut self.direction);
             self.fall.fill(0.0);
             let members = self.passive.members();
-            add_rows(&mut self.fall, self.gram, members, &self.direction);
+            add_rows(
+                &mut self.fall,
+                self.gram,
+                members,
+                self.passive.solution(ONES),
+            );
             let residual = energy - self.explained(h, lambda);
             let (step, event) = self.next_event(lambda, residual - most);
             lambda -= step;
-            add_scaled(&mut self.x, step, &self.direction);
+            add_scaled(&mut self.x, step, self.passive.solution(ONES));
             add_scaled(&mut self.correlation, -step, &self.fall);
             match event {
                 Event::End => break,
                 Event::Leaves(i) => {
-                    self.x.remove(i);
+                    self.x.swap_remove(i);
                     self.passive.leave(i);
                     self.refused.fill(false);
                 }
-                Event::Enters(j) => self.enter(j, h),
+                Event::Enters(j) => self.enter(j),
             }
             if lambda <= least {
                 break;
             }
         }
-        self.settle(lambda);
+        self.settle(h, lambda);
     }
 
     #[inline(always)]
-    fn enter(&mut self, j: usize, h: &[f64]) {
-        match self.passive.enter(self.gram, j, [h[j], 1.0]) {
+    fn enter(&mut self, j: usize) {
+        match self.passive.enter(self.gram, j, [0.0, 1.0]) {
             true => self.x.push(0.0),
             false => self.refused[j] = true,
         }
@@ -141,14 +141,14 @@ impl<'a> Homotopy<'a> {
     #[inline(always)]
     fn next_event(&self, lambda: f64, excess: f64) -> (f64, Event) {
         // The squared residual falls by 2γλs − γ²s over a step γ.
-        let ones = self.passive.carried(ONES);
-        let root = lambda * lambda - excess / dot(ones, ones);
+        let direction = self.passive.solution(ONES);
+        let root = lambda * lambda - excess / direction.iter().sum::<f64>();
         let mut step = match root > 0.0 {
             true => lambda - root.sqrt(),
             false => lambda,
         };
         let mut event = Event::End;
-        for (i, (&x, &d)) in self.x.iter().zip(&self.direction).enumerate() {
+        for (i, (&x, &d)) in self.x.iter().zip(direction).enumerate() {
             if d < 0.0 && x < -d * step {
                 (step, event) = ((-x / d).max(0.0), Event::Leaves(i));
             }
@@ -166,13 +166,20 @@ impl<'a> Homotopy<'a> {
         (step, event)
     }
 
-    /// `x` at λ from the equations instead of from the sum of all steps.
+    /// `x` at λ from the equations instead of from the sum of all steps: the residual of
+    /// `G[P, P] x = h[P] − λ` is what rounding has gathered.
     #[inline(always)]
-    fn settle(&mut self, lambda: f64) {
-        self.x.clear();
-        self.x.extend_from_slice(self.passive.carried(RIGHT));
-        add_scaled(&mut self.x, -lambda, self.passive.carried(ONES));
-        self.passive.back_substitute(&mut self.x);
+    fn settle(&mut self, h: &[f64], lambda: f64) {
+        for _ in 0..2 {
+            for (c, h) in self.correlation.iter_mut().zip(h) {
+                *c = lambda - h;
+            }
+            let members = self.passive.members();
+            add_rows(&mut self.correlation, self.gram, members, &self.x);
+            self.correlation.iter_mut().for_each(|c| *c = -*c);
+            self.passive.carry(RIGHT, &self.correlation);
+            add_scaled(&mut self.x, 1.0, self.passive.solution(RIGHT));
+        }
         self.x.iter_mut().for_each(|x| *x = x.max(0.0));
     }
 }

@@ -18,8 +18,9 @@ pub struct Tolerance {
 }
 
 impl Tolerance {
-    /// Shares to choose from.
-    pub const SHARES: [f64; 6] = [1.0, 0.6, 0.35, 0.2, 0.1, 0.05];
+    /// Shares to choose from. At zero nothing satisfies the constraint and what is left is least
+    /// squares, so that a prior that only harms does none.
+    pub const SHARES: [f64; 7] = [1.0, 0.6, 0.35, 0.2, 0.1, 0.04, 0.0];
 
     /// ε for `rows` measurements of this mean.
     pub fn epsilon(self, rows: usize, mean: f64) -> f64 {
