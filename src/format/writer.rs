@@ -1,11 +1,12 @@
 //! Writing a transport as an `.ltm` file.
 
+use std::borrow::Borrow;
 use std::io::{self, Write};
 
 use super::header::{ENTRY_BYTES, HEADER_BYTES, Header, TileEntry};
 use super::metadata::MAX_METADATA_BYTES;
 use super::{FormatError, Metadata, codec};
-use crate::transport::{DirectTile, Geometry};
+use crate::transport::{CHANNELS, DirectTile, Geometry};
 
 /// A tile ready to be written: compress tiles wherever there are threads, then [`write`] them.
 pub struct EncodedTile {
@@ -21,7 +22,30 @@ impl EncodedTile {
             step: tile.step,
         })
     }
+
+    /// The tile as bytes for [`from_record`](Self::from_record): to keep it somewhere for a while,
+    /// not a format for exchange.
+    pub fn to_record(&self) -> Vec<u8> {
+        let steps = self.step.iter().flat_map(|step| step.to_le_bytes());
+        steps.chain(self.bytes.iter().copied()).collect()
+    }
+
+    /// Takes back what [`to_record`](Self::to_record) gave; `None` where it is too short.
+    pub fn from_record(record: &[u8]) -> Option<Self> {
+        let (steps, bytes) = record.split_at_checked(STEP_BYTES)?;
+        let mut step = [0.0; CHANNELS];
+        for (step, bytes) in step.iter_mut().zip(steps.chunks_exact(4)) {
+            *step = f32::from_le_bytes(bytes.try_into().ok()?);
+        }
+        Some(Self {
+            bytes: bytes.to_vec(),
+            step,
+        })
+    }
 }
+
+/// Bytes of a tile's steps.
+const STEP_BYTES: usize = 4 * CHANNELS;
 
 /// Writes a whole file. `tiles` are in row-major order, one for each of [`Geometry::tiles`].
 /// The same input gives the same bytes.
@@ -35,15 +59,29 @@ pub fn write(
     out: &mut impl Write,
 ) -> Result<(), FormatError> {
     assert_eq!(tiles.len(), geometry.tile_grid().area(), "one of each tile");
+    write_from(geometry, metadata, |i| Ok(&tiles[i]), out)
+}
+
+/// Like [`write()`], with tiles that need not be in memory all at once: `tile` is asked twice for
+/// each by its number, once for the directory and once for its bytes.
+pub fn write_from<T: Borrow<EncodedTile>>(
+    geometry: &Geometry,
+    metadata: &Metadata,
+    mut tile: impl FnMut(usize) -> io::Result<T>,
+    out: &mut impl Write,
+) -> Result<(), FormatError> {
+    let tiles = geometry.tile_grid().area();
     let metadata = serde_json::to_vec(metadata).map_err(FormatError::Metadata)?;
     let metadata_bytes = u32::try_from(metadata.len())
         .ok()
         .filter(|bytes| *bytes <= MAX_METADATA_BYTES)
         .ok_or(FormatError::MetadataLength(metadata.len() as u64))?;
-    let first = HEADER_BYTES + tiles.len() * ENTRY_BYTES + metadata.len();
+    let first = HEADER_BYTES + tiles * ENTRY_BYTES + metadata.len();
     let mut offset = first as u64;
-    let mut directory = Vec::with_capacity(tiles.len() * ENTRY_BYTES);
-    for (i, tile) in tiles.iter().enumerate() {
+    let mut directory = Vec::with_capacity(tiles * ENTRY_BYTES);
+    for i in 0..tiles {
+        let tile = tile(i).map_err(FormatError::Write)?;
+        let tile: &EncodedTile = tile.borrow();
         let bytes =
             u32::try_from(tile.bytes.len()).map_err(|_| FormatError::TooLarge { tile: i })?;
         let entry = TileEntry {
@@ -66,6 +104,6 @@ pub fn write(
     put(&header.encode())
         .and_then(|()| put(&directory))
         .and_then(|()| put(&metadata))
-        .and_then(|()| tiles.iter().try_for_each(|tile| put(&tile.bytes)))
+        .and_then(|()| (0..tiles).try_for_each(|i| put(&tile(i)?.borrow().bytes)))
         .map_err(FormatError::Write)
 }

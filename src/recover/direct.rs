@@ -139,7 +139,11 @@ impl Direct {
     /// patterns best.
     fn choose_common_mode(&self, measurements: &Measurements) -> Result<CommonMode, RecoverError> {
         let mut windows = BTreeMap::new();
-        for rect in self.geometry.tiles() {
+        let covered = self
+            .geometry
+            .tiles()
+            .filter(|&tile| measurements.covers(tile));
+        for rect in covered {
             let lit = self.windows(rect).into_iter();
             for (origin, mut pixels) in lit.filter(|&(origin, _)| !self.dark(origin)) {
                 pixels.truncate(1); // One pixel a window is enough to choose by.
