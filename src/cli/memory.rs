@@ -8,7 +8,7 @@ use crate::capture::{Manifest, Rows};
 use crate::transport::{CHANNELS, Geometry, Window};
 
 /// What the program needs whatever it works on: itself, buffers, what the allocator keeps.
-const PROGRAM: u64 = 24 << 20;
+const PROGRAM: u64 = 32 << 20;
 /// What reading one photograph takes beside its rows: pieces of the file, and the decoder's memory
 /// of what it last decompressed.
 const READER: u64 = 320 << 10;

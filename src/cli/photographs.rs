@@ -1,9 +1,9 @@
 //! Photographs read side by side.
 
 use anyhow::Result;
+use indicatif::ProgressBar;
 use rayon::prelude::*;
 
-use super::process;
 use crate::capture::{CaptureError, CaptureFolder, DarkFrame, Measurements, Photo, Picture, Rows};
 
 /// Photographs of some shots, and the flood's, as they are read from the top down on all cores.
@@ -27,11 +27,12 @@ impl<'a> Photographs<'a> {
     }
 
     /// Makes `measurements` hold `rows`: those it has are kept, the others are read. None of `rows`
-    /// that it lacks may lie above what has been read before.
+    /// that it lacks may lie above what has been read before. Tells `bar` of each photograph.
     pub fn advance(
         &mut self,
         measurements: &mut Measurements,
         rows: &Rows,
+        bar: &ProgressBar,
     ) -> Result<(), CaptureError> {
         let width = measurements.camera.width as usize;
         let first = rows.strips().first().map_or(0, |strip| strip.start);
@@ -45,14 +46,12 @@ impl<'a> Photographs<'a> {
         if let (Some(photo), Some(picture)) = (&mut self.flood, &mut measurements.flood) {
             advance(photo, picture)?;
         }
-        let bar = process::progress("reading", self.shots.len());
         let pictures = measurements.pictures.par_iter_mut();
         let shots = self.shots.par_iter_mut().zip(pictures);
         shots.try_for_each(|(photo, picture)| {
             bar.inc(1);
             advance(photo, picture)
         })?;
-        bar.finish_and_clear();
         measurements.rows = rows.clone();
         Ok(())
     }

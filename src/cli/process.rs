@@ -1,11 +1,12 @@
 //! What the process itself has used, how it shows that it is still at work, and how it is told to
 //! stop.
 
+use std::fmt::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use rayon::prelude::*;
 
 use crate::recover::Workers;
@@ -70,9 +71,14 @@ impl Interrupt {
 /// A progress bar on standard error with rate and time left, shown on a terminal only.
 pub fn progress(what: &'static str, steps: usize) -> ProgressBar {
     let bar = ProgressBar::new(steps as u64).with_message(what);
-    let template = "{msg:12} {wide_bar} {pos}/{len}, {per_sec}, {eta} left";
+    let template = "{msg:12} {wide_bar} {pos}/{len}, {rate}, {eta} left";
     if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
+        bar.set_style(
+            style.with_key("rate", |state: &ProgressState, out: &mut dyn Write| {
+                // A terminal that takes no more is no failure of ours.
+                let _ = write!(out, "{:.1}/s", state.per_sec());
+            }),
+        );
     }
     bar
 }

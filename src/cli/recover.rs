@@ -141,7 +141,9 @@ fn recover(
     // Before the long work: a checkpoint that does not fit is better known now.
     let recipe = recipe(args, folder, shots, plan)?;
     let checkpoint = Checkpoint::open(&args.output, &recipe, args.resume)?;
-    photographs.advance(&mut measurements, &plan.sample())?;
+    let bar = process::progress("reading", shots.len());
+    photographs.advance(&mut measurements, &plan.sample(), &bar)?;
+    bar.finish_and_clear();
     let saturated = photographs.finish()?;
     measurements.noise = Noise::with_gain_from(&measurements);
     warn_of_saturation(
@@ -173,7 +175,7 @@ fn recover(
     let strips = plan.strips(recovery.halo())?;
     for (tile_rows, rows) in &strips {
         if let Some(photographs) = &mut photographs {
-            photographs.advance(&mut measurements, rows)?;
+            photographs.advance(&mut measurements, rows, &ProgressBar::hidden())?;
         }
         overexposed += run.tiles(&measurements, tile_rows.clone(), saturated > 0)?;
     }
