@@ -306,7 +306,11 @@ fn recipe(
     let options = [
         ("--method", Method::from(args.method).name().to_owned()),
         ("--window", args.window.side().to_string()),
-        ("--patterns", shots.len().to_string()),
+        (
+            "--patterns",
+            args.patterns
+                .map_or_else(|| "not given".to_owned(), |k| k.to_string()),
+        ),
         ("--memory", memory),
     ];
     let contents = |(name, path): (&str, PathBuf)| -> Result<(String, Contents)> {
