@@ -302,6 +302,29 @@ fn a_picture_of_the_wrong_size_or_depth_is_refused() {
 }
 
 #[test]
+fn an_interlaced_photograph_is_refused() {
+    let crc32 = |bytes: &[u8]| {
+        !bytes.iter().fold(!0u32, |crc, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), |crc, _| match crc & 1 {
+                1 => crc >> 1 ^ 0xEDB8_8320,
+                _ => crc >> 1,
+            })
+        })
+    };
+    refuses(
+        |c| {
+            let path = c.join("photos/0002.png");
+            let mut photo = fs::read(&path).unwrap();
+            photo[28] = 1; // the header's last byte
+            let crc = crc32(&photo[12..29]);
+            photo[29..33].copy_from_slice(&crc.to_be_bytes());
+            fs::write(path, photo).unwrap();
+        },
+        &["photos/0002.png", "is interlaced", "without interlacing"],
+    );
+}
+
+#[test]
 fn a_jpeg_is_no_pattern_and_a_named_flood_must_be_there() {
     refuses(
         |c| {

@@ -8,7 +8,7 @@
 
 use serde::Serialize;
 
-use super::{Measurements, Picture};
+use super::Measurements;
 use crate::eigen::symmetric_eigen;
 use crate::transport::{CHANNELS, CameraPx};
 
@@ -44,6 +44,35 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// What a dark frame tells, in rows `width` pixels long: the floor. The gain is still zero.
+    ///
+    /// Neighbours differ by noise alone, but for what the sensor's fixed pattern adds. Rounding to
+    /// codes `quantum` apart is always there, even where a dark frame shows no noise at all.
+    pub fn from_dark(dark: &[[f32; CHANNELS]], width: u32, quantum: f64) -> Self {
+        let rounding = quantum * quantum / 12.0;
+        let floor = std::array::from_fn(|c| {
+            let rows = dark.chunks_exact(width as usize);
+            let differences = rows.flat_map(|row| {
+                let pairs = row.chunks_exact(2);
+                pairs.map(|pair| f64::from(pair[1][c]) - f64::from(pair[0][c]))
+            });
+            let mut sizes: Vec<f64> = differences.map(f64::abs).collect();
+            let Some(deviation) = quantile(&mut sizes, 1, 2) else {
+                return rounding;
+            };
+            // Codes are coarse against the noise of a good camera, and so is their median: it only
+            // says which differences are no noise. `quantum` keeps it from being zero.
+            let limit = OUTLIER * (MAD_TO_SIGMA * deviation).max(quantum);
+            let kept = sizes.iter().take_while(|size| **size <= limit);
+            let (count, sum) = kept.fold((0.0, 0.0), |(n, sum), d| (n + 1.0, sum + d * d));
+            (sum / (2.0 * f64::max(count, 1.0))).max(rounding)
+        });
+        Self {
+            gain: [0.0; CHANNELS],
+            floor,
+        }
+    }
+
     /// Variance of a sample of channel `c` that came out as `y` at relative exposure `exposure`.
     pub fn variance(&self, c: usize, y: f64, exposure: f64) -> f64 {
         (self.gain[c] * y.max(0.0) + self.floor[c] / exposure) / exposure
@@ -51,7 +80,7 @@ impl Noise {
 
     /// Estimates the gain from `measurements`, whose own `noise` has the floor. Where no pixel has
     /// enough samples that are not saturated, the gain is zero.
-    pub(super) fn with_gain_from(measurements: &Measurements) -> Self {
+    pub fn with_gain_from(measurements: &Measurements) -> Self {
         let mut noise = measurements.noise;
         let blocks = blocks(measurements);
         for round in 0..ROUNDS {
@@ -60,30 +89,6 @@ impl Noise {
         }
         noise
     }
-}
-
-/// Variance without light, from a dark frame of rows `width` pixels long. Neighbours differ by noise
-/// alone, but for what the sensor's fixed pattern adds. Rounding to codes `quantum` apart is always
-/// there, even where a dark frame shows no noise at all.
-pub(super) fn floor(dark: &Picture, width: u32, quantum: f64) -> [f64; CHANNELS] {
-    let rounding = quantum * quantum / 12.0;
-    std::array::from_fn(|c| {
-        let rows = dark.chunks_exact(width as usize);
-        let differences = rows.flat_map(|row| {
-            let pairs = row.chunks_exact(2);
-            pairs.map(|pair| f64::from(pair[1][c]) - f64::from(pair[0][c]))
-        });
-        let mut sizes: Vec<f64> = differences.map(f64::abs).collect();
-        let Some(deviation) = quantile(&mut sizes, 1, 2) else {
-            return rounding;
-        };
-        // Codes are coarse against the noise of a good camera, and so is their median: it only
-        // says which differences are no noise. `quantum` keeps it from being zero.
-        let limit = OUTLIER * (MAD_TO_SIGMA * deviation).max(quantum);
-        let kept = sizes.iter().take_while(|size| **size <= limit);
-        let (count, sum) = kept.fold((0.0, 0.0), |(n, sum), d| (n + 1.0, sum + d * d));
-        (sum / (2.0 * f64::max(count, 1.0))).max(rounding)
-    })
 }
 
 /// Samples of a block of pixels in the shots in which none of it is saturated.
@@ -98,23 +103,26 @@ struct Block {
     mean_full_scale: f64,
 }
 
-/// Blocks spread over the picture.
+/// Blocks spread over the rows at hand.
 fn blocks(measurements: &Measurements) -> Vec<Block> {
-    let (across, down) = (
-        measurements.camera.width / BLOCK_SIDE,
-        measurements.camera.height / BLOCK_SIDE,
-    );
-    let count = across as usize * down as usize;
+    let across = measurements.camera.width / BLOCK_SIDE;
+    let strips = measurements.rows.strips().iter();
+    let tops: Vec<u32> = strips
+        .flat_map(|strip| {
+            let whole = (strip.len() as u32) / BLOCK_SIDE;
+            (0..whole).map(|row| strip.start + row * BLOCK_SIDE)
+        })
+        .collect();
+    let count = across as usize * tops.len();
     let every = count.div_ceil(MOST_BLOCKS).max(1);
-    // A step that shares no factor with the rows' length, lest the blocks form columns.
     let places = (0..count).step_by(every).map(|i| {
         let row = i as u32 / across;
+        // Shifted from row to row, lest the blocks form columns.
         let column = (i as u32 % across + row * 7) % across;
-        (column * BLOCK_SIDE, row * BLOCK_SIDE)
+        (column * BLOCK_SIDE, tops[row as usize])
     });
-    places
-        .filter_map(|(x, y)| Block::at(measurements, x, y))
-        .collect()
+    let found = places.filter_map(|(x, y)| Block::at(measurements, x, y));
+    found.collect()
 }
 
 impl Block {
@@ -267,7 +275,7 @@ fn quantile(values: &mut [f64], part: usize, of: usize) -> Option<f64> {
 #[cfg(not(target_arch = "wasm32"))]
 mod tests {
     use super::*;
-    use crate::capture::Pattern;
+    use crate::capture::{Pattern, Picture, Rows};
     use crate::simulate::{Camera, Codes, Ensemble, Exposure, NoiseStream, SceneKind};
     use crate::transport::{Extent, TileRect};
 
@@ -316,7 +324,7 @@ mod tests {
             pairs.map(pixel).collect()
         });
         let dark = pictures.next().unwrap();
-        let floor = floor(&dark, camera.width, 1.0 / (60_000.0 - 512.0));
+        let noise = Noise::from_dark(&dark, camera.width, 1.0 / (60_000.0 - 512.0));
         let less_dark = |mut picture: Picture| {
             for (y, dark) in picture.iter_mut().flatten().zip(dark.iter().flatten()) {
                 *y -= dark;
@@ -331,12 +339,10 @@ mod tests {
             full_scale: (1..=patterns as usize)
                 .map(|i| exposure(i).recip() as f32)
                 .collect(),
+            rows: Rows::all(camera.height),
             pictures: pictures.map(less_dark).collect(),
             flood: None,
-            noise: Noise {
-                gain: [0.0; CHANNELS],
-                floor,
-            },
+            noise,
         }
     }
 
@@ -385,9 +391,12 @@ mod tests {
     #[test]
     fn a_dark_frame_without_noise_has_that_of_rounding_and_hot_pixels_are_none() {
         let mut dark: Picture = vec![[0.0; CHANNELS]; 64];
-        assert_eq!(floor(&dark, 8, 0.12), [0.12 * 0.12 / 12.0; CHANNELS]);
+        assert_eq!(
+            Noise::from_dark(&dark, 8, 0.12).floor,
+            [0.12 * 0.12 / 12.0; CHANNELS]
+        );
         dark[9][1] = 40.0;
-        let found = floor(&dark, 8, 0.001);
+        let found = Noise::from_dark(&dark, 8, 0.001).floor;
         assert!(found[1] < 1e-6, "{found:?}");
         let noise = Noise {
             gain: [2.0; CHANNELS],

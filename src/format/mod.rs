@@ -46,4 +46,4 @@ pub use header::{HEADER_BYTES, Header, TileEntry, TileKind};
 pub use limits::Limits;
 pub use metadata::Metadata;
 pub use reader::{Progress, Reader};
-pub use writer::{EncodedTile, write};
+pub use writer::{EncodedTile, write, write_from};

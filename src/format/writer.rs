@@ -1,5 +1,6 @@
 //! Writing a transport as an `.ltm` file.
 
+use std::borrow::Borrow;
 use std::io::{self, Write};
 
 use super::codec::{basis, direct, factored};
@@ -122,6 +123,22 @@ pub fn write(
     out: &mut impl Write,
 ) -> Result<(), FormatError> {
     assert_eq!(tiles.len(), geometry.tile_grid().area(), "one of each tile");
+    write_from(geometry, metadata, basis, |i| Ok(&tiles[i]), out)
+}
+
+/// Writes a whole file as [`write`] does, of tiles that `tile` fetches by number from wherever they
+/// are kept. Each is asked for twice: for the directory, and for its bytes.
+///
+/// # Panics
+/// If a kernel is not of the window's area.
+pub fn write_from<T: Borrow<EncodedTile>>(
+    geometry: &Geometry,
+    metadata: &Metadata,
+    basis: Option<&Basis>,
+    mut tile: impl FnMut(usize) -> io::Result<T>,
+    out: &mut impl Write,
+) -> Result<(), FormatError> {
+    let tiles = geometry.tile_grid().area();
     let metadata = serde_json::to_vec(metadata).map_err(FormatError::Metadata)?;
     let metadata_bytes = u32::try_from(metadata.len())
         .ok()
@@ -140,10 +157,12 @@ pub fn write(
             (rank, basis::encode(basis)?)
         }
     };
-    let first = HEADER_BYTES + tiles.len() * ENTRY_BYTES + metadata.len() + basis.len();
+    let first = HEADER_BYTES + tiles * ENTRY_BYTES + metadata.len() + basis.len();
     let mut offset = first as u64;
-    let mut directory = Vec::with_capacity(tiles.len() * ENTRY_BYTES);
-    for (i, tile) in tiles.iter().enumerate() {
+    let mut directory = Vec::with_capacity(tiles * ENTRY_BYTES);
+    for i in 0..tiles {
+        let tile = tile(i).map_err(FormatError::Write)?;
+        let tile: &EncodedTile = tile.borrow();
         if let TileKind::Factored { components } = tile.kind
             && components > rank
         {
@@ -174,6 +193,6 @@ pub fn write(
         .and_then(|()| put(&directory))
         .and_then(|()| put(&metadata))
         .and_then(|()| put(&basis))
-        .and_then(|()| tiles.iter().try_for_each(|tile| put(&tile.bytes)))
+        .and_then(|()| (0..tiles).try_for_each(|i| put(&tile(i)?.borrow().bytes)))
         .map_err(FormatError::Write)
 }

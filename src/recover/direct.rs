@@ -358,7 +358,8 @@ impl<'a> HeldOut<'a> {
         sample: Sample,
     ) -> Result<Self, RecoverError> {
         let mut lit: BTreeMap<_, Vec<_>> = BTreeMap::new();
-        for rect in geometry.tiles() {
+        let covered = geometry.tiles().filter(|&tile| measurements.covers(tile));
+        for rect in covered {
             for (origin, pixels) in windows(&geometry, rect) {
                 if !dark(&geometry, origin) {
                     let pixels = pixels.into_iter().take(sample.pixels);

@@ -85,7 +85,9 @@ enum Solver {
 }
 
 impl Recovery {
-    /// Learns and chooses from `measurements` whatever the method asks for.
+    /// Learns and chooses from `measurements` whatever the method asks for. They may hold strips of
+    /// the picture instead of all of it, and are then looked at where tiles are
+    /// [covered](Measurements::covers).
     pub fn prepare(
         measurements: &Measurements,
         settings: Settings,
@@ -143,7 +145,8 @@ impl Recovery {
         }
     }
 
-    /// Recovers one tile. `measurements` are those the recovery was prepared from.
+    /// Recovers one tile. `measurements` are those the recovery was prepared from, or other rows of
+    /// the same: they cover the tile and [`halo`](Self::halo) rows around it, as far as there are any.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
         match &self.solver {
             Solver::Learned(learned) => learned.tile(measurements, rect),

@@ -94,7 +94,7 @@ impl Learned {
     ) -> Result<Self, RecoverError> {
         let area = geometry.window.area();
         let split = Split::new(measurements.patterns.len());
-        let squares = start::spread(geometry.camera, SQUARES.1, SQUARES.0);
+        let squares = start::spread(measurements, SQUARES.1, SQUARES.0);
         let pooled = start::pooled_mean(measurements, &geometry, &split.learn, &squares, workers)
             .ok_or(RecoverError::NoLight)?;
         let mean = start::blur(&pooled, geometry.window.side() as usize);
@@ -134,7 +134,7 @@ impl Learned {
         let (_, mut learned) = chosen.ok_or(RecoverError::NoLight)?;
 
         // What neighbours tell, and whether it helps.
-        let inner = start::spread(geometry.camera, PATCHES.1, PATCHES.0);
+        let inner = start::spread(measurements, PATCHES.1, PATCHES.0);
         learned.learn_context(measurements, &split.learn, &inner, workers);
         if !split.held.is_empty() {
             let with = learned.held_out_error(measurements, &split, &inner, workers);
@@ -195,7 +195,7 @@ impl Learned {
         workers: &impl Workers,
     ) {
         let equations = workers.map(inner.len(), |i| {
-            let rect = grown(inner[i], REACH as u32, self.geometry.camera);
+            let rect = grown(measurements, inner[i], REACH as u32);
             Equations::new(measurements, &self.geometry, &self.kernels, rows, rect)
         });
         for _ in 0..LATE_ROUNDS {
@@ -223,7 +223,7 @@ impl Learned {
         rows: &[usize],
         rect: TileRect,
     ) -> (Vec<bool>, Vec<[f32; CHANNELS]>) {
-        let region = grown(rect, self.halo(), self.geometry.camera);
+        let region = grown(measurements, rect, self.halo());
         let equations = Equations::new(measurements, &self.geometry, &self.kernels, rows, region);
         let field = Field::new(&equations, &self.prior, &self.threshold);
         let patch = Patch {
@@ -356,15 +356,23 @@ fn corner(rect: TileRect) -> TileRect {
     }
 }
 
-/// `rect` with `by` more pixels all around, as far as the picture goes.
-fn grown(rect: TileRect, by: u32, camera: Extent) -> TileRect {
-    let (x, y) = (rect.x.saturating_sub(by), rect.y.saturating_sub(by));
+/// `rect` with `by` more pixels all around, as far as the picture goes and is at hand.
+fn grown(measurements: &Measurements, rect: TileRect, by: u32) -> TileRect {
+    let camera = measurements.camera;
+    let (right, bottom) = (rect.x + rect.extent.width, rect.y + rect.extent.height);
+    let at_hand = |y: &u32| measurements.rows.place(*y).is_some();
+    let x = rect.x.saturating_sub(by);
+    let y = rect.y
+        - (1..=by.min(rect.y))
+            .take_while(|d| at_hand(&(rect.y - d)))
+            .count() as u32;
+    let below = (bottom..camera.height.min(bottom + by)).take_while(at_hand);
     TileRect {
         x,
         y,
         extent: Extent {
-            width: (rect.x + rect.extent.width + by).min(camera.width) - x,
-            height: (rect.y + rect.extent.height + by).min(camera.height) - y,
+            width: (right + by).min(camera.width) - x,
+            height: bottom + below.count() as u32 - y,
         },
     }
 }

@@ -30,8 +30,18 @@ const DEVIATION: f64 = 0.1;
 const MEAN_WEIGHT: f64 = 0.3;
 
 /// Squares of `side` pixels spread evenly over the picture, none over another, at most `most`: all
-/// there are room for where the picture is small.
-pub(super) fn spread(camera: Extent, side: u32, most: usize) -> Vec<TileRect> {
+/// there are room for where the picture is small. Only such whose measurements are at hand.
+pub(super) fn spread(measurements: &Measurements, side: u32, most: usize) -> Vec<TileRect> {
+    let camera = measurements.camera;
+    squares(camera, side, most, |square| measurements.covers(square))
+}
+
+fn squares(
+    camera: Extent,
+    side: u32,
+    most: usize,
+    at_hand: impl Fn(TileRect) -> bool,
+) -> Vec<TileRect> {
     let extent = Extent {
         width: side.min(camera.width),
         height: side.min(camera.height),
@@ -48,18 +58,19 @@ pub(super) fn spread(camera: Extent, side: u32, most: usize) -> Vec<TileRect> {
     if cells.area() <= most {
         return (0..cells.height)
             .flat_map(|y| (0..cells.width).map(move |x| square(x, y)))
+            .filter(|&square| at_hand(square))
             .collect();
     }
     let mut squares: Vec<TileRect> = Vec::with_capacity(most);
     // Roberts's R2 sequence: even, and in step with no pattern of the picture.
-    for i in 1..=8 * most {
+    for i in 1..=64 * most {
         let at =
             |step: f64, cells: u32| ((0.5 + step * i as f64).fract() * f64::from(cells)) as u32;
         let (x, y) = (
             at(0.754_877_666_246_69, cells.width),
             at(0.569_840_290_998_05, cells.height),
         );
-        if !squares.contains(&square(x, y)) {
+        if !squares.contains(&square(x, y)) && at_hand(square(x, y)) {
             squares.push(square(x, y));
             if squares.len() == most {
                 break;
@@ -403,22 +414,23 @@ mod tests {
             width: 128,
             height: 96,
         };
-        let squares = spread(camera, 16, 24);
-        assert_eq!(squares.len(), 24);
-        for (i, a) in squares.iter().enumerate() {
+        let chosen = squares(camera, 16, 24, |_| true);
+        assert_eq!(chosen.len(), 24);
+        for (i, a) in chosen.iter().enumerate() {
             assert!(a.x + 16 <= 128 && a.y + 16 <= 96);
-            for b in &squares[..i] {
+            for b in &chosen[..i] {
                 assert!(a.x.abs_diff(b.x) >= 16 || a.y.abs_diff(b.y) >= 16);
             }
         }
         assert_eq!(
-            spread(
+            squares(
                 Extent {
                     width: 3,
                     height: 5
                 },
                 16,
-                24
+                24,
+                |_| true
             )
             .len(),
             1
