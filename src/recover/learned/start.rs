@@ -135,8 +135,7 @@ fn pooled_round(
                             rows,
                             mean,
                             only_whole,
-                            origin,
-                            &pixels,
+                            (origin, &pixels),
                         )
                     },
                 );
@@ -178,8 +177,7 @@ impl Pooled {
         rows: &[usize],
         mean: &[f64],
         only_whole: bool,
-        origin: Element,
-        pixels: &[(usize, CameraPx)],
+        (origin, pixels): (Element, &[(usize, CameraPx)]),
     ) {
         let area = geometry.window.area();
         let elements: Vec<(usize, usize)> = (0..area)
