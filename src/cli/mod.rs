@@ -11,6 +11,7 @@ mod recover;
 mod relight;
 mod report;
 mod simulate;
+mod study;
 mod verify;
 
 use std::process::ExitCode;
@@ -33,6 +34,7 @@ enum Command {
     Relight(relight::RelightArgs),
     Inspect(inspect::InspectArgs),
     Verify(verify::VerifyArgs),
+    Study(study::StudyArgs),
 }
 
 /// Parses the command line and runs it. Status: 0 done, 1 failed, 2 wrong usage.
@@ -44,6 +46,7 @@ pub fn main() -> ExitCode {
         Command::Relight(args) => relight::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Study(args) => study::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

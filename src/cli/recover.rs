@@ -168,7 +168,8 @@ fn choose_shots(available: usize, first: Option<u32>) -> Result<Vec<usize>> {
     }
 }
 
-fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
+/// Reads shots with the correspondence that goes with them.
+pub(super) fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
     let dark = folder.read_dark()?;
     // Least squares has no use for it, but a capture that names a flood is not whole without it.
     folder.read_flood(&dark)?;
