@@ -198,6 +198,8 @@ fn study_capture(
             name: light,
         });
     }
+    // The light that shows most comes first.
+    lights.sort_by_key(|light| light.name != "flood");
     let shots: Vec<usize> = (0..folder.manifest().shots.len()).collect();
     let measurements = recover::read(&folder, &shots)?;
     let known = CaptureTruth::new(truth, measurements.correspondence)?;

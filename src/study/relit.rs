@@ -113,7 +113,10 @@ pub fn relit_pictures(
             Panel::photograph(extent, picture.into_iter().map(|y| y.map(|y| y * exposure)))
         };
         let panels = [
-            Panel::photograph(light.light.extent(), emitted),
+            Panel {
+                data: true,
+                ..Panel::photograph(light.light.extent(), emitted)
+            },
             small(&truth[i]),
             small(&ours[i]),
             small(&error),

@@ -23,7 +23,7 @@ impl Section {
 
     /// Adds a paragraph.
     pub(super) fn paragraph(&mut self, text: &str) {
-        self.markdown += &format!("\n{text}\n");
+        self.markdown += &format!("\n{}\n", text.trim_end());
     }
 
     /// Adds a picture and shows it.
@@ -80,12 +80,22 @@ impl Table {
             format!("| {} |\n", cells.join(" | "))
         };
         let mut text = line(&mut self.header.iter().copied());
-        text += &line(&mut self.header.iter().map(|_| "---"));
+        let numeric = |i: usize| {
+            self.rows
+                .iter()
+                .all(|row| row.get(i).is_some_and(|cell| is_number(cell)))
+        };
+        text += &line(&mut (0..self.header.len()).map(|i| if numeric(i) { "--:" } else { "---" }));
         for row in &self.rows {
             text += &line(&mut row.iter().map(String::as_str));
         }
         text
     }
+}
+
+/// Whether a cell is a number, or empty where one might be, and so goes to the right.
+fn is_number(cell: &str) -> bool {
+    cell.is_empty() || cell.trim_end_matches(" %").parse::<f64>().is_ok()
 }
 
 /// A level as a cell: two decimals, or nothing where there is none.
@@ -113,7 +123,7 @@ mod tests {
         );
         assert_eq!(
             table.markdown(),
-            "| scene | snr_db |\n| --- | --- |\n| a, b | 25.00 |\n"
+            "| scene | snr_db |\n| --- | --: |\n| a, b | 25.00 |\n"
         );
         table.row(["one".to_owned()]);
         assert!(table.csv().is_err());

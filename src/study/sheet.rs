@@ -132,6 +132,12 @@ impl Sheet {
                     self.side,
                     panel.data_url()?
                 );
+                let _ = writeln!(
+                    svg,
+                    "<rect x=\"{x}\" y=\"{y}\" width=\"{0}\" height=\"{0}\" fill=\"none\" \
+                     stroke=\"#c8c8c8\"/>",
+                    self.side
+                );
                 for (i, line) in caption.iter().enumerate() {
                     let below = y + self.side + LINE * (i as u32 + 1) - 5;
                     text(&mut svg, x + self.side / 2, below, line);

@@ -335,15 +335,16 @@ fn zoom(known: &impl Known) -> Captioned {
     }
 }
 
-/// The pixel whose function has the median energy.
+/// The pixel whose function has the median energy, of those in the middle of the picture, whose
+/// windows no border cuts.
 fn median_pixel(camera: Extent, energies: &[f32]) -> CameraPx {
-    let mut order: Vec<usize> = (0..energies.len()).collect();
-    order.sort_by(|&a, &b| energies[a].total_cmp(&energies[b]));
-    let n = order.get(order.len() / 2).copied().unwrap_or(0) as u32;
-    CameraPx {
-        x: n % camera.width,
-        y: n / camera.width,
-    }
+    let middle = |side: u32| side / 4..(3 * side).div_ceil(4);
+    let mut pixels: Vec<CameraPx> = middle(camera.height)
+        .flat_map(|y| middle(camera.width).map(move |x| CameraPx { x, y }))
+        .collect();
+    let energy = |pixel: &CameraPx| energies[camera.index(*pixel)];
+    pixels.sort_by(|a, b| energy(a).total_cmp(&energy(b)));
+    pixels[pixels.len() / 2]
 }
 
 /// One function in colour, its brightest value white.
