@@ -29,6 +29,12 @@ const RELIT_PATTERNS: usize = 80;
 const ELECTRONS: f64 = 40_000.0;
 const SEED: u64 = 2014;
 
+const INTRODUCTION: &str = "# Results\n\n\
+    SNR is 20 log10(‖T‖ / ‖T − T̂‖) over the whole matrix, Frobenius norms; what lies outside the \
+    window counts as error. L is the number of patterns, M that of light elements, N that of camera \
+    pixels. Figures are numbered as in the paper (Thanikachalam et al. 2014). \
+    `ltm-export study` writes this page.\n";
+
 /// Measure recovery where the transport is known: the paper's figures, its comparison, many scenes
 #[derive(Debug, Args)]
 pub struct StudyArgs {
@@ -69,13 +75,11 @@ pub fn run(args: &StudyArgs) -> Result<()> {
     let progress = |text: &str| eprintln!("[{:7.1} s] {text}", start.elapsed().as_secs_f64());
     new_folder::fill_new_folder(&args.output, |root| {
         let results = root.join("results.md");
-        let mut text = "# Results\n\n\
-            SNR is 20 log10(‖T‖ / ‖T − T̂‖) over the whole matrix, Frobenius norms; what lies \
-            outside the window counts as error. L is the number of patterns, M that of light \
-            elements, N that of camera pixels.\n"
-            .to_owned();
+        let mut text = INTRODUCTION.to_owned();
         for (subject, name) in subjects.iter().zip(&names) {
             let pixels = args.pixels as usize;
+            let begun = Instant::now();
+            text += &format!("\nFrom `ltm-export study {name} -o DIR`:\n");
             for section in study_one(subject, name, pixels, &progress)? {
                 for (path, bytes) in &section.files {
                     write(&root.join(path), bytes)?;
@@ -83,6 +87,11 @@ pub fn run(args: &StudyArgs) -> Result<()> {
                 text += "\n";
                 text += &section.markdown;
             }
+            text += &format!(
+                "\nThis took {:.0} s on {} threads.\n",
+                begun.elapsed().as_secs_f64(),
+                rayon::current_num_threads()
+            );
             // Rewritten after each: an hour's work should not hang on its last minute.
             write(&results, text.as_bytes())?;
         }

@@ -222,7 +222,7 @@ fn flame(x: f64, height: f64, seconds: f64) -> [f32; 3] {
     let aside = (2.0 * x - 1.0).powi(4);
     let heat = (1.3 - 1.75 * height - 0.5 * aside + 2.2 * (noise - 0.5)).clamp(0.0, 1.0);
     // Black body colours: red first, then yellow, white at the hottest only.
-    [heat * heat, 0.62 * heat.powi(3), 0.25 * heat.powi(7)].map(|c| c as f32)
+    [heat * heat, 0.55 * heat.powi(4), 0.16 * heat.powi(8)].map(|c| c as f32)
 }
 
 /// Smooth noise of unit grain, 0 to 1.

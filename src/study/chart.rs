@@ -5,11 +5,14 @@ use std::ops::Range;
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::StudyError;
 
 /// Size in pixels.
-const SIZE: (u32, u32) = (800, 500);
+const SIZE: (u32, u32) = (960, 500);
+/// Room at the right for the names of lines, which there hide nothing.
+const LEGEND: u32 = 210;
 /// Colours that people with any colour vision tell apart (Okabe & Ito 2008).
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
@@ -49,7 +52,6 @@ pub(super) struct Chart<'a> {
     pub y: Range<f64>,
     /// A level to compare with, and its name.
     pub level: Option<(f64, &'a str)>,
-    pub legend: SeriesLabelPosition,
     pub series: Vec<Series>,
 }
 
@@ -75,7 +77,7 @@ impl Chart<'_> {
         let mut builder = ChartBuilder::on(&area);
         builder
             .margin(12)
-            .margin_right(28)
+            .margin_right(LEGEND)
             .x_label_area_size(52)
             .y_label_area_size(64);
         if self.top.is_some() {
@@ -135,41 +137,30 @@ impl Chart<'_> {
                 .draw_series(DashedLineSeries::new(ends, 6, 5, grey.stroke_width(1)))
                 .map_err(boxed)?;
             let style = TextStyle::from((FONT, 13).into_font()).color(&grey);
+            let above_its_end = style.pos(Pos::new(HPos::Right, VPos::Bottom));
+            let end = (x.end, level + 0.01 * (self.y.end - self.y.start));
             chart
-                .draw_series([Text::new(
-                    name.to_owned(),
-                    (x.start * 1.02, level + 0.045 * (self.y.end - self.y.start)),
-                    style,
-                )])
+                .draw_series([Text::new(name.to_owned(), end, above_its_end)])
                 .map_err(boxed)?;
         }
+        let (width, _) = area.dim_in_pixel();
+        let left = (width - LEGEND + 16) as i32;
         for (i, series) in self.series.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
             let line = LineSeries::new(series.points.iter().copied(), colour.stroke_width(2));
-            chart
-                .draw_series(line)
-                .map_err(boxed)?
-                .label(series.name.as_str())
-                .legend(move |(x, y)| {
-                    PathElement::new([(x, y), (x + 22, y)], colour.stroke_width(3))
-                });
+            chart.draw_series(line).map_err(boxed)?;
             if series.marked {
                 let points = series.points.iter();
                 chart
                     .draw_series(points.map(|&p| Circle::new(p, 4, colour.filled())))
                     .map_err(boxed)?;
             }
-        }
-        if !self.series.is_empty() {
-            chart
-                .configure_series_labels()
-                .position(self.legend.clone())
-                .margin(14)
-                .legend_area_size(30)
-                .background_style(WHITE.mix(0.85))
-                .border_style(RGBColor(200, 200, 200))
-                .label_font((FONT, 14))
-                .draw()
+            let y = 72 + 24 * i as i32;
+            let line = PathElement::new([(left, y), (left + 22, y)], colour.stroke_width(3));
+            area.draw(&line).map_err(boxed)?;
+            let style = TextStyle::from((FONT, 14).into_font());
+            let beside = style.pos(Pos::new(HPos::Left, VPos::Center));
+            area.draw(&Text::new(series.name.clone(), (left + 30, y), beside))
                 .map_err(boxed)?;
         }
         Ok(())
@@ -249,7 +240,6 @@ mod tests {
             }),
             y: level_range([-3.0, 31.0].into_iter(), 25.0),
             level: Some((25.0, "25 dB")),
-            legend: SeriesLabelPosition::LowerRight,
             series: vec![Series {
                 name: "nnls".to_owned(),
                 points: vec![(1.0, -3.0), (10.0, 31.0)],

@@ -11,7 +11,7 @@ use crate::recover::Workers;
 /// Exponents γ to choose from.
 const EXPONENTS: [f64; 5] = [1.0, 0.7, 0.5, 0.35, 0.25];
 /// Ridges to choose from, as shares of the mean of the Gram matrix's diagonal.
-const RIDGES: [f64; 4] = [1e-10, 1e-6, 1e-3, 1e-1];
+const RIDGES: [f64; 5] = [1e-10, 1e-6, 1e-3, 1e-1, 1e1];
 /// One row in so many is held out while exponent and ridge are chosen.
 const HOLD_OUT_EVERY: usize = 5;
 

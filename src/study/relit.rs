@@ -1,5 +1,7 @@
 //! Relit pictures next to true ones (paper, figures 4 and 5).
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use super::known::{Known, expose, pixel_under};
 use super::methods::DEFAULT;
 use super::report::{Section, Table, cell};
@@ -59,7 +61,8 @@ pub fn relit_pictures(
         "{name}: relighting, recovered by {} from {patterns} patterns",
         DEFAULT.name()
     ));
-    let (truth, ours) = pictures(known, measurements, &lights, workers)?;
+    let tenth = |tenths: usize| progress(&format!("{name}: relighting, {tenths}0 %"));
+    let (truth, ours) = pictures(known, measurements, &lights, workers, &tenth)?;
     let camera = measurements.camera;
     let flood: Vec<f64> = truth
         .iter()
@@ -154,6 +157,7 @@ fn pictures(
     measurements: &Measurements,
     lights: &[RelitLight],
     workers: &impl Workers,
+    tenth: &(impl Fn(usize) + Sync),
 ) -> Result<(Pictures, Pictures), StudyError> {
     let settings = Settings {
         method: DEFAULT,
@@ -163,6 +167,7 @@ fn pictures(
     let geometry = *recovery.geometry();
     let area = geometry.window.area();
     let rects: Vec<_> = geometry.tiles().collect();
+    let done = AtomicUsize::new(0);
     let tiles = workers.map(rects.len(), |i| {
         let tile = recovery.tile(measurements, rects[i]);
         let functions = tile.functions(&geometry, recovery.basis());
@@ -182,7 +187,13 @@ fn pictures(
                 .collect();
             (truth, ours)
         });
-        seen.collect::<Vec<(Vec<_>, Vec<_>)>>()
+        let seen: Vec<(Vec<_>, Vec<_>)> = seen.collect();
+        let before = done.fetch_add(1, Ordering::Relaxed);
+        let tenths = |tiles: usize| 10 * tiles / rects.len();
+        if tenths(before + 1) > tenths(before) {
+            tenth(tenths(before + 1));
+        }
+        seen
     });
     let black = vec![vec![[0.0; CHANNELS]; geometry.camera.area()]; lights.len()];
     let (mut truth, mut ours) = (black.clone(), black);

@@ -1,7 +1,5 @@
 //! SNR against undersampling, for each method (paper, figures 3a and 3b).
 
-use plotters::prelude::SeriesLabelPosition;
-
 use super::accuracy::judge;
 use super::chart::{Chart, Series, TopAxis, level_range};
 use super::known::Known;
@@ -133,7 +131,6 @@ pub fn snr_curves(
         }),
         y: level_range(levels, 30.0),
         level: Some(PAPER_LEVEL),
-        legend: SeriesLabelPosition::LowerRight,
         series,
     };
     let mut section = Section::new(&format!("Figure 3: SNR against undersampling, {name}"));

@@ -242,7 +242,7 @@ fn profile_chart(
     };
     let series = [
         ("all of T", whole, functions),
-        ("the light transport function below", one, CHANNELS as f64),
+        ("the one function below", one, CHANNELS as f64),
     ]
     .map(|(name, profile, functions)| Series {
         name: name.to_owned(),
@@ -284,7 +284,6 @@ fn profile_chart(
         top: None,
         y: 0.0..100.0,
         level: None,
-        legend: plotters::prelude::SeriesLabelPosition::LowerRight,
         series: series.into(),
     };
     section.picture(
