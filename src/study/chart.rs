@@ -130,21 +130,20 @@ impl Chart<'_> {
                 .draw()
                 .map_err(boxed)?;
         }
+        let left = (area.dim_in_pixel().0 - LEGEND + 16) as i32;
         if let Some((level, name)) = self.level {
             let grey = RGBColor(120, 120, 120);
             let ends = [(x.start, level), (x.end, level)];
             chart
                 .draw_series(DashedLineSeries::new(ends, 6, 5, grey.stroke_width(1)))
                 .map_err(boxed)?;
-            let style = TextStyle::from((FONT, 13).into_font()).color(&grey);
-            let above_its_end = style.pos(Pos::new(HPos::Right, VPos::Bottom));
-            let end = (x.end, level + 0.01 * (self.y.end - self.y.start));
-            chart
-                .draw_series([Text::new(name.to_owned(), end, above_its_end)])
-                .map_err(boxed)?;
+            let y = 72 + 24 * self.series.len() as i32;
+            for x in [left, left + 13] {
+                let dash = PathElement::new([(x, y), (x + 8, y)], grey.stroke_width(1));
+                area.draw(&dash).map_err(boxed)?;
+            }
+            area.draw(&beside(name, left, y)).map_err(boxed)?;
         }
-        let (width, _) = area.dim_in_pixel();
-        let left = (width - LEGEND + 16) as i32;
         for (i, series) in self.series.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
             let line = LineSeries::new(series.points.iter().copied(), colour.stroke_width(2));
@@ -158,10 +157,7 @@ impl Chart<'_> {
             let y = 72 + 24 * i as i32;
             let line = PathElement::new([(left, y), (left + 22, y)], colour.stroke_width(3));
             area.draw(&line).map_err(boxed)?;
-            let style = TextStyle::from((FONT, 14).into_font());
-            let beside = style.pos(Pos::new(HPos::Left, VPos::Center));
-            area.draw(&Text::new(series.name.clone(), (left + 30, y), beside))
-                .map_err(boxed)?;
+            area.draw(&beside(&series.name, left, y)).map_err(boxed)?;
         }
         Ok(())
     }
@@ -175,6 +171,13 @@ impl Chart<'_> {
             false => 0.5 * most.max(1.0)..2.0 * most.max(1.0),
         }
     }
+}
+
+/// A name in the legend, beside the piece of its line that begins at `left`.
+fn beside(name: &str, left: i32, y: i32) -> Text<'static, (i32, i32), String> {
+    let style = TextStyle::from((FONT, 14).into_font());
+    let style = style.pos(Pos::new(HPos::Left, VPos::Center));
+    Text::new(name.to_owned(), (left + 30, y), style)
 }
 
 /// A range of levels that holds `values` and ends on round numbers.

@@ -13,7 +13,7 @@ use crate::relight::{BuiltinLight, Light, area_resample};
 use crate::transport::{CHANNELS, Decibels, Extent};
 
 /// Widest picture on a sheet, in pixels.
-const SHOWN: u32 = 256;
+const SHOWN: u32 = 200;
 /// What errors are multiplied by to be seen.
 const ERROR_GAIN: f64 = 10.0;
 /// Share of the flood-lit samples that are white at most.
@@ -117,7 +117,8 @@ pub fn relit_pictures(
         };
         let panels = [
             Panel {
-                data: true,
+                // Few elements are squares to be seen as such.
+                data: light.light.extent().width <= SHOWN / 2,
                 ..Panel::photograph(light.light.extent(), emitted)
             },
             small(&truth[i]),

@@ -12,7 +12,7 @@ use super::StudyError;
 use crate::relight::tone;
 use crate::transport::{CHANNELS, Extent};
 
-const JPEG_QUALITY: u8 = 90;
+const JPEG_QUALITY: u8 = 85;
 /// Room for a line of text, in pixels.
 const LINE: u32 = 22;
 const GAP: u32 = 8;

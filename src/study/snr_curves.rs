@@ -5,7 +5,7 @@ use super::chart::{Chart, Series, TopAxis, level_range};
 use super::known::Known;
 use super::methods::METHODS;
 use super::report::{Section, Table, cell, seconds};
-use super::{Progress, StudyError};
+use super::{Progress, StudyError, blocks};
 use crate::capture::Measurements;
 use crate::recover::Workers;
 
@@ -14,7 +14,7 @@ pub const SNR_PATTERNS: [usize; 11] = [10, 14, 20, 28, 40, 56, 80, 112, 160, 224
 /// Numbers that stand at the chart's axes.
 const TICKS: [usize; 6] = [10, 20, 40, 80, 160, 320];
 /// What the paper reaches with 80 patterns.
-pub(super) const PAPER_LEVEL: (f64, &str) = (25.0, "25 dB: the paper at L = 80");
+const PAPER_LEVEL: (f64, &str) = (25.0, "the paper at L = 80");
 
 /// Figures 3a and 3b: recovers from the first patterns, ever fewer of them. Uses the measurements
 /// up, because at the paper's scale a second copy would not fit beside them.
@@ -138,8 +138,9 @@ pub fn snr_curves(
         None => "Every camera pixel is judged.".to_owned(),
         Some(n) => format!(
             "Methods that recover each pixel on its own are judged on {n} camera pixels in blocks \
-             of 8x8 drawn at random, always the same; their SNR has a standard error of at most \
-             {doubt:.2} dB."
+             of {0}x{0} drawn at random, always the same; their SNR has a standard error of at most \
+             {doubt:.2} dB.",
+            blocks::SIDE
         ),
     });
     section.picture(

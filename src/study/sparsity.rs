@@ -16,8 +16,10 @@ const CLASSES: usize = 1 << (31 - DROPPED_BITS);
 const POINTS: usize = 120;
 /// Shares of the energy that the table tells of.
 const SHARES: [f64; 4] = [0.5, 0.9, 0.99, 0.999];
-/// Side of the picture of the whole matrix, and width of the zoom, in cells.
+/// Side of the picture of the whole matrix, in cells.
 const PICTURE: u32 = 512;
+/// Side of the zoom, in pixels and elements.
+const ZOOM: u32 = 96;
 
 /// How the energy (the sum of squares) of many elements is spread over them: a histogram of their
 /// magnitudes, fine enough that shares are exact to about a percent of an element's energy.
@@ -296,20 +298,24 @@ fn profile_chart(
     Ok(())
 }
 
-/// T between the middle row of camera pixels and the display rows its windows span: consecutive
-/// rows and columns of the matrix.
+/// A small square of T: consecutive pixels of the middle row, and consecutive elements of the
+/// display row behind them.
 fn zoom(known: &impl Known) -> Captioned {
     let geometry = known.geometry();
-    let (width, y) = (
-        geometry.camera.width.min(PICTURE),
+    let half = (geometry.window.side() / 2) as i32;
+    let width = geometry.camera.width.min(ZOOM);
+    let height = geometry.light.width.min(ZOOM);
+    let (left, y) = (
+        (geometry.camera.width - width) / 2,
         geometry.camera.height / 2,
     );
-    let left = (geometry.camera.width - width) / 2;
-    // As many display rows as make the picture about square.
-    let shown = (width / geometry.light.width).clamp(1, geometry.window.side());
-    let middle = known.origin(CameraPx { x: left, y }).v + (geometry.window.side() / 2) as i32;
-    let first = middle - (shown / 2) as i32;
-    let height = shown * geometry.light.width;
+    let middle = known.origin(CameraPx {
+        x: left + width / 2,
+        y,
+    });
+    let row = middle.v + half;
+    let last_first = (geometry.light.width - height) as i32;
+    let first = (middle.u + half - height as i32 / 2).clamp(0, last_first);
     let mut values = vec![0.0f32; (width * height) as usize];
     let mut tau = vec![[0.0; CHANNELS]; geometry.window.area()];
     for i in 0..width {
@@ -318,10 +324,9 @@ fn zoom(known: &impl Known) -> Captioned {
         known.function(pixel, &mut tau);
         for (s, tau) in tau.iter().enumerate() {
             let element = geometry.window.element(origin, s);
-            let row = element.v - first;
-            if (0..shown as i32).contains(&row) && element.index_in(geometry.light).is_some() {
-                let m = row as u32 * geometry.light.width + element.u as u32;
-                values[(m * width + i) as usize] = mean(*tau);
+            let down = element.u - first;
+            if element.v == row && (0..height as i32).contains(&down) {
+                values[(down as u32 * width + i) as usize] = mean(*tau);
             }
         }
     }
@@ -329,7 +334,7 @@ fn zoom(known: &impl Known) -> Captioned {
         panel: grey(extent(width, height), &values),
         caption: vec![
             format!("Zoom: {width} pixels of row {y} across,"),
-            format!("the {height} elements of {shown} display rows down"),
+            format!("{height} elements of row {row} down"),
         ],
     }
 }
