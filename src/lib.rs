@@ -23,6 +23,7 @@ pub mod calibrate;
 pub mod capture;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod cli;
+mod eigen;
 pub mod format;
 pub mod recover;
 pub mod relight;

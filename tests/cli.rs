@@ -140,6 +140,8 @@ fn photographs_become_a_file_that_relights_them() {
     let inspected = json(&["inspect", text(&file), "--json"]);
     assert_eq!(inspected["camera"], serde_json::json!([64, 64]));
     assert_eq!(inspected["window"], 13);
+    assert_eq!(inspected["factored_tiles"], 0);
+    assert_eq!(inspected["rank"], serde_json::Value::Null);
     assert_eq!(
         inspected["metadata"]["shots_used"]
             .as_array()
@@ -296,6 +298,29 @@ fn a_picture_of_the_wrong_size_or_depth_is_refused() {
             picture.save(c.join("patterns/0001.png")).unwrap();
         },
         &["patterns/0001.png", "16-bit grey", "8-bit grey or RGB"],
+    );
+}
+
+#[test]
+fn an_interlaced_photograph_is_refused() {
+    let crc32 = |bytes: &[u8]| {
+        !bytes.iter().fold(!0u32, |crc, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), |crc, _| match crc & 1 {
+                1 => crc >> 1 ^ 0xEDB8_8320,
+                _ => crc >> 1,
+            })
+        })
+    };
+    refuses(
+        |c| {
+            let path = c.join("photos/0002.png");
+            let mut photo = fs::read(&path).unwrap();
+            photo[28] = 1; // the header's last byte
+            let crc = crc32(&photo[12..29]);
+            photo[29..33].copy_from_slice(&crc.to_be_bytes());
+            fs::write(path, photo).unwrap();
+        },
+        &["photos/0002.png", "is interlaced", "without interlacing"],
     );
 }
 
@@ -473,7 +498,7 @@ fn damaged_files_are_refused_by_every_command() {
             },
             "damaged",
         ),
-        (|f| f[12] = 9, "version 9.0"),
+        (|f| f[12] = 9, "version 9.1"),
         (|f| f[..4].copy_from_slice(b"<!DO"), "not an .ltm file"),
         (|f| f.push(0), "goes on after its end"),
     ];

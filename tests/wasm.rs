@@ -9,7 +9,7 @@
 
 mod common;
 
-use common::{relit, tiled};
+use common::{recovered, relit, tiled};
 use js_sys::{Object, Reflect};
 use relightable_photo::format::{self, EncodedTile, Metadata};
 use relightable_photo::relight::{Rgba8Picture, reference};
@@ -101,10 +101,13 @@ async fn pause() {
 
 fn file(transport: &Transport, metadata: &Metadata) -> Vec<u8> {
     let geometry = &transport.geometry;
-    let encode = |tile| EncodedTile::new(geometry, tile).unwrap();
+    let encode = |tile| {
+        let tile = recovered(tile, geometry.window.area());
+        EncodedTile::new(geometry, &tile).unwrap()
+    };
     let tiles: Vec<_> = transport.tiles.iter().map(encode).collect();
     let mut bytes = Vec::new();
-    format::write(geometry, metadata, &tiles, &mut bytes).unwrap();
+    format::write(geometry, metadata, None, &tiles, &mut bytes).unwrap();
     bytes
 }
 

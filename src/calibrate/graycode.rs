@@ -27,7 +27,7 @@ pub enum Axis {
     Y,
 }
 
-/// Photographs of one bit, `[N]` in units of the measurement; NaN where saturated.
+/// Photographs of one bit, `[rows, width]` in units of the measurement; NaN where saturated.
 #[derive(Clone, Debug)]
 pub struct BitPair {
     /// With the bit shown as it is.
@@ -49,23 +49,25 @@ pub enum CalibrationError {
     FewPixels(usize, Axis),
 }
 
-/// Photographed Gray code: the bits of each axis, most significant first.
+/// Photographed Gray code: the bits of each axis, most significant first, in the camera rows given.
 #[derive(Clone, Debug, Default)]
 pub struct GrayCode {
     /// Bits of the column number.
     pub x: Vec<BitPair>,
     /// Bits of the row number.
     pub y: Vec<BitPair>,
+    /// The camera rows that the bits have, from the top down.
+    pub rows: Vec<u32>,
 }
 
 impl GrayCode {
-    /// Decodes every pixel and fits an affine map to where they look.
+    /// Decodes every pixel of the rows at hand and fits an affine map to where they look.
     pub fn correspondence(&self, camera: Extent) -> Result<Correspondence, CalibrationError> {
         let axis = |bits: &[BitPair], axis| {
             if bits.is_empty() {
                 return Err(CalibrationError::NoBits(axis));
             }
-            let samples = decode(bits, camera);
+            let samples = decode(bits, &self.rows, camera.width);
             let fitted = (samples.len() >= FEWEST_PIXELS).then(|| robust_affine(&samples));
             fitted
                 .flatten()
@@ -78,7 +80,8 @@ impl GrayCode {
 }
 
 /// Where each pixel with at least half of its bits clear looks along one axis.
-fn decode(bits: &[BitPair], camera: Extent) -> Vec<Sample> {
+fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<Sample> {
+    let pixels = rows.len() * width as usize;
     // A saturated sample is at least white.
     let full = |v: &f32| if v.is_nan() { 1.0 } else { *v };
     let sum = |p: &[f32; CHANNELS]| p.iter().map(full).sum::<f32>();
@@ -86,7 +89,7 @@ fn decode(bits: &[BitPair], camera: Extent) -> Vec<Sample> {
         let (plain, inverted) = (sum(&bit.plain[n]), sum(&bit.inverted[n]));
         (plain - inverted, plain + inverted)
     };
-    let brightest = (0..camera.area())
+    let brightest = (0..pixels)
         .map(|n| light(&bits[0], n).1)
         .fold(0.0f32, f32::max);
     let pixel = |n: usize| {
@@ -105,7 +108,7 @@ fn decode(bits: &[BitPair], camera: Extent) -> Vec<Sample> {
         let unclear = bits.len() - clear;
         (2 * clear >= bits.len() && clear > 0).then(|| {
             let cell = f64::from(1u32 << unclear.min(31));
-            let (x, y) = (n as u32 % camera.width, n as u32 / camera.width);
+            let (x, y) = (n as u32 % width, rows[n / width as usize]);
             Sample {
                 pixel: CameraPx { x, y },
                 position: (f64::from(code) + 0.5) * cell,
@@ -113,7 +116,7 @@ fn decode(bits: &[BitPair], camera: Extent) -> Vec<Sample> {
             }
         })
     };
-    (0..camera.area()).filter_map(pixel).collect()
+    (0..pixels).filter_map(pixel).collect()
 }
 
 #[cfg(test)]
@@ -147,6 +150,7 @@ mod tests {
         GrayCode {
             x: axis(Axis::X),
             y: axis(Axis::Y),
+            rows: (0..camera.height).collect(),
         }
     }
 

@@ -2,8 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::images;
-use super::{CaptureError, MANIFEST_NAME, Manifest, Measurements, Pattern, Truth};
+use super::images::{self, Rgb16Rows};
+use super::{
+    CaptureError, MANIFEST_NAME, Manifest, Measurements, Noise, Pattern, Photo, Picture, Rows,
+    Truth,
+};
 use crate::calibrate::{BitPair, GrayCode};
 use crate::transport::{CHANNELS, Correspondence};
 
@@ -15,23 +18,20 @@ pub struct CaptureFolder {
     emission: [f64; 256],
 }
 
-/// What a photograph saw, `[N]`, in units of the measurement; NaN where saturated.
-pub type Picture = Vec<[f32; CHANNELS]>;
-
-/// One shot, linear.
+/// What is seen while the display is dark.
 #[derive(Clone, Debug)]
-pub struct Exposed {
-    /// What was shown.
-    pub pattern: Pattern,
-    /// Measurement at which a sample saturates.
-    pub full_scale: f32,
-    /// What was seen.
-    pub picture: Picture,
+pub struct DarkFrame {
+    light: Picture,
+    /// What it tells of noise.
+    noise: Noise,
 }
 
-/// Light seen while the display is dark, `[N]`, in units of the measurement.
-#[derive(Clone, Debug)]
-pub struct DarkFrame(Vec<[f32; CHANNELS]>);
+impl DarkFrame {
+    /// What was seen, `[N]`, in units of the measurement.
+    pub(super) fn light(&self) -> &[[f32; CHANNELS]] {
+        &self.light
+    }
+}
 
 impl CaptureFolder {
     /// Opens the folder `root` and reads its manifest.
@@ -68,6 +68,25 @@ impl CaptureFolder {
         &self.manifest
     }
 
+    /// The files that recovery from `shots` reads, by their names in the manifest, with where they
+    /// lie.
+    pub fn files(&self, shots: &[usize]) -> Vec<(&str, PathBuf)> {
+        let manifest = &self.manifest;
+        let shots = shots.iter().map(|&i| &manifest.shots[i]);
+        let shots = shots.flat_map(|shot| [&shot.pattern, &shot.photo]);
+        let gray_code = match manifest.correspondence {
+            Some(_) => &[][..],
+            None => &manifest.graycode,
+        };
+        let gray_code = gray_code.iter().map(|shot| &shot.photo);
+        let names = manifest.dark.iter().chain(&manifest.flood);
+        let names = names.chain(shots).chain(gray_code).map(String::as_str);
+        std::iter::once(MANIFEST_NAME)
+            .chain(names)
+            .map(|name| (name, self.root.join(name)))
+            .collect()
+    }
+
     /// Where the manifest lies.
     pub fn manifest_path(&self) -> PathBuf {
         self.root.join(MANIFEST_NAME)
@@ -83,8 +102,8 @@ impl CaptureFolder {
         self.manifest.correspondence.as_ref().map(Into::into)
     }
 
-    /// Reads the photographs of Gray code. Every bit needs its inverse.
-    pub fn read_gray_code(&self, dark: &DarkFrame) -> Result<GrayCode, CaptureError> {
+    /// Reads `rows` of the photographs of Gray code. Every bit needs its inverse.
+    pub fn read_gray_code(&self, dark: &DarkFrame, rows: &Rows) -> Result<GrayCode, CaptureError> {
         let bits = |axis: &str, side: u32| -> Result<Vec<BitPair>, CaptureError> {
             let shots = || self.manifest.graycode.iter().enumerate();
             let photo = |bit, inverted| {
@@ -100,7 +119,12 @@ impl CaptureFolder {
                         ),
                     ));
                 };
-                self.read_photo(&shot.photo, &format!("graycode[{i}].photo"), 1.0, dark)
+                let named = format!("graycode[{i}].photo");
+                let mut photo = self.photo(&shot.photo, &named, 1.0, dark)?;
+                let mut picture = Picture::new();
+                photo.read(rows, &mut picture)?;
+                photo.finish()?;
+                Ok(picture)
             };
             let pair = |bit| {
                 Ok(BitPair {
@@ -115,74 +139,77 @@ impl CaptureFolder {
         Ok(GrayCode {
             x: bits("x", self.manifest.light.width)?,
             y: bits("y", self.manifest.light.height)?,
+            rows: rows.iter().collect(),
         })
     }
 
     /// Reads the dark frame; without one, nothing is seen in the dark.
     pub fn read_dark(&self) -> Result<DarkFrame, CaptureError> {
         let camera = &self.manifest.camera;
-        Ok(DarkFrame(match &self.manifest.dark {
+        let light = match &self.manifest.dark {
             None => vec![[0.0; CHANNELS]; camera.extent().area()],
             Some(name) => images::rgb16(&self.root.join(name), camera.extent(), "dark")?
                 .into_iter()
-                .map(|codes| codes.map(|code| self.linear(code, 1.0)))
+                .map(|codes| codes.map(|code| camera.linear(code, 1.0)))
                 .collect(),
-        }))
+        };
+        let code = 1.0 / (camera.white - camera.black);
+        let noise = Noise::from_dark(&light, camera.width, code);
+        Ok(DarkFrame { light, noise })
     }
 
-    /// Reads the flood photograph, where the manifest names one.
-    pub fn read_flood(&self, dark: &DarkFrame) -> Result<Option<Picture>, CaptureError> {
+    /// Opens the flood photograph, where the manifest names one.
+    pub fn flood<'a>(&'a self, dark: &'a DarkFrame) -> Result<Option<Photo<'a>>, CaptureError> {
         let flood = self.manifest.flood.as_ref();
-        flood
-            .map(|name| self.read_photo(name, "flood", 1.0, dark))
-            .transpose()
+        let open = |name: &String| self.photo(name, "flood", 1.0, dark);
+        flood.map(open).transpose()
     }
 
-    /// Reads shot `i`: its pattern as emitted light, its photograph as measurement less the dark.
+    /// Opens the photograph of shot `i`.
     ///
     /// # Panics
     /// If there is no such shot.
-    pub fn read_shot(&self, i: usize, dark: &DarkFrame) -> Result<Exposed, CaptureError> {
+    pub fn shot<'a>(&'a self, i: usize, dark: &'a DarkFrame) -> Result<Photo<'a>, CaptureError> {
         let shot = &self.manifest.shots[i];
-        let light = &self.manifest.light;
+        let named = format!("shots[{i}].photo");
+        self.photo(&shot.photo, &named, self.exposure(i), dark)
+    }
+
+    /// Reads the pattern of shot `i`, as emitted light.
+    ///
+    /// # Panics
+    /// If there is no such shot.
+    pub fn read_pattern(&self, i: usize) -> Result<Pattern, CaptureError> {
+        let path = self.root.join(&self.manifest.shots[i].pattern);
         let named = format!("shots[{i}].pattern");
-        let planes = images::codes8(&self.root.join(&shot.pattern), light.extent(), &named)?;
+        let planes = images::codes8(&path, self.manifest.light.extent(), &named)?;
         let mut planes = planes.into_iter().map(|codes| {
             let emitted = codes
                 .into_iter()
                 .map(|c| self.emission[usize::from(c)] as f32);
             emitted.collect::<Vec<_>>()
         });
-        let pattern = match (planes.next(), planes.next(), planes.next()) {
+        Ok(match (planes.next(), planes.next(), planes.next()) {
             (Some(r), Some(g), Some(b)) => Pattern::Rgb([r, g, b]),
             (grey, ..) => Pattern::Grey(grey.unwrap_or_default()),
-        };
-        let named = format!("shots[{i}].photo");
-        let exposure = shot.exposure.unwrap_or(1.0);
-        Ok(Exposed {
-            pattern,
-            full_scale: (1.0 / exposure) as f32,
-            picture: self.read_photo(&shot.photo, &named, exposure, dark)?,
         })
     }
 
-    /// Reads a photograph as measurement less the dark, NaN where saturated.
-    fn read_photo(
-        &self,
+    /// Relative exposure of shot `i`.
+    fn exposure(&self, i: usize) -> f64 {
+        self.manifest.shots[i].exposure.unwrap_or(1.0)
+    }
+
+    fn photo<'a>(
+        &'a self,
         name: &str,
         named_by: &str,
         exposure: f64,
-        dark: &DarkFrame,
-    ) -> Result<Picture, CaptureError> {
+        dark: &'a DarkFrame,
+    ) -> Result<Photo<'a>, CaptureError> {
         let camera = &self.manifest.camera;
-        let codes = images::rgb16(&self.root.join(name), camera.extent(), named_by)?;
-        let picture = codes.into_iter().zip(&dark.0).map(|(codes, dark)| {
-            std::array::from_fn(|c| match f64::from(codes[c]) >= camera.white {
-                true => f32::NAN,
-                false => self.linear(codes[c], exposure) - dark[c],
-            })
-        });
-        Ok(picture.collect())
+        let codes = Rgb16Rows::open(&self.root.join(name), camera.extent(), named_by)?;
+        Ok(Photo::new(camera, dark, exposure, codes))
     }
 
     fn field_error(&self, field: &str, problem: String) -> CaptureError {
@@ -193,28 +220,25 @@ impl CaptureFolder {
         }
     }
 
-    /// Joins shots into measurements.
-    pub fn measurements(
+    /// Measurements of `shots` that have no camera row yet, and of whose noise the floor is known.
+    pub fn no_rows(
         &self,
-        shots: Vec<Exposed>,
+        shots: &[usize],
+        patterns: Vec<Pattern>,
         correspondence: Correspondence,
+        dark: &DarkFrame,
     ) -> Measurements {
-        let full_scale = shots.iter().map(|s| s.full_scale).collect();
-        let (patterns, pictures) = shots.into_iter().map(|s| (s.pattern, s.picture)).unzip();
+        let full_scale = shots.iter().map(|&i| (1.0 / self.exposure(i)) as f32);
         Measurements {
             camera: self.manifest.camera.extent(),
             light: self.manifest.light.extent(),
             correspondence,
             patterns,
-            full_scale,
-            pictures,
+            full_scale: full_scale.collect(),
+            rows: Rows::from_strips([]),
+            pictures: vec![Picture::new(); shots.len()],
+            flood: self.manifest.flood.as_ref().map(|_| Picture::new()),
+            noise: dark.noise,
         }
-    }
-
-    /// `(code − black) / (white − black)` at unit exposure. The dark frame holds light, which grows
-    /// with exposure, so it is subtracted after this, not from the code.
-    fn linear(&self, code: u16, exposure: f64) -> f32 {
-        let camera = &self.manifest.camera;
-        ((f64::from(code) - camera.black) / (camera.white - camera.black) / exposure) as f32
     }
 }

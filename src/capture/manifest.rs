@@ -121,6 +121,12 @@ impl CameraSpec {
             height: self.height,
         }
     }
+
+    /// `(code − black) / (white − black)` at unit exposure. The dark frame holds light, which grows
+    /// with exposure, so it is subtracted after this, not from the code.
+    pub fn linear(&self, code: u16, exposure: f64) -> f32 {
+        ((f64::from(code) - self.black) / (self.white - self.black) / exposure) as f32
+    }
 }
 
 impl From<&AffineSpec> for Correspondence {

@@ -1,6 +1,7 @@
 //! Linear measurements: what recovery works on.
 
-use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent};
+use super::{Noise, Rows};
+use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent, TileRect};
 
 /// The light each element emitted during one shot, 1 at full brightness, row by row.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +22,16 @@ impl Pattern {
     }
 }
 
+/// What a photograph saw, `[rows, width]` for the camera rows at hand, in units of the measurement;
+/// NaN where saturated.
+pub type Picture = Vec<[f32; CHANNELS]>;
+
 /// `Y = PT` as photographed: patterns in, pictures out, all in linear units.
+///
+/// Photographs of many megapixels need not be in memory whole: `rows` says which camera rows are at
+/// hand. Whoever prepares a recovery may get strips spread over the picture, and must then look at
+/// the tiles that are [covered](Self::covers) alone; whoever recovers a tile gets the tile's rows
+/// and as many around it as was asked for.
 #[derive(Clone, Debug)]
 pub struct Measurements {
     /// Camera grid, `N` pixels.
@@ -34,8 +44,15 @@ pub struct Measurements {
     pub patterns: Vec<Pattern>,
     /// For each pattern, the measurement at which a sample saturates: 1 over the exposure.
     pub full_scale: Vec<f32>,
-    /// `L` pictures of `N` pixels, row by row. NaN where a sample was saturated and says nothing.
-    pub pictures: Vec<Vec<[f32; CHANNELS]>>,
+    /// The camera rows that `pictures` and `flood` hold.
+    pub rows: Rows,
+    /// `L` pictures of the rows at hand. NaN where a sample was saturated and says nothing.
+    pub pictures: Vec<Picture>,
+    /// What every element at full brightness shows together, less the dark, where it was
+    /// photographed; taken at exposure 1.
+    pub flood: Option<Picture>,
+    /// How noisy the samples are.
+    pub noise: Noise,
 }
 
 impl Measurements {
@@ -44,26 +61,47 @@ impl Measurements {
         self.patterns.iter().all(|p| matches!(p, Pattern::Grey(_)))
     }
 
-    /// What channel `c` of a pixel saw under pattern `l`; NaN where saturated.
+    /// What channel `c` of a pixel saw under pattern `l`; NaN where saturated, and where the pixel's
+    /// row is not at hand.
     pub fn sample(&self, l: usize, pixel: CameraPx, c: usize) -> f64 {
-        f64::from(self.pictures[l][self.camera.index(pixel)][c])
+        let pixel = self.index(pixel).map(|n| self.pictures[l][n]);
+        pixel.map_or(f64::NAN, |sample| f64::from(sample[c]))
     }
 
-    /// Pixels of which some channel is saturated in so nearly all photographs that fewer than
-    /// `fewest` samples are left of it.
-    pub fn overexposed_pixels(&self, fewest: usize) -> usize {
-        let hopeless = |n: &usize| {
+    /// Where `pictures` and `flood` have a pixel, if its row is at hand.
+    pub fn index(&self, pixel: CameraPx) -> Option<usize> {
+        let row = self.rows.place(pixel.y)?;
+        Some(row * self.camera.width as usize + pixel.x as usize)
+    }
+
+    /// Gives back the memory of all rows.
+    pub fn forget_rows(&mut self) {
+        self.rows = Rows::from_strips([]);
+        for picture in self.pictures.iter_mut().chain(&mut self.flood) {
+            *picture = Picture::new();
+        }
+    }
+
+    /// Whether all pixels of a tile are at hand.
+    pub fn covers(&self, rect: TileRect) -> bool {
+        self.rows.contains_all(rect.y..rect.y + rect.extent.height)
+    }
+
+    /// Variance of a sample of channel `c` under pattern `l` that came out as `y`.
+    pub fn variance(&self, l: usize, c: usize, y: f64) -> f64 {
+        let exposure = f64::from(self.full_scale[l]).recip();
+        self.noise.variance(c, y, exposure)
+    }
+
+    /// Pixels of the tile of which some channel is saturated in so nearly all photographs that fewer
+    /// than `fewest` samples are left of it.
+    pub fn overexposed_pixels(&self, rect: TileRect, fewest: usize) -> usize {
+        let hopeless = |pixel: &CameraPx| {
             (0..CHANNELS).any(|c| {
-                let samples = self.pictures.iter();
-                samples.filter(|picture| !picture[*n][c].is_nan()).count() < fewest
+                let samples = (0..self.pictures.len()).map(|l| self.sample(l, *pixel, c));
+                samples.filter(|y| !y.is_nan()).count() < fewest
             })
         };
-        (0..self.camera.area()).filter(hopeless).count()
-    }
-
-    /// Saturated samples, of `L · N · 3`.
-    pub fn saturated(&self) -> usize {
-        let samples = self.pictures.iter().flatten().flatten();
-        samples.filter(|y| y.is_nan()).count()
+        rect.pixels().filter(hopeless).count()
     }
 }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{files, lights, report};
-use crate::capture::{CaptureFolder, Pattern, Truth};
+use crate::capture::{CaptureFolder, Pattern, Picture, Rows, Truth};
 use crate::relight::Light;
 use crate::transport::{CHANNELS, Decibels, Geometry, Transport, TransportError};
 
@@ -159,10 +159,12 @@ fn against_shots(
     let mut errors = [TransportError::default(); CHANNELS];
     let dark = folder.read_dark()?;
     for &i in shots {
-        let shot = folder.read_shot(i, &dark)?;
-        let light = pattern_light(&transport.geometry, &shot.pattern)?;
+        let light = pattern_light(&transport.geometry, &folder.read_pattern(i)?)?;
         let ours = lights::relight(transport, &light);
-        for (ours, seen) in ours.pixels.iter().zip(&shot.picture) {
+        let (mut photo, mut picture) = (folder.shot(i, &dark)?, Picture::new());
+        photo.read(&Rows::all(folder.manifest().camera.height), &mut picture)?;
+        photo.finish()?;
+        for (ours, seen) in ours.pixels.iter().zip(&picture) {
             for c in 0..CHANNELS {
                 if seen[c].is_finite() {
                     errors[c].add(f64::from(seen[c]), f64::from(ours[c]));

@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::{files, report};
-use crate::format::Metadata;
+use crate::format::{Metadata, TileKind};
 
 /// Show what is in a relightable photograph
 #[derive(Debug, Args)]
@@ -29,6 +29,10 @@ struct Report {
     tile_side: u32,
     tiles: usize,
     dark_tiles: usize,
+    direct_tiles: usize,
+    factored_tiles: usize,
+    /// Functions that factored tiles are combined from; none if there are no such tiles.
+    rank: Option<u16>,
     header_bytes: u64,
     tile_bytes: u64,
     largest_tile_bytes: u32,
@@ -40,6 +44,7 @@ struct Report {
 pub fn run(args: &InspectArgs) -> Result<()> {
     let file = files::read_ltm(&args.file)?;
     let geometry = &file.header.geometry;
+    let count = |is: fn(TileKind) -> bool| file.entries.iter().filter(|e| is(e.kind)).count();
     let sizes = || file.entries.iter().map(|e| e.bytes);
     let report = Report {
         camera: [geometry.camera.width, geometry.camera.height],
@@ -48,7 +53,10 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         correspondence: geometry.correspondence.affine,
         tile_side: geometry.tile_side,
         tiles: file.entries.len(),
-        dark_tiles: sizes().filter(|&bytes| bytes == 0).count(),
+        dark_tiles: count(|kind| kind == TileKind::Dark),
+        direct_tiles: count(|kind| kind == TileKind::Direct),
+        factored_tiles: count(|kind| matches!(kind, TileKind::Factored { .. })),
+        rank: Some(file.header.rank).filter(|&rank| rank > 0),
         header_bytes: file.header.tiles_offset(),
         tile_bytes: sizes().map(u64::from).sum(),
         largest_tile_bytes: sizes().max().unwrap_or(0),
@@ -74,9 +82,17 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         (
             "tiles",
             format!(
-                "{} of {}x{} pixels, {} dark, direct",
-                report.tiles, report.tile_side, report.tile_side, report.dark_tiles
+                "{} of {1}x{1} pixels: {2} direct, {3} factored, {4} dark",
+                report.tiles,
+                report.tile_side,
+                report.direct_tiles,
+                report.factored_tiles,
+                report.dark_tiles
             ),
+        ),
+        (
+            "rank",
+            report.rank.map_or("-".to_owned(), |rank| rank.to_string()),
         ),
         (
             "recovered",

@@ -1,11 +1,14 @@
 //! The command line: subcommands over the library, with the files, threads and terminal that the
 //! library does not know of.
 
+mod checkpoint;
 mod evaluate;
 mod files;
 mod inspect;
 mod lights;
+mod memory;
 mod new_folder;
+mod photographs;
 mod process;
 mod recover;
 mod relight;
@@ -37,7 +40,7 @@ enum Command {
     Study(study::StudyArgs),
 }
 
-/// Parses the command line and runs it. Status: 0 done, 1 failed, 2 wrong usage.
+/// Parses the command line and runs it. Status: 0 done, 1 failed, 2 wrong usage, 130 told to stop.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Simulate(args) => simulate::run(&args),
@@ -50,6 +53,10 @@ pub fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
+        Err(error) if error.is::<process::Interrupted>() => {
+            eprintln!("{error:#}");
+            ExitCode::from(process::INTERRUPTED)
+        }
         Err(error) => {
             eprintln!("error: {error:#}");
             if error.is::<Usage>() {

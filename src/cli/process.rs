@@ -1,6 +1,12 @@
-//! What the process itself has used, and how it shows that it is still at work.
+//! What the process itself has used, how it shows that it is still at work, and how it is told to
+//! stop.
 
-use indicatif::{ProgressBar, ProgressStyle};
+use std::fmt::Write;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context, Result};
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use rayon::prelude::*;
 
 use crate::recover::Workers;
@@ -29,11 +35,50 @@ pub fn peak_rss_bytes() -> Option<u64> {
     None
 }
 
-/// A progress bar on standard error, shown on a terminal only.
+/// Exit status of a command that was told to stop, as shells have it for Ctrl-C.
+pub const INTERRUPTED: u8 = 130;
+
+/// What there is to say of work that was told to stop before its end.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Interrupted(pub String);
+
+/// Whether the process has been told to stop, by Ctrl-C or SIGTERM. Told twice, it stops at once.
+#[derive(Clone, Debug)]
+pub struct Interrupt(Arc<AtomicBool>);
+
+impl Interrupt {
+    /// Listens from now on. Once a process.
+    pub fn listen() -> Result<Self> {
+        let told = Arc::new(AtomicBool::new(false));
+        let handler = Arc::clone(&told);
+        ctrlc::set_handler(move || {
+            if handler.swap(true, Ordering::Relaxed) {
+                std::process::exit(INTERRUPTED.into());
+            }
+            eprintln!("stopping once what is begun is done; again to stop at once");
+        })
+        .context("cannot listen for Ctrl-C")?;
+        Ok(Self(told))
+    }
+
+    /// Whether to stop.
+    pub fn told(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// A progress bar on standard error with rate and time left, shown on a terminal only.
 pub fn progress(what: &'static str, steps: usize) -> ProgressBar {
     let bar = ProgressBar::new(steps as u64).with_message(what);
-    if let Ok(style) = ProgressStyle::with_template("{msg:12} {wide_bar} {pos}/{len} {eta} left") {
-        bar.set_style(style);
+    let template = "{msg:12} {wide_bar} {pos}/{len}, {rate}, {eta} left";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(
+            style.with_key("rate", |state: &ProgressState, out: &mut dyn Write| {
+                // A terminal that takes no more is no failure of ours.
+                let _ = write!(out, "{:.1}/s", state.per_sec());
+            }),
+        );
     }
     bar
 }

@@ -1,19 +1,26 @@
 //! `ltm-export recover`: a capture folder to an `.ltm` file.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
+use indicatif::ProgressBar;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::process::AllCores;
+use super::checkpoint::{Checkpoint, Contents, Recipe};
+use super::memory::{self, Plan};
+use super::photographs::Photographs;
+use super::process::{AllCores, Interrupt, Interrupted};
 use super::{files, process, report};
-use crate::capture::{CaptureFolder, Measurements};
+use crate::capture::{CaptureFolder, DarkFrame, Measurements, Noise};
 use crate::format::{self, EncodedTile, Metadata};
-use crate::recover::{self, Method, Recovery, Settings};
-use crate::transport::{CHANNELS, DirectTile, Geometry, Window};
+use crate::recover::{self, Method, Recovery, Settings, SparsityBasis};
+use crate::transport::{Basis, CHANNELS, Window};
 
 /// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
 const HOLD_OUT_EVERY: usize = 10;
@@ -30,14 +37,23 @@ pub struct RecoverArgs {
     #[arg(short, long, value_name = "FILE.ltm")]
     output: PathBuf,
     /// How each light transport function is recovered
-    #[arg(long, value_enum, default_value_t = MethodName::Nnls)]
+    #[arg(long, value_enum, default_value_t = MethodName::Learned)]
     method: MethodName,
+    /// With --method bpdn: where light transport functions are sparse
+    #[arg(long, value_enum, default_value_t = BasisName::Identity)]
+    basis: BasisName,
     /// Side of the window of light elements each camera pixel may see; odd
     #[arg(long, value_name = "W", default_value = "15", value_parser = parse_window)]
     window: Window,
     /// Use the first K shots only [default: all but every tenth, which are held out]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     patterns: Option<u32>,
+    /// Memory to stay within: photographs of many megapixels are then read by strips
+    #[arg(long, value_name = "BYTES", default_value = memory::Bytes::DEFAULT, value_parser = memory::Bytes::parse)]
+    memory: memory::Bytes,
+    /// Go on with a recovery that was interrupted, from FILE.ltm.checkpoint
+    #[arg(long)]
+    resume: bool,
     /// Print one JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -51,14 +67,35 @@ fn parse_window(text: &str) -> Result<Window, String> {
 /// Recovery methods by name.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum MethodName {
+    /// A prior learned from the photographs themselves
+    Learned,
     /// Non-negative least squares
     Nnls,
+    /// Basis pursuit denoising: the sparsest function that explains the photographs
+    Bpdn,
 }
 
-impl From<MethodName> for Method {
-    fn from(name: MethodName) -> Self {
-        match name {
-            MethodName::Nnls => Self::Nnls,
+/// Bases of `--method bpdn` by name.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum BasisName {
+    /// Light elements themselves, for opaque objects
+    Identity,
+    /// Discrete cosine transform, for translucent ones
+    Dct,
+    /// Haar wavelets
+    Haar,
+}
+
+impl RecoverArgs {
+    fn method(&self) -> Method {
+        match self.method {
+            MethodName::Learned => Method::Learned,
+            MethodName::Nnls => Method::Nnls,
+            MethodName::Bpdn => Method::Bpdn(match self.basis {
+                BasisName::Identity => SparsityBasis::Identity,
+                BasisName::Dct => SparsityBasis::Dct,
+                BasisName::Haar => SparsityBasis::Haar,
+            }),
         }
     }
 }
@@ -70,9 +107,12 @@ struct Report {
     method: Method,
     window: u32,
     /// None: every tile is direct.
-    rank: Option<u32>,
+    rank: Option<usize>,
     patterns: usize,
-    common_mode: crate::recover::CommonMode,
+    common_mode: Option<crate::recover::CommonMode>,
+    noise: Noise,
+    /// Parts in which the photographs were read to stay within the memory given; 1 is whole.
+    strips: usize,
     saturated_samples: usize,
     /// Pixels of which nothing but white is known.
     overexposed_pixels: usize,
@@ -81,78 +121,247 @@ struct Report {
 
 pub fn run(args: &RecoverArgs) -> Result<()> {
     let start = Instant::now();
-    let output = files::Output::create(&args.output, files::Kind::Ltm)?;
+    let interrupt = Interrupt::listen()?;
+    // Whether it can be written is better known before than after.
+    drop(files::Output::create(&args.output, files::Kind::Ltm)?);
     let folder = CaptureFolder::open(&args.capture)?;
-    let shots = choose_shots(folder.manifest().shots.len(), args.patterns)?;
-    let measurements = read(&folder, &shots)?;
-    let saturated = measurements.saturated();
-    if saturated > 0 {
-        let samples = shots.len() * measurements.camera.area() * CHANNELS;
-        let percent = 100.0 * saturated as f64 / samples as f64;
-        eprintln!("note: {saturated} saturated samples ({percent:.1} %) are left out");
-        if percent > MUCH_SATURATED {
-            eprintln!(
-                "warning: that is much; check \"camera.white\" in the manifest, or photograph \
-                 with less exposure"
-            );
-        }
-    }
-    let settings = Settings {
-        method: args.method.into(),
-        window: args.window,
-    };
-    let recovery = Recovery::prepare(&measurements, settings, &AllCores)
-        .with_context(|| args.capture.display().to_string())?;
-    let overexposed = match saturated {
-        0 => 0,
-        _ => measurements.overexposed_pixels(recover::FEWEST_PATTERNS),
-    };
-    if overexposed > 0 {
-        eprintln!(
-            "warning: {overexposed} pixels are saturated in nearly all photographs and will be \
-             white under any light; photograph with less exposure"
-        );
-    }
-    let geometry = *recovery.geometry();
-    let bar = process::progress("recovering", geometry.tile_grid().area());
-    let tiles = (0..geometry.tile_grid().area())
-        .into_par_iter()
-        .map(|i| {
-            let tile = recovery.tile(&measurements, geometry.tile(i));
-            let functions = tile.functions(&geometry, recovery.basis());
-            let tile = DirectTile::quantise(&functions);
-            let encoded = EncodedTile::new(&geometry, &tile);
-            bar.inc(1);
-            encoded
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    bar.finish_and_clear();
-    let file_bytes = write(output, settings.method, &geometry, shots.clone(), &tiles)?;
-    let report = Report {
-        seconds: start.elapsed().as_secs_f64(),
-        peak_rss_bytes: process::peak_rss_bytes(),
-        method: settings.method,
-        window: args.window.side(),
-        rank: None,
-        patterns: shots.len(),
-        common_mode: recovery.common_mode(),
-        saturated_samples: saturated,
-        overexposed_pixels: overexposed,
-        file_bytes,
-    };
+    let manifest = folder.manifest();
+    let shots = choose_shots(manifest.shots.len(), args.patterns)?;
+    let threads = rayon::current_num_threads();
+    let plan = Plan::new(args.memory, manifest, shots.len(), args.window, threads)?;
+    let threads = rayon::ThreadPoolBuilder::new()
+        .num_threads(plan.tiles_at_once)
+        .build()
+        .context("threads cannot be started")?;
+    let mut report = threads.install(|| recover(args, &folder, &shots, &plan, &interrupt))?;
+    report.seconds = start.elapsed().as_secs_f64();
+    report.peak_rss_bytes = process::peak_rss_bytes();
     if args.json {
         return report::print_json(&report);
     }
     report::print_line(&format!(
         "{}: {} camera pixels, {} light elements, window {}, from {} patterns in {:.1} s, {}",
         args.output.display(),
-        geometry.camera,
-        geometry.light,
+        manifest.camera.extent(),
+        manifest.light.extent(),
         report.window,
         report.patterns,
         report.seconds,
-        report::bytes(file_bytes),
+        report::bytes(report.file_bytes),
     ))
+}
+
+/// Recovers and writes the file; what it took is left for the caller to report.
+fn recover(
+    args: &RecoverArgs,
+    folder: &CaptureFolder,
+    shots: &[usize],
+    plan: &Plan,
+    interrupt: &Interrupt,
+) -> Result<Report> {
+    let dark = folder.read_dark()?;
+    let mut measurements = no_rows(folder, &dark, shots, plan)?;
+    let mut photographs = Photographs::open(folder, &dark, shots)?;
+    // Before the long work: a checkpoint that does not fit is better known now.
+    let recipe = recipe(args, folder, shots, plan)?;
+    let checkpoint = Checkpoint::open(&args.output, &recipe, args.resume)?;
+    let bar = process::progress("reading", shots.len());
+    photographs.advance(&mut measurements, &plan.sample(), &bar)?;
+    bar.finish_and_clear();
+    let saturated = photographs.finish()?;
+    measurements.noise = Noise::with_gain_from(&measurements);
+    warn_of_saturation(
+        saturated,
+        shots.len() * measurements.camera.area() * CHANNELS,
+    );
+    let settings = Settings {
+        method: args.method(),
+        window: args.window,
+    };
+    let recovery = Recovery::prepare(&measurements, settings, &AllCores)
+        .with_context(|| args.capture.display().to_string())?;
+    let geometry = *recovery.geometry();
+    let mut run = Run {
+        interrupt,
+        recovery: &recovery,
+        bar: process::progress("recovering", recipe.tiles),
+        checkpoint: Mutex::new(checkpoint),
+    };
+    run.announce(args.resume)?;
+    let mut overexposed = 0;
+    let mut photographs = match plan.whole() {
+        true => None,
+        false => Some(Photographs::open(folder, &dark, shots)?),
+    };
+    if photographs.is_some() {
+        measurements.forget_rows();
+    }
+    let strips = plan.strips(recovery.halo())?;
+    for (tile_rows, rows) in &strips {
+        if let Some(photographs) = &mut photographs {
+            photographs.advance(&mut measurements, rows, &ProgressBar::hidden())?;
+        }
+        overexposed += run.tiles(&measurements, tile_rows.clone(), saturated > 0)?;
+    }
+    run.bar.finish_and_clear();
+    if overexposed > 0 {
+        eprintln!(
+            "warning: {overexposed} pixels are saturated in nearly all photographs and will be \
+             white under any light; photograph with less exposure"
+        );
+    }
+    let noise = measurements.noise;
+    drop((measurements, photographs));
+    let metadata = Metadata {
+        writer: PROGRAM.to_owned(),
+        method: settings.method.name().to_owned(),
+        shots_used: shots.to_vec(),
+    };
+    let basis = recovery.basis();
+    let rank = basis.map_or(0, Basis::rank) as u16; // a format that cannot hold it says so
+    let mut checkpoint = run
+        .checkpoint
+        .into_inner()
+        .unwrap_or_else(PoisonError::into_inner);
+    let output = files::Output::create(&args.output, files::Kind::Ltm)?;
+    let file_bytes = output.finish(|out| {
+        let tile = |i| checkpoint.tile(&geometry, rank, i);
+        Ok(format::write_from(&geometry, &metadata, basis, tile, out)?)
+    })?;
+    checkpoint.done();
+    Ok(Report {
+        seconds: 0.0,
+        peak_rss_bytes: None,
+        method: settings.method,
+        window: args.window.side(),
+        rank: basis.map(Basis::rank),
+        patterns: shots.len(),
+        common_mode: recovery.common_mode(),
+        noise,
+        strips: strips.len(),
+        saturated_samples: saturated,
+        overexposed_pixels: overexposed,
+        file_bytes,
+    })
+}
+
+/// Tiles on their way into the checkpoint.
+struct Run<'a> {
+    interrupt: &'a Interrupt,
+    recovery: &'a Recovery,
+    bar: ProgressBar,
+    checkpoint: Mutex<Checkpoint>,
+}
+
+impl Run<'_> {
+    /// Says what is there already.
+    fn announce(&mut self, resume: bool) -> Result<()> {
+        let checkpoint = self
+            .checkpoint
+            .get_mut()
+            .unwrap_or_else(PoisonError::into_inner);
+        let (count, tiles) = (checkpoint.count(), checkpoint.tiles());
+        match count {
+            0 if resume => eprintln!("note: there is no checkpoint to resume from; starting anew"),
+            0 => {}
+            _ => eprintln!("resuming with {count} of {tiles} tiles"),
+        }
+        self.bar.set_position(count as u64);
+        self.bar.reset_eta(); // The tiles that are there took no time.
+        Ok(())
+    }
+
+    /// Recovers the rows of tiles `tile_rows`, except what is kept already. Returns the number of
+    /// their pixels that are saturated in nearly all photographs, if there is anything `saturated`.
+    fn tiles(
+        &self,
+        measurements: &Measurements,
+        tile_rows: Range<u32>,
+        saturated: bool,
+    ) -> Result<usize> {
+        let geometry = self.recovery.geometry();
+        let across = geometry.tile_grid().width;
+        let tiles = (tile_rows.start * across) as usize..(tile_rows.end * across) as usize;
+        let lock = || {
+            self.checkpoint
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+        };
+        let overexposed = tiles.into_par_iter().map(|i| -> Result<usize> {
+            let rect = geometry.tile(i);
+            if !lock().has(i) {
+                if self.interrupt.told() {
+                    bail!(Interrupted(String::new()));
+                }
+                let tile = self.recovery.tile(measurements, rect);
+                lock().add(i, &EncodedTile::new(geometry, &tile)?)?;
+                self.bar.inc(1);
+            }
+            Ok(match saturated {
+                true => measurements.overexposed_pixels(rect, recover::FEWEST_PATTERNS),
+                false => 0,
+            })
+        });
+        let overexposed = overexposed.try_reduce(|| 0, |a, b| Ok(a + b));
+        match overexposed {
+            Err(e) if e.is::<Interrupted>() => {
+                self.bar.finish_and_clear();
+                bail!(Interrupted(lock().interrupted()?))
+            }
+            other => other,
+        }
+    }
+}
+
+/// What made a file or a checkpoint.
+const PROGRAM: &str = concat!("ltm-export ", env!("CARGO_PKG_VERSION"));
+
+/// All that decides what the tiles are.
+fn recipe(
+    args: &RecoverArgs,
+    folder: &CaptureFolder,
+    shots: &[usize],
+    plan: &Plan,
+) -> Result<Recipe> {
+    let memory = match plan.whole() {
+        true => "enough for all photographs".to_owned(),
+        false => args.memory.0.to_string(),
+    };
+    let options = [
+        ("--method", args.method().name().to_owned()),
+        ("--window", args.window.side().to_string()),
+        (
+            "--patterns",
+            args.patterns
+                .map_or_else(|| "not given".to_owned(), |k| k.to_string()),
+        ),
+        ("--memory", memory),
+    ];
+    let contents = |(name, path): (&str, PathBuf)| -> Result<(String, Contents)> {
+        let contents = Contents::of(&path).with_context(|| path.display().to_string())?;
+        Ok((name.to_owned(), contents))
+    };
+    let files = folder.files(shots).into_par_iter().map(contents);
+    Ok(Recipe {
+        program: PROGRAM.to_owned(),
+        options: options.map(|(name, is)| (name.to_owned(), is)).into(),
+        files: files.collect::<Result<BTreeMap<_, _>>>()?,
+        tiles: plan.tiles(),
+    })
+}
+
+fn warn_of_saturation(saturated: usize, samples: usize) {
+    if saturated == 0 {
+        return;
+    }
+    let percent = 100.0 * saturated as f64 / samples as f64;
+    eprintln!("note: {saturated} saturated samples ({percent:.1} %) are left out");
+    if percent > MUCH_SATURATED {
+        eprintln!(
+            "warning: that is much; check \"camera.white\" in the manifest, or photograph with \
+             less exposure"
+        );
+    }
 }
 
 /// Which of `available` shots to recover from.
@@ -168,42 +377,24 @@ fn choose_shots(available: usize, first: Option<u32>) -> Result<Vec<usize>> {
     }
 }
 
-/// Reads shots with the correspondence that goes with them.
-pub(super) fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
-    let dark = folder.read_dark()?;
-    // Least squares has no use for it, but a capture that names a flood is not whole without it.
-    folder.read_flood(&dark)?;
-    let bar = process::progress("reading", shots.len());
-    let exposed = shots
-        .par_iter()
-        .map(|&i| {
-            let shot = folder.read_shot(i, &dark);
-            bar.inc(1);
-            shot
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    bar.finish_and_clear();
+/// Reads all there is to measurements but their rows.
+fn no_rows(
+    folder: &CaptureFolder,
+    dark: &DarkFrame,
+    shots: &[usize],
+    plan: &Plan,
+) -> Result<Measurements> {
     let correspondence = match folder.correspondence() {
         Some(given) => given,
-        None => folder
-            .read_gray_code(&dark)?
-            .correspondence(folder.manifest().camera.extent())
-            .with_context(|| folder.manifest_path().display().to_string())?,
+        None => {
+            let rows = plan.gray_code_rows(folder.manifest().graycode.len());
+            folder
+                .read_gray_code(dark, &rows)?
+                .correspondence(folder.manifest().camera.extent())
+                .with_context(|| folder.manifest_path().display().to_string())?
+        }
     };
-    Ok(folder.measurements(exposed, correspondence))
-}
-
-fn write(
-    output: files::Output,
-    method: Method,
-    geometry: &Geometry,
-    shots_used: Vec<usize>,
-    tiles: &[EncodedTile],
-) -> Result<u64> {
-    let metadata = Metadata {
-        writer: concat!("ltm-export ", env!("CARGO_PKG_VERSION")).to_owned(),
-        method: method.name().to_owned(),
-        shots_used,
-    };
-    output.finish(|out| Ok(format::write(geometry, &metadata, tiles, out)?))
+    let patterns = shots.par_iter().map(|&i| folder.read_pattern(i));
+    let patterns = patterns.collect::<Result<Vec<_>, _>>()?;
+    Ok(folder.no_rows(shots, patterns, correspondence, dark))
 }

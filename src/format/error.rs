@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::header::{MAJOR, MAX_RANK, MINOR};
 use super::metadata::MAX_METADATA_BYTES;
 use crate::transport::GeometryError;
 
@@ -21,7 +22,7 @@ pub enum FormatError {
     TextMode,
     /// A version this reader does not know.
     #[error(
-        "the file has format version {major}.{minor}; this reader knows version 0: get a newer one"
+        "the file has format version {major}.{minor}; this reader knows {MAJOR}.{MINOR} alone: get the reader for it, or export the file again"
     )]
     Version {
         /// Major version found.
@@ -32,7 +33,7 @@ pub enum FormatError {
     /// Bytes do not match their checksum.
     #[error("the {part} is damaged: its checksum does not match; copy or export the file again")]
     Checksum {
-        /// Header, directory, metadata or which tile.
+        /// Which part.
         part: Part,
     },
     /// The geometry cannot be.
@@ -44,18 +45,37 @@ pub enum FormatError {
         /// Tile number.
         tile: usize,
     },
+    /// A tile that this file cannot have.
+    #[error(
+        "the directory is invalid: tile {tile} is of unknown kind, or has a length, step or number of components that its kind cannot have"
+    )]
+    Kind {
+        /// Tile number.
+        tile: usize,
+    },
+    /// Too large a basis.
+    #[error("the basis has {0} functions, more than the {MAX_RANK} allowed")]
+    Rank(u64),
+    /// A basis whose length cannot be.
+    #[error("the header is invalid: {bytes} bytes cannot hold a basis of {rank} functions")]
+    BasisLength {
+        /// Functions it is to have.
+        rank: u16,
+        /// Compressed bytes.
+        bytes: u32,
+    },
     /// The metadata is too long.
     #[error("the file has {0} bytes of metadata, more than the {MAX_METADATA_BYTES} allowed")]
     MetadataLength(u64),
     /// The metadata is not JSON of the expected form.
     #[error("the metadata is invalid: {0}")]
     Metadata(serde_json::Error),
-    /// A tile does not decompress to what the geometry asks for.
+    /// A part does not decompress to what the header asks for.
     #[error("the {part} does not decompress: {reason}")]
     Decompress {
-        /// Which tile.
+        /// Basis or which tile.
         part: Part,
-        /// zstd's word for it.
+        /// zstd's word for it, or what is wrong with what it gave.
         reason: String,
     },
     /// Decoding would take more memory than allowed.
@@ -101,11 +121,21 @@ pub enum FormatError {
         end: u64,
     },
     /// Writing: zstd failed.
-    #[error("a tile does not compress: {0}")]
+    #[error("light transport does not compress: {0}")]
     Compress(std::io::Error),
     /// Writing: the output failed.
     #[error("the file cannot be written: {0}")]
     Write(std::io::Error),
+    /// Writing: the tile is factored over another basis.
+    #[error("tile {tile} has {components} components, but there is a basis of {rank} functions")]
+    Components {
+        /// Tile number.
+        tile: usize,
+        /// What it has.
+        components: u16,
+        /// What there is; 0 if there is no basis.
+        rank: u16,
+    },
     /// Writing: the transport has more data than the format can address.
     #[error("tile {tile} takes more than 4 GiB; use smaller tiles")]
     TooLarge {
@@ -130,6 +160,8 @@ pub enum Part {
     Directory,
     /// The JSON metadata.
     Metadata,
+    /// The basis of factored tiles.
+    Basis,
     /// A tile, by number.
     Tile(usize),
 }
@@ -140,6 +172,7 @@ impl std::fmt::Display for Part {
             Self::Header => f.write_str("header"),
             Self::Directory => f.write_str("directory"),
             Self::Metadata => f.write_str("metadata"),
+            Self::Basis => f.write_str("basis"),
             Self::Tile(i) => write!(f, "picture data (tile {i})"),
         }
     }

@@ -1,18 +1,25 @@
 //! The fixed header and the tile directory.
 
 use super::FormatError;
+use super::codec::{basis, compressed_bound, direct, factored};
 use super::error::Part;
 use super::metadata::MAX_METADATA_BYTES;
 use crate::transport::{CHANNELS, Correspondence, Extent, Geometry, Window};
 
-/// Shows text-mode damage as PNG's and KTX2's do: a high bit, CR LF, ^Z, LF.
-const MAGIC: [u8; 12] = *b"\xABLTM 00\xBB\r\n\x1A\n";
+/// Version of the format. Before 1.0, every minor version is a format of its own.
+pub(super) const MAJOR: u16 = 0;
+pub(super) const MINOR: u16 = 1;
+/// Shows text-mode damage as PNG's and KTX2's do: a high bit, CR LF, ^Z, LF. The digits are the
+/// version's.
+const MAGIC: [u8; 12] = *b"\xABLTM 01\xBB\r\n\x1A\n";
+/// Where the version's digits stand in it.
+const MAGIC_VERSION: std::ops::Range<usize> = 5..7;
 /// Bytes of the fixed header.
-pub const HEADER_BYTES: usize = 112;
+pub const HEADER_BYTES: usize = 124;
 /// Bytes of one directory entry.
 pub(super) const ENTRY_BYTES: usize = 32;
-const MAJOR: u16 = 0;
-const MINOR: u16 = 0;
+/// Largest basis: as many functions as any window of up to 31 elements can tell apart.
+pub(super) const MAX_RANK: u16 = 1024;
 
 /// The fixed header, checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +31,11 @@ pub struct Header {
     /// Length of the metadata.
     pub metadata_bytes: u32,
     pub(super) metadata_crc: u32,
+    /// Functions in the basis of factored tiles; 0 for none.
+    pub rank: u16,
+    /// Length of the basis, compressed.
+    pub basis_bytes: u32,
+    pub(super) basis_crc: u32,
     pub(super) directory_crc: u32,
 }
 
@@ -32,12 +44,48 @@ pub struct Header {
 pub struct TileEntry {
     /// Offset in the file.
     pub offset: u64,
-    /// Compressed bytes; 0 for a tile that is all dark.
+    /// Compressed bytes.
     pub bytes: u32,
     /// crc32c of the compressed bytes.
     pub crc: u32,
     /// Value of one code, per channel.
     pub step: [f32; CHANNELS],
+    /// What the bytes are.
+    pub kind: TileKind,
+}
+
+/// What a tile holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TileKind {
+    /// Nothing: no light comes from it, whatever the light.
+    Dark,
+    /// Every element of every pixel's window.
+    Direct,
+    /// Coefficients over the file's basis.
+    Factored {
+        /// How many of the basis's functions are used: the first so many.
+        components: u16,
+    },
+}
+
+impl TileKind {
+    /// As in the directory: kind, then components.
+    fn encode(self) -> [u16; 2] {
+        match self {
+            Self::Dark => [0, 0],
+            Self::Direct => [1, 0],
+            Self::Factored { components } => [2, components],
+        }
+    }
+
+    fn decode(fields: [u16; 2]) -> Option<Self> {
+        match fields {
+            [0, 0] => Some(Self::Dark),
+            [1, 0] => Some(Self::Direct),
+            [2, components] if components > 0 => Some(Self::Factored { components }),
+            _ => None,
+        }
+    }
 }
 
 impl Header {
@@ -48,7 +96,10 @@ impl Header {
 
     /// Offset of the first tile: what comes before it opens the file.
     pub fn tiles_offset(&self) -> u64 {
-        HEADER_BYTES as u64 + self.directory_bytes() + u64::from(self.metadata_bytes)
+        HEADER_BYTES as u64
+            + self.directory_bytes()
+            + u64::from(self.metadata_bytes)
+            + u64::from(self.basis_bytes)
     }
 
     pub(super) fn encode(&self) -> [u8; HEADER_BYTES] {
@@ -73,6 +124,9 @@ impl Header {
         out.extend(self.file_bytes.to_le_bytes());
         out.extend(self.metadata_bytes.to_le_bytes());
         out.extend(self.metadata_crc.to_le_bytes());
+        out.extend(u32::from(self.rank).to_le_bytes());
+        out.extend(self.basis_bytes.to_le_bytes());
+        out.extend(self.basis_crc.to_le_bytes());
         out.extend(self.directory_crc.to_le_bytes());
         out.extend(crc32c::crc32c(&out).to_le_bytes());
         let mut header = [0; HEADER_BYTES];
@@ -84,7 +138,7 @@ impl Header {
         check_magic(bytes)?;
         let mut fields = Fields(&bytes[MAGIC.len()..]);
         let (major, minor) = (fields.u16(), fields.u16());
-        if major != MAJOR {
+        if (major, minor) != (MAJOR, MINOR) {
             return Err(FormatError::Version { major, minor });
         }
         let camera = Extent {
@@ -101,10 +155,16 @@ impl Header {
             *a = fields.f64();
         }
         let (file_bytes, metadata_bytes) = (fields.u64(), fields.u32());
-        let (metadata_crc, directory_crc) = (fields.u32(), fields.u32());
+        let metadata_crc = fields.u32();
+        let (rank, basis_bytes, basis_crc) = (fields.u32(), fields.u32(), fields.u32());
+        let directory_crc = fields.u32();
         if fields.u32() != crc32c::crc32c(&bytes[..HEADER_BYTES - 4]) {
             return Err(FormatError::Checksum { part: Part::Header });
         }
+        let rank = u16::try_from(rank)
+            .ok()
+            .filter(|rank| *rank <= MAX_RANK)
+            .ok_or(FormatError::Rank(rank.into()))?;
         let header = Self {
             geometry: Geometry {
                 camera,
@@ -117,10 +177,20 @@ impl Header {
             file_bytes,
             metadata_bytes,
             metadata_crc,
+            rank,
+            basis_bytes,
+            basis_crc,
             directory_crc,
         };
         if metadata_bytes > MAX_METADATA_BYTES {
             return Err(FormatError::MetadataLength(metadata_bytes.into()));
+        }
+        let plain = basis::plain_bytes(rank, header.geometry.window.area()) as u64;
+        if !could_hold(basis_bytes, plain) {
+            return Err(FormatError::BasisLength {
+                rank,
+                bytes: basis_bytes,
+            });
         }
         if file_bytes < header.tiles_offset() {
             return Err(FormatError::Truncated {
@@ -132,8 +202,25 @@ impl Header {
     }
 }
 
-/// Tells a wrong file from a damaged one from the first bytes, however few.
+/// Whether so many compressed bytes can be what `plain` bytes became: none are none.
+fn could_hold(compressed: u32, plain: u64) -> bool {
+    match plain {
+        0 => compressed == 0,
+        _ => compressed > 0 && u64::from(compressed) <= compressed_bound(plain),
+    }
+}
+
+/// Tells a wrong file from a damaged one, and from one of another version, from the first bytes,
+/// however few.
 pub(super) fn check_magic(bytes: &[u8]) -> Result<(), FormatError> {
+    let name = MAGIC_VERSION.start;
+    if let Some(digits @ &[b'0'..=b'9', b'0'..=b'9']) = bytes.get(MAGIC_VERSION)
+        && bytes[..name] == MAGIC[..name]
+        && digits != &MAGIC[MAGIC_VERSION]
+    {
+        let [major, minor] = [digits[0], digits[1]].map(|digit| u16::from(digit - b'0'));
+        return Err(FormatError::Version { major, minor });
+    }
     match bytes.iter().zip(&MAGIC).position(|(a, b)| a != b) {
         None => Ok(()),
         // Past the name: only the line ends that are there to catch this.
@@ -153,16 +240,48 @@ impl TileEntry {
         for (at, s) in (16..).step_by(4).zip(self.step) {
             out[at..at + 4].copy_from_slice(&s.to_le_bytes());
         }
+        let [kind, components] = self.kind.encode();
+        out[28..30].copy_from_slice(&kind.to_le_bytes());
+        out[30..].copy_from_slice(&components.to_le_bytes());
         out
     }
 
-    fn decode(bytes: &[u8]) -> Self {
+    /// The entry of tile number `tile`, whose kind, step and length go together.
+    pub(super) fn decode(
+        bytes: &[u8; ENTRY_BYTES],
+        tile: usize,
+        geometry: &Geometry,
+        rank: u16,
+    ) -> Result<Self, FormatError> {
         let mut fields = Fields(bytes);
-        Self {
-            offset: fields.u64(),
-            bytes: fields.u32(),
-            crc: fields.u32(),
-            step: std::array::from_fn(|_| fields.f32()),
+        let (offset, bytes, crc) = (fields.u64(), fields.u32(), fields.u32());
+        let step = std::array::from_fn(|_| fields.f32());
+        let kind = TileKind::decode([fields.u16(), fields.u16()]);
+        let plain = |kind| {
+            let rect = geometry.tile(tile);
+            match kind {
+                TileKind::Dark => Some(0),
+                TileKind::Direct => Some(direct::plain_bytes(rect, geometry.window.area())),
+                TileKind::Factored { components } if components <= rank => {
+                    Some(factored::plain_bytes(rect, components))
+                }
+                TileKind::Factored { .. } => None,
+            }
+        };
+        match kind {
+            Some(kind)
+                if plain(kind).is_some_and(|plain| could_hold(bytes, plain as u64))
+                    && step.iter().all(|s: &f32| s.is_finite() && *s > 0.0) =>
+            {
+                Ok(Self {
+                    offset,
+                    bytes,
+                    crc,
+                    step,
+                    kind,
+                })
+            }
+            _ => Err(FormatError::Kind { tile }),
         }
     }
 }
@@ -181,12 +300,11 @@ pub(super) fn decode_directory(
     }
     let mut next = header.tiles_offset();
     let mut entries = Vec::with_capacity(bytes.len() / ENTRY_BYTES);
-    for (tile, bytes) in bytes.chunks_exact(ENTRY_BYTES).enumerate() {
-        let entry = TileEntry::decode(bytes);
-        let steps_ok = entry.step.iter().all(|s| s.is_finite() && *s > 0.0);
+    for (tile, bytes) in bytes.as_chunks().0.iter().enumerate() {
+        let entry = TileEntry::decode(bytes, tile, &header.geometry, header.rank)?;
         let end = entry.offset.checked_add(u64::from(entry.bytes));
         match end {
-            Some(end) if entry.offset == next && end <= header.file_bytes && steps_ok => next = end,
+            Some(end) if entry.offset == next && end <= header.file_bytes => next = end,
             _ => return Err(FormatError::Entry { tile }),
         }
         entries.push(entry);

@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use super::codec::TileError;
+use super::codec::{basis, direct, factored};
 use super::error::Part;
-use super::header::{self, HEADER_BYTES, Header, TileEntry};
-use super::{FormatError, Limits, Metadata, codec};
-use crate::transport::{DirectTile, Transport};
+use super::header::{self, HEADER_BYTES, Header, TileEntry, TileKind};
+use super::{FormatError, Limits, Metadata};
+use crate::transport::{Basis, DirectTile, Transport};
 
 /// An incremental reader. [`wants`](Self::wants) says which bytes come next, [`feed`](Self::feed)
 /// takes them in pieces of any size; each tile is checked and decoded as soon as it is whole.
@@ -38,16 +38,18 @@ enum Stage {
     Header,
     Directory,
     Metadata,
+    Basis,
     Tile(usize),
     Done,
 }
 
-/// What is known once the directory and metadata have been read.
+/// What is known once the parts before the tiles have been read.
 #[derive(Debug)]
 struct Opened {
     header: Header,
     entries: Vec<TileEntry>,
     metadata: Metadata,
+    basis: Basis,
 }
 
 /// How far a file has been read.
@@ -155,6 +157,7 @@ impl Reader {
             (Stage::Header, _) => Some(HEADER_BYTES as u64),
             (Stage::Directory, Some(o)) => Some(o.header.directory_bytes()),
             (Stage::Metadata, Some(o)) => Some(u64::from(o.header.metadata_bytes)),
+            (Stage::Basis, Some(o)) => Some(u64::from(o.header.basis_bytes)),
             (Stage::Tile(i), Some(o)) => Some(u64::from(o.entries[i].bytes)),
             _ => None,
         }
@@ -174,11 +177,12 @@ impl Reader {
             let mut bytes = [0; HEADER_BYTES];
             bytes.copy_from_slice(part);
             let header = Header::decode(&bytes)?;
-            self.limits.check(&header.geometry)?;
+            self.limits.check(&header)?;
             self.opened = Some(Opened {
                 header,
                 entries: Vec::new(),
                 metadata: Metadata::default(),
+                basis: Basis::default(),
             });
             return Ok(Stage::Directory);
         };
@@ -188,31 +192,21 @@ impl Reader {
                 Ok(Stage::Metadata)
             }
             Stage::Metadata => {
-                if crc32c::crc32c(part) != opened.header.metadata_crc {
-                    return Err(FormatError::Checksum {
-                        part: Part::Metadata,
-                    });
-                }
+                check(part, opened.header.metadata_crc, Part::Metadata)?;
                 opened.metadata = serde_json::from_slice(part).map_err(FormatError::Metadata)?;
+                Ok(Stage::Basis)
+            }
+            Stage::Basis => {
+                let header = &opened.header;
+                if header.rank > 0 {
+                    check(part, header.basis_crc, Part::Basis)?;
+                    opened.basis = basis::decode(part, header.rank, header.geometry.window.area())
+                        .map_err(|e| e.of(Part::Basis))?;
+                }
                 Ok(Stage::Tile(0))
             }
             Stage::Tile(i) => {
-                let entry = &opened.entries[i];
-                if crc32c::crc32c(part) != entry.crc {
-                    return Err(FormatError::Checksum {
-                        part: Part::Tile(i),
-                    });
-                }
-                let geometry = &opened.header.geometry;
-                let area = geometry.window.area();
-                let tile = codec::decode(part, geometry.tile(i), area, entry.step);
-                self.tiles.push(tile.map_err(|error| match error {
-                    TileError::Damaged(reason) => FormatError::Decompress {
-                        part: Part::Tile(i),
-                        reason,
-                    },
-                    TileError::Memory(need) => FormatError::Memory { need },
-                })?);
+                self.tiles.push(opened.decode(i, part)?);
                 let next = i + 1;
                 Ok(if next < opened.entries.len() {
                     Stage::Tile(next)
@@ -222,5 +216,30 @@ impl Reader {
             }
             Stage::Done => Ok(Stage::Done),
         }
+    }
+}
+
+impl Opened {
+    /// Checks and decodes tile number `i`.
+    fn decode(&self, i: usize, bytes: &[u8]) -> Result<DirectTile, FormatError> {
+        let (entry, geometry) = (&self.entries[i], &self.header.geometry);
+        check(bytes, entry.crc, Part::Tile(i))?;
+        let (rect, step) = (geometry.tile(i), entry.step);
+        let tile = match entry.kind {
+            TileKind::Dark => Ok(DirectTile::dark(rect)),
+            TileKind::Direct => direct::decode(bytes, rect, geometry.window.area(), step),
+            TileKind::Factored { components } => {
+                factored::decode(bytes, rect, components, self.basis.rank(), step)
+                    .and_then(|tile| factored::multiply_out(&tile, geometry, &self.basis))
+            }
+        };
+        tile.map_err(|e| e.of(Part::Tile(i)))
+    }
+}
+
+fn check(bytes: &[u8], crc: u32, part: Part) -> Result<(), FormatError> {
+    match crc32c::crc32c(bytes) == crc {
+        true => Ok(()),
+        false => Err(FormatError::Checksum { part }),
     }
 }

@@ -1,114 +1,332 @@
 //! The equations that all pixels with the same window share.
 
 use super::CommonMode;
+use super::vector::{add_scaled, dot, vectorised};
 use crate::capture::Pattern;
 use crate::transport::{Element, Extent, Window};
 
-/// Patterns as one window sees them through one channel: centred over patterns, with the weighted
-/// mean row kept apart, and their Gram matrix. Elements off the display are left out.
-#[derive(Debug)]
-pub(super) struct Design {
-    /// Window slots (row · side + column) of the `k` elements on the display.
-    pub slots: Vec<usize>,
-    /// Centred patterns `[k, rows]`, each element's emissions over the patterns in one run.
-    centred: Vec<f64>,
-    rows: usize,
-    /// Mean emission over patterns, `[k]`.
-    mean: Vec<f64>,
-    /// Weight of the squared mean row, L·ω².
-    mean_weight: f64,
-    /// `[k, k]`.
-    pub gram: Vec<f64>,
+/// A rectangle of light elements, all on the display.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Region {
+    u: usize,
+    v: usize,
+    width: usize,
+    height: usize,
 }
 
-impl Design {
-    /// The equations for the window that starts at `origin`, from the patterns numbered `rows`.
+impl Region {
+    /// What of the windows that start between two origins lies on the display.
+    fn of_windows(first: Element, last: Element, window: Window, light: Extent) -> Self {
+        let clip = |first: i32, last: i32, length: u32| {
+            let length = i64::from(length);
+            let start = i64::from(first).clamp(0, length);
+            let end = (i64::from(last) + i64::from(window.side())).clamp(start, length);
+            (start as usize, (end - start) as usize)
+        };
+        let (u, width) = clip(first.u, last.u, light.width);
+        let (v, height) = clip(first.v, last.v, light.height);
+        Self {
+            u,
+            v,
+            width,
+            height,
+        }
+    }
+
+    fn area(self) -> usize {
+        self.width * self.height
+    }
+
+    /// Number in this region of the element in column `u` and row `v` of `inner`, which lies in it.
+    fn index(self, inner: Self, u: usize, v: usize) -> usize {
+        (inner.v + v - self.v) * self.width + inner.u + u - self.u
+    }
+}
+
+/// A part of the display under some of the patterns, as one channel sees it, with what the windows
+/// in it share.
+#[derive(Debug)]
+pub(super) struct Patch {
+    light: Extent,
+    window: Window,
+    region: Region,
+    rows: usize,
+    /// `[element, pattern]`.
+    emissions: Vec<f64>,
+    /// Mean emission over the patterns, `[element]`.
+    mean: Vec<f64>,
+    /// Correlations with the neighbours, `G[m, m + δ]`, as `[element, δv, δu]`, each δ from
+    /// `-(w − 1)` to `w − 1`; empty where few windows are to share them.
+    correlations: Vec<f64>,
+}
+
+/// Largest table of correlations: what one thread may have in memory of them.
+const MOST_TABLE_BYTES: usize = 64 << 20;
+
+impl Patch {
+    /// The part of the display that `windows` windows see, all of them starting between the origins
+    /// `first` and `last`, under the patterns numbered `rows`.
     pub fn new(
         patterns: &[Pattern],
         rows: &[usize],
         channel: usize,
         light: Extent,
         window: Window,
-        origin: Element,
-        common_mode: CommonMode,
+        [first, last]: [Element; 2],
+        windows: usize,
     ) -> Self {
-        let (slots, elements): (Vec<usize>, Vec<usize>) = (0..window.area())
-            .filter_map(|slot| {
-                let m = window.element(origin, slot).index_in(light)?;
-                Some((slot, m))
-            })
-            .unzip();
-        let (k, l) = (slots.len(), rows.len());
-        let mut centred = vec![0.0; k * l];
-        let mut mean = vec![0.0; k];
+        let region = Region::of_windows(first, last, window, light);
+        let l = rows.len();
+        let mut emissions = vec![0.0; region.area() * l];
         for (i, &row) in rows.iter().enumerate() {
             let plane = patterns[row].plane(channel);
-            for (j, &m) in elements.iter().enumerate() {
-                centred[j * l + i] = f64::from(plane[m]);
+            for v in 0..region.height {
+                let start = (region.v + v) * light.width as usize + region.u;
+                for (u, &p) in plane[start..start + region.width].iter().enumerate() {
+                    emissions[(v * region.width + u) * l + i] = f64::from(p);
+                }
             }
         }
-        for (emissions, mean) in centred.chunks_exact_mut(l.max(1)).zip(&mut mean) {
-            *mean = emissions.iter().sum::<f64>() / l as f64;
-            emissions.iter_mut().for_each(|e| *e -= *mean);
-        }
-        let mut design = Self {
-            slots,
-            centred,
+        let mean = emissions.chunks_exact(l.max(1));
+        let mut patch = Self {
+            light,
+            window,
+            region,
             rows: l,
-            mean,
-            mean_weight: l as f64 * common_mode.weight().powi(2),
-            gram: Vec::new(),
+            mean: mean.map(|e| e.iter().sum::<f64>() / l as f64).collect(),
+            emissions,
+            correlations: Vec::new(),
         };
-        design.gram = design.gram();
+        // The table has a dot product for each pair of elements that any window could hold, a Gram
+        // matrix of its own one for each pair that its window does hold.
+        let entries = region.area() * patch.reach().pow(2);
+        if entries * size_of::<f64>() <= MOST_TABLE_BYTES
+            && entries < windows * window.area().pow(2)
+        {
+            patch.correlations = vectorised(
+                #[inline(always)]
+                || patch.correlate(),
+            );
+        }
+        patch
+    }
+
+    /// Number of offsets along an axis between two elements of a window.
+    fn reach(&self) -> usize {
+        2 * self.window.side() as usize - 1
+    }
+
+    /// Emissions of the region's element `m`.
+    #[inline(always)]
+    fn emission(&self, m: usize) -> &[f64] {
+        &self.emissions[m * self.rows..(m + 1) * self.rows]
+    }
+
+    #[inline(always)]
+    fn correlate(&self) -> Vec<f64> {
+        let (region, reach) = (self.region, self.reach());
+        let most = self.window.side() as usize - 1;
+        let mut table = vec![0.0; region.area() * reach * reach];
+        for v in 0..region.height {
+            for u in 0..region.width {
+                let m = v * region.width + u;
+                let here = self.emission(m);
+                for below in v..region.height.min(v + most + 1) {
+                    let first = if below == v {
+                        u
+                    } else {
+                        u.saturating_sub(most)
+                    };
+                    for beside in first..region.width.min(u + most + 1) {
+                        let n = below * region.width + beside;
+                        let value = dot(here, self.emission(n));
+                        // δ seen from m, and −δ from n.
+                        let (dv, du) = (below - v, beside + most - u);
+                        table[(m * reach + most + dv) * reach + du] = value;
+                        table[(n * reach + most - dv) * reach + 2 * most - du] = value;
+                    }
+                }
+            }
+        }
+        table
+    }
+
+    /// The equations of the window that starts at `origin`, from all of the patch's patterns but
+    /// those at `dropped`, places among its rows.
+    pub fn design(&self, origin: Element, common_mode: CommonMode, dropped: &[usize]) -> Design {
+        let here = Region::of_windows(origin, origin, self.window, self.light);
+        let elements: Vec<usize> = (0..here.area())
+            .map(|i| self.region.index(here, i % here.width, i / here.width))
+            .collect();
+        let side = self.window.side() as usize;
+        // Columns and rows of the window that lie off the display before its first element.
+        let (left, above) = (
+            (here.u as i64 - i64::from(origin.u)) as usize,
+            (here.v as i64 - i64::from(origin.v)) as usize,
+        );
+        let slots = (0..here.area())
+            .map(|i| (above + i / here.width) * side + left + i % here.width)
+            .collect();
+        let (k, l) = (elements.len(), self.rows - dropped.len());
+        let mut design = Design {
+            slots,
+            emissions: Vec::with_capacity(k * l),
+            rows: l,
+            mean: Vec::with_capacity(k),
+            common_mode,
+            gram: vec![0.0; k * k],
+        };
+        for &m in &elements {
+            let start = design.emissions.len();
+            let all = self.emission(m).iter().enumerate();
+            design
+                .emissions
+                .extend(all.filter(|(i, _)| !dropped.contains(i)).map(|(_, e)| e));
+            let mean = match dropped.is_empty() {
+                true => self.mean[m],
+                false => design.emissions[start..].iter().sum::<f64>() / l as f64,
+            };
+            design.mean.push(mean);
+        }
+        vectorised(
+            #[inline(always)]
+            || {
+                match self.correlations.is_empty() {
+                    true => design.multiply_out(),
+                    false => self.look_up(here, &elements, dropped, &mut design.gram),
+                }
+                design.weigh_common_mode();
+            },
+        );
         design
     }
 
+    /// The Gram matrix of the elements `here` from the table, less what `dropped` rows add to it.
+    #[inline(always)]
+    fn look_up(&self, here: Region, elements: &[usize], dropped: &[usize], gram: &mut [f64]) {
+        let (k, reach, most) = (
+            elements.len(),
+            self.reach(),
+            self.window.side() as usize - 1,
+        );
+        for (i, row) in gram.chunks_exact_mut(k.max(1)).enumerate() {
+            let (u, v) = (i % here.width, i / here.width);
+            for (to, row) in row.chunks_exact_mut(here.width.max(1)).enumerate() {
+                let start = (elements[i] * reach + most + to - v) * reach + most - u;
+                row.copy_from_slice(&self.correlations[start..start + here.width]);
+            }
+        }
+        for &r in dropped {
+            let of: Vec<f64> = elements.iter().map(|&m| self.emission(m)[r]).collect();
+            for (i, row) in gram.chunks_exact_mut(k.max(1)).enumerate() {
+                for (g, e) in row.iter_mut().zip(&of) {
+                    *g -= of[i] * e;
+                }
+            }
+        }
+    }
+}
+
+/// Patterns as one window sees them through one channel, `P̂`, with their common mode weighted: the
+/// equations are `Wy = WP̂τ`, where `W = I − (1 − ω) 11ᵀ/L` leaves alone what differs between
+/// patterns and scales their mean by ω. Elements off the display are left out.
+#[derive(Debug)]
+pub(super) struct Design {
+    /// Window slots (row · side + column) of the `k` elements on the display.
+    pub slots: Vec<usize>,
+    /// `P̂ᵀ`, `[k, rows]`: each element's emissions over the patterns in one run.
+    emissions: Vec<f64>,
+    rows: usize,
+    /// Mean emission over patterns, `[k]`.
+    mean: Vec<f64>,
+    common_mode: CommonMode,
+    /// `(WP̂)ᵀ(WP̂)`, `[k, k]`.
+    pub gram: Vec<f64>,
+}
+
+impl Design {
     /// Number of unknowns.
     pub fn unknowns(&self) -> usize {
         self.slots.len()
     }
 
-    /// `Aᵀb` for measurements `y`, one for each of the design's patterns.
-    pub fn right_hand_side(&self, y: &[f64]) -> Vec<f64> {
-        let mean_y = y.iter().sum::<f64>() / y.len() as f64;
-        // Centred columns sum to zero, so y need not be centred.
-        let emissions = self.centred.chunks_exact(self.rows.max(1));
-        emissions
-            .zip(&self.mean)
-            .map(|(e, mean)| dot(e, y) + self.mean_weight * mean * mean_y)
-            .collect()
+    /// Number of equations, `L`.
+    pub fn rows(&self) -> usize {
+        self.rows
     }
 
-    fn gram(&self) -> Vec<f64> {
+    /// Turns measurements, one for each of the design's patterns, into `Wy`.
+    pub fn weigh(&self, mut y: Vec<f64>) -> Vec<f64> {
+        let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
+        let less = (1.0 - self.common_mode.weight()) * mean;
+        y.iter_mut().for_each(|y| *y -= less);
+        y
+    }
+
+    /// `‖Wy − WP̂x‖²` for weighted measurements `Wy`.
+    pub fn squared_residual(&self, weighted_y: &[f64], x: &[f64]) -> f64 {
+        let mut difference = weighted_y.to_vec();
+        let columns = self.emissions.chunks_exact(self.rows.max(1));
+        let mut weighted_mean = 0.0;
+        for ((column, mean), &x) in columns.zip(&self.mean).zip(x).filter(|(_, x)| **x != 0.0) {
+            add_scaled(&mut difference, -x, column);
+            weighted_mean += (1.0 - self.common_mode.weight()) * mean * x;
+        }
+        difference.iter().map(|d| (d + weighted_mean).powi(2)).sum()
+    }
+
+    /// `(WP̂)ᵀ`, `[k, rows]`.
+    pub fn weighted(&self) -> Vec<f64> {
+        let mut all = self.emissions.clone();
+        for (column, mean) in all.chunks_exact_mut(self.rows.max(1)).zip(&self.mean) {
+            let less = (1.0 - self.common_mode.weight()) * mean;
+            column.iter_mut().for_each(|e| *e -= less);
+        }
+        all
+    }
+
+    /// `(WP̂)ᵀ Wy` for weighted measurements `Wy`.
+    pub fn right_hand_side(&self, weighted_y: &[f64]) -> Vec<f64> {
+        // Of (WP̂)ᵀ = P̂ᵀ − (1 − ω) p̄1ᵀ the second part only meets the sum of Wy.
+        let less = (1.0 - self.common_mode.weight()) * weighted_y.iter().sum::<f64>();
+        vectorised(
+            #[inline(always)]
+            || {
+                let columns = self.emissions.chunks_exact(self.rows.max(1));
+                columns
+                    .zip(&self.mean)
+                    .map(|(e, mean)| dot(e, weighted_y) - less * mean)
+                    .collect()
+            },
+        )
+    }
+
+    #[inline(always)]
+    fn multiply_out(&mut self) {
         let (k, l) = (self.unknowns(), self.rows);
-        let mut gram = vec![0.0; k * k];
         for i in 0..k {
-            let a = &self.centred[i * l..(i + 1) * l];
+            let a = &self.emissions[i * l..(i + 1) * l];
             for j in 0..=i {
-                let b = &self.centred[j * l..(j + 1) * l];
-                let value = dot(a, b) + self.mean_weight * self.mean[i] * self.mean[j];
-                gram[i * k + j] = value;
-                gram[j * k + i] = value;
+                let value = dot(a, &self.emissions[j * l..(j + 1) * l]);
+                self.gram[i * k + j] = value;
+                self.gram[j * k + i] = value;
             }
         }
-        gram
     }
-}
 
-/// Dot product in four lanes, which the compiler turns into vectors.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0f64; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4
-        .remainder()
-        .iter()
-        .zip(b4.remainder())
-        .map(|(a, b)| a * b)
-        .sum();
-    for (a, b) in a4.zip(b4) {
-        for lane in 0..4 {
-            lanes[lane] += a[lane] * b[lane];
+    /// `P̂ᵀP̂` to `P̂ᵀW²P̂ = P̂ᵀP̂ − (1 − ω²) L p̄p̄ᵀ`.
+    #[inline(always)]
+    fn weigh_common_mode(&mut self) {
+        let factor = (1.0 - self.common_mode.weight().powi(2)) * self.rows as f64;
+        if factor == 0.0 {
+            return;
+        }
+        let rows = self.gram.chunks_exact_mut(self.mean.len().max(1));
+        for (row, mean) in rows.zip(&self.mean) {
+            let scaled = factor * mean;
+            for (g, mean) in row.iter_mut().zip(&self.mean) {
+                *g -= scaled * mean;
+            }
         }
     }
-    lanes.iter().sum::<f64>() + rest
 }

@@ -2,35 +2,99 @@
 
 use std::collections::BTreeMap;
 
-use super::design::Design;
-use super::{CommonMode, FEWEST_PATTERNS, Nnls, RecoverError};
+use super::bpdn::{Constraint, Homotopy, SparsityBasis, Splitting, Tolerance};
+use super::design::{Design, Patch};
+use super::{CommonMode, FEWEST_PATTERNS, Nnls, RecoverError, Workers};
 use crate::capture::Measurements;
 use crate::transport::{
-    CameraPx, Decibels, Element, Geometry, TileRect, TransportError, TransportFunctions,
+    CHANNELS, CameraPx, Decibels, Element, Geometry, TileRect, TransportError, TransportFunctions,
 };
 
-/// Every how many patterns one is held out while the common mode's weight is chosen.
+/// Every how many patterns one is held out while the settings below are chosen.
 const HOLD_OUT_EVERY: usize = 10;
-/// Windows the choice is made on, spread over the picture: enough that pixels tell candidates apart
-/// by hundredths of a decibel, few enough to cost a second.
-const SAMPLE_WINDOWS: usize = 48;
+/// Windows the choice is made on, spread over the picture, and pixels of each: enough that they tell
+/// candidates apart by hundredths of a decibel, few enough to cost seconds.
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    windows: usize,
+    pixels: usize,
+}
+
+/// For least squares every pixel costs as much as the next, so that all may be far apart.
+const SCATTERED: Sample = Sample {
+    windows: 48,
+    pixels: 1,
+};
+/// Denoising solves for all pixels of a window at about the cost of one.
+const GATHERED: Sample = Sample {
+    windows: 16,
+    pixels: 4,
+};
+
+/// Windows whose origins fall in the same square of this side share their pattern correlations: a
+/// default tile's at two camera pixels an element.
+const BLOCK: i32 = 16;
+
+/// What is solved for each pixel and channel of a window.
+#[derive(Clone, Copy, Debug)]
+enum Problem {
+    LeastSquares,
+    Denoising(SparsityBasis, Tolerance),
+}
 
 /// A solver of single windows, with what it chose on patterns held out.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Direct {
     geometry: Geometry,
     common_mode: CommonMode,
+    problem: Problem,
+}
+
+/// A pixel of a window, with its number among the caller's.
+type Numbered = (usize, CameraPx);
+
+/// What a pixel and channel saw under the patterns of a design.
+struct Seen {
+    pixel: usize,
+    channel: usize,
+    y: Vec<f64>,
 }
 
 impl Direct {
-    /// Chooses how far the common mode is trusted, on patterns held out.
-    pub fn new(measurements: &Measurements, geometry: Geometry) -> Result<Self, RecoverError> {
-        let mut direct = Self {
-            geometry,
-            common_mode: CommonMode::FULL,
-        };
-        direct.common_mode = direct.choose_common_mode(measurements)?;
-        Ok(direct)
+    /// Non-negative least squares: chooses how far the common mode is trusted.
+    pub fn least_squares(
+        measurements: &Measurements,
+        geometry: Geometry,
+        workers: &impl Workers,
+    ) -> Result<Self, RecoverError> {
+        let trial = HeldOut::new(measurements, geometry, SCATTERED)?;
+        Ok(trial.choose(
+            CommonMode::CANDIDATES.map(|common_mode| Self {
+                geometry,
+                common_mode,
+                problem: Problem::LeastSquares,
+            }),
+            workers,
+        ))
+    }
+
+    /// Basis pursuit denoising: chooses, as well, how near to the measurements to stay.
+    pub fn denoising(
+        measurements: &Measurements,
+        geometry: Geometry,
+        basis: SparsityBasis,
+        workers: &impl Workers,
+    ) -> Result<Self, RecoverError> {
+        let least_squares = Self::least_squares(measurements, geometry, workers)?;
+        let noise = HeldOut::new(measurements, geometry, SCATTERED)?.noise(&least_squares, workers);
+        let trial = HeldOut::new(measurements, geometry, GATHERED)?;
+        Ok(trial.choose(
+            Tolerance::SHARES.map(|share| Self {
+                problem: Problem::Denoising(basis, Tolerance { share, ..noise }),
+                ..least_squares
+            }),
+            workers,
+        ))
     }
 
     /// The weight chosen for the common mode.
@@ -40,161 +104,335 @@ impl Direct {
 
     /// Recovers the light transport functions of one tile.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> TransportFunctions {
+        let rows: Vec<usize> = (0..measurements.patterns.len()).collect();
+        self.tile_from(measurements, &rows, rect)
+    }
+
+    /// Squared error of predicting the patterns numbered `held` in one tile from those in `rows`.
+    pub fn held_out_error(
+        &self,
+        measurements: &Measurements,
+        rows: &[usize],
+        held: &[usize],
+        rect: TileRect,
+    ) -> f64 {
+        let functions = self.tile_from(measurements, rows, rect);
+        let (area, light) = (self.geometry.window.area(), self.geometry.light);
+        let mut error = 0.0;
+        for (p, pixel) in rect.pixels().enumerate() {
+            let origin = self.geometry.window_origin(pixel);
+            let tau = &functions.tau[p * area..(p + 1) * area];
+            for &l in held {
+                let mut y = [0.0; CHANNELS];
+                for (slot, tau) in tau.iter().enumerate() {
+                    let element = self.geometry.window.element(origin, slot);
+                    if let Some(m) = element.index_in(light) {
+                        for c in 0..CHANNELS {
+                            y[c] += f64::from(measurements.patterns[l].plane(c)[m] * tau[c]);
+                        }
+                    }
+                }
+                for c in 0..CHANNELS {
+                    let miss = measurements.sample(l, pixel, c) - y[c];
+                    if miss.is_finite() {
+                        error += miss * miss;
+                    }
+                }
+            }
+        }
+        error
+    }
+
+    fn tile_from(
+        &self,
+        measurements: &Measurements,
+        rows: &[usize],
+        rect: TileRect,
+    ) -> TransportFunctions {
         let area = self.geometry.window.area();
         let mut functions = TransportFunctions::zeros(rect, area);
-        let rows: Vec<usize> = (0..measurements.patterns.len()).collect();
-        for (origin, pixels) in self.windows(rect) {
-            self.window(
-                measurements,
-                origin,
-                &pixels,
-                &rows,
-                self.common_mode,
-                |p, c, slots, x| {
-                    for (&slot, &x) in slots.iter().zip(x) {
-                        functions.tau[p * area + slot][c] = x as f32;
-                    }
-                },
-            );
+        let mut blocks: BTreeMap<_, BTreeMap<_, _>> = BTreeMap::new();
+        for (origin, pixels) in windows(&self.geometry, rect) {
+            let block = (origin.v.div_euclid(BLOCK), origin.u.div_euclid(BLOCK));
+            blocks.entry(block).or_default().insert(origin, pixels);
+        }
+        for windows in blocks.values() {
+            self.block(measurements, windows, rows, |_, pixel, c, slots, x| {
+                for (&slot, &x) in slots.iter().zip(x) {
+                    functions.tau[pixel * area + slot][c] = x as f32;
+                }
+            });
         }
         functions
     }
 
-    /// All pixels of a tile by their common window: (number in the tile, pixel).
-    fn windows(&self, rect: TileRect) -> BTreeMap<Element, Vec<(usize, CameraPx)>> {
-        let mut windows: BTreeMap<_, Vec<_>> = BTreeMap::new();
-        for (p, pixel) in rect.pixels().enumerate() {
-            let origin = self.geometry.window_origin(pixel);
-            windows.entry(origin).or_default().push((p, pixel));
-        }
-        windows
-    }
-
-    /// Solves for all pixels of one window from the patterns numbered `rows`; `take` gets each
-    /// pixel's number, channel, and solution on the window slots.
-    fn window(
+    /// Solves for all pixels of neighbouring windows from the patterns numbered `rows`; `take` gets
+    /// each one's window, pixel number, channel, and solution on the window slots.
+    fn block(
         &self,
         measurements: &Measurements,
-        origin: Element,
-        pixels: &[(usize, CameraPx)],
+        windows: &BTreeMap<Element, Vec<Numbered>>,
         rows: &[usize],
-        common_mode: CommonMode,
-        mut take: impl FnMut(usize, usize, &[usize], &[f64]),
+        mut take: impl FnMut(Element, usize, usize, &[usize], &[f64]),
     ) {
-        let design = |rows: &[usize], channel| {
-            Design::new(
-                &measurements.patterns,
-                rows,
-                channel,
-                self.geometry.light,
-                self.geometry.window,
-                origin,
-                common_mode,
-            )
+        let Some(mut corners) = windows.keys().next().map(|&first| [first, first]) else {
+            return;
         };
-        // Grey patterns drive all channels alike: one design for all of them.
+        for origin in windows.keys() {
+            corners[0].u = corners[0].u.min(origin.u);
+            corners[1].u = corners[1].u.max(origin.u);
+            corners[1].v = corners[1].v.max(origin.v);
+        }
+        // Grey patterns drive all channels alike: one set of equations for all of them.
         let groups: &[&[usize]] = match measurements.grey() {
             true => &[&[0, 1, 2]],
             false => &[&[0], &[1], &[2]],
         };
         for channels in groups {
-            let shared = design(rows, channels[0]);
-            let mut solver = Nnls::new(&shared.gram, shared.unknowns());
-            for &(p, pixel) in pixels {
-                for &c in *channels {
-                    let usable: Vec<usize> = rows
-                        .iter()
-                        .copied()
-                        .filter(|&l| measurements.sample(l, pixel, c).is_finite())
-                        .collect();
-                    if usable.len() == rows.len() || usable.len() < FEWEST_PATTERNS {
-                        // Of a pixel saturated nearly always, all that is known is that it is at
-                        // least white: it is shown so, not black.
-                        let y: Vec<f64> = rows
-                            .iter()
-                            .map(|&l| match measurements.sample(l, pixel, c) {
-                                y if y.is_finite() => y,
-                                _ => f64::from(measurements.full_scale[l]),
-                            })
-                            .collect();
-                        let x = solver.solve(&shared.right_hand_side(&y));
-                        take(p, c, &shared.slots, &x);
-                    } else {
-                        // Saturated samples drop out, and with them the shared equations.
-                        let own = design(&usable, c);
-                        let y: Vec<f64> = usable
-                            .iter()
-                            .map(|&l| measurements.sample(l, pixel, c))
-                            .collect();
-                        let x =
-                            Nnls::new(&own.gram, own.unknowns()).solve(&own.right_hand_side(&y));
-                        take(p, c, &own.slots, &x);
-                    }
+            let patch = Patch::new(
+                &measurements.patterns,
+                rows,
+                channels[0],
+                self.geometry.light,
+                self.geometry.window,
+                corners,
+                windows.len(),
+            );
+            for (&origin, pixels) in windows {
+                self.window(
+                    measurements,
+                    &patch,
+                    origin,
+                    (pixels, channels),
+                    rows,
+                    |pixel, c, slots, x| take(origin, pixel, c, slots, x),
+                );
+            }
+        }
+    }
+
+    /// Solves for the pixels and channels of one window.
+    fn window(
+        &self,
+        measurements: &Measurements,
+        patch: &Patch,
+        origin: Element,
+        (pixels, channels): (&[Numbered], &[usize]),
+        rows: &[usize],
+        mut take: impl FnMut(usize, usize, &[usize], &[f64]),
+    ) {
+        let mut whole = Vec::with_capacity(pixels.len() * channels.len());
+        for &(pixel, at) in pixels {
+            for &channel in channels {
+                let mut y: Vec<f64> = rows
+                    .iter()
+                    .map(|&l| measurements.sample(l, at, channel))
+                    .collect();
+                let saturated: Vec<usize> = (0..y.len()).filter(|&i| !y[i].is_finite()).collect();
+                if !saturated.is_empty() && rows.len() - saturated.len() >= FEWEST_PATTERNS {
+                    // Saturated samples drop out, and with them the shared equations.
+                    y.retain(|y| y.is_finite());
+                    let own = patch.design(origin, self.common_mode, &saturated);
+                    self.solve(&own, vec![Seen { pixel, channel, y }], |pixel, c, x, _| {
+                        take(pixel, c, &own.slots, x)
+                    });
+                    continue;
+                }
+                // Of a pixel saturated nearly always, all that is known is that it is at least
+                // white: it is shown so, not black.
+                for i in saturated {
+                    y[i] = f64::from(measurements.full_scale[rows[i]]);
+                }
+                whole.push(Seen { pixel, channel, y });
+            }
+        }
+        if !whole.is_empty() {
+            let shared = patch.design(origin, self.common_mode, &[]);
+            self.solve(&shared, whole, |pixel, c, x, _| {
+                take(pixel, c, &shared.slots, x);
+            });
+        }
+    }
+
+    /// Solves for all that was seen through one design; `take` gets pixel, channel, solution, and
+    /// the unweighted mean and least-squares noise variance of its measurements, where that is known.
+    fn solve(
+        &self,
+        design: &Design,
+        seen: Vec<Seen>,
+        mut take: impl FnMut(usize, usize, &[f64], Option<(f64, f64)>),
+    ) {
+        let mut nnls = Nnls::new(&design.gram, design.unknowns());
+        match self.problem {
+            Problem::LeastSquares => {
+                for Seen { pixel, channel, y } in seen {
+                    let (mean, y) = (mean(&y), design.weigh(y));
+                    let h = design.right_hand_side(&y);
+                    let x = nnls.solve(&h);
+                    let spare = design.rows() as f64 - nnls.degrees_of_freedom() as f64;
+                    let residual = design.squared_residual(&y, &x);
+                    let noise = (spare >= 1.0).then(|| (mean, residual / spare));
+                    take(pixel, channel, &x, noise);
+                }
+            }
+            Problem::Denoising(SparsityBasis::Identity, tolerance) => {
+                let mut homotopy = Homotopy::new(&design.gram, design.unknowns());
+                for Seen { pixel, channel, y } in seen {
+                    let epsilon = tolerance.epsilon(y.len(), mean(&y));
+                    let y = design.weigh(y);
+                    let energy = y.iter().map(|y| y * y).sum();
+                    let x = homotopy.solve(&design.right_hand_side(&y), energy, epsilon);
+                    take(pixel, channel, &x, None);
+                }
+            }
+            Problem::Denoising(basis, tolerance) => {
+                let splitting = Splitting::new(
+                    basis,
+                    &design.weighted(),
+                    design.rows(),
+                    &design.slots,
+                    self.geometry.window.side() as usize,
+                );
+                let prepared: Vec<_> = seen
+                    .into_iter()
+                    .map(|Seen { pixel, channel, y }| {
+                        let epsilon = tolerance.epsilon(y.len(), mean(&y));
+                        let y = design.weigh(y);
+                        let least_squares = nnls.solve(&design.right_hand_side(&y));
+                        (pixel, channel, y, epsilon, least_squares)
+                    })
+                    .collect();
+                let constraints: Vec<_> = prepared
+                    .iter()
+                    .map(|(_, _, y, epsilon, least_squares)| Constraint {
+                        y,
+                        epsilon: *epsilon,
+                        least_squares,
+                    })
+                    .collect();
+                let solutions = splitting.solve(&constraints);
+                for ((pixel, channel, ..), solution) in prepared.iter().zip(&solutions) {
+                    take(*pixel, *channel, &solution.x, None);
                 }
             }
         }
     }
+}
 
-    /// Tries every candidate on a spread of windows and keeps the one that predicts held-out
-    /// patterns best.
-    fn choose_common_mode(&self, measurements: &Measurements) -> Result<CommonMode, RecoverError> {
-        let mut windows = BTreeMap::new();
-        for rect in self.geometry.tiles() {
-            let lit = self.windows(rect).into_iter();
-            for (origin, mut pixels) in lit.filter(|&(origin, _)| !self.dark(origin)) {
-                pixels.truncate(1); // One pixel a window is enough to choose by.
-                windows.insert(origin, pixels);
+fn mean(y: &[f64]) -> f64 {
+    y.iter().sum::<f64>() / y.len().max(1) as f64
+}
+
+/// All pixels of a tile by their common window.
+fn windows(geometry: &Geometry, rect: TileRect) -> BTreeMap<Element, Vec<Numbered>> {
+    let mut windows: BTreeMap<_, Vec<_>> = BTreeMap::new();
+    for (p, pixel) in rect.pixels().enumerate() {
+        let origin = geometry.window_origin(pixel);
+        windows.entry(origin).or_default().push((p, pixel));
+    }
+    windows
+}
+
+/// Whether all of the window lies off the display.
+fn dark(geometry: &Geometry, origin: Element) -> bool {
+    let side = i64::from(geometry.window.side());
+    let misses =
+        |at: i32, length: u32| i64::from(at) + side <= 0 || i64::from(at) >= i64::from(length);
+    misses(origin.u, geometry.light.width) || misses(origin.v, geometry.light.height)
+}
+
+/// A spread of windows with some of their pixels, and the patterns to choose settings by.
+struct HeldOut<'a> {
+    measurements: &'a Measurements,
+    geometry: Geometry,
+    windows: Vec<(Element, Vec<CameraPx>)>,
+    /// Patterns to predict, and to recover from.
+    held: Vec<usize>,
+    rows: Vec<usize>,
+}
+
+impl<'a> HeldOut<'a> {
+    fn new(
+        measurements: &'a Measurements,
+        geometry: Geometry,
+        sample: Sample,
+    ) -> Result<Self, RecoverError> {
+        let mut lit: BTreeMap<_, Vec<_>> = BTreeMap::new();
+        let covered = geometry.tiles().filter(|&tile| measurements.covers(tile));
+        for rect in covered {
+            for (origin, pixels) in windows(&geometry, rect) {
+                if !dark(&geometry, origin) {
+                    let pixels = pixels.into_iter().take(sample.pixels);
+                    lit.insert(origin, pixels.map(|(_, pixel)| pixel).collect());
+                }
             }
         }
-        if windows.is_empty() {
+        if lit.is_empty() {
             return Err(RecoverError::NoLight);
         }
-        let every = windows.len().div_ceil(SAMPLE_WINDOWS);
-        let (held, rows): (Vec<usize>, Vec<usize>) = (0..measurements.patterns.len())
+        let every = lit.len().div_ceil(sample.windows);
+        let (held, rows) = (0..measurements.patterns.len())
             .partition(|l| l % HOLD_OUT_EVERY == HOLD_OUT_EVERY / 2);
-        if held.is_empty() || rows.len() < FEWEST_PATTERNS {
-            return Ok(CommonMode::FULL);
+        Ok(Self {
+            measurements,
+            geometry,
+            windows: lit.into_iter().step_by(every).collect(),
+            held,
+            rows,
+        })
+    }
+
+    /// Of `candidates` the one that predicts the patterns held out best, or the first where none
+    /// can be.
+    fn choose<const N: usize>(&self, candidates: [Direct; N], workers: &impl Workers) -> Direct {
+        let mut chosen = candidates[0];
+        if self.held.is_empty() || self.rows.len() < FEWEST_PATTERNS {
+            return chosen;
         }
-        let mut best: Option<(Decibels, CommonMode)> = None;
-        for candidate in CommonMode::CANDIDATES {
+        let errors = workers.map(self.windows.len(), |i| {
+            candidates.map(|candidate| self.error(&candidate, &self.windows[i]))
+        });
+        let mut best: Option<Decibels> = None;
+        for (n, candidate) in candidates.into_iter().enumerate() {
             let mut error = TransportError::default();
-            for (&origin, pixels) in windows.iter().step_by(every) {
-                self.window(
-                    measurements,
-                    origin,
-                    pixels,
-                    &rows,
-                    candidate,
-                    |_, c, slots, x| {
-                        for &l in &held {
-                            let y = measurements.sample(l, pixels[0].1, c);
-                            if y.is_finite() {
-                                error.add(y, self.predict(measurements, l, c, origin, slots, x));
-                            }
-                        }
-                    },
-                );
-            }
+            errors.iter().for_each(|errors| error.merge(errors[n]));
             if let Some(snr) = error.snr()
-                && best.is_none_or(|(most, _)| snr > most)
+                && best.is_none_or(|most| snr > most)
             {
-                best = Some((snr, candidate));
+                (best, chosen) = (Some(snr), candidate);
             }
         }
-        Ok(best.map_or(CommonMode::FULL, |(_, candidate)| candidate))
+        chosen
+    }
+
+    /// Of what a candidate says that one window's pixels see under the patterns held out.
+    fn error(
+        &self,
+        candidate: &Direct,
+        (origin, pixels): &(Element, Vec<CameraPx>),
+    ) -> TransportError {
+        let mut error = TransportError::default();
+        let numbered = pixels.iter().copied().enumerate().collect();
+        let window = BTreeMap::from([(*origin, numbered)]);
+        candidate.block(
+            self.measurements,
+            &window,
+            &self.rows,
+            |_, pixel, c, slots, x| {
+                for &l in &self.held {
+                    let y = self.measurements.sample(l, pixels[pixel], c);
+                    if y.is_finite() {
+                        error.add(y, self.predict(l, c, *origin, slots, x));
+                    }
+                }
+            },
+        );
+        error
     }
 
     /// What solution `x` says a pixel of the window sees under pattern `l`.
-    fn predict(
-        &self,
-        measurements: &Measurements,
-        l: usize,
-        c: usize,
-        origin: Element,
-        slots: &[usize],
-        x: &[f64],
-    ) -> f64 {
-        let plane = measurements.patterns[l].plane(c);
+    fn predict(&self, l: usize, c: usize, origin: Element, slots: &[usize], x: &[f64]) -> f64 {
+        let plane = self.measurements.patterns[l].plane(c);
         let terms = slots.iter().zip(x).filter_map(|(&slot, &x)| {
             let element = self.geometry.window.element(origin, slot);
             let m = element.index_in(self.geometry.light)?;
@@ -203,11 +441,41 @@ impl Direct {
         terms.sum()
     }
 
-    /// Whether all of the window lies off the display.
-    fn dark(&self, origin: Element) -> bool {
-        let side = i64::from(self.geometry.window.side());
-        let misses =
-            |at: i32, length: u32| i64::from(at) + side <= 0 || i64::from(at) >= i64::from(length);
-        misses(origin.u, self.geometry.light.width) || misses(origin.v, self.geometry.light.height)
+    /// The noise of the measurements, from what least squares leaves of them, degrees of freedom
+    /// allowed for.
+    fn noise(&self, least_squares: &Direct, workers: &impl Workers) -> Tolerance {
+        let rows: Vec<usize> = (0..self.measurements.patterns.len()).collect();
+        let pairs = workers.map(self.windows.len(), |i| {
+            let (origin, pixel) = (self.windows[i].0, self.windows[i].1[0]);
+            let patch = |c| {
+                Patch::new(
+                    &self.measurements.patterns,
+                    &rows,
+                    c,
+                    self.geometry.light,
+                    self.geometry.window,
+                    [origin, origin],
+                    1,
+                )
+            };
+            let mut pairs = Vec::new();
+            for channel in 0..CHANNELS {
+                let y: Vec<f64> = rows
+                    .iter()
+                    .map(|&l| self.measurements.sample(l, pixel, channel))
+                    .collect();
+                if y.iter().all(|y| y.is_finite()) {
+                    let design = patch(channel).design(origin, least_squares.common_mode, &[]);
+                    let seen = vec![Seen {
+                        pixel: 0,
+                        channel,
+                        y,
+                    }];
+                    least_squares.solve(&design, seen, |_, _, _, noise| pairs.extend(noise));
+                }
+            }
+            pairs
+        });
+        Tolerance::fit(&pairs.concat())
     }
 }

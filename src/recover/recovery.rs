@@ -4,23 +4,41 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::direct::Direct;
-use super::{CommonMode, FEWEST_PATTERNS, Workers};
+use super::learned::Learned;
+use super::{CommonMode, FEWEST_PATTERNS, SparsityBasis, Workers};
 use crate::capture::Measurements;
 use crate::transport::{Basis, Geometry, GeometryError, RecoveredTile, TileRect, Window};
 
 /// How light transport functions are recovered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(into = "&'static str")]
 pub enum Method {
+    /// A Gaussian prior learned from the measurements themselves, and the posterior mean under it;
+    /// least squares in tiles where that predicts patterns held out better.
+    Learned,
     /// Non-negative least squares, each pixel and channel on its own (paper, section 3, case (a)).
     Nnls,
+    /// Basis pursuit denoising: of all functions that explain a pixel's measurements to within noise
+    /// the sparsest in this basis (paper, section 3, case (b)).
+    Bpdn(SparsityBasis),
+}
+
+impl From<Method> for &'static str {
+    fn from(method: Method) -> Self {
+        method.name()
+    }
 }
 
 impl Method {
+    /// Every method there is.
+    pub const ALL: &[Self] = &[Self::Nnls];
+
     /// The name by which options, reports and files call it.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Learned => "learned",
             Self::Nnls => "nnls",
+            Self::Bpdn(_) => "bpdn",
         }
     }
 }
@@ -62,15 +80,18 @@ pub struct Recovery {
 
 #[derive(Debug)]
 enum Solver {
+    Learned(Box<Learned>),
     Direct(Direct),
 }
 
 impl Recovery {
-    /// Learns and chooses from `measurements` whatever the method asks for.
+    /// Learns and chooses from `measurements` whatever the method asks for. They may hold strips of
+    /// the picture instead of all of it, and are then looked at where tiles are
+    /// [covered](Measurements::covers).
     pub fn prepare(
         measurements: &Measurements,
         settings: Settings,
-        _workers: &impl Workers,
+        workers: &impl Workers,
     ) -> Result<Self, RecoverError> {
         let geometry = Geometry {
             camera: measurements.camera,
@@ -84,7 +105,13 @@ impl Recovery {
             return Err(RecoverError::FewPatterns(measurements.patterns.len()));
         }
         let solver = match settings.method {
-            Method::Nnls => Solver::Direct(Direct::new(measurements, geometry)?),
+            Method::Learned => {
+                Solver::Learned(Box::new(Learned::new(measurements, geometry, workers)?))
+            }
+            Method::Nnls => Solver::Direct(Direct::least_squares(measurements, geometry, workers)?),
+            Method::Bpdn(basis) => {
+                Solver::Direct(Direct::denoising(measurements, geometry, basis, workers)?)
+            }
         };
         Ok(Self { geometry, solver })
     }
@@ -96,24 +123,33 @@ impl Recovery {
 
     /// The functions that factored tiles are combined from, if there are such tiles.
     pub fn basis(&self) -> Option<&Basis> {
-        None
+        match &self.solver {
+            Solver::Learned(learned) => Some(learned.basis()),
+            Solver::Direct(_) => None,
+        }
     }
 
-    /// Weight chosen for the patterns' common mode.
-    pub fn common_mode(&self) -> CommonMode {
+    /// Weight chosen for the patterns' common mode, where the method chooses one.
+    pub fn common_mode(&self) -> Option<CommonMode> {
         match &self.solver {
-            Solver::Direct(direct) => direct.common_mode(),
+            Solver::Learned(_) => None,
+            Solver::Direct(direct) => Some(direct.common_mode()),
         }
     }
 
     /// Camera pixels around a tile whose measurements go into it.
     pub fn halo(&self) -> u32 {
-        0
+        match &self.solver {
+            Solver::Learned(learned) => learned.halo(),
+            Solver::Direct(_) => 0,
+        }
     }
 
-    /// Recovers one tile. `measurements` are those the recovery was prepared from.
+    /// Recovers one tile. `measurements` are those the recovery was prepared from, or other rows of
+    /// the same: they cover the tile and [`halo`](Self::halo) rows around it, as far as there are any.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
         match &self.solver {
+            Solver::Learned(learned) => learned.tile(measurements, rect),
             Solver::Direct(direct) => RecoveredTile::Direct(direct.tile(measurements, rect)),
         }
     }

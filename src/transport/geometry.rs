@@ -249,6 +249,27 @@ impl Geometry {
     pub fn window_origin(&self, pixel: CameraPx) -> Element {
         self.window.origin(self.correspondence.at(pixel))
     }
+
+    /// Zeroes the values of elements off the display, for the window that starts at `origin`.
+    pub(crate) fn darken_off_display<T: Copy + Default>(&self, origin: Element, values: &mut [T]) {
+        let side = self.window.side() as usize;
+        // Window columns or rows that lie on the display, from one up to another.
+        let on_display = |origin: i32, length: u32| {
+            let clamp = |at: i64| at.clamp(0, side as i64) as usize;
+            let start = clamp(-i64::from(origin));
+            start..clamp(i64::from(length) - i64::from(origin)).max(start)
+        };
+        let columns = on_display(origin.u, self.light.width);
+        let rows = on_display(origin.v, self.light.height);
+        for (v, row) in values.chunks_exact_mut(side).enumerate() {
+            if rows.contains(&v) {
+                row[..columns.start].fill(T::default());
+                row[columns.end..].fill(T::default());
+            } else {
+                row.fill(T::default());
+            }
+        }
+    }
 }
 
 /// A geometry no transport can have.

@@ -30,6 +30,11 @@ impl DirectTile {
     /// Rounds functions to codes, with a step per channel set by the tile's brightest element.
     /// Negative and non-finite values, which no light transport function has, become zero.
     pub fn quantise(functions: &TransportFunctions) -> Self {
+        Self::quantise_into(functions, Vec::new())
+    }
+
+    /// [`quantise`](Self::quantise) into memory the caller has: a vector that is empty.
+    pub(crate) fn quantise_into(functions: &TransportFunctions, mut codes: Vec<TexelCode>) -> Self {
         let mut peak = [0.0f32; CHANNELS];
         for t in &functions.tau {
             for c in 0..CHANNELS {
@@ -38,23 +43,25 @@ impl DirectTile {
                 }
             }
         }
-        if peak == [0.0; CHANNELS] {
+        // A step below this would not be a normal number; so dim a channel is dark.
+        let step = peak.map(|p| p / TOP_CODE);
+        if step.iter().all(|s| *s < f32::MIN_POSITIVE) {
             return Self::dark(functions.rect);
         }
-        let step = peak.map(|p| if p > 0.0 { p / TOP_CODE } else { 1.0 });
-        let code = |t: f32, step: f32| (t / step).round() as u16; // `as` saturates, NaN is 0
-        let codes = functions
-            .tau
-            .iter()
-            .map(|t| {
-                [
-                    code(t[0], step[0]),
-                    code(t[1], step[1]),
-                    code(t[2], step[2]),
-                    0,
-                ]
-            })
-            .collect();
+        let step = step.map(|s| if s < f32::MIN_POSITIVE { 1.0 } else { s });
+        let code = |t: f32, step: f32| match t < f32::INFINITY {
+            true => (t / step + 0.5) as u16, // rounds; `as` saturates
+            false => 0,
+        };
+        let codes_of = |t: &[f32; CHANNELS]| {
+            [
+                code(t[0], step[0]),
+                code(t[1], step[1]),
+                code(t[2], step[2]),
+                0,
+            ]
+        };
+        codes.extend(functions.tau.iter().map(codes_of));
         Self {
             rect: functions.rect,
             step,

@@ -5,7 +5,7 @@
 pub mod relit;
 
 use relightable_photo::transport::{
-    Correspondence, DirectTile, Extent, Geometry, Transport, TransportFunctions, Window,
+    Correspondence, DirectTile, Extent, Geometry, RecoveredTile, TransportFunctions, Window,
 };
 
 /// A reproducible stream of numbers in 0..1.
@@ -45,8 +45,8 @@ pub fn tiled(
     .unwrap()
 }
 
-/// A transport of peaks and noise, masked to the display; its first tile is all dark.
-pub fn transport(geometry: Geometry, seed: u64) -> Transport {
+/// Light transport functions of peaks and noise, masked to the display; the first tile is all dark.
+pub fn functions(geometry: Geometry, seed: u64) -> Vec<TransportFunctions> {
     let mut noise = Noise(seed);
     let (side, area) = (geometry.window.side() as usize, geometry.window.area());
     let tiles = geometry.tiles().enumerate().map(|(i, rect)| {
@@ -62,10 +62,16 @@ pub fn transport(geometry: Geometry, seed: u64) -> Transport {
                 }
             }
         }
-        DirectTile::quantise(&functions)
+        functions
     });
-    Transport {
-        geometry,
-        tiles: tiles.collect(),
-    }
+    tiles.collect()
+}
+
+/// The transport of a tile's own values, as a solver would yield it.
+pub fn recovered(tile: &DirectTile, area: usize) -> RecoveredTile {
+    let texels = 0..tile.rect.extent.area() * area;
+    RecoveredTile::Direct(TransportFunctions {
+        rect: tile.rect,
+        tau: texels.map(|i| tile.tau(area, i / area, i % area)).collect(),
+    })
 }

@@ -1,0 +1,114 @@
+//! Orthonormal bases in which light transport functions may be sparse.
+
+use std::f64::consts::PI;
+
+/// φ: the basis in which a light transport function has few large coefficients.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SparsityBasis {
+    /// The function itself: opaque objects, which reflect or refract few directions.
+    Identity,
+    /// 2-D discrete cosine transform (DCT-II): translucent objects, which scatter smoothly.
+    Dct,
+    /// 2-D Haar wavelets: smooth patches with edges between them.
+    Haar,
+}
+
+impl SparsityBasis {
+    /// The name by which options and reports call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Identity => "identity",
+            Self::Dct => "dct",
+            Self::Haar => "haar",
+        }
+    }
+
+    /// The basis along one axis, `[side, side]`, a basis vector a row, the constant one first. The
+    /// basis of a window is its product with itself, and takes τ as a square to `B τ Bᵀ`.
+    ///
+    /// Window sides are odd, so that intervals cannot be halved for ever as Haar's are. They are
+    /// split as evenly as possible instead, and a wavelet is constant on either part, orthogonal to
+    /// one and of norm one: the unbalanced Haar transform (Girardi & Sweldens 1997), orthonormal
+    /// for every length.
+    pub fn along_axis(self, side: usize) -> Vec<f64> {
+        let mut basis = vec![0.0; side * side];
+        match self {
+            Self::Identity => (0..side).for_each(|i| basis[i * side + i] = 1.0),
+            Self::Dct => {
+                for (i, row) in basis.chunks_exact_mut(side).enumerate() {
+                    let norm = (if i == 0 { 1.0 } else { 2.0 } / side as f64).sqrt();
+                    for (j, b) in row.iter_mut().enumerate() {
+                        *b = norm * (PI * i as f64 * (j as f64 + 0.5) / side as f64).cos();
+                    }
+                }
+            }
+            Self::Haar => {
+                let mut rows = basis.chunks_exact_mut(side);
+                if let Some(constant) = rows.next() {
+                    constant.fill(1.0 / (side as f64).sqrt());
+                }
+                // Intervals to split, coarse ones first.
+                let mut intervals = std::collections::VecDeque::from([(0, side)]);
+                while let Some((start, end)) = intervals.pop_front() {
+                    if end - start < 2 {
+                        continue;
+                    }
+                    let middle = start + (end - start).div_ceil(2);
+                    let (a, b) = ((middle - start) as f64, (end - middle) as f64);
+                    if let Some(row) = rows.next() {
+                        row[start..middle].fill((b / (a * (a + b))).sqrt());
+                        row[middle..end].fill(-(a / (b * (a + b))).sqrt());
+                    }
+                    intervals.extend([(start, middle), (middle, end)]);
+                }
+            }
+        }
+        basis
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_basis_is_orthonormal_at_every_side() {
+        for basis in [
+            SparsityBasis::Identity,
+            SparsityBasis::Dct,
+            SparsityBasis::Haar,
+        ] {
+            for side in (1..=63).step_by(2) {
+                let b = basis.along_axis(side);
+                for i in 0..side {
+                    for j in 0..side {
+                        let product: f64 =
+                            (0..side).map(|s| b[i * side + s] * b[j * side + s]).sum();
+                        let expected = if i == j { 1.0 } else { 0.0 };
+                        assert!(
+                            (product - expected).abs() < 1e-12,
+                            "{basis:?} {side} {i} {j}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn haar_of_three_elements() {
+        let b = SparsityBasis::Haar.along_axis(3);
+        let close = |row: usize, expected: [f64; 3]| {
+            for (b, e) in b[row * 3..].iter().zip(expected) {
+                assert!((b - e).abs() < 1e-12);
+            }
+        };
+        close(0, [1.0 / 3f64.sqrt(); 3]);
+        close(
+            1,
+            [1.0 / 6f64.sqrt(), 1.0 / 6f64.sqrt(), -2.0 / 6f64.sqrt()],
+        );
+        close(2, [0.5f64.sqrt(), -(0.5f64.sqrt()), 0.0]);
+    }
+}

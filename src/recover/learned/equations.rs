@@ -1,0 +1,316 @@
+//! A picture's measurements as equations over a few kernels.
+
+use std::collections::BTreeMap;
+
+use super::kernels::Kernels;
+use crate::capture::Measurements;
+use crate::recover::FEWEST_PATTERNS;
+use crate::recover::vector::{dot, vectorised};
+use crate::transport::{CHANNELS, CameraPx, Element, Geometry, TileRect};
+
+/// Weight of the mean over patterns against a centred equation. Noise alone would make it 1; the
+/// dark frame's own noise and light from beyond the window shift a pixel by a constant, which
+/// averaging over patterns does not lower.
+const MEAN_WEIGHT: f64 = 0.3;
+
+/// Sub-element position classes along one axis. At two camera pixels an element, neighbours lie in
+/// different halves of it, and so differ in what they see of their window.
+const HALVES: usize = 2;
+/// Sub-element position classes of a pixel.
+pub(super) const PHASES: usize = HALVES * HALVES;
+
+/// Where in its light element a pixel's centre lies: 0 to [`PHASES`] - 1.
+pub(super) fn phase(geometry: &Geometry, pixel: CameraPx) -> usize {
+    let at = geometry.correspondence.at(pixel);
+    let half = |x: f64| (((x - x.floor()) * HALVES as f64) as usize).min(HALVES - 1);
+    half(at.v) * HALVES + half(at.u)
+}
+
+/// One channel of one pixel: `y = f·B z + noise` over its window's kernels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Member {
+    /// Which of the region's Gram matrices is its own.
+    pub gram: usize,
+    /// Brightness `f`, in units of the measurement: what the kernels' mean would send under full
+    /// light.
+    pub scale: f64,
+    /// Variance of one measurement.
+    pub variance: f64,
+    /// Sum of the weighted rows' squares, `‖y‖²`.
+    pub power: f64,
+    /// Number of measurements; 0 if nothing usable is known.
+    pub rows: usize,
+    /// Sub-element position class.
+    pub phase: usize,
+    /// Whether all of its window lies on the display.
+    pub whole: bool,
+}
+
+impl Member {
+    /// Brightness against the noise of one measurement.
+    pub fn contrast(&self) -> f64 {
+        self.scale / self.variance.sqrt()
+    }
+}
+
+/// All equations of the pixels of a region.
+#[derive(Debug)]
+pub(super) struct Equations {
+    /// The pixels covered.
+    pub rect: TileRect,
+    /// Number of kernels, `r`.
+    pub rank: usize,
+    /// `BᵀB`, each `[r, r]`, for each window and set of usable patterns.
+    grams: Vec<Vec<f64>>,
+    /// `[pixel, channel]`.
+    pub members: Vec<Member>,
+    /// `Bᵀy`, `[pixel, channel, r]`.
+    rights: Vec<f64>,
+}
+
+impl Equations {
+    /// The equations of `rect` from the patterns numbered `rows`.
+    pub fn new(
+        measurements: &Measurements,
+        geometry: &Geometry,
+        kernels: &Kernels,
+        rows: &[usize],
+        rect: TileRect,
+    ) -> Self {
+        let rank = kernels.rank();
+        let pixels = rect.extent.area();
+        let unknown = Member {
+            gram: 0,
+            scale: 0.0,
+            variance: 1.0,
+            power: 0.0,
+            rows: 0,
+            phase: 0,
+            whole: false,
+        };
+        let mut equations = Self {
+            rect,
+            rank,
+            grams: Vec::new(),
+            members: vec![unknown; pixels * CHANNELS],
+            rights: vec![0.0; pixels * CHANNELS * rank],
+        };
+        for (origin, pixels) in windows(geometry, rect) {
+            let planes: &[usize] = if measurements.grey() {
+                &[0]
+            } else {
+                &[0, 1, 2]
+            };
+            for &plane in planes {
+                let projected = kernels.project(measurements, geometry, origin, plane);
+                let channels = if measurements.grey() {
+                    0..CHANNELS
+                } else {
+                    plane..plane + 1
+                };
+                vectorised(
+                    #[inline(always)]
+                    || {
+                        let fill = Fill {
+                            measurements,
+                            geometry,
+                            projected: &projected,
+                            rows,
+                        };
+                        fill.window(&mut equations, &pixels, channels);
+                    },
+                );
+            }
+        }
+        equations
+    }
+
+    /// `BᵀB` of a member, `[r, r]`, both triangles.
+    pub fn gram(&self, member: usize) -> &[f64] {
+        &self.grams[self.members[member].gram]
+    }
+
+    /// `Bᵀy` of a member, `[r]`.
+    pub fn right(&self, member: usize) -> &[f64] {
+        &self.rights[member * self.rank..(member + 1) * self.rank]
+    }
+}
+
+/// All pixels of a region by their common window: (number in the region, pixel).
+pub(super) fn windows(
+    geometry: &Geometry,
+    rect: TileRect,
+) -> BTreeMap<Element, Vec<(usize, CameraPx)>> {
+    let mut windows: BTreeMap<_, Vec<_>> = BTreeMap::new();
+    for (p, pixel) in rect.pixels().enumerate() {
+        let origin = geometry.window_origin(pixel);
+        windows.entry(origin).or_default().push((p, pixel));
+    }
+    windows
+}
+
+/// The patterns of a window as its kernels see them, uncentred.
+#[derive(Debug)]
+pub(super) struct Projected {
+    /// `[pattern, stride]`: the kernels' responses, then the mean function's.
+    pub responses: Vec<f32>,
+    /// Values a pattern has, at least `rank + 1`.
+    pub stride: usize,
+    /// Number of kernels.
+    pub rank: usize,
+    /// Whether all of the window lies on the display.
+    pub whole: bool,
+}
+
+impl Projected {
+    /// Responses of the kernels to pattern `l`.
+    pub fn row(&self, l: usize) -> &[f32] {
+        &self.responses[l * self.stride..l * self.stride + self.rank]
+    }
+
+    /// Response of the mean light transport function to pattern `l`.
+    pub fn mean(&self, l: usize) -> f64 {
+        f64::from(self.responses[l * self.stride + self.rank])
+    }
+}
+
+/// What one window's equations are made from.
+struct Fill<'a> {
+    measurements: &'a Measurements,
+    geometry: &'a Geometry,
+    projected: &'a Projected,
+    rows: &'a [usize],
+}
+
+/// Centred kernels' responses for one set of patterns.
+struct Centred<'a> {
+    rows: Vec<usize>,
+    /// `[r, rows]`: a kernel's responses in one run.
+    columns: Vec<f64>,
+    /// `[r]`.
+    mean: Vec<f64>,
+    /// Mean response of the mean function.
+    profile: f64,
+    gram: usize,
+    projected: &'a Projected,
+}
+
+impl<'a> Fill<'a> {
+    #[inline(always)]
+    fn window(
+        &self,
+        equations: &mut Equations,
+        pixels: &[(usize, CameraPx)],
+        channels: std::ops::Range<usize>,
+    ) {
+        let mut shared: Option<Centred<'a>> = None;
+        for &(p, pixel) in pixels {
+            for c in channels.clone() {
+                let y: Vec<f64> = self
+                    .rows
+                    .iter()
+                    .map(|&l| self.measurements.sample(l, pixel, c))
+                    .collect();
+                let member = p * CHANNELS + c;
+                if y.iter().all(|y| y.is_finite()) {
+                    let centred = shared.get_or_insert_with(|| self.centre(equations, self.rows));
+                    self.member(equations, centred, member, (pixel, c), &y);
+                } else {
+                    // Saturated samples drop out, and with them the shared equations. Of a pixel
+                    // saturated nearly always, all that is known is that it is at least white.
+                    let usable = y.iter().filter(|y| y.is_finite()).count();
+                    let white = usable < FEWEST_PATTERNS;
+                    let (rows, y): (Vec<usize>, Vec<f64>) = self
+                        .rows
+                        .iter()
+                        .zip(&y)
+                        .filter(|(_, y)| white || y.is_finite())
+                        .map(|(&l, &y)| match y.is_finite() {
+                            true => (l, y),
+                            false => (l, f64::from(self.measurements.full_scale[l])),
+                        })
+                        .unzip();
+                    let own = self.centre(equations, &rows);
+                    self.member(equations, &own, member, (pixel, c), &y);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn centre(&self, equations: &mut Equations, rows: &[usize]) -> Centred<'a> {
+        let (rank, count) = (self.projected.rank, rows.len());
+        let mut columns = vec![0.0; rank * count];
+        for (i, &l) in rows.iter().enumerate() {
+            for (k, &b) in self.projected.row(l).iter().enumerate() {
+                columns[k * count + i] = f64::from(b);
+            }
+        }
+        let mut mean = Vec::with_capacity(rank);
+        for column in columns.chunks_exact_mut(count.max(1)) {
+            let m = column.iter().sum::<f64>() / count as f64;
+            column.iter_mut().for_each(|b| *b -= m);
+            mean.push(m);
+        }
+        let weight = count as f64 * MEAN_WEIGHT * MEAN_WEIGHT;
+        let mut gram = vec![0.0; rank * rank];
+        for i in 0..rank {
+            let a = &columns[i * count..(i + 1) * count];
+            for j in i..rank {
+                let b = &columns[j * count..(j + 1) * count];
+                let value = dot(a, b) + weight * mean[i] * mean[j];
+                gram[i * rank + j] = value;
+                gram[j * rank + i] = value;
+            }
+        }
+        equations.grams.push(gram);
+        let profile = rows.iter().map(|&l| self.projected.mean(l)).sum::<f64>();
+        Centred {
+            rows: rows.to_vec(),
+            columns,
+            mean,
+            profile: profile / count.max(1) as f64,
+            gram: equations.grams.len() - 1,
+            projected: self.projected,
+        }
+    }
+
+    #[inline(always)]
+    fn member(
+        &self,
+        equations: &mut Equations,
+        centred: &Centred<'_>,
+        member: usize,
+        (pixel, c): (CameraPx, usize),
+        y: &[f64],
+    ) {
+        let (rank, count) = (centred.projected.rank, centred.rows.len());
+        let mean = y.iter().sum::<f64>() / count as f64;
+        let weight = count as f64 * MEAN_WEIGHT * MEAN_WEIGHT;
+        let right = &mut equations.rights[member * rank..(member + 1) * rank];
+        // Centred columns sum to zero, so y need not be centred.
+        for (k, column) in centred.columns.chunks_exact(count).enumerate() {
+            right[k] = dot(column, y) + weight * centred.mean[k] * mean;
+        }
+        let variance = centred.rows.iter().zip(y);
+        let variance = variance.map(|(&l, &y)| self.measurements.variance(l, c, y));
+        let deviation = y.iter().map(|y| (y - mean) * (y - mean)).sum::<f64>();
+        let scale = if centred.profile > 0.0 {
+            mean / centred.profile
+        } else {
+            0.0
+        };
+        equations.members[member] = Member {
+            gram: centred.gram,
+            scale: scale.max(0.0),
+            variance: (variance.sum::<f64>() / count as f64).max(LEAST_VARIANCE),
+            power: deviation + weight * mean * mean,
+            rows: count,
+            phase: phase(self.geometry, pixel),
+            whole: centred.projected.whole,
+        };
+    }
+}
+
+/// Variance below which no 16-bit photograph can go: its own rounding.
+const LEAST_VARIANCE: f64 = 1.0 / (12.0 * 65536.0 * 65536.0);

@@ -1,0 +1,391 @@
+//! Recovery with a prior that the measurements themselves teach.
+//!
+//! 80 patterns are far fewer than the elements of a window, so that a pixel's own measurements leave
+//! most of its light transport function open. But the functions of one object are alike, and each
+//! pixel sees another random projection of its own: together they tell what such functions look
+//! like. Scaled by the pixel's brightness `f`, a function is a combination `V z` of a few kernels,
+//! and `z` is Gaussian, its mean and covariance learned from the compressive measurements by
+//! expectation–maximisation ([`prior`]); then again given the pixel's neighbours ([`context`]). The
+//! posterior mean is a closed form, and its coefficients `f z` over the kernels are a factored tile
+//! as they are.
+//!
+//! How many kernels, whether neighbours help, and where the paper's least squares does better, are
+//! decided on patterns held out.
+
+mod context;
+mod dense;
+mod equations;
+mod kernels;
+mod posterior;
+mod prior;
+mod start;
+
+use context::{Context, Field, Patch, REACH};
+use equations::{Equations, windows};
+use kernels::Kernels;
+use prior::{Prior, Threshold};
+
+use super::direct::Direct;
+use super::{FEWEST_PATTERNS, RecoverError, Workers};
+use crate::capture::Measurements;
+use crate::transport::{Basis, CHANNELS, Extent, FactoredTile, Geometry, RecoveredTile, TileRect};
+
+/// Every how many patterns one is held out for choosing.
+const HOLD_OUT_EVERY: usize = 10;
+/// Ranks to choose from; each fills vector registers together with the mean function.
+const RANKS: [usize; 3] = [23, 31, 47];
+/// Squares that the prior is learned from, and their side in pixels.
+const SQUARES: (usize, u32) = (128, 4);
+/// Rounds of expectation–maximisation with all the kernels that learning starts with.
+const ROUNDS: usize = 20;
+/// Patches that neighbours' part is learned from, and their side in pixels.
+const PATCHES: (usize, u32) = (64, 16);
+/// Rounds of expectation–maximisation on the patches, with the kernels chosen.
+const LATE_ROUNDS: usize = 2;
+/// Share of the brightness that 5 % of the pixels exceed, below which nothing is learned of a pixel.
+const DIM: f64 = 0.1;
+/// Least squares is tried tile by tile only if, over the whole picture, its error on patterns held
+/// out is at most this many times that of the learned prior.
+const COMPETITIVE: f64 = 1.5;
+
+/// What has been learned.
+#[derive(Debug)]
+pub(super) struct Learned {
+    geometry: Geometry,
+    kernels: Kernels,
+    basis: Basis,
+    prior: Prior,
+    context: Option<Context>,
+    threshold: Threshold,
+    /// Least squares, where it is worth trying tile by tile.
+    direct: Option<Direct>,
+}
+
+/// Patterns to learn from and patterns to choose by.
+struct Split {
+    all: Vec<usize>,
+    learn: Vec<usize>,
+    held: Vec<usize>,
+}
+
+impl Split {
+    fn new(patterns: usize) -> Self {
+        let all: Vec<usize> = (0..patterns).collect();
+        let (held, learn): (Vec<usize>, Vec<usize>) = all
+            .iter()
+            .partition(|&l| l % HOLD_OUT_EVERY == HOLD_OUT_EVERY / 2);
+        match learn.len() >= FEWEST_PATTERNS && !held.is_empty() {
+            true => Self { all, learn, held },
+            false => Self {
+                learn: all.clone(),
+                all,
+                held: Vec::new(),
+            },
+        }
+    }
+}
+
+impl Learned {
+    /// Learns from all of `measurements`.
+    pub fn new(
+        measurements: &Measurements,
+        geometry: Geometry,
+        workers: &impl Workers,
+    ) -> Result<Self, RecoverError> {
+        let area = geometry.window.area();
+        let split = Split::new(measurements.patterns.len());
+        let squares = start::spread(measurements, SQUARES.1, SQUARES.0);
+        let pooled = start::pooled_mean(measurements, &geometry, &split.learn, &squares, workers)
+            .ok_or(RecoverError::NoLight)?;
+        let mean = start::blur(&pooled, geometry.window.side() as usize);
+        let (functions, mut prior) =
+            start::first_prior(&mean, geometry.window.side() as usize, workers);
+        let kernels = start::projector(&functions, &mean);
+        let equations = |kernels: &Kernels, rows: &[usize], rects: &[TileRect]| {
+            workers.map(rects.len(), |i| {
+                Equations::new(measurements, &geometry, kernels, rows, rects[i])
+            })
+        };
+        let samples = equations(&kernels, &split.learn, &squares);
+        let threshold = threshold(&samples);
+        for _ in 0..ROUNDS {
+            prior.improve(&samples, &threshold, workers);
+        }
+        drop(samples);
+
+        // How many kernels.
+        let mut chosen: Option<(f64, Learned)> = None;
+        for rank in RANKS {
+            let (functions, prior) = start::cut(&functions, &prior, rank, area);
+            let learned = Self {
+                geometry,
+                kernels: start::projector(&functions, &mean),
+                basis: Basis::default(),
+                prior,
+                context: None,
+                threshold,
+                direct: None,
+            };
+            let error = learned.held_out_error(measurements, &split, &squares, workers);
+            if chosen.as_ref().is_none_or(|(least, _)| error < *least) {
+                chosen = Some((error, learned));
+            }
+        }
+        let (_, mut learned) = chosen.ok_or(RecoverError::NoLight)?;
+
+        // What neighbours tell, and whether it helps.
+        let inner = start::spread(measurements, PATCHES.1, PATCHES.0);
+        learned.learn_context(measurements, &split.learn, &inner, workers);
+        if !split.held.is_empty() {
+            let with = learned.held_out_error(measurements, &split, &inner, workers);
+            let context = learned.context.take();
+            let without = learned.held_out_error(measurements, &split, &inner, workers);
+            if context.is_some() && with < without {
+                learned.learn_context(measurements, &split.all, &inner, workers);
+            }
+            let best = with.min(without);
+            learned.direct = learned.rival(measurements, &split, &inner, best, workers)?;
+        }
+        learned.basis = Basis {
+            kernels: (0..learned.kernels.rank())
+                .map(|k| learned.kernels.kernel(k))
+                .collect(),
+        };
+        Ok(learned)
+    }
+
+    /// Number of kernels, `r`.
+    pub fn rank(&self) -> usize {
+        self.kernels.rank()
+    }
+
+    /// The kernels, orthonormal.
+    pub fn basis(&self) -> &Basis {
+        &self.basis
+    }
+
+    /// Camera pixels around a tile whose measurements go into it.
+    pub fn halo(&self) -> u32 {
+        if self.context.is_some() {
+            REACH as u32
+        } else {
+            0
+        }
+    }
+
+    /// Recovers one tile.
+    pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
+        let split = Split::new(measurements.patterns.len());
+        if let Some(direct) = &self.direct {
+            let (ours, theirs) = self.compare(measurements, direct, &split, rect);
+            if theirs < ours {
+                return RecoveredTile::Direct(direct.tile(measurements, rect));
+            }
+        }
+        let coefficients = self.solve(measurements, &split.all, rect).1;
+        RecoveredTile::Factored(FactoredTile { rect, coefficients })
+    }
+
+    /// Learns the late rounds of the prior, and the neighbours' part, from the patterns `rows`.
+    fn learn_context(
+        &mut self,
+        measurements: &Measurements,
+        rows: &[usize],
+        inner: &[TileRect],
+        workers: &impl Workers,
+    ) {
+        let equations = workers.map(inner.len(), |i| {
+            let rect = grown(measurements, inner[i], REACH as u32);
+            Equations::new(measurements, &self.geometry, &self.kernels, rows, rect)
+        });
+        for _ in 0..LATE_ROUNDS {
+            self.prior.improve(&equations, &self.threshold, workers);
+        }
+        let fields = workers.map(equations.len(), |i| {
+            Field::new(&equations[i], &self.prior, &self.threshold)
+        });
+        let parts = equations.into_iter().zip(fields).zip(inner);
+        let patches: Vec<Patch> = parts
+            .map(|((equations, field), &inner)| Patch {
+                equations,
+                field,
+                inner,
+            })
+            .collect();
+        self.context = Context::learn(&patches, &self.prior, &self.threshold, workers);
+    }
+
+    /// Coefficients `f z` of `rect` from the patterns `rows`, `[pixel, component]`, and whether each
+    /// pixel and channel is bright, `[pixel, channel]`.
+    fn solve(
+        &self,
+        measurements: &Measurements,
+        rows: &[usize],
+        rect: TileRect,
+    ) -> (Vec<bool>, Vec<[f32; CHANNELS]>) {
+        let region = grown(measurements, rect, self.halo());
+        let equations = Equations::new(measurements, &self.geometry, &self.kernels, rows, region);
+        let field = Field::new(&equations, &self.prior, &self.threshold);
+        let patch = Patch {
+            equations,
+            field,
+            inner: rect,
+        };
+        let rank = self.rank();
+        let z = match &self.context {
+            Some(context) => context.refine(&patch, self.prior.noise),
+            None => patch.field.z.clone(),
+        };
+        let mut bright = Vec::with_capacity(rect.extent.area() * CHANNELS);
+        let mut coefficients = vec![[0.0f32; CHANNELS]; rect.extent.area() * rank];
+        for (p, pixel) in rect.pixels().enumerate() {
+            let there = (pixel.y - region.y) * region.extent.width + pixel.x - region.x;
+            for c in 0..CHANNELS {
+                let member = there as usize * CHANNELS + c;
+                let scale = patch.equations.members[member].scale;
+                let z = &z[(p * CHANNELS + c) * rank..(p * CHANNELS + c + 1) * rank];
+                for (k, z) in z.iter().enumerate() {
+                    coefficients[p * rank + k][c] = (scale * z) as f32;
+                }
+                bright.push(patch.field.bright[member]);
+            }
+        }
+        (bright, coefficients)
+    }
+
+    /// Squared error, over `rects`, of predicting the patterns held out.
+    fn held_out_error(
+        &self,
+        measurements: &Measurements,
+        split: &Split,
+        rects: &[TileRect],
+        workers: &impl Workers,
+    ) -> f64 {
+        let errors = workers.map(rects.len(), |i| {
+            let (_, coefficients) = self.solve(measurements, &split.learn, rects[i]);
+            self.error_of(measurements, split, rects[i], &coefficients)
+        });
+        errors.iter().sum()
+    }
+
+    /// Squared error of predicting the patterns held out from a tile's coefficients.
+    fn error_of(
+        &self,
+        measurements: &Measurements,
+        split: &Split,
+        rect: TileRect,
+        coefficients: &[[f32; CHANNELS]],
+    ) -> f64 {
+        let rank = self.rank();
+        let mut error = 0.0;
+        for (origin, pixels) in windows(&self.geometry, rect) {
+            for c in 0..CHANNELS {
+                if c > 0 && measurements.grey() {
+                    continue;
+                }
+                let projected = self
+                    .kernels
+                    .project(measurements, &self.geometry, origin, c);
+                let channels = if measurements.grey() {
+                    0..CHANNELS
+                } else {
+                    c..c + 1
+                };
+                for &(p, pixel) in &pixels {
+                    let coefficients = &coefficients[p * rank..(p + 1) * rank];
+                    for c in channels.clone() {
+                        for &l in &split.held {
+                            let row = projected.row(l).iter().zip(coefficients);
+                            let y: f64 = row.map(|(b, z)| f64::from(b * z[c])).sum();
+                            let miss = measurements.sample(l, pixel, c) - y;
+                            if miss.is_finite() {
+                                error += miss * miss;
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        error
+    }
+
+    /// Errors of the learned prior and of least squares on the patterns held out, on one tile.
+    fn compare(
+        &self,
+        measurements: &Measurements,
+        direct: &Direct,
+        split: &Split,
+        rect: TileRect,
+    ) -> (f64, f64) {
+        let (_, coefficients) = self.solve(measurements, &split.learn, rect);
+        let ours = self.error_of(measurements, split, rect, &coefficients);
+        let theirs = direct.held_out_error(measurements, &split.learn, &split.held, rect);
+        (ours, theirs)
+    }
+
+    /// Least squares, if it does not do much worse than the learned prior, whose error is `ours`.
+    fn rival(
+        &self,
+        measurements: &Measurements,
+        split: &Split,
+        rects: &[TileRect],
+        ours: f64,
+        workers: &impl Workers,
+    ) -> Result<Option<Direct>, RecoverError> {
+        let direct = Direct::least_squares(measurements, self.geometry, workers)?;
+        // A corner of each patch is enough to tell.
+        let corners: Vec<TileRect> = rects.iter().map(|rect| corner(*rect)).collect();
+        let errors = workers.map(corners.len(), |i| {
+            direct.held_out_error(measurements, &split.learn, &split.held, corners[i])
+        });
+        let theirs: f64 = errors.iter().sum();
+        let share: f64 = corners.iter().map(|c| c.extent.area() as f64).sum::<f64>()
+            / rects.iter().map(|r| r.extent.area() as f64).sum::<f64>();
+        Ok((theirs < COMPETITIVE * ours * share).then_some(direct))
+    }
+}
+
+/// The first few pixels of a rectangle.
+fn corner(rect: TileRect) -> TileRect {
+    TileRect {
+        extent: Extent {
+            width: rect.extent.width.min(4),
+            height: rect.extent.height.min(4),
+        },
+        ..rect
+    }
+}
+
+/// `rect` with `by` more pixels all around, as far as the picture goes and is at hand.
+fn grown(measurements: &Measurements, rect: TileRect, by: u32) -> TileRect {
+    let camera = measurements.camera;
+    let (right, bottom) = (rect.x + rect.extent.width, rect.y + rect.extent.height);
+    let at_hand = |y: &u32| measurements.rows.place(*y).is_some();
+    let x = rect.x.saturating_sub(by);
+    let y = rect.y
+        - (1..=by.min(rect.y))
+            .take_while(|d| at_hand(&(rect.y - d)))
+            .count() as u32;
+    let below = (bottom..camera.height.min(bottom + by)).take_while(at_hand);
+    TileRect {
+        x,
+        y,
+        extent: Extent {
+            width: (right + by).min(camera.width) - x,
+            height: bottom + below.count() as u32 - y,
+        },
+    }
+}
+
+/// Brightness below which a pixel is not learned from, by channel.
+fn threshold(samples: &[Equations]) -> Threshold {
+    std::array::from_fn(|c| {
+        let members = samples
+            .iter()
+            .flat_map(|s| s.members.iter().skip(c).step_by(CHANNELS));
+        let mut scales: Vec<f64> = members.map(|m| m.scale).collect();
+        scales.sort_by(f64::total_cmp);
+        let top = scales.get(scales.len() * 95 / 100);
+        DIM * top.copied().unwrap_or(0.0)
+    })
+}
