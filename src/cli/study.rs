@@ -6,9 +6,10 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 
-use super::process::AllCores;
+use super::photographs::Photographs;
+use super::process::{self, AllCores};
 use super::{new_folder, recover};
-use crate::capture::CaptureFolder;
+use crate::capture::{CaptureFolder, Measurements, Noise, Rows};
 use crate::relight::Light;
 use crate::simulate::{SceneKind, WINDOW_SIDE};
 use crate::study::{
@@ -210,15 +211,29 @@ fn study_capture(
     // The light that shows most comes first.
     lights.sort_by_key(|light| light.name != "flood");
     let shots: Vec<usize> = (0..folder.manifest().shots.len()).collect();
-    let measurements = recover::read(&folder, &shots)?;
+    let measurements = read(&folder, &shots)?;
     let known = CaptureTruth::new(truth, measurements.correspondence)?;
     figures(name, &known, measurements, lights, pixels, progress)
+}
+
+/// Reads shots whole.
+fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
+    let rows = Rows::all(folder.manifest().camera.height);
+    let dark = folder.read_dark()?;
+    let mut measurements = recover::no_rows(folder, &dark, shots, &rows)?;
+    let mut photographs = Photographs::open(folder, &dark, shots)?;
+    let bar = process::progress("reading", shots.len());
+    photographs.advance(&mut measurements, &rows, &bar)?;
+    bar.finish_and_clear();
+    photographs.finish()?;
+    measurements.noise = Noise::with_gain_from(&measurements);
+    Ok(measurements)
 }
 
 fn figures(
     name: &str,
     known: &impl Known,
-    measurements: crate::capture::Measurements,
+    measurements: Measurements,
     lights: Vec<RelitLight>,
     pixels: usize,
     progress: study::Progress,

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::known::{Known, error_of};
-use super::methods::judged_on_sample;
+use super::methods::judged;
 use super::{StudyError, blocks};
 use crate::capture::Measurements;
 use crate::recover::{Method, Recovery, Settings, Workers};
@@ -22,8 +22,8 @@ pub(super) struct Accuracy {
     pub seconds: f64,
 }
 
-/// Recovers and judges: all pixels, or about `pixels` of them where the method takes long and
-/// recovers each on its own.
+/// Recovers and judges about `pixels` pixels, or more or fewer of them as the method is faster or
+/// slower ([`judged`]).
 pub(super) fn judge(
     known: &impl Known,
     measurements: &Measurements,
@@ -39,23 +39,20 @@ pub(super) fn judge(
     let recovery = Recovery::prepare(measurements, settings, workers)?;
     let prepared = start.elapsed().as_secs_f64();
     let geometry = *recovery.geometry();
-    let rects = match judged_on_sample(method) {
-        true => blocks::sample(geometry.camera, pixels),
-        false => geometry.tiles().collect(),
-    };
+    let rects = judged(method, &geometry, pixels);
     let errors = workers.map(rects.len(), |i| {
         let tile = recovery.tile(measurements, rects[i]);
         let functions = tile.functions(&geometry, recovery.basis());
         error_of(known, &geometry, &functions)
     });
-    let judged = blocks::pixels(&rects);
+    let pixels = blocks::pixels(&rects);
     let all = geometry.camera.area();
-    let (snr, standard_error) = pooled(&errors, judged as f64 / all as f64);
-    let per_pixel = (start.elapsed().as_secs_f64() - prepared) / judged as f64;
+    let (snr, standard_error) = pooled(&errors, pixels as f64 / all as f64);
+    let per_pixel = (start.elapsed().as_secs_f64() - prepared) / pixels as f64;
     Ok(Accuracy {
         snr,
         standard_error,
-        pixels: judged,
+        pixels,
         seconds: prepared + per_pixel * all as f64,
     })
 }

@@ -4,7 +4,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardUniform};
 
-use crate::transport::{Extent, TileRect};
+use crate::transport::{Extent, Geometry, TileRect};
 
 /// Camera pixels along a block's side. At two pixels a light element a block is one window's, so that
 /// smaller ones would cost more; larger ones would tell less, as neighbours are alike.
@@ -22,6 +22,14 @@ pub(super) fn sample(camera: Extent, pixels: usize) -> Vec<TileRect> {
         blocks = drawn.into_iter().map(|i| blocks[i]).collect();
     }
     blocks
+}
+
+/// Whole tiles that together cover about `pixels` pixels, drawn likewise.
+pub(super) fn tiles(geometry: &Geometry, pixels: usize) -> Vec<TileRect> {
+    let count = geometry.tile_grid().area();
+    let wanted = pixels.div_ceil((geometry.tile_side * geometry.tile_side) as usize);
+    let drawn = draw(count, wanted.max(1));
+    drawn.into_iter().map(|i| geometry.tile(i)).collect()
 }
 
 /// `wanted` different numbers below `count`, rising: the start of a shuffle by Fisher and Yates.

@@ -14,7 +14,7 @@ const SIZE: (u32, u32) = (960, 500);
 /// Room at the right for the names of lines, which there hide nothing.
 const LEGEND: u32 = 210;
 /// Colours that people with any colour vision tell apart (Okabe & Ito 2008).
-const COLOURS: [RGBColor; 7] = [
+const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -22,6 +22,7 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
     RGBColor(90, 90, 90),
+    RGBColor(190, 180, 20),
 ];
 const FONT: &str = "Helvetica, Arial, sans-serif";
 

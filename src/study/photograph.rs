@@ -1,7 +1,7 @@
 //! Photographs of a scene in memory.
 
 use super::{Picture, StudyError};
-use crate::capture::{Measurements, Pattern};
+use crate::capture::{Measurements, Noise, Pattern, Rows};
 use crate::recover::Workers;
 use crate::simulate::{Camera, Codes, Ensemble, Exposure, NoiseStream, Scene, emission};
 use crate::transport::CHANNELS;
@@ -48,14 +48,27 @@ impl Photographer<'_> {
             })
             .collect::<Result<Vec<_>, _>>()?;
         let pictures = self.photographs(&codes, workers)?;
-        Ok(Measurements {
+        let camera = self.camera();
+        let code = 1.0 / (camera.white - camera.black);
+        let mut measurements = Measurements {
             camera: geometry.camera,
             light: geometry.light,
             correspondence: geometry.correspondence,
             patterns: codes.iter().map(emitted).collect(),
             full_scale: vec![1.0; count],
+            rows: Rows::all(geometry.camera.height),
             pictures,
-        })
+            flood: None,
+            noise: Noise::from_dark(&self.dark()?, geometry.camera.width, code),
+        };
+        measurements.noise = Noise::with_gain_from(&measurements);
+        Ok(measurements)
+    }
+
+    /// What the camera sees in the dark.
+    fn dark(&self) -> Result<Picture, StudyError> {
+        let black = vec![[0.0; CHANNELS]; self.scene.geometry().camera.area()];
+        self.noisy(&black, 0)
     }
 
     /// One photograph for each light, in units of the measurement, less a dark photograph; NaN
@@ -66,8 +79,7 @@ impl Photographer<'_> {
         workers: &impl Workers,
     ) -> Result<Vec<Picture>, StudyError> {
         let mut pictures = self.expose(lights, workers);
-        let black = vec![[0.0; CHANNELS]; self.scene.geometry().camera.area()];
-        let dark = self.noisy(&black, 0)?;
+        let dark = self.dark()?;
         let mut done = 0;
         for batch in pictures.chunks_mut(BATCH) {
             let noisy = workers.map(batch.len(), |i| {
@@ -130,7 +142,7 @@ fn emitted(codes: &Codes) -> Pattern {
     }
 }
 
-/// The first `count` shots of `measurements`.
+/// The first `count` shots of `measurements`, with the noise that all of them told.
 pub fn first_shots(measurements: &Measurements, count: usize) -> Measurements {
     let count = count.min(measurements.patterns.len());
     Measurements {
@@ -139,6 +151,9 @@ pub fn first_shots(measurements: &Measurements, count: usize) -> Measurements {
         correspondence: measurements.correspondence,
         patterns: measurements.patterns[..count].to_vec(),
         full_scale: measurements.full_scale[..count].to_vec(),
+        rows: measurements.rows.clone(),
         pictures: measurements.pictures[..count].to_vec(),
+        flood: measurements.flood.clone(),
+        noise: measurements.noise,
     }
 }

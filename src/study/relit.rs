@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::known::{Known, expose, pixel_under};
-use super::methods::DEFAULT;
+use super::methods::{self, DEFAULT};
 use super::report::{Section, Table, cell};
 use super::sheet::{Captioned, Panel, Sheet};
 use super::{Progress, StudyError};
@@ -59,7 +59,7 @@ pub fn relit_pictures(
     let patterns = measurements.patterns.len();
     progress(&format!(
         "{name}: relighting, recovered by {} from {patterns} patterns",
-        DEFAULT.name()
+        methods::name(DEFAULT)
     ));
     let tenth = |tenths: usize| progress(&format!("{name}: relighting, {tenths}0 %"));
     let (truth, ours) = pictures(known, measurements, &lights, workers, &tenth)?;
@@ -74,7 +74,7 @@ pub fn relit_pictures(
     section.paragraph(&format!(
         "Recovered by `{}` from {patterns} patterns. PSNR is against the true pictures, peak 1 in \
          units of the measurement, over all pixels and channels.",
-        DEFAULT.name()
+        methods::name(DEFAULT)
     ));
     let mut table = Table::new(&["light", "psnr_db", "true_mean", "method", "patterns"]);
     let mut shown = Table::new(&["light", "PSNR (dB)"]);
@@ -93,7 +93,7 @@ pub fn relit_pictures(
                 "{:.4}",
                 total(&truth[i]) / (camera.area() * CHANNELS) as f64
             ),
-            DEFAULT.name().to_owned(),
+            methods::name(DEFAULT).to_owned(),
             patterns.to_string(),
         ]);
         shown.row([light.name.clone(), cell(psnr)]);

@@ -2,7 +2,7 @@
 
 use super::accuracy::judge;
 use super::known::SceneTruth;
-use super::methods::{DEFAULT, METHODS};
+use super::methods::{self, DEFAULT, METHODS};
 use super::report::{Section, Table, cell};
 use super::{Photographer, Progress, StudyError};
 use crate::recover::Workers;
@@ -79,7 +79,7 @@ pub fn scenes_table(
         "electrons",
         "seed",
     ];
-    header.extend(METHODS.iter().map(|m| m.name()));
+    header.extend(METHODS.iter().map(|&m| methods::name(m)));
     header.extend(["default", "shortfall"]);
     let mut table = Table::new(&header);
     let mut worst = f64::NEG_INFINITY;
@@ -126,7 +126,7 @@ pub fn scenes_table(
         };
         let shortfall = of(false).zip(of(true)).map(|(other, ours)| other - ours);
         worst = worst.max(shortfall.unwrap_or(worst));
-        row.push(DEFAULT.name().to_owned());
+        row.push(methods::name(DEFAULT).to_owned());
         row.push(shortfall.map_or(String::new(), |db| format!("{db:.2}")));
         table.row(row);
     }

@@ -3,7 +3,7 @@
 use super::accuracy::judge;
 use super::chart::{Chart, Series, TopAxis, level_range};
 use super::known::Known;
-use super::methods::METHODS;
+use super::methods::{self, METHODS};
 use super::report::{Section, Table, cell, seconds};
 use super::{Progress, StudyError, blocks};
 use crate::capture::Measurements;
@@ -11,6 +11,8 @@ use crate::recover::Workers;
 
 /// Numbers of patterns, `L`, rising.
 pub const SNR_PATTERNS: [usize; 11] = [10, 14, 20, 28, 40, 56, 80, 112, 160, 224, 320];
+/// Of those, the numbers that slow methods are given.
+const SLOW_PATTERNS: [usize; 3] = [20, 80, 320];
 /// Numbers that stand at the chart's axes.
 const TICKS: [usize; 6] = [10, 20, 40, 80, 160, 320];
 /// What the paper reaches with 80 patterns.
@@ -41,10 +43,13 @@ pub fn snr_curves(
         measurements.full_scale.truncate(l);
         measurements.pictures.truncate(l);
         for &method in METHODS {
+            if methods::slow(method) && !SLOW_PATTERNS.contains(&l) {
+                continue;
+            }
             let accuracy = judge(known, &measurements, method, pixels, workers)?;
             progress(&format!(
                 "{name}: {} from {l} patterns: {} dB",
-                method.name(),
+                methods::name(method),
                 cell(accuracy.snr)
             ));
             results.push((l, method, accuracy));
@@ -63,15 +68,16 @@ pub fn snr_curves(
         "seconds_for_all_pixels",
     ]);
     let mut header = vec!["L", "L/M"];
-    header.extend(METHODS.iter().map(|m| m.name()));
+    header.extend(METHODS.iter().map(|&m| methods::name(m)));
     let mut table = Table::new(&header);
     for &l in &counts {
         let mut row = vec![l.to_string(), format!("{:.5}", l as f64 / light)];
         for &method in METHODS {
             let found = results.iter().find(|r| (r.0, r.1) == (l, method));
+            row.push(found.map_or(String::new(), |found| cell(found.2.snr)));
             if let Some((_, _, accuracy)) = found {
                 data.row([
-                    method.name().to_owned(),
+                    methods::name(method).to_owned(),
                     l.to_string(),
                     format!("{:.6}", l as f64 / light),
                     cell(accuracy.snr),
@@ -80,7 +86,6 @@ pub fn snr_curves(
                     measurements.camera.area().to_string(),
                     seconds(accuracy.seconds),
                 ]);
-                row.push(cell(accuracy.snr));
             }
         }
         table.row(row);
@@ -88,7 +93,7 @@ pub fn snr_curves(
     let series: Vec<_> = METHODS
         .iter()
         .map(|&method| Series {
-            name: method.name().to_owned(),
+            name: methods::name(method).to_owned(),
             points: counts
                 .iter()
                 .filter_map(|&l| {

@@ -68,7 +68,7 @@ mod tests {
     use rand_distr::{Distribution, StandardUniform};
 
     use super::*;
-    use crate::capture::Pattern;
+    use crate::capture::{Noise, Pattern, Rows};
     use crate::recover::OneThread;
     use crate::simulate::NoiseStream;
     use crate::transport::{Correspondence, Extent};
@@ -103,7 +103,13 @@ mod tests {
                 affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             },
             full_scale: vec![1.0; 10],
+            rows: Rows::all(1),
             pictures: patterns.iter().map(seen).collect(),
+            flood: None,
+            noise: Noise {
+                gain: [0.0; CHANNELS],
+                floor: [0.0; CHANNELS],
+            },
             patterns: patterns.into_iter().map(Pattern::Grey).collect(),
         };
         let truth = Dense { elements: 16, tau };
