@@ -17,7 +17,7 @@ use super::memory::{self, Plan};
 use super::photographs::Photographs;
 use super::process::{AllCores, Interrupt, Interrupted};
 use super::{files, process, report};
-use crate::capture::{CaptureFolder, DarkFrame, Measurements, Noise};
+use crate::capture::{CaptureFolder, DarkFrame, Measurements, Noise, Rows};
 use crate::format::{self, EncodedTile, Metadata};
 use crate::recover::{self, Band, Method, Recovery, Settings, SparsityBasis};
 use crate::transport::{Basis, CHANNELS, Window};
@@ -197,7 +197,8 @@ fn recover(
     interrupt: &Interrupt,
 ) -> Result<Report> {
     let dark = folder.read_dark()?;
-    let mut measurements = no_rows(folder, &dark, shots, plan)?;
+    let gray_code_rows = plan.gray_code_rows(folder.manifest().graycode.len());
+    let mut measurements = no_rows(folder, &dark, shots, &gray_code_rows)?;
     let mut photographs = Photographs::open(folder, &dark, shots)?;
     // Before the long work: a checkpoint that does not fit is better known now.
     let recipe = recipe(args, folder, shots, plan)?;
@@ -422,22 +423,20 @@ fn choose_shots(available: usize, first: Option<u32>) -> Result<Vec<usize>> {
     }
 }
 
-/// Reads all there is to measurements but their rows.
-fn no_rows(
+/// Reads all there is to measurements but their rows. Gray code, where it is needed, is read in
+/// `gray_code_rows`.
+pub(super) fn no_rows(
     folder: &CaptureFolder,
     dark: &DarkFrame,
     shots: &[usize],
-    plan: &Plan,
+    gray_code_rows: &Rows,
 ) -> Result<Measurements> {
     let correspondence = match folder.correspondence() {
         Some(given) => given,
-        None => {
-            let rows = plan.gray_code_rows(folder.manifest().graycode.len());
-            folder
-                .read_gray_code(dark, &rows)?
-                .correspondence(folder.manifest().camera.extent())
-                .with_context(|| folder.manifest_path().display().to_string())?
-        }
+        None => folder
+            .read_gray_code(dark, gray_code_rows)?
+            .correspondence(folder.manifest().camera.extent())
+            .with_context(|| folder.manifest_path().display().to_string())?,
     };
     let patterns = shots.par_iter().map(|&i| folder.read_pattern(i));
     let patterns = patterns.collect::<Result<Vec<_>, _>>()?;
