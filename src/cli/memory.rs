@@ -5,6 +5,7 @@ use std::ops::Range;
 use anyhow::{Result, ensure};
 
 use crate::capture::{Manifest, Rows};
+use crate::recover::Method;
 use crate::transport::{CHANNELS, Geometry, Window};
 
 /// What the program needs whatever it works on: itself, buffers, what the allocator keeps.
@@ -62,12 +63,14 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Shares `budget` out for recovery from `shots` photographs, on at most `threads` threads.
+    /// Shares `budget` out for recovery by `method` from `shots` photographs, on at most `threads`
+    /// threads.
     /// Which rows are at hand does not depend on the number of threads.
     pub fn new(
         budget: Bytes,
         manifest: &Manifest,
         shots: usize,
+        method: Method,
         window: Window,
         threads: usize,
     ) -> Result<Self> {
@@ -77,6 +80,7 @@ impl Plan {
         let photographs = shots as u64 + u64::from(manifest.flood.is_some());
         let width = u64::from(camera.width);
         let fixed = PROGRAM
+            + method.preparation_bytes() as u64
             + pixel * camera.area() as u64 // the dark frame
             + pixel * (shots * light.area()) as u64 // patterns, of any colour
             + photographs * (READER + 4 * 2 * CHANNELS as u64 * width);
@@ -194,6 +198,7 @@ mod tests {
             Bytes(megabytes << 20),
             &manifest.unwrap(),
             80,
+            Method::Nnls,
             window,
             threads,
         )

@@ -68,6 +68,17 @@ impl Interrupt {
     }
 }
 
+/// A sign of life on standard error while something runs whose length nobody knows, shown on a
+/// terminal only.
+pub fn spinner(what: &'static str) -> ProgressBar {
+    let bar = ProgressBar::new_spinner().with_message(what);
+    if let Ok(style) = ProgressStyle::with_template("{msg:12} {spinner} {elapsed}") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(std::time::Duration::from_millis(100));
+    bar
+}
+
 /// A progress bar on standard error with rate and time left, shown on a terminal only.
 pub fn progress(what: &'static str, steps: usize) -> ProgressBar {
     let bar = ProgressBar::new(steps as u64).with_message(what);

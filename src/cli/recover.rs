@@ -163,6 +163,7 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         args.memory,
         manifest,
         shots.len(),
+        args.method(),
         args.window.most(),
         threads,
     )?;
@@ -223,8 +224,10 @@ fn recover(
         method: args.method(),
         window: band.map_or(args.window.most(), |band| band.window),
     };
+    let spinner = process::spinner("learning");
     let recovery =
         Recovery::prepare(&measurements, settings, &AllCores).with_context(of_capture)?;
+    spinner.finish_and_clear();
     let geometry = *recovery.geometry();
     let mut run = Run {
         interrupt,

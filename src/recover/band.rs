@@ -81,7 +81,7 @@ impl Band {
             });
             let mut total = Sums::new(groups.count);
             parts.iter().for_each(|part| total.merge(part));
-            profile = total.solve().ok_or(RecoverError::NoLight)?;
+            profile = total.solve().ok_or(RecoverError::Dark)?;
         }
         groups.band(&profile, probe)
     }

@@ -108,17 +108,18 @@ impl Direct {
         self.tile_from(measurements, &rows, rect)
     }
 
-    /// Squared error of predicting the patterns numbered `held` in one tile from those in `rows`.
-    pub fn held_out_error(
+    /// What is missed, `[pixel, held, channel]`, in predicting the patterns numbered `held` in one
+    /// tile from those in `rows`; NaN where saturated.
+    pub fn held_out_misses(
         &self,
         measurements: &Measurements,
         rows: &[usize],
         held: &[usize],
         rect: TileRect,
-    ) -> f64 {
+    ) -> Vec<f64> {
         let functions = self.tile_from(measurements, rows, rect);
         let (area, light) = (self.geometry.window.area(), self.geometry.light);
-        let mut error = 0.0;
+        let mut misses = Vec::with_capacity(rect.extent.area() * held.len() * CHANNELS);
         for (p, pixel) in rect.pixels().enumerate() {
             let origin = self.geometry.window_origin(pixel);
             let tau = &functions.tau[p * area..(p + 1) * area];
@@ -132,15 +133,10 @@ impl Direct {
                         }
                     }
                 }
-                for c in 0..CHANNELS {
-                    let miss = measurements.sample(l, pixel, c) - y[c];
-                    if miss.is_finite() {
-                        error += miss * miss;
-                    }
-                }
+                misses.extend((0..CHANNELS).map(|c| measurements.sample(l, pixel, c) - y[c]));
             }
         }
-        error
+        misses
     }
 
     fn tile_from(

@@ -33,6 +33,14 @@ impl Method {
     /// Every method there is.
     pub const ALL: &[Self] = &[Self::Nnls];
 
+    /// About the most memory that preparing a recovery takes beside the measurements, in bytes.
+    pub fn preparation_bytes(self) -> usize {
+        match self {
+            Self::Learned => Learned::PREPARATION_BYTES,
+            Self::Nnls | Self::Bpdn(_) => 0,
+        }
+    }
+
     /// The name by which options, reports and files call it.
     pub fn name(self) -> &'static str {
         match self {
@@ -68,6 +76,11 @@ pub enum RecoverError {
         "no camera pixel looks at the light plane; check \"correspondence\" and \"light\" in the capture's manifest"
     )]
     NoLight,
+    /// Nothing in the photographs stands out of their noise.
+    #[error(
+        "the photographs show no light from the display; check \"camera.black\", the exposure, and that photographs are listed with the patterns they show"
+    )]
+    Dark,
 }
 
 /// A recovery ready to run: what has been learned or chosen from the measurements as a whole, by

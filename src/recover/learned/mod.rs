@@ -19,6 +19,8 @@ mod kernels;
 mod posterior;
 mod prior;
 pub(super) mod start;
+#[cfg(test)]
+mod tests;
 
 use context::{Context, Field, Patch, REACH};
 use equations::{Equations, windows};
@@ -40,13 +42,17 @@ const SQUARES: (usize, u32) = (128, 4);
 const ROUNDS: usize = 20;
 /// Patches that neighbours' part is learned from, and their side in pixels.
 const PATCHES: (usize, u32) = (64, 16);
+/// Bytes that the patches' Gram matrices may take: where windows are many, there are fewer patches.
+const PATCH_BYTES: usize = 128 << 20;
+/// Fewest patches all the same.
+const FEWEST_PATCHES: usize = 8;
 /// Rounds of expectation–maximisation on the patches, with the kernels chosen.
 const LATE_ROUNDS: usize = 2;
 /// Share of the brightness that 5 % of the pixels exceed, below which nothing is learned of a pixel.
 const DIM: f64 = 0.1;
-/// Least squares is tried tile by tile only if, over the whole picture, its error on patterns held
-/// out is at most this many times that of the learned prior.
-const COMPETITIVE: f64 = 1.5;
+/// Share of the error on patterns held out that blending with least squares must save to be worth
+/// a direct tile, which takes ten times the room of a factored one.
+const LEAST_GAIN: f64 = 0.005;
 
 /// What has been learned.
 #[derive(Debug)]
@@ -86,6 +92,10 @@ impl Split {
 }
 
 impl Learned {
+    /// About the most memory that learning takes beside the measurements: the patches, what is said
+    /// of them, and the sums of the neighbours' regressions.
+    pub const PREPARATION_BYTES: usize = 2 * PATCH_BYTES;
+
     /// Learns from all of `measurements`.
     pub fn new(
         measurements: &Measurements,
@@ -96,7 +106,10 @@ impl Learned {
         let split = Split::new(measurements.patterns.len());
         let squares = start::spread(measurements, SQUARES.1, SQUARES.0);
         let pooled = start::pooled_mean(measurements, &geometry, &split.learn, &squares, workers)
-            .ok_or(RecoverError::NoLight)?;
+            .ok_or_else(|| match windows_seen(&geometry) {
+            true => RecoverError::Dark,
+            false => RecoverError::NoLight,
+        })?;
         let mean = start::blur(&pooled, geometry.window.side() as usize);
         let (functions, mut prior) =
             start::first_prior(&mean, geometry.window.side() as usize, workers);
@@ -131,10 +144,10 @@ impl Learned {
                 chosen = Some((error, learned));
             }
         }
-        let (_, mut learned) = chosen.ok_or(RecoverError::NoLight)?;
+        let (_, mut learned) = chosen.ok_or(RecoverError::Dark)?;
 
         // What neighbours tell, and whether it helps.
-        let inner = start::spread(measurements, PATCHES.1, PATCHES.0);
+        let inner = start::spread(measurements, PATCHES.1, learned.patches(measurements));
         learned.learn_context(measurements, &split.learn, &inner, workers);
         if !split.held.is_empty() {
             let with = learned.held_out_error(measurements, &split, &inner, workers);
@@ -143,8 +156,7 @@ impl Learned {
             if context.is_some() && with < without {
                 learned.learn_context(measurements, &split.all, &inner, workers);
             }
-            let best = with.min(without);
-            learned.direct = learned.rival(measurements, &split, &inner, best, workers)?;
+            learned.direct = learned.rival(measurements, &split, &inner, workers)?;
         }
         learned.basis = Basis {
             kernels: (0..learned.kernels.rank())
@@ -176,14 +188,41 @@ impl Learned {
     /// Recovers one tile.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
         let split = Split::new(measurements.patterns.len());
-        if let Some(direct) = &self.direct {
-            let (ours, theirs) = self.compare(measurements, direct, &split, rect);
-            if theirs < ours {
-                return RecoveredTile::Direct(direct.tile(measurements, rect));
+        let coefficients = self.solve(measurements, &split.all, rect);
+        let factored = RecoveredTile::Factored(FactoredTile { rect, coefficients });
+        let Some(direct) = &self.direct else {
+            return factored;
+        };
+        let share = self
+            .compare(measurements, direct, &split, rect)
+            .best_share();
+        if share == 0.0 {
+            return factored;
+        }
+        let mut functions = factored.functions(&self.geometry, Some(&self.basis));
+        let theirs = direct.tile(measurements, rect);
+        for (tau, theirs) in functions.tau.iter_mut().zip(&theirs.tau) {
+            for c in 0..CHANNELS {
+                tau[c] += share * (theirs[c] - tau[c]);
             }
         }
-        let coefficients = self.solve(measurements, &split.all, rect).1;
-        RecoveredTile::Factored(FactoredTile { rect, coefficients })
+        RecoveredTile::Direct(functions)
+    }
+
+    /// Number of patches there is memory for.
+    fn patches(&self, measurements: &Measurements) -> usize {
+        let patch = TileRect {
+            x: 0,
+            y: 0,
+            extent: Extent {
+                width: PATCHES.1 + 2 * REACH as u32,
+                height: PATCHES.1 + 2 * REACH as u32,
+            },
+        };
+        let planes = if measurements.grey() { 1 } else { CHANNELS };
+        let grams = windows(&self.geometry, patch).len() * planes;
+        let bytes = grams * self.rank() * self.rank() * size_of::<f64>();
+        (PATCH_BYTES / bytes).clamp(FEWEST_PATCHES, PATCHES.0)
     }
 
     /// Learns the late rounds of the prior, and the neighbours' part, from the patterns `rows`.
@@ -215,14 +254,13 @@ impl Learned {
         self.context = Context::learn(&patches, &self.prior, &self.threshold, workers);
     }
 
-    /// Coefficients `f z` of `rect` from the patterns `rows`, `[pixel, component]`, and whether each
-    /// pixel and channel is bright, `[pixel, channel]`.
+    /// Coefficients `f z` of `rect` from the patterns `rows`, `[pixel, component]`.
     fn solve(
         &self,
         measurements: &Measurements,
         rows: &[usize],
         rect: TileRect,
-    ) -> (Vec<bool>, Vec<[f32; CHANNELS]>) {
+    ) -> Vec<[f32; CHANNELS]> {
         let region = grown(measurements, rect, self.halo());
         let equations = Equations::new(measurements, &self.geometry, &self.kernels, rows, region);
         let field = Field::new(&equations, &self.prior, &self.threshold);
@@ -236,7 +274,6 @@ impl Learned {
             Some(context) => context.refine(&patch, self.prior.noise),
             None => patch.field.z.clone(),
         };
-        let mut bright = Vec::with_capacity(rect.extent.area() * CHANNELS);
         let mut coefficients = vec![[0.0f32; CHANNELS]; rect.extent.area() * rank];
         for (p, pixel) in rect.pixels().enumerate() {
             let there = (pixel.y - region.y) * region.extent.width + pixel.x - region.x;
@@ -247,10 +284,9 @@ impl Learned {
                 for (k, z) in z.iter().enumerate() {
                     coefficients[p * rank + k][c] = (scale * z) as f32;
                 }
-                bright.push(patch.field.bright[member]);
             }
         }
-        (bright, coefficients)
+        coefficients
     }
 
     /// Squared error, over `rects`, of predicting the patterns held out.
@@ -262,87 +298,132 @@ impl Learned {
         workers: &impl Workers,
     ) -> f64 {
         let errors = workers.map(rects.len(), |i| {
-            let (_, coefficients) = self.solve(measurements, &split.learn, rects[i]);
-            self.error_of(measurements, split, rects[i], &coefficients)
+            let misses = self.misses(measurements, split, rects[i]);
+            let seen = misses.iter().filter(|miss| miss.is_finite());
+            seen.map(|miss| miss * miss).sum::<f64>()
         });
         errors.iter().sum()
     }
 
-    /// Squared error of predicting the patterns held out from a tile's coefficients.
-    fn error_of(
-        &self,
-        measurements: &Measurements,
-        split: &Split,
-        rect: TileRect,
-        coefficients: &[[f32; CHANNELS]],
-    ) -> f64 {
-        let rank = self.rank();
-        let mut error = 0.0;
+    /// What is missed, `[pixel, held, channel]`, in predicting the patterns held out from the others;
+    /// NaN where saturated.
+    fn misses(&self, measurements: &Measurements, split: &Split, rect: TileRect) -> Vec<f64> {
+        let coefficients = self.solve(measurements, &split.learn, rect);
+        let (rank, held) = (self.rank(), split.held.len());
+        let mut misses = vec![f64::NAN; rect.extent.area() * held * CHANNELS];
+        let planes: &[usize] = if measurements.grey() {
+            &[0]
+        } else {
+            &[0, 1, 2]
+        };
         for (origin, pixels) in windows(&self.geometry, rect) {
-            for c in 0..CHANNELS {
-                if c > 0 && measurements.grey() {
-                    continue;
-                }
+            for &plane in planes {
                 let projected = self
                     .kernels
-                    .project(measurements, &self.geometry, origin, c);
+                    .project(measurements, &self.geometry, origin, plane);
                 let channels = if measurements.grey() {
                     0..CHANNELS
                 } else {
-                    c..c + 1
+                    plane..plane + 1
                 };
                 for &(p, pixel) in &pixels {
                     let coefficients = &coefficients[p * rank..(p + 1) * rank];
-                    for c in channels.clone() {
-                        for &l in &split.held {
+                    for (i, &l) in split.held.iter().enumerate() {
+                        for c in channels.clone() {
                             let row = projected.row(l).iter().zip(coefficients);
                             let y: f64 = row.map(|(b, z)| f64::from(b * z[c])).sum();
-                            let miss = measurements.sample(l, pixel, c) - y;
-                            if miss.is_finite() {
-                                error += miss * miss;
-                            }
+                            misses[(p * held + i) * CHANNELS + c] =
+                                measurements.sample(l, pixel, c) - y;
                         }
                     }
                 }
             }
         }
-        error
+        misses
     }
 
-    /// Errors of the learned prior and of least squares on the patterns held out, on one tile.
+    /// The learned prior and least squares on the patterns held out, on one tile.
     fn compare(
         &self,
         measurements: &Measurements,
         direct: &Direct,
         split: &Split,
         rect: TileRect,
-    ) -> (f64, f64) {
-        let (_, coefficients) = self.solve(measurements, &split.learn, rect);
-        let ours = self.error_of(measurements, split, rect, &coefficients);
-        let theirs = direct.held_out_error(measurements, &split.learn, &split.held, rect);
-        (ours, theirs)
+    ) -> Comparison {
+        let ours = self.misses(measurements, split, rect);
+        let theirs = direct.held_out_misses(measurements, &split.learn, &split.held, rect);
+        let mut comparison = Comparison::default();
+        for (a, b) in ours.into_iter().zip(theirs) {
+            if a.is_finite() && b.is_finite() {
+                comparison.ours += a * a;
+                comparison.both += a * b;
+                comparison.theirs += b * b;
+            }
+        }
+        comparison
     }
 
-    /// Least squares, if it does not do much worse than the learned prior, whose error is `ours`.
+    /// Least squares, if blending with it helps over the whole picture.
     fn rival(
         &self,
         measurements: &Measurements,
         split: &Split,
         rects: &[TileRect],
-        ours: f64,
         workers: &impl Workers,
     ) -> Result<Option<Direct>, RecoverError> {
         let direct = Direct::least_squares(measurements, self.geometry, workers)?;
         // A corner of each patch is enough to tell.
-        let corners: Vec<TileRect> = rects.iter().map(|rect| corner(*rect)).collect();
-        let errors = workers.map(corners.len(), |i| {
-            direct.held_out_error(measurements, &split.learn, &split.held, corners[i])
+        let parts = workers.map(rects.len(), |i| {
+            self.compare(measurements, &direct, split, corner(rects[i]))
         });
-        let theirs: f64 = errors.iter().sum();
-        let share: f64 = corners.iter().map(|c| c.extent.area() as f64).sum::<f64>()
-            / rects.iter().map(|r| r.extent.area() as f64).sum::<f64>();
-        Ok((theirs < COMPETITIVE * ours * share).then_some(direct))
+        let mut total = Comparison::default();
+        for part in parts {
+            total.ours += part.ours;
+            total.both += part.both;
+            total.theirs += part.theirs;
+        }
+        Ok((total.best_share() > 0.0).then_some(direct))
     }
+}
+
+/// Inner products of what two methods miss on the patterns held out.
+#[derive(Clone, Copy, Debug, Default)]
+struct Comparison {
+    ours: f64,
+    both: f64,
+    theirs: f64,
+}
+
+impl Comparison {
+    /// Share of their functions in the blend with ours that misses least; 0 if that saves too
+    /// little.
+    ///
+    /// Where the transport is sparse and each function a case of its own, least squares knows what a
+    /// Gaussian prior does not, that no light is negative; their errors differ, and a blend of both
+    /// is better than either.
+    fn best_share(self) -> f32 {
+        let apart = self.ours - 2.0 * self.both + self.theirs;
+        if apart.is_nan() || apart <= 0.0 {
+            return 0.0;
+        }
+        let share = ((self.ours - self.both) / apart).clamp(0.0, 1.0);
+        let saved = share * (2.0 * (self.ours - self.both) - share * apart);
+        match saved > LEAST_GAIN * self.ours {
+            true => share as f32,
+            false => 0.0,
+        }
+    }
+}
+
+/// Whether any window reaches the display.
+fn windows_seen(geometry: &Geometry) -> bool {
+    let side = i64::from(geometry.window.side());
+    let reaches =
+        |at: i32, length: u32| i64::from(at) + side > 0 && i64::from(at) < i64::from(length);
+    geometry.tiles().flat_map(TileRect::pixels).any(|pixel| {
+        let origin = geometry.window_origin(pixel);
+        reaches(origin.u, geometry.light.width) && reaches(origin.v, geometry.light.height)
+    })
 }
 
 /// The first few pixels of a rectangle.

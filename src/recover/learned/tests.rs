@@ -1,0 +1,292 @@
+//! The learned prior on made-up objects whose functions are known.
+
+use super::equations::Equations;
+use super::posterior::{Gaussian, Workspace};
+use super::*;
+use crate::capture::{Noise, Pattern, Rows};
+use crate::recover::{OneThread, Workers};
+use crate::transport::{CameraPx, Correspondence, TransportFunctions, Window};
+
+/// Works backwards: what comes out must not depend on the order.
+struct Backwards;
+
+impl Workers for Backwards {
+    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        let mut results: Vec<T> = (0..count).rev().map(work).collect();
+        results.reverse();
+        results
+    }
+}
+
+/// Uniform numbers in [0, 1), always the same.
+fn random(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+const SIDE: u32 = 48;
+const WINDOW: u32 = 7;
+
+fn geometry() -> Geometry {
+    Geometry {
+        camera: Extent {
+            width: SIDE,
+            height: SIDE,
+        },
+        light: Extent {
+            width: SIDE / 2,
+            height: SIDE / 2,
+        },
+        window: Window::new(WINDOW).unwrap(),
+        correspondence: Correspondence {
+            affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
+        },
+        tile_side: 32,
+    }
+}
+
+/// Spots whose place and size change smoothly over the picture, `[pixel, element, channel]`.
+fn object(geometry: &Geometry) -> Vec<[f64; CHANNELS]> {
+    let side = WINDOW as usize;
+    let mut tau = Vec::new();
+    let all = TileRect {
+        x: 0,
+        y: 0,
+        extent: geometry.camera,
+    };
+    for pixel in all.pixels() {
+        let (x, y) = (f64::from(pixel.x), f64::from(pixel.y));
+        let (du, dv) = ((0.21 * x + 0.1 * y).sin(), (0.17 * y - 0.13 * x).cos());
+        let at = geometry.correspondence.at(pixel);
+        let size = 0.7 + 0.3 * (0.11 * x).sin();
+        let origin = geometry.window_origin(pixel);
+        for s in 0..side * side {
+            let element = geometry.window.element(origin, s);
+            let u = f64::from(element.u) + 0.5 - at.u - du;
+            let v = f64::from(element.v) + 0.5 - at.v - dv;
+            let value = (-(u * u + v * v) / (2.0 * size * size)).exp() * 0.1;
+            let lit = element.index_in(geometry.light).is_some();
+            let bright = 0.7 + 0.3 * (0.05 * x * y).cos();
+            tau.push([1.0, 0.8, 0.5].map(|c| if lit { c * bright * value } else { 0.0 }));
+        }
+    }
+    tau
+}
+
+fn measurements(patterns: usize, seed: u64) -> (Measurements, Vec<[f64; CHANNELS]>) {
+    let geometry = geometry();
+    let tau = object(&geometry);
+    let mut random = random(seed);
+    let shown: Vec<Vec<f32>> = (0..patterns)
+        .map(|_| {
+            let element = |_| if random() < 0.5 { 0.0 } else { 1.0 };
+            (0..geometry.light.area()).map(element).collect()
+        })
+        .collect();
+    let all = TileRect {
+        x: 0,
+        y: 0,
+        extent: geometry.camera,
+    };
+    let area = geometry.window.area();
+    let pictures = shown
+        .iter()
+        .map(|pattern| {
+            let pixels = all.pixels().enumerate().map(|(n, pixel)| {
+                let origin = geometry.window_origin(pixel);
+                let mut y = [0.0; CHANNELS];
+                for s in 0..area {
+                    let element = geometry.window.element(origin, s);
+                    if let Some(m) = element.index_in(geometry.light) {
+                        for c in 0..CHANNELS {
+                            y[c] += f64::from(pattern[m]) * tau[n * area + s][c];
+                        }
+                    }
+                }
+                y.map(|y| (y + 1e-4 * (random() + random() + random() - 1.5) * 2.0) as f32)
+            });
+            pixels.collect()
+        })
+        .collect();
+    let measurements = Measurements {
+        camera: geometry.camera,
+        light: geometry.light,
+        correspondence: geometry.correspondence,
+        patterns: shown.into_iter().map(Pattern::Grey).collect(),
+        full_scale: vec![1.0; patterns],
+        rows: Rows::all(SIDE),
+        pictures,
+        flood: None,
+        noise: Noise {
+            gain: [0.0; CHANNELS],
+            floor: [1e-8; CHANNELS],
+        },
+    };
+    (measurements, tau)
+}
+
+fn snr(tiles: &[TransportFunctions], tau: &[[f64; CHANNELS]]) -> f64 {
+    let geometry = geometry();
+    let area = geometry.window.area();
+    let (mut signal, mut error) = (0.0, 0.0);
+    for tile in tiles {
+        for (p, pixel) in tile.rect.pixels().enumerate() {
+            let n = geometry.camera.index(pixel);
+            for s in 0..area {
+                for c in 0..CHANNELS {
+                    let truth = tau[n * area + s][c];
+                    signal += truth * truth;
+                    error += (truth - f64::from(tile.tau[p * area + s][c])).powi(2);
+                }
+            }
+        }
+    }
+    10.0 * (signal / error).log10()
+}
+
+#[test]
+fn few_patterns_suffice_where_functions_are_alike() {
+    let geometry = geometry();
+    let (measurements, tau) = measurements(20, 7);
+    let learned = Learned::new(&measurements, geometry, &OneThread).unwrap();
+    let direct = Direct::least_squares(&measurements, geometry, &OneThread).unwrap();
+    let ours: Vec<_> = geometry
+        .tiles()
+        .map(|rect| {
+            let tile = learned.tile(&measurements, rect);
+            tile.functions(&geometry, Some(learned.basis()))
+        })
+        .collect();
+    let theirs: Vec<_> = geometry
+        .tiles()
+        .map(|rect| direct.tile(&measurements, rect))
+        .collect();
+    let (ours, theirs) = (snr(&ours, &tau), snr(&theirs, &tau));
+    assert!(ours > theirs + 6.0, "{ours} dB against {theirs} dB");
+    assert!(ours > 20.0, "{ours} dB");
+}
+
+#[test]
+fn order_and_threads_leave_every_bit_as_it_is() {
+    let geometry = geometry();
+    let (measurements, _) = measurements(12, 3);
+    let one = Learned::new(&measurements, geometry, &OneThread).unwrap();
+    let other = Learned::new(&measurements, geometry, &Backwards).unwrap();
+    assert_eq!(one.basis(), other.basis());
+    let rect = geometry.tile(1);
+    match (
+        one.tile(&measurements, rect),
+        other.tile(&measurements, rect),
+    ) {
+        (RecoveredTile::Factored(a), RecoveredTile::Factored(b)) => assert_eq!(a, b),
+        (RecoveredTile::Direct(a), RecoveredTile::Direct(b)) => assert_eq!(a.tau, b.tau),
+        _ => panic!("tiles of different kinds"),
+    }
+}
+
+#[test]
+fn darkness_is_an_error_that_says_so() {
+    let (mut measurements, _) = measurements(6, 1);
+    for picture in &mut measurements.pictures {
+        picture.fill([0.0; CHANNELS]);
+    }
+    let error = Learned::new(&measurements, geometry(), &OneThread).unwrap_err();
+    assert!(matches!(error, RecoverError::Dark), "{error}");
+}
+
+/// Kernels that are single elements, so that the posterior can be worked out by hand.
+fn single_elements() -> Kernels {
+    let area = (WINDOW * WINDOW) as usize;
+    let mut kernels = vec![0.0; 3 * area];
+    for (k, s) in [24, 25, 31].into_iter().enumerate() {
+        kernels[k * area + s] = 1.0;
+    }
+    let mut mean = vec![0.0; area];
+    mean[24] = 1.0;
+    Kernels::new(&kernels, &mean)
+}
+
+fn square() -> TileRect {
+    TileRect {
+        x: 20,
+        y: 20,
+        extent: Extent {
+            width: 2,
+            height: 2,
+        },
+    }
+}
+
+#[test]
+fn the_posterior_mean_minimises_what_it_should() {
+    let (measurements, _) = measurements(10, 5);
+    let rows: Vec<usize> = (0..10).collect();
+    let kernels = single_elements();
+    let equations = Equations::new(&measurements, &geometry(), &kernels, &rows, square());
+    let covariance = [2.0, 0.5, 0.1, 0.5, 1.0, 0.2, 0.1, 0.2, 0.7];
+    let prior = Gaussian::new(&covariance, 3);
+    let mean = [0.8, 0.1, -0.2];
+    let mut work = Workspace::new(3);
+    for member in 0..12 {
+        work.infer(&equations, member, 1.3, &prior, &mean);
+        let of = equations.members[member];
+        let gram = equations.gram(member);
+        let variance = 1.3 * of.variance;
+        // The gradient of ‖y − fBz‖²/σ² + (z − m)ᵀC⁻¹(z − m) times C, which needs no inverse:
+        // (z − m) − C f Bᵀ(y − fBz)/σ² = 0.
+        let residual: Vec<f64> = (0..3)
+            .map(|k| {
+                let image: f64 = (0..3).map(|j| gram[k * 3 + j] * work.z[j]).sum();
+                of.scale * (equations.right(member)[k] - of.scale * image) / variance
+            })
+            .collect();
+        for k in 0..3 {
+            let pull: f64 = (0..3).map(|j| covariance[k * 3 + j] * residual[j]).sum();
+            let off = work.z[k] - mean[k] - pull;
+            assert!(off.abs() < 1e-6 * (1.0 + pull.abs()), "{off} of {pull}");
+        }
+    }
+}
+
+#[test]
+fn a_saturated_sample_is_as_good_as_not_taken() {
+    let (mut measurements, _) = measurements(10, 5);
+    let kernels = single_elements();
+    let without: Vec<usize> = (0..10).filter(|&l| l != 4).collect();
+    let clean = Equations::new(&measurements, &geometry(), &kernels, &without, square());
+    let n = geometry().camera.index(CameraPx { x: 21, y: 20 });
+    measurements.pictures[4][n] = [f32::NAN; CHANNELS];
+    let rows: Vec<usize> = (0..10).collect();
+    let saturated = Equations::new(&measurements, &geometry(), &kernels, &rows, square());
+    for member in 3..6 {
+        assert_eq!(saturated.gram(member), clean.gram(member));
+        assert_eq!(saturated.right(member), clean.right(member));
+        assert_eq!(saturated.members[member].scale, clean.members[member].scale);
+        assert_eq!(saturated.members[member].rows, 9);
+    }
+    assert_eq!(saturated.members[0].rows, 10);
+}
+
+#[test]
+fn colour_patterns_of_one_colour_are_grey_ones() {
+    let (grey, _) = measurements(8, 9);
+    let mut colour = grey.clone();
+    for pattern in &mut colour.patterns {
+        let plane = pattern.plane(0).to_vec();
+        *pattern = Pattern::Rgb([plane.clone(), plane.clone(), plane]);
+    }
+    let rows: Vec<usize> = (0..8).collect();
+    let kernels = single_elements();
+    let a = Equations::new(&grey, &geometry(), &kernels, &rows, square());
+    let b = Equations::new(&colour, &geometry(), &kernels, &rows, square());
+    for member in 0..12 {
+        assert_eq!(a.gram(member), b.gram(member));
+        assert_eq!(a.right(member), b.right(member));
+        assert_eq!(a.members[member].scale, b.members[member].scale);
+    }
+}
