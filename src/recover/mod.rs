@@ -11,6 +11,7 @@
 
 mod bpdn;
 mod common_mode;
+mod dense;
 mod design;
 mod direct;
 mod learned;

@@ -13,7 +13,6 @@
 //! decided on patterns held out.
 
 mod context;
-mod dense;
 mod equations;
 mod kernels;
 mod posterior;
