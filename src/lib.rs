@@ -15,6 +15,7 @@
 //! | [`transport`] | – | what the rooms around it share: windows, tiles, the band |
 //! | [`format`] | a transport | an `.ltm` file, and back |
 //! | [`relight`] | a transport and a light | a picture |
+//! | [`study`] (native) | known transport | how well all of this does: figures and tables |
 //!
 //! `cli` (native) and `web` (wasm32) are thin faces on them.
 
@@ -28,6 +29,8 @@ pub mod recover;
 pub mod relight;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod simulate;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod study;
 pub mod transport;
 #[cfg(target_arch = "wasm32")]
 pub mod web;

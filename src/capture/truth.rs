@@ -73,6 +73,16 @@ impl Truth {
         }))
     }
 
+    /// Camera grid.
+    pub fn camera(&self) -> Extent {
+        self.camera
+    }
+
+    /// Light grid.
+    pub fn light_plane(&self) -> Extent {
+        self.light
+    }
+
     /// The window the truth is given on.
     pub fn window(&self) -> Window {
         self.window

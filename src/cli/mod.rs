@@ -14,6 +14,7 @@ mod recover;
 mod relight;
 mod report;
 mod simulate;
+mod study;
 mod verify;
 
 use std::process::ExitCode;
@@ -36,6 +37,7 @@ enum Command {
     Relight(relight::RelightArgs),
     Inspect(inspect::InspectArgs),
     Verify(verify::VerifyArgs),
+    Study(study::StudyArgs),
 }
 
 /// Parses the command line and runs it. Status: 0 done, 1 failed, 2 wrong usage, 130 told to stop.
@@ -47,6 +49,7 @@ pub fn main() -> ExitCode {
         Command::Relight(args) => relight::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Study(args) => study::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

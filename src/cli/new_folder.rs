@@ -30,6 +30,17 @@ pub fn write_folder_whole(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -
     write().with_context(|| path.display().to_string())
 }
 
+/// Makes a new folder, or takes an empty one, and fills it in place: for work so long that what is
+/// done should be kept if the rest fails.
+pub fn fill_new_folder(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    ensure_free(path)
+        .and_then(|()| {
+            std::fs::create_dir_all(path).context("cannot be created; may you write there?")
+        })
+        .with_context(|| path.display().to_string())?;
+    fill(path)
+}
+
 fn ensure_free(path: &Path) -> Result<()> {
     use std::io::ErrorKind;
     match std::fs::read_dir(path) {

@@ -15,7 +15,7 @@ pub struct RelightArgs {
     /// Relightable photograph
     #[arg(value_name = "FILE.ltm")]
     file: PathBuf,
-    /// flood, torch, checkerboard, stripes, spectrum, or an image file
+    /// flood, torch, checkerboard, stripes, spectrum, fire, or an image file
     #[arg(long, value_name = "NAME|IMAGE")]
     light: String,
     /// Where a torch shines, as fractions of the picture from its top left corner [default: over

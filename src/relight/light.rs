@@ -63,16 +63,19 @@ pub enum BuiltinLight {
     Stripes,
     /// The rainbow from left to right.
     Spectrum,
+    /// One moment of a fire that burns along the lower edge.
+    Fire,
 }
 
 impl BuiltinLight {
     /// All of them, in the order menus show them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Flood,
         Self::Torch,
         Self::Checkerboard,
         Self::Stripes,
         Self::Spectrum,
+        Self::Fire,
     ];
 
     /// The name by which attributes and commands call it.
@@ -83,6 +86,7 @@ impl BuiltinLight {
             Self::Checkerboard => "checkerboard",
             Self::Stripes => "stripes",
             Self::Spectrum => "spectrum",
+            Self::Fire => "fire",
         }
     }
 
@@ -110,6 +114,7 @@ impl BuiltinLight {
                 Light::from_fn(extent, |p| white(((p.u / stripe) as u32).is_multiple_of(2)))
             }
             Self::Spectrum => Light::from_fn(extent, |p| rainbow(p.u / w)),
+            Self::Fire => Light::fire(extent, 0.0),
         }
     }
 }
@@ -179,6 +184,13 @@ impl Light {
         })
     }
 
+    /// A fire that burns along the lower edge, `seconds` after it was first looked at: always the
+    /// same at the same time.
+    pub fn fire(extent: Extent, seconds: f64) -> Self {
+        let (w, h) = (f64::from(extent.width), f64::from(extent.height));
+        Self::from_fn(extent, |p| flame(p.u / w, 1.0 - p.v / h, seconds))
+    }
+
     /// Light plane.
     pub fn extent(&self) -> Extent {
         self.extent
@@ -198,6 +210,36 @@ fn rainbow(x: f64) -> [f32; 3] {
     };
     // Violet is blue with a little red coming back.
     [lobe(0.12) + 0.35 * lobe(1.0), lobe(0.48), lobe(0.82)]
+}
+
+/// Glowing gas at a place of the unit square, as linear RGB: noise that rises, cools and frays.
+fn flame(x: f64, height: f64, seconds: f64) -> [f32; 3] {
+    let turbulence = |grain: f64| {
+        let rise = 0.5 * grain * seconds;
+        lattice_noise(x * grain, 0.5 * height * grain - rise)
+    };
+    let noise = 0.5 * turbulence(4.0) + 0.3 * turbulence(9.0) + 0.2 * turbulence(19.0);
+    let aside = (2.0 * x - 1.0).powi(4);
+    let heat = (1.3 - 1.75 * height - 0.5 * aside + 2.2 * (noise - 0.5)).clamp(0.0, 1.0);
+    // Black body colours: red first, then yellow, white at the hottest only.
+    [heat * heat, 0.55 * heat.powi(4), 0.16 * heat.powi(8)].map(|c| c as f32)
+}
+
+/// Smooth noise of unit grain, 0 to 1.
+fn lattice_noise(x: f64, y: f64) -> f64 {
+    let corner = |i: i64, j: i64| {
+        // Any good mix of the two will do (finaliser of MurmurHash3).
+        let mut h = (i as u32).wrapping_mul(0x9e37_79b9) ^ (j as u32).wrapping_mul(0x85eb_ca6b);
+        h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
+        h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
+        f64::from(h ^ (h >> 16)) / f64::from(u32::MAX)
+    };
+    let (i, j) = (x.floor(), y.floor());
+    let smooth = |t: f64| t * t * (3.0 - 2.0 * t);
+    let (s, t) = (smooth(x - i), smooth(y - j));
+    let (i, j) = (i as i64, j as i64);
+    let row = |j: i64| corner(i, j) * (1.0 - s) + corner(i + 1, j) * s;
+    row(j) * (1.0 - t) + row(j + 1) * t
 }
 
 #[cfg(test)]
@@ -239,6 +281,23 @@ mod tests {
             .max_by(|a, b| a.1[0].total_cmp(&b.1[0]))
             .unwrap();
         assert_eq!(brightest.0, 9 * 32 + 4);
+    }
+
+    #[test]
+    fn fire_burns_below_glows_red_and_moves() {
+        let fire = Light::fire(PLANE, 0.0);
+        let row = |v: usize| -> f32 { fire.elements[v * 32..][..32].iter().map(|e| e[0]).sum() };
+        assert!(
+            row(15) > 8.0 && row(0) < 0.1 * row(15),
+            "{}, {}",
+            row(15),
+            row(0)
+        );
+        for [r, g, b, _] in &fire.elements {
+            assert!(r >= g && g >= b);
+        }
+        assert_eq!(Light::fire(PLANE, 0.0), fire);
+        assert_ne!(Light::fire(PLANE, 0.1), fire);
     }
 
     #[test]

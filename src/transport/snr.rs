@@ -34,6 +34,16 @@ impl TransportError {
         self.error += other.error;
     }
 
+    /// Sum of squares of the true values added.
+    pub fn signal(&self) -> f64 {
+        self.signal
+    }
+
+    /// Sum of squared differences.
+    pub fn error(&self) -> f64 {
+        self.error
+    }
+
     /// The SNR; `None` where there is no error or no signal, for which no decibel figure exists.
     pub fn snr(&self) -> Option<Decibels> {
         (self.signal > 0.0 && self.error > 0.0)

@@ -11,7 +11,7 @@ const program = join(repository, 'target/release/ltm-export');
 
 export const FOLDER = join(repository, 'target/browser-tests/photos');
 export const SCREENSHOTS = join(repository, 'target/screenshots');
-export const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum'];
+export const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum', 'fire'];
 
 const GLASS = join(FOLDER, 'glass.ltm');
 const DEMO = join(repository, 'target/demo/photos/stained-glass.ltm');

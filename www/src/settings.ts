@@ -4,7 +4,7 @@ import type { Backend } from './engine.js';
 import { PhotoError } from './errors.js';
 
 /** The built-in lights, in the order menus show them. */
-export const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum'] as const;
+export const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum', 'fire'] as const;
 
 /** The name of a built-in light. */
 export type LightName = (typeof LIGHTS)[number];

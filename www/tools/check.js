@@ -14,7 +14,7 @@ import { site } from './site.js';
 
 /** Largest difference of a code that rounding explains. */
 const TOLERANCE = 1;
-const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum'];
+const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum', 'fire'];
 
 const photo = resolve(process.argv[2] ?? 'target/demo/photos/stained-glass.ltm');
 const program = join(import.meta.dirname, '../../target/release/ltm-export');

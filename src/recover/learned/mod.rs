@@ -13,11 +13,11 @@
 //! decided on patterns held out.
 
 mod context;
-mod equations;
+pub(super) mod equations;
 mod kernels;
 mod posterior;
 mod prior;
-mod start;
+pub(super) mod start;
 
 use context::{Context, Field, Patch, REACH};
 use equations::{Equations, windows};

@@ -1,0 +1,261 @@
+//! Line charts as SVG.
+
+use std::fmt::Display;
+use std::ops::Range;
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::StudyError;
+
+/// Size in pixels.
+const SIZE: (u32, u32) = (960, 500);
+/// Room at the right for the names of lines, which there hide nothing.
+const LEGEND: u32 = 210;
+/// Colours that people with any colour vision tell apart (Okabe & Ito 2008).
+const COLOURS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(90, 90, 90),
+    RGBColor(190, 180, 20),
+];
+const FONT: &str = "Helvetica, Arial, sans-serif";
+
+/// One line.
+pub(super) struct Series {
+    pub name: String,
+    /// By rising x; every x is above zero.
+    pub points: Vec<(f64, f64)>,
+    /// Whether the points themselves are shown.
+    pub marked: bool,
+}
+
+/// A second reading of the horizontal axis, along the top: `x · factor`.
+pub(super) struct TopAxis {
+    pub label: &'static str,
+    pub factor: f64,
+    /// Where ticks stand, as read at the top.
+    pub ticks: Vec<f64>,
+}
+
+/// A chart with a logarithmic horizontal axis.
+pub(super) struct Chart<'a> {
+    pub title: &'a str,
+    pub x_label: &'a str,
+    pub y_label: &'a str,
+    pub x_ticks: Vec<f64>,
+    pub top: Option<TopAxis>,
+    pub y: Range<f64>,
+    /// A level to compare with, and its name.
+    pub level: Option<(f64, &'a str)>,
+    pub series: Vec<Series>,
+}
+
+impl Chart<'_> {
+    /// Draws it.
+    pub fn svg(&self) -> Result<String, StudyError> {
+        let mut svg = String::new();
+        let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        self.draw(&area).map_err(failed)?;
+        area.present().map_err(failed)?;
+        drop(area);
+        Ok(svg)
+    }
+
+    fn draw(
+        &self,
+        area: &DrawingArea<SVGBackend, Shift>,
+    ) -> Result<(), Box<dyn std::error::Error + '_>> {
+        let x = self.x_range();
+        area.fill(&WHITE).map_err(boxed)?;
+        let title = TextStyle::from((FONT, 20).into_font()).color(&RGBColor(30, 30, 30));
+        let area = area.titled(self.title, title).map_err(boxed)?;
+        let mut builder = ChartBuilder::on(&area);
+        builder
+            .margin(12)
+            .margin_right(LEGEND)
+            .x_label_area_size(52)
+            .y_label_area_size(64);
+        if self.top.is_some() {
+            builder.top_x_label_area_size(48);
+        }
+        let factor = self.top.as_ref().map_or(1.0, |top| top.factor);
+        let top_ticks = self
+            .top
+            .as_ref()
+            .map_or(Vec::new(), |top| top.ticks.clone());
+        let mut chart = builder
+            .build_cartesian_2d(
+                (x.clone())
+                    .log_scale()
+                    .with_key_points(self.x_ticks.clone()),
+                self.y.clone(),
+            )
+            .map_err(boxed)?
+            .set_secondary_coord(
+                (x.start * factor..x.end * factor)
+                    .log_scale()
+                    .with_key_points(top_ticks),
+                self.y.clone(),
+            );
+        let label = (FONT, 14);
+        chart
+            .configure_mesh()
+            .x_labels(self.x_ticks.len().max(2))
+            .y_labels(9)
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(RGBColor(225, 225, 225))
+            .axis_style(RGBColor(90, 90, 90))
+            .x_desc(self.x_label)
+            .y_desc(self.y_label)
+            .x_label_formatter(&|x| number(*x))
+            .y_label_formatter(&|y| number(*y))
+            .label_style(label)
+            .axis_desc_style((FONT, 16))
+            .draw()
+            .map_err(boxed)?;
+        if let Some(top) = &self.top {
+            chart
+                .configure_secondary_axes()
+                .x_labels(top.ticks.len())
+                .x_desc(top.label)
+                .x_label_formatter(&|x| number(*x))
+                .label_style(label)
+                .axis_desc_style((FONT, 16))
+                .axis_style(RGBColor(90, 90, 90))
+                .draw()
+                .map_err(boxed)?;
+        }
+        let left = (area.dim_in_pixel().0 - LEGEND + 16) as i32;
+        if let Some((level, name)) = self.level {
+            let grey = RGBColor(120, 120, 120);
+            let ends = [(x.start, level), (x.end, level)];
+            chart
+                .draw_series(DashedLineSeries::new(ends, 6, 5, grey.stroke_width(1)))
+                .map_err(boxed)?;
+            let y = 72 + 24 * self.series.len() as i32;
+            for x in [left, left + 13] {
+                let dash = PathElement::new([(x, y), (x + 8, y)], grey.stroke_width(1));
+                area.draw(&dash).map_err(boxed)?;
+            }
+            area.draw(&beside(name, left, y)).map_err(boxed)?;
+        }
+        for (i, series) in self.series.iter().enumerate() {
+            let colour = COLOURS[i % COLOURS.len()];
+            let line = LineSeries::new(series.points.iter().copied(), colour.stroke_width(2));
+            chart.draw_series(line).map_err(boxed)?;
+            if series.marked {
+                let points = series.points.iter();
+                chart
+                    .draw_series(points.map(|&p| Circle::new(p, 4, colour.filled())))
+                    .map_err(boxed)?;
+            }
+            let y = 72 + 24 * i as i32;
+            let line = PathElement::new([(left, y), (left + 22, y)], colour.stroke_width(3));
+            area.draw(&line).map_err(boxed)?;
+            area.draw(&beside(&series.name, left, y)).map_err(boxed)?;
+        }
+        Ok(())
+    }
+
+    /// From the first point to the last of any line, and a little room.
+    fn x_range(&self) -> Range<f64> {
+        let xs = || self.series.iter().flat_map(|s| &s.points).map(|p| p.0);
+        let (least, most) = (xs().fold(f64::MAX, f64::min), xs().fold(0.0, f64::max));
+        match least < most {
+            true => least / 1.08..most * 1.08,
+            false => 0.5 * most.max(1.0)..2.0 * most.max(1.0),
+        }
+    }
+}
+
+/// A name in the legend, beside the piece of its line that begins at `left`.
+fn beside(name: &str, left: i32, y: i32) -> Text<'static, (i32, i32), String> {
+    let style = TextStyle::from((FONT, 14).into_font());
+    let style = style.pos(Pos::new(HPos::Left, VPos::Center));
+    Text::new(name.to_owned(), (left + 30, y), style)
+}
+
+/// A range of levels that holds `values` and ends on round numbers.
+pub(super) fn level_range(values: impl Iterator<Item = f64>, least_top: f64) -> Range<f64> {
+    let (mut low, mut high) = (0.0f64, least_top);
+    for value in values {
+        (low, high) = (low.min(value), high.max(value));
+    }
+    let step = 5.0;
+    (low / step).floor() * step..(high / step).ceil() * step
+}
+
+/// Up to three significant digits, without zeros that say nothing.
+fn number(x: f64) -> String {
+    if x == 0.0 {
+        return "0".to_owned();
+    }
+    let decimals = (2 - x.abs().log10().floor() as i32).clamp(0, 8) as usize;
+    let text = format!("{x:.decimals$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
+fn boxed<E: std::error::Error + 'static>(error: E) -> Box<dyn std::error::Error> {
+    Box::new(error)
+}
+
+fn failed(error: impl Display) -> StudyError {
+    StudyError::Chart(error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        for (x, text) in [
+            (0.0, "0"),
+            (0.00122, "0.00122"),
+            (0.5, "0.5"),
+            (25.0, "25"),
+            (320.0, "320"),
+            (-5.0, "-5"),
+        ] {
+            assert_eq!(number(x), text);
+        }
+    }
+
+    #[test]
+    fn a_chart_shows_its_labels_and_lines() {
+        let chart = Chart {
+            title: "Title",
+            x_label: "across",
+            y_label: "up (dB)",
+            x_ticks: vec![1.0, 10.0],
+            top: Some(TopAxis {
+                label: "twice",
+                factor: 2.0,
+                ticks: vec![2.0, 20.0],
+            }),
+            y: level_range([-3.0, 31.0].into_iter(), 25.0),
+            level: Some((25.0, "25 dB")),
+            series: vec![Series {
+                name: "nnls".to_owned(),
+                points: vec![(1.0, -3.0), (10.0, 31.0)],
+                marked: true,
+            }],
+        };
+        assert_eq!(chart.y, -5.0..35.0);
+        let svg = chart.svg().unwrap();
+        for word in [
+            "Title", "across", "up (dB)", "twice", "25 dB", "nnls", "<circle",
+        ] {
+            assert!(svg.contains(word), "no {word:?}");
+        }
+    }
+}

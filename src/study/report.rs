@@ -1,0 +1,131 @@
+//! What a part of the study yields: text, tables and pictures, in memory.
+
+use super::StudyError;
+use crate::transport::Decibels;
+
+/// One part of the study.
+#[derive(Debug, Default)]
+pub struct Section {
+    /// Markdown; names pictures by their paths in `files`.
+    pub markdown: String,
+    /// Path (with forward slashes) and content of every file.
+    pub files: Vec<(String, Vec<u8>)>,
+}
+
+impl Section {
+    /// A section that begins with a heading of the second level.
+    pub(super) fn new(heading: &str) -> Self {
+        Self {
+            markdown: format!("## {heading}\n"),
+            files: Vec::new(),
+        }
+    }
+
+    /// Adds a paragraph.
+    pub(super) fn paragraph(&mut self, text: &str) {
+        self.markdown += &format!("\n{}\n", text.trim_end());
+    }
+
+    /// Adds a picture and shows it.
+    pub(super) fn picture(&mut self, name: &str, alt: &str, svg: String) {
+        let path = format!("images/{name}.svg");
+        self.paragraph(&format!("![{alt}]({path})"));
+        self.files.push((path, svg.into_bytes()));
+    }
+
+    /// Adds a table's CSV.
+    pub(super) fn data(&mut self, name: &str, table: &Table) -> Result<(), StudyError> {
+        self.files.push((format!("{name}.csv"), table.csv()?));
+        Ok(())
+    }
+}
+
+/// A table, for people and for programs.
+#[derive(Clone, Debug)]
+pub struct Table {
+    header: Vec<&'static str>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// An empty table with these columns.
+    pub fn new(header: &[&'static str]) -> Self {
+        Self {
+            header: header.to_vec(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a row, one cell for each column.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+        self.rows.push(cells.into_iter().collect());
+    }
+
+    /// As CSV, the header first. Refuses rows that are longer or shorter than it.
+    pub fn csv(&self) -> Result<Vec<u8>, StudyError> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&self.header)?;
+        for row in &self.rows {
+            writer.write_record(row)?;
+        }
+        Ok(writer
+            .into_inner()
+            .map_err(|e| csv::Error::from(e.into_error()))?)
+    }
+
+    /// As a Markdown table.
+    pub fn markdown(&self) -> String {
+        let line = |cells: &mut dyn Iterator<Item = &str>| {
+            let cells: Vec<_> = cells.collect();
+            format!("| {} |\n", cells.join(" | "))
+        };
+        let mut text = line(&mut self.header.iter().copied());
+        let numeric = |i: usize| {
+            self.rows
+                .iter()
+                .all(|row| row.get(i).is_some_and(|cell| is_number(cell)))
+        };
+        text += &line(&mut (0..self.header.len()).map(|i| if numeric(i) { "--:" } else { "---" }));
+        for row in &self.rows {
+            text += &line(&mut row.iter().map(String::as_str));
+        }
+        text
+    }
+}
+
+/// Whether a cell is a number, or empty where one might be, and so goes to the right.
+fn is_number(cell: &str) -> bool {
+    cell.is_empty() || cell.trim_end_matches(" %").parse::<f64>().is_ok()
+}
+
+/// A level as a cell: two decimals, or nothing where there is none.
+pub(super) fn cell(level: Option<Decibels>) -> String {
+    level.map_or(String::new(), |level| format!("{:.2}", level.0))
+}
+
+/// A duration as a cell.
+pub(super) fn seconds(seconds: f64) -> String {
+    let decimals = usize::from(seconds < 10.0) + usize::from(seconds < 1.0);
+    format!("{seconds:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_has_one_cell_for_each_column() {
+        let mut table = Table::new(&["scene", "snr_db"]);
+        table.row(["a, b".to_owned(), cell(Some(Decibels(25.0)))]);
+        assert_eq!(
+            String::from_utf8(table.csv().unwrap()).unwrap(),
+            "scene,snr_db\n\"a, b\",25.00\n"
+        );
+        assert_eq!(
+            table.markdown(),
+            "| scene | snr_db |\n| --- | --: |\n| a, b | 25.00 |\n"
+        );
+        table.row(["one".to_owned()]);
+        assert!(table.csv().is_err());
+    }
+}

@@ -1,0 +1,119 @@
+//! Compressive sensing out of the box: every light element is an unknown of every pixel.
+
+use super::blocks;
+use super::dense::Dense;
+use crate::capture::Measurements;
+use crate::recover::{Nnls, Workers};
+use crate::transport::{CHANNELS, TransportError};
+
+/// Recovers about `pixels` pixels drawn at random, each on its own, by non-negative least squares
+/// over all M elements, and returns each one's error. With `φ = I` and `τ ≥ 0` the ℓ1 norm of the
+/// paper's case (b) is the light the pixel sees in all, which the measurements already fix but for
+/// their noise; least squares stands for both.
+///
+/// Patterns must be grey and no sample saturated.
+pub(super) fn recover(
+    truth: &Dense,
+    measurements: &Measurements,
+    pixels: usize,
+    workers: &impl Workers,
+) -> Vec<TransportError> {
+    let gram = gram(measurements, workers);
+    let drawn = blocks::draw(truth.pixels(), pixels);
+    workers.map(drawn.len(), |i| {
+        let n = drawn[i];
+        let mut solver = Nnls::new(&gram, truth.elements);
+        let mut error = TransportError::default();
+        for c in 0..CHANNELS {
+            let tau = solver.solve(&right_hand_side(measurements, n, c));
+            for (truth, tau) in truth.pixel(n).iter().zip(tau) {
+                error.add(f64::from(truth[c]), tau);
+            }
+        }
+        error
+    })
+}
+
+/// `PᵀP`, `[M, M]`.
+fn gram(measurements: &Measurements, workers: &impl Workers) -> Vec<f64> {
+    let elements = measurements.light.area();
+    let rows = workers.map(elements, |i| {
+        let mut row = vec![0.0; elements];
+        for pattern in &measurements.patterns {
+            let plane = pattern.plane(0);
+            let here = f64::from(plane[i]);
+            for (sum, &emitted) in row.iter_mut().zip(plane) {
+                *sum += here * f64::from(emitted);
+            }
+        }
+        row
+    });
+    rows.concat()
+}
+
+/// `Pᵀy`, `[M]`.
+fn right_hand_side(measurements: &Measurements, n: usize, c: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; measurements.light.area()];
+    for (pattern, picture) in measurements.patterns.iter().zip(&measurements.pictures) {
+        let y = f64::from(picture[n][c]);
+        for (sum, &emitted) in sums.iter_mut().zip(pattern.plane(0)) {
+            *sum += y * f64::from(emitted);
+        }
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, StandardUniform};
+
+    use super::*;
+    use crate::capture::{Noise, Pattern, Rows};
+    use crate::recover::OneThread;
+    use crate::simulate::NoiseStream;
+    use crate::transport::{Correspondence, Extent};
+
+    #[test]
+    fn a_sparse_function_is_found_among_all_elements() {
+        // 16 elements, 10 patterns, two of them seen.
+        let mut tau = vec![[0.0f32; CHANNELS]; 16];
+        tau[3] = [0.5, 0.2, 0.1];
+        tau[11] = [0.0, 0.3, 0.4];
+        let random = |l: u32| -> Vec<f32> {
+            let mut stream = NoiseStream::Pattern(l).start(1);
+            (0..16)
+                .map(|_| StandardUniform.sample(&mut stream))
+                .collect()
+        };
+        let patterns: Vec<Vec<f32>> = (0..10).map(random).collect();
+        let seen = |p: &Vec<f32>| {
+            let y = |c: usize| p.iter().zip(&tau).map(|(p, t)| p * t[c]).sum();
+            vec![[0, 1, 2].map(y)]
+        };
+        let measurements = Measurements {
+            camera: Extent {
+                width: 1,
+                height: 1,
+            },
+            light: Extent {
+                width: 4,
+                height: 4,
+            },
+            correspondence: Correspondence {
+                affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            },
+            full_scale: vec![1.0; 10],
+            rows: Rows::all(1),
+            pictures: patterns.iter().map(seen).collect(),
+            flood: None,
+            noise: Noise {
+                gain: [0.0; CHANNELS],
+                floor: [0.0; CHANNELS],
+            },
+            patterns: patterns.into_iter().map(Pattern::Grey).collect(),
+        };
+        let truth = Dense { elements: 16, tau };
+        let errors = recover(&truth, &measurements, 1, &OneThread);
+        assert!(errors[0].snr().is_none_or(|snr| snr.0 > 60.0), "{errors:?}");
+    }
+}

@@ -1,0 +1,145 @@
+//! `ltm-export study` on a capture whose transport is known.
+#![cfg(not(target_arch = "wasm32"))]
+#![allow(clippy::unwrap_used)] // a test that cannot go on should stop
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use assert_cmd::Command;
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Shots left in the fixture: few, so that recovery takes little time.
+const SHOTS: usize = 16;
+
+fn run(args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
+    command.args(args).output().unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// The fixture with its first shots only, truth and all, called `glass`.
+fn capture(folder: &Path) -> PathBuf {
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/glass-s");
+    let capture = folder.join("glass");
+    for part in ["patterns", "photos", "graycode", "truth"] {
+        fs::create_dir_all(capture.join(part)).unwrap();
+        for entry in fs::read_dir(fixture.join(part)).unwrap() {
+            let entry = entry.unwrap();
+            fs::copy(entry.path(), capture.join(part).join(entry.file_name())).unwrap();
+        }
+    }
+    let manifest = fs::read_to_string(fixture.join("capture.json")).unwrap();
+    let mut manifest: Value = serde_json::from_str(&manifest).unwrap();
+    manifest["shots"].as_array_mut().unwrap().truncate(SHOTS);
+    fs::write(capture.join("capture.json"), manifest.to_string()).unwrap();
+    capture
+}
+
+/// Header and rows of a table.
+fn csv(path: &Path) -> (Vec<String>, Vec<Vec<String>>) {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let cells = |record: &csv::StringRecord| record.iter().map(str::to_owned).collect();
+    let header = cells(reader.headers().unwrap());
+    let rows = reader.records().map(|row| cells(&row.unwrap())).collect();
+    (header, rows)
+}
+
+#[test]
+fn figures_agree_with_recover_and_evaluate() {
+    let folder = TempDir::new().unwrap();
+    let (capture, results) = (capture(folder.path()), folder.path().join("results"));
+    let output = run(&[
+        "study",
+        text(&capture),
+        "-o",
+        text(&results),
+        "--pixels",
+        "200",
+    ]);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert!(output.stdout.is_empty(), "progress goes to standard error");
+
+    // Every picture that is shown is there, and is whole.
+    let shown = fs::read_to_string(results.join("results.md")).unwrap();
+    let pictures: Vec<&str> = shown
+        .split("](")
+        .skip(1)
+        .map(|rest| rest.split(')').next().unwrap())
+        .collect();
+    assert_eq!(pictures.len(), 4);
+    for picture in pictures {
+        let svg = fs::read_to_string(results.join(picture)).unwrap();
+        assert!(
+            svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"),
+            "{picture}"
+        );
+    }
+
+    let (header, rows) = csv(&results.join("glass-figure3.csv"));
+    assert_eq!(
+        header[..4],
+        ["method", "patterns", "patterns_per_light_element", "snr_db"]
+    );
+    let patterns: Vec<&str> = rows
+        .iter()
+        .filter(|row| row[0] == "nnls")
+        .map(|row| row[1].as_str())
+        .collect();
+    assert_eq!(patterns, ["10", "14", "16"]);
+    let (_, profile) = csv(&results.join("glass-figure2.csv"));
+    let last = profile.last().unwrap();
+    assert_eq!((last[1].as_str(), last[2].as_str()), ("100.000", "100.000"));
+
+    // Pictures are relit as by the other commands, which round to the file's codes in between.
+    let file = folder.path().join("glass.ltm");
+    let window = ["--window", "13", "--patterns", "16"];
+    let (_, rows) = csv(&results.join("glass-figure4.csv"));
+    let method = ["--method", rows[0][3].as_str()];
+    let recover = ["recover", text(&capture), "-o", text(&file)];
+    assert!(
+        run(&[&recover[..], &window, &method].concat())
+            .status
+            .success()
+    );
+    let evaluated = run(&["evaluate", text(&file), text(&capture), "--json"]);
+    let evaluated: Value = serde_json::from_slice(&evaluated.stdout).unwrap();
+    assert_eq!(rows.len(), 5);
+    for row in rows {
+        let (ours, theirs) = (row[1].parse::<f64>().unwrap(), &evaluated["relit"][&row[0]]);
+        assert!(
+            (ours - theirs.as_f64().unwrap()).abs() < 0.05,
+            "{row:?}, {theirs}"
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_studied_is_refused_at_once() {
+    let folder = TempDir::new().unwrap();
+    let capture = capture(folder.path());
+    let results = folder.path().join("results");
+    let refused = |subjects: &[&str], word: &str| {
+        let args = [&["study", "-o", text(&results)], subjects].concat();
+        let output = run(&args);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(message.contains(word), "no {word:?} in: {message}");
+    };
+    refused(&["nowhere"], "nowhere");
+    refused(&[text(&capture), text(&capture)], "named twice");
+    assert!(!results.exists());
+    fs::remove_dir_all(capture.join("truth")).unwrap();
+    refused(&[text(&capture)], "truth/");
+    fs::write(folder.path().join("mine"), "keep").unwrap();
+    let output = run(&["study", "scenes", "-o", text(folder.path())]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("something in it"));
+}
