@@ -5,7 +5,8 @@
 //! out. No sign is imposed, so that rings beyond the band come out near zero, on either side of it,
 //! rather than gathering noise.
 
-use super::learned::{dense, equations, start};
+use super::dense;
+use super::learned::{equations, start};
 use super::vector::{add_scaled, dot, vectorised};
 use super::{RecoverError, Workers};
 use crate::capture::Measurements;

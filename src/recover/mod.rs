@@ -12,6 +12,7 @@
 mod band;
 mod bpdn;
 mod common_mode;
+mod dense;
 mod design;
 mod direct;
 mod learned;

@@ -7,6 +7,7 @@
 //! the constraint, and both return that least-squares solution.
 
 mod homotopy;
+mod interior;
 mod splitting;
 mod tolerance;
 mod transform;

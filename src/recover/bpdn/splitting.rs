@@ -9,10 +9,13 @@
 //!
 //! The dual problem is `max yᵀν − ε‖ν‖ : Aᵀν ≤ φs, ‖s‖_∞ ≤ 1`. The multipliers nearly satisfy its
 //! constraints, and mixing in a little of the constant basis vector makes them satisfy them, so that
-//! the distance to the optimum is known at any time: iterations end by it.
+//! the distance to the optimum is known at any time: iterations end by it. As ε nears ‖y‖ the
+//! problem nears a linear program, on which splitting can take thousands of iterations: what is then
+//! still open goes to [`interior`].
 
+use super::super::dense;
 use super::super::vector::{dot, vectorised};
-use super::SparsityBasis;
+use super::{SparsityBasis, interior};
 
 /// Right-hand sides solved for side by side: the four camera pixels and three channels of a window
 /// at two camera pixels an element.
@@ -28,10 +31,12 @@ const MEAN_EIGENVALUE: f64 = 10.0;
 const RELAXATION: f64 = 1.7;
 /// Iterations between looks at gap and penalty.
 const CHECK_EVERY: usize = 20;
-/// Past this many iterations the best answer so far is taken.
-const MOST_ITERATIONS: usize = 2_000;
+/// Past this many iterations a barrier method goes on with those right-hand sides that are open.
+const MOST_ITERATIONS: usize = 1_000;
 /// Relative duality gap at which a solution is good: noise moves the objective by far more.
-const GAP: f64 = 1e-2;
+pub(super) const GAP: f64 = 2e-3;
+/// Steps of the search for the best mixture in a bound.
+const THIRDS: usize = 40;
 /// 1/ρ to start with, as a share of the function's total; balancing moves it from there.
 const INITIAL_SHRINK: f64 = 1e-3;
 
@@ -56,6 +61,13 @@ pub struct Solution {
     pub objective: f64,
     /// A lower bound on the objective of every feasible x; zero where none is feasible.
     pub bound: f64,
+}
+
+impl Solution {
+    /// How far the objective may be above the optimum, as a share of it.
+    pub(super) fn gap(&self) -> f64 {
+        (self.objective - self.bound) / self.objective
+    }
 }
 
 /// Solver for right-hand sides that share one matrix.
@@ -180,69 +192,166 @@ impl Splitting {
             for _ in 0..CHECK_EVERY {
                 state.iterate(self);
             }
-            let bounds = state.bounds(self);
-            let mut done = true;
+            let mut open = 0;
             for (lane, (constraint, best)) in constraints.iter().zip(&mut best).enumerate() {
-                let x = self.repair(state.candidate(self, lane), constraint);
-                let objective = self.objective(&x);
-                if objective < best.objective {
-                    (best.x, best.objective) = (x, objective);
+                if best.gap() > GAP {
+                    let [s, nu] = state.multipliers(lane);
+                    self.record(constraint, state.candidate(self, lane), &s, best);
+                    best.bound = best.bound.max(self.bound(constraint, &s, &nu));
                 }
-                // A bound once proven holds for good.
-                best.bound = best.bound.max(bounds[lane]);
-                done &= best.objective - best.bound <= GAP * best.objective;
+                open += usize::from(best.gap() > GAP);
             }
-            if done {
-                break;
+            if open == 0 {
+                return best;
             }
             state.balance();
+        }
+        let gram = self.gram();
+        for (constraint, best) in constraints.iter().zip(&mut best) {
+            if best.gap() > GAP {
+                interior::improve(self, &gram, constraint, best);
+            }
         }
         best
     }
 
-    /// The point nearest to `x`, on the way to the least-squares solution, that satisfies the
-    /// constraint.
+    /// Points near `x` that satisfy the constraint: the darkest one along the ray through x, if that
+    /// meets the ball around y, and the nearest one on the way to the least-squares solution.
     #[inline(always)]
-    fn repair(&self, mut x: Vec<f64>, constraint: &Constraint) -> Vec<f64> {
+    fn feasible(&self, x: Vec<f64>, constraint: &Constraint) -> impl Iterator<Item = Vec<f64>> {
         let &Constraint {
             y,
             epsilon,
             least_squares,
         } = constraint;
-        let (from, to) = (self.difference(&x, y), self.difference(least_squares, y));
-        // ‖from + t (to − from)‖² = ε² for the least t in [0, 1].
+        let from = self.difference(&x, y);
+        let seen: Vec<f64> = y.iter().zip(&from).map(|(y, from)| y - from).collect();
+        let to = self.difference(least_squares, y);
         let step: Vec<f64> = to.iter().zip(&from).map(|(to, from)| to - from).collect();
-        let (a, b) = (dot(&step, &step), -dot(&step, &from));
-        let c = dot(&from, &from) - epsilon * epsilon;
-        if c > 0.0 {
-            let root = b * b - a * c;
-            let t = match root >= 0.0 && a > 0.0 {
-                true => (c / (b + root.sqrt())).clamp(0.0, 1.0),
-                false => 1.0,
-            };
-            for (x, least) in x.iter_mut().zip(least_squares) {
-                *x += t * (least - *x);
-            }
-        }
-        x
+        let minus: Vec<f64> = seen.iter().map(|s| -s).collect();
+        let ray = reach(y, &minus, epsilon).map(|t| x.iter().map(|x| t * x).collect());
+        let onward = reach(&from, &step, epsilon).filter(|&t| t <= 1.0).map(|t| {
+            let both = x.iter().zip(least_squares);
+            both.map(|(x, least)| x + t * (least - x)).collect()
+        });
+        ray.into_iter().chain(onward)
     }
 
     /// `‖φᵀx‖₁` of x on the unknowns.
     #[inline(always)]
     fn objective(&self, x: &[f64]) -> f64 {
-        let mut window = vec![ZERO; self.side * self.side];
+        self.coefficients(x).iter().map(|c| c.abs()).sum()
+    }
+
+    /// `φᵀx` of x on the unknowns.
+    #[inline(always)]
+    pub(super) fn coefficients(&self, x: &[f64]) -> Vec<f64> {
+        let mut window = vec![0.0; self.side * self.side];
         for (&slot, &x) in self.slots.iter().zip(x) {
-            window[slot][0] = x;
+            window[slot] = x;
         }
-        let mut coefficients = window.clone();
-        let mut scratch = window.clone();
-        self.transform(&self.analysis, &window, &mut scratch, &mut coefficients);
-        coefficients.iter().map(|c| c[0].abs()).sum()
+        self.transform_one(&self.analysis, &window)
+    }
+
+    /// φs on the unknowns.
+    #[inline(always)]
+    pub(super) fn synthesize(&self, s: &[f64]) -> Vec<f64> {
+        let window = self.transform_one(&self.synthesis, s);
+        self.slots.iter().map(|&slot| window[slot]).collect()
+    }
+
+    /// `M input Mᵀ` with `M` along one axis.
+    #[inline(always)]
+    fn transform_one(&self, along: &[f64], input: &[f64]) -> Vec<f64> {
+        let side = self.side;
+        let half = dense::product(along, input, side, side);
+        let rows = half.chunks_exact(side);
+        rows.flat_map(|row| along.chunks_exact(side).map(move |b| dot(row, b)))
+            .collect()
+    }
+
+    /// `φ diag(d) φᵀ` between the unknowns, `[k, k]`.
+    #[inline(always)]
+    pub(super) fn sandwich(&self, d: &[f64]) -> Vec<f64> {
+        let side = self.side;
+        let area = side * side;
+        // Along one axis for each coefficient of the other, `[p, (u, u′)]`: then sums over p.
+        let products = |b: &[f64]| -> Vec<f64> {
+            let pairs = (0..side).flat_map(|i| (0..side).map(move |j| (i, j)));
+            pairs
+                .flat_map(|(i, j)| (0..side).map(move |p| b[p * side + i] * b[p * side + j]))
+                .collect()
+        };
+        let pairs = products(&self.analysis);
+        let along = dense::product(d, &transpose(&pairs, side), side, area);
+        let both = dense::product(&pairs, &along, side, area);
+        let mut out = Vec::with_capacity(self.slots.len() * self.slots.len());
+        for &a in &self.slots {
+            let (v, u) = (a / side, a % side);
+            for &b in &self.slots {
+                out.push(both[(v * side + b / side) * area + u * side + b % side]);
+            }
+        }
+        out
+    }
+
+    /// `Aᵀr` on the unknowns.
+    #[inline(always)]
+    pub(super) fn correlate(&self, r: &[f64]) -> Vec<f64> {
+        let column = |&slot: &usize| &self.transposed[slot * self.rows..(slot + 1) * self.rows];
+        let columns = self.slots.iter().map(column);
+        columns.map(|column| dot(column, r) / self.beta).collect()
+    }
+
+    /// `AᵀA` between the unknowns.
+    #[inline(always)]
+    fn gram(&self) -> Vec<f64> {
+        let column = |&slot: &usize| &self.transposed[slot * self.rows..(slot + 1) * self.rows];
+        let all = self.slots.iter().flat_map(|a| {
+            let others = self.slots.iter();
+            others.map(move |b| dot(column(a), column(b)) / (self.beta * self.beta))
+        });
+        all.collect()
+    }
+
+    /// Keeps what is better than `best` of feasible points near x, and of the bound that multipliers
+    /// s near the optimal ones prove.
+    #[inline(always)]
+    pub(super) fn record(
+        &self,
+        constraint: &Constraint,
+        x: Vec<f64>,
+        s: &[f64],
+        best: &mut Solution,
+    ) {
+        for x in self.feasible(x, constraint) {
+            let objective = self.objective(&x);
+            if objective < best.objective {
+                (best.x, best.objective) = (x, objective);
+            }
+        }
+        // At the optimum ν points the residual's way.
+        let residual = self.difference(&best.x, constraint.y);
+        best.bound = best.bound.max(self.bound(constraint, s, &residual));
+    }
+
+    /// A lower bound on the objective, from multipliers s within ±1 and the direction of ν.
+    #[inline(always)]
+    fn bound(&self, constraint: &Constraint, s: &[f64], direction: &[f64]) -> f64 {
+        let size = dot(direction, direction).sqrt();
+        let gain = dot(direction, constraint.y) - constraint.epsilon * size;
+        if gain <= 0.0 {
+            return 0.0;
+        }
+        let pairs: Vec<_> = (self.correlate(direction).into_iter())
+            .zip(self.synthesize(s))
+            .collect();
+        gain * farthest(&pairs, 1.0 / self.side as f64)
     }
 
     /// `y − Ax`.
     #[inline(always)]
-    fn difference(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
+    pub(super) fn difference(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
         let mut difference = y.to_vec();
         for (&slot, &x) in self.slots.iter().zip(x) {
             if x != 0.0 {
@@ -274,6 +383,51 @@ impl Splitting {
             );
         }
     }
+}
+
+/// The least `t ≥ 0` at which `‖from + t step‖ ≤ ε`.
+#[inline(always)]
+fn reach(from: &[f64], step: &[f64], epsilon: f64) -> Option<f64> {
+    let (a, b) = (dot(step, step), -dot(step, from));
+    let c = dot(from, from) - epsilon * epsilon;
+    if c <= 0.0 {
+        return Some(0.0);
+    }
+    let root = b * b - a * c;
+    (b > 0.0 && root >= 0.0).then(|| c / (b + root.sqrt()))
+}
+
+/// The largest t for which `t p ≤ α q + (1 − α) c` for all pairs (p, q) and some α in [0, 1].
+///
+/// φ turns the constant basis vector into `c = 1/side` everywhere, so that, with q = φs and
+/// p = Aᵀν, the dual's constraint holds for tν and `αs` plus `1 − α` of that vector.
+#[inline(always)]
+fn farthest(pairs: &[(f64, f64)], c: f64) -> f64 {
+    // What is allowed at α ends at `most`, and begins where p < 0 meets a negative right side.
+    let along = |alpha: f64| {
+        let (mut least, mut most) = (0.0f64, f64::INFINITY);
+        for &(p, q) in pairs {
+            let room = alpha * q + (1.0 - alpha) * c;
+            if p > 0.0 {
+                most = most.min(room / p);
+            } else if room < 0.0 {
+                least = least.max(room / p);
+            }
+        }
+        if least <= most { most } else { -1.0 }
+    };
+    // Concave in α as far as anything is allowed, which it is from zero on: by thirds.
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..THIRDS {
+        let (a, b) = ((2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0);
+        if along(a) < along(b) {
+            low = a;
+        } else {
+            high = b;
+        }
+    }
+    let best = along(low).max(along(high));
+    if best.is_finite() { best.max(0.0) } else { 0.0 }
 }
 
 /// Everything that iterates, with the multipliers scaled by 1/ρ as usual.
@@ -423,47 +577,11 @@ impl State {
         slots.map(|&slot| self.z[1][slot][lane]).collect()
     }
 
-    /// Lower bounds on the objective from the multipliers `ν = −ρu₃` and `s = ρu₁`.
-    #[inline(always)]
-    fn bounds(&mut self, problem: &Splitting) -> Lanes {
-        let [first, second] = &mut self.window;
-        let [along, _] = &mut self.equations;
-        for (a, u) in along.iter_mut().zip(&self.u[2]) {
-            for lane in 0..PANEL {
-                a[lane] = -u[lane] / self.shrink[lane];
-            }
-        }
-        // How far Aᵀν ≤ φs is violated.
-        multiply(&problem.transposed, problem.rows, along, 1, first, 1);
-        let mut violation = ZERO;
-        {
-            let scratch = &mut self.seen[1];
-            problem.transform(&problem.synthesis, &self.u[0], scratch, second);
-        }
-        for (slot, (nu, s)) in first.iter().zip(second.iter()).enumerate() {
-            if self.on_display[slot] {
-                for lane in 0..PANEL {
-                    let here = nu[lane] - s[lane] / self.shrink[lane];
-                    violation[lane] = violation[lane].max(here);
-                }
-            }
-        }
-        let (mut product, mut squares) = (ZERO, ZERO);
-        for (nu, y) in along.iter().zip(&self.y) {
-            for lane in 0..PANEL {
-                product[lane] += nu[lane] * y[lane];
-                squares[lane] += nu[lane] * nu[lane];
-            }
-        }
-        let mut bounds = ZERO;
-        for lane in 0..PANEL {
-            // φ turns the constant basis vector into 1/side everywhere: θs + (1 − θ) of it, with θν,
-            // satisfies the constraint for θ (violation + 1/side) ≤ 1/side.
-            let theta = 1.0 / (1.0 + violation[lane] * problem.side as f64);
-            let dual = product[lane] - self.epsilon[lane] * squares[lane].sqrt();
-            bounds[lane] = (theta * dual).max(0.0);
-        }
-        bounds
+    /// The multipliers `s = ρu₁` of one right-hand side, `[side²]`, and ν's direction.
+    fn multipliers(&self, lane: usize) -> [Vec<f64>; 2] {
+        let s = self.u[0].iter().map(|u| u[lane] / self.shrink[lane]);
+        let nu = self.u[2].iter().map(|u| -u[lane]);
+        [s.collect(), nu.collect()]
     }
 
     /// Moves ρ to where splits and multipliers converge alike (Wohlberg 2017).
@@ -572,37 +690,13 @@ fn transpose(matrix: &[f64], n: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The inverse of a symmetric positive definite matrix, `[n, n]`, by Cholesky's factors.
+/// The inverse of a symmetric positive definite matrix, `[n, n]`; zero if it is not.
 #[inline(always)]
-fn invert(mut l: Vec<f64>, n: usize) -> Vec<f64> {
-    for i in 0..n {
-        let (above, row) = l.split_at_mut(i * n);
-        for j in 0..i {
-            let other = &above[j * n..j * n + j + 1];
-            row[j] = (row[j] - dot(&row[..j], &other[..j])) / other[j];
-        }
-        row[i] = (row[i] - dot(&row[..i], &row[..i])).sqrt();
-    }
-    // Rows of L⁻ᵀ, which is upper triangular: column i of L⁻¹ in row i.
-    let mut factor = vec![0.0; n * n];
-    for i in 0..n {
-        let column = &mut factor[i * n..(i + 1) * n];
-        column[i] = 1.0 / l[i * n + i];
-        for row in i + 1..n {
-            let known = dot(&l[row * n + i..row * n + row], &column[i..row]);
-            column[row] = -known / l[row * n + row];
-        }
-    }
+fn invert(mut system: Vec<f64>, n: usize) -> Vec<f64> {
     let mut inverse = vec![0.0; n * n];
-    for i in 0..n {
-        for j in 0..=i {
-            let value = dot(
-                &factor[i * n + i..(i + 1) * n],
-                &factor[j * n + i..(j + 1) * n],
-            );
-            inverse[i * n + j] = value;
-            inverse[j * n + i] = value;
-        }
+    if dense::cholesky(&mut system, n).is_some() {
+        dense::invert(&system, n, &mut vec![0.0; n * n], &mut inverse);
+        dense::mirror(&mut inverse, n);
     }
     inverse
 }
@@ -649,14 +743,15 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(60))]
+        #![proptest_config(ProptestConfig::with_cases(200))]
 
-        /// Feasible to rounding, non-negative, objective as stated, and the gap to a proven bound
-        /// small. (As ε nears the size of y, x nears zero and iterations end before 1 %.)
+        /// For ε from 2 % of ‖y‖ to above it: feasible to rounding, non-negative, objective as
+        /// stated, and the gap to a proven bound small; least squares where nothing is feasible,
+        /// dark where zero is.
         #[test]
         fn answers_are_feasible_and_the_gap_closes(
             dct in any::<bool>(), rows in 4usize..30, missing in 0usize..8, seed in any::<u64>(),
-            share in 0.05f64..0.6,
+            share in 0.02f64..1.1,
         ) {
             let basis = if dct { SparsityBasis::Dct } else { SparsityBasis::Haar };
             let (problem, splitting) = window(basis, rows, missing, seed);
@@ -667,25 +762,29 @@ mod tests {
                 let least_squares = solver.solve(&problem.right_hand_side(y));
                 let least = problem.residual(&least_squares, y);
                 let size = Problem::energy(y).sqrt();
-                let epsilon = least + share * (size - least);
+                let epsilon = share * size;
                 let constraint = Constraint { y, epsilon, least_squares: &least_squares };
                 let solution = splitting.solve(&[constraint]).remove(0);
                 prop_assert!(solution.x.iter().all(|&x| x >= 0.0));
-                let residual = problem.residual(&solution.x, y);
-                prop_assert!(residual <= epsilon + 1e-9 * size, "{residual} > {epsilon}");
                 let objective = norm_in_basis(basis, missing, &solution.x);
                 prop_assert!((objective - solution.objective).abs() <= 1e-9 * (1.0 + objective));
-                prop_assert!(solution.bound <= objective + 1e-9);
+                if epsilon < size && epsilon <= least {
+                    prop_assert_eq!(&solution.x, &least_squares);
+                    continue;
+                }
+                let residual = problem.residual(&solution.x, y);
+                prop_assert!(residual <= epsilon + 1e-9 * size, "{residual} > {epsilon}");
+                prop_assert!(solution.bound <= objective * (1.0 + 1e-9));
                 prop_assert!(
-                    objective - solution.bound <= GAP * objective + 1e-9 * size,
-                    "{objective} is not near {}", solution.bound
+                    objective - solution.bound <= GAP * objective,
+                    "{objective} is not near {} at {share}, least {}", solution.bound, least / size
                 );
             }
         }
 
         /// With φ = I the homotopy is an independent solver of the same problem.
         #[test]
-        fn agrees_with_the_homotopy(rows in 4usize..30, seed in any::<u64>(), share in 0.1f64..0.9) {
+        fn agrees_with_the_homotopy(rows in 4usize..30, seed in any::<u64>(), share in 0.02f64..0.98) {
             let (problem, splitting) = window(SparsityBasis::Identity, rows, 0, seed);
             let gram = problem.gram();
             for y in &problem.measurements {
@@ -697,7 +796,7 @@ mod tests {
                 let constraint = Constraint { y, epsilon, least_squares: &least_squares };
                 let found = splitting.solve(&[constraint]).remove(0);
                 let best: f64 = exact.iter().sum();
-                prop_assert!((found.objective - best).abs() <= 0.01 * best + 1e-9);
+                prop_assert!((found.objective - best).abs() <= GAP * best + 1e-9);
             }
         }
     }

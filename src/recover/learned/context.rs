@@ -7,11 +7,11 @@
 //! prediction fails, so that each pixel weighs both priors by how well they explain its own
 //! measurements.
 
-use super::dense;
 use super::equations::{Equations, Member, PHASES};
 use super::posterior::{Gaussian, Workspace};
 use super::prior::{Prior, Threshold, bright};
 use crate::recover::Workers;
+use crate::recover::dense;
 use crate::recover::vector::{add_scaled, vectorised};
 use crate::transport::{CHANNELS, Extent, TileRect};
 

@@ -13,7 +13,6 @@
 //! decided on patterns held out.
 
 mod context;
-pub(super) mod dense;
 pub(super) mod equations;
 mod kernels;
 mod posterior;

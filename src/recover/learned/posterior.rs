@@ -1,7 +1,7 @@
 //! What one pixel's measurements and a Gaussian prior say together, in closed form.
 
-use super::dense;
 use super::equations::Equations;
+use crate::recover::dense;
 use crate::recover::vector::dot;
 
 /// A covariance ready for use.

@@ -1,9 +1,9 @@
 //! The prior of one pixel on its own, learned by expectation–maximisation.
 
-use super::dense;
 use super::equations::{Equations, PHASES};
 use super::posterior::{Gaussian, Workspace};
 use crate::recover::Workers;
+use crate::recover::dense;
 use crate::recover::vector::{add_scaled, vectorised};
 use crate::transport::CHANNELS;
 

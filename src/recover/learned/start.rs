@@ -1,10 +1,10 @@
 //! Where learning starts: the mean light transport function, and smooth variations of it.
 
-use super::dense;
 use super::equations::windows;
 use super::kernels::Kernels;
 use super::prior::Prior;
 use crate::capture::Measurements;
+use crate::recover::dense;
 use crate::recover::vector::{add_scaled, dot, vectorised};
 use crate::recover::{Nnls, Workers};
 use crate::transport::{CHANNELS, CameraPx, Element, Extent, Geometry, TileRect};

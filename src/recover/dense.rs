@@ -1,6 +1,6 @@
-//! Small dense matrices, row-major: what the posterior of a light transport function takes.
+//! Small dense matrices, row-major.
 
-use crate::recover::vector::{add_scaled, dot};
+use super::vector::{add_scaled, dot};
 
 /// Rows eliminated together: each row below is then loaded and stored a quarter as often.
 const BLOCK: usize = 4;
