@@ -35,6 +35,10 @@ const GATHERED: Sample = Sample {
 /// default tile's at two camera pixels an element.
 const BLOCK: i32 = 16;
 
+/// Squared residual above what is allowed, as a share of the measurements', at which a path of
+/// solutions has gone astray.
+const LOST: f64 = 1e-6;
+
 /// What is solved for each pixel and channel of a window.
 #[derive(Clone, Copy, Debug)]
 enum Problem {
@@ -276,8 +280,15 @@ impl Direct {
                 for Seen { pixel, channel, y } in seen {
                     let epsilon = tolerance.epsilon(y.len(), mean(&y));
                     let y = design.weigh(y);
-                    let energy = y.iter().map(|y| y * y).sum();
-                    let x = homotopy.solve(&design.right_hand_side(&y), energy, epsilon);
+                    let energy: f64 = y.iter().map(|y| y * y).sum();
+                    let h = design.right_hand_side(&y);
+                    let mut x = homotopy.solve(&h, energy, epsilon);
+                    // With no more patterns than elements on the path its equations may be singular
+                    // to rounding, and the path lost.
+                    let residual = design.squared_residual(&y, &x);
+                    if residual.is_nan() || residual > epsilon * epsilon + LOST * energy {
+                        x = nnls.solve(&h);
+                    }
                     take(pixel, channel, &x, None);
                 }
             }
