@@ -31,7 +31,13 @@ impl From<Method> for &'static str {
 
 impl Method {
     /// Every method there is.
-    pub const ALL: &[Self] = &[Self::Nnls];
+    pub const ALL: &[Self] = &[
+        Self::Learned,
+        Self::Nnls,
+        Self::Bpdn(SparsityBasis::Identity),
+        Self::Bpdn(SparsityBasis::Dct),
+        Self::Bpdn(SparsityBasis::Haar),
+    ];
 
     /// The name by which options, reports and files call it.
     pub fn name(self) -> &'static str {
