@@ -31,7 +31,13 @@ impl From<Method> for &'static str {
 
 impl Method {
     /// Every method there is.
-    pub const ALL: &[Self] = &[Self::Nnls];
+    pub const ALL: &[Self] = &[
+        Self::Learned,
+        Self::Nnls,
+        Self::Bpdn(SparsityBasis::Identity),
+        Self::Bpdn(SparsityBasis::Dct),
+        Self::Bpdn(SparsityBasis::Haar),
+    ];
 
     /// About the most memory that preparing a recovery takes beside the measurements, in bytes.
     pub fn preparation_bytes(self) -> usize {

@@ -1,5 +1,6 @@
 //! Solvers build for browsers unchanged, and answer there as they do natively: every method
-//! recovers the fixture on one thread, and must reach the same SNR against its truth on both.
+//! recovers the fixture, or a part of it, on one thread, and must reach the same SNR against its
+//! truth on both.
 //!
 //! In a browser this runs in a worker, as a page would have it.
 #![allow(clippy::unwrap_used)] // a test that cannot go on should stop
@@ -8,7 +9,7 @@ mod glass_s;
 
 use relightable_photo::capture::Measurements;
 use relightable_photo::recover::{Method, OneThread, Recovery, Settings, SparsityBasis};
-use relightable_photo::transport::TransportError;
+use relightable_photo::transport::{Extent, Geometry, TileRect, TransportError};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::{wasm_bindgen_test, wasm_bindgen_test_configure};
 
@@ -22,13 +23,16 @@ fn expected_snr(method: Method) -> f64 {
         Method::Learned => 34.153,
         Method::Nnls => 18.624,
         Method::Bpdn(SparsityBasis::Identity) => 18.288,
-        Method::Bpdn(SparsityBasis::Dct) => 18.141,
-        Method::Bpdn(SparsityBasis::Haar) => 18.719,
+        Method::Bpdn(SparsityBasis::Dct) => 15.626,
+        Method::Bpdn(SparsityBasis::Haar) => 16.407,
     }
 }
 
-/// Both machines must come this close to the figure, and so twice as close to each other.
-const TOLERANCE: f64 = 0.025;
+/// Both machines must come this close to the figure, and so within 0.025 dB of each other.
+const TOLERANCE: f64 = 0.0125;
+
+/// What the learned prior must reach, whatever figure it is given above.
+const LEARNED_AT_LEAST: f64 = 31.0;
 
 #[cfg_attr(not(target_arch = "wasm32"), test)]
 #[cfg_attr(target_arch = "wasm32", wasm_bindgen_test)]
@@ -42,23 +46,42 @@ fn every_method_recovers_the_fixture_alike() {
         let (snr, took) = (error.snr().unwrap().0, seconds() - start);
         let expected = expected_snr(method);
         say(&format!(
-            "{method:?}: {snr:.3} dB (expected {expected}) in {took:.1} s"
+            "{method:?}: {snr:.4} dB (expected {expected}) in {took:.1} s"
         ));
         if (snr - expected).abs() > TOLERANCE {
-            off.push(format!("{method:?} reaches {snr:.3} dB, not {expected}"));
+            off.push(format!("{method:?} reaches {snr:.4} dB, not {expected}"));
+        }
+        if method == Method::Learned && snr < LEARNED_AT_LEAST {
+            off.push(format!("{method:?} is below {LEARNED_AT_LEAST} dB"));
         }
     }
     assert!(off.is_empty(), "{}", off.join("; "));
 }
 
-/// Recovers every tile by `method` and adds up its error.
+/// What is recovered by `method`: the picture, but for transforms, which take about a minute for it,
+/// only the middle of it.
+fn parts(method: Method, geometry: &Geometry) -> Vec<TileRect> {
+    match method {
+        Method::Bpdn(SparsityBasis::Dct | SparsityBasis::Haar) => {
+            let extent = Extent {
+                width: 16,
+                height: 16,
+            };
+            let [x, y] = [24, 24];
+            vec![TileRect { x, y, extent }]
+        }
+        _ => geometry.tiles().collect(),
+    }
+}
+
+/// Recovers by `method` and adds up the error.
 fn recover(measurements: &Measurements, method: Method, truth: &[[f64; 3]]) -> TransportError {
     let window = glass_s::true_window();
     let settings = Settings { method, window };
     let recovery = Recovery::prepare(measurements, settings, &OneThread).unwrap();
     let (geometry, area) = (recovery.geometry(), window.area());
     let mut error = TransportError::default();
-    for rect in geometry.tiles() {
+    for rect in parts(method, geometry) {
         let tile = recovery.tile(measurements, rect);
         let functions = tile.functions(geometry, recovery.basis());
         for (p, pixel) in rect.pixels().enumerate() {
