@@ -378,6 +378,7 @@ fn recipe(
     };
     let options = [
         ("--method", args.method().name().to_owned()),
+        ("--basis", format!("{:?}", args.basis).to_lowercase()),
         ("--window", args.window.name()),
         (
             "--patterns",
