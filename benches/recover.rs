@@ -26,7 +26,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use rayon::prelude::*;
-use relightable_photo::capture::{Measurements, Pattern};
+use relightable_photo::capture::{Measurements, Noise, Pattern, Picture, Rows};
 use relightable_photo::recover::{Method, OneThread, Recovery, Settings, SparsityBasis, Workers};
 use relightable_photo::simulate::{
     Camera, Codes, Ensemble, Exposure, NoiseStream, SceneKind, emission,
@@ -112,25 +112,33 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
             }
         }
     }
+    let code = 1.0 / (sensor.white - sensor.black);
+    let photograph = |seen: &[[f32; CHANNELS]], number: u32| -> Picture {
+        let mut noise = NoiseStream::Photograph(number).start(SEED);
+        let photo = sensor.photograph(seen, &mut noise).unwrap();
+        let linear = |value: u16| ((f64::from(value) - sensor.black) * code) as f32;
+        photo.iter().map(|codes| codes.map(linear)).collect()
+    };
     for (i, picture) in pictures.iter_mut().enumerate() {
-        let mut noise = NoiseStream::Photograph(i as u32).start(SEED);
-        let photo = sensor.photograph(picture, &mut noise).unwrap();
-        let linear =
-            |code: u16| ((f64::from(code) - sensor.black) / (sensor.white - sensor.black)) as f32;
-        *picture = photo.iter().map(|codes| codes.map(linear)).collect();
+        *picture = photograph(picture, i as u32);
     }
+    let dark = photograph(&vec![[0.0; CHANNELS]; camera.area()], PATTERNS as u32);
     let patterns = codes.iter().map(|codes| match codes {
         Codes::Grey(codes) => Pattern::Grey(codes.iter().map(|&c| emission(c) as f32).collect()),
         Codes::Rgb(_) => unreachable!("this ensemble is grey"),
     });
-    let measurements = Measurements {
+    let mut measurements = Measurements {
         camera,
         light,
         correspondence: geometry.correspondence,
         patterns: patterns.collect(),
         full_scale: vec![1.0; PATTERNS],
+        rows: Rows::all(camera.height),
         pictures,
+        flood: None,
+        noise: Noise::from_dark(&dark, camera.width, code),
     };
+    measurements.noise = Noise::with_gain_from(&measurements);
     (measurements, truth)
 }
 
@@ -253,7 +261,10 @@ fn write_problems(
 ) {
     let geometry = recovery.geometry();
     let area = geometry.window.area();
-    let common_mode = recovery.common_mode().weight();
+    let common_mode = recovery
+        .common_mode()
+        .expect("both methods choose it")
+        .weight();
     let weigh = |values: &mut [f64]| {
         let less = (1.0 - common_mode) * values.iter().sum::<f64>() / values.len() as f64;
         values.iter_mut().for_each(|v| *v -= less);

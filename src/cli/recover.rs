@@ -19,7 +19,7 @@ use super::process::{AllCores, Interrupt, Interrupted};
 use super::{files, process, report};
 use crate::capture::{CaptureFolder, DarkFrame, Measurements, Noise, Rows};
 use crate::format::{self, EncodedTile, Metadata};
-use crate::recover::{self, Method, Recovery, Settings, SparsityBasis};
+use crate::recover::{self, Band, Method, Recovery, Settings, SparsityBasis};
 use crate::transport::{Basis, CHANNELS, Window};
 
 /// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
@@ -42,9 +42,9 @@ pub struct RecoverArgs {
     /// With --method bpdn: where light transport functions are sparse
     #[arg(long, value_enum, default_value_t = BasisName::Identity)]
     basis: BasisName,
-    /// Side of the window of light elements each camera pixel may see; odd
+    /// Side of the window of light elements each camera pixel may see; odd, or "auto" to estimate it
     #[arg(long, value_name = "W", default_value = "15", value_parser = parse_window)]
-    window: Window,
+    window: WindowChoice,
     /// Use the first K shots only [default: all but every tenth, which are held out]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     patterns: Option<u32>,
@@ -59,9 +59,38 @@ pub struct RecoverArgs {
     json: bool,
 }
 
-fn parse_window(text: &str) -> Result<Window, String> {
-    let side = text.parse::<u32>().map_err(|e| e.to_string())?;
-    Window::new(side).map_err(|e| e.to_string())
+/// The window asked for.
+#[derive(Clone, Copy, Debug)]
+enum WindowChoice {
+    Auto,
+    Fixed(Window),
+}
+
+impl WindowChoice {
+    /// The largest window that it may come to.
+    fn most(self) -> Window {
+        match self {
+            Self::Auto => Band::MOST,
+            Self::Fixed(window) => window,
+        }
+    }
+
+    fn name(self) -> String {
+        match self {
+            Self::Auto => "auto".to_owned(),
+            Self::Fixed(window) => window.side().to_string(),
+        }
+    }
+}
+
+fn parse_window(text: &str) -> Result<WindowChoice, String> {
+    if text == "auto" {
+        return Ok(WindowChoice::Auto);
+    }
+    let odd = "give an odd number of light elements, or auto";
+    let side = text.parse::<u32>().map_err(|e| format!("{e}; {odd}"))?;
+    let window = Window::new(side).map_err(|e| e.to_string())?;
+    Ok(WindowChoice::Fixed(window))
 }
 
 /// Recovery methods by name.
@@ -106,6 +135,8 @@ struct Report {
     peak_rss_bytes: Option<u64>,
     method: Method,
     window: u32,
+    /// With --window auto: estimated share of a pixel's light that comes from outside the window.
+    leak: Option<f64>,
     /// None: every tile is direct.
     rank: Option<usize>,
     patterns: usize,
@@ -128,7 +159,13 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     let manifest = folder.manifest();
     let shots = choose_shots(manifest.shots.len(), args.patterns)?;
     let threads = rayon::current_num_threads();
-    let plan = Plan::new(args.memory, manifest, shots.len(), args.window, threads)?;
+    let plan = Plan::new(
+        args.memory,
+        manifest,
+        shots.len(),
+        args.window.most(),
+        threads,
+    )?;
     let threads = rayon::ThreadPoolBuilder::new()
         .num_threads(plan.tiles_at_once)
         .build()
@@ -175,12 +212,19 @@ fn recover(
         saturated,
         shots.len() * measurements.camera.area() * CHANNELS,
     );
+    let of_capture = || args.capture.display().to_string();
+    let band = match args.window {
+        WindowChoice::Auto => {
+            Some(Band::estimate(&measurements, &AllCores).with_context(of_capture)?)
+        }
+        WindowChoice::Fixed(_) => None,
+    };
     let settings = Settings {
         method: args.method(),
-        window: args.window,
+        window: band.map_or(args.window.most(), |band| band.window),
     };
-    let recovery = Recovery::prepare(&measurements, settings, &AllCores)
-        .with_context(|| args.capture.display().to_string())?;
+    let recovery =
+        Recovery::prepare(&measurements, settings, &AllCores).with_context(of_capture)?;
     let geometry = *recovery.geometry();
     let mut run = Run {
         interrupt,
@@ -234,7 +278,8 @@ fn recover(
         seconds: 0.0,
         peak_rss_bytes: None,
         method: settings.method,
-        window: args.window.side(),
+        window: settings.window.side(),
+        leak: band.map(|band| band.leak),
         rank: basis.map(Basis::rank),
         patterns: shots.len(),
         common_mode: recovery.common_mode(),
@@ -330,7 +375,7 @@ fn recipe(
     };
     let options = [
         ("--method", args.method().name().to_owned()),
-        ("--window", args.window.side().to_string()),
+        ("--window", args.window.name()),
         (
             "--patterns",
             args.patterns

@@ -9,6 +9,7 @@
 //!
 //! [`Recovery`] is pure and works tile by tile: whoever has threads runs tiles on them.
 
+mod band;
 mod bpdn;
 mod common_mode;
 mod design;
@@ -22,6 +23,7 @@ mod test_problems;
 mod vector;
 mod workers;
 
+pub use band::Band;
 pub use bpdn::{Constraint, Homotopy, Solution, SparsityBasis, Splitting};
 pub use common_mode::CommonMode;
 pub use nnls::Nnls;

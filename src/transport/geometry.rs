@@ -100,7 +100,7 @@ pub struct Window {
 
 impl Window {
     /// A window of odd side 1 to [`MAX_WINDOW`].
-    pub fn new(side: u32) -> Result<Self, GeometryError> {
+    pub const fn new(side: u32) -> Result<Self, GeometryError> {
         if side % 2 == 1 && side <= MAX_WINDOW {
             Ok(Self { side })
         } else {

@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use half::f16;
 use png::{BitDepth, ColorType};
-use relightable_photo::capture::{Manifest, Measurements, Pattern};
+use relightable_photo::capture::{Manifest, Measurements, Noise, Pattern, Picture, Rows};
 use relightable_photo::transport::{CHANNELS, Window};
 
 /// Bytes of a file of the capture.
@@ -35,12 +35,11 @@ pub fn measurements() -> Measurements {
     let json = std::str::from_utf8(file!("capture.json")).unwrap();
     let manifest = Manifest::parse(json, "capture.json".as_ref()).unwrap();
     let (emission, camera) = (manifest.light.emission(), &manifest.camera);
-    let linear = |code| (f64::from(code) - camera.black) / (camera.white - camera.black);
-    let dark: Vec<_> = codes16(file!("photos/dark.png"))
+    let dark: Picture = codes16(file!("photos/dark.png"))
         .into_iter()
-        .map(|codes| codes.map(|code| linear(code) as f32))
+        .map(|codes| codes.map(|code| camera.linear(code, 1.0)))
         .collect();
-    let picture = |png: &[u8]| {
+    let picture = |png: &[u8]| -> Picture {
         let codes = codes16(png);
         assert!(
             codes
@@ -49,7 +48,7 @@ pub fn measurements() -> Measurements {
                 .all(|&code| f64::from(code) < camera.white)
         );
         let lit = codes.into_iter().zip(&dark);
-        lit.map(|(codes, dark)| std::array::from_fn(|c| linear(codes[c]) as f32 - dark[c]))
+        lit.map(|(codes, dark)| std::array::from_fn(|c| camera.linear(codes[c], 1.0) - dark[c]))
             .collect()
     };
     let pattern = |png: &[u8]| {
@@ -60,14 +59,20 @@ pub fn measurements() -> Measurements {
                 .collect(),
         )
     };
-    Measurements {
+    let code = 1.0 / (camera.white - camera.black);
+    let mut measurements = Measurements {
         camera: camera.extent(),
         light: manifest.light.extent(),
         correspondence: manifest.correspondence.as_ref().unwrap().into(),
         patterns: SHOTS.iter().map(|(png, _)| pattern(png)).collect(),
         full_scale: vec![1.0; SHOTS.len()],
+        rows: Rows::all(camera.height),
         pictures: SHOTS.iter().map(|(_, png)| picture(png)).collect(),
-    }
+        flood: Some(picture(file!("photos/flood.png"))),
+        noise: Noise::from_dark(&dark, camera.width, code),
+    };
+    measurements.noise = Noise::with_gain_from(&measurements);
+    measurements
 }
 
 fn codes16(png: &[u8]) -> Vec<[u16; CHANNELS]> {

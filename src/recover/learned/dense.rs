@@ -9,7 +9,7 @@ const BLOCK: usize = 4;
 /// upper triangle only. Returns the logarithm of the determinant, or `None` if the matrix is not
 /// positive definite to working precision.
 #[inline(always)]
-pub(super) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
+pub(in crate::recover) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
     let mut log_det = 0.0;
     for first in (0..n).step_by(BLOCK) {
         let end = (first + BLOCK).min(n);
@@ -47,7 +47,7 @@ pub(super) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
 
 /// Solves `UᵀU x = b` in place, `U` as [`cholesky`] leaves it.
 #[inline(always)]
-pub(super) fn solve(u: &[f64], b: &mut [f64]) {
+pub(in crate::recover) fn solve(u: &[f64], b: &mut [f64]) {
     let n = b.len();
     for k in 0..n {
         b[k] /= u[k * n + k];

@@ -137,7 +137,7 @@ impl Equations {
 }
 
 /// All pixels of a region by their common window: (number in the region, pixel).
-pub(super) fn windows(
+pub(in crate::recover) fn windows(
     geometry: &Geometry,
     rect: TileRect,
 ) -> BTreeMap<Element, Vec<(usize, CameraPx)>> {

@@ -13,12 +13,12 @@
 //! decided on patterns held out.
 
 mod context;
-mod dense;
-mod equations;
+pub(super) mod dense;
+pub(super) mod equations;
 mod kernels;
 mod posterior;
 mod prior;
-mod start;
+pub(super) mod start;
 
 use context::{Context, Field, Patch, REACH};
 use equations::{Equations, windows};

@@ -25,13 +25,17 @@ const BLUR: f64 = 1.0;
 const POOLED_ROUNDS: usize = 3;
 /// How far, as a share of full brightness, a pixel is from what the mean function says of it: what
 /// weighs pixels against each other where noise is less.
-const DEVIATION: f64 = 0.1;
+pub(in crate::recover) const DEVIATION: f64 = 0.1;
 /// How the mean row is weighted, as in `equations`.
 const MEAN_WEIGHT: f64 = 0.3;
 
 /// Squares of `side` pixels spread evenly over the picture, none over another, at most `most`: all
 /// there are room for where the picture is small. Only such whose measurements are at hand.
-pub(super) fn spread(measurements: &Measurements, side: u32, most: usize) -> Vec<TileRect> {
+pub(in crate::recover) fn spread(
+    measurements: &Measurements,
+    side: u32,
+    most: usize,
+) -> Vec<TileRect> {
     let camera = measurements.camera;
     squares(camera, side, most, |square| measurements.covers(square))
 }
@@ -126,19 +130,12 @@ fn pooled_round(
         };
         for square in squares.iter().skip(part).step_by(PARTS) {
             for (origin, pixels) in windows(geometry, *square) {
+                if only_whole && !on_display(geometry, origin) {
+                    continue;
+                }
                 vectorised(
                     #[inline(always)]
-                    || {
-                        sums.add(
-                            measurements,
-                            geometry,
-                            rows,
-                            mean,
-                            only_whole,
-                            origin,
-                            &pixels,
-                        )
-                    },
+                    || sums.add(measurements, geometry, rows, mean, (origin, &pixels)),
                 );
             }
         }
@@ -177,9 +174,7 @@ impl Pooled {
         geometry: &Geometry,
         rows: &[usize],
         mean: &[f64],
-        only_whole: bool,
-        origin: Element,
-        pixels: &[(usize, CameraPx)],
+        (origin, pixels): (Element, &[(usize, CameraPx)]),
     ) {
         let area = geometry.window.area();
         let elements: Vec<(usize, usize)> = (0..area)
@@ -188,9 +183,6 @@ impl Pooled {
                 Some((slot, element.index_in(geometry.light)?))
             })
             .collect();
-        if only_whole && elements.len() < area {
-            return;
-        }
         let count = rows.len();
         let planes = if measurements.grey() { 1 } else { CHANNELS };
         for plane in 0..planes {
