@@ -142,10 +142,10 @@ fn emitted(codes: &Codes) -> Pattern {
     }
 }
 
-/// The first `count` shots of `measurements`, with the noise that all of them told.
+/// The first `count` shots of `measurements`, as if no others had been taken.
 pub fn first_shots(measurements: &Measurements, count: usize) -> Measurements {
     let count = count.min(measurements.patterns.len());
-    Measurements {
+    let mut first = Measurements {
         camera: measurements.camera,
         light: measurements.light,
         correspondence: measurements.correspondence,
@@ -155,5 +155,7 @@ pub fn first_shots(measurements: &Measurements, count: usize) -> Measurements {
         pictures: measurements.pictures[..count].to_vec(),
         flood: measurements.flood.clone(),
         noise: measurements.noise,
-    }
+    };
+    first.noise = Noise::with_gain_from(&first);
+    first
 }

@@ -5,8 +5,8 @@ use super::chart::{Chart, Series, TopAxis, level_range};
 use super::known::Known;
 use super::methods::{self, METHODS};
 use super::report::{Section, Table, cell, seconds};
-use super::{Progress, StudyError, blocks};
-use crate::capture::Measurements;
+use super::{Progress, StudyError};
+use crate::capture::{Measurements, Noise};
 use crate::recover::Workers;
 
 /// Numbers of patterns, `L`, rising.
@@ -42,6 +42,7 @@ pub fn snr_curves(
         measurements.patterns.truncate(l);
         measurements.full_scale.truncate(l);
         measurements.pictures.truncate(l);
+        measurements.noise = Noise::with_gain_from(&measurements);
         for &method in METHODS {
             if methods::slow(method) && !SLOW_PATTERNS.contains(&l) {
                 continue;
@@ -104,28 +105,15 @@ pub fn snr_curves(
             marked: true,
         })
         .collect();
-    let sampled = results
-        .iter()
-        .map(|r| r.2)
-        .filter(|a| a.pixels < measurements.camera.area());
-    let doubt = sampled
-        .clone()
-        .map(|a| a.standard_error)
-        .fold(0.0, f64::max);
-    let sample = sampled.map(|a| a.pixels).max();
+    let all = measurements.camera.area();
     let ticks: Vec<f64> = TICKS
         .into_iter()
         .filter(|&l| l <= available)
         .map(|l| l as f64)
         .collect();
     let levels = series.iter().flat_map(|s| &s.points).map(|p| p.1);
-    let sample_note = sample.map_or(String::new(), |n| format!(", judged on {n} pixels"));
     let chart = Chart {
-        title: &format!(
-            "{name}, N = {}, M = {}{sample_note}",
-            measurements.camera.area(),
-            measurements.light.area()
-        ),
+        title: &format!("{name}, N = {all}, M = {}", measurements.light.area()),
         x_label: "undersampling L/M",
         y_label: "SNR of T (dB)",
         x_ticks: ticks.iter().map(|l| l / light).collect(),
@@ -139,13 +127,24 @@ pub fn snr_curves(
         series,
     };
     let mut section = Section::new(&format!("Figure 3: SNR against undersampling, {name}"));
-    section.paragraph(&match sample {
-        None => "Every camera pixel is judged.".to_owned(),
-        Some(n) => format!(
-            "Methods that recover each pixel on its own are judged on {n} camera pixels in blocks \
-             of {0}x{0} drawn at random, always the same; their SNR has a standard error of at most \
-             {doubt:.2} dB.",
-            blocks::SIDE
+    let samples: Vec<String> = METHODS
+        .iter()
+        .filter_map(|&method| {
+            let of_method = results.iter().filter(|r| r.1 == method);
+            let doubt = of_method.clone().map(|r| r.2.standard_error);
+            let pixels = of_method.map(|r| r.2.pixels).max()?;
+            (pixels < all).then(|| {
+                let doubt = doubt.fold(0.0, f64::max);
+                let name = methods::name(method);
+                format!("`{name}` {pixels} (standard error at most {doubt:.2} dB)")
+            })
+        })
+        .collect();
+    section.paragraph(&match samples.is_empty() {
+        true => "Every camera pixel is judged.".to_owned(),
+        false => format!(
+            "Some methods are judged on camera pixels drawn at random, always the same: {}.",
+            samples.join(", ")
         ),
     });
     section.picture(
