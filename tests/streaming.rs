@@ -67,21 +67,24 @@ fn little_memory_reads_photographs_by_strips_and_recovers_the_same() {
         let output = command(&args).output().unwrap();
         (file, output)
     };
-    let (_, refused) = recover("learned", "1M");
-    assert_eq!(refused.status.code(), Some(1));
-    let message = said(&refused);
-    assert!(message.contains("--memory 1M is too little"), "{message}");
-    let least = message.trim().rsplit(' ').next().unwrap();
-
-    let budget = least.trim_end_matches('M').parse::<u64>().unwrap() << 20;
     let peak = |report: &Value| report["peak_rss_bytes"].as_u64().unwrap();
     let whole_and_strips = |method: &str| {
+        let (_, refused) = recover(method, "1M");
+        assert_eq!(refused.status.code(), Some(1));
+        let message = said(&refused);
+        assert!(message.contains("--memory 1M is too little"), "{message}");
+        let least = message.trim().rsplit(' ').next().unwrap();
+        let budget = least.trim_end_matches('M').parse::<u64>().unwrap() << 20;
         let (whole, whole_report) = recover(method, "2G");
         let (strips, report) = recover(method, least);
         let (whole_report, report) = (json(&whole_report), json(&report));
         assert_eq!(whole_report["strips"], 1);
         assert!(report["strips"].as_u64().unwrap() > 2, "{report}");
-        assert!(peak(&report) < budget.min(peak(&whole_report)), "{report}");
+        assert!(peak(&report) < budget, "{report}");
+        if method == "nnls" {
+            // Learning takes more than the photographs of a capture as small as this.
+            assert!(peak(&report) < peak(&whole_report), "{report}");
+        }
         assert_eq!(whole_report["common_mode"], report["common_mode"]);
         [whole, strips]
     };
