@@ -10,7 +10,7 @@ use super::{Progress, StudyError};
 use crate::capture::Measurements;
 use crate::recover::{Recovery, Settings, Workers};
 use crate::relight::{BuiltinLight, Light, area_resample};
-use crate::transport::{CHANNELS, Decibels, Extent};
+use crate::transport::{CHANNELS, Decibels, DirectTile, Extent};
 
 /// Widest picture on a sheet, in pixels.
 const SHOWN: u32 = 200;
@@ -171,7 +171,12 @@ fn pictures(
     let done = AtomicUsize::new(0);
     let tiles = workers.map(rects.len(), |i| {
         let tile = recovery.tile(measurements, rects[i]);
-        let functions = tile.functions(&geometry, recovery.basis());
+        // Rounded to codes, as they are when a file is relit.
+        let mut functions = tile.functions(&geometry, recovery.basis());
+        let codes = DirectTile::quantise(&functions);
+        for (i, tau) in functions.tau.iter_mut().enumerate() {
+            *tau = codes.tau(area, i / area, i % area);
+        }
         let seen = lights.iter().map(|light| {
             let truth = match &light.photographed {
                 Some(picture) => {

@@ -111,7 +111,10 @@ impl Sheet {
         );
         let column_x = |i: usize| left + GAP + i as u32 * (self.side + GAP);
         for (i, name) in self.columns.iter().enumerate() {
-            text(&mut svg, column_x(i) + self.side / 2, top - 4, name);
+            // Without names there is no line above for them.
+            if !name.is_empty() {
+                text(&mut svg, column_x(i) + self.side / 2, top - 4, name);
+            }
         }
         let mut y = top + GAP / 2;
         for ((name, row), height) in self.rows.iter().zip(&heights) {
