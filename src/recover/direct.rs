@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::bpdn::{Constraint, Homotopy, SparsityBasis, Splitting, Tolerance};
 use super::design::{Design, Patch};
+use super::learned::equations::windows;
 use super::{CommonMode, FEWEST_PATTERNS, Nnls, RecoverError, Workers};
 use crate::capture::Measurements;
 use crate::transport::{
@@ -328,16 +329,6 @@ impl Direct {
 
 fn mean(y: &[f64]) -> f64 {
     y.iter().sum::<f64>() / y.len().max(1) as f64
-}
-
-/// All pixels of a tile by their common window.
-fn windows(geometry: &Geometry, rect: TileRect) -> BTreeMap<Element, Vec<Numbered>> {
-    let mut windows: BTreeMap<_, Vec<_>> = BTreeMap::new();
-    for (p, pixel) in rect.pixels().enumerate() {
-        let origin = geometry.window_origin(pixel);
-        windows.entry(origin).or_default().push((p, pixel));
-    }
-    windows
 }
 
 /// Whether all of the window lies off the display.

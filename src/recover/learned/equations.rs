@@ -11,7 +11,7 @@ use crate::transport::{CHANNELS, CameraPx, Element, Geometry, TileRect};
 /// Weight of the mean over patterns against a centred equation. Noise alone would make it 1; the
 /// dark frame's own noise and light from beyond the window shift a pixel by a constant, which
 /// averaging over patterns does not lower.
-const MEAN_WEIGHT: f64 = 0.3;
+pub(super) const MEAN_WEIGHT: f64 = 0.3;
 
 /// Sub-element position classes along one axis. At two camera pixels an element, neighbours lie in
 /// different halves of it, and so differ in what they see of their window.

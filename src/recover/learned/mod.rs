@@ -112,7 +112,7 @@ impl Learned {
         let mean = start::blur(&pooled, geometry.window.side() as usize);
         let (functions, mut prior) =
             start::first_prior(&mean, geometry.window.side() as usize, workers);
-        let kernels = start::projector(&functions, &mean);
+        let kernels = Kernels::new(&functions, &mean);
         let equations = |kernels: &Kernels, rows: &[usize], rects: &[TileRect]| {
             workers.map(rects.len(), |i| {
                 Equations::new(measurements, &geometry, kernels, rows, rects[i])
@@ -131,7 +131,7 @@ impl Learned {
             let (functions, prior) = start::cut(&functions, &prior, rank, area);
             let learned = Self {
                 geometry,
-                kernels: start::projector(&functions, &mean),
+                kernels: Kernels::new(&functions, &mean),
                 basis: Basis::default(),
                 prior,
                 context: None,

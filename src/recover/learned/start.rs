@@ -1,7 +1,6 @@
 //! Where learning starts: the mean light transport function, and smooth variations of it.
 
-use super::equations::windows;
-use super::kernels::Kernels;
+use super::equations::{MEAN_WEIGHT, windows};
 use super::prior::Prior;
 use crate::capture::Measurements;
 use crate::recover::dense;
@@ -26,8 +25,6 @@ const POOLED_ROUNDS: usize = 3;
 /// How far, as a share of full brightness, a pixel is from what the mean function says of it: what
 /// weighs pixels against each other where noise is less.
 pub(in crate::recover) const DEVIATION: f64 = 0.1;
-/// How the mean row is weighted, as in `equations`.
-const MEAN_WEIGHT: f64 = 0.3;
 
 /// Squares of `side` pixels spread evenly over the picture, none over another, at most `most`: all
 /// there are room for where the picture is small. Only such whose measurements are at hand.
@@ -388,11 +385,6 @@ pub(super) fn cut(kernels: &[f64], prior: &Prior, rank: usize, area: usize) -> (
         *mean = kept.chunks_exact(full).map(|v| dot(v, old)).collect();
     }
     (dense::product(kept, kernels, full, area), cut)
-}
-
-/// Kernels for projecting patterns, from kernels `[r, element]` and the mean function.
-pub(super) fn projector(kernels: &[f64], mean: &[f64]) -> Kernels {
-    Kernels::new(kernels, mean)
 }
 
 #[cfg(test)]
