@@ -128,8 +128,13 @@ describe('an element', () => {
           await load;
         };
         await again();
-        const before = bytes();
-        for (let i = 0; i < 10; i += 1) await again();
+        let before = 0;
+        // Now and then a heap grows by what does not fit its gaps; by what leaks it grows always.
+        for (let round = 0; round < 3; round += 1) {
+          before = bytes();
+          for (let i = 0; i < 10; i += 1) await again();
+          if (bytes() === before) break;
+        }
         return { before, after: bytes(), photo: photo.info.decodedBytes };
       });
       // Ten loads may cost what an allocator wastes, but not one photograph.
