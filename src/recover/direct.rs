@@ -113,38 +113,8 @@ impl Direct {
         self.tile_from(measurements, &rows, rect)
     }
 
-    /// What is missed, `[pixel, held, channel]`, in predicting the patterns numbered `held` in one
-    /// tile from those in `rows`; NaN where saturated.
-    pub fn held_out_misses(
-        &self,
-        measurements: &Measurements,
-        rows: &[usize],
-        held: &[usize],
-        rect: TileRect,
-    ) -> Vec<f64> {
-        let functions = self.tile_from(measurements, rows, rect);
-        let (area, light) = (self.geometry.window.area(), self.geometry.light);
-        let mut misses = Vec::with_capacity(rect.extent.area() * held.len() * CHANNELS);
-        for (p, pixel) in rect.pixels().enumerate() {
-            let origin = self.geometry.window_origin(pixel);
-            let tau = &functions.tau[p * area..(p + 1) * area];
-            for &l in held {
-                let mut y = [0.0; CHANNELS];
-                for (slot, tau) in tau.iter().enumerate() {
-                    let element = self.geometry.window.element(origin, slot);
-                    if let Some(m) = element.index_in(light) {
-                        for c in 0..CHANNELS {
-                            y[c] += f64::from(measurements.patterns[l].plane(c)[m] * tau[c]);
-                        }
-                    }
-                }
-                misses.extend((0..CHANNELS).map(|c| measurements.sample(l, pixel, c) - y[c]));
-            }
-        }
-        misses
-    }
-
-    fn tile_from(
+    /// Recovers one tile from the patterns numbered `rows`.
+    pub fn tile_from(
         &self,
         measurements: &Measurements,
         rows: &[usize],
@@ -325,6 +295,35 @@ impl Direct {
             }
         }
     }
+}
+
+/// What is missed, `[pixel, held, channel]`, in predicting the patterns numbered `held` by a tile's
+/// functions; NaN where saturated.
+pub(super) fn held_out_misses(
+    geometry: &Geometry,
+    measurements: &Measurements,
+    held: &[usize],
+    functions: &TransportFunctions,
+) -> Vec<f64> {
+    let (area, rect) = (geometry.window.area(), functions.rect);
+    let mut misses = Vec::with_capacity(rect.extent.area() * held.len() * CHANNELS);
+    for (p, pixel) in rect.pixels().enumerate() {
+        let origin = geometry.window_origin(pixel);
+        let tau = &functions.tau[p * area..(p + 1) * area];
+        for &l in held {
+            let mut y = [0.0; CHANNELS];
+            for (slot, tau) in tau.iter().enumerate() {
+                let element = geometry.window.element(origin, slot);
+                if let Some(m) = element.index_in(geometry.light) {
+                    for c in 0..CHANNELS {
+                        y[c] += f64::from(measurements.patterns[l].plane(c)[m] * tau[c]);
+                    }
+                }
+            }
+            misses.extend((0..CHANNELS).map(|c| measurements.sample(l, pixel, c) - y[c]));
+        }
+    }
+    misses
 }
 
 fn mean(y: &[f64]) -> f64 {

@@ -3,7 +3,7 @@
 use super::equations::Projected;
 use crate::capture::Measurements;
 use crate::recover::vector::vectorised;
-use crate::transport::{Element, Geometry};
+use crate::transport::{Basis, Element, Geometry};
 
 /// Responses computed together: two vector registers of f32 on the narrowest machine of note.
 const LANES: usize = 8;
@@ -43,10 +43,15 @@ impl Kernels {
         self.rank
     }
 
-    /// Kernel `k`, `[element]`.
-    pub fn kernel(&self, k: usize) -> Vec<f32> {
-        let rows = self.values.chunks_exact(self.stride);
-        rows.map(|row| row[k]).collect()
+    /// The kernels by themselves.
+    pub fn basis(&self) -> Basis {
+        let kernel = |k| {
+            let rows = self.values.chunks_exact(self.stride);
+            rows.map(|row| row[k]).collect()
+        };
+        Basis {
+            kernels: (0..self.rank).map(kernel).collect(),
+        }
     }
 
     /// Every pattern, in the colour of channel `plane`, seen by the window that starts at `origin`.

@@ -30,6 +30,13 @@ impl Gaussian {
                 dense::mirror(&mut precision, rank);
                 return Self { precision, log_det };
             }
+            if !ridge.is_finite() {
+                // A covariance that is no number says nothing.
+                return Self {
+                    precision: vec![0.0; rank * rank],
+                    log_det: f64::INFINITY,
+                };
+            }
             ridge = (ridge * 10.0).max(1e-300);
         }
     }
