@@ -1,11 +1,12 @@
 //! Exact non-negative least squares from normal equations, by active sets.
 //!
 //! Lawson & Hanson's method on the Gram matrix (Bro & de Jong 1997), with the inverse on the passive
-//! set updated as elements enter and leave. The passive set of one right-hand side starts the next:
-//! neighbouring pixels and channels light up some of the same elements.
+//! set updated as elements enter and leave, several of them for each gradient. Every search starts
+//! from nothing: of the set of a neighbouring pixel or channel so much has to leave again that it is
+//! no quicker to start from, and what rounding its inverse has gathered comes along.
 
 use super::passive::PassiveSet;
-use super::vector::{add_rows, vectorised};
+use super::vector::{LANES, add_rows, vectorised, whole_blocks};
 
 /// Solver for right-hand sides that share one Gram matrix.
 #[derive(Debug)]
@@ -19,13 +20,14 @@ pub struct Nnls<'a> {
     x: Vec<f64>,
     /// `h − Gx`.
     gradient: Vec<f64>,
+    /// The gradient where elements may enter, −∞ elsewhere and up to a whole number of [`LANES`].
+    slopes: Vec<f64>,
 }
 
 /// Largest gradient, as a share of the largest right-hand side entry, still taken as zero.
 const TOLERANCE: f64 = 1e-10;
-/// Elements that may enter for each time that the whole gradient is computed, which is most of the
-/// work, and the share of its gradient that one must have kept by then.
-const AT_ONCE: usize = 4;
+/// Several elements may enter for each time that the whole gradient is computed, which is much work:
+/// share of its gradient that one must have kept by then.
 const STILL_STEEP: f64 = 0.5;
 
 impl<'a> Nnls<'a> {
@@ -41,13 +43,17 @@ impl<'a> Nnls<'a> {
             passive: PassiveSet::new(k),
             x: Vec::with_capacity(k),
             gradient: vec![0.0; k],
+            slopes: vec![f64::NEG_INFINITY; whole_blocks(k)],
         }
     }
 
     /// Minimises `½xᵀGx − hᵀx` subject to `x ≥ 0`, with `h = Aᵀb`, `[k]`. Returns `x`, `[k]`, which
     /// is feasible always and optimal to rounding: it satisfies the Karush–Kuhn–Tucker conditions.
     pub fn solve(&mut self, h: &[f64]) -> Vec<f64> {
-        vectorised(|| self.search(h));
+        vectorised(
+            #[inline(always)]
+            || self.search(h),
+        );
         let mut x = vec![0.0; self.k];
         for (&j, &value) in self.passive.members().iter().zip(&self.x) {
             x[j] = value;
@@ -62,27 +68,16 @@ impl<'a> Nnls<'a> {
 
     #[inline(always)]
     fn search(&mut self, h: &[f64]) {
+        self.passive.clear();
+        self.x.clear();
         let top = h.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         if top == 0.0 {
-            self.passive.clear();
-            self.x.clear();
             return;
         }
-        // Warm start: keep of the last passive set what is positive here.
-        self.passive.carry(0, h);
-        while self.passive.solution(0).iter().any(|&z| z <= 0.0) {
-            for i in (0..self.passive.members().len()).rev() {
-                if self.passive.solution(0)[i] <= 0.0 {
-                    self.passive.leave(i);
-                }
-            }
-        }
-        self.x.clear();
-        self.x.extend_from_slice(self.passive.solution(0));
         let least = TOLERANCE * top;
         // An element that was refused, or that left at once, must not be picked again before
         // something else has changed, or rounding could make the search go round in circles.
-        let mut refused = vec![false; self.k];
+        let mut refused = Vec::new();
         let mut rebuilt = false;
         for _ in 0..10 * self.k {
             if self.descent(h) > least {
@@ -96,27 +91,29 @@ impl<'a> Nnls<'a> {
                 }
             }
             let mut found = false;
-            for (j, steep) in self.steepest(least, &refused).into_iter().flatten() {
+            for (j, steep) in self.steepest(&refused) {
+                if steep <= least {
+                    break;
+                }
                 // Those that entered before have changed this one's gradient.
-                let row = &self.gram[j * self.k..(j + 1) * self.k];
-                let members = self.passive.members().iter().zip(&self.x);
-                let known: f64 = members.map(|(&i, x)| row[i] * x).sum();
-                if h[j] - known < STILL_STEEP * steep {
+                let offer = self.passive.offer(self.gram, j, [h[j]]);
+                if offer.left[0] < STILL_STEEP * steep {
                     continue;
                 }
                 found = true;
-                refused[j] = !self.passive.enter(self.gram, j, [h[j]]);
-                if refused[j] {
+                if !self.passive.accept(offer) {
+                    refused.push(j);
                     continue;
                 }
                 self.x.push(0.0);
                 self.descend();
                 match self.passive.contains(j) {
-                    true => refused.fill(false),
-                    false => refused[j] = true,
+                    true => refused.clear(),
+                    false => refused.push(j),
                 }
             }
             if !found {
+                self.polish();
                 break;
             }
         }
@@ -157,6 +154,16 @@ impl<'a> Nnls<'a> {
         }
     }
 
+    /// Takes out of the solution what rounding has left of its gradient: next to nothing in `x`, but
+    /// where measurements can be met exactly all of the residual.
+    #[inline(always)]
+    fn polish(&mut self) {
+        self.passive.refine(0, &self.gradient);
+        if self.passive.solution(0).iter().all(|&z| z > 0.0) {
+            self.x.copy_from_slice(self.passive.solution(0));
+        }
+    }
+
     /// Lets the passive elements enter once more, one by one, into an empty set: what many updates
     /// have done to the inverse is gone.
     #[inline(always)]
@@ -186,26 +193,30 @@ impl<'a> Nnls<'a> {
         on_set.fold(0.0, f64::max)
     }
 
-    /// The elements outside the passive set whose growth lowers the residual most steeply, with
-    /// their gradient, the steepest first.
+    /// Elements outside the passive set whose growth lowers the residual steeply, with their gradient,
+    /// the steepest of all first: of every [`LANES`]-th element one.
     #[inline(always)]
-    fn steepest(&self, least: f64, refused: &[bool]) -> [Option<(usize, f64)>; AT_ONCE] {
-        let mut best = [None; AT_ONCE];
-        let mut least = least;
-        for (j, &g) in self.gradient.iter().enumerate() {
-            if g > least && !self.passive.contains(j) && !refused[j] {
-                let mut rest = Some((j, g));
-                for place in &mut best {
-                    if place.is_none_or(|(_, steep)| g > steep) || rest != Some((j, g)) {
-                        std::mem::swap(place, &mut rest);
-                    }
-                }
-                if let Some((_, steep)) = best[AT_ONCE - 1] {
-                    least = steep;
-                }
-            }
+    fn steepest(&mut self, refused: &[usize]) -> [(usize, f64); LANES] {
+        self.slopes[..self.k].copy_from_slice(&self.gradient);
+        for &j in self.passive.members().iter().chain(refused) {
+            self.slopes[j] = f64::NEG_INFINITY;
         }
-        best
+        // Numbers instead of indices: comparing and choosing then takes a register of either.
+        let mut best = [f64::NEG_INFINITY; LANES];
+        let mut at = [0.0; LANES];
+        let mut number = 0.0;
+        for slopes in self.slopes.as_chunks::<LANES>().0 {
+            for lane in 0..LANES {
+                let better = slopes[lane] > best[lane];
+                best[lane] = if better { slopes[lane] } else { best[lane] };
+                at[lane] = if better { number } else { at[lane] };
+            }
+            number += 1.0;
+        }
+        let mut steepest =
+            std::array::from_fn(|lane| (at[lane] as usize * LANES + lane, best[lane]));
+        steepest.sort_unstable_by(|a: &(usize, f64), b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        steepest
     }
 }
 
@@ -276,7 +287,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(200))]
 
-        /// Wide and tall problems, several right-hand sides through one warm-started solver: no
+        /// Wide and tall problems, several right-hand sides through one solver: no
         /// negative entries, no ascent directions, no gradient where an entry is above zero.
         #[test]
         fn answers_satisfy_kkt(

@@ -1,24 +1,35 @@
 //! The elements that an active-set solver lets above zero, with their equations kept solved.
 
-use super::vector::{add_scaled, dot};
+use super::vector::{LANES, add_blocks, dot_blocks, whole_blocks};
+
+/// As many numbers as fill whole registers.
+type Block = [f64; LANES];
 
 /// A pivot below this share of its diagonal means that the element's column depends linearly on the
 /// passive ones, to the precision of the Gram matrix: letting it in would not lower the residual.
 const DEPENDENT: f64 = 1e-9;
 /// Members there is room for at first; sets rarely grow beyond the number of patterns.
 const ROOM: usize = 96;
+/// Rows of the inverse that are multiplied together.
+const ROWS: usize = 4;
 
 /// A passive set `P` with the inverse `H = G[P, P]⁻¹` and the solutions `H b[P]` of `N` right-hand
 /// sides, all updated as elements enter and leave, at `n²` products each. No step waits for the one
 /// before, as in substitution through a triangular factor; what rounding the updates gather is taken
 /// out by [`PassiveSet::refine`].
+///
+/// Sets are small and of every size, so that vectors which ended where the set does would spend most
+/// time on what is left over of them after the last full register. All have zeros up to a full one.
 #[derive(Debug)]
 pub(super) struct PassiveSet<const N: usize> {
     /// Elements in the order of all vectors over the set.
     members: Vec<usize>,
     is_member: Vec<bool>,
-    /// `H`, row i in `inverse[i·stride..]`.
-    inverse: Vec<f64>,
+    /// `H`, `[stride, stride]`, zero beyond the members' rows and columns, in panels of [`LANES`]
+    /// columns: the part of a vector that goes with a panel stays in registers.
+    inverse: Vec<Block>,
+    /// A multiple of [`LANES`], and the length of the vectors below, which are zero beyond the
+    /// members.
     stride: usize,
     solutions: [Vec<f64>; N],
     column: Vec<f64>,
@@ -28,15 +39,15 @@ pub(super) struct PassiveSet<const N: usize> {
 impl<const N: usize> PassiveSet<N> {
     /// An empty set out of `k` elements.
     pub fn new(k: usize) -> Self {
-        let stride = k.min(ROOM);
+        let stride = whole_blocks(k.min(ROOM));
         Self {
             members: Vec::with_capacity(stride),
             is_member: vec![false; k],
-            inverse: vec![0.0; stride * stride],
+            inverse: vec![[0.0; LANES]; stride * stride / LANES],
             stride,
-            solutions: std::array::from_fn(|_| Vec::with_capacity(stride)),
-            column: Vec::with_capacity(stride),
-            product: Vec::with_capacity(stride),
+            solutions: std::array::from_fn(|_| vec![0.0; stride]),
+            column: vec![0.0; stride],
+            product: vec![0.0; stride],
         }
     }
 
@@ -54,49 +65,97 @@ impl<const N: usize> PassiveSet<N> {
     /// Takes all elements out.
     #[inline(always)]
     pub fn clear(&mut self) {
+        let width = self.width();
+        for panel in panels(&mut self.inverse, self.stride, width) {
+            panel.fill([0.0; LANES]);
+        }
+        for z in &mut self.solutions {
+            z[..width].fill(0.0);
+        }
         for j in self.members.drain(..) {
             self.is_member[j] = false;
         }
-        self.solutions.iter_mut().for_each(Vec::clear);
+    }
+
+    /// Length of vectors over the set with the zeros that fill the last register.
+    #[inline(always)]
+    fn width(&self) -> usize {
+        whole_blocks(self.members.len())
     }
 
     /// The solution of `G[P, P] z = b[P]` for right-hand side `which`.
     #[inline(always)]
     pub fn solution(&self, which: usize) -> &[f64] {
-        &self.solutions[which]
+        &self.solutions[which][..self.members.len()]
     }
 
     /// Replaces right-hand side `which` by `b`, `[k]`.
     #[inline(always)]
     pub fn carry(&mut self, which: usize, b: &[f64]) {
-        self.column.clear();
-        self.column.extend(self.members.iter().map(|&j| b[j]));
+        self.gather(b);
         self.multiply();
-        self.solutions[which].clone_from(&self.product);
+        let width = self.width();
+        self.solutions[which][..width].copy_from_slice(&self.product[..width]);
     }
 
     /// Corrects the solution of right-hand side `which` by what is left of it, `b − Gz`, `[k]`.
     #[inline(always)]
     pub fn refine(&mut self, which: usize, left: &[f64]) {
-        self.column.clear();
-        self.column.extend(self.members.iter().map(|&j| left[j]));
+        self.gather(left);
         self.multiply();
-        add_scaled(&mut self.solutions[which], 1.0, &self.product);
+        let width = self.width();
+        add_blocks(
+            &mut self.solutions[which][..width],
+            1.0,
+            &self.product[..width],
+        );
+    }
+
+    /// `column = b[P]`.
+    #[inline(always)]
+    fn gather(&mut self, b: &[f64]) {
+        let n = self.members.len();
+        let width = self.width();
+        for (c, &j) in self.column.iter_mut().zip(&self.members) {
+            *c = b[j];
+        }
+        self.column[n..width].fill(0.0);
     }
 
     /// `product = H column`.
     #[inline(always)]
     fn multiply(&mut self) {
-        let n = self.members.len();
-        self.product.clear();
-        self.product.resize(n, 0.0);
+        let width = self.width();
         // H is symmetric: its columns are its rows, and sums along rows need no reduction.
-        for (row, &c) in self
-            .inverse
-            .chunks_exact(self.stride.max(1))
-            .zip(&self.column)
-        {
-            add_scaled(&mut self.product, c, &row[..n]);
+        let factors = self.column[..width].as_chunks::<ROWS>().0;
+        let product = self.product.as_chunks_mut::<LANES>().0;
+        let inverse = self.inverse.chunks_exact(self.stride.max(1));
+        for (p, panel) in product[..width / LANES].iter_mut().zip(inverse) {
+            let mut sum = [0.0; LANES];
+            for ([a, b, c, d], f) in panel.as_chunks::<ROWS>().0.iter().zip(factors) {
+                for i in 0..LANES {
+                    sum[i] += (f[0] * a[i] + f[1] * b[i]) + (f[2] * c[i] + f[3] * d[i]);
+                }
+            }
+            *p = sum;
+        }
+    }
+
+    /// Looks at element `j` with its entries `b` of the right-hand sides.
+    #[inline(always)]
+    pub fn offer(&mut self, gram: &[f64], j: usize, b: [f64; N]) -> Offer<N> {
+        let k = self.is_member.len();
+        let row = &gram[j * k..(j + 1) * k];
+        self.gather(row);
+        let column = &self.column[..self.width()];
+        let mut left = b;
+        for (left, z) in left.iter_mut().zip(&self.solutions) {
+            *left -= dot_blocks(column, &z[..column.len()]);
+        }
+        Offer {
+            j,
+            diagonal: row[j],
+            left,
         }
     }
 
@@ -104,82 +163,148 @@ impl<const N: usize> PassiveSet<N> {
     /// on the set's.
     #[inline(always)]
     pub fn enter(&mut self, gram: &[f64], j: usize, b: [f64; N]) -> bool {
-        let (n, k) = (self.members.len(), self.is_member.len());
-        let row = &gram[j * k..(j + 1) * k];
-        self.column.clear();
-        self.column.extend(self.members.iter().map(|&i| row[i]));
+        let offer = self.offer(gram, j, b);
+        self.accept(offer)
+    }
+
+    /// Adds the element offered last, on the same terms.
+    #[inline(always)]
+    pub fn accept(&mut self, offer: Offer<N>) -> bool {
         self.multiply();
-        let pivot = row[j] - dot(&self.column, &self.product);
+        let (n, before) = (self.members.len(), self.width());
+        let known = dot_blocks(&self.column[..before], &self.product[..before]);
+        let pivot = offer.diagonal - known;
         // NaN is refused as well.
-        if pivot.is_nan() || pivot <= DEPENDENT * row[j] {
+        if pivot.is_nan() || pivot <= DEPENDENT * offer.diagonal {
             return false;
         }
         if n == self.stride {
             self.widen();
         }
-        let (inverse, stride) = (1.0 / pivot, self.stride);
-        for (z, b) in self.solutions.iter_mut().zip(b) {
-            let step = (b - dot(&self.column, z)) * inverse;
-            add_scaled(z, -step, &self.product);
-            z.push(step);
+        let inverse = 1.0 / pivot;
+        for (z, left) in self.solutions.iter_mut().zip(offer.left) {
+            let step = left * inverse;
+            add_blocks(&mut z[..before], -step, &self.product[..before]);
+            z[n] = step;
         }
-        let rows = self.inverse.chunks_exact_mut(stride);
-        for (row, &v) in rows.zip(&self.product) {
-            add_scaled(&mut row[..n], v * inverse, &self.product);
-            row[n] = -v * inverse;
-        }
-        let last = &mut self.inverse[n * stride..n * stride + n + 1];
-        for (h, v) in last.iter_mut().zip(&self.product) {
-            *h = -v * inverse;
-        }
-        last[n] = inverse;
-        self.members.push(j);
-        self.is_member[j] = true;
+        // With −1 as the new element's entry, one outer product updates all of the inverse.
+        self.members.push(offer.j);
+        self.is_member[offer.j] = true;
+        let width = self.width();
+        self.product[before..width].fill(0.0);
+        self.product[n] = -1.0;
+        self.add_outer(inverse);
         true
+    }
+
+    /// `H += factor · product productᵀ`.
+    #[inline(always)]
+    fn add_outer(&mut self, factor: f64) {
+        let width = self.width();
+        let product = &self.product[..width];
+        let blocks = product.as_chunks::<LANES>().0;
+        let factors = product.as_chunks::<ROWS>().0;
+        for (panel, block) in panels(&mut self.inverse, self.stride, width).zip(blocks) {
+            let block = block.map(|v| v * factor);
+            let rows = panel.as_chunks_mut::<ROWS>().0.iter_mut();
+            for (rows, factors) in rows.zip(factors) {
+                let mut sums = *rows;
+                for (sum, v) in sums.iter_mut().zip(factors) {
+                    for lane in 0..LANES {
+                        sum[lane] += v * block[lane];
+                    }
+                }
+                *rows = sums;
+            }
+        }
     }
 
     /// Takes out the `i`-th member; the last one moves to its place.
     #[inline(always)]
     pub fn leave(&mut self, i: usize) {
-        let (last, stride) = (self.members.len() - 1, self.stride);
-        self.is_member[self.members.swap_remove(i)] = false;
-        // Move the last row and column to the place of those that go, and these to the end.
-        for row in self.inverse.chunks_exact_mut(stride).take(last + 1) {
-            row.swap(i, last);
+        let (last, width) = (self.members.len() - 1, self.width());
+        // The inverse's column that goes.
+        let (panel, lane) = (i / LANES * self.stride, i % LANES);
+        for (p, row) in self.product[..width].iter_mut().zip(&self.inverse[panel..]) {
+            *p = row[lane];
         }
-        let (before, gone) = self.inverse.split_at_mut(last * stride);
-        let gone = &mut gone[..last + 1];
-        if i < last {
-            before[i * stride..i * stride + last + 1].swap_with_slice(gone);
-        }
-        let inverse = 1.0 / gone[last];
+        let inverse = 1.0 / self.product[i];
         for z in &mut self.solutions {
-            let step = z.swap_remove(i) * inverse;
-            add_scaled(z, -step, &gone[..last]);
+            let step = z[i] * inverse;
+            add_blocks(&mut z[..width], -step, &self.product[..width]);
+            z[i] = z[last];
+            z[last] = 0.0;
         }
-        for (row, &h) in before.chunks_exact_mut(stride).zip(&gone[..last]) {
-            add_scaled(&mut row[..last], -h * inverse, &gone[..last]);
+        self.add_outer(-inverse);
+        self.move_last_to(i);
+        self.is_member[self.members.swap_remove(i)] = false;
+    }
+
+    /// Puts the last row and column of the inverse in the place of the `i`-th and zeros in theirs.
+    #[inline(always)]
+    fn move_last_to(&mut self, i: usize) {
+        let (last, width, stride) = (self.members.len() - 1, self.width(), self.stride);
+        for panel in panels(&mut self.inverse, stride, width) {
+            panel[i] = panel[last];
+            panel[last] = [0.0; LANES];
+        }
+        let (from, to) = (last / LANES * stride, i / LANES * stride);
+        for row in 0..width {
+            let moved = std::mem::take(&mut self.inverse[from + row][last % LANES]);
+            if i < last {
+                self.inverse[to + row][i % LANES] = moved;
+            }
         }
     }
 
     /// Makes room for twice as many members.
     #[cold]
     fn widen(&mut self) {
-        let (old, new) = (self.stride, (2 * self.stride).min(self.is_member.len()));
-        let mut inverse = vec![0.0; new * new];
+        let (old, new) = (
+            self.stride,
+            whole_blocks((2 * self.stride).min(self.is_member.len())),
+        );
+        let mut inverse = vec![[0.0; LANES]; new * new / LANES];
         for (to, from) in inverse
             .chunks_exact_mut(new)
-            .zip(self.inverse.chunks_exact(old))
+            .zip(self.inverse.chunks_exact(old.max(1)))
         {
             to[..old].copy_from_slice(from);
         }
         (self.inverse, self.stride) = (inverse, new);
+        let vectors = [&mut self.column, &mut self.product];
+        for vector in vectors.into_iter().chain(&mut self.solutions) {
+            vector.resize(new, 0.0);
+        }
     }
+}
+
+/// An element that may enter a set of `N` right-hand sides.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Offer<const N: usize> {
+    j: usize,
+    /// `G[j, j]`.
+    diagonal: f64,
+    /// What the set's solutions leave of its entries of the right-hand sides.
+    pub left: [f64; N],
+}
+
+/// The panels of the first `width` columns of a matrix as [`PassiveSet`] keeps it, `width` rows each.
+#[inline(always)]
+fn panels(
+    inverse: &mut [Block],
+    stride: usize,
+    width: usize,
+) -> impl Iterator<Item = &mut [Block]> {
+    let all = inverse.chunks_exact_mut(stride.max(1));
+    all.take(width / LANES)
+        .map(move |panel| &mut panel[..width])
 }
 
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests {
     use super::super::test_problems::Problem;
+    use super::super::vector::add_scaled;
     use super::*;
 
     #[test]

@@ -23,7 +23,44 @@ pub(super) fn vectorised<R>(work: impl FnOnce() -> R) -> R {
 }
 
 /// Partial sums that a dot product is gathered in; the compiler makes vectors of them.
-const LANES: usize = 8;
+pub(super) const LANES: usize = 8;
+
+/// `n`, or the next whole number of [`LANES`].
+#[inline(always)]
+pub(super) fn whole_blocks(n: usize) -> usize {
+    n.next_multiple_of(LANES)
+}
+
+/// `aᵀb` for vectors of whole blocks, of [`LANES`] numbers each.
+#[inline(always)]
+pub(super) fn dot_blocks(a: &[f64], b: &[f64]) -> f64 {
+    let mut lanes = [0.0f64; LANES];
+    for (a, b) in a
+        .as_chunks::<LANES>()
+        .0
+        .iter()
+        .zip(b.as_chunks::<LANES>().0)
+    {
+        for lane in 0..LANES {
+            lanes[lane] += a[lane] * b[lane];
+        }
+    }
+    let [a, b, c, d, e, f, g, h] = lanes;
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
+}
+
+/// `y += factor · x` for vectors of whole blocks.
+#[inline(always)]
+pub(super) fn add_blocks(y: &mut [f64], factor: f64, x: &[f64]) {
+    let y = y.as_chunks_mut::<LANES>().0;
+    for (y, x) in y.iter_mut().zip(x.as_chunks::<LANES>().0) {
+        let mut sum = *y;
+        for lane in 0..LANES {
+            sum[lane] += factor * x[lane];
+        }
+        *y = sum;
+    }
+}
 
 /// `aᵀb`.
 #[inline(always)]
@@ -85,6 +122,12 @@ mod tests {
         for n in [0, 1, 7, 8, 80, 225] {
             let (a, b) = (numbers(n, 1), numbers(n, 2));
             assert_eq!(dot(&a, &b).to_bits(), vectorised(|| dot(&a, &b)).to_bits());
+            let whole = n / LANES * LANES;
+            let blocks = (&a[..whole], &b[..whole]);
+            assert_eq!(
+                dot_blocks(blocks.0, blocks.1).to_bits(),
+                vectorised(|| dot_blocks(blocks.0, blocks.1)).to_bits()
+            );
             let (matrix, factors) = (numbers(7 * n, 3), numbers(6, 4));
             let members = [6, 0, 3, 2, 5, 1];
             let (mut plain, mut wide) = (a.clone(), a.clone());
@@ -92,6 +135,17 @@ mod tests {
             vectorised(|| add_rows(&mut wide, &matrix, &members, &factors));
             assert_eq!(plain, wide);
         }
+    }
+
+    #[test]
+    fn blocks_are_vectors() {
+        let (a, b) = (numbers(24, 1), numbers(24, 2));
+        assert!((dot_blocks(&a, &b) - dot(&a, &b)).abs() < 1e-9);
+        let (mut whole, mut plain) = (a.clone(), a);
+        add_blocks(&mut whole, 0.5, &b);
+        add_scaled(&mut plain, 0.5, &b);
+        assert_eq!(whole, plain);
+        assert_eq!([0, 1, 8, 9].map(whole_blocks), [0, 8, 8, 16]);
     }
 
     #[test]

@@ -21,10 +21,10 @@ wasm_bindgen_test_configure!(run_in_dedicated_worker);
 fn expected_snr(method: Method) -> f64 {
     match method {
         Method::Learned => 34.153,
-        Method::Nnls => 18.624,
-        Method::Bpdn(SparsityBasis::Identity) => 18.288,
-        Method::Bpdn(SparsityBasis::Dct) => 15.626,
-        Method::Bpdn(SparsityBasis::Haar) => 16.407,
+        Method::Nnls => 18.755,
+        Method::Bpdn(SparsityBasis::Identity) => 18.305,
+        Method::Bpdn(SparsityBasis::Dct) => 15.736,
+        Method::Bpdn(SparsityBasis::Haar) => 16.479,
     }
 }
 
