@@ -5,17 +5,20 @@
 //! ([`Recovery::tile`]) on one thread, divided by pixels and channels: gathering patterns, Gram
 //! matrices, right-hand sides and everything else is in it. A peer's time is its solver's call
 //! alone, on the same equations as ready arrays, one right-hand side after the other, on one thread;
-//! Gram matrices that it can use are given to it and not counted.
+//! Gram matrices that it can use are given to it and not counted. Our own solvers' calls alone, on
+//! what the peers get, are shown as well.
 //!
-//! - Non-negative least squares: `scipy.optimize.nnls`. Objective: `‖y − Ax‖`.
+//! - Non-negative least squares: `scipy.optimize.nnls`. Objective: `‖y − Ax‖`, where residuals below
+//!   1e-10 `‖y‖`, of measurements that can be met exactly, count as that.
 //! - Basis pursuit denoising, φ = I: scikit-learn has no constrained form. Lasso's minimiser at the λ
 //!   at which its residual is ε is the constrained problem's, so peers are given that λ, which they
 //!   would have to search for: `Lasso(positive=True)` at it, and `lars_path` and `lars_path_gram`
 //!   down to it. Objective: `½‖y − Ax‖² + λ‖x‖₁`, in which all can be compared. The ratio is against
 //!   the fastest of the three.
 //!
-//! Objectives are shown as the worst ratio of ours to the peer's, right-hand side by right-hand
-//! side: above one, the peer was better.
+//! Objectives are those of the solvers' own answers in double precision to the same equations, and
+//! are shown as the worst ratio of ours to the peer's, right-hand side by right-hand side: above
+//! one, the peer was better.
 
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a bench that cannot go on should stop
 
@@ -27,12 +30,14 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 use relightable_photo::capture::{Measurements, Noise, Pattern, Picture, Rows};
-use relightable_photo::recover::{Method, OneThread, Recovery, Settings, SparsityBasis, Workers};
+use relightable_photo::recover::{
+    Homotopy, Method, Nnls, OneThread, Recovery, Settings, SparsityBasis, Workers,
+};
 use relightable_photo::simulate::{
     Camera, Codes, Ensemble, Exposure, NoiseStream, SceneKind, emission,
 };
 use relightable_photo::transport::{
-    CHANNELS, CameraPx, Extent, TransportError, TransportFunctions, Window,
+    CHANNELS, CameraPx, Extent, TileRect, TransportError, TransportFunctions, Window,
 };
 use serde_json::{Value, json};
 
@@ -43,6 +48,11 @@ const SEED: u64 = 7;
 /// Tiles timed, and windows of them that peers get.
 const TILES: usize = 4;
 const PEER_WINDOWS: usize = 12;
+/// ε² of the problems that peers of denoising get, beyond what least squares leaves: this share of
+/// the measurements' energy.
+const DENOISE: f64 = 1e-5;
+/// Camera pixels a side of the sample that transforms are timed on, which take long.
+const SMALL: u32 = 8;
 
 fn main() {
     // `cargo bench` passes flags for a harness this bench does not have.
@@ -58,7 +68,8 @@ fn main() {
     for (key, value) in &figures {
         println!("{key:32} {value:.4}");
     }
-    let report = json!({"machine": machine(), "figures": figures});
+    let mut report = json!(figures);
+    report["machine"] = machine().into();
     let path = folder.join("recover.json");
     fs::write(&path, serde_json::to_string_pretty(&report).unwrap() + "\n").unwrap();
     println!("\n{}", path.display());
@@ -147,11 +158,10 @@ fn prepare(measurements: &Measurements, method: Method) -> Recovery {
     Recovery::prepare(measurements, Settings { method, window }, &OneThread).unwrap()
 }
 
-fn tile(recovery: &Recovery, measurements: &Measurements, i: usize) -> TransportFunctions {
-    let geometry = recovery.geometry();
+fn tile(recovery: &Recovery, measurements: &Measurements, rect: TileRect) -> TransportFunctions {
     recovery
-        .tile(measurements, geometry.tile(i))
-        .functions(geometry, recovery.basis())
+        .tile(measurements, rect)
+        .functions(recovery.geometry(), recovery.basis())
 }
 
 /// Seconds of the fastest of a few runs: whatever else the machine does only adds to it.
@@ -164,21 +174,34 @@ fn fastest(runs: usize, mut work: impl FnMut()) -> f64 {
     times.fold(f64::INFINITY, f64::min)
 }
 
-fn snr(recovered: &[TransportFunctions], truth: &[&TransportFunctions]) -> f64 {
+fn snr(recovered: &[TransportFunctions], truth: &[TransportFunctions]) -> f64 {
     let mut error = TransportError::default();
     for (recovered, truth) in recovered.iter().zip(truth) {
-        let pairs = recovered
-            .tau
-            .iter()
-            .flatten()
-            .zip(truth.tau.iter().flatten());
-        for (r, t) in pairs {
-            error.add(f64::from(*t), f64::from(*r));
+        // The truth's tile may be larger.
+        let area = recovered.tau.len() / recovered.rect.extent.area();
+        for (p, pixel) in recovered.rect.pixels().enumerate() {
+            let q = truth.rect.pixels().position(|at| at == pixel).unwrap();
+            let recovered = recovered.tau[p * area..(p + 1) * area].iter().flatten();
+            let truth = truth.tau[q * area..(q + 1) * area].iter().flatten();
+            for (r, t) in recovered.zip(truth) {
+                error.add(f64::from(*t), f64::from(*r));
+            }
         }
     }
     error.snr().map_or(f64::NAN, |snr| snr.0)
 }
 
+/// Tiles from the middle of the picture: their windows are on the display whole.
+fn inner_tiles(recovery: &Recovery) -> Vec<usize> {
+    let grid = recovery.geometry().tile_grid();
+    let across = grid.width as usize;
+    let inner = |i: usize| {
+        (1..across - 1).contains(&(i % across)) && (1..across - 1).contains(&(i / across))
+    };
+    (0..grid.area()).filter(|&i| inner(i)).take(TILES).collect()
+}
+
+/// Every method on the same tiles, each followed by its peers.
 fn against_peers(folder: &Path, figures: &mut BTreeMap<String, f64>) {
     let (measurements, truth) = photograph(square(128));
     println!(
@@ -186,116 +209,186 @@ fn against_peers(folder: &Path, figures: &mut BTreeMap<String, f64>) {
         WINDOW * WINDOW
     );
     println!(
-        "{:28} {:>10} {:>9} {:>16} {:>8}",
-        "", "µs", "SNR dB", "objective ours/", "ratio"
+        "{:28} {:>10} {:>9} {:>10} {:>16} {:>8}",
+        "", "µs", "SNR dB", "prepare s", "objective ours/", "ratio"
     );
-    for (name, method) in [
-        ("nnls", Method::Nnls),
-        ("bpdn", Method::Bpdn(SparsityBasis::Identity)),
-    ] {
+    let mut equations = Vec::new();
+    for &method in Method::ALL {
+        let start = Instant::now();
         let recovery = prepare(&measurements, method);
-        // Tiles from the middle of the picture: windows on the display whole.
-        let geometry = recovery.geometry();
-        let across = geometry.tile_grid().width as usize;
-        let tiles: Vec<usize> = (0..geometry.tile_grid().area())
-            .filter(|i| {
-                (1..across - 1).contains(&(i % across)) && (1..across - 1).contains(&(i / across))
-            })
-            .take(TILES)
-            .collect();
+        let prepared = start.elapsed().as_secs_f64();
+        let tiles = inner_tiles(&recovery);
+        let (name, transform) = match method {
+            Method::Learned => ("learned", false),
+            Method::Nnls => ("nnls", false),
+            Method::Bpdn(SparsityBasis::Identity) => ("bpdn", false),
+            Method::Bpdn(SparsityBasis::Dct) => ("bpdn_dct", true),
+            Method::Bpdn(SparsityBasis::Haar) => ("bpdn_haar", true),
+        };
+        let whole = tiles.iter().map(|&i| recovery.geometry().tile(i));
+        let rects: Vec<_> = match transform {
+            false => whole.collect(),
+            true => whole.take(1).map(|rect| middle(rect, SMALL)).collect(),
+        };
         let mut recovered = Vec::new();
-        let seconds = fastest(3, || {
-            recovered = tiles
-                .iter()
-                .map(|&i| tile(&recovery, &measurements, i))
+        let seconds = fastest(if transform { 1 } else { 3 }, || {
+            recovered = (rects.iter())
+                .map(|&rect| tile(&recovery, &measurements, rect))
                 .collect();
         });
-        let sides: usize = recovered
-            .iter()
-            .map(|f| f.rect.extent.area() * CHANNELS)
-            .sum();
-        let ours = seconds / sides as f64;
-        let truth: Vec<_> = tiles.iter().map(|&i| &truth[i]).collect();
+        let pixels: usize = rects.iter().map(|rect| rect.extent.area()).sum();
+        let ours = seconds / (pixels * CHANNELS) as f64;
+        let truth: Vec<_> = tiles.iter().map(|&i| truth[i].clone()).collect();
+        let snr = snr(&recovered, &truth);
         println!(
-            "{:28} {:10.1} {:9.2}",
+            "{:28} {:10.1} {snr:9.2} {prepared:10.2}",
             format!("{name} (this)"),
-            ours * 1e6,
-            snr(&recovered, &truth)
+            ours * 1e6
         );
         figures.insert(format!("{name}_us"), ours * 1e6);
-        figures.insert(format!("{name}_snr_db"), snr(&recovered, &truth));
-        write_problems(folder, &measurements, &recovery, &recovered);
-        let answer = peers(folder, name);
-        let mut fastest_peer = f64::INFINITY;
-        for (peer, result) in answer.as_object().unwrap() {
-            let theirs = result["seconds"].as_f64().unwrap();
-            let objective = result["objective"].as_f64().unwrap();
-            println!(
-                "{:28} {:10.1} {:>9} {:16.6} {:8.1}",
-                format!("  {peer}"),
-                theirs * 1e6,
-                "",
-                objective,
-                theirs / ours
-            );
-            figures.insert(format!("{name}_vs_{peer}"), theirs / ours);
-            figures.insert(format!("{name}_objective_vs_{peer}"), objective);
-            fastest_peer = fastest_peer.min(theirs);
+        figures.insert(format!("{name}_snr_db"), snr);
+        if method == Method::Nnls {
+            equations = Equations::spread(&measurements, &recovery, &truth);
         }
-        let key = if name == "nnls" {
-            "nnls_vs_scipy"
-        } else {
-            "bpdn_vs_sklearn"
-        };
-        figures.insert(key.to_owned(), fastest_peer / ours);
+        match method {
+            Method::Nnls => compare(folder, "nnls", "nnls_vs_scipy", ours, &equations, figures),
+            Method::Bpdn(SparsityBasis::Identity) => {
+                compare(folder, "bpdn", "bpdn_vs_sklearn", ours, &equations, figures);
+            }
+            _ => {}
+        }
     }
 }
 
-/// Writes the weighted equations of a spread of windows as raw little-endian f64: for each window
-/// A `[L, S]`, then for each of its right-hand sides y `[L]` and our x `[S]`.
-fn write_problems(
+/// A square of `side` pixels in the middle of a tile.
+fn middle(rect: TileRect, side: u32) -> TileRect {
+    TileRect {
+        x: rect.x + (rect.extent.width - side) / 2,
+        y: rect.y + (rect.extent.height - side) / 2,
+        extent: square(side),
+    }
+}
+
+/// Holds our solver's answers to `equations` against the peers', and its time and that of whole
+/// tiles, `ours`, against theirs.
+fn compare(
     folder: &Path,
-    measurements: &Measurements,
-    recovery: &Recovery,
-    recovered: &[TransportFunctions],
+    name: &str,
+    key: &str,
+    ours: f64,
+    equations: &[Equations],
+    figures: &mut BTreeMap<String, f64>,
 ) {
-    let geometry = recovery.geometry();
-    let area = geometry.window.area();
-    let common_mode = recovery
-        .common_mode()
-        .expect("both methods choose it")
-        .weight();
-    let weigh = |values: &mut [f64]| {
-        let less = (1.0 - common_mode) * values.iter().sum::<f64>() / values.len() as f64;
-        values.iter_mut().for_each(|v| *v -= less);
-    };
-    let mut bytes = Vec::new();
-    let mut write = |value: f64| bytes.extend(value.to_le_bytes());
-    for n in 0..PEER_WINDOWS {
-        let functions = &recovered[n % recovered.len()];
+    let mut solutions = Vec::new();
+    let seconds = fastest(3, || {
+        solutions = equations.iter().map(|e| e.solve(name)).collect();
+    });
+    let sides: usize = equations.iter().map(|e| e.sides.len()).sum();
+    let alone = seconds / sides as f64;
+    write_problems(folder, equations, &solutions);
+    let mut answer = peers(folder, name);
+    let answers = answer.as_object_mut().unwrap();
+    let same = answers.remove("this").unwrap();
+    println!(
+        "{:28} {:10.1} {:9.2}",
+        "  solver alone (this)",
+        alone * 1e6,
+        same["snr"].as_f64().unwrap()
+    );
+    figures.insert(format!("{name}_solver_us"), alone * 1e6);
+    let (mut fastest_peer, mut worst) = (f64::INFINITY, 0.0f64);
+    for (peer, result) in answers {
+        let [theirs, snr, objective] =
+            ["seconds", "snr", "objective"].map(|key| result[key].as_f64().unwrap());
+        println!(
+            "{:28} {:10.1} {snr:9.2} {:>10} {objective:16.9} {:8.1}",
+            format!("  {peer}"),
+            theirs * 1e6,
+            "",
+            theirs / ours
+        );
+        figures.insert(format!("{name}_vs_{peer}"), theirs / ours);
+        figures.insert(format!("{name}_solver_vs_{peer}"), theirs / alone);
+        figures.insert(format!("{name}_objective_vs_{peer}"), objective);
+        fastest_peer = fastest_peer.min(theirs);
+        worst = worst.max(objective);
+    }
+    figures.insert(key.to_owned(), fastest_peer / ours);
+    figures.insert(format!("{name}_worst_objective"), worst);
+}
+
+/// The weighted equations of a window, with the right-hand sides of its four pixels.
+struct Equations {
+    /// `Aᵀ`, `[S, L]`.
+    columns: Vec<Vec<f64>>,
+    /// `AᵀA`, `[S, S]`.
+    gram: Vec<f64>,
+    sides: Vec<Side>,
+}
+
+struct Side {
+    y: Vec<f64>,
+    /// `Aᵀy`.
+    h: Vec<f64>,
+    /// Squared residual that denoising may leave.
+    most: f64,
+    truth: Vec<f64>,
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+impl Equations {
+    /// Those of a spread of windows.
+    fn spread(
+        measurements: &Measurements,
+        recovery: &Recovery,
+        truth: &[TransportFunctions],
+    ) -> Vec<Self> {
+        let common_mode = recovery.common_mode().expect("this method chooses it");
+        let weigh = |mut values: Vec<f64>| {
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            let less = (1.0 - common_mode.weight()) * mean;
+            values.iter_mut().for_each(|v| *v -= less);
+            values
+        };
+        let windows = (0..PEER_WINDOWS).map(|n| {
+            let functions = &truth[n % truth.len()];
+            Self::new(measurements, recovery, functions, n as u32, &weigh)
+        });
+        windows.collect()
+    }
+
+    fn new(
+        measurements: &Measurements,
+        recovery: &Recovery,
+        functions: &TransportFunctions,
+        n: u32,
+        weigh: &impl Fn(Vec<f64>) -> Vec<f64>,
+    ) -> Self {
+        let geometry = recovery.geometry();
+        let area = geometry.window.area();
         // The first of the window's four pixels: both coordinates are even.
-        let step = 2 * (1 + n as u32);
+        let step = 2 * (1 + n);
         let first = CameraPx {
             x: functions.rect.x + step,
             y: functions.rect.y + (5 * step) % functions.rect.extent.height,
         };
         let origin = geometry.window_origin(first);
-        let columns: Vec<Vec<f64>> = (0..area)
-            .map(|slot| {
-                let element = geometry.window.element(origin, slot);
-                let m = element
-                    .index_in(geometry.light)
-                    .expect("inside the display");
-                let mut column: Vec<f64> = (measurements.patterns.iter())
-                    .map(|p| f64::from(p.plane(0)[m]))
-                    .collect();
-                weigh(&mut column);
-                column
-            })
-            .collect();
-        for l in 0..PATTERNS {
-            columns.iter().for_each(|column| write(column[l]));
-        }
+        let column = |slot| {
+            let element = geometry.window.element(origin, slot);
+            let m = (element.index_in(geometry.light)).expect("inside the display");
+            let emissions = measurements.patterns.iter().map(|p| p.plane(0)[m]);
+            weigh(emissions.map(f64::from).collect())
+        };
+        let columns: Vec<Vec<f64>> = (0..area).map(column).collect();
+        let gram = (0..area * area).map(|i| dot(&columns[i / area], &columns[i % area]));
+        let mut equations = Self {
+            gram: gram.collect(),
+            columns,
+            sides: Vec::new(),
+        };
         for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
             let pixel = CameraPx {
                 x: first.x + dx,
@@ -303,22 +396,73 @@ fn write_problems(
             };
             assert_eq!(geometry.window_origin(pixel), origin);
             let p = functions.rect.pixels().position(|at| at == pixel).unwrap();
+            let truth = &functions.tau[p * area..(p + 1) * area];
             for c in 0..CHANNELS {
-                let mut y: Vec<f64> = (0..PATTERNS)
-                    .map(|l| measurements.sample(l, pixel, c))
-                    .collect();
-                weigh(&mut y);
-                y.into_iter().for_each(&mut write);
-                for tau in &functions.tau[p * area..(p + 1) * area] {
-                    write(f64::from(tau[c]));
-                }
+                let samples = (0..PATTERNS).map(|l| measurements.sample(l, pixel, c));
+                let y = weigh(samples.collect());
+                let truth = truth.iter().map(|tau| f64::from(tau[c])).collect();
+                equations.add(y, truth);
             }
+        }
+        equations
+    }
+
+    fn add(&mut self, y: Vec<f64>, truth: Vec<f64>) {
+        let h: Vec<f64> = self.columns.iter().map(|a| dot(a, &y)).collect();
+        let mut left = y.clone();
+        let x = Nnls::new(&self.gram, h.len()).solve(&h);
+        for (a, x) in self.columns.iter().zip(x) {
+            left.iter_mut().zip(a).for_each(|(left, a)| *left -= a * x);
+        }
+        self.sides.push(Side {
+            most: dot(&left, &left) + DENOISE * dot(&y, &y),
+            h,
+            y,
+            truth,
+        });
+    }
+
+    /// The answers to all right-hand sides.
+    fn solve(&self, problem: &str) -> Vec<Vec<f64>> {
+        let k = self.columns.len();
+        match problem {
+            "nnls" => {
+                let mut solver = Nnls::new(&self.gram, k);
+                self.sides.iter().map(|s| solver.solve(&s.h)).collect()
+            }
+            _ => {
+                let mut solver = Homotopy::new(&self.gram, k);
+                let sides = self.sides.iter();
+                sides
+                    .map(|s| solver.solve(&s.h, dot(&s.y, &s.y), s.most.sqrt()))
+                    .collect()
+            }
+        }
+    }
+}
+
+/// Writes equations and our answers as raw little-endian f64: for each window A `[L, S]`, then for
+/// each of its right-hand sides y `[L]`, our x `[S]` and the true one `[S]`.
+fn write_problems(folder: &Path, equations: &[Equations], solutions: &[Vec<Vec<f64>>]) {
+    let mut bytes = Vec::new();
+    let mut write = |value: &f64| bytes.extend(value.to_le_bytes());
+    for (window, solutions) in equations.iter().zip(solutions) {
+        for l in 0..PATTERNS {
+            window.columns.iter().for_each(|column| write(&column[l]));
+        }
+        for (side, x) in window.sides.iter().zip(solutions) {
+            side.y
+                .iter()
+                .chain(x)
+                .chain(&side.truth)
+                .for_each(&mut write);
         }
     }
     fs::write(folder.join("problems.f64"), bytes).unwrap();
 }
 
-/// What the peers need for the same, by name: seconds and worst ratio of objectives.
+/// What the peers make of the problems written, by name: seconds, worst ratio of objectives and SNR;
+/// and our answers' SNR.
 fn peers(folder: &Path, problem: &str) -> Value {
     let python =
         std::env::var("BENCH_PYTHON").expect("BENCH_PYTHON: run pkg-scripts/bench recover");
@@ -335,6 +479,9 @@ fn peers(folder: &Path, problem: &str) -> Value {
     assert!(output.status.success(), "the peers failed");
     serde_json::from_slice(&output.stdout).unwrap()
 }
+
+/// Camera pixels a side of the pictures that time is held against.
+const SIDES: [u32; 3] = [128, 192, 256];
 
 /// Threads of a pool.
 struct Pool(rayon::ThreadPool);
@@ -353,39 +500,44 @@ fn against_size(figures: &mut BTreeMap<String, f64>) {
         "camera", "threads", "seconds", "µs a pixel"
     );
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut per_pixel = Vec::new();
-    for (side, threads) in [(64, 1), (128, 1), (192, 1), (128, 2)] {
-        if threads > cores {
-            continue;
-        }
+    let mut per_pixel = BTreeMap::new();
+    for side in SIDES {
         let (measurements, _) = photograph(square(side));
         let recovery = prepare(&measurements, Method::Nnls);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        let pool = Pool(pool.build().unwrap());
-        let tiles = recovery.geometry().tile_grid().area();
-        let seconds = fastest(2, || {
-            pool.map(tiles, |i| drop(tile(&recovery, &measurements, i)));
-        });
         let pixels = measurements.camera.area();
-        let us = seconds / pixels as f64 * 1e6;
-        println!(
-            "{:>10} {threads:8} {seconds:10.2} {us:14.1}",
-            measurements.camera.to_string()
-        );
-        match threads {
-            1 => per_pixel.push(us),
-            _ => {
-                figures.insert("speedup_on_2_cores".to_owned(), per_pixel[1] / us);
+        for threads in [1, 2] {
+            if threads > cores {
+                continue;
             }
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            let pool = Pool(pool.build().unwrap());
+            let geometry = recovery.geometry();
+            let seconds = fastest(2, || {
+                pool.map(geometry.tile_grid().area(), |i| {
+                    drop(tile(&recovery, &measurements, geometry.tile(i)));
+                });
+            });
+            let us = seconds / pixels as f64 * 1e6;
+            println!(
+                "{:>10} {threads:8} {seconds:10.2} {us:14.1}",
+                measurements.camera.to_string()
+            );
+            figures.insert(format!("nnls_{side}_{threads}_threads_seconds"), seconds);
+            figures.insert(format!("nnls_{side}_{threads}_threads_us_a_pixel"), us);
+            per_pixel.insert((side, threads), us);
         }
-        figures.insert(format!("nnls_{side}_{threads}_threads_seconds"), seconds);
     }
     // 1 where time is linear in the number of pixels; borders, whose windows are smaller, make it
     // a little more.
+    let [small, .., large] = SIDES;
     figures.insert(
-        "time_per_pixel_9x_pixels".to_owned(),
-        per_pixel[2] / per_pixel[0],
+        "nnls_us_a_pixel_largest_to_smallest".to_owned(),
+        per_pixel[&(large, 1)] / per_pixel[&(small, 1)],
     );
+    if let Some(two) = per_pixel.get(&(large, 2)) {
+        let speedup = per_pixel[&(large, 1)] / two;
+        figures.insert("nnls_speedup_on_2_threads".to_owned(), speedup);
+    }
 }
 
 /// The paper's size by the command line's default method, files and all.

@@ -2,7 +2,8 @@
 
 python recover_peers.py nnls|bpdn PROBLEMS.f64 L S RIGHT_HAND_SIDES
 
-Prints {peer: {"seconds": a right-hand side, "objective": worst ratio of ours to the peer's}}.
+Prints {peer: {"seconds": a right-hand side, "objective": worst ratio of ours to the peer's, "snr"}},
+and the SNR of our answers as those of "this".
 """
 
 import json
@@ -16,13 +17,14 @@ RUNS = 3
 
 
 def read(path, patterns, elements, sides):
-    """Yields A [L, S], Y [sides, L] and our X [sides, S] of each window."""
+    """Yields A [L, S], Y [sides, L], our X [sides, S] and the true one of each window."""
     data = np.fromfile(path, "<f8")
-    per_window = patterns * elements + sides * (patterns + elements)
+    per_window = patterns * elements + sides * (patterns + 2 * elements)
     for window in data.reshape(-1, per_window):
         a = window[: patterns * elements].reshape(patterns, elements)
-        rest = window[patterns * elements :].reshape(sides, patterns + elements)
-        yield np.ascontiguousarray(a), rest[:, :patterns].copy(), rest[:, patterns:].copy()
+        rest = window[patterns * elements :].reshape(sides, patterns + 2 * elements)
+        ys, ours, truth = np.split(rest, [patterns, patterns + elements], axis=1)
+        yield np.ascontiguousarray(a), ys.copy(), ours.copy(), truth.copy()
 
 
 def fastest(solve, problems):
@@ -35,37 +37,45 @@ def fastest(solve, problems):
     return best / len(problems), answers
 
 
+def snr(answers, truths):
+    answers, truths = np.array(answers), np.array(truths)
+    return 10 * np.log10(np.sum(truths**2) / np.sum((answers - truths) ** 2))
+
+
 def nnls(windows):
     import scipy.optimize
 
-    problems = [(a, y) for a, ys, _ in windows for y in ys]
-    ours = [x for _, _, xs in windows for x in xs]
+    problems = [(a, y) for a, ys, _, _ in windows for y in ys]
+    ours = [x for _, _, xs, _ in windows for x in xs]
+    truths = [t for _, _, _, ts in windows for t in ts]
     seconds, theirs = fastest(lambda a, y: scipy.optimize.nnls(a, y)[0], problems)
     ratios = []
     for (a, y), x, peer in zip(problems, ours, theirs):
-        # Some functions can be fitted exactly, and ours are kept in single precision: far below the
-        # noise, at a ten-thousandth of the signal, no residual is better than another.
-        least = 1e-4 * np.linalg.norm(y)
-        here, there = np.linalg.norm(y - a @ x), np.linalg.norm(y - a @ peer)
-        ratios.append((here + least) / (there + least))
-    return {"scipy": {"seconds": seconds, "objective": max(ratios)}}
+        # Where both meet the measurements exactly, what is left is rounding.
+        least = 1e-10 * np.linalg.norm(y)
+        here, there = (max(np.linalg.norm(y - a @ z), least) for z in (x, peer))
+        ratios.append(here / there)
+    return {
+        "this": {"snr": snr(ours, truths)},
+        "scipy": {"seconds": seconds, "objective": max(ratios), "snr": snr(theirs, truths)},
+    }
 
 
 def bpdn(windows):
     from sklearn.linear_model import Lasso, lars_path, lars_path_gram
 
-    problems, ours = [], []
-    for a, ys, xs in windows:
+    problems, ours, truths = [], [], []
+    for a, ys, xs, ts in windows:
         gram = a.T @ a
         fortran = np.asfortranarray(a)
-        for y, x in zip(ys, xs):
+        for y, x, truth in zip(ys, xs, ts):
             h = a.T @ y
-            # Where the constraint cannot be met, ours is the least-squares end of the path, λ = 0,
-            # which Lasso does not do: those are few and left out, as is a pixel that is black.
-            strength = (h - gram @ x).max()
-            if x.max() > 0 and strength > 1e-5 * h.max():
+            # Black pixels have no λ.
+            if x.max() > 0:
+                strength = (a.T @ (y - a @ x))[x > 0].mean()
                 problems.append((fortran, y, gram, h, strength / len(y)))
                 ours.append(x)
+                truths.append(truth)
 
     def lasso(a, y, gram, h, alpha):
         model = Lasso(alpha, positive=True, fit_intercept=False, precompute=gram, max_iter=20000)
@@ -82,15 +92,16 @@ def bpdn(windows):
     def objective(a, y, gram, h, alpha, x):
         return 0.5 * np.sum((y - a @ x) ** 2) + alpha * len(y) * np.abs(x).sum()
 
-    results = {}
+    results = {"this": {"snr": snr(ours, truths)}}
     for name, solve in [("lasso", lasso), ("lars_path", path), ("lars_path_gram", path_gram)]:
         seconds, theirs = fastest(solve, problems)
         ratios = [
             objective(*problem, x) / objective(*problem, np.maximum(peer, 0))
             for problem, x, peer in zip(problems, ours, theirs)
         ]
-        results[name] = {"seconds": seconds, "objective": max(ratios)}
-    print(f"{len(problems)} right-hand sides", file=sys.stderr)
+        results[name] = {
+            "seconds": seconds, "objective": max(ratios), "snr": snr(theirs, truths)
+        }
     return results
 
 
