@@ -66,7 +66,7 @@ fn main() {
     paper_scale(&folder, &mut figures);
     println!();
     for (key, value) in &figures {
-        println!("{key:32} {value:.4}");
+        println!("{key:36} {value:.6}");
     }
     let mut report = json!(figures);
     report["machine"] = machine().into();

@@ -204,7 +204,7 @@ impl Direct {
                     // Saturated samples drop out, and with them the shared equations.
                     y.retain(|y| y.is_finite());
                     let own = patch.design(origin, self.common_mode, &saturated);
-                    self.solve(&own, vec![Seen { pixel, channel, y }], |pixel, c, x, _| {
+                    self.solve(&own, vec![Seen { pixel, channel, y }], |pixel, c, x| {
                         take(pixel, c, &own.slots, x)
                     });
                     continue;
@@ -219,31 +219,20 @@ impl Direct {
         }
         if !whole.is_empty() {
             let shared = patch.design(origin, self.common_mode, &[]);
-            self.solve(&shared, whole, |pixel, c, x, _| {
+            self.solve(&shared, whole, |pixel, c, x| {
                 take(pixel, c, &shared.slots, x);
             });
         }
     }
 
-    /// Solves for all that was seen through one design; `take` gets pixel, channel, solution, and
-    /// the unweighted mean and least-squares noise variance of its measurements, where that is known.
-    fn solve(
-        &self,
-        design: &Design,
-        seen: Vec<Seen>,
-        mut take: impl FnMut(usize, usize, &[f64], Option<(f64, f64)>),
-    ) {
+    /// Solves for all that was seen through one design; `take` gets pixel, channel and solution.
+    fn solve(&self, design: &Design, seen: Vec<Seen>, mut take: impl FnMut(usize, usize, &[f64])) {
         let mut nnls = Nnls::new(&design.gram, design.unknowns());
         match self.problem {
             Problem::LeastSquares => {
                 for Seen { pixel, channel, y } in seen {
-                    let (mean, y) = (mean(&y), design.weigh(y));
-                    let h = design.right_hand_side(&y);
-                    let x = nnls.solve(&h);
-                    let spare = design.rows() as f64 - nnls.degrees_of_freedom() as f64;
-                    let residual = design.squared_residual(&y, &x);
-                    let noise = (spare >= 1.0).then(|| (mean, residual / spare));
-                    take(pixel, channel, &x, noise);
+                    let h = design.right_hand_side(&design.weigh(y));
+                    take(pixel, channel, &nnls.solve(&h));
                 }
             }
             Problem::Denoising(SparsityBasis::Identity, tolerance) => {
@@ -260,7 +249,7 @@ impl Direct {
                     if residual.is_nan() || residual > epsilon * epsilon + LOST * energy {
                         x = nnls.solve(&h);
                     }
-                    take(pixel, channel, &x, None);
+                    take(pixel, channel, &x);
                 }
             }
             Problem::Denoising(basis, tolerance) => {
@@ -290,7 +279,7 @@ impl Direct {
                     .collect();
                 let solutions = splitting.solve(&constraints);
                 for ((pixel, channel, ..), solution) in prepared.iter().zip(&solutions) {
-                    take(*pixel, *channel, &solution.x, None);
+                    take(*pixel, *channel, &solution.x);
                 }
             }
         }
@@ -324,6 +313,16 @@ pub(super) fn held_out_misses(
         }
     }
     misses
+}
+
+/// The mean of measurements and their noise variance, from what least squares leaves of them, where
+/// it leaves them degrees of freedom.
+fn mean_and_noise(design: &Design, y: Vec<f64>) -> Option<(f64, f64)> {
+    let (mean, y) = (mean(&y), design.weigh(y));
+    let mut nnls = Nnls::new(&design.gram, design.unknowns());
+    let x = nnls.solve(&design.right_hand_side(&y));
+    let spare = design.rows() as f64 - nnls.degrees_of_freedom() as f64;
+    (spare >= 1.0).then(|| (mean, design.squared_residual(&y, &x) / spare))
 }
 
 fn mean(y: &[f64]) -> f64 {
@@ -463,12 +462,7 @@ impl<'a> HeldOut<'a> {
                     .collect();
                 if y.iter().all(|y| y.is_finite()) {
                     let design = patch(channel).design(origin, least_squares.common_mode, &[]);
-                    let seen = vec![Seen {
-                        pixel: 0,
-                        channel,
-                        y,
-                    }];
-                    least_squares.solve(&design, seen, |_, _, _, noise| pairs.extend(noise));
+                    pairs.extend(mean_and_noise(&design, y));
                 }
             }
             pairs
