@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::bpdn::{Constraint, Homotopy, SparsityBasis, Splitting, Tolerance};
+use super::bpdn::{Constraint, Homotopy, InteriorPoint, SparsityBasis, Tolerance};
 use super::design::{Design, Patch};
 use super::learned::equations::windows;
 use super::{CommonMode, FEWEST_PATTERNS, Nnls, RecoverError, Workers};
@@ -26,7 +26,8 @@ const SCATTERED: Sample = Sample {
     windows: 48,
     pixels: 1,
 };
-/// Denoising solves for all pixels of a window at about the cost of one.
+/// Denoising takes far longer, for seven candidates: fewer windows, some pixels sharing the equations
+/// of each.
 const GATHERED: Sample = Sample {
     windows: 16,
     pixels: 4,
@@ -264,7 +265,7 @@ impl Direct {
                 }
             }
             Problem::Denoising(basis, tolerance) => {
-                let splitting = Splitting::new(
+                let denoiser = InteriorPoint::new(
                     basis,
                     &design.weighted(),
                     design.rows(),
@@ -288,7 +289,7 @@ impl Direct {
                         least_squares,
                     })
                     .collect();
-                let solutions = splitting.solve(&constraints);
+                let solutions = denoiser.solve(&constraints);
                 for ((pixel, channel, ..), solution) in prepared.iter().zip(&solutions) {
                     take(*pixel, *channel, &solution.x, None);
                 }
