@@ -331,14 +331,6 @@ fn mean(y: &[f64]) -> f64 {
     y.iter().sum::<f64>() / y.len().max(1) as f64
 }
 
-/// Whether all of the window lies off the display.
-fn dark(geometry: &Geometry, origin: Element) -> bool {
-    let side = i64::from(geometry.window.side());
-    let misses =
-        |at: i32, length: u32| i64::from(at) + side <= 0 || i64::from(at) >= i64::from(length);
-    misses(origin.u, geometry.light.width) || misses(origin.v, geometry.light.height)
-}
-
 /// A spread of windows with some of their pixels, and the patterns to choose settings by.
 struct HeldOut<'a> {
     measurements: &'a Measurements,
@@ -359,7 +351,7 @@ impl<'a> HeldOut<'a> {
         let covered = geometry.tiles().filter(|&tile| measurements.covers(tile));
         for rect in covered {
             for (origin, pixels) in windows(&geometry, rect) {
-                if !dark(&geometry, origin) {
+                if geometry.reaches_display(origin) {
                     let pixels = pixels.into_iter().take(sample.pixels);
                     lit.insert(origin, pixels.map(|(_, pixel)| pixel).collect());
                 }

@@ -5,16 +5,14 @@
 //! neighbouring pixels and channels light up some of the same elements.
 
 use super::passive::PassiveSet;
-use super::vector::{add_rows, vectorised};
+use super::vector::vectorised;
 
 /// Solver for right-hand sides that share one Gram matrix.
 #[derive(Debug)]
 pub struct Nnls<'a> {
-    /// `[k, k]`, row-major, symmetric.
-    gram: &'a [f64],
     k: usize,
     /// Elements allowed to be above zero; carries the right-hand side.
-    passive: PassiveSet<1>,
+    passive: PassiveSet<'a, 1>,
     /// The passive elements' values now; the set itself knows where least squares puts them.
     x: Vec<f64>,
     /// `h − Gx`.
@@ -34,11 +32,9 @@ impl<'a> Nnls<'a> {
     /// # Panics
     /// If `gram` does not have `k²` entries.
     pub fn new(gram: &'a [f64], k: usize) -> Self {
-        assert_eq!(gram.len(), k * k, "the Gram matrix is square");
         Self {
-            gram,
             k,
-            passive: PassiveSet::new(k),
+            passive: PassiveSet::new(gram, k),
             x: Vec::with_capacity(k),
             gradient: vec![0.0; k],
         }
@@ -48,11 +44,7 @@ impl<'a> Nnls<'a> {
     /// is feasible always and optimal to rounding: it satisfies the Karush–Kuhn–Tucker conditions.
     pub fn solve(&mut self, h: &[f64]) -> Vec<f64> {
         vectorised(|| self.search(h));
-        let mut x = vec![0.0; self.k];
-        for (&j, &value) in self.passive.members().iter().zip(&self.x) {
-            x[j] = value;
-        }
-        x
+        self.passive.spread(&self.x)
     }
 
     /// Elements above zero in the last solution: the degrees of freedom it spent.
@@ -98,14 +90,14 @@ impl<'a> Nnls<'a> {
             let mut found = false;
             for (j, steep) in self.steepest(least, &refused).into_iter().flatten() {
                 // Those that entered before have changed this one's gradient.
-                let row = &self.gram[j * self.k..(j + 1) * self.k];
+                let row = self.passive.row(j);
                 let members = self.passive.members().iter().zip(&self.x);
                 let known: f64 = members.map(|(&i, x)| row[i] * x).sum();
                 if h[j] - known < STILL_STEEP * steep {
                     continue;
                 }
                 found = true;
-                refused[j] = !self.passive.enter(self.gram, j, [h[j]]);
+                refused[j] = !self.passive.enter(j, [h[j]]);
                 if refused[j] {
                     continue;
                 }
@@ -165,7 +157,7 @@ impl<'a> Nnls<'a> {
         let x = std::mem::take(&mut self.x);
         self.passive.clear();
         for (&j, x) in members.iter().zip(x) {
-            if self.passive.enter(self.gram, j, [h[j]]) {
+            if self.passive.enter(j, [h[j]]) {
                 self.x.push(x);
             }
         }
@@ -179,10 +171,13 @@ impl<'a> Nnls<'a> {
         for (g, h) in self.gradient.iter_mut().zip(h) {
             *g = -h;
         }
-        let members = self.passive.members();
-        add_rows(&mut self.gradient, self.gram, members, &self.x);
+        self.passive.add_product(&mut self.gradient, &self.x);
         self.gradient.iter_mut().for_each(|g| *g = -*g);
-        let on_set = members.iter().map(|&j| self.gradient[j].abs());
+        let on_set = self
+            .passive
+            .members()
+            .iter()
+            .map(|&j| self.gradient[j].abs());
         on_set.fold(0.0, f64::max)
     }
 

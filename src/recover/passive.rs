@@ -1,6 +1,6 @@
 //! The elements that an active-set solver lets above zero, with their equations kept solved.
 
-use super::vector::{add_scaled, dot};
+use super::vector::{add_rows, add_scaled, dot};
 
 /// A pivot below this share of its diagonal means that the element's column depends linearly on the
 /// passive ones, to the precision of the Gram matrix: letting it in would not lower the residual.
@@ -13,7 +13,9 @@ const ROOM: usize = 96;
 /// before, as in substitution through a triangular factor; what rounding the updates gather is taken
 /// out by [`PassiveSet::refine`].
 #[derive(Debug)]
-pub(super) struct PassiveSet<const N: usize> {
+pub(super) struct PassiveSet<'a, const N: usize> {
+    /// `[k, k]`, row-major, symmetric.
+    gram: &'a [f64],
     /// Elements in the order of all vectors over the set.
     members: Vec<usize>,
     is_member: Vec<bool>,
@@ -25,11 +27,16 @@ pub(super) struct PassiveSet<const N: usize> {
     product: Vec<f64>,
 }
 
-impl<const N: usize> PassiveSet<N> {
-    /// An empty set out of `k` elements.
-    pub fn new(k: usize) -> Self {
+impl<'a, const N: usize> PassiveSet<'a, N> {
+    /// An empty set out of the `k` elements of `gram`, `[k, k]` row-major.
+    ///
+    /// # Panics
+    /// If `gram` does not have `k²` entries.
+    pub fn new(gram: &'a [f64], k: usize) -> Self {
+        assert_eq!(gram.len(), k * k, "the Gram matrix is square");
         let stride = k.min(ROOM);
         Self {
+            gram,
             members: Vec::with_capacity(stride),
             is_member: vec![false; k],
             inverse: vec![0.0; stride * stride],
@@ -49,6 +56,28 @@ impl<const N: usize> PassiveSet<N> {
     #[inline(always)]
     pub fn contains(&self, j: usize) -> bool {
         self.is_member[j]
+    }
+
+    /// An element's row of the Gram matrix.
+    #[inline(always)]
+    pub fn row(&self, j: usize) -> &'a [f64] {
+        let k = self.is_member.len();
+        &self.gram[j * k..(j + 1) * k]
+    }
+
+    /// `y += Gx` for an x that is zero outside the set.
+    #[inline(always)]
+    pub fn add_product(&self, y: &mut [f64], x: &[f64]) {
+        add_rows(y, self.gram, &self.members, x);
+    }
+
+    /// Values of the members as a vector of all elements, `[k]`.
+    pub fn spread(&self, values: &[f64]) -> Vec<f64> {
+        let mut all = vec![0.0; self.is_member.len()];
+        for (&j, &value) in self.members.iter().zip(values) {
+            all[j] = value;
+        }
+        all
     }
 
     /// Takes all elements out.
@@ -103,9 +132,8 @@ impl<const N: usize> PassiveSet<N> {
     /// Adds element `j` with its entries of the right-hand sides, unless its column depends linearly
     /// on the set's.
     #[inline(always)]
-    pub fn enter(&mut self, gram: &[f64], j: usize, b: [f64; N]) -> bool {
-        let (n, k) = (self.members.len(), self.is_member.len());
-        let row = &gram[j * k..(j + 1) * k];
+    pub fn enter(&mut self, j: usize, b: [f64; N]) -> bool {
+        let (n, row) = (self.members.len(), self.row(j));
         self.column.clear();
         self.column.extend(self.members.iter().map(|&i| row[i]));
         self.multiply();
@@ -188,9 +216,9 @@ mod tests {
         let problem = Problem::random(k, 200, 5, 0.5);
         let gram = problem.gram();
         let b = problem.right_hand_side(&problem.measurements[0]);
-        let mut set = PassiveSet::<1>::new(k);
+        let mut set = PassiveSet::<1>::new(&gram, k);
         for j in 0..k {
-            assert!(set.enter(&gram, j, [b[j]]));
+            assert!(set.enter(j, [b[j]]));
             if j % 3 == 2 {
                 set.leave(j / 3 % set.members().len());
             }
@@ -217,7 +245,7 @@ mod tests {
         assert!(set.members().is_empty() && !set.contains(0));
         // A column that is another one's double does not enter.
         let twin = [1.0, 2.0, 2.0, 4.0];
-        let mut set = PassiveSet::<1>::new(2);
-        assert!(set.enter(&twin, 0, [1.0]) && !set.enter(&twin, 1, [2.0]));
+        let mut set = PassiveSet::<1>::new(&twin, 2);
+        assert!(set.enter(0, [1.0]) && !set.enter(1, [2.0]));
     }
 }
