@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::bpdn::{Constraint, Homotopy, SparsityBasis, Splitting, Tolerance};
+use super::bpdn::{Constraint, Homotopy, InteriorPoint, SparsityBasis, Tolerance};
 use super::design::{Design, Patch};
 use super::learned::equations::windows;
 use super::{CommonMode, FEWEST_PATTERNS, Nnls, RecoverError, Workers};
@@ -26,7 +26,8 @@ const SCATTERED: Sample = Sample {
     windows: 48,
     pixels: 1,
 };
-/// Denoising solves for all pixels of a window at about the cost of one.
+/// Denoising takes far longer, for seven candidates: fewer windows, some pixels sharing the equations
+/// of each.
 const GATHERED: Sample = Sample {
     windows: 16,
     pixels: 4,
@@ -253,7 +254,7 @@ impl Direct {
                 }
             }
             Problem::Denoising(basis, tolerance) => {
-                let splitting = Splitting::new(
+                let denoiser = InteriorPoint::new(
                     basis,
                     &design.weighted(),
                     design.rows(),
@@ -277,7 +278,7 @@ impl Direct {
                         least_squares,
                     })
                     .collect();
-                let solutions = splitting.solve(&constraints);
+                let solutions = denoiser.solve(&constraints);
                 for ((pixel, channel, ..), solution) in prepared.iter().zip(&solutions) {
                     take(*pixel, *channel, &solution.x);
                 }
@@ -329,14 +330,6 @@ fn mean(y: &[f64]) -> f64 {
     y.iter().sum::<f64>() / y.len().max(1) as f64
 }
 
-/// Whether all of the window lies off the display.
-fn dark(geometry: &Geometry, origin: Element) -> bool {
-    let side = i64::from(geometry.window.side());
-    let misses =
-        |at: i32, length: u32| i64::from(at) + side <= 0 || i64::from(at) >= i64::from(length);
-    misses(origin.u, geometry.light.width) || misses(origin.v, geometry.light.height)
-}
-
 /// A spread of windows with some of their pixels, and the patterns to choose settings by.
 struct HeldOut<'a> {
     measurements: &'a Measurements,
@@ -357,7 +350,7 @@ impl<'a> HeldOut<'a> {
         let covered = geometry.tiles().filter(|&tile| measurements.covers(tile));
         for rect in covered {
             for (origin, pixels) in windows(&geometry, rect) {
-                if !dark(&geometry, origin) {
+                if geometry.reaches_display(origin) {
                     let pixels = pixels.into_iter().take(sample.pixels);
                     lit.insert(origin, pixels.map(|(_, pixel)| pixel).collect());
                 }

@@ -2,8 +2,8 @@
 //!
 //! For each camera pixel and channel, over its window and subject to `τ ≥ 0`: minimise `‖y − P̂τ‖₂`
 //! (paper, section 3, case (a); [`Nnls`]), or `‖φᵀτ‖₁` subject to `‖y − P̂τ‖₂ ≤ ε` (case (b);
-//! [`Homotopy`] and [`Splitting`]). What makes it affordable is that all pixels and channels whose
-//! correspondence falls in the same light element share one window and so one set of normal
+//! [`Homotopy`] and [`InteriorPoint`]). What makes it affordable is that all pixels and channels
+//! whose correspondence falls in the same light element share one window and so one set of normal
 //! equations, and that windows share the patterns' correlations ([`design`]); what makes it accurate
 //! is how the patterns' common mode is weighted ([`CommonMode`]).
 //!
@@ -25,7 +25,7 @@ mod vector;
 mod workers;
 
 pub use band::Band;
-pub use bpdn::{Constraint, Homotopy, Solution, SparsityBasis, Splitting};
+pub use bpdn::{Constraint, Homotopy, InteriorPoint, Solution, SparsityBasis};
 pub use common_mode::CommonMode;
 pub use nnls::Nnls;
 pub use recovery::{Method, RecoverError, Recovery, Settings};

@@ -6,16 +6,14 @@
 //! no quicker to start from, and what rounding its inverse has gathered comes along.
 
 use super::passive::PassiveSet;
-use super::vector::{LANES, add_rows, vectorised, whole_blocks};
+use super::vector::{LANES, vectorised, whole_blocks};
 
 /// Solver for right-hand sides that share one Gram matrix.
 #[derive(Debug)]
 pub struct Nnls<'a> {
-    /// `[k, k]`, row-major, symmetric.
-    gram: &'a [f64],
     k: usize,
     /// Elements allowed to be above zero; carries the right-hand side.
-    passive: PassiveSet<1>,
+    passive: PassiveSet<'a, 1>,
     /// The passive elements' values now; the set itself knows where least squares puts them.
     x: Vec<f64>,
     /// `h − Gx`.
@@ -36,11 +34,9 @@ impl<'a> Nnls<'a> {
     /// # Panics
     /// If `gram` does not have `k²` entries.
     pub fn new(gram: &'a [f64], k: usize) -> Self {
-        assert_eq!(gram.len(), k * k, "the Gram matrix is square");
         Self {
-            gram,
             k,
-            passive: PassiveSet::new(k),
+            passive: PassiveSet::new(gram, k),
             x: Vec::with_capacity(k),
             gradient: vec![0.0; k],
             slopes: vec![f64::NEG_INFINITY; whole_blocks(k)],
@@ -54,11 +50,7 @@ impl<'a> Nnls<'a> {
             #[inline(always)]
             || self.search(h),
         );
-        let mut x = vec![0.0; self.k];
-        for (&j, &value) in self.passive.members().iter().zip(&self.x) {
-            x[j] = value;
-        }
-        x
+        self.passive.spread(&self.x)
     }
 
     /// Elements above zero in the last solution: the degrees of freedom it spent.
@@ -96,7 +88,7 @@ impl<'a> Nnls<'a> {
                     break;
                 }
                 // Those that entered before have changed this one's gradient.
-                let offer = self.passive.offer(self.gram, j, [h[j]]);
+                let offer = self.passive.offer(j, [h[j]]);
                 if offer.left[0] < STILL_STEEP * steep {
                     continue;
                 }
@@ -172,7 +164,7 @@ impl<'a> Nnls<'a> {
         let x = std::mem::take(&mut self.x);
         self.passive.clear();
         for (&j, x) in members.iter().zip(x) {
-            if self.passive.enter(self.gram, j, [h[j]]) {
+            if self.passive.enter(j, [h[j]]) {
                 self.x.push(x);
             }
         }
@@ -186,10 +178,13 @@ impl<'a> Nnls<'a> {
         for (g, h) in self.gradient.iter_mut().zip(h) {
             *g = -h;
         }
-        let members = self.passive.members();
-        add_rows(&mut self.gradient, self.gram, members, &self.x);
+        self.passive.add_product(&mut self.gradient, &self.x);
         self.gradient.iter_mut().for_each(|g| *g = -*g);
-        let on_set = members.iter().map(|&j| self.gradient[j].abs());
+        let on_set = self
+            .passive
+            .members()
+            .iter()
+            .map(|&j| self.gradient[j].abs());
         on_set.fold(0.0, f64::max)
     }
 

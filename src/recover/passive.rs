@@ -1,6 +1,6 @@
 //! The elements that an active-set solver lets above zero, with their equations kept solved.
 
-use super::vector::{LANES, add_blocks, dot_blocks, whole_blocks};
+use super::vector::{LANES, add_blocks, add_rows, dot_blocks, whole_blocks};
 
 /// As many numbers as fill whole registers.
 type Block = [f64; LANES];
@@ -21,7 +21,9 @@ const ROWS: usize = 4;
 /// Sets are small and of every size, so that vectors which ended where the set does would spend most
 /// time on what is left over of them after the last full register. All have zeros up to a full one.
 #[derive(Debug)]
-pub(super) struct PassiveSet<const N: usize> {
+pub(super) struct PassiveSet<'a, const N: usize> {
+    /// `[k, k]`, row-major, symmetric.
+    gram: &'a [f64],
     /// Elements in the order of all vectors over the set.
     members: Vec<usize>,
     is_member: Vec<bool>,
@@ -36,11 +38,16 @@ pub(super) struct PassiveSet<const N: usize> {
     product: Vec<f64>,
 }
 
-impl<const N: usize> PassiveSet<N> {
-    /// An empty set out of `k` elements.
-    pub fn new(k: usize) -> Self {
+impl<'a, const N: usize> PassiveSet<'a, N> {
+    /// An empty set out of the `k` elements of `gram`, `[k, k]` row-major.
+    ///
+    /// # Panics
+    /// If `gram` does not have `k²` entries.
+    pub fn new(gram: &'a [f64], k: usize) -> Self {
+        assert_eq!(gram.len(), k * k, "the Gram matrix is square");
         let stride = whole_blocks(k.min(ROOM));
         Self {
+            gram,
             members: Vec::with_capacity(stride),
             is_member: vec![false; k],
             inverse: vec![[0.0; LANES]; stride * stride / LANES],
@@ -60,6 +67,28 @@ impl<const N: usize> PassiveSet<N> {
     #[inline(always)]
     pub fn contains(&self, j: usize) -> bool {
         self.is_member[j]
+    }
+
+    /// An element's row of the Gram matrix.
+    #[inline(always)]
+    pub fn row(&self, j: usize) -> &'a [f64] {
+        let k = self.is_member.len();
+        &self.gram[j * k..(j + 1) * k]
+    }
+
+    /// `y += Gx` for an x that is zero outside the set.
+    #[inline(always)]
+    pub fn add_product(&self, y: &mut [f64], x: &[f64]) {
+        add_rows(y, self.gram, &self.members, x);
+    }
+
+    /// Values of the members as a vector of all elements, `[k]`.
+    pub fn spread(&self, values: &[f64]) -> Vec<f64> {
+        let mut all = vec![0.0; self.is_member.len()];
+        for (&j, &value) in self.members.iter().zip(values) {
+            all[j] = value;
+        }
+        all
     }
 
     /// Takes all elements out.
@@ -143,9 +172,8 @@ impl<const N: usize> PassiveSet<N> {
 
     /// Looks at element `j` with its entries `b` of the right-hand sides.
     #[inline(always)]
-    pub fn offer(&mut self, gram: &[f64], j: usize, b: [f64; N]) -> Offer<N> {
-        let k = self.is_member.len();
-        let row = &gram[j * k..(j + 1) * k];
+    pub fn offer(&mut self, j: usize, b: [f64; N]) -> Offer<N> {
+        let row = self.row(j);
         self.gather(row);
         let column = &self.column[..self.width()];
         let mut left = b;
@@ -162,8 +190,8 @@ impl<const N: usize> PassiveSet<N> {
     /// Adds element `j` with its entries of the right-hand sides, unless its column depends linearly
     /// on the set's.
     #[inline(always)]
-    pub fn enter(&mut self, gram: &[f64], j: usize, b: [f64; N]) -> bool {
-        let offer = self.offer(gram, j, b);
+    pub fn enter(&mut self, j: usize, b: [f64; N]) -> bool {
+        let offer = self.offer(j, b);
         self.accept(offer)
     }
 
@@ -313,9 +341,9 @@ mod tests {
         let problem = Problem::random(k, 200, 5, 0.5);
         let gram = problem.gram();
         let b = problem.right_hand_side(&problem.measurements[0]);
-        let mut set = PassiveSet::<1>::new(k);
+        let mut set = PassiveSet::<1>::new(&gram, k);
         for j in 0..k {
-            assert!(set.enter(&gram, j, [b[j]]));
+            assert!(set.enter(j, [b[j]]));
             if j % 3 == 2 {
                 set.leave(j / 3 % set.members().len());
             }
@@ -342,7 +370,7 @@ mod tests {
         assert!(set.members().is_empty() && !set.contains(0));
         // A column that is another one's double does not enter.
         let twin = [1.0, 2.0, 2.0, 4.0];
-        let mut set = PassiveSet::<1>::new(2);
-        assert!(set.enter(&twin, 0, [1.0]) && !set.enter(&twin, 1, [2.0]));
+        let mut set = PassiveSet::<1>::new(&twin, 2);
+        assert!(set.enter(0, [1.0]) && !set.enter(1, [2.0]));
     }
 }

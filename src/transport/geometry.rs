@@ -250,6 +250,14 @@ impl Geometry {
         self.window.origin(self.correspondence.at(pixel))
     }
 
+    /// Whether any of the window that starts at `origin` lies on the display.
+    pub(crate) fn reaches_display(&self, origin: Element) -> bool {
+        let side = i64::from(self.window.side());
+        let reaches =
+            |at: i32, length: u32| i64::from(at) + side > 0 && i64::from(at) < i64::from(length);
+        reaches(origin.u, self.light.width) && reaches(origin.v, self.light.height)
+    }
+
     /// Zeroes the values of elements off the display, for the window that starts at `origin`.
     pub(crate) fn darken_off_display<T: Copy + Default>(&self, origin: Element, values: &mut [T]) {
         let side = self.window.side() as usize;

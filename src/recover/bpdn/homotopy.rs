@@ -6,16 +6,14 @@
 //! `‖y − Ax‖ = ε` is a root and no search over λ. At it `x` solves the constrained problem.
 
 use super::super::passive::PassiveSet;
-use super::super::vector::{add_rows, add_scaled, vectorised};
+use super::super::vector::{add_scaled, vectorised};
 
 /// Solver for right-hand sides that share one Gram matrix.
 #[derive(Debug)]
 pub struct Homotopy<'a> {
-    /// `[k, k]`, row-major, symmetric.
-    gram: &'a [f64],
     k: usize,
     /// Elements above zero; solves for a vector of ones, and at the end for what rounding left.
-    passive: PassiveSet<2>,
+    passive: PassiveSet<'a, 2>,
     /// The passive elements' values. The set's solution for ones is how they grow as λ falls.
     x: Vec<f64>,
     /// `h − Gx`, and how it falls as λ falls: λ and 1 on the passive set.
@@ -45,11 +43,9 @@ impl<'a> Homotopy<'a> {
     /// # Panics
     /// If `gram` does not have `k²` entries.
     pub fn new(gram: &'a [f64], k: usize) -> Self {
-        assert_eq!(gram.len(), k * k, "the Gram matrix is square");
         Self {
-            gram,
             k,
-            passive: PassiveSet::new(k),
+            passive: PassiveSet::new(gram, k),
             x: Vec::with_capacity(k),
             correlation: vec![0.0; k],
             fall: vec![0.0; k],
@@ -65,11 +61,7 @@ impl<'a> Homotopy<'a> {
             #[inline(always)]
             || self.follow(h, energy, epsilon * epsilon),
         );
-        let mut x = vec![0.0; self.k];
-        for (&j, &value) in self.passive.members().iter().zip(&self.x) {
-            x[j] = value;
-        }
-        x
+        self.passive.spread(&self.x)
     }
 
     #[inline(always)]
@@ -93,13 +85,8 @@ impl<'a> Homotopy<'a> {
         // Each event changes the set by one element; paths have about as many as members at the end.
         for _ in 0..10 * self.k {
             self.fall.fill(0.0);
-            let members = self.passive.members();
-            add_rows(
-                &mut self.fall,
-                self.gram,
-                members,
-                self.passive.solution(ONES),
-            );
+            let passive = &self.passive;
+            passive.add_product(&mut self.fall, passive.solution(ONES));
             let residual = energy - self.explained(h, lambda);
             let (step, event) = self.next_event(lambda, residual - most);
             lambda -= step;
@@ -123,7 +110,7 @@ impl<'a> Homotopy<'a> {
 
     #[inline(always)]
     fn enter(&mut self, j: usize) {
-        match self.passive.enter(self.gram, j, [0.0, 1.0]) {
+        match self.passive.enter(j, [0.0, 1.0]) {
             true => self.x.push(0.0),
             false => self.refused[j] = true,
         }
@@ -174,8 +161,7 @@ impl<'a> Homotopy<'a> {
             for (c, h) in self.correlation.iter_mut().zip(h) {
                 *c = lambda - h;
             }
-            let members = self.passive.members();
-            add_rows(&mut self.correlation, self.gram, members, &self.x);
+            self.passive.add_product(&mut self.correlation, &self.x);
             self.correlation.iter_mut().for_each(|c| *c = -*c);
             self.passive.carry(RIGHT, &self.correlation);
             add_scaled(&mut self.x, 1.0, self.passive.solution(RIGHT));

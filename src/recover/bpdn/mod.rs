@@ -2,17 +2,19 @@
 //! case (b)), for the constraint as written.
 //!
 //! With φ the identity the path of solutions over ε is followed from dark to where it meets ε
-//! ([`homotopy`]); with any other orthonormal φ the constraints are split off and solved for in
-//! turns ([`splitting`]). Where ε is less than non-negative least squares can reach, no τ satisfies
+//! ([`homotopy`]); with any other orthonormal φ Newton's method goes to the solution through the
+//! inside of all constraints ([`interior`]). Where ε is less than non-negative least squares can reach, no τ satisfies
 //! the constraint, and both return that least-squares solution.
 
 mod homotopy;
 mod interior;
-mod splitting;
+mod solution;
 mod tolerance;
 mod transform;
+mod window;
 
 pub use homotopy::Homotopy;
-pub use splitting::{Constraint, Solution, Splitting};
+pub use interior::InteriorPoint;
+pub use solution::{Constraint, Solution};
 pub(super) use tolerance::Tolerance;
 pub use transform::SparsityBasis;

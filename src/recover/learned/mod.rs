@@ -436,13 +436,8 @@ impl Comparison {
 
 /// Whether any window reaches the display.
 fn windows_seen(geometry: &Geometry) -> bool {
-    let side = i64::from(geometry.window.side());
-    let reaches =
-        |at: i32, length: u32| i64::from(at) + side > 0 && i64::from(at) < i64::from(length);
-    geometry.tiles().flat_map(TileRect::pixels).any(|pixel| {
-        let origin = geometry.window_origin(pixel);
-        reaches(origin.u, geometry.light.width) && reaches(origin.v, geometry.light.height)
-    })
+    let mut pixels = geometry.tiles().flat_map(TileRect::pixels);
+    pixels.any(|pixel| geometry.reaches_display(geometry.window_origin(pixel)))
 }
 
 /// The first few pixels of a rectangle.
