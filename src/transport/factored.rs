@@ -46,79 +46,26 @@ impl FactoredTile {
         basis: &Basis,
         tau: &mut [[f32; CHANNELS]],
     ) {
-        let area = geometry.window.area();
-        let Some(blocks) = Blocks::new(basis, area) else {
+        let (area, rank) = (geometry.window.area(), basis.rank());
+        if rank == 0 {
             return;
-        };
-        let pixels = self.rect.pixels().zip(tau.chunks_exact_mut(area));
-        for ((pixel, tau), coefficients) in pixels.zip(self.coefficients.chunks_exact(blocks.rank))
-        {
-            blocks.combine(coefficients, tau, |t| t.max(0.0));
-            geometry.darken_off_display(geometry.window_origin(pixel), tau);
         }
-    }
-
-    /// Scales each function so that it sends as much light in all as the combination does before
-    /// what is below zero is cut off: cutting alone would brighten the pixel.
-    pub(crate) fn keep_totals(&mut self, geometry: &Geometry, basis: &Basis) {
-        let area = geometry.window.area();
-        let Some(blocks) = Blocks::new(basis, area) else {
-            return;
-        };
-        let mut tau = vec![[0.0f32; CHANNELS]; area];
-        let pixels = self.rect.pixels();
-        for (pixel, coefficients) in pixels.zip(self.coefficients.chunks_exact_mut(blocks.rank)) {
-            blocks.combine(coefficients, &mut tau, |t| t);
-            geometry.darken_off_display(geometry.window_origin(pixel), &mut tau);
-            let (mut total, mut shown) = ([0.0; CHANNELS], [0.0; CHANNELS]);
-            for t in &tau {
-                for c in 0..CHANNELS {
-                    total[c] += t[c];
-                    shown[c] += t[c].max(0.0);
-                }
-            }
-            for c in 0..CHANNELS {
-                if total[c] > 0.0 {
-                    let share = total[c] / shown[c];
-                    coefficients.iter_mut().for_each(|z| z[c] *= share);
-                }
-            }
-        }
-    }
-}
-
-/// A basis as `[block, component, element]`: what the inner loop reads lies in one run.
-struct Blocks {
-    kernels: Vec<[f32; BLOCK]>,
-    rank: usize,
-}
-
-impl Blocks {
-    /// `None` without kernels.
-    fn new(basis: &Basis, area: usize) -> Option<Self> {
-        let rank = basis.rank();
+        // `[block, component, element]`: what the inner loop reads lies in one run.
         let mut kernels = vec![[0.0; BLOCK]; area.div_ceil(BLOCK) * rank];
         for (k, kernel) in basis.kernels.iter().enumerate() {
             for (b, elements) in kernel.chunks(BLOCK).enumerate() {
                 kernels[b * rank + k][..elements.len()].copy_from_slice(elements);
             }
         }
-        (rank > 0).then_some(Self { kernels, rank })
-    }
-
-    /// One pixel's function, each value as `clip` leaves it.
-    fn combine(
-        &self,
-        coefficients: &[[f32; CHANNELS]],
-        tau: &mut [[f32; CHANNELS]],
-        clip: impl Fn(f32) -> f32,
-    ) {
-        let blocks = self.kernels.chunks_exact(self.rank);
-        for (tau, kernels) in tau.chunks_mut(BLOCK).zip(blocks) {
-            let sums = combine(coefficients, kernels);
-            for (s, tau) in tau.iter_mut().enumerate() {
-                *tau = std::array::from_fn(|c| clip(sums[c][s]));
+        let pixels = self.rect.pixels().zip(tau.chunks_exact_mut(area));
+        for ((pixel, tau), coefficients) in pixels.zip(self.coefficients.chunks_exact(rank)) {
+            for (tau, kernels) in tau.chunks_mut(BLOCK).zip(kernels.chunks_exact(rank)) {
+                let sums = combine(coefficients, kernels);
+                for (s, tau) in tau.iter_mut().enumerate() {
+                    *tau = std::array::from_fn(|c| sums[c][s].max(0.0));
+                }
             }
+            geometry.darken_off_display(geometry.window_origin(pixel), tau);
         }
     }
 }
@@ -214,67 +161,6 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn cutting_off_what_is_below_zero_keeps_the_total() {
-        let extent = |width, height| Extent { width, height };
-        let geometry = Geometry {
-            camera: extent(12, 6),
-            light: extent(6, 3),
-            window: Window::new(5).unwrap(),
-            correspondence: Correspondence {
-                affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
-            },
-            tile_side: 16,
-        };
-        let (rank, area) = (4, 25);
-        let basis = Basis {
-            kernels: (0..rank)
-                .map(|k| (0..area).map(|s| wave(k * area + s)).collect())
-                .collect(),
-        };
-        let rect = geometry.tile(0);
-        let coefficients: Vec<_> = (0..rect.extent.area() * rank)
-            .map(|i| [0, 1, 2].map(|c| wave(i * 3 + c)))
-            .collect();
-        let mut tile = FactoredTile { rect, coefficients };
-        let before = tile.clone();
-        tile.keep_totals(&geometry, &basis);
-        let functions = tile.expand(&geometry, &basis);
-        let mut scaled = 0;
-        for (p, pixel) in rect.pixels().enumerate() {
-            let origin = geometry.window_origin(pixel);
-            for c in 0..CHANNELS {
-                let on_display = (0..area).filter(|&s| {
-                    let element = geometry.window.element(origin, s);
-                    element.index_in(geometry.light).is_some()
-                });
-                let total: f32 = on_display
-                    .map(|s| {
-                        let terms = (0..rank)
-                            .map(|k| before.coefficients[p * rank + k][c] * basis.kernels[k][s]);
-                        terms.sum::<f32>()
-                    })
-                    .sum();
-                let tau = &functions.tau[p * area..(p + 1) * area];
-                let shown: f32 = tau.iter().map(|t| t[c]).sum();
-                if total > 0.0 {
-                    assert!(
-                        (shown - total).abs() < 1e-5,
-                        "{pixel:?}, {c}: {shown}, {total}"
-                    );
-                    scaled += 1;
-                } else {
-                    // Nothing to keep: left as it was.
-                    assert_eq!(
-                        tile.coefficients[p * rank][c],
-                        before.coefficients[p * rank][c]
-                    );
-                }
-            }
-        }
-        assert!(scaled > 50, "{scaled}");
     }
 
     #[test]

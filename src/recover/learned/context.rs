@@ -8,6 +8,7 @@
 //! measurements.
 
 use super::equations::{Equations, Member, PHASES};
+use super::nonnegative::NonNegative;
 use super::posterior::{Gaussian, Workspace};
 use super::prior::{Prior, Threshold, bright};
 use crate::recover::Workers;
@@ -96,6 +97,29 @@ impl Field {
             },
         );
         field
+    }
+
+    /// The best estimate for every pixel of `patch.inner` without its neighbours, `[pixel, channel,
+    /// r]`.
+    pub fn refine(&self, patch: &Patch, prior: &Prior, nonnegative: &NonNegative) -> Vec<f64> {
+        let mut out = Vec::with_capacity(patch.inner.extent.area() * CHANNELS * self.rank);
+        vectorised(
+            #[inline(always)]
+            || {
+                let mut work = Workspace::new(self.rank);
+                for (_, _, _, member) in self.members(patch.inner) {
+                    let mut z = self.z[member * self.rank..(member + 1) * self.rank].to_vec();
+                    if self.bright[member] {
+                        let mean = &prior.mean[patch.equations.members[member].phase];
+                        let (noise, gaussian) = (prior.noise, &prior.gaussian);
+                        work.infer(&patch.equations, member, noise, gaussian, mean);
+                        work.pull(nonnegative, &mut z);
+                    }
+                    out.extend(z);
+                }
+            },
+        );
+        out
     }
 
     /// What `feature` of pixel (x, y), counted from the region's first, is; `None` off the region.
@@ -384,20 +408,24 @@ impl Context {
     }
 
     /// The best estimate for every pixel of `patch.inner`, `[pixel, channel, r]`.
-    pub fn refine(&self, patch: &Patch, noise: f64) -> Vec<f64> {
+    pub fn refine(&self, patch: &Patch, noise: f64, nonnegative: &NonNegative) -> Vec<f64> {
         let rank = self.rank;
         let mut out = Vec::with_capacity(patch.inner.extent.area() * CHANNELS * rank);
         vectorised(
             #[inline(always)]
             || {
                 let mut work = Workspace::new(rank);
-                let mut mean = vec![0.0; rank];
+                let (mut mean, mut best) = (vec![0.0; rank], vec![0.0; rank]);
                 for at in patch.field.members(patch.inner) {
                     let member = at.3;
                     let alone = &patch.field.z[member * rank..(member + 1) * rank];
                     if patch.field.bright[member] {
                         let q = self.infer(patch, noise, at, &mut mean, &mut work);
-                        out.extend(work.z.iter().zip(alone).map(|(z, a)| q * z + (1.0 - q) * a));
+                        for (best, (z, a)) in best.iter_mut().zip(work.z.iter().zip(alone)) {
+                            *best = q * z + (1.0 - q) * a;
+                        }
+                        work.pull(nonnegative, &mut best);
+                        out.extend_from_slice(&best);
                     } else {
                         out.extend_from_slice(alone);
                     }

@@ -54,6 +54,17 @@ impl Kernels {
         }
     }
 
+    /// The kernels as `[element, r]`, and the mean function's peak.
+    pub fn by_element(&self) -> (Vec<f64>, f64) {
+        let mut elements = Vec::with_capacity(self.values.len());
+        let mut peak = 0.0f64;
+        for row in self.values.chunks_exact(self.stride) {
+            elements.extend(row[..self.rank].iter().map(|&v| f64::from(v)));
+            peak = peak.max(f64::from(row[self.rank]));
+        }
+        (elements, peak)
+    }
+
     /// Every pattern, in the colour of channel `plane`, seen by the window that starts at `origin`.
     pub fn project(
         &self,

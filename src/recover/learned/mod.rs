@@ -15,6 +15,7 @@
 mod context;
 pub(super) mod equations;
 mod kernels;
+mod nonnegative;
 mod posterior;
 mod prior;
 pub(super) mod start;
@@ -24,6 +25,7 @@ mod tests;
 use context::{Context, Field, Patch, REACH};
 use equations::{Equations, windows};
 use kernels::Kernels;
+use nonnegative::NonNegative;
 use prior::{Prior, Threshold};
 
 use super::direct::{Direct, held_out_misses};
@@ -62,6 +64,7 @@ const LEAST_GAIN: f64 = 0.005;
 pub(super) struct Learned {
     geometry: Geometry,
     kernels: Kernels,
+    nonnegative: NonNegative,
     basis: Basis,
     prior: Prior,
     context: Option<Context>,
@@ -137,6 +140,7 @@ impl Learned {
             let learned = Self {
                 geometry,
                 basis: kernels.basis(),
+                nonnegative: NonNegative::new(&kernels),
                 kernels,
                 prior,
                 context: None,
@@ -217,12 +221,10 @@ impl Learned {
         rows: &[usize],
         rect: TileRect,
     ) -> FactoredTile {
-        let mut tile = FactoredTile {
+        FactoredTile {
             rect,
             coefficients: self.solve(measurements, rows, rect),
-        };
-        tile.keep_totals(&self.geometry, &self.basis);
-        tile
+        }
     }
 
     /// Number of patches there is memory for.
@@ -287,8 +289,8 @@ impl Learned {
         };
         let rank = self.rank();
         let z = match &self.context {
-            Some(context) => context.refine(&patch, self.prior.noise),
-            None => patch.field.z.clone(),
+            Some(context) => context.refine(&patch, self.prior.noise, &self.nonnegative),
+            None => patch.field.refine(&patch, &self.prior, &self.nonnegative),
         };
         let mut coefficients = vec![[0.0f32; CHANNELS]; rect.extent.area() * rank];
         for (p, pixel) in rect.pixels().enumerate() {

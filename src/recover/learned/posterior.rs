@@ -1,6 +1,7 @@
 //! What one pixel's measurements and a Gaussian prior say together, in closed form.
 
 use super::equations::Equations;
+use super::nonnegative::{NonNegative, Pull};
 use crate::recover::dense;
 use crate::recover::vector::dot;
 
@@ -51,6 +52,7 @@ pub(super) struct Workspace {
     pub inverse: Vec<f64>,
     image: Vec<f64>,
     step: Vec<f64>,
+    pull: Pull,
     /// Posterior mean, `[r]`.
     pub z: Vec<f64>,
 }
@@ -65,6 +67,7 @@ impl Workspace {
             inverse: square,
             image: line.clone(),
             step: line.clone(),
+            pull: Pull::new(rank),
             z: line,
         }
     }
@@ -108,6 +111,12 @@ impl Workspace {
             *z += m;
         }
         -0.5 * (quadratic - explained + log_det + prior.log_det)
+    }
+
+    /// Moves `z`, near the mean of the posterior just inferred, to where light is hardly negative.
+    #[inline(always)]
+    pub fn pull(&mut self, nonnegative: &NonNegative, z: &mut [f64]) {
+        nonnegative.pull(&self.factor, z, &mut self.pull);
     }
 
     /// The covariance of the posterior just inferred, into `inverse`.
