@@ -55,9 +55,15 @@ const FEWEST_PATCHES: usize = 8;
 const LATE_ROUNDS: usize = 2;
 /// Share of the brightness that 5 % of the pixels exceed, below which nothing is learned of a pixel.
 const DIM: f64 = 0.1;
-/// Share of the error on patterns held out that blending with least squares must save to be worth
-/// a direct tile, which takes ten times the room of a factored one.
+/// Share of the error on patterns held out that blending with least squares must save in a tile to be
+/// worth a direct one, which takes ten times the room of a factored one.
 const LEAST_GAIN: f64 = 0.005;
+/// The same over the whole picture, to be worth trying tile by tile, which takes twice the time.
+const LEAST_GAIN_IN_ALL: f64 = 0.02;
+/// Side of the part of a tile by which its blend is chosen.
+const JUDGED: u32 = 16;
+/// Side of the part of each patch by which it is chosen whether to try.
+const GLANCED: u32 = 4;
 
 /// What has been learned.
 #[derive(Debug)]
@@ -199,8 +205,8 @@ impl Learned {
             return RecoveredTile::Factored(tile);
         };
         let share = self
-            .compare(measurements, direct, &split, rect)
-            .best_share();
+            .compare(measurements, direct, &split, part(rect, JUDGED))
+            .best_share(LEAST_GAIN);
         if share == 0.0 {
             return RecoveredTile::Factored(tile);
         }
@@ -393,9 +399,8 @@ impl Learned {
         workers: &impl Workers,
     ) -> Result<Option<Direct>, RecoverError> {
         let direct = Direct::least_squares(measurements, self.geometry, workers)?;
-        // A corner of each patch is enough to tell.
         let parts = workers.map(rects.len(), |i| {
-            self.compare(measurements, &direct, split, corner(rects[i]))
+            self.compare(measurements, &direct, split, part(rects[i], GLANCED))
         });
         let mut total = Comparison::default();
         for part in parts {
@@ -403,7 +408,7 @@ impl Learned {
             total.both += part.both;
             total.theirs += part.theirs;
         }
-        Ok((total.best_share() > 0.0).then_some(direct))
+        Ok((total.best_share(LEAST_GAIN_IN_ALL) > 0.0).then_some(direct))
     }
 }
 
@@ -416,20 +421,20 @@ struct Comparison {
 }
 
 impl Comparison {
-    /// Share of their functions in the blend with ours that misses least; 0 if that saves too
-    /// little.
+    /// Share of their functions in the blend with ours that misses least; 0 if that saves a smaller
+    /// share of what ours miss than `least`.
     ///
     /// Where the transport is sparse and each function a case of its own, least squares knows what a
     /// Gaussian prior does not, that no light is negative; their errors differ, and a blend of both
     /// is better than either.
-    fn best_share(self) -> f32 {
+    fn best_share(self, least: f64) -> f32 {
         let apart = self.ours - 2.0 * self.both + self.theirs;
         if apart.is_nan() || apart <= 0.0 {
             return 0.0;
         }
         let share = ((self.ours - self.both) / apart).clamp(0.0, 1.0);
         let saved = share * (2.0 * (self.ours - self.both) - share * apart);
-        match saved > LEAST_GAIN * self.ours {
+        match saved > least * self.ours {
             true => share as f32,
             false => 0.0,
         }
@@ -442,14 +447,16 @@ fn windows_seen(geometry: &Geometry) -> bool {
     pixels.any(|pixel| geometry.reaches_display(geometry.window_origin(pixel)))
 }
 
-/// The first few pixels of a rectangle.
-fn corner(rect: TileRect) -> TileRect {
+/// At most `side²` pixels from the middle of a rectangle.
+fn part(rect: TileRect, side: u32) -> TileRect {
+    let extent = Extent {
+        width: rect.extent.width.min(side),
+        height: rect.extent.height.min(side),
+    };
     TileRect {
-        extent: Extent {
-            width: rect.extent.width.min(4),
-            height: rect.extent.height.min(4),
-        },
-        ..rect
+        x: rect.x + (rect.extent.width - extent.width) / 2,
+        y: rect.y + (rect.extent.height - extent.height) / 2,
+        extent,
     }
 }
 
