@@ -18,8 +18,8 @@ pub(super) const DEFAULT: Method = Method::Learned;
 
 /// How many times as many pixels are judged of methods that take a fraction of the time.
 const MORE_OF_FAST: usize = 4;
-/// How many times fewer pixels are judged of methods that take far longer.
-const FEWER_OF_SLOW: usize = 64;
+/// How many times fewer pixels are judged of methods that take longer.
+const FEWER_OF_SLOW: usize = 8;
 
 /// The name by which tables and legends call a method; no two have the same.
 pub(super) fn name(method: Method) -> &'static str {
@@ -31,7 +31,7 @@ pub(super) fn name(method: Method) -> &'static str {
     }
 }
 
-/// Whether `method` takes so long that curves of it have few points.
+/// Whether `method` takes longer than others.
 pub(super) fn slow(method: Method) -> bool {
     matches!(
         method,
