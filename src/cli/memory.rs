@@ -80,7 +80,7 @@ impl Plan {
         let photographs = shots as u64 + u64::from(manifest.flood.is_some());
         let width = u64::from(camera.width);
         let fixed = PROGRAM
-            + method.preparation_bytes() as u64
+            + method.preparation_bytes(window) as u64
             + pixel * camera.area() as u64 // the dark frame
             + pixel * (shots * light.area()) as u64 // patterns, of any colour
             + photographs * (READER + 4 * 2 * CHANNELS as u64 * width);
@@ -99,7 +99,8 @@ impl Plan {
         };
         plan.share_out();
         plan.tiles_at_once = threads.min((plan.photographs / tile) as usize);
-        let least = plan.fixed + 2 * tile.max(plan.row * u64::from(tile_side.min(camera.height)));
+        let rows = (tile_side + 2 * method.most_halo()).min(camera.height);
+        let least = plan.fixed + 2 * tile.max(plan.row * u64::from(rows));
         plan.ensure_at_least(least)?;
         Ok(plan)
     }
@@ -149,20 +150,18 @@ impl Plan {
 
     /// Rows of tiles by strips, from the top down, each with the camera rows to be at hand for it:
     /// its own and `halo` more on either side.
-    pub fn strips(&self, halo: u32) -> Result<Vec<(Range<u32>, Rows)>> {
+    pub fn strips(&self, halo: u32) -> Vec<(Range<u32>, Rows)> {
         let tile_rows = self.height.div_ceil(self.tile_side);
         if self.whole() {
-            return Ok(vec![(0..tile_rows, Rows::all(self.height))]);
+            return vec![(0..tile_rows, Rows::all(self.height))];
         }
-        let least = self.row * u64::from((self.tile_side + 2 * halo).min(self.height));
-        self.ensure_at_least(self.fixed + 2 * least)?;
         let count = self.rows_at_once().saturating_sub(2 * halo) / self.tile_side;
         let strips = (0..tile_rows).step_by(count.max(1) as usize).map(|first| {
             let strip = first..(first + count.max(1)).min(tile_rows);
             let rows = self.pixel_rows(strip.clone(), halo);
             (strip, Rows::from_strips([rows]))
         });
-        Ok(strips.collect())
+        strips.collect()
     }
 
     /// The rows of Gray code to find the correspondence by, from so many photographs: all where
@@ -229,7 +228,7 @@ mod tests {
             assert!((1..=8).contains(&plan.tiles_at_once));
             for halo in [0, 8] {
                 let mut next = 0;
-                for (strip, rows) in plan.strips(halo).unwrap() {
+                for (strip, rows) in plan.strips(halo) {
                     assert_eq!(strip.start, next);
                     next = strip.end;
                     let needed =

@@ -220,6 +220,13 @@ fn recover(
         }
         WindowChoice::Fixed(_) => None,
     };
+    if let Some(Band { window, leak: None }) = band {
+        eprintln!(
+            "warning: the band is at least as wide as the window of {0}x{0} light elements that was \
+             looked at; a wider one can be asked for with --window",
+            window.side()
+        );
+    }
     let settings = Settings {
         method: args.method(),
         window: band.map_or(args.window.most(), |band| band.window),
@@ -244,7 +251,7 @@ fn recover(
     if photographs.is_some() {
         measurements.forget_rows();
     }
-    let strips = plan.strips(recovery.halo())?;
+    let strips = plan.strips(recovery.halo());
     for (tile_rows, rows) in &strips {
         if let Some(photographs) = &mut photographs {
             photographs.advance(&mut measurements, rows, &ProgressBar::hidden())?;
@@ -282,7 +289,7 @@ fn recover(
         peak_rss_bytes: None,
         method: settings.method,
         window: settings.window.side(),
-        leak: band.map(|band| band.leak),
+        leak: band.and_then(|band| band.leak),
         rank: basis.map(Basis::rank),
         patterns: shots.len(),
         common_mode: recovery.common_mode(),
@@ -343,7 +350,8 @@ impl Run<'_> {
                     bail!(Interrupted(String::new()));
                 }
                 let tile = self.recovery.tile(measurements, rect);
-                lock().add(i, &EncodedTile::new(geometry, &tile)?)?;
+                let encoded = EncodedTile::new(geometry, &tile)?;
+                lock().add(i, &encoded)?;
                 self.bar.inc(1);
             }
             Ok(match saturated {
@@ -372,7 +380,9 @@ fn recipe(
     shots: &[usize],
     plan: &Plan,
 ) -> Result<Recipe> {
-    let memory = match plan.whole() {
+    let gray_code = plan.gray_code_rows(folder.manifest().graycode.len());
+    let whole = plan.whole() && gray_code == Rows::all(folder.manifest().camera.height);
+    let memory = match whole {
         true => "enough for all photographs".to_owned(),
         false => args.memory.0.to_string(),
     };

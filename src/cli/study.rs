@@ -154,7 +154,7 @@ fn study_one(
             Ok(section)
         })
         .collect::<Result<_>>()?,
-        _ => vec![study::scenes_table(&AllCores, progress)?],
+        _ => vec![study::scenes_table(pixels, &AllCores, progress)?],
     })
 }
 

@@ -30,8 +30,9 @@ const PARTS: usize = 8;
 pub struct Band {
     /// The smallest window that holds nearly all of the band.
     pub window: Window,
-    /// Estimated share of a pixel's light that comes from outside it.
-    pub leak: f64,
+    /// Estimated share of a pixel's light that comes from outside it; `None` where the window is as
+    /// wide as was looked, so that nothing is known of what lies outside.
+    pub leak: Option<f64>,
 }
 
 impl Band {
@@ -82,7 +83,9 @@ impl Band {
             });
             let mut total = Sums::new(groups.count);
             parts.iter().for_each(|part| total.merge(part));
-            profile = total.solve().ok_or(RecoverError::Dark)?;
+            profile = total
+                .solve()
+                .ok_or_else(|| start::dark_or_overexposed(measurements, &squares))?;
         }
         groups.band(&profile, probe)
     }
@@ -133,7 +136,7 @@ impl Groups {
         let inside = (held.unwrap_or(rings.len()) + MARGIN).min(rings.len());
         Ok(Band {
             window: Window::new(MIDDLE.min(probe) + 2 * inside as u32)?,
-            leak: leaks[inside].max(0.0),
+            leak: (inside < rings.len()).then(|| leaks[inside].max(0.0)),
         })
     }
 }
@@ -175,14 +178,21 @@ impl Sums {
         if elements.len() < window.area() {
             return; // Of what lies off the display nothing can be said.
         }
-        let patterns = measurements.patterns.len();
+        let all: Vec<usize> = (0..measurements.patterns.len()).collect();
         let planes = if measurements.grey() { 1 } else { CHANNELS };
         for plane in 0..planes {
+            let channels = if planes == 1 {
+                0..CHANNELS
+            } else {
+                plane..plane + 1
+            };
+            let rows = start::unsaturated(measurements, &all, pixels, channels.clone());
+            let patterns = rows.len();
             let mut columns = vec![0.0; groups.count * patterns];
-            for (l, pattern) in measurements.patterns.iter().enumerate() {
-                let pattern = pattern.plane(plane);
+            for (i, &l) in rows.iter().enumerate() {
+                let pattern = measurements.patterns[l].plane(plane);
                 for (&m, &g) in elements.iter().zip(&groups.of) {
-                    columns[g * patterns + l] += f64::from(pattern[m]);
+                    columns[g * patterns + i] += f64::from(pattern[m]);
                 }
             }
             let mut level = 0.0;
@@ -198,22 +208,18 @@ impl Sums {
             if level <= 0.0 {
                 continue;
             }
-            let channels = if planes == 1 {
-                0..CHANNELS
-            } else {
-                plane..plane + 1
-            };
             let mut seen = vec![0.0; patterns];
             let mut energy = 0.0;
             for &(_, pixel) in pixels {
                 for c in channels.clone() {
-                    let y = (0..patterns).map(|l| measurements.sample(l, pixel, c));
+                    let y = rows.iter().map(|&l| measurements.sample(l, pixel, c));
                     let y: Vec<f64> = y.collect();
                     let mean = y.iter().sum::<f64>() / patterns as f64;
                     // Also false where some sample is saturated.
                     if mean > 0.0 {
                         let brightness = mean / level;
-                        let noise = measurements.variance(0, c, mean) / brightness.powi(2);
+                        let noise =
+                            start::mean_variance(measurements, &rows, c, mean) / brightness.powi(2);
                         let weight = 1.0 / (start::DEVIATION.powi(2) + noise);
                         energy += weight;
                         add_scaled(&mut seen, weight / brightness, &y);
@@ -257,7 +263,12 @@ mod tests {
         flux[middle + 3] = 0.001; // out to side 15
         let band = groups.band(&flux, 15).unwrap();
         assert_eq!(band.window.side(), 13); // 11 leaves 0.5 %, and a ring of margin
-        assert!((band.leak - 0.001).abs() < 1e-12);
+        assert!((band.leak.unwrap() - 0.001).abs() < 1e-12);
+        // Where rings never stay dark the window is as wide as was looked, and that is all there is to
+        // say.
+        flux[middle + 3] = 0.02;
+        let band = groups.band(&flux, 15).unwrap();
+        assert_eq!((band.window.side(), band.leak), (15, None));
     }
 
     #[test]

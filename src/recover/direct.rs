@@ -26,7 +26,7 @@ const SCATTERED: Sample = Sample {
     windows: 48,
     pixels: 1,
 };
-/// Denoising takes far longer, for seven candidates: fewer windows, some pixels sharing the equations
+/// Denoising takes longer, for seven candidates: fewer windows, some pixels sharing the equations
 /// of each.
 const GATHERED: Sample = Sample {
     windows: 16,

@@ -1,6 +1,7 @@
 //! From measurements to light transport functions.
 //!
-//! For each camera pixel and channel, over its window and subject to `τ ≥ 0`: minimise `‖y − P̂τ‖₂`
+//! By default a prior learned from all pixels' measurements says what each function is likely to be
+//! ([`learned`]). The paper's own methods treat every pixel by itself: for each camera pixel and channel, over its window and subject to `τ ≥ 0`: minimise `‖y − P̂τ‖₂`
 //! (paper, section 3, case (a); [`Nnls`]), or `‖φᵀτ‖₁` subject to `‖y − P̂τ‖₂ ≤ ε` (case (b);
 //! [`Homotopy`] and [`InteriorPoint`]). What makes it affordable is that all pixels and channels
 //! whose correspondence falls in the same light element share one window and so one set of normal

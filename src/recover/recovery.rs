@@ -13,8 +13,8 @@ use crate::transport::{Basis, Geometry, GeometryError, RecoveredTile, TileRect, 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(into = "&'static str")]
 pub enum Method {
-    /// A Gaussian prior learned from the measurements themselves, and the posterior mean under it;
-    /// least squares in tiles where that predicts patterns held out better.
+    /// A Gaussian prior learned from the measurements themselves, and the posterior under it; blended
+    /// with least squares in tiles where a blend predicts patterns held out better.
     Learned,
     /// Non-negative least squares, each pixel and channel on its own (paper, section 3, case (a)).
     Nnls,
@@ -40,9 +40,17 @@ impl Method {
     ];
 
     /// About the most memory that preparing a recovery takes beside the measurements, in bytes.
-    pub fn preparation_bytes(self) -> usize {
+    pub fn preparation_bytes(self, window: Window) -> usize {
         match self {
-            Self::Learned => Learned::PREPARATION_BYTES,
+            Self::Learned => Learned::preparation_bytes(window),
+            Self::Nnls | Self::Bpdn(_) => 0,
+        }
+    }
+
+    /// The most camera pixels around a tile whose measurements may go into it.
+    pub fn most_halo(self) -> u32 {
+        match self {
+            Self::Learned => Learned::MOST_HALO,
             Self::Nnls | Self::Bpdn(_) => 0,
         }
     }
@@ -87,6 +95,11 @@ pub enum RecoverError {
         "the photographs show no light from the display; check \"camera.black\", the exposure, and that photographs are listed with the patterns they show"
     )]
     Dark,
+    /// No pixel looked at can be learned from.
+    #[error(
+        "too many pixels are saturated in too many photographs; photograph with less exposure, or add shots with less (\"exposure\" in capture.json)"
+    )]
+    Overexposed,
 }
 
 /// A recovery ready to run: what has been learned or chosen from the measurements as a whole, by

@@ -64,8 +64,12 @@ const SETTINGS: [Setting; 14] = [
 /// How far the default may fall short of the best other method, in dB.
 const ALLOWED: f64 = 0.3;
 
-/// The table of scenes, each method judged on all pixels.
-pub fn scenes_table(workers: &impl Workers, progress: Progress) -> Result<Section, StudyError> {
+/// The table of scenes. Methods that recover each pixel on its own are judged on about `pixels`.
+pub fn scenes_table(
+    pixels: usize,
+    workers: &impl Workers,
+    progress: Progress,
+) -> Result<Section, StudyError> {
     let mut header = vec![
         "scene",
         "camera",
@@ -96,7 +100,7 @@ pub fn scenes_table(workers: &impl Workers, progress: Progress) -> Result<Sectio
         let mut levels = Vec::new();
         for &method in METHODS {
             let known = SceneTruth(scene.as_ref());
-            levels.push(judge(&known, &measurements, method, usize::MAX, workers)?.snr);
+            levels.push(judge(&known, &measurements, method, pixels, workers)?.snr);
         }
         let mut row = vec![
             scene_name(setting.kind).to_owned(),

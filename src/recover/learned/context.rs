@@ -35,15 +35,16 @@ struct Feature {
     channel: usize,
 }
 
-/// All neighbours in the same channel; the nearest, and the pixel itself, in the others.
+/// All neighbours in the same channel; those in its row and column, and the pixel itself, in the
+/// others.
 fn features() -> Vec<Feature> {
     let mut features = Vec::new();
     for dy in -REACH..=REACH {
         for dx in -REACH..=REACH {
-            let near = dx.abs() + dy.abs() <= 1 || (dx == 0 || dy == 0);
+            let straight = dx == 0 || dy == 0;
             for channel in 0..CHANNELS {
                 let itself = dx == 0 && dy == 0;
-                if if channel == 0 { !itself } else { near } {
+                if if channel == 0 { !itself } else { straight } {
                     features.push(Feature { dx, dy, channel });
                 }
             }
@@ -152,7 +153,7 @@ impl Field {
 pub(super) struct Patch {
     pub equations: Equations,
     pub field: Field,
-    /// The pixels whose neighbours are all there, unless the picture ends.
+    /// The pixels whose neighbours are all there, unless the picture, or what is at hand of it, ends.
     pub inner: TileRect,
 }
 

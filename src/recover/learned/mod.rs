@@ -31,7 +31,9 @@ use prior::{Prior, Threshold};
 use super::direct::{Direct, held_out_misses};
 use super::{FEWEST_PATTERNS, RecoverError, Workers};
 use crate::capture::Measurements;
-use crate::transport::{Basis, CHANNELS, Extent, FactoredTile, Geometry, RecoveredTile, TileRect};
+use crate::transport::{
+    Basis, CHANNELS, Extent, FactoredTile, Geometry, RecoveredTile, TileRect, Window,
+};
 
 /// Every how many patterns one is held out for choosing.
 const HOLD_OUT_EVERY: usize = 10;
@@ -58,7 +60,7 @@ const DIM: f64 = 0.1;
 /// Share of the error on patterns held out that blending with least squares must save in a tile to be
 /// worth a direct one, which takes ten times the room of a factored one.
 const LEAST_GAIN: f64 = 0.005;
-/// The same over the whole picture, to be worth trying tile by tile, which takes twice the time.
+/// The same over the patches, to be worth trying tile by tile, which takes twice the time.
 const LEAST_GAIN_IN_ALL: f64 = 0.02;
 /// Side of the part of a tile by which its blend is chosen.
 const JUDGED: u32 = 16;
@@ -105,8 +107,11 @@ impl Split {
 
 impl Learned {
     /// About the most memory that learning takes beside the measurements: the patches, what is said
-    /// of them, and the sums of the neighbours' regressions.
-    pub const PREPARATION_BYTES: usize = 2 * PATCH_BYTES;
+    /// of them and the sums of the neighbours' regressions, or before that the pooled equations.
+    pub fn preparation_bytes(window: Window) -> usize {
+        let pooled = (start::PARTS + 2) * window.area() * window.area() * size_of::<f64>();
+        pooled.max(2 * PATCH_BYTES)
+    }
 
     /// Learns from all of `measurements`.
     pub fn new(
@@ -119,7 +124,7 @@ impl Learned {
         let squares = start::spread(measurements, SQUARES.1, SQUARES.0);
         let pooled = start::pooled_mean(measurements, &geometry, &split.learn, &squares, workers)
             .ok_or_else(|| match windows_seen(&geometry) {
-            true => RecoverError::Dark,
+            true => start::dark_or_overexposed(measurements, &squares),
             false => RecoverError::NoLight,
         })?;
         let mean = start::blur(&pooled, geometry.window.side() as usize);
@@ -154,9 +159,7 @@ impl Learned {
                 direct: None,
             };
             let error = learned.held_out_error(measurements, &split, &squares, workers);
-            let least = chosen
-                .as_ref()
-                .map_or(f64::INFINITY, |(least, _)| least.min(error));
+            let least = chosen.as_ref().map_or(error, |(least, _)| least.min(error));
             if error <= (1.0 + NO_WORSE) * least {
                 chosen = Some((least, learned));
             }
@@ -170,10 +173,16 @@ impl Learned {
             let with = learned.held_out_error(measurements, &split, &inner, workers);
             let context = learned.context.take();
             let without = learned.held_out_error(measurements, &split, &inner, workers);
-            if context.is_some() && with < without {
-                learned.learn_context(measurements, &split.all, &inner, workers);
+            let helps = context.is_some() && with < without;
+            if helps {
+                learned.context = context;
             }
             learned.direct = learned.rival(measurements, &split, &inner, workers)?;
+            // All is chosen: every pattern may teach.
+            learned.learn_context(measurements, &split.all, &inner, workers);
+            if !helps {
+                learned.context = None;
+            }
         }
         Ok(learned)
     }
@@ -188,10 +197,13 @@ impl Learned {
         &self.basis
     }
 
+    /// The most camera pixels around a tile whose measurements may go into it.
+    pub const MOST_HALO: u32 = REACH as u32;
+
     /// Camera pixels around a tile whose measurements go into it.
     pub fn halo(&self) -> u32 {
         if self.context.is_some() {
-            REACH as u32
+            Self::MOST_HALO
         } else {
             0
         }
@@ -204,6 +216,8 @@ impl Learned {
         let Some(direct) = &self.direct else {
             return RecoveredTile::Factored(tile);
         };
+        // The prior has been taught by the patterns held out as well, but has few numbers to fit to
+        // them; what a pixel's own measurements say comes from the others alone.
         let share = self
             .compare(measurements, direct, &split, part(rect, JUDGED))
             .best_share(LEAST_GAIN);

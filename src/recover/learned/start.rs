@@ -5,7 +5,7 @@ use super::prior::Prior;
 use crate::capture::Measurements;
 use crate::recover::dense;
 use crate::recover::vector::{add_scaled, dot, vectorised};
-use crate::recover::{Nnls, Workers};
+use crate::recover::{FEWEST_PATTERNS, Nnls, RecoverError, Workers};
 use crate::transport::{CHANNELS, CameraPx, Element, Extent, Geometry, TileRect};
 
 /// Kernels that learning starts with. Together with the mean a whole number of vector registers.
@@ -22,6 +22,8 @@ const BLUR: f64 = 1.0;
 /// Rounds of finding brightness and mean function in turn. A brightness that is a few per cent off,
 /// as it is while the function is unknown, shows as light from far off.
 const POOLED_ROUNDS: usize = 3;
+/// Parts that sums are made of. Fixed, so that they do not depend on the number of threads.
+pub(super) const PARTS: usize = 8;
 /// How far, as a share of full brightness, a pixel is from what the mean function says of it: what
 /// weighs pixels against each other where noise is less.
 pub(in crate::recover) const DEVIATION: f64 = 0.1;
@@ -118,8 +120,6 @@ fn pooled_round(
         pixels.all(|pixel| on_display(geometry, geometry.window_origin(pixel)))
     };
     let only_whole = 4 * squares.iter().filter(whole).count() >= squares.len();
-    // A fixed number of parts, so that sums do not depend on the number of threads.
-    const PARTS: usize = 8;
     let parts = workers.map(PARTS, |part| {
         let mut sums = Pooled {
             gram: vec![0.0; area * area],
@@ -180,9 +180,15 @@ impl Pooled {
                 Some((slot, element.index_in(geometry.light)?))
             })
             .collect();
-        let count = rows.len();
         let planes = if measurements.grey() { 1 } else { CHANNELS };
         for plane in 0..planes {
+            let channels = if planes == 1 {
+                0..CHANNELS
+            } else {
+                plane..plane + 1
+            };
+            let rows = unsaturated(measurements, rows, pixels, channels.clone());
+            let count = rows.len();
             let mut columns = vec![0.0; elements.len() * count];
             for (i, &l) in rows.iter().enumerate() {
                 let pattern = measurements.patterns[l].plane(plane);
@@ -209,11 +215,6 @@ impl Pooled {
             let weight = count as f64 * MEAN_WEIGHT * MEAN_WEIGHT;
             let (mut energy, mut seen) = (0.0, vec![0.0; count]);
             let mut seen_mean = 0.0;
-            let channels = if planes == 1 {
-                0..CHANNELS
-            } else {
-                plane..plane + 1
-            };
             for &(_, pixel) in pixels {
                 for c in channels.clone() {
                     let y: Vec<f64> = rows
@@ -223,7 +224,7 @@ impl Pooled {
                     let mean = y.iter().sum::<f64>() / count as f64;
                     // Also false where some sample is saturated.
                     if mean > 0.0 {
-                        let variance = measurements.variance(rows[0], c, mean);
+                        let variance = mean_variance(measurements, &rows, c, mean);
                         let brightness = mean / level;
                         let weight =
                             1.0 / (DEVIATION * DEVIATION + variance / (brightness * brightness));
@@ -243,6 +244,60 @@ impl Pooled {
                 }
             }
         }
+    }
+}
+
+/// Those of the patterns `rows` under which no channel of no pixel is saturated; all of them where
+/// those are too few, for pixels that are not.
+pub(in crate::recover) fn unsaturated(
+    measurements: &Measurements,
+    rows: &[usize],
+    pixels: &[(usize, CameraPx)],
+    channels: std::ops::Range<usize>,
+) -> Vec<usize> {
+    let seen = |&l: &usize| {
+        let mut pixels = pixels.iter();
+        pixels.all(|&(_, pixel)| {
+            let mut channels = channels.clone();
+            channels.all(|c| measurements.sample(l, pixel, c).is_finite())
+        })
+    };
+    let usable: Vec<usize> = rows.iter().copied().filter(seen).collect();
+    match usable.len() >= FEWEST_PATTERNS {
+        true => usable,
+        false => rows.to_vec(),
+    }
+}
+
+/// Mean variance of measurements that are `y` on average, over the patterns `rows`, whose exposures
+/// may differ.
+pub(in crate::recover) fn mean_variance(
+    measurements: &Measurements,
+    rows: &[usize],
+    c: usize,
+    y: f64,
+) -> f64 {
+    let variances = rows.iter().map(|&l| measurements.variance(l, c, y));
+    variances.sum::<f64>() / rows.len().max(1) as f64
+}
+
+/// Why nothing can be learned from `squares`.
+pub(in crate::recover) fn dark_or_overexposed(
+    measurements: &Measurements,
+    squares: &[TileRect],
+) -> RecoverError {
+    let saturated = |pixel| {
+        let mut samples = (0..measurements.patterns.len())
+            .flat_map(|l| (0..CHANNELS).map(move |c| measurements.sample(l, pixel, c)));
+        samples.any(f64::is_nan)
+    };
+    match squares
+        .iter()
+        .flat_map(|square| square.pixels())
+        .any(saturated)
+    {
+        true => RecoverError::Overexposed,
+        false => RecoverError::Dark,
     }
 }
 
