@@ -50,6 +50,15 @@ fn geometry() -> Geometry {
     }
 }
 
+/// All of the picture.
+fn whole() -> TileRect {
+    TileRect {
+        x: 0,
+        y: 0,
+        extent: geometry().camera,
+    }
+}
+
 /// Spots whose place and size change smoothly over the picture, `[pixel, element, channel]`.
 fn object(geometry: &Geometry) -> Vec<[f64; CHANNELS]> {
     let side = WINDOW as usize;
@@ -187,6 +196,37 @@ fn order_and_threads_leave_every_bit_as_it_is() {
         (RecoveredTile::Direct(a), RecoveredTile::Direct(b)) => assert_eq!(a.tau, b.tau),
         _ => panic!("tiles of different kinds"),
     }
+}
+
+#[test]
+fn pixels_that_all_saturate_somewhere_teach_all_the_same() {
+    let geometry = geometry();
+    let (mut measurements, tau) = measurements(20, 7);
+    let windows = windows(&geometry, whole());
+    for (i, pixels) in windows.values().enumerate() {
+        for &(n, _) in pixels {
+            measurements.pictures[i % 20][n] = [f32::NAN; CHANNELS];
+        }
+    }
+    let learned = Learned::new(&measurements, geometry, &OneThread).unwrap();
+    let tiles = geometry.tiles().map(|rect| {
+        let tile = learned.tile(&measurements, rect);
+        tile.functions(&geometry, Some(learned.basis()))
+    });
+    let snr = snr(&tiles.collect::<Vec<_>>(), &tau);
+    assert!(snr > 19.0, "{snr} dB");
+}
+
+#[test]
+fn whiteness_is_an_error_that_says_so() {
+    let (mut measurements, _) = measurements(6, 1);
+    for picture in &mut measurements.pictures {
+        picture.fill([f32::NAN; CHANNELS]);
+    }
+    let error = Learned::new(&measurements, geometry(), &OneThread).unwrap_err();
+    assert!(matches!(error, RecoverError::Overexposed), "{error}");
+    let error = crate::recover::Band::estimate(&measurements, &OneThread).unwrap_err();
+    assert!(matches!(error, RecoverError::Overexposed), "{error}");
 }
 
 #[test]
