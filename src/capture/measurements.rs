@@ -1,5 +1,7 @@
 //! Linear measurements: what recovery works on.
 
+use std::ops::Range;
+
 use super::{Noise, Rows};
 use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent, TileRect};
 
@@ -59,6 +61,16 @@ impl Measurements {
     /// Whether every pattern is grey, so that channels share their equations.
     pub fn grey(&self) -> bool {
         self.patterns.iter().all(|p| matches!(p, Pattern::Grey(_)))
+    }
+
+    /// The planes of the patterns, each with the camera channels that it drives: one for all where
+    /// every pattern is grey.
+    pub fn planes(&self) -> impl Iterator<Item = (usize, Range<usize>)> + use<> {
+        let grey = self.grey();
+        (0..if grey { 1 } else { CHANNELS }).map(move |plane| match grey {
+            true => (plane, 0..CHANNELS),
+            false => (plane, plane..plane + 1),
+        })
     }
 
     /// What channel `c` of a pixel saw under pattern `l`; NaN where saturated, and where the pixel's

@@ -10,7 +10,7 @@ use super::learned::{equations, start};
 use super::vector::{add_scaled, dot, vectorised};
 use super::{RecoverError, Workers};
 use crate::capture::Measurements;
-use crate::transport::{CHANNELS, CameraPx, Element, Geometry, Window};
+use crate::transport::{CameraPx, Element, Geometry, Window};
 
 /// Side of the window that the band is looked for in.
 const PROBE: u32 = 31;
@@ -179,13 +179,7 @@ impl Sums {
             return; // Of what lies off the display nothing can be said.
         }
         let all: Vec<usize> = (0..measurements.patterns.len()).collect();
-        let planes = if measurements.grey() { 1 } else { CHANNELS };
-        for plane in 0..planes {
-            let channels = if planes == 1 {
-                0..CHANNELS
-            } else {
-                plane..plane + 1
-            };
+        for (plane, channels) in measurements.planes() {
             let rows = start::unsaturated(measurements, &all, pixels, channels.clone());
             let patterns = rows.len();
             let mut columns = vec![0.0; groups.count * patterns];

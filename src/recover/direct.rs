@@ -1,6 +1,7 @@
 //! Recovery window by window, each on its own: what the paper does.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use super::bpdn::{Constraint, Homotopy, InteriorPoint, SparsityBasis, Tolerance};
 use super::design::{Design, Patch};
@@ -156,15 +157,11 @@ impl Direct {
             corners[1].v = corners[1].v.max(origin.v);
         }
         // Grey patterns drive all channels alike: one set of equations for all of them.
-        let groups: &[&[usize]] = match measurements.grey() {
-            true => &[&[0, 1, 2]],
-            false => &[&[0], &[1], &[2]],
-        };
-        for channels in groups {
+        for (plane, channels) in measurements.planes() {
             let patch = Patch::new(
                 &measurements.patterns,
                 rows,
-                channels[0],
+                plane,
                 self.geometry.light,
                 self.geometry.window,
                 corners,
@@ -175,7 +172,7 @@ impl Direct {
                     measurements,
                     &patch,
                     origin,
-                    (pixels, channels),
+                    (pixels, channels.clone()),
                     rows,
                     |pixel, c, slots, x| take(origin, pixel, c, slots, x),
                 );
@@ -189,13 +186,13 @@ impl Direct {
         measurements: &Measurements,
         patch: &Patch,
         origin: Element,
-        (pixels, channels): (&[Numbered], &[usize]),
+        (pixels, channels): (&[Numbered], Range<usize>),
         rows: &[usize],
         mut take: impl FnMut(usize, usize, &[usize], &[f64]),
     ) {
         let mut whole = Vec::with_capacity(pixels.len() * channels.len());
         for &(pixel, at) in pixels {
-            for &channel in channels {
+            for channel in channels.clone() {
                 let mut y: Vec<f64> = rows
                     .iter()
                     .map(|&l| measurements.sample(l, at, channel))

@@ -96,18 +96,8 @@ impl Equations {
             rights: vec![0.0; pixels * CHANNELS * rank],
         };
         for (origin, pixels) in windows(geometry, rect) {
-            let planes: &[usize] = if measurements.grey() {
-                &[0]
-            } else {
-                &[0, 1, 2]
-            };
-            for &plane in planes {
+            for (plane, channels) in measurements.planes() {
                 let projected = kernels.project(measurements, geometry, origin, plane);
-                let channels = if measurements.grey() {
-                    0..CHANNELS
-                } else {
-                    plane..plane + 1
-                };
                 vectorised(
                     #[inline(always)]
                     || {

@@ -257,8 +257,7 @@ impl Learned {
                 height: PATCHES.1 + 2 * REACH as u32,
             },
         };
-        let planes = if measurements.grey() { 1 } else { CHANNELS };
-        let grams = windows(&self.geometry, patch).len() * planes;
+        let grams = windows(&self.geometry, patch).len() * measurements.planes().count();
         let bytes = grams * self.rank() * self.rank() * size_of::<f64>();
         (PATCH_BYTES / bytes).clamp(FEWEST_PATCHES, PATCHES.0)
     }
@@ -349,21 +348,11 @@ impl Learned {
         let coefficients = self.solve(measurements, &split.learn, rect);
         let (rank, held) = (self.rank(), split.held.len());
         let mut misses = vec![f64::NAN; rect.extent.area() * held * CHANNELS];
-        let planes: &[usize] = if measurements.grey() {
-            &[0]
-        } else {
-            &[0, 1, 2]
-        };
         for (origin, pixels) in windows(&self.geometry, rect) {
-            for &plane in planes {
+            for (plane, channels) in measurements.planes() {
                 let projected = self
                     .kernels
                     .project(measurements, &self.geometry, origin, plane);
-                let channels = if measurements.grey() {
-                    0..CHANNELS
-                } else {
-                    plane..plane + 1
-                };
                 for &(p, pixel) in &pixels {
                     let coefficients = &coefficients[p * rank..(p + 1) * rank];
                     for (i, &l) in split.held.iter().enumerate() {

@@ -180,13 +180,7 @@ impl Pooled {
                 Some((slot, element.index_in(geometry.light)?))
             })
             .collect();
-        let planes = if measurements.grey() { 1 } else { CHANNELS };
-        for plane in 0..planes {
-            let channels = if planes == 1 {
-                0..CHANNELS
-            } else {
-                plane..plane + 1
-            };
+        for (plane, channels) in measurements.planes() {
             let rows = unsaturated(measurements, rows, pixels, channels.clone());
             let count = rows.len();
             let mut columns = vec![0.0; elements.len() * count];
