@@ -84,8 +84,8 @@ fn little_memory_reads_photographs_by_strips_and_recovers_the_same() {
         if method == "nnls" {
             // Learning takes more than the photographs of a capture as small as this.
             assert!(peak(&report) < peak(&whole_report), "{report}");
+            assert_eq!(whole_report["common_mode"], report["common_mode"]);
         }
-        assert_eq!(whole_report["common_mode"], report["common_mode"]);
         [whole, strips]
     };
     // Least squares chooses one weight, the same from either sample, and so recovers the same.
@@ -150,19 +150,25 @@ impl Interruptible {
 
     /// Recovers until the first tile is kept, then sends `signal`.
     fn interrupt(&self, name: &str, signal: &str) -> Output {
+        let output = self.signal(name, signal, wait_for_a_tile);
+        assert!(self.path(&format!("{name}.checkpoint")).exists());
+        output
+    }
+
+    /// Recovers until the end of `wait`, which is given the checkpoint, then sends `signal`.
+    fn signal(&self, name: &str, signal: &str, wait: impl Fn(&mut Child, &Path)) -> Output {
         assert!(!self.path(name).exists());
         let checkpoint = self.path(&format!("{name}.checkpoint"));
         let mut recover = self.recover(name, &["--memory", "4G"]);
         // On one thread, most tiles are yet to come when the first is there.
         recover.env("RAYON_NUM_THREADS", "1");
         let mut child = recover.stderr(Stdio::piped()).spawn().unwrap();
-        wait_for_a_tile(&mut child, &checkpoint);
+        wait(&mut child, &checkpoint);
         let id = child.id().to_string();
         let sent = Command::new("kill").args([signal, &id]).status().unwrap();
         assert!(sent.success());
         let output = child.wait_with_output().unwrap();
         assert!(!self.path(name).exists(), "never half a file");
-        assert!(checkpoint.exists());
         output
     }
 
@@ -216,6 +222,21 @@ fn an_interrupted_recovery_goes_on_to_the_same_bytes() {
     let output = recovery.recover("new.ltm", &["--resume"]).output().unwrap();
     assert!(said(&output).contains("starting anew"), "{}", said(&output));
     assert!(fs::read(recovery.path("new.ltm")).unwrap() == recovery.whole);
+}
+
+#[test]
+fn learning_stops_when_told_and_leaves_nothing() {
+    let recovery = Interruptible::new();
+    let output = recovery.signal("early.ltm", "-INT", |child, checkpoint| {
+        while !checkpoint.exists() {
+            assert!(child.try_wait().unwrap().is_none(), "ended too soon");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    });
+    assert_eq!(output.status.code(), Some(130), "{}", said(&output));
+    let before = "interrupted before the first tile: nothing is kept";
+    assert!(said(&output).contains(before), "{}", said(&output));
+    assert!(!recovery.path("early.ltm.checkpoint").exists());
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! How much of the capture may be in memory at once.
 
+use std::fmt;
 use std::ops::Range;
 
 use anyhow::{Result, ensure};
@@ -46,6 +47,19 @@ impl Bytes {
     }
 }
 
+impl fmt::Display for Bytes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let units = [(30, "G"), (20, "M"), (10, "K")];
+        let unit = units
+            .into_iter()
+            .find(|(shift, _)| self.0 > 0 && self.0 % (1 << shift) == 0);
+        match unit {
+            Some((shift, unit)) => write!(f, "{}{unit}", self.0 >> shift),
+            None => write!(f, "{}", self.0),
+        }
+    }
+}
+
 /// What is in memory when.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
@@ -86,7 +100,9 @@ impl Plan {
             + photographs * (READER + 4 * 2 * CHANNELS as u64 * width);
         // A tile's functions as real numbers, as codes, and as planes to compress.
         let element = pixel + 8 + 2 * CHANNELS as u64;
-        let tile = COMPRESSOR + element * u64::from(tile_side * tile_side) * window.area() as u64;
+        let tile = COMPRESSOR
+            + method.tile_bytes(window, shots) as u64
+            + element * u64::from(tile_side * tile_side) * window.area() as u64;
         let mut plan = Self {
             photographs: 0,
             row: photographs * pixel * width,
@@ -97,25 +113,23 @@ impl Plan {
             budget: budget.0,
             fixed,
         };
-        plan.share_out();
-        plan.tiles_at_once = threads.min((plan.photographs / tile) as usize);
-        let rows = (tile_side + 2 * method.most_halo()).min(camera.height);
-        let least = plan.fixed + 2 * tile.max(plan.row * u64::from(rows));
-        plan.ensure_at_least(least)?;
+        let rows = plan.row * u64::from((tile_side + 2 * method.most_halo()).min(camera.height));
+        plan.ensure_at_least(plan.fixed + tile + rows)?;
+        // Half of what is left is for photographs, the rest and what they leave of it for the tiles
+        // worked on.
+        let left = plan.budget - plan.fixed;
+        plan.photographs = (left / 2).clamp(rows, left - tile);
+        let taken = plan.photographs.min(plan.row * u64::from(plan.height));
+        plan.tiles_at_once = threads.min(((left - taken) / tile) as usize);
         Ok(plan)
-    }
-
-    /// Half of what is left is for photographs, half for the tiles worked on.
-    fn share_out(&mut self) {
-        self.photographs = self.budget.saturating_sub(self.fixed) / 2;
     }
 
     fn ensure_at_least(&self, least: u64) -> Result<()> {
         let megabytes = least.div_ceil(1 << 20);
         ensure!(
             self.budget >= least,
-            "--memory {}M is too little for this capture; it takes at least --memory {megabytes}M",
-            self.budget >> 20,
+            "--memory {} is too little for this capture; it takes at least --memory {megabytes}M",
+            Bytes(self.budget),
         );
         Ok(())
     }
@@ -214,6 +228,7 @@ mod tests {
             ("1 T", 1 << 40),
         ] {
             assert_eq!(Bytes::parse(text), Ok(Bytes(bytes)), "{text}");
+            assert_eq!(Bytes::parse(&Bytes(bytes).to_string()), Ok(Bytes(bytes)));
         }
         for text in ["", "G", "4X", "4.5G", "-1G", "99999999999T"] {
             assert!(Bytes::parse(text).is_err(), "{text}");

@@ -11,6 +11,20 @@ use rayon::prelude::*;
 
 use crate::recover::Workers;
 
+/// All of the machine's cores, until told to stop.
+#[derive(Clone, Debug)]
+pub struct Cores(Interrupt);
+
+impl Workers for Cores {
+    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        AllCores.map(count, work)
+    }
+
+    fn stopped(&self) -> bool {
+        self.0.told()
+    }
+}
+
 /// All of the machine's cores.
 #[derive(Clone, Copy, Debug)]
 pub struct AllCores;
@@ -60,6 +74,11 @@ impl Interrupt {
         })
         .context("cannot listen for Ctrl-C")?;
         Ok(Self(told))
+    }
+
+    /// All cores, to work until it is told.
+    pub fn cores(&self) -> Cores {
+        Cores(self.clone())
     }
 
     /// Whether to stop.

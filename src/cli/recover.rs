@@ -15,11 +15,11 @@ use serde::Serialize;
 use super::checkpoint::{Checkpoint, Contents, Recipe};
 use super::memory::{self, Plan};
 use super::photographs::Photographs;
-use super::process::{AllCores, Interrupt, Interrupted};
+use super::process::{Interrupt, Interrupted};
 use super::{files, process, report};
 use crate::capture::{CaptureFolder, DarkFrame, Measurements, Noise, Rows};
 use crate::format::{self, EncodedTile, Metadata};
-use crate::recover::{self, Band, Method, Recovery, Settings, SparsityBasis};
+use crate::recover::{self, Band, Method, RecoverError, Recovery, Settings, SparsityBasis};
 use crate::transport::{Basis, CHANNELS, Window};
 
 /// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
@@ -158,6 +158,10 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     let folder = CaptureFolder::open(&args.capture)?;
     let manifest = folder.manifest();
     let shots = choose_shots(manifest.shots.len(), args.patterns)?;
+    if shots.len() < recover::FEWEST_PATTERNS {
+        let manifest = folder.manifest_path().display().to_string();
+        return Err(RecoverError::FewPatterns(shots.len())).context(manifest);
+    }
     let threads = rayon::current_num_threads();
     let plan = Plan::new(
         args.memory,
@@ -213,10 +217,13 @@ fn recover(
         saturated,
         shots.len() * measurements.camera.area() * CHANNELS,
     );
-    let of_capture = || args.capture.display().to_string();
+    let failed = |error| match error {
+        RecoverError::Stopped => interrupted(&checkpoint),
+        other => anyhow::Error::new(other).context(args.capture.display().to_string()),
+    };
     let band = match args.window {
         WindowChoice::Auto => {
-            Some(Band::estimate(&measurements, &AllCores).with_context(of_capture)?)
+            Some(Band::estimate(&measurements, &interrupt.cores()).map_err(failed)?)
         }
         WindowChoice::Fixed(_) => None,
     };
@@ -233,7 +240,7 @@ fn recover(
     };
     let spinner = process::spinner("learning");
     let recovery =
-        Recovery::prepare(&measurements, settings, &AllCores).with_context(of_capture)?;
+        Recovery::prepare(&measurements, settings, &interrupt.cores()).map_err(failed)?;
     spinner.finish_and_clear();
     let geometry = *recovery.geometry();
     let mut run = Run {
@@ -301,6 +308,14 @@ fn recover(
     })
 }
 
+/// What there is to say of a recovery that was told to stop.
+fn interrupted(checkpoint: &Checkpoint) -> anyhow::Error {
+    match checkpoint.interrupted() {
+        Ok(kept) => Interrupted(kept).into(),
+        Err(error) => error,
+    }
+}
+
 /// Tiles on their way into the checkpoint.
 struct Run<'a> {
     interrupt: &'a Interrupt,
@@ -363,7 +378,7 @@ impl Run<'_> {
         match overexposed {
             Err(e) if e.is::<Interrupted>() => {
                 self.bar.finish_and_clear();
-                bail!(Interrupted(lock().interrupted()?))
+                Err(interrupted(&lock()))
             }
             other => other,
         }

@@ -8,6 +8,7 @@
 use super::dense;
 use super::learned::{equations, start};
 use super::vector::{add_scaled, dot, vectorised};
+use super::workers::go_on;
 use super::{RecoverError, Workers};
 use crate::capture::Measurements;
 use crate::transport::{CameraPx, Element, Geometry, Window};
@@ -62,6 +63,7 @@ impl Band {
         // Brightness is known only once the function is, roughly.
         let mut profile = vec![1.0 / groups.count as f64; groups.count];
         for _ in 0..3 {
+            go_on(workers)?;
             let parts = workers.map(PARTS, |part| {
                 let mut sums = Sums::new(groups.count);
                 for square in squares.iter().skip(part).step_by(PARTS) {

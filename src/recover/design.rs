@@ -64,6 +64,16 @@ pub(super) struct Patch {
 const MOST_TABLE_BYTES: usize = 64 << 20;
 
 impl Patch {
+    /// About the most memory that the windows of a square of `side²` origins take to share what they
+    /// do under so many patterns, and one design made from it, in bytes.
+    pub fn bytes(window: Window, side: usize, patterns: usize) -> usize {
+        let region = (side + window.side() as usize - 1).pow(2);
+        let table = region * (2 * window.side() as usize - 1).pow(2) * size_of::<f64>();
+        let table = if table <= MOST_TABLE_BYTES { table } else { 0 };
+        let emissions = (region + window.area()) * patterns * size_of::<f64>();
+        table + emissions + window.area().pow(2) * size_of::<f64>()
+    }
+
     /// The part of the display that `windows` windows see, all of them starting between the origins
     /// `first` and `last`, under the patterns numbered `rows`.
     pub fn new(

@@ -6,10 +6,12 @@ use std::ops::Range;
 use super::bpdn::{Constraint, Homotopy, InteriorPoint, SparsityBasis, Tolerance};
 use super::design::{Design, Patch};
 use super::learned::equations::windows;
+use super::workers::go_on;
 use super::{CommonMode, FEWEST_PATTERNS, Nnls, RecoverError, Workers};
 use crate::capture::Measurements;
 use crate::transport::{
     CHANNELS, CameraPx, Decibels, Element, Geometry, TileRect, TransportError, TransportFunctions,
+    Window,
 };
 
 /// Every how many patterns one is held out while the settings below are chosen.
@@ -68,12 +70,20 @@ struct Seen {
 }
 
 impl Direct {
+    /// About the most memory that recovering a tile takes beside its functions, in bytes.
+    pub fn tile_bytes(window: Window, patterns: usize) -> usize {
+        // What solvers keep of the Gram matrix's size, and of the equations'.
+        let solver = 4 * window.area().pow(2) + 2 * window.area() * patterns;
+        Patch::bytes(window, BLOCK as usize, patterns) + solver * size_of::<f64>()
+    }
+
     /// Non-negative least squares: chooses how far the common mode is trusted.
     pub fn least_squares(
         measurements: &Measurements,
         geometry: Geometry,
         workers: &impl Workers,
     ) -> Result<Self, RecoverError> {
+        go_on(workers)?;
         let trial = HeldOut::new(measurements, geometry, SCATTERED)?;
         Ok(trial.choose(
             CommonMode::CANDIDATES.map(|common_mode| Self {
@@ -94,6 +104,7 @@ impl Direct {
     ) -> Result<Self, RecoverError> {
         let least_squares = Self::least_squares(measurements, geometry, workers)?;
         let noise = HeldOut::new(measurements, geometry, SCATTERED)?.noise(&least_squares, workers);
+        go_on(workers)?;
         let trial = HeldOut::new(measurements, geometry, GATHERED)?;
         Ok(trial.choose(
             Tolerance::SHARES.map(|share| Self {

@@ -47,6 +47,17 @@ impl Method {
         }
     }
 
+    /// About the most memory that recovering one tile takes beside the measurements and the tile's
+    /// functions, in bytes.
+    pub fn tile_bytes(self, window: Window, patterns: usize) -> usize {
+        let direct = Direct::tile_bytes(window, patterns);
+        match self {
+            // Tiles may be blended with least squares.
+            Self::Learned => direct.max(Learned::tile_bytes(window)),
+            Self::Nnls | Self::Bpdn(_) => direct,
+        }
+    }
+
     /// The most camera pixels around a tile whose measurements may go into it.
     pub fn most_halo(self) -> u32 {
         match self {
@@ -100,6 +111,9 @@ pub enum RecoverError {
         "too many pixels are saturated in too many photographs; photograph with less exposure, or add shots with less (\"exposure\" in capture.json)"
     )]
     Overexposed,
+    /// The [`Workers`] were told to stop.
+    #[error("the recovery was stopped")]
+    Stopped,
 }
 
 /// A recovery ready to run: what has been learned or chosen from the measurements as a whole, by
@@ -161,10 +175,11 @@ impl Recovery {
         }
     }
 
-    /// Weight chosen for the patterns' common mode, where the method chooses one.
+    /// Weight that least squares or denoising gives the patterns' common mode, where either goes into
+    /// the answer.
     pub fn common_mode(&self) -> Option<CommonMode> {
         match &self.solver {
-            Solver::Learned(_) => None,
+            Solver::Learned(learned) => learned.common_mode(),
             Solver::Direct(direct) => Some(direct.common_mode()),
         }
     }

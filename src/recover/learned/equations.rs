@@ -1,6 +1,7 @@
 //! A picture's measurements as equations over a few kernels.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use super::kernels::Kernels;
 use crate::capture::Measurements;
@@ -115,6 +116,30 @@ impl Equations {
         equations
     }
 
+    /// Number of Gram matrices that the equations of `rect` have: one for each window and set of
+    /// usable patterns.
+    pub fn count_grams(
+        measurements: &Measurements,
+        geometry: &Geometry,
+        rows: &[usize],
+        rect: TileRect,
+    ) -> usize {
+        let windows = windows(geometry, rect);
+        let sets = |pixels: &[(usize, CameraPx)], channels: Range<usize>| {
+            let sets: BTreeSet<Vec<usize>> = pixels
+                .iter()
+                .flat_map(|&(_, pixel)| channels.clone().map(move |c| (pixel, c)))
+                .map(|(pixel, c)| usable(measurements, rows, pixel, c))
+                .collect();
+            sets.len()
+        };
+        let counts = windows.values().flat_map(|pixels| {
+            let planes = measurements.planes();
+            planes.map(move |(_, channels)| sets(pixels, channels))
+        });
+        counts.sum()
+    }
+
     /// `BᵀB` of a member, `[r, r]`, both triangles.
     pub fn gram(&self, member: usize) -> &[f64] {
         &self.grams[self.members[member].gram]
@@ -164,6 +189,18 @@ impl Projected {
     }
 }
 
+/// The patterns of `rows` that say something of a channel of a pixel: those that do not saturate it.
+/// Of one saturated nearly always all that is known is that it is at least white, which all say.
+#[inline(always)]
+fn usable(measurements: &Measurements, rows: &[usize], pixel: CameraPx, c: usize) -> Vec<usize> {
+    let finite = |l: &usize| measurements.sample(*l, pixel, c).is_finite();
+    let usable: Vec<usize> = rows.iter().copied().filter(finite).collect();
+    match usable.len() < FEWEST_PATTERNS {
+        true => rows.to_vec(),
+        false => usable,
+    }
+}
+
 /// What one window's equations are made from.
 struct Fill<'a> {
     measurements: &'a Measurements,
@@ -191,44 +228,32 @@ impl<'a> Fill<'a> {
         &self,
         equations: &mut Equations,
         pixels: &[(usize, CameraPx)],
-        channels: std::ops::Range<usize>,
+        channels: Range<usize>,
     ) {
-        let mut shared: Option<Centred<'a>> = None;
+        let mut shared: Vec<Centred<'a>> = Vec::new();
         for &(p, pixel) in pixels {
             for c in channels.clone() {
-                let y: Vec<f64> = self
-                    .rows
-                    .iter()
-                    .map(|&l| self.measurements.sample(l, pixel, c))
-                    .collect();
-                let member = p * CHANNELS + c;
-                if y.iter().all(|y| y.is_finite()) {
-                    let centred = shared.get_or_insert_with(|| self.centre(equations, self.rows));
-                    self.member(equations, centred, member, (pixel, c), &y);
-                } else {
-                    // Saturated samples drop out, and with them the shared equations. Of a pixel
-                    // saturated nearly always, all that is known is that it is at least white.
-                    let usable = y.iter().filter(|y| y.is_finite()).count();
-                    let white = usable < FEWEST_PATTERNS;
-                    let (rows, y): (Vec<usize>, Vec<f64>) = self
-                        .rows
-                        .iter()
-                        .zip(&y)
-                        .filter(|(_, y)| white || y.is_finite())
-                        .map(|(&l, &y)| match y.is_finite() {
-                            true => (l, y),
-                            false => (l, f64::from(self.measurements.full_scale[l])),
-                        })
-                        .unzip();
-                    let own = self.centre(equations, &rows);
-                    self.member(equations, &own, member, (pixel, c), &y);
-                }
+                let rows = usable(self.measurements, self.rows, pixel, c);
+                let y = rows.iter().map(|&l| {
+                    let y = self.measurements.sample(l, pixel, c);
+                    match y.is_finite() {
+                        true => y,
+                        false => f64::from(self.measurements.full_scale[l]),
+                    }
+                });
+                let y: Vec<f64> = y.collect();
+                let known = shared.iter().position(|centred| centred.rows == rows);
+                let at = known.unwrap_or_else(|| {
+                    shared.push(self.centre(equations, rows));
+                    shared.len() - 1
+                });
+                self.member(equations, &shared[at], p * CHANNELS + c, (pixel, c), &y);
             }
         }
     }
 
     #[inline(always)]
-    fn centre(&self, equations: &mut Equations, rows: &[usize]) -> Centred<'a> {
+    fn centre(&self, equations: &mut Equations, rows: Vec<usize>) -> Centred<'a> {
         let (rank, count) = (self.projected.rank, rows.len());
         let mut columns = vec![0.0; rank * count];
         for (i, &l) in rows.iter().enumerate() {
@@ -256,7 +281,7 @@ impl<'a> Fill<'a> {
         equations.grams.push(gram);
         let profile = rows.iter().map(|&l| self.projected.mean(l)).sum::<f64>();
         Centred {
-            rows: rows.to_vec(),
+            rows,
             columns,
             mean,
             profile: profile / count.max(1) as f64,

@@ -29,7 +29,8 @@ use nonnegative::NonNegative;
 use prior::{Prior, Threshold};
 
 use super::direct::{Direct, held_out_misses};
-use super::{FEWEST_PATTERNS, RecoverError, Workers};
+use super::workers::go_on;
+use super::{CommonMode, FEWEST_PATTERNS, RecoverError, Workers};
 use crate::capture::Measurements;
 use crate::transport::{
     Basis, CHANNELS, Extent, FactoredTile, Geometry, RecoveredTile, TileRect, Window,
@@ -49,8 +50,9 @@ const SQUARES: (usize, u32) = (128, 4);
 const ROUNDS: usize = 20;
 /// Patches that neighbours' part is learned from, and their side in pixels.
 const PATCHES: (usize, u32) = (64, 16);
-/// Bytes that the patches' Gram matrices may take: where windows are many, there are fewer patches.
-const PATCH_BYTES: usize = 128 << 20;
+/// Bytes that the patches' Gram matrices may take: where windows are many, or saturated samples leave
+/// pixels matrices of their own, there are fewer patches.
+const PATCH_BYTES: usize = 144 << 20;
 /// Fewest patches all the same.
 const FEWEST_PATCHES: usize = 8;
 /// Rounds of expectation–maximisation on the patches, with the kernels chosen.
@@ -113,6 +115,14 @@ impl Learned {
         pooled.max(2 * PATCH_BYTES)
     }
 
+    /// About the most memory that recovering a tile takes beside its functions, in bytes: Gram
+    /// matrices, where each pixel and channel is saturated in other photographs.
+    pub fn tile_bytes(window: Window) -> usize {
+        let pixels = (Geometry::DEFAULT_TILE_SIDE as usize + 2 * REACH as usize).pow(2);
+        let rank = RANKS.into_iter().max().unwrap_or(0).min(window.area());
+        pixels * CHANNELS * rank * rank * size_of::<f64>()
+    }
+
     /// Learns from all of `measurements`.
     pub fn new(
         measurements: &Measurements,
@@ -139,13 +149,18 @@ impl Learned {
         let samples = equations(&kernels, &split.learn, &squares);
         let threshold = threshold(&samples);
         for _ in 0..ROUNDS {
+            go_on(workers)?;
             prior.improve(&samples, &threshold, workers);
         }
         drop(samples);
 
         // How many kernels.
         let mut chosen: Option<(f64, Learned)> = None;
-        for rank in RANKS {
+        // A small window has room for fewer.
+        let mut ranks = RANKS.map(|rank| rank.min(prior.rank)).to_vec();
+        ranks.dedup();
+        for rank in ranks {
+            go_on(workers)?;
             let (functions, prior) = start::cut(&functions, &prior, rank, area);
             let kernels = Kernels::new(&functions, &mean);
             let learned = Self {
@@ -167,7 +182,8 @@ impl Learned {
         let (_, mut learned) = chosen.ok_or(RecoverError::Dark)?;
 
         // What neighbours tell, and whether it helps.
-        let inner = start::spread(measurements, PATCHES.1, learned.patches(measurements));
+        go_on(workers)?;
+        let inner = learned.patches(measurements, &split.all, workers);
         learned.learn_context(measurements, &split.learn, &inner, workers);
         if !split.held.is_empty() {
             let with = learned.held_out_error(measurements, &split, &inner, workers);
@@ -177,8 +193,10 @@ impl Learned {
             if helps {
                 learned.context = context;
             }
+            go_on(workers)?;
             learned.direct = learned.rival(measurements, &split, &inner, workers)?;
             // All is chosen: every pattern may teach.
+            go_on(workers)?;
             learned.learn_context(measurements, &split.all, &inner, workers);
             if !helps {
                 learned.context = None;
@@ -195,6 +213,11 @@ impl Learned {
     /// The kernels, orthonormal.
     pub fn basis(&self) -> &Basis {
         &self.basis
+    }
+
+    /// Weight of the patterns' common mode in the least squares that tiles are blended with, if any.
+    pub fn common_mode(&self) -> Option<CommonMode> {
+        self.direct.as_ref().map(Direct::common_mode)
     }
 
     /// The most camera pixels around a tile whose measurements may go into it.
@@ -247,19 +270,27 @@ impl Learned {
         }
     }
 
-    /// Number of patches there is memory for.
-    fn patches(&self, measurements: &Measurements) -> usize {
-        let patch = TileRect {
-            x: 0,
-            y: 0,
-            extent: Extent {
-                width: PATCHES.1 + 2 * REACH as u32,
-                height: PATCHES.1 + 2 * REACH as u32,
-            },
-        };
-        let grams = windows(&self.geometry, patch).len() * measurements.planes().count();
+    /// The patches, as many as there is memory for, without the pixels around them.
+    fn patches(
+        &self,
+        measurements: &Measurements,
+        rows: &[usize],
+        workers: &impl Workers,
+    ) -> Vec<TileRect> {
+        let patches = start::spread(measurements, PATCHES.1, PATCHES.0);
+        let grams = workers.map(patches.len(), |i| {
+            let rect = grown(measurements, patches[i], REACH as u32);
+            Equations::count_grams(measurements, &self.geometry, rows, rect)
+        });
+        let grams: usize = grams.iter().sum();
         let bytes = grams * self.rank() * self.rank() * size_of::<f64>();
-        (PATCH_BYTES / bytes).clamp(FEWEST_PATCHES, PATCHES.0)
+        match bytes <= PATCH_BYTES {
+            true => patches,
+            false => {
+                let fit = patches.len() * PATCH_BYTES / bytes;
+                start::spread(measurements, PATCHES.1, fit.max(FEWEST_PATCHES))
+            }
+        }
     }
 
     /// Learns the late rounds of the prior, and the neighbours' part, from the patterns `rows`.

@@ -412,11 +412,10 @@ fn orthonormalise(rows: &mut [f64], length: usize) {
     }
 }
 
-/// Keeps the `rank` directions in which functions vary most, mean and all: kernels `[rank, element]`
-/// and the prior on them.
+/// Keeps the `rank` directions, at most the prior's own number, in which functions vary most, mean and
+/// all: kernels `[rank, element]` and the prior on them.
 pub(super) fn cut(kernels: &[f64], prior: &Prior, rank: usize, area: usize) -> (Vec<f64>, Prior) {
     let full = prior.rank;
-    let rank = rank.min(full);
     let mut moment = prior.covariance.clone();
     for mean in &prior.mean {
         for i in 0..full {
