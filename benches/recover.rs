@@ -146,7 +146,6 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
         full_scale: vec![1.0; PATTERNS],
         rows: Rows::all(camera.height),
         pictures,
-        flood: None,
         noise: Noise::from_dark(&dark, camera.width, code),
     };
     measurements.noise = Noise::with_gain_from(&measurements);

@@ -79,8 +79,12 @@ impl CaptureFolder {
             None => &manifest.graycode,
         };
         let gray_code = gray_code.iter().map(|shot| &shot.photo);
-        let names = manifest.dark.iter().chain(&manifest.flood);
-        let names = names.chain(shots).chain(gray_code).map(String::as_str);
+        let names = manifest
+            .dark
+            .iter()
+            .chain(shots)
+            .chain(gray_code)
+            .map(String::as_str);
         std::iter::once(MANIFEST_NAME)
             .chain(names)
             .map(|name| (name, self.root.join(name)))
@@ -237,7 +241,6 @@ impl CaptureFolder {
             full_scale: full_scale.collect(),
             rows: Rows::from_strips([]),
             pictures: vec![Picture::new(); shots.len()],
-            flood: self.manifest.flood.as_ref().map(|_| Picture::new()),
             noise: dark.noise,
         }
     }

@@ -46,13 +46,10 @@ pub struct Measurements {
     pub patterns: Vec<Pattern>,
     /// For each pattern, the measurement at which a sample saturates: 1 over the exposure.
     pub full_scale: Vec<f32>,
-    /// The camera rows that `pictures` and `flood` hold.
+    /// The camera rows that `pictures` hold.
     pub rows: Rows,
     /// `L` pictures of the rows at hand. NaN where a sample was saturated and says nothing.
     pub pictures: Vec<Picture>,
-    /// What every element at full brightness shows together, less the dark, where it was
-    /// photographed; taken at exposure 1.
-    pub flood: Option<Picture>,
     /// How noisy the samples are.
     pub noise: Noise,
 }
@@ -80,7 +77,7 @@ impl Measurements {
         pixel.map_or(f64::NAN, |sample| f64::from(sample[c]))
     }
 
-    /// Where `pictures` and `flood` have a pixel, if its row is at hand.
+    /// Where `pictures` have a pixel, if its row is at hand.
     pub fn index(&self, pixel: CameraPx) -> Option<usize> {
         let row = self.rows.place(pixel.y)?;
         Some(row * self.camera.width as usize + pixel.x as usize)
@@ -89,7 +86,7 @@ impl Measurements {
     /// Gives back the memory of all rows.
     pub fn forget_rows(&mut self) {
         self.rows = Rows::from_strips([]);
-        for picture in self.pictures.iter_mut().chain(&mut self.flood) {
+        for picture in &mut self.pictures {
             *picture = Picture::new();
         }
     }

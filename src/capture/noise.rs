@@ -341,7 +341,6 @@ mod tests {
                 .collect(),
             rows: Rows::all(camera.height),
             pictures: pictures.map(less_dark).collect(),
-            flood: None,
             noise,
         }
     }

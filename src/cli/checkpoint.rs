@@ -1,8 +1,8 @@
 //! What is kept of a recovery while it runs, so that it can go on after an end that was none.
 //!
 //! A file beside the output, named after it: a head that says what the recovery was asked for and
-//! of which files, then one record a tile, in the order in which they came, each with a checksum. It
-//! is only ever appended to. Whatever ends the process, at worst the last record is torn, and left
+//! of which files, then a record that tells what was learned, then one a tile, in the order in which
+//! they came, each with a checksum. It is only ever appended to. Whatever ends the process, at worst the last record is torn, and left
 //! out by the next.
 
 use std::collections::BTreeMap;
@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
+use super::process::Interrupted;
 use crate::format::EncodedTile;
 use crate::transport::Geometry;
 
@@ -21,6 +22,8 @@ use crate::transport::Geometry;
 const MAGIC: [u8; 8] = *b"LTMPART\n";
 /// Tile number, bytes and checksum before each record.
 const RECORD_HEAD: usize = 12;
+/// In place of a tile's number: what was learned or chosen before the first tile.
+const PREPARED: u32 = u32::MAX;
 /// The head names every file of the capture; thousands of shots are well below this.
 const MOST_HEAD_BYTES: u32 = 64 << 20;
 
@@ -99,6 +102,8 @@ pub struct Checkpoint {
     /// Where each tile's record lies, and how long it is.
     records: Vec<Option<(u64, u32)>>,
     end: u64,
+    /// What tells the preparation that the tiles are of.
+    prepared: Option<Vec<u8>>,
     /// Whether the file goes when this does.
     remove: bool,
 }
@@ -128,6 +133,7 @@ impl Checkpoint {
                 file,
                 records: vec![None; recipe.tiles],
                 end: 0,
+                prepared: None,
                 remove: false,
             };
             if !checkpoint.load(recipe, resume)? {
@@ -153,7 +159,7 @@ impl Checkpoint {
     pub fn interrupted(&self) -> Result<String> {
         let (count, tiles, path) = (self.count(), self.tiles(), self.path.display());
         if count == 0 {
-            return Ok("interrupted before the first tile: nothing is kept".to_owned());
+            return Ok(Interrupted::before_any().0);
         }
         let synced = self.file.sync_data();
         synced.with_context(|| format!("{path}: cannot be written"))?;
@@ -168,25 +174,49 @@ impl Checkpoint {
         self.records[i].is_some()
     }
 
+    /// Takes what tells the preparation that tiles will be of. An error if tiles are kept that are of
+    /// another: the same photographs may teach another build, or another machine, something else.
+    pub fn prepared(&mut self, by: &[u8]) -> Result<()> {
+        match &self.prepared {
+            Some(kept) if kept == by => Ok(()),
+            Some(_) if self.count() > 0 => bail!(
+                "{}: does not fit: another build of this program, or another machine, began it; go \
+                 on with that one, or delete it to start anew",
+                self.path.display()
+            ),
+            _ => {
+                self.append(PREPARED, by)?;
+                self.prepared = Some(by.to_vec());
+                Ok(())
+            }
+        }
+    }
+
     /// Keeps tile `i`.
     pub fn add(&mut self, i: usize, tile: &EncodedTile) -> Result<()> {
-        let mut add = || -> Result<()> {
-            let record = tile.to_bytes()?;
+        let record = tile.to_bytes()?;
+        self.records[i] = Some(self.append(i as u32, &record)?);
+        self.remove = false;
+        Ok(())
+    }
+
+    /// Writes a record; where it lies, and how long it is.
+    fn append(&mut self, number: u32, record: &[u8]) -> Result<(u64, u32)> {
+        let mut append = || -> Result<(u64, u32)> {
             let mut bytes = Vec::with_capacity(RECORD_HEAD + record.len());
             let length = u32::try_from(record.len()).context("a tile is too large")?;
-            bytes.extend((i as u32).to_le_bytes());
+            bytes.extend(number.to_le_bytes());
             bytes.extend(length.to_le_bytes());
-            let crc = crc32c::crc32c_append(crc32c::crc32c(&bytes), &record);
+            let crc = crc32c::crc32c_append(crc32c::crc32c(&bytes), record);
             bytes.extend(crc.to_le_bytes());
             bytes.extend(record);
             self.file.seek(SeekFrom::Start(self.end))?;
             self.file.write_all(&bytes)?;
-            self.records[i] = Some((self.end + RECORD_HEAD as u64, length));
+            let start = self.end + RECORD_HEAD as u64;
             self.end += bytes.len() as u64;
-            self.remove = false;
-            Ok(())
+            Ok((start, length))
         };
-        add().with_context(|| format!("{}: cannot be written", self.path.display()))
+        append().with_context(|| format!("{}: cannot be written", self.path.display()))
     }
 
     /// Reads tile `i` back.
@@ -233,7 +263,7 @@ impl Checkpoint {
         Ok(true)
     }
 
-    /// The head, if it is whole; `None` of a file that is empty or ends within it.
+    /// The head; `None` of a file that is empty or ends within it.
     fn read_head(&mut self, bytes: u64) -> Result<Option<Recipe>> {
         let mut start = [0; 16];
         let present = bytes.min(16) as usize;
@@ -245,21 +275,22 @@ impl Checkpoint {
         let [length, crc] = [8, 12]
             .map(|at| u32::from_le_bytes([start[at], start[at + 1], start[at + 2], start[at + 3]]));
         self.end = 16 + u64::from(length);
-        if present < 16 || length > MOST_HEAD_BYTES || bytes < self.end {
+        if present < 16 || (length <= MOST_HEAD_BYTES && bytes < self.end) {
             return Ok(None);
         }
-        let mut json = vec![0; length as usize];
+        let mut json = vec![0; length.min(MOST_HEAD_BYTES) as usize];
         self.file.read_exact(&mut json)?;
-        if crc32c::crc32c(&json) != crc {
-            return Ok(None);
-        }
+        ensure!(
+            length <= MOST_HEAD_BYTES && crc32c::crc32c(&json) == crc,
+            "is damaged; delete it to start anew"
+        );
         let head = serde_json::from_slice(&json);
         Ok(Some(head.context(
             "is by another version of this program; use that one, or delete it to start anew",
         )?))
     }
 
-    /// The records from here to the first that is torn.
+    /// The records from here to the first that is torn, which only the last can be.
     fn read_records(&mut self, bytes: u64, tiles: usize) -> Result<Vec<Option<(u64, u32)>>> {
         let mut records = vec![None; tiles];
         let mut reader = io::BufReader::with_capacity(1 << 18, &self.file);
@@ -272,16 +303,29 @@ impl Checkpoint {
             let [tile, length, crc] = [0, 4, 8]
                 .map(|at| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]));
             let start = self.end + RECORD_HEAD as u64;
-            if bytes - start < u64::from(length) || tile as usize >= tiles {
+            if bytes - start < u64::from(length) {
                 break;
             }
             let mut record = vec![0; length as usize];
             reader.read_exact(&mut record)?;
+            let end = start + u64::from(length);
             if crc32c::crc32c_append(crc32c::crc32c(&head[..8]), &record) != crc {
+                // A crash may leave a last record of the right length whose bytes never came.
+                if end < bytes {
+                    eprintln!(
+                        "warning: {} is damaged after {} tiles; the others are recovered anew",
+                        self.path.display(),
+                        records.iter().flatten().count()
+                    );
+                }
                 break;
             }
-            records[tile as usize] = Some((start, length));
-            self.end = start + u64::from(length);
+            match tile {
+                PREPARED => self.prepared = Some(record),
+                tile if (tile as usize) < tiles => records[tile as usize] = Some((start, length)),
+                _ => break,
+            }
+            self.end = end;
         }
         Ok(records)
     }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{files, lights, report};
-use crate::capture::{CaptureFolder, Pattern, Picture, Rows, Truth};
+use crate::capture::{CaptureFolder, DarkFrame, Pattern, Photo, Picture, Rows, Truth};
 use crate::relight::Light;
 use crate::transport::{CHANNELS, Decibels, Geometry, Transport, TransportError};
 
@@ -37,6 +37,9 @@ struct Report {
     /// The same by camera channel.
     heldout_rgb_snr_db: [Option<Decibels>; CHANNELS],
     heldout_shots: usize,
+    /// SNR of the predicted against the flood photograph, which recovery does not look at; null
+    /// without one.
+    flood_snr_db: Option<Decibels>,
     file_bytes: u64,
 }
 
@@ -61,6 +64,7 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
         heldout_snr_db: None,
         heldout_rgb_snr_db: [None; CHANNELS],
         heldout_shots: 0,
+        flood_snr_db: None,
         file_bytes: file.header.file_bytes,
     };
     if let Some(truth) = folder.truth()? {
@@ -74,7 +78,9 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
     let held: Vec<usize> = (0..manifest.shots.len())
         .filter(|i| !file.metadata.shots_used.contains(i))
         .collect();
-    let errors = against_shots(&file.transport, &folder, &held)?;
+    let dark = folder.read_dark()?;
+    let errors = against_shots(&file.transport, &folder, &dark, &held)?;
+    report.flood_snr_db = against_flood(&file.transport, &folder, &dark)?;
     let mut all = TransportError::default();
     errors.iter().for_each(|&e| all.merge(e));
     report.heldout_snr_db = all.snr();
@@ -96,6 +102,10 @@ fn print(report: &Report) -> Result<()> {
         "SNR on {:3} held-out shots   {}",
         report.heldout_shots,
         show(report.heldout_snr_db)
+    ))?;
+    report::print_line(&format!(
+        "SNR on the flood photo     {}",
+        show(report.flood_snr_db)
     ))?;
     for (name, psnr) in &report.relit {
         report::print_line(&format!("PSNR relit under {name:9} {}", show(*psnr)))?;
@@ -154,25 +164,56 @@ fn relit_psnr(transport: &Transport, light: &Light, truth: &[[f64; CHANNELS]]) -
 fn against_shots(
     transport: &Transport,
     folder: &CaptureFolder,
+    dark: &DarkFrame,
     shots: &[usize],
 ) -> Result<[TransportError; CHANNELS]> {
     let mut errors = [TransportError::default(); CHANNELS];
-    let dark = folder.read_dark()?;
     for &i in shots {
         let light = pattern_light(&transport.geometry, &folder.read_pattern(i)?)?;
-        let ours = lights::relight(transport, &light);
-        let (mut photo, mut picture) = (folder.shot(i, &dark)?, Picture::new());
-        photo.read(&Rows::all(folder.manifest().camera.height), &mut picture)?;
-        photo.finish()?;
-        for (ours, seen) in ours.pixels.iter().zip(&picture) {
-            for c in 0..CHANNELS {
-                if seen[c].is_finite() {
-                    errors[c].add(f64::from(seen[c]), f64::from(ours[c]));
-                }
+        add_photo(&mut errors, transport, &light, folder.shot(i, dark)?)?;
+    }
+    Ok(errors)
+}
+
+/// SNR of the predicted against the flood photograph, if there is one.
+fn against_flood(
+    transport: &Transport,
+    folder: &CaptureFolder,
+    dark: &DarkFrame,
+) -> Result<Option<Decibels>> {
+    let Some(photo) = folder.flood(dark)? else {
+        return Ok(None);
+    };
+    let light = Light::from_linear_rgb(
+        transport.geometry.light,
+        &vec![1.0; transport.geometry.light.area() * CHANNELS],
+    )?;
+    let mut errors = [TransportError::default(); CHANNELS];
+    add_photo(&mut errors, transport, &light, photo)?;
+    let mut all = TransportError::default();
+    errors.iter().for_each(|&e| all.merge(e));
+    Ok(all.snr())
+}
+
+/// Adds what is predicted under `light` against what was photographed, saturated samples left out.
+fn add_photo(
+    errors: &mut [TransportError; CHANNELS],
+    transport: &Transport,
+    light: &Light,
+    mut photo: Photo,
+) -> Result<()> {
+    let ours = lights::relight(transport, light);
+    let mut picture = Picture::new();
+    photo.read(&Rows::all(transport.geometry.camera.height), &mut picture)?;
+    photo.finish()?;
+    for (ours, seen) in ours.pixels.iter().zip(&picture) {
+        for c in 0..CHANNELS {
+            if seen[c].is_finite() {
+                errors[c].add(f64::from(seen[c]), f64::from(ours[c]));
             }
         }
     }
-    Ok(errors)
+    Ok(())
 }
 
 fn pattern_light(geometry: &Geometry, pattern: &Pattern) -> Result<Light> {

@@ -152,6 +152,9 @@ impl Output {
             write(&mut out)?;
             out.flush().context("cannot be written")?;
             drop(out);
+            // On the disk before it takes its name, and before anything it was made from may go.
+            let synced = self.file.as_file().sync_all();
+            synced.context("cannot be written")?;
             let metadata = self.file.as_file().metadata();
             let bytes = metadata.context("cannot be read back")?.len();
             self.file

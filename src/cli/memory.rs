@@ -52,7 +52,7 @@ impl fmt::Display for Bytes {
         let units = [(30, "G"), (20, "M"), (10, "K")];
         let unit = units
             .into_iter()
-            .find(|(shift, _)| self.0 > 0 && self.0 % (1 << shift) == 0);
+            .find(|(shift, _)| self.0 > 0 && self.0.is_multiple_of(1 << shift));
         match unit {
             Some((shift, unit)) => write!(f, "{}{unit}", self.0 >> shift),
             None => write!(f, "{}", self.0),
@@ -91,7 +91,7 @@ impl Plan {
         let (camera, light) = (manifest.camera.extent(), manifest.light.extent());
         let tile_side = Geometry::DEFAULT_TILE_SIDE;
         let pixel = (CHANNELS * size_of::<f32>()) as u64;
-        let photographs = shots as u64 + u64::from(manifest.flood.is_some());
+        let photographs = shots as u64;
         let width = u64::from(camera.width);
         let fixed = PROGRAM
             + method.preparation_bytes(window) as u64

@@ -8,6 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use rayon::prelude::*;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 
 use crate::recover::Workers;
 
@@ -57,23 +59,37 @@ pub const INTERRUPTED: u8 = 130;
 #[error("{0}")]
 pub struct Interrupted(pub String);
 
+impl Interrupted {
+    /// Told before there was anything to keep.
+    pub fn before_any() -> Self {
+        Self("interrupted before the first tile: nothing is kept".to_owned())
+    }
+}
+
 /// Whether the process has been told to stop, by Ctrl-C or SIGTERM. Told twice, it stops at once.
 #[derive(Clone, Debug)]
-pub struct Interrupt(Arc<AtomicBool>);
+pub struct Interrupt {
+    told: Arc<AtomicBool>,
+    /// Whether the user has been told that it was heard.
+    said: Arc<AtomicBool>,
+}
 
 impl Interrupt {
     /// Listens from now on. Once a process.
     pub fn listen() -> Result<Self> {
         let told = Arc::new(AtomicBool::new(false));
-        let handler = Arc::clone(&told);
-        ctrlc::set_handler(move || {
-            if handler.swap(true, Ordering::Relaxed) {
-                std::process::exit(INTERRUPTED.into());
-            }
-            eprintln!("stopping once what is begun is done; again to stop at once");
+        // Not for SIGHUP, which `nohup` has a process ignore; where it is not ignored, tiles are kept
+        // all the same.
+        for signal in [SIGINT, SIGTERM] {
+            // In this order: the second time, the first action finds what the second has set.
+            flag::register_conditional_shutdown(signal, INTERRUPTED.into(), Arc::clone(&told))
+                .and_then(|_| flag::register(signal, Arc::clone(&told)))
+                .context("cannot listen for Ctrl-C")?;
+        }
+        Ok(Self {
+            told,
+            said: Arc::default(),
         })
-        .context("cannot listen for Ctrl-C")?;
-        Ok(Self(told))
     }
 
     /// All cores, to work until it is told.
@@ -83,7 +99,11 @@ impl Interrupt {
 
     /// Whether to stop.
     pub fn told(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        let told = self.told.load(Ordering::Relaxed);
+        if told && !self.said.swap(true, Ordering::Relaxed) {
+            eprintln!("stopping once what is begun is done; again to stop at once");
+        }
+        told
     }
 }
 

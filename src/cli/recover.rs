@@ -16,7 +16,7 @@ use super::checkpoint::{Checkpoint, Contents, Recipe};
 use super::memory::{self, Plan};
 use super::photographs::Photographs;
 use super::process::{Interrupt, Interrupted};
-use super::{files, process, report};
+use super::{Usage, files, process, report};
 use crate::capture::{CaptureFolder, DarkFrame, Measurements, Noise, Rows};
 use crate::format::{self, EncodedTile, Metadata};
 use crate::recover::{self, Band, Method, RecoverError, Recovery, Settings, SparsityBasis};
@@ -39,9 +39,9 @@ pub struct RecoverArgs {
     /// How each light transport function is recovered
     #[arg(long, value_enum, default_value_t = MethodName::Learned)]
     method: MethodName,
-    /// With --method bpdn: where light transport functions are sparse
-    #[arg(long, value_enum, default_value_t = BasisName::Identity)]
-    basis: BasisName,
+    /// With --method bpdn: where light transport functions are sparse [default: identity]
+    #[arg(long, value_enum)]
+    basis: Option<BasisName>,
     /// Side of the window of light elements each camera pixel may see; odd, or "auto" to estimate it
     #[arg(long, value_name = "W", default_value = "15", value_parser = parse_window)]
     window: WindowChoice,
@@ -121,9 +121,9 @@ impl RecoverArgs {
             MethodName::Learned => Method::Learned,
             MethodName::Nnls => Method::Nnls,
             MethodName::Bpdn => Method::Bpdn(match self.basis {
-                BasisName::Identity => SparsityBasis::Identity,
-                BasisName::Dct => SparsityBasis::Dct,
-                BasisName::Haar => SparsityBasis::Haar,
+                Some(BasisName::Identity) | None => SparsityBasis::Identity,
+                Some(BasisName::Dct) => SparsityBasis::Dct,
+                Some(BasisName::Haar) => SparsityBasis::Haar,
             }),
         }
     }
@@ -134,6 +134,8 @@ struct Report {
     seconds: f64,
     peak_rss_bytes: Option<u64>,
     method: Method,
+    /// With bpdn: where the functions were sought sparse.
+    basis: Option<SparsityBasis>,
     window: u32,
     /// With --window auto: estimated share of a pixel's light that comes from outside the window.
     leak: Option<f64>,
@@ -152,6 +154,9 @@ struct Report {
 
 pub fn run(args: &RecoverArgs) -> Result<()> {
     let start = Instant::now();
+    if args.basis.is_some() && !matches!(args.method, MethodName::Bpdn) {
+        bail!(Usage("--basis is for --method bpdn"));
+    }
     let interrupt = Interrupt::listen()?;
     // Whether it can be written is better known before than after.
     drop(files::Output::create(&args.output, files::Kind::Ltm)?);
@@ -206,11 +211,18 @@ fn recover(
     let mut measurements = no_rows(folder, &dark, shots, &gray_code_rows)?;
     let mut photographs = Photographs::open(folder, &dark, shots)?;
     // Before the long work: a checkpoint that does not fit is better known now.
-    let recipe = recipe(args, folder, shots, plan)?;
-    let checkpoint = Checkpoint::open(&args.output, &recipe, args.resume)?;
+    let recipe = recipe(args, folder, shots, plan, interrupt)?;
+    let mut checkpoint = Checkpoint::open(&args.output, &recipe, args.resume)?;
+    announce(&checkpoint, args.resume);
     let bar = process::progress("reading", shots.len());
-    photographs.advance(&mut measurements, &plan.sample(), &bar)?;
+    let read = photographs.advance(&mut measurements, &plan.sample(), || {
+        bar.inc(1);
+        !interrupt.told()
+    })?;
     bar.finish_and_clear();
+    if !read {
+        return Err(interrupted(&checkpoint));
+    }
     let saturated = photographs.finish()?;
     measurements.noise = Noise::with_gain_from(&measurements);
     warn_of_saturation(
@@ -243,13 +255,16 @@ fn recover(
         Recovery::prepare(&measurements, settings, &interrupt.cores()).map_err(failed)?;
     spinner.finish_and_clear();
     let geometry = *recovery.geometry();
-    let mut run = Run {
+    checkpoint.prepared(&recovery.fingerprint())?;
+    let bar = process::progress("recovering", recipe.tiles);
+    bar.set_position(checkpoint.count() as u64);
+    bar.reset_eta(); // The tiles that are there took no time.
+    let run = Run {
         interrupt,
         recovery: &recovery,
-        bar: process::progress("recovering", recipe.tiles),
+        bar,
         checkpoint: Mutex::new(checkpoint),
     };
-    run.announce(args.resume)?;
     let mut overexposed = 0;
     let mut photographs = match plan.whole() {
         true => None,
@@ -261,7 +276,7 @@ fn recover(
     let strips = plan.strips(recovery.halo());
     for (tile_rows, rows) in &strips {
         if let Some(photographs) = &mut photographs {
-            photographs.advance(&mut measurements, rows, &ProgressBar::hidden())?;
+            photographs.advance(&mut measurements, rows, || true)?;
         }
         overexposed += run.tiles(&measurements, tile_rows.clone(), saturated > 0)?;
     }
@@ -295,6 +310,7 @@ fn recover(
         seconds: 0.0,
         peak_rss_bytes: None,
         method: settings.method,
+        basis: settings.method.basis(),
         window: settings.window.side(),
         leak: band.and_then(|band| band.leak),
         rank: basis.map(Basis::rank),
@@ -316,6 +332,16 @@ fn interrupted(checkpoint: &Checkpoint) -> anyhow::Error {
     }
 }
 
+/// Says what is there already.
+fn announce(checkpoint: &Checkpoint, resume: bool) {
+    let (count, tiles) = (checkpoint.count(), checkpoint.tiles());
+    match count {
+        0 if resume => eprintln!("note: there is no checkpoint to resume from; starting anew"),
+        0 => {}
+        _ => eprintln!("resuming with {count} of {tiles} tiles"),
+    }
+}
+
 /// Tiles on their way into the checkpoint.
 struct Run<'a> {
     interrupt: &'a Interrupt,
@@ -325,23 +351,6 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Says what is there already.
-    fn announce(&mut self, resume: bool) -> Result<()> {
-        let checkpoint = self
-            .checkpoint
-            .get_mut()
-            .unwrap_or_else(PoisonError::into_inner);
-        let (count, tiles) = (checkpoint.count(), checkpoint.tiles());
-        match count {
-            0 if resume => eprintln!("note: there is no checkpoint to resume from; starting anew"),
-            0 => {}
-            _ => eprintln!("resuming with {count} of {tiles} tiles"),
-        }
-        self.bar.set_position(count as u64);
-        self.bar.reset_eta(); // The tiles that are there took no time.
-        Ok(())
-    }
-
     /// Recovers the rows of tiles `tile_rows`, except what is kept already. Returns the number of
     /// their pixels that are saturated in nearly all photographs, if there is anything `saturated`.
     fn tiles(
@@ -394,6 +403,7 @@ fn recipe(
     folder: &CaptureFolder,
     shots: &[usize],
     plan: &Plan,
+    interrupt: &Interrupt,
 ) -> Result<Recipe> {
     let gray_code = plan.gray_code_rows(folder.manifest().graycode.len());
     let whole = plan.whole() && gray_code == Rows::all(folder.manifest().camera.height);
@@ -401,18 +411,26 @@ fn recipe(
         true => "enough for all photographs".to_owned(),
         false => args.memory.0.to_string(),
     };
+    let none = || "not given".to_owned();
     let options = [
         ("--method", args.method().name().to_owned()),
-        ("--basis", format!("{:?}", args.basis).to_lowercase()),
+        (
+            "--basis",
+            args.method()
+                .basis()
+                .map_or_else(none, |basis| basis.name().to_owned()),
+        ),
         ("--window", args.window.name()),
         (
             "--patterns",
-            args.patterns
-                .map_or_else(|| "not given".to_owned(), |k| k.to_string()),
+            args.patterns.map_or_else(none, |k| k.to_string()),
         ),
         ("--memory", memory),
     ];
     let contents = |(name, path): (&str, PathBuf)| -> Result<(String, Contents)> {
+        if interrupt.told() {
+            bail!(Interrupted::before_any());
+        }
         let contents = Contents::of(&path).with_context(|| path.display().to_string())?;
         Ok((name.to_owned(), contents))
     };

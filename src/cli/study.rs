@@ -223,7 +223,10 @@ fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
     let mut measurements = recover::no_rows(folder, &dark, shots, &rows)?;
     let mut photographs = Photographs::open(folder, &dark, shots)?;
     let bar = process::progress("reading", shots.len());
-    photographs.advance(&mut measurements, &rows, &bar)?;
+    photographs.advance(&mut measurements, &rows, || {
+        bar.inc(1);
+        true
+    })?;
     bar.finish_and_clear();
     photographs.finish()?;
     measurements.noise = Noise::with_gain_from(&measurements);

@@ -66,6 +66,14 @@ impl Method {
         }
     }
 
+    /// The basis of [`Bpdn`](Self::Bpdn).
+    pub fn basis(self) -> Option<SparsityBasis> {
+        match self {
+            Self::Bpdn(basis) => Some(basis),
+            Self::Learned | Self::Nnls => None,
+        }
+    }
+
     /// The name by which options, reports and files call it.
     pub fn name(self) -> &'static str {
         match self {
@@ -165,6 +173,22 @@ impl Recovery {
     /// Grids, band and tiling of the answer.
     pub fn geometry(&self) -> &Geometry {
         &self.geometry
+    }
+
+    /// Numbers that tell one preparation from another: tiles are of one file only if these are equal.
+    pub fn fingerprint(&self) -> Vec<u8> {
+        let common_mode = self.common_mode().map(CommonMode::weight);
+        let chosen = [
+            f64::from(self.geometry.window.side()),
+            common_mode.unwrap_or(f64::NAN),
+        ];
+        let kernels = self.basis().into_iter().flat_map(|basis| &basis.kernels);
+        let kernels = kernels.flatten().flat_map(|v| v.to_le_bytes());
+        chosen
+            .into_iter()
+            .flat_map(f64::to_le_bytes)
+            .chain(kernels)
+            .collect()
     }
 
     /// The functions that factored tiles are combined from, if there are such tiles.

@@ -58,7 +58,6 @@ impl Photographer<'_> {
             full_scale: vec![1.0; count],
             rows: Rows::all(geometry.camera.height),
             pictures,
-            flood: None,
             noise: Noise::from_dark(&self.dark()?, geometry.camera.width, code),
         };
         measurements.noise = Noise::with_gain_from(&measurements);
@@ -153,7 +152,6 @@ pub fn first_shots(measurements: &Measurements, count: usize) -> Measurements {
         full_scale: measurements.full_scale[..count].to_vec(),
         rows: measurements.rows.clone(),
         pictures: measurements.pictures[..count].to_vec(),
-        flood: measurements.flood.clone(),
         noise: measurements.noise,
     };
     first.noise = Noise::with_gain_from(&first);

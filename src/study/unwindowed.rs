@@ -105,7 +105,6 @@ mod tests {
             full_scale: vec![1.0; 10],
             rows: Rows::all(1),
             pictures: patterns.iter().map(seen).collect(),
-            flood: None,
             noise: Noise {
                 gain: [0.0; CHANNELS],
                 floor: [0.0; CHANNELS],

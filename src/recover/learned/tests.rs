@@ -130,7 +130,6 @@ fn measurements(patterns: usize, seed: u64) -> (Measurements, Vec<[f64; CHANNELS
         full_scale: vec![1.0; patterns],
         rows: Rows::all(SIDE),
         pictures,
-        flood: None,
         noise: Noise {
             gain: [0.0; CHANNELS],
             floor: [1e-8; CHANNELS],
