@@ -461,6 +461,20 @@ fn a_bad_manifest_is_refused_by_field() {
         |c| edit_manifest(c, |m| m["shots"].as_array_mut().unwrap().truncate(3)),
         &["3 patterns are too few"],
     );
+    // Every photograph listed with the pattern before its own.
+    refuses(
+        |c| {
+            edit_manifest(c, |m| {
+                let shots = m["shots"].as_array_mut().unwrap();
+                let photos: Vec<Value> = shots.iter().map(|s| s["photo"].clone()).collect();
+                for (i, photo) in photos.into_iter().enumerate() {
+                    let next = (i + 1) % shots.len();
+                    shots[next]["photo"] = photo;
+                }
+            })
+        },
+        &["each is listed with the pattern it shows"],
+    );
 }
 
 #[test]
@@ -475,6 +489,7 @@ fn options_that_cannot_be_are_refused() {
     let many = recover(&["--patterns", "61"]);
     assert!(String::from_utf8_lossy(&many.stderr).contains("60 shots"));
     assert_eq!(recover(&["--method", "magic"]).status.code(), Some(2));
+    assert_eq!(recover(&["--basis", "dct"]).status.code(), Some(2));
     assert_eq!(recover(&["--patterns", "0"]).status.code(), Some(2));
     let relight = ["relight", "x.ltm", "-o", "x.png", "--light"];
     for wrong in [

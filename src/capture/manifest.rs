@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::CaptureError;
-use crate::transport::{Correspondence, Extent, GeometryError};
+use crate::transport::{Correspondence, Extent};
 
 /// The manifest's file name.
 pub const MANIFEST_NAME: &str = "capture.json";
@@ -106,8 +106,9 @@ impl LightSpec {
 
     /// Light emitted for each of the 256 codes, 1 at full brightness.
     pub fn emission(&self) -> [f64; 256] {
+        let full = |table: &[[f64; 2]]| interpolate(table, 255.0);
         std::array::from_fn(|code| match (&self.response, self.gamma) {
-            (Some(table), _) => interpolate(table, code as f64),
+            (Some(table), _) => interpolate(table, code as f64) / full(table),
             (None, gamma) => (code as f64 / 255.0).powf(gamma.unwrap_or(1.0)),
         })
     }
@@ -178,7 +179,13 @@ impl Manifest {
         ];
         for (name, value) in sides {
             if !(1..=crate::transport::MAX_SIDE).contains(&value) {
-                return bad(name, GeometryError::Side { name, value }.to_string());
+                return bad(
+                    name,
+                    format!(
+                        "is {value}; it must lie between 1 and {}",
+                        crate::transport::MAX_SIDE
+                    ),
+                );
             }
         }
         let (black, white) = (self.camera.black, self.camera.white);
@@ -200,10 +207,12 @@ impl Manifest {
                     .windows(2)
                     .all(|w| w[0][0] < w[1][0] && w[0][1] <= w[1][1]);
                 let sane = table.iter().flatten().all(|x| x.is_finite() && *x >= 0.0);
-                if table.len() < 2 || !rising || !sane {
+                if table.len() < 2 || !rising || !sane || interpolate(table, 255.0) <= 0.0 {
                     return bad(
                         "light.response",
-                        "must be two or more [code, emitted] pairs, both rising".to_owned(),
+                        "must be two or more [code, emitted] pairs, both rising, and emit light at \
+                         code 255"
+                            .to_owned(),
                     );
                 }
             }
@@ -335,14 +344,17 @@ mod tests {
 
     #[test]
     fn response_table_is_interpolated_and_gamma_is_a_power() {
-        let table = manifest(|j| {
-            j["light"] = serde_json::json!({"width": 4, "height": 4,
-                "response": [[10, 0.0], [110, 0.5], [255, 1.0]]});
-        });
-        let emission = table.unwrap().light.emission();
-        assert_eq!(emission[0], 0.0);
-        assert!((emission[60] - 0.25).abs() < 1e-12);
-        assert_eq!(emission[255], 1.0);
+        // In candelas a square metre as well as in shares of the most.
+        for full in [1.0, 350.0] {
+            let table = manifest(|j| {
+                j["light"] = serde_json::json!({"width": 4, "height": 4,
+                    "response": [[10, 0.0], [110, 0.5 * full], [255, full]]});
+            });
+            let emission = table.unwrap().light.emission();
+            assert_eq!(emission[0], 0.0);
+            assert!((emission[60] - 0.25).abs() < 1e-12);
+            assert_eq!(emission[255], 1.0);
+        }
         let gamma = manifest(|_| {}).unwrap().light.emission();
         assert!((gamma[51] - 0.04).abs() < 1e-12);
     }

@@ -102,6 +102,16 @@ impl Measurements {
         self.noise.variance(c, y, exposure)
     }
 
+    /// What each pattern's equations count for, mean square 1: photon noise, the most of it, lets a
+    /// sample's variance fall as the exposure grows.
+    pub fn weights(&self) -> Vec<f64> {
+        let exposures = || self.full_scale.iter().map(|&full| f64::from(full).recip());
+        let mean = exposures().sum::<f64>() / self.full_scale.len() as f64;
+        exposures()
+            .map(|exposure| (exposure / mean).sqrt())
+            .collect()
+    }
+
     /// Pixels of the tile of which some channel is saturated in so nearly all photographs that fewer
     /// than `fewest` samples are left of it.
     pub fn overexposed_pixels(&self, rect: TileRect, fewest: usize) -> usize {

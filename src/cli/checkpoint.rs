@@ -14,7 +14,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
-use super::process::Interrupted;
 use crate::format::EncodedTile;
 use crate::transport::Geometry;
 
@@ -159,7 +158,7 @@ impl Checkpoint {
     pub fn interrupted(&self) -> Result<String> {
         let (count, tiles, path) = (self.count(), self.tiles(), self.path.display());
         if count == 0 {
-            return Ok(Interrupted::before_any().0);
+            return Ok("interrupted before the first tile: nothing is kept".to_owned());
         }
         let synced = self.file.sync_data();
         synced.with_context(|| format!("{path}: cannot be written"))?;

@@ -59,13 +59,6 @@ pub const INTERRUPTED: u8 = 130;
 #[error("{0}")]
 pub struct Interrupted(pub String);
 
-impl Interrupted {
-    /// Told before there was anything to keep.
-    pub fn before_any() -> Self {
-        Self("interrupted before the first tile: nothing is kept".to_owned())
-    }
-}
-
 /// Whether the process has been told to stop, by Ctrl-C or SIGTERM. Told twice, it stops at once.
 #[derive(Clone, Debug)]
 pub struct Interrupt {

@@ -1,6 +1,6 @@
 //! `ltm-export recover`: a capture folder to an `.ltm` file.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -17,7 +17,7 @@ use super::memory::{self, Plan};
 use super::photographs::Photographs;
 use super::process::{Interrupt, Interrupted};
 use super::{Usage, files, process, report};
-use crate::capture::{CaptureFolder, DarkFrame, Measurements, Noise, Rows};
+use crate::capture::{CaptureFolder, DarkFrame, Measurements, Noise, Rows, Shot};
 use crate::format::{self, EncodedTile, Metadata};
 use crate::recover::{self, Band, Method, RecoverError, Recovery, Settings, SparsityBasis};
 use crate::transport::{Basis, CHANNELS, Window};
@@ -162,7 +162,7 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     drop(files::Output::create(&args.output, files::Kind::Ltm)?);
     let folder = CaptureFolder::open(&args.capture)?;
     let manifest = folder.manifest();
-    let shots = choose_shots(manifest.shots.len(), args.patterns)?;
+    let shots = choose_shots(&manifest.shots, args.patterns)?;
     if shots.len() < recover::FEWEST_PATTERNS {
         let manifest = folder.manifest_path().display().to_string();
         return Err(RecoverError::FewPatterns(shots.len())).context(manifest);
@@ -429,7 +429,9 @@ fn recipe(
     ];
     let contents = |(name, path): (&str, PathBuf)| -> Result<(String, Contents)> {
         if interrupt.told() {
-            bail!(Interrupted::before_any());
+            bail!(Interrupted(
+                "interrupted before anything was read".to_owned()
+            ));
         }
         let contents = Contents::of(&path).with_context(|| path.display().to_string())?;
         Ok((name.to_owned(), contents))
@@ -458,15 +460,24 @@ fn warn_of_saturation(saturated: usize, samples: usize) {
 }
 
 /// Which of `available` shots to recover from.
-fn choose_shots(available: usize, first: Option<u32>) -> Result<Vec<usize>> {
+fn choose_shots(shots: &[Shot], first: Option<u32>) -> Result<Vec<usize>> {
+    let available = shots.len();
     match first.map(|k| k as usize) {
         Some(k) if k > available => {
             bail!("--patterns is {k}, but the capture has {available} shots")
         }
         Some(k) => Ok((0..k).collect()),
-        None => Ok((0..available)
-            .filter(|l| l % HOLD_OUT_EVERY != HOLD_OUT_EVERY - 1)
-            .collect()),
+        None => {
+            // Shots of one pattern, by several exposures, are held out together.
+            let mut known = HashMap::new();
+            let mut number = |shot: &Shot| {
+                let next = known.len();
+                *known.entry(shot.pattern.clone()).or_insert(next)
+            };
+            let numbers: Vec<usize> = shots.iter().map(&mut number).collect();
+            let used = |l: &usize| numbers[*l] % HOLD_OUT_EVERY != HOLD_OUT_EVERY - 1;
+            Ok((0..available).filter(used).collect())
+        }
     }
 }
 

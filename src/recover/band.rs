@@ -6,7 +6,8 @@
 //! rather than gathering noise.
 
 use super::dense;
-use super::learned::{equations, start};
+use super::pooled::{DEVIATION, dark_or_overexposed};
+use super::sample::{mean_variance, reaches_display, spread, unsaturated, windows};
 use super::vector::{add_scaled, dot, vectorised};
 use super::workers::go_on;
 use super::{RecoverError, Workers};
@@ -58,8 +59,11 @@ impl Band {
             tile_side: Geometry::DEFAULT_TILE_SIDE,
         }
         .validate()?;
+        if !reaches_display(&geometry) {
+            return Err(RecoverError::NoLight);
+        }
         let groups = Groups::new(probe);
-        let squares = start::spread(measurements, SQUARES.1, SQUARES.0);
+        let squares = spread(measurements, SQUARES.1, SQUARES.0);
         // Brightness is known only once the function is, roughly.
         let mut profile = vec![1.0 / groups.count as f64; groups.count];
         for _ in 0..3 {
@@ -67,7 +71,7 @@ impl Band {
             let parts = workers.map(PARTS, |part| {
                 let mut sums = Sums::new(groups.count);
                 for square in squares.iter().skip(part).step_by(PARTS) {
-                    for (origin, pixels) in equations::windows(&geometry, *square) {
+                    for (origin, pixels) in windows(&geometry, *square) {
                         vectorised(
                             #[inline(always)]
                             || {
@@ -87,7 +91,7 @@ impl Band {
             parts.iter().for_each(|part| total.merge(part));
             profile = total
                 .solve()
-                .ok_or_else(|| start::dark_or_overexposed(measurements, &squares))?;
+                .ok_or_else(|| dark_or_overexposed(measurements, &squares))?;
         }
         groups.band(&profile, probe)
     }
@@ -182,7 +186,7 @@ impl Sums {
         }
         let all: Vec<usize> = (0..measurements.patterns.len()).collect();
         for (plane, channels) in measurements.planes() {
-            let rows = start::unsaturated(measurements, &all, pixels, channels.clone());
+            let rows = unsaturated(measurements, &all, pixels, channels.clone());
             let patterns = rows.len();
             let mut columns = vec![0.0; groups.count * patterns];
             for (i, &l) in rows.iter().enumerate() {
@@ -215,8 +219,8 @@ impl Sums {
                     if mean > 0.0 {
                         let brightness = mean / level;
                         let noise =
-                            start::mean_variance(measurements, &rows, c, mean) / brightness.powi(2);
-                        let weight = 1.0 / (start::DEVIATION.powi(2) + noise);
+                            mean_variance(measurements, &rows, c, mean) / brightness.powi(2);
+                        let weight = 1.0 / (DEVIATION.powi(2) + noise);
                         energy += weight;
                         add_scaled(&mut seen, weight / brightness, &y);
                     }

@@ -50,10 +50,11 @@ pub(super) struct Patch {
     light: Extent,
     window: Window,
     region: Region,
-    rows: usize,
-    /// `[element, pattern]`.
+    /// What each pattern counts for, `[pattern]`.
+    weights: Vec<f64>,
+    /// Emissions times the pattern's weight, `[element, pattern]`.
     emissions: Vec<f64>,
-    /// Mean emission over the patterns, `[element]`.
+    /// Mean emission over the patterns, each by the square of its weight, `[element]`.
     mean: Vec<f64>,
     /// Correlations with the neighbours, `G[m, m + δ]`, as `[element, δv, δu]`, each δ from
     /// `-(w − 1)` to `w − 1`; empty where few windows are to share them.
@@ -75,9 +76,9 @@ impl Patch {
     }
 
     /// The part of the display that `windows` windows see, all of them starting between the origins
-    /// `first` and `last`, under the patterns numbered `rows`.
+    /// `first` and `last`, under the patterns numbered `rows`; `weights` of all patterns.
     pub fn new(
-        patterns: &[Pattern],
+        (patterns, weights): (&[Pattern], &[f64]),
         rows: &[usize],
         channel: usize,
         light: Extent,
@@ -93,17 +94,18 @@ impl Patch {
             for v in 0..region.height {
                 let start = (region.v + v) * light.width as usize + region.u;
                 for (u, &p) in plane[start..start + region.width].iter().enumerate() {
-                    emissions[(v * region.width + u) * l + i] = f64::from(p);
+                    emissions[(v * region.width + u) * l + i] = weights[row] * f64::from(p);
                 }
             }
         }
-        let mean = emissions.chunks_exact(l.max(1));
+        let weights: Vec<f64> = rows.iter().map(|&row| weights[row]).collect();
+        let columns = emissions.chunks_exact(l.max(1));
         let mut patch = Self {
             light,
             window,
             region,
-            rows: l,
-            mean: mean.map(|e| e.iter().sum::<f64>() / l as f64).collect(),
+            mean: columns.map(|e| mean(&weights, e)).collect(),
+            weights,
             emissions,
             correlations: Vec::new(),
         };
@@ -129,7 +131,8 @@ impl Patch {
     /// Emissions of the region's element `m`.
     #[inline(always)]
     fn emission(&self, m: usize) -> &[f64] {
-        &self.emissions[m * self.rows..(m + 1) * self.rows]
+        let rows = self.weights.len();
+        &self.emissions[m * rows..(m + 1) * rows]
     }
 
     #[inline(always)]
@@ -177,11 +180,17 @@ impl Patch {
         let slots = (0..here.area())
             .map(|i| (above + i / here.width) * side + left + i % here.width)
             .collect();
-        let (k, l) = (elements.len(), self.rows - dropped.len());
+        let kept = |i: &usize| !dropped.contains(i);
+        let weights: Vec<f64> = (0..self.weights.len())
+            .filter(kept)
+            .map(|i| self.weights[i])
+            .collect();
+        let k = elements.len();
         let mut design = Design {
             slots,
-            emissions: Vec::with_capacity(k * l),
-            rows: l,
+            emissions: Vec::with_capacity(k * weights.len()),
+            total: weights.iter().map(|w| w * w).sum(),
+            weights,
             mean: Vec::with_capacity(k),
             common_mode,
             gram: vec![0.0; k * k],
@@ -191,12 +200,12 @@ impl Patch {
             let all = self.emission(m).iter().enumerate();
             design
                 .emissions
-                .extend(all.filter(|(i, _)| !dropped.contains(i)).map(|(_, e)| e));
-            let mean = match dropped.is_empty() {
+                .extend(all.filter(|(i, _)| kept(i)).map(|(_, e)| e));
+            let level = match dropped.is_empty() {
                 true => self.mean[m],
-                false => design.emissions[start..].iter().sum::<f64>() / l as f64,
+                false => mean(&design.weights, &design.emissions[start..]),
             };
-            design.mean.push(mean);
+            design.mean.push(level);
         }
         vectorised(
             #[inline(always)]
@@ -237,16 +246,19 @@ impl Patch {
     }
 }
 
-/// Patterns as one window sees them through one channel, `P̂`, with their common mode weighted: the
-/// equations are `Wy = WP̂τ`, where `W = I − (1 − ω) 11ᵀ/L` leaves alone what differs between
-/// patterns and scales their mean by ω. Elements off the display are left out.
+/// Patterns as one window sees them through one channel, `P̂`, by what they count for and with their
+/// common mode weighted: the equations are `Wy = WP̂τ`, where `W = (I − (1 − ω) wwᵀ/‖w‖²) diag(w)` for
+/// weights `w` leaves alone what differs between patterns and scales their mean by ω. Elements off the
+/// display are left out.
 #[derive(Debug)]
 pub(super) struct Design {
     /// Window slots (row · side + column) of the `k` elements on the display.
     pub slots: Vec<usize>,
-    /// `P̂ᵀ`, `[k, rows]`: each element's emissions over the patterns in one run.
+    /// `(diag(w)P̂)ᵀ`, `[k, rows]`: each element's emissions over the patterns in one run.
     emissions: Vec<f64>,
-    rows: usize,
+    /// `w`, `[rows]`, and `‖w‖²`.
+    weights: Vec<f64>,
+    total: f64,
     /// Mean emission over patterns, `[k]`.
     mean: Vec<f64>,
     common_mode: CommonMode,
@@ -262,47 +274,53 @@ impl Design {
 
     /// Number of equations, `L`.
     pub fn rows(&self) -> usize {
-        self.rows
+        self.weights.len()
     }
 
     /// Turns measurements, one for each of the design's patterns, into `Wy`.
     pub fn weigh(&self, mut y: Vec<f64>) -> Vec<f64> {
-        let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
-        let less = (1.0 - self.common_mode.weight()) * mean;
-        y.iter_mut().for_each(|y| *y -= less);
+        y.iter_mut().zip(&self.weights).for_each(|(y, w)| *y *= w);
+        let less = (1.0 - self.common_mode.weight()) * mean(&self.weights, &y);
+        y.iter_mut()
+            .zip(&self.weights)
+            .for_each(|(y, w)| *y -= less * w);
         y
     }
 
     /// `‖Wy − WP̂x‖²` for weighted measurements `Wy`.
     pub fn squared_residual(&self, weighted_y: &[f64], x: &[f64]) -> f64 {
         let mut difference = weighted_y.to_vec();
-        let columns = self.emissions.chunks_exact(self.rows.max(1));
+        let columns = self.emissions.chunks_exact(self.rows().max(1));
         let mut weighted_mean = 0.0;
         for ((column, mean), &x) in columns.zip(&self.mean).zip(x).filter(|(_, x)| **x != 0.0) {
             add_scaled(&mut difference, -x, column);
             weighted_mean += (1.0 - self.common_mode.weight()) * mean * x;
         }
-        difference.iter().map(|d| (d + weighted_mean).powi(2)).sum()
+        let difference = difference.iter().zip(&self.weights);
+        difference
+            .map(|(d, w)| (d + weighted_mean * w).powi(2))
+            .sum()
     }
 
     /// `(WP̂)ᵀ`, `[k, rows]`.
     pub fn weighted(&self) -> Vec<f64> {
         let mut all = self.emissions.clone();
-        for (column, mean) in all.chunks_exact_mut(self.rows.max(1)).zip(&self.mean) {
+        for (column, mean) in all.chunks_exact_mut(self.rows().max(1)).zip(&self.mean) {
             let less = (1.0 - self.common_mode.weight()) * mean;
-            column.iter_mut().for_each(|e| *e -= less);
+            let column = column.iter_mut().zip(&self.weights);
+            column.for_each(|(e, w)| *e -= less * w);
         }
         all
     }
 
     /// `(WP̂)ᵀ Wy` for weighted measurements `Wy`.
     pub fn right_hand_side(&self, weighted_y: &[f64]) -> Vec<f64> {
-        // Of (WP̂)ᵀ = P̂ᵀ − (1 − ω) p̄1ᵀ the second part only meets the sum of Wy.
-        let less = (1.0 - self.common_mode.weight()) * weighted_y.iter().sum::<f64>();
+        // Of (WP̂)ᵀ = (diag(w)P̂)ᵀ − (1 − ω) p̄wᵀ the second part only meets wᵀWy.
+        let less = (1.0 - self.common_mode.weight()) * dot(&self.weights, weighted_y);
         vectorised(
             #[inline(always)]
             || {
-                let columns = self.emissions.chunks_exact(self.rows.max(1));
+                let columns = self.emissions.chunks_exact(self.rows().max(1));
                 columns
                     .zip(&self.mean)
                     .map(|(e, mean)| dot(e, weighted_y) - less * mean)
@@ -313,7 +331,7 @@ impl Design {
 
     #[inline(always)]
     fn multiply_out(&mut self) {
-        let (k, l) = (self.unknowns(), self.rows);
+        let (k, l) = (self.unknowns(), self.rows());
         for i in 0..k {
             let a = &self.emissions[i * l..(i + 1) * l];
             for j in 0..=i {
@@ -324,10 +342,10 @@ impl Design {
         }
     }
 
-    /// `P̂ᵀP̂` to `P̂ᵀW²P̂ = P̂ᵀP̂ − (1 − ω²) L p̄p̄ᵀ`.
+    /// `A = (diag(w)P̂)ᵀdiag(w)P̂` to `P̂ᵀW²P̂ = A − (1 − ω²) ‖w‖² p̄p̄ᵀ`.
     #[inline(always)]
     fn weigh_common_mode(&mut self) {
-        let factor = (1.0 - self.common_mode.weight().powi(2)) * self.rows as f64;
+        let factor = (1.0 - self.common_mode.weight().powi(2)) * self.total;
         if factor == 0.0 {
             return;
         }
@@ -339,4 +357,10 @@ impl Design {
             }
         }
     }
+}
+
+/// The mean of values that come times their weights, each by the square of its weight.
+fn mean(weights: &[f64], weighted: &[f64]) -> f64 {
+    let sum: f64 = weights.iter().zip(weighted).map(|(w, e)| w * e).sum();
+    sum / weights.iter().map(|w| w * w).sum::<f64>()
 }

@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use super::bpdn::{Constraint, Homotopy, InteriorPoint, SparsityBasis, Tolerance};
 use super::design::{Design, Patch};
-use super::learned::equations::windows;
+use super::holdout::Split;
+use super::sample::windows;
 use super::workers::go_on;
 use super::{CommonMode, FEWEST_PATTERNS, Nnls, RecoverError, Workers};
 use crate::capture::Measurements;
@@ -14,8 +15,6 @@ use crate::transport::{
     Window,
 };
 
-/// Every how many patterns one is held out while the settings below are chosen.
-const HOLD_OUT_EVERY: usize = 10;
 /// Windows the choice is made on, spread over the picture, and pixels of each: enough that they tell
 /// candidates apart by hundredths of a decibel, few enough to cost seconds.
 #[derive(Clone, Copy, Debug)]
@@ -81,10 +80,11 @@ impl Direct {
     pub fn least_squares(
         measurements: &Measurements,
         geometry: Geometry,
+        split: &Split,
         workers: &impl Workers,
     ) -> Result<Self, RecoverError> {
         go_on(workers)?;
-        let trial = HeldOut::new(measurements, geometry, SCATTERED)?;
+        let trial = HeldOut::new(measurements, geometry, split, SCATTERED)?;
         Ok(trial.choose(
             CommonMode::CANDIDATES.map(|common_mode| Self {
                 geometry,
@@ -100,12 +100,14 @@ impl Direct {
         measurements: &Measurements,
         geometry: Geometry,
         basis: SparsityBasis,
+        split: &Split,
         workers: &impl Workers,
     ) -> Result<Self, RecoverError> {
-        let least_squares = Self::least_squares(measurements, geometry, workers)?;
-        let noise = HeldOut::new(measurements, geometry, SCATTERED)?.noise(&least_squares, workers);
+        let least_squares = Self::least_squares(measurements, geometry, split, workers)?;
+        let noise =
+            HeldOut::new(measurements, geometry, split, SCATTERED)?.noise(&least_squares, workers);
         go_on(workers)?;
-        let trial = HeldOut::new(measurements, geometry, GATHERED)?;
+        let trial = HeldOut::new(measurements, geometry, split, GATHERED)?;
         Ok(trial.choose(
             Tolerance::SHARES.map(|share| Self {
                 problem: Problem::Denoising(basis, Tolerance { share, ..noise }),
@@ -167,10 +169,11 @@ impl Direct {
             corners[1].u = corners[1].u.max(origin.u);
             corners[1].v = corners[1].v.max(origin.v);
         }
+        let weights = measurements.weights();
         // Grey patterns drive all channels alike: one set of equations for all of them.
         for (plane, channels) in measurements.planes() {
             let patch = Patch::new(
-                &measurements.patterns,
+                (&measurements.patterns, &weights),
                 rows,
                 plane,
                 self.geometry.light,
@@ -343,15 +346,14 @@ struct HeldOut<'a> {
     measurements: &'a Measurements,
     geometry: Geometry,
     windows: Vec<(Element, Vec<CameraPx>)>,
-    /// Patterns to predict, and to recover from.
-    held: Vec<usize>,
-    rows: Vec<usize>,
+    split: &'a Split,
 }
 
 impl<'a> HeldOut<'a> {
     fn new(
         measurements: &'a Measurements,
         geometry: Geometry,
+        split: &'a Split,
         sample: Sample,
     ) -> Result<Self, RecoverError> {
         let mut lit: BTreeMap<_, Vec<_>> = BTreeMap::new();
@@ -368,14 +370,11 @@ impl<'a> HeldOut<'a> {
             return Err(RecoverError::NoLight);
         }
         let every = lit.len().div_ceil(sample.windows);
-        let (held, rows) = (0..measurements.patterns.len())
-            .partition(|l| l % HOLD_OUT_EVERY == HOLD_OUT_EVERY / 2);
         Ok(Self {
             measurements,
             geometry,
             windows: lit.into_iter().step_by(every).collect(),
-            held,
-            rows,
+            split,
         })
     }
 
@@ -383,7 +382,7 @@ impl<'a> HeldOut<'a> {
     /// can be.
     fn choose<const N: usize>(&self, candidates: [Direct; N], workers: &impl Workers) -> Direct {
         let mut chosen = candidates[0];
-        if self.held.is_empty() || self.rows.len() < FEWEST_PATTERNS {
+        if self.split.held.is_empty() {
             return chosen;
         }
         let errors = workers.map(self.windows.len(), |i| {
@@ -414,9 +413,9 @@ impl<'a> HeldOut<'a> {
         candidate.block(
             self.measurements,
             &window,
-            &self.rows,
+            &self.split.learn,
             |_, pixel, c, slots, x| {
-                for &l in &self.held {
+                for &l in &self.split.held {
                     let y = self.measurements.sample(l, pixels[pixel], c);
                     if y.is_finite() {
                         error.add(y, self.predict(l, c, *origin, slots, x));
@@ -442,11 +441,12 @@ impl<'a> HeldOut<'a> {
     /// allowed for.
     fn noise(&self, least_squares: &Direct, workers: &impl Workers) -> Tolerance {
         let rows: Vec<usize> = (0..self.measurements.patterns.len()).collect();
+        let weights = self.measurements.weights();
         let pairs = workers.map(self.windows.len(), |i| {
             let (origin, pixel) = (self.windows[i].0, self.windows[i].1[0]);
             let patch = |c| {
                 Patch::new(
-                    &self.measurements.patterns,
+                    (&self.measurements.patterns, &weights),
                     &rows,
                     c,
                     self.geometry.light,
@@ -457,12 +457,15 @@ impl<'a> HeldOut<'a> {
             };
             let mut pairs = Vec::new();
             for channel in 0..CHANNELS {
-                let y: Vec<f64> = rows
+                let mut y: Vec<f64> = rows
                     .iter()
                     .map(|&l| self.measurements.sample(l, pixel, channel))
                     .collect();
-                if y.iter().all(|y| y.is_finite()) {
-                    let design = patch(channel).design(origin, least_squares.common_mode, &[]);
+                let saturated: Vec<usize> = (0..y.len()).filter(|&i| !y[i].is_finite()).collect();
+                y.retain(|y| y.is_finite());
+                if y.len() >= FEWEST_PATTERNS {
+                    let design =
+                        patch(channel).design(origin, least_squares.common_mode, &saturated);
                     pairs.extend(mean_and_noise(&design, y));
                 }
             }

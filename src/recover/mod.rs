@@ -16,10 +16,13 @@ mod common_mode;
 mod dense;
 mod design;
 mod direct;
+mod holdout;
 mod learned;
 mod nnls;
 mod passive;
+mod pooled;
 mod recovery;
+mod sample;
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod test_problems;
 mod vector;

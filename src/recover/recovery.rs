@@ -4,7 +4,9 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::direct::Direct;
+use super::holdout::Split;
 use super::learned::Learned;
+use super::pooled;
 use super::{CommonMode, FEWEST_PATTERNS, SparsityBasis, Workers};
 use crate::capture::Measurements;
 use crate::transport::{Basis, Geometry, GeometryError, RecoveredTile, TileRect, Window};
@@ -114,6 +116,11 @@ pub enum RecoverError {
         "the photographs show no light from the display; check \"camera.black\", the exposure, and that photographs are listed with the patterns they show"
     )]
     Dark,
+    /// Patterns do not tell what photographs show.
+    #[error(
+        "what the photographs show does not follow from the patterns; check that each is listed with the pattern it shows, \"correspondence\" in the capture's manifest, and the exposure"
+    )]
+    Unrelated,
     /// No pixel looked at can be learned from.
     #[error(
         "too many pixels are saturated in too many photographs; photograph with less exposure, or add shots with less (\"exposure\" in capture.json)"
@@ -158,14 +165,26 @@ impl Recovery {
         if measurements.patterns.len() < FEWEST_PATTERNS {
             return Err(RecoverError::FewPatterns(measurements.patterns.len()));
         }
+        let split = Split::new(measurements);
+        let mean = pooled::mean_function(measurements, &geometry, &split, workers)?;
         let solver = match settings.method {
             Method::Learned => {
-                Solver::Learned(Box::new(Learned::new(measurements, geometry, workers)?))
+                let learned = Learned::new(measurements, geometry, split, &mean, workers)?;
+                Solver::Learned(Box::new(learned))
             }
-            Method::Nnls => Solver::Direct(Direct::least_squares(measurements, geometry, workers)?),
-            Method::Bpdn(basis) => {
-                Solver::Direct(Direct::denoising(measurements, geometry, basis, workers)?)
-            }
+            Method::Nnls => Solver::Direct(Direct::least_squares(
+                measurements,
+                geometry,
+                &split,
+                workers,
+            )?),
+            Method::Bpdn(basis) => Solver::Direct(Direct::denoising(
+                measurements,
+                geometry,
+                basis,
+                &split,
+                workers,
+            )?),
         };
         Ok(Self { geometry, solver })
     }

@@ -1,18 +1,15 @@
 //! A picture's measurements as equations over a few kernels.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::kernels::Kernels;
 use crate::capture::Measurements;
 use crate::recover::FEWEST_PATTERNS;
+use crate::recover::pooled::MEAN_WEIGHT;
+use crate::recover::sample::windows;
 use crate::recover::vector::{dot, vectorised};
-use crate::transport::{CHANNELS, CameraPx, Element, Geometry, TileRect};
-
-/// Weight of the mean over patterns against a centred equation. Noise alone would make it 1; the
-/// dark frame's own noise and light from beyond the window shift a pixel by a constant, which
-/// averaging over patterns does not lower.
-pub(super) const MEAN_WEIGHT: f64 = 0.3;
+use crate::transport::{CHANNELS, CameraPx, Geometry, TileRect};
 
 /// Sub-element position classes along one axis. At two camera pixels an element, neighbours lie in
 /// different halves of it, and so differ in what they see of their window.
@@ -96,6 +93,7 @@ impl Equations {
             members: vec![unknown; pixels * CHANNELS],
             rights: vec![0.0; pixels * CHANNELS * rank],
         };
+        let weights = measurements.weights();
         for (origin, pixels) in windows(geometry, rect) {
             for (plane, channels) in measurements.planes() {
                 let projected = kernels.project(measurements, geometry, origin, plane);
@@ -107,6 +105,7 @@ impl Equations {
                             geometry,
                             projected: &projected,
                             rows,
+                            weights: &weights,
                         };
                         fill.window(&mut equations, &pixels, channels);
                     },
@@ -149,19 +148,6 @@ impl Equations {
     pub fn right(&self, member: usize) -> &[f64] {
         &self.rights[member * self.rank..(member + 1) * self.rank]
     }
-}
-
-/// All pixels of a region by their common window: (number in the region, pixel).
-pub(in crate::recover) fn windows(
-    geometry: &Geometry,
-    rect: TileRect,
-) -> BTreeMap<Element, Vec<(usize, CameraPx)>> {
-    let mut windows: BTreeMap<_, Vec<_>> = BTreeMap::new();
-    for (p, pixel) in rect.pixels().enumerate() {
-        let origin = geometry.window_origin(pixel);
-        windows.entry(origin).or_default().push((p, pixel));
-    }
-    windows
 }
 
 /// The patterns of a window as its kernels see them, uncentred.
@@ -207,11 +193,16 @@ struct Fill<'a> {
     geometry: &'a Geometry,
     projected: &'a Projected,
     rows: &'a [usize],
+    /// What each pattern counts for, `[pattern]`.
+    weights: &'a [f64],
 }
 
-/// Centred kernels' responses for one set of patterns.
+/// Centred kernels' responses for one set of patterns, times what the patterns count for.
 struct Centred<'a> {
     rows: Vec<usize>,
+    /// `[rows]`, and the sum of their squares.
+    weights: Vec<f64>,
+    total: f64,
     /// `[r, rows]`: a kernel's responses in one run.
     columns: Vec<f64>,
     /// `[r]`.
@@ -261,13 +252,17 @@ impl<'a> Fill<'a> {
                 columns[k * count + i] = f64::from(b);
             }
         }
+        let weights: Vec<f64> = rows.iter().map(|&l| self.weights[l]).collect();
+        let total = weights.iter().map(|w| w * w).sum::<f64>();
         let mut mean = Vec::with_capacity(rank);
         for column in columns.chunks_exact_mut(count.max(1)) {
-            let m = column.iter().sum::<f64>() / count as f64;
-            column.iter_mut().for_each(|b| *b -= m);
+            let of = |(b, w): (&f64, &f64)| w * w * b;
+            let m = column.iter().zip(&weights).map(of).sum::<f64>() / total;
+            let column = column.iter_mut().zip(&weights);
+            column.for_each(|(b, w)| *b = w * (*b - m));
             mean.push(m);
         }
-        let weight = count as f64 * MEAN_WEIGHT * MEAN_WEIGHT;
+        let weight = total * MEAN_WEIGHT * MEAN_WEIGHT;
         let mut gram = vec![0.0; rank * rank];
         for i in 0..rank {
             let a = &columns[i * count..(i + 1) * count];
@@ -279,12 +274,15 @@ impl<'a> Fill<'a> {
             }
         }
         equations.grams.push(gram);
-        let profile = rows.iter().map(|&l| self.projected.mean(l)).sum::<f64>();
+        let profile = rows.iter().zip(&weights);
+        let profile: f64 = profile.map(|(&l, w)| w * w * self.projected.mean(l)).sum();
         Centred {
             rows,
+            weights,
+            total,
             columns,
             mean,
-            profile: profile / count.max(1) as f64,
+            profile: profile / total,
             gram: equations.grams.len() - 1,
             projected: self.projected,
         }
@@ -300,16 +298,19 @@ impl<'a> Fill<'a> {
         y: &[f64],
     ) {
         let (rank, count) = (centred.projected.rank, centred.rows.len());
-        let mean = y.iter().sum::<f64>() / count as f64;
-        let weight = count as f64 * MEAN_WEIGHT * MEAN_WEIGHT;
+        let (weights, total) = (&centred.weights, centred.total);
+        let weighted: Vec<f64> = y.iter().zip(weights).map(|(y, w)| w * y).collect();
+        let mean = dot(&weighted, weights) / total;
+        let weight = total * MEAN_WEIGHT * MEAN_WEIGHT;
         let right = &mut equations.rights[member * rank..(member + 1) * rank];
-        // Centred columns sum to zero, so y need not be centred.
+        // Centred columns are orthogonal to the weights, so y need not be centred.
         for (k, column) in centred.columns.chunks_exact(count).enumerate() {
-            right[k] = dot(column, y) + weight * centred.mean[k] * mean;
+            right[k] = dot(column, &weighted) + weight * centred.mean[k] * mean;
         }
-        let variance = centred.rows.iter().zip(y);
-        let variance = variance.map(|(&l, &y)| self.measurements.variance(l, c, y));
-        let deviation = y.iter().map(|y| (y - mean) * (y - mean)).sum::<f64>();
+        let samples = || centred.rows.iter().zip(weights).zip(y);
+        let variance = samples().map(|((&l, w), &y)| w * w * self.measurements.variance(l, c, y));
+        let deviation = samples().map(|((_, w), y)| (w * (y - mean)).powi(2));
+        let deviation = deviation.sum::<f64>();
         let scale = if centred.profile > 0.0 {
             mean / centred.profile
         } else {

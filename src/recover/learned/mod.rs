@@ -13,39 +13,38 @@
 //! decided on patterns held out.
 
 mod context;
-pub(super) mod equations;
+mod equations;
 mod kernels;
 mod nonnegative;
 mod posterior;
 mod prior;
-pub(super) mod start;
+mod start;
 #[cfg(test)]
 mod tests;
 
 use context::{Context, Field, Patch, REACH};
-use equations::{Equations, windows};
+use equations::Equations;
 use kernels::Kernels;
 use nonnegative::NonNegative;
 use prior::{Prior, Threshold};
 
 use super::direct::{Direct, held_out_misses};
+use super::holdout::Split;
+use super::pooled;
+use super::sample::{spread, windows};
 use super::workers::go_on;
-use super::{CommonMode, FEWEST_PATTERNS, RecoverError, Workers};
+use super::{CommonMode, RecoverError, Workers};
 use crate::capture::Measurements;
 use crate::transport::{
     Basis, CHANNELS, Extent, FactoredTile, Geometry, RecoveredTile, TileRect, Window,
 };
 
-/// Every how many patterns one is held out for choosing.
-const HOLD_OUT_EVERY: usize = 10;
 /// Ranks to choose from; each fills vector registers together with the mean function.
 const RANKS: [usize; 3] = [23, 31, 47];
 /// Share of the error on patterns held out by which more kernels may be worse than fewer. Most of
 /// that error is noise, which tells little of kernels that 80 patterns hardly see; but what fewer
 /// kernels cannot show is lost, and the prior keeps what is not seen of more from doing harm.
 const NO_WORSE: f64 = 0.02;
-/// Squares that the prior is learned from, and their side in pixels.
-const SQUARES: (usize, u32) = (128, 4);
 /// Rounds of expectation–maximisation with all the kernels that learning starts with.
 const ROUNDS: usize = 20;
 /// Patches that neighbours' part is learned from, and their side in pixels.
@@ -79,39 +78,16 @@ pub(super) struct Learned {
     prior: Prior,
     context: Option<Context>,
     threshold: Threshold,
+    split: Split,
     /// Least squares, where it is worth trying tile by tile.
     direct: Option<Direct>,
-}
-
-/// Patterns to learn from and patterns to choose by.
-struct Split {
-    all: Vec<usize>,
-    learn: Vec<usize>,
-    held: Vec<usize>,
-}
-
-impl Split {
-    fn new(patterns: usize) -> Self {
-        let all: Vec<usize> = (0..patterns).collect();
-        let (held, learn): (Vec<usize>, Vec<usize>) = all
-            .iter()
-            .partition(|&l| l % HOLD_OUT_EVERY == HOLD_OUT_EVERY / 2);
-        match learn.len() >= FEWEST_PATTERNS && !held.is_empty() {
-            true => Self { all, learn, held },
-            false => Self {
-                learn: all.clone(),
-                all,
-                held: Vec::new(),
-            },
-        }
-    }
 }
 
 impl Learned {
     /// About the most memory that learning takes beside the measurements: the patches, what is said
     /// of them and the sums of the neighbours' regressions, or before that the pooled equations.
     pub fn preparation_bytes(window: Window) -> usize {
-        let pooled = (start::PARTS + 2) * window.area() * window.area() * size_of::<f64>();
+        let pooled = (pooled::PARTS + 2) * window.area() * window.area() * size_of::<f64>();
         pooled.max(2 * PATCH_BYTES)
     }
 
@@ -123,21 +99,18 @@ impl Learned {
         pixels * CHANNELS * rank * rank * size_of::<f64>()
     }
 
-    /// Learns from all of `measurements`.
+    /// Learns from all of `measurements`, whose patterns are `split`; starts from their
+    /// [mean function](pooled::mean_function).
     pub fn new(
         measurements: &Measurements,
         geometry: Geometry,
+        split: Split,
+        mean_function: &[f64],
         workers: &impl Workers,
     ) -> Result<Self, RecoverError> {
         let area = geometry.window.area();
-        let split = Split::new(measurements.patterns.len());
-        let squares = start::spread(measurements, SQUARES.1, SQUARES.0);
-        let pooled = start::pooled_mean(measurements, &geometry, &split.learn, &squares, workers)
-            .ok_or_else(|| match windows_seen(&geometry) {
-            true => start::dark_or_overexposed(measurements, &squares),
-            false => RecoverError::NoLight,
-        })?;
-        let mean = start::blur(&pooled, geometry.window.side() as usize);
+        let squares = pooled::squares(measurements);
+        let mean = start::blur(mean_function, geometry.window.side() as usize);
         let (functions, mut prior) =
             start::first_prior(&mean, geometry.window.side() as usize, workers);
         let kernels = Kernels::new(&functions, &mean);
@@ -171,9 +144,10 @@ impl Learned {
                 prior,
                 context: None,
                 threshold,
+                split: split.clone(),
                 direct: None,
             };
-            let error = learned.held_out_error(measurements, &split, &squares, workers);
+            let error = learned.held_out_error(measurements, &squares, workers);
             let least = chosen.as_ref().map_or(error, |(least, _)| least.min(error));
             if error <= (1.0 + NO_WORSE) * least {
                 chosen = Some((least, learned));
@@ -186,15 +160,15 @@ impl Learned {
         let inner = learned.patches(measurements, &split.all, workers);
         learned.learn_context(measurements, &split.learn, &inner, workers);
         if !split.held.is_empty() {
-            let with = learned.held_out_error(measurements, &split, &inner, workers);
+            let with = learned.held_out_error(measurements, &inner, workers);
             let context = learned.context.take();
-            let without = learned.held_out_error(measurements, &split, &inner, workers);
+            let without = learned.held_out_error(measurements, &inner, workers);
             let helps = context.is_some() && with < without;
             if helps {
                 learned.context = context;
             }
             go_on(workers)?;
-            learned.direct = learned.rival(measurements, &split, &inner, workers)?;
+            learned.direct = learned.rival(measurements, &inner, workers)?;
             // All is chosen: every pattern may teach.
             go_on(workers)?;
             learned.learn_context(measurements, &split.all, &inner, workers);
@@ -234,15 +208,14 @@ impl Learned {
 
     /// Recovers one tile.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
-        let split = Split::new(measurements.patterns.len());
-        let tile = self.factored(measurements, &split.all, rect);
+        let tile = self.factored(measurements, &self.split.all, rect);
         let Some(direct) = &self.direct else {
             return RecoveredTile::Factored(tile);
         };
         // The prior has been taught by the patterns held out as well, but has few numbers to fit to
         // them; what a pixel's own measurements say comes from the others alone.
         let share = self
-            .compare(measurements, direct, &split, part(rect, JUDGED))
+            .compare(measurements, direct, part(rect, JUDGED))
             .best_share(LEAST_GAIN);
         if share == 0.0 {
             return RecoveredTile::Factored(tile);
@@ -277,7 +250,7 @@ impl Learned {
         rows: &[usize],
         workers: &impl Workers,
     ) -> Vec<TileRect> {
-        let patches = start::spread(measurements, PATCHES.1, PATCHES.0);
+        let patches = spread(measurements, PATCHES.1, PATCHES.0);
         let grams = workers.map(patches.len(), |i| {
             let rect = grown(measurements, patches[i], REACH as u32);
             Equations::count_grams(measurements, &self.geometry, rows, rect)
@@ -288,7 +261,7 @@ impl Learned {
             true => patches,
             false => {
                 let fit = patches.len() * PATCH_BYTES / bytes;
-                start::spread(measurements, PATCHES.1, fit.max(FEWEST_PATCHES))
+                spread(measurements, PATCHES.1, fit.max(FEWEST_PATCHES))
             }
         }
     }
@@ -361,12 +334,11 @@ impl Learned {
     fn held_out_error(
         &self,
         measurements: &Measurements,
-        split: &Split,
         rects: &[TileRect],
         workers: &impl Workers,
     ) -> f64 {
         let errors = workers.map(rects.len(), |i| {
-            let misses = self.misses(measurements, split, rects[i]);
+            let misses = self.misses(measurements, rects[i]);
             let seen = misses.iter().filter(|miss| miss.is_finite());
             seen.map(|miss| miss * miss).sum::<f64>()
         });
@@ -375,9 +347,9 @@ impl Learned {
 
     /// What is missed, `[pixel, held, channel]`, in predicting the patterns held out from the others;
     /// NaN where saturated.
-    fn misses(&self, measurements: &Measurements, split: &Split, rect: TileRect) -> Vec<f64> {
-        let coefficients = self.solve(measurements, &split.learn, rect);
-        let (rank, held) = (self.rank(), split.held.len());
+    fn misses(&self, measurements: &Measurements, rect: TileRect) -> Vec<f64> {
+        let coefficients = self.solve(measurements, &self.split.learn, rect);
+        let (rank, held) = (self.rank(), self.split.held.len());
         let mut misses = vec![f64::NAN; rect.extent.area() * held * CHANNELS];
         for (origin, pixels) in windows(&self.geometry, rect) {
             for (plane, channels) in measurements.planes() {
@@ -386,7 +358,7 @@ impl Learned {
                     .project(measurements, &self.geometry, origin, plane);
                 for &(p, pixel) in &pixels {
                     let coefficients = &coefficients[p * rank..(p + 1) * rank];
-                    for (i, &l) in split.held.iter().enumerate() {
+                    for (i, &l) in self.split.held.iter().enumerate() {
                         for c in channels.clone() {
                             let row = projected.row(l).iter().zip(coefficients);
                             let y: f64 = row.map(|(b, z)| f64::from(b * z[c])).sum();
@@ -401,18 +373,12 @@ impl Learned {
     }
 
     /// The learned prior and least squares on the patterns held out, on one tile.
-    fn compare(
-        &self,
-        measurements: &Measurements,
-        direct: &Direct,
-        split: &Split,
-        rect: TileRect,
-    ) -> Comparison {
-        let ours = self.factored(measurements, &split.learn, rect);
+    fn compare(&self, measurements: &Measurements, direct: &Direct, rect: TileRect) -> Comparison {
+        let ours = self.factored(measurements, &self.split.learn, rect);
         let ours = ours.expand(&self.geometry, &self.basis);
-        let ours = held_out_misses(&self.geometry, measurements, &split.held, &ours);
-        let theirs = direct.tile_from(measurements, &split.learn, rect);
-        let theirs = held_out_misses(&self.geometry, measurements, &split.held, &theirs);
+        let ours = held_out_misses(&self.geometry, measurements, &self.split.held, &ours);
+        let theirs = direct.tile_from(measurements, &self.split.learn, rect);
+        let theirs = held_out_misses(&self.geometry, measurements, &self.split.held, &theirs);
         let mut comparison = Comparison::default();
         for (a, b) in ours.into_iter().zip(theirs) {
             if a.is_finite() && b.is_finite() {
@@ -428,13 +394,12 @@ impl Learned {
     fn rival(
         &self,
         measurements: &Measurements,
-        split: &Split,
         rects: &[TileRect],
         workers: &impl Workers,
     ) -> Result<Option<Direct>, RecoverError> {
-        let direct = Direct::least_squares(measurements, self.geometry, workers)?;
+        let direct = Direct::least_squares(measurements, self.geometry, &self.split, workers)?;
         let parts = workers.map(rects.len(), |i| {
-            self.compare(measurements, &direct, split, part(rects[i], GLANCED))
+            self.compare(measurements, &direct, part(rects[i], GLANCED))
         });
         let mut total = Comparison::default();
         for part in parts {
@@ -473,12 +438,6 @@ impl Comparison {
             false => 0.0,
         }
     }
-}
-
-/// Whether any window reaches the display.
-fn windows_seen(geometry: &Geometry) -> bool {
-    let mut pixels = geometry.tiles().flat_map(TileRect::pixels);
-    pixels.any(|pixel| geometry.reaches_display(geometry.window_origin(pixel)))
 }
 
 /// At most `side²` pixels from the middle of a rectangle.

@@ -157,12 +157,24 @@ fn snr(tiles: &[TransportFunctions], tau: &[[f64; CHANNELS]]) -> f64 {
     10.0 * (signal / error).log10()
 }
 
+fn learn(measurements: &Measurements, workers: &impl Workers) -> Result<Learned, RecoverError> {
+    let split = Split::new(measurements);
+    let mean = pooled::mean_function(measurements, &geometry(), &split, workers)?;
+    Learned::new(measurements, geometry(), split, &mean, workers)
+}
+
 #[test]
 fn few_patterns_suffice_where_functions_are_alike() {
     let geometry = geometry();
     let (measurements, tau) = measurements(20, 7);
-    let learned = Learned::new(&measurements, geometry, &OneThread).unwrap();
-    let direct = Direct::least_squares(&measurements, geometry, &OneThread).unwrap();
+    let learned = learn(&measurements, &OneThread).unwrap();
+    let direct = Direct::least_squares(
+        &measurements,
+        geometry,
+        &Split::new(&measurements),
+        &OneThread,
+    )
+    .unwrap();
     let ours: Vec<_> = geometry
         .tiles()
         .map(|rect| {
@@ -180,11 +192,45 @@ fn few_patterns_suffice_where_functions_are_alike() {
 }
 
 #[test]
+fn short_exposures_do_not_drown_long_ones() {
+    let (mut measurements, tau) = measurements(32, 7);
+    let mut random = random(5);
+    let mut normal = || (0..12).map(|_| random()).sum::<f64>() - 6.0;
+    measurements.noise.gain = [2e-5; CHANNELS];
+    for (l, picture) in measurements.pictures.iter_mut().enumerate() {
+        let exposure: f64 = if l % 2 == 0 { 1.0 } else { 1.0 / 16.0 };
+        measurements.full_scale[l] = exposure.recip() as f32;
+        for y in picture.iter_mut().flatten() {
+            *y += (2e-5 * f64::from(*y).max(0.0) / exposure).sqrt() as f32 * normal() as f32;
+        }
+    }
+    let geometry = geometry();
+    let recovered = |measurements: &Measurements| {
+        let learned = learn(measurements, &OneThread).unwrap();
+        let split = Split::new(measurements);
+        let direct = Direct::least_squares(measurements, geometry, &split, &OneThread).unwrap();
+        let learned = geometry.tiles().map(|rect| {
+            let tile = learned.tile(measurements, rect);
+            tile.functions(&geometry, Some(learned.basis()))
+        });
+        let direct = geometry.tiles().map(|rect| direct.tile(measurements, rect));
+        [learned.collect::<Vec<_>>(), direct.collect()].map(|tiles| snr(&tiles, &tau))
+    };
+    let known = recovered(&measurements);
+    measurements.full_scale.fill(1.0);
+    let unknown = recovered(&measurements);
+    for (i, gain) in [1.0, 0.3].into_iter().enumerate() {
+        let (known, unknown) = (known[i], unknown[i]);
+        assert!(known > unknown + gain, "{known} dB against {unknown} dB");
+    }
+}
+
+#[test]
 fn order_and_threads_leave_every_bit_as_it_is() {
     let geometry = geometry();
     let (measurements, _) = measurements(12, 3);
-    let one = Learned::new(&measurements, geometry, &OneThread).unwrap();
-    let other = Learned::new(&measurements, geometry, &Backwards).unwrap();
+    let one = learn(&measurements, &OneThread).unwrap();
+    let other = learn(&measurements, &Backwards).unwrap();
     assert_eq!(one.basis(), other.basis());
     let rect = geometry.tile(1);
     match (
@@ -207,7 +253,7 @@ fn pixels_that_all_saturate_somewhere_teach_all_the_same() {
             measurements.pictures[i % 20][n] = [f32::NAN; CHANNELS];
         }
     }
-    let learned = Learned::new(&measurements, geometry, &OneThread).unwrap();
+    let learned = learn(&measurements, &OneThread).unwrap();
     let tiles = geometry.tiles().map(|rect| {
         let tile = learned.tile(&measurements, rect);
         tile.functions(&geometry, Some(learned.basis()))
@@ -222,7 +268,7 @@ fn whiteness_is_an_error_that_says_so() {
     for picture in &mut measurements.pictures {
         picture.fill([f32::NAN; CHANNELS]);
     }
-    let error = Learned::new(&measurements, geometry(), &OneThread).unwrap_err();
+    let error = learn(&measurements, &OneThread).unwrap_err();
     assert!(matches!(error, RecoverError::Overexposed), "{error}");
     let error = crate::recover::Band::estimate(&measurements, &OneThread).unwrap_err();
     assert!(matches!(error, RecoverError::Overexposed), "{error}");
@@ -234,8 +280,23 @@ fn darkness_is_an_error_that_says_so() {
     for picture in &mut measurements.pictures {
         picture.fill([0.0; CHANNELS]);
     }
-    let error = Learned::new(&measurements, geometry(), &OneThread).unwrap_err();
+    let error = learn(&measurements, &OneThread).unwrap_err();
     assert!(matches!(error, RecoverError::Dark), "{error}");
+}
+
+#[test]
+fn photographs_that_do_not_go_with_their_patterns_are_an_error_that_says_so() {
+    let (mut measurements, _) = measurements(30, 1);
+    measurements.pictures.rotate_left(1);
+    let error = learn(&measurements, &OneThread).unwrap_err();
+    assert!(matches!(error, RecoverError::Unrelated), "{error}");
+    // Nothing but the noise of the sensor.
+    let mut random = random(3);
+    for sample in measurements.pictures.iter_mut().flatten().flatten() {
+        *sample = 1e-3 * (random() - 0.499) as f32;
+    }
+    let error = learn(&measurements, &OneThread).unwrap_err();
+    assert!(matches!(error, RecoverError::Unrelated), "{error}");
 }
 
 /// Kernels that are single elements, so that the posterior can be worked out by hand.

@@ -1,0 +1,72 @@
+//! Patterns held out, by which all is chosen that measurements themselves must tell.
+
+use std::collections::HashMap;
+
+use super::FEWEST_PATTERNS;
+use crate::capture::{Measurements, Pattern};
+use crate::transport::CHANNELS;
+
+/// Every how many patterns one is held out.
+const EVERY: usize = 10;
+
+/// Patterns to learn from and patterns to choose by.
+#[derive(Clone, Debug)]
+pub(super) struct Split {
+    /// All patterns.
+    pub all: Vec<usize>,
+    /// All but those held out.
+    pub learn: Vec<usize>,
+    /// Patterns held out; none where that would leave too few.
+    pub held: Vec<usize>,
+}
+
+impl Split {
+    /// Holds out every tenth of the patterns that differ. Shots of one pattern, by several exposures,
+    /// stay together: what was learned from cannot tell what was learned well.
+    pub fn new(measurements: &Measurements) -> Self {
+        let all: Vec<usize> = (0..measurements.patterns.len()).collect();
+        let numbers = numbers(&measurements.patterns);
+        let (held, learn): (Vec<usize>, Vec<usize>) =
+            all.iter().partition(|&&l| numbers[l] % EVERY == EVERY / 2);
+        match learn.len() >= FEWEST_PATTERNS && !held.is_empty() {
+            true => Self { all, learn, held },
+            false => Self {
+                learn: all.clone(),
+                all,
+                held: Vec::new(),
+            },
+        }
+    }
+}
+
+/// Numbers patterns in the order in which they come up; the same ones alike.
+fn numbers(patterns: &[Pattern]) -> Vec<usize> {
+    let mut known = HashMap::new();
+    let number = |pattern: &Pattern| {
+        let planes = (0..CHANNELS).map(|c| pattern.plane(c));
+        let bits: Vec<u32> = planes.flatten().map(|p| p.to_bits()).collect();
+        let next = known.len();
+        *known.entry(bits).or_insert(next)
+    };
+    patterns.iter().map(number).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shots_of_one_pattern_have_one_number() {
+        let grey = |p: f32| Pattern::Grey(vec![p, 0.5]);
+        let rgb = |p: f32| Pattern::Rgb([(); CHANNELS].map(|()| vec![p, 0.5]));
+        let patterns = [
+            grey(0.1),
+            rgb(0.1),
+            grey(0.3),
+            grey(0.1),
+            grey(0.4),
+            rgb(0.3),
+        ];
+        assert_eq!(numbers(&patterns), [0, 0, 1, 0, 2, 1]);
+    }
+}
