@@ -181,15 +181,15 @@ impl Interruptible {
     }
 }
 
-/// Waits until the checkpoint has grown beyond what it began with.
+/// Waits until the checkpoint holds more than its head and what was learned.
 fn wait_for_a_tile(child: &mut Child, checkpoint: &Path) {
-    let mut begun_with = None;
+    let (mut last, mut grown) = (0, 0);
     loop {
         let bytes = fs::metadata(checkpoint).map_or(0, |m| m.len());
-        match begun_with {
-            None if bytes > 0 => begun_with = Some(bytes),
-            Some(head) if bytes > head => return,
-            _ => {}
+        grown += u32::from(bytes > last);
+        last = bytes;
+        if grown == 3 {
+            return;
         }
         assert!(child.try_wait().unwrap().is_none(), "ended too soon");
         std::thread::sleep(Duration::from_millis(1));
@@ -266,6 +266,30 @@ fn a_killed_recovery_goes_on_too_and_what_does_not_fit_is_named() {
         .unwrap();
     refuses(&[], &["photos/0003.png in the capture has changed"]);
     fs::write(&photo, sound).unwrap();
+
+    // As if another build had begun it, and learned something else.
+    let head = 16 + u32::from_le_bytes(kept[8..12].try_into().unwrap()) as usize;
+    assert_eq!(kept[head..head + 4], u32::MAX.to_le_bytes());
+    let length = u32::from_le_bytes(kept[head + 4..head + 8].try_into().unwrap()) as usize;
+    let mut other = kept.clone();
+    other[head + 12 + 20] ^= 1;
+    let crc = crc32c::crc32c(&other[head..head + 8]);
+    let crc = crc32c::crc32c_append(crc, &other[head + 12..head + 12 + length]);
+    other[head + 8..head + 12].copy_from_slice(&crc.to_le_bytes());
+    // And as if the disk had lost a bit of what was asked for.
+    let mut damaged = kept.clone();
+    damaged[20] ^= 1;
+    for (bytes, words) in [(other, "another build"), (damaged, "is damaged; delete it")] {
+        fs::write(&checkpoint, &bytes).unwrap();
+        for more in [&["--resume"][..], &[]] {
+            let output = recovery.recover("killed.ltm", more).output().unwrap();
+            assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+            if words.contains("damaged") || !more.is_empty() {
+                assert!(said(&output).contains(words), "{}", said(&output));
+            }
+            assert!(fs::read(&checkpoint).unwrap() == bytes);
+        }
+    }
 
     // As if the process had died while it wrote.
     let mut torn = kept.clone();

@@ -19,7 +19,7 @@ use super::process::{Interrupt, Interrupted};
 use super::{Usage, files, process, report};
 use crate::capture::{CaptureFolder, DarkFrame, Measurements, Noise, Rows, Shot};
 use crate::format::{self, EncodedTile, Metadata};
-use crate::recover::{self, Band, Method, RecoverError, Recovery, Settings, SparsityBasis};
+use crate::recover::{self, Band, Method, Reach, RecoverError, Recovery, Settings, SparsityBasis};
 use crate::transport::{Basis, CHANNELS, Window};
 
 /// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
@@ -207,6 +207,7 @@ fn recover(
     interrupt: &Interrupt,
 ) -> Result<Report> {
     let dark = folder.read_dark()?;
+    folder.flood(&dark)?; // `evaluate` will want it: better known now that it is not there.
     let gray_code_rows = plan.gray_code_rows(folder.manifest().graycode.len());
     let mut measurements = no_rows(folder, &dark, shots, &gray_code_rows)?;
     let mut photographs = Photographs::open(folder, &dark, shots)?;
@@ -239,12 +240,24 @@ fn recover(
         }
         WindowChoice::Fixed(_) => None,
     };
-    if let Some(Band { window, leak: None }) = band {
-        eprintln!(
+    match band {
+        Some(Band {
+            window,
+            reach: Reach::Beyond,
+        }) => eprintln!(
             "warning: the band is at least as wide as the window of {0}x{0} light elements that was \
              looked at; a wider one can be asked for with --window",
             window.side()
-        );
+        ),
+        Some(Band {
+            window,
+            reach: Reach::Unclear,
+        }) => eprintln!(
+            "warning: these photographs do not tell how wide the band is; {0}x{0} light elements are \
+             taken for it, and another number can be given with --window",
+            window.side()
+        ),
+        _ => {}
     }
     let settings = Settings {
         method: args.method(),
@@ -312,7 +325,10 @@ fn recover(
         method: settings.method,
         basis: settings.method.basis(),
         window: settings.window.side(),
-        leak: band.and_then(|band| band.leak),
+        leak: band.and_then(|band| match band.reach {
+            Reach::Within { leak } => Some(leak),
+            Reach::Beyond | Reach::Unclear => None,
+        }),
         rank: basis.map(Basis::rank),
         patterns: shots.len(),
         common_mode: recovery.common_mode(),

@@ -27,6 +27,8 @@ const COMPARISON_CAMERA: u32 = 64;
 const COMPARISON_LIGHT: u32 = 32;
 /// Patterns that pictures are relit from: the paper's number.
 const RELIT_PATTERNS: usize = 80;
+/// Camera pixels that slow methods are judged on unless it is said.
+const PIXELS: usize = 8192;
 const ELECTRONS: f64 = 40_000.0;
 const SEED: u64 = 2014;
 
@@ -47,7 +49,7 @@ pub struct StudyArgs {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Camera pixels that slow methods are judged on; fewer are quicker and less exact
-    #[arg(long, value_name = "N", default_value_t = 8192,
+    #[arg(long, value_name = "N", default_value_t = PIXELS as u32,
           value_parser = clap::value_parser!(u32).range(1..))]
     pixels: u32,
 }
@@ -80,7 +82,11 @@ pub fn run(args: &StudyArgs) -> Result<()> {
         for (subject, name) in subjects.iter().zip(&names) {
             let pixels = args.pixels as usize;
             let begun = Instant::now();
-            text += &format!("\nFrom `ltm-export study {name} -o DIR`:\n");
+            let option = match pixels {
+                PIXELS => String::new(),
+                other => format!(" --pixels {other}"),
+            };
+            text += &format!("\nFrom `ltm-export study {name} -o DIR{option}`:\n");
             for section in study_one(subject, name, pixels, &progress)? {
                 for (path, bytes) in &section.files {
                     write(&root.join(path), bytes)?;

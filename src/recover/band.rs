@@ -1,9 +1,10 @@
 //! How wide the band is: what share of a pixel's light reaches it from how far off.
 //!
-//! The mean light transport function, a pixel's brightness taken out, is fitted to many pixels'
-//! measurements at once by plain least squares: single elements near the centre, whole rings farther
-//! out. No sign is imposed, so that rings beyond the band come out near zero, on either side of it,
-//! rather than gathering noise.
+//! What the rings of light elements around a pixel send it, as a share of all, is fitted to many pixels'
+//! measurements at once by plain least squares. What its own few elements send differs from pixel to
+//! pixel, and is left out: the equations are projected onto what does not depend on it. No sign is
+//! imposed, so that rings beyond the band come out near zero, on either side of it, rather than
+//! gathering noise.
 
 use super::dense;
 use super::pooled::{DEVIATION, dark_or_overexposed};
@@ -16,8 +17,13 @@ use crate::transport::{CameraPx, Element, Geometry, Window};
 
 /// Side of the window that the band is looked for in.
 const PROBE: u32 = 31;
-/// Side of the window's middle, where elements count one by one.
-const MIDDLE: u32 = 7;
+/// Side of the smallest window.
+const LEAST: u32 = 7;
+/// Side where nothing can be told.
+const USUAL: u32 = 15;
+/// Sides of what counts as a pixel's own elements; the largest whose number is at most three quarters of that
+/// of the patterns.
+const OWN: [u32; 4] = [7, 5, 3, 1];
 /// Largest share of a pixel's light left outside the window chosen.
 const LEAK: f64 = 0.01;
 /// Rings added: the mean function is narrower than the widest ones.
@@ -27,14 +33,27 @@ const SQUARES: (usize, u32) = (1024, 4);
 /// Parts that the squares are divided into; fixed, so that sums do not depend on threads.
 const PARTS: usize = 8;
 
-/// A window, and the light that it leaves out.
+/// A window to recover with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
-    /// The smallest window that holds nearly all of the band.
+    /// The smallest window that holds nearly all of the band, as far as that is known.
     pub window: Window,
-    /// Estimated share of a pixel's light that comes from outside it; `None` where the window is as
-    /// wide as was looked, so that nothing is known of what lies outside.
-    pub leak: Option<f64>,
+    /// What is known of the light from outside it.
+    pub reach: Reach,
+}
+
+/// How far the band reaches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reach {
+    /// Not much farther than the window.
+    Within {
+        /// Estimated share of a pixel's light that comes from outside the window.
+        leak: f64,
+    },
+    /// As far as was looked, or farther.
+    Beyond,
+    /// Too few measurements to tell.
+    Unclear,
 }
 
 impl Band {
@@ -62,105 +81,149 @@ impl Band {
         if !reaches_display(&geometry) {
             return Err(RecoverError::NoLight);
         }
-        let groups = Groups::new(probe);
-        let squares = spread(measurements, SQUARES.1, SQUARES.0);
-        // Brightness is known only once the function is, roughly.
-        let mut profile = vec![1.0 / groups.count as f64; groups.count];
-        for _ in 0..3 {
-            go_on(workers)?;
-            let parts = workers.map(PARTS, |part| {
-                let mut sums = Sums::new(groups.count);
-                for square in squares.iter().skip(part).step_by(PARTS) {
-                    for (origin, pixels) in windows(&geometry, *square) {
-                        vectorised(
-                            #[inline(always)]
-                            || {
-                                sums.add(
-                                    measurements,
-                                    &geometry,
-                                    (&groups, &profile),
-                                    (origin, &pixels),
-                                )
-                            },
-                        );
-                    }
+        let patterns = measurements.patterns.len();
+        let rings = Rings::new(probe, patterns);
+        let mut squares = spread(measurements, SQUARES.1, SQUARES.0);
+        // Each part a piece of the picture: what lies beside each other errs alike.
+        squares.sort_by_key(|square| (square.y, square.x));
+        go_on(workers)?;
+        let parts = workers.map(PARTS, |part| {
+            let mut sums = Sums::new(rings.sizes.len());
+            let share = |part: usize| part * squares.len() / PARTS;
+            for square in &squares[share(part)..share(part + 1)] {
+                for (origin, pixels) in windows(&geometry, *square) {
+                    vectorised(
+                        #[inline(always)]
+                        || sums.add(measurements, &geometry, &rings, (origin, &pixels)),
+                    );
                 }
-                sums
-            });
-            let mut total = Sums::new(groups.count);
-            parts.iter().for_each(|part| total.merge(part));
-            profile = total
-                .solve()
-                .ok_or_else(|| dark_or_overexposed(measurements, &squares))?;
-        }
-        groups.band(&profile, probe)
+            }
+            sums
+        });
+        // From all parts but one, and from all.
+        let leaks = |but: usize| {
+            let mut total = Sums::new(rings.sizes.len());
+            let parts = parts.iter().enumerate().filter(|(part, _)| *part != but);
+            parts.for_each(|(_, part)| total.merge(part));
+            let flux = total.solve();
+            flux.map(|flux| rings.leaks(&flux, probe))
+        };
+        let all = leaks(PARTS).ok_or_else(|| dark_or_overexposed(measurements, &squares))?;
+        let without: Option<Vec<Vec<f64>>> = (0..PARTS).map(leaks).collect();
+        let errors = match without {
+            Some(without) => jackknife(&without, &all),
+            None => vec![f64::INFINITY; all.len()],
+        };
+        band(&all, &errors, probe)
     }
 }
 
-/// Elements of the probing window that are taken together.
-struct Groups {
-    /// Group of each slot.
-    of: Vec<usize>,
-    /// Elements in each group.
+/// Elements of the probing window by their distance from its middle.
+struct Rings {
+    /// Side of what is a pixel's own.
+    own: u32,
+    /// Of each slot: its place among the pixel's own, or the ring it is in.
+    of: Vec<Place>,
+    /// Elements in each ring, from the inside out.
     sizes: Vec<f64>,
-    count: usize,
 }
 
-impl Groups {
-    fn new(probe: u32) -> Self {
-        let (half, middle) = (probe / 2, MIDDLE.min(probe));
-        let first = (middle * middle) as usize;
-        let ring = |s: u32| (s / probe).abs_diff(half).max((s % probe).abs_diff(half));
+#[derive(Clone, Copy, Debug)]
+enum Place {
+    Own(usize),
+    Ring(usize),
+}
+
+impl Rings {
+    fn new(probe: u32, patterns: usize) -> Self {
+        let fits = |own: &u32| *own < probe && 4 * (own * own) as usize <= 3 * patterns;
+        let own = OWN.into_iter().find(fits).unwrap_or(1);
+        let half = probe / 2;
+        let distance = |s: u32| (s / probe).abs_diff(half).max((s % probe).abs_diff(half));
+        let mut sizes = vec![0.0; (half - own / 2) as usize];
         let mut next = 0;
-        let of: Vec<usize> = (0..probe * probe)
-            .map(|s| match ring(s) {
-                r if r <= middle / 2 => {
-                    next += 1;
-                    next - 1
-                }
-                r => first + (r - middle / 2 - 1) as usize,
-            })
-            .collect();
-        let count = first + (half - middle / 2) as usize;
-        let mut sizes = vec![0.0; count];
-        of.iter().for_each(|&g| sizes[g] += 1.0);
-        Self { of, sizes, count }
+        let place = |s: u32| match distance(s).checked_sub(own / 2 + 1) {
+            Some(ring) => {
+                sizes[ring as usize] += 1.0;
+                Place::Ring(ring as usize)
+            }
+            None => {
+                next += 1;
+                Place::Own(next - 1)
+            }
+        };
+        let of = (0..probe * probe).map(place).collect();
+        Self { own, of, sizes }
     }
 
-    /// The band of the flux in each group.
-    fn band(&self, flux: &[f64], probe: u32) -> Result<Band, RecoverError> {
-        let total: f64 = flux.iter().sum();
-        let rings = &flux[(MIDDLE * MIDDLE).min(probe * probe) as usize..];
-        // Light from outside the middle and the first rings, for every number of rings.
-        let mut leaks = vec![0.0; rings.len() + 1];
-        for (i, ring) in rings.iter().enumerate().rev() {
-            leaks[i] = leaks[i + 1] + ring / total;
-        }
-        // Estimates are good to some half per cent: one that is low by chance is not enough.
-        let low = |leak: &f64| leak.abs() <= LEAK;
-        let held = leaks.windows(2).position(|pair| pair.iter().all(low));
-        let inside = (held.unwrap_or(rings.len()) + MARGIN).min(rings.len());
-        Ok(Band {
-            window: Window::new(MIDDLE.min(probe) + 2 * inside as u32)?,
-            leak: (inside < rings.len()).then(|| leaks[inside].max(0.0)),
-        })
+    /// Light from outside the least window and the first rings, for every number of rings but all,
+    /// of the flux in each ring.
+    fn leaks(&self, flux: &[f64], probe: u32) -> Vec<f64> {
+        let rings = &flux[((LEAST.min(probe) - self.own) / 2) as usize..];
+        let mut outside = 0.0;
+        let leaks = rings.iter().rev().map(|ring| {
+            outside += ring;
+            outside
+        });
+        let mut leaks: Vec<f64> = leaks.collect();
+        leaks.reverse();
+        leaks
     }
 }
 
-/// Normal equations of the groups' flux.
+/// The band, where windows from the least on leave out `leaks`, give or take `errors`.
+fn band(leaks: &[f64], errors: &[f64], probe: u32) -> Result<Band, RecoverError> {
+    let rings = leaks.len();
+    // One that is low by chance is not enough, and beyond the last there is none.
+    let low = |i: usize| leaks.get(i).is_none_or(|leak| leak.abs() <= LEAK);
+    let held = (0..rings).find(|&i| low(i) && low(i + 1));
+    let side = |inside: usize| Window::new(LEAST.min(probe) + 2 * inside as u32);
+    if let Some(inside) = held.map(|held| held + MARGIN).filter(|&i| i < rings) {
+        return Ok(Band {
+            window: side(inside)?,
+            reach: Reach::Within {
+                leak: leaks[inside].max(0.0),
+            },
+        });
+    }
+    // The last may be low: the band then ends where the looking does.
+    let mut but_last = leaks.iter().zip(errors).take(rings.saturating_sub(1));
+    match but_last.all(|(leak, error)| *leak > LEAK + 2.0 * error) {
+        true => Ok(Band {
+            window: side(rings)?,
+            reach: Reach::Beyond,
+        }),
+        false => Ok(Band {
+            window: Window::new(USUAL.min(probe))?,
+            reach: Reach::Unclear,
+        }),
+    }
+}
+
+/// Standard errors of `all`, from what they are `without` each part.
+fn jackknife(without: &[Vec<f64>], all: &[f64]) -> Vec<f64> {
+    let parts = without.len() as f64;
+    let error = |(i, all): (usize, &f64)| {
+        let squares = without.iter().map(|leaks| (leaks[i] - all).powi(2));
+        (squares.sum::<f64>() * (parts - 1.0) / parts).sqrt()
+    };
+    all.iter().enumerate().map(error).collect()
+}
+
+/// Normal equations of the rings' flux.
 struct Sums {
-    count: usize,
-    /// `[group, group]`, upper triangle.
+    rings: usize,
+    /// `[ring, ring]`.
     gram: Vec<f64>,
     right: Vec<f64>,
 }
 
 impl Sums {
-    fn new(count: usize) -> Self {
+    fn new(rings: usize) -> Self {
         Self {
-            count,
-            gram: vec![0.0; count * count],
-            right: vec![0.0; count],
+            rings,
+            gram: vec![0.0; rings * rings],
+            right: vec![0.0; rings],
         }
     }
 
@@ -174,38 +237,38 @@ impl Sums {
         &mut self,
         measurements: &Measurements,
         geometry: &Geometry,
-        (groups, flux): (&Groups, &[f64]),
+        rings: &Rings,
         (origin, pixels): (Element, &[(usize, CameraPx)]),
     ) {
         let (light, window) = (geometry.light, geometry.window);
-        let elements: Vec<usize> = (0..window.area())
-            .map_while(|slot| window.element(origin, slot).index_in(light))
+        let elements: Vec<(usize, Place)> = (0..window.area())
+            .filter_map(|slot| {
+                let m = window.element(origin, slot).index_in(light)?;
+                Some((m, rings.of[slot]))
+            })
             .collect();
-        if elements.len() < window.area() {
-            return; // Of what lies off the display nothing can be said.
+        let own = |(_, place): &&(usize, Place)| matches!(place, Place::Own(_));
+        if elements.iter().filter(own).count() < (rings.own * rings.own) as usize {
+            return; // How bright it is cannot be told.
         }
         let all: Vec<usize> = (0..measurements.patterns.len()).collect();
         for (plane, channels) in measurements.planes() {
             let rows = unsaturated(measurements, &all, pixels, channels.clone());
             let patterns = rows.len();
-            let mut columns = vec![0.0; groups.count * patterns];
+            let mut own = vec![0.0; (rings.own * rings.own) as usize * patterns];
+            let mut columns = vec![0.0; self.rings * patterns];
             for (i, &l) in rows.iter().enumerate() {
                 let pattern = measurements.patterns[l].plane(plane);
-                for (&m, &g) in elements.iter().zip(&groups.of) {
-                    columns[g * patterns + i] += f64::from(pattern[m]);
+                for &(m, place) in &elements {
+                    let p = f64::from(pattern[m]);
+                    match place {
+                        Place::Own(k) => own[k * patterns + i] += p,
+                        Place::Ring(r) => columns[r * patterns + i] += p / rings.sizes[r],
+                    }
                 }
             }
-            let mut level = 0.0;
-            for ((column, size), flux) in columns
-                .chunks_exact_mut(patterns)
-                .zip(&groups.sizes)
-                .zip(flux)
-            {
-                let mean = column.iter().sum::<f64>() / patterns as f64;
-                column.iter_mut().for_each(|p| *p = (*p - mean) / size);
-                level += flux * mean / size;
-            }
-            if level <= 0.0 {
+            let level = own.iter().sum::<f64>() / own.len() as f64;
+            if level <= 0.0 || !leave_out(&mut own, &mut columns, patterns) {
                 continue;
             }
             let mut seen = vec![0.0; patterns];
@@ -226,25 +289,58 @@ impl Sums {
                     }
                 }
             }
-            for i in 0..groups.count {
+            for i in 0..self.rings {
                 let a = &columns[i * patterns..(i + 1) * patterns];
                 self.right[i] += dot(a, &seen);
-                for j in i..groups.count {
+                for j in 0..self.rings {
                     let b = &columns[j * patterns..(j + 1) * patterns];
-                    self.gram[i * groups.count + j] += energy * dot(a, b);
+                    self.gram[i * self.rings + j] += energy * dot(a, b);
                 }
             }
         }
     }
 
-    /// Flux of each group; `None` without light.
+    /// Flux of each ring; `None` without light.
     fn solve(mut self) -> Option<Vec<f64>> {
-        let ridge = 1e-9 * self.gram[0];
-        (0..self.count).for_each(|i| self.gram[i * self.count + i] += ridge);
-        dense::cholesky(&mut self.gram, self.count)?;
+        dense::cholesky(&mut self.gram, self.rings)?;
         dense::solve(&self.gram, &mut self.right);
-        (self.right.iter().sum::<f64>() > 0.0).then_some(self.right)
+        Some(self.right)
     }
+}
+
+/// Takes from `columns`, `[ring, pattern]`, their means and all that those of a pixel's own elements,
+/// `[element, pattern]`, can show. False where these are not independent.
+#[inline(always)]
+fn leave_out(own: &mut [f64], columns: &mut [f64], patterns: usize) -> bool {
+    for column in own
+        .chunks_exact_mut(patterns)
+        .chain(columns.chunks_exact_mut(patterns))
+    {
+        let mean = column.iter().sum::<f64>() / patterns as f64;
+        column.iter_mut().for_each(|p| *p -= mean);
+    }
+    let own: Vec<&[f64]> = own.chunks_exact(patterns).collect();
+    let k = own.len();
+    let mut gram = vec![0.0; k * k];
+    for i in 0..k {
+        for j in 0..k {
+            gram[i * k + j] = dot(own[i], own[j]);
+        }
+    }
+    if dense::cholesky(&mut gram, k).is_none() {
+        return false;
+    }
+    let mut share = vec![0.0; k];
+    for column in columns.chunks_exact_mut(patterns) {
+        for (share, own) in share.iter_mut().zip(&own) {
+            *share = dot(own, column);
+        }
+        dense::solve(&gram, &mut share);
+        for (share, own) in share.iter().zip(&own) {
+            add_scaled(column, -share, own);
+        }
+    }
+    true
 }
 
 #[cfg(test)]
@@ -253,30 +349,36 @@ mod tests {
 
     #[test]
     fn the_band_ends_where_rings_stay_dark() {
-        let groups = Groups::new(15);
-        let middle = (MIDDLE * MIDDLE) as usize;
-        let mut flux = vec![0.0; groups.count];
-        flux[middle / 2] = 0.9;
-        flux[middle] = 0.06; // out to side 9
-        flux[middle + 1] = 0.035; // out to side 11
-        flux[middle + 2] = 0.004; // out to side 13
-        flux[middle + 3] = 0.001; // out to side 15
-        let band = groups.band(&flux, 15).unwrap();
-        assert_eq!(band.window.side(), 13); // 11 leaves 0.5 %, and a ring of margin
-        assert!((band.leak.unwrap() - 0.001).abs() < 1e-12);
-        // Where rings never stay dark the window is as wide as was looked, and that is all there is to
-        // say.
-        flux[middle + 3] = 0.02;
-        let band = groups.band(&flux, 15).unwrap();
-        assert_eq!((band.window.side(), band.leak), (15, None));
+        let rings = Rings::new(15, 100);
+        let flux = [0.06, 0.035, 0.004, 0.001]; // out to sides 9, 11, 13 and 15
+        let leaks = rings.leaks(&flux, 15);
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        for (leak, expected) in leaks.iter().zip([0.1, 0.04, 0.005, 0.001]) {
+            assert!(close(*leak, expected), "{leaks:?}");
+        }
+        let sure = [0.001; 4];
+        // A window of 11 leaves 0.5 %, and there is a ring of margin.
+        let found = band(&leaks, &sure, 15).unwrap();
+        assert_eq!(found.window.side(), 13);
+        assert!(matches!(found.reach, Reach::Within { leak } if close(leak, 0.001)));
+        // Where rings never stay dark the band is as wide as was looked, if that is sure.
+        let far = [0.1, 0.06, 0.04, 0.02];
+        let beyond = band(&far, &sure, 15).unwrap();
+        assert_eq!((beyond.window.side(), beyond.reach), (15, Reach::Beyond));
+        let edge = band(&[0.1, 0.06, 0.04, 0.002], &sure, 15).unwrap();
+        assert_eq!(edge.reach, Reach::Beyond);
+        let unclear = band(&[0.1; 12], &[0.06; 12], 31).unwrap();
+        assert_eq!((unclear.window.side(), unclear.reach), (15, Reach::Unclear));
     }
 
     #[test]
-    fn groups_cover_the_window() {
-        for probe in [3, 7, 9, 31] {
-            let groups = Groups::new(probe);
-            assert_eq!(groups.sizes.iter().sum::<f64>(), f64::from(probe * probe));
-            assert!(groups.sizes.iter().all(|&size| size >= 1.0));
+    fn rings_cover_the_window() {
+        for (probe, patterns, own) in [(3, 80, 1), (7, 80, 5), (9, 20, 3), (31, 80, 7)] {
+            let rings = Rings::new(probe, patterns);
+            assert_eq!(rings.own, own);
+            let elements = rings.sizes.iter().sum::<f64>() + f64::from(own * own);
+            assert_eq!(elements, f64::from(probe * probe));
+            assert!(rings.sizes.iter().all(|&size| size >= 1.0));
         }
     }
 }

@@ -28,7 +28,7 @@ mod test_problems;
 mod vector;
 mod workers;
 
-pub use band::Band;
+pub use band::{Band, Reach};
 pub use bpdn::{Constraint, Homotopy, InteriorPoint, Solution, SparsityBasis};
 pub use common_mode::CommonMode;
 pub use nnls::Nnls;

@@ -40,15 +40,18 @@ pub(super) fn judge(
     let prepared = start.elapsed().as_secs_f64();
     let geometry = *recovery.geometry();
     let rects = judged(method, &geometry, pixels);
-    let errors = workers.map(rects.len(), |i| {
+    let functions = workers.map(rects.len(), |i| {
         let tile = recovery.tile(measurements, rects[i]);
-        let functions = tile.functions(&geometry, recovery.basis());
-        error_of(known, &geometry, &functions)
+        tile.functions(&geometry, recovery.basis())
+    });
+    let recovered = start.elapsed().as_secs_f64();
+    let errors = workers.map(functions.len(), |i| {
+        error_of(known, &geometry, &functions[i])
     });
     let pixels = blocks::pixels(&rects);
     let all = geometry.camera.area();
     let (snr, standard_error) = pooled(&errors, pixels as f64 / all as f64);
-    let per_pixel = (start.elapsed().as_secs_f64() - prepared) / pixels as f64;
+    let per_pixel = (recovered - prepared) / pixels as f64;
     Ok(Accuracy {
         snr,
         standard_error,

@@ -93,12 +93,11 @@ pub fn comparison(
         points: Vec::new(),
     };
     for photographs in counts(2 * elements.min(camera.area())) {
-        let start = Instant::now();
-        let snr = low_rank(&truth, &photographer, &scans, photographs, workers)?;
+        let (snr, seconds) = low_rank(&truth, &photographer, &scans, photographs, workers)?;
         nystrom.points.push(Point {
             photographs,
             snr,
-            seconds: start.elapsed().as_secs_f64(),
+            seconds,
         });
     }
     tell(&nystrom);
@@ -111,14 +110,14 @@ pub fn comparison(
         points: Vec::new(),
     };
     for l in counts(MOST_PATTERNS) {
-        let start = Instant::now();
         let measurements = first_shots(&measurements, l);
-        let errors = unwindowed::recover(&truth, &measurements, UNWINDOWED_PIXELS, workers);
+        let (errors, seconds) =
+            unwindowed::recover(&truth, &measurements, UNWINDOWED_PIXELS, workers);
         let share = errors.len() as f64 / truth.pixels() as f64;
         whole.points.push(Point {
             photographs: l,
             snr: pooled(&errors, share).0,
-            seconds: start.elapsed().as_secs_f64() / share,
+            seconds,
         });
     }
     tell(&whole);
@@ -257,14 +256,15 @@ fn single_elements(light: Extent) -> Vec<Codes> {
     (0..light.area()).map(single).collect()
 }
 
-/// Kernel Nyström from half as many columns and rows as `photographs`, drawn at random.
+/// Kernel Nyström from half as many columns and rows as `photographs`, drawn at random: its SNR, and
+/// the seconds it takes once they are photographed.
 fn low_rank(
     truth: &Dense,
     photographer: &Photographer,
     scans: &[Picture],
     photographs: usize,
     workers: &impl Workers,
-) -> Result<Option<Decibels>, StudyError> {
+) -> Result<(Option<Decibels>, f64), StudyError> {
     let elements = blocks::draw(truth.elements, photographs / 2);
     let pixels = blocks::draw(truth.pixels(), photographs - photographs / 2);
     let black = vec![[0.0; CHANNELS]; truth.elements];
@@ -274,6 +274,7 @@ fn low_rank(
         photographer.noisy(&row, ROW_NOISE + 1 + pixels[i] as u32)
     });
     let rows = rows.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let start = Instant::now();
     let mut parts = vec![TransportError::default(); truth.pixels()];
     for c in 0..CHANNELS {
         let columns = (0..truth.pixels())
@@ -313,7 +314,7 @@ fn low_rank(
             part.merge(error);
         }
     }
-    Ok(pooled(&parts, 1.0).0)
+    Ok((pooled(&parts, 1.0).0, start.elapsed().as_secs_f64()))
 }
 
 /// A level to sort by.

@@ -68,7 +68,6 @@ pub fn measurements() -> Measurements {
         full_scale: vec![1.0; SHOTS.len()],
         rows: Rows::all(camera.height),
         pictures: SHOTS.iter().map(|(_, png)| picture(png)).collect(),
-        flood: Some(picture(file!("photos/flood.png"))),
         noise: Noise::from_dark(&dark, camera.width, code),
     };
     measurements.noise = Noise::with_gain_from(&measurements);

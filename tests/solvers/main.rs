@@ -140,7 +140,6 @@ fn what_the_test_carries_is_what_the_folder_holds() {
     };
     let pictures = shots.iter().map(|&i| whole(folder.shot(i, &dark).unwrap()));
     read.pictures = pictures.collect();
-    read.flood = folder.flood(&dark).unwrap().map(whole);
     read.noise = Noise::with_gain_from(&read);
     assert_eq!((carried.camera, carried.light), (read.camera, read.light));
     assert_eq!(carried.correspondence, read.correspondence);
@@ -148,7 +147,6 @@ fn what_the_test_carries_is_what_the_folder_holds() {
     assert_eq!(carried.full_scale, read.full_scale);
     assert_eq!(carried.rows, read.rows);
     assert_eq!(carried.pictures, read.pictures);
-    assert_eq!(carried.flood, read.flood);
     assert_eq!(carried.noise, read.noise);
 
     let truth = folder.truth().unwrap().unwrap();

@@ -4,7 +4,7 @@ use super::equations::Equations;
 use super::posterior::{Gaussian, Workspace};
 use super::*;
 use crate::capture::{Noise, Pattern, Rows};
-use crate::recover::{OneThread, Workers};
+use crate::recover::{Band, OneThread, Reach, Workers};
 use crate::transport::{CameraPx, Correspondence, TransportFunctions, Window};
 
 /// Works backwards: what comes out must not depend on the order.
@@ -88,8 +88,13 @@ fn object(geometry: &Geometry) -> Vec<[f64; CHANNELS]> {
 }
 
 fn measurements(patterns: usize, seed: u64) -> (Measurements, Vec<[f64; CHANNELS]>) {
+    let tau = object(&geometry());
+    (photographed(patterns, seed, &tau), tau)
+}
+
+/// `tau` under random patterns, with a little noise.
+fn photographed(patterns: usize, seed: u64, tau: &[[f64; CHANNELS]]) -> Measurements {
     let geometry = geometry();
-    let tau = object(&geometry);
     let mut random = random(seed);
     let shown: Vec<Vec<f32>> = (0..patterns)
         .map(|_| {
@@ -122,7 +127,7 @@ fn measurements(patterns: usize, seed: u64) -> (Measurements, Vec<[f64; CHANNELS
             pixels.collect()
         })
         .collect();
-    let measurements = Measurements {
+    Measurements {
         camera: geometry.camera,
         light: geometry.light,
         correspondence: geometry.correspondence,
@@ -134,8 +139,7 @@ fn measurements(patterns: usize, seed: u64) -> (Measurements, Vec<[f64; CHANNELS
             gain: [0.0; CHANNELS],
             floor: [1e-8; CHANNELS],
         },
-    };
-    (measurements, tau)
+    }
 }
 
 fn snr(tiles: &[TransportFunctions], tau: &[[f64; CHANNELS]]) -> f64 {
@@ -263,6 +267,64 @@ fn pixels_that_all_saturate_somewhere_teach_all_the_same() {
 }
 
 #[test]
+fn the_band_is_as_wide_as_it_was_made() {
+    let (measurements, _) = measurements(80, 7);
+    let band = Band::estimate(&measurements, &OneThread).unwrap();
+    // To within the ring that is left as a margin.
+    let side = band.window.side();
+    assert!((WINDOW..=WINDOW + 2).contains(&side), "{band:?}");
+    assert!(
+        matches!(band.reach, Reach::Within { leak } if leak < 0.01),
+        "{band:?}"
+    );
+}
+
+#[test]
+fn a_blend_takes_of_each_what_misses_least() {
+    let share = |ours, both, theirs| Comparison { ours, both, theirs }.best_share(LEAST_GAIN);
+    assert_eq!(share(1.0, 0.0, 1.0), 0.5); // errors as large as each other that have nothing in common
+    assert!((share(1.0, 0.0, 3.0) - 0.25).abs() < 1e-6);
+    assert_eq!(share(1.0, 1.0, 4.0), 0.0); // theirs are ours and more
+    assert_eq!(share(4.0, 1.0, 1.0), 1.0);
+    assert_eq!(share(1.0, 1.0, 1.0), 0.0); // the same
+    assert_eq!(share(1.0, 0.97, 1.4), 0.0); // too little to be worth it
+    assert_eq!(share(f64::NAN, 0.0, 1.0), 0.0);
+}
+
+#[test]
+fn sparse_functions_each_a_case_of_its_own_are_blended_and_better_for_it() {
+    // Of each window two elements, drawn at random: nothing a Gaussian prior could know.
+    let geometry = geometry();
+    let area = geometry.window.area();
+    let mut place = random(11);
+    let mut tau = vec![[0.0; CHANNELS]; geometry.camera.area() * area];
+    for (n, pixel) in whole().pixels().enumerate() {
+        let origin = geometry.window_origin(pixel);
+        for _ in 0..2 {
+            let s = (place() * area as f64) as usize;
+            let lit = geometry.window.element(origin, s).index_in(geometry.light);
+            if lit.is_some() {
+                tau[n * area + s] = [0.5; CHANNELS];
+            }
+        }
+    }
+    let measurements = photographed(40, 7, &tau);
+    let mut learned = learn(&measurements, &OneThread).unwrap();
+    assert!(learned.direct.is_some());
+    let recovered = |learned: &Learned| -> Vec<_> {
+        let tiles = geometry.tiles().map(|rect| {
+            let tile = learned.tile(&measurements, rect);
+            tile.functions(&geometry, Some(learned.basis()))
+        });
+        tiles.collect()
+    };
+    let blended = snr(&recovered(&learned), &tau);
+    learned.direct = None;
+    let alone = snr(&recovered(&learned), &tau);
+    assert!(blended > alone + 1.0, "{blended} dB against {alone} dB");
+}
+
+#[test]
 fn whiteness_is_an_error_that_says_so() {
     let (mut measurements, _) = measurements(6, 1);
     for picture in &mut measurements.pictures {
@@ -270,7 +332,7 @@ fn whiteness_is_an_error_that_says_so() {
     }
     let error = learn(&measurements, &OneThread).unwrap_err();
     assert!(matches!(error, RecoverError::Overexposed), "{error}");
-    let error = crate::recover::Band::estimate(&measurements, &OneThread).unwrap_err();
+    let error = Band::estimate(&measurements, &OneThread).unwrap_err();
     assert!(matches!(error, RecoverError::Overexposed), "{error}");
 }
 
