@@ -39,6 +39,16 @@ pub enum CaptureError {
         /// Where and what.
         source: serde_json::Error,
     },
+    /// A part of the manifest is not of the expected form.
+    #[error("{path}: \"{field}\" is not as it must be")]
+    Form {
+        /// The manifest.
+        path: PathBuf,
+        /// The part, as a path into the JSON.
+        field: String,
+        /// Where and what.
+        source: serde_json::Error,
+    },
     /// The manifest is of another version.
     #[error("{path}: \"version\" is {version}; this program reads version 1: get a newer one")]
     Version {
@@ -58,10 +68,12 @@ pub enum CaptureError {
         problem: String,
     },
     /// A picture is not what it must be.
-    #[error("{path}: {problem}")]
+    #[error("{path}{named_by}: {problem}")]
     Image {
         /// The picture.
         path: PathBuf,
+        /// Where the manifest names it, as for [`Missing`](Self::Missing).
+        named_by: String,
         /// What is wrong and what to do.
         problem: String,
     },

@@ -18,12 +18,12 @@ fn open(path: &Path, extent: Extent, named_by: &str) -> Result<DynamicImage, Cap
     // PNG and nothing else: what a lossy format gives back is no measurement.
     let picture = ImageReader::with_format(BufReader::new(file), ImageFormat::Png)
         .decode()
-        .map_err(|e| unreadable(path, &e))?;
+        .map_err(|e| unreadable(path, named_by, &e))?;
     let found = Extent {
         width: picture.width(),
         height: picture.height(),
     };
-    check_extent(path, found, extent)?;
+    check_extent(path, named_by, found, extent)?;
     Ok(picture)
 }
 
@@ -31,10 +31,7 @@ fn io_error(path: &Path, named_by: &str, source: io::Error) -> CaptureError {
     match source.kind() {
         io::ErrorKind::NotFound => CaptureError::Missing {
             path: path.to_owned(),
-            named_by: match named_by {
-                "" => String::new(),
-                field => format!(" ({field} in {})", super::MANIFEST_NAME),
-            },
+            named_by: field(named_by),
         },
         _ => CaptureError::Io {
             path: path.to_owned(),
@@ -43,19 +40,38 @@ fn io_error(path: &Path, named_by: &str, source: io::Error) -> CaptureError {
     }
 }
 
-fn unreadable(path: &Path, why: &dyn std::fmt::Display) -> CaptureError {
-    CaptureError::Image {
-        path: path.to_owned(),
-        problem: format!("is not a readable PNG: {why}"),
+/// Where the manifest names a file, in brackets.
+fn field(named_by: &str) -> String {
+    match named_by {
+        "" => String::new(),
+        field => format!(" ({field} in {})", super::MANIFEST_NAME),
     }
 }
 
-fn check_extent(path: &Path, found: Extent, wanted: Extent) -> Result<(), CaptureError> {
+fn unreadable(path: &Path, named_by: &str, why: &dyn std::fmt::Display) -> CaptureError {
+    let why = why.to_string();
+    CaptureError::Image {
+        path: path.to_owned(),
+        named_by: field(named_by),
+        problem: format!(
+            "is not a readable PNG: {}; export or copy it again",
+            why.trim_end_matches('.')
+        ),
+    }
+}
+
+fn check_extent(
+    path: &Path,
+    named_by: &str,
+    found: Extent,
+    wanted: Extent,
+) -> Result<(), CaptureError> {
     if found == wanted {
         return Ok(());
     }
     Err(CaptureError::Image {
         path: path.to_owned(),
+        named_by: field(named_by),
         problem: format!("is {found} pixels; capture.json says {wanted}: correct one of them"),
     })
 }
@@ -78,6 +94,7 @@ pub(super) fn rgb16(
 /// A 16-bit RGB picture that is read row by row from the top.
 pub(super) struct Rgb16Rows {
     path: PathBuf,
+    named_by: String,
     reader: png::Reader<BufReader<ReopenedFile>>,
     left: u32,
 }
@@ -87,18 +104,19 @@ impl Rgb16Rows {
     pub fn open(path: &Path, extent: Extent, named_by: &str) -> Result<Self, CaptureError> {
         let bad = |problem| CaptureError::Image {
             path: path.to_owned(),
+            named_by: field(named_by),
             problem,
         };
         let file = ReopenedFile::open(path).map_err(|e| io_error(path, named_by, e))?;
         let file = BufReader::with_capacity(FILE_BUFFER, file);
         let reader = png::Decoder::new(file).read_info();
-        let reader = reader.map_err(|e| unreadable(path, &e))?;
+        let reader = reader.map_err(|e| unreadable(path, named_by, &e))?;
         let info = reader.info();
         let found = Extent {
             width: info.width,
             height: info.height,
         };
-        check_extent(path, found, extent)?;
+        check_extent(path, named_by, found, extent)?;
         if (info.bit_depth, info.color_type) != (png::BitDepth::Sixteen, png::ColorType::Rgb) {
             return Err(bad(format!(
                 "is {}-bit {}; a photograph must be a 16-bit linear RGB PNG: export it again from \
@@ -121,6 +139,7 @@ impl Rgb16Rows {
         }
         Ok(Self {
             path: path.to_owned(),
+            named_by: named_by.to_owned(),
             left: extent.height,
             reader,
         })
@@ -132,9 +151,9 @@ impl Rgb16Rows {
             return Ok(None);
         }
         let row = self.reader.next_row();
-        let row = row.map_err(|e| unreadable(&self.path, &e))?;
+        let row = row.map_err(|e| unreadable(&self.path, &self.named_by, &e))?;
         let Some(row) = row else {
-            return Err(unreadable(&self.path, &"it ends too soon"));
+            return Err(unreadable(&self.path, &self.named_by, &"it ends too soon"));
         };
         self.left -= 1;
         let code = |bytes: &[u8]| u16::from_be_bytes([bytes[0], bytes[1]]);
@@ -147,7 +166,7 @@ impl Rgb16Rows {
     /// Checks that the file is whole to its end, once all rows have been read.
     pub fn finish(mut self) -> Result<(), CaptureError> {
         let finished = self.reader.finish();
-        finished.map_err(|e| unreadable(&self.path, &e))
+        finished.map_err(|e| unreadable(&self.path, &self.named_by, &e))
     }
 }
 
@@ -204,6 +223,7 @@ pub(super) fn codes8(
             .collect()),
         other => Err(CaptureError::Image {
             path: path.to_owned(),
+            named_by: field(named_by),
             problem: format!(
                 "is {}; a pattern must be an 8-bit grey or RGB PNG",
                 kind(&other)

@@ -33,6 +33,9 @@ pub struct Manifest {
     /// Camera pixels to light elements.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correspondence: Option<AffineSpec>,
+    /// Fields that are none of these, as paths into the JSON: of a later program, or misspelt.
+    #[serde(skip)]
+    pub unknown: Vec<String>,
 }
 
 /// The light plane and how its codes turn into light.
@@ -157,7 +160,21 @@ impl Manifest {
                 version,
             });
         }
-        let manifest: Self = serde_json::from_str(json).map_err(json_error)?;
+        let mut source = serde_json::Deserializer::from_str(json);
+        let mut unknown = Vec::new();
+        let mut note = |field: serde_ignored::Path| unknown.push(field.to_string());
+        let noting = serde_ignored::Deserializer::new(&mut source, &mut note);
+        let manifest: Self =
+            serde_path_to_error::deserialize(noting).map_err(|error| CaptureError::Form {
+                path: path.to_owned(),
+                field: error.path().to_string(),
+                source: error.into_inner(),
+            })?;
+        source.end().map_err(json_error)?;
+        let manifest = Self {
+            unknown,
+            ..manifest
+        };
         match manifest.problem() {
             None => Ok(manifest),
             Some((field, problem)) => Err(CaptureError::Field {
@@ -207,11 +224,18 @@ impl Manifest {
                     .windows(2)
                     .all(|w| w[0][0] < w[1][0] && w[0][1] <= w[1][1]);
                 let sane = table.iter().flatten().all(|x| x.is_finite() && *x >= 0.0);
-                if table.len() < 2 || !rising || !sane || interpolate(table, 255.0) <= 0.0 {
+                if self.light.gamma.is_some() {
                     return bad(
                         "light.response",
-                        "must be two or more [code, emitted] pairs, both rising, and emit light at \
-                         code 255"
+                        "is there beside \"gamma\", which it stands instead of: leave one of them"
+                            .to_owned(),
+                    );
+                }
+                let last = table.last().map_or([0.0; 2], |pair| *pair);
+                if table.len() < 2 || !rising || !sane || last[0] < 255.0 || last[1] <= 0.0 {
+                    return bad(
+                        "light.response",
+                        "must be two or more [code, emitted] pairs, both rising, up to code 255"
                             .to_owned(),
                     );
                 }
@@ -288,7 +312,7 @@ mod tests {
             "light": {"width": 4, "height": 4, "gamma": 2.0},
             "camera": {"width": 8, "height": 8, "black": 512, "white": 60000},
             "shots": [{"pattern": "a.png", "photo": "b.png"}],
-            "someday": "a field from the future",
+            "someday": {"a": "field from the future"},
         });
         edit(&mut json);
         Manifest::parse(&json.to_string(), Path::new("x/capture.json"))
@@ -296,9 +320,9 @@ mod tests {
 
     #[test]
     fn a_bad_field_is_named_with_its_file() {
-        assert!(manifest(|_| {}).is_ok());
+        assert_eq!(manifest(|_| {}).unwrap().unknown, ["someday"]);
         type Edit = fn(&mut serde_json::Value);
-        let cases: [(Edit, &str); 10] = [
+        let cases: [(Edit, &str); 12] = [
             (
                 |j| {
                     j["graycode"] = serde_json::json!([{"photo": "g", "axis": "z", "bit": 0, "inverted": false}])
@@ -317,6 +341,17 @@ mod tests {
                 |j| j["light"]["gamma"] = serde_json::Value::Null,
                 "\"light.gamma\"",
             ),
+            (
+                |j| j["light"]["response"] = serde_json::json!([[0, 0], [255, 1]]),
+                "beside \"gamma\"",
+            ),
+            (
+                |j| {
+                    j["light"] =
+                        serde_json::json!({"width": 4, "height": 4, "response": [[0, 0], [128, 1]]})
+                },
+                "up to code 255",
+            ),
             (|j| j["shots"] = serde_json::json!([]), "\"shots\""),
             (
                 |j| j["shots"][0]["exposure"] = 0.into(),
@@ -333,9 +368,10 @@ mod tests {
             assert!(message.contains("x/capture.json"), "{message}");
         }
         let missing = manifest(|j| j["camera"] = serde_json::json!({"width": 8}));
-        let CaptureError::Json { source, .. } = missing.unwrap_err() else {
+        let CaptureError::Form { source, field, .. } = missing.unwrap_err() else {
             panic!("another error")
         };
+        assert_eq!(field, "camera");
         assert!(
             source.to_string().contains("missing field `height`"),
             "{source}"

@@ -35,7 +35,12 @@ pub fn write_folder_whole(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -
 pub fn fill_new_folder(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     ensure_free(path)
         .and_then(|()| {
-            std::fs::create_dir_all(path).context("cannot be created; may you write there?")
+            if path.is_dir() {
+                return Ok(());
+            }
+            std::fs::create_dir(path).context(
+                "cannot be created; does its parent folder exist, and may you write there?",
+            )
         })
         .with_context(|| path.display().to_string())?;
     fill(path)

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use indicatif::ProgressBar;
 use rayon::prelude::*;
@@ -24,6 +24,9 @@ use crate::transport::{Basis, CHANNELS, Window};
 
 /// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
 const HOLD_OUT_EVERY: usize = 10;
+
+/// Shots that an error names one by one.
+const MOST_NAMED: usize = 4;
 
 /// Percentage of saturated samples past which a wrong manifest is likelier than a few highlights.
 const MUCH_SATURATED: f64 = 2.0;
@@ -162,6 +165,13 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     drop(files::Output::create(&args.output, files::Kind::Ltm)?);
     let folder = CaptureFolder::open(&args.capture)?;
     let manifest = folder.manifest();
+    for field in manifest.unknown.iter().take(MOST_NAMED) {
+        let path = folder.manifest_path();
+        eprintln!(
+            "note: {}: \"{field}\" is not a field that is known; it is ignored",
+            path.display()
+        );
+    }
     let shots = choose_shots(&manifest.shots, args.patterns)?;
     if shots.len() < recover::FEWEST_PATTERNS {
         let manifest = folder.manifest_path().display().to_string();
@@ -226,12 +236,10 @@ fn recover(
     }
     let saturated = photographs.finish()?;
     measurements.noise = Noise::with_gain_from(&measurements);
-    warn_of_saturation(
-        saturated,
-        shots.len() * measurements.camera.area() * CHANNELS,
-    );
+    warn_of_saturation(saturated, &measurements);
     let failed = |error| match error {
         RecoverError::Stopped => interrupted(&checkpoint),
+        RecoverError::Astray(patterns) => astray(folder, patterns.iter().map(|&l| shots[l])),
         other => anyhow::Error::new(other).context(args.capture.display().to_string()),
     };
     let band = match args.window {
@@ -338,6 +346,22 @@ fn recover(
         overexposed_pixels: overexposed,
         file_bytes,
     })
+}
+
+/// What there is to say of photographs that are not of the patterns they are listed with.
+fn astray(folder: &CaptureFolder, shots: impl ExactSizeIterator<Item = usize>) -> anyhow::Error {
+    let (count, listed) = (shots.len(), &folder.manifest().shots);
+    let name = |i: usize| format!("shots[{i}] ({}, {})", listed[i].photo, listed[i].pattern);
+    let mut names: Vec<String> = shots.take(MOST_NAMED).map(name).collect();
+    if count > MOST_NAMED {
+        names.push(format!("and {} more", count - MOST_NAMED));
+    }
+    anyhow!(
+        "{}: photographs do not show the patterns they are listed with, as others do: {}; correct \
+         these, or take them out",
+        folder.manifest_path().display(),
+        names.join(", ")
+    )
 }
 
 /// What there is to say of a recovery that was told to stop.
@@ -461,13 +485,17 @@ fn recipe(
     })
 }
 
-fn warn_of_saturation(saturated: usize, samples: usize) {
+fn warn_of_saturation(saturated: usize, measurements: &Measurements) {
     if saturated == 0 {
         return;
     }
+    let samples = measurements.pictures.len() * measurements.camera.area() * CHANNELS;
     let percent = 100.0 * saturated as f64 / samples as f64;
     eprintln!("note: {saturated} saturated samples ({percent:.1} %) are left out");
-    if percent > MUCH_SATURATED {
+    // Of several exposures the longest are meant to saturate.
+    let exposures = &measurements.full_scale;
+    let alike = exposures.iter().all(|exposure| *exposure == exposures[0]);
+    if alike && percent > MUCH_SATURATED {
         eprintln!(
             "warning: that is much; check \"camera.white\" in the manifest, or photograph with \
              less exposure"

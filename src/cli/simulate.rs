@@ -160,6 +160,7 @@ impl Plan {
         let scene = kind.build(args.camera, args.light)?;
         let mut plan = Self {
             manifest: Manifest {
+                unknown: Vec::new(),
                 version: 1,
                 light: LightSpec {
                     width: args.light.width,

@@ -28,6 +28,11 @@ const SQUARES: (usize, u32) = (128, 4);
 /// captures that are worth recovering it is above a half.
 const RELATED: f64 = 0.1;
 
+/// Share of the correlation usual in a capture below which a pattern's photograph is of another.
+const ASTRAY: f64 = 0.3;
+/// Fewest windows that tell one photograph from another.
+const FEWEST_WINDOWS: usize = 64;
+
 /// The squares that are looked at.
 pub(super) fn squares(measurements: &Measurements) -> Vec<TileRect> {
     spread(measurements, SQUARES.1, SQUARES.0)
@@ -48,26 +53,61 @@ pub(super) fn mean_function(
     let mean = pooled_mean(measurements, geometry, &split.learn, &squares, workers)
         .ok_or_else(|| dark_or_overexposed(measurements, &squares))?;
     let parts = workers.map(squares.len(), |i| {
-        let mut agreement = Agreement::default();
-        for (origin, pixels) in windows(geometry, squares[i]) {
-            agreement.add(measurements, geometry, split, &mean, (origin, &pixels));
+        let mut agreement = vec![Agreement::default(); split.all.len()];
+        let windows = windows(geometry, squares[i]);
+        let count = windows.len();
+        for (origin, pixels) in windows {
+            agree(
+                &mut agreement,
+                measurements,
+                geometry,
+                split,
+                &mean,
+                (origin, &pixels),
+            );
         }
-        agreement
+        (agreement, count)
     });
-    let mut agreement = Agreement::default();
-    for part in parts {
-        agreement.shown += part.shown;
-        agreement.both += part.both;
-        agreement.seen += part.seen;
+    let mut by_pattern = vec![Agreement::default(); split.all.len()];
+    for (part, _) in &parts {
+        for (sum, part) in by_pattern.iter_mut().zip(part) {
+            sum.add(*part);
+        }
     }
-    match agreement.seen > 0.0 && agreement.correlation() < RELATED {
-        true => Err(RecoverError::Unrelated),
-        false => Ok(mean),
+    let mut held = Agreement::default();
+    split.held.iter().for_each(|&l| held.add(by_pattern[l]));
+    if held
+        .correlation()
+        .is_some_and(|correlation| correlation < RELATED)
+    {
+        return Err(RecoverError::Unrelated);
+    }
+    let looked_at: usize = parts.iter().map(|(_, windows)| windows).sum();
+    match astray(&by_pattern) {
+        patterns if !patterns.is_empty() && looked_at >= FEWEST_WINDOWS => {
+            Err(RecoverError::Astray(patterns))
+        }
+        _ => Ok(mean),
     }
 }
 
-/// Inner products, over patterns held out, of what the mean function says that differs from a pixel's
-/// mean, and what was photographed.
+/// Patterns that show what was photographed far worse than others do.
+fn astray(by_pattern: &[Agreement]) -> Vec<usize> {
+    let correlations: Vec<Option<f64>> = by_pattern.iter().map(|a| a.correlation()).collect();
+    let mut known: Vec<f64> = correlations.iter().flatten().copied().collect();
+    known.sort_by(f64::total_cmp);
+    // Of those that are right, if no more than nine in ten are wrong.
+    let Some(usual) = known.get(known.len() * 9 / 10) else {
+        return Vec::new();
+    };
+    let worse = |c: &Option<f64>| c.is_some_and(|c| c < ASTRAY * usual);
+    (0..by_pattern.len())
+        .filter(|&l| worse(&correlations[l]))
+        .collect()
+}
+
+/// Inner products, over pixels, of what the mean function says that differs from a pixel's mean, and
+/// what was photographed.
 #[derive(Clone, Copy, Debug, Default)]
 struct Agreement {
     shown: f64,
@@ -76,54 +116,61 @@ struct Agreement {
 }
 
 impl Agreement {
-    fn add(
-        &mut self,
-        measurements: &Measurements,
-        geometry: &Geometry,
-        split: &Split,
-        mean: &[f64],
-        (origin, pixels): (Element, &[(usize, CameraPx)]),
-    ) {
-        for (plane, channels) in measurements.planes() {
-            let shown = |&l: &usize| {
-                let pattern = measurements.patterns[l].plane(plane);
-                let slots = mean.iter().enumerate().filter_map(|(slot, m)| {
-                    let element = geometry.window.element(origin, slot);
-                    Some(m * f64::from(pattern[element.index_in(geometry.light)?]))
-                });
-                slots.sum::<f64>()
-            };
-            let learned: Vec<f64> = split.learn.iter().map(shown).collect();
-            let held: Vec<f64> = split.held.iter().map(shown).collect();
-            for (&(_, pixel), c) in pixels
-                .iter()
-                .flat_map(|pixel| channels.clone().map(move |c| (pixel, c)))
-            {
-                let usual = |rows: &[usize], shown: &[f64]| {
-                    let pairs = rows.iter().zip(shown);
-                    let pairs = pairs.map(|(&l, shown)| (*shown, measurements.sample(l, pixel, c)));
-                    let pairs: Vec<(f64, f64)> = pairs.filter(|(_, y)| y.is_finite()).collect();
-                    pairs
-                };
-                let known = usual(&split.learn, &learned);
-                let sums = known.iter().fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
-                if !(sums.0 > 0.0 && sums.1 > 0.0) {
-                    continue;
-                }
-                let (brightness, count) = (sums.1 / sums.0, known.len() as f64);
-                for (shown, seen) in usual(&split.held, &held) {
-                    let (shown, seen) =
-                        (brightness * (shown - sums.0 / count), seen - sums.1 / count);
-                    self.shown += shown * shown;
-                    self.both += shown * seen;
-                    self.seen += seen * seen;
+    fn add(&mut self, other: Self) {
+        self.shown += other.shown;
+        self.both += other.both;
+        self.seen += other.seen;
+    }
+
+    /// `None` where nothing is seen, or shown, that differs.
+    fn correlation(self) -> Option<f64> {
+        let correlation = self.both / (self.shown * self.seen).sqrt();
+        correlation.is_finite().then_some(correlation)
+    }
+}
+
+/// Adds one window's pixels to `agreement`, `[pattern]`.
+fn agree(
+    agreement: &mut [Agreement],
+    measurements: &Measurements,
+    geometry: &Geometry,
+    split: &Split,
+    mean: &[f64],
+    (origin, pixels): (Element, &[(usize, CameraPx)]),
+) {
+    for (plane, channels) in measurements.planes() {
+        let shown = |&l: &usize| {
+            let pattern = measurements.patterns[l].plane(plane);
+            let slots = mean.iter().enumerate().filter_map(|(slot, m)| {
+                let element = geometry.window.element(origin, slot);
+                Some(m * f64::from(pattern[element.index_in(geometry.light)?]))
+            });
+            slots.sum::<f64>()
+        };
+        let shown: Vec<f64> = split.all.iter().map(shown).collect();
+        let pixels = pixels.iter().map(|&(_, pixel)| pixel);
+        for (pixel, c) in pixels.flat_map(|pixel| channels.clone().map(move |c| (pixel, c))) {
+            let sample = |l: usize| measurements.sample(l, pixel, c);
+            let known = split.learn.iter().filter(|&&l| sample(l).is_finite());
+            let sums = known.fold([0.0; 3], |[shown_sum, seen, count], &l| {
+                [shown_sum + shown[l], seen + sample(l), count + 1.0]
+            });
+            let [level, light, count] = sums;
+            if !(level > 0.0 && light > 0.0) {
+                continue;
+            }
+            for (l, agreement) in agreement.iter_mut().enumerate() {
+                let seen = sample(l) - light / count;
+                if seen.is_finite() {
+                    let shown = light / level * (shown[l] - level / count);
+                    agreement.add(Agreement {
+                        shown: shown * shown,
+                        both: shown * seen,
+                        seen: seen * seen,
+                    });
                 }
             }
         }
-    }
-
-    fn correlation(self) -> f64 {
-        self.both / (self.shown * self.seen).sqrt().max(f64::MIN_POSITIVE)
     }
 }
 

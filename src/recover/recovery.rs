@@ -121,6 +121,10 @@ pub enum RecoverError {
         "what the photographs show does not follow from the patterns; check that each is listed with the pattern it shows, \"correspondence\" in the capture's manifest, and the exposure"
     )]
     Unrelated,
+    /// Some patterns do not tell what their photographs show, as others do: which, among the
+    /// measurements'.
+    #[error("what the photographs of {} of the patterns show is not of them", .0.len())]
+    Astray(Vec<usize>),
     /// No pixel looked at can be learned from.
     #[error(
         "too many pixels are saturated in too many photographs; photograph with less exposure, or add shots with less (\"exposure\" in capture.json)"

@@ -24,11 +24,15 @@ pub(super) fn sample(camera: Extent, pixels: usize) -> Vec<TileRect> {
     blocks
 }
 
-/// Whole tiles that together cover about `pixels` pixels, drawn likewise.
+/// Fewest tiles of a sample: of fewer there is no telling how far they are from all.
+const FEWEST_TILES: usize = 8;
+
+/// Whole tiles that together cover about `pixels` pixels, drawn likewise, but at least
+/// [`FEWEST_TILES`].
 pub(super) fn tiles(geometry: &Geometry, pixels: usize) -> Vec<TileRect> {
     let count = geometry.tile_grid().area();
     let wanted = pixels.div_ceil((geometry.tile_side * geometry.tile_side) as usize);
-    let drawn = draw(count, wanted.max(1));
+    let drawn = draw(count, wanted.max(FEWEST_TILES));
     drawn.into_iter().map(|i| geometry.tile(i)).collect()
 }
 

@@ -352,6 +352,13 @@ fn photographs_that_do_not_go_with_their_patterns_are_an_error_that_says_so() {
     measurements.pictures.rotate_left(1);
     let error = learn(&measurements, &OneThread).unwrap_err();
     assert!(matches!(error, RecoverError::Unrelated), "{error}");
+    measurements.pictures.rotate_right(1);
+    measurements.pictures.swap(4, 20);
+    let error = learn(&measurements, &OneThread).unwrap_err();
+    assert!(
+        matches!(&error, RecoverError::Astray(l) if l == &[4, 20]),
+        "{error}"
+    );
     // Nothing but the noise of the sensor.
     let mut random = random(3);
     for sample in measurements.pictures.iter_mut().flatten().flatten() {
