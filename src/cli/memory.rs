@@ -115,11 +115,14 @@ impl Plan {
         };
         let rows = plan.row * u64::from((tile_side + 2 * method.most_halo()).min(camera.height));
         plan.ensure_at_least(plan.fixed + tile + rows)?;
-        // Half of what is left is for photographs, the rest and what they leave of it for the tiles
-        // worked on.
+        // All photographs, or half of what is left, the rest for the tiles worked on: at least one.
         let left = plan.budget - plan.fixed;
-        plan.photographs = (left / 2).clamp(rows, left - tile);
-        let taken = plan.photographs.min(plan.row * u64::from(plan.height));
+        let all = plan.row * u64::from(plan.height);
+        plan.photographs = match all <= left - tile {
+            true => all,
+            false => (left / 2).clamp(rows, left - tile),
+        };
+        let taken = plan.photographs;
         plan.tiles_at_once = threads.min(((left - taken) / tile) as usize);
         Ok(plan)
     }

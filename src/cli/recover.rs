@@ -1,6 +1,6 @@
 //! `ltm-export recover`: a capture folder to an `.ltm` file.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -145,6 +145,8 @@ struct Report {
     /// None: every tile is direct.
     rank: Option<usize>,
     patterns: usize,
+    /// More than patterns where some were photographed at several exposures.
+    photographs: usize,
     common_mode: Option<crate::recover::CommonMode>,
     noise: Noise,
     /// Parts in which the photographs were read to stay within the memory given; 1 is whole.
@@ -197,12 +199,15 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         return report::print_json(&report);
     }
     report::print_line(&format!(
-        "{}: {} camera pixels, {} light elements, window {}, from {} patterns in {:.1} s, {}",
+        "{}: {} camera pixels, {} light elements, window {}, from {} in {:.1} s, {}",
         args.output.display(),
         manifest.camera.extent(),
         manifest.light.extent(),
         report.window,
-        report.patterns,
+        match (report.patterns, report.photographs) {
+            (patterns, photographs) if patterns == photographs => format!("{patterns} patterns"),
+            (patterns, photographs) => format!("{photographs} photographs of {patterns} patterns"),
+        },
         report.seconds,
         report::bytes(report.file_bytes),
     ))
@@ -338,7 +343,12 @@ fn recover(
             Reach::Beyond | Reach::Unclear => None,
         }),
         rank: basis.map(Basis::rank),
-        patterns: shots.len(),
+        patterns: shots
+            .iter()
+            .map(|&i| &folder.manifest().shots[i].pattern)
+            .collect::<HashSet<_>>()
+            .len(),
+        photographs: shots.len(),
         common_mode: recovery.common_mode(),
         noise,
         strips: strips.len(),
