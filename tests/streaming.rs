@@ -272,7 +272,7 @@ fn a_killed_recovery_goes_on_too_and_what_does_not_fit_is_named() {
     assert_eq!(kept[head..head + 4], u32::MAX.to_le_bytes());
     let length = u32::from_le_bytes(kept[head + 4..head + 8].try_into().unwrap()) as usize;
     let mut other = kept.clone();
-    other[head + 12 + 20] ^= 1;
+    other[head + 12] ^= 1;
     let crc = crc32c::crc32c(&other[head..head + 8]);
     let crc = crc32c::crc32c_append(crc, &other[head + 12..head + 12 + length]);
     other[head + 8..head + 12].copy_from_slice(&crc.to_le_bytes());

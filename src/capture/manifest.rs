@@ -165,10 +165,13 @@ impl Manifest {
         let mut note = |field: serde_ignored::Path| unknown.push(field.to_string());
         let noting = serde_ignored::Deserializer::new(&mut source, &mut note);
         let manifest: Self =
-            serde_path_to_error::deserialize(noting).map_err(|error| CaptureError::Form {
-                path: path.to_owned(),
-                field: error.path().to_string(),
-                source: error.into_inner(),
+            serde_path_to_error::deserialize(noting).map_err(|error| match error.path() {
+                at if at.iter().next().is_none() => json_error(error.into_inner()),
+                at => CaptureError::Form {
+                    path: path.to_owned(),
+                    field: at.to_string(),
+                    source: error.into_inner(),
+                },
             })?;
         source.end().map_err(json_error)?;
         let manifest = Self {
@@ -232,7 +235,12 @@ impl Manifest {
                     );
                 }
                 let last = table.last().map_or([0.0; 2], |pair| *pair);
-                if table.len() < 2 || !rising || !sane || last[0] < 255.0 || last[1] <= 0.0 {
+                if table.len() < 2
+                    || !rising
+                    || !sane
+                    || last[0] < 255.0
+                    || interpolate(table, 255.0) <= 0.0
+                {
                     return bad(
                         "light.response",
                         "must be two or more [code, emitted] pairs, both rising, up to code 255"

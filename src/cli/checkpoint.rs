@@ -175,16 +175,17 @@ impl Checkpoint {
 
     /// Takes what tells the preparation that tiles will be of. An error if tiles are kept that are of
     /// another: the same photographs may teach another build, or another machine, something else.
-    pub fn prepared(&mut self, by: &[u8]) -> Result<()> {
+    pub fn prepared(&mut self, by: u32) -> Result<()> {
+        let by = by.to_le_bytes();
         match &self.prepared {
-            Some(kept) if kept == by => Ok(()),
-            Some(_) if self.count() > 0 => bail!(
+            Some(kept) if *kept == by => Ok(()),
+            _ if self.count() > 0 => bail!(
                 "{}: does not fit: another build of this program, or another machine, began it; go \
                  on with that one, or delete it to start anew",
                 self.path.display()
             ),
             _ => {
-                self.append(PREPARED, by)?;
+                self.append(PREPARED, &by)?;
                 self.prepared = Some(by.to_vec());
                 Ok(())
             }
@@ -334,6 +335,7 @@ impl Checkpoint {
         let length = u32::try_from(json.len()).ok();
         let length = length.filter(|length| *length <= MOST_HEAD_BYTES);
         let length = length.context("the capture has too many files")?;
+        self.prepared = None;
         self.file.set_len(0)?;
         self.file.rewind()?;
         let mut head = MAGIC.to_vec();

@@ -186,7 +186,7 @@ impl Plan {
     pub fn gray_code_rows(&self, photographs: usize) -> Rows {
         // A pixel's samples, and what it says of its place.
         let pixel = photographs as u64 * (CHANNELS * size_of::<f32>()) as u64 + 64;
-        let fit = 2 * self.photographs / (pixel * u64::from(self.width));
+        let fit = (self.budget - self.fixed) / (pixel * u64::from(self.width));
         let every = u64::from(self.height).div_ceil(fit.max(1));
         let rows = (0..self.height).step_by(every as usize);
         Rows::from_strips(rows.map(|y| y..y + 1))
@@ -263,7 +263,14 @@ mod tests {
             assert_eq!(sample, super::tests::plan(megabytes, 1).unwrap().sample());
         }
         assert!(plan(4000, 2).unwrap().whole());
-        assert_eq!(plan(4000, 2).unwrap().gray_code_rows(12).count(), 300);
+        // However few the shots, and never more than there is room for.
+        for photographs in [12, 44, 2000] {
+            let plan = plan(4000, 2).unwrap();
+            let rows = plan.gray_code_rows(photographs).count() as u64;
+            let bytes = rows * 500 * photographs as u64 * (CHANNELS * size_of::<f32>()) as u64;
+            assert!(bytes < 4000 << 20);
+            assert!(rows == 300 || photographs == 2000);
+        }
         assert!(!plan(160, 2).unwrap().whole());
     }
 

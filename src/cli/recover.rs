@@ -25,7 +25,7 @@ use crate::transport::{Basis, CHANNELS, Window};
 /// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
 const HOLD_OUT_EVERY: usize = 10;
 
-/// Shots that an error names one by one.
+/// How many of a kind a message names one by one.
 const MOST_NAMED: usize = 4;
 
 /// Percentage of saturated samples past which a wrong manifest is likelier than a few highlights.
@@ -167,11 +167,11 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     drop(files::Output::create(&args.output, files::Kind::Ltm)?);
     let folder = CaptureFolder::open(&args.capture)?;
     let manifest = folder.manifest();
-    for field in manifest.unknown.iter().take(MOST_NAMED) {
-        let path = folder.manifest_path();
+    if !manifest.unknown.is_empty() {
         eprintln!(
-            "note: {}: \"{field}\" is not a field that is known; it is ignored",
-            path.display()
+            "note: {}: ignored, as no field has such a name: {}",
+            folder.manifest_path().display(),
+            named(manifest.unknown.iter().cloned())
         );
     }
     let shots = choose_shots(&manifest.shots, args.patterns)?;
@@ -281,7 +281,7 @@ fn recover(
         Recovery::prepare(&measurements, settings, &interrupt.cores()).map_err(failed)?;
     spinner.finish_and_clear();
     let geometry = *recovery.geometry();
-    checkpoint.prepared(&recovery.fingerprint())?;
+    checkpoint.prepared(recovery.fingerprint())?;
     let bar = process::progress("recovering", recipe.tiles);
     bar.set_position(checkpoint.count() as u64);
     bar.reset_eta(); // The tiles that are there took no time.
@@ -301,8 +301,10 @@ fn recover(
     }
     let strips = plan.strips(recovery.halo());
     for (tile_rows, rows) in &strips {
-        if let Some(photographs) = &mut photographs {
-            photographs.advance(&mut measurements, rows, || true)?;
+        if let Some(photographs) = &mut photographs
+            && !photographs.advance(&mut measurements, rows, || !interrupt.told())?
+        {
+            return Err(run.interrupted());
         }
         overexposed += run.tiles(&measurements, tile_rows.clone(), saturated > 0)?;
     }
@@ -360,18 +362,24 @@ fn recover(
 
 /// What there is to say of photographs that are not of the patterns they are listed with.
 fn astray(folder: &CaptureFolder, shots: impl ExactSizeIterator<Item = usize>) -> anyhow::Error {
-    let (count, listed) = (shots.len(), &folder.manifest().shots);
+    let listed = &folder.manifest().shots;
     let name = |i: usize| format!("shots[{i}] ({}, {})", listed[i].photo, listed[i].pattern);
-    let mut names: Vec<String> = shots.take(MOST_NAMED).map(name).collect();
-    if count > MOST_NAMED {
-        names.push(format!("and {} more", count - MOST_NAMED));
-    }
     anyhow!(
         "{}: photographs do not show the patterns they are listed with, as others do: {}; correct \
          these, or take them out",
         folder.manifest_path().display(),
-        names.join(", ")
+        named(shots.map(name))
     )
+}
+
+/// The first of `names`, and how many more there are.
+fn named(names: impl ExactSizeIterator<Item = String>) -> String {
+    let more = names.len().saturating_sub(MOST_NAMED);
+    let mut first: Vec<String> = names.take(MOST_NAMED).collect();
+    if more > 0 {
+        first.push(format!("and {more} more"));
+    }
+    first.join(", ")
 }
 
 /// What there is to say of a recovery that was told to stop.
@@ -401,6 +409,13 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
+    /// What there is to say where it was told to stop.
+    fn interrupted(&self) -> anyhow::Error {
+        self.bar.finish_and_clear();
+        let checkpoint = self.checkpoint.lock();
+        interrupted(&checkpoint.unwrap_or_else(PoisonError::into_inner))
+    }
+
     /// Recovers the rows of tiles `tile_rows`, except what is kept already. Returns the number of
     /// their pixels that are saturated in nearly all photographs, if there is anything `saturated`.
     fn tiles(
@@ -435,10 +450,7 @@ impl Run<'_> {
         });
         let overexposed = overexposed.try_reduce(|| 0, |a, b| Ok(a + b));
         match overexposed {
-            Err(e) if e.is::<Interrupted>() => {
-                self.bar.finish_and_clear();
-                Err(interrupted(&lock()))
-            }
+            Err(e) if e.is::<Interrupted>() => Err(self.interrupted()),
             other => other,
         }
     }

@@ -7,7 +7,8 @@
 //! gathering noise.
 
 use super::dense;
-use super::pooled::{DEVIATION, dark_or_overexposed};
+use super::holdout::distinct;
+use super::pooled::DEVIATION;
 use super::sample::{mean_variance, reaches_display, spread, unsaturated, windows};
 use super::vector::{add_scaled, dot, vectorised};
 use super::workers::go_on;
@@ -81,7 +82,7 @@ impl Band {
         if !reaches_display(&geometry) {
             return Err(RecoverError::NoLight);
         }
-        let patterns = measurements.patterns.len();
+        let patterns = distinct(&measurements.patterns);
         let rings = Rings::new(probe, patterns);
         let mut squares = spread(measurements, SQUARES.1, SQUARES.0);
         // Each part a piece of the picture: what lies beside each other errs alike.
@@ -108,7 +109,9 @@ impl Band {
             let flux = total.solve();
             flux.map(|flux| rings.leaks(&flux, probe))
         };
-        let all = leaks(PARTS).ok_or_else(|| dark_or_overexposed(measurements, &squares))?;
+        let Some(all) = leaks(PARTS) else {
+            return unclear(probe); // or dark, which recovery says
+        };
         let without: Option<Vec<Vec<f64>>> = (0..PARTS).map(leaks).collect();
         let errors = match without {
             Some(without) => jackknife(&without, &all),
@@ -175,7 +178,10 @@ impl Rings {
 fn band(leaks: &[f64], errors: &[f64], probe: u32) -> Result<Band, RecoverError> {
     let rings = leaks.len();
     // One that is low by chance is not enough, and beyond the last there is none.
-    let low = |i: usize| leaks.get(i).is_none_or(|leak| leak.abs() <= LEAK);
+    let low = |i: usize| match (leaks.get(i), errors.get(i)) {
+        (Some(leak), Some(error)) => leak.abs() <= LEAK && *error <= LEAK,
+        _ => true,
+    };
     let held = (0..rings).find(|&i| low(i) && low(i + 1));
     let side = |inside: usize| Window::new(LEAST.min(probe) + 2 * inside as u32);
     if let Some(inside) = held.map(|held| held + MARGIN).filter(|&i| i < rings) {
@@ -188,16 +194,20 @@ fn band(leaks: &[f64], errors: &[f64], probe: u32) -> Result<Band, RecoverError>
     }
     // The last may be low: the band then ends where the looking does.
     let mut but_last = leaks.iter().zip(errors).take(rings.saturating_sub(1));
-    match but_last.all(|(leak, error)| *leak > LEAK + 2.0 * error) {
+    match rings > 1 && but_last.all(|(leak, error)| *leak > LEAK + 2.0 * error) {
         true => Ok(Band {
             window: side(rings)?,
             reach: Reach::Beyond,
         }),
-        false => Ok(Band {
-            window: Window::new(USUAL.min(probe))?,
-            reach: Reach::Unclear,
-        }),
+        false => unclear(probe),
     }
+}
+
+fn unclear(probe: u32) -> Result<Band, RecoverError> {
+    Ok(Band {
+        window: Window::new(USUAL.min(probe))?,
+        reach: Reach::Unclear,
+    })
 }
 
 /// Standard errors of `all`, from what they are `without` each part.

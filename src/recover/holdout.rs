@@ -39,6 +39,14 @@ impl Split {
     }
 }
 
+/// How many patterns differ from one another.
+pub(super) fn distinct(patterns: &[Pattern]) -> usize {
+    numbers(patterns)
+        .into_iter()
+        .max()
+        .map_or(0, |last| last + 1)
+}
+
 /// Numbers patterns in the order in which they come up; the same ones alike.
 fn numbers(patterns: &[Pattern]) -> Vec<usize> {
     let mut known = HashMap::new();

@@ -10,6 +10,7 @@
 //!
 //! [`Recovery`] is pure and works tile by tile: whoever has threads runs tiles on them.
 
+mod agreement;
 mod band;
 mod bpdn;
 mod common_mode;

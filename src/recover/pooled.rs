@@ -4,15 +4,16 @@
 use super::holdout::Split;
 use super::sample::{mean_variance, reaches_display, spread, unsaturated, windows};
 use super::vector::{add_scaled, dot, vectorised};
-use super::{Nnls, RecoverError, Workers, dense};
+use super::workers::go_on;
+use super::{Nnls, RecoverError, Workers, agreement, dense};
 use crate::capture::Measurements;
-use crate::transport::{CHANNELS, CameraPx, Element, Geometry, TileRect};
+use crate::transport::{CHANNELS, CameraPx, Element, Geometry, TileRect, Window};
 
 /// Rounds of finding brightness and mean function in turn. A brightness that is a few per cent off,
 /// as it is while the function is unknown, shows as light from far off.
 const POOLED_ROUNDS: usize = 3;
 /// Parts that sums are made of. Fixed, so that they do not depend on the number of threads.
-pub(super) const PARTS: usize = 8;
+const PARTS: usize = 8;
 /// How far, as a share of full brightness, a pixel is from what the mean function says of it: what
 /// weighs pixels against each other where noise is less.
 pub(super) const DEVIATION: f64 = 0.1;
@@ -23,15 +24,12 @@ pub(super) const MEAN_WEIGHT: f64 = 0.3;
 
 /// Squares that are looked at, and their side in pixels.
 const SQUARES: (usize, u32) = (128, 4);
-/// Least correlation of patterns held out, as the mean function shows them, with what was
-/// photographed. Where the two have nothing to do with each other it is zero but for chance; of
-/// captures that are worth recovering it is above a half.
-const RELATED: f64 = 0.1;
-
-/// Share of the correlation usual in a capture below which a pattern's photograph is of another.
-const ASTRAY: f64 = 0.3;
-/// Fewest windows that tell one photograph from another.
-const FEWEST_WINDOWS: usize = 64;
+/// Most channels of pixels in them.
+pub(super) const MOST_SAMPLES: usize = SQUARES.0 * (SQUARES.1 * SQUARES.1) as usize * CHANNELS;
+/// About the most memory that [`mean_function`] takes, in bytes.
+pub(super) fn bytes(window: Window) -> usize {
+    (PARTS + 2) * window.area() * window.area() * size_of::<f64>()
+}
 
 /// The squares that are looked at.
 pub(super) fn squares(measurements: &Measurements) -> Vec<TileRect> {
@@ -50,128 +48,11 @@ pub(super) fn mean_function(
     if !reaches_display(geometry) {
         return Err(RecoverError::NoLight);
     }
-    let mean = pooled_mean(measurements, geometry, &split.learn, &squares, workers)
+    let mean = pooled_mean(measurements, geometry, &split.learn, &squares, workers)?
         .ok_or_else(|| dark_or_overexposed(measurements, &squares))?;
-    let parts = workers.map(squares.len(), |i| {
-        let mut agreement = vec![Agreement::default(); split.all.len()];
-        let windows = windows(geometry, squares[i]);
-        let count = windows.len();
-        for (origin, pixels) in windows {
-            agree(
-                &mut agreement,
-                measurements,
-                geometry,
-                split,
-                &mean,
-                (origin, &pixels),
-            );
-        }
-        (agreement, count)
-    });
-    let mut by_pattern = vec![Agreement::default(); split.all.len()];
-    for (part, _) in &parts {
-        for (sum, part) in by_pattern.iter_mut().zip(part) {
-            sum.add(*part);
-        }
-    }
-    let mut held = Agreement::default();
-    split.held.iter().for_each(|&l| held.add(by_pattern[l]));
-    if held
-        .correlation()
-        .is_some_and(|correlation| correlation < RELATED)
-    {
-        return Err(RecoverError::Unrelated);
-    }
-    let looked_at: usize = parts.iter().map(|(_, windows)| windows).sum();
-    match astray(&by_pattern) {
-        patterns if !patterns.is_empty() && looked_at >= FEWEST_WINDOWS => {
-            Err(RecoverError::Astray(patterns))
-        }
-        _ => Ok(mean),
-    }
-}
-
-/// Patterns that show what was photographed far worse than others do.
-fn astray(by_pattern: &[Agreement]) -> Vec<usize> {
-    let correlations: Vec<Option<f64>> = by_pattern.iter().map(|a| a.correlation()).collect();
-    let mut known: Vec<f64> = correlations.iter().flatten().copied().collect();
-    known.sort_by(f64::total_cmp);
-    // Of those that are right, if no more than nine in ten are wrong.
-    let Some(usual) = known.get(known.len() * 9 / 10) else {
-        return Vec::new();
-    };
-    let worse = |c: &Option<f64>| c.is_some_and(|c| c < ASTRAY * usual);
-    (0..by_pattern.len())
-        .filter(|&l| worse(&correlations[l]))
-        .collect()
-}
-
-/// Inner products, over pixels, of what the mean function says that differs from a pixel's mean, and
-/// what was photographed.
-#[derive(Clone, Copy, Debug, Default)]
-struct Agreement {
-    shown: f64,
-    both: f64,
-    seen: f64,
-}
-
-impl Agreement {
-    fn add(&mut self, other: Self) {
-        self.shown += other.shown;
-        self.both += other.both;
-        self.seen += other.seen;
-    }
-
-    /// `None` where nothing is seen, or shown, that differs.
-    fn correlation(self) -> Option<f64> {
-        let correlation = self.both / (self.shown * self.seen).sqrt();
-        correlation.is_finite().then_some(correlation)
-    }
-}
-
-/// Adds one window's pixels to `agreement`, `[pattern]`.
-fn agree(
-    agreement: &mut [Agreement],
-    measurements: &Measurements,
-    geometry: &Geometry,
-    split: &Split,
-    mean: &[f64],
-    (origin, pixels): (Element, &[(usize, CameraPx)]),
-) {
-    for (plane, channels) in measurements.planes() {
-        let shown = |&l: &usize| {
-            let pattern = measurements.patterns[l].plane(plane);
-            let slots = mean.iter().enumerate().filter_map(|(slot, m)| {
-                let element = geometry.window.element(origin, slot);
-                Some(m * f64::from(pattern[element.index_in(geometry.light)?]))
-            });
-            slots.sum::<f64>()
-        };
-        let shown: Vec<f64> = split.all.iter().map(shown).collect();
-        let pixels = pixels.iter().map(|&(_, pixel)| pixel);
-        for (pixel, c) in pixels.flat_map(|pixel| channels.clone().map(move |c| (pixel, c))) {
-            let sample = |l: usize| measurements.sample(l, pixel, c);
-            let known = split.learn.iter().filter(|&&l| sample(l).is_finite());
-            let sums = known.fold([0.0; 3], |[shown_sum, seen, count], &l| {
-                [shown_sum + shown[l], seen + sample(l), count + 1.0]
-            });
-            let [level, light, count] = sums;
-            if !(level > 0.0 && light > 0.0) {
-                continue;
-            }
-            for (l, agreement) in agreement.iter_mut().enumerate() {
-                let seen = sample(l) - light / count;
-                if seen.is_finite() {
-                    let shown = light / level * (shown[l] - level / count);
-                    agreement.add(Agreement {
-                        shown: shown * shown,
-                        both: shown * seen,
-                        seen: seen * seen,
-                    });
-                }
-            }
-        }
-    }
+    go_on(workers)?;
+    agreement::check(measurements, geometry, split, &mean, &squares, workers)?;
+    Ok(mean)
 }
 
 /// The light transport function that explains all of `squares` at once, each pixel scaled by its
@@ -182,18 +63,19 @@ fn pooled_mean(
     rows: &[usize],
     squares: &[TileRect],
     workers: &impl Workers,
-) -> Option<Vec<f64>> {
+) -> Result<Option<Vec<f64>>, RecoverError> {
     let area = geometry.window.area();
     let mut mean = vec![1.0 / area as f64; area];
     for _ in 0..POOLED_ROUNDS {
+        go_on(workers)?;
         let right = pooled_round(measurements, geometry, rows, squares, &mean, workers);
         let sum: f64 = right.iter().sum();
         if sum.is_nan() || sum <= 0.0 {
-            return None;
+            return Ok(None);
         }
         mean = right.iter().map(|m| m / sum).collect();
     }
-    Some(mean)
+    Ok(Some(mean))
 }
 
 /// One round: brightness as seen with `mean`, then the function that explains all pixels.

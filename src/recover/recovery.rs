@@ -1,5 +1,7 @@
 //! Recovery of a whole transport, tile by tile, by any of the methods.
 
+use std::fmt::Write;
+
 use serde::Serialize;
 use thiserror::Error;
 
@@ -43,10 +45,11 @@ impl Method {
 
     /// About the most memory that preparing a recovery takes beside the measurements, in bytes.
     pub fn preparation_bytes(self, window: Window) -> usize {
-        match self {
+        let own = match self {
             Self::Learned => Learned::preparation_bytes(window),
             Self::Nnls | Self::Bpdn(_) => 0,
-        }
+        };
+        own.max(pooled::bytes(window))
     }
 
     /// About the most memory that recovering one tile takes beside the measurements and the tile's
@@ -135,6 +138,16 @@ pub enum RecoverError {
     Stopped,
 }
 
+/// The crc32c of what is written.
+struct Checksum(u32);
+
+impl Write for Checksum {
+    fn write_str(&mut self, text: &str) -> std::fmt::Result {
+        self.0 = crc32c::crc32c_append(self.0, text.as_bytes());
+        Ok(())
+    }
+}
+
 /// A recovery ready to run: what has been learned or chosen from the measurements as a whole, by
 /// which tiles can then be recovered one by one, in any order.
 #[derive(Debug)]
@@ -198,20 +211,13 @@ impl Recovery {
         &self.geometry
     }
 
-    /// Numbers that tell one preparation from another: tiles are of one file only if these are equal.
-    pub fn fingerprint(&self) -> Vec<u8> {
-        let common_mode = self.common_mode().map(CommonMode::weight);
-        let chosen = [
-            f64::from(self.geometry.window.side()),
-            common_mode.unwrap_or(f64::NAN),
-        ];
-        let kernels = self.basis().into_iter().flat_map(|basis| &basis.kernels);
-        let kernels = kernels.flatten().flat_map(|v| v.to_le_bytes());
-        chosen
-            .into_iter()
-            .flat_map(f64::to_le_bytes)
-            .chain(kernels)
-            .collect()
+    /// Tells one preparation from another: tiles are of one file only if these are equal.
+    pub fn fingerprint(&self) -> u32 {
+        // All of it as text, in which numbers are exact.
+        let mut sum = Checksum(0);
+        let written = write!(sum, "{:?} {:?}", self.geometry, self.solver);
+        debug_assert!(written.is_ok(), "a checksum takes everything");
+        sum.0
     }
 
     /// The functions that factored tiles are combined from, if there are such tiles.

@@ -85,10 +85,12 @@ pub(super) struct Learned {
 
 impl Learned {
     /// About the most memory that learning takes beside the measurements: the patches, what is said
-    /// of them and the sums of the neighbours' regressions, or before that the pooled equations.
+    /// of them and the sums of the neighbours' regressions, or before that the samples' equations.
     pub fn preparation_bytes(window: Window) -> usize {
-        let pooled = (pooled::PARTS + 2) * window.area() * window.area() * size_of::<f64>();
-        pooled.max(2 * PATCH_BYTES)
+        // Where each pixel and channel is saturated in other photographs.
+        let rank = start::KERNELS.min(window.area());
+        let samples = pooled::MOST_SAMPLES * rank * rank * size_of::<f64>();
+        samples.max(2 * PATCH_BYTES)
     }
 
     /// About the most memory that recovering a tile takes beside its functions, in bytes: Gram
@@ -260,7 +262,7 @@ impl Learned {
         match bytes <= PATCH_BYTES {
             true => patches,
             false => {
-                let fit = patches.len() * PATCH_BYTES / bytes;
+                let fit = PATCH_BYTES / (bytes / patches.len()).max(1);
                 spread(measurements, PATCHES.1, fit.max(FEWEST_PATCHES))
             }
         }

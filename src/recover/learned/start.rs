@@ -5,7 +5,7 @@ use crate::recover::vector::{add_scaled, dot};
 use crate::recover::{Workers, dense};
 
 /// Kernels that learning starts with. Together with the mean a whole number of vector registers.
-const KERNELS: usize = 95;
+pub(super) const KERNELS: usize = 95;
 /// Rounds of subspace iteration: the kernels need span the large directions, not be exact.
 const ROUNDS: usize = 12;
 /// Distance, in elements, over which variations of a function are taken to be correlated at first.
