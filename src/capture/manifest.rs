@@ -109,9 +109,12 @@ impl LightSpec {
 
     /// Light emitted for each of the 256 codes, 1 at full brightness.
     pub fn emission(&self) -> [f64; 256] {
-        let full = |table: &[[f64; 2]]| interpolate(table, 255.0);
+        let full = self
+            .response
+            .as_ref()
+            .map_or(1.0, |table| interpolate(table, 255.0));
         std::array::from_fn(|code| match (&self.response, self.gamma) {
-            (Some(table), _) => interpolate(table, code as f64) / full(table),
+            (Some(table), _) => interpolate(table, code as f64) / full,
             (None, gamma) => (code as f64 / 255.0).powf(gamma.unwrap_or(1.0)),
         })
     }

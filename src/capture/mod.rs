@@ -5,6 +5,7 @@
 //! whoever has threads can read them at once; a [`Photo`] is read by rows, from the top down, so that
 //! those of many megapixels need not be in memory whole. [`Measurements`] is what recovery works on.
 
+mod alike;
 mod error;
 #[cfg(not(target_arch = "wasm32"))]
 mod folder;
@@ -19,6 +20,7 @@ mod rows;
 #[cfg(not(target_arch = "wasm32"))]
 mod truth;
 
+pub(crate) use alike::{distinct, numbers};
 pub use error::CaptureError;
 #[cfg(not(target_arch = "wasm32"))]
 pub use folder::{CaptureFolder, DarkFrame};

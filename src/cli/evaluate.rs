@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::{files, lights, report};
 use crate::capture::{CaptureFolder, DarkFrame, Pattern, Photo, Picture, Rows, Truth};
-use crate::relight::Light;
+use crate::relight::{BuiltinLight, Light};
 use crate::transport::{CHANNELS, Decibels, Geometry, Transport, TransportError};
 
 /// Hold a file against a capture's known transport, relit pictures and unused photographs
@@ -81,9 +81,7 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
     let dark = folder.read_dark()?;
     let errors = against_shots(&file.transport, &folder, &dark, &held)?;
     report.flood_snr_db = against_flood(&file.transport, &folder, &dark)?;
-    let mut all = TransportError::default();
-    errors.iter().for_each(|&e| all.merge(e));
-    report.heldout_snr_db = all.snr();
+    report.heldout_snr_db = together(&errors).snr();
     report.heldout_rgb_snr_db = errors.map(|e| e.snr());
     report.heldout_shots = held.len();
     if args.json {
@@ -184,15 +182,17 @@ fn against_flood(
     let Some(photo) = folder.flood(dark)? else {
         return Ok(None);
     };
-    let light = Light::from_linear_rgb(
-        transport.geometry.light,
-        &vec![1.0; transport.geometry.light.area() * CHANNELS],
-    )?;
+    let light = BuiltinLight::Flood.render(transport.geometry.light);
     let mut errors = [TransportError::default(); CHANNELS];
     add_photo(&mut errors, transport, &light, photo)?;
+    Ok(together(&errors).snr())
+}
+
+/// The error over all channels.
+fn together(errors: &[TransportError; CHANNELS]) -> TransportError {
     let mut all = TransportError::default();
     errors.iter().for_each(|&e| all.merge(e));
-    Ok(all.snr())
+    all
 }
 
 /// Adds what is predicted under `light` against what was photographed, saturated samples left out.

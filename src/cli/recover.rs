@@ -1,6 +1,6 @@
 //! `ltm-export recover`: a capture folder to an `.ltm` file.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -17,7 +17,7 @@ use super::memory::{self, Plan};
 use super::photographs::Photographs;
 use super::process::{Interrupt, Interrupted};
 use super::{Usage, files, process, report};
-use crate::capture::{CaptureFolder, DarkFrame, Measurements, Noise, Rows, Shot};
+use crate::capture::{self, CaptureFolder, DarkFrame, Measurements, Noise, Rows, Shot};
 use crate::format::{self, EncodedTile, Metadata};
 use crate::recover::{self, Band, Method, Reach, RecoverError, Recovery, Settings, SparsityBasis};
 use crate::transport::{Basis, CHANNELS, Window};
@@ -334,6 +334,7 @@ fn recover(
         Ok(format::write_from(&geometry, &metadata, basis, tile, out)?)
     })?;
     checkpoint.done();
+    let patterns = shots.iter().map(|&i| &folder.manifest().shots[i].pattern);
     Ok(Report {
         seconds: 0.0,
         peak_rss_bytes: None,
@@ -345,11 +346,7 @@ fn recover(
             Reach::Beyond | Reach::Unclear => None,
         }),
         rank: basis.map(Basis::rank),
-        patterns: shots
-            .iter()
-            .map(|&i| &folder.manifest().shots[i].pattern)
-            .collect::<HashSet<_>>()
-            .len(),
+        patterns: capture::distinct(&capture::numbers(patterns)),
         photographs: shots.len(),
         common_mode: recovery.common_mode(),
         noise,
@@ -535,12 +532,7 @@ fn choose_shots(shots: &[Shot], first: Option<u32>) -> Result<Vec<usize>> {
         Some(k) => Ok((0..k).collect()),
         None => {
             // Shots of one pattern, by several exposures, are held out together.
-            let mut known = HashMap::new();
-            let mut number = |shot: &Shot| {
-                let next = known.len();
-                *known.entry(shot.pattern.clone()).or_insert(next)
-            };
-            let numbers: Vec<usize> = shots.iter().map(&mut number).collect();
+            let numbers = capture::numbers(shots.iter().map(|shot| &shot.pattern));
             let used = |l: &usize| numbers[*l] % HOLD_OUT_EVERY != HOLD_OUT_EVERY - 1;
             Ok((0..available).filter(used).collect())
         }

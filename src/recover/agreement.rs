@@ -2,8 +2,9 @@
 //!
 //! What the mean light transport function makes of a pattern is, on average, what is photographed
 //! under it: the slope of the one against the other is the same for all, however coarse or fine the
-//! pattern (one, if the window holds all light). Under another pattern's photograph it is zero. How far it may be off by chance is told by how much squares
-//! of the picture differ (clusters, as in Liang & Zeger 1986); what is too noisy to tell is let pass.
+//! pattern (one, if the window holds all light). Under another pattern's photograph it is zero. How far
+//! it may be off by chance is told by how much squares of the picture differ (clusters, as in Liang &
+//! Zeger 1986); what is too noisy to tell is let pass.
 
 use super::holdout::Split;
 use super::sample::windows;

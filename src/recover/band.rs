@@ -7,13 +7,13 @@
 //! gathering noise.
 
 use super::dense;
-use super::holdout::distinct;
+use super::holdout::numbers;
 use super::pooled::DEVIATION;
 use super::sample::{mean_variance, reaches_display, spread, unsaturated, windows};
 use super::vector::{add_scaled, dot, vectorised};
 use super::workers::go_on;
 use super::{RecoverError, Workers};
-use crate::capture::Measurements;
+use crate::capture::{Measurements, distinct};
 use crate::transport::{CameraPx, Element, Geometry, Window};
 
 /// Side of the window that the band is looked for in.
@@ -22,8 +22,8 @@ const PROBE: u32 = 31;
 const LEAST: u32 = 7;
 /// Side where nothing can be told.
 const USUAL: u32 = 15;
-/// Sides of what counts as a pixel's own elements; the largest whose number is at most three quarters of that
-/// of the patterns.
+/// Sides of what counts as a pixel's own elements; the largest whose number is at most three quarters
+/// of that of the patterns.
 const OWN: [u32; 4] = [7, 5, 3, 1];
 /// Largest share of a pixel's light left outside the window chosen.
 const LEAK: f64 = 0.01;
@@ -82,7 +82,7 @@ impl Band {
         if !reaches_display(&geometry) {
             return Err(RecoverError::NoLight);
         }
-        let patterns = distinct(&measurements.patterns);
+        let patterns = distinct(&numbers(&measurements.patterns));
         let rings = Rings::new(probe, patterns);
         let mut squares = spread(measurements, SQUARES.1, SQUARES.0);
         // Each part a piece of the picture: what lies beside each other errs alike.
@@ -223,7 +223,7 @@ fn jackknife(without: &[Vec<f64>], all: &[f64]) -> Vec<f64> {
 /// Normal equations of the rings' flux.
 struct Sums {
     rings: usize,
-    /// `[ring, ring]`.
+    /// `[ring, ring]`, upper triangle.
     gram: Vec<f64>,
     right: Vec<f64>,
 }
@@ -302,7 +302,7 @@ impl Sums {
             for i in 0..self.rings {
                 let a = &columns[i * patterns..(i + 1) * patterns];
                 self.right[i] += dot(a, &seen);
-                for j in 0..self.rings {
+                for j in i..self.rings {
                     let b = &columns[j * patterns..(j + 1) * patterns];
                     self.gram[i * self.rings + j] += energy * dot(a, b);
                 }
@@ -333,7 +333,7 @@ fn leave_out(own: &mut [f64], columns: &mut [f64], patterns: usize) -> bool {
     let k = own.len();
     let mut gram = vec![0.0; k * k];
     for i in 0..k {
-        for j in 0..k {
+        for j in i..k {
             gram[i * k + j] = dot(own[i], own[j]);
         }
     }

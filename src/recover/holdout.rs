@@ -1,9 +1,7 @@
 //! Patterns held out, by which all is chosen that measurements themselves must tell.
 
-use std::collections::HashMap;
-
 use super::FEWEST_PATTERNS;
-use crate::capture::{Measurements, Pattern};
+use crate::capture::{self, Measurements, Pattern};
 use crate::transport::CHANNELS;
 
 /// Every how many patterns one is held out.
@@ -39,24 +37,13 @@ impl Split {
     }
 }
 
-/// How many patterns differ from one another.
-pub(super) fn distinct(patterns: &[Pattern]) -> usize {
-    numbers(patterns)
-        .into_iter()
-        .max()
-        .map_or(0, |last| last + 1)
-}
-
 /// Numbers patterns in the order in which they come up; the same ones alike.
-fn numbers(patterns: &[Pattern]) -> Vec<usize> {
-    let mut known = HashMap::new();
-    let number = |pattern: &Pattern| {
+pub(super) fn numbers(patterns: &[Pattern]) -> Vec<usize> {
+    let bits = |pattern: &Pattern| -> Vec<u32> {
         let planes = (0..CHANNELS).map(|c| pattern.plane(c));
-        let bits: Vec<u32> = planes.flatten().map(|p| p.to_bits()).collect();
-        let next = known.len();
-        *known.entry(bits).or_insert(next)
+        planes.flatten().map(|p| p.to_bits()).collect()
     };
-    patterns.iter().map(number).collect()
+    capture::numbers(patterns.iter().map(bits))
 }
 
 #[cfg(test)]

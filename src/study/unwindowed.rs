@@ -9,9 +9,9 @@ use crate::recover::{Nnls, Workers};
 use crate::transport::TransportError;
 
 /// Recovers about `pixels` pixels drawn at random, each on its own, by non-negative least squares
-/// over all M elements. Returns each one's error, and the seconds that all pixels would take. With `φ = I` and `τ ≥ 0` the ℓ1 norm of the
-/// paper's case (b) is the light the pixel sees in all, which the measurements already fix but for
-/// their noise; least squares stands for both.
+/// over all M elements. Returns each one's error, and the seconds that all pixels would take. With
+/// `φ = I` and `τ ≥ 0` the ℓ1 norm of the paper's case (b) is the light the pixel sees in all, which the
+/// measurements already fix but for their noise; least squares stands for both.
 ///
 /// Patterns must be grey and no sample saturated.
 pub(super) fn recover(
