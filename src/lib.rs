@@ -34,6 +34,7 @@ pub mod study;
 pub mod transport;
 #[cfg(target_arch = "wasm32")]
 pub mod web;
+pub mod workers;
 
 // Unit tests of wasm32 run where the kernels and canvases are: in a browser.
 #[cfg(all(test, target_arch = "wasm32"))]

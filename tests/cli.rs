@@ -112,6 +112,7 @@ fn photographs_become_a_file_that_relights_them() {
         text(&file),
         "--window",
         "13",
+        "--lossless",
         "--json",
     ]);
     assert_eq!(recovered["method"], "learned");
@@ -142,8 +143,13 @@ fn photographs_become_a_file_that_relights_them() {
     assert_eq!(inspected["camera"], serde_json::json!([64, 64]));
     assert_eq!(inspected["window"], 13);
     assert_eq!(inspected["metadata"]["method"], "learned");
-    assert_eq!(inspected["factored_tiles"], 4);
+    assert_eq!(inspected["factored_tiles"], 1);
     assert_eq!(inspected["rank"], recovered["rank"]);
+    assert_eq!(inspected["scans"][0]["coding"], "halves");
+    assert_eq!(
+        inspected["scans"].as_array().unwrap().last().unwrap()["prefix_bytes"],
+        bytes
+    );
     assert_eq!(
         inspected["metadata"]["shots_used"]
             .as_array()
@@ -154,6 +160,74 @@ fn photographs_become_a_file_that_relights_them() {
     let verified = json(&["verify", text(&file), "--json"]);
     assert_eq!(verified["ok"], true);
     assert_eq!(verified["file_bytes"], bytes);
+
+    // Unless archives are asked for, a file is a tenth of that and nearly as good.
+    let args = ["--window", "13", "--json"];
+    let small = json(&[&["recover", text(&fixture), "-o", text(&file)], &args[..]].concat());
+    assert!(small["file_bytes"].as_u64().unwrap() * 6 < bytes, "{small}");
+    let expected = small["expected_snr_db"].as_f64().unwrap();
+    let lossless = evaluated["snr_db"].as_f64().unwrap();
+    assert!(
+        (expected - lossless).abs() < 2.0,
+        "{expected} dB expected, {lossless} dB reached"
+    );
+    let evaluated = json(&["evaluate", text(&file), text(&fixture), "--json"]);
+    assert!(
+        evaluated["snr_db"].as_f64().unwrap() > lossless - 0.3,
+        "{evaluated}"
+    );
+    // A tenth of it relights too.
+    let args = [
+        "evaluate",
+        text(&file),
+        text(&fixture),
+        "--first",
+        "10%",
+        "--json",
+    ];
+    for (light, psnr) in json(&args)["relit"].as_object().unwrap() {
+        assert!(psnr.as_f64().unwrap() > 24.0, "{light}: {psnr} dB");
+    }
+}
+
+#[test]
+fn a_file_is_as_good_or_as_small_as_asked_for() {
+    let folder = TempDir::new().unwrap();
+    let (fixture, file) = (fixture(), folder.path().join("glass.ltm"));
+    let recover = |args: &[&str]| {
+        let start = [
+            "recover",
+            text(&fixture),
+            "-o",
+            text(&file),
+            "--window",
+            "5",
+            "--json",
+        ];
+        json(&[&start, args].concat())
+    };
+    let good = recover(&["--quality", "30"]);
+    assert!(
+        (good["file_snr_db"].as_f64().unwrap() - 30.0).abs() < 0.5,
+        "{good}"
+    );
+    let small = recover(&["--max-bytes", "20000"]);
+    let bytes = small["file_bytes"].as_u64().unwrap();
+    assert!((18_000..=20_000).contains(&bytes), "{small}");
+    let message = complaint(&[
+        "recover",
+        text(&fixture),
+        "-o",
+        text(&file),
+        "--max-bytes",
+        "99",
+    ]);
+    assert!(
+        message.contains("at least") && message.contains("99"),
+        "{message}"
+    );
+    let both = ["recover", "x", "-o", "y", "--lossless", "--quality", "30"];
+    assert_eq!(run(&both).status.code(), Some(2));
 }
 
 #[test]
@@ -548,7 +622,7 @@ fn damaged_files_are_refused_by_every_command() {
             },
             "damaged",
         ),
-        (|f| f[12] = 9, "version 9.1"),
+        (|f| f[12] = 9, "version 9.0"),
         (|f| f[..4].copy_from_slice(b"<!DO"), "not an .ltm file"),
         (|f| f.push(0), "goes on after its end"),
     ];
@@ -558,7 +632,6 @@ fn damaged_files_are_refused_by_every_command() {
         fs::write(&file, bytes).unwrap();
         for args in [
             &["verify", text(&file)][..],
-            &["inspect", text(&file)],
             &["relight", text(&file), "--light", "flood", "-o", text(&png)],
             &["evaluate", text(&file), text(&fixture)],
         ] {
@@ -566,6 +639,13 @@ fn damaged_files_are_refused_by_every_command() {
             assert!(message.contains(word), "{args:?}: {message}");
             assert!(message.contains("damaged.ltm"), "{args:?}: {message}");
         }
+        // What does not read the whole of a file tells at least of its length.
+        let inspected = run(&["inspect", text(&file)]);
+        let told = String::from_utf8_lossy(&inspected.stderr).into_owned();
+        assert!(
+            told.contains(word) || word == "damaged" || told.contains("warning"),
+            "{told}"
+        );
         let verified = run(&["verify", text(&file), "--json"]);
         assert_eq!(verified.status.code(), Some(1));
         let report: Value = serde_json::from_slice(&verified.stdout).unwrap();

@@ -3,30 +3,46 @@
 
 mod common;
 
-use common::{Noise, functions, geometry};
+use common::{Noise, functions, geometry, sealed};
 use proptest::prelude::*;
 use relightable_photo::format::{
-    EncodedTile, FormatError, HEADER_BYTES, Limits, Metadata, Part, Reader, TileKind, write,
+    self, Coding, EncodedFile, Extension, FormatError, HEADER_BYTES, Interest, Limits, Metadata,
+    Part, PartNumber, Quality, Reader, Source,
 };
 use relightable_photo::transport::{
-    Basis, DirectTile, FactoredTile, Geometry, RecoveredTile, Transport,
+    BandTile, Basis, CHANNELS, Decibels, DirectTile, FactoredTile, Geometry, RecoveredTile,
+    Transport, TransportError, TransportFunctions,
 };
+use relightable_photo::workers::{OneThread, Workers};
 
 /// What a recovery yields.
+#[derive(Clone)]
 struct Recovered {
     geometry: Geometry,
     basis: Option<Basis>,
-    tiles: Vec<RecoveredTile>,
+    tiles: Vec<BandTile>,
+}
+
+// Briefly: what a failing case prints is what it was made from.
+impl std::fmt::Debug for Recovered {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let rank = self.basis.as_ref().map(Basis::rank);
+        write!(f, "rank {rank:?} on {:?}", self.geometry)
+    }
 }
 
 impl Recovered {
     /// Direct tiles, the first of them dark.
     fn direct(geometry: Geometry, seed: u64) -> Self {
-        let tiles = functions(geometry, seed).into_iter();
+        let tiles = functions(geometry, seed).into_iter().map(|functions| {
+            let mut tile = BandTile::dark(functions.rect);
+            tile.put(RecoveredTile::Direct(functions));
+            tile
+        });
         Self {
             geometry,
             basis: None,
-            tiles: tiles.map(RecoveredTile::Direct).collect(),
+            tiles: tiles.collect(),
         }
     }
 
@@ -54,69 +70,114 @@ impl Recovered {
                 };
                 [1.0, 0.5, 2.0].map(|c| c * size * (noise.next() as f32 - 0.3))
             };
-            recovered.tiles[i] = RecoveredTile::Factored(FactoredTile {
+            let mut tile = BandTile::dark(rect);
+            tile.put(RecoveredTile::Factored(FactoredTile {
                 rect,
                 coefficients: (0..rect.extent.area() * rank).map(coefficient).collect(),
-            });
+            }));
+            recovered.tiles[i] = tile;
         }
         recovered
     }
 
-    fn encoded(&self) -> Vec<EncodedTile> {
-        let encode = |tile| EncodedTile::new(&self.geometry, tile).unwrap();
-        self.tiles.iter().map(encode).collect()
+    fn encode(&self, quality: Quality<'_>) -> Result<EncodedFile, FormatError> {
+        self.encode_by(quality, &OneThread, Vec::new())
     }
 
-    fn file(&self) -> Vec<u8> {
-        let mut file = Vec::new();
-        let basis = self.basis.as_ref();
-        write(
-            &self.geometry,
-            &metadata(),
-            basis,
-            &self.encoded(),
-            &mut file,
-        )
-        .unwrap();
-        file
-    }
-
-    /// What is to be read of it, but for the rounding of coefficients.
-    fn expected(&self) -> Transport {
-        let quantise = |tile: &RecoveredTile| {
-            let functions = tile.clone().functions(&self.geometry, self.basis.as_ref());
-            DirectTile::quantise(&functions)
-        };
-        Transport {
+    fn encode_by(
+        &self,
+        quality: Quality<'_>,
+        workers: &impl Workers,
+        extensions: Vec<Extension>,
+    ) -> Result<EncodedFile, FormatError> {
+        let source = Source {
             geometry: self.geometry,
-            tiles: self.tiles.iter().map(quantise).collect(),
+            basis: self.basis.as_ref(),
+            tile: &|i| Ok(self.tiles[i].clone()),
+            metadata: metadata(),
+            extensions,
+        };
+        EncodedFile::new(source, quality, workers)
+    }
+
+    fn file(&self, quality: Quality<'_>) -> Vec<u8> {
+        bytes(&self.encode(quality).unwrap())
+    }
+
+    /// Light transport functions of tile `i`, term by term.
+    fn functions(&self, i: usize) -> TransportFunctions {
+        let (tile, area) = (&self.tiles[i], self.geometry.window.area());
+        let mut functions = TransportFunctions::zeros(tile.rect, area);
+        if !tile.functions.is_empty() {
+            functions.tau.clone_from(&tile.functions);
         }
+        if let Some(basis) = &self.basis
+            && !tile.coefficients.is_empty()
+        {
+            let factored = FactoredTile {
+                rect: tile.rect,
+                coefficients: tile.coefficients.clone(),
+            };
+            let more = factored.expand(&self.geometry, basis);
+            for (tau, more) in functions.tau.iter_mut().zip(more.tau) {
+                (0..CHANNELS).for_each(|c| tau[c] += more[c]);
+            }
+        }
+        functions
+    }
+
+    /// How far a transport is from this one.
+    fn error(&self, decoded: &Transport) -> TransportError {
+        let area = self.geometry.window.area();
+        let mut error = TransportError::default();
+        for (i, tile) in decoded.tiles.iter().enumerate() {
+            for (at, want) in self.functions(i).tau.iter().enumerate() {
+                let got = tile.tau(area, at / area, at % area);
+                for c in 0..CHANNELS {
+                    error.add(f64::from(want[c]), f64::from(got[c]));
+                }
+            }
+        }
+        error
     }
 }
 
-fn decode(file: &[u8], piece: usize) -> Result<(Transport, Metadata), FormatError> {
+fn bytes(file: &EncodedFile) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    file.write(&mut bytes).unwrap();
+    assert_eq!(bytes.len() as u64, file.bytes());
+    bytes
+}
+
+fn read(file: &[u8], piece: usize) -> Result<Reader, FormatError> {
     let mut reader = Reader::new(Limits::default());
+    let mut offset = 0;
     for piece in file.chunks(piece.max(1)) {
-        reader.feed(reader.position(), piece)?;
+        reader.feed(offset, piece)?;
+        offset += piece.len() as u64;
     }
-    reader.finish()
+    Ok(reader)
+}
+
+fn decode(file: &[u8], piece: usize) -> Result<(Transport, Metadata), FormatError> {
+    read(file, piece)?.finish()
 }
 
 fn metadata() -> Metadata {
     Metadata {
+        title: "A window".to_owned(),
         writer: "test".to_owned(),
         method: "nnls".to_owned(),
         shots_used: vec![0, 2, 5],
+        ..Metadata::default()
     }
 }
+
+const QUALITY: Quality<'static> = Quality::Snr(Decibels(30.0));
 
 /// Six tiles of 8 x 8 pixels and less.
 fn small_geometry() -> Geometry {
     geometry([17, 9], [8, 6], 3, [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]])
-}
-
-fn direct_file() -> Vec<u8> {
-    Recovered::direct(small_geometry(), 1).file()
 }
 
 /// Tiles 0 and 3 dark, 1 and 5 factored, 2 and 4 direct.
@@ -124,135 +185,348 @@ fn mixed() -> Recovered {
     Recovered::mixed(small_geometry(), 4, 1)
 }
 
+/// A file in each coding: rounded and in half precision, direct and mixed.
+fn small_files() -> Vec<Vec<u8>> {
+    let mut files = Vec::new();
+    for recovered in [mixed(), Recovered::direct(small_geometry(), 1)] {
+        files.extend([QUALITY, Quality::Lossless].map(|quality| recovered.file(quality)));
+    }
+    files
+}
+
+/// Transports, and geometries of theirs, of all sorts.
+fn any_recovered() -> impl Strategy<Value = Recovered> {
+    let sides = ([1u32..40, 1u32..40], [1u32..20, 1u32..20], 0u32..4);
+    let others = (-30.0f64..30.0, 0usize..20, any::<u64>());
+    (sides, others).prop_map(|((camera, light, half), (offset, rank, seed))| {
+        let affine = [[0.5, 0.01, offset], [-0.02, 0.5, 0.25]];
+        let geometry = geometry(camera, light, 2 * half + 1, affine);
+        match rank {
+            0 => Recovered::direct(geometry, seed),
+            rank => Recovered::mixed(geometry, rank, seed),
+        }
+    })
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
     #[test]
-    fn any_transport_survives_in_pieces_of_any_size(
-        camera in [1u32..40, 1u32..40], light in [1u32..20, 1u32..20], half in 0u32..4,
-        offset in -30.0f64..30.0, seed in any::<u64>(), piece in 1usize..5000,
-    ) {
-        let affine = [[0.5, 0.01, offset], [-0.02, 0.5, 0.25]];
-        let recovered = Recovered::direct(geometry(camera, light, 2 * half + 1, affine), seed);
-        let (decoded, meta) = decode(&recovered.file(), piece).unwrap();
-        prop_assert_eq!(decoded, recovered.expected());
+    fn archives_keep_eleven_bits(recovered in any_recovered(), piece in 1usize..5000) {
+        let (decoded, meta) = decode(&recovered.file(Quality::Lossless), piece).unwrap();
         prop_assert_eq!(meta, metadata());
+        prop_assert_eq!(decoded.geometry, recovered.geometry);
+        let snr = recovered.error(&decoded).snr();
+        prop_assert!(snr.is_none_or(|snr| snr.0 > 55.0), "{:?}", snr);
     }
 
     #[test]
-    fn factored_tiles_survive_but_for_rounding(
-        camera in [1u32..40, 1u32..40], light in [1u32..20, 1u32..20], half in 0u32..4,
-        offset in -30.0f64..30.0, rank in 1usize..20, seed in any::<u64>(),
-        piece in 1usize..5000,
+    fn other_files_keep_the_quality_asked_for(
+        recovered in any_recovered(), quality in 15.0f64..60.0, piece in 1usize..5000,
     ) {
-        let affine = [[0.5, 0.01, offset], [-0.02, 0.5, 0.25]];
-        let geometry = geometry(camera, light, 2 * half + 1, affine);
-        let recovered = Recovered::mixed(geometry, rank, seed);
-        let (decoded, _) = decode(&recovered.file(), piece).unwrap();
-        let area = geometry.window.area();
-        for (i, want) in recovered.expected().tiles.iter().enumerate() {
-            let got = &decoded.tiles[i];
-            let RecoveredTile::Factored(tile) = &recovered.tiles[i] else {
-                prop_assert_eq!(got, want);
-                continue;
-            };
-            prop_assert_eq!(got.rect, want.rect);
-            // Half a step of each coefficient, on kernels of unit norm; then half a code at most
-            // on either side, as the codes' own step changes little.
-            let peak = |c: usize| {
-                let sizes = tile.coefficients.iter().map(|coefficient| coefficient[c].abs());
-                sizes.fold(0.0, f32::max)
-            };
-            for c in 0..3 {
-                let bound = 0.51 * peak(c) / 32767.0 * (rank as f32).sqrt() + 1.01 * want.step[c];
-                for at in 0..got.rect.extent.area() * area {
-                    let [got, want] = [got, want].map(|t| t.tau(area, at / area, at % area)[c]);
-                    prop_assert!((got - want).abs() <= bound, "{got} is not {want}");
+        let encoded = recovered.encode(Quality::Snr(Decibels(quality))).unwrap();
+        let (decoded, _) = decode(&bytes(&encoded), piece).unwrap();
+        let snr = recovered.error(&decoded).snr();
+        // What is off the display counts for the encoder and is not there for the eye; and codes of
+        // twelve bits have noise of their own.
+        let geometry = &recovered.geometry;
+        let seen = geometry.light.area() > 100 && geometry.correspondence.affine[0][2].abs() < 3.0;
+        let snr = snr.filter(|_| seen);
+        prop_assert!(snr.is_none_or(|snr| snr.0 > quality.min(52.0) - 3.0), "{:?}", snr);
+        if let Some(claimed) = encoded.snr() {
+            prop_assert!(claimed.0 > quality - 0.3, "{}", claimed.0);
+        }
+    }
+
+    #[test]
+    fn parts_may_come_in_any_order(recovered in any_recovered(), seed in any::<u64>()) {
+        let file = recovered.file(QUALITY);
+        let want = decode(&file, file.len()).unwrap();
+        let mut reader = Reader::new(Limits::default());
+        let mut noise = Noise(seed);
+        while let Some(ranges) = Some(reader.wants(&Interest::default())).filter(|r| !r.is_empty()) {
+            let range = ranges[(noise.next() * ranges.len() as f64) as usize].clone();
+            let mut range = range.start as usize..file.len().min(range.end as usize);
+            if let Some(head) = reader.head() && noise.next() < 0.7 {
+                // A part by itself, from the middle of what is wanted.
+                let parts: Vec<_> = head
+                    .parts()
+                    .map(|part| head.range(part))
+                    .filter(|part| part.start as usize >= range.start && part.end as usize <= range.end)
+                    .collect();
+                if !parts.is_empty() {
+                    let part = &parts[(noise.next() * parts.len() as f64) as usize];
+                    range = part.start as usize..part.end as usize;
                 }
             }
+            let length = (noise.next() * 2.0 * range.len() as f64) as usize;
+            range.end = range.end.min(range.start + length.max(1));
+            reader.feed(range.start as u64, &file[range]).unwrap();
         }
+        prop_assert_eq!(reader.progress().tiles, want.0.tiles.len());
+        prop_assert_eq!(reader.progress().bytes, file.len() as u64);
+        prop_assert!(reader.finish().unwrap() == want);
+    }
+}
+
+/// A worker who does the last first.
+struct Backwards;
+
+impl Workers for Backwards {
+    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        let mut results: Vec<T> = (0..count).rev().map(work).collect();
+        results.reverse();
+        results
     }
 }
 
 #[test]
 fn the_same_transport_gives_the_same_bytes() {
-    assert_eq!(direct_file(), direct_file());
-    assert_eq!(mixed().file(), mixed().file());
+    for quality in [QUALITY, Quality::Bytes(6000), Quality::Lossless] {
+        let first = mixed().file(quality);
+        let again = mixed().encode_by(quality, &Backwards, Vec::new()).unwrap();
+        assert!(first == bytes(&again), "{quality:?}");
+    }
 }
 
 #[test]
-fn tiles_keep_their_kinds() {
-    let recovered = mixed();
-    let file = recovered.file();
+fn every_scan_makes_it_better_and_says_by_how_much() {
+    let geometry = geometry([70, 50], [40, 30], 7, [[0.5, 0.0, 2.0], [0.0, 0.5, 2.0]]);
+    for (recovered, quality) in [
+        (
+            Recovered::mixed(geometry, 12, 3),
+            Quality::Snr(Decibels(35.0)),
+        ),
+        (Recovered::mixed(geometry, 12, 3), Quality::Lossless),
+        (Recovered::direct(geometry, 3), Quality::Snr(Decibels(35.0))),
+    ] {
+        let file = recovered.file(quality);
+        let head = read(&file, file.len()).unwrap().head().unwrap().clone();
+        let mut before = 0.0;
+        for (s, scan) in head.scans.iter().enumerate() {
+            let end = head.scan_range(s).end as usize;
+            let mut reader = read(&file[..end], 3000).unwrap();
+            assert!(reader.progress().scans > s); // later ones may hold nothing
+            assert!(
+                reader
+                    .wants(&Interest::default())
+                    .iter()
+                    .all(|r| r.start >= end as u64)
+            );
+            let enough = Interest {
+                quality: Some(Decibels(scan.snr.0)),
+                viewport: None,
+            };
+            assert!(reader.wants(&enough).is_empty(), "scan {s}");
+            reader.feed(3, &file[3..end]).unwrap(); // once more, which changes nothing
+            let (transport, _) = reader.finish_early().unwrap();
+            let snr = recovered.error(&transport).snr().unwrap().0;
+            // Colour axes that are not final yet, and codes of twelve bits, take their part.
+            let [snr, claimed] = [snr, scan.snr.0].map(|snr| snr.min(55.0));
+            assert!(
+                (snr - claimed).abs() < 2.5,
+                "scan {s}: {snr} dB for {claimed}"
+            );
+            assert!(snr > before - 0.01, "scan {s}: {snr} dB after {before}");
+            before = snr;
+        }
+    }
+}
+
+#[test]
+fn a_file_can_be_as_small_as_asked_for() {
+    let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
+    let geometry = common::tiled([128, 128], [64, 64], 5, 64, affine);
+    let recovered = Recovered::mixed(geometry, 8, 5);
+    let mut before = 0.0;
+    for most in [30_000, 60_000, 120_000] {
+        let file = recovered.encode(Quality::Bytes(most)).unwrap();
+        assert!(
+            (most * 9 / 10..=most).contains(&file.bytes()),
+            "{} of {most}",
+            file.bytes()
+        );
+        let snr = file.snr().unwrap().0;
+        assert!(snr > before + 1.0, "{snr} dB in {most} bytes");
+        before = snr;
+    }
+    let error = recovered.encode(Quality::Bytes(300)).unwrap_err();
+    assert!(
+        matches!(error, FormatError::TooLarge { most: 300, least } if least > 300),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_is_seen_is_wanted_and_nothing_else() {
+    let geometry = geometry([64, 48], [32, 24], 5, [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]);
+    let file = Recovered::mixed(geometry, 6, 2).file(QUALITY);
     let mut reader = Reader::new(Limits::default());
-    reader.feed(0, &file).unwrap();
-    let kinds: Vec<_> = reader.entries().iter().map(|entry| entry.kind).collect();
-    // The last component is zero throughout.
-    let factored = TileKind::Factored { components: 3 };
-    let (dark, direct) = (TileKind::Dark, TileKind::Direct);
-    assert_eq!(kinds, [dark, factored, direct, dark, direct, factored]);
-    assert_eq!(reader.header().unwrap().rank, 4);
-    assert!(reader.finish().unwrap().0.tiles[3].is_dark());
-}
-
-#[test]
-fn a_tile_can_be_kept_by_itself() {
-    let recovered = mixed();
-    for (i, tile) in recovered.encoded().into_iter().enumerate() {
-        let bytes = tile.to_bytes().unwrap();
-        let restore =
-            |rank, bytes: &[u8]| EncodedTile::from_bytes(&recovered.geometry, rank, i, bytes);
-        assert_eq!(restore(4, &bytes).unwrap(), tile);
-        for length in 0..bytes.len() {
-            let error = restore(4, &bytes[..length]).unwrap_err();
-            assert!(matches!(error, FormatError::Truncated { .. }), "{error}");
-        }
-        let error = restore(4, &[&bytes[..], b"."].concat()).unwrap_err();
-        assert!(matches!(error, FormatError::TrailingBytes { .. }));
-        if !matches!(tile.kind(), TileKind::Dark) {
-            let mut damaged = bytes.clone();
-            *damaged.last_mut().unwrap() ^= 1;
-            let part = Part::Tile(i);
-            let error = restore(4, &damaged).unwrap_err();
-            assert!(matches!(error, FormatError::Checksum { part: p } if p == part));
-        }
-        if matches!(tile.kind(), TileKind::Factored { .. }) {
-            let error = restore(2, &bytes).unwrap_err();
-            assert!(matches!(error, FormatError::Kind { tile } if tile == i));
-        }
-    }
-}
-
-#[test]
-fn factored_tiles_are_not_written_without_their_basis() {
-    let recovered = mixed();
-    let tiles = recovered.encoded();
-    let mut short = recovered.basis.clone().unwrap();
-    short.kernels.truncate(2);
-    for (basis, there_is) in [(None, 0), (Some(&short), 2)] {
-        let geometry = &recovered.geometry;
-        let error = write(geometry, &metadata(), basis, &tiles, &mut Vec::new()).unwrap_err();
-        assert!(matches!(
-            error,
-            FormatError::Components { tile: 1, components: 3, rank } if rank == there_is
-        ));
-    }
-    let large = Basis {
-        kernels: vec![vec![0.1; 9]; 1025],
+    let first = reader.wants(&Interest::default());
+    assert_eq!((first.len(), &first[0]), (1, &(0..format::FIRST_BYTES)));
+    let head_bytes = read(&file, file.len()).unwrap().head_bytes().unwrap();
+    reader.feed(0, &file[..200]).unwrap();
+    let then = reader.wants(&Interest::default());
+    assert_eq!((then.len(), &then[0]), (1, &(200..head_bytes)));
+    reader.feed(200, &file[200..head_bytes as usize]).unwrap();
+    let interest = Interest {
+        viewport: Some((20..33, 9..16)),
+        quality: None,
     };
-    let (geometry, mut out) = (&recovered.geometry, Vec::new());
-    let error = write(geometry, &metadata(), Some(&large), &tiles, &mut out).unwrap_err();
-    assert!(matches!(error, FormatError::Rank(1025)));
+    // Tiles 2, 3 and 4 of the second row of eight.
+    let head = reader.head().unwrap().clone();
+    let seen = [10, 11, 12];
+    for range in reader.wants(&interest) {
+        let part = head
+            .parts()
+            .find(|part| head.range(*part).start == range.start)
+            .unwrap();
+        assert!(
+            part.tile.is_none_or(|tile| seen.contains(&tile)),
+            "{part:?}"
+        );
+        reader
+            .feed(range.start, &file[range.start as usize..range.end as usize])
+            .unwrap();
+    }
+    assert!(reader.wants(&interest).is_empty());
+    let rest: u64 = reader
+        .wants(&Interest::default())
+        .iter()
+        .map(|r| r.end - r.start)
+        .sum();
+    let others = head
+        .parts()
+        .filter(|part| part.tile.is_some_and(|tile| !seen.contains(&tile)));
+    let others: u64 = others
+        .map(|part| head.range(part).end - head.range(part).start)
+        .sum();
+    assert_eq!(rest, others);
+    let (whole, _) = decode(&file, file.len()).unwrap();
+    let (part, _) = reader.finish_early().unwrap();
+    for tile in seen {
+        assert_eq!(part.tiles[tile], whole.tiles[tile]);
+    }
+    assert!(part.tiles[20].is_dark() && !whole.tiles[20].is_dark());
 }
 
 #[test]
-fn every_truncation_is_refused() {
-    for file in [direct_file(), mixed().file()] {
+fn dark_tiles_cost_nothing() {
+    let geometry = geometry(
+        [320, 320],
+        [160, 160],
+        3,
+        [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
+    );
+    let mut recovered = Recovered::direct(geometry, 1);
+    for tile in &mut recovered.tiles[2..] {
+        *tile = BandTile::dark(tile.rect);
+    }
+    let file = recovered.file(QUALITY);
+    let mut one = recovered.clone();
+    one.geometry.camera.width = 16;
+    one.geometry.camera.height = 8;
+    one.tiles.truncate(2);
+    let alone = one.file(QUALITY);
+    assert!(
+        file.len() < alone.len() + 60,
+        "{} {}",
+        file.len(),
+        alone.len()
+    );
+    let (transport, _) = decode(&file, 999).unwrap();
+    assert!(transport.tiles[2..].iter().all(DirectTile::is_dark));
+    for tile in &mut recovered.tiles {
+        *tile = BandTile::dark(tile.rect);
+    }
+    for quality in [QUALITY, Quality::Bytes(1000), Quality::Lossless] {
+        let (transport, _) = decode(&recovered.file(quality), 7).unwrap();
+        assert!(transport.tiles.iter().all(DirectTile::is_dark));
+    }
+}
+
+/// Whether what codecs do at the borders of tiles shows: light transport that is smooth all over the
+/// picture, under a flat light and under the edge of a shadow.
+#[test]
+fn tiles_have_no_seams() {
+    let side = 64;
+    let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
+    let geometry = common::tiled([128, 128], [64, 64], 7, side, affine);
+    let area = geometry.window.area();
+    let kernel = |k: usize| -> Vec<f32> {
+        (0..area)
+            .map(|s| ((s * (k + 1)) as f32 * 0.11).cos() + 0.3)
+            .collect()
+    };
+    let mut noise = Noise(4);
+    let mut recovered = Recovered {
+        geometry,
+        basis: Some(Basis {
+            kernels: (0..6).map(kernel).collect(),
+        }),
+        tiles: Vec::new(),
+    };
+    for rect in geometry.tiles() {
+        let mut tile = BandTile::dark(rect);
+        let coefficients = rect.pixels().flat_map(|pixel| {
+            let (x, y) = (pixel.x as f32 / 20.0, pixel.y as f32 / 27.0);
+            let value =
+                |k: usize| ((x + k as f32).sin() * (y - k as f32).cos() + 1.1) / (k + 1) as f32;
+            (0..6).map(value).collect::<Vec<_>>()
+        });
+        let coefficients = coefficients
+            .map(|value| [0.9, 0.6, 0.3].map(|c| c * value + 0.02 * (noise.next() as f32 - 0.5)));
+        tile.coefficients = coefficients.collect();
+        recovered.tiles.push(tile);
+    }
+    let file = recovered.file(Quality::Snr(Decibels(28.0)));
+    let (decoded, _) = decode(&file, file.len()).unwrap();
+    let window = geometry.window;
+    for edge in [64.0, 31.3] {
+        let (mut border, mut inside) = ([0.0, 0.0], [0.0, 0.0]);
+        for (i, tile) in decoded.tiles.iter().enumerate() {
+            let want = recovered.functions(i);
+            for (p, pixel) in tile.rect.pixels().enumerate() {
+                let origin = geometry.window_origin(pixel);
+                let mut off = 0.0;
+                for s in 0..area {
+                    let element = window.element(origin, s);
+                    if element.index_in(geometry.light).is_some() && f64::from(element.u) < edge {
+                        off += f64::from(tile.tau(area, p, s)[1] - want.tau[p * area + s][1]);
+                    }
+                }
+                let at_border = |x: u32| x == side - 1 || x == side;
+                let sums = match at_border(pixel.x) || at_border(pixel.y) {
+                    true => &mut border,
+                    false => &mut inside,
+                };
+                sums[0] += off * off;
+                sums[1] += 1.0;
+            }
+        }
+        let [border, inside] = [border, inside].map(|[squares, count]| squares / count);
+        assert!(
+            inside > 0.0 && border < 1.6 * inside,
+            "edge {edge}: {border} against {inside}"
+        );
+    }
+}
+
+#[test]
+fn every_truncation_is_refused_and_relights_as_far_as_it_goes() {
+    for file in small_files() {
+        let head_bytes = read(&file, file.len()).unwrap().head_bytes().unwrap();
         for length in 0..file.len() {
             let error = decode(&file[..length], 97).unwrap_err();
             assert!(
                 matches!(error, FormatError::Truncated { got, .. } if got == length as u64),
                 "cut to {length}: {error}"
+            );
+            let early = read(&file[..length], 97).unwrap().finish_early();
+            assert_eq!(
+                early.is_ok(),
+                length as u64 >= head_bytes,
+                "cut to {length}"
             );
         }
     }
@@ -260,11 +534,11 @@ fn every_truncation_is_refused() {
 
 #[test]
 fn every_flipped_bit_is_refused() {
-    for file in [direct_file(), mixed().file()] {
+    for file in small_files() {
         for byte in 0..file.len() {
+            let mut damaged = file.clone();
             for bit in 0..8 {
-                let mut damaged = file.clone();
-                damaged[byte] ^= 1 << bit;
+                damaged[byte] = file[byte] ^ (1 << bit);
                 assert!(
                     decode(&damaged, 1 << 20).is_err(),
                     "bit {bit} of byte {byte}"
@@ -274,9 +548,45 @@ fn every_flipped_bit_is_refused() {
     }
 }
 
+/// Checksums made right, so that what lies behind them is met: pictures of noise, or an error.
+#[test]
+fn ten_thousand_mutations_do_no_harm() {
+    let limits = Limits {
+        decoded_bytes: 64 << 20,
+    };
+    let files = small_files();
+    let mut noise = Noise(11);
+    let mut fate = [0, 0];
+    for round in 0..10_000 {
+        let mut file = files[round % files.len()].clone();
+        for _ in 0..1 + (noise.next() * 4.0) as usize {
+            let at = (noise.next() * file.len() as f64) as usize;
+            match (noise.next() * 4.0) as u32 {
+                0 => file[at] ^= 1 << (noise.next() * 8.0) as u32,
+                1 => file[at] = (noise.next() * 256.0) as u8,
+                2 => file[at] = [0, 0xFF, 0x7F, 0x80][(noise.next() * 4.0) as usize],
+                _ => {
+                    let from = (noise.next() * file.len() as f64) as usize;
+                    file[at] = file[from];
+                }
+            }
+        }
+        let file = sealed(file, |_| {});
+        let mut reader = Reader::new(limits);
+        let result = reader.feed(0, &file).and_then(|()| reader.finish());
+        if let Ok((transport, _)) = &result {
+            let steps = transport.tiles.iter().flat_map(|tile| tile.step);
+            assert!(steps.into_iter().all(f32::is_finite), "round {round}");
+        }
+        fate[usize::from(result.is_ok())] += 1;
+    }
+    // Neither is rare, or this would be a test of one path.
+    assert!(fate.iter().all(|count| *count > 500), "{fate:?}");
+}
+
 #[test]
 fn what_is_wrong_is_said() {
-    let file = direct_file();
+    let file = mixed().file(QUALITY);
     let message = |edit: &dyn Fn(&mut Vec<u8>)| {
         let mut file = file.clone();
         edit(&mut file);
@@ -292,175 +602,207 @@ fn what_is_wrong_is_said() {
     let mangled = [&file[..8], b"\n\x1A\n"].concat();
     let error = decode(&mangled, 1).unwrap_err();
     assert!(matches!(error, FormatError::TextMode), "{error}");
-    // By the name, in which readers of version 0.0 saw it, and by the field.
-    assert!(message(&|f| f[5..7].copy_from_slice(b"00")).contains("version 0.0"));
-    assert!(message(&|f| f[12] = 1).contains("version 1.1"));
-    assert!(message(&|f| f[14] = 7).contains("version 0.7"));
+    // By the name, and by the field.
+    assert!(message(&|f| f[5..7].copy_from_slice(b"01")).contains("version 0.1"));
+    assert!(message(&|f| f[12] = 2).contains("version 2.0"));
     assert!(message(&|f| f[20] ^= 1).contains("header is damaged"));
     assert!(message(&|f| f[HEADER_BYTES + 9] ^= 1).contains("directory is damaged"));
-    assert!(message(&|f| *f.last_mut().unwrap() ^= 1).contains("(tile 5) is damaged"));
+    let last = message(&|f| *f.last_mut().unwrap() ^= 1);
+    assert!(last.contains("tile 4) is damaged"), "{last}");
     assert!(message(&|f| f.push(0)).contains("goes on after its end"));
     assert!(message(&|f| f.truncate(50)).contains("cut short"));
 }
 
-/// Offsets of fields that only a file of somebody who means harm has wrong: the checksums of it
-/// are right.
+#[test]
+fn other_minor_versions_and_unknown_extensions_are_read_unless_they_must_be_understood() {
+    let extension = |must_understand| Extension {
+        tag: *b"TEST",
+        must_understand,
+        data: vec![1, 2, 3],
+    };
+    let recovered = mixed();
+    let plain = decode(&recovered.file(QUALITY), 100).unwrap();
+    let encode = |extensions| {
+        bytes(
+            &recovered
+                .encode_by(QUALITY, &OneThread, extensions)
+                .unwrap(),
+        )
+    };
+    let file = encode(vec![extension(false), extension(false)]);
+    assert!(decode(&file, 100).unwrap() == plain);
+    let kept = read(&file, 100).unwrap().head().unwrap().extensions.clone();
+    assert_eq!(kept, [extension(false), extension(false)]);
+    let newer = sealed(file, |f| f[14] = 7);
+    assert!(decode(&newer, 100).unwrap() == plain);
+    let error = decode(&encode(vec![extension(true)]), 100).unwrap_err();
+    assert!(
+        matches!(error, FormatError::Extension { tag } if &tag == b"TEST"),
+        "{error}"
+    );
+}
+
+/// Offsets of the header's fields.
 mod field {
-    use super::HEADER_BYTES;
-
-    pub const METADATA_BYTES: usize = 96;
-    pub const RANK: usize = 104;
-    pub const BASIS_BYTES: usize = 108;
-    pub const BASIS_CRC: usize = 112;
-    pub const DIRECTORY_CRC: usize = 116;
-    pub const HEADER_CRC: usize = 120;
-    /// The entry of the second tile.
-    pub const ENTRY: usize = HEADER_BYTES + 32;
-    pub const LENGTH: usize = ENTRY + 8;
-    pub const STEP: usize = ENTRY + 16;
-    pub const KIND: usize = ENTRY + 28;
-    pub const COMPONENTS: usize = ENTRY + 30;
-}
-
-fn u32_at(file: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes(file[at..at + 4].try_into().unwrap())
-}
-
-fn put(file: &mut [u8], at: usize, bytes: &[u8]) {
-    file[at..at + bytes.len()].copy_from_slice(bytes);
-}
-
-/// Makes the checksums of the basis, directory and header right.
-fn seal(file: &mut [u8], tiles: usize) {
-    let directory = HEADER_BYTES..HEADER_BYTES + 32 * tiles;
-    let basis = directory.end + u32_at(file, field::METADATA_BYTES) as usize;
-    let basis = basis..(basis + u32_at(file, field::BASIS_BYTES) as usize).min(file.len());
-    for (part, at) in [
-        (basis, field::BASIS_CRC),
-        (directory, field::DIRECTORY_CRC),
-        (0..field::HEADER_CRC, field::HEADER_CRC),
-    ] {
-        let crc = crc32c::crc32c(&file[part]);
-        put(file, at, &crc.to_le_bytes());
-    }
+    pub const RANK: usize = 96;
+    pub const SCANS: usize = 100;
+    pub const DIRECTORY_BYTES: usize = 104;
+    pub const EXTENSION_BYTES: usize = 112;
+    pub const METADATA_BYTES: usize = 120;
+    /// Of the directory, decompressed.
+    pub const CODING: usize = 0;
+    pub const FIRST: usize = 2;
+    pub const COUNT: usize = 4;
+    pub const STEP: usize = 8;
+    pub const BASIS_BYTES: usize = 16;
+    pub const SCAN: usize = 24;
 }
 
 #[test]
 fn a_crafted_file_is_refused_for_what_is_wrong_with_it() {
-    let file = mixed().file();
-    let basis_at = HEADER_BYTES + 32 * 6 + u32_at(&file, field::METADATA_BYTES) as usize;
-    let refusal = |edit: &dyn Fn(&mut Vec<u8>)| {
-        let mut file = file.clone();
-        edit(&mut file);
-        seal(&mut file, 6);
-        decode(&file, 1 << 20).unwrap_err()
+    let file = mixed().file(QUALITY);
+    let header = |at: usize, value: u32| {
+        let edit = |f: &mut Vec<u8>| f[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        decode(&sealed(file.clone(), edit), 1 << 20).unwrap_err()
     };
-    let kind = |edit: &dyn Fn(&mut Vec<u8>)| {
-        let error = refusal(edit);
-        assert!(matches!(error, FormatError::Kind { tile: 1 }), "{error}");
-    };
-    kind(&|f| put(f, field::KIND, &[3, 0]));
-    kind(&|f| put(f, field::KIND, &[0, 0]));
-    kind(&|f| put(f, field::KIND, &[1, 0]));
-    kind(&|f| put(f, field::COMPONENTS, &[5, 0]));
-    kind(&|f| put(f, field::COMPONENTS, &[0, 0]));
-    kind(&|f| put(f, field::STEP, &f32::NAN.to_le_bytes()));
-    kind(&|f| put(f, field::STEP, &0.0f32.to_le_bytes()));
-    kind(&|f| put(f, field::LENGTH, &0u32.to_le_bytes()));
-    kind(&|f| put(f, field::LENGTH, &u32::MAX.to_le_bytes()));
-    // Fewer than were written, for which it is too long; and more.
-    kind(&|f| put(f, field::COMPONENTS, &[2, 0]));
-    let error = refusal(&|f| put(f, field::COMPONENTS, &[4, 0]));
-    let part = Part::Tile(1);
-    assert!(
-        matches!(error, FormatError::Decompress { part: p, .. } if p == part),
-        "{error}"
-    );
-    let error = refusal(&|f| put(f, field::RANK, &u32::MAX.to_le_bytes()));
+    let error = header(field::RANK, u32::MAX);
     assert!(matches!(error, FormatError::Rank(0xFFFF_FFFF)), "{error}");
-    let error = refusal(&|f| put(f, field::RANK, &3u32.to_le_bytes()));
+    let error = header(field::RANK, 3);
+    assert!(matches!(error, FormatError::Scan { .. }), "{error}");
+    let error = header(field::SCANS, 5000);
+    assert!(matches!(error, FormatError::Scans(5000)), "{error}");
+    let error = header(field::SCANS, 2);
     assert!(
-        matches!(
-            error,
-            FormatError::Decompress {
-                part: Part::Basis,
-                ..
-            }
-        ),
+        error.to_string().contains("directory does not decompress"),
         "{error}"
     );
-    for (rank, bytes) in [(0, 20), (4, 0), (4, u32::MAX)] {
-        let error = refusal(&|f| {
-            put(f, field::RANK, &u32::to_le_bytes(rank));
-            put(f, field::BASIS_BYTES, &bytes.to_le_bytes());
-        });
-        assert!(matches!(error, FormatError::BasisLength { .. }), "{error}");
+    let error = header(field::DIRECTORY_BYTES, 1 << 30);
+    assert!(matches!(error, FormatError::Truncated { .. }), "{error}");
+    let error = header(field::EXTENSION_BYTES, 1 << 30);
+    assert!(matches!(error, FormatError::ExtensionLength(_)), "{error}");
+    let error = header(field::METADATA_BYTES, 1 << 30);
+    assert!(matches!(error, FormatError::MetadataLength(_)), "{error}");
+
+    let directory = |at: usize, value: &[u8]| {
+        let edit = |d: &mut Vec<u8>| d[at..at + value.len()].copy_from_slice(value);
+        let crafted = common::with_directory(&file, edit);
+        decode(&crafted, 1 << 20).unwrap_err()
+    };
+    for (at, value) in [
+        (field::CODING, &[0, 0][..]),
+        (field::CODING, &[5, 0]),
+        (field::CODING, &[3, 0]),
+        (field::FIRST, &[1, 0]),
+        (field::COUNT, &[0, 0]),
+        (field::COUNT, &[200, 0]),
+        (field::STEP, &f32::NAN.to_le_bytes()),
+        (field::STEP, &0.0f32.to_le_bytes()),
+        (field::STEP, &f32::INFINITY.to_le_bytes()),
+        (field::BASIS_BYTES, &[0, 0, 0, 0]),
+        (field::BASIS_BYTES, &[0, 0, 1, 0]),
+    ] {
+        let error = directory(at, value);
+        assert!(
+            matches!(error, FormatError::Scan { scan: 0 }),
+            "{at}: {error}"
+        );
     }
-    let error = refusal(&|f| put(f, basis_at, &[0; 8]));
-    assert!(error.to_string().contains("basis does not"), "{error}");
-    // Sealed no more.
-    let mut damaged = file.clone();
-    damaged[basis_at + 9] ^= 1;
-    let error = decode(&damaged, 1 << 20).unwrap_err();
-    assert!(error.to_string().contains("basis is damaged"), "{error}");
-}
-
-#[test]
-fn a_basis_of_no_numbers_is_refused() {
-    let mut recovered = mixed();
-    recovered.basis.as_mut().unwrap().kernels[2][5] = f32::INFINITY;
-    let error = decode(&recovered.file(), 1000).unwrap_err();
+    let scans = read(&file, 1000).unwrap().head().unwrap().scans.len();
+    let lengths = scans * field::SCAN;
+    let plains = lengths + 4 * 6 * scans;
+    // The first scan has nothing for tile 0, and something for tile 1.
+    for (at, value) in [
+        (lengths + 4, 0u32),
+        (lengths + 4, u32::MAX),
+        (plains + 4, 0),
+        (plains + 4, u32::MAX),
+        (plains, 1),
+    ] {
+        let error = directory(at, &value.to_le_bytes());
+        assert!(
+            matches!(error, FormatError::Entry { scan: 0, .. }),
+            "{at}: {error}"
+        );
+    }
+    let error = directory(lengths, &1u32.to_le_bytes());
     assert!(
-        error.to_string().contains("element 5 of kernel 2"),
+        matches!(error, FormatError::Entry { scan: 0, tile: 0 }),
         "{error}"
     );
+    let one = u32::from_le_bytes([1, 0, 0, 0]);
+    let longer = |d: &mut Vec<u8>| d[lengths + 4] += one as u8;
+    let error = decode(&common::with_directory(&file, longer), 1 << 20).unwrap_err();
+    assert!(matches!(error, FormatError::Length { .. }), "{error}");
 }
 
 #[test]
-fn steps_that_overflow_give_a_picture_of_numbers() {
-    let mut file = mixed().file();
-    put(&mut file, field::STEP, &f32::MAX.to_le_bytes());
-    seal(&mut file, 6);
-    let (transport, _) = decode(&file, 1000).unwrap();
-    let tile = &transport.tiles[1];
-    assert!(tile.step.iter().all(|step| step.is_finite()));
-    let codes = tile.codes.iter().flatten();
-    assert!(codes.max() <= Some(&4095));
+fn what_is_checked_part_by_part_is_what_is_read() {
+    for file in small_files() {
+        let head = read(&file, file.len()).unwrap().head().unwrap().clone();
+        for part in head.parts() {
+            let range = head.range(part);
+            let bytes = &file[range.start as usize..range.end as usize];
+            format::check(&head, part, bytes).unwrap();
+            let mut damaged = bytes.to_vec();
+            damaged[bytes.len() / 2] ^= 1;
+            let error = format::check(&head, part, &damaged).unwrap_err();
+            assert!(matches!(error, FormatError::Checksum { part: p } if p == Part::from(part)));
+            assert!(format::check(&head, part, &bytes[1..]).is_err());
+        }
+    }
+}
+
+#[test]
+fn numbers_that_are_none_become_zero() {
+    let mut recovered = mixed();
+    recovered.tiles[1].coefficients[5] = [f32::NAN, f32::INFINITY, 0.1];
+    recovered.tiles[2].functions[7] = [f32::NEG_INFINITY, 0.1, f32::NAN];
+    for quality in [QUALITY, Quality::Lossless] {
+        let (transport, _) = decode(&recovered.file(quality), 1000).unwrap();
+        assert!(
+            transport
+                .tiles
+                .iter()
+                .flat_map(|tile| tile.step)
+                .all(f32::is_finite)
+        );
+    }
 }
 
 #[test]
 fn a_file_that_asks_for_too_much_memory_is_refused_before_it_gets_any() {
-    let refusal = |file: &[u8]| {
-        let mut reader = Reader::new(Limits {
-            decoded_bytes: 10_000,
-        });
-        match reader.feed(0, file).unwrap_err() {
-            FormatError::Limit {
-                need,
-                limit: 10_000,
-            } => need,
-            error => panic!("{error}"),
-        }
-    };
-    let codes = 17 * 9 * 9 * 8;
-    assert_eq!(refusal(&direct_file()), codes);
-    // And while a tile is multiplied out: its planes, coefficients and functions, and two bases.
-    let working = 64 * 4 * 3 * 2 + 64 * 4 * 3 * 4 + 64 * 9 * 3 * 4 + 2 * 4 * 9 * 4;
-    assert_eq!(refusal(&mixed().file()), codes + working);
+    let file = mixed().file(QUALITY);
+    let mut reader = Reader::new(Limits {
+        decoded_bytes: 10_000,
+    });
+    let error = reader.feed(0, &file).unwrap_err();
+    assert!(matches!(error, FormatError::Limit { limit: 10_000, need } if need > 17 * 9 * 9 * 8));
+    assert!(reader.head().is_none());
 }
 
 #[test]
-fn the_reader_says_what_it_wants_and_takes_nothing_else() {
-    let file = mixed().file();
+fn gaps_are_refused() {
+    let file = mixed().file(QUALITY);
     let mut reader = Reader::new(Limits::default());
-    assert_eq!(reader.wants(), Some(0..HEADER_BYTES as u64));
-    while let Some(range) = reader.wants() {
-        assert!(!range.is_empty());
-        let bytes = &file[range.start as usize..range.end as usize];
-        reader.feed(range.start, bytes).unwrap();
-    }
-    assert_eq!(reader.position(), file.len() as u64);
     let error = reader.feed(3, &[0]).unwrap_err();
-    assert!(matches!(error, FormatError::Offset { got: 3, .. }));
-    assert!(reader.finish().is_ok());
+    assert!(matches!(error, FormatError::Offset { got: 3, wanted: 0 }));
+    let mut reader = read(
+        &file[..read(&file, 9).unwrap().head_bytes().unwrap() as usize],
+        9,
+    )
+    .unwrap();
+    let head = reader.head().unwrap().clone();
+    let part = PartNumber {
+        scan: 0,
+        tile: Some(1),
+    };
+    let start = head.range(part).start;
+    reader
+        .feed(start, &file[start as usize..start as usize + 3])
+        .unwrap();
+    let error = reader
+        .feed(start + 5, &file[start as usize + 5..start as usize + 7])
+        .unwrap_err();
+    assert!(matches!(error, FormatError::Offset { wanted, .. } if wanted == start + 3));
+    assert_eq!(head.scans[0].coding, Coding::Transform);
 }

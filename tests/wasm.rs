@@ -11,10 +11,11 @@ mod common;
 
 use common::{recovered, relit, tiled};
 use js_sys::{Object, Reflect};
-use relightable_photo::format::{self, EncodedTile, Metadata};
+use relightable_photo::format::{EncodedFile, Metadata, Quality, Source};
 use relightable_photo::relight::{Rgba8Picture, reference};
-use relightable_photo::transport::{Extent, Geometry, Transport};
+use relightable_photo::transport::{BandTile, Extent, Geometry, Transport};
 use relightable_photo::web::{CodedError, Decoder, Light, Photo, Relighter};
+use relightable_photo::workers::OneThread;
 use wasm_bindgen::convert::TryFromJsValue;
 use wasm_bindgen::{JsCast, JsValue};
 use wasm_bindgen_futures::JsFuture;
@@ -100,21 +101,29 @@ async fn pause() {
 }
 
 fn file(transport: &Transport, metadata: &Metadata) -> Vec<u8> {
-    let geometry = &transport.geometry;
-    let encode = |tile| {
-        let tile = recovered(tile, geometry.window.area());
-        EncodedTile::new(geometry, &tile).unwrap()
+    let geometry = transport.geometry;
+    let tile = |i: usize| {
+        let mut tile = BandTile::dark(geometry.tile(i));
+        tile.put(recovered(&transport.tiles[i], geometry.window.area()));
+        Ok(tile)
     };
-    let tiles: Vec<_> = transport.tiles.iter().map(encode).collect();
+    let source = Source {
+        geometry,
+        basis: None,
+        tile: &tile,
+        metadata: metadata.clone(),
+        extensions: Vec::new(),
+    };
     let mut bytes = Vec::new();
-    format::write(geometry, metadata, None, &tiles, &mut bytes).unwrap();
+    let file = EncodedFile::new(source, Quality::Lossless, &OneThread).unwrap();
+    file.write(&mut bytes).unwrap();
     bytes
 }
 
 fn decode(bytes: &[u8], piece: usize) -> Result<Photo, CodedError> {
     let mut decoder = Decoder::new(None);
-    for piece in bytes.chunks(piece) {
-        decoder.feed(piece)?;
+    for (i, bytes) in bytes.chunks(piece).enumerate() {
+        decoder.feed((i * piece) as f64, bytes)?;
     }
     decoder.finish()
 }
@@ -290,9 +299,41 @@ fn a_file_decodes_in_pieces_of_any_size() {
     }
     let mut decoder = Decoder::new(None);
     assert_eq!((decoder.bytes_fed(), decoder.file_bytes()), (0.0, None));
-    decoder.feed(&bytes[..500]).unwrap();
+    decoder.feed(0.0, &bytes[..500]).unwrap();
     let whole = Some(bytes.len() as f64);
     assert_eq!((decoder.bytes_fed(), decoder.file_bytes()), (500.0, whole));
+}
+
+#[wasm_bindgen_test]
+fn a_decoder_wants_every_byte_once() {
+    let transport = transport(0);
+    let bytes = file(&transport, &Metadata::default());
+    let mut decoder = Decoder::new(None);
+    let mut asked = Vec::new();
+    loop {
+        let wanted = decoder.wants();
+        let (ranges, []) = wanted.as_chunks() else {
+            panic!("{wanted:?}");
+        };
+        let Some(&[start, end]) = ranges.first() else {
+            break;
+        };
+        assert_eq!((decoder.tiles_done(), decoder.scans_done()), (0, 0));
+        let end = end.min(bytes.len() as f64);
+        decoder
+            .feed(start, &bytes[start as usize..end as usize])
+            .unwrap();
+        asked.push((start, end));
+    }
+    let (first, size) = (f64::from(1 << 14), bytes.len() as f64);
+    assert_eq!(asked, [(0.0, first), (first, size)]);
+    assert_eq!(decoder.bytes_fed(), size);
+    assert_eq!(decoder.tiles_done(), transport.tiles.len());
+    assert!(decoder.scans_done() > 0);
+    // What has come may come again.
+    decoder.feed(100.0, &bytes[100..20_000]).unwrap();
+    assert_eq!(decoder.bytes_fed(), size);
+    decoder.finish().unwrap();
 }
 
 #[wasm_bindgen_test]
@@ -323,7 +364,10 @@ fn every_bad_file_has_its_code() {
         coded(decode(&[&good[..], b"more"].concat(), 4096)),
         "format-invalid"
     );
-    assert_eq!(coded(Decoder::new(Some(1e6)).feed(&good)), "format-limit");
+    let limited = Decoder::new(Some(1e6)).feed(0.0, &good);
+    assert_eq!(coded(limited), "format-limit");
+    let gap = Decoder::new(None).feed(1000.0, &good[1000..]);
+    assert_eq!(coded(gap), "format-invalid");
 }
 
 #[wasm_bindgen_test]

@@ -15,6 +15,15 @@ pub const MANIFEST_NAME: &str = "capture.json";
 pub struct Manifest {
     /// Always 1.
     pub version: u32,
+    /// What the photographs show; goes into the file, as do the next two.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub title: String,
+    /// Who made them.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub creator: String,
+    /// Who may do what with them.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub rights: String,
     /// The display or projector.
     pub light: LightSpec,
     /// The camera.

@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
-use crate::format::EncodedTile;
-use crate::transport::Geometry;
+use super::tile_record;
+use crate::transport::{Geometry, RecoveredTile};
 
 /// How every checkpoint begins.
 const MAGIC: [u8; 8] = *b"LTMPART\n";
@@ -192,10 +192,9 @@ impl Checkpoint {
         }
     }
 
-    /// Keeps tile `i`.
-    pub fn add(&mut self, i: usize, tile: &EncodedTile) -> Result<()> {
-        let record = tile.to_bytes()?;
-        self.records[i] = Some(self.append(i as u32, &record)?);
+    /// Keeps tile `i`, of which [`tile_record::encode`] made `record`.
+    pub fn add(&mut self, i: usize, record: &[u8]) -> Result<()> {
+        self.records[i] = Some(self.append(i as u32, record)?);
         self.remove = false;
         Ok(())
     }
@@ -220,14 +219,18 @@ impl Checkpoint {
     }
 
     /// Reads tile `i` back.
-    pub fn tile(&mut self, geometry: &Geometry, rank: u16, i: usize) -> io::Result<EncodedTile> {
+    pub fn tile(
+        &mut self,
+        geometry: &Geometry,
+        rank: usize,
+        i: usize,
+    ) -> io::Result<RecoveredTile> {
         let missing = || io::Error::from(ErrorKind::NotFound);
         let (start, length) = self.records[i].ok_or_else(missing)?;
         let mut record = vec![0; length as usize];
         self.file.seek(SeekFrom::Start(start))?;
         self.file.read_exact(&mut record)?;
-        EncodedTile::from_bytes(geometry, rank, i, &record)
-            .map_err(|error| io::Error::new(ErrorKind::InvalidData, error))
+        tile_record::decode(geometry.tile(i), rank, geometry.window.area(), &record)
     }
 
     /// Removes the checkpoint: it is no longer needed.

@@ -21,6 +21,9 @@ pub struct EvaluateArgs {
     file: PathBuf,
     /// Capture folder it was recovered from
     capture: PathBuf,
+    /// Only the file's first so many bytes, or hundredths, as a visitor sees it while it loads: 20K, 10%
+    #[arg(long, value_name = "BYTES|PERCENT", value_parser = files::Share::parse)]
+    first: Option<files::Share>,
     /// Print one JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -44,9 +47,10 @@ struct Report {
 }
 
 pub fn run(args: &EvaluateArgs) -> Result<()> {
-    let file = files::read_ltm(&args.file)?;
+    let file = files::read_ltm(&args.file, args.first)?;
+    let header = &file.head.header;
     let folder = CaptureFolder::open(&args.capture)?;
-    let (geometry, manifest) = (&file.header.geometry, folder.manifest());
+    let (geometry, manifest) = (&header.geometry, folder.manifest());
     for (what, ours, theirs) in [
         ("camera", geometry.camera, manifest.camera.extent()),
         ("light", geometry.light, manifest.light.extent()),
@@ -65,7 +69,7 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
         heldout_rgb_snr_db: [None; CHANNELS],
         heldout_shots: 0,
         flood_snr_db: None,
-        file_bytes: file.header.file_bytes,
+        file_bytes: header.file_bytes,
     };
     if let Some(truth) = folder.truth()? {
         report.snr_db = against_truth(&file.transport, &truth).snr();
@@ -76,7 +80,7 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
         }
     }
     let held: Vec<usize> = (0..manifest.shots.len())
-        .filter(|i| !file.metadata.shots_used.contains(i))
+        .filter(|i| !file.head.metadata.shots_used.contains(i))
         .collect();
     let dark = folder.read_dark()?;
     let errors = against_shots(&file.transport, &folder, &dark, &held)?;

@@ -1,13 +1,15 @@
 //! Reading and writing files whole.
 
 use std::fs::File;
-use std::io::{BufWriter, ErrorKind, Read, Write};
+use std::io::{BufWriter, ErrorKind, Read, Seek, SeekFrom, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use tempfile::NamedTempFile;
 
-use crate::format::{Header, Limits, Metadata, Reader, TileEntry};
+use super::memory::Bytes;
+use crate::format::{HEADER_BYTES, Head, Interest, Limits, Reader};
 use crate::transport::Transport;
 
 /// Bytes read at a time.
@@ -19,36 +21,108 @@ const LIMITS: Limits = Limits {
 
 /// Everything an `.ltm` file holds.
 pub struct LtmFile {
-    pub header: Header,
-    pub entries: Vec<TileEntry>,
-    pub metadata: Metadata,
+    pub head: Head,
     pub transport: Transport,
 }
 
-/// Reads and checks an `.ltm` file.
-pub fn read_ltm(path: &Path) -> Result<LtmFile> {
+/// Reads and checks an `.ltm` file, or of its beginning as much as `first` says.
+pub fn read_ltm(path: &Path, first: Option<Share>) -> Result<LtmFile> {
     let read = || -> Result<LtmFile> {
-        ensure!(!path.is_dir(), "is a folder, not an .ltm file");
-        let mut file = File::open(path).context("cannot be opened")?;
+        let mut file = open(path)?;
+        let length = file.metadata().context("cannot be read")?.len();
+        let mut left = first.map_or(u64::MAX, |first| first.of(length));
         let mut reader = Reader::new(LIMITS);
         let mut piece = vec![0; PIECE];
+        let mut offset = 0;
         loop {
-            let n = file.read(&mut piece).context("cannot be read")?;
+            let most = PIECE.min(usize::try_from(left).unwrap_or(PIECE));
+            let n = file.read(&mut piece[..most]).context("cannot be read")?;
             if n == 0 {
                 break;
             }
-            reader.feed(reader.position(), &piece[..n])?;
+            reader.feed(offset, &piece[..n])?;
+            offset += n as u64;
+            left -= n as u64;
         }
-        let (header, entries) = (reader.header().copied(), reader.entries().to_vec());
-        let (transport, metadata) = reader.finish()?;
+        let head = reader.head().cloned();
+        let (transport, _) = match first {
+            Some(_) => reader.finish_early()?,
+            None => reader.finish()?,
+        };
         Ok(LtmFile {
-            header: header.context("has no header")?,
-            entries,
-            metadata,
+            head: head.context("has no head")?,
             transport,
         })
     };
     read().with_context(|| path.display().to_string())
+}
+
+/// Opens an `.ltm` file as far as its head.
+pub fn open_ltm(path: &Path) -> Result<(File, Reader)> {
+    let read = || -> Result<(File, Reader)> {
+        let mut file = open(path)?;
+        let mut reader = Reader::new(LIMITS);
+        while reader.head().is_none() {
+            let Some(wanted) = reader.wants(&Interest::default()).into_iter().next() else {
+                break;
+            };
+            let piece = read_at(&mut file, wanted.clone())?;
+            if piece.is_empty() {
+                return Err(reader.cut_short().into());
+            }
+            // What the head does not need is not decoded.
+            let head = reader.head_bytes().unwrap_or(HEADER_BYTES as u64);
+            let useful = piece.len().min((head - wanted.start) as usize);
+            reader.feed(wanted.start, &piece[..useful])?;
+        }
+        Ok((file, reader))
+    };
+    read().with_context(|| path.display().to_string())
+}
+
+/// Bytes of a file from some place to another, or to its end.
+pub fn read_at(file: &mut File, range: Range<u64>) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    file.seek(SeekFrom::Start(range.start))
+        .context("cannot be read")?;
+    let part = file.take(range.end - range.start).read_to_end(&mut bytes);
+    part.context("cannot be read")?;
+    Ok(bytes)
+}
+
+fn open(path: &Path) -> Result<File> {
+    ensure!(!path.is_dir(), "is a folder, not an .ltm file");
+    File::open(path).context("cannot be opened")
+}
+
+/// How much of a file: so many bytes, or so many hundredths of it.
+#[derive(Clone, Copy, Debug)]
+pub enum Share {
+    Bytes(u64),
+    Percent(f64),
+}
+
+impl Share {
+    /// Parses `20000`, `20K` or `10%`.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text.strip_suffix('%') {
+            Some(number) => {
+                let percent = number.parse::<f64>().map_err(|e| e.to_string())?;
+                match (0.0..=100.0).contains(&percent) {
+                    true => Ok(Self::Percent(percent)),
+                    false => Err("give a number from 0% to 100%".to_owned()),
+                }
+            }
+            None => Ok(Self::Bytes(Bytes::parse(text)?.0)),
+        }
+    }
+
+    fn of(self, length: u64) -> u64 {
+        match self {
+            Self::Bytes(bytes) => bytes,
+            Self::Percent(percent) => (length as f64 * percent / 100.0) as u64,
+        }
+    }
 }
 
 /// What makes temporary files or folders with the permissions of any new one (`mode` less the

@@ -2,6 +2,7 @@
 //! library does not know of.
 
 mod checkpoint;
+mod encode;
 mod evaluate;
 mod files;
 mod inspect;
@@ -15,6 +16,7 @@ mod relight;
 mod report;
 mod simulate;
 mod study;
+mod tile_record;
 mod verify;
 
 use std::process::ExitCode;

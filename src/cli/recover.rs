@@ -13,14 +13,17 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::checkpoint::{Checkpoint, Contents, Recipe};
+use super::encode::{self, QualityArgs};
 use super::memory::{self, Plan};
 use super::photographs::Photographs;
 use super::process::{Interrupt, Interrupted};
-use super::{Usage, files, process, report};
+use super::{Usage, files, process, report, tile_record};
 use crate::capture::{self, CaptureFolder, DarkFrame, Measurements, Noise, Rows, Shot};
-use crate::format::{self, EncodedTile, Metadata};
-use crate::recover::{self, Band, Method, Reach, RecoverError, Recovery, Settings, SparsityBasis};
-use crate::transport::{Basis, CHANNELS, Window};
+use crate::format::{CaptureNote, Metadata};
+use crate::recover::{
+    self, Band, Method, Reach, RecoverError, Recovery, Rehearsal, Settings, SparsityBasis,
+};
+use crate::transport::{Basis, CHANNELS, Decibels, Window};
 
 /// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
 const HOLD_OUT_EVERY: usize = 10;
@@ -51,6 +54,8 @@ pub struct RecoverArgs {
     /// Use the first K shots only [default: all but every tenth, which are held out]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     patterns: Option<u32>,
+    #[command(flatten)]
+    quality: QualityArgs,
     /// Memory to stay within: photographs of many megapixels are then read by strips
     #[arg(long, value_name = "BYTES", default_value = memory::Bytes::DEFAULT, value_parser = memory::Bytes::parse)]
     memory: memory::Bytes,
@@ -147,6 +152,10 @@ struct Report {
     patterns: usize,
     /// More than patterns where some were photographed at several exposures.
     photographs: usize,
+    /// About the SNR of what was recovered against the object, where the method can tell.
+    expected_snr_db: Option<Decibels>,
+    /// SNR of the file against what was recovered.
+    file_snr_db: Option<Decibels>,
     common_mode: Option<crate::recover::CommonMode>,
     noise: Noise,
     /// Parts in which the photographs were read to stay within the memory given; 1 is whole.
@@ -280,7 +289,6 @@ fn recover(
     let recovery =
         Recovery::prepare(&measurements, settings, &interrupt.cores()).map_err(failed)?;
     spinner.finish_and_clear();
-    let geometry = *recovery.geometry();
     checkpoint.prepared(recovery.fingerprint())?;
     let bar = process::progress("recovering", recipe.tiles);
     bar.set_position(checkpoint.count() as u64);
@@ -317,24 +325,39 @@ fn recover(
     }
     let noise = measurements.noise;
     drop((measurements, photographs));
+    let manifest = folder.manifest();
+    let patterns = shots.iter().map(|&i| &manifest.shots[i].pattern);
+    let patterns = capture::distinct(&capture::numbers(patterns));
     let metadata = Metadata {
+        title: manifest.title.clone(),
+        creator: manifest.creator.clone(),
+        rights: manifest.rights.clone(),
+        capture: CaptureNote {
+            patterns,
+            photographs: shots.len(),
+        },
         writer: PROGRAM.to_owned(),
         method: settings.method.name().to_owned(),
+        units: UNITS.to_owned(),
         shots_used: shots.to_vec(),
     };
     let basis = recovery.basis();
-    let rank = basis.map_or(0, Basis::rank) as u16; // a format that cannot hold it says so
-    let mut checkpoint = run
+    let checkpoint = run
         .checkpoint
         .into_inner()
         .unwrap_or_else(PoisonError::into_inner);
+    let spinner = process::spinner("compressing");
+    let (file, checkpoint) = encode::file(
+        &args.quality,
+        checkpoint,
+        &recovery,
+        metadata,
+        &interrupt.cores(),
+    )?;
+    spinner.finish_and_clear();
     let output = files::Output::create(&args.output, files::Kind::Ltm)?;
-    let file_bytes = output.finish(|out| {
-        let tile = |i| checkpoint.tile(&geometry, rank, i);
-        Ok(format::write_from(&geometry, &metadata, basis, tile, out)?)
-    })?;
+    let file_bytes = output.finish(|out| Ok(file.write(out)?))?;
     checkpoint.done();
-    let patterns = shots.iter().map(|&i| &folder.manifest().shots[i].pattern);
     Ok(Report {
         seconds: 0.0,
         peak_rss_bytes: None,
@@ -346,8 +369,10 @@ fn recover(
             Reach::Beyond | Reach::Unclear => None,
         }),
         rank: basis.map(Basis::rank),
-        patterns: capture::distinct(&capture::numbers(patterns)),
+        patterns,
         photographs: shots.len(),
+        expected_snr_db: recovery.rehearsal().and_then(Rehearsal::snr),
+        file_snr_db: file.snr(),
         common_mode: recovery.common_mode(),
         noise,
         strips: strips.len(),
@@ -436,8 +461,8 @@ impl Run<'_> {
                     bail!(Interrupted(String::new()));
                 }
                 let tile = self.recovery.tile(measurements, rect);
-                let encoded = EncodedTile::new(geometry, &tile)?;
-                lock().add(i, &encoded)?;
+                let record = tile_record::encode(&tile).context("a tile cannot be kept")?;
+                lock().add(i, &record)?;
                 self.bar.inc(1);
             }
             Ok(match saturated {
@@ -452,6 +477,10 @@ impl Run<'_> {
         }
     }
 }
+
+/// What light transport is in units of.
+const UNITS: &str =
+    "camera value where camera.black is 0 and camera.white is 1, per light element at full code";
 
 /// What made a file or a checkpoint.
 const PROGRAM: &str = concat!("ltm-export ", env!("CARGO_PKG_VERSION"));

@@ -162,6 +162,9 @@ impl Plan {
             manifest: Manifest {
                 unknown: Vec::new(),
                 version: 1,
+                title: String::new(),
+                creator: String::new(),
+                rights: String::new(),
                 light: LightSpec {
                     width: args.light.width,
                     height: args.light.height,

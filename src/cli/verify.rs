@@ -1,12 +1,14 @@
 //! `ltm-export verify`: whether every byte of an `.ltm` file is as it was written.
 
+use std::ops::Range;
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
 
 use super::{files, report};
+use crate::format::{self, FormatError, PartNumber};
 
 /// Check a relightable photograph: every checksum, every tile
 #[derive(Debug, Args)]
@@ -19,36 +21,78 @@ pub struct VerifyArgs {
     json: bool,
 }
 
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct Report {
     ok: bool,
     /// What is wrong first.
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
+    /// The first bad part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bad: Option<BadPart>,
     #[serde(skip_serializing_if = "Option::is_none")]
     tiles: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scans: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     file_bytes: Option<u64>,
 }
 
+#[derive(Serialize)]
+struct BadPart {
+    scan: usize,
+    /// None: the functions of the basis that the scan brings.
+    tile: Option<usize>,
+    /// Where it lies.
+    bytes: Range<u64>,
+}
+
 pub fn run(args: &VerifyArgs) -> Result<()> {
-    let result = files::read_ltm(&args.file);
+    let mut report = Report::default();
+    let result = verify(args, &mut report);
+    report.ok = result.is_ok();
+    report.error = result.as_ref().err().map(|e| format!("{e:#}"));
     if args.json {
-        report::print_json(&Report {
-            ok: result.is_ok(),
-            error: result.as_ref().err().map(|e| format!("{e:#}")),
-            tiles: result.as_ref().ok().map(|f| f.entries.len()),
-            file_bytes: result.as_ref().ok().map(|f| f.header.file_bytes),
-        })?;
-    }
-    let file = result?;
-    if !args.json {
-        return report::print_line(&format!(
-            "{}: sound, {} tiles, {}",
+        report::print_json(&report)?;
+    } else if let (Some(tiles), Some(scans), Some(bytes)) =
+        (report.tiles, report.scans, report.file_bytes)
+        && report.ok
+    {
+        report::print_line(&format!(
+            "{}: sound, {tiles} tiles in {scans} scans, {}",
             args.file.display(),
-            file.entries.len(),
-            report::bytes(file.header.file_bytes)
-        ));
+            report::bytes(bytes)
+        ))?;
     }
-    Ok(())
+    result
+}
+
+/// Checks part by part; a file may be larger than memory.
+fn verify(args: &VerifyArgs, report: &mut Report) -> Result<()> {
+    let (mut file, reader) = files::open_ltm(&args.file)?;
+    let name = || args.file.display().to_string();
+    let head = reader.head().context("has no head").with_context(name)?;
+    let end = head.header.file_bytes;
+    report.tiles = Some(head.tiles());
+    report.scans = Some(head.scans.len());
+    report.file_bytes = Some(end);
+    for part in head.parts() {
+        let bytes = files::read_at(&mut file, head.range(part)).with_context(name)?;
+        if let Err(error) = format::check(head, part, &bytes) {
+            let PartNumber { scan, tile } = part;
+            let bytes = head.range(part);
+            let at = format!("at bytes {} to {}", bytes.start, bytes.end);
+            report.bad = Some(BadPart { scan, tile, bytes });
+            return Err(anyhow::Error::new(error).context(at).context(name()));
+        }
+    }
+    let length = file
+        .metadata()
+        .context("cannot be read")
+        .with_context(name)?
+        .len();
+    match length > end {
+        true => Err(FormatError::TrailingBytes { end }).with_context(name),
+        false => Ok(()),
+    }
 }

@@ -2,8 +2,9 @@
 
 use thiserror::Error;
 
-use super::header::{MAJOR, MAX_RANK, MINOR};
+use super::header::{MAJOR, MAX_EXTENSION_BYTES, MAX_RANK};
 use super::metadata::MAX_METADATA_BYTES;
+use super::scan::MOST_SCANS;
 use crate::transport::GeometryError;
 
 /// Why bytes are not a readable `.ltm` file.
@@ -22,7 +23,7 @@ pub enum FormatError {
     TextMode,
     /// A version this reader does not know.
     #[error(
-        "the file has format version {major}.{minor}; this reader knows {MAJOR}.{MINOR} alone: get the reader for it, or export the file again"
+        "the file has format version {major}.{minor}; this reader knows {MAJOR}.x alone: get the reader for it, or export the file again"
     )]
     Version {
         /// Major version found.
@@ -39,31 +40,51 @@ pub enum FormatError {
     /// The geometry cannot be.
     #[error("the header is invalid: {0}")]
     Geometry(GeometryError),
-    /// A directory entry does not fit the file.
-    #[error("the directory is invalid: tile {tile} lies outside the file or over other data")]
+    /// A scan that this file cannot have.
+    #[error(
+        "the directory is invalid: scan {scan} is of unknown coding, or has components, a step or a length that it cannot have"
+    )]
+    Scan {
+        /// Scan number; the number of scans if they do not go together.
+        scan: usize,
+    },
+    /// Too many scans.
+    #[error("the file has {0} scans, more than the {MOST_SCANS} allowed")]
+    Scans(u32),
+    /// A chunk that this file cannot have.
+    #[error(
+        "the directory is invalid: scan {scan} of tile {tile} has a length that it cannot have"
+    )]
     Entry {
+        /// Scan number.
+        scan: usize,
         /// Tile number.
         tile: usize,
     },
-    /// A tile that this file cannot have.
+    /// The parts do not add up to the file.
     #[error(
-        "the directory is invalid: tile {tile} is of unknown kind, or has a length, step or number of components that its kind cannot have"
+        "the directory is invalid: its parts end at byte {end}, and the file at byte {file_bytes}"
     )]
-    Kind {
-        /// Tile number.
-        tile: usize,
+    Length {
+        /// End of the last part.
+        end: u64,
+        /// Length in the header.
+        file_bytes: u64,
+    },
+    /// The extensions are too long.
+    #[error("the file has {0} bytes of extensions, more than the {MAX_EXTENSION_BYTES} allowed")]
+    ExtensionLength(u32),
+    /// An extension that must be understood and is not.
+    #[error(
+        "the file needs a reader that knows its extension \"{}\": get a newer one", tag.escape_ascii()
+    )]
+    Extension {
+        /// Its name.
+        tag: [u8; 4],
     },
     /// Too large a basis.
     #[error("the basis has {0} functions, more than the {MAX_RANK} allowed")]
     Rank(u64),
-    /// A basis whose length cannot be.
-    #[error("the header is invalid: {bytes} bytes cannot hold a basis of {rank} functions")]
-    BasisLength {
-        /// Functions it is to have.
-        rank: u16,
-        /// Compressed bytes.
-        bytes: u32,
-    },
     /// The metadata is too long.
     #[error("the file has {0} bytes of metadata, more than the {MAX_METADATA_BYTES} allowed")]
     MetadataLength(u64),
@@ -126,21 +147,16 @@ pub enum FormatError {
     /// Writing: the output failed.
     #[error("the file cannot be written: {0}")]
     Write(std::io::Error),
-    /// Writing: the tile is factored over another basis.
-    #[error("tile {tile} has {components} components, but there is a basis of {rank} functions")]
-    Components {
-        /// Tile number.
-        tile: usize,
-        /// What it has.
-        components: u16,
-        /// What there is; 0 if there is no basis.
-        rank: u16,
-    },
-    /// Writing: the transport has more data than the format can address.
-    #[error("tile {tile} takes more than 4 GiB; use smaller tiles")]
+    /// Writing: a tile cannot be had.
+    #[error("a tile cannot be read back: {0}")]
+    Source(std::io::Error),
+    /// Writing: not even the coarsest file is small enough.
+    #[error("the file takes at least {least} bytes, more than the {most} asked for")]
     TooLarge {
-        /// Tile number.
-        tile: usize,
+        /// Bytes allowed.
+        most: u64,
+        /// Bytes of the smallest file.
+        least: u64,
     },
 }
 
@@ -158,12 +174,22 @@ pub enum Part {
     Header,
     /// The tile directory.
     Directory,
+    /// The extensions.
+    Extensions,
     /// The JSON metadata.
     Metadata,
-    /// The basis of factored tiles.
-    Basis,
-    /// A tile, by number.
-    Tile(usize),
+    /// Functions of the basis.
+    Basis {
+        /// The scan that brings them.
+        scan: usize,
+    },
+    /// A tile's share of a scan.
+    Chunk {
+        /// Scan number.
+        scan: usize,
+        /// Tile number.
+        tile: usize,
+    },
 }
 
 impl std::fmt::Display for Part {
@@ -171,9 +197,10 @@ impl std::fmt::Display for Part {
         match self {
             Self::Header => f.write_str("header"),
             Self::Directory => f.write_str("directory"),
+            Self::Extensions => f.write_str("list of extensions"),
             Self::Metadata => f.write_str("metadata"),
-            Self::Basis => f.write_str("basis"),
-            Self::Tile(i) => write!(f, "picture data (tile {i})"),
+            Self::Basis { scan } => write!(f, "basis (scan {scan})"),
+            Self::Chunk { scan, tile } => write!(f, "picture data (scan {scan}, tile {tile})"),
         }
     }
 }

@@ -1,14 +1,14 @@
 //! How much memory a file may ask for.
 
-use super::codec::{basis, factored};
-use super::{FormatError, Header};
+use super::codec::{MOST_PLAIN, basis};
+use super::{ChunkEntry, FormatError, Header};
 use crate::transport::{CHANNELS, TexelCode};
 
 /// Bounds on what a reader allocates on a file's word.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Bytes of decoded tiles, were none of them dark, and of what decoding factored ones takes
-    /// for a while.
+    /// Bytes of the directory, of tiles as they are decoded, were none of them dark, and of what
+    /// decoding one takes for a while.
     pub decoded_bytes: u64,
 }
 
@@ -23,25 +23,25 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// Refuses a file whose tiles would decode to more than allowed.
+    /// Refuses a file that would take more than allowed.
     pub(super) fn check(&self, header: &Header) -> Result<(), FormatError> {
         let geometry = &header.geometry;
-        let area = geometry.window.area() as u64;
-        // At most 2^15 · 2^15 · 63² · 8 < 2^45: no overflow for a validated geometry.
-        let tiles = geometry.camera.area() as u64 * area * size_of::<TexelCode>() as u64;
-        let working = match header.rank {
-            0 => 0,
-            rank => {
-                // The first tile is as large as any.
-                let (tile, rank) = (geometry.tile(0), u64::from(rank));
-                let value = (CHANNELS * size_of::<f32>()) as u64;
-                factored::plain_bytes(tile, header.rank) as u64
-                    + tile.extent.area() as u64 * (rank + area) * value
-                    // Once as kept, once as multiplied out.
-                    + 2 * basis::plain_bytes(header.rank, geometry.window.area()) as u64
-            }
-        };
-        let need = tiles + working;
+        let value = (CHANNELS * size_of::<f32>()) as u64;
+        let (area, rank) = (geometry.window.area() as u64, u64::from(header.rank));
+        // At most 2^15 · 2^15 · 63² · 12 < 2^46: no overflow for a validated geometry.
+        let pixels = geometry.camera.area() as u64;
+        // A tile is kept as numbers until it is whole, and then as codes. Which of the file's tiles
+        // have functions by element the directory will tell; all might.
+        let codes = area * size_of::<TexelCode>() as u64;
+        let tiles = pixels * codes.max(rank * value);
+        // The first tile is as large as any.
+        let tile = geometry.tile(0).extent.area() as u64;
+        let working = tile * (rank + 2 * area) * value + 2 * MOST_PLAIN;
+        let functions = 2 * basis::plain_bytes(header.rank.into(), geometry.window.area()) as u64;
+        let entries = u64::from(header.scans) * (geometry.tile_grid().area() as u64 + 1);
+        let kept = (size_of::<ChunkEntry>() + size_of::<u64>() + 1) as u64;
+        let directory = 2 * header.directory_plain_bytes() + entries * kept;
+        let need = tiles + working + functions + directory;
         if need <= self.decoded_bytes {
             Ok(())
         } else {

@@ -1,22 +1,29 @@
 //! Reading without I/O: bytes in, tiles out.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::codec::{basis, direct, factored};
+use super::codec::{PartError, basis, direct, zeros};
 use super::error::Part;
-use super::header::{self, HEADER_BYTES, Header, TileEntry, TileKind};
+use super::head::{Head, PartNumber, tiles_in};
+use super::header::{self, FIRST_BYTES, HEADER_BYTES, Header};
+use super::tile::TileNumbers;
 use super::{FormatError, Limits, Metadata};
-use crate::transport::{Basis, DirectTile, Transport};
+use crate::transport::{Basis, Decibels, DirectTile, Transport};
 
-/// An incremental reader. [`wants`](Self::wants) says which bytes come next, [`feed`](Self::feed)
-/// takes them in pieces of any size; each tile is checked and decoded as soon as it is whole.
+/// An incremental reader. [`wants`](Self::wants) says which bytes are of use,
+/// [`feed`](Self::feed) takes any, in pieces of any size; each tile is checked and decoded as far as
+/// its chunks have come.
 ///
 /// ```
-/// use relightable_photo::format::{Limits, Reader};
+/// use relightable_photo::format::{Interest, Limits, Reader};
 /// # fn open(file: &[u8]) -> Result<(), relightable_photo::format::FormatError> {
 /// let mut reader = Reader::new(Limits::default());
-/// for piece in file.chunks(1000) {
-///     reader.feed(reader.position(), piece)?;
+/// loop {
+///     let wanted = reader.wants(&Interest::default());
+///     let Some(range) = wanted.first() else { break };
+///     let end = file.len().min(range.end as usize);
+///     reader.feed(range.start, &file[range.start as usize..end])?;
 /// }
 /// let (transport, metadata) = reader.finish()?;
 /// # Ok(()) }
@@ -24,32 +31,20 @@ use crate::transport::{Basis, DirectTile, Transport};
 #[derive(Debug)]
 pub struct Reader {
     limits: Limits,
-    stage: Stage,
-    /// Bytes of the current part received so far.
-    pending: Vec<u8>,
-    /// Offset of the next byte.
-    position: u64,
+    /// Bytes of the head received so far.
+    gathered: Vec<u8>,
+    header: Option<Header>,
     opened: Option<Opened>,
-    tiles: Vec<DirectTile>,
+    received: u64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Stage {
-    Header,
-    Directory,
-    Metadata,
-    Basis,
-    Tile(usize),
-    Done,
-}
-
-/// What is known once the parts before the tiles have been read.
-#[derive(Debug)]
-struct Opened {
-    header: Header,
-    entries: Vec<TileEntry>,
-    metadata: Metadata,
-    basis: Basis,
+/// What of a file is of use: by default all of it.
+#[derive(Clone, Debug, Default)]
+pub struct Interest {
+    /// Camera pixels that are seen, columns and rows; all if none.
+    pub viewport: Option<(Range<u32>, Range<u32>)>,
+    /// SNR that is enough.
+    pub quality: Option<Decibels>,
 }
 
 /// How far a file has been read.
@@ -59,187 +54,416 @@ pub struct Progress {
     pub bytes: u64,
     /// Bytes in the file, once the header is known.
     pub file_bytes: Option<u64>,
-    /// Tiles decoded.
+    /// Scans that are there for every tile.
+    pub scans: usize,
+    /// Tiles that are whole.
     pub tiles: usize,
 }
 
+/// What is known once the head has been read.
+#[derive(Debug)]
+struct Opened {
+    head: Head,
+    /// Functions not there yet are all zero.
+    basis: Basis,
+    /// Slots of the window in the order of direct scans.
+    order: Vec<u16>,
+    tiles: Vec<Tile>,
+    /// Parts that have come, `[scan, basis and tiles]`.
+    parts: Vec<bool>,
+    /// How many of each scan have not.
+    missing: Vec<usize>,
+    /// Parts of which some bytes have come.
+    partial: BTreeMap<PartNumber, Vec<u8>>,
+    /// Chunks that wait for those of earlier scans.
+    early: BTreeMap<PartNumber, Vec<u8>>,
+}
+
+/// A tile on its way.
+#[derive(Debug)]
+enum Tile {
+    Numbers(TileNumbers),
+    Whole(DirectTile),
+}
+
 impl Reader {
-    /// A reader at the start of a file.
+    /// A reader of which nothing is known.
     pub fn new(limits: Limits) -> Self {
         Self {
             limits,
-            stage: Stage::Header,
-            pending: Vec::new(),
-            position: 0,
+            gathered: Vec::new(),
+            header: None,
             opened: None,
-            tiles: Vec::new(),
+            received: 0,
         }
     }
 
-    /// Offset of the next byte to feed.
-    pub fn position(&self) -> u64 {
-        self.position
-    }
-
-    /// The byte range needed next, or `None` once the file is read. Feeding more than it is fine.
-    pub fn wants(&self) -> Option<Range<u64>> {
-        let need = self.part_bytes()? - self.pending.len() as u64;
-        Some(self.position..self.position + need)
+    /// Byte ranges that are of use, the most important first: the head, and once that is there each
+    /// scan as far as `interest` goes. What has come is left out. The first range may reach beyond
+    /// the end of a small file. None once there is nothing more to want.
+    pub fn wants(&self, interest: &Interest) -> Vec<Range<u64>> {
+        let Some(opened) = &self.opened else {
+            let have = self.gathered.len() as u64;
+            let head = self.header.map(|header| header.head_bytes());
+            let wanted = have..head.unwrap_or(FIRST_BYTES);
+            return Vec::from([wanted]);
+        };
+        opened.wants(interest)
     }
 
     /// How far reading has come.
     pub fn progress(&self) -> Progress {
+        let opened = self.opened.as_ref();
         Progress {
-            bytes: self.position,
-            file_bytes: self.opened.as_ref().map(|o| o.header.file_bytes),
-            tiles: self.tiles.len(),
-        }
-    }
-
-    /// The header, once read.
-    pub fn header(&self) -> Option<&Header> {
-        self.opened.as_ref().map(|o| &o.header)
-    }
-
-    /// The directory, in tile order; empty until read.
-    pub fn entries(&self) -> &[TileEntry] {
-        self.opened.as_ref().map_or(&[], |o| &o.entries)
-    }
-
-    /// Takes the file's bytes from `offset` on, which must be [`position`](Self::position).
-    pub fn feed(&mut self, offset: u64, mut bytes: &[u8]) -> Result<(), FormatError> {
-        if offset != self.position {
-            return Err(FormatError::Offset {
-                got: offset,
-                wanted: self.position,
-            });
-        }
-        while !bytes.is_empty() {
-            let Some(part_bytes) = self.part_bytes() else {
-                return Err(FormatError::TrailingBytes { end: self.position });
-            };
-            let missing = part_bytes - self.pending.len() as u64;
-            let taken = bytes
-                .len()
-                .min(usize::try_from(missing).unwrap_or(usize::MAX));
-            let (now, later) = bytes.split_at(taken);
-            self.pending.extend_from_slice(now);
-            self.position += taken as u64;
-            bytes = later;
-            if self.stage == Stage::Header {
-                header::check_magic(&self.pending)?;
-            }
-            self.advance()?;
-        }
-        Ok(())
-    }
-
-    /// The whole transport, once every byte has been fed.
-    pub fn finish(self) -> Result<(Transport, Metadata), FormatError> {
-        match self.opened {
-            Some(opened) if self.stage == Stage::Done => Ok((
-                Transport {
-                    geometry: opened.header.geometry,
-                    tiles: self.tiles,
-                },
-                opened.metadata,
-            )),
-            opened => Err(FormatError::Truncated {
-                got: self.position,
-                need: opened.map_or(HEADER_BYTES as u64, |o| o.header.file_bytes),
+            bytes: self.received,
+            file_bytes: self.header.map(|header| header.file_bytes),
+            scans: opened.map_or(0, Opened::scans),
+            tiles: opened.map_or(0, |opened| {
+                let whole = |tile: &&Tile| matches!(tile, Tile::Whole(_));
+                opened.tiles.iter().filter(whole).count()
             }),
         }
     }
 
-    /// Length of the part being read, `None` when all are.
-    fn part_bytes(&self) -> Option<u64> {
-        match (self.stage, &self.opened) {
-            (Stage::Header, _) => Some(HEADER_BYTES as u64),
-            (Stage::Directory, Some(o)) => Some(o.header.directory_bytes()),
-            (Stage::Metadata, Some(o)) => Some(u64::from(o.header.metadata_bytes)),
-            (Stage::Basis, Some(o)) => Some(u64::from(o.header.basis_bytes)),
-            (Stage::Tile(i), Some(o)) => Some(u64::from(o.entries[i].bytes)),
-            _ => None,
+    /// Length of the head, once the header is known.
+    pub fn head_bytes(&self) -> Option<u64> {
+        self.header.map(|header| header.head_bytes())
+    }
+
+    /// All that is known before the first chunk, once it is.
+    pub fn head(&self) -> Option<&Head> {
+        self.opened.as_ref().map(|opened| &opened.head)
+    }
+
+    /// Takes the file's bytes from `offset` on. The head's must come in order, and so must those of
+    /// each later part; what has come before is passed over.
+    pub fn feed(&mut self, offset: u64, bytes: &[u8]) -> Result<(), FormatError> {
+        let (mut offset, mut bytes) = (offset, bytes);
+        while self.opened.is_none() {
+            let have = self.gathered.len() as u64;
+            if offset > have {
+                return Err(FormatError::Offset {
+                    got: offset,
+                    wanted: have,
+                });
+            }
+            let known = usize::try_from(have - offset).unwrap_or(usize::MAX);
+            bytes = bytes.get(known..).unwrap_or_default();
+            offset = have;
+            if bytes.is_empty() {
+                return Ok(());
+            }
+            let target = self.header.map_or(HEADER_BYTES as u64, |h| h.head_bytes());
+            let missing = usize::try_from(target - have).unwrap_or(usize::MAX);
+            let (now, later) = bytes.split_at(bytes.len().min(missing));
+            self.gathered.extend_from_slice(now);
+            self.received += now.len() as u64;
+            offset += now.len() as u64;
+            bytes = later;
+            self.advance()?;
+        }
+        match &mut self.opened {
+            Some(opened) => {
+                self.received += opened.feed(offset, bytes)?;
+                Ok(())
+            }
+            None => Ok(()),
         }
     }
 
-    /// Takes in every part that is whole, the empty ones too.
+    /// Reads the header, and the head, once they are there.
     fn advance(&mut self) -> Result<(), FormatError> {
-        while self.part_bytes() == Some(self.pending.len() as u64) {
-            let part = std::mem::take(&mut self.pending);
-            self.stage = self.take_part(&part)?;
+        let Some(header) = self.header else {
+            header::check_magic(&self.gathered)?;
+            if let Some(bytes) = self.gathered.first_chunk::<HEADER_BYTES>() {
+                let header = Header::decode(bytes)?;
+                self.limits.check(&header)?;
+                self.header = Some(header);
+                return self.advance();
+            }
+            return Ok(());
+        };
+        if self.gathered.len() as u64 == header.head_bytes() {
+            let head = Head::decode(header, &self.gathered, &self.limits)?;
+            self.opened = Some(Opened::new(head)?);
+            self.gathered = Vec::new();
         }
         Ok(())
     }
 
-    fn take_part(&mut self, part: &[u8]) -> Result<Stage, FormatError> {
-        let Some(opened) = &mut self.opened else {
-            let mut bytes = [0; HEADER_BYTES];
-            bytes.copy_from_slice(part);
-            let header = Header::decode(&bytes)?;
-            self.limits.check(&header)?;
-            self.opened = Some(Opened {
-                header,
-                entries: Vec::new(),
-                metadata: Metadata::default(),
-                basis: Basis::default(),
-            });
-            return Ok(Stage::Directory);
-        };
-        match self.stage {
-            Stage::Header | Stage::Directory => {
-                opened.entries = header::decode_directory(&opened.header, part)?;
-                Ok(Stage::Metadata)
-            }
-            Stage::Metadata => {
-                check(part, opened.header.metadata_crc, Part::Metadata)?;
-                opened.metadata = serde_json::from_slice(part).map_err(FormatError::Metadata)?;
-                Ok(Stage::Basis)
-            }
-            Stage::Basis => {
-                let header = &opened.header;
-                if header.rank > 0 {
-                    check(part, header.basis_crc, Part::Basis)?;
-                    opened.basis = basis::decode(part, header.rank, header.geometry.window.area())
-                        .map_err(|e| e.of(Part::Basis))?;
-                }
-                Ok(Stage::Tile(0))
-            }
-            Stage::Tile(i) => {
-                self.tiles.push(opened.decode(i, part)?);
-                let next = i + 1;
-                Ok(if next < opened.entries.len() {
-                    Stage::Tile(next)
-                } else {
-                    Stage::Done
-                })
-            }
-            Stage::Done => Ok(Stage::Done),
+    /// The error of a file that ends after what has been fed.
+    pub fn cut_short(&self) -> FormatError {
+        FormatError::Truncated {
+            got: self.received,
+            need: self
+                .header
+                .map_or(HEADER_BYTES as u64, |header| header.file_bytes),
+        }
+    }
+
+    /// The whole transport, once every byte has been fed.
+    pub fn finish(self) -> Result<(Transport, Metadata), FormatError> {
+        let cut_short = self.cut_short();
+        match self.opened {
+            Some(opened) if opened.missing.iter().all(|missing| *missing == 0) => opened.finish(),
+            _ => Err(cut_short),
+        }
+    }
+
+    /// The transport as far as it has come, once the head has.
+    pub fn finish_early(self) -> Result<(Transport, Metadata), FormatError> {
+        match self.opened {
+            Some(opened) => opened.finish(),
+            None => self.finish(),
         }
     }
 }
 
 impl Opened {
-    /// Checks and decodes tile number `i`.
-    fn decode(&self, i: usize, bytes: &[u8]) -> Result<DirectTile, FormatError> {
-        let (entry, geometry) = (&self.entries[i], &self.header.geometry);
-        check(bytes, entry.crc, Part::Tile(i))?;
-        let (rect, step) = (geometry.tile(i), entry.step);
-        let tile = match entry.kind {
-            TileKind::Dark => Ok(DirectTile::dark(rect)),
-            TileKind::Direct => direct::decode(bytes, rect, geometry.window.area(), step),
-            TileKind::Factored { components } => {
-                factored::decode(bytes, rect, components, self.basis.rank(), step)
-                    .and_then(|tile| factored::multiply_out(&tile, geometry, &self.basis))
-            }
+    fn new(head: Head) -> Result<Self, FormatError> {
+        let memory = |e: PartError| e.of(Part::Directory);
+        let (tiles, scans) = (head.tiles(), head.scans.len());
+        let area = head.header.geometry.window.area();
+        let mut kernels = Vec::new();
+        for _ in 0..head.header.rank {
+            kernels.push(zeros(area).map_err(memory)?);
+        }
+        let mut opened = Self {
+            basis: Basis { kernels },
+            order: direct::order(head.header.geometry.window),
+            tiles: (0..tiles)
+                .map(|_| Tile::Numbers(TileNumbers::default()))
+                .collect(),
+            parts: vec![true; scans * (tiles + 1)],
+            missing: vec![0; scans],
+            partial: BTreeMap::new(),
+            early: BTreeMap::new(),
+            head,
         };
-        tile.map_err(|e| e.of(Part::Tile(i)))
+        for part in opened.head.parts() {
+            let at = part_index(tiles, part);
+            opened.parts[at] = false;
+            opened.missing[part.scan] += 1;
+        }
+        // Tiles that are all dark are whole from the beginning.
+        for tile in 0..tiles {
+            opened.pass_over(tile)?;
+        }
+        Ok(opened)
+    }
+
+    fn has(&self, part: PartNumber) -> bool {
+        self.parts[part_index(self.tiles.len(), part)]
+    }
+
+    /// Scans that are there for every tile.
+    fn scans(&self) -> usize {
+        let gap = self.missing.iter().position(|missing| *missing > 0);
+        gap.unwrap_or(self.missing.len())
+    }
+
+    fn wants(&self, interest: &Interest) -> Vec<Range<u64>> {
+        let enough = interest.quality.and_then(|quality| {
+            let scans = &self.head.scans;
+            scans.iter().position(|scan| scan.snr.0 >= quality.0)
+        });
+        let scans = enough.map_or(self.head.scans.len(), |last| last + 1);
+        let geometry = &self.head.header.geometry;
+        let tiles = match &interest.viewport {
+            Some((x, y)) => tiles_in(geometry, x.clone(), y.clone()),
+            None => (0..self.tiles.len()).collect(),
+        };
+        let mut ranges: Vec<Range<u64>> = Vec::new();
+        for scan in 0..scans {
+            let chunks = tiles.iter().map(|&tile| Some(tile));
+            for tile in std::iter::once(None).chain(chunks) {
+                let part = PartNumber { scan, tile };
+                if self.has(part) {
+                    continue;
+                }
+                let mut range = self.head.range(part);
+                if let Some(bytes) = self.partial.get(&part) {
+                    range.start += bytes.len() as u64;
+                }
+                match ranges.last_mut() {
+                    Some(last) if last.end == range.start => last.end = range.end,
+                    _ => ranges.push(range),
+                }
+            }
+        }
+        ranges
+    }
+
+    /// Takes bytes of parts; how many of them were new.
+    fn feed(&mut self, mut offset: u64, mut bytes: &[u8]) -> Result<u64, FormatError> {
+        let end = self.head.header.file_bytes;
+        let mut new = 0;
+        // The head once more, from a server that starts anew.
+        let head_bytes = self.head.header.head_bytes();
+        if offset < head_bytes {
+            let known = usize::try_from(head_bytes - offset).unwrap_or(usize::MAX);
+            bytes = bytes.get(known..).unwrap_or_default();
+            offset = head_bytes;
+        }
+        while !bytes.is_empty() {
+            if offset >= end {
+                return Err(FormatError::TrailingBytes { end });
+            }
+            let part = self.head.part_at(offset);
+            let range = self.head.range(part);
+            let here = bytes.len().min((range.end - offset) as usize); // a part is below 4 GiB
+            let (now, later) = bytes.split_at(here);
+            if !self.has(part) {
+                new += self.feed_part(part, range, offset, now)?;
+            }
+            offset += here as u64;
+            bytes = later;
+        }
+        Ok(new)
+    }
+
+    /// Takes some bytes of one part.
+    fn feed_part(
+        &mut self,
+        part: PartNumber,
+        range: Range<u64>,
+        offset: u64,
+        bytes: &[u8],
+    ) -> Result<u64, FormatError> {
+        let length = (range.end - range.start) as usize;
+        if bytes.len() == length {
+            self.partial.remove(&part);
+            self.take(part, bytes)?;
+            return Ok(length as u64);
+        }
+        let at = (offset - range.start) as usize;
+        let partial = self.partial.entry(part).or_default();
+        if at > partial.len() {
+            return Err(FormatError::Offset {
+                got: offset,
+                wanted: range.start + partial.len() as u64,
+            });
+        }
+        let fresh = bytes.get(partial.len() - at..).unwrap_or_default();
+        partial.extend_from_slice(fresh);
+        let new = fresh.len() as u64;
+        if partial.len() == length
+            && let Some(whole) = self.partial.remove(&part)
+        {
+            self.take(part, &whole)?;
+        }
+        Ok(new)
+    }
+
+    /// Takes a part that is whole.
+    fn take(&mut self, part: PartNumber, bytes: &[u8]) -> Result<(), FormatError> {
+        self.head.check_crc(part, bytes)?;
+        let at = part_index(self.tiles.len(), part);
+        self.parts[at] = true;
+        self.missing[part.scan] -= 1;
+        let Some(tile) = part.tile else {
+            let functions = self.head.functions(part.scan);
+            let area = self.head.header.geometry.window.area();
+            let decoded = basis::decode(bytes, functions.len(), area);
+            let decoded = decoded.map_err(|e| e.of(part.into()))?;
+            self.basis.kernels[functions].clone_from_slice(&decoded);
+            // Tiles may have waited for it.
+            for tile in 0..self.tiles.len() {
+                self.complete(tile)?;
+            }
+            return Ok(());
+        };
+        match &self.tiles[tile] {
+            Tile::Numbers(numbers) if numbers.scans == part.scan => {
+                self.add(tile, bytes)?;
+                self.pass_over(tile)
+            }
+            _ => {
+                self.early.insert(part, bytes.to_vec());
+                Ok(())
+            }
+        }
+    }
+
+    /// Takes a tile past the scans that have nothing for it, or that wait already.
+    fn pass_over(&mut self, tile: usize) -> Result<(), FormatError> {
+        while let Tile::Numbers(numbers) = &mut self.tiles[tile]
+            && numbers.scans < self.head.scans.len()
+        {
+            let part = PartNumber {
+                scan: numbers.scans,
+                tile: Some(tile),
+            };
+            if self.head.entry(part.scan, tile).bytes == 0 {
+                numbers.scans += 1;
+            } else if let Some(bytes) = self.early.remove(&part) {
+                self.add(tile, &bytes)?;
+            } else {
+                break;
+            }
+        }
+        self.complete(tile)
+    }
+
+    /// Decodes a chunk, the next of its tile.
+    fn add(&mut self, tile: usize, bytes: &[u8]) -> Result<(), FormatError> {
+        match &mut self.tiles[tile] {
+            Tile::Numbers(numbers) => numbers.add(&self.head, &self.order, tile, bytes),
+            Tile::Whole(_) => Ok(()),
+        }
+    }
+
+    /// Turns a tile whose chunks have all come into codes, if the basis has come too.
+    fn complete(&mut self, tile: usize) -> Result<(), FormatError> {
+        let scans = self.head.scans.len();
+        let basis = (0..scans).all(|scan| self.has(PartNumber { scan, tile: None }));
+        match &mut self.tiles[tile] {
+            Tile::Numbers(numbers) if numbers.scans == scans && basis => {
+                let numbers = std::mem::take(numbers);
+                self.tiles[tile] = Tile::Whole(self.codes(tile, numbers)?);
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The codes of what has come of a tile.
+    fn codes(&self, tile: usize, numbers: TileNumbers) -> Result<DirectTile, FormatError> {
+        let geometry = &self.head.header.geometry;
+        let band = numbers.band_tile(&self.head, tile)?;
+        if band.is_dark() {
+            return Ok(DirectTile::dark(band.rect));
+        }
+        let part = Part::Chunk {
+            scan: self.head.scans.len().saturating_sub(1),
+            tile,
+        };
+        let values = band.rect.extent.area() * geometry.window.area();
+        let own = !band.functions.is_empty();
+        let room = zeros(if own { 0 } else { values }).map_err(|e| e.of(part))?;
+        let mut codes = zeros(values).map_err(|e| e.of(part))?;
+        codes.clear();
+        let functions = band.into_functions(geometry, &self.basis, room);
+        Ok(DirectTile::quantise_into(&functions, codes))
+    }
+
+    fn finish(mut self) -> Result<(Transport, Metadata), FormatError> {
+        let mut tiles = Vec::with_capacity(self.tiles.len());
+        for i in 0..self.tiles.len() {
+            let none = Tile::Numbers(TileNumbers::default());
+            tiles.push(match std::mem::replace(&mut self.tiles[i], none) {
+                Tile::Whole(tile) => tile,
+                Tile::Numbers(numbers) => self.codes(i, numbers)?,
+            });
+        }
+        let transport = Transport {
+            geometry: self.head.header.geometry,
+            tiles,
+        };
+        Ok((transport, self.head.metadata))
     }
 }
 
-fn check(bytes: &[u8], crc: u32, part: Part) -> Result<(), FormatError> {
-    match crc32c::crc32c(bytes) == crc {
-        true => Ok(()),
-        false => Err(FormatError::Checksum { part }),
-    }
+fn part_index(tiles: usize, part: PartNumber) -> usize {
+    part.scan * (tiles + 1) + part.tile.map_or(0, |tile| tile + 1)
 }

@@ -9,7 +9,7 @@ use super::holdout::Split;
 use super::sample::windows;
 use super::workers::go_on;
 use super::{CommonMode, FEWEST_PATTERNS, Nnls, RecoverError, Workers};
-use crate::capture::Measurements;
+use crate::capture::{Measurements, Pattern};
 use crate::transport::{
     CHANNELS, CameraPx, Decibels, Element, Geometry, TileRect, TransportError, TransportFunctions,
     Window,
@@ -306,25 +306,44 @@ pub(super) fn held_out_misses(
     held: &[usize],
     functions: &TransportFunctions,
 ) -> Vec<f64> {
+    let patterns = held.iter().map(|&l| &measurements.patterns[l]);
+    let mut misses = predictions(geometry, patterns, functions);
+    let of_pixels = misses.chunks_exact_mut(held.len() * CHANNELS);
+    for (pixel, misses) in functions.rect.pixels().zip(of_pixels) {
+        for (misses, &l) in misses.chunks_exact_mut(CHANNELS).zip(held) {
+            for (c, miss) in misses.iter_mut().enumerate() {
+                *miss = measurements.sample(l, pixel, c) - *miss;
+            }
+        }
+    }
+    misses
+}
+
+/// What a tile's functions make of patterns, `[pixel, pattern, channel]`.
+pub(super) fn predictions<'a>(
+    geometry: &Geometry,
+    patterns: impl IntoIterator<Item = &'a Pattern, IntoIter: Clone>,
+    functions: &TransportFunctions,
+) -> Vec<f64> {
     let (area, rect) = (geometry.window.area(), functions.rect);
-    let mut misses = Vec::with_capacity(rect.extent.area() * held.len() * CHANNELS);
-    for (p, pixel) in rect.pixels().enumerate() {
+    let patterns = patterns.into_iter();
+    let mut predictions = Vec::new();
+    for (pixel, tau) in rect.pixels().zip(functions.tau.chunks_exact(area)) {
         let origin = geometry.window_origin(pixel);
-        let tau = &functions.tau[p * area..(p + 1) * area];
-        for &l in held {
+        for pattern in patterns.clone() {
             let mut y = [0.0; CHANNELS];
             for (slot, tau) in tau.iter().enumerate() {
                 let element = geometry.window.element(origin, slot);
                 if let Some(m) = element.index_in(geometry.light) {
                     for c in 0..CHANNELS {
-                        y[c] += f64::from(measurements.patterns[l].plane(c)[m] * tau[c]);
+                        y[c] += f64::from(pattern.plane(c)[m] * tau[c]);
                     }
                 }
             }
-            misses.extend((0..CHANNELS).map(|c| measurements.sample(l, pixel, c) - y[c]));
+            predictions.extend(y);
         }
     }
-    misses
+    predictions
 }
 
 /// The mean of measurements and their noise variance, from what least squares leaves of them, where

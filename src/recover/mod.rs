@@ -23,6 +23,7 @@ mod nnls;
 mod passive;
 mod pooled;
 mod recovery;
+mod rehearsal;
 mod sample;
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod test_problems;
@@ -34,7 +35,9 @@ pub use bpdn::{Constraint, Homotopy, InteriorPoint, Solution, SparsityBasis};
 pub use common_mode::CommonMode;
 pub use nnls::Nnls;
 pub use recovery::{Method, RecoverError, Recovery, Settings};
-pub use workers::{OneThread, Workers};
+pub use rehearsal::Rehearsal;
+
+pub use crate::workers::{OneThread, Workers};
 
 /// Fewest patterns that recovery makes sense with.
 pub(crate) const FEWEST_PATTERNS: usize = 4;

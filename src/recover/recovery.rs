@@ -9,6 +9,7 @@ use super::direct::Direct;
 use super::holdout::Split;
 use super::learned::Learned;
 use super::pooled;
+use super::rehearsal::Rehearsal;
 use super::{CommonMode, FEWEST_PATTERNS, SparsityBasis, Workers};
 use crate::capture::Measurements;
 use crate::transport::{Basis, Geometry, GeometryError, RecoveredTile, TileRect, Window};
@@ -154,6 +155,7 @@ impl Write for Checksum {
 pub struct Recovery {
     geometry: Geometry,
     solver: Solver,
+    rehearsal: Option<Rehearsal>,
 }
 
 #[derive(Debug)]
@@ -186,7 +188,7 @@ impl Recovery {
         let mean = pooled::mean_function(measurements, &geometry, &split, workers)?;
         let solver = match settings.method {
             Method::Learned => {
-                let learned = Learned::new(measurements, geometry, split, &mean, workers)?;
+                let learned = Learned::new(measurements, geometry, split.clone(), &mean, workers)?;
                 Solver::Learned(Box::new(learned))
             }
             Method::Nnls => Solver::Direct(Direct::least_squares(
@@ -203,7 +205,20 @@ impl Recovery {
                 workers,
             )?),
         };
-        Ok(Self { geometry, solver })
+        let mut recovery = Self {
+            geometry,
+            solver,
+            rehearsal: None,
+        };
+        let rehearse = |rect: TileRect| match &recovery.solver {
+            Solver::Learned(learned) => learned.rehearse(measurements, rect),
+            Solver::Direct(direct) => {
+                RecoveredTile::Direct(direct.tile_from(measurements, &split.learn, rect))
+            }
+        };
+        let setting = (&geometry, recovery.basis());
+        recovery.rehearsal = Rehearsal::new(measurements, setting, &split, workers, rehearse)?;
+        Ok(recovery)
     }
 
     /// Grids, band and tiling of the answer.
@@ -235,6 +250,11 @@ impl Recovery {
             Solver::Learned(learned) => learned.common_mode(),
             Solver::Direct(direct) => Some(direct.common_mode()),
         }
+    }
+
+    /// How well it does on patterns held out; none where there are too few to hold any out.
+    pub fn rehearsal(&self) -> Option<&Rehearsal> {
+        self.rehearsal.as_ref()
     }
 
     /// Camera pixels around a tile whose measurements go into it.

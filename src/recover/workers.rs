@@ -1,32 +1,12 @@
-//! Who does the work: solvers know no threads.
+//! Stopping where it is no longer wanted.
 
 use super::RecoverError;
-
-/// Runs independent pieces of work, in any order and on as many threads as it likes.
-pub trait Workers: Sync {
-    /// `work(0)` to `work(count - 1)`, results in that order.
-    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T>;
-
-    /// Whether the work is no longer wanted. Asked between stages of a few seconds.
-    fn stopped(&self) -> bool {
-        false
-    }
-}
+use crate::workers::Workers;
 
 /// [`RecoverError::Stopped`] if `workers` are.
 pub(super) fn go_on(workers: &impl Workers) -> Result<(), RecoverError> {
     match workers.stopped() {
         true => Err(RecoverError::Stopped),
         false => Ok(()),
-    }
-}
-
-/// One piece after the other, on the caller's thread.
-#[derive(Clone, Copy, Debug)]
-pub struct OneThread;
-
-impl Workers for OneThread {
-    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-        (0..count).map(work).collect()
     }
 }

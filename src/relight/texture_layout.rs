@@ -2,7 +2,7 @@
 //!
 //! | texture | format | texel |
 //! |---|---|---|
-//! | codes | `rgba16uint`, 2D array | τ of one pixel and element, window after window, folded |
+//! | codes | `rgba16sint`, 2D array | τ of one pixel and element, window after window, folded |
 //! | pixels | `rgba32sint`, camera grid | window origin u, v; index of the first code; tile |
 //! | steps | `rgba32float`, tile grid | value of one code in R, G, B |
 //! | light | `rgba32float`, light grid | linear emission in R, G, B |
@@ -282,7 +282,7 @@ mod tests {
                 2 => Vec::new(),
                 _ => rect
                     .pixels()
-                    .flat_map(|p| (0..area).map(move |s| [p.x as u16, p.y as u16, s as u16, 0]))
+                    .flat_map(|p| (0..area).map(move |s| [p.x as i16, p.y as i16, s as i16, 0]))
                     .collect(),
             },
         });
@@ -323,7 +323,7 @@ mod tests {
                         let code = texture[first as usize + s];
                         let expected = match transport.tiles[tile as usize].is_dark() {
                             true => [0; 4],
-                            false => [x as u16, y as u16, s as u16, 0],
+                            false => [x as i16, y as i16, s as i16, 0],
                         };
                         assert_eq!(code, expected);
                     }

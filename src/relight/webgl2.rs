@@ -1,6 +1,6 @@
 //! Relighting by WebGL2, through web-sys: a tenth of the size of wgpu's own WebGL.
 
-use js_sys::{Float32Array, Int32Array, Object, Uint16Array};
+use js_sys::{Float32Array, Int16Array, Int32Array, Object};
 use wasm_bindgen::JsCast;
 use web_sys::{
     HtmlCanvasElement, WebGl2RenderingContext as Gl, WebGlBuffer, WebGlContextAttributes,
@@ -101,9 +101,9 @@ struct Texel {
 }
 
 const CODES16: Texel = Texel {
-    internal: Gl::RGBA16UI,
+    internal: Gl::RGBA16I,
     format: Gl::RGBA_INTEGER,
-    component: Gl::UNSIGNED_SHORT,
+    component: Gl::SHORT,
 };
 const INTEGERS: Texel = Texel {
     internal: Gl::RGBA32I,
@@ -242,11 +242,11 @@ impl Context {
         self.add_texture(CODES, CODES16, codes.extent, Some(codes.layers))?;
         // Out of memory shows here, before the long work.
         self.check()?;
-        let mut staging = Uint16Array::new_with_length(0);
+        let mut staging = Int16Array::new_with_length(0);
         layout.for_each_code_block(transport, |block| {
             let components = block.texels.as_flattened();
             if staging.length() as usize != components.len() {
-                staging = Uint16Array::new_with_length(components.len() as u32);
+                staging = Int16Array::new_with_length(components.len() as u32);
             }
             staging.copy_from(components);
             self.gl

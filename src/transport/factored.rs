@@ -31,15 +31,15 @@ pub struct FactoredTile {
 const BLOCK: usize = 12;
 
 impl FactoredTile {
-    /// The light transport functions themselves: elements off the display send nothing, and what
-    /// the combination leaves below zero is zero.
+    /// The light transport functions themselves: elements off the display send nothing. What the
+    /// combination leaves below zero stays so: without it the sum, a picture, would be too bright.
     pub fn expand(&self, geometry: &Geometry, basis: &Basis) -> TransportFunctions {
         let mut functions = TransportFunctions::zeros(self.rect, geometry.window.area());
         self.expand_into(geometry, basis, &mut functions.tau);
         functions
     }
 
-    /// [`expand`](Self::expand) into memory the caller has: zeros as `[pixel, element, channel]`.
+    /// [`expand`](Self::expand), added to what `tau` has as `[pixel, element, channel]`.
     pub(crate) fn expand_into(
         &self,
         geometry: &Geometry,
@@ -62,7 +62,7 @@ impl FactoredTile {
             for (tau, kernels) in tau.chunks_mut(BLOCK).zip(kernels.chunks_exact(rank)) {
                 let sums = combine(coefficients, kernels);
                 for (s, tau) in tau.iter_mut().enumerate() {
-                    *tau = std::array::from_fn(|c| sums[c][s].max(0.0));
+                    (0..CHANNELS).for_each(|c| tau[c] += sums[c][s]);
                 }
             }
             geometry.darken_off_display(geometry.window_origin(pixel), tau);
@@ -85,6 +85,90 @@ fn combine(coefficients: &[[f32; CHANNELS]], kernels: &[[f32; BLOCK]]) -> [[f32;
     [red, green, blue]
 }
 
+/// A tile as a file has it: `τ_n = Σ_k c_nk v_k + d_n`, either part of which may be missing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BandTile {
+    /// The pixels covered.
+    pub rect: TileRect,
+    /// `c_nk` as `[pixel, component, channel]`; empty if all are zero.
+    pub coefficients: Vec<[f32; CHANNELS]>,
+    /// `d_n` as `[pixel, element, channel]`; empty if all are zero.
+    pub functions: Vec<[f32; CHANNELS]>,
+}
+
+impl BandTile {
+    /// A tile from which no light comes, whatever the light.
+    pub fn dark(rect: TileRect) -> Self {
+        Self {
+            rect,
+            coefficients: Vec::new(),
+            functions: Vec::new(),
+        }
+    }
+
+    /// Whether neither part is there.
+    pub fn is_dark(&self) -> bool {
+        self.coefficients.is_empty() && self.functions.is_empty()
+    }
+
+    /// Puts what a solver yields for some of the tile's pixels in its place.
+    ///
+    /// # Panics
+    /// If `part` is not within the tile.
+    pub fn put(&mut self, part: RecoveredTile) {
+        let (values, rect, of_part) = match part {
+            RecoveredTile::Direct(part) => (&mut self.functions, part.rect, part.tau),
+            RecoveredTile::Factored(part) => (&mut self.coefficients, part.rect, part.coefficients),
+        };
+        let each = of_part.len() / rect.extent.area();
+        if values.is_empty() {
+            values.resize(self.rect.extent.area() * each, [0.0; CHANNELS]);
+        }
+        let width = rect.extent.width as usize * each;
+        for (row, y) in of_part
+            .chunks_exact(width.max(1))
+            .zip(rect.y - self.rect.y..)
+        {
+            let at = y as usize * self.rect.extent.width as usize;
+            let at = (at + (rect.x - self.rect.x) as usize) * each;
+            values[at..at + width].copy_from_slice(row);
+        }
+    }
+
+    /// The light transport functions.
+    pub fn functions(self, geometry: &Geometry, basis: &Basis) -> TransportFunctions {
+        let values = self.rect.extent.area() * geometry.window.area();
+        let own = !self.functions.is_empty();
+        let room = vec![[0.0; CHANNELS]; if own { 0 } else { values }];
+        self.into_functions(geometry, basis, room)
+    }
+
+    /// The light transport functions; `room` is for as many zeros as they are, where the tile has no
+    /// functions of its own.
+    pub(crate) fn into_functions(
+        self,
+        geometry: &Geometry,
+        basis: &Basis,
+        room: Vec<[f32; CHANNELS]>,
+    ) -> TransportFunctions {
+        let mut functions = TransportFunctions {
+            rect: self.rect,
+            tau: match self.functions.is_empty() {
+                true => room,
+                false => self.functions,
+            },
+        };
+        if !self.coefficients.is_empty() {
+            let tile = FactoredTile {
+                rect: self.rect,
+                coefficients: self.coefficients,
+            };
+            tile.expand_into(geometry, basis, &mut functions.tau);
+        }
+        functions
+    }
+}
+
 /// A tile as a solver yields it.
 #[derive(Clone, Debug)]
 pub enum RecoveredTile {
@@ -95,6 +179,14 @@ pub enum RecoveredTile {
 }
 
 impl RecoveredTile {
+    /// The pixels covered.
+    pub fn rect(&self) -> TileRect {
+        match self {
+            Self::Direct(tile) => tile.rect,
+            Self::Factored(tile) => tile.rect,
+        }
+    }
+
     /// The light transport functions themselves.
     pub fn functions(self, geometry: &Geometry, basis: Option<&Basis>) -> TransportFunctions {
         match (self, basis) {
@@ -152,7 +244,7 @@ mod tests {
                             f64::from(coefficient) * f64::from(basis.kernels[k][s])
                         });
                         let want = match element.index_in(geometry.light) {
-                            Some(_) => terms.sum::<f64>().max(0.0),
+                            Some(_) => terms.sum::<f64>(),
                             None => 0.0,
                         };
                         let got = f64::from(functions.tau[p * area + s][c]);

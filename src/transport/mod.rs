@@ -15,7 +15,7 @@ mod geometry;
 mod snr;
 mod tile;
 
-pub use factored::{Basis, FactoredTile, RecoveredTile};
+pub use factored::{BandTile, Basis, FactoredTile, RecoveredTile};
 pub use functions::TransportFunctions;
 pub use geometry::{
     CameraPx, Correspondence, Element, Extent, Geometry, GeometryError, LightPx, MAX_SIDE,

@@ -6,10 +6,11 @@ use super::{Geometry, TileRect, TransportFunctions};
 pub const CHANNELS: usize = 3;
 
 /// Quantised τ of one pixel and element: R, G, B and an unused fourth code, so that a tile is a
-/// ready `rgba16uint` texture and one SIMD load.
-pub type TexelCode = [u16; 4];
+/// ready `rgba16sint` texture and one SIMD load. Signed: light transport has no negative elements,
+/// but a truncated sum of basis functions has, and to clip them would brighten the picture.
+pub type TexelCode = [i16; 4];
 
-/// Highest code written. 12 bits put the quantisation noise of an unsparse pixel (S = 225, all
+/// Largest code written. 12 bits put the quantisation noise of an unsparse pixel (S = 225, all
 /// elements off by step/√12) some 60 dB below it, under what any photograph can tell; 16 would
 /// store noise.
 const TOP_CODE: f32 = 4095.0;
@@ -27,8 +28,8 @@ pub struct DirectTile {
 }
 
 impl DirectTile {
-    /// Rounds functions to codes, with a step per channel set by the tile's brightest element.
-    /// Negative and non-finite values, which no light transport function has, become zero.
+    /// Rounds functions to codes, with a step per channel set by the tile's largest element.
+    /// Non-finite values, which no light transport function has, become zero.
     pub fn quantise(functions: &TransportFunctions) -> Self {
         Self::quantise_into(functions, Vec::new())
     }
@@ -39,7 +40,7 @@ impl DirectTile {
         for t in &functions.tau {
             for c in 0..CHANNELS {
                 if t[c].is_finite() {
-                    peak[c] = peak[c].max(t[c]);
+                    peak[c] = peak[c].max(t[c].abs());
                 }
             }
         }
@@ -49,8 +50,8 @@ impl DirectTile {
             return Self::dark(functions.rect);
         }
         let step = step.map(|s| if s < f32::MIN_POSITIVE { 1.0 } else { s });
-        let code = |t: f32, step: f32| match t < f32::INFINITY {
-            true => (t / step + 0.5) as u16, // rounds; `as` saturates
+        let code = |t: f32, step: f32| match t.is_finite() {
+            true => (t / step + 0.5f32.copysign(t)) as i16, // rounds; `as` saturates
             false => 0,
         };
         let codes_of = |t: &[f32; CHANNELS]| {

@@ -1,18 +1,18 @@
-//! Decoding a file as it arrives.
+//! Decoding a file as its bytes come.
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{CodedError, Photo};
-use crate::format::{Limits, Reader};
+use crate::format::{Interest, Limits, Reader};
 
-/// Takes the bytes of an `.ltm` file in pieces of any size and makes a [`Photo`] of them.
+/// Says which bytes of an `.ltm` file are of use, takes them in pieces of any size and makes a
+/// [`Photo`] of them.
 #[wasm_bindgen]
 pub struct Decoder(Reader);
 
 #[wasm_bindgen]
 impl Decoder {
-    /// A decoder at the start of a file that may decode to `maxDecodedBytes` bytes; 2 GiB if left
-    /// out.
+    /// A decoder of a file that may decode to `maxDecodedBytes` bytes; 2 GiB if left out.
     #[wasm_bindgen(constructor)]
     pub fn new(#[wasm_bindgen(js_name = maxDecodedBytes)] max_decoded_bytes: Option<f64>) -> Self {
         let limits = max_decoded_bytes.map_or_else(Limits::default, |bytes| Limits {
@@ -21,15 +21,27 @@ impl Decoder {
         Self(Reader::new(limits))
     }
 
-    /// Takes the next bytes of the file.
-    pub fn feed(&mut self, bytes: &[u8]) -> Result<(), CodedError> {
-        Ok(self.0.feed(self.0.position(), bytes)?)
+    /// Byte ranges that have not come yet, the most important first: where the first begins, where
+    /// it ends, where the second begins. The first may reach beyond the end of a small file. Empty
+    /// once all has come.
+    pub fn wants(&self) -> Vec<f64> {
+        let ranges = self.0.wants(&Interest::default());
+        let bounds = ranges
+            .into_iter()
+            .flat_map(|range| [range.start, range.end]);
+        bounds.map(|bound| bound as f64).collect()
     }
 
-    /// Bytes fed so far.
+    /// Takes the file's bytes from `offset` on. Those of one range have to come in order; what has
+    /// come before is passed over.
+    pub fn feed(&mut self, offset: f64, bytes: &[u8]) -> Result<(), CodedError> {
+        Ok(self.0.feed(offset as u64, bytes)?)
+    }
+
+    /// Bytes that have come, each counted once.
     #[wasm_bindgen(getter, js_name = bytesFed)]
     pub fn bytes_fed(&self) -> f64 {
-        self.0.position() as f64
+        self.0.progress().bytes as f64
     }
 
     /// Bytes the file has, once its header has been read.
@@ -38,7 +50,19 @@ impl Decoder {
         self.0.progress().file_bytes.map(|bytes| bytes as f64)
     }
 
-    /// The photograph, once the whole file has been fed.
+    /// Tiles that are whole.
+    #[wasm_bindgen(getter, js_name = tilesDone)]
+    pub fn tiles_done(&self) -> usize {
+        self.0.progress().tiles
+    }
+
+    /// Scans that are there for every tile.
+    #[wasm_bindgen(getter, js_name = scansDone)]
+    pub fn scans_done(&self) -> usize {
+        self.0.progress().scans
+    }
+
+    /// The photograph, once nothing is wanted any more.
     pub fn finish(self) -> Result<Photo, CodedError> {
         let (transport, metadata) = self.0.finish()?;
         Photo::new(transport, &metadata)

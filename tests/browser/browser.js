@@ -4,6 +4,7 @@ import { after } from 'node:test';
 import { gzipSync } from 'node:zlib';
 import { launchChromium } from '../../www/tools/chromium.js';
 import { decodePng } from '../../www/tools/pictures.js';
+import { answer } from '../../www/tools/ranges.js';
 import { listen } from '../../www/tools/serve.js';
 import { site } from '../../www/tools/site.js';
 import { FOLDER, glassBytes } from './photos.js';
@@ -11,14 +12,19 @@ import { FOLDER, glassBytes } from './photos.js';
 /** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
 /** @typedef {import('playwright-core').Page} Page */
 /** @typedef {{ type: string } & Record<string, unknown>} Happening an event, as data */
+/** @typedef {import('node:http').ServerResponse} Response */
+/** @typedef {import('node:http').IncomingMessage} Request */
 
-const TRANSFER_PIECE = 1 << 14;
+/** What elements ask for first. */
+export const FIRST_BYTES = 1 << 14;
+
+const SLOW_PIECES = 40;
 
 /**
  * A server that compresses, and lets pages of other origins read what it sends.
  *
  * @param {number} level
- * @returns {(response: import('node:http').ServerResponse) => unknown}
+ * @returns {(response: Response) => unknown}
  */
 function gzipped(level) {
   const bytes = gzipSync(glassBytes, { level });
@@ -33,9 +39,24 @@ function gzipped(level) {
 }
 
 /**
- * Bad servers and odd ones, by path.
+ * Answers as servers do that know ranges.
  *
- * @type {Record<string, (response: import('node:http').ServerResponse) => unknown>}
+ * @param {Response} response
+ * @param {Request} request
+ * @param {string} etag
+ */
+function inParts(response, request, etag = '"a"') {
+  const read = (/** @type {number} */ start, /** @type {number} */ end) => [
+    glassBytes.subarray(start, end),
+  ];
+  const content = { size: glassBytes.length, type: 'application/vnd.ltm', etag, read };
+  answer(request, response, content).catch(() => {});
+}
+
+/**
+ * Bad servers and odd ones, by path. `count` is 1 with the first request for an address.
+ *
+ * @type {Record<string, (response: Response, request: Request, count: number) => unknown>}
  */
 const FAULTS = {
   '/faults/status': (response) => response.writeHead(503, 'Service Unavailable').end('later'),
@@ -62,8 +83,9 @@ const FAULTS = {
   // Whole, but so slowly that tests can do things meanwhile.
   '/faults/slow': async (response) => {
     response.writeHead(200, { 'Content-Length': glassBytes.length });
-    for (let at = 0; at < glassBytes.length && !response.destroyed; at += TRANSFER_PIECE) {
-      response.write(glassBytes.subarray(at, at + TRANSFER_PIECE));
+    const piece = Math.ceil(glassBytes.length / SLOW_PIECES);
+    for (let at = 0; at < glassBytes.length && !response.destroyed; at += piece) {
+      response.write(glassBytes.subarray(at, at + piece));
       await new Promise((resolve) => setTimeout(resolve, 50));
     }
     response.end();
@@ -71,6 +93,35 @@ const FAULTS = {
   '/faults/gzipped': gzipped(9),
   // Longer than the file itself.
   '/faults/gzipped-longer': gzipped(0),
+  // Readable by pages of other origins, to which Content-Range, ETag and lengths of files stay hidden.
+  '/faults/shared': (response, request) => {
+    response.setHeader('Access-Control-Allow-Origin', '*');
+    inParts(response, request);
+  },
+  // Breaks off in the middle of the second answer.
+  '/faults/breaking': (response, request, count) => {
+    if (count !== 2) return inParts(response, request);
+    const [start, end] = [FIRST_BYTES, glassBytes.length];
+    response.writeHead(206, {
+      'Content-Length': end - start,
+      'Content-Range': `bytes ${start}-${end - 1}/${end}`,
+      ETag: '"a"',
+    });
+    const half = glassBytes.subarray(start, (start + end) / 2);
+    return response.write(half, () => response.destroy());
+  },
+  '/faults/replaced-once': (response, request, count) =>
+    inParts(response, request, count === 1 ? '"a"' : '"b"'),
+  '/faults/replaced': (response, request, count) => inParts(response, request, `"${count}"`),
+  '/faults/compressed-parts': (response, request) => {
+    response.setHeader('Content-Encoding', 'gzip');
+    inParts(response, request);
+  },
+  '/faults/other-part': (response) => {
+    response.writeHead(206, { 'Content-Range': `bytes 1-100/${glassBytes.length}` });
+    response.end(glassBytes.subarray(1, 101));
+  },
+  '/faults/refused': (response) => response.writeHead(416).end(),
   '/blank': (response) =>
     response
       .writeHead(200, { 'Content-Type': 'text/html' })
@@ -86,16 +137,22 @@ const FAULTS = {
 
 /** Paths of transfers that the client ended. */
 export const aborted = /** @type {string[]} */ ([]);
+/** Ranges that were asked for of each address, in order; undefined for the whole file. */
+export const asked = /** @type {Map<string, (string | undefined)[]>} */ (new Map());
 
 const serveSite = site({ photos: FOLDER });
 /** @type {import('node:http').RequestListener} */
 const serve = (request, response) => {
-  const path = request.url ?? '/';
+  const url = request.url ?? '/';
+  const path = url.split('?', 1)[0] ?? '/';
   response.on('close', () => {
     if (!response.writableFinished) aborted.push(path);
   });
+  const ranges = asked.get(url) ?? [];
+  asked.set(url, ranges);
+  const count = ranges.push(request.headers.range?.replace('bytes=', ''));
   const fault = FAULTS[path];
-  if (fault) fault(response);
+  if (fault) fault(response, request, count);
   else serveSite(request, response);
 };
 const [server, otherServer] = await Promise.all([listen(serve, 0), listen(serve, 0)]);

@@ -27,8 +27,12 @@ const ANSWERS = [
     'a body without a length that is cut',
     '/faults/cut-silently',
     'http-short',
-    /incomplete.* of \d+ bytes/,
+    /incomplete.* before byte \d+/,
   ],
+  ['another file every time', '/faults/replaced', 'http-changed', /was replaced on the server/],
+  ['compressed parts', '/faults/compressed-parts', 'http-encoding', /compresses it \(gzip\)/],
+  ['other parts', '/faults/other-part', 'http-range', /bytes 0 to 16383, the server sent others/],
+  ['no parts', '/faults/refused', 'http-range', /says that it has no bytes 0 to 16383/],
   ['nothing at all', '/faults/no-answer', 'http-network', /cannot be reached/],
   // Nothing listens on port 9 of this machine.
   ['no server', 'http://127.0.0.1:9/window.ltm', 'http-network', /window\.ltm .*cannot be reached/],

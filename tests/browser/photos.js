@@ -27,6 +27,7 @@ export const glassBytes = readFileSync(GLASS);
 
 // The demo page asks for this one; the fixture stands in for it where the demo was never made.
 copyFileSync(existsSync(DEMO) ? DEMO : GLASS, join(FOLDER, 'stained-glass.ltm'));
+export const demoBytes = readFileSync(join(FOLDER, 'stained-glass.ltm'));
 
 /** Names of damaged copies, with the code each of them has to end in. */
 export const DAMAGED = {

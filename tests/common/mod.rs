@@ -4,6 +4,7 @@
 
 pub mod relit;
 
+use relightable_photo::format::HEADER_BYTES;
 use relightable_photo::transport::{
     Correspondence, DirectTile, Extent, Geometry, RecoveredTile, TransportFunctions, Window,
 };
@@ -74,4 +75,103 @@ pub fn recovered(tile: &DirectTile, area: usize) -> RecoveredTile {
         rect: tile.rect,
         tau: texels.map(|i| tile.tau(area, i / area, i % area)).collect(),
     })
+}
+
+/// A file after an edit of its header or parts, all checksums made right again as far as the file's
+/// own lengths make sense.
+pub fn sealed(mut file: Vec<u8>, edit: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+    edit(&mut file);
+    if file.len() < HEADER_BYTES {
+        return file;
+    }
+    seal_chunks(&mut file);
+    seal_head(&mut file);
+    file
+}
+
+/// A file whose directory, decompressed, was edited.
+pub fn with_directory(file: &[u8], edit: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+    let [directory, rest] = directory_bounds(file);
+    let mut plain = zstd::bulk::decompress(&file[directory..rest], 1 << 20).unwrap();
+    edit(&mut plain);
+    let packed = zstd::bulk::compress(&plain, 19).unwrap();
+    let mut edited = [&file[..directory], &packed, &file[rest..]].concat();
+    let length = packed.len() as u32;
+    edited[104..108].copy_from_slice(&length.to_le_bytes());
+    let total = edited.len() as u64;
+    edited[88..96].copy_from_slice(&total.to_le_bytes());
+    seal_head(&mut edited);
+    edited
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> usize {
+    u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize
+}
+
+fn directory_bounds(file: &[u8]) -> [usize; 2] {
+    let end = (HEADER_BYTES + u32_at(file, 104)).min(file.len());
+    [HEADER_BYTES, end]
+}
+
+/// Checksums of chunks and of the basis, in the directory.
+fn seal_chunks(file: &mut Vec<u8>) {
+    let [start, end] = directory_bounds(file);
+    let scans = u32_at(file, 100);
+    let Ok(mut plain) = zstd::bulk::decompress(&file[start..end], 1 << 20) else {
+        return;
+    };
+    let Some(entries) = plain
+        .len()
+        .checked_sub(24 * scans)
+        .filter(|n| scans > 0 && n % 12 == 0)
+    else {
+        return;
+    };
+    let (count, head) = (entries / 12, 24 * scans);
+    if count % scans != 0 {
+        return;
+    }
+    let mut at = end + u32_at(file, 112) + u32_at(file, 120);
+    for scan in 0..scans {
+        let crc = |at: &mut usize, length: usize| {
+            let bytes = file.get(*at..at.saturating_add(length)).unwrap_or_default();
+            *at = at.saturating_add(length);
+            crc32c::crc32c(bytes).to_le_bytes()
+        };
+        let basis = u32_at(&plain, 24 * scan + 16);
+        let sum = crc(&mut at, basis);
+        plain[24 * scan + 20..24 * scan + 24].copy_from_slice(&sum);
+        for i in scan * (count / scans)..(scan + 1) * (count / scans) {
+            let length = u32_at(&plain, head + 4 * i);
+            let sum = crc(&mut at, length);
+            let place = head + 4 * (2 * count + i);
+            if length > 0 {
+                plain[place..place + 4].copy_from_slice(&sum);
+            }
+        }
+    }
+    let Ok(packed) = zstd::bulk::compress(&plain, 19) else {
+        return;
+    };
+    let grown = packed.len() as i64 - (end - start) as i64;
+    file.splice(start..end, packed.iter().copied());
+    let length = packed.len() as u32;
+    file[104..108].copy_from_slice(&length.to_le_bytes());
+    let total = u64::from_le_bytes(file[88..96].try_into().unwrap()).wrapping_add_signed(grown);
+    file[88..96].copy_from_slice(&total.to_le_bytes());
+}
+
+/// Checksums of the head's parts, and the header's own.
+fn seal_head(file: &mut [u8]) {
+    let mut start = HEADER_BYTES;
+    for length_at in [104, 112, 120] {
+        let end = start
+            .saturating_add(u32_at(file, length_at))
+            .min(file.len());
+        let crc = crc32c::crc32c(&file[start.min(end)..end]);
+        file[length_at + 4..length_at + 8].copy_from_slice(&crc.to_le_bytes());
+        start = end;
+    }
+    let crc = crc32c::crc32c(&file[..HEADER_BYTES - 4]);
+    file[HEADER_BYTES - 4..HEADER_BYTES].copy_from_slice(&crc.to_le_bytes());
 }

@@ -23,11 +23,17 @@ export interface Photo extends Freeable {
 /** What every element of the light plane emits. */
 export interface Light extends Freeable {}
 
-/** Takes a file's bytes as they come. */
+/** Says which bytes of a file it wants, and takes them as they come. */
 export interface Decoder extends Freeable {
-  feed(bytes: Uint8Array): void;
+  /** Where ranges begin and end, in turns, the most important first; empty once all has come. */
+  wants(): Float64Array;
+  /** Takes the file's bytes from `offset` on; those of a range in order. */
+  feed(offset: number, bytes: Uint8Array): void;
+  /** Each byte counted once. */
   readonly bytesFed: number;
   readonly fileBytes: number | undefined;
+  readonly tilesDone: number;
+  readonly scansDone: number;
   /** Ends the decoder, whether it succeeds or throws. */
   finish(): Photo;
 }

@@ -16,6 +16,12 @@ export type PageErrorCode =
   | 'http-short'
   /** Nothing came for a long time. */
   | 'http-stalled'
+  /** The file was replaced on the server while it was read. */
+  | 'http-changed'
+  /** The server sends parts of the file compressed, which are not parts of the file. */
+  | 'http-encoding'
+  /** The server does not have, or did not send, the part of the file that was asked for. */
+  | 'http-range'
   /** The WebAssembly module beside the script could not be loaded. */
   | 'wasm-unavailable'
   /** Something was asked of a photograph that is not loaded yet. */

@@ -2,9 +2,11 @@
 
 import type { Decoder, Engine, Photo } from './engine.js';
 import { PhotoError, toPhotoError } from './errors.js';
-import { body, checkHead, request, short } from './http.js';
+import { within } from './retry.js';
+import { type ByteRange, HttpSource, type Piece, type SourceOptions } from './source.js';
 
-/** Told how much of the file has come; `total` is 0 until known. */
+/** Told how much of the file has been decoded; `total` is 0 until known. A file that is replaced
+ * meanwhile counts anew. */
 export type OnProgress = (loaded: number, total: number) => void;
 
 /** What loading needs from the world around it. */
@@ -17,17 +19,40 @@ export interface LoadPorts {
   readonly now: () => number;
 }
 
-/** Bytes decoded in one go: some tiles, a few milliseconds. */
-const SLICE_BYTES = 1 << 18;
+/** What every file begins with. The source asks for more along with it: of most files, the head. */
+const HEADER: ByteRange = { start: 0, end: 144 };
+/** Decoders take a range in order, and all of a file is wanted: what is left comes as one answer. */
+const IN_ORDER: Partial<SourceOptions> = {
+  concurrency: 1,
+  maxRangeBytes: Number.POSITIVE_INFINITY,
+};
+/** Bytes decoded in one go: so few that hardly two tiles end among them. */
+const SLICE_BYTES = 1 << 10;
 /** Time after which the page gets its turn: within a frame of 60 a second, with room for its own
  * work. */
 const TURN_MS = 8;
 
 /**
- * Fetches and decodes a file while it arrives. Throws a `PhotoError`, or the signal's reason once
- * aborted; what was decoded till then is freed.
+ * Fetches and decodes a file while it arrives. One that is replaced meanwhile is begun anew, once.
+ * Throws a `PhotoError`, or the signal's reason once aborted; what was decoded till then is freed.
  */
 export async function openPhoto(
+  url: string,
+  signal: AbortSignal,
+  onProgress: OnProgress,
+  ports: LoadPorts,
+): Promise<Photo> {
+  try {
+    return await open(url, signal, onProgress, ports);
+  } catch (thrown) {
+    if (!(thrown instanceof PhotoError && thrown.code === 'http-changed')) throw thrown;
+    // A cache may still have parts of the file that was.
+    const anew: typeof fetch = (input, init) => ports.fetch(input, { ...init, cache: 'reload' });
+    return await open(url, signal, onProgress, { ...ports, fetch: anew });
+  }
+}
+
+async function open(
   url: string,
   signal: AbortSignal,
   onProgress: OnProgress,
@@ -38,13 +63,15 @@ export async function openPhoto(
   signal.throwIfAborted();
   signal.addEventListener('abort', stopToo);
   try {
+    const source = new HttpSource(url, { fetch: ports.fetch }, IN_ORDER);
+    const opening = source.read([HEADER], stop.signal);
     // The module is compiled while the server thinks.
-    const [engine, response] = await Promise.all([
-      ports.engine(),
-      request(url, stop.signal, ports.fetch),
-    ]);
+    const loading = within(ports.engine(), stop.signal);
+    const [engine, first] = await Promise.all([loading, opening.next()]);
     signal.throwIfAborted();
-    return await decode(new engine.Decoder(), url, response, signal, onProgress, ports);
+    const decoder = new engine.Decoder();
+    const pieces = piecesOf(first, opening, decoder, source, stop.signal);
+    return await decode(decoder, pieces, signal, onProgress, ports);
   } catch (thrown) {
     // A transfer that nobody waits for any more is not left running.
     stop.abort();
@@ -55,47 +82,69 @@ export async function openPhoto(
   }
 }
 
+/** All of a file that its decoder wants, after what was asked for without it. */
+async function* piecesOf(
+  first: IteratorResult<Piece, void>,
+  opening: AsyncIterable<Piece>,
+  decoder: Decoder,
+  source: HttpSource,
+  signal: AbortSignal,
+): AsyncGenerator<Piece, void> {
+  if (!first.done) yield first.value;
+  yield* opening;
+  let fed = -1;
+  for (;;) {
+    const wanted = rangesOf(decoder.wants());
+    if (wanted.length === 0) return;
+    // It would be asked for again and again.
+    if (decoder.bytesFed === fed) throw new Error('the decoder wants what it has been fed');
+    fed = decoder.bytesFed;
+    yield* source.read(wanted, signal);
+  }
+}
+
 async function decode(
   decoder: Decoder,
-  url: string,
-  response: Response,
+  pieces: AsyncIterable<Piece>,
   signal: AbortSignal,
   onProgress: OnProgress,
   ports: LoadPorts,
 ): Promise<Photo> {
-  const promised = checkHead(url, response).bytes;
   let held = true;
   let turn = ports.now();
+  let told = 0;
+  const tell = () => {
+    if (decoder.bytesFed > told) onProgress(decoder.bytesFed, decoder.fileBytes ?? 0);
+    told = decoder.bytesFed;
+  };
   try {
-    for await (const piece of body(url, response, signal, () => decoder.fileBytes)) {
-      for (let at = 0; at < piece.byteLength; at += SLICE_BYTES) {
-        decoder.feed(piece.subarray(at, at + SLICE_BYTES));
+    for await (const { offset, bytes } of pieces) {
+      for (let at = 0; at < bytes.byteLength; at += SLICE_BYTES) {
+        decoder.feed(offset + at, bytes.subarray(at, at + SLICE_BYTES));
         if (ports.now() - turn >= TURN_MS) {
+          tell();
           await ports.pause();
           signal.throwIfAborted();
           turn = ports.now();
         }
       }
-      onProgress(decoder.bytesFed, decoder.fileBytes ?? 0);
+      tell();
       signal.throwIfAborted();
     }
-    const { bytesFed, fileBytes } = decoder;
     held = false;
-    try {
-      return decoder.finish();
-    } catch (thrown) {
-      const error = toPhotoError(thrown);
-      // Only a server that sent all it promised has a file that is short. Of others it cannot be
-      // told whether the file or the transfer ended early; the latter is likelier, and curable.
-      const allCame = promised !== undefined && bytesFed >= promised;
-      if (error.code === 'format-truncated' && !allCame) {
-        throw short(url, bytesFed, fileBytes ?? promised, thrown);
-      }
-      throw error;
-    }
+    return decoder.finish();
   } finally {
     if (held) decoder.free();
   }
+}
+
+/** Ranges, of which `bounds` has where each begins and ends. */
+function rangesOf(bounds: Float64Array): ByteRange[] {
+  const ranges: ByteRange[] = [];
+  for (let i = 0; i + 1 < bounds.length; i += 2) {
+    ranges.push({ start: bounds[i] as number, end: bounds[i + 1] as number });
+  }
+  return ranges;
 }
 
 /** A `PhotoError` for an element without an address. */

@@ -1,7 +1,12 @@
 /** The demo site as a request handler: the page, the built element, the photographs. */
 
-import { join } from 'node:path';
+import { open } from 'node:fs/promises';
+import { join, resolve, sep } from 'node:path';
 import sirv from 'sirv';
+import { answer } from './ranges.js';
+
+/** @typedef {import('node:http').IncomingMessage} Request */
+/** @typedef {import('node:http').ServerResponse} Response */
 
 const repository = join(import.meta.dirname, '..', '..');
 
@@ -16,25 +21,24 @@ const CONTENT_SECURITY_POLICY =
   "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self'; connect-src 'self'";
 
 /**
- * @param {{ photos: string }} options folder that is served as /photos/
- * @returns {(request: import('node:http').IncomingMessage, response: import('node:http').ServerResponse) => void}
+ * @param {{ photos: string }} options folder whose `.ltm` files are served below /photos/
+ * @returns {(request: Request, response: Response) => void}
  */
 export function site({ photos }) {
   const options = {
     // Files are looked up at each request: they may be rebuilt under a running server.
     dev: true,
     etag: true,
-    /** @param {import('node:http').ServerResponse} response @param {string} path */
-    setHeaders(response, path) {
+    /** @param {Response} response */
+    setHeaders(response) {
       response.setHeader('Cache-Control', 'no-cache');
       response.setHeader('Content-Security-Policy', CONTENT_SECURITY_POLICY);
-      if (path.endsWith('.ltm')) response.setHeader('Content-Type', 'application/octet-stream');
     },
   };
   const page = sirv(join(repository, 'www'), options);
   const mounts = [
     { at: '/relightable-photo/', serve: sirv(join(repository, 'dist'), options) },
-    { at: '/photos/', serve: sirv(photos, options) },
+    { at: '/photos/', serve: photographs(photos) },
   ];
   return (request, response) => {
     const missing = () => {
@@ -55,4 +59,61 @@ export function site({ photos }) {
     if (PAGE_FILES.has(url.split('?', 1)[0] ?? '')) page(request, response, missing);
     else missing();
   };
+}
+
+/**
+ * Serves the photographs of a folder, in parts where parts are asked for.
+ *
+ * @param {string} folder
+ * @returns {(request: Request, response: Response, missing: () => void) => void}
+ */
+function photographs(folder) {
+  const root = resolve(folder) + sep;
+  return (request, response, missing) => {
+    const path = photographAt(root, request.url ?? '/');
+    if (!path) return missing();
+    // A transfer that the client ends, or that fails, has nobody to tell.
+    send(path, request, response, missing).catch(() => response.destroy());
+  };
+}
+
+/**
+ * @param {string} path
+ * @param {Request} request
+ * @param {Response} response
+ * @param {() => void} missing
+ */
+async function send(path, request, response, missing) {
+  const file = await open(path).catch(() => undefined);
+  if (!file) return missing();
+  // What is open stays the same file when another takes its place.
+  try {
+    const stats = await file.stat({ bigint: true });
+    if (!stats.isFile()) return missing();
+    response.setHeader('Cache-Control', 'no-cache');
+    response.setHeader('Last-Modified', stats.mtime.toUTCString());
+    await answer(request, response, {
+      size: Number(stats.size),
+      type: 'application/vnd.ltm',
+      etag: `"${[stats.ino, stats.mtimeNs, stats.size].map((n) => n.toString(36)).join('-')}"`,
+      read: (start, end) => file.createReadStream({ start, end: end - 1, autoClose: false }),
+    });
+  } finally {
+    await file.close();
+  }
+}
+
+/**
+ * The photograph that a request is for; none where it leads out of the folder or to anything else.
+ *
+ * @param {string} root ends in a separator
+ * @param {string} url
+ */
+function photographAt(root, url) {
+  try {
+    const path = join(root, decodeURIComponent(url.split('?', 1)[0] ?? ''));
+    return path.startsWith(root) && path.endsWith('.ltm') ? path : undefined;
+  } catch {
+    return undefined; // no text in UTF-8
+  }
 }

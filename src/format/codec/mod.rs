@@ -1,18 +1,23 @@
 //! Parts of the file to bytes and back.
-//!
-//! All parts are compressed the same way: numbers of two or four bytes are split into one plane for
-//! each byte, the least significant first, so that zstd sees the bytes that are alike together.
 
 pub(super) mod basis;
+mod bytes;
+mod colour;
+mod dct;
 pub(super) mod direct;
-pub(super) mod factored;
+pub(super) mod halves;
+mod tokens;
+pub(super) mod transform;
 
 use super::FormatError;
 use super::error::Part;
 
-/// zstd level for writing. 19 is the highest whose window stays within a tile's own size; decoding
-/// speed does not depend on it.
+/// zstd level for writing. 19 is the highest that stays within the window of 8 MiB; decoding speed
+/// does not depend on it.
 const LEVEL: i32 = 19;
+
+/// Most bytes that a part may have before compression, and largest window of a zstd frame.
+pub const MOST_PLAIN: u64 = 8 << 20;
 
 /// Most bytes that `plain` bytes can take compressed (ZSTD_COMPRESSBOUND, rounded up). A part that
 /// claims more is refused before it is gathered.
@@ -20,26 +25,49 @@ pub(super) fn compressed_bound(plain: u64) -> u64 {
     plain + plain / 256 + 64
 }
 
-fn compress(planes: &[u8]) -> Result<Vec<u8>, FormatError> {
-    zstd::bulk::compress(planes, LEVEL).map_err(FormatError::Compress)
+/// Compresses into one zstd frame.
+pub(super) fn compress(plain: &[u8]) -> Result<Vec<u8>, FormatError> {
+    zstd::bulk::compress(plain, LEVEL).map_err(FormatError::Compress)
 }
 
-/// Decompresses exactly `need` bytes.
-fn decompress(bytes: &[u8], need: usize) -> Result<Vec<u8>, PartError> {
-    let mut planes = zeros(need)?;
-    let length = zstd::bulk::decompress_to_buffer(bytes, &mut planes)
+/// Decompresses one zstd frame to exactly `need` bytes.
+pub(super) fn decompress(frame: &[u8], need: usize) -> Result<Vec<u8>, PartError> {
+    check_frame(frame)?;
+    let mut plain = zeros(need)?;
+    let length = zstd::bulk::decompress_to_buffer(frame, &mut plain)
         .map_err(|e| PartError::Damaged(e.to_string()))?;
     match length == need {
-        true => Ok(planes),
-        false => Err(PartError::Damaged(format!(
-            "it has {length} bytes, not {need}"
-        ))),
+        true => Ok(plain),
+        false => Err(damaged(format!("it has {length} bytes, not {need}"))),
     }
+}
+
+/// Refuses what is not one frame of a window that any decoder must take (RFC 8878, section 3.1.1).
+fn check_frame(frame: &[u8]) -> Result<(), PartError> {
+    let &[0x28, 0xB5, 0x2F, 0xFD, descriptor, window, ..] = frame else {
+        return Err(damaged("it is no zstd frame"));
+    };
+    let one = zstd::zstd_safe::find_frame_compressed_size(frame) == Ok(frame.len());
+    if !one {
+        return Err(damaged("it is not one zstd frame"));
+    }
+    let single_segment = descriptor & 0x20 != 0;
+    let (exponent, mantissa) = (u64::from(window >> 3), u64::from(window & 7));
+    let window = (8 + mantissa) << (7 + exponent);
+    match single_segment || window <= MOST_PLAIN {
+        true => Ok(()),
+        false => Err(damaged(format!("its zstd window has {window} bytes"))),
+    }
+}
+
+/// Whether bytes have the checksum they are to have. Fuzzing goes past it, to what it keeps away.
+pub(super) fn intact(bytes: &[u8], crc: u32) -> bool {
+    cfg!(fuzzing) || crc32c::crc32c(bytes) == crc
 }
 
 /// A vector of `length` zeros. A browser may refuse what the limits allow: that is an error, not
 /// the end of the page.
-fn zeros<T: bytemuck::Zeroable + Clone>(length: usize) -> Result<Vec<T>, PartError> {
+pub(super) fn zeros<T: bytemuck::Zeroable + Clone>(length: usize) -> Result<Vec<T>, PartError> {
     let mut values = Vec::new();
     values
         .try_reserve_exact(length)
@@ -55,6 +83,10 @@ pub(super) enum PartError {
     Damaged(String),
     /// The system has no memory for this many bytes more.
     Memory(usize),
+}
+
+fn damaged(what: impl Into<String>) -> PartError {
+    PartError::Damaged(what.into())
 }
 
 impl PartError {

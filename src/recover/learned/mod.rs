@@ -36,7 +36,8 @@ use super::workers::go_on;
 use super::{CommonMode, RecoverError, Workers};
 use crate::capture::Measurements;
 use crate::transport::{
-    Basis, CHANNELS, Extent, FactoredTile, Geometry, RecoveredTile, TileRect, Window,
+    Basis, CHANNELS, Extent, FactoredTile, Geometry, RecoveredTile, TileRect, TransportFunctions,
+    Window,
 };
 
 /// Ranks to choose from; each fills vector registers together with the mean function.
@@ -224,11 +225,25 @@ impl Learned {
         }
         let mut functions = tile.expand(&self.geometry, &self.basis);
         let theirs = direct.tile(measurements, rect);
-        for (tau, theirs) in functions.tau.iter_mut().zip(&theirs.tau) {
-            for c in 0..CHANNELS {
-                tau[c] += share * (theirs[c] - tau[c]);
-            }
+        blend(&mut functions, &theirs, share);
+        RecoveredTile::Direct(functions)
+    }
+
+    /// What [`tile`](Self::tile) would be without the patterns held out, all of `rect` blended alike.
+    pub fn rehearse(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
+        let ours = self.factored(measurements, &self.split.learn, rect);
+        let Some(direct) = &self.direct else {
+            return RecoveredTile::Factored(ours);
+        };
+        let share = self
+            .compare(measurements, direct, rect)
+            .best_share(LEAST_GAIN);
+        if share == 0.0 {
+            return RecoveredTile::Factored(ours);
         }
+        let mut functions = ours.expand(&self.geometry, &self.basis);
+        let theirs = direct.tile_from(measurements, &self.split.learn, rect);
+        blend(&mut functions, &theirs, share);
         RecoveredTile::Direct(functions)
     }
 
@@ -410,6 +425,15 @@ impl Learned {
             total.theirs += part.theirs;
         }
         Ok((total.best_share(LEAST_GAIN_IN_ALL) > 0.0).then_some(direct))
+    }
+}
+
+/// Takes functions a `share` of the way to others.
+fn blend(functions: &mut TransportFunctions, theirs: &TransportFunctions, share: f32) {
+    for (tau, theirs) in functions.tau.iter_mut().zip(&theirs.tau) {
+        for c in 0..CHANNELS {
+            tau[c] += share * (theirs[c] - tau[c]);
+        }
     }
 }
 

@@ -134,7 +134,7 @@ mod twins {
         for side in [1, 3, 15, 17] {
             let stride = side + 5;
             let codes: Vec<_> = (0..side * side)
-                .map(|_| std::array::from_fn(|_| next() as u16))
+                .map(|_| std::array::from_fn(|_| next() as i16))
                 .collect();
             let seen: Vec<_> = (0..stride * side)
                 .map(|_| std::array::from_fn(|_| next() as f32 / 16_777_216.0))

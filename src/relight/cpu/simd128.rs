@@ -1,7 +1,7 @@
 //! The kernel on WebAssembly's 128-bit vectors: one texel an instruction.
 
 use std::arch::wasm32::{
-    f32x4_add, f32x4_convert_u32x4, f32x4_mul, f32x4_splat, u32x4_load_extend_u16x4, v128,
+    f32x4_add, f32x4_convert_i32x4, f32x4_mul, f32x4_splat, i32x4_load_extend_i16x4, v128,
     v128_load, v128_store,
 };
 
@@ -16,11 +16,11 @@ pub fn accumulate(codes: &[TexelCode], seen: &[[f32; 4]], side: usize, stride: u
             // SAFETY: `code` is 8 readable bytes and `light` 16; wasm loads need no alignment.
             let (code, light): (v128, v128) = unsafe {
                 (
-                    u32x4_load_extend_u16x4(code.as_ptr()),
+                    i32x4_load_extend_i16x4(code.as_ptr()),
                     v128_load(light.as_ptr().cast()),
                 )
             };
-            sum = f32x4_add(sum, f32x4_mul(f32x4_convert_u32x4(code), light));
+            sum = f32x4_add(sum, f32x4_mul(f32x4_convert_i32x4(code), light));
         }
     }
     let mut out = [0.0f32; 4];

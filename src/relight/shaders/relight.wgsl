@@ -12,8 +12,8 @@ struct Params {
     reserved: vec2<f32>,
 }
 
-// τ as 16-bit codes: a pixel's window, row by row, from the texel that `pixels` names.
-@group(0) @binding(0) var codes: texture_2d_array<u32>;
+// τ as signed 16-bit codes: a pixel's window, row by row, from the texel that `pixels` names.
+@group(0) @binding(0) var codes: texture_2d_array<i32>;
 // For each camera pixel: its window's first element (u, v), its first code, its tile.
 @group(0) @binding(1) var pixels: texture_2d<i32>;
 // Value of one code, per tile and channel.

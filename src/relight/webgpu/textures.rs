@@ -26,10 +26,10 @@ impl Textures {
                 view_formats: &[],
             })
         };
-        use wgpu::TextureFormat::{Rgba16Uint, Rgba32Float, Rgba32Sint};
+        use wgpu::TextureFormat::{Rgba16Sint, Rgba32Float, Rgba32Sint};
         let codes = layout.codes();
         Self {
-            codes: texture("codes", codes.extent, codes.layers, Rgba16Uint),
+            codes: texture("codes", codes.extent, codes.layers, Rgba16Sint),
             pixels: texture("pixels", layout.pixels(), 1, Rgba32Sint),
             steps: texture("steps", layout.steps(), 1, Rgba32Float),
             light: texture("light", layout.light(), 1, Rgba32Float),

@@ -1,0 +1,118 @@
+//! From the tiles of a checkpoint to a file.
+
+use std::io;
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::Result;
+use clap::Args;
+
+use super::checkpoint::Checkpoint;
+use super::memory::Bytes;
+use super::process::Cores;
+use crate::format::{EncodedFile, Judge, Metadata, Quality, Source};
+use crate::recover::{Recovery, Rehearsal};
+use crate::transport::{BandTile, Basis, Decibels, Geometry, RecoveredTile, TransportFunctions};
+
+/// Camera pixels along a tile's side in a file: more than those of a recovered tile, for what is
+/// compressed together is smaller, and few enough to fetch what is seen alone.
+const TILE_SIDE: u32 = 128;
+/// SNR that may be lost in a file unless another quality is asked for, by what the rehearsal tells. It
+/// recovered from fewer patterns than the file is made of, and so a little more noise.
+const LOSS: Decibels = Decibels(0.5);
+/// SNR against what was recovered where there is no rehearsal: with so few patterns that is noisy.
+const USUAL: Decibels = Decibels(32.0);
+
+/// How good, or how small, the file is to be.
+#[derive(Debug, Args)]
+#[group(multiple = false)]
+pub struct QualityArgs {
+    /// SNR of the file against what was recovered, in dB: more is larger [default: as much as tells by the photographs]
+    #[arg(long, value_name = "DB", value_parser = |text: &str| super::number_in(text, 5.0, 75.0))]
+    quality: Option<f32>,
+    /// Make the best file of at most so many bytes: 500kB, 2MB
+    #[arg(long, value_name = "BYTES", value_parser = Bytes::parse)]
+    max_bytes: Option<Bytes>,
+    /// Keep eleven bits of every coefficient, for archives: some ten times larger
+    #[arg(long)]
+    lossless: bool,
+}
+
+impl QualityArgs {
+    /// What was asked for.
+    fn quality<'a>(&self, judge: Option<&'a Judging<'a>>) -> Quality<'a> {
+        match (self.quality, self.max_bytes, judge) {
+            (Some(snr), ..) => Quality::Snr(Decibels(f64::from(snr))),
+            (_, Some(most), _) => Quality::Bytes(most.0),
+            _ if self.lossless => Quality::Lossless,
+            (.., Some(judge)) => Quality::Loss(LOSS, judge),
+            (.., None) => Quality::Snr(USUAL),
+        }
+    }
+}
+
+/// The rehearsal of a recovery as the judge of a file.
+struct Judging<'a>(&'a Rehearsal);
+
+impl Judge for Judging<'_> {
+    fn tiles(&self) -> Vec<BandTile> {
+        let of_square = |tile: &RecoveredTile| {
+            let mut square = BandTile::dark(tile.rect());
+            square.put(tile.clone());
+            square
+        };
+        self.0.tiles().map(of_square).collect()
+    }
+
+    fn loss(&self, functions: &[TransportFunctions]) -> Decibels {
+        self.0.loss(functions)
+    }
+}
+
+/// Encodes the tiles that `checkpoint` keeps of a recovery.
+pub fn file(
+    args: &QualityArgs,
+    checkpoint: Checkpoint,
+    recovery: &Recovery,
+    metadata: Metadata,
+    cores: &Cores,
+) -> Result<(EncodedFile, Checkpoint)> {
+    let (recovered, basis) = (recovery.geometry(), recovery.basis());
+    let geometry = Geometry {
+        tile_side: TILE_SIDE,
+        ..*recovered
+    };
+    let rank = basis.map_or(0, Basis::rank);
+    let kept = Mutex::new(checkpoint);
+    let tile = |i: usize| -> io::Result<BandTile> {
+        let rect = geometry.tile(i);
+        let mut tile = BandTile::dark(rect);
+        for (x, y) in parts(rect.x, rect.extent.width, recovered.tile_side).flat_map(|x| {
+            parts(rect.y, rect.extent.height, recovered.tile_side).map(move |y| (x, y))
+        }) {
+            let i = y * recovered.tile_grid().width + x;
+            let mut checkpoint = kept.lock().unwrap_or_else(PoisonError::into_inner);
+            let part = checkpoint.tile(recovered, rank, i as usize)?;
+            drop(checkpoint);
+            tile.put(part);
+        }
+        Ok(tile)
+    };
+    let source = Source {
+        geometry,
+        basis,
+        tile: &tile,
+        metadata,
+        extensions: Vec::new(),
+    };
+    let judge = recovery.rehearsal().map(Judging);
+    let file = EncodedFile::new(source, args.quality(judge.as_ref()), cores)?;
+    Ok((
+        file,
+        kept.into_inner().unwrap_or_else(PoisonError::into_inner),
+    ))
+}
+
+/// Columns or rows of recovered tiles within a file's tile from `start` on.
+fn parts(start: u32, length: u32, side: u32) -> impl Iterator<Item = u32> + Clone {
+    start / side..(start + length).div_ceil(side)
+}

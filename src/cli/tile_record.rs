@@ -1,0 +1,122 @@
+//! A recovered tile as a checkpoint keeps it: half-precision floats in units of a power of two, which
+//! is far finer than any file but an archive's, and fast.
+
+use std::io::{self, ErrorKind};
+
+use half::f16;
+
+use crate::transport::{CHANNELS, FactoredTile, RecoveredTile, TileRect, TransportFunctions};
+
+/// zstd level: a checkpoint is read once, and soon.
+const LEVEL: i32 = 1;
+/// Kind, and what values are in units of.
+const HEAD: usize = 5;
+const DIRECT: u8 = 1;
+const FACTORED: u8 = 2;
+
+/// A tile as bytes.
+pub fn encode(tile: &RecoveredTile) -> io::Result<Vec<u8>> {
+    let (kind, values) = match tile {
+        RecoveredTile::Direct(tile) => (DIRECT, &tile.tau),
+        RecoveredTile::Factored(tile) => (FACTORED, &tile.coefficients),
+    };
+    let values = values.as_flattened();
+    let finite = values.iter().filter(|v| v.is_finite());
+    let peak = finite.fold(f32::MIN_POSITIVE, |peak, v| peak.max(v.abs()));
+    let step = (peak.log2().ceil() - 15.0).clamp(-120.0, 110.0).exp2();
+    let (mut low, mut high) = (Vec::new(), Vec::new());
+    for value in values {
+        let value = if value.is_finite() { value / step } else { 0.0 };
+        let [l, h] = f16::from_f32(value).to_bits().to_le_bytes();
+        low.push(l);
+        high.push(h);
+    }
+    low.extend(high);
+    let mut record = vec![kind];
+    record.extend(step.to_le_bytes());
+    record.extend(zstd::bulk::compress(&low, LEVEL)?);
+    Ok(record)
+}
+
+/// The tile for `rect`, of `rank` components or functions of `area` elements.
+pub fn decode(
+    rect: TileRect,
+    rank: usize,
+    area: usize,
+    record: &[u8],
+) -> io::Result<RecoveredTile> {
+    let damaged = || io::Error::from(ErrorKind::InvalidData);
+    let (&[kind, a, b, c, d], frame) = record.split_first_chunk::<HEAD>().ok_or_else(damaged)?;
+    let step = f32::from_le_bytes([a, b, c, d]);
+    let each = match kind {
+        DIRECT => area,
+        FACTORED => rank,
+        _ => return Err(damaged()),
+    };
+    let count = rect.extent.area() * each * CHANNELS;
+    let planes = zstd::bulk::decompress(frame, 2 * count)?;
+    if planes.len() != 2 * count {
+        return Err(damaged());
+    }
+    let (low, high) = planes.split_at(count);
+    let halves = low
+        .iter()
+        .zip(high)
+        .map(|(&l, &h)| f16::from_le_bytes([l, h]));
+    let values: Vec<f32> = halves.map(|half| half.to_f32() * step).collect();
+    let values = values.as_chunks().0.to_vec();
+    Ok(match kind {
+        DIRECT => RecoveredTile::Direct(TransportFunctions { rect, tau: values }),
+        _ => RecoveredTile::Factored(FactoredTile {
+            rect,
+            coefficients: values,
+        }),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::transport::Extent;
+
+    #[test]
+    fn tiles_come_back_to_eleven_bits() {
+        let rect = TileRect {
+            x: 3,
+            y: 5,
+            extent: Extent {
+                width: 4,
+                height: 2,
+            },
+        };
+        for size in [1e-30f32, 0.2, 1e20] {
+            let value = |i: usize| [0.2, -1.0, 0.01].map(|c| c * size * (i as f32).cos());
+            let values = |each: usize| -> Vec<_> { (0..8 * each).map(value).collect() };
+            let direct = RecoveredTile::Direct(TransportFunctions {
+                rect,
+                tau: values(9),
+            });
+            let factored = RecoveredTile::Factored(FactoredTile {
+                rect,
+                coefficients: values(5),
+            });
+            for tile in [direct, factored] {
+                let record = encode(&tile).unwrap();
+                let (got, want) = match (decode(rect, 5, 9, &record).unwrap(), tile) {
+                    (RecoveredTile::Direct(a), RecoveredTile::Direct(b)) => (a.tau, b.tau),
+                    (RecoveredTile::Factored(a), RecoveredTile::Factored(b)) => {
+                        (a.coefficients, b.coefficients)
+                    }
+                    _ => panic!("another kind"),
+                };
+                for (got, want) in got.as_flattened().iter().zip(want.as_flattened()) {
+                    assert!((got - want).abs() <= want.abs() / 2048.0 + size * 1e-7);
+                }
+                assert!(decode(rect, 6, 10, &record).is_err());
+                for cut in 0..record.len() {
+                    assert!(decode(rect, 5, 9, &record[..cut]).is_err());
+                }
+            }
+        }
+    }
+}

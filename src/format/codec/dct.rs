@@ -1,0 +1,148 @@
+//! The discrete cosine transform of blocks of 8 by 8 (Ahmed, Natarajan & Rao 1974), orthonormal.
+
+/// Pixels along a block's side.
+pub const SIDE: usize = 8;
+/// Pixels of a block.
+pub const AREA: usize = SIDE * SIDE;
+
+/// A block's pixels, or its coefficients, row by row.
+pub type Block = [f32; AREA];
+
+/// `cos(i π / 16)` for i from 0 to 8, as f32.
+const COSINES: [f32; 9] = [
+    1.0,
+    0.980_785_25,
+    0.923_879_5,
+    0.831_469_6,
+    0.707_106_77,
+    0.555_570_24,
+    0.382_683_43,
+    0.195_090_32,
+    0.0,
+];
+
+/// `[frequency][place]`: `½ cos((2 place + 1) frequency π / 16)`, and `√⅛` for frequency 0.
+pub const BASIS: [[f32; SIDE]; SIDE] = basis();
+
+const fn basis() -> [[f32; SIDE]; SIDE] {
+    let mut basis = [[0.0; SIDE]; SIDE];
+    let mut frequency = 0;
+    while frequency < SIDE {
+        let mut place = 0;
+        while place < SIDE {
+            // The angle in sixteenths of π, folded into the first quarter of the circle.
+            let turn = (2 * place + 1) * frequency % 32;
+            let half = if turn > 16 { 32 - turn } else { turn };
+            let cosine = if half > 8 {
+                -COSINES[16 - half]
+            } else {
+                COSINES[half]
+            };
+            basis[frequency][place] = 0.5 * if frequency == 0 { COSINES[4] } else { cosine };
+            place += 1;
+        }
+        frequency += 1;
+    }
+    basis
+}
+
+/// Order of coefficients: by the sum of their frequencies, then to and fro.
+pub const ZIGZAG: [u8; AREA] = zigzag();
+
+const fn zigzag() -> [u8; AREA] {
+    let mut order = [0; AREA];
+    let (mut at, mut sum) = (0, 0);
+    while sum < 2 * SIDE - 1 {
+        let mut step = 0;
+        while step <= sum {
+            let row = if sum % 2 == 0 { sum - step } else { step };
+            let column = sum - row;
+            if row < SIDE && column < SIDE {
+                order[at] = (row * SIDE + column) as u8;
+                at += 1;
+            }
+            step += 1;
+        }
+        sum += 1;
+    }
+    order
+}
+
+/// Coefficients of a block's pixels.
+pub fn forward(pixels: &Block) -> Block {
+    let mut rows = [0.0; AREA];
+    for y in 0..SIDE {
+        for u in 0..SIDE {
+            rows[y * SIDE + u] = (0..SIDE).map(|x| BASIS[u][x] * pixels[y * SIDE + x]).sum();
+        }
+    }
+    let mut coefficients = [0.0; AREA];
+    for v in 0..SIDE {
+        for u in 0..SIDE {
+            coefficients[v * SIDE + u] = (0..SIDE).map(|y| BASIS[v][y] * rows[y * SIDE + u]).sum();
+        }
+    }
+    coefficients
+}
+
+/// Pixels of a block's coefficients: columns first, then rows, each sum from frequency 0 upwards.
+pub fn inverse(coefficients: &Block) -> Block {
+    let mut columns = [0.0f32; AREA];
+    for v in 0..SIDE {
+        let row = &coefficients[v * SIDE..(v + 1) * SIDE];
+        if row.iter().all(|c| *c == 0.0) {
+            continue;
+        }
+        for y in 0..SIDE {
+            for u in 0..SIDE {
+                columns[y * SIDE + u] += BASIS[v][y] * row[u];
+            }
+        }
+    }
+    let mut pixels = [0.0f32; AREA];
+    for y in 0..SIDE {
+        for u in 0..SIDE {
+            for x in 0..SIDE {
+                pixels[y * SIDE + x] += columns[y * SIDE + u] * BASIS[u][x];
+            }
+        }
+    }
+    pixels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_basis_is_the_cosines_and_orthonormal() {
+        for u in 0..SIDE {
+            for x in 0..SIDE {
+                let angle = (2 * x + 1) as f64 * u as f64 * std::f64::consts::PI / 16.0;
+                let norm = if u == 0 { 0.125f64.sqrt() } else { 0.5 };
+                assert!((f64::from(BASIS[u][x]) - norm * angle.cos()).abs() < 1e-7);
+            }
+            for v in 0..SIDE {
+                let dot: f32 = BASIS[u].iter().zip(&BASIS[v]).map(|(a, b)| a * b).sum();
+                assert!((dot - f32::from(u8::from(u == v))).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn zigzag_is_that_of_jpeg() {
+        assert_eq!(ZIGZAG[..10], [0, 1, 8, 16, 9, 2, 3, 10, 17, 24]);
+        let mut all = ZIGZAG;
+        all.sort();
+        assert!(all.iter().enumerate().all(|(i, at)| usize::from(*at) == i));
+    }
+
+    #[test]
+    fn blocks_come_back() {
+        let pixels: Block = std::array::from_fn(|i| ((i * i) as f32 * 0.37).sin());
+        let back = inverse(&forward(&pixels));
+        for (a, b) in back.iter().zip(&pixels) {
+            assert!((a - b).abs() < 1e-5);
+        }
+    }
+}

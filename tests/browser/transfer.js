@@ -1,0 +1,95 @@
+/** How photographs come: in which parts, from which servers. */
+
+import assert from 'node:assert/strict';
+import { describe, test } from 'node:test';
+import { compare } from '../../www/tools/pictures.js';
+import {
+  asked,
+  FIRST_BYTES,
+  loaded,
+  mount,
+  openPage,
+  origin,
+  otherOrigin,
+  picture,
+} from './browser.js';
+import { demoBytes, glassBytes, nativePicture } from './photos.js';
+
+/** The ranges of two requests that bring a file of so many bytes. */
+const inTwo = (/** @type {number} */ size) => [
+  `0-${FIRST_BYTES - 1}`,
+  `${FIRST_BYTES}-${size - 1}`,
+];
+
+/**
+ * Opens a photograph from an address that no other test has asked for.
+ *
+ * @param {import('node:test').TestContext} t
+ * @param {string} path
+ * @param {string} [from]
+ */
+async function opened(t, path, from = origin) {
+  const page = await openPage(t, '/bench');
+  const address = `${path}?for=${encodeURIComponent(t.name)}`;
+  await mount(page, { src: from + address, backend: 'cpu', light: 'spectrum' });
+  const happened = await loaded(page);
+  return { page, happened, ranges: asked.get(address) };
+}
+
+describe('a photograph', () => {
+  test('comes with two requests, of which no byte is for nothing', async (t) => {
+    const { happened, ranges } = await opened(t, '/photos/stained-glass.ltm');
+    assert.deepEqual(ranges, inTwo(demoBytes.length));
+    const progress = happened.filter((event) => event.type === 'progress');
+    assert.equal(progress.at(-1)?.['loaded'], demoBytes.length);
+  });
+
+  test('comes with one from a server that knows no ranges', async (t) => {
+    const { ranges } = await opened(t, '/faults/slow');
+    assert.equal(ranges?.length, 1);
+  });
+
+  for (const from of [origin, otherOrigin]) {
+    const where = from === origin ? 'its own origin' : 'another origin';
+    test(`comes in parts from ${where}`, async (t) => {
+      const { page, ranges } = await opened(t, '/faults/shared', from);
+      assert.deepEqual(ranges, inTwo(glassBytes.length));
+      assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
+    });
+  }
+
+  test('whose transfer breaks off goes on where it ended', async (t) => {
+    const { page, ranges } = await opened(t, '/faults/breaking');
+    assert.deepEqual(ranges?.slice(0, 2), inTwo(glassBytes.length));
+    assert.equal(ranges?.length, 3);
+    assert.ok(Number.parseInt(ranges?.[2] ?? '', 10) > FIRST_BYTES);
+    assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
+  });
+
+  test('that is replaced meanwhile is begun anew', async (t) => {
+    const { page, ranges } = await opened(t, '/faults/replaced-once');
+    const twice = [...inTwo(glassBytes.length), ...inTwo(glassBytes.length)];
+    assert.deepEqual(ranges, twice);
+    assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
+  });
+
+  test('is not fetched whole again while the browser has it', async (t) => {
+    const page = await openPage(t, '/bench');
+    const address = '/photos/glass.ltm?for=twice';
+    await mount(page, { src: address, backend: 'cpu' });
+    await loaded(page);
+    const again = await page.evaluate(async (address) => {
+      const other = document.createElement('relightable-photo');
+      Object.assign(other, { src: address, backend: 'cpu' });
+      const load = new Promise((resolve) => other.addEventListener('load', resolve));
+      document.body.append(other);
+      await load;
+      const entries = performance.getEntriesByType('resource');
+      const bodies = /** @type {PerformanceResourceTiming[]} */ (entries)
+        .filter(({ name }) => name.endsWith(address))
+        .map(({ encodedBodySize, transferSize }) => ({ encodedBodySize, transferSize }));
+      return bodies;
+    }, address);
+    t.diagnostic(JSON.stringify(again));
+  });
+});
