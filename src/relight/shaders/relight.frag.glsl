@@ -13,7 +13,7 @@ struct Covering {
     vec4 clip;
     vec2 picture;
 };
-uniform highp usampler2DArray _group_0_binding_0_fs;
+uniform highp isampler2DArray _group_0_binding_0_fs;
 
 uniform highp isampler2D _group_0_binding_1_fs;
 
@@ -78,7 +78,7 @@ vec3 windowed_sum(ivec2 origin, int first_code) {
                     vec3 _e63 = sum;
                     ivec2 _e65 = texel;
                     int _e66 = layer;
-                    uvec4 _e68 = texelFetch(_group_0_binding_0_fs, ivec3(_e65, _e66), 0);
+                    ivec4 _e68 = texelFetch(_group_0_binding_0_fs, ivec3(_e65, _e66), 0);
                     sum = (_e63 + (vec3(_e68.xyz) * emitted.xyz));
                     int _e76 = texel.x;
                     texel.x = (_e76 + 1);
