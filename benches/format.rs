@@ -1,0 +1,313 @@
+//! `pkg-scripts/bench format`: what light transport takes in a file and how fast it comes out, against
+//! other codecs at equal SNR in the same run.
+//!
+//! - At the paper's scale, and on a scene a quarter as wide: bytes of a default file, and how much SNR
+//!   against the truth is lost by it (an archive, `--lossless`, is the recovered transport).
+//! - First tenth of a file: the least PSNR of pictures relit by it.
+//! - Peers (`format_peers.py`) code the recovered band, or its coefficients as pictures, as coarsely as
+//!   our file's SNR against it allows. `vs_best_band_codec` is against f16 + zstd-19, CSR, blosc2 and zfp
+//!   where lossless ones get numbers rounded for them, each in its best arrangement;
+//!   `vs_best_plain_band_codec` against these as they are: zfp at equal SNR, or half floats as recovered.
+//! - Decoding: MB of dequantised coefficients, four bytes each, a second: natively tile by tile, on one
+//!   thread; in WebAssembly with simd128, of all scans but the last, in Node on one thread.
+
+#![allow(clippy::unwrap_used, clippy::expect_used)] // a bench that cannot go on should stop
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use relightable_photo::format::{
+    EncodedFile, Head, Interest, Limits, Metadata, PartNumber, Quality, Reader, Source,
+    decode_basis, decode_tile,
+};
+use relightable_photo::transport::{BandTile, Basis, CHANNELS, Decibels, TransportError};
+use relightable_photo::workers::OneThread;
+use serde_json::{Value, json};
+
+type Figures = BTreeMap<String, f64>;
+
+/// Peers of the plain band that keep what they are given.
+const KEEPERS: [&str; 4] = ["band_f16_zstd19", "dense_f16_zstd19", "csr_npz", "blosc2"];
+const PLANES: [&str; 2] = ["jpeg_planes", "webp_planes"];
+
+fn main() {
+    let target = PathBuf::from(env!("CARGO_BIN_EXE_ltm-export"));
+    let target = target.ancestors().nth(2).unwrap().to_owned();
+    let folder = target.join("bench");
+    fs::create_dir_all(&folder).unwrap();
+    let mut figures = Figures::new();
+    let capture = simulated(&folder, "quarter-scale", 128);
+    let small = loss(&folder, "quarter", &capture, &mut figures);
+    prefix(&small, &capture, &mut figures);
+    against_peers(&folder, &small, &mut figures);
+    rates(&small, &mut figures);
+    let capture = simulated(&folder, "paper-scale", 512);
+    let large = loss(&folder, "paper", &capture, &mut figures);
+    wasm_rate(&large.file, &mut figures);
+    println!();
+    for (key, value) in &figures {
+        println!("{key:36} {value:.4}");
+    }
+    let path = folder.join("format.json");
+    let report = json!({"machine": machine(), "figures": figures});
+    fs::write(&path, serde_json::to_string_pretty(&report).unwrap() + "\n").unwrap();
+    println!("\n{}", path.display());
+}
+
+fn machine() -> String {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let arch = std::env::consts::ARCH;
+    format!("{arch}, {cores} cores, {}", std::env::consts::OS)
+}
+
+fn ltm_export(args: &[&str]) -> Value {
+    let output = Command::new(env!("CARGO_BIN_EXE_ltm-export"))
+        .args(args)
+        .stderr(Stdio::inherit())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{args:?}");
+    serde_json::from_slice(&output.stdout).unwrap_or(Value::Null)
+}
+
+/// Stained glass at two camera pixels an element under 80 patterns.
+fn simulated(folder: &Path, name: &str, side: u32) -> PathBuf {
+    let capture = folder.join(name);
+    if !capture.join("capture.json").exists() {
+        let [camera, light] = [side, side / 2].map(|side| format!("{side}x{side}"));
+        let grids = ["--camera", &camera, "--light", &light, "--patterns", "80"];
+        let what = ["simulate", "stained-glass", "-o", capture.to_str().unwrap()];
+        ltm_export(&[&what[..], &grids].concat());
+    }
+    capture
+}
+
+/// A default file, and the archive of the same recovery.
+struct Files {
+    file: PathBuf,
+    archive: PathBuf,
+}
+
+fn loss(folder: &Path, name: &str, capture: &Path, figures: &mut Figures) -> Files {
+    let files = Files {
+        file: folder.join(format!("{name}.ltm")),
+        archive: folder.join(format!("{name}-lossless.ltm")),
+    };
+    let capture = capture.to_str().unwrap();
+    let mut snr = [0.0; 2];
+    for (i, (path, how)) in [(&files.archive, "--lossless"), (&files.file, "--json")]
+        .into_iter()
+        .enumerate()
+    {
+        let path = path.to_str().unwrap();
+        ltm_export(&["recover", capture, "-o", path, "--patterns", "80", how]);
+        let evaluated = ltm_export(&["evaluate", path, capture, "--json"]);
+        snr[i] = evaluated["snr_db"].as_f64().unwrap();
+    }
+    let bytes = fs::metadata(&files.file).unwrap().len();
+    println!("{name}: {bytes} bytes, SNR {:.2} dB of {:.2} dB", snr[1], snr[0]);
+    figures.insert(format!("{name}_scale_mb"), bytes as f64 / 1e6);
+    figures.insert(format!("{name}_scale_snr_loss_db"), snr[0] - snr[1]);
+    files
+}
+
+fn prefix(files: &Files, capture: &Path, figures: &mut Figures) {
+    let (file, capture) = (files.file.to_str().unwrap(), capture.to_str().unwrap());
+    let evaluated = ltm_export(&["evaluate", file, capture, "--first", "10%", "--json"]);
+    let relit = evaluated["relit"].as_object().unwrap();
+    let least = relit.values().map(|psnr| psnr.as_f64().unwrap());
+    figures.insert("prefix10_min_psnr_db".to_owned(), least.fold(f64::INFINITY, f64::min));
+}
+
+/// A file's head, basis and tiles as they are in it.
+struct Decoded {
+    head: Head,
+    basis: Basis,
+    tiles: Vec<BandTile>,
+}
+
+fn decode(path: &Path) -> Decoded {
+    let bytes = fs::read(path).unwrap();
+    let mut reader = Reader::new(Limits::default());
+    while reader.head().is_none() {
+        let wanted = reader.wants(&Interest::default()).remove(0);
+        let end = bytes.len().min(wanted.end as usize);
+        let head = reader.head_bytes().unwrap_or(200) as usize;
+        reader
+            .feed(wanted.start, &bytes[wanted.start as usize..end.min(head)])
+            .unwrap();
+    }
+    let head = reader.head().unwrap().clone();
+    let fetch = |part: PartNumber| {
+        let range = head.range(part);
+        Ok::<_, relightable_photo::format::FormatError>(
+            bytes[range.start as usize..range.end as usize].to_vec(),
+        )
+    };
+    let basis = decode_basis(&head, fetch).unwrap();
+    let tiles = (0..head.tiles()).map(|i| decode_tile(&head, i, fetch).unwrap());
+    Decoded {
+        tiles: tiles.collect(),
+        basis,
+        head,
+    }
+}
+
+fn npy(path: &Path, kind: &str, shape: &[usize], bytes: &[u8]) {
+    let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
+    let mut header = format!(
+        "{{'descr': '{kind}', 'fortran_order': False, 'shape': ({},), }}",
+        shape.join(", ")
+    );
+    while (header.len() + 11) % 64 != 0 {
+        header.push(' ');
+    }
+    header.push('\n');
+    let mut file = b"\x93NUMPY\x01\x00".to_vec();
+    file.extend((header.len() as u16).to_le_bytes());
+    file.extend(header.as_bytes());
+    file.extend(bytes);
+    fs::write(path, file).unwrap();
+}
+
+fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
+    let Ok(python) = std::env::var("BENCH_PYTHON") else {
+        println!("no peers: run pkg-scripts/bench format");
+        return;
+    };
+    let (given, ours) = (decode(&files.archive), decode(&files.file));
+    let geometry = given.head.header.geometry;
+    let (camera, area) = (geometry.camera, geometry.window.area());
+    let rank = given.basis.rank();
+    let mut band = vec![0.0f32; camera.area() * area * CHANNELS];
+    let mut planes = vec![0.0f32; rank * CHANNELS * camera.area()];
+    let mut origins = vec![0i32; 2 * camera.area()];
+    let mut error = TransportError::default();
+    for (tile, coded) in given.tiles.iter().zip(&ours.tiles) {
+        let functions = tile.clone().functions(&geometry, &given.basis);
+        let coded = coded.clone().functions(&geometry, &ours.basis);
+        for (p, pixel) in tile.rect.pixels().enumerate() {
+            let n = camera.index(pixel);
+            let origin = geometry.window_origin(pixel);
+            [origins[2 * n], origins[2 * n + 1]] = [origin.u, origin.v];
+            for s in 0..area {
+                for c in 0..CHANNELS {
+                    let tau = functions.tau[p * area + s][c];
+                    band[(n * area + s) * CHANNELS + c] = tau;
+                    error.add(f64::from(tau), f64::from(coded.tau[p * area + s][c]));
+                }
+            }
+            for k in 0..rank {
+                for c in 0..CHANNELS {
+                    planes[(k * CHANNELS + c) * camera.area() + n] =
+                        tile.coefficients[p * rank + k][c];
+                }
+            }
+        }
+    }
+    let bytes = fs::metadata(&files.file).unwrap().len();
+    let problem = folder.join("format-problem");
+    fs::create_dir_all(&problem).unwrap();
+    let (width, height) = (camera.width as usize, camera.height as usize);
+    let kernels: Vec<f32> = given.basis.kernels.concat();
+    let floats = |values: &[f32]| bytemuck::cast_slice::<f32, u8>(values).to_vec();
+    let write = |name: &str, kind, shape: &[usize], bytes: &[u8]| {
+        npy(&problem.join(name), kind, shape, bytes);
+    };
+    write("band.npy", "<f4", &[camera.area(), area, CHANNELS], &floats(&band));
+    write("coefficients.npy", "<f4", &[rank, CHANNELS, height, width], &floats(&planes));
+    write("basis.npy", "<f4", &[rank, area], &floats(&kernels));
+    write("origins.npy", "<i4", &[camera.area(), 2], bytemuck::cast_slice(&origins));
+    let snr = error.snr().unwrap().0;
+    let about = json!({
+        "camera": [camera.width, camera.height],
+        "light": [geometry.light.width, geometry.light.height],
+        "window": geometry.window.side(),
+        "snr_db": snr,
+        "ours_bytes": bytes,
+    });
+    fs::write(problem.join("problem.json"), about.to_string()).unwrap();
+    let output = Command::new(python)
+        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/benches/format_peers.py"))
+        .arg(&problem)
+        .env("OMP_NUM_THREADS", "1")
+        .stderr(Stdio::inherit())
+        .output()
+        .unwrap();
+    assert!(output.status.success());
+    let peers: Value = serde_json::from_slice(&output.stdout).unwrap();
+    println!("\nAt {snr:.2} dB against the recovered band, of {bytes} bytes:");
+    for (name, peer) in peers.as_object().unwrap() {
+        println!("{name:20} {peer}");
+    }
+    let ratio = |name: &str| peers[name]["bytes"].as_f64().map(|b| b / bytes as f64);
+    let least = |names: &[&str]| {
+        let ratios = names.iter().filter_map(|name| ratio(name));
+        ratios.fold(f64::INFINITY, f64::min)
+    };
+    for name in KEEPERS.iter().chain(&PLANES).chain(&["zfp"]) {
+        if let Some(ratio) = ratio(name) {
+            figures.insert(format!("vs_{name}"), ratio);
+        }
+    }
+    let plain = half_floats(&band) as f64 / bytes as f64;
+    figures.insert("vs_plain_f16_zstd19".to_owned(), plain);
+    let zfp = ratio("zfp").unwrap_or(f64::INFINITY);
+    figures.insert("vs_best_plain_band_codec".to_owned(), zfp.min(plain));
+    figures.insert("vs_best_band_codec".to_owned(), least(&KEEPERS).min(zfp));
+    figures.insert("vs_best_image_planes".to_owned(), least(&PLANES));
+}
+
+/// The band as half floats in planes of bytes, compressed.
+fn half_floats(band: &[f32]) -> usize {
+    let halves = || band.iter().map(|v| half::f16::from_f32(*v).to_bits().to_le_bytes());
+    let planes: Vec<u8> = halves().map(|h| h[0]).chain(halves().map(|h| h[1])).collect();
+    zstd::bulk::compress(&planes, 19).unwrap().len()
+}
+
+/// Encoding and decoding on one thread, natively.
+fn rates(files: &Files, figures: &mut Figures) {
+    let given = decode(&files.archive);
+    let megabytes = |decoded: &Decoded| {
+        let values: usize = decoded.tiles.iter().map(|tile| tile.coefficients.len()).sum();
+        (values * CHANNELS * size_of::<f32>()) as f64 / 1e6
+    };
+    let source = Source {
+        geometry: given.head.header.geometry,
+        basis: Some(&given.basis),
+        tile: &|i| Ok(given.tiles[i].clone()),
+        metadata: Metadata::default(),
+        extensions: Vec::new(),
+    };
+    let start = Instant::now();
+    EncodedFile::new(source, Quality::Snr(Decibels(33.0)), &OneThread).unwrap();
+    let encoding = megabytes(&given) / start.elapsed().as_secs_f64();
+    figures.insert("encode_native_mb_s".to_owned(), encoding);
+    let fastest = (0..5).map(|_| {
+        let start = Instant::now();
+        let decoded = decode(&files.file);
+        megabytes(&decoded) / start.elapsed().as_secs_f64()
+    });
+    figures.insert("decode_native_mb_s".to_owned(), fastest.fold(0.0, f64::max));
+}
+
+/// Decoding in WebAssembly, where the player has been built.
+fn wasm_rate(file: &Path, figures: &mut Figures) {
+    let Ok(node) = std::env::var("BENCH_NODE") else {
+        return;
+    };
+    let inspected = ltm_export(&["inspect", file.to_str().unwrap(), "--json"]);
+    let output = Command::new(node)
+        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/benches/format_wasm.js"))
+        .arg(file)
+        .arg(inspected.to_string())
+        .stderr(Stdio::inherit())
+        .output()
+        .unwrap();
+    assert!(output.status.success());
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    figures.insert("decode_mb_s".to_owned(), report["mb_s"].as_f64().unwrap());
+}
