@@ -23,6 +23,27 @@ first_command() {
   done
 }
 
+# Prints the python of an environment with exactly these packages, made where there is none.
+python_with() { # name, packages…
+  local name=$1 python environment
+  shift
+  python=$(first_command python3 python)
+  environment=$CACHE/python-$name
+  if [ "$(cat "$environment/.installed" 2>/dev/null)" != "$*" ]; then
+    rm -rf "$environment"
+    if [ -z "$python" ] || ! "$python" -m venv "$environment" >&2; then
+      echo "Python cannot make an environment. On Debian: sudo apt-get install python3 python3-venv" >&2
+      return 1
+    fi
+    if ! "$environment/bin/python" -m pip install --quiet --disable-pip-version-check "$@" >&2; then
+      echo "These Python packages could not be installed: $*" >&2
+      return 1
+    fi
+    echo "$*" >"$environment/.installed"
+  fi
+  echo "$environment/bin/python"
+}
+
 clang_targets_wasm() {
   # The header is part of the question: some packages of clang come without their own.
   echo '#include <stddef.h>' |
