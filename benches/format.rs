@@ -108,7 +108,10 @@ fn loss(folder: &Path, name: &str, capture: &Path, figures: &mut Figures) -> Fil
         snr[i] = evaluated["snr_db"].as_f64().unwrap();
     }
     let bytes = fs::metadata(&files.file).unwrap().len();
-    println!("{name}: {bytes} bytes, SNR {:.2} dB of {:.2} dB", snr[1], snr[0]);
+    println!(
+        "{name}: {bytes} bytes, SNR {:.2} dB of {:.2} dB",
+        snr[1], snr[0]
+    );
     figures.insert(format!("{name}_scale_mb"), bytes as f64 / 1e6);
     figures.insert(format!("{name}_scale_snr_loss_db"), snr[0] - snr[1]);
     files
@@ -119,7 +122,10 @@ fn prefix(files: &Files, capture: &Path, figures: &mut Figures) {
     let evaluated = ltm_export(&["evaluate", file, capture, "--first", "10%", "--json"]);
     let relit = evaluated["relit"].as_object().unwrap();
     let least = relit.values().map(|psnr| psnr.as_f64().unwrap());
-    figures.insert("prefix10_min_psnr_db".to_owned(), least.fold(f64::INFINITY, f64::min));
+    figures.insert(
+        "prefix10_min_psnr_db".to_owned(),
+        least.fold(f64::INFINITY, f64::min),
+    );
 }
 
 /// A file's head, basis and tiles as they are in it.
@@ -217,10 +223,25 @@ fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
     let write = |name: &str, kind, shape: &[usize], bytes: &[u8]| {
         npy(&problem.join(name), kind, shape, bytes);
     };
-    write("band.npy", "<f4", &[camera.area(), area, CHANNELS], &floats(&band));
-    write("coefficients.npy", "<f4", &[rank, CHANNELS, height, width], &floats(&planes));
+    write(
+        "band.npy",
+        "<f4",
+        &[camera.area(), area, CHANNELS],
+        &floats(&band),
+    );
+    write(
+        "coefficients.npy",
+        "<f4",
+        &[rank, CHANNELS, height, width],
+        &floats(&planes),
+    );
     write("basis.npy", "<f4", &[rank, area], &floats(&kernels));
-    write("origins.npy", "<i4", &[camera.area(), 2], bytemuck::cast_slice(&origins));
+    write(
+        "origins.npy",
+        "<i4",
+        &[camera.area(), 2],
+        bytemuck::cast_slice(&origins),
+    );
     let snr = error.snr().unwrap().0;
     let about = json!({
         "camera": [camera.width, camera.height],
@@ -231,7 +252,10 @@ fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
     });
     fs::write(problem.join("problem.json"), about.to_string()).unwrap();
     let output = Command::new(python)
-        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/benches/format_peers.py"))
+        .arg(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/benches/format_peers.py"
+        ))
         .arg(&problem)
         .env("OMP_NUM_THREADS", "1")
         .stderr(Stdio::inherit())
@@ -263,8 +287,14 @@ fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
 
 /// The band as half floats in planes of bytes, compressed.
 fn half_floats(band: &[f32]) -> usize {
-    let halves = || band.iter().map(|v| half::f16::from_f32(*v).to_bits().to_le_bytes());
-    let planes: Vec<u8> = halves().map(|h| h[0]).chain(halves().map(|h| h[1])).collect();
+    let halves = || {
+        band.iter()
+            .map(|v| half::f16::from_f32(*v).to_bits().to_le_bytes())
+    };
+    let planes: Vec<u8> = halves()
+        .map(|h| h[0])
+        .chain(halves().map(|h| h[1]))
+        .collect();
     zstd::bulk::compress(&planes, 19).unwrap().len()
 }
 
@@ -272,7 +302,11 @@ fn half_floats(band: &[f32]) -> usize {
 fn rates(files: &Files, figures: &mut Figures) {
     let given = decode(&files.archive);
     let megabytes = |decoded: &Decoded| {
-        let values: usize = decoded.tiles.iter().map(|tile| tile.coefficients.len()).sum();
+        let values: usize = decoded
+            .tiles
+            .iter()
+            .map(|tile| tile.coefficients.len())
+            .sum();
         (values * CHANNELS * size_of::<f32>()) as f64 / 1e6
     };
     let source = Source {
@@ -301,7 +335,10 @@ fn wasm_rate(file: &Path, figures: &mut Figures) {
     };
     let inspected = ltm_export(&["inspect", file.to_str().unwrap(), "--json"]);
     let output = Command::new(node)
-        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/benches/format_wasm.js"))
+        .arg(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/benches/format_wasm.js"
+        ))
         .arg(file)
         .arg(inspected.to_string())
         .stderr(Stdio::inherit())
