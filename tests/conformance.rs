@@ -184,7 +184,7 @@ fn make(name: &str) -> Vec<u8> {
         "transform" => (Synthetic::factored(wide, 4, &[0, 2, 3, 4]), snr(40.0)),
         "coarse" => (
             Synthetic::factored(narrow, 5, &[0, 2, 3, 4]).dark_when_flat(4),
-            snr(13.0),
+            snr(14.0),
         ),
         "direct" => {
             let mut direct = Synthetic::factored(broad, 1, &[]).and_direct(&[1, 2, 3]);

@@ -43,13 +43,13 @@ function gzipped(level) {
  *
  * @param {Response} response
  * @param {Request} request
- * @param {string} etag
+ * @param {{ etag?: string, bytes?: Buffer }} [file]
  */
-function inParts(response, request, etag = '"a"') {
+function inParts(response, request, { etag = '"a"', bytes = glassBytes } = {}) {
   const read = (/** @type {number} */ start, /** @type {number} */ end) => [
-    glassBytes.subarray(start, end),
+    bytes.subarray(start, end),
   ];
-  const content = { size: glassBytes.length, type: 'application/vnd.ltm', etag, read };
+  const content = { size: bytes.length, type: 'application/vnd.ltm', etag, read };
   answer(request, response, content).catch(() => {});
 }
 
@@ -111,10 +111,16 @@ const FAULTS = {
     return response.write(half, () => response.destroy());
   },
   '/faults/replaced-once': (response, request, count) =>
-    inParts(response, request, count === 1 ? '"a"' : '"b"'),
-  '/faults/replaced': (response, request, count) => inParts(response, request, `"${count}"`),
+    inParts(response, request, { etag: count === 1 ? '"a"' : '"b"' }),
+  '/faults/replaced': (response, request, count) =>
+    inParts(response, request, { etag: `"${count}"` }),
+  // Parts of the compressed file, as servers send them that keep it compressed.
   '/faults/compressed-parts': (response, request) => {
     response.setHeader('Content-Encoding', 'gzip');
+    inParts(response, request, { bytes: gzipSync(glassBytes) });
+  },
+  '/faults/cached': (response, request) => {
+    response.setHeader('Cache-Control', 'max-age=3600');
     inParts(response, request);
   },
   '/faults/other-part': (response) => {

@@ -30,7 +30,6 @@ const ANSWERS = [
     /incomplete.* before byte \d+/,
   ],
   ['another file every time', '/faults/replaced', 'http-changed', /was replaced on the server/],
-  ['compressed parts', '/faults/compressed-parts', 'http-encoding', /compresses it \(gzip\)/],
   ['other parts', '/faults/other-part', 'http-range', /bytes 0 to 16383, the server sent others/],
   ['no parts', '/faults/refused', 'http-range', /says that it has no bytes 0 to 16383/],
   ['nothing at all', '/faults/no-answer', 'http-network', /cannot be reached/],

@@ -33,6 +33,7 @@ export const demoBytes = readFileSync(join(FOLDER, 'stained-glass.ltm'));
 export const DAMAGED = {
   'truncated.ltm': 'format-truncated',
   'empty.ltm': 'format-truncated',
+  'too-long.ltm': 'format-invalid',
   'flipped-header.ltm': 'format-checksum',
   'flipped-tile.ltm': 'format-checksum',
   'unknown-version.ltm': 'format-version',
@@ -53,6 +54,7 @@ function flip(bytes, at) {
 
 damaged('truncated.ltm', (bytes) => bytes.subarray(0, bytes.length / 2));
 damaged('empty.ltm', () => Buffer.alloc(0));
+damaged('too-long.ltm', (bytes) => Buffer.concat([bytes, Buffer.from('more')]));
 damaged('flipped-header.ltm', (bytes) => flip(bytes, 20));
 damaged('flipped-tile.ltm', (bytes) => flip(bytes, bytes.length - 10));
 damaged('unknown-version.ltm', (bytes) => {

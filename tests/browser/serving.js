@@ -39,6 +39,7 @@ describe('the server', () => {
       assert.equal(headers['content-length'], String(size));
       assert.equal(headers['accept-ranges'], 'bytes');
       assert.equal(headers['content-encoding'], undefined);
+      assert.equal(headers['cache-control'], 'no-cache, no-transform');
       assert.match(headers.etag ?? '', /^"[^"]+"$/, 'a strong one');
       assert.ok(body.equals(method === 'GET' ? glassBytes : Buffer.alloc(0)));
     }

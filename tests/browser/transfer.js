@@ -61,8 +61,8 @@ describe('a photograph', () => {
   test('whose transfer breaks off goes on where it ended', async (t) => {
     const { page, ranges } = await opened(t, '/faults/breaking');
     assert.deepEqual(ranges?.slice(0, 2), inTwo(glassBytes.length));
-    assert.equal(ranges?.length, 3);
-    assert.ok(Number.parseInt(ranges?.[2] ?? '', 10) > FIRST_BYTES);
+    // The browser may ask for what its cache lacks and what the page lacks by themselves.
+    assert.ok(ranges?.slice(2).every((range) => Number.parseInt(range ?? '', 10) > FIRST_BYTES));
     assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
   });
 
@@ -73,23 +73,23 @@ describe('a photograph', () => {
     assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
   });
 
-  test('is not fetched whole again while the browser has it', async (t) => {
-    const page = await openPage(t, '/bench');
-    const address = '/photos/glass.ltm?for=twice';
-    await mount(page, { src: address, backend: 'cpu' });
-    await loaded(page);
-    const again = await page.evaluate(async (address) => {
-      const other = document.createElement('relightable-photo');
-      Object.assign(other, { src: address, backend: 'cpu' });
-      const load = new Promise((resolve) => other.addEventListener('load', resolve));
-      document.body.append(other);
+  test('that a server compresses, part by part, comes whole', async (t) => {
+    const { page, ranges } = await opened(t, '/faults/compressed-parts');
+    assert.equal(ranges?.at(-1), undefined);
+    assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
+  });
+
+  test('is not fetched again while the browser has it', async (t) => {
+    const { page, ranges } = await opened(t, '/faults/cached');
+    assert.deepEqual(ranges, inTwo(glassBytes.length));
+    await page.evaluate(async () => {
+      const { photo } = /** @type {any} */ (globalThis);
+      const load = new Promise((resolve) =>
+        photo.addEventListener('load', resolve, { once: true }),
+      );
+      photo.setAttribute('src', photo.getAttribute('src'));
       await load;
-      const entries = performance.getEntriesByType('resource');
-      const bodies = /** @type {PerformanceResourceTiming[]} */ (entries)
-        .filter(({ name }) => name.endsWith(address))
-        .map(({ encodedBodySize, transferSize }) => ({ encodedBodySize, transferSize }));
-      return bodies;
-    }, address);
-    t.diagnostic(JSON.stringify(again));
+    });
+    assert.equal(ranges?.length, 2);
   });
 });

@@ -90,11 +90,19 @@ export function otherPart(url: string, range: ByteRange, sent: string): PhotoErr
   );
 }
 
-/** The same to pages as a file that turns out to be cut short while it is decoded. */
+/** To pages the same as what a decoder says of a file that is cut short. */
 export function tooShort(url: string, range: ByteRange, size: number): PhotoError {
   return new PhotoError(
     'format-truncated',
     `${nameOf(url)} is too short: bytes ${inWords(range)} are needed, but the server has only ${size}.`,
+  );
+}
+
+/** To pages the same as what a decoder says of a file with something after its end. */
+export function tooLong(url: string, end: number, size: number): PhotoError {
+  return new PhotoError(
+    'format-invalid',
+    `${nameOf(url)} goes on after its end at byte ${end}: the server has ${size}.`,
   );
 }
 

@@ -265,6 +265,16 @@ test('a file short on the server is told from one short in transfer', async (t) 
   });
 });
 
+test('a file that goes on after its end is format-invalid', async (t) => {
+  const file = Buffer.concat([fileOf(), Buffer.alloc(10)]);
+  const site = await serve(t, (request, response) => send(request, response, file));
+  await assert.rejects(opened(site.url), {
+    code: 'format-invalid',
+    message: /rose\.ltm goes on after its end at byte 800000: the server has 800010\./,
+  });
+  assert.equal(site.asked.length, 1);
+});
+
 test('an empty file is format-truncated', async (t) => {
   const parts = await serve(t, (request, response) => send(request, response, Buffer.alloc(0)));
   const whole = await serve(t, (_, response) => {

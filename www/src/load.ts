@@ -2,6 +2,7 @@
 
 import type { Decoder, Engine, Photo } from './engine.js';
 import { PhotoError, toPhotoError } from './errors.js';
+import { tooLong } from './http-errors.js';
 import { within } from './retry.js';
 import { type ByteRange, HttpSource, type Piece, type SourceOptions } from './source.js';
 
@@ -94,6 +95,8 @@ async function* piecesOf(
   yield* opening;
   let fed = -1;
   for (;;) {
+    const [end, size] = [decoder.fileBytes, source.size];
+    if (end !== undefined && size !== undefined && size > end) throw tooLong(source.url, end, size);
     const wanted = rangesOf(decoder.wants());
     if (wanted.length === 0) return;
     // It would be asked for again and again.

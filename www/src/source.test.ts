@@ -612,6 +612,54 @@ test('a server out of reach is http-network', async () => {
   assert.equal(pauses.length, 4);
 });
 
+/** A browser's `fetch` that lets no answer through where a part was asked for; counts what it is asked. */
+function withoutParts(asked: string[]): typeof fetch {
+  return (input, init) => {
+    asked.push(init?.headers ? 'part' : 'whole');
+    return init?.headers ? Promise.reject(new TypeError('Failed to fetch')) : fetch(input, init);
+  };
+}
+
+test('a browser that does not let parts through is given the whole file', async (t) => {
+  const file = fileOf(40_000);
+  const site = await serve(t, (_, response) => {
+    response.writeHead(200, { 'content-encoding': 'gzip' });
+    response.end(gzipSync(file));
+  });
+  const tries: string[] = [];
+  const { source, pauses } = sourceOf(site.url, { fetch: withoutParts(tries) });
+  (await new Copy(40_000).read(source, [range(0, 100)])).has(file, range(0, 40_000));
+  assert.deepEqual(tries, ['part', 'part', 'whole']);
+  assert.equal(pauses.length, 2);
+  assert.ok(source.stats.whole);
+  await drain(source, [range(30_000, 40_000)]);
+  assert.equal(tries.length, 3);
+});
+
+test('a whole file that breaks off is not asked for in parts that nobody lets through', async (t) => {
+  const file = fileOf(40_000);
+  const site = await serve(t, (_, response, count) => {
+    response.writeHead(200, { 'content-length': file.length });
+    send(response, file, count * 15_000);
+  });
+  const tries: string[] = [];
+  const { source } = sourceOf(site.url, { fetch: withoutParts(tries) });
+  (await new Copy(40_000).read(source, [range(0, 100)])).has(file, range(0, 40_000));
+  assert.deepEqual(tries, ['part', 'part', 'whole', 'whole', 'whole']);
+});
+
+test('a server that has answered once is asked for parts only', async (t) => {
+  const file = fileOf(5000);
+  const site = await serve(t, (request, response, count) => {
+    if (count > 1 && count < 5) response.socket?.destroy();
+    else answer(request, response, file);
+  });
+  const { source } = sourceOf(site.url);
+  await drain(source, [range(0, 100)]);
+  await drain(source, [range(200, 300)]);
+  assert.deepEqual(site.asked, ['0-99', ...Array(4).fill('200-299')]);
+});
+
 test('other statuses are http-status at once', async (t) => {
   for (const status of [404, 403, 204]) {
     const site = await serve(t, (_, response) => response.writeHead(status).end());

@@ -1,6 +1,7 @@
 /**
  * Reading parts of a file over HTTP as they arrive. Transfers that break off go on where they ended;
- * a server that knows no ranges is read from start to end instead.
+ * a server that knows no ranges, or that a browser does not ask for them, is read from start to end
+ * instead.
  */
 
 import { differ, type Head, readHead, sizeOfUnsatisfied, type Version } from './answer.js';
@@ -74,13 +75,15 @@ interface Transfer {
   /** Where the next piece begins. */
   at: number;
   end: number;
+  /** Whether a part is asked for, not the whole file. */
+  inParts: boolean;
   /** Ends what is under way; another one takes its place with every new try. */
   stop: AbortController;
 }
 
 /** A file behind an address. Meant for one `read` at a time. */
 export class HttpSource {
-  readonly #url: string;
+  readonly url: string;
   readonly #ports: SourcePorts;
   readonly #options: SourceOptions;
   readonly #wanted = new RangeSet();
@@ -94,7 +97,7 @@ export class HttpSource {
   #whole: { delivered: number; done: boolean; sizeTold: boolean } | undefined;
 
   constructor(url: string, ports: Partial<SourcePorts> = {}, options: Partial<SourceOptions> = {}) {
-    this.#url = url;
+    this.url = url;
     this.#ports = { ...DEFAULT_PORTS, ...ports };
     this.#options = { ...DEFAULT_OPTIONS, ...options };
   }
@@ -154,12 +157,13 @@ export class HttpSource {
     const lacking = ranges.find((range) => range.end > range.start && lacks(range, size));
     if (!lacking) return;
     // Where only the end of the transfer told the size, that end may have come too early.
-    if (this.#whole && !this.#whole.sizeTold) throw errors.short(this.#url, size, lacking.end);
-    throw errors.tooShort(this.#url, lacking, size);
+    if (this.#whole && !this.#whole.sizeTold) throw errors.short(this.url, size, lacking.end);
+    throw errors.tooShort(this.url, lacking, size);
   }
 
   #job({ start, end }: ByteRange): Job<Piece> {
-    const transfer: Transfer = { start, at: start, end, stop: new AbortController() };
+    const stop = new AbortController();
+    const transfer: Transfer = { start, at: start, end, inParts: !this.#whole, stop };
     return {
       run: (alone) => this.#pieces(transfer, alone),
       stop: (reason) => transfer.stop.abort(reason),
@@ -181,6 +185,10 @@ export class HttpSource {
         if (!(thrown instanceof Passing)) throw thrown;
         failures = transfer.at === before ? failures + 1 : 1;
         if (failures > this.#options.retries) throw thrown.after(failures);
+        // Browsers do not say why there is no answer. Some refuse what is compressed where a part was
+        // asked for, some have another origin's server asked whether it allows that.
+        const unheard = this.#version === undefined && thrown.code === 'http-network';
+        if (unheard) transfer.inParts = failures % 2 === 1;
         transfer.stop.abort();
         transfer.stop = new AbortController();
         const { signal } = transfer.stop;
@@ -197,12 +205,13 @@ export class HttpSource {
     try {
       // Another transfer's answer, with the whole file, may have come at the same moment.
       transfer.stop.signal.throwIfAborted();
-      if (response.status === 416 && !this.#whole) return this.#endBefore(transfer, response);
+      if (response.status === 416 && transfer.inParts) return this.#endBefore(transfer, response);
       const asked = { start: transfer.at, end: transfer.end };
-      const head = readHead(this.#url, response, this.#whole ? 'whole' : asked);
+      const head = readHead(this.url, response, transfer.inParts ? asked : 'whole');
       this.#recognise(head.version, head.size);
       if (head.whole && !this.#whole) {
         this.#whole = { delivered: 0, done: false, sizeTold: false };
+        transfer.inParts = false;
         transfer.at = 0;
         transfer.end = Number.POSITIVE_INFINITY;
         alone();
@@ -216,7 +225,7 @@ export class HttpSource {
 
   async #request(transfer: Transfer): Promise<Response> {
     const init: RequestInit = { signal: transfer.stop.signal };
-    if (!this.#whole) {
+    if (transfer.inParts) {
       const { at, end } = transfer;
       // The one header that other origins need not be asked to allow.
       init.headers = { Range: `bytes=${at}-${end - 1}` };
@@ -224,9 +233,9 @@ export class HttpSource {
     }
     this.#requests++;
     const { fetch } = this.#ports; // Browsers' own does not want to be called as a method.
-    const answer = (async () => fetch(this.#url, init))();
+    const answer = (async () => fetch(this.url, init))();
     return await this.#unlessSilent(answer, transfer, (cause) =>
-      errors.unreachable(this.#url, cause),
+      errors.unreachable(this.url, cause),
     );
   }
 
@@ -240,15 +249,15 @@ export class HttpSource {
     let offset = head.from;
     for (;;) {
       const { done, value } = await this.#unlessSilent(reader.read(), transfer, (cause) =>
-        errors.short(this.#url, offset, end, cause),
+        errors.short(this.url, offset, end, cause),
       );
       if (done) break;
       this.#received += value.byteLength;
       const skip = transfer.at - offset;
       offset += value.byteLength;
       if (offset > (end ?? offset)) {
-        if (head.whole) throw errors.changed(this.#url);
-        throw errors.otherPart(this.#url, transfer, 'more of them');
+        if (head.whole) throw errors.changed(this.url);
+        throw errors.otherPart(this.url, transfer, 'more of them');
       }
       if (skip >= value.byteLength) continue;
       const piece = { offset: transfer.at, bytes: value.subarray(skip) };
@@ -261,7 +270,7 @@ export class HttpSource {
   /** The body has ended at `offset`. */
   #finish(transfer: Transfer, head: Head, offset: number): void {
     const end = head.to ?? this.#size;
-    if (offset < Math.max(end ?? 0, transfer.at)) throw errors.short(this.#url, offset, end);
+    if (offset < Math.max(end ?? 0, transfer.at)) throw errors.short(this.url, offset, end);
     if (!this.#whole) return;
     this.#whole.sizeTold = this.#size !== undefined;
     this.#whole.done = true;
@@ -276,14 +285,14 @@ export class HttpSource {
     const end = told ?? (transfer.at > transfer.start ? transfer.at : undefined);
     if (end !== undefined) this.#recognise({}, end);
     if (end !== undefined && end <= transfer.at) return;
-    throw errors.refused(this.#url, { start: transfer.at, end: transfer.end });
+    throw errors.refused(this.url, { start: transfer.at, end: transfer.end });
   }
 
   /** Makes sure that an answer is of the same file as those before. */
   #recognise(version: Version, size: number | undefined): void {
     const known = this.#version ?? version;
     if (differ(known, version) || (this.#size ?? size) !== (size ?? this.#size)) {
-      throw errors.changed(this.#url);
+      throw errors.changed(this.url);
     }
     this.#version = {
       etag: known.etag ?? version.etag,
@@ -299,7 +308,7 @@ export class HttpSource {
     failure: (cause: unknown) => Passing,
   ): Promise<T> {
     const ms = this.#ports.stallMs;
-    const silence = () => errors.stalled(this.#url, ms);
+    const silence = () => errors.stalled(this.url, ms);
     return within(promise, signal, { ms, error: silence }).catch((cause: unknown) => {
       signal.throwIfAborted();
       throw cause instanceof Passing ? cause : failure(cause);

@@ -90,7 +90,8 @@ async function send(path, request, response, missing) {
   try {
     const stats = await file.stat({ bigint: true });
     if (!stats.isFile()) return missing();
-    response.setHeader('Cache-Control', 'no-cache');
+    // Compressed on their way, parts would be no parts of the file.
+    response.setHeader('Cache-Control', 'no-cache, no-transform');
     response.setHeader('Last-Modified', stats.mtime.toUTCString());
     await answer(request, response, {
       size: Number(stats.size),
