@@ -41,7 +41,8 @@ impl Limits {
         let entries = u64::from(header.scans) * (geometry.tile_grid().area() as u64 + 1);
         let kept = (size_of::<ChunkEntry>() + size_of::<u64>() + 1) as u64;
         let directory = 2 * header.directory_plain_bytes() + entries * kept;
-        let need = tiles + working + functions + directory;
+        // All that comes before the first scan is gathered before it is read.
+        let need = tiles + working + functions + directory + header.head_bytes();
         if need <= self.decoded_bytes {
             Ok(())
         } else {
