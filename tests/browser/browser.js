@@ -108,7 +108,8 @@ const FAULTS = {
       ETag: '"a"',
     });
     const half = glassBytes.subarray(start, (start + end) / 2);
-    return response.write(half, () => response.destroy());
+    // Not at once: what is on its way when a connection is reset may be lost.
+    return response.write(half, () => setTimeout(() => response.destroy(), 300));
   },
   '/faults/replaced-once': (response, request, count) =>
     inParts(response, request, { etag: count === 1 ? '"a"' : '"b"' }),
