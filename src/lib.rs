@@ -32,6 +32,7 @@ pub mod simulate;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod study;
 pub mod transport;
+mod vectorised;
 #[cfg(target_arch = "wasm32")]
 pub mod web;
 pub mod workers;

@@ -16,9 +16,7 @@ use relightable_photo::format::{
     self, CaptureNote, EncodedFile, Extension, FormatError, Head, Limits, Metadata, PartNumber,
     Quality, Reader, Source,
 };
-use relightable_photo::transport::{
-    BandTile, Basis, CHANNELS, Decibels, DirectTile, Geometry, TileRect,
-};
+use relightable_photo::transport::{BandTile, Basis, CHANNELS, Decibels, Geometry, Tile, TileRect};
 use relightable_photo::workers::OneThread;
 
 /// What each file is, as `docs/format.md` lists them.
@@ -313,10 +311,14 @@ fn tiles_are_made_of_these_values() {
         let (head, part) = parts(&file);
         let basis = format::decode_basis(&head, &part).unwrap();
         let (transport, _) = read(&file).finish().unwrap();
+        assert_eq!(transport.basis, basis, "{name}");
         for (i, tile) in transport.tiles.iter().enumerate() {
             let numbers = format::decode_tile(&head, i, &part).unwrap();
-            let functions = numbers.functions(&transport.geometry, &basis);
-            assert_eq!(tile, &DirectTile::quantise(&functions), "{name}, tile {i}");
+            assert_eq!(
+                tile,
+                &Tile::quantise(&numbers, basis.rank()),
+                "{name}, tile {i}"
+            );
         }
     }
 }

@@ -10,8 +10,8 @@ use relightable_photo::format::{
     Part, PartNumber, Quality, Reader, Source,
 };
 use relightable_photo::transport::{
-    BandTile, Basis, CHANNELS, Decibels, DirectTile, FactoredTile, Geometry, RecoveredTile,
-    Transport, TransportError, TransportFunctions,
+    BandTile, Basis, CHANNELS, Decibels, FactoredTile, Geometry, RecoveredTile, Tile, Transport,
+    TransportError, TransportFunctions,
 };
 use relightable_photo::workers::{OneThread, Workers};
 
@@ -143,11 +143,10 @@ impl Recovered {
 
     /// How far a transport is from this one.
     fn error(&self, decoded: &Transport) -> TransportError {
-        let area = self.geometry.window.area();
         let mut error = TransportError::default();
         for (i, tile) in decoded.tiles.iter().enumerate() {
-            for (at, want) in self.functions(i).tau.iter().enumerate() {
-                let got = tile.tau(area, at / area, at % area);
+            let got = tile.functions(&decoded.geometry, &decoded.basis).tau;
+            for (got, want) in got.iter().zip(self.functions(i).tau) {
                 for c in 0..CHANNELS {
                     error.add(f64::from(want[c]), f64::from(got[c]));
                 }
@@ -448,13 +447,13 @@ fn dark_tiles_cost_nothing() {
         alone.len()
     );
     let (transport, _) = decode(&file, 999).unwrap();
-    assert!(transport.tiles[2..].iter().all(DirectTile::is_dark));
+    assert!(transport.tiles[2..].iter().all(Tile::is_dark));
     for tile in &mut recovered.tiles {
         *tile = BandTile::dark(tile.rect);
     }
     for quality in [QUALITY, Quality::Bytes(1000), Quality::Lossless] {
         let (transport, _) = decode(&recovered.file(quality), 7).unwrap();
-        assert!(transport.tiles.iter().all(DirectTile::is_dark));
+        assert!(transport.tiles.iter().all(Tile::is_dark));
     }
 }
 
@@ -499,13 +498,14 @@ fn tiles_have_no_seams() {
         let (mut border, mut inside) = ([0.0, 0.0], [0.0, 0.0]);
         for (i, tile) in decoded.tiles.iter().enumerate() {
             let want = recovered.functions(i);
-            for (p, pixel) in tile.rect.pixels().enumerate() {
+            let got = tile.functions(&geometry, &decoded.basis);
+            for (p, pixel) in tile.rect().pixels().enumerate() {
                 let origin = geometry.window_origin(pixel);
                 let mut off = 0.0;
                 for s in 0..area {
                     let element = window.element(origin, s);
                     if element.index_in(geometry.light).is_some() && f64::from(element.u) < edge {
-                        off += f64::from(tile.tau(area, p, s)[1] - want.tau[p * area + s][1]);
+                        off += f64::from(got.tau[p * area + s][1] - want.tau[p * area + s][1]);
                     }
                 }
                 let at_border = |x: u32| x == side - 1 || x == side;
@@ -588,8 +588,7 @@ fn ten_thousand_mutations_do_no_harm() {
         let mut reader = Reader::new(limits);
         let result = reader.feed(0, &file).and_then(|()| reader.finish());
         if let Ok((transport, _)) = &result {
-            let steps = transport.tiles.iter().flat_map(|tile| tile.step);
-            assert!(steps.into_iter().all(f32::is_finite), "round {round}");
+            assert!(steps(transport).all(f32::is_finite), "round {round}");
         }
         fate[usize::from(result.is_ok())] += 1;
     }
@@ -765,6 +764,12 @@ fn what_is_checked_part_by_part_is_what_is_read() {
     }
 }
 
+/// What a code is worth, of both parts of all tiles.
+fn steps(transport: &Transport) -> impl Iterator<Item = f32> {
+    let tiles = transport.tiles.iter();
+    tiles.flat_map(|tile| [tile.coefficients.step, tile.functions.step].concat())
+}
+
 #[test]
 fn numbers_that_are_none_become_zero() {
     let mut recovered = mixed();
@@ -772,13 +777,7 @@ fn numbers_that_are_none_become_zero() {
     recovered.tiles[2].functions[7] = [f32::NEG_INFINITY, 0.1, f32::NAN];
     for quality in [QUALITY, Quality::Lossless] {
         let (transport, _) = decode(&recovered.file(quality), 1000).unwrap();
-        assert!(
-            transport
-                .tiles
-                .iter()
-                .flat_map(|tile| tile.step)
-                .all(f32::is_finite)
-        );
+        assert!(steps(&transport).all(f32::is_finite));
     }
 }
 

@@ -3,10 +3,14 @@
 
 mod common;
 
-use common::{relit, tiled};
+use std::sync::Arc;
+
+use common::relit::{self, Kind};
+use common::tiled;
 use proptest::prelude::*;
-use relightable_photo::relight::{cpu, reference};
-use relightable_photo::transport::{Geometry, MAX_WINDOW};
+use relightable_photo::relight::{Light, TorchPose, cpu, reference};
+use relightable_photo::transport::{Geometry, LightPx, MAX_WINDOW};
+use relightable_photo::workers::OneThread;
 
 /// Grids, windows and tiles of all shapes, with correspondences that turn, mirror and shift the
 /// picture until windows hang over the display's edges, or miss it.
@@ -28,9 +32,13 @@ proptest! {
         seed: u64,
         exposure in 0.0..8.0f32,
     ) {
-        let transport = relit::asymmetric_transport(geometry, seed);
+        let kind = [Kind::Direct, Kind::Factored, Kind::Mixed][seed as usize % 3];
+        let transport = Arc::new(relit::asymmetric_transport(geometry, kind, seed));
+        // One for all lights: what is left of the last must not show.
+        let mut relighter = cpu::Relighter::new(transport.clone());
         for (name, light) in relit::lights(geometry.light) {
-            let got = cpu::relight(&transport, &light).tone_map(exposure);
+            relighter.relight(&light, &OneThread);
+            let got = relighter.picture(exposure);
             let want = reference::relight_srgb8(&transport, &light, f64::from(exposure));
             relit::assert_within_one_code(&got, &want, name);
         }
@@ -42,13 +50,48 @@ fn a_window_off_the_display_sees_nothing() {
     for shift in [1e300, -1e300, 5e9, -2_147_483_648.0, 2_147_483_647.0] {
         let affine = [[0.5, 0.0, shift], [0.0, 0.5, 0.0]];
         let geometry = tiled([9, 8], [8, 8], 17, 8, affine);
-        let transport = relit::asymmetric_transport(geometry, 1);
+        let transport = Arc::new(relit::asymmetric_transport(geometry, Kind::Mixed, 1));
+        let mut relighter = cpu::Relighter::new(transport);
         for (name, light) in relit::lights(geometry.light) {
-            let picture = cpu::relight(&transport, &light).tone_map(1.0);
+            relighter.relight(&light, &OneThread);
+            let picture = relighter.picture(1.0);
             assert!(
                 picture.pixels.iter().all(|p| *p == [0, 0, 0, 255]),
                 "{name}, {shift}"
             );
         }
+    }
+}
+
+#[test]
+fn a_light_that_moves_leaves_nothing_behind() {
+    let geometry = tiled(
+        [90, 70],
+        [140, 110],
+        15,
+        32,
+        [[1.5, 0.02, 1.0], [0.0, 1.5, -2.0]],
+    );
+    let transport = Arc::new(relit::asymmetric_transport(geometry, Kind::Mixed, 3));
+    let mut moved = cpu::Relighter::new(transport.clone());
+    for step in 0..6 {
+        let centre = LightPx {
+            u: 20.0 * f64::from(step),
+            v: 100.0 - 15.0 * f64::from(step),
+        };
+        let pose = TorchPose {
+            centre,
+            radius: 2.0,
+        };
+        let mut elements = Vec::new();
+        for [r, g, b, _] in Light::torch(geometry.light, pose).elements() {
+            // Dark where it hardly shines, so that most of the light stays as it is.
+            elements.extend([r, g, b].map(|c| if *c < 1e-3 { 0.0 } else { *c }));
+        }
+        let light = Light::from_linear_rgb(geometry.light, &elements).unwrap();
+        moved.relight(&light, &OneThread);
+        let mut anew = cpu::Relighter::new(transport.clone());
+        anew.relight(&light, &OneThread);
+        assert_eq!(moved.linear(), anew.linear(), "step {step}");
     }
 }

@@ -56,6 +56,7 @@ fn checked_in_glsl_is_translated_from_the_wgsl() {
     let wgsl = std::fs::read_to_string(shaders.join("relight.wgsl")).unwrap();
     for (name, entry_point, stage) in [
         ("relight.vert.glsl", "cover", ShaderStage::Vertex),
+        ("see.frag.glsl", "see", ShaderStage::Fragment),
         ("relight.frag.glsl", "relight", ShaderStage::Fragment),
     ] {
         let expected = translate(&wgsl, entry_point, stage);

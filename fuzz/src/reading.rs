@@ -3,7 +3,7 @@
 use relightable_photo::format::{
     self, FIRST_BYTES, FormatError, HEADER_BYTES, Head, Interest, Limits, Metadata, Reader,
 };
-use relightable_photo::transport::{CHANNELS, Decibels, DirectTile, Transport};
+use relightable_photo::transport::{CHANNELS, CoefficientTile, Decibels, Tile, Transport};
 
 use crate::choices::Choices;
 use crate::heap::most_held;
@@ -107,11 +107,17 @@ pub fn check_transport(transport: &Transport) {
     let geometry = transport.geometry;
     let tiles: Vec<_> = geometry.tiles().collect();
     assert_eq!(transport.tiles.len(), tiles.len());
+    let (rank, area) = (transport.basis.rank(), geometry.window.area());
+    assert!(transport.basis.kernels.iter().all(|kernel| kernel.len() == area));
     for (tile, rect) in transport.tiles.iter().zip(tiles) {
-        assert_eq!(tile.rect, rect);
-        assert!(tile.step.iter().all(|step| step.is_normal() && *step > 0.0));
-        let codes = rect.extent.area() * geometry.window.area();
-        assert!(tile.is_dark() || tile.codes.len() == codes);
+        let (coefficients, functions) = (&tile.coefficients, &tile.functions);
+        assert_eq!((coefficients.rect, functions.rect), (rect, rect));
+        let steps = coefficients.step.iter().chain(&functions.step);
+        assert!(steps.into_iter().all(|step| step.is_normal() && *step > 0.0));
+        let texels = CoefficientTile::texels(rect, rank);
+        assert!(coefficients.is_dark() || coefficients.codes.len() == texels);
+        let codes = rect.extent.area() * area;
+        assert!(functions.is_dark() || functions.codes.len() == codes);
     }
 }
 
@@ -156,19 +162,15 @@ pub fn check_file(file: &[u8]) -> Read {
 }
 
 /// The tiles of a file, each read by itself.
-fn tiles_by_themselves(head: &Head, file: &[u8]) -> Result<Vec<DirectTile>, FormatError> {
+fn tiles_by_themselves(head: &Head, file: &[u8]) -> Result<Vec<Tile>, FormatError> {
     let fetch = |part| {
         let range = head.range(part);
         Ok(file[range.start as usize..range.end as usize].to_vec())
     };
-    let geometry = head.header.geometry;
-    let basis = format::decode_basis::<FormatError>(head, fetch)?;
+    let rank = format::decode_basis::<FormatError>(head, fetch)?.rank();
     let tile = |i| {
         let tile = format::decode_tile::<FormatError>(head, i, fetch)?;
-        Ok(match tile.is_dark() {
-            true => DirectTile::dark(tile.rect),
-            false => DirectTile::quantise(&tile.functions(&geometry, &basis)),
-        })
+        Ok(Tile::quantise(&tile, rank))
     };
     (0..head.tiles()).map(tile).collect()
 }
@@ -224,20 +226,23 @@ pub fn check_error(
     claimed: Option<Decibels>,
     wanted: Wanted,
 ) {
-    let area = given.geometry.window.area();
     let (mut energy, mut error, mut codes) = (0.0, 0.0, 0.0);
     for (i, tile) in transport.tiles.iter().enumerate() {
-        let want = given.functions(i);
-        for (at, want) in want.tau.iter().enumerate() {
-            let got = tile.tau(area, at / area, at % area);
+        let got = tile.functions(&transport.geometry, &transport.basis).tau;
+        for (got, want) in got.iter().zip(given.functions(i).tau) {
             for c in 0..CHANNELS {
                 let (got, want) = (f64::from(got[c]), f64::from(want[c]));
                 energy += want * want;
                 error += (got - want) * (got - want);
             }
         }
-        let step = tile.step.map(|step| f64::from(step).powi(2) / 4.0);
-        codes += step.iter().sum::<f64>() * tile.codes.len() as f64;
+        // Off by half a code at most: each element, and each coefficient of functions of unit norm.
+        let worth = |step: [f32; CHANNELS]| -> f64 {
+            step.iter().map(|step| f64::from(*step).powi(2) / 4.0).sum()
+        };
+        codes += worth(tile.functions.step) * tile.functions.codes.len() as f64;
+        let coefficients = tile.rect().extent.area() * transport.basis.rank().pow(2);
+        codes += worth(tile.coefficients.step) * coefficients as f64;
     }
     let Some(claimed) = claimed else {
         assert!(energy == 0.0 || error <= energy, "all of it is lost: {given:?}, {wanted:?}");

@@ -2,15 +2,17 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::{Result, ensure};
 use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{files, lights, report};
+use super::process::AllCores;
+use super::{files, report};
 use crate::capture::{CaptureFolder, DarkFrame, Pattern, Photo, Picture, Rows, Truth};
-use crate::relight::{BuiltinLight, Light};
+use crate::relight::{BuiltinLight, Light, cpu};
 use crate::transport::{CHANNELS, Decibels, Geometry, Transport, TransportError};
 
 /// Hold a file against a capture's known transport, relit pictures and unused photographs
@@ -71,11 +73,12 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
         flood_snr_db: None,
         file_bytes: header.file_bytes,
     };
+    let mut relighter = cpu::Relighter::new(Arc::new(file.transport));
     if let Some(truth) = folder.truth()? {
-        report.snr_db = against_truth(&file.transport, &truth).snr();
+        report.snr_db = against_truth(relighter.transport(), &truth).snr();
         for name in truth.lights()? {
             let light = Light::from_linear_rgb(geometry.light, &truth.light(&name)?)?;
-            let psnr = relit_psnr(&file.transport, &light, &truth.relit(&name)?);
+            let psnr = relit_psnr(&mut relighter, &light, &truth.relit(&name)?);
             report.relit.insert(name, psnr);
         }
     }
@@ -83,8 +86,8 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
         .filter(|i| !file.head.metadata.shots_used.contains(i))
         .collect();
     let dark = folder.read_dark()?;
-    let errors = against_shots(&file.transport, &folder, &dark, &held)?;
-    report.flood_snr_db = against_flood(&file.transport, &folder, &dark)?;
+    let errors = against_shots(&mut relighter, &folder, &dark, &held)?;
+    report.flood_snr_db = against_flood(&mut relighter, &folder, &dark)?;
     report.heldout_snr_db = together(&errors).snr();
     report.heldout_rgb_snr_db = errors.map(|e| e.snr());
     report.heldout_shots = held.len();
@@ -124,13 +127,15 @@ fn against_truth(transport: &Transport, truth: &Truth) -> TransportError {
     let window = geometry.window;
     let tiles = transport.tiles.par_iter().map(|tile| {
         let mut sum = TransportError::default();
-        for (p, pixel) in tile.rect.pixels().enumerate() {
+        let functions = tile.functions(geometry, &transport.basis).tau;
+        let functions = functions.chunks_exact(window.area());
+        for (pixel, function) in tile.rect().pixels().zip(functions) {
             let n = geometry.camera.index(pixel);
             let (ours, theirs) = (geometry.window_origin(pixel), truth.window_origin(n));
             let tau = truth.tau(n);
             for (s, tau) in tau.iter().enumerate() {
                 let here = window.slot(ours, truth.window().element(theirs, s));
-                let estimate = here.map_or([0.0; CHANNELS], |s| tile.tau(window.area(), p, s));
+                let estimate = here.map_or([0.0; CHANNELS], |s| function[s]);
                 for c in 0..CHANNELS {
                     sum.add(tau[c].to_f64(), f64::from(estimate[c]));
                 }
@@ -138,7 +143,7 @@ fn against_truth(transport: &Transport, truth: &Truth) -> TransportError {
             for s in 0..window.area() {
                 let element = window.element(ours, s);
                 if truth.window().slot(theirs, element).is_none() {
-                    for estimate in tile.tau(window.area(), p, s) {
+                    for estimate in function[s] {
                         sum.add(0.0, f64::from(estimate));
                     }
                 }
@@ -153,8 +158,13 @@ fn against_truth(transport: &Transport, truth: &Truth) -> TransportError {
 }
 
 /// 10 log10(1 / mean squared error) over all pixels and channels.
-fn relit_psnr(transport: &Transport, light: &Light, truth: &[[f64; CHANNELS]]) -> Option<Decibels> {
-    let ours = lights::relight(transport, light);
+fn relit_psnr(
+    relighter: &mut cpu::Relighter,
+    light: &Light,
+    truth: &[[f64; CHANNELS]],
+) -> Option<Decibels> {
+    relighter.relight(light, &AllCores);
+    let ours = relighter.linear();
     let squares = ours.pixels.iter().zip(truth).flat_map(|(ours, truth)| {
         (0..CHANNELS).map(move |c| (f64::from(ours[c]) - truth[c]).powi(2))
     });
@@ -164,31 +174,31 @@ fn relit_psnr(transport: &Transport, light: &Light, truth: &[[f64; CHANNELS]]) -
 
 /// Error of predicted against photographed pictures, by channel.
 fn against_shots(
-    transport: &Transport,
+    relighter: &mut cpu::Relighter,
     folder: &CaptureFolder,
     dark: &DarkFrame,
     shots: &[usize],
 ) -> Result<[TransportError; CHANNELS]> {
     let mut errors = [TransportError::default(); CHANNELS];
     for &i in shots {
-        let light = pattern_light(&transport.geometry, &folder.read_pattern(i)?)?;
-        add_photo(&mut errors, transport, &light, folder.shot(i, dark)?)?;
+        let light = pattern_light(&relighter.transport().geometry, &folder.read_pattern(i)?)?;
+        add_photo(&mut errors, relighter, &light, folder.shot(i, dark)?)?;
     }
     Ok(errors)
 }
 
 /// SNR of the predicted against the flood photograph, if there is one.
 fn against_flood(
-    transport: &Transport,
+    relighter: &mut cpu::Relighter,
     folder: &CaptureFolder,
     dark: &DarkFrame,
 ) -> Result<Option<Decibels>> {
     let Some(photo) = folder.flood(dark)? else {
         return Ok(None);
     };
-    let light = BuiltinLight::Flood.render(transport.geometry.light);
+    let light = BuiltinLight::Flood.render(relighter.transport().geometry.light);
     let mut errors = [TransportError::default(); CHANNELS];
-    add_photo(&mut errors, transport, &light, photo)?;
+    add_photo(&mut errors, relighter, &light, photo)?;
     Ok(together(&errors).snr())
 }
 
@@ -202,13 +212,14 @@ fn together(errors: &[TransportError; CHANNELS]) -> TransportError {
 /// Adds what is predicted under `light` against what was photographed, saturated samples left out.
 fn add_photo(
     errors: &mut [TransportError; CHANNELS],
-    transport: &Transport,
+    relighter: &mut cpu::Relighter,
     light: &Light,
     mut photo: Photo,
 ) -> Result<()> {
-    let ours = lights::relight(transport, light);
+    relighter.relight(light, &AllCores);
+    let ours = relighter.linear();
     let mut picture = Picture::new();
-    photo.read(&Rows::all(transport.geometry.camera.height), &mut picture)?;
+    photo.read(&Rows::all(ours.extent.height), &mut picture)?;
     photo.finish()?;
     for (ours, seen) in ours.pixels.iter().zip(&picture) {
         for c in 0..CHANNELS {

@@ -1,13 +1,12 @@
-//! Lights from names and image files, and relighting on all cores.
+//! Lights from names and image files.
 
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use image::ImageReader;
-use rayon::prelude::*;
 
-use crate::relight::{BuiltinLight, Light, LinearPicture, area_resample, cpu, tone};
-use crate::transport::{Extent, Transport};
+use crate::relight::{BuiltinLight, Light, area_resample, tone};
+use crate::transport::Extent;
 
 /// The light that `--light` asks for: a built-in one by name, else an image file, taken as sRGB.
 pub fn named(light: &str, plane: Extent) -> Result<Light> {
@@ -38,24 +37,4 @@ pub fn named(light: &str, plane: Extent) -> Result<Light> {
         plane,
         &area_resample(&linear, extent, plane),
     )?)
-}
-
-/// [`cpu::relight`] on all cores.
-pub fn relight(transport: &Transport, light: &Light) -> LinearPicture {
-    let geometry = &transport.geometry;
-    let padded = cpu::PaddedLight::new(geometry, light);
-    let tiles: Vec<_> = transport
-        .tiles
-        .par_iter()
-        .map(|tile| {
-            let mut pixels = vec![[0.0; 4]; tile.rect.extent.area()];
-            cpu::relight_tile(geometry, tile, &padded, &mut pixels);
-            (tile.rect, pixels)
-        })
-        .collect();
-    let mut picture = LinearPicture::black(geometry.camera);
-    for (rect, pixels) in tiles {
-        picture.put(rect, &pixels);
-    }
-    picture
 }

@@ -1,13 +1,15 @@
 //! `ltm-export relight`: a picture of the object under a light.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
+use super::process::AllCores;
 use super::{Usage, files, lights};
-use crate::relight::{Light, TorchPose, reference};
+use crate::relight::{Light, TorchPose, cpu, reference};
 
 /// Relight an object and write the picture as an 8-bit sRGB PNG
 #[derive(Debug, Args)]
@@ -68,7 +70,11 @@ pub fn run(args: &RelightArgs) -> Result<()> {
         Some([x, y]) => Light::torch(geometry.light, TorchPose::behind(geometry, x, y)),
     };
     let picture = match args.backend {
-        Backend::Cpu => lights::relight(&file.transport, &light).tone_map(args.exposure),
+        Backend::Cpu => {
+            let mut relighter = cpu::Relighter::new(Arc::new(file.transport));
+            relighter.relight(&light, &AllCores);
+            relighter.picture(args.exposure)
+        }
         Backend::Reference => {
             reference::relight_srgb8(&file.transport, &light, f64::from(args.exposure))
         }

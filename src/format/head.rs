@@ -34,7 +34,7 @@ impl Head {
         bytes: &[u8],
         limits: &Limits,
     ) -> Result<Self, FormatError> {
-        limits.check(&header)?;
+        limits.check_header(&header)?;
         let mut rest = &bytes[HEADER_BYTES..];
         let mut take = |length: u32, crc: u32, part: Part| {
             let (taken, after) = rest.split_at(length as usize);
@@ -67,10 +67,12 @@ impl Head {
             extensions,
             metadata: serde_json::from_slice(metadata).map_err(FormatError::Metadata)?,
         };
-        match (head.end(), header.file_bytes) {
-            (end, file_bytes) if end == file_bytes => Ok(head),
-            (end, file_bytes) => Err(FormatError::Length { end, file_bytes }),
+        let (end, file_bytes) = (head.end(), header.file_bytes);
+        if end != file_bytes {
+            return Err(FormatError::Length { end, file_bytes });
         }
+        limits.check(&head)?;
+        Ok(head)
     }
 
     /// Puts the head of a file together. Lengths and checksums in `header` are made right.

@@ -9,7 +9,7 @@ use super::head::{Head, PartNumber, tiles_in};
 use super::header::{self, FIRST_BYTES, HEADER_BYTES, Header};
 use super::tile::TileNumbers;
 use super::{FormatError, Limits, Metadata};
-use crate::transport::{Basis, Decibels, DirectTile, Transport};
+use crate::transport::{Basis, CoefficientTile, Decibels, DirectTile, Tile, Transport};
 
 /// An incremental reader. [`wants`](Self::wants) says which bytes are of use,
 /// [`feed`](Self::feed) takes any, in pieces of any size; each tile is checked and decoded as far as
@@ -68,7 +68,7 @@ struct Opened {
     basis: Basis,
     /// Slots of the window in the order of direct scans.
     order: Vec<u16>,
-    tiles: Vec<Tile>,
+    tiles: Vec<Coming>,
     /// Parts that have come, `[scan, basis and tiles]`.
     parts: Vec<bool>,
     /// How many of each scan have not.
@@ -81,9 +81,9 @@ struct Opened {
 
 /// A tile on its way.
 #[derive(Debug)]
-enum Tile {
+enum Coming {
     Numbers(TileNumbers),
-    Whole(DirectTile),
+    Whole(Tile),
 }
 
 impl Reader {
@@ -119,7 +119,7 @@ impl Reader {
             file_bytes: self.header.map(|header| header.file_bytes),
             scans: opened.map_or(0, Opened::scans),
             tiles: opened.map_or(0, |opened| {
-                let whole = |tile: &&Tile| matches!(tile, Tile::Whole(_));
+                let whole = |tile: &&Coming| matches!(tile, Coming::Whole(_));
                 opened.tiles.iter().filter(whole).count()
             }),
         }
@@ -177,7 +177,7 @@ impl Reader {
             header::check_magic(&self.gathered)?;
             if let Some(bytes) = self.gathered.first_chunk::<HEADER_BYTES>() {
                 let header = Header::decode(bytes)?;
-                self.limits.check(&header)?;
+                self.limits.check_header(&header)?;
                 self.header = Some(header);
                 return self.advance();
             }
@@ -232,7 +232,7 @@ impl Opened {
             basis: Basis { kernels },
             order: direct::order(head.header.geometry.window),
             tiles: (0..tiles)
-                .map(|_| Tile::Numbers(TileNumbers::default()))
+                .map(|_| Coming::Numbers(TileNumbers::default()))
                 .collect(),
             parts: vec![true; scans * (tiles + 1)],
             missing: vec![0; scans],
@@ -367,14 +367,10 @@ impl Opened {
             let decoded = basis::decode(bytes, functions.len(), area);
             let decoded = decoded.map_err(|e| e.of(part.into()))?;
             self.basis.kernels[functions].clone_from_slice(&decoded);
-            // Tiles may have waited for it.
-            for tile in 0..self.tiles.len() {
-                self.complete(tile)?;
-            }
             return Ok(());
         };
         match &self.tiles[tile] {
-            Tile::Numbers(numbers) if numbers.scans == part.scan => {
+            Coming::Numbers(numbers) if numbers.scans == part.scan => {
                 self.add(tile, bytes)?;
                 self.pass_over(tile)
             }
@@ -387,7 +383,7 @@ impl Opened {
 
     /// Takes a tile past the scans that have nothing for it, or that wait already.
     fn pass_over(&mut self, tile: usize) -> Result<(), FormatError> {
-        while let Tile::Numbers(numbers) = &mut self.tiles[tile]
+        while let Coming::Numbers(numbers) = &mut self.tiles[tile]
             && numbers.scans < self.head.scans.len()
         {
             let part = PartNumber {
@@ -408,19 +404,17 @@ impl Opened {
     /// Decodes a chunk, the next of its tile.
     fn add(&mut self, tile: usize, bytes: &[u8]) -> Result<(), FormatError> {
         match &mut self.tiles[tile] {
-            Tile::Numbers(numbers) => numbers.add(&self.head, &self.order, tile, bytes),
-            Tile::Whole(_) => Ok(()),
+            Coming::Numbers(numbers) => numbers.add(&self.head, &self.order, tile, bytes),
+            Coming::Whole(_) => Ok(()),
         }
     }
 
-    /// Turns a tile whose chunks have all come into codes, if the basis has come too.
+    /// Turns a tile whose chunks have all come into codes.
     fn complete(&mut self, tile: usize) -> Result<(), FormatError> {
-        let scans = self.head.scans.len();
-        let basis = (0..scans).all(|scan| self.has(PartNumber { scan, tile: None }));
         match &mut self.tiles[tile] {
-            Tile::Numbers(numbers) if numbers.scans == scans && basis => {
+            Coming::Numbers(numbers) if numbers.scans == self.head.scans.len() => {
                 let numbers = std::mem::take(numbers);
-                self.tiles[tile] = Tile::Whole(self.codes(tile, numbers)?);
+                self.tiles[tile] = Coming::Whole(self.codes(tile, numbers)?);
                 Ok(())
             }
             _ => Ok(()),
@@ -428,36 +422,39 @@ impl Opened {
     }
 
     /// The codes of what has come of a tile.
-    fn codes(&self, tile: usize, numbers: TileNumbers) -> Result<DirectTile, FormatError> {
-        let geometry = &self.head.header.geometry;
-        let band = numbers.band_tile(&self.head, tile)?;
-        if band.is_dark() {
-            return Ok(DirectTile::dark(band.rect));
-        }
+    fn codes(&self, tile: usize, numbers: TileNumbers) -> Result<Tile, FormatError> {
         let part = Part::Chunk {
             scan: self.head.scans.len().saturating_sub(1),
             tile,
         };
-        let values = band.rect.extent.area() * geometry.window.area();
-        let own = !band.functions.is_empty();
-        let room = zeros(if own { 0 } else { values }).map_err(|e| e.of(part))?;
-        let mut codes = zeros(values).map_err(|e| e.of(part))?;
-        codes.clear();
-        let functions = band.into_functions(geometry, &self.basis, room);
-        Ok(DirectTile::quantise_into(&functions, codes))
+        let band = numbers.band_tile(&self.head, tile)?;
+        let (rect, rank) = (band.rect, self.basis.rank());
+        let mut codes = Tile::dark(rect);
+        if !band.coefficients.is_empty() {
+            let room = zeros(CoefficientTile::texels(rect, rank)).map_err(|e| e.of(part))?;
+            codes.coefficients =
+                CoefficientTile::quantise_into(rect, &band.coefficients, rank, room);
+        }
+        if !band.functions.is_empty() {
+            let mut room = zeros(band.functions.len()).map_err(|e| e.of(part))?;
+            room.clear();
+            codes.functions = DirectTile::quantise_into(rect, &band.functions, room);
+        }
+        Ok(codes)
     }
 
     fn finish(mut self) -> Result<(Transport, Metadata), FormatError> {
         let mut tiles = Vec::with_capacity(self.tiles.len());
         for i in 0..self.tiles.len() {
-            let none = Tile::Numbers(TileNumbers::default());
+            let none = Coming::Numbers(TileNumbers::default());
             tiles.push(match std::mem::replace(&mut self.tiles[i], none) {
-                Tile::Whole(tile) => tile,
-                Tile::Numbers(numbers) => self.codes(i, numbers)?,
+                Coming::Whole(tile) => tile,
+                Coming::Numbers(numbers) => self.codes(i, numbers)?,
             });
         }
         let transport = Transport {
             geometry: self.head.header.geometry,
+            basis: self.basis,
             tiles,
         };
         Ok((transport, self.head.metadata))

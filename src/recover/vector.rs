@@ -1,26 +1,9 @@
-//! Small vector arithmetic, and the widest instructions that the machine has for it.
+//! Small vector arithmetic.
 //!
 //! Nothing here fuses a multiplication with an addition or depends on the width of a register, so
 //! every machine, WebAssembly too, gets the same bits.
 
-/// Runs `work` compiled for the widest vector instructions at hand. What it calls must be
-/// `#[inline(always)]` to be compiled along with it.
-#[inline(always)]
-pub(super) fn vectorised<R>(work: impl FnOnce() -> R) -> R {
-    #[cfg(target_arch = "x86_64")]
-    {
-        /// `work` itself, for machines with AVX2.
-        #[target_feature(enable = "avx2")]
-        fn avx2<R>(work: impl FnOnce() -> R) -> R {
-            work()
-        }
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the machine has AVX2, as was just asked.
-            return unsafe { avx2(work) };
-        }
-    }
-    work()
-}
+pub(super) use crate::vectorised::vectorised;
 
 /// Partial sums that a dot product is gathered in; the compiler makes vectors of them.
 pub(super) const LANES: usize = 8;

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::Tint;
 use crate::transport::{Extent, Geometry, LightPx};
 
 /// Linear emission of every light element, 0 dark to 1 full brightness: R, G, B and an unused
@@ -189,6 +190,11 @@ impl Light {
     pub fn fire(extent: Extent, seconds: f64) -> Self {
         let (w, h) = (f64::from(extent.width), f64::from(extent.height));
         Self::from_fn(extent, |p| flame(p.u / w, 1.0 - p.v / h, seconds))
+    }
+
+    /// What its channels have in common.
+    pub fn tint(&self) -> Tint {
+        Tint::of(std::iter::once(&self.elements[..]))
     }
 
     /// Light plane.

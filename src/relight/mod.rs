@@ -13,6 +13,7 @@ mod picture;
 pub mod reference;
 mod resample;
 pub mod texture_layout;
+mod tint;
 pub mod tone;
 #[cfg(target_arch = "wasm32")]
 pub mod webgl2;
@@ -22,6 +23,7 @@ pub mod webgpu;
 pub use light::{BuiltinLight, Light, LightError, TorchPose};
 pub use picture::{LinearPicture, Rgba8Picture};
 pub use resample::area_resample;
+pub use tint::Tint;
 
 /// The WGSL source of both GPU back ends.
 pub const SHADER: &str = include_str!("shaders/relight.wgsl");

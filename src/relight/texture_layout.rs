@@ -2,17 +2,24 @@
 //!
 //! | texture | format | texel |
 //! |---|---|---|
+//! | coefficients | `rgba16sint`, 2D array, camera grid | four components of one channel |
+//! | seen | `rgba32float`, 2D array, window origins | the light through four components of the basis |
 //! | codes | `rgba16sint`, 2D array | τ of one pixel and element, window after window, folded |
-//! | pixels | `rgba32sint`, camera grid | window origin u, v; index of the first code; tile |
-//! | steps | `rgba32float`, tile grid | value of one code in R, G, B |
+//! | pixels | `rgba32sint`, camera grid | window origin u, v; index of the first code, or -1; tile |
+//! | steps | `rgba32float`, tile grid twice | value of one code in R, G, B: coefficients', then τ's |
 //! | light | `rgba32float`, light grid | linear emission in R, G, B |
 //!
-//! All that takes double precision or knowledge of tiles is computed here, once, so that no two
-//! back ends can disagree about it.
+//! Layers of coefficients and of what is seen are `[channel, quad]`, quads in pairs: one pass of the
+//! shader fills two layers. All that takes double precision or knowledge of tiles is computed here,
+//! once, so that no two back ends can disagree about it.
 
 use thiserror::Error;
 
-use crate::transport::{Element, Extent, Geometry, TexelCode, Transport};
+use super::Tint;
+use crate::transport::{
+    Basis, CHANNELS, CoefficientTile, DirectTile, Element, Extent, Geometry, QUAD, TexelCode, Tile,
+    Transport,
+};
 
 /// Sides of the codes' texture: what every WebGL2 and WebGPU implementation allows.
 const FOLD: u32 = 2048;
@@ -42,7 +49,39 @@ pub struct Fold {
 #[derive(Clone, Copy, Debug)]
 pub struct TextureLayout {
     geometry: Geometry,
+    /// Quads of components, in pairs.
+    pairs: u32,
     codes: Fold,
+}
+
+/// Values of two quads of the basis, slot by slot, as one pass has them: what every device allows
+/// for uniforms.
+pub type PairOfQuads = [[[f32; QUAD]; 2]; BASIS_SLOTS];
+
+/// Slots of a window that a pass has room for.
+const BASIS_SLOTS: usize = (16 << 10) / (2 * QUAD * size_of::<f32>());
+
+/// A draw that fills two layers of what is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pass {
+    /// The light's channel.
+    pub channel: usize,
+    /// The part of the basis.
+    pub pair: usize,
+    /// The first of the layers.
+    pub layer: u32,
+}
+
+/// Rows of one tile's coefficients in one layer.
+pub struct CoefficientBlock<'a> {
+    /// The layer.
+    pub layer: u32,
+    /// First column and row.
+    pub at: [u32; 2],
+    /// Columns and rows.
+    pub extent: Extent,
+    /// Their texels.
+    pub texels: &'a [TexelCode],
 }
 
 /// Whole rows of one layer of the codes' texture.
@@ -63,7 +102,12 @@ pub struct CodeBlock<'a> {
 pub struct Params {
     window: i32,
     exposure: f32,
-    reserved: [f32; 2],
+    /// Layers of a channel of the coefficients; 0 for none.
+    quads: i32,
+    /// Layers from one channel of what is seen to the next; 0 where the light has one tint.
+    seen_quads: i32,
+    /// What a channel is of the light's tint.
+    tint: [f32; 4],
 }
 
 /// A photograph that a device's textures cannot hold.
@@ -81,6 +125,26 @@ pub enum LayoutError {
         /// The device's limit.
         limit: u32,
     },
+    /// There are more components than layers.
+    #[error(
+        "the light transport has {need} layers of components, more than the {limit} the graphics device can hold"
+    )]
+    Layers {
+        /// Layers needed.
+        need: u32,
+        /// Layers allowed.
+        limit: u32,
+    },
+    /// The window has more elements than uniforms have room for.
+    #[error(
+        "the window of {side} has more elements than a graphics device correlates with a basis: {limit}"
+    )]
+    Window {
+        /// Its side.
+        side: u32,
+        /// Elements allowed.
+        limit: usize,
+    },
     /// The transport is larger than a texture array.
     #[error(
         "the light transport has {need} values a channel, more than the {limit} the graphics device can hold"
@@ -94,11 +158,19 @@ pub enum LayoutError {
 }
 
 impl TextureLayout {
-    /// Lays out a transport of this geometry, if the device can hold it.
-    pub fn new(geometry: Geometry, limits: TextureLimits) -> Result<Self, LayoutError> {
+    /// Lays out a transport, if the device can hold it.
+    pub fn new(transport: &Transport, limits: TextureLimits) -> Result<Self, LayoutError> {
+        let geometry = transport.geometry;
+        let tiles = &transport.tiles;
+        let factored = tiles.iter().any(|tile| !tile.coefficients.is_dark());
+        let pairs = match factored {
+            true => transport.basis.rank().div_ceil(2 * QUAD) as u32,
+            false => 0,
+        };
+        let seen = seen(&geometry);
         for (grid, extent) in [
             ("camera grid", geometry.camera),
-            ("light grid", geometry.light),
+            ("light grid", if factored { seen } else { geometry.light }),
         ] {
             if extent.width.max(extent.height) > limits.side {
                 return Err(LayoutError::Side {
@@ -108,7 +180,30 @@ impl TextureLayout {
                 });
             }
         }
-        let need = geometry.camera.area() as u64 * geometry.window.area() as u64;
+        let need = CHANNELS as u32 * 2 * pairs;
+        if need > limits.layers {
+            return Err(LayoutError::Layers {
+                need,
+                limit: limits.layers,
+            });
+        }
+        if factored && geometry.window.area() > BASIS_SLOTS {
+            return Err(LayoutError::Window {
+                side: geometry.window.side(),
+                limit: BASIS_SLOTS,
+            });
+        }
+        let direct = tiles.iter().map(|tile| tile.functions.codes.len() as u64);
+        let codes = Self::fold(direct.sum(), limits)?;
+        Ok(Self {
+            geometry,
+            pairs,
+            codes,
+        })
+    }
+
+    /// As many layers as so many codes take, then only as high as that many have to be.
+    fn fold(need: u64, limits: TextureLimits) -> Result<Fold, LayoutError> {
         let side = FOLD.min(limits.side);
         let layer = u64::from(side) * u64::from(side);
         // The shader counts texels in an i32.
@@ -116,20 +211,103 @@ impl TextureLayout {
         if need > limit {
             return Err(LayoutError::Codes { need, limit });
         }
-        // As many layers as it takes, then only as high as that many have to be.
-        let width = u64::from(side).min(need);
-        let lines = need.div_ceil(width);
+        let width = u64::from(side).min(need).max(1);
+        let lines = need.div_ceil(width).max(1);
         let layers = lines.div_ceil(u64::from(side));
-        Ok(Self {
-            geometry,
-            codes: Fold {
-                extent: Extent {
-                    width: width as u32,
-                    height: lines.div_ceil(layers) as u32,
-                },
-                layers: layers as u32,
+        Ok(Fold {
+            extent: Extent {
+                width: width as u32,
+                height: lines.div_ceil(layers) as u32,
             },
+            layers: layers as u32,
         })
+    }
+
+    /// Extent of the coefficients' texture: of one texel where there are none.
+    pub fn coefficients(&self) -> Fold {
+        self.layered(self.geometry.camera)
+    }
+
+    /// Extent of the texture of what is seen.
+    pub fn seen(&self) -> Fold {
+        self.layered(seen(&self.geometry))
+    }
+
+    fn layered(&self, extent: Extent) -> Fold {
+        let one = Extent {
+            width: 1,
+            height: 1,
+        };
+        Fold {
+            extent: if self.pairs == 0 { one } else { extent },
+            layers: (CHANNELS as u32 * 2 * self.pairs).max(1),
+        }
+    }
+
+    /// Parts that the basis is seen in, of two quads each.
+    pub fn pairs(&self) -> u32 {
+        self.pairs
+    }
+
+    /// The basis, pass by pass.
+    pub fn basis(&self, basis: &Basis) -> Vec<PairOfQuads> {
+        let pair = |functions: &[Vec<f32>]| {
+            let mut pair = [[[0.0; QUAD]; 2]; BASIS_SLOTS];
+            for (k, function) in functions.iter().enumerate() {
+                for (slot, value) in pair.iter_mut().zip(function) {
+                    slot[k / QUAD][k % QUAD] = *value;
+                }
+            }
+            pair
+        };
+        let pairs = basis.kernels.chunks(2 * QUAD).take(self.pairs as usize);
+        pairs.map(pair).collect()
+    }
+
+    /// Uniforms that tell a pass which channel it sees.
+    pub const CHANNELS: [[f32; 4]; CHANNELS] = [
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0, 0.0],
+    ];
+
+    /// Passes for a light: the channel and the pair of quads each sees, and the first of the two
+    /// layers it fills.
+    pub fn passes(&self, tint: Tint) -> Vec<Pass> {
+        let channels = (0..).zip(tint.channels());
+        let passes = channels.flat_map(|(i, &channel)| {
+            (0..self.pairs).map(move |pair| Pass {
+                channel,
+                pair: pair as usize,
+                layer: 2 * (i * self.pairs + pair),
+            })
+        });
+        passes.collect()
+    }
+
+    /// The coefficients' texels, tile by tile; all others are zero. Stops at the first error of
+    /// `put`.
+    pub fn for_each_coefficient_block<E>(
+        &self,
+        transport: &Transport,
+        mut put: impl FnMut(CoefficientBlock<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let quads = transport.basis.rank().div_ceil(QUAD) as u32;
+        for Tile { coefficients, .. } in &transport.tiles {
+            let rect = coefficients.rect;
+            let planes = coefficients
+                .codes
+                .chunks_exact(CoefficientTile::plane(rect));
+            for (i, plane) in (0..).zip(planes) {
+                put(CoefficientBlock {
+                    layer: i / quads * 2 * self.pairs + i % quads,
+                    at: [rect.x, rect.y],
+                    extent: rect.extent,
+                    texels: &plane[..rect.extent.area()],
+                })?;
+            }
+        }
+        Ok(())
     }
 
     /// Extent of the codes' texture.
@@ -144,7 +322,11 @@ impl TextureLayout {
 
     /// Extent of the steps' texture.
     pub fn steps(&self) -> Extent {
-        self.geometry.tile_grid()
+        let Extent { width, height } = self.geometry.tile_grid();
+        Extent {
+            width,
+            height: 2 * height,
+        }
     }
 
     /// Extent of the light's texture.
@@ -159,11 +341,8 @@ impl TextureLayout {
         mut put: impl FnMut(CodeBlock<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let Fold { extent, layers } = self.codes;
-        let area = self.geometry.window.area();
-        let mut tiles = transport.tiles.iter();
+        let mut tiles = transport.tiles.iter().map(|tile| &tile.functions);
         let mut source: &[TexelCode] = &[];
-        // Texels of dark tiles still to be written: they hold no codes, but have their place.
-        let mut dark = 0;
         let mut texels = Vec::new();
         for layer in 0..layers {
             for row in (0..extent.height).step_by(BLOCK_ROWS as usize) {
@@ -171,17 +350,13 @@ impl TextureLayout {
                 let need = (rows * extent.width) as usize;
                 texels.clear();
                 while texels.len() < need {
-                    if source.is_empty() && dark == 0 {
+                    if source.is_empty() {
                         match tiles.next() {
-                            Some(tile) if tile.is_dark() => dark = tile.rect.extent.area() * area,
-                            Some(tile) => source = &tile.codes,
+                            Some(DirectTile { codes, .. }) => source = codes,
                             // Past the last code, where nothing is ever read.
-                            None => dark = need - texels.len(),
+                            None => texels.resize(need, [0; 4]),
                         }
                     }
-                    let zeros = dark.min(need - texels.len());
-                    texels.resize(texels.len() + zeros, [0; 4]);
-                    dark -= zeros;
                     let (now, later) = source.split_at(source.len().min(need - texels.len()));
                     texels.extend_from_slice(now);
                     source = later;
@@ -198,7 +373,7 @@ impl TextureLayout {
     }
 
     /// The pixels' texels.
-    pub fn pixel_texels(&self) -> Vec<[i32; 4]> {
+    pub fn pixel_texels(&self, transport: &Transport) -> Vec<[i32; 4]> {
         let Geometry {
             camera,
             light,
@@ -209,16 +384,17 @@ impl TextureLayout {
         let near = |origin: i32, side: u32| origin.clamp(-(window.side() as i32), side as i32);
         let mut texels = vec![[0; 4]; camera.area()];
         let mut first_code = 0;
-        for (i, tile) in self.geometry.tiles().enumerate() {
-            for pixel in tile.pixels() {
+        for (i, tile) in (0..).zip(&transport.tiles) {
+            let direct = !tile.functions.is_dark();
+            for pixel in tile.rect().pixels() {
                 let Element { u, v } = self.geometry.window_origin(pixel);
                 texels[camera.index(pixel)] = [
                     near(u, light.width),
                     near(v, light.height),
-                    first_code,
-                    i as i32,
+                    if direct { first_code } else { -1 },
+                    i,
                 ];
-                first_code += window.area() as i32;
+                first_code += if direct { window.area() as i32 } else { 0 };
             }
         }
         texels
@@ -227,27 +403,43 @@ impl TextureLayout {
     /// The steps' texels.
     pub fn step_texels(&self, transport: &Transport) -> Vec<[f32; 4]> {
         let texel = |[r, g, b]: [f32; 3]| [r, g, b, 0.0];
-        transport
-            .tiles
-            .iter()
-            .map(|tile| texel(tile.step))
-            .collect()
+        let tiles = &transport.tiles;
+        let coefficients = tiles.iter().map(|tile| tile.coefficients.step);
+        let functions = tiles.iter().map(|tile| tile.functions.step);
+        coefficients.chain(functions).map(texel).collect()
     }
 
     /// The uniforms for a frame.
-    pub fn params(&self, exposure: f32) -> Params {
+    pub fn params(&self, tint: Tint, exposure: f32) -> Params {
+        let quads = 2 * self.pairs as i32;
+        let (seen_quads, [r, g, b]) = match tint {
+            Tint::One(_, factors) => (0, factors),
+            Tint::Many => (quads, [1.0; CHANNELS]),
+        };
         Params {
             window: self.geometry.window.side() as i32,
             exposure,
-            reserved: [0.0; 2],
+            quads,
+            seen_quads,
+            tint: [r, g, b, 0.0],
         }
+    }
+}
+
+/// Window origins that see any of the display, and one around them for all others.
+fn seen(geometry: &Geometry) -> Extent {
+    let Geometry { light, window, .. } = geometry;
+    let span = |side: u32| side + window.side() + 1;
+    Extent {
+        width: span(light.width),
+        height: span(light.height),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::transport::{CameraPx, Correspondence, DirectTile, Window};
+    use crate::transport::{CameraPx, Correspondence, Window};
 
     const WEBGL2_MINIMUM: TextureLimits = TextureLimits {
         side: 2048,
@@ -272,22 +464,36 @@ mod tests {
         }
     }
 
-    /// Codes that tell pixel and element; every third tile is dark.
-    fn transport(geometry: Geometry) -> Transport {
+    /// Codes that tell pixel and element, or pixel, channel and component; every third tile has no
+    /// functions, and every fourth no coefficients.
+    fn transport(geometry: Geometry, rank: usize) -> Transport {
         let area = geometry.window.area();
-        let tiles = geometry.tiles().enumerate().map(|(i, rect)| DirectTile {
-            rect,
-            step: [1.0, 2.0, rect.x as f32],
-            codes: match i % 3 {
-                2 => Vec::new(),
-                _ => rect
+        let tiles = geometry.tiles().enumerate().map(|(i, rect)| {
+            let mut tile = Tile::dark(rect);
+            tile.functions.step = [1.0, 2.0, rect.x as f32];
+            if i % 3 != 2 {
+                let codes = rect
                     .pixels()
-                    .flat_map(|p| (0..area).map(move |s| [p.x as i16, p.y as i16, s as i16, 0]))
-                    .collect(),
-            },
+                    .flat_map(|p| (0..area).map(move |s| [p.x as i16, p.y as i16, s as i16, 0]));
+                tile.functions.codes = codes.collect();
+            }
+            if i % 4 != 3 && rank > 0 {
+                let plane = CoefficientTile::plane(rect);
+                let mut codes = vec![[0; 4]; CoefficientTile::texels(rect, rank)];
+                for (i, codes) in codes.chunks_exact_mut(plane).enumerate() {
+                    for (p, code) in rect.pixels().zip(codes) {
+                        *code = [p.x as i16, p.y as i16, i as i16, 7];
+                    }
+                }
+                tile.coefficients.codes = codes;
+            }
+            tile
         });
         Transport {
             geometry,
+            basis: Basis {
+                kernels: vec![vec![1.0; area]; rank],
+            },
             tiles: tiles.collect(),
         }
     }
@@ -297,8 +503,8 @@ mod tests {
         // 150 * 141 * 225 texels fill more than one layer.
         for (camera, window) in [((150, 141), 15), ((37, 23), 3), ((8, 1), 1)] {
             let geometry = geometry(camera, window);
-            let transport = transport(geometry);
-            let layout = TextureLayout::new(geometry, WEBGL2_MINIMUM).unwrap();
+            let transport = transport(geometry, 0);
+            let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
             let Fold { extent, layers } = layout.codes();
             let mut texture = Vec::new();
             layout
@@ -311,24 +517,62 @@ mod tests {
                 })
                 .unwrap();
             assert_eq!(texture.len(), extent.area() * layers as usize);
-            let pixels = layout.pixel_texels();
+            let pixels = layout.pixel_texels(&transport);
             let steps = layout.step_texels(&transport);
             for y in 0..camera.1 {
                 for x in 0..camera.0 {
                     let [u, v, first, tile] = pixels[(y * camera.0 + x) as usize];
                     let origin = geometry.window_origin(CameraPx { x, y });
                     assert_eq!((u, v), (origin.u, origin.v));
-                    assert_eq!(steps[tile as usize][2], (x / 16 * 16) as f32);
+                    let tiles = transport.tiles.len();
+                    assert_eq!(steps[tiles + tile as usize][2], (x / 16 * 16) as f32);
+                    if transport.tiles[tile as usize].functions.is_dark() {
+                        assert_eq!(first, -1);
+                        continue;
+                    }
                     for s in 0..geometry.window.area() {
                         let code = texture[first as usize + s];
-                        let expected = match transport.tiles[tile as usize].is_dark() {
-                            true => [0; 4],
-                            false => [x as i16, y as i16, s as i16, 0],
-                        };
-                        assert_eq!(code, expected);
+                        assert_eq!(code, [x as i16, y as i16, s as i16, 0]);
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn every_coefficient_is_where_its_pixel_lies() {
+        let geometry = geometry((37, 23), 3);
+        for rank in [1, 4, 9, 16] {
+            let transport = transport(geometry, rank);
+            let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
+            let (quads, pairs) = (rank.div_ceil(4) as u32, rank.div_ceil(8) as u32);
+            assert_eq!(layout.pairs(), pairs);
+            let Fold { extent, layers } = layout.coefficients();
+            assert_eq!((extent, layers), (geometry.camera, 3 * 2 * pairs));
+            let mut found = 0;
+            let Ok(()) = layout.for_each_coefficient_block(&transport, |block| {
+                let (channel, quad) = (block.layer / (2 * pairs), block.layer % (2 * pairs));
+                assert!(quad < quads && block.texels.len() == block.extent.area());
+                for (i, texel) in block.texels.iter().enumerate() {
+                    let (x, y) = (i as u32 % block.extent.width, i as u32 / block.extent.width);
+                    let at = [(block.at[0] + x) as i16, (block.at[1] + y) as i16];
+                    assert_eq!(*texel, [at[0], at[1], (channel * quads + quad) as i16, 7]);
+                    found += 1;
+                }
+                Ok::<_, std::convert::Infallible>(())
+            });
+            let tiles = transport
+                .tiles
+                .iter()
+                .filter(|tile| !tile.coefficients.is_dark());
+            let pixels: usize = tiles.map(|tile| tile.rect().extent.area()).sum();
+            assert_eq!(found, pixels * 3 * quads as usize);
+            let passes = layout.passes(Tint::Many);
+            let filled: Vec<_> = passes.iter().map(|pass| pass.layer).collect();
+            assert!(filled.iter().copied().eq((0..layers).step_by(2)));
+            let one = layout.passes(Tint::One(1, [0.5, 1.0, 0.25]));
+            assert!(one.iter().all(|pass| pass.channel == 1) && one[0].layer == 0);
+            assert_eq!(one.len(), pairs as usize);
         }
     }
 
@@ -337,8 +581,9 @@ mod tests {
         for (shift, expected) in [(1e300, [20, 10]), (-1e300, [-15, -15])] {
             let mut geometry = geometry((8, 8), 15);
             geometry.correspondence.affine = [[0.0, 0.0, shift]; 2];
-            let layout = TextureLayout::new(geometry, WEBGL2_MINIMUM).unwrap();
-            for [u, v, ..] in layout.pixel_texels() {
+            let transport = transport(geometry, 0);
+            let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
+            for [u, v, ..] in layout.pixel_texels(&transport) {
                 assert_eq!([u, v], expected);
             }
         }
@@ -346,29 +591,43 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_refused() {
-        let refused = |camera, window, limits| {
-            TextureLayout::new(geometry(camera, window), limits).unwrap_err()
+        let refused = |camera, window, rank, limits| {
+            let transport = transport(geometry(camera, window), rank);
+            TextureLayout::new(&transport, limits).unwrap_err()
         };
         assert!(matches!(
-            refused((2049, 8), 1, WEBGL2_MINIMUM),
+            refused((2049, 8), 1, 0, WEBGL2_MINIMUM),
             LayoutError::Side {
                 grid: "camera grid",
                 limit: 2048,
                 ..
             }
         ));
-        let two_layers = TextureLimits {
-            side: 2048,
+        let small = TextureLimits {
+            side: 64,
             layers: 2,
         };
         assert_eq!(
-            refused((512, 512), 15, two_layers),
+            refused((64, 64), 3, 0, small),
             LayoutError::Codes {
-                need: 512 * 512 * 225,
-                limit: 2 * 2048 * 2048,
+                need: 11 * 256 * 9,
+                limit: 2 * 64 * 64,
             }
         );
-        let fits = TextureLayout::new(geometry((512, 512), 15), WEBGL2_MINIMUM).unwrap();
+        assert_eq!(
+            refused((8, 8), 1, 1, small),
+            LayoutError::Layers { need: 6, limit: 2 }
+        );
+        let window = refused((8, 8), 25, 1, WEBGL2_MINIMUM);
+        assert_eq!(
+            window,
+            LayoutError::Window {
+                side: 25,
+                limit: 512
+            }
+        );
+        let large = transport(geometry((512, 512), 15), 0);
+        let fits = TextureLayout::new(&large, WEBGL2_MINIMUM).unwrap();
         assert!(fits.codes().layers <= 256);
     }
 }

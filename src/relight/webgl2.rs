@@ -1,26 +1,39 @@
 //! Relighting by WebGL2, through web-sys: a tenth of the size of wgpu's own WebGL.
 
 use js_sys::{Float32Array, Int16Array, Int32Array, Object};
-use wasm_bindgen::JsCast;
+use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{
     HtmlCanvasElement, WebGl2RenderingContext as Gl, WebGlBuffer, WebGlContextAttributes,
-    WebGlProgram, WebGlShader, WebGlTexture, WebglLoseContext,
+    WebGlFramebuffer, WebGlProgram, WebGlShader, WebGlTexture, WebglLoseContext,
 };
 
-use super::Light;
 use super::backend::{Backend, BackendError};
-use super::texture_layout::{TextureLayout, TextureLimits};
+use super::texture_layout::{Fold, Params, Pass, TextureLayout, TextureLimits};
+use super::{Light, Tint};
 use crate::transport::{Extent, Geometry, Transport};
 
 const API: &str = "WebGL2";
 const VERTEX_SHADER: &str = include_str!("shaders/relight.vert.glsl");
-const FRAGMENT_SHADER: &str = include_str!("shaders/relight.frag.glsl");
+const SEE_SHADER: &str = include_str!("shaders/see.frag.glsl");
+const RELIGHT_SHADER: &str = include_str!("shaders/relight.frag.glsl");
 
 /// Texture units, which are naga's binding numbers too.
-const CODES: u32 = 0;
-const PIXELS: u32 = 1;
-const STEPS: u32 = 2;
-const LIGHT: u32 = 3;
+const COEFFICIENTS: u32 = 0;
+const SEEN: u32 = 1;
+const CODES: u32 = 2;
+const PIXELS: u32 = 3;
+const STEPS: u32 = 4;
+const LIGHT: u32 = 5;
+
+/// Points that uniforms are bound to, and naga's names for them.
+const UNIFORMS: [(u32, &str); 3] = [
+    (PARAMS, "Params_block_0Fragment"),
+    (BASIS, "Basis_block_1Fragment"),
+    (CHANNEL, "Channel_block_2Fragment"),
+];
+const PARAMS: u32 = 0;
+const BASIS: u32 = 1;
+const CHANNEL: u32 = 2;
 
 /// A transport in a WebGL2 context.
 pub struct WebGl2 {
@@ -28,15 +41,25 @@ pub struct WebGl2 {
     context: Context,
     /// The light as the context takes it, kept to spare an allocation a frame.
     light: Float32Array,
+    /// The light that is seen.
+    lit: Option<Light>,
     kernel: String,
 }
 
 /// The context and all that was made in it.
 struct Context {
     gl: Gl,
-    program: Option<WebGlProgram>,
+    programs: Vec<WebGlProgram>,
     textures: Vec<WebGlTexture>,
+    buffers: Vec<WebGlBuffer>,
+    /// Each of two layers of what is seen.
+    framebuffers: Vec<WebGlFramebuffer>,
+    see: Option<WebGlProgram>,
+    relight: Option<WebGlProgram>,
     params: Option<WebGlBuffer>,
+    /// Pair by pair.
+    basis: Vec<WebGlBuffer>,
+    channels: Vec<WebGlBuffer>,
 }
 
 impl WebGl2 {
@@ -45,17 +68,28 @@ impl WebGl2 {
     pub fn new(transport: &Transport, canvas: &HtmlCanvasElement) -> Result<Self, BackendError> {
         let Geometry { camera, light, .. } = transport.geometry;
         let mut context = open(canvas, camera)?;
-        let layout = TextureLayout::new(transport.geometry, limits(&context.gl))?;
+        let layout = TextureLayout::new(transport, limits(&context.gl))?;
         let kernel = describe(&context.gl);
-        context.link()?;
+        if layout.pairs() > 0 {
+            // To draw into floats.
+            let extension = context.gl.get_extension("EXT_color_buffer_float");
+            if !matches!(extension, Ok(Some(_))) {
+                return Err(BackendError::Device {
+                    api: API,
+                    reason: "it does not draw into floating-point textures".into(),
+                });
+            }
+            context.see = Some(context.link(SEE_SHADER, &[LIGHT])?);
+        }
+        let all = [COEFFICIENTS, SEEN, CODES, PIXELS, STEPS, LIGHT];
+        context.relight = Some(context.link(RELIGHT_SHADER, &all)?);
         context.upload(&layout, transport)?;
-        let gl = &context.gl;
-        gl.disable(Gl::DITHER); // on unless switched off
-        gl.viewport(0, 0, camera.width as i32, camera.height as i32);
+        context.gl.disable(Gl::DITHER); // on unless switched off
         context.check()?;
         Ok(Self {
             layout,
             light: Float32Array::new_with_length(4 * light.area() as u32),
+            lit: None,
             kernel,
             context,
         })
@@ -72,16 +106,25 @@ impl Backend for WebGl2 {
     }
 
     fn render(&mut self, light: &Light, exposure: f32) -> Result<(), BackendError> {
-        let Context { gl, .. } = &self.context;
-        self.light.copy_from(light.elements().as_flattened());
-        gl.active_texture(Gl::TEXTURE0 + LIGHT);
-        let written = write_rows(gl, self.layout.light(), FLOATS, &self.light);
-        let params = self.layout.params(exposure);
-        gl.buffer_sub_data_with_i32_and_u8_array(
-            Gl::UNIFORM_BUFFER,
-            0,
-            bytemuck::bytes_of(&params),
-        );
+        let context = &self.context;
+        let gl = &context.gl;
+        let tint = light.tint();
+        let params = self.layout.params(tint, exposure);
+        gl.bind_buffer(Gl::UNIFORM_BUFFER, context.params.as_ref());
+        let bytes = bytemuck::bytes_of(&params);
+        gl.buffer_sub_data_with_i32_and_u8_array(Gl::UNIFORM_BUFFER, 0, bytes);
+        let mut written = Ok(());
+        // What is seen depends on the light alone.
+        if self.lit.as_ref() != Some(light) {
+            self.light.copy_from(light.elements().as_flattened());
+            gl.active_texture(Gl::TEXTURE0 + LIGHT);
+            written = write_rows(gl, self.layout.light(), FLOATS, &self.light);
+            context.see(&self.layout, tint);
+            self.lit = Some(light.clone());
+        }
+        let Extent { width, height } = self.layout.pixels();
+        gl.viewport(0, 0, width as i32, height as i32);
+        gl.use_program(context.relight.as_ref());
         gl.draw_arrays(Gl::TRIANGLES, 0, 3);
         // To a lost context all calls are no-ops. Asking for other errors would wait for the
         // device, and a draw that was good once has none.
@@ -140,9 +183,15 @@ fn open(canvas: &HtmlCanvasElement, camera: Extent) -> Result<Context, BackendEr
     // From here on, whatever goes wrong gives the context back.
     let context = Context {
         gl,
-        program: None,
+        programs: Vec::new(),
         textures: Vec::new(),
+        buffers: Vec::new(),
+        framebuffers: Vec::new(),
+        see: None,
+        relight: None,
         params: None,
+        basis: Vec::new(),
+        channels: Vec::new(),
     };
     let gl = &context.gl;
     if gl.is_context_lost() {
@@ -187,48 +236,101 @@ fn describe(gl: &Gl) -> String {
 }
 
 impl Context {
-    fn link(&mut self) -> Result<(), BackendError> {
+    /// A program that reads these textures.
+    fn link(&mut self, fragment: &str, textures: &[u32]) -> Result<WebGlProgram, BackendError> {
         let gl = &self.gl;
         let shaders = [
             compile(gl, Gl::VERTEX_SHADER, "vertex shader", VERTEX_SHADER)?,
-            compile(gl, Gl::FRAGMENT_SHADER, "fragment shader", FRAGMENT_SHADER)?,
+            compile(gl, Gl::FRAGMENT_SHADER, "fragment shader", fragment)?,
         ];
         let refused = |log| BackendError::Shader {
             stage: "program",
             log,
         };
-        let program = gl.create_program();
-        let program = self.program.insert(program.ok_or_else(|| self.lost())?);
+        let program = gl.create_program().ok_or_else(|| self.lost())?;
+        self.programs.push(program.clone());
         for shader in &shaders {
-            gl.attach_shader(program, shader);
+            gl.attach_shader(&program, shader);
         }
-        gl.link_program(program);
+        gl.link_program(&program);
         for shader in &shaders {
             gl.delete_shader(Some(shader)); // the program keeps it
         }
-        if gl.get_program_parameter(program, Gl::LINK_STATUS) != true {
+        if gl.get_program_parameter(&program, Gl::LINK_STATUS) != true {
             return Err(refused(
-                gl.get_program_info_log(program).unwrap_or_default(),
+                gl.get_program_info_log(&program).unwrap_or_default(),
             ));
         }
-        gl.use_program(Some(program));
-        for unit in [CODES, PIXELS, STEPS, LIGHT] {
+        gl.use_program(Some(&program));
+        for unit in textures {
             let name = format!("_group_0_binding_{unit}_fs");
-            let location = gl.get_uniform_location(program, &name);
+            let location = gl.get_uniform_location(&program, &name);
             let location = location.ok_or_else(|| refused(format!("{name} is missing")))?;
-            gl.uniform1i(Some(&location), unit as i32);
+            gl.uniform1i(Some(&location), *unit as i32);
         }
-        let block = gl.get_uniform_block_index(program, "Params_block_0Fragment");
-        gl.uniform_block_binding(program, block, 0);
-        let params = self
-            .params
-            .insert(gl.create_buffer().ok_or_else(|| self.lost())?);
-        gl.bind_buffer_base(Gl::UNIFORM_BUFFER, 0, Some(params));
-        gl.buffer_data_with_i32(
-            Gl::UNIFORM_BUFFER,
-            size_of::<super::texture_layout::Params>() as i32,
-            Gl::DYNAMIC_DRAW,
-        );
+        for (point, name) in UNIFORMS {
+            let block = gl.get_uniform_block_index(&program, name);
+            if block != Gl::INVALID_INDEX {
+                gl.uniform_block_binding(&program, block, point);
+            }
+        }
+        Ok(program)
+    }
+
+    /// Uniforms with these bytes.
+    fn add_uniforms(&mut self, bytes: &[u8]) -> Result<WebGlBuffer, BackendError> {
+        let gl = &self.gl;
+        let buffer = gl.create_buffer().ok_or_else(|| self.lost())?;
+        gl.bind_buffer(Gl::UNIFORM_BUFFER, Some(&buffer));
+        gl.buffer_data_with_u8_array(Gl::UNIFORM_BUFFER, bytes, Gl::DYNAMIC_DRAW);
+        self.buffers.push(buffer.clone());
+        Ok(buffer)
+    }
+
+    /// Fills what is seen of the light by the basis.
+    fn see(&self, layout: &TextureLayout, tint: Tint) {
+        let gl = &self.gl;
+        let Extent { width, height } = layout.seen().extent;
+        gl.viewport(0, 0, width as i32, height as i32);
+        gl.use_program(self.see.as_ref());
+        // It is not read while it is written.
+        gl.active_texture(Gl::TEXTURE0 + SEEN);
+        gl.bind_texture(Gl::TEXTURE_2D_ARRAY, None);
+        for Pass {
+            channel,
+            pair,
+            layer,
+        } in layout.passes(tint)
+        {
+            gl.bind_framebuffer(Gl::FRAMEBUFFER, self.framebuffers.get(layer as usize / 2));
+            gl.bind_buffer_base(Gl::UNIFORM_BUFFER, BASIS, self.basis.get(pair));
+            gl.bind_buffer_base(Gl::UNIFORM_BUFFER, CHANNEL, self.channels.get(channel));
+            gl.draw_arrays(Gl::TRIANGLES, 0, 3);
+        }
+        gl.bind_framebuffer(Gl::FRAMEBUFFER, None);
+        gl.bind_texture(Gl::TEXTURE_2D_ARRAY, self.textures.get(SEEN as usize));
+    }
+
+    /// Framebuffers of each two layers of what is seen.
+    fn add_framebuffers(&mut self, layers: u32) -> Result<(), BackendError> {
+        for first in (0..layers).step_by(2) {
+            let gl = &self.gl;
+            let framebuffer = gl.create_framebuffer().ok_or_else(|| self.lost())?;
+            gl.bind_framebuffer(Gl::FRAMEBUFFER, Some(&framebuffer));
+            let targets = [Gl::COLOR_ATTACHMENT0, Gl::COLOR_ATTACHMENT1];
+            for (layer, target) in (first as i32..).zip(targets) {
+                let seen = self.textures.get(SEEN as usize);
+                gl.framebuffer_texture_layer(Gl::FRAMEBUFFER, target, seen, 0, layer);
+            }
+            gl.draw_buffers(&js_sys::Array::from_iter(targets.map(JsValue::from)));
+            let status = gl.check_framebuffer_status(Gl::FRAMEBUFFER);
+            gl.bind_framebuffer(Gl::FRAMEBUFFER, None);
+            self.framebuffers.push(framebuffer);
+            if status != Gl::FRAMEBUFFER_COMPLETE {
+                let reason = format!("a framebuffer of floats is incomplete: {status:#06x}");
+                return Err(BackendError::Upload(reason));
+            }
+        }
         Ok(())
     }
 
@@ -238,10 +340,52 @@ impl Context {
         layout: &TextureLayout,
         transport: &Transport,
     ) -> Result<(), BackendError> {
+        let Fold { extent, layers } = layout.coefficients();
+        self.add_texture(COEFFICIENTS, CODES16, extent, Some(layers))?;
+        let Fold { extent, layers } = layout.seen();
+        self.add_texture(SEEN, FLOATS, extent, Some(layers))?;
         let codes = layout.codes();
         self.add_texture(CODES, CODES16, codes.extent, Some(codes.layers))?;
         // Out of memory shows here, before the long work.
         self.check()?;
+        if layout.pairs() > 0 {
+            self.add_framebuffers(layers)?;
+        }
+        for pair in layout.basis(&transport.basis) {
+            let basis = self.add_uniforms(bytemuck::cast_slice(&pair))?;
+            self.basis.push(basis);
+        }
+        for channel in TextureLayout::CHANNELS {
+            let channel = self.add_uniforms(bytemuck::cast_slice(&channel))?;
+            self.channels.push(channel);
+        }
+        let params = self.add_uniforms(&[0; size_of::<Params>()])?;
+        self.gl
+            .bind_buffer_base(Gl::UNIFORM_BUFFER, PARAMS, Some(&params));
+        self.params = Some(params);
+        let write_codes = |gl: &Gl, [x, y, z]: [u32; 3], extent: Extent, texels: &Int16Array| {
+            gl.tex_sub_image_3d_with_opt_array_buffer_view(
+                Gl::TEXTURE_2D_ARRAY,
+                0,
+                x as i32,
+                y as i32,
+                z as i32,
+                extent.width as i32,
+                extent.height as i32,
+                1,
+                CODES16.format,
+                CODES16.component,
+                Some(texels),
+            )
+            .map_err(upload_error)
+        };
+        self.gl.active_texture(Gl::TEXTURE0 + COEFFICIENTS);
+        layout.for_each_coefficient_block(transport, |block| {
+            let texels = Int16Array::from(block.texels.as_flattened());
+            let [x, y] = block.at;
+            write_codes(&self.gl, [x, y, block.layer], block.extent, &texels)
+        })?;
+        self.gl.active_texture(Gl::TEXTURE0 + CODES);
         let mut staging = Int16Array::new_with_length(0);
         layout.for_each_code_block(transport, |block| {
             let components = block.texels.as_flattened();
@@ -249,24 +393,14 @@ impl Context {
                 staging = Int16Array::new_with_length(components.len() as u32);
             }
             staging.copy_from(components);
-            self.gl
-                .tex_sub_image_3d_with_opt_array_buffer_view(
-                    Gl::TEXTURE_2D_ARRAY,
-                    0,
-                    0,
-                    block.row as i32,
-                    block.layer as i32,
-                    codes.extent.width as i32,
-                    block.rows as i32,
-                    1,
-                    CODES16.format,
-                    CODES16.component,
-                    Some(&staging),
-                )
-                .map_err(upload_error)
+            let rows = Extent {
+                width: codes.extent.width,
+                height: block.rows,
+            };
+            write_codes(&self.gl, [0, block.row, block.layer], rows, &staging)
         })?;
         self.add_texture(PIXELS, INTEGERS, layout.pixels(), None)?;
-        let pixels = layout.pixel_texels();
+        let pixels = layout.pixel_texels(transport);
         let pixels = Int32Array::from(pixels.as_flattened());
         write_rows(&self.gl, layout.pixels(), INTEGERS, &pixels)?;
         self.add_texture(STEPS, FLOATS, layout.steps(), None)?;
@@ -329,8 +463,15 @@ impl Drop for Context {
         for texture in &self.textures {
             self.gl.delete_texture(Some(texture));
         }
-        self.gl.delete_buffer(self.params.as_ref());
-        self.gl.delete_program(self.program.as_ref());
+        for framebuffer in &self.framebuffers {
+            self.gl.delete_framebuffer(Some(framebuffer));
+        }
+        for buffer in &self.buffers {
+            self.gl.delete_buffer(Some(buffer));
+        }
+        for program in &self.programs {
+            self.gl.delete_program(Some(program));
+        }
         // The context itself too: browsers allow a page only so many, sixteen in Chromium, and at the
         // next one take away the oldest, which may be another photograph's.
         if let Ok(Some(extension)) = self.gl.get_extension("WEBGL_lose_context") {
@@ -377,6 +518,6 @@ fn write_rows(gl: &Gl, extent: Extent, texel: Texel, data: &Object) -> Result<()
     .map_err(upload_error)
 }
 
-fn upload_error(thrown: wasm_bindgen::JsValue) -> BackendError {
+fn upload_error(thrown: JsValue) -> BackendError {
     BackendError::Upload(format!("{thrown:?}"))
 }

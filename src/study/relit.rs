@@ -10,7 +10,7 @@ use super::{Progress, StudyError};
 use crate::capture::Measurements;
 use crate::recover::{Recovery, Settings, Workers};
 use crate::relight::{BuiltinLight, Light, area_resample};
-use crate::transport::{CHANNELS, Decibels, DirectTile, Extent};
+use crate::transport::{BandTile, CHANNELS, Decibels, Extent, Tile};
 
 /// Widest picture on a sheet, in pixels.
 const SHOWN: u32 = 200;
@@ -166,17 +166,15 @@ fn pictures(
     };
     let recovery = Recovery::prepare(measurements, settings, workers)?;
     let geometry = *recovery.geometry();
+    let basis = recovery.basis().cloned().unwrap_or_default();
     let area = geometry.window.area();
     let rects: Vec<_> = geometry.tiles().collect();
     let done = AtomicUsize::new(0);
     let tiles = workers.map(rects.len(), |i| {
-        let tile = recovery.tile(measurements, rects[i]);
+        let mut tile = BandTile::dark(rects[i]);
+        tile.put(recovery.tile(measurements, rects[i]));
         // Rounded to codes, as they are when a file is relit.
-        let mut functions = tile.functions(&geometry, recovery.basis());
-        let codes = DirectTile::quantise(&functions);
-        for (i, tau) in functions.tau.iter_mut().enumerate() {
-            *tau = codes.tau(area, i / area, i % area);
-        }
+        let functions = Tile::quantise(&tile, basis.rank()).functions(&geometry, &basis);
         let seen = lights.iter().map(|light| {
             let truth = match &light.photographed {
                 Some(picture) => {

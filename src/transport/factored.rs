@@ -137,25 +137,11 @@ impl BandTile {
 
     /// The light transport functions.
     pub fn functions(self, geometry: &Geometry, basis: &Basis) -> TransportFunctions {
-        let values = self.rect.extent.area() * geometry.window.area();
-        let own = !self.functions.is_empty();
-        let room = vec![[0.0; CHANNELS]; if own { 0 } else { values }];
-        self.into_functions(geometry, basis, room)
-    }
-
-    /// The light transport functions; `room` is for as many zeros as they are, where the tile has no
-    /// functions of its own.
-    pub(crate) fn into_functions(
-        self,
-        geometry: &Geometry,
-        basis: &Basis,
-        room: Vec<[f32; CHANNELS]>,
-    ) -> TransportFunctions {
-        let mut functions = TransportFunctions {
-            rect: self.rect,
-            tau: match self.functions.is_empty() {
-                true => room,
-                false => self.functions,
+        let mut functions = match self.functions.is_empty() {
+            true => TransportFunctions::zeros(self.rect, geometry.window.area()),
+            false => TransportFunctions {
+                rect: self.rect,
+                tau: self.functions,
             },
         };
         if !self.coefficients.is_empty() {
@@ -286,7 +272,7 @@ mod tests {
             let functions = tile.expand(&geometry, &basis);
             expanding += start.elapsed().as_secs_f64();
             let start = std::time::Instant::now();
-            std::hint::black_box(crate::transport::DirectTile::quantise(&functions));
+            std::hint::black_box(crate::transport::DirectTile::quantise(rect, &functions.tau));
             quantising += start.elapsed().as_secs_f64();
         }
         println!("expand {expanding:.2} s, quantise {quantising:.2} s");

@@ -6,7 +6,7 @@
 //! (Thanikachalam et al. 2014, section 3).
 //!
 //! This is the one room that `recover`, `format` and `relight` all know: where pixels, windows and
-//! tiles lie ([`Geometry`]), what a tile holds ([`DirectTile`]), and how far two transports are
+//! tiles lie ([`Geometry`]), what a tile holds ([`Tile`]), and how far two transports are
 //! apart ([`TransportError`]).
 
 mod factored;
@@ -22,4 +22,4 @@ pub use geometry::{
     MAX_WINDOW, TileRect, Window,
 };
 pub use snr::{Decibels, TransportError};
-pub use tile::{CHANNELS, DirectTile, TexelCode, Transport};
+pub use tile::{CHANNELS, CoefficientTile, DirectTile, QUAD, TexelCode, Tile, Transport};

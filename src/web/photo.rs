@@ -1,29 +1,29 @@
 //! A decoded photograph.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::CodedError;
 use crate::format::{FormatError, Metadata};
-use crate::transport::{Geometry, TexelCode, Transport};
+use crate::transport::{Geometry, Tile, Transport};
 
 /// A relightable photograph in memory.
 #[wasm_bindgen]
 pub struct Photo {
-    transport: Rc<Transport>,
+    transport: Arc<Transport>,
     metadata: String,
 }
 
 impl Photo {
     pub(super) fn new(transport: Transport, metadata: &Metadata) -> Result<Self, CodedError> {
         Ok(Self {
-            transport: Rc::new(transport),
+            transport: Arc::new(transport),
             metadata: serde_json::to_string(metadata).map_err(FormatError::Metadata)?,
         })
     }
 
-    pub(super) fn transport(&self) -> Rc<Transport> {
+    pub(super) fn transport(&self) -> Arc<Transport> {
         self.transport.clone()
     }
 
@@ -67,7 +67,7 @@ impl Photo {
     /// Bytes the photograph takes in memory.
     #[wasm_bindgen(getter, js_name = decodedBytes)]
     pub fn decoded_bytes(&self) -> f64 {
-        let codes = self.geometry().camera.area() as f64 * self.geometry().window.area() as f64;
-        codes * size_of::<TexelCode>() as f64
+        let codes: usize = self.transport.tiles.iter().map(Tile::bytes).sum();
+        codes as f64
     }
 }

@@ -6,7 +6,7 @@ pub mod relit;
 
 use relightable_photo::format::HEADER_BYTES;
 use relightable_photo::transport::{
-    Correspondence, DirectTile, Extent, Geometry, RecoveredTile, TransportFunctions, Window,
+    BandTile, Basis, Correspondence, Extent, Geometry, Tile, TransportFunctions, Window,
 };
 
 /// A reproducible stream of numbers in 0..1.
@@ -68,13 +68,21 @@ pub fn functions(geometry: Geometry, seed: u64) -> Vec<TransportFunctions> {
     tiles.collect()
 }
 
-/// The transport of a tile's own values, as a solver would yield it.
-pub fn recovered(tile: &DirectTile, area: usize) -> RecoveredTile {
-    let texels = 0..tile.rect.extent.area() * area;
-    RecoveredTile::Direct(TransportFunctions {
-        rect: tile.rect,
-        tau: texels.map(|i| tile.tau(area, i / area, i % area)).collect(),
-    })
+/// A tile's own values, as a file has them.
+pub fn band_tile(tile: &Tile, geometry: &Geometry, basis: &Basis) -> BandTile {
+    let (rank, area) = (basis.rank(), geometry.window.area());
+    let pixels = tile.rect().extent.area();
+    let mut band = BandTile::dark(tile.rect());
+    if !tile.coefficients.is_dark() {
+        let values =
+            (0..pixels * rank).map(|i| tile.coefficients.coefficient(rank, i / rank, i % rank));
+        band.coefficients = values.collect();
+    }
+    if !tile.functions.is_dark() {
+        let values = (0..pixels * area).map(|i| tile.functions.tau(area, i / area, i % area));
+        band.functions = values.collect();
+    }
+    band
 }
 
 /// A file after an edit of its header or parts, all checksums made right again as far as the file's

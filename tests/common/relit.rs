@@ -1,33 +1,70 @@
 //! What tests of relighting share: transports, lights, and the standard that pictures are held to.
 
 use relightable_photo::relight::{BuiltinLight, Light, Rgba8Picture};
-use relightable_photo::transport::{DirectTile, Extent, Geometry, Transport, TransportFunctions};
+use relightable_photo::transport::{BandTile, Basis, Extent, Geometry, Tile, Transport};
 
 use super::Noise;
+
+/// What tiles of a transport hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Functions element by element.
+    Direct,
+    /// Coefficients over nine functions.
+    Factored,
+    /// Either, both, or nothing.
+    Mixed,
+}
 
 /// Light transport functions with a peak in the window's middle and a rough tail, brighter to the
 /// right and below, so that a mirrored or shifted picture cannot pass for the right one. They are
 /// not zero off the display, so that whatever is wrongly seen there shows.
-pub fn asymmetric_transport(geometry: Geometry, seed: u64) -> Transport {
+pub fn asymmetric_transport(geometry: Geometry, kind: Kind, seed: u64) -> Transport {
+    const RANK: usize = 9;
     let mut noise = Noise(seed);
     let (side, area) = (geometry.window.side() as i32, geometry.window.area());
-    let tiles = geometry.tiles().map(|rect| {
-        let mut functions = TransportFunctions::zeros(rect, area);
-        for (pixel, tau) in rect.pixels().zip(functions.tau.chunks_exact_mut(area)) {
+    let mut function = move || -> Vec<f32> {
+        let values = (0..area as i32).map(|s| {
+            let (u, v) = (s % side - side / 2, s / side - side / 2);
+            0.5 / (1.0 + (u * u + v * v) as f32) * (0.2 + 0.8 * noise.next() as f32)
+        });
+        values.collect()
+    };
+    let basis = Basis {
+        kernels: (0..RANK).map(|_| function()).collect(),
+    };
+    let mut noise = Noise(!seed);
+    let tiles = geometry.tiles().enumerate().map(|(i, rect)| {
+        let [direct, factored] = match kind {
+            Kind::Direct => [true, false],
+            Kind::Factored => [false, true],
+            Kind::Mixed => [i % 3 < 2, i % 4 > 0],
+        };
+        let mut tile = BandTile::dark(rect);
+        for pixel in rect.pixels() {
             let across = (pixel.x as f32 + 1.0) / geometry.camera.width as f32;
             let down = (pixel.y as f32 + 1.0) / geometry.camera.height as f32;
             let gain = [0.3 + 0.7 * across, 0.3 + 0.7 * down, 1.2 - across * down];
-            for (s, tau) in tau.iter_mut().enumerate() {
-                let (u, v) = (s as i32 % side - side / 2, s as i32 / side - side / 2);
-                let peak = 0.5 / (1.0 + (u * u + v * v) as f32);
-                *tau = gain.map(|g| g * peak * (0.2 + 0.8 * noise.next() as f32));
+            if direct {
+                let functions = function();
+                tile.functions
+                    .extend(functions.iter().map(|tau| gain.map(|g| g * tau)));
+            }
+            if factored {
+                // Some are negative, in each pixel others.
+                let coefficients = (0..RANK).map(|k| {
+                    let size = (noise.next() as f32 - 0.3) / (1.0 + k as f32).sqrt();
+                    gain.map(|g| g * size)
+                });
+                tile.coefficients.extend(coefficients);
             }
         }
-        DirectTile::quantise(&functions)
+        Tile::quantise(&tile, RANK)
     });
     Transport {
-        geometry,
         tiles: tiles.collect(),
+        basis,
+        geometry,
     }
 }
 
@@ -42,6 +79,14 @@ pub fn lights(extent: Extent) -> Vec<(&'static str, Light)> {
         .collect();
     let random = Light::from_linear_rgb(extent, &values).unwrap();
     lights.push(("random", random));
+    // One that fills a corner only, of one colour.
+    let corner = (0..extent.area()).flat_map(|i| {
+        let (u, v) = (i as u32 % extent.width, i as u32 / extent.width);
+        let lit = u < extent.width.div_ceil(3) && v < extent.height.div_ceil(3);
+        [0.2, 0.9, 0.4].map(|c| if lit { c * noise.next() as f32 } else { 0.0 })
+    });
+    let corner: Vec<f32> = corner.collect();
+    lights.push(("corner", Light::from_linear_rgb(extent, &corner).unwrap()));
     lights
 }
 

@@ -1,147 +1,230 @@
-//! Relighting on the CPU, tile by tile.
+//! Relighting on the CPU: square by square of the light plane, and of the squares only those in
+//! which the light has changed.
 //!
-//! The inner loop is one kernel with a scalar twin and a `simd128` one. Both do the same operations
-//! in the same order in each lane, so their results are equal to the bit.
+//! A square's light is correlated with the basis ([`correlation`]), and the pixels that look at the
+//! square are combined from that while it is in the cache ([`combine`]). Elements that a tile has
+//! besides are summed one by one ([`direct`]). All of it is plain arithmetic in one order, whatever
+//! the width of the vectors, so that every machine draws the same bits.
 
-#[cfg_attr(
-    all(target_arch = "wasm32", target_feature = "simd128"),
-    allow(dead_code) // the twin, then used by the equality test alone
-)]
-mod scalar;
-#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-mod simd128;
+mod combine;
+mod correlation;
+mod direct;
+mod fft;
+mod padded;
+mod squares;
 
-use super::{Light, LinearPicture};
-use crate::transport::{DirectTile, Element, Geometry, Transport};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::{Light, LinearPicture, Rgba8Picture, Tint, tone};
+use crate::transport::{CHANNELS, QUAD, Tile, Transport};
+use crate::vectorised::vectorised;
+use crate::workers::Workers;
+use correlation::{Correlator, Workspace};
+use padded::PaddedLight;
+use squares::{Run, Square, Squares};
 
 /// The kernel this build uses.
 pub const KERNEL: &str = if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
     "simd128"
-} else {
+} else if cfg!(target_arch = "wasm32") {
     "scalar"
+} else {
+    "native"
 };
 
-#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-use simd128::accumulate;
-
-#[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
-use scalar::accumulate;
-
-/// A light with a dark border, so that windows reaching over the display's edge need no tests.
-#[derive(Clone, Debug)]
-pub struct PaddedLight {
-    elements: Vec<[f32; 4]>,
-    stride: usize,
-    rows: usize,
-    border: i32,
+/// One photograph, ready to be relit.
+#[derive(Debug)]
+pub struct Relighter {
+    transport: Arc<Transport>,
+    /// None where no tile has coefficients.
+    correlator: Option<Correlator>,
+    squares: Squares,
+    light: PaddedLight,
+    /// Of each square's pixels; in a lock of its own for threads to share the squares out.
+    linear: Vec<Mutex<Vec<[f32; CHANNELS]>>>,
 }
 
-impl PaddedLight {
-    /// Pads a light for windows of the given geometry.
+/// What a thread works with, kept from frame to frame.
+#[derive(Debug, Default)]
+struct Scratch {
+    work: Option<Workspace>,
+    seen: Vec<[f32; QUAD]>,
+}
+
+thread_local! {
+    static SCRATCH: std::cell::RefCell<Scratch> = std::cell::RefCell::default();
+}
+
+impl Relighter {
+    /// Plans the work. All is dark until the first light.
+    pub fn new(transport: Arc<Transport>) -> Self {
+        let geometry = &transport.geometry;
+        let bounds = squares::bounds(&transport);
+        let factored = transport
+            .tiles
+            .iter()
+            .any(|tile| !tile.coefficients.is_dark());
+        let (across, down) = (bounds.columns.len(), bounds.rows.len());
+        let correlator =
+            factored.then(|| Correlator::new(&transport.basis, geometry.window, across, down));
+        let reach = correlator
+            .as_ref()
+            .map_or(squares::DIRECT_REACH, Correlator::reach);
+        let squares = Squares::new(&transport, &bounds, reach);
+        let light = PaddedLight::new(
+            geometry.light,
+            squares.origin,
+            squares.seen(geometry.window.side() as usize),
+        );
+        let dark = |square: &Square| Mutex::new(vec![[0.0; CHANNELS]; square.places.len()]);
+        Self {
+            linear: squares.all.iter().map(dark).collect(),
+            correlator,
+            squares,
+            light,
+            transport,
+        }
+    }
+
+    /// What is relit.
+    pub fn transport(&self) -> &Transport {
+        &self.transport
+    }
+
+    /// Takes a light in the place of the last one; does only what its changes ask for.
     ///
     /// # Panics
-    /// If the light's extent is not the geometry's.
-    pub fn new(geometry: &Geometry, light: &Light) -> Self {
-        let extent = geometry.light;
+    /// If the light's extent is not the transport's.
+    pub fn relight(&mut self, light: &Light, workers: &impl Workers) {
+        let extent = self.transport.geometry.light;
         assert_eq!(light.extent(), extent, "a light of another extent");
-        let border = geometry.window.side() as usize - 1;
-        let stride = extent.width as usize + 2 * border;
-        let rows = extent.height as usize + 2 * border;
-        let mut elements = vec![[0.0; 4]; stride * rows];
-        for (v, row) in light
-            .elements()
-            .chunks_exact(extent.width as usize)
-            .enumerate()
+        self.light.put(light);
+        let side = self.squares.reach + self.transport.geometry.window.side() as usize - 1;
+        let stale: Vec<usize> = (0..self.squares.all.len())
+            .filter(|&i| {
+                let [u, v] = self.squares.all[i].at;
+                self.light.changed(u..u + side, v..v + side)
+            })
+            .collect();
+        let this = &*self;
+        workers.map(stale.len(), |i| {
+            SCRATCH
+                .with_borrow_mut(|scratch| vectorised(|| this.relight_square(stale[i], scratch)));
+        });
+    }
+
+    #[inline(always)]
+    fn relight_square(&self, i: usize, scratch: &mut Scratch) {
+        let square = &self.squares.all[i];
+        let mut linear = lock(&self.linear[i]);
+        let [u, v] = square.at;
+        let side = self.squares.reach + self.transport.geometry.window.side() as usize - 1;
+        let rows = (v..v + side).map(|v| &self.light.row(u, v)[..side]);
+        let tint = Tint::of(rows);
+        linear.fill([0.0; CHANNELS]);
+        if tint.is_dark() {
+            return;
+        }
+        if let Some(correlator) = &self.correlator
+            && square
+                .runs
+                .iter()
+                .any(|run| !self.tile(run).coefficients.is_dark())
         {
-            let at = (v + border) * stride + border;
-            elements[at..at + row.len()].copy_from_slice(row);
+            let fits = |work: &Workspace| correlator.fits(work);
+            let work = match scratch.work.take().filter(fits) {
+                Some(work) => scratch.work.insert(work),
+                None => scratch.work.insert(correlator.workspace()),
+            };
+            let channels = tint.channels();
+            let (reach, quads) = (correlator.reach(), correlator.quads());
+            let texels = reach * reach * channels.len() * quads;
+            scratch.seen.resize(texels, [0.0; QUAD]);
+            let row = |r: usize| (r < side).then(|| &self.light.row(u, v + r)[..side]);
+            correlator.correlate(row, channels, work, &mut scratch.seen);
+            for run in &square.runs {
+                let tile = &self.tile(run).coefficients;
+                if !tile.is_dark() {
+                    let places = &square.places[run.begin..run.begin + run.length];
+                    let linear = &mut linear[run.begin..run.begin + run.length];
+                    let from = combine::Seen {
+                        texels: &scratch.seen,
+                        quads,
+                        tint,
+                    };
+                    combine::combine(tile, run.first, places, from, linear);
+                }
+            }
         }
-        Self {
-            elements,
-            stride,
-            rows,
-            border: border as i32,
+        let window = self.transport.geometry.window.side() as usize;
+        for run in &square.runs {
+            let tile = &self.tile(run).functions;
+            if tile.is_dark() {
+                continue;
+            }
+            for at in 0..run.length {
+                let place = usize::from(square.places[run.begin + at]);
+                let (column, row) = (place % self.squares.reach, place / self.squares.reach);
+                let seen = self.light.rows(u + column, v + row);
+                let sum = direct::sum(tile, run.first + at, seen, window, self.light.stride());
+                let y = &mut linear[run.begin + at];
+                (0..CHANNELS).for_each(|c| y[c] += sum[c]);
+            }
         }
     }
 
-    /// The part of the light a window of `side` elements sees, or `None` where all of it is dark.
-    fn window(&self, origin: Element, side: usize) -> Option<&[[f32; 4]]> {
-        let u = usize::try_from(origin.u.checked_add(self.border)?).ok()?;
-        let v = usize::try_from(origin.v.checked_add(self.border)?).ok()?;
-        (u + side <= self.stride && v + side <= self.rows)
-            .then(|| &self.elements[v * self.stride + u..])
+    fn tile(&self, run: &Run) -> &Tile {
+        &self.transport.tiles[run.tile]
+    }
+
+    /// The picture, in units of the measurement.
+    pub fn linear(&self) -> LinearPicture {
+        let mut picture = LinearPicture::black(self.transport.geometry.camera);
+        self.for_each_run(|run, linear| {
+            let at = self.transport.geometry.camera.index(run.pixel);
+            for (y, &[r, g, b]) in picture.pixels[at..at + run.length].iter_mut().zip(linear) {
+                *y = [r, g, b, 0.0];
+            }
+        });
+        picture
+    }
+
+    /// The picture scaled by `exposure`, as 8-bit sRGB.
+    pub fn picture(&self, exposure: f32) -> Rgba8Picture {
+        let mut picture = Rgba8Picture::black(self.transport.geometry.camera);
+        self.tone_map(exposure, &mut picture);
+        picture
+    }
+
+    /// The picture scaled by `exposure`, as 8-bit sRGB, into one of the camera's extent.
+    ///
+    /// # Panics
+    /// If `picture` has another extent.
+    pub fn tone_map(&self, exposure: f32, picture: &mut Rgba8Picture) {
+        let camera = self.transport.geometry.camera;
+        assert_eq!(picture.extent, camera, "a picture of another extent");
+        picture.pixels.fill([0, 0, 0, 255]);
+        let curve = tone::Curve::get();
+        self.for_each_run(|run, linear| {
+            let at = camera.index(run.pixel);
+            for (y, linear) in picture.pixels[at..at + run.length].iter_mut().zip(linear) {
+                let [r, g, b] = linear.map(|y| curve.srgb8(y * exposure));
+                *y = [r, g, b, 255];
+            }
+        });
+    }
+
+    fn for_each_run(&self, mut each: impl FnMut(&Run, &[[f32; CHANNELS]])) {
+        for (square, linear) in self.squares.all.iter().zip(&self.linear) {
+            let linear = lock(linear);
+            for run in &square.runs {
+                each(run, &linear[run.begin..run.begin + run.length]);
+            }
+        }
     }
 }
 
-/// Relights one tile: its pixels' linear RGB, row by row, into `out`.
-///
-/// # Panics
-/// If `out` or the tile's codes do not have the length the geometry gives them.
-pub fn relight_tile(
-    geometry: &Geometry,
-    tile: &DirectTile,
-    light: &PaddedLight,
-    out: &mut [[f32; 4]],
-) {
-    let (side, area) = (geometry.window.side() as usize, geometry.window.area());
-    assert_eq!(out.len(), tile.rect.extent.area(), "one output a pixel");
-    if tile.is_dark() {
-        out.fill([0.0; 4]);
-        return;
-    }
-    assert_eq!(tile.codes.len(), out.len() * area, "one code an element");
-    let functions = tile.codes.chunks_exact(area);
-    for ((pixel, codes), y) in tile.rect.pixels().zip(functions).zip(out) {
-        let sum = light
-            .window(geometry.window_origin(pixel), side)
-            .map_or([0.0; 4], |seen| accumulate(codes, seen, side, light.stride));
-        *y = [
-            sum[0] * tile.step[0],
-            sum[1] * tile.step[1],
-            sum[2] * tile.step[2],
-            0.0,
-        ];
-    }
-}
-
-/// Relights the whole picture on the calling thread.
-pub fn relight(transport: &Transport, light: &Light) -> LinearPicture {
-    let geometry = &transport.geometry;
-    let padded = PaddedLight::new(geometry, light);
-    let mut picture = LinearPicture::black(geometry.camera);
-    let mut scratch = Vec::new();
-    for tile in &transport.tiles {
-        scratch.clear();
-        scratch.resize(tile.rect.extent.area(), [0.0; 4]);
-        relight_tile(geometry, tile, &padded, &mut scratch);
-        picture.put(tile.rect, &scratch);
-    }
-    picture
-}
-
-#[cfg(all(test, target_arch = "wasm32", target_feature = "simd128"))]
-mod twins {
-    use super::{scalar, simd128};
-    use wasm_bindgen_test::wasm_bindgen_test;
-
-    #[wasm_bindgen_test]
-    fn simd128_equals_scalar_to_the_bit() {
-        let mut state = 1u32;
-        let mut next = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            state >> 8
-        };
-        for side in [1, 3, 15, 17] {
-            let stride = side + 5;
-            let codes: Vec<_> = (0..side * side)
-                .map(|_| std::array::from_fn(|_| next() as i16))
-                .collect();
-            let seen: Vec<_> = (0..stride * side)
-                .map(|_| std::array::from_fn(|_| next() as f32 / 16_777_216.0))
-                .collect();
-            let fast = simd128::accumulate(&codes, &seen, side, stride);
-            let plain = scalar::accumulate(&codes, &seen, side, stride);
-            assert_eq!(fast.map(f32::to_bits), plain.map(f32::to_bits));
-        }
-    }
+/// A square's pixels. They are written whole, whatever became of another thread.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

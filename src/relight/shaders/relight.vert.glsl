@@ -7,16 +7,28 @@ precision highp int;
 struct Params {
     int window;
     float exposure;
-    vec2 reserved;
+    int quads;
+    int seen_quads;
+    vec4 tint;
+};
+struct Basis {
+    vec4 quads[1024];
+};
+struct Channel {
+    vec4 share;
 };
 struct Covering {
     vec4 clip;
     vec2 picture;
 };
+struct Pair {
+    vec4 first;
+    vec4 second;
+};
 smooth out vec2 _vs2fs_location0;
 
-vec3 srgb_encode(vec3 linear) {
-    vec3 y = clamp(linear, vec3(0.0), vec3(1.0));
+vec3 srgb_encode(vec3 linear_1) {
+    vec3 y = clamp(linear_1, vec3(0.0), vec3(1.0));
     vec3 curve = ((1.055 * pow(y, vec3(0.41666666))) - vec3(0.055));
     return mix(curve, (12.92 * y), lessThanEqual(y, vec3(0.0031308)));
 }

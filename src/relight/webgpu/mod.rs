@@ -9,9 +9,9 @@ use wasm_bindgen::JsCast;
 use wgpu::util::is_browser_webgpu_supported;
 
 use super::backend::{Backend, BackendError};
-use super::texture_layout::{TextureLayout, TextureLimits};
+use super::texture_layout::{Pass, TextureLayout, TextureLimits};
 use super::{Light, SHADER};
-use crate::transport::{Extent, Transport};
+use crate::transport::{CHANNELS, Extent, Transport};
 use textures::{Textures, write_texture};
 
 const API: &str = "WebGPU";
@@ -22,13 +22,23 @@ pub struct WebGpu {
     device: wgpu::Device,
     queue: wgpu::Queue,
     surface: wgpu::Surface<'static>,
-    pipeline: wgpu::RenderPipeline,
+    see: Passes,
+    relight: wgpu::RenderPipeline,
     bindings: wgpu::BindGroup,
-    light: wgpu::Texture,
-    params: wgpu::Buffer,
+    textures: Textures,
+    /// The light that is seen.
+    lit: Option<Light>,
     kernel: String,
     /// Why the device no longer works, once it does not.
     lost: Arc<OnceLock<String>>,
+}
+
+/// What sees the light through the basis.
+struct Passes {
+    pipeline: wgpu::RenderPipeline,
+    /// `[channel][pair]`.
+    bindings: [Vec<wgpu::BindGroup>; CHANNELS],
+    layers: Vec<wgpu::TextureView>,
 }
 
 impl WebGpu {
@@ -52,7 +62,7 @@ impl WebGpu {
             .map_err(|e| device_error(e.to_string()))?;
         let offered = adapter.limits();
         let layout = TextureLayout::new(
-            transport.geometry,
+            transport,
             TextureLimits {
                 side: offered.max_texture_dimension_2d,
                 layers: offered.max_texture_array_layers,
@@ -86,12 +96,17 @@ impl WebGpu {
                 .first()
                 .copied()
                 .unwrap_or(wgpu::TextureFormat::Bgra8Unorm);
-            let pipeline = pipeline(&device, format);
-            let textures = Textures::new(&device, &layout);
+            let [see, relight] = pipelines(&device, format);
+            let textures = Textures::new(&device, &layout, &transport.basis);
             textures.upload(&queue, &layout, transport);
-            let bindings = textures.bind(&device, &pipeline);
+            let bindings = textures.bind(&device, &relight);
+            let see = Passes {
+                bindings: textures.bind_passes(&device, &see),
+                layers: textures.layers(),
+                pipeline: see,
+            };
             configure(&surface, &device, format, transport.geometry.camera);
-            (surface, pipeline, bindings, textures)
+            (surface, see, relight, bindings, textures)
         });
         // Scopes are popped on every path, innermost first.
         let errors = [out_of_memory.pop().await, invalid.pop().await];
@@ -100,15 +115,17 @@ impl WebGpu {
             None => Ok(parts),
         });
         // Not left to the garbage collector, which does not know how much the device holds.
-        let (surface, pipeline, bindings, textures) = built.inspect_err(|_| device.destroy())?;
+        let (surface, see, relight, bindings, textures) =
+            built.inspect_err(|_| device.destroy())?;
         Ok(Self {
             layout,
             queue,
             surface,
-            pipeline,
+            see,
+            relight,
             bindings,
-            light: textures.light,
-            params: textures.params,
+            textures,
+            lit: None,
             kernel: describe(&adapter.get_info(), &device),
             lost,
             device,
@@ -134,36 +151,30 @@ impl Backend for WebGpu {
             | wgpu::CurrentSurfaceTexture::Suboptimal(frame) => frame,
             other => return Err(BackendError::Lost(format!("no frame: {other:?}"))),
         };
-        let elements = bytemuck::cast_slice(light.elements());
-        write_texture(
-            &self.queue,
-            &self.light,
-            elements,
-            (0, 0),
-            self.layout.light(),
-        );
-        let params = self.layout.params(exposure);
-        self.queue
-            .write_buffer(&self.params, 0, bytemuck::bytes_of(&params));
-        let view = frame.texture.create_view(&Default::default());
+        let tint = light.tint();
+        let params = self.layout.params(tint, exposure);
+        let bytes = bytemuck::bytes_of(&params);
+        self.queue.write_buffer(&self.textures.params, 0, bytes);
         let mut encoder = self.device.create_command_encoder(&Default::default());
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
-                ..Default::default()
-            });
-            pass.set_pipeline(&self.pipeline);
-            pass.set_bind_group(0, &self.bindings, &[]);
-            pass.draw(0..3, 0..1);
+        // What is seen depends on the light alone.
+        if self.lit.as_ref() != Some(light) {
+            let elements = bytemuck::cast_slice(light.elements());
+            let extent = self.layout.light();
+            write_texture(&self.queue, &self.textures.light, elements, [0; 3], extent);
+            for Pass {
+                channel,
+                pair,
+                layer,
+            } in self.layout.passes(tint)
+            {
+                let layers = &self.see.layers[layer as usize..][..2];
+                let bindings = &self.see.bindings[channel][pair];
+                draw(&mut encoder, &self.see.pipeline, bindings, layers);
+            }
+            self.lit = Some(light.clone());
         }
+        let view = frame.texture.create_view(&Default::default());
+        draw(&mut encoder, &self.relight, &self.bindings, &[view]);
         self.queue.submit([encoder.finish()]);
         self.queue.present(frame);
         Ok(())
@@ -215,32 +226,68 @@ fn describe(info: &wgpu::AdapterInfo, device: &wgpu::Device) -> String {
     }
 }
 
-fn pipeline(device: &wgpu::Device, format: wgpu::TextureFormat) -> wgpu::RenderPipeline {
+/// Covers the targets.
+fn draw(
+    encoder: &mut wgpu::CommandEncoder,
+    pipeline: &wgpu::RenderPipeline,
+    bindings: &wgpu::BindGroup,
+    targets: &[wgpu::TextureView],
+) {
+    let attachment = |view| {
+        Some(wgpu::RenderPassColorAttachment {
+            view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                store: wgpu::StoreOp::Store,
+            },
+        })
+    };
+    let attachments: Vec<_> = targets.iter().map(attachment).collect();
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        color_attachments: &attachments,
+        ..Default::default()
+    });
+    pass.set_pipeline(pipeline);
+    pass.set_bind_group(0, bindings, &[]);
+    pass.draw(0..3, 0..1);
+}
+
+/// Of the passes that see, and of the last one.
+fn pipelines(device: &wgpu::Device, format: wgpu::TextureFormat) -> [wgpu::RenderPipeline; 2] {
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("relight"),
         source: wgpu::ShaderSource::Wgsl(SHADER.into()),
     });
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("relight"),
-        layout: None,
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("cover"),
-            compilation_options: Default::default(),
-            buffers: &[],
-        },
-        primitive: Default::default(),
-        depth_stencil: None,
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("relight"),
-            compilation_options: Default::default(),
-            targets: &[Some(format.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+    let pipeline = |entry_point, targets: &[Option<wgpu::ColorTargetState>]| {
+        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(entry_point),
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("cover"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: Default::default(),
+            depth_stencil: None,
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some(entry_point),
+                compilation_options: Default::default(),
+                targets,
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    };
+    let seen = Some(wgpu::TextureFormat::Rgba32Float.into());
+    [
+        pipeline("see", &[seen.clone(), seen]),
+        pipeline("relight", &[Some(format.into())]),
+    ]
 }
 
 fn configure(
@@ -267,7 +314,7 @@ fn configure(
 mod tests {
     use super::*;
     use crate::relight::BuiltinLight;
-    use crate::transport::{Correspondence, DirectTile, Geometry, TransportFunctions, Window};
+    use crate::transport::{Basis, Correspondence, Geometry, Tile, Window};
     use wasm_bindgen_futures::JsFuture;
     use wasm_bindgen_test::wasm_bindgen_test;
 
@@ -286,10 +333,10 @@ mod tests {
             },
             tile_side: 8,
         };
-        let functions = TransportFunctions::zeros(geometry.tile(0), geometry.window.area());
         let transport = Transport {
             geometry,
-            tiles: vec![DirectTile::quantise(&functions)],
+            basis: Basis::default(),
+            tiles: vec![Tile::dark(geometry.tile(0))],
         };
         let document = web_sys::window().unwrap().document().unwrap();
         let canvas = document.create_element("canvas").unwrap().unchecked_into();

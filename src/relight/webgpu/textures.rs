@@ -1,20 +1,29 @@
 //! The transport and the light as WebGPU textures.
 
-use crate::relight::texture_layout::{Params, TextureLayout};
-use crate::transport::{Extent, Transport};
+use wgpu::util::DeviceExt;
+
+use crate::relight::texture_layout::{Fold, Params, TextureLayout};
+use crate::transport::{Basis, CHANNELS, Extent, Transport};
 
 /// What the shader's bindings stand for, in their order.
 pub(super) struct Textures {
+    coefficients: wgpu::Texture,
+    pub seen: wgpu::Texture,
     codes: wgpu::Texture,
     pixels: wgpu::Texture,
     steps: wgpu::Texture,
     pub light: wgpu::Texture,
     pub params: wgpu::Buffer,
+    /// Pair by pair.
+    basis: Vec<wgpu::Buffer>,
+    channels: [wgpu::Buffer; CHANNELS],
 }
 
 impl Textures {
-    pub fn new(device: &wgpu::Device, layout: &TextureLayout) -> Self {
-        let texture = |label, extent: Extent, layers, format| {
+    pub fn new(device: &wgpu::Device, layout: &TextureLayout, basis: &Basis) -> Self {
+        use wgpu::TextureFormat::{Rgba16Sint, Rgba32Float, Rgba32Sint};
+        use wgpu::TextureUsages;
+        let texture = |label, Fold { extent, layers }, format, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
                 size: size(extent, layers),
@@ -22,28 +31,56 @@ impl Textures {
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
                 format,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+                usage: TextureUsages::TEXTURE_BINDING | usage,
                 view_formats: &[],
             })
         };
-        use wgpu::TextureFormat::{Rgba16Sint, Rgba32Float, Rgba32Sint};
-        let codes = layout.codes();
-        Self {
-            codes: texture("codes", codes.extent, codes.layers, Rgba16Sint),
-            pixels: texture("pixels", layout.pixels(), 1, Rgba32Sint),
-            steps: texture("steps", layout.steps(), 1, Rgba32Float),
-            light: texture("light", layout.light(), 1, Rgba32Float),
-            params: device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("params"),
-                size: size_of::<Params>() as u64,
+        let flat = |extent| Fold { extent, layers: 1 };
+        let given = TextureUsages::COPY_DST;
+        let uniforms = |label, contents: &[u8]| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
                 usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
+            })
+        };
+        let pairs = layout.basis(basis);
+        Self {
+            coefficients: texture("coefficients", layout.coefficients(), Rgba16Sint, given),
+            seen: texture(
+                "seen",
+                layout.seen(),
+                Rgba32Float,
+                TextureUsages::RENDER_ATTACHMENT,
+            ),
+            codes: texture("codes", layout.codes(), Rgba16Sint, given),
+            pixels: texture("pixels", flat(layout.pixels()), Rgba32Sint, given),
+            steps: texture("steps", flat(layout.steps()), Rgba32Float, given),
+            light: texture("light", flat(layout.light()), Rgba32Float, given),
+            params: uniforms("params", &[0; size_of::<Params>()]),
+            basis: pairs
+                .iter()
+                .map(|pair| uniforms("basis", bytemuck::cast_slice(pair)))
+                .collect(),
+            channels: TextureLayout::CHANNELS
+                .map(|channel| uniforms("channel", bytemuck::cast_slice(&channel))),
         }
     }
 
-    /// Fills all but the light, which every frame brings anew.
+    /// Fills what does not depend on the light.
     pub fn upload(&self, queue: &wgpu::Queue, layout: &TextureLayout, transport: &Transport) {
+        let Ok(()) = layout.for_each_coefficient_block(transport, |block| {
+            let [x, y] = block.at;
+            let texels = bytemuck::cast_slice(block.texels);
+            write_texture(
+                queue,
+                &self.coefficients,
+                texels,
+                [x, y, block.layer],
+                block.extent,
+            );
+            Ok::<_, std::convert::Infallible>(())
+        });
         let width = layout.codes().extent.width;
         let Ok(()) = layout.for_each_code_block(transport, |block| {
             let rows = Extent {
@@ -51,43 +88,100 @@ impl Textures {
                 height: block.rows,
             };
             let texels = bytemuck::cast_slice(block.texels);
-            write_texture(queue, &self.codes, texels, (block.layer, block.row), rows);
+            write_texture(
+                queue,
+                &self.codes,
+                texels,
+                [0, block.row, block.layer],
+                rows,
+            );
             Ok::<_, std::convert::Infallible>(())
         });
-        let pixels = layout.pixel_texels();
+        let pixels = layout.pixel_texels(transport);
         let texels = bytemuck::cast_slice(&pixels);
-        write_texture(queue, &self.pixels, texels, (0, 0), layout.pixels());
+        write_texture(queue, &self.pixels, texels, [0; 3], layout.pixels());
         let steps = layout.step_texels(transport);
         let texels = bytemuck::cast_slice(&steps);
-        write_texture(queue, &self.steps, texels, (0, 0), layout.steps());
+        write_texture(queue, &self.steps, texels, [0; 3], layout.steps());
     }
 
+    /// What the last pass reads.
     pub fn bind(&self, device: &wgpu::Device, pipeline: &wgpu::RenderPipeline) -> wgpu::BindGroup {
-        // An array of one layer is still an array to the shader.
-        let codes = self.codes.create_view(&wgpu::TextureViewDescriptor {
-            dimension: Some(wgpu::TextureViewDimension::D2Array),
-            ..Default::default()
-        });
-        let [pixels, steps, light] = [&self.pixels, &self.steps, &self.light]
-            .map(|texture| texture.create_view(&Default::default()));
-        let entry = |binding, view| wgpu::BindGroupEntry {
-            binding,
-            resource: wgpu::BindingResource::TextureView(view),
+        let array = |texture: &wgpu::Texture| {
+            // An array of one layer is still an array to the shader.
+            texture.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2Array),
+                ..Default::default()
+            })
         };
+        let views = [
+            array(&self.coefficients),
+            array(&self.seen),
+            array(&self.codes),
+            self.pixels.create_view(&Default::default()),
+            self.steps.create_view(&Default::default()),
+            self.light.create_view(&Default::default()),
+        ];
+        let textures = (0..)
+            .zip(&views)
+            .map(|(binding, view)| wgpu::BindGroupEntry {
+                binding,
+                resource: wgpu::BindingResource::TextureView(view),
+            });
+        let entries: Vec<_> = textures.chain([uniform(6, &self.params)]).collect();
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("relight"),
             layout: &pipeline.get_bind_group_layout(0),
-            entries: &[
-                entry(0, &codes),
-                entry(1, &pixels),
-                entry(2, &steps),
-                entry(3, &light),
-                wgpu::BindGroupEntry {
-                    binding: 4,
-                    resource: self.params.as_entire_binding(),
-                },
-            ],
+            entries: &entries,
         })
+    }
+
+    /// What the passes before read: `[channel][pair]`.
+    pub fn bind_passes(
+        &self,
+        device: &wgpu::Device,
+        pipeline: &wgpu::RenderPipeline,
+    ) -> [Vec<wgpu::BindGroup>; CHANNELS] {
+        let layout = pipeline.get_bind_group_layout(0);
+        let light = self.light.create_view(&Default::default());
+        self.channels.each_ref().map(|channel| {
+            let pairs = self.basis.iter().map(|basis| {
+                device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: Some("see"),
+                    layout: &layout,
+                    entries: &[
+                        wgpu::BindGroupEntry {
+                            binding: 5,
+                            resource: wgpu::BindingResource::TextureView(&light),
+                        },
+                        uniform(6, &self.params),
+                        uniform(7, basis),
+                        uniform(8, channel),
+                    ],
+                })
+            });
+            pairs.collect()
+        })
+    }
+
+    /// Each layer of what is seen, to draw into.
+    pub fn layers(&self) -> Vec<wgpu::TextureView> {
+        let layer = |layer| {
+            self.seen.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2),
+                base_array_layer: layer,
+                array_layer_count: Some(1),
+                ..Default::default()
+            })
+        };
+        (0..self.seen.depth_or_array_layers()).map(layer).collect()
+    }
+}
+
+fn uniform(binding: u32, buffer: &wgpu::Buffer) -> wgpu::BindGroupEntry<'_> {
+    wgpu::BindGroupEntry {
+        binding,
+        resource: buffer.as_entire_binding(),
     }
 }
 
@@ -99,31 +193,27 @@ fn size(extent: Extent, layers: u32) -> wgpu::Extent3d {
     }
 }
 
-/// Writes whole rows of one layer, from `(layer, row)` on.
+/// Writes a rectangle of one layer, from column, row and layer `at` on.
 pub(super) fn write_texture(
     queue: &wgpu::Queue,
     texture: &wgpu::Texture,
     texels: &[u8],
-    (layer, row): (u32, u32),
-    rows: Extent,
+    [x, y, z]: [u32; 3],
+    extent: Extent,
 ) {
     queue.write_texture(
         wgpu::TexelCopyTextureInfo {
             texture,
             mip_level: 0,
-            origin: wgpu::Origin3d {
-                x: 0,
-                y: row,
-                z: layer,
-            },
+            origin: wgpu::Origin3d { x, y, z },
             aspect: wgpu::TextureAspect::All,
         },
         texels,
         wgpu::TexelCopyBufferLayout {
             offset: 0,
-            bytes_per_row: Some((texels.len() / rows.height as usize) as u32),
+            bytes_per_row: Some((texels.len() / extent.height as usize) as u32),
             rows_per_image: None,
         },
-        size(rows, 1),
+        size(extent, 1),
     );
 }

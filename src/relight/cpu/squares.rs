@@ -1,0 +1,151 @@
+//! Which pixels look at which square of the light plane.
+
+use std::ops::Range;
+
+use crate::transport::{CameraPx, Element, Extent, Transport};
+
+/// Origins along a square's side where nothing is correlated.
+pub const DIRECT_REACH: usize = 64;
+
+/// Window origins of all pixels that see any of the display.
+#[derive(Clone, Debug, Default)]
+pub struct Bounds {
+    /// Along u.
+    pub columns: Range<i32>,
+    /// Along v.
+    pub rows: Range<i32>,
+}
+
+/// Pixels side by side that one tile holds and that look at one square.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// The tile.
+    pub tile: usize,
+    /// The first pixel's number in the tile.
+    pub first: usize,
+    /// The first pixel.
+    pub pixel: CameraPx,
+    /// The first pixel's number among those of the square.
+    pub begin: usize,
+    /// Number of pixels.
+    pub length: usize,
+}
+
+/// Window origins in a square of the light plane, and the pixels that have them.
+#[derive(Clone, Debug, Default)]
+pub struct Square {
+    /// Its first origin's column and row, counted from [`Squares::origin`].
+    pub at: [usize; 2],
+    /// Its pixels.
+    pub runs: Vec<Run>,
+    /// Of each pixel the number of its origin in the square, row by row.
+    pub places: Vec<u16>,
+}
+
+/// All squares that any pixel looks at.
+#[derive(Clone, Debug)]
+pub struct Squares {
+    /// The first origin of the first of them.
+    pub origin: Element,
+    /// Origins along each one's side, at most 256.
+    pub reach: usize,
+    across: usize,
+    down: usize,
+    /// Those that any pixel looks at.
+    pub all: Vec<Square>,
+}
+
+/// The origins that matter: of pixels that are not dark, with windows not wholly off the display.
+pub fn bounds(transport: &Transport) -> Bounds {
+    let mut bounds: Option<Bounds> = None;
+    for_each_pixel(transport, |_, _, _, Element { u, v }| {
+        let known = bounds.clone().unwrap_or(Bounds {
+            columns: u..u,
+            rows: v..v,
+        });
+        bounds = Some(Bounds {
+            columns: known.columns.start.min(u)..known.columns.end.max(u + 1),
+            rows: known.rows.start.min(v)..known.rows.end.max(v + 1),
+        });
+    });
+    bounds.unwrap_or_default()
+}
+
+impl Squares {
+    /// Shares the pixels out to squares of `reach` origins a side.
+    pub fn new(transport: &Transport, bounds: &Bounds, reach: usize) -> Self {
+        let across = bounds.columns.len().div_ceil(reach);
+        let down = bounds.rows.len().div_ceil(reach);
+        let mut all = vec![Square::default(); across * down];
+        for_each_pixel(transport, |tile, p, pixel, Element { u, v }| {
+            let (u, v) = (
+                (u - bounds.columns.start) as usize,
+                (v - bounds.rows.start) as usize,
+            );
+            let square = &mut all[v / reach * across + u / reach];
+            let place = v % reach * reach + u % reach;
+            square.at = [u / reach * reach, v / reach * reach];
+            let begin = square.places.len();
+            square.places.push(place as u16); // a reach is at most 256
+            match square.runs.last_mut() {
+                // The next of the same row and tile.
+                Some(run)
+                    if run.tile == tile
+                        && run.first + run.length == p
+                        && run.pixel.y == pixel.y =>
+                {
+                    run.length += 1;
+                }
+                _ => square.runs.push(Run {
+                    tile,
+                    first: p,
+                    pixel,
+                    begin,
+                    length: 1,
+                }),
+            }
+        });
+        all.retain(|square| !square.places.is_empty());
+        for square in &mut all {
+            square.runs.shrink_to_fit();
+            square.places.shrink_to_fit();
+        }
+        Self {
+            origin: Element {
+                u: bounds.columns.start,
+                v: bounds.rows.start,
+            },
+            reach,
+            across,
+            down,
+            all,
+        }
+    }
+
+    /// What all squares see, through windows of that side.
+    pub fn seen(&self, window: usize) -> Extent {
+        let span = |count: usize| (count * self.reach + window - 1) as u32;
+        Extent {
+            width: span(self.across),
+            height: span(self.down),
+        }
+    }
+}
+
+/// Tile, number in it, pixel and window origin of all that may be lit.
+fn for_each_pixel(transport: &Transport, mut each: impl FnMut(usize, usize, CameraPx, Element)) {
+    let geometry = &transport.geometry;
+    let near =
+        |origin: i32, side: u32| origin > -(geometry.window.side() as i32) && origin < side as i32;
+    for (i, tile) in transport.tiles.iter().enumerate() {
+        if tile.is_dark() {
+            continue;
+        }
+        for (p, pixel) in tile.rect().pixels().enumerate() {
+            let origin = geometry.window_origin(pixel);
+            if near(origin.u, geometry.light.width) && near(origin.v, geometry.light.height) {
+                each(i, p, pixel, origin);
+            }
+        }
+    }
+}

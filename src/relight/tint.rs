@@ -1,0 +1,88 @@
+//! Lights of one colour, which are seen through the basis once and not three times.
+
+use crate::transport::CHANNELS;
+
+/// How far from its colour an element may be, of the brightest: rounding of single precision.
+const ROUNDING: f32 = 1e-6;
+
+/// What channels of a light have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tint {
+    /// Each channel is the same as the one of that number, times its factor.
+    One(usize, [f32; CHANNELS]),
+    /// Elements have colours of their own.
+    Many,
+}
+
+impl Tint {
+    /// Of all elements of these rows.
+    #[inline(always)]
+    pub fn of<'a>(rows: impl Iterator<Item = &'a [[f32; 4]]> + Clone) -> Self {
+        let mut sums = [0.0f32; 4];
+        let mut peak = [0.0f32; 4];
+        for row in rows.clone() {
+            for element in row {
+                for c in 0..4 {
+                    sums[c] += element[c];
+                    peak[c] = peak[c].max(element[c]);
+                }
+            }
+        }
+        let base = (1..CHANNELS).fold(0, |best, c| if sums[c] > sums[best] { c } else { best });
+        if sums[base] <= 0.0 {
+            return Self::One(base, [0.0; CHANNELS]);
+        }
+        // From the brightest element: sums have rounding of their own.
+        let brightest = rows
+            .clone()
+            .flatten()
+            .max_by(|a, b| a[base].total_cmp(&b[base]));
+        let brightest = brightest.copied().unwrap_or_default();
+        let factors = std::array::from_fn(|c| brightest[c] / brightest[base]);
+        let most = ROUNDING * peak[0].max(peak[1]).max(peak[2]);
+        for row in rows {
+            let mut off = [0.0f32; CHANNELS];
+            for element in row {
+                for c in 0..CHANNELS {
+                    off[c] = off[c].max((element[c] - factors[c] * element[base]).abs());
+                }
+            }
+            if off.iter().any(|off| *off > most) {
+                return Self::Many;
+            }
+        }
+        Self::One(base, factors)
+    }
+
+    /// Whether there is no light.
+    pub fn is_dark(&self) -> bool {
+        matches!(self, Self::One(_, [0.0, 0.0, 0.0]))
+    }
+
+    /// The channels that have to be looked at.
+    pub fn channels(&self) -> &[usize] {
+        const ALL: [usize; CHANNELS] = [0, 1, 2];
+        match self {
+            Self::One(base, _) => &ALL[*base..=*base],
+            Self::Many => &ALL,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_colour_is_told_from_many() {
+        let tint = |elements: &[[f32; 4]]| Tint::of(elements.chunks(2));
+        let warm = |x: f32| [x, 0.93 * x, 0.8 * x, 0.0];
+        assert_eq!(
+            tint(&[warm(0.0), warm(0.3), warm(0.7)]),
+            Tint::One(0, [1.0, 0.93 * 0.7 / 0.7, 0.8 * 0.7 / 0.7])
+        );
+        assert!(tint(&[[0.0; 4]; 3]).is_dark());
+        assert_eq!(tint(&[warm(0.1), [0.1, 0.1, 0.1, 0.0]]), Tint::Many);
+        assert_eq!(tint(&[[0.0, 0.0, 0.5, 0.0]]).channels(), [2]);
+    }
+}
