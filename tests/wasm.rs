@@ -322,6 +322,47 @@ fn a_file_decodes_in_pieces_of_any_size() {
 }
 
 #[wasm_bindgen_test]
+async fn a_photo_goes_to_another_module_tile_by_tile() {
+    let transport = filed(&transport(0));
+    let mut sent = photo(&transport);
+    let (geometry, basis) = (sent.geometry_parcel(), sent.basis_parcel());
+    let mut received = Photo::receive(&geometry, &basis, sent.metadata()).unwrap();
+    assert_eq!(
+        (received.tiles(), received.decoded_bytes()),
+        (sent.tiles(), 0.0)
+    );
+    let bytes = sent.decoded_bytes();
+    let mut tiles: Vec<_> = (0..sent.tiles())
+        .map(|i| sent.take_tile(i).unwrap())
+        .collect();
+    assert_eq!(sent.decoded_bytes(), 0.0);
+    for (i, tile) in tiles.iter().enumerate() {
+        received.put_tile(i, tile).unwrap();
+    }
+    assert_eq!(received.decoded_bytes(), bytes);
+    let canvas = new_canvas();
+    let mut relighter = relighter("cpu", &received, &canvas).await.unwrap();
+    let light = Light::builtin(&received, "spectrum").unwrap();
+    relighter.render(&light, 1.0).unwrap();
+    let (_, light) = relit::lights(transport.geometry.light).swap_remove(4);
+    let want = reference::relight_srgb8(&transport, &light, 1.0);
+    relit::assert_within_one_code(&read_back(&canvas), &want, "received");
+    // A photograph in use stays, and what was not sent is not taken.
+    assert_eq!(coded(received.put_tile(0, &tiles[0])), "internal");
+    assert_eq!(coded(sent.put_tile(99, &tiles[0])), "internal");
+    tiles[1].pop();
+    assert_eq!(coded(sent.put_tile(1, &tiles[1])), "internal");
+    assert_eq!(
+        coded(Photo::receive(&geometry[1..], &basis, String::new())),
+        "internal"
+    );
+    assert_eq!(
+        coded(Photo::receive(&geometry, &basis[1..], String::new())),
+        "internal"
+    );
+}
+
+#[wasm_bindgen_test]
 fn a_decoder_wants_every_byte_once() {
     let transport = relit::asymmetric_transport(geometries()[0], Kind::Direct, 0);
     let bytes = file(&transport, &Metadata::default());

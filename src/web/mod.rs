@@ -6,6 +6,7 @@ mod canvas2d;
 mod decoder;
 mod error;
 mod light;
+mod parcel;
 mod photo;
 mod relighter;
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::CodedError;
+use super::{CodedError, parcel};
 use crate::format::{FormatError, Metadata};
 use crate::transport::{Geometry, Tile, Transport};
 
@@ -34,6 +34,54 @@ impl Photo {
 
 #[wasm_bindgen]
 impl Photo {
+    /// What a photograph that was decoded by another module has besides tiles: all dark as yet.
+    pub fn receive(geometry: &[f64], basis: &[f32], metadata: String) -> Result<Photo, CodedError> {
+        let transport = parcel::unpack(geometry, basis)?;
+        Ok(Self {
+            transport: Arc::new(transport),
+            metadata,
+        })
+    }
+
+    /// Takes a tile that [`takeTile`](Self::take_tile) gave. Not once a `Relighter` has been made.
+    #[wasm_bindgen(js_name = putTile)]
+    pub fn put_tile(&mut self, index: usize, bytes: &[u8]) -> Result<(), CodedError> {
+        let transport = self.unshared()?;
+        let rank = transport.basis.rank();
+        let area = transport.geometry.window.area();
+        let tile = transport.tiles.get_mut(index).ok_or_else(parcel::wrong)?;
+        *tile = parcel::unpack_tile(bytes, tile.rect(), rank, area)?;
+        Ok(())
+    }
+
+    /// A tile, for a photograph in another module; it is dark afterwards. Not once a `Relighter` has
+    /// been made.
+    #[wasm_bindgen(js_name = takeTile)]
+    pub fn take_tile(&mut self, index: usize) -> Result<Vec<u8>, CodedError> {
+        let tiles = &mut self.unshared()?.tiles;
+        let tile = tiles.get_mut(index).ok_or_else(parcel::wrong)?;
+        let dark = Tile::dark(tile.rect());
+        Ok(parcel::pack_tile(&std::mem::replace(tile, dark)))
+    }
+
+    /// Number of tiles.
+    #[wasm_bindgen(getter)]
+    pub fn tiles(&self) -> usize {
+        self.transport.tiles.len()
+    }
+
+    /// Grids, window and correspondence, for [`receive`](Self::receive).
+    #[wasm_bindgen(js_name = geometryParcel)]
+    pub fn geometry_parcel(&self) -> Vec<f64> {
+        parcel::pack_geometry(self.geometry())
+    }
+
+    /// The basis, for [`receive`](Self::receive).
+    #[wasm_bindgen(js_name = basisParcel)]
+    pub fn basis_parcel(&self) -> Vec<f32> {
+        self.transport.basis.kernels.concat()
+    }
+
     /// Columns of the picture.
     #[wasm_bindgen(getter)]
     pub fn width(&self) -> u32 {
@@ -69,5 +117,12 @@ impl Photo {
     pub fn decoded_bytes(&self) -> f64 {
         let codes: usize = self.transport.tiles.iter().map(Tile::bytes).sum();
         codes as f64
+    }
+}
+
+impl Photo {
+    fn unshared(&mut self) -> Result<&mut Transport, CodedError> {
+        Arc::get_mut(&mut self.transport)
+            .ok_or_else(|| CodedError::new("internal", "tiles of a photograph in use stay"))
     }
 }

@@ -15,6 +15,11 @@ type _Builds = Extends<typeof Scalar, Pick<typeof Scalar, keyof typeof Simd>>;
 type _Decoder = Extends<Simd.Decoder, Omit<Decoder, 'finish'>>;
 type _Constructor = Extends<[number?], ConstructorParameters<typeof Simd.Decoder>>;
 type _Finish = Extends<ReturnType<Simd.Decoder['finish']>, Photo>;
+type _Receive = Extends<ReturnType<typeof Simd.Photo.receive>, Photo>;
+type _Parcels = Extends<
+  [Float64Array, Float32Array, string],
+  Parameters<typeof Simd.Photo.receive>
+>;
 type _Light = Extends<ReturnType<typeof Simd.Light.builtin>, Light>;
 type _Builtin = Extends<[Simd.Photo, string], Parameters<typeof Simd.Light.builtin>>;
 type _Torch = Extends<[Simd.Photo, number, number, number?], Parameters<typeof Simd.Light.torch>>;
@@ -33,6 +38,8 @@ export type Contract = [
   _Decoder,
   _Constructor,
   _Finish,
+  _Receive,
+  _Parcels,
   _Light,
   _Builtin,
   _Torch,

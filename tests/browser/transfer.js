@@ -15,6 +15,8 @@ import {
 } from './browser.js';
 import { demoBytes, glassBytes, nativePicture } from './photos.js';
 
+const SRC = '/photos/glass.ltm';
+
 /** The ranges of two requests that bring a file of so many bytes. */
 const inTwo = (/** @type {number} */ size) => [
   `0-${FIRST_BYTES - 1}`,
@@ -91,5 +93,54 @@ describe('a photograph', () => {
       await load;
     });
     assert.equal(ranges?.length, 2);
+  });
+
+  test('is decoded by a worker, which ends with it', async (t) => {
+    const page = await openPage(t, '/bench');
+    /** @type {Promise<unknown>[]} */
+    const ends = [];
+    page.on('worker', (worker) => ends.push(worker.waitForEvent('close')));
+    await mount(page, { src: SRC, backend: 'cpu', light: 'spectrum' });
+    await loaded(page);
+    assert.equal(ends.length, 1);
+    await Promise.all(ends);
+    assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
+  });
+
+  /** @type {[what: string, worker: string | number][]} */
+  const WORKERS = [
+    ['is not there', 404],
+    ['is no script', 'this is no JavaScript'],
+    ['does not know what is asked', 'onmessage = () => {}; postMessage({ kind: "failed" });'],
+  ];
+  for (const [what, worker] of WORKERS) {
+    test(`is decoded on the page where the worker ${what}`, async (t) => {
+      const page = await openPage(t, '/bench');
+      await page.route('**/relightable-photo-worker.js', (route) =>
+        typeof worker === 'number'
+          ? route.fulfill({ status: worker })
+          : route.fulfill({ contentType: 'text/javascript', body: worker }),
+      );
+      await mount(page, { src: SRC, backend: 'cpu', light: 'spectrum' });
+      await loaded(page);
+      assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
+    });
+  }
+
+  test('is decoded on the page where workers are refused', async (t) => {
+    const page = await openPage(t, '/bench', {
+      before: () => {
+        globalThis.Worker = /** @type {any} */ (
+          class {
+            constructor() {
+              throw new DOMException('of another origin', 'SecurityError');
+            }
+          }
+        );
+      },
+    });
+    await mount(page, { src: SRC, backend: 'cpu', light: 'spectrum' });
+    await loaded(page);
+    assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
   });
 });

@@ -1,5 +1,6 @@
 /** `<relightable-photo>`: attributes and pointer in, events and a picture out. */
 
+import { newDecoder } from './decoders.js';
 import { type Backend, loadEngine } from './engine.js';
 import { PhotoError, toPhotoError } from './errors.js';
 import {
@@ -80,10 +81,9 @@ export class RelightablePhoto extends Base {
       {
         open: (src, signal, onProgress) =>
           openPhoto(src, signal, onProgress, {
-            engine: loadEngine,
+            decoder: newDecoder,
             fetch: (...request) => fetch(...request),
             pause,
-            now: () => performance.now(),
           }),
         draw: async (backend, photo, lost) =>
           CanvasDrawing.create(await loadEngine(), backend, photo, lost),

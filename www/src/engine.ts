@@ -18,6 +18,15 @@ export interface Photo extends Freeable {
   readonly lightHeight: number;
   readonly metadata: string;
   readonly decodedBytes: number;
+  /** Number of tiles. */
+  readonly tiles: number;
+  /** What `Photo.receive` in another module takes. */
+  geometryParcel(): Float64Array;
+  basisParcel(): Float32Array;
+  /** A tile for another module; it is dark here afterwards. Not once the photograph is drawn. */
+  takeTile(index: number): Uint8Array;
+  /** Takes a tile that `takeTile` gave. Not once the photograph is drawn. */
+  putTile(index: number, bytes: Uint8Array): void;
 }
 
 /** What every element of the light plane emits. */
@@ -50,6 +59,10 @@ export interface Relighter extends Freeable {
 /** What the module exports. */
 export interface Engine {
   Decoder: { new (maxDecodedBytes?: number): Decoder };
+  Photo: {
+    /** A photograph that another module decoded, without its tiles as yet. */
+    receive(geometry: Float64Array, basis: Float32Array, metadata: string): Photo;
+  };
   Light: {
     builtin(photo: Photo, name: string): Light;
     torch(photo: Photo, x: number, y: number, size?: number): Light;

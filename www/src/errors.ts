@@ -24,6 +24,8 @@ export type PageErrorCode =
   | 'http-range'
   /** The WebAssembly module beside the script could not be loaded. */
   | 'wasm-unavailable'
+  /** The worker that decodes a photograph stopped at it, for want of memory for one. */
+  | 'worker-unavailable'
   /** Something was asked of a photograph that is not loaded yet. */
   | 'not-loaded'
   /** A fault in this software. */

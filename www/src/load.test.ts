@@ -5,6 +5,7 @@ import type { AddressInfo } from 'node:net';
 import test, { type TestContext } from 'node:test';
 import { gzipSync } from 'node:zlib';
 import { answer } from '../tools/ranges.js';
+import { LocalDecoder } from './decoding.js';
 import type { Decoder, Photo } from './engine.js';
 import { type LoadPorts, openPhoto } from './load.js';
 
@@ -118,10 +119,9 @@ function bytesOf(asked: Site['asked'], size: number): number {
 function portsOf(ports: Partial<LoadPorts> = {}): LoadPorts {
   let time = 0;
   return {
-    engine: () => Promise.resolve({ Decoder: FakeDecoder }),
+    decoder: async () => new LocalDecoder({ Decoder: FakeDecoder }, () => time++),
     fetch: (input, init) => fetch(input, init),
     pause: () => Promise.resolve(),
-    now: () => time++,
     ...ports,
   };
 }
@@ -352,28 +352,28 @@ test('an abort while the page has its turn is noticed', async (t) => {
 test('an abort while the module loads does not wait for it', async (t) => {
   const site = await serve(t, (request, response) => send(request, response, fileOf()));
   const abort = new AbortController();
-  const engine = () => new Promise<never>(() => {});
+  const decoder = () => new Promise<never>(() => {});
   setTimeout(() => abort.abort(new Error('another src')), 20);
   await assert.rejects(
-    openPhoto(site.url, abort.signal, () => {}, portsOf({ engine })),
+    openPhoto(site.url, abort.signal, () => {}, portsOf({ decoder })),
     /another src/,
   );
 });
 
 test('a module that does not start ends the transfer too', async (t) => {
   const site = await serve(t, (_, response) => response.write('…'));
-  const engine = async () => {
+  const decoder = async () => {
     while (site.closed.length === 0) await new Promise((resolve) => setTimeout(resolve));
     throw new Error('no wasm');
   };
-  await assert.rejects(opened(site.url, { engine }), { code: 'internal', message: /no wasm/ });
+  await assert.rejects(opened(site.url, { decoder }), { code: 'internal', message: /no wasm/ });
   await Promise.all(site.closed);
 });
 
 test('what the server says is told before the module is there', async (t) => {
   const site = await serve(t, (_, response) => response.writeHead(404).end());
-  const engine = () => new Promise<never>(() => {});
-  await assert.rejects(opened(site.url, { engine }), { code: 'http-status' });
+  const decoder = () => new Promise<never>(() => {});
+  await assert.rejects(opened(site.url, { decoder }), { code: 'http-status' });
 });
 
 test('the page gets its turn, with what has been decoded by then', async (t) => {
@@ -399,7 +399,7 @@ test('a decoder that is never content ends in an error', async (t) => {
     override wants = () => Float64Array.of(0, 100);
   }
   const site = await serve(t, (request, response) => send(request, response, fileOf()));
-  const engine = () => Promise.resolve({ Decoder: Glutton });
-  await assert.rejects(opened(site.url, { engine }), { code: 'internal', message: /fed/ });
+  const decoder = async () => new LocalDecoder({ Decoder: Glutton }, () => 0);
+  await assert.rejects(opened(site.url, { decoder }), { code: 'internal', message: /fed/ });
   assert.equal(site.asked.length, 2);
 });

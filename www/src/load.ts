@@ -1,6 +1,7 @@
 /** From an address to a decoded photograph. */
 
-import type { Decoder, Engine, Photo } from './engine.js';
+import type { PhotoDecoder } from './decoding.js';
+import type { Photo } from './engine.js';
 import { PhotoError, toPhotoError } from './errors.js';
 import { tooLong } from './http-errors.js';
 import { within } from './retry.js';
@@ -12,12 +13,10 @@ export type OnProgress = (loaded: number, total: number) => void;
 
 /** What loading needs from the world around it. */
 export interface LoadPorts {
-  readonly engine: () => Promise<Pick<Engine, 'Decoder'>>;
+  readonly decoder: () => Promise<PhotoDecoder>;
   readonly fetch: typeof fetch;
   /** Lets the page draw and take input. */
   readonly pause: () => Promise<void>;
-  /** Milliseconds, from any start. */
-  readonly now: () => number;
 }
 
 /** What every file begins with. The source asks for more along with it: of most files, the head. */
@@ -27,12 +26,6 @@ const IN_ORDER: Partial<SourceOptions> = {
   concurrency: 1,
   maxRangeBytes: Number.POSITIVE_INFINITY,
 };
-/** Bytes decoded in one go: so few that hardly two tiles end among them. */
-const SLICE_BYTES = 1 << 10;
-/** Time after which the page gets its turn: within a frame of 60 a second, with room for its own
- * work. */
-const TURN_MS = 8;
-
 /**
  * Fetches and decodes a file while it arrives. One that is replaced meanwhile is begun anew, once.
  * Throws a `PhotoError`, or the signal's reason once aborted; what was decoded till then is freed.
@@ -66,11 +59,16 @@ async function open(
   try {
     const source = new HttpSource(url, { fetch: ports.fetch }, IN_ORDER);
     const opening = source.read([HEADER], stop.signal);
-    // The module is compiled while the server thinks.
-    const loading = within(ports.engine(), stop.signal);
-    const [engine, first] = await Promise.all([loading, opening.next()]);
+    // The decoder gets ready while the server thinks.
+    const starting = ports.decoder();
+    let taken = false;
+    stop.signal.addEventListener('abort', () => {
+      // One that nobody waits for any more is let go when it comes.
+      if (!taken) starting.then((decoder) => decoder.free()).catch(() => {});
+    });
+    const [decoder, first] = await Promise.all([within(starting, stop.signal), opening.next()]);
     signal.throwIfAborted();
-    const decoder = new engine.Decoder();
+    taken = true;
     const pieces = piecesOf(first, opening, decoder, source, stop.signal);
     return await decode(decoder, pieces, signal, onProgress, ports);
   } catch (thrown) {
@@ -87,7 +85,7 @@ async function open(
 async function* piecesOf(
   first: IteratorResult<Piece, void>,
   opening: AsyncIterable<Piece>,
-  decoder: Decoder,
+  decoder: PhotoDecoder,
   source: HttpSource,
   signal: AbortSignal,
 ): AsyncGenerator<Piece, void> {
@@ -95,59 +93,55 @@ async function* piecesOf(
   yield* opening;
   let fed = -1;
   for (;;) {
-    const [end, size] = [decoder.fileBytes, source.size];
+    const { fileBytes: end, wants, bytesFed } = decoder.state;
+    const { size } = source;
     if (end !== undefined && size !== undefined && size > end) throw tooLong(source.url, end, size);
-    const wanted = rangesOf(decoder.wants());
-    if (wanted.length === 0) return;
+    if (wants.length === 0) return;
     // It would be asked for again and again.
-    if (decoder.bytesFed === fed) throw new Error('the decoder wants what it has been fed');
-    fed = decoder.bytesFed;
-    yield* source.read(wanted, signal);
+    if (bytesFed === fed) throw new Error('the decoder wants what it has been fed');
+    fed = bytesFed;
+    yield* source.read(wants, signal);
   }
 }
 
 async function decode(
-  decoder: Decoder,
+  decoder: PhotoDecoder,
   pieces: AsyncIterable<Piece>,
   signal: AbortSignal,
   onProgress: OnProgress,
   ports: LoadPorts,
 ): Promise<Photo> {
   let held = true;
-  let turn = ports.now();
   let told = 0;
   const tell = () => {
-    if (decoder.bytesFed > told) onProgress(decoder.bytesFed, decoder.fileBytes ?? 0);
-    told = decoder.bytesFed;
+    const { bytesFed, fileBytes } = decoder.state;
+    if (bytesFed > told) onProgress(bytesFed, fileBytes ?? 0);
+    told = bytesFed;
   };
+  const turn = async () => {
+    tell();
+    await ports.pause();
+    signal.throwIfAborted();
+  };
+  // What a worker is at need not be waited for.
+  const stop = () => {
+    if (held) decoder.free();
+    held = false;
+  };
+  signal.addEventListener('abort', stop);
   try {
     for await (const { offset, bytes } of pieces) {
-      for (let at = 0; at < bytes.byteLength; at += SLICE_BYTES) {
-        decoder.feed(offset + at, bytes.subarray(at, at + SLICE_BYTES));
-        if (ports.now() - turn >= TURN_MS) {
-          tell();
-          await ports.pause();
-          signal.throwIfAborted();
-          turn = ports.now();
-        }
-      }
+      await decoder.feed(offset, bytes, turn);
+      signal.throwIfAborted();
       tell();
       signal.throwIfAborted();
     }
     held = false;
-    return decoder.finish();
+    return await decoder.finish();
   } finally {
-    if (held) decoder.free();
+    signal.removeEventListener('abort', stop);
+    stop();
   }
-}
-
-/** Ranges, of which `bounds` has where each begins and ends. */
-function rangesOf(bounds: Float64Array): ByteRange[] {
-  const ranges: ByteRange[] = [];
-  for (let i = 0; i + 1 < bounds.length; i += 2) {
-    ranges.push({ start: bounds[i] as number, end: bounds[i + 1] as number });
-  }
-  return ranges;
 }
 
 /** A `PhotoError` for an element without an address. */

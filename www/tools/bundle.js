@@ -1,4 +1,4 @@
-/** Bundles www/src into dist/relightable-photo.js and writes its types to dist/types. */
+/** Bundles www/src into dist/relightable-photo.js and the worker beside it, and writes the types to dist/types. */
 
 import { execFileSync } from 'node:child_process';
 import { rmSync } from 'node:fs';
@@ -10,7 +10,10 @@ const repository = join(import.meta.dirname, '..', '..');
 
 await build({
   absWorkingDir: repository,
-  entryPoints: { 'relightable-photo': 'www/src/index.ts' },
+  entryPoints: {
+    'relightable-photo': 'www/src/index.ts',
+    'relightable-photo-worker': 'www/src/decode-worker.ts',
+  },
   outdir: 'dist',
   bundle: true,
   format: 'esm',

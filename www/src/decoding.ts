@@ -1,0 +1,79 @@
+/** Decoding on the page's own thread, in turns. */
+
+import type { Decoder, Engine, Photo } from './engine.js';
+import type { ByteRange } from './source.js';
+
+/** How far decoding has come, and what it wants. */
+export interface DecoderState {
+  /** Each byte counted once. */
+  readonly bytesFed: number;
+  readonly fileBytes: number | undefined;
+  /** The most important first; none once all has come. */
+  readonly wants: readonly ByteRange[];
+}
+
+/** Lets the page draw and take input. Throws once nobody waits for the photograph any more. */
+export type Turn = () => Promise<void>;
+
+/** Takes a file's bytes and makes a photograph of them, on whichever thread. */
+export interface PhotoDecoder {
+  readonly state: DecoderState;
+  /** Takes the file's bytes from `offset` on; those of a range in order. */
+  feed(offset: number, bytes: Uint8Array, turn: Turn): Promise<void>;
+  /** Ends the decoder, whether it succeeds or throws. */
+  finish(): Promise<Photo>;
+  /** Ends the decoder. */
+  free(): void;
+}
+
+/** Bytes decoded in one go: so few that hardly two tiles end among them. */
+const SLICE_BYTES = 1 << 10;
+/** Time after which the page gets its turn: within a frame of 60 a second, with room for its own
+ * work. */
+const TURN_MS = 8;
+
+/** See the module. */
+export class LocalDecoder implements PhotoDecoder {
+  readonly #decoder: Decoder;
+  readonly #now: () => number;
+  /** When the page had its last turn. */
+  #turned: number;
+
+  /** `now` tells milliseconds, from any start. */
+  constructor(engine: Pick<Engine, 'Decoder'>, now: () => number) {
+    this.#decoder = new engine.Decoder();
+    this.#now = now;
+    this.#turned = now();
+  }
+
+  get state(): DecoderState {
+    return stateOf(this.#decoder);
+  }
+
+  async feed(offset: number, bytes: Uint8Array, turn: Turn): Promise<void> {
+    for (let at = 0; at < bytes.byteLength; at += SLICE_BYTES) {
+      this.#decoder.feed(offset + at, bytes.subarray(at, at + SLICE_BYTES));
+      if (this.#now() - this.#turned < TURN_MS) continue;
+      await turn();
+      this.#turned = this.#now();
+    }
+  }
+
+  async finish(): Promise<Photo> {
+    return this.#decoder.finish();
+  }
+
+  free(): void {
+    this.#decoder.free();
+  }
+}
+
+/** What a decoder of the module says of itself. */
+export function stateOf(decoder: Decoder): DecoderState {
+  const bounds = decoder.wants();
+  const wants: ByteRange[] = [];
+  for (let i = 0; i + 1 < bounds.length; i += 2) {
+    wants.push({ start: bounds[i] as number, end: bounds[i + 1] as number });
+  }
+  return { bytesFed: decoder.bytesFed, fileBytes: decoder.fileBytes, wants };
+}

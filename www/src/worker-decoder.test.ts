@@ -1,0 +1,151 @@
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import type { DecoderState } from './decoding.js';
+import type { Photo } from './engine.js';
+import { type Answer, type Request, WorkerDecoder, type WorkerLike } from './worker-decoder.js';
+
+const stateAt = (bytesFed: number): DecoderState => ({ bytesFed, fileBytes: 900, wants: [] });
+
+/** A worker that answers by a script. */
+class FakeWorker implements WorkerLike {
+  onmessage: WorkerLike['onmessage'] = null;
+  onerror: WorkerLike['onerror'] = null;
+  onmessageerror: WorkerLike['onmessageerror'] = null;
+  ended = false;
+  readonly asked: Request[] = [];
+
+  constructor(answers: (request: Request) => Answer[]) {
+    this.#answers = answers;
+  }
+  readonly #answers: (request: Request) => Answer[];
+
+  postMessage(request: Request): void {
+    assert.ok(!this.ended, 'nothing is asked of a worker that has ended');
+    this.asked.push(request);
+    for (const answer of this.#answers(request)) this.say(answer);
+  }
+
+  say(data: Answer): void {
+    queueMicrotask(() => {
+      if (!this.ended) this.onmessage?.({ data } as MessageEvent<Answer>);
+    });
+  }
+
+  die(message: string): void {
+    queueMicrotask(() => this.onerror?.({ message } as ErrorEvent));
+  }
+
+  terminate(): void {
+    this.ended = true;
+  }
+}
+
+/** The page's module, and the photographs that came of it. */
+function page() {
+  const photos: { tiles: number[]; freed: boolean }[] = [];
+  const Photo = {
+    receive(_geometry: Float64Array, _basis: Float32Array, _metadata: string) {
+      const received = { tiles: [] as number[], freed: false };
+      photos.push(received);
+      const photo = {
+        putTile: (index: number, bytes: Uint8Array) => {
+          if (bytes.length === 0) throw Object.assign(new Error('no tile'), { code: 'internal' });
+          received.tiles.push(index);
+        },
+        free: () => {
+          received.freed = true;
+        },
+      };
+      return photo as unknown as Photo;
+    },
+  };
+  return { photos, engine: async () => ({ Photo }) };
+}
+
+const PHOTO: Answer = {
+  kind: 'photo',
+  geometry: new Float64Array(12),
+  basis: new Float32Array(9),
+  metadata: '{}',
+};
+const tile = (index: number, length = 4): Answer => ({
+  kind: 'tile',
+  index,
+  bytes: new Uint8Array(length),
+});
+
+async function started(answers: (request: Request) => Answer[], engine = page().engine) {
+  const worker = new FakeWorker(answers);
+  const starting = WorkerDecoder.start(worker, engine);
+  worker.say({ kind: 'ready', state: stateAt(0) });
+  return { worker, decoder: await starting };
+}
+
+test('bytes go to the worker and a photograph comes of them, tile by tile', async () => {
+  const { photos, engine } = page();
+  const { worker, decoder } = await started(
+    (request) =>
+      request.kind === 'feed'
+        ? [{ kind: 'fed', state: stateAt(request.offset + request.bytes.length) }]
+        : [PHOTO, tile(0), tile(1), { kind: 'done' }],
+    engine,
+  );
+  assert.equal(decoder.state.bytesFed, 0);
+  await decoder.feed(0, new Uint8Array(300));
+  await decoder.feed(300, new Uint8Array(600));
+  assert.deepEqual(decoder.state, stateAt(900));
+  await decoder.finish();
+  assert.deepEqual(photos, [{ tiles: [0, 1], freed: false }]);
+  assert.ok(worker.ended);
+});
+
+test('what is wrong with a file keeps its code', async () => {
+  const { decoder } = await started(() => [
+    { kind: 'failed', code: 'format-checksum', message: 'tile 3 is damaged' },
+  ]);
+  const wrong = { code: 'format-checksum', message: 'tile 3 is damaged' };
+  await assert.rejects(decoder.feed(0, new Uint8Array(1)), wrong);
+  // And of that nothing more can come.
+  await assert.rejects(decoder.finish(), wrong);
+});
+
+test('a worker that does not start is told, and ended', async () => {
+  for (const fail of [
+    (worker: FakeWorker) => worker.die('refused by a policy'),
+    (worker: FakeWorker) => worker.say({ kind: 'failed', code: 'wasm-unavailable', message: '' }),
+  ]) {
+    const worker = new FakeWorker(() => []);
+    const starting = WorkerDecoder.start(worker, page().engine);
+    fail(worker);
+    await assert.rejects(starting, { name: 'PhotoError' });
+    assert.ok(worker.ended);
+  }
+});
+
+test('a worker that dies at it is worker-unavailable', async () => {
+  const { worker, decoder } = await started(() => []);
+  const feeding = decoder.feed(0, new Uint8Array(1));
+  worker.die('out of memory');
+  await assert.rejects(feeding, { code: 'worker-unavailable', message: /out of memory/ });
+});
+
+test('a decoder that is freed keeps nobody waiting', async () => {
+  const { worker, decoder } = await started(() => []);
+  const feeding = decoder.feed(0, new Uint8Array(1));
+  decoder.free();
+  await assert.rejects(feeding, { name: 'PhotoError' });
+  assert.ok(worker.ended);
+});
+
+test('a photograph that is not received whole is freed', async () => {
+  for (const answers of [
+    [PHOTO, tile(0), { kind: 'failed', code: 'internal', message: 'no memory' }],
+    [PHOTO, tile(0, 0)],
+  ] as Answer[][]) {
+    const { photos, engine } = page();
+    const { worker, decoder } = await started(() => answers, engine);
+    await assert.rejects(decoder.finish(), { code: 'internal' });
+    assert.equal(photos[0]?.freed, true);
+    assert.ok(worker.ended);
+  }
+});

@@ -1,0 +1,155 @@
+/** Decoding in a worker of its own, which ends with the photograph and gives its memory back. */
+
+import type { DecoderState, PhotoDecoder } from './decoding.js';
+import type { Engine, Photo } from './engine.js';
+import { PhotoError } from './errors.js';
+
+/** What the page asks of the worker. One thing at a time. */
+export type Request =
+  | { readonly kind: 'feed'; readonly offset: number; readonly bytes: Uint8Array }
+  | { readonly kind: 'finish' };
+
+/** What the worker says. */
+export type Answer =
+  | { readonly kind: 'ready' | 'fed'; readonly state: DecoderState }
+  | {
+      readonly kind: 'photo';
+      readonly geometry: Float64Array;
+      readonly basis: Float32Array;
+      readonly metadata: string;
+    }
+  | { readonly kind: 'tile'; readonly index: number; readonly bytes: Uint8Array }
+  | { readonly kind: 'done' }
+  | { readonly kind: 'failed'; readonly code: string; readonly message: string };
+
+/** What of a worker is used. */
+export type WorkerLike = Pick<Worker, 'postMessage' | 'terminate'> & {
+  onmessage: ((event: MessageEvent<Answer>) => void) | null;
+  onerror: ((event: ErrorEvent) => void) | null;
+  onmessageerror: ((event: MessageEvent) => void) | null;
+};
+
+/** Somebody waits for the next answers. */
+interface Waiting {
+  readonly take: (answer: Answer) => void;
+  readonly fail: (error: PhotoError) => void;
+}
+
+/** See the module. */
+export class WorkerDecoder implements PhotoDecoder {
+  readonly #worker: WorkerLike;
+  readonly #engine: () => Promise<Pick<Engine, 'Photo'>>;
+  #state: DecoderState = { bytesFed: 0, fileBytes: undefined, wants: [] };
+  #waiting: Waiting | null = null;
+  #failure: PhotoError | null = null;
+
+  private constructor(worker: WorkerLike, engine: () => Promise<Pick<Engine, 'Photo'>>) {
+    this.#worker = worker;
+    this.#engine = engine;
+    worker.onmessage = ({ data }) => {
+      if (data.kind === 'failed') this.#fail(new PhotoError(data.code, data.message));
+      else this.#waiting?.take(data);
+    };
+    const died = (why: string) =>
+      this.#fail(new PhotoError('worker-unavailable', `The decoding worker stopped. ${why}`));
+    worker.onerror = (event) => {
+      event.preventDefault?.();
+      died(event.message ?? '');
+    };
+    worker.onmessageerror = () => died('Its answer could not be read.');
+  }
+
+  /**
+   * A decoder in `worker`, once it is up; `engine` is the page's own module, for the photograph.
+   * Rejects where the worker does not start.
+   */
+  static async start(
+    worker: WorkerLike,
+    engine: () => Promise<Pick<Engine, 'Photo'>>,
+  ): Promise<WorkerDecoder> {
+    const decoder = new WorkerDecoder(worker, engine);
+    try {
+      await decoder.#until('ready');
+      return decoder;
+    } catch (thrown) {
+      decoder.free();
+      throw thrown;
+    }
+  }
+
+  get state(): DecoderState {
+    return this.#state;
+  }
+
+  async feed(offset: number, bytes: Uint8Array): Promise<void> {
+    this.#ask({ kind: 'feed', offset, bytes });
+    await this.#until('fed');
+  }
+
+  async finish(): Promise<Photo> {
+    let photo: Photo | undefined;
+    try {
+      const { Photo } = await this.#engine();
+      this.#ask({ kind: 'finish' });
+      await this.#until('done', (answer) => {
+        if (answer.kind === 'photo') {
+          photo = Photo.receive(answer.geometry, answer.basis, answer.metadata);
+        } else if (answer.kind === 'tile') {
+          photo?.putTile(answer.index, answer.bytes);
+        }
+      });
+      if (!photo) throw new PhotoError('internal', 'The decoding worker gave no photograph.');
+      return photo;
+    } catch (thrown) {
+      photo?.free();
+      throw thrown;
+    } finally {
+      this.free();
+    }
+  }
+
+  free(): void {
+    this.#worker.terminate();
+    this.#fail(new PhotoError('internal', 'The decoding worker was ended.'));
+  }
+
+  #ask(request: Request): void {
+    if (!this.#failure) this.#worker.postMessage(request);
+  }
+
+  /** Waits for an answer of that kind; those before it go to `each`. */
+  #until(kind: Answer['kind'], each: (answer: Answer) => void = () => {}): Promise<void> {
+    return new Promise((resolve, reject) => {
+      if (this.#failure) {
+        reject(this.#failure);
+        return;
+      }
+      const end = () => {
+        this.#waiting = null;
+      };
+      this.#waiting = {
+        take: (answer) => {
+          try {
+            if ('state' in answer) this.#state = answer.state;
+            each(answer);
+            if (answer.kind !== kind) return;
+            end();
+            resolve();
+          } catch (thrown) {
+            end();
+            reject(thrown);
+          }
+        },
+        fail: (error) => {
+          end();
+          reject(error);
+        },
+      };
+    });
+  }
+
+  #fail(error: PhotoError): void {
+    this.#failure ??= error;
+    this.#waiting?.fail(this.#failure);
+  }
+}
