@@ -65,7 +65,7 @@ impl Head {
             scans,
             entries,
             extensions,
-            metadata: serde_json::from_slice(metadata).map_err(FormatError::Metadata)?,
+            metadata: decode_metadata(metadata).map_err(FormatError::Metadata)?,
         };
         let (end, file_bytes) = (head.end(), header.file_bytes);
         if end != file_bytes {
@@ -212,7 +212,18 @@ impl From<PartNumber> for Part {
     }
 }
 
-/// Part offsets, from the head's end on. Sums of at most 2^34 lengths below 2^32 fit.
+/// Reads the metadata, which are an object: fields in a list have no names to know them by.
+fn decode_metadata(json: &[u8]) -> Result<Metadata, serde_json::Error> {
+    if json.trim_ascii_start().first() == Some(&b'[') {
+        return Err(serde::de::Error::custom(
+            "a list where an object was expected",
+        ));
+    }
+    serde_json::from_slice(json)
+}
+
+/// Part offsets, from the head's end on. There are at most 2^34 lengths, and none of what decompresses
+/// to 8 MiB is beyond 2^24: sums fit.
 fn offsets(header: &Header, scans: &[Scan], entries: &[ChunkEntry]) -> Vec<u64> {
     let tiles = header.geometry.tile_grid().area();
     let mut offsets = Vec::with_capacity(scans.len() * (tiles + 1) + 1);
