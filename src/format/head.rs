@@ -65,7 +65,7 @@ impl Head {
             scans,
             entries,
             extensions,
-            metadata: decode_metadata(metadata).map_err(FormatError::Metadata)?,
+            metadata: Metadata::decode(metadata).map_err(FormatError::Metadata)?,
         };
         let (end, file_bytes) = (head.end(), header.file_bytes);
         if end != file_bytes {
@@ -210,16 +210,6 @@ impl From<PartNumber> for Part {
     fn from(PartNumber { scan, tile }: PartNumber) -> Self {
         tile.map_or(Self::Basis { scan }, |tile| Self::Chunk { scan, tile })
     }
-}
-
-/// Reads the metadata, which are an object: fields in a list have no names to know them by.
-fn decode_metadata(json: &[u8]) -> Result<Metadata, serde_json::Error> {
-    if json.trim_ascii_start().first() == Some(&b'[') {
-        return Err(serde::de::Error::custom(
-            "a list where an object was expected",
-        ));
-    }
-    serde_json::from_slice(json)
 }
 
 /// Part offsets, from the head's end on. There are at most 2^34 lengths, and none of what decompresses

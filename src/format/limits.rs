@@ -8,7 +8,7 @@ use crate::transport::{CHANNELS, CoefficientTile, TexelCode};
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Bytes of the head, of all tiles as they are decoded, of what decoding one takes for a while,
-    /// and of a picture.
+    /// and of a light and a picture.
     pub decoded_bytes: u64,
 }
 
@@ -51,8 +51,7 @@ impl Limits {
             // Coefficients in red, green and blue, and codes of both.
             working = working.max(factored * (numbers + codes) + direct * functions);
         }
-        let picture = (geometry.camera.area() * size_of::<[f32; 4]>()) as u64;
-        self.allow(head_bytes(&head.header) + kept + working + 2 * MOST_PLAIN + picture)
+        self.allow(head_bytes(&head.header) + kept + working + 2 * MOST_PLAIN)
     }
 
     fn allow(&self, need: u64) -> Result<(), FormatError> {
@@ -67,12 +66,15 @@ impl Limits {
     }
 }
 
-/// What the head takes: its own bytes, which are gathered before they are read, what they
-/// decompress to, and what that becomes.
+/// What a file takes whatever its tiles: the bytes of the head, which are gathered before they are
+/// read, what they decompress to, and what that becomes; and as soon as it is relit a picture, a light,
+/// and the light as it was last.
 fn head_bytes(header: &Header) -> u64 {
     let geometry = &header.geometry;
+    let pixel = size_of::<[f32; 4]>() as u64;
+    let relit = (geometry.camera.area() as u64 + 2 * geometry.light.area() as u64) * pixel;
     let functions = 2 * basis::plain_bytes(header.rank.into(), geometry.window.area()) as u64;
     let entries = u64::from(header.scans) * (geometry.tile_grid().area() as u64 + 1);
     let kept = (size_of::<ChunkEntry>() + size_of::<u64>() + 1) as u64;
-    2 * header.directory_plain_bytes() + entries * kept + functions + header.head_bytes()
+    2 * header.directory_plain_bytes() + entries * kept + functions + header.head_bytes() + relit
 }

@@ -1,6 +1,11 @@
 //! What a file says about where it came from.
 
-use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::marker::PhantomData;
+
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Longest metadata a reader accepts: room for any caption, none for an attack.
 pub(super) const MAX_METADATA_BYTES: u32 = 1 << 20;
@@ -20,6 +25,7 @@ pub struct Metadata {
     #[serde(skip_serializing_if = "String::is_empty")]
     pub rights: String,
     /// What the object's light transport was measured with.
+    #[serde(deserialize_with = "object")]
     pub capture: CaptureNote,
     /// Program and version that wrote the file.
     pub writer: String,
@@ -41,4 +47,31 @@ pub struct CaptureNote {
     pub patterns: usize,
     /// Photographs that the transport was recovered from.
     pub photographs: usize,
+}
+
+impl Metadata {
+    /// Reads the JSON of a file.
+    pub(super) fn decode(json: &[u8]) -> Result<Self, serde_json::Error> {
+        let mut json = serde_json::Deserializer::from_slice(json);
+        let metadata = object(&mut json)?;
+        json.end()?;
+        Ok(metadata)
+    }
+}
+
+/// Reads an object. In a list, which serde takes too, fields have no names to know them by.
+fn object<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<T, D::Error> {
+    struct Object<T>(PhantomData<T>);
+    impl<'de, T: Deserialize<'de>> Visitor<'de> for Object<T> {
+        type Value = T;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("an object")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<T, A::Error> {
+            T::deserialize(MapAccessDeserializer::new(map))
+        }
+    }
+    from.deserialize_map(Object(PhantomData))
 }

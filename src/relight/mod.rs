@@ -1,7 +1,9 @@
 //! From a transport and a light to a picture: `y = pT` on the CPU, WebGPU and WebGL2.
 //!
-//! Every back end computes the same thing from the same bytes: for each camera pixel and channel,
-//! Σ over its window of `code · step · light`, then exposure and the sRGB curve ([`tone`]).
+//! Every back end computes the same thing from the same bytes: the light seen through each function
+//! of the basis from each window's place; for each camera pixel and channel Σ of that times its
+//! coefficients, and Σ over its window of `code · step · light` for what it has by element; then
+//! exposure and the sRGB curve ([`tone`]).
 //! [`reference`] does it in double precision and is what the others are tested against. The GPU
 //! back ends share one WGSL source, `shaders/relight.wgsl`.
 

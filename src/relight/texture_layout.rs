@@ -58,6 +58,9 @@ pub struct TextureLayout {
 /// for uniforms.
 pub type PairOfQuads = [[[f32; QUAD]; 2]; BASIS_SLOTS];
 
+/// Most bytes for what is seen: of a light of 1024² by 16 components it is 0.2 GB.
+const MOST_SEEN: u64 = 256 << 20;
+
 /// Slots of a window that a pass has room for.
 const BASIS_SLOTS: usize = (16 << 10) / (2 * QUAD * size_of::<f32>());
 
@@ -135,6 +138,17 @@ pub enum LayoutError {
         /// Layers allowed.
         limit: u32,
     },
+    /// What is seen of the light takes more memory, and time, than a graphics device should be asked
+    /// for.
+    #[error(
+        "the light seen through all components takes {need} bytes of graphics memory; {limit} at most are asked for"
+    )]
+    Seen {
+        /// Bytes needed.
+        need: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
     /// The window has more elements than uniforms have room for.
     #[error(
         "the window of {side} has more elements than a graphics device correlates with a basis: {limit}"
@@ -168,10 +182,11 @@ impl TextureLayout {
             false => 0,
         };
         let seen = seen(&geometry);
-        for (grid, extent) in [
-            ("camera grid", geometry.camera),
-            ("light grid", if factored { seen } else { geometry.light }),
-        ] {
+        let light = match factored {
+            true => ("light grid with its border", seen),
+            false => ("light grid", geometry.light),
+        };
+        for (grid, extent) in [("camera grid", geometry.camera), light] {
             if extent.width.max(extent.height) > limits.side {
                 return Err(LayoutError::Side {
                     grid,
@@ -185,6 +200,13 @@ impl TextureLayout {
             return Err(LayoutError::Layers {
                 need,
                 limit: limits.layers,
+            });
+        }
+        let bytes = seen.area() as u64 * u64::from(need) * size_of::<[f32; 4]>() as u64;
+        if bytes > MOST_SEEN {
+            return Err(LayoutError::Seen {
+                need: bytes,
+                limit: MOST_SEEN,
             });
         }
         if factored && geometry.window.area() > BASIS_SLOTS {
@@ -618,6 +640,13 @@ mod tests {
             refused((8, 8), 1, 1, small),
             LayoutError::Layers { need: 6, limit: 2 }
         );
+        let mut wide = transport(geometry((8, 8), 1), 64);
+        wide.geometry.light = Extent {
+            width: 1500,
+            height: 1500,
+        };
+        let seen = TextureLayout::new(&wide, WEBGL2_MINIMUM).unwrap_err();
+        assert!(matches!(seen, LayoutError::Seen { need, .. } if need == 1502 * 1502 * 48 * 16));
         let window = refused((8, 8), 25, 1, WEBGL2_MINIMUM);
         assert_eq!(
             window,

@@ -2,7 +2,7 @@
 
 use crate::transport::CHANNELS;
 
-/// How far from its colour an element may be, of the brightest: rounding of single precision.
+/// How far from its colour an element may be, of itself: rounding of single precision.
 const ROUNDING: f32 = 1e-6;
 
 /// What channels of a light have in common.
@@ -19,13 +19,9 @@ impl Tint {
     #[inline(always)]
     pub fn of<'a>(rows: impl Iterator<Item = &'a [[f32; 4]]> + Clone) -> Self {
         let mut sums = [0.0f32; 4];
-        let mut peak = [0.0f32; 4];
         for row in rows.clone() {
             for element in row {
-                for c in 0..4 {
-                    sums[c] += element[c];
-                    peak[c] = peak[c].max(element[c]);
-                }
+                (0..4).for_each(|c| sums[c] += element[c]);
             }
         }
         let base = (1..CHANNELS).fold(0, |best, c| if sums[c] > sums[best] { c } else { best });
@@ -39,15 +35,17 @@ impl Tint {
             .max_by(|a, b| a[base].total_cmp(&b[base]));
         let brightest = brightest.copied().unwrap_or_default();
         let factors = std::array::from_fn(|c| brightest[c] / brightest[base]);
-        let most = ROUNDING * peak[0].max(peak[1]).max(peak[2]);
         for row in rows {
             let mut off = [0.0f32; CHANNELS];
             for element in row {
+                // The smallest numbers there are have no such precision.
+                let size = element[0].max(element[1]).max(element[2]);
+                let most = ROUNDING * size + f32::MIN_POSITIVE;
                 for c in 0..CHANNELS {
-                    off[c] = off[c].max((element[c] - factors[c] * element[base]).abs());
+                    off[c] = off[c].max((element[c] - factors[c] * element[base]).abs() - most);
                 }
             }
-            if off.iter().any(|off| *off > most) {
+            if off.iter().any(|off| *off > 0.0) {
                 return Self::Many;
             }
         }
@@ -83,6 +81,11 @@ mod tests {
         );
         assert!(tint(&[[0.0; 4]; 3]).is_dark());
         assert_eq!(tint(&[warm(0.1), [0.1, 0.1, 0.1, 0.0]]), Tint::Many);
+        assert_eq!(
+            tint(&[[1e4, 1e4, 1e4, 0.0], [0.005, 0.0, 0.0, 0.0]]),
+            Tint::Many
+        );
+        assert!(matches!(tint(&[warm(1.0), warm(1e-39)]), Tint::One(0, _)));
         assert_eq!(tint(&[[0.0, 0.0, 0.5, 0.0]]).channels(), [2]);
     }
 }

@@ -113,12 +113,12 @@ impl Backend for WebGl2 {
         gl.bind_buffer(Gl::UNIFORM_BUFFER, context.params.as_ref());
         let bytes = bytemuck::bytes_of(&params);
         gl.buffer_sub_data_with_i32_and_u8_array(Gl::UNIFORM_BUFFER, 0, bytes);
-        let mut written = Ok(());
         // What is seen depends on the light alone.
         if self.lit.as_ref() != Some(light) {
             self.light.copy_from(light.elements().as_flattened());
             gl.active_texture(Gl::TEXTURE0 + LIGHT);
-            written = write_rows(gl, self.layout.light(), FLOATS, &self.light);
+            self.lit = None;
+            write_rows(gl, self.layout.light(), FLOATS, &self.light)?;
             context.see(&self.layout, tint);
             self.lit = Some(light.clone());
         }
@@ -131,7 +131,7 @@ impl Backend for WebGl2 {
         if gl.is_context_lost() {
             return Err(BackendError::Lost("the browser took its context".into()));
         }
-        written
+        Ok(())
     }
 }
 

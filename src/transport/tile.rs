@@ -43,23 +43,8 @@ impl DirectTile {
         functions: &[[f32; CHANNELS]],
         mut codes: Vec<TexelCode>,
     ) -> Self {
-        let mut peak = [0.0f32; CHANNELS];
-        for t in functions {
-            for c in 0..CHANNELS {
-                if t[c].is_finite() {
-                    peak[c] = peak[c].max(t[c].abs());
-                }
-            }
-        }
-        // A step below this would not be a normal number; so dim a channel is dark.
-        let step = peak.map(|p| p / TOP_CODE);
-        if step.iter().all(|s| *s < f32::MIN_POSITIVE) {
+        let Some(step) = steps(functions, TOP_CODE) else {
             return Self::dark(rect);
-        }
-        let step = step.map(|s| if s < f32::MIN_POSITIVE { 1.0 } else { s });
-        let code = |t: f32, step: f32| match t.is_finite() {
-            true => (t / step + 0.5f32.copysign(t)) as i16, // rounds; `as` saturates
-            false => 0,
         };
         let codes_of = |t: &[f32; CHANNELS]| {
             [
@@ -94,6 +79,31 @@ impl DirectTile {
     }
 }
 
+/// Steps by which the largest value of each channel is `top` codes; none if all are dark.
+fn steps(values: &[[f32; CHANNELS]], top: f32) -> Option<[f32; CHANNELS]> {
+    let mut peak = [0.0f32; CHANNELS];
+    for value in values {
+        for c in 0..CHANNELS {
+            if value[c].is_finite() {
+                peak[c] = peak[c].max(value[c].abs());
+            }
+        }
+    }
+    // A step below this would not be a normal number; so dim a channel is dark.
+    let lit = |step: &f32| *step >= f32::MIN_POSITIVE;
+    let step = peak.map(|peak| peak / top);
+    let some = step.iter().any(lit);
+    some.then(|| step.map(|step| if lit(&step) { step } else { 1.0 }))
+}
+
+/// The code next to a value; of what is no number, 0.
+fn code(value: f32, step: f32) -> i16 {
+    match value.is_finite() {
+        true => (value / step + 0.5f32.copysign(value)) as i16, // rounds; `as` saturates
+        false => 0,
+    }
+}
+
 /// A tile kept as coefficients over the transport's basis: `c = code · step`.
 ///
 /// All components share a step. The pixels' brightness is what an eye compares, and to that each
@@ -125,27 +135,15 @@ impl CoefficientTile {
         rank: usize,
         mut codes: Vec<TexelCode>,
     ) -> Self {
-        let mut peak = [0.0f32; CHANNELS];
-        for value in coefficients {
-            for c in 0..CHANNELS {
-                if value[c].is_finite() {
-                    peak[c] = peak[c].max(value[c].abs());
-                }
-            }
-        }
-        let step = peak.map(|p| p / f32::from(i16::MAX));
-        if rank == 0 || step.iter().all(|s| *s < f32::MIN_POSITIVE) {
+        let Some(step) = steps(coefficients, i16::MAX.into()).filter(|_| rank > 0) else {
             return Self::dark(rect);
-        }
-        let step = step.map(|s| if s < f32::MIN_POSITIVE { 1.0 } else { s });
+        };
         let (plane, quads) = (Self::plane(rect), rank.div_ceil(QUAD));
         for (p, of_pixel) in coefficients.chunks_exact(rank).enumerate() {
             for (k, value) in of_pixel.iter().enumerate() {
                 for c in 0..CHANNELS {
-                    let value = if value[c].is_finite() { value[c] } else { 0.0 };
                     let texel = (c * quads + k / QUAD) * plane + p;
-                    // Rounds; `as` saturates.
-                    codes[texel][k % QUAD] = (value / step[c] + 0.5f32.copysign(value)) as i16;
+                    codes[texel][k % QUAD] = code(value[c], step[c]);
                 }
             }
         }

@@ -111,17 +111,25 @@ pub fn unpack_tile(
         return Err(wrong());
     }
     let code = |bytes: &[u8; size_of::<TexelCode>()]| bytemuck::cast::<_, TexelCode>(*bytes);
+    // No memory is an error, not the end of the page.
+    let taken = |codes: &[[u8; size_of::<TexelCode>()]]| {
+        let mut taken = Vec::new();
+        let full = |_| CodedError::new("format-limit", "there is no memory for the photograph");
+        taken.try_reserve_exact(codes.len()).map_err(full)?;
+        taken.extend(codes.iter().map(code));
+        Ok::<_, CodedError>(taken)
+    };
     let (coefficients, functions) = codes.split_at(texels[0]);
     Ok(Tile {
         coefficients: CoefficientTile {
             rect,
             step: steps[0],
-            codes: coefficients.iter().map(code).collect(),
+            codes: taken(coefficients)?,
         },
         functions: DirectTile {
             rect,
             step: steps[1],
-            codes: functions.iter().map(code).collect(),
+            codes: taken(functions)?,
         },
     })
 }

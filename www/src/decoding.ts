@@ -22,7 +22,7 @@ export interface PhotoDecoder {
   feed(offset: number, bytes: Uint8Array, turn: Turn): Promise<void>;
   /** Ends the decoder, whether it succeeds or throws. */
   finish(): Promise<Photo>;
-  /** Ends the decoder. */
+  /** Ends the decoder, if it has not ended. What `finish` is at is not waited for. */
   free(): void;
 }
 
@@ -36,6 +36,7 @@ const TURN_MS = 8;
 export class LocalDecoder implements PhotoDecoder {
   readonly #decoder: Decoder;
   readonly #now: () => number;
+  #ended = false;
   /** When the page had its last turn. */
   #turned: number;
 
@@ -60,11 +61,13 @@ export class LocalDecoder implements PhotoDecoder {
   }
 
   async finish(): Promise<Photo> {
+    this.#ended = true;
     return this.#decoder.finish();
   }
 
   free(): void {
-    this.#decoder.free();
+    if (!this.#ended) this.#decoder.free();
+    this.#ended = true;
   }
 }
 

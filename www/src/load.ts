@@ -111,7 +111,6 @@ async function decode(
   onProgress: OnProgress,
   ports: LoadPorts,
 ): Promise<Photo> {
-  let held = true;
   let told = 0;
   const tell = () => {
     const { bytesFed, fileBytes } = decoder.state;
@@ -124,10 +123,7 @@ async function decode(
     signal.throwIfAborted();
   };
   // What a worker is at need not be waited for.
-  const stop = () => {
-    if (held) decoder.free();
-    held = false;
-  };
+  const stop = () => decoder.free();
   signal.addEventListener('abort', stop);
   try {
     for await (const { offset, bytes } of pieces) {
@@ -136,8 +132,10 @@ async function decode(
       tell();
       signal.throwIfAborted();
     }
-    held = false;
-    return await decoder.finish();
+    const photo = await decoder.finish();
+    if (signal.aborted) photo.free();
+    signal.throwIfAborted();
+    return photo;
   } finally {
     signal.removeEventListener('abort', stop);
     stop();

@@ -10,6 +10,8 @@ use crate::transport::{Basis, CHANNELS, QUAD, Window};
 
 /// Sides of transforms to choose from; the largest holds a window of 63 and as much again.
 const SIDES: [usize; 4] = [32, 64, 128, 256];
+/// Bytes for spectra of the basis and what is seen of a square, which ought to be in a cache.
+const MOST_MEMORY: u64 = 16 << 20;
 /// Functions in one transform: one in each real part, one in each imaginary part.
 const TOGETHER: usize = 2 * LANES;
 
@@ -40,14 +42,7 @@ impl Correlator {
     /// For window origins that span `across` times `down`.
     pub fn new(basis: &Basis, window: Window, across: usize, down: usize) -> Self {
         let side = window.side() as usize;
-        let cost = |n: &&usize| match (**n + 1).checked_sub(side) {
-            None | Some(0) => usize::MAX,
-            Some(reach) => {
-                let squares = across.div_ceil(reach) * down.div_ceil(reach);
-                squares * **n * **n * (**n).ilog2() as usize
-            }
-        };
-        let n = *SIDES.iter().min_by_key(cost).unwrap_or(&SIDES[3]);
+        let n = side_for(basis.rank(), side, across, down);
         let mut correlator = Self {
             fft: Fft::new(n),
             reach: n + 1 - side,
@@ -109,18 +104,12 @@ impl Correlator {
         }
     }
 
-    /// Whether a workspace is one of this correlator's.
-    pub fn fits(&self, work: &Workspace) -> bool {
-        let n = self.fft.side();
-        work.rows.len() == n * n && work.columns.len() == n * self.reach
-    }
-
     /// `C` of a square, as `[origin, channel, quad]`, of these `channels` of what `row` yields of the
-    /// light: elements of the row of that number, as many as a square sees; none for a dark row.
+    /// light: elements of the row of that number, as many as a square sees.
     #[inline(always)]
     pub fn correlate<'a>(
         &self,
-        row: impl Fn(usize) -> Option<&'a [[f32; 4]]>,
+        row: impl Fn(usize) -> &'a [[f32; 4]],
         channels: &[usize],
         work: &mut Workspace,
         out: &mut [[f32; QUAD]],
@@ -137,13 +126,14 @@ impl Correlator {
 
     /// The light's spectrum.
     #[inline(always)]
-    fn transform<'a>(&self, row: impl Fn(usize) -> Option<&'a [[f32; 4]]>, work: &mut Workspace) {
+    fn transform<'a>(&self, row: impl Fn(usize) -> &'a [[f32; 4]], work: &mut Workspace) {
         let n = self.fft.side();
         for (v, values) in work.rows.chunks_exact_mut(n).enumerate() {
-            let Some(elements) = row(v) else {
+            let elements = row(v);
+            if elements.iter().all(|element| *element == [0.0; 4]) {
                 values.fill(Complex::default());
                 continue;
-            };
+            }
             for (value, element) in work.line.values.iter_mut().zip(elements) {
                 let mut re = [0.0; LANES];
                 re[..CHANNELS].copy_from_slice(&element[..CHANNELS]);
@@ -211,9 +201,45 @@ impl Correlator {
     }
 }
 
+/// The side of transforms that takes the least work, of those that take no more memory than they
+/// may, or of the smallest there can be.
+fn side_for(rank: usize, window: usize, across: usize, down: usize) -> usize {
+    let reach = |n: usize| (n + 1).saturating_sub(window) as u64;
+    let memory = |n: usize| {
+        let values = (n * n) as u64 + CHANNELS as u64 * reach(n).pow(2);
+        values * rank as u64 * size_of::<f32>() as u64
+    };
+    let work = |n: usize| {
+        let squares = (across as u64).div_ceil(reach(n)) * (down as u64).div_ceil(reach(n));
+        squares.saturating_mul((n * n) as u64 * u64::from(n.ilog2()))
+    };
+    let mut possible = SIDES.into_iter().filter(|n| reach(*n) > 0);
+    let smallest = possible.next().unwrap_or(SIDES[SIDES.len() - 1]);
+    let larger = possible.filter(|n| memory(*n) <= MOST_MEMORY);
+    larger.fold(
+        smallest,
+        |best, n| if work(n) < work(best) { n } else { best },
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sides_take_little_work_and_memory() {
+        assert_eq!(side_for(16, 15, 270, 270), 64);
+        assert_eq!(side_for(16, 15, 12, 12), 32);
+        // Of 64, squares of two origins each would take 2^32 operations.
+        assert_eq!(side_for(9, 63, 838, 836), 256);
+        for rank in [1, 1024] {
+            for window in (1..=63).step_by(2) {
+                let n = side_for(rank, window, 32_768 + window, 32_768 + window);
+                assert!(n >= window);
+                assert!(rank == 1 || n <= 64, "{window}: {n}");
+            }
+        }
+    }
 
     #[test]
     fn correlations_are_the_sums_they_stand_for() {
@@ -239,11 +265,13 @@ mod tests {
             let correlator = Correlator::new(&basis, window, span, span);
             let (reach, quads) = (correlator.reach(), correlator.quads());
             let n = reach + side - 1;
-            let light: Vec<[f32; 4]> = (0..n * n)
-                .map(|i| std::array::from_fn(|c| number(4 * i + c).abs()))
-                .collect();
-            // Rows that are not there are dark.
-            let row = |v: usize| (v != 5).then(|| &light[v * n..(v + 1) * n]);
+            // One row is dark.
+            let element = |i: usize| match i / n {
+                5 => [0.0; 4],
+                _ => std::array::from_fn(|c| number(4 * i + c).abs()),
+            };
+            let light: Vec<[f32; 4]> = (0..n * n).map(element).collect();
+            let row = |v: usize| &light[v * n..(v + 1) * n];
             let mut out = vec![[0.0; QUAD]; reach * reach * CHANNELS * quads];
             let mut work = correlator.workspace();
             correlator.correlate(row, &[0, 1, 2], &mut work, &mut out);
@@ -251,7 +279,6 @@ mod tests {
                 for c in 0..CHANNELS {
                     for k in 0..rank {
                         let want: f64 = (0..area)
-                            .filter(|s| o / reach + s / side != 5)
                             .map(|s| {
                                 let at = (o / reach + s / side) * n + o % reach + s % side;
                                 f64::from(basis.kernels[k][s]) * f64::from(light[at][c])

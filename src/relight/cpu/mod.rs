@@ -3,8 +3,9 @@
 //!
 //! A square's light is correlated with the basis ([`correlation`]), and the pixels that look at the
 //! square are combined from that while it is in the cache ([`combine`]). Elements that a tile has
-//! besides are summed one by one ([`direct`]). All of it is plain arithmetic in one order, whatever
-//! the width of the vectors, so that every machine draws the same bits.
+//! besides are summed one by one ([`direct`]).
+//!
+//! Single precision: what is seen of a square is exact to about a millionth of its brightest element.
 
 mod combine;
 mod correlation;
@@ -42,17 +43,15 @@ pub struct Relighter {
     light: PaddedLight,
     /// Of each square's pixels; in a lock of its own for threads to share the squares out.
     linear: Vec<Mutex<Vec<[f32; CHANNELS]>>>,
+    /// Of threads that are not at work, kept from frame to frame.
+    scratch: Mutex<Vec<Scratch>>,
 }
 
-/// What a thread works with, kept from frame to frame.
+/// What a thread works with.
 #[derive(Debug, Default)]
 struct Scratch {
     work: Option<Workspace>,
     seen: Vec<[f32; QUAD]>,
-}
-
-thread_local! {
-    static SCRATCH: std::cell::RefCell<Scratch> = std::cell::RefCell::default();
 }
 
 impl Relighter {
@@ -81,6 +80,7 @@ impl Relighter {
             linear: squares.all.iter().map(dark).collect(),
             correlator,
             squares,
+            scratch: Mutex::default(),
             light,
             transport,
         }
@@ -108,8 +108,9 @@ impl Relighter {
             .collect();
         let this = &*self;
         workers.map(stale.len(), |i| {
-            SCRATCH
-                .with_borrow_mut(|scratch| vectorised(|| this.relight_square(stale[i], scratch)));
+            let mut scratch = lock(&this.scratch).pop().unwrap_or_default();
+            vectorised(|| this.relight_square(stale[i], &mut scratch));
+            lock(&this.scratch).push(scratch);
         });
     }
 
@@ -131,16 +132,12 @@ impl Relighter {
                 .iter()
                 .any(|run| !self.tile(run).coefficients.is_dark())
         {
-            let fits = |work: &Workspace| correlator.fits(work);
-            let work = match scratch.work.take().filter(fits) {
-                Some(work) => scratch.work.insert(work),
-                None => scratch.work.insert(correlator.workspace()),
-            };
+            let work = scratch.work.get_or_insert_with(|| correlator.workspace());
             let channels = tint.channels();
             let (reach, quads) = (correlator.reach(), correlator.quads());
             let texels = reach * reach * channels.len() * quads;
             scratch.seen.resize(texels, [0.0; QUAD]);
-            let row = |r: usize| (r < side).then(|| &self.light.row(u, v + r)[..side]);
+            let row = |r: usize| &self.light.row(u, v + r)[..side];
             correlator.correlate(row, channels, work, &mut scratch.seen);
             for run in &square.runs {
                 let tile = &self.tile(run).coefficients;
@@ -224,7 +221,7 @@ impl Relighter {
     }
 }
 
-/// A square's pixels. They are written whole, whatever became of another thread.
+/// What is written whole, whatever became of another thread.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -135,15 +135,13 @@ impl Squares {
 /// Tile, number in it, pixel and window origin of all that may be lit.
 fn for_each_pixel(transport: &Transport, mut each: impl FnMut(usize, usize, CameraPx, Element)) {
     let geometry = &transport.geometry;
-    let near =
-        |origin: i32, side: u32| origin > -(geometry.window.side() as i32) && origin < side as i32;
     for (i, tile) in transport.tiles.iter().enumerate() {
         if tile.is_dark() {
             continue;
         }
         for (p, pixel) in tile.rect().pixels().enumerate() {
             let origin = geometry.window_origin(pixel);
-            if near(origin.u, geometry.light.width) && near(origin.v, geometry.light.height) {
+            if geometry.reaches_display(origin) {
                 each(i, p, pixel, origin);
             }
         }
