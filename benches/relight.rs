@@ -15,9 +15,9 @@
 //! nor does tone mapping, which is counted in our time. Ours takes a new light in every frame. Peers that
 //! can use all cores are held against all of ours, and one thread against one. scipy has one only, and
 //! is held against both. sprs leaves threads to its caller, which shares the rows out evenly here. All
-//! are run by turns, several times over, and the fastest frame of each counts.
-//!
-//! All pictures must agree in linear light, or the benchmark fails.
+//! are run by turns, several times over, and the fastest frame of each counts: `native_…_vs_…` is the
+//! peer's time divided by ours. Pictures are compared in linear light, and where they do not agree the
+//! benchmark fails.
 //!
 //! Bytes of a frame are those of the codes, each of which is read once, and of the picture written. They
 //! are held against the bytes that copying reads and writes a second, on all cores.
