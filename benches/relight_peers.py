@@ -31,7 +31,8 @@ def main():
     indices = np.fromfile(folder / "indices.i32", "<i4")
     times = {"scipy_csr": 0.0, "scipy_csr_transposed": 0.0}
     pictures = {name: [] for name in times}
-    # One channel at a time, as a matrix and its transpose of all three take much memory.
+    # One channel at a time, as a matrix and its transpose of all three take much memory; a frame is the
+    # sum of the channels' fastest.
     for channel in range(3):
         values = np.fromfile(folder / f"values{channel}.f32", "<f4")
         light = np.fromfile(folder / f"light{channel}.f32", "<f4")
