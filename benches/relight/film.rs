@@ -1,0 +1,203 @@
+//! Transports to relight, lights that change, and the time that a frame takes.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use rayon::prelude::*;
+use relightable_photo::relight::{Light, Rgba8Picture, TorchPose, cpu};
+use relightable_photo::transport::{
+    BandTile, Basis, CHANNELS, Correspondence, Extent, Geometry, LightPx, QUAD, TexelCode, Tile,
+    Transport, Window,
+};
+use relightable_photo::workers::{OneThread, Workers};
+
+const WINDOW: u32 = 15;
+/// Lights that frames take turns with.
+const LIGHTS: usize = 4;
+
+/// All cores.
+pub struct Cores;
+
+impl Workers for Cores {
+    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        (0..count).into_par_iter().map(work).collect()
+    }
+}
+
+/// How the light changes from frame to frame.
+#[derive(Clone, Copy)]
+pub enum Kind {
+    Video,
+    Torch,
+    Static,
+}
+
+pub const KINDS: [Kind; 3] = [Kind::Video, Kind::Torch, Kind::Static];
+
+impl Kind {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Video => "video",
+            Self::Torch => "torch",
+            Self::Static => "static",
+        }
+    }
+
+    fn lights(self, extent: Extent) -> Vec<Light> {
+        match self {
+            Self::Video => (0..LIGHTS).map(|i| video(extent, i)).collect(),
+            Self::Torch => (0..LIGHTS).map(|i| torch(extent, i)).collect(),
+            Self::Static => vec![video(extent, 0)],
+        }
+    }
+}
+
+/// Milliseconds of a frame.
+#[derive(Clone, Copy)]
+pub struct Time {
+    /// Until there is a picture in linear light.
+    pub linear: f64,
+    /// Tone mapping too.
+    pub whole: f64,
+}
+
+impl Time {
+    pub const NEVER: Self = Self {
+        linear: f64::INFINITY,
+        whole: f64::INFINITY,
+    };
+
+    pub fn min(self, other: Self) -> Self {
+        Self {
+            linear: self.linear.min(other.linear),
+            whole: self.whole.min(other.whole),
+        }
+    }
+}
+
+/// A photograph under lights that follow each other.
+pub struct Film {
+    pub relighter: cpu::Relighter,
+    pub lights: Vec<Light>,
+    shown: usize,
+    picture: Rgba8Picture,
+}
+
+impl Film {
+    pub fn new(side: u32, rank: usize) -> Self {
+        Self {
+            relighter: cpu::Relighter::new(Arc::new(transport(side, rank))),
+            lights: Vec::new(),
+            shown: 0,
+            picture: Rgba8Picture::black(square(side)),
+        }
+    }
+
+    /// Takes other lights, and shows the first.
+    pub fn load(&mut self, kind: Kind) {
+        self.lights = kind.lights(self.relighter.transport().geometry.light);
+        self.shown = 0;
+        self.show(&Cores);
+    }
+
+    fn show(&mut self, workers: &impl Workers) -> Time {
+        let light = &self.lights[self.shown % self.lights.len()];
+        self.shown += 1;
+        let start = Instant::now();
+        self.relighter.relight(light, workers);
+        let linear = start.elapsed();
+        self.relighter.tone_map(1.0, &mut self.picture);
+        let [linear, whole] = [linear, start.elapsed()].map(|time| time.as_secs_f64() * 1e3);
+        Time { linear, whole }
+    }
+
+    /// The fastest frames on one thread and on all cores, in so many seconds.
+    pub fn fastest(&mut self, seconds: f64) -> [Time; 2] {
+        let (start, mut best, mut frames) = (Instant::now(), [Time::NEVER; 2], 0);
+        while frames < 5 || frames < 200 && start.elapsed().as_secs_f64() < seconds {
+            best[0] = best[0].min(self.show(&OneThread));
+            best[1] = best[1].min(self.show(&Cores));
+            frames += 1;
+        }
+        best
+    }
+}
+
+/// Seconds of the fastest of a few runs.
+pub fn fastest(runs: usize, mut work: impl FnMut()) -> f64 {
+    let times = (0..runs).map(|_| {
+        let start = Instant::now();
+        work();
+        start.elapsed().as_secs_f64()
+    });
+    times.fold(f64::INFINITY, f64::min)
+}
+
+/// Codes that a frame reads, and the picture it writes.
+pub fn bytes(side: u32, rank: usize) -> usize {
+    let codes = CHANNELS * rank.div_ceil(QUAD) * size_of::<TexelCode>();
+    square(side).area() * (codes + size_of::<[u8; 4]>())
+}
+
+fn square(side: u32) -> Extent {
+    Extent {
+        width: side,
+        height: side,
+    }
+}
+
+/// A number from 0 to 1 for every other number.
+fn noise(i: usize) -> f32 {
+    let mut h = (i as u32).wrapping_mul(0x9e37_79b9);
+    h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
+    h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
+    (h ^ (h >> 16)) as f32 / u32::MAX as f32
+}
+
+/// Made-up coefficients: the time does not depend on their values.
+fn transport(side: u32, rank: usize) -> Transport {
+    let window = Window::new(WINDOW).unwrap();
+    let area = window.area();
+    let geometry = Geometry {
+        camera: square(side),
+        light: square(side / 2),
+        window,
+        correspondence: Correspondence {
+            affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
+        },
+        tile_side: 128,
+    };
+    let kernel = |k: usize| {
+        (0..area)
+            .map(|s| noise(k * area + s) / WINDOW as f32)
+            .collect()
+    };
+    let tile = |t: usize| {
+        let mut tile = BandTile::dark(geometry.tile(t));
+        let values = tile.rect.extent.area() * rank;
+        let coefficient = |i| [0, 1, 2].map(|c| (noise(3 * (i + t * values) + c) - 0.3) * 0.02);
+        tile.coefficients = (0..values).map(coefficient).collect();
+        Tile::quantise(&tile, rank)
+    };
+    let tiles = (0..geometry.tile_grid().area()).into_par_iter();
+    Transport {
+        tiles: tiles.map(tile).collect(),
+        basis: Basis {
+            kernels: (0..rank).map(kernel).collect(),
+        },
+        geometry,
+    }
+}
+
+fn video(extent: Extent, frame: usize) -> Light {
+    let values = 3 * extent.area();
+    let values: Vec<f32> = (0..values).map(|i| noise(i + frame * values)).collect();
+    Light::from_linear_rgb(extent, &values).unwrap()
+}
+
+fn torch(extent: Extent, frame: usize) -> Light {
+    let u = f64::from(extent.width) * (0.3 + 0.04 * frame as f64);
+    let pose = TorchPose::central(extent);
+    let centre = LightPx { u, ..pose.centre };
+    Light::torch(extent, TorchPose { centre, ..pose })
+}
