@@ -778,6 +778,25 @@ fn what_is_checked_part_by_part_is_what_is_read() {
     }
 }
 
+#[test]
+fn numbers_at_the_ends_of_single_precision_are_written_and_read() {
+    for size in [1e37, f32::MAX, 1e-37, f32::MIN_POSITIVE, 1e-45] {
+        let mut recovered = mixed();
+        for tile in &mut recovered.tiles {
+            for values in [&mut tile.coefficients, &mut tile.functions] {
+                for value in values.iter_mut().flatten() {
+                    *value *= size;
+                }
+            }
+        }
+        for quality in [0.0, 30.0, 60.0].map(|snr| Quality::Snr(Decibels(snr))) {
+            let (transport, _) = decode(&recovered.file(quality), 1000).unwrap();
+            assert!(steps(&transport).all(f32::is_finite), "{size:e}");
+        }
+        decode(&recovered.file(Quality::Lossless), 1000).unwrap();
+    }
+}
+
 /// What a code is worth, of both parts of all tiles.
 fn steps(transport: &Transport) -> impl Iterator<Item = f32> {
     let tiles = transport.tiles.iter();

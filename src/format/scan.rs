@@ -63,7 +63,8 @@ impl Scan {
             coding,
             first,
             count,
-            step,
+            // Of numbers at the ends of single precision a coarser or finer step may be beyond them.
+            step: step.clamp(f32::MIN_POSITIVE, f32::MAX),
             snr: Decibels(0.0),
             basis_bytes: 0,
             basis_crc: 0,
