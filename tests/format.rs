@@ -797,6 +797,17 @@ fn numbers_at_the_ends_of_single_precision_are_written_and_read() {
     }
 }
 
+#[test]
+fn a_basis_of_nothing_is_no_basis() {
+    let mut recovered = mixed();
+    recovered.basis = Some(Basis {
+        kernels: vec![vec![0.0; 9]; 4],
+    });
+    for quality in [QUALITY, Quality::Lossless] {
+        decode(&recovered.file(quality), 1000).unwrap();
+    }
+}
+
 /// What a code is worth, of both parts of all tiles.
 fn steps(transport: &Transport) -> impl Iterator<Item = f32> {
     let tiles = transport.tiles.iter();

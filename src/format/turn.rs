@@ -97,7 +97,7 @@ impl Turn {
     /// A tile's coefficients over this basis as `[pixel, component]`; none if it has none.
     pub fn coefficients(&self, tile: &BandTile) -> Vec<[f32; CHANNELS]> {
         let rank = self.rank();
-        if tile.coefficients.is_empty() {
+        if tile.coefficients.is_empty() || rank == 0 {
             return Vec::new();
         }
         let mut turned = vec![[0.0f32; CHANNELS]; tile.rect.extent.area() * rank];
