@@ -6,7 +6,7 @@ mod common;
 use common::{Noise, functions, geometry, sealed};
 use proptest::prelude::*;
 use relightable_photo::format::{
-    self, Coding, EncodedFile, Extension, FormatError, HEADER_BYTES, Interest, Limits, Metadata,
+    self, Coding, EncodedFile, Extension, FormatError, HEADER_BYTES, Interest, Judge, Limits, Metadata,
     Part, PartNumber, Quality, Reader, Source,
 };
 use relightable_photo::transport::{
@@ -104,26 +104,10 @@ impl Recovered {
         bytes(&self.encode(quality).unwrap())
     }
 
-    /// Light transport functions of tile `i`, term by term.
+    /// Light transport functions of tile `i`.
     fn functions(&self, i: usize) -> TransportFunctions {
-        let (tile, area) = (&self.tiles[i], self.geometry.window.area());
-        let mut functions = TransportFunctions::zeros(tile.rect, area);
-        if !tile.functions.is_empty() {
-            functions.tau.clone_from(&tile.functions);
-        }
-        if let Some(basis) = &self.basis
-            && !tile.coefficients.is_empty()
-        {
-            let factored = FactoredTile {
-                rect: tile.rect,
-                coefficients: tile.coefficients.clone(),
-            };
-            let more = factored.expand(&self.geometry, basis);
-            for (tau, more) in functions.tau.iter_mut().zip(more.tau) {
-                (0..CHANNELS).for_each(|c| tau[c] += more[c]);
-            }
-        }
-        functions
+        let basis = self.basis.clone().unwrap_or_default();
+        self.tiles[i].clone().functions(&self.geometry, &basis)
     }
 
     /// The share of all windows' elements that are on the display.
@@ -367,6 +351,60 @@ fn a_file_can_be_as_small_as_asked_for() {
         matches!(error, FormatError::TooLarge { most: 300, least } if least > 300),
         "{error}"
     );
+}
+
+/// Who knows the object's transport: what is to be lost of it is SNR below 30 dB.
+struct Knowing<'a> {
+    geometry: Geometry,
+    basis: &'a Basis,
+    tiles: Vec<BandTile>,
+}
+
+impl Judge for Knowing<'_> {
+    fn tiles(&self) -> Vec<BandTile> {
+        self.tiles.clone()
+    }
+
+    fn loss(&self, functions: &[TransportFunctions]) -> Decibels {
+        let mut error = TransportError::default();
+        for (got, tile) in functions.iter().zip(self.tiles()) {
+            let want = tile.functions(&self.geometry, self.basis);
+            for (got, want) in got.tau.iter().zip(&want.tau) {
+                (0..CHANNELS).for_each(|c| error.add(f64::from(want[c]), f64::from(got[c])));
+            }
+        }
+        Decibels(30.0 - error.snr().unwrap().0)
+    }
+}
+
+#[test]
+fn a_judge_may_have_tiles_of_another_kind_than_the_file() {
+    let mixed = Recovered::mixed(small_geometry(), 4, 3);
+    let basis = mixed.basis.as_ref().unwrap();
+    let only = |kind: &dyn Fn(&BandTile) -> bool| -> Vec<BandTile> {
+        let of_kind = |tile: &BandTile| match kind(tile) {
+            true => tile.clone(),
+            false => BandTile::dark(tile.rect),
+        };
+        mixed.tiles.iter().map(of_kind).collect()
+    };
+    let direct = only(&|tile| tile.coefficients.is_empty());
+    let factored = only(&|tile| tile.functions.is_empty());
+    for (tiles, of_judge) in [(&direct, &factored), (&factored, &direct)] {
+        let recovered = Recovered {
+            tiles: tiles.clone(),
+            ..mixed.clone()
+        };
+        let judge = Knowing {
+            geometry: mixed.geometry,
+            basis,
+            tiles: of_judge.clone(),
+        };
+        let quality = Quality::Loss(Decibels(0.0), &judge);
+        let snr = recovered.encode(quality).unwrap().snr().unwrap();
+        // The same step is another error in another kind.
+        assert!((20.0..40.0).contains(&snr.0), "{snr}");
+    }
 }
 
 #[test]

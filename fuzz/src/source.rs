@@ -6,7 +6,7 @@ use relightable_photo::format::{
     EncodedFile, Extension, FormatError, Judge, Metadata, Quality, Source,
 };
 use relightable_photo::transport::{
-    BandTile, Basis, CHANNELS, Correspondence, Decibels, Extent, FactoredTile, Geometry, TileRect,
+    BandTile, Basis, CHANNELS, Correspondence, Decibels, Extent, Geometry, TileRect,
     TransportFunctions, Window,
 };
 use relightable_photo::workers::{OneThread, Workers};
@@ -205,24 +205,8 @@ impl Given {
 
     /// Light transport functions of tile `i`, whether they are on the display or not.
     pub fn functions(&self, i: usize) -> TransportFunctions {
-        let (tile, area) = (&self.tiles[i], self.geometry.window.area());
-        let mut functions = TransportFunctions::zeros(tile.rect, area);
-        if !tile.functions.is_empty() {
-            functions.tau.clone_from(&tile.functions);
-        }
-        if let Some(basis) = &self.basis
-            && !tile.coefficients.is_empty()
-        {
-            let factored = FactoredTile {
-                rect: tile.rect,
-                coefficients: tile.coefficients.clone(),
-            };
-            let more = factored.expand(&self.geometry, basis);
-            for (tau, more) in functions.tau.iter_mut().zip(more.tau) {
-                (0..CHANNELS).for_each(|c| tau[c] += more[c]);
-            }
-        }
-        functions
+        let basis = self.basis.clone().unwrap_or_default();
+        self.tiles[i].clone().functions(&self.geometry, &basis)
     }
 
     /// Whether every window lies on the display whole.

@@ -236,7 +236,10 @@ impl<'a> Encoder<'a> {
         judge: &dyn Judge,
         workers: &impl Workers,
     ) -> Result<EncodedFile, FormatError> {
-        let tiles = judge.tiles();
+        let tiles = self.coded_alike(judge.tiles());
+        // What few of them are recovered element by element tells the step of the others as well.
+        let has_functions = self.has_functions;
+        self.has_functions |= tiles.iter().any(|tile| !tile.functions.is_empty());
         // Steps from which nothing is left to those that lose nothing.
         let pixels = self.source.geometry.camera.area() as f64;
         let coarsest = 16.0 * (self.energy / pixels).sqrt() as f32;
@@ -253,9 +256,24 @@ impl<'a> Encoder<'a> {
                 false => coarse = middle,
             }
         }
+        self.has_functions = has_functions;
         let step = coarsest * fine.exp2();
         self.cut(step, &self.sample()?, workers);
         self.encode(Some(step), workers)
+    }
+
+    /// A judge's tiles as the file would have them: where it has no components, element by element.
+    fn coded_alike(&self, mut tiles: Vec<BandTile>) -> Vec<BandTile> {
+        if self.turn.is_none()
+            && let Some(basis) = self.source.basis
+        {
+            for tile in &mut tiles {
+                let functions = std::mem::replace(tile, BandTile::dark(tile.rect))
+                    .functions(&self.source.geometry, basis);
+                tile.functions = functions.tau;
+            }
+        }
+        tiles
     }
 
     /// The functions of a tile as a reader will have them.
