@@ -228,10 +228,10 @@ class Tokens:  # section 10
         require(self.taken <= self.most_bits, "too few bits")
         return bits
 
-    def block(self, n):
-        numbers = [0] * n
+    def run(self, length):
+        numbers = [0] * length
         at = stream = 0
-        while at < n:
+        while at < length:
             token = next(self.streams[stream if len(self.streams) > 1 else 0], None)
             require(token is not None, "too few tokens")
             stream = 1 if token % 16 <= 1 else 2
@@ -242,7 +242,7 @@ class Tokens:  # section 10
                 continue
             size = token % 16
             at += token >> 4
-            require(size > 0 and at < n, "a token that cannot be")
+            require(size > 0 and at < length, "a token that cannot be")
             sign = self.take(1)
             magnitude = (1 << size - 1) + self.take(size - 1)
             numbers[at] = -magnitude if sign else magnitude
@@ -266,7 +266,7 @@ def cosine(f, x):
     return f32(0.5) * (CONSTANT[4] if f == 0 else value)
 
 
-C = np.array([[cosine(f, x) for x in range(8)] for f in range(8)], f32)
+G = np.array([[cosine(f, x) for x in range(8)] for f in range(8)], f32)
 ZIGZAG = [
     8 * row + total - row
     for total in range(15)
@@ -276,12 +276,12 @@ ZIGZAG = [
 
 
 def inverse_transform(numbers, step):
-    f, columns, pixels = (np.zeros((8, 8), f32) for _ in range(3))
+    f, partial, pixels = (np.zeros((8, 8), f32) for _ in range(3))
     f.reshape(-1)[ZIGZAG] = np.array(numbers, f32) * step
-    for v in range(8):
-        columns += C[v][:, None] * f[v]
-    for u in range(8):
-        pixels += columns[:, u : u + 1] * C[u]
+    for row in range(8):
+        partial += G[row][:, None] * f[row]
+    for column in range(8):
+        pixels += partial[:, column : column + 1] * G[column]
     return pixels
 
 
@@ -296,26 +296,26 @@ class Planes:
         self.blocks = [(y, x) for y in range(0, rows, 8) for x in range(0, columns, 8)]
         self.present, self.palette = [False] * rank, None
 
-    def add(self, chunk, plain, places, step):
-        if places[0] == 0 and self.palette is None:
+    def add(self, chunk, plain, components, step):
+        if components[0] == 0 and self.palette is None:
             require(len(chunk) >= 18, "a cut palette")
             self.palette = np.frombuffer(chunk[:18], "<i2").reshape(3, 3)
             chunk = chunk[18:]
         require(len(chunk) >= 4, "a cut chunk")
         end = 4 + unpack_from("<I", chunk)[0]
         require(end <= len(chunk), "a cut chunk")
-        a = Tokens(chunk[4:end], plain)
-        b = Tokens(chunk[end:], plain - a.count)
-        require(a.count + b.count == plain, "fewer tokens than it says")
-        for tokens, axes in (a, [0]), (b, [1, 2]):
-            for k in places:
+        main = Tokens(chunk[4:end], plain)
+        side = Tokens(chunk[end:], plain - main.count)
+        require(main.count + side.count == plain, "fewer tokens than it says")
+        for tokens, axes in (main, [0]), (side, [1, 2]):
+            for k in components:
                 for y, x in self.blocks:
-                    numbers = tokens.block(64 * len(axes))
+                    numbers = tokens.run(64 * len(axes))
                     self.present[k] |= any(numbers)
                     for i, axis in enumerate(axes):
                         pixels = inverse_transform(numbers[i :: len(axes)], step)
-                        place = self.planes[k, axis, y : y + 8, x : x + 8]
-                        place += pixels[: place.shape[0], : place.shape[1]]
+                        inside = self.planes[k, axis, y : y + 8, x : x + 8]
+                        inside += pixels[: inside.shape[0], : inside.shape[1]]
             tokens.finish()
 
     def coefficients(self):
@@ -323,25 +323,25 @@ class Planes:
         planes = self.planes.reshape(rank, 3, -1)
         c = np.zeros_like(planes)
         if self.present[0]:
-            axes = self.palette.astype(f32) / f32(16384)
+            unit = self.palette.astype(f32) / f32(16384)
             for channel in range(3):
-                c[0, channel] = dot(planes[0], axes[:, channel])
-        r, g, b = c[0]
-        n = np.stack([r - np.sqrt(dot(c[0], c[0])), g, b])
-        square = dot(n, n)
+                c[0, channel] = dot(planes[0], unit[:, channel])
+        red, green, blue = c[0]
+        h = np.stack([red - np.sqrt(dot(c[0], c[0])), green, blue])
+        square = dot(h, h)
         normal = np.isfinite(square) & (square >= np.finfo(f32).tiny)
-        n, factor = np.where(normal, n, f32(0)), np.where(normal, f32(2) / square, f32(0))
+        h, factor = np.where(normal, h, f32(0)), np.where(normal, f32(2) / square, f32(0))
         for k in range(1, rank):
             if self.present[k]:
-                c[k] = planes[k] - factor * dot(n, planes[k]) * n
+                c[k] = planes[k] - factor * dot(h, planes[k]) * h
         return c.transpose(2, 0, 1)
 
 
-def add_halves(values, places, chunk, step):  # section 12
-    halves = join(decompress(chunk, 6 * len(values) * len(places)), "<f2")
+def add_halves(values, items, chunk, step):  # section 12
+    halves = join(decompress(chunk, 6 * len(values) * len(items)), "<f2")
     require(np.isfinite(halves).all(), "a value that is no finite number")
-    halves = halves.reshape(len(places), 3, -1).transpose(2, 0, 1)
-    values[:, places] += halves.astype(f32) * step
+    halves = halves.reshape(len(items), 3, -1).transpose(2, 0, 1)
+    values[:, items] += halves.astype(f32) * step
 
 
 def slot_order(w):  # section 13
@@ -351,16 +351,16 @@ def slot_order(w):  # section 13
     return sorted(range(w * w), key=lambda slot: (distance(slot), slot))
 
 
-def add_direct(values, places, chunk, plain, step):  # section 13
+def add_direct(values, slots, chunk, plain, step):  # section 13
     tokens = Tokens(chunk, plain)
     require(tokens.count == plain, "fewer tokens than it says")
-    numbers = np.array([tokens.block(3 * len(places)) for _ in values]).reshape(-1, len(places), 3)
+    numbers = np.array([tokens.run(3 * len(slots)) for _ in values]).reshape(-1, len(slots), 3)
     tokens.finish()
     luma, orange, greenish = numbers.transpose(2, 0, 1)
     middle = luma - (greenish >> 1)
     blue = middle - (orange >> 1)
     colours = np.stack([blue + orange, greenish + middle, blue], axis=-1)
-    values[:, places] += colours.astype(f32) * step
+    values[:, slots] += colours.astype(f32) * step
 
 
 @np.errstate(all="ignore")  # what is not normal is mirrored in vain, and large steps overflow
@@ -378,17 +378,17 @@ def decode(file):  # section 14
         c, d = (np.zeros((pixels, each, 3), f32) for each in (head.rank, area))
         for s, (coding, first, count, _, step, _, _) in enumerate(head.scans):
             chunk, plain = head.parts[s][1 + t], head.plain[s][t]
-            places, step = range(first, first + count), f32(step)
+            items, step = range(first, first + count), f32(step)
             if not chunk:
                 continue
             if coding == 1:
-                planes.add(chunk, plain, places, step)
+                planes.add(chunk, plain, items, step)
             elif coding == 2:
-                add_halves(c, places, chunk, step)
+                add_halves(c, items, chunk, step)
             elif coding == 3:
-                add_direct(d, [order[place] for place in places], chunk, plain, step)
+                add_direct(d, [order[place] for place in items], chunk, plain, step)
             else:
-                add_halves(d, [order[place] for place in places], chunk, step)
+                add_halves(d, [order[place] for place in items], chunk, step)
         tiles.append((planes.coefficients() if any(planes.present) else c, d))
     return tiles, np.concatenate(basis)
 
