@@ -10,7 +10,8 @@ use super::quality::{Rounding, step_for};
 use super::turn::{Turn, moment};
 use super::{Chunk, ChunkEntry, Coding, FormatError, Header, Metadata, Scan};
 use crate::transport::{
-    BandTile, Basis, CHANNELS, Decibels, FactoredTile, Geometry, TransportFunctions,
+    BandTile, Basis, CHANNELS, Decibels, Extent, FactoredTile, Geometry, TileRect,
+    TransportFunctions,
 };
 use crate::workers::Workers;
 
@@ -65,9 +66,12 @@ impl fmt::Debug for Quality<'_> {
 
 /// Tiles encoded side by side.
 const AT_ONCE: usize = 64;
-/// Tiles by which the step is chosen, spread over the picture, and the most memory they may take.
+/// Tiles by a part of which the step is chosen, spread over the picture, and the most memory that all
+/// parts may take.
 const SAMPLE: usize = 64;
 const SAMPLE_BYTES: usize = 48 << 20;
+/// The side of a part is a multiple of this, so that blocks are whole.
+const PART_SIDE: u32 = 8;
 /// The step of the first scan, which a picture is first seen by, in steps of the last.
 const FIRST_STEP: f32 = 8.0;
 /// The same where functions come element by element, and most elements are small.
@@ -150,6 +154,8 @@ struct Encoder<'a> {
     peak: f32,
     coefficient_energy: f64,
     order: Vec<u16>,
+    /// Numbers of the tiles from which light comes.
+    lit: Vec<usize>,
 }
 
 /// What one look at a tile tells.
@@ -191,19 +197,22 @@ impl<'a> Encoder<'a> {
             functions: 0.0,
             peak: 0.0,
         };
-        let mut has_functions = false;
-        for_tiles(&source, workers, look, |_, of_tile| {
+        let mut lit = Vec::new();
+        for_tiles(&source, workers, look, |i, of_tile| {
+            if of_tile.peak > 0.0 {
+                lit.push(i);
+            }
             for (sum, m) in all.moment.iter_mut().zip(of_tile.moment) {
                 *sum += m;
             }
             all.functions += of_tile.functions;
             all.peak = all.peak.max(of_tile.peak);
-            has_functions |= of_tile.functions > 0.0;
             Ok(())
         })?;
-        let lit = all.moment.iter().any(|m| *m != 0.0);
-        let turn = source.basis.filter(|_| lit);
+        let has_coefficients = all.moment.iter().any(|m| *m != 0.0);
+        let turn = source.basis.filter(|_| has_coefficients);
         let turn = turn.map(|basis| Turn::new(basis, &all.moment));
+        let turn = turn.filter(|turn| turn.rank() > 0);
         let coefficient_energy = turn.as_ref().map_or(0.0, Turn::energy);
         Ok(Self {
             order: direct::order(source.geometry.window),
@@ -213,7 +222,8 @@ impl<'a> Encoder<'a> {
             peak: all.peak * (rank.max(1) as f32).sqrt(),
             source,
             turn,
-            has_functions,
+            has_functions: all.functions > 0.0,
+            lit,
         })
     }
 
@@ -223,9 +233,18 @@ impl<'a> Encoder<'a> {
         workers: &impl Workers,
     ) -> Result<EncodedFile, FormatError> {
         let sample = self.sample()?;
-        let step = self.step(&sample, snr, workers);
-        self.cut(step.unwrap_or(1.0), &sample, workers);
-        drop(sample);
+        self.at_snr(snr, &sample, workers)
+    }
+
+    /// The file whose numbers keep this SNR, by a sample of them. Leaves components out.
+    fn at_snr(
+        &mut self,
+        snr: Decibels,
+        sample: &[BandTile],
+        workers: &impl Workers,
+    ) -> Result<EncodedFile, FormatError> {
+        let step = step_for(snr, |step| self.rounding(sample, step, workers));
+        self.cut(step.unwrap_or(1.0), sample, workers);
         self.encode(step, workers)
     }
 
@@ -304,9 +323,7 @@ impl<'a> Encoder<'a> {
         let turn = self.turn.clone();
         let mut try_snr = |snr: f64| {
             self.turn.clone_from(&turn);
-            let step = self.step(&sample, Decibels(snr), workers);
-            self.cut(step.unwrap_or(1.0), &sample, workers);
-            self.encode(step, workers)
+            self.at_snr(Decibels(snr), &sample, workers)
         };
         let [mut low, mut high] = SNR_FOR_SIZE;
         let mut best = try_snr(low)?;
@@ -329,17 +346,14 @@ impl<'a> Encoder<'a> {
 
     fn lossless(self, workers: &impl Workers) -> Result<EncodedFile, FormatError> {
         let step = halves::step_for(self.peak);
-        let geometry = &self.source.geometry;
-        let most = direct::most_slots(geometry.tile_side) as usize;
+        let most = direct::most_slots(self.source.geometry.tile_side) as usize;
         let mut scans: Vec<Scan> = components(self.rank(), most)
             .map(|(first, count)| Scan::new(Coding::Halves, first, count, step))
             .collect();
-        if self.has_functions {
-            let slots = groups(0, self.order.len(), most, usize::MAX);
-            scans.extend(
-                slots.map(|(first, count)| Scan::new(Coding::DirectHalves, first, count, step)),
-            );
-        }
+        let slots = self.slots();
+        scans.extend(
+            slots.map(|(first, count)| Scan::new(Coding::DirectHalves, first, count, step)),
+        );
         let encode = |tile: BandTile| -> Result<EncodedTile, FormatError> {
             let coefficients = self.coefficients(&tile);
             let mut encoded = EncodedTile::default();
@@ -387,23 +401,18 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// Some tiles, spread over the picture.
+    /// Parts of some tiles, spread over the picture; light comes from each.
     fn sample(&self) -> Result<Vec<BandTile>, FormatError> {
-        let geometry = &self.source.geometry;
         let values = self.rank() + usize::from(self.has_functions) * self.order.len();
-        let bytes = geometry.tile(0).extent.area() * values * CHANNELS * size_of::<f32>();
-        let count = geometry.tile_grid().area();
-        let fit = (SAMPLE_BYTES / bytes.max(1)).clamp(1, SAMPLE);
-        let tiles = (0..count).step_by(count.div_ceil(fit));
-        let tiles = tiles.map(|i| (self.source.tile)(i));
+        let every = self.lit.len().div_ceil(SAMPLE).max(1);
+        let tiles = self.lit.iter().step_by(every);
+        let pixels = SAMPLE_BYTES / (tiles.len() * values * CHANNELS * size_of::<f32>()).max(1);
+        let side = (pixels.isqrt() as u32).min(self.source.geometry.tile_side) / PART_SIDE;
+        let side = (side * PART_SIDE).max(PART_SIDE);
         tiles
+            .map(|&i| Ok(lit_part((self.source.tile)(i)?, side, i)))
             .collect::<io::Result<_>>()
             .map_err(FormatError::Source)
-    }
-
-    /// The step by which `sample` keeps this SNR.
-    fn step(&self, sample: &[BandTile], snr: Decibels, workers: &impl Workers) -> Option<f32> {
-        step_for(snr, |step| self.rounding(sample, step, workers))
     }
 
     /// What rounding to `step` does to some tiles.
@@ -434,56 +443,46 @@ impl<'a> Encoder<'a> {
     /// The scans: everything coarsely first, then better component by component.
     fn plan(&self, step: f32) -> Vec<Scan> {
         let side = self.source.geometry.tile_side;
-        let transform = |first: usize, count: usize, step: f32| {
-            Scan::new(Coding::Transform, first as u16, count as u16, step)
-        };
-        let slots = || {
-            let groups = groups(
-                0,
-                self.order.len(),
-                direct::most_slots(side) as usize,
-                usize::MAX,
-            );
-            groups.filter(|_| self.has_functions)
-        };
+        let transform =
+            |(first, count), step: f32| Scan::new(Coding::Transform, first, count, step);
+        let of_slots = |(first, count), step: f32| Scan::new(Coding::Direct, first, count, step);
         let rank = self.rank();
         let most = transform::most_components(side) as usize;
         let mut scans = Vec::new();
         // No number may be too large: where the step is very fine, it takes a coarse one for all.
         let finest = transform::finest_step(self.peak);
         if rank > 0 {
-            scans.push(transform(0, rank.min(2), finest.max(FIRST_STEP * step)));
+            let two = (0, rank.min(2) as u16);
+            scans.push(transform(two, finest.max(FIRST_STEP * step)));
         }
         if finest > step {
             let others = groups(2.min(rank), rank, most, usize::MAX);
-            scans
-                .extend(others.map(|(first, count)| transform(first.into(), count.into(), finest)));
+            scans.extend(others.map(|group| transform(group, finest)));
         }
         let first_step = direct::finest_step(self.peak).max(FIRST_DIRECT_STEP * step);
-        scans.extend(
-            slots().map(|(first, count)| Scan::new(Coding::Direct, first, count, first_step)),
-        );
+        scans.extend(self.slots().map(|group| of_slots(group, first_step)));
         if rank > 0 {
-            scans.push(transform(0, 1, step / FLAT_PARTS));
+            scans.push(transform((0, 1), step / FLAT_PARTS));
         }
         if rank > 1 {
-            scans.push(transform(1, 1, step));
+            scans.push(transform((1, 1), step));
         }
         let later = groups(2.min(rank), rank, most, 3);
-        scans.extend(later.map(|(first, count)| transform(first.into(), count.into(), step)));
-        scans.extend(slots().map(|(first, count)| Scan::new(Coding::Direct, first, count, step)));
+        scans.extend(later.map(|group| transform(group, step)));
+        scans.extend(self.slots().map(|group| of_slots(group, step)));
         scans
+    }
+
+    /// Slots in groups; none where there are no functions.
+    fn slots(&self) -> impl Iterator<Item = (u16, u16)> {
+        let most = direct::most_slots(self.source.geometry.tile_side) as usize;
+        let count = usize::from(self.has_functions) * self.order.len();
+        groups(0, count, most, usize::MAX)
     }
 
     /// A tile as numbers; `keep` says whether they are to be decoded.
     fn numbers(&self, tile: &BandTile, scans: &[Scan], keep: bool) -> Numbers {
-        let of = |direct: bool| -> Vec<&Scan> {
-            let own = scans
-                .iter()
-                .filter(|scan| scan.coding.is_direct() == direct);
-            own.collect()
-        };
-        let (transform_scans, direct_scans) = (of(false), of(true));
+        let (transform_scans, direct_scans) = (scans_of(scans, false), scans_of(scans, true));
         let coefficients = self.coefficients(tile);
         let coefficients = (!coefficients.is_empty()).then(|| {
             let tile = FactoredTile {
@@ -547,8 +546,9 @@ impl<'a> Encoder<'a> {
         let mut parts = Vec::new();
         let mut entries = Vec::with_capacity(scans.len() * tiles);
         for ((scan, chunks), error) in scans.iter_mut().zip(chunks).zip(errors) {
-            let snr = 10.0 * (self.energy / f64::max(error, f64::MIN_POSITIVE)).log10();
-            scan.snr = Decibels(f64::from(snr as f32));
+            let energy = self.energy;
+            let snr = Rounding { energy, error }.snr();
+            scan.snr = Decibels(f64::from(snr.0 as f32));
             let brings = scan.brings(known);
             if let Some(rounded) = &rounded
                 && brings > 0
@@ -628,45 +628,70 @@ impl Numbers {
     }
 
     fn encode(&self, scans: &[Scan]) -> Result<EncodedTile, FormatError> {
-        let of = |direct: bool| -> Vec<&Scan> {
-            let own = scans
-                .iter()
-                .filter(|scan| scan.coding.is_direct() == direct);
-            own.collect()
-        };
-        let mut encoded = EncodedTile::default();
-        let (mut coefficients, mut functions) = (Vec::new(), Vec::new());
-        let (mut left_coefficients, mut left_functions) = (0.0, 0.0);
+        // Of both kinds of scans: what is to come, and the squared error until then.
+        let (mut coming, mut left) = ([Vec::new(), Vec::new()], [0.0; 2]);
         if let Some(numbers) = &self.coefficients {
-            coefficients = numbers
-                .chunks(&of(false))?
-                .into_iter()
-                .zip(&numbers.errors)
-                .collect();
-            left_coefficients = numbers.energy;
+            let chunks = numbers.chunks(&scans_of(scans, false))?.into_iter();
+            coming[0] = chunks.zip(numbers.errors.iter().copied()).collect();
+            left[0] = numbers.energy;
         }
         if let Some(numbers) = &self.functions {
-            functions = numbers
-                .chunks(&of(true))?
-                .into_iter()
-                .zip(&numbers.errors)
-                .collect();
-            left_functions = numbers.energy;
+            let chunks = numbers.chunks(&scans_of(scans, true))?.into_iter();
+            coming[1] = chunks.zip(numbers.errors.iter().copied()).collect();
+            left[1] = numbers.energy;
         }
-        let (mut coefficients, mut functions) = (coefficients.into_iter(), functions.into_iter());
+        let mut coming = coming.map(Vec::into_iter);
+        let mut encoded = EncodedTile::default();
         for scan in scans {
-            let (next, left) = match scan.coding.is_direct() {
-                true => (functions.next(), &mut left_functions),
-                false => (coefficients.next(), &mut left_coefficients),
-            };
-            encoded.chunks.push(next.and_then(|(chunk, error)| {
-                *left = *error;
-                chunk
-            }));
-            encoded.errors.push(left_coefficients + left_functions);
+            let kind = usize::from(scan.coding.is_direct());
+            let mut chunk = None;
+            if let Some(next) = coming[kind].next() {
+                (chunk, left[kind]) = next;
+            }
+            encoded.chunks.push(chunk);
+            encoded.errors.push(left.iter().sum());
         }
         Ok(encoded)
     }
+}
+
+/// Scans of direct tiles, or of factored ones.
+fn scans_of(scans: &[Scan], direct: bool) -> Vec<&Scan> {
+    let of_kind = scans
+        .iter()
+        .filter(|scan| scan.coding.is_direct() == direct);
+    of_kind.collect()
+}
+
+/// One of the squares of `side` that a tile consists of: which one changes from tile to tile, so that
+/// parts lie in all places. One from which light comes, if any does.
+fn lit_part(tile: BandTile, side: u32, number: usize) -> BandTile {
+    let Extent { width, height } = tile.rect.extent;
+    if width.max(height) <= side {
+        return tile;
+    }
+    let (across, down) = (width.div_ceil(side), height.div_ceil(side));
+    let count = (across * down) as usize;
+    let part = |i: usize| {
+        let i = ((number + i) % count) as u32;
+        let (left, top) = (i % across * side, i / across * side);
+        tile.crop(TileRect {
+            x: tile.rect.x + left,
+            y: tile.rect.y + top,
+            extent: Extent {
+                width: side.min(width - left),
+                height: side.min(height - top),
+            },
+        })
+    };
+    let is_lit = |part: &BandTile| {
+        let mut values = part.coefficients.iter().chain(&part.functions).flatten();
+        values.any(|v| v.is_finite() && *v != 0.0)
+    };
+    (0..count)
+        .map(part)
+        .find(is_lit)
+        .unwrap_or_else(|| BandTile::dark(tile.rect))
 }
 
 /// Fetches each tile, works on it, and takes the results in order.

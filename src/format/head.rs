@@ -34,7 +34,6 @@ impl Head {
         bytes: &[u8],
         limits: &Limits,
     ) -> Result<Self, FormatError> {
-        limits.check_header(&header)?;
         let mut rest = &bytes[HEADER_BYTES..];
         let mut take = |length: u32, crc: u32, part: Part| {
             let (taken, after) = rest.split_at(length as usize);
@@ -184,7 +183,8 @@ impl Head {
         self.offsets.last().copied().unwrap_or(0)
     }
 
-    fn index(&self, part: PartNumber) -> usize {
+    /// The part's number in the order of the file.
+    pub(super) fn index(&self, part: PartNumber) -> usize {
         part.scan * (self.tiles() + 1) + part.tile.map_or(0, |tile| tile + 1)
     }
 

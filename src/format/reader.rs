@@ -241,7 +241,7 @@ impl Opened {
             head,
         };
         for part in opened.head.parts() {
-            let at = part_index(tiles, part);
+            let at = opened.head.index(part);
             opened.parts[at] = false;
             opened.missing[part.scan] += 1;
         }
@@ -253,7 +253,7 @@ impl Opened {
     }
 
     fn has(&self, part: PartNumber) -> bool {
-        self.parts[part_index(self.tiles.len(), part)]
+        self.parts[self.head.index(part)]
     }
 
     /// Scans that are there for every tile.
@@ -358,7 +358,7 @@ impl Opened {
     /// Takes a part that is whole.
     fn take(&mut self, part: PartNumber, bytes: &[u8]) -> Result<(), FormatError> {
         self.head.check_crc(part, bytes)?;
-        let at = part_index(self.tiles.len(), part);
+        let at = self.head.index(part);
         self.parts[at] = true;
         self.missing[part.scan] -= 1;
         let Some(tile) = part.tile else {
@@ -459,8 +459,4 @@ impl Opened {
         };
         Ok((transport, self.head.metadata))
     }
-}
-
-fn part_index(tiles: usize, part: PartNumber) -> usize {
-    part.scan * (tiles + 1) + part.tile.map_or(0, |tile| tile + 1)
 }

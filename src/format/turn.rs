@@ -90,14 +90,14 @@ impl Turn {
         let old = self.rank();
         self.functions.truncate(rank);
         self.energies.truncate(rank);
-        let rows = self.rotation.chunks_exact(old.max(1));
+        let rows = self.rotation.chunks_exact(old);
         self.rotation = rows.flat_map(|row| &row[..rank]).copied().collect();
     }
 
     /// A tile's coefficients over this basis as `[pixel, component]`; none if it has none.
     pub fn coefficients(&self, tile: &BandTile) -> Vec<[f32; CHANNELS]> {
         let rank = self.rank();
-        if tile.coefficients.is_empty() || rank == 0 {
+        if tile.coefficients.is_empty() {
             return Vec::new();
         }
         let mut turned = vec![[0.0f32; CHANNELS]; tile.rect.extent.area() * rank];
@@ -147,7 +147,7 @@ pub fn moment(tile: &BandTile, rank: usize) -> Vec<f64> {
 /// and the moment along each column.
 fn flat_first(moment: &[f64], sums: &[f64], n: usize) -> (Vec<f64>, Vec<f64>) {
     let length = sums.iter().map(|s| s * s).sum::<f64>().sqrt();
-    if n == 0 || length < 1e-6 {
+    if length < 1e-6 {
         // No part of the span is flat.
         let (energies, rows) = symmetric_eigen(moment.to_vec(), n);
         return (transpose(&rows, n), energies);

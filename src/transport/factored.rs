@@ -5,8 +5,7 @@ use super::{CHANNELS, Geometry, TileRect, TransportFunctions};
 /// Light transport functions that others are combined from: `τ_n ≈ Σ_k c_nk v_k`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Basis {
-    /// `v_k` as `[rank, element]`, window rows (v) then columns (u), the most important first. Each
-    /// of unit Euclidean norm, by which files round all coefficients to the same step.
+    /// `v_k` as `[rank, element]`, window rows (v) then columns (u), the most important first.
     pub kernels: Vec<Vec<f32>>,
 }
 
@@ -39,7 +38,8 @@ impl FactoredTile {
         functions
     }
 
-    /// [`expand`](Self::expand), added to what `tau` has as `[pixel, element, channel]`.
+    /// [`expand`](Self::expand), added to what `tau` has as `[pixel, element, channel]`. Elements off
+    /// the display become zero.
     pub(crate) fn expand_into(
         &self,
         geometry: &Geometry,
@@ -132,6 +132,30 @@ impl BandTile {
             let at = y as usize * self.rect.extent.width as usize;
             let at = (at + (rect.x - self.rect.x) as usize) * each;
             values[at..at + width].copy_from_slice(row);
+        }
+    }
+
+    /// What of the tile lies in `rect`.
+    ///
+    /// # Panics
+    /// If `rect` is not within the tile.
+    pub fn crop(&self, rect: TileRect) -> Self {
+        let pixels = self.rect.extent.area();
+        let (left, top) = ((rect.x - self.rect.x) as usize, rect.y - self.rect.y);
+        let (width, of_tile) = (rect.extent.width as usize, self.rect.extent.width as usize);
+        let of_rect = |values: &[[f32; CHANNELS]]| {
+            let each = values.len() / pixels;
+            let rows = top as usize..(top + rect.extent.height) as usize;
+            let rows = rows.flat_map(|y| {
+                let at = (y * of_tile + left) * each;
+                &values[at..at + width * each]
+            });
+            rows.copied().collect()
+        };
+        Self {
+            rect,
+            coefficients: of_rect(&self.coefficients),
+            functions: of_rect(&self.functions),
         }
     }
 

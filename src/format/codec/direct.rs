@@ -93,7 +93,7 @@ impl Numbers {
         let mut rest: Vec<Pixel> = Vec::with_capacity(functions.len());
         for function in functions.chunks_exact(order.len()) {
             let ordered = order.iter().map(|&slot| function[usize::from(slot)]);
-            rest.extend(ordered.map(|tau| tau.map(|t| if t.is_finite() { t } else { 0.0 })));
+            rest.extend(ordered.map(finite));
         }
         let square = |rest: &[Pixel]| {
             let all = rest.iter().flatten();
@@ -127,7 +127,7 @@ impl Numbers {
 
     /// What a reader will have of the `functions` that these are of.
     pub fn decoded(&self, functions: &[Pixel], order: &[u16]) -> Vec<Pixel> {
-        let mut decoded = functions.to_vec();
+        let mut decoded: Vec<Pixel> = functions.iter().copied().map(finite).collect();
         let of_pixels = decoded.chunks_exact_mut(order.len());
         for (function, rest) in of_pixels.zip(self.rest.chunks_exact(order.len())) {
             for (&slot, rest) in order.iter().zip(rest) {
@@ -155,6 +155,11 @@ impl Numbers {
         })
         .collect()
     }
+}
+
+/// What is no number counts for none.
+fn finite(tau: Pixel) -> Pixel {
+    tau.map(|t| if t.is_finite() { t } else { 0.0 })
 }
 
 fn round(x: f32, step: f32, rounding: f32) -> i32 {

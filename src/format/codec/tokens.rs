@@ -39,8 +39,9 @@ pub fn bound(tokens: u64) -> u64 {
 /// Blocks on their way into a file.
 #[derive(Debug, Default)]
 pub struct Writer {
-    /// Each with its class.
-    tokens: Vec<(usize, u8)>,
+    /// All of them, and the same by class: which takes less is known at the end.
+    tokens: Vec<u8>,
+    streams: [Vec<u8>; CLASSES],
     bits: Vec<u8>,
     /// Bits not yet in `bits`, the first the lowest.
     pending: u32,
@@ -52,7 +53,8 @@ impl Writer {
     pub fn block(&mut self, block: &[i32]) {
         let (mut before, mut zeros) = (None, 0);
         let mut put = |token: u8| {
-            self.tokens.push((class(before), token));
+            self.tokens.push(token);
+            self.streams[class(before)].push(token);
             before = Some(token);
         };
         for &number in block {
@@ -87,19 +89,15 @@ impl Writer {
         if self.count > 0 {
             self.bits.push(self.pending as u8);
         }
-        let mut streams = [const { Vec::new() }; CLASSES];
-        for &(class, token) in &self.tokens {
-            streams[class].push(token);
-        }
-        let all = self.tokens.iter().map(|(_, token)| *token).collect();
-        let (apart, together) = (pack(&streams)?, pack(&[all])?);
+        let count = self.tokens.len() as u32; // a chunk's tokens are few
+        let (apart, together) = (pack(&self.streams)?, pack(&[self.tokens])?);
         // Few tokens are better together.
         let mut bytes = match together.len() <= apart.len() {
             true => together,
             false => apart,
         };
         bytes.extend(self.bits);
-        Ok((bytes, self.tokens.len() as u32)) // a chunk's tokens are few
+        Ok((bytes, count))
     }
 }
 
