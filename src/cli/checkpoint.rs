@@ -14,9 +14,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
-use super::tile_record;
-use crate::transport::{Geometry, RecoveredTile};
-
 /// How every checkpoint begins.
 const MAGIC: [u8; 8] = *b"LTMPART\n";
 /// Tile number, bytes and checksum before each record.
@@ -218,19 +215,14 @@ impl Checkpoint {
         append().with_context(|| format!("{}: cannot be written", self.path.display()))
     }
 
-    /// Reads tile `i` back.
-    pub fn tile(
-        &mut self,
-        geometry: &Geometry,
-        rank: usize,
-        i: usize,
-    ) -> io::Result<RecoveredTile> {
+    /// Reads the record of tile `i` back.
+    pub fn record(&mut self, i: usize) -> io::Result<Vec<u8>> {
         let missing = || io::Error::from(ErrorKind::NotFound);
         let (start, length) = self.records[i].ok_or_else(missing)?;
         let mut record = vec![0; length as usize];
         self.file.seek(SeekFrom::Start(start))?;
         self.file.read_exact(&mut record)?;
-        tile_record::decode(geometry.tile(i), rank, geometry.window.area(), &record)
+        Ok(record)
     }
 
     /// Removes the checkpoint: it is no longer needed.
@@ -253,8 +245,8 @@ impl Checkpoint {
         self.records = records;
         ensure!(
             resume,
-            "holds {count} of {tiles} tiles of a recovery that was interrupted; add --resume to go \
-             on with it, or {way_out}"
+            "holds {count} of {tiles} tiles of a recovery that did not come to its end; add --resume to \
+             go on with it, or {way_out}"
         );
         if let Some(difference) = kept.difference(recipe) {
             bail!(

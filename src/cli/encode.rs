@@ -1,21 +1,21 @@
 //! From the tiles of a checkpoint to a file.
 
-use std::io;
+use std::io::{self, ErrorKind};
 use std::sync::{Mutex, PoisonError};
 
-use anyhow::Result;
 use clap::Args;
 
 use super::checkpoint::Checkpoint;
 use super::memory::Bytes;
-use super::process::Cores;
-use crate::format::{EncodedFile, Judge, Metadata, Quality, Source};
+use super::process::Interrupt;
+use super::tile_record;
+use crate::format::{EncodedFile, FormatError, HEADER_BYTES, Judge, Metadata, Quality, Source};
 use crate::recover::{Recovery, Rehearsal};
 use crate::transport::{BandTile, Basis, Decibels, Geometry, RecoveredTile, TransportFunctions};
 
 /// Camera pixels along a tile's side in a file: more than those of a recovered tile, for what is
 /// compressed together is smaller, and few enough to fetch what is seen alone.
-const TILE_SIDE: u32 = 128;
+pub const TILE_SIDE: u32 = 128;
 /// SNR that may be lost in a file unless another quality is asked for, by what the rehearsal tells. It
 /// recovered from fewer patterns than the file is made of, and so a little more noise.
 const LOSS: Decibels = Decibels(0.5);
@@ -29,12 +29,23 @@ pub struct QualityArgs {
     /// SNR of the file against what was recovered, in dB: more is larger [default: as much as tells by the photographs]
     #[arg(long, value_name = "DB", value_parser = |text: &str| super::number_in(text, 5.0, 75.0))]
     quality: Option<f32>,
-    /// Make the best file of at most so many bytes: 500kB, 2MB
-    #[arg(long, value_name = "BYTES", value_parser = Bytes::parse)]
+    /// Make the best file of at most so many bytes: 500kB, 2MB (kB and MB are powers of 1000, KiB and MiB of 1024)
+    #[arg(long, value_name = "BYTES", value_parser = parse_most)]
     max_bytes: Option<Bytes>,
-    /// Keep eleven bits of every coefficient, for archives: some ten times larger
+    /// Keep eleven bits of every coefficient, for archives: ten to seventy times larger
     #[arg(long)]
     lossless: bool,
+}
+
+/// Parses the most bytes of a file.
+fn parse_most(text: &str) -> Result<Bytes, String> {
+    let most = Bytes::parse(text)?;
+    match most.0 > HEADER_BYTES as u64 {
+        true => Ok(most),
+        false => Err(format!(
+            "a file's header alone has {HEADER_BYTES} bytes; give more"
+        )),
+    }
 }
 
 impl QualityArgs {
@@ -68,31 +79,34 @@ impl Judge for Judging<'_> {
     }
 }
 
-/// Encodes the tiles that `checkpoint` keeps of a recovery.
+/// Encodes the tiles that `checkpoint` keeps of a recovery. Told to stop, it ends with
+/// [`FormatError::Source`] of [`ErrorKind::Interrupted`].
 pub fn file(
     args: &QualityArgs,
-    checkpoint: Checkpoint,
+    checkpoint: &Mutex<Checkpoint>,
     recovery: &Recovery,
     metadata: Metadata,
-    cores: &Cores,
-) -> Result<(EncodedFile, Checkpoint)> {
+    interrupt: &Interrupt,
+) -> Result<EncodedFile, FormatError> {
     let (recovered, basis) = (recovery.geometry(), recovery.basis());
     let geometry = Geometry {
         tile_side: TILE_SIDE,
         ..*recovered
     };
-    let rank = basis.map_or(0, Basis::rank);
-    let kept = Mutex::new(checkpoint);
+    let (rank, area) = (basis.map_or(0, Basis::rank), recovered.window.area());
     let tile = |i: usize| -> io::Result<BandTile> {
+        if interrupt.told() {
+            return Err(ErrorKind::Interrupted.into());
+        }
         let rect = geometry.tile(i);
         let mut tile = BandTile::dark(rect);
         for (x, y) in parts(rect.x, rect.extent.width, recovered.tile_side).flat_map(|x| {
             parts(rect.y, rect.extent.height, recovered.tile_side).map(move |y| (x, y))
         }) {
-            let i = y * recovered.tile_grid().width + x;
-            let mut checkpoint = kept.lock().unwrap_or_else(PoisonError::into_inner);
-            let part = checkpoint.tile(recovered, rank, i as usize)?;
-            drop(checkpoint);
+            let i = (y * recovered.tile_grid().width + x) as usize;
+            let kept = checkpoint.lock();
+            let record = kept.unwrap_or_else(PoisonError::into_inner).record(i)?;
+            let part = tile_record::decode(recovered.tile(i), rank, area, &record)?;
             tile.put(part);
         }
         Ok(tile)
@@ -105,11 +119,7 @@ pub fn file(
         extensions: Vec::new(),
     };
     let judge = recovery.rehearsal().map(Judging);
-    let file = EncodedFile::new(source, args.quality(judge.as_ref()), cores)?;
-    Ok((
-        file,
-        kept.into_inner().unwrap_or_else(PoisonError::into_inner),
-    ))
+    EncodedFile::new(source, args.quality(judge.as_ref()), &interrupt.cores())
 }
 
 /// Columns or rows of recovered tiles within a file's tile from `start` on.

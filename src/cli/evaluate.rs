@@ -46,6 +46,10 @@ struct Report {
     /// without one.
     flood_snr_db: Option<Decibels>,
     file_bytes: u64,
+    /// Bytes that were looked at, and scans that are whole in them.
+    read_bytes: u64,
+    read_scans: usize,
+    scans: usize,
 }
 
 pub fn run(args: &EvaluateArgs) -> Result<()> {
@@ -72,6 +76,9 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
         heldout_shots: 0,
         flood_snr_db: None,
         file_bytes: header.file_bytes,
+        read_bytes: file.bytes,
+        read_scans: file.scans,
+        scans: file.head.scans.len(),
     };
     let mut relighter = cpu::Relighter::new(Arc::new(file.transport));
     if let Some(truth) = folder.truth()? {
@@ -98,27 +105,31 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
 }
 
 fn print(report: &Report) -> Result<()> {
-    let show = |d: Option<Decibels>| d.map_or("-".to_owned(), |d| d.to_string());
-    report::print_line(&format!(
-        "SNR against the truth      {}",
-        show(report.snr_db)
-    ))?;
-    report::print_line(&format!(
-        "SNR on {:3} held-out shots   {}",
-        report.heldout_shots,
-        show(report.heldout_snr_db)
-    ))?;
-    report::print_line(&format!(
-        "SNR on the flood photo     {}",
-        show(report.flood_snr_db)
-    ))?;
+    let line = |name: &str, value: &str| report::print_line(&format!("{name:28} {value}"));
+    let snr = |name: &str, of: Option<Decibels>| {
+        line(name, &of.map_or("-".to_owned(), |snr| snr.to_string()))
+    };
+    snr("SNR against the truth", report.snr_db)?;
+    let held = format!("SNR on {} held-out shots", report.heldout_shots);
+    snr(&held, report.heldout_snr_db)?;
+    snr("SNR on the flood photo", report.flood_snr_db)?;
     for (name, psnr) in &report.relit {
-        report::print_line(&format!("PSNR relit under {name:9} {}", show(*psnr)))?;
+        snr(&format!("PSNR relit under {name}"), *psnr)?;
     }
-    report::print_line(&format!(
-        "File                       {}",
-        report::bytes(report.file_bytes)
-    ))
+    let bytes = report::bytes;
+    match report.read_bytes < report.file_bytes {
+        true => line(
+            "File",
+            &format!(
+                "the first {} of {}: {} of {} scans whole",
+                bytes(report.read_bytes),
+                bytes(report.file_bytes),
+                report.read_scans,
+                report.scans
+            ),
+        ),
+        false => line("File", &bytes(report.file_bytes)),
+    }
 }
 
 /// Adds up the error over every element that either transport has for any pixel.

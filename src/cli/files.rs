@@ -5,11 +5,11 @@ use std::io::{BufWriter, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use tempfile::NamedTempFile;
 
 use super::memory::Bytes;
-use crate::format::{HEADER_BYTES, Head, Interest, Limits, Reader};
+use crate::format::{FormatError, HEADER_BYTES, Head, Interest, Limits, Part, Reader};
 use crate::transport::Transport;
 
 /// Bytes read at a time.
@@ -19,53 +19,88 @@ const LIMITS: Limits = Limits {
     decoded_bytes: 16 << 30,
 };
 
-/// Everything an `.ltm` file holds.
+/// What was read of an `.ltm` file.
 pub struct LtmFile {
     pub head: Head,
     pub transport: Transport,
+    /// Bytes read, and scans that are whole for every tile.
+    pub bytes: u64,
+    pub scans: usize,
 }
 
 /// Reads and checks an `.ltm` file, or of its beginning as much as `first` says.
 pub fn read_ltm(path: &Path, first: Option<Share>) -> Result<LtmFile> {
     let read = || -> Result<LtmFile> {
-        let mut file = open(path)?;
+        let file = open(path)?;
         let length = file.metadata().context("cannot be read")?.len();
-        let mut left = first.map_or(u64::MAX, |first| first.of(length));
+        let most = first.map_or(u64::MAX, |first| first.of(length));
         let mut reader = Reader::new(LIMITS);
-        let mut piece = vec![0; PIECE];
-        let mut offset = 0;
-        loop {
-            let most = PIECE.min(usize::try_from(left).unwrap_or(PIECE));
-            let n = file.read(&mut piece[..most]).context("cannot be read")?;
-            if n == 0 {
-                break;
-            }
-            reader.feed(offset, &piece[..n])?;
-            offset += n as u64;
-            left -= n as u64;
-        }
-        let head = reader.head().cloned();
-        let (transport, _) = match first {
-            Some(_) => reader.finish_early()?,
-            None => reader.finish()?,
+        let fed = feed(&mut reader, file.take(most));
+        let Some(head) = reader.head().cloned() else {
+            fed?;
+            ensure!(
+                most >= length,
+                "the first {most} bytes end within its head; give --first more"
+            );
+            return Err(reader.cut_short().into());
         };
+        let progress = reader.progress();
+        let transport = fed.and_then(|()| match first {
+            Some(_) => Ok(reader.finish_early()?),
+            None => Ok(reader.finish()?),
+        });
+        let (transport, _) = transport.map_err(|error| match sound_bytes(&head, &error) {
+            Some(sound) if sound > 0 => {
+                anyhow!("{error:#} (--first {sound} shows what comes before)")
+            }
+            _ => error,
+        })?;
         Ok(LtmFile {
-            head: head.context("has no head")?,
+            head,
             transport,
+            bytes: progress.bytes,
+            scans: progress.scans,
         })
     };
     read().with_context(|| path.display().to_string())
 }
 
+fn feed(reader: &mut Reader, mut file: impl Read) -> Result<()> {
+    let mut piece = vec![0; PIECE];
+    let mut offset = 0;
+    loop {
+        let n = file.read(&mut piece).context("cannot be read")?;
+        if n == 0 {
+            return Ok(());
+        }
+        reader.feed(offset, &piece[..n])?;
+        offset += n as u64;
+    }
+}
+
+/// Bytes before what an error is of, where that is known.
+fn sound_bytes(head: &Head, error: &anyhow::Error) -> Option<u64> {
+    match error.downcast_ref::<FormatError>()? {
+        FormatError::Truncated { got, .. } => Some(*got),
+        FormatError::Checksum { part } | FormatError::Decompress { part, .. } => {
+            let bad = head.parts().find(|&number| Part::from(number) == *part);
+            bad.map(|number| head.range(number).start)
+        }
+        _ => None,
+    }
+}
+
 /// Opens an `.ltm` file as far as its head.
-pub fn open_ltm(path: &Path) -> Result<(File, Reader)> {
-    let read = || -> Result<(File, Reader)> {
+pub fn open_ltm(path: &Path) -> Result<(File, Head)> {
+    let read = || -> Result<(File, Head)> {
         let mut file = open(path)?;
         let mut reader = Reader::new(LIMITS);
-        while reader.head().is_none() {
-            let Some(wanted) = reader.wants(&Interest::default()).into_iter().next() else {
-                break;
-            };
+        loop {
+            if let Some(head) = reader.head() {
+                return Ok((file, head.clone()));
+            }
+            let wanted = reader.wants(&Interest::default()).into_iter().next();
+            let wanted = wanted.unwrap_or_default();
             let piece = read_at(&mut file, wanted.clone())?;
             if piece.is_empty() {
                 return Err(reader.cut_short().into());
@@ -75,7 +110,6 @@ pub fn open_ltm(path: &Path) -> Result<(File, Reader)> {
             let useful = piece.len().min((head - wanted.start) as usize);
             reader.feed(wanted.start, &piece[..useful])?;
         }
-        Ok((file, reader))
     };
     read().with_context(|| path.display().to_string())
 }
@@ -161,6 +195,16 @@ impl Kind {
         }
     }
 
+    /// Whether a path's ending is that of this kind, or none.
+    fn fits(self, path: &Path) -> bool {
+        let extension = match self {
+            Self::Ltm => return true, // no other program writes these
+            Self::Png => "png",
+        };
+        path.extension()
+            .is_none_or(|own| own.eq_ignore_ascii_case(extension))
+    }
+
     /// Whether `path` holds a file of this kind, or nothing at all.
     fn may_replace(self, path: &Path) -> std::io::Result<bool> {
         let file = match File::open(path) {
@@ -198,6 +242,10 @@ impl Output {
             ensure!(
                 !path.exists() || path.is_file(),
                 "is a folder or a device; give the name of a file"
+            );
+            ensure!(
+                kind.fits(path),
+                "{kind} is what is written; give a name that ends like one"
             );
             ensure!(
                 kind.may_replace(path).context("cannot be looked at")?,

@@ -1,9 +1,10 @@
 //! `ltm-export inspect`: what is in an `.ltm` file.
 
+use std::cmp::Ordering;
 use std::ops::Range;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 
@@ -82,7 +83,7 @@ impl ScanReport {
     fn print(&self) -> Result<()> {
         let Range { start, end } = self.places;
         report::print_line(&format!(
-            "{:15} {:13} {start:4} to {end:4} {:>12} {:>12} {:>9}",
+            "{:15} {:13} {start:4} to {end:4} {:>12} {:>12} {:>17}",
             "  scan",
             self.coding,
             report::bytes(self.bytes),
@@ -93,33 +94,31 @@ impl ScanReport {
 }
 
 pub fn run(args: &InspectArgs) -> Result<()> {
-    let (file, reader) = files::open_ltm(&args.file)?;
-    let head = reader.head().context("has no head");
-    let head = head.with_context(|| args.file.display().to_string())?;
-    let length = file
-        .metadata()
-        .map_or(head.header.file_bytes, |file| file.len());
-    if length != head.header.file_bytes {
-        eprintln!(
-            "warning: {}: has {length} bytes, not {}: cut short, or more than was written; verify says \
-             what of it is sound",
-            args.file.display(),
-            head.header.file_bytes
-        );
+    let (file, head) = files::open_ltm(&args.file)?;
+    let declared = head.header.file_bytes;
+    let length = file.metadata().map_or(declared, |file| file.len());
+    let name = args.file.display();
+    match length.cmp(&declared) {
+        Ordering::Less => eprintln!(
+            "warning: {name}: is cut short, at {length} of {declared} bytes; relight --first {length} \
+             shows what came"
+        ),
+        Ordering::Equal => {}
+        Ordering::Greater => eprintln!(
+            "warning: {name}: has {length} bytes, and the photograph ends after {declared}; the rest \
+             is not of it"
+        ),
     }
     let geometry = &head.header.geometry;
     let chunks: Vec<PartNumber> = head.parts().filter(|part| part.tile.is_some()).collect();
-    let tiles_with = |direct: bool| {
-        let of_kind = chunks
-            .iter()
-            .filter(|part| head.scans[part.scan].coding.is_direct() == direct);
-        let mut tiles: Vec<usize> = of_kind.filter_map(|part| part.tile).collect();
-        tiles.sort_unstable();
-        tiles.dedup();
-        tiles
-    };
-    let (direct, factored) = (tiles_with(true), tiles_with(false));
-    let dark = |tile: &usize| !direct.contains(tile) && !factored.contains(tile);
+    // Whether scans hold anything of a tile: as coefficients, as functions.
+    let mut held = vec![[false; 2]; head.tiles()];
+    for part in &chunks {
+        if let Some(tile) = part.tile {
+            held[tile][usize::from(head.scans[part.scan].coding.is_direct())] = true;
+        }
+    }
+    let tiles_of = |of: fn(&[bool; 2]) -> bool| held.iter().filter(|tile| of(tile)).count();
     let sizes = chunks.iter().map(|part| head.range(*part));
     let report = Report {
         camera: [geometry.camera.width, geometry.camera.height],
@@ -128,14 +127,14 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         correspondence: geometry.correspondence.affine,
         tile_side: geometry.tile_side,
         tiles: head.tiles(),
-        dark_tiles: (0..head.tiles()).filter(dark).count(),
-        direct_tiles: direct.len(),
-        factored_tiles: factored.len(),
+        dark_tiles: tiles_of(|tile| *tile == [false; 2]),
+        direct_tiles: tiles_of(|tile| tile[1]),
+        factored_tiles: tiles_of(|tile| tile[0]),
         rank: Some(head.header.rank).filter(|&rank| rank > 0),
         head_bytes: head.header.head_bytes(),
         largest_chunk_bytes: sizes.map(|r| (r.end - r.start) as u32).max().unwrap_or(0),
         scans: (0..head.scans.len())
-            .map(|scan| ScanReport::new(head, scan))
+            .map(|scan| ScanReport::new(&head, scan))
             .collect(),
         file_bytes: head.header.file_bytes,
         metadata: head.metadata.clone(),
@@ -150,7 +149,6 @@ fn print(report: &Report) -> Result<()> {
     let [a, b] = report.correspondence;
     let [camera, light] = [report.camera, report.light].map(|[w, h]| format!("{w}x{h}"));
     let metadata = &report.metadata;
-    let CaptureText(capture) = metadata.into();
     for (name, value) in [
         ("title", metadata.title.clone()),
         ("creator", metadata.creator.clone()),
@@ -174,7 +172,7 @@ fn print(report: &Report) -> Result<()> {
             "rank",
             report.rank.map_or(String::new(), |rank| rank.to_string()),
         ),
-        ("recovered", capture),
+        ("recovered", recovered(metadata)),
         ("written by", metadata.writer.clone()),
         ("head", report::bytes(report.head_bytes)),
     ] {
@@ -184,8 +182,8 @@ fn print(report: &Report) -> Result<()> {
     }
     if !report.scans.is_empty() {
         report::print_line(&format!(
-            "{:15} {:13} {:12} {:>12} {:>12} {:>9}",
-            "scans", "", "places", "bytes", "file to here", "SNR"
+            "{:15} {:13} {:12} {:>12} {:>12} {:>17}",
+            "scans", "", "items", "bytes", "file to here", "SNR to recovered"
         ))?;
     }
     report.scans.iter().try_for_each(ScanReport::print)?;
@@ -197,21 +195,12 @@ fn print(report: &Report) -> Result<()> {
 }
 
 /// How the file came to be, in words.
-struct CaptureText(String);
-
-impl From<&Metadata> for CaptureText {
-    fn from(metadata: &Metadata) -> Self {
-        let shots = metadata.shots_used.len();
-        let patterns = match metadata.capture.patterns {
-            0 => shots,
-            patterns => patterns,
-        };
-        Self(match patterns == shots {
-            true => format!("{} from {shots} patterns", metadata.method),
-            false => format!(
-                "{} from {shots} photographs of {patterns} patterns",
-                metadata.method
-            ),
-        })
-    }
+fn recovered(metadata: &Metadata) -> String {
+    let photographs = metadata.shots_used.len();
+    let patterns = match metadata.capture.patterns {
+        0 => photographs,
+        patterns => patterns,
+    };
+    let shots = report::shots(patterns, photographs);
+    format!("{} from {shots}", metadata.method)
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use anyhow::{Result, ensure};
 
+use super::encode;
 use crate::capture::{Manifest, Rows};
 use crate::recover::Method;
 use crate::transport::{CHANNELS, Geometry, Window};
@@ -14,8 +15,13 @@ const PROGRAM: u64 = 32 << 20;
 /// What reading one photograph takes beside its rows: pieces of the file, and the decoder's memory
 /// of what it last decompressed.
 const READER: u64 = 320 << 10;
-/// What compressing one tile takes beside the tile.
+/// What compressing one recovered tile takes beside the tile.
 const COMPRESSOR: u64 = 24 << 20;
+/// What one coefficient or element of all channels takes while its tile of the file is encoded: itself,
+/// what rounding leaves of it, the numbers of two scans, and their tokens.
+const ENCODED: u64 = 60;
+/// What choosing the file's step takes.
+const ENCODER: u64 = 64 << 20;
 
 /// An amount of memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,21 +32,26 @@ impl Bytes {
     /// of the machine's memory: the same command gives the same bytes everywhere.
     pub const DEFAULT: &str = "4G";
 
-    /// Parses `512M`, `4G`, `4GiB` or a number of bytes; units are powers of 1024.
+    /// Parses `512M`, `4GiB`, `500kB` or a number of bytes: units are powers of 1024, or with `B`
+    /// alone of 1000, in which amounts are printed.
     pub fn parse(text: &str) -> Result<Self, String> {
         let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
-        let shift = match text[digits.len()..].to_ascii_lowercase().as_str() {
-            "" | "b" => 0,
-            "k" | "kb" | "kib" => 10,
-            "m" | "mb" | "mib" => 20,
-            "g" | "gb" | "gib" => 30,
-            "t" | "tb" | "tib" => 40,
+        let unit: u64 = match text[digits.len()..].to_ascii_lowercase().as_str() {
+            "" | "b" => 1,
+            "kb" => 1_000,
+            "mb" => 1_000_000,
+            "gb" => 1_000_000_000,
+            "tb" => 1_000_000_000_000,
+            "k" | "kib" => 1 << 10,
+            "m" | "mib" => 1 << 20,
+            "g" | "gib" => 1 << 30,
+            "t" | "tib" => 1 << 40,
             _ => return Err("give it like 512M, 4G or 4GiB, or as a number of bytes".to_owned()),
         };
         let number: u64 = digits.trim().parse().map_err(|_| {
             format!("{digits:?} is not a whole number; give it like 512M, 4G or 4GiB")
         })?;
-        let bytes = number.checked_mul(1 << shift);
+        let bytes = number.checked_mul(unit);
         bytes
             .map(Self)
             .ok_or_else(|| "is more than there is".to_owned())
@@ -72,6 +83,8 @@ pub struct Plan {
     tile_side: u32,
     /// Tiles that may be worked on at once.
     pub tiles_at_once: usize,
+    /// Tiles of the file that may be encoded at once.
+    pub encoders: usize,
     budget: u64,
     fixed: u64,
 }
@@ -110,11 +123,19 @@ impl Plan {
             width: camera.width,
             tile_side,
             tiles_at_once: 0,
+            encoders: 0,
             budget: budget.0,
             fixed,
         };
         let rows = plan.row * u64::from((tile_side + 2 * method.most_halo()).min(camera.height));
-        plan.ensure_at_least(plan.fixed + tile + rows)?;
+        // The file is made once all photographs are gone.
+        let side = u64::from(encode::TILE_SIDE);
+        let pixels = (camera.area() as u64).min(side * side);
+        let values = window.area() + method.most_rank(window);
+        let encoded = ENCODED * pixels * values as u64;
+        let encoder = PROGRAM + ENCODER.min(ENCODED * (camera.area() * values) as u64);
+        plan.ensure_at_least((plan.fixed + tile + rows).max(encoder + encoded))?;
+        plan.encoders = threads.min(((plan.budget - encoder) / encoded) as usize);
         // All photographs, or half of what is left, the rest for the tiles worked on: at least one.
         let left = plan.budget - plan.fixed;
         let all = plan.row * u64::from(plan.height);
@@ -227,7 +248,8 @@ mod tests {
             ("512M", 512 << 20),
             ("4G", 4 << 30),
             ("4GiB", 4 << 30),
-            ("4gb", 4 << 30),
+            ("4gb", 4_000_000_000),
+            ("100kB", 100_000),
             ("1 T", 1 << 40),
         ] {
             assert_eq!(Bytes::parse(text), Ok(Bytes(bytes)), "{text}");

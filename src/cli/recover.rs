@@ -1,6 +1,7 @@
 //! `ltm-export recover`: a capture folder to an `.ltm` file.
 
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -19,7 +20,7 @@ use super::photographs::Photographs;
 use super::process::{Interrupt, Interrupted};
 use super::{Usage, files, process, report, tile_record};
 use crate::capture::{self, CaptureFolder, DarkFrame, Measurements, Noise, Rows, Shot};
-use crate::format::{CaptureNote, Metadata};
+use crate::format::{CaptureNote, FormatError, Metadata};
 use crate::recover::{
     self, Band, Method, Reach, RecoverError, Recovery, Rehearsal, Settings, SparsityBasis,
 };
@@ -197,11 +198,8 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         args.window.most(),
         threads,
     )?;
-    let threads = rayon::ThreadPoolBuilder::new()
-        .num_threads(plan.tiles_at_once)
-        .build()
-        .context("threads cannot be started")?;
-    let mut report = threads.install(|| recover(args, &folder, &shots, &plan, &interrupt))?;
+    let mut report =
+        pool(plan.tiles_at_once)?.install(|| recover(args, &folder, &shots, &plan, &interrupt))?;
     report.seconds = start.elapsed().as_secs_f64();
     report.peak_rss_bytes = process::peak_rss_bytes();
     if args.json {
@@ -213,13 +211,24 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         manifest.camera.extent(),
         manifest.light.extent(),
         report.window,
-        match (report.patterns, report.photographs) {
-            (patterns, photographs) if patterns == photographs => format!("{patterns} patterns"),
-            (patterns, photographs) => format!("{photographs} photographs of {patterns} patterns"),
-        },
+        report::shots(report.patterns, report.photographs),
         report.seconds,
         report::bytes(report.file_bytes),
-    ))
+    ))?;
+    if let Some(snr) = report.expected_snr_db {
+        report::print_line(&format!(
+            "recovered to about {snr} of SNR against the object, as patterns held out tell"
+        ))?;
+    }
+    if let Some(snr) = report.file_snr_db {
+        report::print_line(&format!("kept to {snr} of SNR against what was recovered"))?;
+    }
+    Ok(())
+}
+
+fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.context("threads cannot be started")
 }
 
 /// Recovers and writes the file; what it took is left for the caller to report.
@@ -342,22 +351,31 @@ fn recover(
         shots_used: shots.to_vec(),
     };
     let basis = recovery.basis();
-    let checkpoint = run
-        .checkpoint
-        .into_inner()
-        .unwrap_or_else(PoisonError::into_inner);
     let spinner = process::spinner("compressing");
-    let (file, checkpoint) = encode::file(
-        &args.quality,
-        checkpoint,
-        &recovery,
-        metadata,
-        &interrupt.cores(),
-    )?;
+    let encoders = pool(plan.encoders)?;
+    let file = encoders.install(|| {
+        encode::file(
+            &args.quality,
+            &run.checkpoint,
+            &recovery,
+            metadata,
+            interrupt,
+        )
+    });
     spinner.finish_and_clear();
+    let file = file.map_err(|error| match error {
+        FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => run.interrupted(),
+        FormatError::TooLarge { .. } => anyhow::Error::new(error).context(format!(
+            "{}: cannot be written; nothing that was recovered is lost: give the same command with \
+             --resume and more --max-bytes, or without --max-bytes",
+            args.output.display()
+        )),
+        other => anyhow::Error::new(other).context(args.output.display().to_string()),
+    })?;
     let output = files::Output::create(&args.output, files::Kind::Ltm)?;
     let file_bytes = output.finish(|out| Ok(file.write(out)?))?;
-    checkpoint.done();
+    let checkpoint = run.checkpoint.into_inner();
+    checkpoint.unwrap_or_else(PoisonError::into_inner).done();
     Ok(Report {
         seconds: 0.0,
         peak_rss_bytes: None,

@@ -20,6 +20,14 @@ pub fn print_line(line: &str) -> Result<()> {
     }
 }
 
+/// What a photograph was recovered from, for people.
+pub fn shots(patterns: usize, photographs: usize) -> String {
+    match patterns == photographs {
+        true => format!("{patterns} patterns"),
+        false => format!("{photographs} photographs of {patterns} patterns"),
+    }
+}
+
 /// A byte count for people.
 pub fn bytes(n: u64) -> String {
     indicatif::DecimalBytes(n).to_string()

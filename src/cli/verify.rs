@@ -27,9 +27,10 @@ struct Report {
     /// What is wrong first.
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
-    /// The first bad part.
+    /// The first bad part, and how many there are.
     #[serde(skip_serializing_if = "Option::is_none")]
     bad: Option<BadPart>,
+    bad_parts: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     tiles: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -69,22 +70,29 @@ pub fn run(args: &VerifyArgs) -> Result<()> {
 
 /// Checks part by part; a file may be larger than memory.
 fn verify(args: &VerifyArgs, report: &mut Report) -> Result<()> {
-    let (mut file, reader) = files::open_ltm(&args.file)?;
+    let (mut file, head) = files::open_ltm(&args.file)?;
     let name = || args.file.display().to_string();
-    let head = reader.head().context("has no head").with_context(name)?;
     let end = head.header.file_bytes;
     report.tiles = Some(head.tiles());
     report.scans = Some(head.scans.len());
     report.file_bytes = Some(end);
+    let mut first = None;
     for part in head.parts() {
         let bytes = files::read_at(&mut file, head.range(part)).with_context(name)?;
-        if let Err(error) = format::check(head, part, &bytes) {
-            let PartNumber { scan, tile } = part;
-            let bytes = head.range(part);
-            let at = format!("at bytes {} to {}", bytes.start, bytes.end);
-            report.bad = Some(BadPart { scan, tile, bytes });
-            return Err(anyhow::Error::new(error).context(at).context(name()));
+        if let Err(error) = format::check(&head, part, &bytes) {
+            report.bad_parts += 1;
+            first.get_or_insert((part, error));
         }
+    }
+    if let Some((PartNumber { scan, tile }, error)) = first {
+        let bytes = head.range(PartNumber { scan, tile });
+        let (bad, parts) = (report.bad_parts, head.parts().count());
+        let at = format!(
+            "{bad} of {parts} parts are bad, the first at bytes {} to {}",
+            bytes.start, bytes.end
+        );
+        report.bad = Some(BadPart { scan, tile, bytes });
+        return Err(anyhow::Error::new(error).context(at).context(name()));
     }
     let length = file
         .metadata()

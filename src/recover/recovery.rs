@@ -64,6 +64,14 @@ impl Method {
         }
     }
 
+    /// The most components that tiles may be combined from.
+    pub fn most_rank(self, window: Window) -> usize {
+        match self {
+            Self::Learned => Learned::most_rank(window),
+            Self::Nnls | Self::Bpdn(_) => 0,
+        }
+    }
+
     /// The most camera pixels around a tile whose measurements may go into it.
     pub fn most_halo(self) -> u32 {
         match self {

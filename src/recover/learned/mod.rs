@@ -98,8 +98,13 @@ impl Learned {
     /// matrices, where each pixel and channel is saturated in other photographs.
     pub fn tile_bytes(window: Window) -> usize {
         let pixels = (Geometry::DEFAULT_TILE_SIDE as usize + 2 * REACH as usize).pow(2);
-        let rank = RANKS.into_iter().max().unwrap_or(0).min(window.area());
+        let rank = Self::most_rank(window);
         pixels * CHANNELS * rank * rank * size_of::<f64>()
+    }
+
+    /// The most kernels there may be.
+    pub fn most_rank(window: Window) -> usize {
+        RANKS.into_iter().max().unwrap_or(0).min(window.area())
     }
 
     /// Learns from all of `measurements`, whose patterns are `split`; starts from their
@@ -235,14 +240,14 @@ impl Learned {
         let Some(direct) = &self.direct else {
             return RecoveredTile::Factored(ours);
         };
+        let mut functions = ours.expand(&self.geometry, &self.basis);
+        let theirs = direct.tile_from(measurements, &self.split.learn, rect);
         let share = self
-            .compare(measurements, direct, rect)
+            .comparison(measurements, &functions, &theirs)
             .best_share(LEAST_GAIN);
         if share == 0.0 {
             return RecoveredTile::Factored(ours);
         }
-        let mut functions = ours.expand(&self.geometry, &self.basis);
-        let theirs = direct.tile_from(measurements, &self.split.learn, rect);
         blend(&mut functions, &theirs, share);
         RecoveredTile::Direct(functions)
     }
@@ -393,9 +398,20 @@ impl Learned {
     fn compare(&self, measurements: &Measurements, direct: &Direct, rect: TileRect) -> Comparison {
         let ours = self.factored(measurements, &self.split.learn, rect);
         let ours = ours.expand(&self.geometry, &self.basis);
-        let ours = held_out_misses(&self.geometry, measurements, &self.split.held, &ours);
         let theirs = direct.tile_from(measurements, &self.split.learn, rect);
-        let theirs = held_out_misses(&self.geometry, measurements, &self.split.held, &theirs);
+        self.comparison(measurements, &ours, &theirs)
+    }
+
+    /// What two methods' functions, from the patterns not held out, miss of those that are.
+    fn comparison(
+        &self,
+        measurements: &Measurements,
+        ours: &TransportFunctions,
+        theirs: &TransportFunctions,
+    ) -> Comparison {
+        let [ours, theirs] = [ours, theirs].map(|functions| {
+            held_out_misses(&self.geometry, measurements, &self.split.held, functions)
+        });
         let mut comparison = Comparison::default();
         for (a, b) in ours.into_iter().zip(theirs) {
             if a.is_finite() && b.is_finite() {
