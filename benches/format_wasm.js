@@ -1,7 +1,7 @@
 /**
  * How fast the player's WebAssembly decodes coefficients: node format_wasm.js FILE.ltm INSPECTED, the
  * latter what `ltm-export inspect --json` says of the file. Feeds all scans but the last, after which
- * tiles would be multiplied out, and prints {"mb_s"}: dequantised coefficients, four bytes each.
+ * tiles would be turned into codes, and prints {"mb_s"}: dequantised coefficients, four bytes each.
  */
 
 import { readFileSync } from 'node:fs';

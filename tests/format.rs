@@ -6,8 +6,8 @@ mod common;
 use common::{Noise, functions, geometry, sealed};
 use proptest::prelude::*;
 use relightable_photo::format::{
-    self, Coding, EncodedFile, Extension, FormatError, HEADER_BYTES, Interest, Judge, Limits, Metadata,
-    Part, PartNumber, Quality, Reader, Source,
+    self, Coding, EncodedFile, Extension, FormatError, HEADER_BYTES, Interest, Judge, Limits,
+    Metadata, Part, PartNumber, Quality, Reader, Source, TextDamage,
 };
 use relightable_photo::transport::{
     BandTile, Basis, CHANNELS, Decibels, FactoredTile, Geometry, RecoveredTile, Tile, Transport,
@@ -498,6 +498,21 @@ fn dark_tiles_cost_nothing() {
 /// Whether what codecs do at the borders of tiles shows: light transport that is smooth all over the
 /// picture, under a flat light and under the edge of a shadow.
 #[test]
+fn a_picture_with_light_in_one_corner_keeps_the_quality_asked_for() {
+    let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
+    let geometry = geometry([120, 120], [60, 60], 3, affine);
+    let mut recovered = Recovered::mixed(geometry, 4, 9);
+    let dark = recovered.tiles.len() - 1;
+    for tile in &mut recovered.tiles[..dark] {
+        *tile = BandTile::dark(tile.rect);
+    }
+    let file = recovered.file(QUALITY);
+    let decoded = decode(&file, 500).unwrap().0;
+    let snr = recovered.error(&decoded).snr().unwrap();
+    assert!((29.0..33.0).contains(&snr.0), "{snr}");
+}
+
+#[test]
 fn tiles_have_no_seams() {
     let side = 64;
     let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
@@ -647,11 +662,16 @@ fn what_is_wrong_is_said() {
         message(&|f| {
             f.remove(9);
         })
-        .contains("text-mode")
+        .contains("line ends were converted")
     );
+    assert!(message(&|f| f.iter_mut().for_each(|b| *b &= 0x7F)).contains("highest bit"));
+    let utf8 = |f: &mut Vec<u8>| *f = f.iter().map(|&b| char::from(b)).collect::<String>().into();
+    assert!(message(&utf8).contains("in UTF-8"));
+    assert!(message(&|f| f[..4].copy_from_slice(b"\x89PNG")).contains("PNG picture"));
     let mangled = [&file[..8], b"\n\x1A\n"].concat();
     let error = decode(&mangled, 1).unwrap_err();
-    assert!(matches!(error, FormatError::TextMode), "{error}");
+    let line_ends = FormatError::TextMode(TextDamage::LineEnds);
+    assert_eq!(error.to_string(), line_ends.to_string());
     // By the name, and by the field.
     assert!(message(&|f| f[5..7].copy_from_slice(b"01")).contains("version 0.1"));
     assert!(message(&|f| f[12] = 2).contains("version 2.0"));

@@ -11,16 +11,14 @@ use crate::transport::GeometryError;
 #[derive(Debug, Error)]
 pub enum FormatError {
     /// The magic is not there.
-    #[error("this is not an .ltm file: it begins with {found:02x?}")]
+    #[error("this is not an .ltm file: it {}", beginning(found))]
     Magic {
         /// First bytes found.
         found: Vec<u8>,
     },
     /// The magic was damaged by a transfer in text mode.
-    #[error(
-        "line ends in this .ltm file were converted, as a text-mode transfer does; transfer it again as binary"
-    )]
-    TextMode,
+    #[error("{0} in this .ltm file, as a transfer in text mode does; transfer it again as binary")]
+    TextMode(TextDamage),
     /// A version this reader does not know.
     #[error(
         "the file has format version {major}.{minor}; this reader knows {MAJOR}.x alone: get the reader for it, or export the file again"
@@ -158,6 +156,37 @@ pub enum FormatError {
         /// Bytes of the smallest file.
         least: u64,
     },
+}
+
+/// What a transfer in text mode did to a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum TextDamage {
+    /// CR LF became LF, or LF CR LF.
+    #[error("line ends were converted")]
+    LineEnds,
+    /// Seven bits of each byte are left.
+    #[error("the highest bit of bytes was cleared")]
+    HighBit,
+    /// Bytes were taken for Latin-1 characters, or for UTF-8 that they are not, and written as UTF-8.
+    #[error("bytes above 127 were replaced by characters in UTF-8")]
+    Utf8,
+}
+
+/// What bytes that are no `.ltm` file are, as far as their beginning tells.
+fn beginning(found: &[u8]) -> String {
+    let known: [(&[u8], &str); 6] = [
+        (b"\x89PNG", "is a PNG picture"),
+        (b"\xFF\xD8\xFF", "is a JPEG picture"),
+        (b"II*\0", "is a TIFF picture"),
+        (b"MM\0*", "is a TIFF picture"),
+        (b"PK\x03\x04", "is a ZIP archive"),
+        (b"<", "begins like a web page"),
+    ];
+    let kind = known.iter().find(|(start, _)| found.starts_with(start));
+    kind.map_or_else(
+        || format!("begins with {found:02x?}"),
+        |(_, kind)| (*kind).to_owned(),
+    )
 }
 
 // By hand, as its text holds all of the source's: a chain of causes would say it twice.

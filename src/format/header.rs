@@ -1,7 +1,7 @@
 //! The fixed header.
 
 use super::codec::intact;
-use super::error::Part;
+use super::error::{Part, TextDamage};
 use super::fields::Fields;
 use super::metadata::MAX_METADATA_BYTES;
 use super::scan::MOST_SCANS;
@@ -14,6 +14,8 @@ pub(super) const MINOR: u16 = 0;
 /// Shows text-mode damage as PNG's and KTX2's do: a high bit, CR LF, ^Z, LF. The digits are those of
 /// version 1.0 and stand for all of major version 1.
 const MAGIC: [u8; 12] = *b"\xABLTM 10\xBB\r\n\x1A\n";
+/// Bytes of it by which a file is known though it was damaged.
+const NAME: usize = 4;
 /// Where the version's digits stand in it.
 const MAGIC_VERSION: std::ops::Range<usize> = 5..7;
 /// Bytes of the fixed header.
@@ -174,7 +176,7 @@ impl Header {
 }
 
 /// Tells a wrong file from a damaged one, and from one of another version, from the first bytes,
-/// however few.
+/// once there are four of them.
 pub(super) fn check_magic(bytes: &[u8]) -> Result<(), FormatError> {
     let name = MAGIC_VERSION.start;
     if let Some(digits @ &[b'0'..=b'9', b'0'..=b'9']) = bytes.get(MAGIC_VERSION)
@@ -184,10 +186,20 @@ pub(super) fn check_magic(bytes: &[u8]) -> Result<(), FormatError> {
         let [major, minor] = [digits[0], digits[1]].map(|digit| u16::from(digit - b'0'));
         return Err(FormatError::Version { major, minor });
     }
+    if bytes.len() < NAME {
+        return Ok(());
+    }
+    let looks_like = |damaged: &[u8]| bytes[..NAME] == damaged[..NAME];
+    if looks_like(&MAGIC.map(|byte| byte & 0x7F)) {
+        return Err(FormatError::TextMode(TextDamage::HighBit));
+    }
+    if looks_like(b"\xC2\xABLT") || looks_like(b"\xEF\xBF\xBDL") {
+        return Err(FormatError::TextMode(TextDamage::Utf8));
+    }
     match bytes.iter().zip(&MAGIC).position(|(a, b)| a != b) {
         None => Ok(()),
         // Past the name: only the line ends that are there to catch this.
-        Some(8..) => Err(FormatError::TextMode),
+        Some(8..) => Err(FormatError::TextMode(TextDamage::LineEnds)),
         Some(_) => Err(FormatError::Magic {
             found: bytes[..bytes.len().min(MAGIC.len())].to_vec(),
         }),

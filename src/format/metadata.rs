@@ -52,7 +52,9 @@ pub struct CaptureNote {
 impl Metadata {
     /// Reads the JSON of a file.
     pub(super) fn decode(json: &[u8]) -> Result<Self, serde_json::Error> {
-        let mut json = serde_json::Deserializer::from_slice(json);
+        // Strings that are passed over would go unchecked.
+        let json = str::from_utf8(json).map_err(serde::de::Error::custom)?;
+        let mut json = serde_json::Deserializer::from_str(json);
         let metadata = object(&mut json)?;
         json.end()?;
         Ok(metadata)
@@ -74,4 +76,20 @@ fn object<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<T, 
         }
     }
     from.deserialize_map(Object(PhantomData))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn metadata_are_one_object_of_text() {
+        let title = Metadata::decode(br#"{"title": "A", "other": ["B"]}"#)
+            .unwrap()
+            .title;
+        assert_eq!(title, "A");
+        for bad in [&b"[]"[..], b"{} {}", b"", b"{\"other\": \"\xFF\"}"] {
+            assert!(Metadata::decode(bad).is_err(), "{}", bad.escape_ascii());
+        }
+    }
 }

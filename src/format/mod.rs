@@ -35,7 +35,7 @@ use chunk::Chunk;
 
 pub use chunk::ChunkEntry;
 pub use encode::{EncodedFile, Judge, Quality, Source};
-pub use error::{FormatError, Part};
+pub use error::{FormatError, Part, TextDamage};
 pub use extension::Extension;
 pub use head::{Head, PartNumber};
 pub use header::{FIRST_BYTES, HEADER_BYTES, Header};

@@ -45,7 +45,7 @@ impl From<FormatError> for CodedError {
     fn from(error: FormatError) -> Self {
         let code = match error {
             FormatError::Magic { .. } => "format-magic",
-            FormatError::TextMode => "format-text-mode",
+            FormatError::TextMode(_) => "format-text-mode",
             FormatError::Version { .. } => "format-version",
             FormatError::Checksum { .. } => "format-checksum",
             FormatError::Limit { .. } | FormatError::Memory { .. } => "format-limit",

@@ -87,7 +87,8 @@ export function loadEngine(): Promise<Engine> {
     throw new PhotoError(
       'wasm-unavailable',
       'The relighting module could not be started. Its wasm folder has to lie beside the script, and ' +
-        "a content security policy has to allow 'wasm-unsafe-eval' in script-src. " +
+        "a content security policy has to allow 'wasm-unsafe-eval' in script-src, and the folder's " +
+        'address in connect-src. ' +
         `The browser says: ${messageOf(cause)}`,
       cause,
     );
