@@ -214,18 +214,22 @@ fn a_file_is_as_good_or_as_small_as_asked_for() {
     let small = recover(&["--max-bytes", "20000"]);
     let bytes = small["file_bytes"].as_u64().unwrap();
     assert!((18_000..=20_000).contains(&bytes), "{small}");
-    let message = complaint(&[
-        "recover",
-        text(&fixture),
-        "-o",
-        text(&file),
-        "--max-bytes",
-        "99",
-    ]);
+    let most = |bytes: &'static str| {
+        let start = ["recover", text(&fixture), "-o", text(&file)];
+        [&start[..], &["--window", "5", "--max-bytes", bytes]].concat()
+    };
+    let before = fs::read(&file).unwrap();
+    let message = complaint(&most("600"));
     assert!(
-        message.contains("at least") && message.contains("99"),
+        ["at least", "600", "--resume"].map(|words| message.contains(words)) == [true; 3],
         "{message}"
     );
+    assert!(fs::read(&file).unwrap() == before);
+    // Nothing is recovered twice.
+    let resumed = run(&[&most("20kB")[..], &["--resume"]].concat());
+    assert!(String::from_utf8_lossy(&resumed.stderr).contains("resuming with 4 of 4 tiles"));
+    assert!(fs::read(&file).unwrap() == before);
+    assert_eq!(run(&most("99")).status.code(), Some(2));
     let both = ["recover", "x", "-o", "y", "--lossless", "--quality", "30"];
     assert_eq!(run(&both).status.code(), Some(2));
 }
@@ -355,6 +359,19 @@ fn an_input_named_as_output_is_not_destroyed() {
         text(&file),
     ]);
     assert!(message.contains("is not a PNG"), "{message}");
+    let jpeg = folder.path().join("x.jpg");
+    let message = complaint(&[
+        "relight",
+        text(&file),
+        "--light",
+        "flood",
+        "-o",
+        text(&jpeg),
+    ]);
+    assert!(
+        message.contains("x.jpg: a PNG is what is written"),
+        "{message}"
+    );
     assert_eq!(fs::read(&file).unwrap(), before);
     assert!(complaint(&["verify", text(folder.path())]).contains("is a folder"));
     // What the program wrote itself is replaced.

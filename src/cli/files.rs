@@ -244,12 +244,12 @@ impl Output {
                 "is a folder or a device; give the name of a file"
             );
             ensure!(
-                kind.fits(path),
-                "{kind} is what is written; give a name that ends like one"
-            );
-            ensure!(
                 kind.may_replace(path).context("cannot be looked at")?,
                 "is there already and is not {kind}; give another name"
+            );
+            ensure!(
+                kind.fits(path),
+                "{kind} is what is written; give a name that ends like one"
             );
             let (builder, folder) = beside(path, 0o666);
             builder
