@@ -13,31 +13,31 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a bench that cannot go on should stop
 
-use std::collections::BTreeMap;
+mod figures;
+
 use std::fs;
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
+use npyz::WriterBuilder;
 use relightable_photo::format::{
-    EncodedFile, Head, Interest, Limits, Metadata, PartNumber, Quality, Reader, Source,
+    EncodedFile, HEADER_BYTES, Head, Limits, Metadata, PartNumber, Quality, Reader, Source,
     decode_basis, decode_tile,
 };
 use relightable_photo::transport::{BandTile, Basis, CHANNELS, Decibels, TransportError};
 use relightable_photo::workers::OneThread;
 use serde_json::{Value, json};
 
-type Figures = BTreeMap<String, f64>;
+use figures::Figures;
 
 /// Peers of the plain band that keep what they are given.
 const KEEPERS: [&str; 4] = ["band_f16_zstd19", "dense_f16_zstd19", "csr_npz", "blosc2"];
 const PLANES: [&str; 2] = ["jpeg_planes", "webp_planes"];
 
 fn main() {
-    let target = PathBuf::from(env!("CARGO_BIN_EXE_ltm-export"));
-    let target = target.ancestors().nth(2).unwrap().to_owned();
-    let folder = target.join("bench");
-    fs::create_dir_all(&folder).unwrap();
+    let folder = figures::folder();
     let mut figures = Figures::new();
     let capture = simulated(&folder, "quarter-scale", 128);
     let small = loss(&folder, "quarter", &capture, &mut figures);
@@ -47,20 +47,7 @@ fn main() {
     let capture = simulated(&folder, "paper-scale", 512);
     let large = loss(&folder, "paper", &capture, &mut figures);
     wasm_rate(&large.file, &mut figures);
-    println!();
-    for (key, value) in &figures {
-        println!("{key:36} {value:.4}");
-    }
-    let path = folder.join("format.json");
-    let report = json!({"machine": machine(), "figures": figures});
-    fs::write(&path, serde_json::to_string_pretty(&report).unwrap() + "\n").unwrap();
-    println!("\n{}", path.display());
-}
-
-fn machine() -> String {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let arch = std::env::consts::ARCH;
-    format!("{arch}, {cores} cores, {}", std::env::consts::OS)
+    figures::report("format", &figures);
 }
 
 fn ltm_export(args: &[&str]) -> Value {
@@ -138,14 +125,9 @@ struct Decoded {
 fn decode(path: &Path) -> Decoded {
     let bytes = fs::read(path).unwrap();
     let mut reader = Reader::new(Limits::default());
-    while reader.head().is_none() {
-        let wanted = reader.wants(&Interest::default()).remove(0);
-        let end = bytes.len().min(wanted.end as usize);
-        let head = reader.head_bytes().unwrap_or(200) as usize;
-        reader
-            .feed(wanted.start, &bytes[wanted.start as usize..end.min(head)])
-            .unwrap();
-    }
+    reader.feed(0, &bytes[..HEADER_BYTES]).unwrap();
+    let head = reader.head_bytes().unwrap() as usize;
+    reader.feed(0, &bytes[..head]).unwrap();
     let head = reader.head().unwrap().clone();
     let fetch = |part: PartNumber| {
         let range = head.range(part);
@@ -162,21 +144,13 @@ fn decode(path: &Path) -> Decoded {
     }
 }
 
-fn npy(path: &Path, kind: &str, shape: &[usize], bytes: &[u8]) {
-    let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
-    let mut header = format!(
-        "{{'descr': '{kind}', 'fortran_order': False, 'shape': ({},), }}",
-        shape.join(", ")
-    );
-    while (header.len() + 11) % 64 != 0 {
-        header.push(' ');
-    }
-    header.push('\n');
-    let mut file = b"\x93NUMPY\x01\x00".to_vec();
-    file.extend((header.len() as u16).to_le_bytes());
-    file.extend(header.as_bytes());
-    file.extend(bytes);
-    fs::write(path, file).unwrap();
+fn npy<T: npyz::AutoSerialize + Copy>(path: &Path, shape: &[usize], values: &[T]) {
+    let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
+    let file = BufWriter::new(fs::File::create(path).unwrap());
+    let options = npyz::WriteOptions::new().default_dtype().shape(&shape);
+    let mut writer = options.writer(file).begin_nd().unwrap();
+    writer.extend(values.iter().copied()).unwrap();
+    writer.finish().unwrap();
 }
 
 fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
@@ -219,29 +193,15 @@ fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
     fs::create_dir_all(&problem).unwrap();
     let (width, height) = (camera.width as usize, camera.height as usize);
     let kernels: Vec<f32> = given.basis.kernels.concat();
-    let floats = |values: &[f32]| bytemuck::cast_slice::<f32, u8>(values).to_vec();
-    let write = |name: &str, kind, shape: &[usize], bytes: &[u8]| {
-        npy(&problem.join(name), kind, shape, bytes);
-    };
-    write(
-        "band.npy",
-        "<f4",
-        &[camera.area(), area, CHANNELS],
-        &floats(&band),
-    );
-    write(
-        "coefficients.npy",
-        "<f4",
+    let file = |name: &str| problem.join(name);
+    npy(&file("band.npy"), &[camera.area(), area, CHANNELS], &band);
+    npy(
+        &file("coefficients.npy"),
         &[rank, CHANNELS, height, width],
-        &floats(&planes),
+        &planes,
     );
-    write("basis.npy", "<f4", &[rank, area], &floats(&kernels));
-    write(
-        "origins.npy",
-        "<i4",
-        &[camera.area(), 2],
-        bytemuck::cast_slice(&origins),
-    );
+    npy(&file("basis.npy"), &[rank, area], &kernels);
+    npy(&file("origins.npy"), &[camera.area(), 2], &origins);
     let snr = error.snr().unwrap().0;
     let about = json!({
         "camera": [camera.width, camera.height],

@@ -22,9 +22,11 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a bench that cannot go on should stop
 
+mod figures;
+
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
@@ -39,7 +41,9 @@ use relightable_photo::simulate::{
 use relightable_photo::transport::{
     CHANNELS, CameraPx, Extent, TileRect, TransportError, TransportFunctions, Window,
 };
-use serde_json::{Value, json};
+use serde_json::Value;
+
+use figures::Figures;
 
 /// The headline case: S = 225 elements, L = 80 patterns.
 const WINDOW: u32 = 15;
@@ -56,33 +60,12 @@ const SMALL: u32 = 8;
 
 fn main() {
     // `cargo bench` passes flags for a harness this bench does not have.
-    let target = PathBuf::from(env!("CARGO_BIN_EXE_ltm-export"));
-    let target = target.ancestors().nth(2).unwrap().to_owned();
-    let folder = target.join("bench");
-    fs::create_dir_all(&folder).unwrap();
-    let mut figures = BTreeMap::new();
+    let folder = figures::folder();
+    let mut figures = Figures::new();
     against_peers(&folder, &mut figures);
     against_size(&mut figures);
     paper_scale(&folder, &mut figures);
-    println!();
-    for (key, value) in &figures {
-        println!("{key:36} {value:.6}");
-    }
-    let mut report = json!(figures);
-    report["machine"] = machine().into();
-    let path = folder.join("recover.json");
-    fs::write(&path, serde_json::to_string_pretty(&report).unwrap() + "\n").unwrap();
-    println!("\n{}", path.display());
-}
-
-fn machine() -> String {
-    let cpu = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = cpu.lines().find_map(|l| l.strip_prefix("model name"));
-    let model = model.map_or(std::env::consts::ARCH, |m| {
-        m.trim_start_matches([' ', '\t', ':'])
-    });
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    format!("{model}, {cores} cores, {}", std::env::consts::OS)
+    figures::report("recover", &figures);
 }
 
 fn square(side: u32) -> Extent {
@@ -201,7 +184,7 @@ fn inner_tiles(recovery: &Recovery) -> Vec<usize> {
 }
 
 /// Every method on the same tiles, each followed by its peers.
-fn against_peers(folder: &Path, figures: &mut BTreeMap<String, f64>) {
+fn against_peers(folder: &Path, figures: &mut Figures) {
     let (measurements, truth) = photograph(square(128));
     println!(
         "Glass, S = {}, L = {PATTERNS}, one thread, per right-hand side:\n",
@@ -276,7 +259,7 @@ fn compare(
     key: &str,
     ours: f64,
     equations: &[Equations],
-    figures: &mut BTreeMap<String, f64>,
+    figures: &mut Figures,
 ) {
     let mut solutions = Vec::new();
     let seconds = fastest(3, || {
@@ -492,7 +475,7 @@ impl Workers for Pool {
     }
 }
 
-fn against_size(figures: &mut BTreeMap<String, f64>) {
+fn against_size(figures: &mut Figures) {
     println!("\nNon-negative least squares of a whole picture, L = {PATTERNS}, window {WINDOW}:\n");
     println!(
         "{:>10} {:>8} {:>10} {:>14}",
@@ -540,7 +523,7 @@ fn against_size(figures: &mut BTreeMap<String, f64>) {
 }
 
 /// The paper's size by the command line's default method, files and all.
-fn paper_scale(folder: &Path, figures: &mut BTreeMap<String, f64>) {
+fn paper_scale(folder: &Path, figures: &mut Figures) {
     let ltm_export = || Command::new(env!("CARGO_BIN_EXE_ltm-export"));
     let capture = folder.join("paper-scale");
     if !capture.join("capture.json").exists() {

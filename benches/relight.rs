@@ -23,6 +23,7 @@
 //! are held against the bytes that copying reads and writes a second, on all cores.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a bench that cannot go on should stop
 
+mod figures;
 #[path = "relight/film.rs"]
 mod film;
 #[path = "relight/peers.rs"]
@@ -30,47 +31,24 @@ mod peers;
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::PathBuf;
 
-use rayon::prelude::*;
-use serde_json::json;
-
+use figures::Figures;
 use film::{Film, KINDS, Time};
-
-type Figures = BTreeMap<String, f64>;
+use rayon::prelude::*;
 
 const SIDES: [u32; 3] = [128, 512, 2048];
 const RANKS: [usize; 3] = [8, 16, 32];
 
 fn main() {
     // `cargo bench` passes flags for a harness this bench does not have.
-    let target = PathBuf::from(env!("CARGO_BIN_EXE_ltm-export"));
-    let folder = target.ancestors().nth(2).unwrap().join("bench");
-    let problem = folder.join("relight");
+    let problem = figures::folder().join("relight");
     fs::create_dir_all(&problem).unwrap();
     let mut figures = Figures::new();
     let before = copy_bandwidth();
     sizes(&mut figures);
     peers::compare(&problem, &mut figures);
     bandwidth(before.max(copy_bandwidth()), &mut figures);
-    println!();
-    for (key, value) in &figures {
-        println!("{key:40} {value:.4}");
-    }
-    let report = json!({"machine": machine(), "figures": figures});
-    let path = folder.join("relight.json");
-    fs::write(&path, serde_json::to_string_pretty(&report).unwrap() + "\n").unwrap();
-    println!("\n{}", path.display());
-}
-
-fn machine() -> String {
-    let cpu = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = cpu.lines().find_map(|l| l.strip_prefix("model name"));
-    let model = model.map_or(std::env::consts::ARCH, |m| {
-        m.trim_start_matches([' ', '\t', ':'])
-    });
-    let cores = rayon::current_num_threads();
-    format!("{model}, {cores} cores, {}", std::env::consts::OS)
+    figures::report("relight", &figures);
 }
 
 /// Frames of every size, rank and light, all of them twice: a machine is rarely busy that long.
