@@ -1,7 +1,7 @@
 //! The widest vector instructions that the machine has.
 
-/// Runs `work` compiled for the widest vector instructions at hand. What it calls must be
-/// `#[inline(always)]` to be compiled along with it. None of them fuses a multiplication with an
+/// Runs `work` compiled for the widest vector instructions at hand. It must be `#[inline(always)]`, and
+/// so must what it calls, to be compiled along with it. None of them fuses a multiplication with an
 /// addition, so that every machine, WebAssembly too, gets the same bits.
 #[inline(always)]
 pub fn vectorised<R>(work: impl FnOnce() -> R) -> R {

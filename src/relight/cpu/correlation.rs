@@ -5,7 +5,8 @@
 //! Through the Fourier transform, square by square: some 60 operations a value where a window of 15
 //! takes 450.
 
-use super::fft::{Complex, Fft, LANES, Lanes, Line};
+use super::fft::{Between, Complex, Fft, Packed};
+use super::lanes::{LANES, Plain, Vector};
 use crate::transport::{Basis, CHANNELS, QUAD, Window};
 
 /// Sides of transforms to choose from; the largest holds a window of 63 and as much again.
@@ -23,19 +24,21 @@ pub struct Correlator {
     reach: usize,
     quads: usize,
     /// Of the functions, mirrored; `[group, u, v]`.
-    spectra: Vec<Complex>,
+    spectra: Vec<Packed>,
 }
 
 /// Memory that correlating takes for a while.
 #[derive(Debug)]
 pub struct Workspace {
-    line: Line,
-    /// `[v, u]`.
-    rows: Vec<Complex>,
+    between: Between,
+    /// Of some rows of the light, two a lane; `[u]`.
+    rows: Vec<Packed>,
+    /// Of one channel of the light along `u` alone: `[block of u, v]`, of the first half of `u`.
+    half: Vec<Packed>,
     /// Of the light, `[u, v, channel]`.
     spectrum: Vec<[[f32; 2]; CHANNELS]>,
     /// `[u, v]`, of `v` as many as a square has.
-    columns: Vec<Complex>,
+    columns: Vec<Packed>,
 }
 
 impl Correlator {
@@ -57,29 +60,41 @@ impl Correlator {
 
     fn add_spectrum(&mut self, functions: &[Vec<f32>], side: usize) {
         let n = self.fft.side();
-        let scale = 1.0 / (n * n) as f32;
-        let mut square = vec![Complex::default(); n * n];
+        // The light's spectrum is twice what it is.
+        let scale = 0.5 / (n * n) as f32;
+        let mut square = vec![Packed::default(); n * n];
         for (k, function) in functions.iter().enumerate() {
             for (s, value) in function.iter().enumerate() {
                 // Mirrored: what a transform multiplies is a convolution.
                 let (u, v) = ((n - s % side) % n, (n - s / side) % n);
-                let Complex { re, im } = &mut square[v * n + u];
+                let Packed { re, im } = &mut square[v * n + u];
                 let part = if k < LANES { re } else { im };
-                part.0[k % LANES] = value * scale;
+                part[k % LANES] = value * scale;
             }
         }
-        let mut line = Line::new(n);
+        let mut between = Between::new(n);
         for row in square.chunks_exact_mut(n) {
-            line.values.copy_from_slice(row);
-            self.fft.transform(&mut line);
-            row.copy_from_slice(&line.values);
+            let given = row.to_vec();
+
+            self.fft.transform(
+                &mut between,
+                #[inline(always)]
+                |u| given[u].load(),
+                #[inline(always)]
+                |u: usize, value: Complex<Plain>| value.store(&mut row[u]),
+            );
         }
         for u in 0..n {
-            for v in 0..n {
-                line.values[v] = square[v * n + u];
-            }
-            self.fft.transform(&mut line);
-            self.spectra.extend_from_slice(&line.values);
+            let start = self.spectra.len();
+            self.spectra.resize(start + n, Packed::default());
+
+            self.fft.transform(
+                &mut between,
+                #[inline(always)]
+                |v| square[v * n + u].load(),
+                #[inline(always)]
+                |v: usize, value: Complex<Plain>| value.store(&mut self.spectra[start + v]),
+            );
         }
     }
 
@@ -97,83 +112,144 @@ impl Correlator {
     pub fn workspace(&self) -> Workspace {
         let n = self.fft.side();
         Workspace {
-            line: Line::new(n),
-            rows: vec![Complex::default(); n * n],
+            between: Between::new(n),
+            rows: vec![Packed::default(); n],
+            half: vec![Packed::default(); blocks(n) * n],
             spectrum: vec![Default::default(); n * n],
-            columns: vec![Complex::default(); n * self.reach],
+            columns: vec![Packed::default(); n * self.reach],
         }
     }
 
     /// `C` of a square, as `[origin, channel, quad]`, of these `channels` of what `row` yields of the
     /// light: elements of the row of that number, as many as a square sees.
     #[inline(always)]
-    pub fn correlate<'a>(
+    pub fn correlate<'a, V: Vector>(
         &self,
         row: impl Fn(usize) -> &'a [[f32; 4]],
         channels: &[usize],
         work: &mut Workspace,
         out: &mut [[f32; QUAD]],
     ) {
-        self.transform(row, work);
         let n = self.fft.side();
+        for channel in channels {
+            self.along_u::<V>(&row, *channel, work);
+            self.along_v::<V>(*channel, work);
+        }
         for (group, spectra) in self.spectra.chunks_exact(n * n).enumerate() {
             for (i, channel) in channels.iter().enumerate() {
-                self.invert(spectra, *channel, work);
-                self.collect(group, (i, channels.len()), work, out);
+                self.invert::<V>(spectra, *channel, work);
+                self.collect::<V>(group, (i, channels.len()), work, out);
             }
         }
     }
 
-    /// The light's spectrum.
+    /// Transforms one channel of the light along `u`. Rows are real, so that two share a transform:
+    /// of `f = a + ib`, `a` has the spectrum `(f(u) + f̄(-u)) / 2` and `b` has `(f(u) - f̄(-u)) / 2i`.
+    /// They are left as twice that, and for `u` up to the middle, which tells the others.
     #[inline(always)]
-    fn transform<'a>(&self, row: impl Fn(usize) -> &'a [[f32; 4]], work: &mut Workspace) {
+    fn along_u<'a, V: Vector>(
+        &self,
+        row: impl Fn(usize) -> &'a [[f32; 4]],
+        channel: usize,
+        work: &mut Workspace,
+    ) {
         let n = self.fft.side();
-        for (v, values) in work.rows.chunks_exact_mut(n).enumerate() {
-            let elements = row(v);
-            if elements.iter().all(|element| *element == [0.0; 4]) {
-                values.fill(Complex::default());
-                continue;
+        for first in (0..n).step_by(2 * LANES) {
+            let rows: [&[[f32; 4]]; 2 * LANES] = std::array::from_fn(|l| &row(first + l)[..n]);
+            let is_dark = |row: &[[f32; 4]]| row.iter().all(|element| element[channel] == 0.0);
+            if rows.iter().all(|row| is_dark(row)) {
+                work.rows.fill(Packed::default());
+            } else {
+                self.fft.transform(
+                    &mut work.between,
+                    #[inline(always)]
+                    |u: usize| {
+                        let part =
+                            |first: usize| std::array::from_fn(|l| rows[first + l][u][channel]);
+                        Packed {
+                            re: part(0),
+                            im: part(LANES),
+                        }
+                        .load()
+                    },
+                    #[inline(always)]
+                    |u: usize, value: Complex<V>| value.store(&mut work.rows[u]),
+                );
             }
-            for (value, element) in work.line.values.iter_mut().zip(elements) {
-                let mut re = [0.0; LANES];
-                re[..CHANNELS].copy_from_slice(&element[..CHANNELS]);
-                *value = Complex {
-                    re: Lanes(re),
-                    im: Lanes::default(),
-                };
+            for u in 0..=n / 2 {
+                let (f, g) = (&work.rows[u], &work.rows[(n - u) % n]);
+                let rows = &mut work.half[u / LANES * n + first..][..2 * LANES];
+                let (of_a, of_b) = rows.split_at_mut(LANES);
+                for l in 0..LANES {
+                    of_a[l].re[u % LANES] = f.re[l] + g.re[l];
+                    of_a[l].im[u % LANES] = f.im[l] - g.im[l];
+                    of_b[l].re[u % LANES] = f.im[l] + g.im[l];
+                    of_b[l].im[u % LANES] = g.re[l] - f.re[l];
+                }
             }
-            self.fft.transform(&mut work.line);
-            values.copy_from_slice(&work.line.values);
         }
-        for (u, spectrum) in work.spectrum.chunks_exact_mut(n).enumerate() {
-            for (value, row) in work.line.values.iter_mut().zip(work.rows.chunks_exact(n)) {
-                *value = row[u];
-            }
-            self.fft.transform(&mut work.line);
-            for (spectrum, value) in spectrum.iter_mut().zip(&work.line.values) {
-                *spectrum = std::array::from_fn(|c| [value.re.0[c], value.im.0[c]]);
-            }
+    }
+
+    /// Transforms what that left along `v`. What is beyond the middle is the conjugate of what is as
+    /// far before it.
+    #[inline(always)]
+    fn along_v<V: Vector>(&self, channel: usize, work: &mut Workspace) {
+        let n = self.fft.side();
+        for (block, half) in work.half.chunks_exact(n).enumerate() {
+            let first = block * LANES;
+            let lanes = LANES.min(n / 2 + 1 - first);
+
+            self.fft.transform(
+                &mut work.between,
+                #[inline(always)]
+                |v| half[v].load(),
+                #[inline(always)]
+                |v: usize, value: Complex<V>| {
+                    let mut packed = Packed::default();
+                    value.store(&mut packed);
+                    let Packed { re, im } = packed;
+                    for lane in 0..lanes {
+                        let (u, re, im) = (first + lane, re[lane], im[lane]);
+                        work.spectrum[u * n + v][channel] = [re, im];
+                        if u > 0 {
+                            work.spectrum[(n - u) * n + (n - v) % n][channel] = [re, -im];
+                        }
+                    }
+                },
+            );
         }
     }
 
     /// The product of the spectra, transformed back along `v`.
     #[inline(always)]
-    fn invert(&self, spectra: &[Complex], channel: usize, work: &mut Workspace) {
+    fn invert<V: Vector>(&self, spectra: &[Packed], channel: usize, work: &mut Workspace) {
         let n = self.fft.side();
         let lines = spectra.chunks_exact(n).zip(work.spectrum.chunks_exact(n));
         for ((functions, light), column) in lines.zip(work.columns.chunks_exact_mut(self.reach)) {
-            let both = functions.iter().zip(light);
-            for (value, (function, light)) in work.line.values.iter_mut().zip(both) {
-                *value = function.times(light[channel]).exchanged();
-            }
-            self.fft.transform(&mut work.line);
-            column.copy_from_slice(&work.line.values[..self.reach]);
+            let (functions, light) = (&functions[..n], &light[..n]);
+
+            self.fft.transform(
+                &mut work.between,
+                #[inline(always)]
+                |v: usize| {
+                    functions[v]
+                        .load::<V>()
+                        .times(light[v][channel])
+                        .exchanged()
+                },
+                #[inline(always)]
+                |v: usize, value: Complex<V>| {
+                    if let Some(place) = column.get_mut(v) {
+                        value.store(place);
+                    }
+                },
+            );
         }
     }
 
     /// The same along `u`, and where it belongs.
     #[inline(always)]
-    fn collect(
+    fn collect<V: Vector>(
         &self,
         group: usize,
         (channel, channels): (usize, usize),
@@ -185,20 +261,35 @@ impl Correlator {
         let each = channels * self.quads;
         let at = channel * self.quads + first;
         for (v, out) in out.chunks_exact_mut(self.reach * each).enumerate() {
-            let columns = work.columns.chunks_exact(self.reach);
-            for (value, column) in work.line.values.iter_mut().zip(columns) {
-                *value = column[v];
-            }
-            self.fft.transform(&mut work.line);
-            for (value, out) in work.line.values.iter().zip(out.chunks_exact_mut(each)) {
-                let Complex { re, im } = value.exchanged();
-                let texels = re.0.as_chunks().0.iter().chain(im.0.as_chunks().0);
-                for (out, texel) in out[at..at + quads].iter_mut().zip(texels) {
-                    *out = *texel;
-                }
-            }
+            self.fft.transform(
+                &mut work.between,
+                #[inline(always)]
+                |u: usize| work.columns[u * self.reach + v].load::<V>(),
+                #[inline(always)]
+                |u: usize, value: Complex<V>| {
+                    let Some(out) = out.get_mut(u * each + at..u * each + at + quads) else {
+                        return; // Beyond the square's origins.
+                    };
+                    let mut packed = Packed::default();
+                    value.exchanged().store(&mut packed);
+                    let texels = packed
+                        .re
+                        .as_chunks()
+                        .0
+                        .iter()
+                        .chain(packed.im.as_chunks().0);
+                    for (out, texel) in out.iter_mut().zip(texels) {
+                        *out = *texel;
+                    }
+                },
+            );
         }
     }
+}
+
+/// Blocks of lanes that the first half of a spectrum takes, its middle included.
+fn blocks(n: usize) -> usize {
+    (n / 2 + 1).div_ceil(LANES)
 }
 
 /// The side of transforms that takes the least work, of those that take no more memory than they
@@ -274,7 +365,7 @@ mod tests {
             let row = |v: usize| &light[v * n..(v + 1) * n];
             let mut out = vec![[0.0; QUAD]; reach * reach * CHANNELS * quads];
             let mut work = correlator.workspace();
-            correlator.correlate(row, &[0, 1, 2], &mut work, &mut out);
+            correlator.correlate::<Plain>(row, &[0, 1, 2], &mut work, &mut out);
             for o in [0, 1, reach - 1, reach * reach / 2, reach * reach - 1] {
                 for c in 0..CHANNELS {
                     for k in 0..rank {

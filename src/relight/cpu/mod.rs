@@ -11,6 +11,7 @@ mod combine;
 mod correlation;
 mod direct;
 mod fft;
+mod lanes;
 mod padded;
 mod squares;
 
@@ -18,9 +19,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::{Light, LinearPicture, Rgba8Picture, Tint, tone};
 use crate::transport::{CHANNELS, QUAD, Tile, Transport};
-use crate::vectorised::vectorised;
 use crate::workers::Workers;
 use correlation::{Correlator, Workspace};
+use lanes::{Vector, Work, widest};
 use padded::PaddedLight;
 use squares::{Run, Square, Squares};
 
@@ -109,13 +110,17 @@ impl Relighter {
         let this = &*self;
         workers.map(stale.len(), |i| {
             let mut scratch = lock(&this.scratch).pop().unwrap_or_default();
-            vectorised(|| this.relight_square(stale[i], &mut scratch));
+            widest(SquareWork {
+                relighter: this,
+                square: stale[i],
+                scratch: &mut scratch,
+            });
             lock(&this.scratch).push(scratch);
         });
     }
 
     #[inline(always)]
-    fn relight_square(&self, i: usize, scratch: &mut Scratch) {
+    fn relight_square<V: Vector>(&self, i: usize, scratch: &mut Scratch) {
         let square = &self.squares.all[i];
         let mut linear = lock(&self.linear[i]);
         let [u, v] = square.at;
@@ -138,7 +143,7 @@ impl Relighter {
             let texels = reach * reach * channels.len() * quads;
             scratch.seen.resize(texels, [0.0; QUAD]);
             let row = |r: usize| &self.light.row(u, v + r)[..side];
-            correlator.correlate(row, channels, work, &mut scratch.seen);
+            correlator.correlate::<V>(row, channels, work, &mut scratch.seen);
             for run in &square.runs {
                 let tile = &self.tile(run).coefficients;
                 if !tile.is_dark() {
@@ -218,6 +223,21 @@ impl Relighter {
                 each(run, &linear[run.begin..run.begin + run.length]);
             }
         }
+    }
+}
+
+/// A square to relight.
+struct SquareWork<'a> {
+    relighter: &'a Relighter,
+    square: usize,
+    scratch: &'a mut Scratch,
+}
+
+impl Work for SquareWork<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        self.relighter
+            .relight_square::<V>(self.square, self.scratch);
     }
 }
 
