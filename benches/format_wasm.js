@@ -16,7 +16,7 @@ const [path = '', inspected = '{}'] = process.argv.slice(2);
 const { scans, camera } = JSON.parse(inspected);
 const last = scans.at(-2);
 const bytes = readFileSync(path).subarray(0, last.prefix_bytes);
-const megabytes = (camera[0] * camera[1] * last.places.end * 3 * 4) / 1e6;
+const megabytes = (camera[0] * camera[1] * last.items.end * 3 * 4) / 1e6;
 
 let fastest = 0;
 for (let run = 0; run < RUNS; run += 1) {

@@ -203,7 +203,7 @@ impl Given {
         EncodedFile::new(source, quality, workers)
     }
 
-    /// Light transport functions of tile `i`, whether they are on the display or not.
+    /// Light transport functions of tile `i`.
     pub fn functions(&self, i: usize) -> TransportFunctions {
         let basis = self.basis.clone().unwrap_or_default();
         self.tiles[i].clone().functions(&self.geometry, &basis)

@@ -50,7 +50,7 @@ pub fn read_ltm(path: &Path, first: Option<Share>) -> Result<LtmFile> {
             None => Ok(reader.finish()?),
         });
         let (transport, _) = transport.map_err(|error| match sound_bytes(&head, &error) {
-            Some(sound) if sound > 0 => {
+            Some(sound) if sound > head.header.head_bytes() => {
                 anyhow!("{error:#} (--first {sound} shows what comes before)")
             }
             _ => error,

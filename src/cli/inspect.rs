@@ -50,7 +50,7 @@ struct Report {
 struct ScanReport {
     coding: &'static str,
     /// Components, or slots of the window from the middle outwards.
-    places: Range<u16>,
+    items: Range<u16>,
     step: f32,
     basis_bytes: u32,
     bytes: u64,
@@ -71,7 +71,7 @@ impl ScanReport {
                 Coding::Direct => "direct",
                 Coding::DirectHalves => "direct-halves",
             },
-            places: scan.first..scan.end() as u16, // components and slots are below 2^12
+            items: scan.first..scan.end() as u16, // components and slots are below 2^12
             step: scan.step,
             basis_bytes: scan.basis_bytes,
             bytes: range.end - range.start,
@@ -81,7 +81,7 @@ impl ScanReport {
     }
 
     fn print(&self) -> Result<()> {
-        let Range { start, end } = self.places;
+        let Range { start, end } = self.items;
         report::print_line(&format!(
             "{:15} {:13} {start:4} to {end:4} {:>12} {:>12} {:>17}",
             "  scan",
@@ -100,8 +100,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     let name = args.file.display();
     match length.cmp(&declared) {
         Ordering::Less => eprintln!(
-            "warning: {name}: is cut short, at {length} of {declared} bytes; relight --first {length} \
-             shows what came"
+            "warning: {name}: is cut short, at {length} of {declared} bytes; copy or download it again"
         ),
         Ordering::Equal => {}
         Ordering::Greater => eprintln!(

@@ -83,8 +83,7 @@ pub struct Plan {
     tile_side: u32,
     /// Tiles that may be worked on at once.
     pub tiles_at_once: usize,
-    /// Tiles of the file that may be encoded at once.
-    pub encoders: usize,
+    threads: usize,
     budget: u64,
     fixed: u64,
 }
@@ -123,19 +122,12 @@ impl Plan {
             width: camera.width,
             tile_side,
             tiles_at_once: 0,
-            encoders: 0,
+            threads,
             budget: budget.0,
             fixed,
         };
         let rows = plan.row * u64::from((tile_side + 2 * method.most_halo()).min(camera.height));
-        // The file is made once all photographs are gone.
-        let side = u64::from(encode::TILE_SIDE);
-        let pixels = (camera.area() as u64).min(side * side);
-        let values = window.area() + method.most_rank(window);
-        let encoded = ENCODED * pixels * values as u64;
-        let encoder = PROGRAM + ENCODER.min(ENCODED * (camera.area() * values) as u64);
-        plan.ensure_at_least((plan.fixed + tile + rows).max(encoder + encoded))?;
-        plan.encoders = threads.min(((plan.budget - encoder) / encoded) as usize);
+        plan.ensure_at_least(plan.fixed + tile + rows)?;
         // All photographs, or half of what is left, the rest for the tiles worked on: at least one.
         let left = plan.budget - plan.fixed;
         let all = plan.row * u64::from(plan.height);
@@ -146,6 +138,17 @@ impl Plan {
         let taken = plan.photographs;
         plan.tiles_at_once = threads.min(((left - taken) / tile) as usize);
         Ok(plan)
+    }
+
+    /// Tiles of the file that may be encoded at once, of so many components and functions of that window.
+    /// That is once all photographs are gone. The file itself comes on top.
+    pub fn encoders(&self, window: Window, rank: usize) -> Result<usize> {
+        let pixels = u64::from(self.width) * u64::from(self.height);
+        let value = ENCODED * (window.area() + rank) as u64;
+        let tile = value * pixels.min(u64::from(encode::TILE_SIDE).pow(2));
+        let fixed = PROGRAM + ENCODER.min(value * pixels);
+        self.ensure_at_least(fixed + tile)?;
+        Ok(self.threads.min(((self.budget - fixed) / tile) as usize))
     }
 
     fn ensure_at_least(&self, least: u64) -> Result<()> {

@@ -198,6 +198,9 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         args.window.most(),
         threads,
     )?;
+    if let WindowChoice::Fixed(window) = args.window {
+        plan.encoders(window, args.method().most_rank(window))?;
+    }
     let mut report =
         pool(plan.tiles_at_once)?.install(|| recover(args, &folder, &shots, &plan, &interrupt))?;
     report.seconds = start.elapsed().as_secs_f64();
@@ -298,6 +301,8 @@ fn recover(
     let recovery =
         Recovery::prepare(&measurements, settings, &interrupt.cores()).map_err(failed)?;
     spinner.finish_and_clear();
+    let rank = recovery.basis().map(Basis::rank);
+    let encoders = plan.encoders(settings.window, rank.unwrap_or(0))?;
     checkpoint.prepared(recovery.fingerprint())?;
     let bar = process::progress("recovering", recipe.tiles);
     bar.set_position(checkpoint.count() as u64);
@@ -334,6 +339,7 @@ fn recover(
     }
     let noise = measurements.noise;
     drop((measurements, photographs));
+    drop(dark);
     let manifest = folder.manifest();
     let patterns = shots.iter().map(|&i| &manifest.shots[i].pattern);
     let patterns = capture::distinct(&capture::numbers(patterns));
@@ -350,10 +356,8 @@ fn recover(
         units: UNITS.to_owned(),
         shots_used: shots.to_vec(),
     };
-    let basis = recovery.basis();
     let spinner = process::spinner("compressing");
-    let encoders = pool(plan.encoders)?;
-    let file = encoders.install(|| {
+    let file = pool(encoders)?.install(|| {
         encode::file(
             &args.quality,
             &run.checkpoint,
@@ -386,7 +390,7 @@ fn recover(
             Reach::Within { leak } => Some(leak),
             Reach::Beyond | Reach::Unclear => None,
         }),
-        rank: basis.map(Basis::rank),
+        rank,
         patterns,
         photographs: shots.len(),
         expected_snr_db: recovery.rehearsal().and_then(Rehearsal::snr),

@@ -240,7 +240,7 @@ impl<'a> Encoder<'a> {
     fn at_snr(
         &mut self,
         snr: Decibels,
-        sample: &[BandTile],
+        sample: &[Sampled],
         workers: &impl Workers,
     ) -> Result<EncodedFile, FormatError> {
         let step = step_for(snr, |step| self.rounding(sample, step, workers));
@@ -402,31 +402,47 @@ impl<'a> Encoder<'a> {
     }
 
     /// Parts of some tiles, spread over the picture; light comes from each.
-    fn sample(&self) -> Result<Vec<BandTile>, FormatError> {
+    fn sample(&self) -> Result<Vec<Sampled>, FormatError> {
         let values = self.rank() + usize::from(self.has_functions) * self.order.len();
-        let every = self.lit.len().div_ceil(SAMPLE).max(1);
-        let tiles = self.lit.iter().step_by(every);
-        let pixels = SAMPLE_BYTES / (tiles.len() * values * CHANNELS * size_of::<f32>()).max(1);
-        let side = (pixels.isqrt() as u32).min(self.source.geometry.tile_side) / PART_SIDE;
-        let side = (side * PART_SIDE).max(PART_SIDE);
-        tiles
-            .map(|&i| Ok(lit_part((self.source.tile)(i)?, side, i)))
+        let pixel = (values * CHANNELS * size_of::<f32>()).max(1);
+        let smallest = PART_SIDE.pow(2) as usize * pixel;
+        let most = SAMPLE.min(SAMPLE_BYTES / smallest).max(1);
+        let count = self.lit.len().min(most);
+        let tile_side = self.source.geometry.tile_side;
+        let side = (SAMPLE_BYTES / (count.max(1) * pixel)).isqrt() as u32;
+        let side = match side >= tile_side {
+            true => tile_side,
+            false => (side / PART_SIDE * PART_SIDE).max(PART_SIDE),
+        };
+        let part = |n: usize| -> io::Result<Sampled> {
+            // One of each of `count` equal groups; which one follows no grid.
+            let [from, to] = [n, n + 1].map(|n| n * self.lit.len() / count);
+            let tile = self.lit[from + scattered(n) % (to - from)];
+            let (tile, parts) = lit_part((self.source.tile)(tile)?, side, scattered(n + SAMPLE));
+            Ok(Sampled {
+                tile,
+                weight: (parts * (to - from)) as f64,
+            })
+        };
+        (0..count)
+            .map(part)
             .collect::<io::Result<_>>()
             .map_err(FormatError::Source)
     }
 
     /// What rounding to `step` does to some tiles.
-    fn rounding(&self, sample: &[BandTile], step: f32, workers: &impl Workers) -> Rounding {
+    fn rounding(&self, sample: &[Sampled], step: f32, workers: &impl Workers) -> Rounding {
         let scans = self.plan(step);
         let each = workers.map(sample.len(), |i| {
-            self.numbers(&sample[i], &scans, false).rounding()
+            let Sampled { tile, weight } = &sample[i];
+            self.numbers(tile, &scans, false).rounding().times(*weight)
         });
         // In order: sums must not depend on threads.
         each.into_iter().fold(Rounding::default(), Rounding::and)
     }
 
     /// Leaves out the components that matter little against what rounding to `step` does.
-    fn cut(&mut self, step: f32, sample: &[BandTile], workers: &impl Workers) {
+    fn cut(&mut self, step: f32, sample: &[Sampled], workers: &impl Workers) {
         let Rounding { energy, error } = self.rounding(sample, step, workers);
         let allowed = CUT_SHARE * self.energy * error / energy.max(f64::MIN_POSITIVE);
         if let Some(turn) = &mut self.turn {
@@ -663,17 +679,21 @@ fn scans_of(scans: &[Scan], direct: bool) -> Vec<&Scan> {
     of_kind.collect()
 }
 
-/// One of the squares of `side` that a tile consists of: which one changes from tile to tile, so that
-/// parts lie in all places. One from which light comes, if any does.
-fn lit_part(tile: BandTile, side: u32, number: usize) -> BandTile {
+/// A part of a tile, and how many such it stands for.
+struct Sampled {
+    tile: BandTile,
+    weight: f64,
+}
+
+/// One of the squares of `side` that a tile consists of, of those from which light comes, and how many
+/// of these there are. Which one follows from `chance`.
+fn lit_part(tile: BandTile, side: u32, chance: usize) -> (BandTile, usize) {
     let Extent { width, height } = tile.rect.extent;
-    if width.max(height) <= side {
-        return tile;
-    }
     let (across, down) = (width.div_ceil(side), height.div_ceil(side));
-    let count = (across * down) as usize;
-    let part = |i: usize| {
-        let i = ((number + i) % count) as u32;
+    if across * down == 1 {
+        return (tile, 1);
+    }
+    let parts = (0..across * down).map(|i| {
         let (left, top) = (i % across * side, i / across * side);
         tile.crop(TileRect {
             x: tile.rect.x + left,
@@ -683,15 +703,22 @@ fn lit_part(tile: BandTile, side: u32, number: usize) -> BandTile {
                 height: side.min(height - top),
             },
         })
-    };
-    let is_lit = |part: &BandTile| {
-        let mut values = part.coefficients.iter().chain(&part.functions).flatten();
-        values.any(|v| v.is_finite() && *v != 0.0)
-    };
-    (0..count)
-        .map(part)
-        .find(is_lit)
-        .unwrap_or_else(|| BandTile::dark(tile.rect))
+    });
+    let mut lit: Vec<BandTile> = parts.filter(is_lit).collect();
+    match lit.len() {
+        0 => (BandTile::dark(tile.rect), 0),
+        count => (lit.swap_remove(chance % count), count),
+    }
+}
+
+fn is_lit(tile: &BandTile) -> bool {
+    let mut values = tile.coefficients.iter().chain(&tile.functions).flatten();
+    values.any(|v| v.is_finite() && *v != 0.0)
+}
+
+/// A number that has nothing to do with `n`, but is always the same.
+fn scattered(n: usize) -> usize {
+    (n as u32).wrapping_mul(0x9E37_79B9).rotate_left(16) as usize
 }
 
 /// Fetches each tile, works on it, and takes the results in order.
@@ -728,4 +755,44 @@ fn groups(from: usize, to: usize, most: usize, size: usize) -> impl Iterator<Ite
         size = size.saturating_mul(2).saturating_add(1);
         (count > 0).then_some(group)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_is_lit_and_tells_how_many_are() {
+        let rect = TileRect {
+            x: 32,
+            y: 16,
+            extent: Extent {
+                width: 20,
+                height: 13,
+            },
+        };
+        let with_light_at = |pixels: &[usize]| {
+            let mut tile = BandTile::dark(rect);
+            tile.functions = vec![[0.0; CHANNELS]; rect.extent.area() * 9];
+            for p in pixels {
+                tile.functions[p * 9 + 4][1] = 1.0;
+            }
+            tile
+        };
+        for chance in 0..7 {
+            // The last pixel, alone in a part of four by five.
+            let (part, count) = lit_part(with_light_at(&[259]), 8, chance);
+            assert_eq!(count, 1);
+            assert_eq!((part.rect.x, part.rect.y), (48, 24));
+            assert_eq!((part.rect.extent.width, part.rect.extent.height), (4, 5));
+            assert!(is_lit(&part));
+            // The first, one beside it, and the last.
+            let (part, count) = lit_part(with_light_at(&[0, 3, 259]), 8, chance);
+            assert_eq!(count, 2);
+            assert_eq!(part.rect.x, [32, 48][chance % 2]);
+            assert_eq!(lit_part(with_light_at(&[]), 8, chance).1, 0);
+            let (whole, count) = lit_part(with_light_at(&[7]), 24, chance);
+            assert_eq!((whole.rect, count), (rect, 1));
+        }
+    }
 }

@@ -20,6 +20,14 @@ impl Rounding {
         }
     }
 
+    /// Of so many like it.
+    pub fn times(self, count: f64) -> Self {
+        Self {
+            energy: self.energy * count,
+            error: self.error * count,
+        }
+    }
+
     /// How far numbers lie above their errors.
     pub fn snr(self) -> Decibels {
         Decibels(10.0 * (self.energy / self.error.max(f64::MIN_POSITIVE)).log10())

@@ -266,6 +266,78 @@ mod tests {
     }
 
     #[test]
+    fn a_tile_is_the_sum_of_its_parts_and_crops_are_of_its_pixels() {
+        let extent = |width, height| Extent { width, height };
+        let geometry = Geometry {
+            camera: extent(40, 30),
+            light: extent(40, 30),
+            window: Window::new(3).unwrap(),
+            correspondence: Correspondence {
+                affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            },
+            tile_side: 32,
+        };
+        let rect = |x, y, width, height| TileRect {
+            x,
+            y,
+            extent: extent(width, height),
+        };
+        let (rank, area, tile) = (2, 9, rect(5, 7, 20, 13));
+        let basis = Basis {
+            kernels: (0..rank)
+                .map(|k| (0..area).map(|s| wave(k * area + s)).collect())
+                .collect(),
+        };
+        let values = |each: usize, from: usize| -> Vec<_> {
+            let count = tile.extent.area() * each;
+            (0..count)
+                .map(|i| [0, 1, 2].map(|c| wave(from + 3 * i + c)))
+                .collect()
+        };
+        let band = BandTile {
+            rect: tile,
+            coefficients: values(rank, 0),
+            functions: values(area, 500),
+        };
+        let functions = band.clone().functions(&geometry, &basis);
+        for (p, tau) in functions.tau.chunks_exact(area).enumerate() {
+            for (s, tau) in tau.iter().enumerate() {
+                for c in 0..CHANNELS {
+                    let combined: f32 = (0..rank)
+                        .map(|k| band.coefficients[p * rank + k][c] * basis.kernels[k][s])
+                        .sum();
+                    let want = combined + band.functions[p * area + s][c];
+                    assert!((tau[c] - want).abs() < 1e-6);
+                }
+            }
+        }
+        for part in [
+            tile,
+            rect(5, 7, 3, 2),
+            rect(21, 12, 4, 8),
+            rect(10, 19, 15, 1),
+        ] {
+            let cropped = band.crop(part);
+            assert_eq!(cropped.rect, part);
+            for (p, pixel) in part.pixels().enumerate() {
+                let at = (pixel.y - tile.y) * tile.extent.width + pixel.x - tile.x;
+                let of = |values: &[[f32; CHANNELS]], each: usize, p: usize| {
+                    values[p * each..(p + 1) * each].to_vec()
+                };
+                let at = at as usize;
+                assert_eq!(
+                    of(&cropped.coefficients, rank, p),
+                    of(&band.coefficients, rank, at)
+                );
+                assert_eq!(
+                    of(&cropped.functions, area, p),
+                    of(&band.functions, area, at)
+                );
+            }
+        }
+    }
+
+    #[test]
     #[ignore = "a measurement, not a test: cargo test --release -- --ignored --nocapture expand"]
     fn time_to_expand_a_large_picture() {
         let extent = |side| Extent {
