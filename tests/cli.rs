@@ -341,6 +341,49 @@ fn a_missing_photograph_is_named_with_its_field() {
 }
 
 #[test]
+fn photographs_that_are_all_one_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let capture = folder.path().join("cookies");
+    let size = ["--camera", "32x32", "--light", "16x16", "--patterns", "20"];
+    let simulated = run(&[&["simulate", "cookies", "-o", text(&capture)], &size[..]].concat());
+    assert!(simulated.status.success());
+    let photo = |i: usize| capture.join(format!("photos/{i:04}.png"));
+    for i in 1..20 {
+        fs::copy(photo(0), photo(i)).unwrap();
+    }
+    let file = folder.path().join("cookies.ltm");
+    let message = complaint(&["recover", text(&capture), "-o", text(&file)]);
+    assert!(
+        message.contains("capture.json: photographs do not differ from pattern to pattern"),
+        "{message}"
+    );
+}
+
+#[test]
+fn what_a_file_says_does_not_control_the_terminal() {
+    let (folder, capture, _) = spoilt(|capture| {
+        let manifest = capture.join("capture.json");
+        let text = fs::read_to_string(&manifest).unwrap();
+        let title = "{\"title\": \"a\\u001b]0;x\\u0007\\nb\",";
+        fs::write(&manifest, text.replacen('{', title, 1)).unwrap();
+    });
+    let file = folder.path().join("x.ltm");
+    let recovered = run(&[
+        "recover",
+        text(&capture),
+        "-o",
+        text(&file),
+        "--window",
+        "3",
+    ]);
+    assert!(recovered.status.success());
+    let shown = run(&["inspect", text(&file)]).stdout;
+    let shown = String::from_utf8(shown).unwrap();
+    assert!(shown.contains(r"a\u{1b}]0;x\u{7}\nb"), "{shown}");
+    assert!(!shown.contains('\u{1b}'));
+}
+
+#[test]
 fn an_input_named_as_output_is_not_destroyed() {
     let (folder, capture, _) = spoilt(|_| {});
     let manifest = capture.join("capture.json");
@@ -373,6 +416,19 @@ fn an_input_named_as_output_is_not_destroyed() {
         "{message}"
     );
     assert_eq!(fs::read(&file).unwrap(), before);
+    // Nor is a photograph, which is a PNG as well.
+    let photo = capture.join("photos/0000.png");
+    let before = fs::read(&photo).unwrap();
+    let message = complaint(&[
+        "relight",
+        text(&file),
+        "--light",
+        "flood",
+        "-o",
+        text(&photo),
+    ]);
+    assert!(message.contains("such as this writes"), "{message}");
+    assert_eq!(fs::read(&photo).unwrap(), before);
     assert!(complaint(&["verify", text(folder.path())]).contains("is a folder"));
     // What the program wrote itself is replaced.
     assert_eq!(small_ltm(folder.path()), file);

@@ -102,6 +102,8 @@ pub struct Checkpoint {
     prepared: Option<Vec<u8>>,
     /// Whether the file goes when this does.
     remove: bool,
+    /// Whether there was one already.
+    found: bool,
 }
 
 impl Checkpoint {
@@ -131,6 +133,7 @@ impl Checkpoint {
                 end: 0,
                 prepared: None,
                 remove: false,
+                found: false,
             };
             if !checkpoint.load(recipe, resume)? {
                 checkpoint.begin(recipe)?;
@@ -143,6 +146,11 @@ impl Checkpoint {
     /// Number of tiles kept.
     pub fn count(&self) -> usize {
         self.records.iter().flatten().count()
+    }
+
+    /// Whether there was one already, of any tiles or none.
+    pub fn found(&self) -> bool {
+        self.found
     }
 
     /// Number of tiles there will be.
@@ -233,6 +241,7 @@ impl Checkpoint {
     /// Takes in what is kept. False where nothing is: a new file, or one that never got a tile.
     fn load(&mut self, recipe: &Recipe, resume: bool) -> Result<bool> {
         let bytes = self.file.metadata()?.len();
+        self.found = bytes > 0;
         let Some(kept) = self.read_head(bytes)? else {
             return Ok(false);
         };

@@ -32,7 +32,7 @@ pub struct QualityArgs {
     /// Make the best file of at most so many bytes: 500kB, 2MB (kB and MB are powers of 1000, KiB and MiB of 1024)
     #[arg(long, value_name = "BYTES", value_parser = parse_most)]
     max_bytes: Option<Bytes>,
-    /// Keep eleven bits of every coefficient, for archives: eight to seventy times larger
+    /// Keep eleven bits of every coefficient, for archives: many times larger
     #[arg(long)]
     lossless: bool,
 }

@@ -205,7 +205,7 @@ impl Kind {
             .is_none_or(|own| own.eq_ignore_ascii_case(extension))
     }
 
-    /// Whether `path` holds a file of this kind, or nothing at all.
+    /// Whether `path` holds a file of this kind, as this program writes it, or nothing at all.
     fn may_replace(self, path: &Path) -> std::io::Result<bool> {
         let file = match File::open(path) {
             Ok(file) => file,
@@ -213,8 +213,14 @@ impl Kind {
             Err(e) => return Err(e),
         };
         let mut start = Vec::new();
-        file.take(4).read_to_end(&mut start)?;
-        Ok(start.is_empty() || start == self.signature())
+        file.take(26).read_to_end(&mut start)?;
+        let ours = start.starts_with(self.signature())
+            && match self {
+                Self::Ltm => true,
+                // Eight bits of red, green and blue: photographs have sixteen.
+                Self::Png => start.get(24..) == Some(&[8, 2]),
+            };
+        Ok(start.is_empty() || ours)
     }
 }
 
@@ -245,7 +251,7 @@ impl Output {
             );
             ensure!(
                 kind.may_replace(path).context("cannot be looked at")?,
-                "is there already and is not {kind}; give another name"
+                "is there already and is not {kind} such as this writes; give another name"
             );
             ensure!(
                 kind.fits(path),

@@ -29,6 +29,9 @@ use crate::transport::{Basis, CHANNELS, Decibels, Window};
 /// Every how many shots one is kept from recovery, for `evaluate` to hold against the result.
 const HOLD_OUT_EVERY: usize = 10;
 
+/// SNR of a recovery below which something may be wrong with the photographs, in dB.
+const POOR: f64 = 13.0;
+
 /// How many of a kind a message names one by one.
 const MOST_NAMED: usize = 4;
 
@@ -301,6 +304,7 @@ fn recover(
     let recovery =
         Recovery::prepare(&measurements, settings, &interrupt.cores()).map_err(failed)?;
     spinner.finish_and_clear();
+    check_rehearsal(folder, &recovery)?;
     let rank = recovery.basis().map(Basis::rank);
     let encoders = plan.encoders(settings.window, rank.unwrap_or(0))?;
     checkpoint.prepared(recovery.fingerprint())?;
@@ -410,10 +414,32 @@ fn astray(folder: &CaptureFolder, shots: impl ExactSizeIterator<Item = usize>) -
     let name = |i: usize| format!("shots[{i}] ({}, {})", listed[i].photo, listed[i].pattern);
     anyhow!(
         "{}: photographs do not show the patterns they are listed with, as others do: {}; correct \
-         these, or take them out",
+         these, or take them out; if there are many, see whether the correspondence is mirrored",
         folder.manifest_path().display(),
         named(shots.map(name))
     )
+}
+
+/// Says so where the photographs tell little, and refuses those that tell nothing.
+fn check_rehearsal(folder: &CaptureFolder, recovery: &Recovery) -> Result<()> {
+    let Some(rehearsal) = recovery.rehearsal() else {
+        return Ok(());
+    };
+    if !rehearsal.has_signal() {
+        bail!(
+            "{}: photographs do not differ from pattern to pattern by more than their noise; check \
+             that each of \"shots\" names a photo of its own, and that the display was on",
+            folder.manifest_path().display()
+        );
+    }
+    if let Some(snr) = rehearsal.snr().filter(|snr| snr.0 < POOR) {
+        eprintln!(
+            "warning: patterns held out are predicted badly, to {snr} of SNR: are the photographs \
+             linear, was the light steady, does the correspondence fit? With few patterns, or by \
+             another method than learned, it may be no better"
+        );
+    }
+    Ok(())
 }
 
 /// The first of `names`, and how many more there are.
@@ -438,6 +464,9 @@ fn interrupted(checkpoint: &Checkpoint) -> anyhow::Error {
 fn announce(checkpoint: &Checkpoint, resume: bool) {
     let (count, tiles) = (checkpoint.count(), checkpoint.tiles());
     match count {
+        0 if resume && checkpoint.found() => {
+            eprintln!("note: the checkpoint is damaged, or has no tile yet; starting anew");
+        }
         0 if resume => eprintln!("note: there is no checkpoint to resume from; starting anew"),
         0 => {}
         _ => eprintln!("resuming with {count} of {tiles} tiles"),

@@ -64,6 +64,13 @@ pub fn run(args: &RelightArgs) -> Result<()> {
     }
     let output = files::Output::create(&args.output, files::Kind::Png)?;
     let file = files::read_ltm(&args.file, args.first)?;
+    if args.first.is_some() {
+        let scans = file.head.scans.len();
+        eprintln!(
+            "note: {} of {scans} scans are whole in these {} bytes",
+            file.scans, file.bytes
+        );
+    }
     let geometry = &file.head.header.geometry;
     let light = match args.at {
         None => lights::named(&args.light, geometry.light)?,

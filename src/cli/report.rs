@@ -11,8 +11,14 @@ pub fn print_json(report: &impl Serialize) -> Result<()> {
     print_line(&json)
 }
 
-/// Prints one line on standard output. A reader that has gone away is no failure of ours.
+/// Prints one line on standard output: what would control a terminal is shown instead, for files say
+/// what they like. A reader that has gone away is no failure of ours.
 pub fn print_line(line: &str) -> Result<()> {
+    let shown = |c: char| match c.is_control() {
+        true => c.escape_default().to_string(),
+        false => c.to_string(),
+    };
+    let line: String = line.chars().map(shown).collect();
     let written = writeln!(std::io::stdout(), "{line}");
     match written {
         Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::header::{MAJOR, MAX_EXTENSION_BYTES, MAX_RANK};
+use super::header::{MAX_EXTENSION_BYTES, MAX_RANK};
 use super::metadata::MAX_METADATA_BYTES;
 use super::scan::MOST_SCANS;
 use crate::transport::GeometryError;
@@ -11,7 +11,10 @@ use crate::transport::GeometryError;
 #[derive(Debug, Error)]
 pub enum FormatError {
     /// The magic is not there.
-    #[error("this is not an .ltm file: it {}", beginning(found))]
+    #[error(
+        "this is not an .ltm file: it {}; see whether it is the file that was meant",
+        beginning(found)
+    )]
     Magic {
         /// First bytes found.
         found: Vec<u8>,
@@ -21,7 +24,7 @@ pub enum FormatError {
     TextMode(TextDamage),
     /// A version this reader does not know.
     #[error(
-        "the file has format version {major}.{minor}; this reader knows {MAJOR}.x alone: get the reader for it, or export the file again"
+        "the file has format version {major}.{minor}, which this reader does not know: get the reader for it, or export the file again; if it is damaged, copy it again"
     )]
     Version {
         /// Major version found.
@@ -174,12 +177,13 @@ pub enum TextDamage {
 
 /// What bytes that are no `.ltm` file are, as far as their beginning tells.
 fn beginning(found: &[u8]) -> String {
-    let known: [(&[u8], &str); 6] = [
+    let known: [(&[u8], &str); 7] = [
         (b"\x89PNG", "is a PNG picture"),
         (b"\xFF\xD8\xFF", "is a JPEG picture"),
         (b"II*\0", "is a TIFF picture"),
         (b"MM\0*", "is a TIFF picture"),
         (b"PK\x03\x04", "is a ZIP archive"),
+        (b"\x1F\x8B", "was compressed by gzip"),
         (b"<", "begins like a web page"),
     ];
     let kind = known.iter().find(|(start, _)| found.starts_with(start));

@@ -93,6 +93,11 @@ impl Rehearsal {
         Ok(Some(rehearsal))
     }
 
+    /// Whether measurements differ from pattern to pattern by more than their noise.
+    pub fn has_signal(&self) -> bool {
+        self.signal > 0.0
+    }
+
     /// About the SNR of the recovery.
     pub fn snr(&self) -> Option<Decibels> {
         let error = self.error(self.missed);
