@@ -219,7 +219,11 @@ impl<'a> Encoder<'a> {
             coefficient_energy,
             energy: coefficient_energy + all.functions,
             // No turned coefficient is larger than all it was turned from together.
-            peak: all.peak * (rank.max(1) as f32).sqrt(),
+            peak: all.peak
+                * turn
+                    .as_ref()
+                    .map_or(1.0, Turn::gain)
+                    .max((rank as f32).sqrt()),
             source,
             turn,
             has_functions: all.functions > 0.0,

@@ -85,6 +85,15 @@ impl Turn {
         self.energies.iter().sum()
     }
 
+    /// How many times larger than the largest coefficient given one over this basis can be.
+    pub fn gain(&self) -> f32 {
+        let of_component = |j: usize| -> f64 {
+            let rows = self.rotation.chunks_exact(self.rank());
+            rows.map(|row| row[j].abs()).sum()
+        };
+        (0..self.rank()).map(of_component).fold(0.0, f64::max) as f32
+    }
+
     /// Leaves out all components past the first `rank`.
     pub fn cut(&mut self, rank: usize) {
         let old = self.rank();
