@@ -362,10 +362,7 @@ fn photographs_that_are_all_one_are_refused() {
 #[test]
 fn what_a_file_says_does_not_control_the_terminal() {
     let (folder, capture, _) = spoilt(|capture| {
-        let manifest = capture.join("capture.json");
-        let text = fs::read_to_string(&manifest).unwrap();
-        let title = "{\"title\": \"a\\u001b]0;x\\u0007\\nb\",";
-        fs::write(&manifest, text.replacen('{', title, 1)).unwrap();
+        edit_manifest(capture, |m| m["title"] = "a\u{1b}]0;x\u{7}\nb".into());
     });
     let file = folder.path().join("x.ltm");
     let recovered = run(&[
@@ -392,25 +389,15 @@ fn an_input_named_as_output_is_not_destroyed() {
     assert!(message.contains("is not an .ltm file"), "{message}");
     assert_eq!(fs::read(&manifest).unwrap(), before);
     let file = small_ltm(folder.path());
+    let relight_to = |output: &Path| {
+        let start = ["relight", text(&file), "--light", "flood", "-o"];
+        complaint(&[&start[..], &[text(output)]].concat())
+    };
     let before = fs::read(&file).unwrap();
-    let message = complaint(&[
-        "relight",
-        text(&file),
-        "--light",
-        "flood",
-        "-o",
-        text(&file),
-    ]);
+    let message = relight_to(&file);
     assert!(message.contains("is not a PNG"), "{message}");
     let jpeg = folder.path().join("x.jpg");
-    let message = complaint(&[
-        "relight",
-        text(&file),
-        "--light",
-        "flood",
-        "-o",
-        text(&jpeg),
-    ]);
+    let message = relight_to(&jpeg);
     assert!(
         message.contains("x.jpg: a PNG is what is written"),
         "{message}"
@@ -419,14 +406,7 @@ fn an_input_named_as_output_is_not_destroyed() {
     // Nor is a photograph, which is a PNG as well.
     let photo = capture.join("photos/0000.png");
     let before = fs::read(&photo).unwrap();
-    let message = complaint(&[
-        "relight",
-        text(&file),
-        "--light",
-        "flood",
-        "-o",
-        text(&photo),
-    ]);
+    let message = relight_to(&photo);
     assert!(message.contains("such as this writes"), "{message}");
     assert_eq!(fs::read(&photo).unwrap(), before);
     assert!(complaint(&["verify", text(folder.path())]).contains("is a folder"));
