@@ -19,6 +19,9 @@
 //! peer's time divided by ours. Pictures are compared in linear light, and where they do not agree the
 //! benchmark fails.
 //!
+//! With the crate's `gpu` feature, frames on the system's graphics device follow. They are drawn one after
+//! the other into its memory, and timed until all are done; a device that is a program is called one.
+//!
 //! Bytes of a frame are those of the codes, each of which is read once, and of the picture written. They
 //! are held against the bytes that copying reads and writes a second, on all cores.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a bench that cannot go on should stop
@@ -26,6 +29,10 @@
 mod figures;
 #[path = "relight/film.rs"]
 mod film;
+#[cfg(feature = "gpu")]
+#[path = "relight/gpu.rs"]
+mod gpu;
+mod made_up;
 #[path = "relight/peers.rs"]
 mod peers;
 
@@ -34,10 +41,8 @@ use std::fs;
 
 use figures::Figures;
 use film::{Film, KINDS, Time};
+use made_up::{RANKS, SIDES};
 use rayon::prelude::*;
-
-const SIDES: [u32; 3] = [128, 512, 2048];
-const RANKS: [usize; 3] = [8, 16, 32];
 
 fn main() {
     // `cargo bench` passes flags for a harness this bench does not have.
@@ -47,6 +52,8 @@ fn main() {
     let before = copy_bandwidth();
     sizes(&mut figures);
     peers::compare(&problem, &mut figures);
+    #[cfg(feature = "gpu")]
+    gpu::frames(&mut figures);
     bandwidth(before.max(copy_bandwidth()), &mut figures);
     figures::report("relight", &figures);
 }
@@ -110,7 +117,7 @@ fn copy_bandwidth() -> f64 {
 }
 
 fn bandwidth(copied: f64, figures: &mut Figures) {
-    let bytes = film::bytes(peers::SIDE, peers::RANK) as f64;
+    let bytes = made_up::bytes(peers::SIDE, peers::RANK) as f64;
     let frame = figures[&key(peers::SIDE, peers::RANK, "video", false)];
     figures.insert("copy_bandwidth_gb_s".to_owned(), copied / 1e9);
     figures.insert("video_frame_mb".to_owned(), bytes / 1e6);

@@ -3,13 +3,14 @@
 
 mod common;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use common::relit::{self, Kind};
 use common::tiled;
 use proptest::prelude::*;
-use relightable_photo::relight::{Light, TorchPose, cpu, reference};
-use relightable_photo::transport::{Geometry, LightPx, MAX_WINDOW};
+use relightable_photo::relight::{Display, Light, LightError, TorchPose, cpu, reference};
+use relightable_photo::transport::{Extent, Geometry, LightPx, MAX_WINDOW, Tile};
 use relightable_photo::workers::OneThread;
 
 /// Grids, windows and tiles of all shapes, with correspondences that turn, mirror and shift the
@@ -38,8 +39,9 @@ proptest! {
         let mut relighter = cpu::Relighter::new(transport.clone());
         for (name, light) in relit::lights(geometry.light) {
             relighter.relight(&light, &OneThread);
-            let got = relighter.picture(exposure);
-            let want = reference::relight_srgb8(&transport, &light, f64::from(exposure));
+            let display = relit::displays(exposure)[seed as usize / 3 % 4];
+            let got = relighter.picture(&display, &OneThread);
+            let want = reference::picture(&transport, &light, &display);
             relit::assert_within_one_code(&got, &want, name);
         }
     }
@@ -54,7 +56,7 @@ fn a_window_off_the_display_sees_nothing() {
         let mut relighter = cpu::Relighter::new(transport);
         for (name, light) in relit::lights(geometry.light) {
             relighter.relight(&light, &OneThread);
-            let picture = relighter.picture(1.0);
+            let picture = relighter.picture(&Display::srgb(1.0), &OneThread);
             assert!(
                 picture.pixels.iter().all(|p| *p == [0, 0, 0, 255]),
                 "{name}, {shift}"
@@ -94,4 +96,85 @@ fn a_light_that_moves_leaves_nothing_behind() {
         anew.relight(&light, &OneThread);
         assert_eq!(moved.linear(), anew.linear(), "step {step}");
     }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    #[test]
+    fn tiles_shared_out_give_the_same_picture_to_the_bit(geometry in geometries(), seed: u64) {
+        let kind = [Kind::Direct, Kind::Factored, Kind::Mixed][seed as usize % 3];
+        let transport = relit::asymmetric_transport(geometry, kind, seed);
+        let extent = geometry.camera;
+        let middle = (geometry.tile_grid().height / 2 * geometry.tile_side).min(extent.height);
+        let mut parts = [0..middle, middle..extent.height].map(|rows| {
+            let mut part = transport.clone();
+            for tile in &mut part.tiles {
+                if !rows.contains(&tile.rect().y) {
+                    *tile = Tile::dark(tile.rect());
+                }
+            }
+            (cpu::Relighter::new(Arc::new(part)), rows)
+        });
+        let mut whole = cpu::Relighter::new(Arc::new(transport));
+        let display = relit::displays(1.0)[seed as usize / 3 % 4];
+        for (name, light) in relit::lights(geometry.light) {
+            whole.relight(&light, &OneThread);
+            let mut shared = Vec::new();
+            for (relighter, rows) in &mut parts {
+                let (first, seen) = rows_seen(relighter, &light)?;
+                relighter.relight_from(first, &seen, &OneThread);
+                let mut out = vec![[0; 4]; rows.len() * extent.width as usize];
+                relighter.show(&display, rows.clone(), &mut out, &OneThread);
+                shared.append(&mut out);
+                let [start, end] = [rows.start, rows.end].map(|row| (row * extent.width) as usize);
+                let (part, whole) = (relighter.linear(), whole.linear());
+                prop_assert!(part.pixels[start..end] == whole.pixels[start..end], "{name}");
+            }
+            prop_assert!(whole.picture(&display, &OneThread).pixels == shared, "{name}");
+        }
+    }
+}
+
+#[test]
+fn less_detail_is_the_first_components_and_goes_as_it_came() {
+    let geometry = tiled(
+        [70, 50],
+        [35, 25],
+        15,
+        32,
+        [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
+    );
+    let transport = Arc::new(relit::asymmetric_transport(geometry, Kind::Mixed, 5));
+    let mut relighter = cpu::Relighter::new(transport.clone());
+    for (name, light) in relit::lights(geometry.light) {
+        relighter.set_detail(1.0);
+        relighter.relight(&light, &OneThread);
+        let whole = relighter.linear();
+        // One quad of three, then two.
+        for (share, quads) in [(0.0, 1), (0.3, 1), (0.34, 2)] {
+            let display = Display::srgb(1.0);
+            relighter.set_detail(share);
+            relighter.relight(&light, &OneThread);
+            let want = reference::picture(&relit::first_quads(&transport, quads), &light, &display);
+            relit::assert_within_one_code(&relighter.picture(&display, &OneThread), &want, name);
+        }
+        relighter.set_detail(1.0);
+        relighter.relight(&light, &OneThread);
+        assert_eq!(relighter.linear(), whole, "{name}");
+    }
+}
+
+/// The rows of a light that anything sees, and the first one's number.
+fn rows_seen(relighter: &cpu::Relighter, light: &Light) -> Result<(u32, Light), LightError> {
+    let Extent { width, height } = light.extent();
+    let Range { start, end } = relighter.light_rows();
+    assert!(end <= height);
+    let extent = Extent {
+        width,
+        height: end - start,
+    };
+    let elements = &light.elements()[(start * width) as usize..(end * width) as usize];
+    let values: Vec<f32> = elements.iter().flat_map(|e| [e[0], e[1], e[2]]).collect();
+    Ok((start, Light::from_linear_rgb(extent, &values)?))
 }

@@ -57,6 +57,8 @@ fn checked_in_glsl_is_translated_from_the_wgsl() {
     for (name, entry_point, stage) in [
         ("relight.vert.glsl", "cover", ShaderStage::Vertex),
         ("see.frag.glsl", "see", ShaderStage::Fragment),
+        ("across.frag.glsl", "across", ShaderStage::Fragment),
+        ("down.frag.glsl", "down", ShaderStage::Fragment),
         ("relight.frag.glsl", "relight", ShaderStage::Fragment),
     ] {
         let expected = translate(&wgsl, entry_point, stage);

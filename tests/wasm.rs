@@ -11,11 +11,11 @@ mod common;
 
 use common::relit::{self, Kind};
 use common::{band_tile, tiled};
-use js_sys::{Object, Reflect};
+use js_sys::{Float32Array, Object, Reflect, Uint8ClampedArray};
 use relightable_photo::format::{EncodedFile, Limits, Metadata, Quality, Reader, Source};
-use relightable_photo::relight::{Rgba8Picture, reference};
+use relightable_photo::relight::{self, Rgba8Picture, reference};
 use relightable_photo::transport::{Extent, Geometry, Tile, Transport};
-use relightable_photo::web::{CodedError, Decoder, Light, Photo, Relighter};
+use relightable_photo::web::{CodedError, Decoder, Display, Graphics, Light, Photo, Relighter};
 use relightable_photo::workers::OneThread;
 use wasm_bindgen::convert::TryFromJsValue;
 use wasm_bindgen::{JsCast, JsValue};
@@ -155,24 +155,80 @@ fn new_canvas() -> HtmlCanvasElement {
     canvas.unchecked_into()
 }
 
+/// A photograph that is drawn, and what it is drawn by.
+struct Drawn {
+    relighter: Relighter,
+    _graphics: Option<Graphics>,
+}
+
+impl Drawn {
+    fn render(&mut self, light: &Light, exposure: f64) -> Result<(), CodedError> {
+        let display = Display::new(exposure, &[1.0; 3], "clip", "srgb")?;
+        self.relighter.render(light, &display, 1.0)
+    }
+}
+
+async fn graphics(backend: &str) -> Option<Graphics> {
+    match backend {
+        "webgpu" => {
+            let graphics = JsFuture::from(Graphics::webgpu()).await.unwrap();
+            Some(Graphics::try_from_js_value(graphics).expect("a Graphics"))
+        }
+        "webgl2" => Some(Graphics::webgl2(new_canvas()).unwrap()),
+        _ => None,
+    }
+}
+
+async fn draw(
+    graphics: &Graphics,
+    photo: &Photo,
+    canvas: &HtmlCanvasElement,
+    gamut: &str,
+) -> Result<Relighter, JsValue> {
+    let drawn = graphics.draw(photo, canvas.clone(), gamut.into());
+    let drawn = JsFuture::from(drawn).await?;
+    Ok(Relighter::try_from_js_value(drawn).expect("a Relighter"))
+}
+
 async fn relighter(
     backend: &str,
     photo: &Photo,
     canvas: &HtmlCanvasElement,
-) -> Result<Relighter, JsValue> {
-    let promise = Relighter::create(backend.into(), photo, canvas.clone());
-    JsFuture::from(promise)
-        .await
-        .map(|value| Relighter::try_from_js_value(value).expect("a Relighter"))
+) -> Result<Drawn, JsValue> {
+    let graphics = graphics(backend).await;
+    let relighter = match &graphics {
+        Some(graphics) => draw(graphics, photo, canvas, "srgb").await?,
+        None => Relighter::new(photo, canvas.clone(), "srgb")?,
+    };
+    Ok(Drawn {
+        relighter,
+        _graphics: graphics,
+    })
+}
+
+/// What pages show: dithered.
+fn shown(exposure: f64) -> relight::Display {
+    let plain = relight::Display::srgb(exposure as f32);
+    relight::Display {
+        dither: true,
+        ..plain
+    }
 }
 
 /// The canvas as a page gets it by `drawImage`, in the task that rendered it.
 fn read_back(canvas: &HtmlCanvasElement) -> Rgba8Picture {
+    read_back_in(canvas, "srgb")
+}
+
+/// The same, as a colour space has it.
+fn read_back_in(canvas: &HtmlCanvasElement, space: &str) -> Rgba8Picture {
     let copy = new_canvas();
+    let settings = Object::new();
+    Reflect::set(&settings, &"colorSpace".into(), &space.into()).unwrap();
     copy.set_width(canvas.width());
     copy.set_height(canvas.height());
-    let context = copy.get_context("2d").unwrap().unwrap();
-    let context: CanvasRenderingContext2d = context.unchecked_into();
+    let context = copy.get_context_with_context_options("2d", &settings);
+    let context: CanvasRenderingContext2d = context.unwrap().unwrap().unchecked_into();
     // Transparency would show as red.
     context.set_fill_style_str("red");
     let (width, height) = (canvas.width(), canvas.height());
@@ -209,18 +265,23 @@ async fn assert_backend_draws_the_reference(backend: &str) {
         let photo = photo(&transport);
         let canvas = new_canvas();
         let mut relighter = relighter(backend, &photo, &canvas).await.unwrap();
-        assert_eq!(relighter.backend(), backend);
+        assert_eq!(relighter.relighter.backend(), backend);
         for (j, (name, light)) in relit::lights(geometry.light).into_iter().enumerate() {
             let values: Vec<f32> = light
                 .elements()
                 .iter()
                 .flat_map(|e| [e[0], e[1], e[2]])
                 .collect();
-            let web_light = Light::from_linear_rgb(&photo, &values).unwrap();
+            let values = Float32Array::from(&values[..]);
+            let Extent { width, height } = geometry.light;
+            let web_light = Light::from_linear(&photo, &values, width, height).unwrap();
             let exposure = [1.0, 0.4, 2.5][j % 3];
             relighter.render(&web_light, exposure).unwrap();
-            let want = reference::relight_srgb8(&transport, &light, exposure);
-            let what = format!("{backend} ({}), geometry {i}, {name}", relighter.kernel());
+            let want = reference::picture(&transport, &light, &shown(exposure));
+            let what = format!(
+                "{backend} ({}), geometry {i}, {name}",
+                relighter.relighter.kernel()
+            );
             relit::assert_within_one_code(&read_back(&canvas), &want, &what);
             pause().await;
         }
@@ -259,7 +320,7 @@ async fn built_in_lights_reach_the_canvas_by_name() {
                 continue;
             }
         }
-        let want = reference::relight_srgb8(&transport, &light, 1.0);
+        let want = reference::picture(&transport, &light, &shown(1.0));
         relit::assert_within_one_code(&read_back(&canvas), &want, name);
     }
 }
@@ -345,7 +406,7 @@ async fn a_photo_goes_to_another_module_tile_by_tile() {
     let light = Light::builtin(&received, "spectrum").unwrap();
     relighter.render(&light, 1.0).unwrap();
     let (_, light) = relit::lights(transport.geometry.light).swap_remove(4);
-    let want = reference::relight_srgb8(&transport, &light, 1.0);
+    let want = reference::picture(&transport, &light, &shown(1.0));
     relit::assert_within_one_code(&read_back(&canvas), &want, "received");
     // A photograph in use stays, and what was not sent is not taken.
     assert_eq!(coded(received.put_tile(0, &tiles[0])), "internal");
@@ -431,10 +492,16 @@ fn every_bad_file_has_its_code() {
 #[wasm_bindgen_test]
 async fn lights_and_exposures_that_cannot_be_are_refused() {
     let [one, other] = [0, 1].map(|i| photo(&transport(i)));
-    assert_eq!(coded(Light::from_linear_rgb(&one, &[1.0; 5])), "light-size");
-    let mut values = vec![1.0; 19 * 14 * 3];
-    values[30] = -1.0;
-    assert_eq!(coded(Light::from_linear_rgb(&one, &values)), "light-value");
+    let linear = |values: &[f32], width, height| {
+        Light::from_linear(&one, &Float32Array::from(values), width, height)
+    };
+    let srgb =
+        |codes: &[u8], width| Light::from_srgb(&one, &Uint8ClampedArray::from(codes), width, 1);
+    assert_eq!(coded(linear(&[1.0; 5], 1, 2)), "light-size");
+    assert_eq!(coded(linear(&[], 0, 3)), "light-size");
+    assert_eq!(coded(linear(&[1.0, -1.0, 1.0], 1, 1)), "light-value");
+    assert_eq!(coded(srgb(&[255; 4], u32::MAX)), "light-size");
+    assert!(srgb(&[255; 8], 2).is_ok());
     for backend in BACKENDS {
         let mut relighter = relighter(backend, &one, &new_canvas()).await.unwrap();
         let foreign = Light::builtin(&other, "flood").unwrap();
@@ -448,20 +515,15 @@ async fn lights_and_exposures_that_cannot_be_are_refused() {
 }
 
 #[wasm_bindgen_test]
-async fn a_canvas_in_use_and_an_unknown_name_are_refused() {
+async fn a_canvas_in_use_is_refused() {
     let photo = photo(&transport(0));
-    for (backend, used_for) in [("webgpu", "2d"), ("webgl2", "2d"), ("cpu", "webgl2")] {
+    for (backend, used_for) in [("webgpu", "2d"), ("webgl2", "webgl2"), ("cpu", "webgl2")] {
         let canvas = new_canvas();
         let taken: Option<Object> = canvas.get_context(used_for).unwrap();
         assert!(taken.is_some());
         let thrown = relighter(backend, &photo, &canvas).await.err().unwrap();
         assert_eq!(code_of(&thrown), "backend-unavailable");
     }
-    let thrown = relighter("vulkan", &photo, &new_canvas())
-        .await
-        .err()
-        .unwrap();
-    assert_eq!(code_of(&thrown), "backend-unavailable");
 }
 
 #[wasm_bindgen_test]
@@ -476,7 +538,7 @@ async fn a_photo_may_go_and_another_take_its_place() {
             drop(photo);
             relighter.render(&light, 1.0).unwrap();
             let (_, light) = relit::lights(transport.geometry.light).swap_remove(4);
-            let want = reference::relight_srgb8(&transport, &light, 1.0);
+            let want = reference::picture(&transport, &light, &shown(1.0));
             relit::assert_within_one_code(&read_back(&canvas), &want, backend);
         }
     }
@@ -485,15 +547,84 @@ async fn a_photo_may_go_and_another_take_its_place() {
 #[wasm_bindgen_test]
 async fn a_lost_webgl2_context_is_reported() {
     let photo = photo(&transport(0));
-    let canvas = new_canvas();
-    let mut relighter = relighter("webgl2", &photo, &canvas).await.unwrap();
     let light = Light::builtin(&photo, "flood").unwrap();
-    relighter.render(&light, 1.0).unwrap();
-    let gl = canvas.get_context("webgl2").unwrap().unwrap();
+    let hidden = new_canvas();
+    let graphics = Graphics::webgl2(hidden.clone()).unwrap();
+    let display = Display::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
+    let mut relighter = draw(&graphics, &photo, &new_canvas(), "srgb")
+        .await
+        .unwrap();
+    relighter.render(&light, &display, 1.0).unwrap();
+    let gl = hidden.get_context("webgl2").unwrap().unwrap();
     let gl: web_sys::WebGl2RenderingContext = gl.unchecked_into();
     let extension = gl.get_extension("WEBGL_lose_context").unwrap().unwrap();
     let lose = Reflect::get(&extension, &"loseContext".into()).unwrap();
     let lose: js_sys::Function = lose.unchecked_into();
     lose.call0(&extension).unwrap();
-    assert_eq!(coded(relighter.render(&light, 1.0)), "backend-lost");
+    assert_eq!(
+        coded(relighter.render(&light, &display, 1.0)),
+        "backend-lost"
+    );
+}
+
+#[wasm_bindgen_test]
+async fn photographs_take_turns_on_one_device() {
+    for backend in ["webgl2", "webgpu"] {
+        let graphics = graphics(backend).await.unwrap();
+        let display = Display::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
+        let mut drawn = Vec::new();
+        for i in [0, 1, 2, 0] {
+            let transport = filed(&transport(i));
+            let (photo, canvas) = (photo(&transport), new_canvas());
+            let relighter = draw(&graphics, &photo, &canvas, "srgb").await.unwrap();
+            drawn.push((relighter, photo, canvas, transport));
+        }
+        for turn in 0..3 {
+            for (i, (relighter, photo, canvas, transport)) in drawn.iter_mut().enumerate() {
+                let (name, light) =
+                    relit::lights(transport.geometry.light).swap_remove((i + turn) % 6);
+                let web_light = Light::builtin(photo, name).unwrap();
+                relighter.render(&web_light, &display, 1.0).unwrap();
+                let want = reference::picture(transport, &light, &shown(1.0));
+                let what = format!("{backend}, photo {i}, turn {turn}, {name}");
+                relit::assert_within_one_code(&read_back(canvas), &want, &what);
+            }
+            // One that goes leaves the others alone.
+            drawn.remove(0);
+        }
+    }
+}
+
+#[wasm_bindgen_test]
+async fn displays_of_all_kinds_show_what_the_reference_shows() {
+    let transport = filed(&transport(0));
+    let photo = photo(&transport);
+    let (name, light) = relit::lights(transport.geometry.light).swap_remove(4);
+    let web_light = Light::builtin(&photo, name).unwrap();
+    let balance = [1.3, 1.0, 0.6];
+    for backend in BACKENDS {
+        let graphics = graphics(backend).await;
+        for gamut in [relight::Gamut::Srgb, relight::Gamut::DisplayP3] {
+            let (canvas, space) = (new_canvas(), gamut.color_space());
+            let mut relighter = match &graphics {
+                Some(graphics) => draw(graphics, &photo, &canvas, space).await.unwrap(),
+                None => Relighter::new(&photo, canvas.clone(), space).unwrap(),
+            };
+            assert_eq!(relighter.gamut(), space);
+            let curves = [relight::ToneCurve::Clip, relight::ToneCurve::Filmic];
+            for (name, curve) in ["clip", "filmic"].into_iter().zip(curves) {
+                let display = Display::new(1.5, &balance, name, space).unwrap();
+                relighter.render(&web_light, &display, 1.0).unwrap();
+                let shown = relight::Display {
+                    gains: balance.map(|factor| (1.5 * factor) as f32),
+                    gamut,
+                    curve,
+                    dither: true,
+                };
+                let want = reference::picture(&transport, &light, &shown);
+                let what = format!("{backend}, {space}, {name}");
+                relit::assert_within_one_code(&read_back_in(&canvas, space), &want, &what);
+            }
+        }
+    }
 }

@@ -1,17 +1,15 @@
-//! Transports to relight, lights that change, and the time that a frame takes.
+//! Photographs to relight, lights that change, and the time that a frame takes.
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
-use relightable_photo::relight::{Light, Rgba8Picture, TorchPose, cpu};
-use relightable_photo::transport::{
-    BandTile, Basis, CHANNELS, Correspondence, Extent, Geometry, LightPx, QUAD, TexelCode, Tile,
-    Transport, Window,
-};
+use relightable_photo::relight::{Display, Light, Rgba8Picture, TorchPose, cpu};
+use relightable_photo::transport::{Extent, LightPx, Tile, Transport};
 use relightable_photo::workers::{OneThread, Workers};
 
-const WINDOW: u32 = 15;
+use crate::made_up::{self, noise, square};
+
 /// Lights that frames take turns with.
 const LIGHTS: usize = 4;
 
@@ -43,7 +41,7 @@ impl Kind {
         }
     }
 
-    fn lights(self, extent: Extent) -> Vec<Light> {
+    pub fn lights(self, extent: Extent) -> Vec<Light> {
         match self {
             Self::Video => (0..LIGHTS).map(|i| video(extent, i)).collect(),
             Self::Torch => (0..LIGHTS).map(|i| torch(extent, i)).collect(),
@@ -106,7 +104,10 @@ impl Film {
         let start = Instant::now();
         self.relighter.relight(light, workers);
         let linear = start.elapsed();
-        self.relighter.tone_map(1.0, &mut self.picture);
+        let rows = 0..self.picture.extent.height;
+        let pixels = &mut self.picture.pixels;
+        self.relighter
+            .show(&Display::srgb(1.0), rows, pixels, workers);
         let [linear, whole] = [linear, start.elapsed()].map(|time| time.as_secs_f64() * 1e3);
         Time { linear, whole }
     }
@@ -133,58 +134,13 @@ pub fn fastest(runs: usize, mut work: impl FnMut()) -> f64 {
     times.fold(f64::INFINITY, f64::min)
 }
 
-/// Codes that a frame reads, and the picture it writes.
-pub fn bytes(side: u32, rank: usize) -> usize {
-    let codes = CHANNELS * rank.div_ceil(QUAD) * size_of::<TexelCode>();
-    square(side).area() * (codes + size_of::<[u8; 4]>())
-}
-
-fn square(side: u32) -> Extent {
-    Extent {
-        width: side,
-        height: side,
-    }
-}
-
-/// A number from 0 to 1 for every other number.
-fn noise(i: usize) -> f32 {
-    let mut h = (i as u32).wrapping_mul(0x9e37_79b9);
-    h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
-    h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
-    (h ^ (h >> 16)) as f32 / u32::MAX as f32
-}
-
-/// Made-up coefficients: the time does not depend on their values.
-fn transport(side: u32, rank: usize) -> Transport {
-    let window = Window::new(WINDOW).unwrap();
-    let area = window.area();
-    let geometry = Geometry {
-        camera: square(side),
-        light: square(side / 2),
-        window,
-        correspondence: Correspondence {
-            affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
-        },
-        tile_side: 128,
-    };
-    let kernel = |k: usize| {
-        (0..area)
-            .map(|s| noise(k * area + s) / WINDOW as f32)
-            .collect()
-    };
-    let tile = |t: usize| {
-        let mut tile = BandTile::dark(geometry.tile(t));
-        let values = tile.rect.extent.area() * rank;
-        let coefficient = |i| [0, 1, 2].map(|c| (noise(3 * (i + t * values) + c) - 0.3) * 0.02);
-        tile.coefficients = (0..values).map(coefficient).collect();
-        Tile::quantise(&tile, rank)
-    };
+pub fn transport(side: u32, rank: usize) -> Transport {
+    let geometry = made_up::geometry(side);
+    let tile = |t: usize| Tile::quantise(&made_up::tile(&geometry, rank, t), rank);
     let tiles = (0..geometry.tile_grid().area()).into_par_iter();
     Transport {
         tiles: tiles.map(tile).collect(),
-        basis: Basis {
-            kernels: (0..rank).map(kernel).collect(),
-        },
+        basis: made_up::basis(&geometry, rank),
         geometry,
     }
 }

@@ -9,7 +9,7 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use super::process::AllCores;
 use super::{Usage, files, lights};
-use crate::relight::{Light, TorchPose, cpu, reference};
+use crate::relight::{Display, Light, TorchPose, cpu, reference};
 
 /// Relight an object and write the picture as an 8-bit sRGB PNG
 #[derive(Debug, Args)]
@@ -76,15 +76,14 @@ pub fn run(args: &RelightArgs) -> Result<()> {
         None => lights::named(&args.light, geometry.light)?,
         Some([x, y]) => Light::torch(geometry.light, TorchPose::behind(geometry, x, y)),
     };
+    let display = Display::srgb(args.exposure);
     let picture = match args.backend {
         Backend::Cpu => {
             let mut relighter = cpu::Relighter::new(Arc::new(file.transport));
             relighter.relight(&light, &AllCores);
-            relighter.picture(args.exposure)
+            relighter.picture(&display, &AllCores)
         }
-        Backend::Reference => {
-            reference::relight_srgb8(&file.transport, &light, f64::from(args.exposure))
-        }
+        Backend::Reference => reference::picture(&file.transport, &light, &display),
     };
     let rgb: Vec<u8> = picture
         .pixels

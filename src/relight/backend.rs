@@ -1,10 +1,56 @@
-//! What a page needs to know of a back end, whichever it is.
+//! What is asked of a back end, whichever it is.
 
-use js_sys::Promise;
 use thiserror::Error;
 
-use super::Light;
 use super::texture_layout::LayoutError;
+use super::{Display, Gamut, Light, Tint};
+#[cfg(target_arch = "wasm32")]
+use crate::transport::Extent;
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a> {
+    /// The light; `None` for the picture that was taken last.
+    pub light: Option<&'a Light>,
+    /// How it is shown.
+    pub display: Display,
+    /// The share of the components that is used, 0 to 1.
+    pub detail: f32,
+}
+
+/// The light that a device has.
+#[derive(Clone, Debug, Default)]
+pub struct Lit {
+    /// `None` for a picture, whose colours nobody has looked at.
+    light: Option<(Light, Tint)>,
+    /// The detail in which it is seen, if it is already.
+    seen: Option<f32>,
+}
+
+impl Lit {
+    /// One that was just given.
+    pub fn of(light: &Light) -> Self {
+        Self {
+            light: Some((light.clone(), light.tint())),
+            seen: None,
+        }
+    }
+
+    /// Whether it is that one.
+    pub fn is(&self, light: &Light) -> bool {
+        self.light.as_ref().is_some_and(|(own, _)| own == light)
+    }
+
+    /// What its channels have in common.
+    pub fn tint(&self) -> Tint {
+        self.light.as_ref().map_or(Tint::Many, |(_, tint)| *tint)
+    }
+
+    /// Whether it is yet to be seen in that detail, as it is afterwards.
+    pub fn look(&mut self, detail: f32) -> bool {
+        self.seen.replace(detail) != Some(detail)
+    }
+}
 
 /// One way of drawing a relit photograph into a canvas.
 pub trait Backend {
@@ -14,15 +60,39 @@ pub trait Backend {
     /// What does the work: an instruction set, or the graphics device.
     fn kernel(&self) -> String;
 
-    /// Draws the whole picture under `light`, scaled by `exposure`, before it returns.
-    fn render(&mut self, light: &Light, exposure: f32) -> Result<(), BackendError>;
+    /// What its canvas shows.
+    fn gamut(&self) -> Gamut;
 
-    /// Settles, with an object that has a `message`, when the graphics device goes away: a picture
-    /// that is not drawn again would be blank without anyone knowing. `None` where there is no such
-    /// device, or the canvas itself tells.
-    fn lost(&self) -> Option<Promise> {
-        None
+    /// Takes a picture that the browser has as the light of frames without one; `false` where the
+    /// device cannot.
+    ///
+    /// # Errors
+    /// What the browser throws, as for pictures of another origin. The last light stays.
+    #[cfg(target_arch = "wasm32")]
+    fn take_picture(
+        &mut self,
+        _: &wasm_bindgen::JsValue,
+        _: Extent,
+    ) -> Result<bool, wasm_bindgen::JsValue> {
+        Ok(false)
     }
+
+    /// Draws the whole picture before it returns.
+    fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError>;
+}
+
+/// Whether a graphics device of that name is a program that makes up for a missing one.
+pub fn names_software(device: &str) -> bool {
+    let name = device.to_lowercase();
+    let known = [
+        "swiftshader",
+        "llvmpipe",
+        "lavapipe",
+        "softpipe",
+        "basic render",
+        "software",
+    ];
+    known.iter().any(|part| name.contains(part))
 }
 
 /// Why a back end does not draw.

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::Tint;
+use super::resample::AreaMeans;
 use crate::transport::{Extent, Geometry, LightPx};
 
 /// Linear emission of every light element, 0 dark to 1 full brightness: R, G, B and an unused
@@ -124,15 +125,18 @@ impl BuiltinLight {
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum LightError {
     /// Wrong number of values.
-    #[error("the light has {got} values; a light of {extent} elements in RGB needs {need}")]
+    #[error("the light has {got} values; a light of {extent} elements needs {need}")]
     Length {
         /// Values given.
         got: usize,
         /// Values needed.
         need: usize,
-        /// The light plane.
+        /// The light.
         extent: Extent,
     },
+    /// A picture of no pixels.
+    #[error("the light is a picture of {0} pixels; it needs one at least each way")]
+    Empty(Extent),
     /// Lights cannot be negative, infinite or NaN.
     #[error("the light has a value that is negative or not a finite number, at element {0}")]
     Value(usize),
@@ -164,23 +168,79 @@ impl Light {
                 extent,
             });
         }
-        if let Some(bad) = values.iter().position(|v| !v.is_finite() || *v < 0.0) {
-            return Err(LightError::Value(bad / 3));
+        check_values(values, 0)?;
+        Ok(Self::from_checked(extent, values))
+    }
+
+    /// A light from a picture of any size, of which `read` gives linear RGB values row by row: each
+    /// element emits the mean of what it covers.
+    pub fn from_linear_rows(
+        extent: Extent,
+        picture: Extent,
+        mut read: impl FnMut(usize, &mut [f32]),
+    ) -> Result<Self, LightError> {
+        check_picture(picture)?;
+        let mut row = vec![0.0; 3 * picture.width as usize];
+        let mut read_checked = |y: usize, row: &mut [f32]| {
+            read(y, row);
+            check_values(row, y * picture.width as usize)
+        };
+        // Of the light's own size, as a page that animates it has it, elements are what they cover.
+        if picture == extent {
+            let mut elements = Vec::with_capacity(extent.area());
+            for y in 0..extent.height as usize {
+                read_checked(y, &mut row)?;
+                elements.extend(row.as_chunks().0.iter().map(|[r, g, b]| [*r, *g, *b, 0.0]));
+            }
+            return Ok(Self { extent, elements });
         }
+        let mut means = AreaMeans::new(picture, extent);
+        for y in 0..picture.height as usize {
+            read_checked(y, &mut row)?;
+            means.add_linear(&row);
+        }
+        Ok(Self::from_checked(extent, &means.finish()))
+    }
+
+    /// A light from a picture of any size, of which `read` gives sRGB codes and alpha row by row: each
+    /// element emits the mean of what it covers. Colours are not multiplied by alpha, which is the
+    /// share of a pixel that shines.
+    pub fn from_srgb_rows(
+        extent: Extent,
+        picture: Extent,
+        mut read: impl FnMut(usize, &mut [u8]),
+    ) -> Result<Self, LightError> {
+        check_picture(picture)?;
+        let mut means = AreaMeans::new(picture, extent);
+        let mut row = vec![0; 4 * picture.width as usize];
+        for y in 0..picture.height as usize {
+            read(y, &mut row);
+            means.add_srgb(&row);
+        }
+        Ok(Self::from_checked(extent, &means.finish()))
+    }
+
+    fn from_checked(extent: Extent, values: &[f32]) -> Self {
         let elements = values.chunks_exact(3).map(|p| [p[0], p[1], p[2], 0.0]);
-        Ok(Self {
+        Self {
             extent,
             elements: elements.collect(),
-        })
+        }
     }
 
     /// A warm Gaussian spot.
     pub fn torch(extent: Extent, pose: TorchPose) -> Self {
         const WARM_WHITE: [f64; 3] = [1.0, 0.93, 0.80];
         let scale = 0.5 / (pose.radius * pose.radius).max(1e-6);
+        // A Gaussian is one across times one down: few exponentials for many elements.
+        let profile = |length: u32, centre: f64| -> Vec<f64> {
+            let offsets = (0..length).map(|i| f64::from(i) + 0.5 - centre);
+            offsets.map(|d| (-d * d * scale).exp()).collect()
+        };
+        let across = profile(extent.width, pose.centre.u);
+        let down = profile(extent.height, pose.centre.v);
         Self::from_fn(extent, |p| {
-            let (du, dv) = (p.u - pose.centre.u, p.v - pose.centre.v);
-            let spot = (-(du * du + dv * dv) * scale).exp();
+            let spot = across[p.u as usize] * down[p.v as usize];
             WARM_WHITE.map(|c| (c * spot) as f32)
         })
     }
@@ -205,6 +265,21 @@ impl Light {
     /// Emission of each element, row by row.
     pub fn elements(&self) -> &[[f32; 4]] {
         &self.elements
+    }
+}
+
+fn check_picture(picture: Extent) -> Result<(), LightError> {
+    if picture.width == 0 || picture.height == 0 {
+        return Err(LightError::Empty(picture));
+    }
+    Ok(())
+}
+
+/// Values of elements from the one of number `first` on.
+fn check_values(values: &[f32], first: usize) -> Result<(), LightError> {
+    match values.iter().position(|v| !v.is_finite() || *v < 0.0) {
+        Some(bad) => Err(LightError::Value(first + bad / 3)),
+        None => Ok(()),
     }
 }
 
@@ -322,5 +397,28 @@ mod tests {
             Light::from_linear_rgb(PLANE, &values),
             Err(LightError::Value(2))
         );
+    }
+
+    #[test]
+    fn a_picture_is_a_light_whatever_its_size() {
+        let extent = |width, height| Extent { width, height };
+        let linear = |picture: Extent, values: &[f32]| {
+            Light::from_linear_rows(PLANE, picture, |y, row| {
+                row.copy_from_slice(&values[y * row.len()..][..row.len()]);
+            })
+        };
+        let values: Vec<f32> = (0..1536).map(|i| i as f32).collect();
+        assert_eq!(
+            linear(PLANE, &values),
+            Light::from_linear_rgb(PLANE, &values)
+        );
+        let flood = BuiltinLight::Flood.render(PLANE);
+        assert_eq!(linear(extent(1, 1), &[1.0; 3]), Ok(flood.clone()));
+        let white = |picture| Light::from_srgb_rows(PLANE, picture, |_, row| row.fill(255));
+        assert_eq!(white(extent(70, 3)), Ok(flood));
+        assert_eq!(white(extent(0, 2)), Err(LightError::Empty(extent(0, 2))));
+        let mut values = vec![1.0; 12];
+        values[10] = -1.0;
+        assert_eq!(linear(extent(2, 2), &values), Err(LightError::Value(3)));
     }
 }

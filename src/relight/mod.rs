@@ -2,14 +2,16 @@
 //!
 //! Every back end computes the same thing from the same bytes: the light seen through each function
 //! of the basis from each window's place; for each camera pixel and channel Σ of that times its
-//! coefficients, and Σ over its window of `code · step · light` for what it has by element; then
-//! exposure and the sRGB curve ([`tone`]).
+//! coefficients, and Σ over its window of `code · step · light` for what it has by element; then what
+//! a display makes of it ([`display`]).
 //! [`reference`] does it in double precision and is what the others are tested against. The GPU
 //! back ends share one WGSL source, `shaders/relight.wgsl`.
 
-#[cfg(target_arch = "wasm32")]
 pub mod backend;
+#[cfg(target_arch = "wasm32")]
+pub mod canvas2d;
 pub mod cpu;
+pub mod display;
 mod light;
 mod picture;
 pub mod reference;
@@ -19,13 +21,19 @@ mod tint;
 pub mod tone;
 #[cfg(target_arch = "wasm32")]
 pub mod webgl2;
-#[cfg(target_arch = "wasm32")]
+#[cfg(any(target_arch = "wasm32", feature = "gpu"))]
 pub mod webgpu;
 
+pub use display::{Display, Gamut, ToneCurve};
 pub use light::{BuiltinLight, Light, LightError, TorchPose};
 pub use picture::{LinearPicture, Rgba8Picture};
 pub use resample::area_resample;
 pub use tint::Tint;
+
+/// A share, 0 to 1, of a number of things of which there is always one.
+fn detailed(all: usize, share: f32) -> usize {
+    ((all as f32 * share).ceil() as usize).clamp(all.min(1), all)
+}
 
 /// The WGSL source of both GPU back ends.
 pub const SHADER: &str = include_str!("shaders/relight.wgsl");

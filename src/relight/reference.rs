@@ -1,8 +1,8 @@
 //! Relighting in double precision, term by term as the paper writes it: the standard that every
 //! fast path is held to.
 
-use super::{Light, Rgba8Picture, tone};
-use crate::transport::{CHANNELS, Element, Transport};
+use super::{Display, Light, Rgba8Picture};
+use crate::transport::{CHANNELS, CameraPx, Element, Transport};
 
 /// `y = pT` over each pixel's window, `[N]` pixels of RGB in units of the measurement.
 ///
@@ -59,14 +59,19 @@ pub fn relight(transport: &Transport, light: &Light) -> Vec<[f64; CHANNELS]> {
     picture
 }
 
-/// [`relight`], scaled by `exposure` and encoded as 8-bit sRGB.
-pub fn relight_srgb8(transport: &Transport, light: &Light, exposure: f64) -> Rgba8Picture {
-    let pixels = relight(transport, light).into_iter().map(|y| {
-        let [r, g, b] = y.map(|y| tone::srgb8(y * exposure));
-        [r, g, b, 255]
-    });
+/// [`relight`], as a display shows it.
+pub fn picture(transport: &Transport, light: &Light, display: &Display) -> Rgba8Picture {
+    let extent = transport.geometry.camera;
+    let linear = relight(transport, light);
+    let pixels = (0..extent.height)
+        .flat_map(|y| (0..extent.width).map(move |x| CameraPx { x, y }))
+        .zip(linear)
+        .map(|(at, linear)| {
+            let [r, g, b] = display.codes(linear, at);
+            [r, g, b, 255]
+        });
     Rgba8Picture {
-        extent: transport.geometry.camera,
+        extent,
         pixels: pixels.collect(),
     }
 }

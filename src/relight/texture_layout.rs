@@ -5,9 +5,10 @@
 //! | coefficients | `rgba16sint`, 2D array, camera grid | four components of one channel |
 //! | seen | `rgba32float`, 2D array, window origins | the light through four components of the basis |
 //! | codes | `rgba16sint`, 2D array | τ of one pixel and element, window after window, folded |
-//! | pixels | `rgba32sint`, camera grid | window origin u, v; index of the first code, or -1; tile |
+//! | origins | `rg16sint`, camera grid | window origin u, v |
 //! | steps | `rgba32float`, tile grid twice | value of one code in R, G, B: coefficients', then τ's |
 //! | light | `rgba32float`, light grid | linear emission in R, G, B |
+//! | tiles | `rgba32sint`, tile grid | index of the first code, or -1; first column and row; width |
 //!
 //! Layers of coefficients and of what is seen are `[channel, quad]`, quads in pairs: one pass of the
 //! shader fills two layers. All that takes double precision or knowledge of tiles is computed here,
@@ -15,10 +16,10 @@
 
 use thiserror::Error;
 
-use super::Tint;
+use super::{Display, Tint, ToneCurve, detailed};
 use crate::transport::{
-    Basis, CHANNELS, CoefficientTile, DirectTile, Element, Extent, Geometry, QUAD, TexelCode, Tile,
-    Transport,
+    Basis, CHANNELS, CameraPx, CoefficientTile, DirectTile, Element, Extent, Geometry, QUAD,
+    TexelCode, Tile, TileRect, Transport,
 };
 
 /// Sides of the codes' texture: what every WebGL2 and WebGPU implementation allows.
@@ -49,8 +50,8 @@ pub struct Fold {
 #[derive(Clone, Copy, Debug)]
 pub struct TextureLayout {
     geometry: Geometry,
-    /// Quads of components, in pairs.
-    pairs: u32,
+    /// Quads of components.
+    quads: u32,
     codes: Fold,
 }
 
@@ -99,18 +100,20 @@ pub struct CodeBlock<'a> {
     pub texels: &'a [TexelCode],
 }
 
-/// The shader's uniforms.
+/// The shader's uniforms, which it describes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Params {
-    window: i32,
-    exposure: f32,
-    /// Layers of a channel of the coefficients; 0 for none.
-    quads: i32,
-    /// Layers from one channel of what is seen to the next; 0 where the light has one tint.
-    seen_quads: i32,
-    /// What a channel is of the light's tint.
+    display: [[f32; 4]; CHANNELS],
     tint: [f32; 4],
+    window: i32,
+    tile_side: i32,
+    quads: i32,
+    channel_quads: i32,
+    seen_quads: i32,
+    filmic: i32,
+    dither: i32,
+    unused: i32,
 }
 
 /// A photograph that a device's textures cannot hold.
@@ -177,8 +180,8 @@ impl TextureLayout {
         let geometry = transport.geometry;
         let tiles = &transport.tiles;
         let factored = tiles.iter().any(|tile| !tile.coefficients.is_dark());
-        let pairs = match factored {
-            true => transport.basis.rank().div_ceil(2 * QUAD) as u32,
+        let quads = match factored {
+            true => transport.basis.rank().div_ceil(QUAD) as u32,
             false => 0,
         };
         let seen = seen(&geometry);
@@ -195,7 +198,7 @@ impl TextureLayout {
                 });
             }
         }
-        let need = CHANNELS as u32 * 2 * pairs;
+        let need = CHANNELS as u32 * quads.next_multiple_of(2);
         if need > limits.layers {
             return Err(LayoutError::Layers {
                 need,
@@ -219,7 +222,7 @@ impl TextureLayout {
         let codes = Self::fold(direct.sum(), limits)?;
         Ok(Self {
             geometry,
-            pairs,
+            quads,
             codes,
         })
     }
@@ -247,28 +250,28 @@ impl TextureLayout {
 
     /// Extent of the coefficients' texture: of one texel where there are none.
     pub fn coefficients(&self) -> Fold {
-        self.layered(self.geometry.camera)
+        self.layered(self.geometry.camera, self.quads)
     }
 
     /// Extent of the texture of what is seen.
     pub fn seen(&self) -> Fold {
-        self.layered(seen(&self.geometry))
+        self.layered(seen(&self.geometry), 2 * self.pairs())
     }
 
-    fn layered(&self, extent: Extent) -> Fold {
+    fn layered(&self, extent: Extent, quads: u32) -> Fold {
         let one = Extent {
             width: 1,
             height: 1,
         };
         Fold {
-            extent: if self.pairs == 0 { one } else { extent },
-            layers: (CHANNELS as u32 * 2 * self.pairs).max(1),
+            extent: if quads == 0 { one } else { extent },
+            layers: (CHANNELS as u32 * quads).max(1),
         }
     }
 
     /// Parts that the basis is seen in, of two quads each.
     pub fn pairs(&self) -> u32 {
-        self.pairs
+        self.quads.div_ceil(2)
     }
 
     /// The basis, pass by pass.
@@ -282,8 +285,13 @@ impl TextureLayout {
             }
             pair
         };
-        let pairs = basis.kernels.chunks(2 * QUAD).take(self.pairs as usize);
+        let pairs = basis.kernels.chunks(2 * QUAD).take(self.pairs() as usize);
         pairs.map(pair).collect()
+    }
+
+    /// Quads that are used of all.
+    fn used(&self, detail: f32) -> u32 {
+        detailed(self.quads as usize, detail) as u32
     }
 
     /// Uniforms that tell a pass which channel it sees.
@@ -295,13 +303,14 @@ impl TextureLayout {
 
     /// Passes for a light: the channel and the pair of quads each sees, and the first of the two
     /// layers it fills.
-    pub fn passes(&self, tint: Tint) -> Vec<Pass> {
+    pub fn passes(&self, tint: Tint, detail: f32) -> Vec<Pass> {
         let channels = (0..).zip(tint.channels());
+        let (all, used) = (self.pairs(), self.used(detail).div_ceil(2));
         let passes = channels.flat_map(|(i, &channel)| {
-            (0..self.pairs).map(move |pair| Pass {
+            (0..used).map(move |pair| Pass {
                 channel,
                 pair: pair as usize,
-                layer: 2 * (i * self.pairs + pair),
+                layer: 2 * (i * all + pair),
             })
         });
         passes.collect()
@@ -314,7 +323,6 @@ impl TextureLayout {
         transport: &Transport,
         mut put: impl FnMut(CoefficientBlock<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let quads = transport.basis.rank().div_ceil(QUAD) as u32;
         for Tile { coefficients, .. } in &transport.tiles {
             let rect = coefficients.rect;
             let planes = coefficients
@@ -322,7 +330,7 @@ impl TextureLayout {
                 .chunks_exact(CoefficientTile::plane(rect));
             for (i, plane) in (0..).zip(planes) {
                 put(CoefficientBlock {
-                    layer: i / quads * 2 * self.pairs + i % quads,
+                    layer: i,
                     at: [rect.x, rect.y],
                     extent: rect.extent,
                     texels: &plane[..rect.extent.area()],
@@ -337,8 +345,8 @@ impl TextureLayout {
         self.codes
     }
 
-    /// Extent of the pixels' texture.
-    pub fn pixels(&self) -> Extent {
+    /// Extent of the origins' texture.
+    pub fn origins(&self) -> Extent {
         self.geometry.camera
     }
 
@@ -349,6 +357,11 @@ impl TextureLayout {
             width,
             height: 2 * height,
         }
+    }
+
+    /// Extent of the tiles' texture.
+    pub fn tiles(&self) -> Extent {
+        self.geometry.tile_grid()
     }
 
     /// Extent of the light's texture.
@@ -394,8 +407,8 @@ impl TextureLayout {
         Ok(())
     }
 
-    /// The pixels' texels.
-    pub fn pixel_texels(&self, transport: &Transport) -> Vec<[i32; 4]> {
+    /// The origins' texels.
+    pub fn origin_texels(&self) -> Vec<[i16; 2]> {
         let Geometry {
             camera,
             light,
@@ -403,23 +416,26 @@ impl TextureLayout {
             ..
         } = self.geometry;
         // A window off the display sees nothing however far off it is; nearer, it can't overflow.
-        let near = |origin: i32, side: u32| origin.clamp(-(window.side() as i32), side as i32);
-        let mut texels = vec![[0; 4]; camera.area()];
-        let mut first_code = 0;
-        for (i, tile) in (0..).zip(&transport.tiles) {
-            let direct = !tile.functions.is_dark();
-            for pixel in tile.rect().pixels() {
-                let Element { u, v } = self.geometry.window_origin(pixel);
-                texels[camera.index(pixel)] = [
-                    near(u, light.width),
-                    near(v, light.height),
-                    if direct { first_code } else { -1 },
-                    i,
-                ];
-                first_code += if direct { window.area() as i32 } else { 0 };
-            }
-        }
-        texels
+        let near = |at: i32, side: u32| at.clamp(-(window.side() as i32), side as i32) as i16;
+        let pixels = (0..camera.height).flat_map(|y| (0..camera.width).map(move |x| (x, y)));
+        let origin = |(x, y)| {
+            let Element { u, v } = self.geometry.window_origin(CameraPx { x, y });
+            [near(u, light.width), near(v, light.height)]
+        };
+        pixels.map(origin).collect()
+    }
+
+    /// The tiles' texels.
+    pub fn tile_texels(&self, transport: &Transport) -> Vec<[i32; 4]> {
+        let mut next = 0;
+        let texel = |tile: &Tile| {
+            let TileRect { x, y, extent } = tile.rect();
+            let codes = tile.functions.codes.len() as i32;
+            let first = if codes == 0 { -1 } else { next };
+            next += codes;
+            [first, x as i32, y as i32, extent.width as i32]
+        };
+        transport.tiles.iter().map(texel).collect()
     }
 
     /// The steps' texels.
@@ -432,18 +448,24 @@ impl TextureLayout {
     }
 
     /// The uniforms for a frame.
-    pub fn params(&self, tint: Tint, exposure: f32) -> Params {
-        let quads = 2 * self.pairs as i32;
+    pub fn params(&self, tint: Tint, display: &Display, detail: f32) -> Params {
         let (seen_quads, [r, g, b]) = match tint {
             Tint::One(_, factors) => (0, factors),
-            Tint::Many => (quads, [1.0; CHANNELS]),
+            Tint::Many => (2 * self.pairs() as i32, [1.0; CHANNELS]),
         };
+        let [red, green, blue] = display.gains;
+        let row = |row: [f32; CHANNELS]| [row[0] * red, row[1] * green, row[2] * blue, 0.0];
         Params {
-            window: self.geometry.window.side() as i32,
-            exposure,
-            quads,
-            seen_quads,
+            display: display.gamut.from_srgb().map(row),
             tint: [r, g, b, 0.0],
+            window: self.geometry.window.side() as i32,
+            tile_side: self.geometry.tile_side as i32,
+            quads: self.used(detail) as i32,
+            channel_quads: self.quads as i32,
+            seen_quads,
+            filmic: (display.curve == ToneCurve::Filmic).into(),
+            dither: display.dither.into(),
+            unused: 0,
         }
     }
 }
@@ -539,19 +561,23 @@ mod tests {
                 })
                 .unwrap();
             assert_eq!(texture.len(), extent.area() * layers as usize);
-            let pixels = layout.pixel_texels(&transport);
+            let origins = layout.origin_texels();
+            let tiles = layout.tile_texels(&transport);
             let steps = layout.step_texels(&transport);
             for y in 0..camera.1 {
                 for x in 0..camera.0 {
-                    let [u, v, first, tile] = pixels[(y * camera.0 + x) as usize];
+                    let [u, v] = origins[(y * camera.0 + x) as usize].map(i32::from);
                     let origin = geometry.window_origin(CameraPx { x, y });
                     assert_eq!((u, v), (origin.u, origin.v));
-                    let tiles = transport.tiles.len();
-                    assert_eq!(steps[tiles + tile as usize][2], (x / 16 * 16) as f32);
-                    if transport.tiles[tile as usize].functions.is_dark() {
+                    let tile = (y / 16 * camera.0.div_ceil(16) + x / 16) as usize;
+                    assert_eq!(steps[tiles.len() + tile][2], (x / 16 * 16) as f32);
+                    let [first, left, top, width] = tiles[tile];
+                    if transport.tiles[tile].functions.is_dark() {
                         assert_eq!(first, -1);
                         continue;
                     }
+                    let pixel = (y as i32 - top) * width + (x as i32 - left);
+                    let first = first + pixel * geometry.window.area() as i32;
                     for s in 0..geometry.window.area() {
                         let code = texture[first as usize + s];
                         assert_eq!(code, [x as i16, y as i16, s as i16, 0]);
@@ -570,11 +596,11 @@ mod tests {
             let (quads, pairs) = (rank.div_ceil(4) as u32, rank.div_ceil(8) as u32);
             assert_eq!(layout.pairs(), pairs);
             let Fold { extent, layers } = layout.coefficients();
-            assert_eq!((extent, layers), (geometry.camera, 3 * 2 * pairs));
+            assert_eq!((extent, layers), (geometry.camera, 3 * quads));
             let mut found = 0;
             let Ok(()) = layout.for_each_coefficient_block(&transport, |block| {
-                let (channel, quad) = (block.layer / (2 * pairs), block.layer % (2 * pairs));
-                assert!(quad < quads && block.texels.len() == block.extent.area());
+                let (channel, quad) = (block.layer / quads, block.layer % quads);
+                assert!(channel < 3 && block.texels.len() == block.extent.area());
                 for (i, texel) in block.texels.iter().enumerate() {
                     let (x, y) = (i as u32 % block.extent.width, i as u32 / block.extent.width);
                     let at = [(block.at[0] + x) as i16, (block.at[1] + y) as i16];
@@ -589,12 +615,18 @@ mod tests {
                 .filter(|tile| !tile.coefficients.is_dark());
             let pixels: usize = tiles.map(|tile| tile.rect().extent.area()).sum();
             assert_eq!(found, pixels * 3 * quads as usize);
-            let passes = layout.passes(Tint::Many);
+            let layers = layout.seen().layers;
+            let passes = layout.passes(Tint::Many, 1.0);
             let filled: Vec<_> = passes.iter().map(|pass| pass.layer).collect();
             assert!(filled.iter().copied().eq((0..layers).step_by(2)));
-            let one = layout.passes(Tint::One(1, [0.5, 1.0, 0.25]));
+            let one = layout.passes(Tint::One(1, [0.5, 1.0, 0.25]), 1.0);
             assert!(one.iter().all(|pass| pass.channel == 1) && one[0].layer == 0);
             assert_eq!(one.len(), pairs as usize);
+            let less = layout.passes(Tint::Many, 0.5);
+            let used = rank.div_ceil(4).div_ceil(2).div_ceil(2); // half the quads, in pairs
+            assert_eq!(less.len(), 3 * used);
+            let first: Vec<_> = passes.iter().filter(|pass| pass.pair < used).collect();
+            assert!(less.iter().eq(first));
         }
     }
 
@@ -605,7 +637,7 @@ mod tests {
             geometry.correspondence.affine = [[0.0, 0.0, shift]; 2];
             let transport = transport(geometry, 0);
             let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
-            for [u, v, ..] in layout.pixel_texels(&transport) {
+            for [u, v] in layout.origin_texels() {
                 assert_eq!([u, v], expected);
             }
         }

@@ -18,6 +18,9 @@ impl Tint {
     /// Of all elements of these rows.
     #[inline(always)]
     pub fn of<'a>(rows: impl Iterator<Item = &'a [[f32; 4]]> + Clone) -> Self {
+        if differs(rows.clone().flatten()) {
+            return Self::Many;
+        }
         let mut sums = [0.0f32; 4];
         for row in rows.clone() {
             for element in row {
@@ -65,6 +68,24 @@ impl Tint {
             Self::Many => &ALL,
         }
     }
+}
+
+/// Whether elements have plainly another colour than the first that shines: what most lights of many
+/// colours show at once.
+#[inline(always)]
+fn differs<'a>(elements: impl Iterator<Item = &'a [f32; 4]>) -> bool {
+    let of = |element: &[f32; 4]| element[0].max(element[1]).max(element[2]);
+    // The smallest numbers there are have no colour to speak of.
+    let mut shining = elements.filter(|element| of(element) > 1e-20);
+    let Some(first) = shining.next() else {
+        return false;
+    };
+    let colour = first.map(|value| value / of(first));
+    let off = |element: &[f32; 4]| {
+        let size = of(element);
+        (0..CHANNELS).any(|c| (element[c] - colour[c] * size).abs() > 1e-3 * size)
+    };
+    shining.any(off)
 }
 
 #[cfg(test)]

@@ -2,42 +2,59 @@
 
 use std::sync::Arc;
 
+use js_sys::{Object, Reflect};
+use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{Clamped, JsCast, JsValue};
-use web_sys::{CanvasRenderingContext2d, HtmlCanvasElement, ImageData};
+use web_sys::{CanvasRenderingContext2d, HtmlCanvasElement};
 
-use crate::relight::backend::{Backend, BackendError};
-use crate::relight::{Light, Rgba8Picture, cpu};
+use crate::relight::backend::{Backend, BackendError, Frame};
+use crate::relight::canvas2d::{Keep, open_2d};
+use crate::relight::{Gamut, Rgba8Picture, cpu};
 use crate::transport::{Extent, Transport};
 use crate::workers::OneThread;
 
+#[wasm_bindgen]
+extern "C" {
+    /// With settings that web-sys does not have.
+    #[wasm_bindgen(js_name = ImageData, extends = web_sys::ImageData)]
+    type Image;
+    #[wasm_bindgen(constructor, catch, js_class = "ImageData")]
+    fn new(
+        data: Clamped<&[u8]>,
+        width: u32,
+        height: u32,
+        settings: &Object,
+    ) -> Result<Image, JsValue>;
+}
+
 /// Relights on the CPU and puts the pixels into a canvas as they are.
+#[derive(Debug)]
 pub struct Canvas2d {
     relighter: cpu::Relighter,
     picture: Rgba8Picture,
     context: CanvasRenderingContext2d,
+    gamut: Gamut,
+    /// Of the pixels.
+    settings: Object,
 }
 
 impl Canvas2d {
     pub fn new(
         transport: Arc<Transport>,
         canvas: &HtmlCanvasElement,
+        gamut: Gamut,
     ) -> Result<Self, BackendError> {
-        let canvas_error = |reason: &str| BackendError::Canvas {
-            api: "2D",
-            reason: reason.into(),
-        };
         let camera = transport.geometry.camera;
-        canvas.set_width(camera.width);
-        canvas.set_height(camera.height);
-        let context = canvas
-            .get_context("2d")
-            .map_err(|e| canvas_error(&format!("{e:?}")))?
-            .and_then(|context| context.dyn_into().ok())
-            .ok_or_else(|| canvas_error("getContext returned null"))?;
+        let (context, gamut) = open_2d(canvas, camera, gamut, Keep::InMemory)?;
+        let settings = Object::new();
+        let space = gamut.color_space().into();
+        Reflect::set(&settings, &"colorSpace".into(), &space).map_err(lost)?;
         Ok(Self {
             relighter: cpu::Relighter::new(transport),
             picture: Rgba8Picture::black(camera),
             context,
+            gamut,
+            settings,
         })
     }
 }
@@ -51,13 +68,28 @@ impl Backend for Canvas2d {
         cpu::KERNEL.into()
     }
 
-    fn render(&mut self, light: &Light, exposure: f32) -> Result<(), BackendError> {
-        self.relighter.relight(light, &OneThread);
-        self.relighter.tone_map(exposure, &mut self.picture);
+    fn gamut(&self) -> Gamut {
+        self.gamut
+    }
+
+    fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
+        self.relighter.set_detail(frame.detail);
+        // It takes no pictures, so there is one.
+        if let Some(light) = frame.light {
+            self.relighter.relight(light, &OneThread);
+        }
+        let rows = 0..self.picture.extent.height;
+        let pixels = &mut self.picture.pixels;
+        self.relighter
+            .show(&frame.display, rows, pixels, &OneThread);
         let bytes = Clamped(self.picture.pixels.as_flattened());
         let Extent { width, height } = self.picture.extent;
-        ImageData::new_with_u8_clamped_array_and_sh(bytes, width, height)
-            .and_then(|image| self.context.put_image_data(&image, 0.0, 0.0))
-            .map_err(|e: JsValue| BackendError::Lost(format!("{e:?}")))
+        let image = Image::new(bytes, width, height, &self.settings).map_err(lost)?;
+        let put = self.context.put_image_data(image.unchecked_ref(), 0.0, 0.0);
+        put.map_err(lost)
     }
+}
+
+fn lost(thrown: JsValue) -> BackendError {
+    BackendError::Lost(format!("{thrown:?}"))
 }

@@ -59,7 +59,7 @@ impl From<FormatError> for CodedError {
 impl From<LightError> for CodedError {
     fn from(error: LightError) -> Self {
         let code = match error {
-            LightError::Length { .. } => "light-size",
+            LightError::Length { .. } | LightError::Empty(_) => "light-size",
             LightError::Value(_) => "light-value",
         };
         Self::new(code, error.to_string())

@@ -1,9 +1,11 @@
 //! Lights made for a photograph.
 
+use js_sys::{Float32Array, Uint8ClampedArray};
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{CodedError, Photo};
-use crate::relight::{self, BuiltinLight, TorchPose};
+use crate::relight::{self, BuiltinLight, LightError, TorchPose};
+use crate::transport::Extent;
 
 /// What each element of a photograph's light plane emits.
 #[wasm_bindgen]
@@ -54,10 +56,65 @@ impl Light {
         Ok(Self(relight::Light::torch(geometry.light, pose)))
     }
 
-    /// A light from linear RGB values, 0 dark to 1 full brightness, row by row.
-    #[wasm_bindgen(js_name = fromLinearRgb)]
-    pub fn from_linear_rgb(photo: &Photo, values: &[f32]) -> Result<Light, CodedError> {
-        let extent = photo.geometry().light;
-        Ok(Self(relight::Light::from_linear_rgb(extent, values)?))
+    /// A picture as light: linear RGB values, 0 dark to 1 full brightness, row by row. Each element
+    /// of the light emits the mean of what it covers.
+    #[wasm_bindgen(js_name = fromLinear)]
+    pub fn from_linear(
+        photo: &Photo,
+        values: &Float32Array,
+        width: u32,
+        height: u32,
+    ) -> Result<Light, CodedError> {
+        let picture = picture(values.length(), 3, width, height)?;
+        let light = relight::Light::from_linear_rows(photo.geometry().light, picture, |y, row| {
+            let (first, end) = (y * row.len(), (y + 1) * row.len());
+            values.subarray(first as u32, end as u32).copy_to(row);
+        })?;
+        Ok(Self(light))
     }
+
+    /// A picture in sRGB as light: RGBA, row by row, colours not multiplied by alpha, which is the
+    /// share of a pixel that shines. Each element of the light emits the mean of what it covers.
+    #[wasm_bindgen(js_name = fromSrgb)]
+    pub fn from_srgb(
+        photo: &Photo,
+        rgba: &Uint8ClampedArray,
+        width: u32,
+        height: u32,
+    ) -> Result<Light, CodedError> {
+        let picture = picture(rgba.length(), 4, width, height)?;
+        let light = relight::Light::from_srgb_rows(photo.geometry().light, picture, |y, row| {
+            let (first, end) = (y * row.len(), (y + 1) * row.len());
+            rgba.subarray(first as u32, end as u32).copy_to(row);
+        })?;
+        Ok(Self(light))
+    }
+
+    /// Linear RGB values of the rows from `first` up to `end`, row by row.
+    #[wasm_bindgen(js_name = linearRgb)]
+    pub fn linear_rgb(&self, first: usize, end: usize) -> Vec<f32> {
+        let Extent { width, height } = self.0.extent();
+        let end = end.min(height as usize) * width as usize;
+        let first = (first * width as usize).min(end);
+        let mut values = Vec::with_capacity(3 * (end - first)); // no larger, or the memory stays
+        for [r, g, b, _] in &self.0.elements()[first..end] {
+            values.extend([r, g, b]);
+        }
+        values
+    }
+}
+
+/// The size of a picture that a script gave, which stays where it is but for a row at a time: this
+/// memory never shrinks.
+fn picture(length: u32, channels: u64, width: u32, height: u32) -> Result<Extent, LightError> {
+    let extent = Extent { width, height };
+    let need = (u64::from(width) * u64::from(height)).saturating_mul(channels);
+    if u64::from(length) != need {
+        return Err(LightError::Length {
+            got: length as usize,
+            need: usize::try_from(need).unwrap_or(usize::MAX),
+            extent,
+        });
+    }
+    Ok(extent)
 }

@@ -43,7 +43,7 @@ impl Photo {
         })
     }
 
-    /// Takes a tile that [`takeTile`](Self::take_tile) gave. Not once a `Relighter` has been made.
+    /// Takes a tile that [`takeTile`](Self::take_tile) gave. Not while a CPU is at the photograph.
     #[wasm_bindgen(js_name = putTile)]
     pub fn put_tile(&mut self, index: usize, bytes: &[u8]) -> Result<(), CodedError> {
         let transport = self.unshared()?;
@@ -54,8 +54,8 @@ impl Photo {
         Ok(())
     }
 
-    /// A tile, for a photograph in another module; it is dark afterwards. Not once a `Relighter` has
-    /// been made.
+    /// A tile, for a photograph in another module; it is dark afterwards. Not while a CPU is at the
+    /// photograph.
     #[wasm_bindgen(js_name = takeTile)]
     pub fn take_tile(&mut self, index: usize) -> Result<Vec<u8>, CodedError> {
         let tiles = &mut self.unshared()?.tiles;
@@ -68,6 +68,12 @@ impl Photo {
     #[wasm_bindgen(getter)]
     pub fn tiles(&self) -> usize {
         self.transport.tiles.len()
+    }
+
+    /// Pixels along a tile's side; those at the right and lower edges may be smaller.
+    #[wasm_bindgen(getter, js_name = tileSide)]
+    pub fn tile_side(&self) -> u32 {
+        self.geometry().tile_side
     }
 
     /// Grids, window and correspondence, for [`receive`](Self::receive).

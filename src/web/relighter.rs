@@ -1,17 +1,14 @@
 //! One photograph on one canvas.
 
-use js_sys::Promise;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
-use wasm_bindgen_futures::future_to_promise;
 use web_sys::HtmlCanvasElement;
 
 use super::canvas2d::Canvas2d;
-use super::{CodedError, Light, Photo};
+use super::display::parse_gamut;
+use super::{CodedError, Display, Light, Photo};
 use crate::relight::LightError;
-use crate::relight::backend::Backend;
-use crate::relight::webgl2::WebGl2;
-use crate::relight::webgpu::WebGpu;
+use crate::relight::backend::{Backend, Frame};
 use crate::transport::Extent;
 
 /// Draws a photograph into a canvas, by one back end.
@@ -21,32 +18,25 @@ pub struct Relighter {
     light: Extent,
 }
 
+impl Relighter {
+    pub(super) fn of(backend: Box<dyn Backend>, light: Extent) -> Self {
+        Self { backend, light }
+    }
+}
+
 #[wasm_bindgen]
 impl Relighter {
-    /// Sets a back end up, and the canvas to the picture's size. `photo` may be freed afterwards.
-    /// A canvas serves one `Relighter` only: give the next, also after a failure, a new one.
-    #[wasm_bindgen(unchecked_return_type = "Promise<Relighter>")]
-    pub fn create(
-        #[wasm_bindgen(unchecked_param_type = "\"webgpu\" | \"webgl2\" | \"cpu\"")] backend: String,
+    /// One that draws on this thread. [`Graphics::draw`](super::Graphics::draw) has those that draw on
+    /// devices; canvases are as there.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
         photo: &Photo,
         canvas: HtmlCanvasElement,
-    ) -> Promise {
-        let (transport, light) = (photo.transport(), photo.geometry().light);
-        future_to_promise(async move {
-            let error = |e| JsValue::from(CodedError::from(e));
-            let backend: Box<dyn Backend> = match backend.as_str() {
-                "webgpu" => Box::new(WebGpu::new(&transport, &canvas).await.map_err(error)?),
-                "webgl2" => Box::new(WebGl2::new(&transport, &canvas).map_err(error)?),
-                "cpu" => Box::new(Canvas2d::new(transport, &canvas).map_err(error)?),
-                name => {
-                    return Err(JsValue::from(CodedError::new(
-                        "backend-unavailable",
-                        format!("there is no back end '{name}'; there are webgpu, webgl2 and cpu"),
-                    )));
-                }
-            };
-            Ok(Self { backend, light }.into())
-        })
+        #[wasm_bindgen(unchecked_param_type = "\"srgb\" | \"display-p3\"")] gamut: &str,
+    ) -> Result<Relighter, CodedError> {
+        let gamut = parse_gamut(gamut)?;
+        let backend = Canvas2d::new(photo.transport(), &canvas, gamut)?;
+        Ok(Self::of(Box::new(backend), photo.geometry().light))
     }
 
     /// The back end's name.
@@ -61,25 +51,20 @@ impl Relighter {
         self.backend.kernel()
     }
 
-    /// Settles when the graphics device goes away, after which nothing can be drawn. A WebGL2 canvas
-    /// tells by an event of its own, and a CPU does not go away.
-    #[wasm_bindgen(
-        getter,
-        unchecked_return_type = "Promise<{ readonly message: string }> | undefined"
-    )]
-    pub fn lost(&self) -> Option<Promise> {
-        self.backend.lost()
+    /// What the canvas shows: the gamut that was asked for, where the browser can.
+    #[wasm_bindgen(getter, unchecked_return_type = "\"srgb\" | \"display-p3\"")]
+    pub fn gamut(&self) -> String {
+        self.backend.gamut().color_space().into()
     }
 
-    /// Draws the picture under `light`, scaled by `exposure`, before it returns. The canvas can be
-    /// read until the end of the current task.
-    pub fn render(&mut self, light: &Light, exposure: f64) -> Result<(), CodedError> {
-        if !(exposure >= 0.0 && exposure <= f64::from(f32::MAX)) {
-            return Err(CodedError::new(
-                "light-value",
-                format!("the exposure is {exposure}; it must be a number from 0 to 3.4e38"),
-            ));
-        }
+    /// Draws the picture under `light` before it returns, by a share of its components from 0, which
+    /// is fastest, to 1, which is all. The canvas can be read until the end of the current task.
+    pub fn render(
+        &mut self,
+        light: &Light,
+        display: &Display,
+        detail: f64,
+    ) -> Result<(), CodedError> {
         let light = light.inner();
         if light.extent() != self.light {
             return Err(LightError::Length {
@@ -89,6 +74,40 @@ impl Relighter {
             }
             .into());
         }
-        Ok(self.backend.render(light, exposure as f32)?)
+        self.draw(Some(light), display, detail)
+    }
+
+    /// Takes a picture that the browser has, of so many pixels, as the light of
+    /// [`renderPicture`](Self::render_picture): codes are decoded from sRGB, and averaged by area. `false`
+    /// where this back end cannot. Throws what the browser does, as for pictures of another origin; the
+    /// last light stays.
+    #[wasm_bindgen(js_name = takePicture)]
+    pub fn take_picture(
+        &mut self,
+        picture: &JsValue,
+        width: u32,
+        height: u32,
+    ) -> Result<bool, JsValue> {
+        self.backend.take_picture(picture, Extent { width, height })
+    }
+
+    /// As [`render`](Self::render), under the picture that was taken last.
+    #[wasm_bindgen(js_name = renderPicture)]
+    pub fn render_picture(&mut self, display: &Display, detail: f64) -> Result<(), CodedError> {
+        self.draw(None, display, detail)
+    }
+
+    fn draw(
+        &mut self,
+        light: Option<&crate::relight::Light>,
+        display: &Display,
+        detail: f64,
+    ) -> Result<(), CodedError> {
+        let (display, detail) = (display.inner(), detail as f32);
+        Ok(self.backend.render(&Frame {
+            light,
+            display,
+            detail,
+        })?)
     }
 }

@@ -19,6 +19,7 @@ import { FOLDER, glassBytes } from './photos.js';
 export const FIRST_BYTES = 1 << 14;
 
 const SLOW_PIECES = 40;
+const UNTIL_MS = 10_000;
 
 /**
  * A server that compresses, and lets pages of other origins read what it sends.
@@ -179,17 +180,19 @@ export const otherOrigin = otherServer.url.replace(/\/$/, '');
  *
  * @param {import('node:test').TestContext} test
  * @param {string} path
- * @param {import('playwright-core').BrowserContextOptions & { before?: () => void }} [options]
- *   `before` runs in the page before its own scripts
+ * @param {import('playwright-core').BrowserContextOptions & { before?: () => void, refusal?: RegExp }} [options]
+ *   `before` runs in the page before its own scripts; a `refusal` is what a policy may refuse
  */
-export async function openPage(test, path, { before, ...options } = {}) {
+export async function openPage(test, path, { before, refusal, ...options } = {}) {
   const context = await chromium.newContext({ baseURL: origin, ...options });
   const page = await context.newPage();
   /** @type {string[]} */
   const faults = [];
   page.on('pageerror', (error) => faults.push(String(error)));
   page.on('console', (message) => {
-    if (/Content Security Policy|panicked/.test(message.text())) faults.push(message.text());
+    const text = message.text();
+    if (refusal?.test(text)) return;
+    if (/Content Security Policy|panicked/.test(text)) faults.push(text);
   });
   test.after(async () => {
     await context.close();
@@ -212,11 +215,12 @@ export async function mount(page, attributes) {
     const photo = document.createElement('relightable-photo');
     /** @type {Happening[]} */
     const happened = [];
-    for (const type of ['load', 'progress', 'error', 'lightchange', 'backendchange']) {
+    const changes = ['lightchange', 'backendchange', 'qualitychange'];
+    for (const type of ['load', 'progress', 'error', ...changes]) {
       // On the document: events have to travel that far.
       document.addEventListener(type, (event) => {
         const fields = ['code', 'message', 'backend', 'previous', 'reason', 'light', 'torch'];
-        const data = [...fields, 'loaded', 'total']
+        const data = [...fields, 'loaded', 'total', 'share']
           .filter((field) => field in event)
           .map((field) => [field, /** @type {any} */ (event)[field]]);
         happened.push({ type, ...Object.fromEntries(data) });
@@ -293,3 +297,29 @@ export async function picture(page, attributes = {}, torch) {
 export function message(page) {
   return page.getByRole('alert');
 }
+
+/**
+ * Waits for something this process sees, not the page.
+ *
+ * @param {() => boolean} condition
+ * @param {string} what is waited for
+ */
+export async function until(condition, what) {
+  const deadline = Date.now() + UNTIL_MS;
+  while (!condition()) {
+    if (Date.now() > deadline) throw new Error(`waited ${UNTIL_MS / 1000} s for ${what}`);
+    await new Promise((resolve) => setTimeout(resolve, 20));
+  }
+}
+
+/** For pages to run first: as in a browser without graphics devices. */
+export const withoutGpus = () => {
+  Object.defineProperty(Navigator.prototype, 'gpu', { get: () => undefined });
+  const { getContext } = HTMLCanvasElement.prototype;
+  HTMLCanvasElement.prototype.getContext = /** @type {any} */ (
+    /** @this {HTMLCanvasElement} @param {string} kind @param {any[]} rest */
+    function (kind, ...rest) {
+      return kind === 'webgl2' ? null : Reflect.apply(getContext, this, [kind, ...rest]);
+    }
+  );
+};

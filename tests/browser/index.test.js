@@ -3,8 +3,13 @@
 import './serving.js';
 import './transfer.js';
 import './relighting.js';
+import './crew.js';
 import './torch.js';
+import './light-sources.js';
+import './sight.js';
+import './quality.js';
 import './fallback.js';
+import './devices.js';
 import './faults.js';
 import './lifetime.js';
 import './page.js';

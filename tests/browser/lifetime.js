@@ -12,27 +12,12 @@ import {
   origin,
   otherOrigin,
   picture,
+  until,
 } from './browser.js';
 import { glassBytes, nativePicture } from './photos.js';
 
 /** @param {import('./browser.js').Happening[]} happened @param {string} type */
 const count = (happened, type) => happened.filter((event) => event.type === type).length;
-
-const UNTIL_MS = 10_000;
-
-/**
- * Waits for something this process sees, not the page.
- *
- * @param {() => boolean} condition
- * @param {string} what is waited for
- */
-async function until(condition, what) {
-  const deadline = Date.now() + UNTIL_MS;
-  while (!condition()) {
-    if (Date.now() > deadline) throw new Error(`waited ${UNTIL_MS / 1000} s for ${what}`);
-    await new Promise((resolve) => setTimeout(resolve, 20));
-  }
-}
 
 describe('the module', () => {
   test('can be imported where there are no elements, as on a server', async () => {

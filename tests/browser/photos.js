@@ -1,8 +1,9 @@
-/** What the tests look at: a photograph recovered from the fixture, pictures of it by the native
- * program, and damaged copies. */
+/** What the tests look at: photographs recovered from the fixture and from a tall scene, pictures of them
+ * by the native program, and damaged copies. */
 
 import { execFileSync } from 'node:child_process';
-import { copyFileSync, existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { createHash } from 'node:crypto';
+import { copyFileSync, existsSync, mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { decodePng } from '../../www/tools/pictures.js';
 
@@ -14,14 +15,37 @@ export const SCREENSHOTS = join(repository, 'target/screenshots');
 export const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum', 'fire'];
 
 const GLASS = join(FOLDER, 'glass.ltm');
+export const TALL = join(FOLDER, 'tall.ltm');
+/** Rows of tiles, one of them a row, for workers to share. */
+export const TALL_ROWS = 4;
 const DEMO = join(repository, 'target/demo/photos/stained-glass.ltm');
 
 mkdirSync(FOLDER, { recursive: true });
 mkdirSync(SCREENSHOTS, { recursive: true });
-execFileSync(program, ['recover', 'tests/fixtures/glass-s', '-o', GLASS], {
-  cwd: repository,
-  stdio: ['ignore', 'ignore', 'inherit'],
-});
+
+/** @param {string[]} args */
+function run(...args) {
+  execFileSync(program, args, { cwd: repository, stdio: ['ignore', 'ignore', 'inherit'] });
+}
+
+run('recover', 'tests/fixtures/glass-s', '-o', GLASS);
+makeTall();
+
+/** Tiles have 128 pixels a side. Takes a while, so made once by each build of the program. */
+function makeTall() {
+  const size = ['--camera', `128x${128 * TALL_ROWS}`, '--light', '128x128'];
+  const simulate = ['simulate', 'stained-glass', ...size, '--patterns', '30', '--seed', '1'];
+  const recover = ['--window', '5', '-o', TALL];
+  const build = createHash('sha256').update(readFileSync(program)).digest('hex');
+  const madeBy = [build, ...simulate, ...recover].join(' ');
+  const stamp = join(FOLDER, '../tall-made-by');
+  if (existsSync(TALL) && existsSync(stamp) && readFileSync(stamp, 'utf8') === madeBy) return;
+  const capture = join(FOLDER, '../tall-capture');
+  rmSync(capture, { recursive: true, force: true });
+  run(...simulate, '-o', capture);
+  run('recover', capture, ...recover);
+  writeFileSync(stamp, madeBy);
+}
 
 export const glassBytes = readFileSync(GLASS);
 
@@ -67,17 +91,18 @@ damaged('text-mode.ltm', (bytes) =>
 damaged('not-ltm.ltm', () => Buffer.from('{"error": "no such photograph"}'));
 
 /**
- * The fixture under a light, by the native program.
+ * A photograph under a light, by the native program.
  *
  * @param {string} light
  * @param {'cpu' | 'reference'} backend
  * @param {number} [exposure]
  * @param {{ x: number, y: number }} [at] where a torch shines
+ * @param {string} [photo] its file, the fixture's where left out
  */
-export function nativePicture(light, backend, exposure = 1, at) {
+export function nativePicture(light, backend, exposure = 1, at, photo = GLASS) {
   const out = join(FOLDER, 'native.png');
   execFileSync(program, [
-    ...['relight', GLASS, '--light', light, '--backend', backend],
+    ...['relight', photo, '--light', light, '--backend', backend],
     ...['--exposure', String(exposure), '-o', out],
     ...(at ? ['--at', `${at.x},${at.y}`] : []),
   ]);

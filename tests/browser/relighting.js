@@ -9,6 +9,10 @@ import { LIGHTS, nativePicture } from './photos.js';
 const BACKENDS = ['webgpu', 'webgl2', 'cpu'];
 const SRC = '/photos/glass.ltm';
 
+const withoutWorkers = () => {
+  Reflect.deleteProperty(globalThis, 'Worker');
+};
+
 describe('relighting', () => {
   for (const backend of BACKENDS) {
     test(`${backend} draws what the native program draws, to 1/255`, async (t) => {
@@ -65,10 +69,41 @@ describe('relighting', () => {
     });
   }
 
+  test('workers draw what the page draws, to the same bit', async (t) => {
+    const crew = await openPage(t, '/bench');
+    const alone = await openPage(t, '/bench', { before: withoutWorkers });
+    for (const src of [SRC, '/photos/stained-glass.ltm']) {
+      for (const page of [crew, alone]) {
+        await page.evaluate('globalThis.photo?.remove()');
+        await mount(page, { src, backend: 'cpu' });
+        await loaded(page);
+      }
+      assert.match(await crew.evaluate('photo.kernel'), /^simd128, \d workers?$/);
+      assert.equal(await alone.evaluate('photo.kernel'), 'simd128');
+      for (const light of LIGHTS) {
+        const [one, other] = await Promise.all(
+          [crew, alone].map((page) => picture(page, { light })),
+        );
+        assert.ok(one && other && compare(one, other).worst === 0, `${src}, ${light}`);
+      }
+      // What the last light has left, where it was as bright as the next.
+      for (let i = 0; i < 5; i += 1) {
+        const torch = { x: 0.1 + 0.2 * i, y: 0.9 - 0.2 * i };
+        const attributes = { light: 'torch', exposure: String(0.5 + i) };
+        const [one, other] = await Promise.all(
+          [crew, alone].map((page) => picture(page, attributes, torch)),
+        );
+        assert.ok(one && other && compare(one, other).worst === 0, `${src}, torch ${i}`);
+      }
+    }
+  });
+
   test('without SIMD the other module draws, to the same bit', async (t) => {
-    const simd = await openPage(t, '/bench');
+    // Without workers, whose modules are their own.
+    const simd = await openPage(t, '/bench', { before: withoutWorkers });
     const scalar = await openPage(t, '/bench', {
       before: () => {
+        Reflect.deleteProperty(globalThis, 'Worker');
         WebAssembly.validate = () => false;
       },
     });

@@ -99,7 +99,11 @@ describe('a photograph', () => {
     const page = await openPage(t, '/bench');
     /** @type {Promise<unknown>[]} */
     const ends = [];
-    page.on('worker', (worker) => ends.push(worker.waitForEvent('close')));
+    page.on('worker', (worker) => {
+      if (worker.url().endsWith('/relightable-photo-worker.js')) {
+        ends.push(worker.waitForEvent('close'));
+      }
+    });
     await mount(page, { src: SRC, backend: 'cpu', light: 'spectrum' });
     await loaded(page);
     assert.equal(ends.length, 1);

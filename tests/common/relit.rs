@@ -1,6 +1,6 @@
 //! What tests of relighting share: transports, lights, and the standard that pictures are held to.
 
-use relightable_photo::relight::{BuiltinLight, Light, Rgba8Picture};
+use relightable_photo::relight::{BuiltinLight, Display, Gamut, Light, Rgba8Picture, ToneCurve};
 use relightable_photo::transport::{BandTile, Basis, Extent, Geometry, Tile, Transport};
 
 use super::Noise;
@@ -88,6 +88,49 @@ pub fn lights(extent: Extent) -> Vec<(&'static str, Light)> {
     let corner: Vec<f32> = corner.collect();
     lights.push(("corner", Light::from_linear_rgb(extent, &corner).unwrap()));
     lights
+}
+
+/// Displays of all kinds, the first of which adds nothing to the exposure.
+pub fn displays(exposure: f32) -> [Display; 4] {
+    let plain = Display::srgb(exposure);
+    let gains = [1.3, 1.0, 0.6].map(|gain| gain * exposure);
+    let (gamut, curve) = (Gamut::DisplayP3, ToneCurve::Filmic);
+    [
+        plain,
+        Display {
+            gains,
+            dither: true,
+            ..plain
+        },
+        Display {
+            gains: [4.0 * exposure; 3],
+            curve,
+            ..plain
+        },
+        Display {
+            gains,
+            gamut,
+            curve,
+            dither: true,
+        },
+    ]
+}
+
+/// A transport with the first of its components only, four a quad.
+pub fn first_quads(transport: &Transport, quads: usize) -> Transport {
+    let mut transport = transport.clone();
+    let all = transport.basis.rank().div_ceil(4);
+    for tile in &mut transport.tiles {
+        let plane = tile.coefficients.codes.len() / (3 * all);
+        for channel in tile
+            .coefficients
+            .codes
+            .chunks_exact_mut((all * plane).max(1))
+        {
+            channel[quads * plane..].fill([0; 4]);
+        }
+    }
+    transport
 }
 
 /// Fails unless every channel of every pixel is within one code of the reference.

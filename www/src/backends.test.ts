@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { after, firstWorking } from './backends.js';
+import { after, firstWorking, from } from './backends.js';
 import type { Backend } from './engine.js';
 
 const always = () => {};
@@ -54,4 +54,5 @@ test('a search nobody waits for tries no further', async () => {
 test('after a loss, those further down the order are left', () => {
   assert.deepEqual(after(['webgpu', 'webgl2', 'cpu'], 'webgl2'), ['cpu']);
   assert.deepEqual(after(['cpu'], 'cpu'), []);
+  assert.deepEqual(from(['webgpu', 'webgl2', 'cpu'], 'webgl2'), ['webgl2', 'cpu']);
 });

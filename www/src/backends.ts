@@ -47,9 +47,14 @@ export async function firstWorking<T>(
   );
 }
 
-/** What is left to try when a back end was lost while drawing. */
-export function after(order: readonly Backend[], lost: Backend): readonly Backend[] {
-  return order.slice(order.indexOf(lost) + 1);
+/** What is left to try when a back end does not come to draw. */
+export function after(order: readonly Backend[], failed: Backend): readonly Backend[] {
+  return order.slice(order.indexOf(failed) + 1);
+}
+
+/** What is left to try when a back end was lost while drawing: that one first. */
+export function from(order: readonly Backend[], lost: Backend): readonly Backend[] {
+  return order.slice(order.indexOf(lost));
 }
 
 function sentence(text: string): string {

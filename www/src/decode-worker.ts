@@ -4,53 +4,44 @@ import { stateOf } from './decoding.js';
 import { type Decoder, loadEngine } from './engine.js';
 import { toPhotoError } from './errors.js';
 import type { Answer, Request } from './worker-decoder.js';
+import { workerScope } from './worker-scope.js';
 
-/** What of a worker's global scope is used; the compiler knows that of pages only. */
-interface Scope {
-  onmessage: ((event: MessageEvent<Request>) => void) | null;
-  postMessage(message: Answer, transfer?: Transferable[]): void;
-}
-const scope = globalThis as unknown as Scope;
+const scope = workerScope<Request, Answer>();
 
-let decoder: Decoder | undefined;
-
-/** Does what it is told, or says why it cannot. */
-function doing(work: () => void): void {
-  try {
-    work();
-  } catch (thrown) {
-    const { code, message } = toPhotoError(thrown);
-    scope.postMessage({ kind: 'failed', code, message });
-  }
+function fail(thrown: unknown): void {
+  const { code, message } = toPhotoError(thrown);
+  scope.postMessage({ kind: 'failed', code, message });
 }
 
-function answer(of: Decoder, request: Request): void {
+function answer(decoder: Decoder, request: Request): void {
   if (request.kind === 'feed') {
-    of.feed(request.offset, request.bytes);
-    scope.postMessage({ kind: 'fed', state: stateOf(of) });
+    decoder.feed(request.offset, request.bytes);
+    scope.postMessage({ kind: 'fed', state: stateOf(decoder) });
     return;
   }
-  const photo = of.finish();
+  const photo = decoder.finish();
+  const { decodedBytes, metadata } = photo;
   const [geometry, basis] = [photo.geometryParcel(), photo.basisParcel()];
-  scope.postMessage({ kind: 'photo', geometry, basis, metadata: photo.metadata });
+  scope.postMessage({ kind: 'photo', geometry, basis, metadata, decodedBytes });
   for (let index = 0; index < photo.tiles; index += 1) {
     const bytes = photo.takeTile(index) as Uint8Array<ArrayBuffer>;
-    scope.postMessage({ kind: 'tile', index, bytes }, [bytes.buffer]);
+    scope.postMessage({ kind: 'tile', bytes }, [bytes.buffer]);
   }
   scope.postMessage({ kind: 'done' });
 }
 
-scope.onmessage = ({ data }) => {
-  doing(() => {
-    if (decoder) answer(decoder, data);
-  });
-};
-
 try {
   const engine = await loadEngine();
-  decoder = new engine.Decoder();
+  const decoder = new engine.Decoder();
+  scope.onmessage = ({ data }) => {
+    try {
+      answer(decoder, data);
+    } catch (thrown) {
+      fail(thrown);
+    }
+  };
+  // Nothing is asked of it before this.
   scope.postMessage({ kind: 'ready', state: stateOf(decoder) });
 } catch (thrown) {
-  const { code, message } = toPhotoError(thrown);
-  scope.postMessage({ kind: 'failed', code, message });
+  fail(thrown);
 }

@@ -1,6 +1,7 @@
 /** Decoding on the page's own thread, in turns. */
 
-import type { Decoder, Engine, Photo } from './engine.js';
+import type { Decoder, Engine } from './engine.js';
+import { Photograph } from './photograph.js';
 import type { ByteRange } from './source.js';
 
 /** How far decoding has come, and what it wants. */
@@ -21,7 +22,7 @@ export interface PhotoDecoder {
   /** Takes the file's bytes from `offset` on; those of a range in order. */
   feed(offset: number, bytes: Uint8Array, turn: Turn): Promise<void>;
   /** Ends the decoder, whether it succeeds or throws. */
-  finish(): Promise<Photo>;
+  finish(): Promise<Photograph>;
   /** Ends the decoder, if it has not ended. What `finish` is at is not waited for. */
   free(): void;
 }
@@ -60,9 +61,9 @@ export class LocalDecoder implements PhotoDecoder {
     }
   }
 
-  async finish(): Promise<Photo> {
+  async finish(): Promise<Photograph> {
     this.#ended = true;
-    return this.#decoder.finish();
+    return Photograph.decoded(this.#decoder.finish());
   }
 
   free(): void {

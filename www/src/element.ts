@@ -1,7 +1,9 @@
 /** `<relightable-photo>`: attributes and pointer in, events and a picture out. */
 
+import type { CanvasSurface } from './canvas.js';
 import { newDecoder } from './decoders.js';
-import { type Backend, loadEngine } from './engine.js';
+import { draw } from './drawings.js';
+import type { Backend, Gamut } from './engine.js';
 import { PhotoError, toPhotoError } from './errors.js';
 import {
   BackendChangeEvent,
@@ -9,37 +11,60 @@ import {
   loadEvent,
   PhotoErrorEvent,
   progressEvent,
+  QualityChangeEvent,
   type RelightablePhotoEventMap,
 } from './events.js';
+import { LightFollower } from './light-follower.js';
+import { checkLightSource, type LightSource } from './light-source.js';
+import type { LightSetting } from './lights.js';
 import { openPhoto } from './load.js';
-import { type LightSetting, Player } from './player.js';
+import type { Facts } from './photograph.js';
+import { Player } from './player.js';
 import {
+  BACKENDS,
   clampToPicture,
   type PicturePoint,
   parseBackends,
   parseExposure,
+  parseGamut,
   parseLight,
+  parseTone,
+  parseWhiteBalance,
   stepTorch,
 } from './settings.js';
-import { CanvasDrawing } from './surface.js';
+import { unwatch, watch } from './sight.js';
 import { View } from './view.js';
 
 // On a server there are no elements, but importing this module must not fail there.
 const Base = globalThis.HTMLElement ?? (class {} as unknown as typeof HTMLElement);
 
-const ATTRIBUTES = ['src', 'alt', 'light', 'backend', 'exposure'] as const;
+const ATTRIBUTES = [
+  'src',
+  'alt',
+  'light',
+  'backend',
+  'exposure',
+  'white-balance',
+  'tone',
+  'gamut',
+] as const;
+/** Properties that a page may have set before this class was known. */
+const PROPERTIES = [
+  'src',
+  'alt',
+  'light',
+  'backend',
+  'exposure',
+  'whiteBalance',
+  'tone',
+  'gamut',
+  'torch',
+  'lightSource',
+] as const;
 const CENTRE: PicturePoint = { x: 0.5, y: 0.5 };
 
 /** What is known of a photograph once it has loaded. */
-export interface PhotoInfo {
-  /** Picture, in pixels. */
-  readonly width: number;
-  readonly height: number;
-  /** Light plane, in elements. */
-  readonly lightWidth: number;
-  readonly lightHeight: number;
-  /** Memory its light transport takes, in bytes. */
-  readonly decodedBytes: number;
+export interface PhotoInfo extends Omit<Facts, 'metadata'> {
   /** What the file says of itself. */
   readonly metadata: unknown;
 }
@@ -55,22 +80,25 @@ export interface BlobOptions {
 /**
  * A photograph that can be relit.
  *
- * Fires `load`, `progress`, `error`, `lightchange` and `backendchange`. Style it by `::part(picture)`,
- * `::part(canvas)`, `::part(progress)` and `::part(message)`, and by the custom properties
- * `--relightable-photo-background`, `-color`, `-accent`, `-focus` and `-aspect`, the last being the
- * space kept until the photograph is there.
+ * Fires `load`, `progress`, `error`, `lightchange`, `backendchange` and `qualitychange`. Style it by
+ * `::part(picture)`, `::part(canvas)`, `::part(progress)` and `::part(message)`, and by the custom
+ * properties `--relightable-photo-background`, `-color`, `-accent`, `-focus` and `-aspect`, the last being
+ * the space kept until the photograph is there.
  */
 // biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the interface only adds overloads of methods that Base has
 export class RelightablePhoto extends Base {
   static readonly observedAttributes: readonly string[] = ATTRIBUTES;
 
   readonly #view: View;
-  readonly #player: Player<CanvasDrawing>;
+  readonly #player: Player<CanvasSurface>;
   #torch: PicturePoint | null = null;
+  #follower: LightFollower | null = null;
+  #seen = true;
   #reload = false;
   #scheduled = false;
   #attributeFault: string | null = null;
   #playerFault: string | null = null;
+  #lightFault: string | null = null;
   /** The light of the last attributes that were right. */
   #lit: LightSetting | null = null;
 
@@ -85,13 +113,18 @@ export class RelightablePhoto extends Base {
             fetch: (...request) => fetch(...request),
             pause,
           }),
-        draw: async (backend, photo, lost) =>
-          CanvasDrawing.create(await loadEngine(), backend, photo, lost),
+        draw,
         nextFrame: requestAnimationFrame.bind(globalThis),
+        later: (ms, callback) => {
+          const timer = setTimeout(callback, ms);
+          return () => clearTimeout(timer);
+        },
+        now: () => performance.now(),
       },
       {
         loading: () => {
           this.#playerFault = null;
+          this.#lightFault = null;
           this.#view.clear();
           this.#view.progress(Number.NaN);
           this.#showFault();
@@ -100,6 +133,13 @@ export class RelightablePhoto extends Base {
           this.#view.progress(total > 0 ? Math.min(1, loaded / total) : Number.NaN);
           this.dispatchEvent(progressEvent(loaded, total));
         },
+        drawn: (fault) => {
+          // A light that stays wrong says so once, not at every frame.
+          if ((fault?.message ?? null) === this.#lightFault) return;
+          this.#lightFault = fault?.message ?? null;
+          this.#lightFaultChanged(fault);
+        },
+        detailChanged: (detail) => this.dispatchEvent(new QualityChangeEvent(detail)),
         loaded: () => {
           this.#view.progress(null);
           this.dispatchEvent(loadEvent());
@@ -162,6 +202,35 @@ export class RelightablePhoto extends Base {
     this.setAttribute('exposure', String(value));
   }
 
+  /** Factors on red, green and blue. */
+  get whiteBalance(): string {
+    return this.getAttribute('white-balance') ?? '1 1 1';
+  }
+  set whiteBalance(value: string) {
+    this.setAttribute('white-balance', value);
+  }
+
+  /** What becomes of brightness: `clip`, cut off at white, or `filmic`, rolled off before it. */
+  get tone(): string {
+    return this.getAttribute('tone') ?? 'clip';
+  }
+  set tone(value: string) {
+    this.setAttribute('tone', value);
+  }
+
+  /** Colours that the canvas is to show: `srgb` or `display-p3`. */
+  get gamut(): string {
+    return this.getAttribute('gamut') ?? 'srgb';
+  }
+  set gamut(value: string) {
+    this.setAttribute('gamut', value);
+  }
+
+  /** Colours that the canvas shows: those asked for where the browser can; `null` without a picture. */
+  get activeGamut(): Gamut | null {
+    return this.#player.drawing?.gamut ?? null;
+  }
+
   /** Where the torch shines, on the picture; `null`: over the middle of the light. */
   get torch(): PicturePoint | null {
     return this.#torch;
@@ -174,9 +243,51 @@ export class RelightablePhoto extends Base {
     this.#schedule();
   }
 
+  /**
+   * What shines in place of the built-in light; `null`, to begin with, where that one does. The built-in
+   * light or the last one stays until there is something to be seen, and where something is wrong with
+   * the source. Frames of videos and streams are followed while the element is in view. A canvas that is
+   * drawn on by WebGL has to have `preserveDrawingBuffer`, as it is looked at after its own frame.
+   */
+  get lightSource(): LightSource | null {
+    return this.#follower?.source ?? null;
+  }
+  set lightSource(value: LightSource | null) {
+    const source = value === null ? null : checkLightSource(value);
+    if (source === this.lightSource) {
+      this.lightChanged();
+      return;
+    }
+    this.#follower?.stop();
+    this.#follower =
+      source &&
+      new LightFollower(source, {
+        changed: () => this.#player.redraw(),
+        faultChanged: (fault) => this.#lightFaultChanged(fault),
+      });
+    this.#lightFault = null;
+    this.#schedule();
+  }
+
+  /**
+   * Looks at the `lightSource` again, in the next frame: canvases, `ImageData` and numbers change without
+   * telling.
+   */
+  lightChanged(): void {
+    if (this.#follower) this.#player.redraw();
+  }
+
   /** The back end that draws, `null` while there is none. */
   get activeBackend(): Backend | null {
     return this.#player.backend;
+  }
+
+  /**
+   * The share of the photograph that the picture is drawn by, the most important of it first: 1, or less
+   * while it moves faster than all of it can be drawn. `null` while there is no picture.
+   */
+  get detail(): number | null {
+    return this.#player.detail;
   }
 
   /** What the back end says of itself: the kernel, the adapter. */
@@ -186,23 +297,23 @@ export class RelightablePhoto extends Base {
 
   /** What is known of the photograph, `null` until it is decoded. */
   get info(): PhotoInfo | null {
-    const photo = this.#player.photo;
-    if (!photo) return null;
-    const { width, height, lightWidth, lightHeight, decodedBytes } = photo;
-    const metadata: unknown = JSON.parse(photo.metadata);
-    return { width, height, lightWidth, lightHeight, decodedBytes, metadata };
+    const facts = this.#player.photo?.facts;
+    return facts ? { ...facts, metadata: JSON.parse(facts.metadata) as unknown } : null;
   }
 
-  /** Draws the picture as it is set now and encodes it. Rejects with `not-loaded` before `load`. */
+  /**
+   * Draws the picture as it is set now, in full detail, and encodes it. Rejects with `not-loaded` while there is no
+   * photograph, and where another takes its place meanwhile.
+   */
   async toBlob({ type = 'image/png', quality }: BlobOptions = {}): Promise<Blob> {
     this.#update();
     // The canvas of a GPU keeps its content only until the browser has shown it.
-    return this.#player.renderNow().toBlob(type, quality);
+    return (await this.#player.renderNow()).toBlob(type, quality);
   }
 
   connectedCallback(): void {
     // Properties that were set before this class was known hide its setters.
-    for (const name of [...ATTRIBUTES, 'torch'] as const) {
+    for (const name of PROPERTIES) {
       if (Object.hasOwn(this, name)) {
         const value = this[name];
         delete (this as Record<string, unknown>)[name];
@@ -235,28 +346,50 @@ export class RelightablePhoto extends Base {
   #update(): void {
     this.#scheduled = false;
     if (!this.isConnected) {
+      unwatch(this);
+      this.#follower?.stop();
       this.#player.stop();
       this.#view.clear();
       this.#attributeFault = null;
       this.#playerFault = null;
+      this.#lightFault = null;
       return;
     }
+    watch(this, (seen) => {
+      this.#seen = seen;
+      this.#player.setVisible(seen);
+      this.#follow();
+    });
+    this.#follow();
     try {
       const name = parseLight(this.getAttribute('light'));
-      const backends = parseBackends(this.getAttribute('backend'));
-      const exposure = parseExposure(this.getAttribute('exposure'));
+      const order = parseBackends(this.getAttribute('backend'));
+      const look = {
+        exposure: parseExposure(this.getAttribute('exposure')),
+        whiteBalance: parseWhiteBalance(this.getAttribute('white-balance')),
+        tone: parseTone(this.getAttribute('tone')),
+      };
+      const wanted = {
+        backends: order ?? BACKENDS,
+        // Who names back ends knows better.
+        software: order !== null,
+        gamut: parseGamut(this.getAttribute('gamut')),
+      };
       const src = this.#address();
       this.#attributeFault = null;
       this.#showFault();
       const lit = this.#lit;
-      const light = { name, torch: name === 'torch' ? this.#torch : null };
+      const torch = name === 'torch' ? this.#torch : null;
+      const picture = this.#follower?.picture ?? null;
+      const light = { name, torch, picture };
       this.#lit = light;
       this.#describe();
       const reload = this.#reload;
       this.#reload = false;
-      this.#player.set({ src, backends, exposure, light }, reload);
-      if (lit && (lit.name !== light.name || lit.torch !== light.torch)) {
-        this.dispatchEvent(new LightChangeEvent(light.name, light.torch));
+      this.#player.set({ src, wanted, look, light }, reload);
+      if (lit && !sameLight(lit, light)) {
+        const moved = picture ? null : torch;
+        this.dispatchEvent(new LightChangeEvent(name, moved, this.lightSource));
       }
     } catch (thrown) {
       this.#describe();
@@ -267,8 +400,18 @@ export class RelightablePhoto extends Base {
     }
   }
 
+  /** Keeps up with the source of light while it matters. */
+  #follow(): void {
+    if (this.#seen && this.isConnected) this.#follower?.start();
+    else this.#follower?.stop();
+  }
+
+  get #holdsTorch(): boolean {
+    return this.#lit?.name === 'torch' && !this.#lit.picture;
+  }
+
   #describe(): void {
-    this.#view.describe(this.getAttribute('alt'), this.#lit?.name === 'torch');
+    this.#view.describe(this.getAttribute('alt'), this.#holdsTorch);
   }
 
   #address(): string | null {
@@ -287,13 +430,20 @@ export class RelightablePhoto extends Base {
     this.dispatchEvent(new PhotoErrorEvent(error));
   }
 
+  /** Nothing else ends by it: a photograph goes on loading. */
+  #lightFaultChanged(fault: PhotoError | null): void {
+    this.#showFault();
+    if (fault) this.dispatchEvent(new PhotoErrorEvent(fault));
+  }
+
   #showFault(): void {
-    this.#view.message(this.#attributeFault ?? this.#playerFault);
+    const source = this.#follower?.fault?.message;
+    this.#view.message(this.#attributeFault ?? this.#playerFault ?? source ?? this.#lightFault);
   }
 
   #listen(): void {
     const { picture } = this.#view;
-    const holdsTorch = () => this.#lit?.name === 'torch' && this.activeBackend !== null;
+    const holdsTorch = () => this.#holdsTorch && this.activeBackend !== null;
     const follow = (event: PointerEvent) => {
       if (!holdsTorch()) return;
       const { left, top, width, height } = picture.getBoundingClientRect();
@@ -316,6 +466,12 @@ export class RelightablePhoto extends Base {
       this.torch = moved;
     });
   }
+}
+
+/** Under a picture, built-in lights do not shine. */
+function sameLight(a: LightSetting, b: LightSetting): boolean {
+  if (a.picture || b.picture) return a.picture === b.picture;
+  return a.name === b.name && a.torch === b.torch;
 }
 
 /** Gives the page its turn. */

@@ -1,9 +1,16 @@
 /** The WebAssembly module: its surface, and how the right build of it is found and started. */
 
 import { messageOf, PhotoError } from './errors.js';
+import type { LivePicture } from './light-source.js';
 
 /** The name of a back end. */
 export type Backend = 'webgpu' | 'webgl2' | 'cpu';
+
+/** What a canvas can show: colours of sRGB, or those of Display P3 too. */
+export type Gamut = 'srgb' | 'display-p3';
+
+/** What becomes of brightness: cut off at white, or rolled off before it. */
+export type ToneCurve = 'clip' | 'filmic';
 
 /** Holds memory inside the module until freed. */
 export interface Freeable {
@@ -18,19 +25,24 @@ export interface Photo extends Freeable {
   readonly lightHeight: number;
   readonly metadata: string;
   readonly decodedBytes: number;
-  /** Number of tiles. */
+  /** Number of tiles, which lie row by row. */
   readonly tiles: number;
+  /** Pixels along a tile's side; those at the right and lower edges may be smaller. */
+  readonly tileSide: number;
   /** What `Photo.receive` in another module takes. */
   geometryParcel(): Float64Array;
   basisParcel(): Float32Array;
-  /** A tile for another module; it is dark here afterwards. Not once the photograph is drawn. */
+  /** A tile for another module; it is dark here afterwards. Not while a CPU is at the photograph. */
   takeTile(index: number): Uint8Array;
-  /** Takes a tile that `takeTile` gave. Not once the photograph is drawn. */
+  /** Takes a tile that `takeTile` gave. Not while a CPU is at the photograph. */
   putTile(index: number, bytes: Uint8Array): void;
 }
 
 /** What every element of the light plane emits. */
-export interface Light extends Freeable {}
+export interface Light extends Freeable {
+  /** Linear R, G and B of the rows from `first` up to `end`, row by row. */
+  linearRgb(first: number, end: number): Float32Array;
+}
 
 /** Says which bytes of a file it wants, and takes them as they come. */
 export interface Decoder extends Freeable {
@@ -41,23 +53,55 @@ export interface Decoder extends Freeable {
   /** Each byte counted once. */
   readonly bytesFed: number;
   readonly fileBytes: number | undefined;
-  readonly tilesDone: number;
-  readonly scansDone: number;
   /** Ends the decoder, whether it succeeds or throws. */
   finish(): Photo;
 }
 
-/** One back end, on one canvas. */
-export interface Relighter extends Freeable {
-  readonly backend: string;
+/** How a picture is shown. */
+export interface Display extends Freeable {}
+
+/** A graphics device, which photographs share. */
+export interface Graphics extends Freeable {
   readonly kernel: string;
-  /** Settles when the graphics device goes away, where there is one to itself. */
+  /** Whether it is a program that makes up for a missing graphics processor. */
+  readonly software: boolean;
+  /** Settles when a WebGPU device goes away; the canvas of a WebGL2 context tells itself. */
   readonly lost: Promise<{ readonly message: string }> | undefined;
-  render(light: Light, exposure: number): void;
+  /** Brings a photograph to the device, to be drawn into a canvas of its own. */
+  draw(photo: Photo, canvas: HTMLCanvasElement, gamut: Gamut): Promise<Relighter>;
+}
+
+/** One photograph, on one canvas. */
+export interface Relighter extends Freeable {
+  readonly kernel: string;
+  /** What the canvas shows. */
+  readonly gamut: Gamut;
+  /** By a share of the components, from 0 to 1, which is all. */
+  render(light: Light, display: Display, detail: number): void;
+  /**
+   * Takes a picture of so many pixels as the light of `renderPicture`; `false` where this back end cannot.
+   * Throws what the browser does; the last light stays.
+   */
+  takePicture(picture: LivePicture, width: number, height: number): boolean;
+  /** As `render`, under the picture that was taken last. */
+  renderPicture(display: Display, detail: number): void;
+}
+
+/** The CPU at work on some rows of a picture, without a canvas. */
+export interface BandRelighter extends Freeable {
+  /** The first row of the light that is seen, and the first after it that is not. */
+  readonly lightRows: Uint32Array;
+  /**
+   * Takes linear R, G and B of those rows, and a share of the components, and writes RGBA into `out`,
+   * row by row.
+   */
+  relight(light: Float32Array, display: Display, detail: number, out: Uint8Array): void;
 }
 
 /** What the module exports. */
 export interface Engine {
+  /** What relights on the CPU: `simd128` or `scalar`. */
+  cpuKernel(): string;
   Decoder: { new (maxDecodedBytes?: number): Decoder };
   Photo: {
     /** A photograph that another module decoded, without its tiles as yet. */
@@ -66,10 +110,22 @@ export interface Engine {
   Light: {
     builtin(photo: Photo, name: string): Light;
     torch(photo: Photo, x: number, y: number, size?: number): Light;
+    /** A picture of any size, in linear RGB, row by row. */
+    fromLinear(photo: Photo, values: Float32Array, width: number, height: number): Light;
+    /** A picture of any size, in sRGB: RGBA, row by row, colours apart from alpha. */
+    fromSrgb(photo: Photo, rgba: Uint8ClampedArray, width: number, height: number): Light;
   };
-  Relighter: {
-    create(backend: Backend, photo: Photo, canvas: HTMLCanvasElement): Promise<Relighter>;
+  BandRelighter: { new (photo: Photo, firstRow: number, rows: number): BandRelighter };
+  Display: {
+    new (exposure: number, balance: Float64Array, curve: ToneCurve, gamut: Gamut): Display;
   };
+  Graphics: {
+    webgpu(): Promise<Graphics>;
+    /** On a canvas for it alone. */
+    webgl2(canvas: HTMLCanvasElement): Graphics;
+  };
+  /** One that draws on this thread. */
+  Relighter: { new (photo: Photo, canvas: HTMLCanvasElement, gamut: Gamut): Relighter };
 }
 
 // The smallest module with a 128-bit operation: () => i8x16.splat(0), dropped.

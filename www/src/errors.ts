@@ -26,6 +26,12 @@ export type PageErrorCode =
   | 'wasm-unavailable'
   /** The worker that decodes a photograph stopped at it, for want of memory for one. */
   | 'worker-unavailable'
+  /** A worker that had a part of the photograph stopped. The photograph is fetched anew, a few times. */
+  | 'photo-lost'
+  /** A picture that is to be light shows what this page may not read, from another origin. */
+  | 'light-tainted'
+  /** What is to be light could not be loaded, played or read. */
+  | 'light-source'
   /** Something was asked of a photograph that is not loaded yet. */
   | 'not-loaded'
   /** A fault in this software. */

@@ -2,6 +2,7 @@
 
 import type { Backend } from './engine.js';
 import type { ErrorCode, PhotoError } from './errors.js';
+import type { LightSource } from './light-source.js';
 import type { LightName, PicturePoint } from './settings.js';
 
 const TRAVELS: EventInit = { bubbles: true, composed: true };
@@ -33,16 +34,20 @@ export class PhotoErrorEvent extends Event {
   }
 }
 
-/** `lightchange`: the light is another, or the torch has moved. */
+/** `lightchange`: the light is another, or the torch has moved. Frames of one source do not tell. */
 export class LightChangeEvent extends Event {
+  /** The built-in light; where there is a source, the one that it stands in for. */
   readonly light: LightName;
   /** Where a torch that was moved shines; `null` for one in the middle, and for other lights. */
   readonly torch: PicturePoint | null;
+  /** What shines in the built-in light's place; `null` where that one does. */
+  readonly source: LightSource | null;
 
-  constructor(light: LightName, torch: PicturePoint | null) {
+  constructor(light: LightName, torch: PicturePoint | null, source: LightSource | null) {
     super('lightchange', TRAVELS);
     this.light = light;
     this.torch = torch;
+    this.source = source;
   }
 }
 
@@ -62,6 +67,20 @@ export class BackendChangeEvent extends Event {
   }
 }
 
+/**
+ * `qualitychange`: what is shown is drawn by another share of the photograph than before. It is less than
+ * 1 only while the picture moves faster than all of it can be drawn.
+ */
+export class QualityChangeEvent extends Event {
+  /** 0 to 1, in full detail; the first picture is. */
+  readonly share: number;
+
+  constructor(share: number) {
+    super('qualitychange', TRAVELS);
+    this.share = share;
+  }
+}
+
 /** Events by name, for typed listeners. */
 export interface RelightablePhotoEventMap extends Omit<HTMLElementEventMap, 'error'> {
   load: Event;
@@ -69,4 +88,5 @@ export interface RelightablePhotoEventMap extends Omit<HTMLElementEventMap, 'err
   error: PhotoErrorEvent;
   lightchange: LightChangeEvent;
   backendchange: BackendChangeEvent;
+  qualitychange: QualityChangeEvent;
 }

@@ -8,7 +8,18 @@ export type { Backend } from './engine.js';
 export type { EngineErrorCode, ErrorCode, PageErrorCode } from './errors.js';
 export { PhotoError } from './errors.js';
 export type { RelightablePhotoEventMap } from './events.js';
-export { BackendChangeEvent, LightChangeEvent, PhotoErrorEvent } from './events.js';
+export {
+  BackendChangeEvent,
+  LightChangeEvent,
+  PhotoErrorEvent,
+  QualityChangeEvent,
+} from './events.js';
+export type {
+  BrowserPicture,
+  LightPicture,
+  LightSource,
+  LinearLight,
+} from './light-source.js';
 export type { LightName, PicturePoint } from './settings.js';
 export { BACKENDS, LIGHTS } from './settings.js';
 

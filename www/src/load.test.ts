@@ -8,6 +8,7 @@ import { answer } from '../tools/ranges.js';
 import { LocalDecoder } from './decoding.js';
 import type { Decoder, Photo } from './engine.js';
 import { type LoadPorts, openPhoto } from './load.js';
+import type { Photograph } from './photograph.js';
 
 const never = new AbortController().signal;
 const FIRST_BYTES = 16_384;
@@ -31,8 +32,6 @@ function fileOf(size = FILE_BYTES, headBytes = 1000): Buffer {
 class FakeDecoder implements Decoder {
   static alive = 0;
   static fed = Buffer.alloc(0);
-  readonly tilesDone = 0;
-  readonly scansDone = 0;
   bytesFed = 0;
   readonly #bytes = Buffer.alloc(10_000_000);
 
@@ -62,7 +61,7 @@ class FakeDecoder implements Decoder {
 
   finish(): Photo {
     this.free();
-    return { free() {} } as Photo;
+    return { tiles: 0, free() {} } as Photo;
   }
 
   free(): void {
@@ -130,7 +129,7 @@ function portsOf(ports: Partial<LoadPorts> = {}): LoadPorts {
 async function opened(
   url: string,
   ports: Partial<LoadPorts> = {},
-): Promise<{ told: [number, number][]; photo: Photo }> {
+): Promise<{ told: [number, number][]; photo: Photograph }> {
   const told: [number, number][] = [];
   try {
     const photo = await openPhoto(url, never, (...p) => told.push(p), portsOf(ports));

@@ -1,9 +1,9 @@
 /** From an address to a decoded photograph. */
 
 import type { PhotoDecoder } from './decoding.js';
-import type { Photo } from './engine.js';
 import { PhotoError, toPhotoError } from './errors.js';
 import { tooLong } from './http-errors.js';
+import type { Photograph } from './photograph.js';
 import { within } from './retry.js';
 import { type ByteRange, HttpSource, type Piece, type SourceOptions } from './source.js';
 
@@ -35,7 +35,7 @@ export async function openPhoto(
   signal: AbortSignal,
   onProgress: OnProgress,
   ports: LoadPorts,
-): Promise<Photo> {
+): Promise<Photograph> {
   try {
     return await open(url, signal, onProgress, ports);
   } catch (thrown) {
@@ -51,7 +51,7 @@ async function open(
   signal: AbortSignal,
   onProgress: OnProgress,
   ports: LoadPorts,
-): Promise<Photo> {
+): Promise<Photograph> {
   const stop = new AbortController();
   const stopToo = () => stop.abort(signal.reason);
   signal.throwIfAborted();
@@ -110,7 +110,7 @@ async function decode(
   signal: AbortSignal,
   onProgress: OnProgress,
   ports: LoadPorts,
-): Promise<Photo> {
+): Promise<Photograph> {
   let told = 0;
   const tell = () => {
     const { bytesFed, fileBytes } = decoder.state;

@@ -5,41 +5,71 @@
  * changed since is aborted and freed.
  */
 
-import { after, BACKEND_TITLES, firstWorking } from './backends.js';
-import type { Backend, Freeable, Photo } from './engine.js';
+import { after, BACKEND_TITLES, firstWorking, from } from './backends.js';
+import type { Backend, Freeable, Gamut } from './engine.js';
 import { PhotoError, toPhotoError } from './errors.js';
+import type { LightSetting } from './lights.js';
 import { missingSource, type OnProgress } from './load.js';
-import type { LightName, PicturePoint } from './settings.js';
-
-/** A built-in light; a torch may have been moved to a point of the picture. */
-export interface LightSetting {
-  readonly name: LightName;
-  readonly torch: PicturePoint | null;
-}
+import type { Look } from './look.js';
+import type { Photograph } from './photograph.js';
+import { UnderWay } from './promises.js';
+import { Quality } from './quality.js';
 
 /** All that attributes and the pointer say. */
 export interface Settings {
   /** Absolute address, or `null` where there is none. */
   readonly src: string | null;
-  readonly backends: readonly Backend[];
+  readonly wanted: Wanted;
   readonly light: LightSetting;
-  readonly exposure: number;
+  readonly look: Look;
+}
+
+/** What drawing is to be done by. */
+export interface Wanted {
+  /** To be tried in this order. */
+  readonly backends: readonly Backend[];
+  /** Whether a graphics device may be a program that makes up for a missing one. */
+  readonly software: boolean;
+  /** What the canvas is to show, where the browser can. */
+  readonly gamut: Gamut;
 }
 
 /** A photograph on a surface, ready to be drawn. */
 export interface Drawing extends Freeable {
   readonly kernel: string;
-  /** Draws at once, or throws `backend-lost`. */
-  render(light: LightSetting, exposure: number): void;
+  /** What is shown. */
+  readonly gamut: Gamut;
+  /**
+   * Draws by a share of the components, at once or by the time the promise settles; not called again
+   * before. Where the light cannot be had, draws by the last one that could, and gives the reason.
+   * Throws or rejects with `backend-lost`, or with `photo-lost` where parts of the photograph are gone.
+   */
+  render(light: LightSetting, look: Look, detail: number): Drawn | Promise<Drawn>;
 }
+
+/** Why a picture was drawn by another light than asked for; `null` where it was not. */
+export type Drawn = PhotoError | null;
 
 /** What the player needs done. */
 export interface Ports<D extends Drawing> {
-  open(src: string, signal: AbortSignal, onProgress: OnProgress): Promise<Photo>;
-  /** Sets a back end up on a surface of its own; throws `backend-unavailable`. */
-  draw(backend: Backend, photo: Photo, lost: (reason: string) => void): Promise<D>;
+  open(src: string, signal: AbortSignal, onProgress: OnProgress): Promise<Photograph>;
+  /**
+   * Sets a back end up on a surface of its own; throws `backend-unavailable`, or `photo-lost`. Need not
+   * go on once `signal` is aborted.
+   */
+  draw(
+    backend: Backend,
+    photo: Photograph,
+    wanted: Wanted,
+    lost: (reason: string) => void,
+    signal: AbortSignal,
+  ): Promise<D>;
   /** Calls back before the browser draws next. */
   nextFrame(callback: () => void): void;
+  /** Calls back once after so many milliseconds, unless what it gives is called first. */
+  later(ms: number, callback: () => void): () => void;
+  /** Milliseconds since any moment. */
+  now(): number;
 }
 
 /** What the player tells. */
@@ -47,8 +77,12 @@ export interface Listener<D extends Drawing> {
   /** A load begins: what was shown is gone. */
   loading(): void;
   progress: OnProgress;
-  /** The photograph is drawn for the first time. */
-  loaded(photo: Photo): void;
+  /** A frame was drawn. */
+  drawn(fault: Drawn): void;
+  /** That frame has another share of the components than the one before it; the first has all. */
+  detailChanged(detail: number): void;
+  /** The photograph is drawn for the first time, or the first since it had to be fetched anew. */
+  loaded(): void;
   /** A back end was taken up; `drawing` is to be shown from now on. */
   backendChanged(drawing: D, backend: Backend, previous: Backend | null, reason: string): void;
   failed(error: PhotoError): void;
@@ -57,19 +91,45 @@ export interface Listener<D extends Drawing> {
 }
 
 /** A back end that was set up. */
-interface SetUp<D extends Drawing> {
+class SetUp<D extends Drawing> {
   readonly backend: Backend;
+  readonly wanted: Wanted;
   readonly drawing: D;
+  readonly quality = new Quality();
   /** Why it no longer works, once it does not. */
-  lost: string | null;
+  lost: string | null = null;
+  /** Whether it has drawn a frame. */
+  drew = false;
+  /** The one that is being drawn, where that takes time. */
+  frame: UnderWay | null = null;
+
+  constructor(backend: Backend, wanted: Wanted, drawing: D) {
+    this.backend = backend;
+    this.wanted = wanted;
+    this.drawing = drawing;
+  }
+}
+
+/** A search for a back end. It has ended also once nobody wants it any more. */
+class Search extends UnderWay {
+  readonly #abort = new AbortController();
+
+  get signal(): AbortSignal {
+    return this.#abort.signal;
+  }
+
+  abort(): void {
+    this.#abort.abort();
+    this.end();
+  }
 }
 
 /** A photograph that is freed when the last of its holders lets go. */
 class Held {
-  readonly photo: Photo;
+  readonly photo: Photograph;
   #holders = 1;
 
-  constructor(photo: Photo) {
+  constructor(photo: Photograph) {
     this.photo = photo;
   }
 
@@ -83,18 +143,36 @@ class Held {
   }
 }
 
+/** A photograph that loses parts is fetched so often without a frame between. */
+const MOST_FETCHES = 5;
+/** A picture of which no newer frame is asked for so long after the browser's next is at rest. */
+const REST_MS = 150;
+
 /** See the module. */
 export class Player<D extends Drawing> {
   readonly #ports: Ports<D>;
   readonly #listener: Listener<D>;
   #settings: Settings | null = null;
   #load: AbortController | null = null;
-  #search: AbortController | null = null;
+  #search: Search | null = null;
   #held: Held | null = null;
   #active: SetUp<D> | null = null;
+  /** The frame that is to follow what is under way. */
+  #next: Promise<D> | null = null;
+  /** How often the photograph was fetched anew since it was last drawn. */
+  #fetches = 0;
   #drawn = false;
   #failed = false;
   #frameAsked = false;
+  #visible = true;
+  /** What was drawn last is out of date. */
+  #stale = false;
+  /** The next frame is to be in full detail, whatever the back end has time for. */
+  #whole = false;
+  /** Of the frame that was told last. */
+  #detail = 1;
+  /** Keeps the picture from being drawn again once it is at rest. */
+  #keepMoving = (): void => {};
 
   constructor(ports: Ports<D>, listener: Listener<D>) {
     this.#ports = ports;
@@ -102,7 +180,7 @@ export class Player<D extends Drawing> {
   }
 
   /** The photograph, once decoded. */
-  get photo(): Photo | null {
+  get photo(): Photograph | null {
     return this.#held?.photo ?? null;
   }
 
@@ -116,17 +194,38 @@ export class Player<D extends Drawing> {
     return this.#active?.drawing ?? null;
   }
 
+  /** The share of the components that the picture is drawn by; `null` while there is none. */
+  get detail(): number | null {
+    return this.#active?.drew ? this.#detail : null;
+  }
+
   /** Takes new settings. `reload` loads even where the address is the same. */
   set(settings: Settings, reload = false): void {
     const before = this.#settings;
     this.#settings = settings;
     if (!before || reload || before.src !== settings.src) {
       this.#begin(settings.src);
-    } else if (!sameOrder(before.backends, settings.backends)) {
-      void this.#choose(settings.backends, this.backend, '');
+    } else if (!same(before.wanted, settings.wanted)) {
+      void this.#choose(settings.wanted, this.backend, '');
     } else {
       this.#askForFrame();
     }
+  }
+
+  /** Draws again: the light is the same, but looks different. */
+  redraw(): void {
+    if (this.#held) this.#askForFrame();
+  }
+
+  /**
+   * Whether anyone can see it. While nobody can, changes of light are not drawn, but the first picture
+   * of a photograph is, and that of another back end, and what `renderNow` is asked for.
+   */
+  setVisible(visible: boolean): void {
+    this.#visible = visible;
+    if (!visible) this.#keepMoving();
+    else if (this.#stale) this.#askForFrame();
+    else if (this.#detail < 1) this.#awaitRest();
   }
 
   /** Lets everything go. */
@@ -135,40 +234,144 @@ export class Player<D extends Drawing> {
     this.#release();
   }
 
-  /** Draws now. Throws where there is nothing to draw, and where drawing fails. */
-  renderNow(): D {
-    if (!this.#active || !this.#settings) {
-      throw new PhotoError(
-        'not-loaded',
-        'The photograph is not loaded yet: wait for its load event.',
-      );
+  /**
+   * Draws the settings there are, or newer ones, in full detail, and gives what was drawn on. At once,
+   * unless a frame or a search for a back end is under way: those asked for meanwhile are one, the next,
+   * by whatever back end there is then. Rejects where there is nothing to draw, and where drawing fails.
+   */
+  renderNow(): Promise<D> {
+    this.#whole = true;
+    return this.#renderSoon();
+  }
+
+  #renderSoon(): Promise<D> {
+    if (!this.#next && !this.#busy) return this.#draw();
+    this.#next ??= this.#drawNext();
+    return this.#next;
+  }
+
+  /**
+   * What drawing waits for: a frame in the middle of a search would take back tiles that were moved for
+   * the back end that is found.
+   */
+  get #busy(): Promise<void> | undefined {
+    return (this.#search ?? this.#active?.frame)?.ended;
+  }
+
+  async #drawNext(): Promise<D> {
+    const held = this.#held;
+    while (this.#busy) {
+      await this.#busy;
+      if (this.#held !== held) throw notLoaded();
     }
+    this.#next = null;
+    return await this.#draw();
+  }
+
+  async #draw(): Promise<D> {
     const active = this.#active;
-    const { drawing } = active;
+    const whole = this.#whole;
+    this.#whole = false;
+    if (!active || !this.#settings) throw notLoaded();
+    const { light, look } = this.#settings;
+    const detail = whole ? 1 : active.quality.detail;
+    this.#stale = false;
+    this.#keepMoving();
     try {
-      drawing.render(this.#settings.light, this.#settings.exposure);
-      return drawing;
+      const began = this.#ports.now();
+      let drawn = active.drawing.render(light, look, detail);
+      if (!whole) this.#clock(active, began, drawn);
+      if (drawn instanceof Promise) {
+        active.frame = new UnderWay();
+        drawn = await drawn;
+      }
+      this.#fetches = 0;
+      active.drew = true;
+      if (active === this.#active) this.#tell(drawn, detail);
+      return active.drawing;
     } catch (thrown) {
+      // What becomes of one that has been let go is nobody's concern.
+      if (active !== this.#active) throw notLoaded(thrown);
       const error = toPhotoError(thrown);
-      if (error.code === 'backend-lost') this.#lost(active, error.message);
-      else this.#fail(error);
+      this.#stopped(active, error);
       throw error;
+    } finally {
+      // Last, so that whoever waits finds all of it done.
+      active.frame?.end();
+      active.frame = null;
     }
+  }
+
+  /** A frame of a motion has begun. */
+  #clock({ quality }: SetUp<D>, began: number, drawing: Drawn | Promise<Drawn>): void {
+    const drew = () => quality.drew(began, this.#ports.now());
+    if (drawing instanceof Promise) drawing.then(drew, () => {});
+    // A graphics device is still at it, and holds up the browser's next frame.
+    else this.#ports.nextFrame(drew);
+    // What a page changes in its own turn before that frame is in time for it.
+    this.#awaitFrame();
+  }
+
+  #tell(drawn: Drawn, detail: number): void {
+    const changed = detail !== this.#detail;
+    this.#detail = detail;
+    if (detail < 1 && !this.#stale && !this.#unseen) this.#awaitRest();
+    this.#listener.drawn(drawn);
+    if (changed) this.#listener.detailChanged(detail);
+  }
+
+  /** Draws once more, in full detail, unless a newer frame comes first. */
+  #awaitRest(): void {
+    this.#keepMoving();
+    let moves = false;
+    this.#keepMoving = () => {
+      moves = true;
+    };
+    // Pages and pointers ask with the browser's frames. Where these are late, it is not yet at rest.
+    this.#ports.nextFrame(() => {
+      if (moves) return;
+      this.#keepMoving = this.#ports.later(REST_MS, () => this.#renderWhole());
+    });
+  }
+
+  /** A frame could not be drawn. */
+  #stopped(active: SetUp<D>, error: PhotoError): void {
+    if (error.code === 'backend-lost') this.#lost(active, error.message);
+    else if (error.code === 'photo-lost') this.#fetchAnew(error.message);
+    else this.#fail(error);
   }
 
   #begin(src: string | null): void {
     this.#release();
+    this.#fetches = 0;
     this.#listener.loading();
     if (src === null) {
       this.#fail(missingSource());
       return;
     }
-    const load = new AbortController();
-    this.#load = load;
-    void this.#run(src, load);
+    void this.#run(src, null, '');
   }
 
-  async #run(src: string, load: AbortController): Promise<void> {
+  /** Loads a photograph again of which parts are gone. Its picture is left until it is there. */
+  #fetchAnew(reason: string): void {
+    const src = this.#settings?.src;
+    const previous = this.backend;
+    const failed = this.#failed;
+    this.#release();
+    if (this.#fetches === MOST_FETCHES) {
+      const vain = `It was fetched ${MOST_FETCHES} times again, in vain.`;
+      this.#fail(new PhotoError('photo-lost', `${reason} ${vain}`));
+      return;
+    }
+    this.#fetches += 1;
+    this.#failed = failed;
+    if (src) void this.#run(src, previous, reason);
+  }
+
+  /** Loads, and takes up a back end in the place of `previous`; `why` tells what became of that one. */
+  async #run(src: string, previous: Backend | null, why: string): Promise<void> {
+    const load = new AbortController();
+    this.#load = load;
     const { signal } = load;
     try {
       const photo = await this.#ports.open(src, signal, (loaded, total) => {
@@ -185,26 +388,26 @@ export class Player<D extends Drawing> {
     } finally {
       if (this.#load === load) this.#load = null;
     }
-    if (this.#settings) await this.#choose(this.#settings.backends, null, '');
+    if (this.#settings) await this.#choose(this.#settings.wanted, previous, why);
   }
 
   /**
    * Takes up the first back end of `order` that works, in the place of `previous`; `why` tells what
    * became of that one. Does nothing before the photograph is there: its load will search.
    */
-  async #choose(order: readonly Backend[], previous: Backend | null, why: string): Promise<void> {
+  async #choose(wanted: Wanted, previous: Backend | null, why: string): Promise<void> {
     this.#search?.abort();
     const held = this.#held;
     if (!held) return;
-    const search = new AbortController();
+    const search = new Search();
     const { signal } = search;
     this.#search = search;
     // Setting a back end up reads the photograph, even when nobody wants the result any more.
     held.hold();
     try {
       const chosen = await firstWorking(
-        order,
-        (backend) => this.#setUp(backend, held.photo, signal),
+        wanted.backends,
+        (backend) => this.#setUp(backend, wanted, held.photo, signal),
         () => signal.throwIfAborted(),
       );
       signal.throwIfAborted();
@@ -217,31 +420,47 @@ export class Player<D extends Drawing> {
       }
       const reason = [why, chosen.reason].filter(Boolean).join(' ');
       if (found.lost !== null) {
-        this.#replace(found, found.lost, order, previous, reason);
+        this.#replace(found, found.lost, wanted, previous, reason);
         return;
       }
       if (changed) {
         this.#listener.backendChanged(found.drawing, found.backend, previous, reason);
       }
-      this.#render();
+      this.#renderWhole();
     } catch (thrown) {
       if (signal.aborted) return;
       this.#search = null;
       this.#dropActive();
-      this.#fail(toPhotoError(thrown));
+      const { code, message } = toPhotoError(thrown);
+      this.#fail(new PhotoError(code, why ? `${why} ${message}` : message, thrown));
     } finally {
+      search.end();
       held.release();
     }
   }
 
   /** One back end, set up, or the one in use where it is the same and works. */
-  async #setUp(backend: Backend, photo: Photo, signal: AbortSignal): Promise<SetUp<D>> {
-    if (this.#active?.backend === backend && this.#active.lost === null) return this.#active;
+  async #setUp(
+    backend: Backend,
+    wanted: Wanted,
+    photo: Photograph,
+    signal: AbortSignal,
+  ): Promise<SetUp<D>> {
+    const active = this.#active;
+    const serves = active?.backend === backend && active.wanted.gamut === wanted.gamut;
+    if (active && serves && active.lost === null) return active;
     let done: SetUp<D> | null = null;
     let lostEarly: string | null = null;
-    const drawing = await this.#ports.draw(backend, photo, (reason) => {
+    const lost = (reason: string): void => {
       if (done) this.#lost(done, reason);
       else lostEarly ??= reason;
+    };
+    const setUp = this.#ports.draw(backend, photo, wanted, lost, signal);
+    const drawing = await setUp.catch((thrown: unknown) => {
+      const error = toPhotoError(thrown);
+      // Nor could any other back end be set up. This ends the search.
+      if (error.code === 'photo-lost' && !signal.aborted) this.#fetchAnew(error.message);
+      throw error;
     });
     if (signal.aborted) {
       drawing.free();
@@ -251,60 +470,83 @@ export class Player<D extends Drawing> {
       drawing.free();
       throw new PhotoError('backend-lost', `it was lost while it was being set up: ${lostEarly}`);
     }
-    done = { backend, drawing, lost: null };
+    done = new SetUp(backend, wanted, drawing);
     return done;
   }
 
   #askForFrame(): void {
-    if (this.#frameAsked) return;
+    this.#stale = true;
+    this.#keepMoving();
+    this.#awaitFrame();
+  }
+
+  /** Draws before the browser does, if there is something new by then. */
+  #awaitFrame(): void {
+    if (this.#frameAsked || this.#unseen) return;
     this.#frameAsked = true;
     this.#ports.nextFrame(() => {
       this.#frameAsked = false;
-      this.#render();
+      if (this.#stale && !this.#unseen) this.#render();
     });
+  }
+
+  /** Nobody can see that the picture is out of date. */
+  get #unseen(): boolean {
+    return this.#drawn && !this.#visible;
+  }
+
+  #renderWhole(): void {
+    this.#whole = true;
+    this.#render();
   }
 
   #render(): void {
     // While a back end is being looked for, the one found will draw.
     if (!this.#held || !this.#active || this.#search) return;
-    try {
-      this.renderNow();
-    } catch {
-      return; // told already
-    }
+    const active = this.#active;
+    void this.#renderSoon().then(
+      () => {
+        if (this.#active === active) this.#shown();
+      },
+      () => {}, // told already
+    );
+  }
+
+  #shown(): void {
     if (this.#failed) {
       this.#failed = false;
       this.#listener.recovered();
     }
     if (!this.#drawn) {
       this.#drawn = true;
-      this.#listener.loaded(this.#held.photo);
+      this.#listener.loaded();
     }
   }
 
   /**
-   * A back end that stopped working is replaced by the next of the order. While one is being looked
-   * for, that search goes on, and what it finds is the replacement.
+   * A back end that stopped working is set up anew, or replaced by the next of the order where it cannot
+   * be had any more, or never drew a frame. While one is being looked for, that search goes on, and what it finds is the
+   * replacement.
    */
   #lost(lost: SetUp<D>, reason: string): void {
     lost.lost ??= reason;
     if (this.#active !== lost || this.#search || !this.#settings) return;
-    this.#replace(lost, reason, this.#settings.backends, lost.backend, '');
+    this.#replace(lost, reason, this.#settings.wanted, lost.backend, '');
   }
 
-  /** Takes up what comes after a lost back end, in the place of `previous`. */
+  /** Takes up a lost back end anew, or what comes after it, in the place of `previous`. */
   #replace(
-    { backend }: SetUp<D>,
+    { backend, drew }: SetUp<D>,
     reason: string,
-    order: readonly Backend[],
+    wanted: Wanted,
     previous: Backend | null,
     before: string,
   ): void {
     this.#dropActive();
-    const rest = after(order, backend);
     const lost = `${BACKEND_TITLES[backend]} was lost: ${reason}`;
     const why = [before, lost].filter(Boolean).join(' ');
-    if (rest.length > 0) void this.#choose(rest, previous, why);
+    const backends = drew ? from(wanted.backends, backend) : after(wanted.backends, backend);
+    if (backends.length > 0) void this.#choose({ ...wanted, backends }, previous, why);
     else this.#fail(new PhotoError('backend-lost', `${why} No other back end is left to try.`));
   }
 
@@ -314,6 +556,7 @@ export class Player<D extends Drawing> {
   }
 
   #dropActive(): void {
+    this.#keepMoving();
     this.#active?.drawing.free();
     this.#active = null;
   }
@@ -323,14 +566,23 @@ export class Player<D extends Drawing> {
     this.#load = null;
     this.#search?.abort();
     this.#search = null;
+    this.#next = null;
     this.#dropActive();
     this.#held?.release();
     this.#held = null;
     this.#drawn = false;
     this.#failed = false;
+    this.#stale = false;
+    this.#whole = false;
   }
 }
 
-function sameOrder(a: readonly Backend[], b: readonly Backend[]): boolean {
-  return a.length === b.length && a.every((backend, i) => backend === b[i]);
+function notLoaded(cause?: unknown): PhotoError {
+  const message = 'The photograph is not loaded yet: wait for its load event.';
+  return new PhotoError('not-loaded', message, cause);
+}
+
+function same(a: Wanted, b: Wanted): boolean {
+  const order = [a, b].map(({ backends }) => backends.join());
+  return order[0] === order[1] && a.software === b.software && a.gamut === b.gamut;
 }

@@ -1,18 +1,30 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { parseBackends, parseExposure, parseLight, stepTorch } from './settings.js';
+import {
+  parseBackends,
+  parseExposure,
+  parseGamut,
+  parseLight,
+  parseTone,
+  parseWhiteBalance,
+  stepTorch,
+} from './settings.js';
 
 test('an absent attribute means its default', () => {
   assert.equal(parseLight(null), 'flood');
-  assert.deepEqual(parseBackends(null), ['webgpu', 'webgl2', 'cpu']);
-  assert.deepEqual(parseBackends('  '), ['webgpu', 'webgl2', 'cpu']);
+  assert.equal(parseBackends(null), null);
+  assert.equal(parseBackends('  '), null);
   assert.equal(parseExposure(null), 1);
+  assert.deepEqual(parseWhiteBalance(null), [1, 1, 1]);
+  assert.equal(parseTone(''), 'clip');
+  assert.equal(parseGamut(null), 'srgb');
 });
 
-test('an exposure may be as large as the module can take', () => {
-  const largest = new Float32Array(new Uint32Array([0x7f7fffff]).buffer)[0];
-  assert.equal(parseExposure(String(largest)), largest);
-  assert.throws(() => parseExposure('1e300'), /from 0 to 3\.4e\+38/);
+test('a white balance is three factors', () => {
+  assert.deepEqual(parseWhiteBalance(' 1.2 1,0.8 '), [1.2, 1, 0.8]);
+  for (const value of ['1 1', '1 1 1 1', '1 x 1', '1 -1 1', '1 1 1e9']) {
+    assert.throws(() => parseWhiteBalance(value), { code: 'attribute', message: /red, green/ });
+  }
 });
 
 test('back ends keep the order they are given in, each once', () => {
@@ -23,7 +35,9 @@ test('unknown values are refused with the values known', () => {
   const refused = (message: RegExp) => ({ name: 'PhotoError', code: 'attribute', message });
   assert.throws(() => parseLight('moon'), refused(/“moon”.*flood, torch, checkerboard/));
   assert.throws(() => parseBackends('cpu vulkan'), refused(/“vulkan”.*webgpu, webgl2, cpu/));
-  for (const exposure of ['bright', '-1', 'Infinity', 'NaN', '1e300', '3.5e38']) {
+  assert.throws(() => parseTone('aces'), refused(/“aces”.*clip, filmic/));
+  assert.throws(() => parseGamut('p3'), refused(/“p3”.*srgb, display-p3/));
+  for (const exposure of ['bright', '-1', 'Infinity', 'NaN', '1e300', '1.1e30']) {
     assert.throws(() => parseExposure(exposure), refused(new RegExp(`“${exposure}”`)));
   }
 });

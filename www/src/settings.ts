@@ -1,7 +1,8 @@
 /** Attribute values, checked. Each parser throws a `PhotoError` that names what it would take. */
 
-import type { Backend } from './engine.js';
+import type { Backend, Gamut, ToneCurve } from './engine.js';
 import { PhotoError } from './errors.js';
+import type { Look } from './look.js';
 
 /** The built-in lights, in the order menus show them. */
 export const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum', 'fire'] as const;
@@ -20,8 +21,11 @@ export interface PicturePoint {
 
 const DEFAULT_LIGHT: LightName = 'flood';
 const DEFAULT_EXPOSURE = 1;
-/** What the module, which computes in 32-bit floats, can take. */
-const MAX_EXPOSURE = 2 ** 127 * (2 - 2 ** -23);
+const TONES = ['clip', 'filmic'] as const;
+const GAMUTS = ['srgb', 'display-p3'] as const;
+/** More than any picture needs, and little enough for the module, which computes in 32-bit floats. */
+const MAX_EXPOSURE = 1e30;
+const MAX_FACTOR = 1000;
 
 /** The `light` attribute; flood where there is none. */
 export function parseLight(value: string | null): LightName {
@@ -34,10 +38,10 @@ export function parseLight(value: string | null): LightName {
   );
 }
 
-/** The `backend` attribute, a list in order of preference; all of them where there is none. */
-export function parseBackends(value: string | null): readonly Backend[] {
+/** The `backend` attribute, a list in order of preference; `null` where there is none. */
+export function parseBackends(value: string | null): readonly Backend[] | null {
   const names = value?.split(/[\s,]+/).filter(Boolean) ?? [];
-  if (names.length === 0) return BACKENDS;
+  if (names.length === 0) return null;
   const order = new Set<Backend>();
   for (const name of names) {
     const known = BACKENDS.find((backend) => backend === name);
@@ -59,8 +63,53 @@ export function parseExposure(value: string | null): number {
   if (exposure >= 0 && exposure <= MAX_EXPOSURE) return exposure;
   throw new PhotoError(
     'attribute',
-    `The exposure “${value}” is not a number from 0 to ${MAX_EXPOSURE.toPrecision(2)}; ` +
+    `The exposure “${value}” is not a number from 0 to ${MAX_EXPOSURE}; ` +
       '1 shows the photograph as taken.',
+  );
+}
+
+/** The `white-balance` attribute, factors on red, green and blue; none of them where there is none. */
+export function parseWhiteBalance(value: string | null): Look['whiteBalance'] {
+  if (value === null || value.trim() === '') return [1, 1, 1];
+  const factors = value
+    .trim()
+    .split(/[\s,]+/)
+    .map(Number);
+  const [red, green, blue] = factors;
+  const fit =
+    factors.length === 3 && factors.every((factor) => factor >= 0 && factor <= MAX_FACTOR);
+  if (fit && red !== undefined && green !== undefined && blue !== undefined) {
+    return [red, green, blue];
+  }
+  throw new PhotoError(
+    'attribute',
+    `The white balance “${value}” is not three numbers from 0 to ${MAX_FACTOR}, for red, green and ` +
+      'blue; “1 1 1” shows the photograph as taken.',
+  );
+}
+
+/** The `tone` attribute; `clip` where there is none. */
+export function parseTone(value: string | null): ToneCurve {
+  return oneOf(value, TONES, 'tone');
+}
+
+/** The `gamut` attribute; `srgb` where there is none. */
+export function parseGamut(value: string | null): Gamut {
+  return oneOf(value, GAMUTS, 'gamut');
+}
+
+/** One of some names, the first where there is none. */
+function oneOf<N extends string>(
+  value: string | null,
+  names: readonly [N, ...N[]],
+  what: string,
+): N {
+  const name = value?.trim() || names[0];
+  const known = names.find((known) => known === name);
+  if (known) return known;
+  throw new PhotoError(
+    'attribute',
+    `There is no ${what} named “${name}”. Known names: ${names.join(', ')}.`,
   );
 }
 

@@ -1,83 +1,95 @@
-/** A canvas with a back end on it. */
+/** A canvas with a back end of the page's own module on it. */
 
-import type { Backend, Engine, Photo, Relighter } from './engine.js';
-import { PhotoError } from './errors.js';
-import type { Drawing, LightSetting } from './player.js';
+import { blobOf, type CanvasSurface } from './canvas.js';
+import type { Lease } from './devices.js';
+import type { Engine, Gamut, Photo, Relighter } from './engine.js';
+import { type PhotoError, toPhotoError } from './errors.js';
+import { Lamp } from './lamp.js';
+import { sizeOf } from './light-pixels.js';
+import { isLive, type LightPicture } from './light-source.js';
+import type { LightSetting } from './lights.js';
+import { type Look, makeDisplay } from './look.js';
 
 /** What of the module drawing needs. */
-type DrawEngine = Pick<Engine, 'Light' | 'Relighter'>;
+type DrawEngine = Pick<Engine, 'Display' | 'Light'>;
 
 /** See the module. */
-export class CanvasDrawing implements Drawing {
+export class CanvasDrawing implements CanvasSurface {
   readonly canvas: HTMLCanvasElement;
-  readonly #engine: DrawEngine;
+  readonly #engine: Pick<Engine, 'Display'>;
+  readonly #lamp: Lamp;
   readonly #photo: Photo;
   readonly #relighter: Relighter;
-  readonly #listening = new AbortController();
+  /** Whether the device has a picture as its light. */
+  #pictured = false;
+  readonly #lease: Pick<Lease, 'fail' | 'release'> | null;
 
-  private constructor(
+  /** On a device, `lease` is the share of it, which is given up at the end. */
+  constructor(
     engine: DrawEngine,
     photo: Photo,
     relighter: Relighter,
     canvas: HTMLCanvasElement,
-    lost: (reason: string) => void,
+    lease: Pick<Lease, 'fail' | 'release'> | null = null,
   ) {
     this.#engine = engine;
+    this.#lamp = new Lamp(engine);
     this.#photo = photo;
     this.#relighter = relighter;
+    this.#lease = lease;
     this.canvas = canvas;
-    // Both kinds of GPU may go away while nothing is being drawn.
-    const { signal } = this.#listening;
-    canvas.addEventListener('webglcontextlost', () => lost('the browser took it away.'), {
-      signal,
-    });
-    void relighter.lost?.then(({ message }) => {
-      if (!signal.aborted) lost(message || 'the graphics device is gone.');
-    });
-  }
-
-  /** Sets a back end up on a canvas of its own: one used by one API cannot be used by another. */
-  static async create(
-    engine: DrawEngine,
-    backend: Backend,
-    photo: Photo,
-    lost: (reason: string) => void,
-  ): Promise<CanvasDrawing> {
-    const canvas = document.createElement('canvas');
-    const relighter = await engine.Relighter.create(backend, photo, canvas);
-    return new CanvasDrawing(engine, photo, relighter, canvas, lost);
   }
 
   get kernel(): string {
     return this.#relighter.kernel;
   }
 
-  render(setting: LightSetting, exposure: number): void {
-    const { Light } = this.#engine;
-    const light =
-      setting.name === 'torch' && setting.torch
-        ? Light.torch(this.#photo, setting.torch.x, setting.torch.y)
-        : Light.builtin(this.#photo, setting.name);
+  get gamut(): Gamut {
+    return this.#relighter.gamut;
+  }
+
+  render(setting: LightSetting, look: Look, detail: number): PhotoError | null {
+    const display = makeDisplay(this.#engine, look, this.gamut);
     try {
-      this.#relighter.render(light, exposure);
+      if (this.#takes(setting.picture)) {
+        this.#pictured = true;
+        this.#relighter.renderPicture(display, detail);
+        return null;
+      }
+      const { light, asked, fault } = this.#lamp.turnTo(setting, this.#photo);
+      // A picture that cannot be had any more leaves what was had of it.
+      this.#pictured &&= !asked;
+      if (this.#pictured) this.#relighter.renderPicture(display, detail);
+      else this.#relighter.render(light, display, detail);
+      return fault;
+    } catch (thrown) {
+      const { code, message } = toPhotoError(thrown);
+      if (code === 'backend-lost') this.#lease?.fail(message);
+      throw thrown;
     } finally {
-      light.free();
+      display.free();
     }
   }
 
-  /** The picture as it was drawn last, in the turn of the event loop that drew it. */
+  /** Whether the device takes a picture as it is, which spares it a way through the page's memory. */
+  #takes(picture: LightPicture | null): boolean {
+    const size = picture && isLive(picture) && sizeOf(picture);
+    if (!size || size.width === 0 || size.height === 0) return false;
+    try {
+      return this.#relighter.takePicture(picture, size.width, size.height);
+    } catch {
+      // Reading it tells what is wrong.
+      return false;
+    }
+  }
+
   toBlob(type: string, quality?: number): Promise<Blob> {
-    return new Promise((resolve, reject) => {
-      const done = (blob: Blob | null) =>
-        blob
-          ? resolve(blob)
-          : reject(new PhotoError('internal', `The browser could not encode ${type}.`));
-      this.canvas.toBlob(done, type, quality);
-    });
+    return blobOf(this.canvas, type, quality);
   }
 
   free(): void {
-    this.#listening.abort();
     this.#relighter.free();
+    this.#lease?.release();
+    this.#lamp.free();
   }
 }

@@ -40,18 +40,16 @@ class FakeWorker implements WorkerLike {
   }
 }
 
-/** The page's module, and the photographs that came of it. */
+/** The page's module, and the photographs of two tiles that came of it. */
 function page() {
-  const photos: { tiles: number[]; freed: boolean }[] = [];
+  const photos: { tiles: [number, number][]; freed: boolean }[] = [];
   const Photo = {
     receive(_geometry: Float64Array, _basis: Float32Array, _metadata: string) {
-      const received = { tiles: [] as number[], freed: false };
+      const received = { tiles: [] as [number, number][], freed: false };
       photos.push(received);
       const photo = {
-        putTile: (index: number, bytes: Uint8Array) => {
-          if (bytes.length === 0) throw Object.assign(new Error('no tile'), { code: 'internal' });
-          received.tiles.push(index);
-        },
+        tiles: 2,
+        putTile: (index: number, bytes: Uint8Array) => received.tiles.push([index, bytes.length]),
         free: () => {
           received.freed = true;
         },
@@ -67,12 +65,9 @@ const PHOTO: Answer = {
   geometry: new Float64Array(12),
   basis: new Float32Array(9),
   metadata: '{}',
+  decodedBytes: 700,
 };
-const tile = (index: number, length = 4): Answer => ({
-  kind: 'tile',
-  index,
-  bytes: new Uint8Array(length),
-});
+const tile = (length: number): Answer => ({ kind: 'tile', bytes: new Uint8Array(length) });
 
 async function started(answers: (request: Request) => Answer[], engine = page().engine) {
   const worker = new FakeWorker(answers);
@@ -87,16 +82,24 @@ test('bytes go to the worker and a photograph comes of them, tile by tile', asyn
     (request) =>
       request.kind === 'feed'
         ? [{ kind: 'fed', state: stateAt(request.offset + request.bytes.length) }]
-        : [PHOTO, tile(0), tile(1), { kind: 'done' }],
+        : [PHOTO, tile(40), tile(50), { kind: 'done' }],
     engine,
   );
   assert.equal(decoder.state.bytesFed, 0);
   await decoder.feed(0, new Uint8Array(300));
   await decoder.feed(300, new Uint8Array(600));
   assert.deepEqual(decoder.state, stateAt(900));
-  await decoder.finish();
-  assert.deepEqual(photos, [{ tiles: [0, 1], freed: false }]);
+  const photograph = await decoder.finish();
   assert.ok(worker.ended);
+  assert.equal(photograph.facts.decodedBytes, 700);
+  // Nobody has asked for them yet, and they may be wanted elsewhere.
+  assert.deepEqual(photos, [{ tiles: [], freed: false }]);
+  await photograph.inPage(() => {});
+  const tiles = [
+    [0, 40],
+    [1, 50],
+  ];
+  assert.deepEqual(photos, [{ tiles, freed: false }]);
 });
 
 test('what is wrong with a file keeps its code', async () => {
@@ -137,15 +140,16 @@ test('a decoder that is freed keeps nobody waiting', async () => {
   assert.ok(worker.ended);
 });
 
-test('a photograph that is not received whole is freed', async () => {
+test('a photograph that is not received whole is none', async () => {
   for (const answers of [
-    [PHOTO, tile(0), { kind: 'failed', code: 'internal', message: 'no memory' }],
-    [PHOTO, tile(0, 0)],
+    [PHOTO, tile(40), { kind: 'failed', code: 'internal', message: 'no memory' }],
+    [PHOTO, tile(40), { kind: 'done' }],
+    [{ kind: 'done' }],
   ] as Answer[][]) {
     const { photos, engine } = page();
     const { worker, decoder } = await started(() => answers, engine);
     await assert.rejects(decoder.finish(), { code: 'internal' });
-    assert.equal(photos[0]?.freed, true);
+    assert.ok(photos.every(({ freed }) => freed));
     assert.ok(worker.ended);
   }
 });

@@ -1,8 +1,9 @@
 /** Decoding in a worker of its own, which ends with the photograph and gives its memory back. */
 
 import type { DecoderState, PhotoDecoder } from './decoding.js';
-import type { Engine, Photo } from './engine.js';
+import type { Engine } from './engine.js';
 import { PhotoError } from './errors.js';
+import { Photograph, type TileBytes } from './photograph.js';
 
 /** What the page asks of the worker. One thing at a time. */
 export type Request =
@@ -17,8 +18,10 @@ export type Answer =
       readonly geometry: Float64Array;
       readonly basis: Float32Array;
       readonly metadata: string;
+      readonly decodedBytes: number;
     }
-  | { readonly kind: 'tile'; readonly index: number; readonly bytes: Uint8Array }
+  /** One after the other. */
+  | { readonly kind: 'tile'; readonly bytes: TileBytes }
   | { readonly kind: 'done' }
   | { readonly kind: 'failed'; readonly code: string; readonly message: string };
 
@@ -86,23 +89,24 @@ export class WorkerDecoder implements PhotoDecoder {
     await this.#until('fed');
   }
 
-  async finish(): Promise<Photo> {
-    let photo: Photo | undefined;
+  async finish(): Promise<Photograph> {
     try {
       const { Photo } = await this.#engine();
       this.#ask({ kind: 'finish' });
+      const heads: (Answer & { kind: 'photo' })[] = [];
+      const tiles: TileBytes[] = [];
       await this.#until('done', (answer) => {
-        if (answer.kind === 'photo') {
-          photo = Photo.receive(answer.geometry, answer.basis, answer.metadata);
-        } else if (answer.kind === 'tile') {
-          photo?.putTile(answer.index, answer.bytes);
-        }
+        if (answer.kind === 'photo') heads.push(answer);
+        else if (answer.kind === 'tile') tiles.push(answer.bytes);
       });
-      if (!photo) throw new PhotoError('internal', 'The decoding worker gave no photograph.');
-      return photo;
-    } catch (thrown) {
-      photo?.free();
-      throw thrown;
+      const [head] = heads;
+      if (!head) throw new PhotoError('internal', 'The decoding worker gave no photograph.');
+      const photo = Photo.receive(head.geometry, head.basis, head.metadata);
+      if (photo.tiles === tiles.length) {
+        return Photograph.received(photo, tiles, head.decodedBytes);
+      }
+      photo.free();
+      throw new PhotoError('internal', 'The decoding worker gave a part of a photograph.');
     } finally {
       this.free();
     }

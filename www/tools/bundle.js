@@ -1,4 +1,4 @@
-/** Bundles www/src into dist/relightable-photo.js and the worker beside it, and writes the types to dist/types. */
+/** Bundles www/src into dist/relightable-photo.js and the workers beside it, and writes the types to dist/types. */
 
 import { execFileSync } from 'node:child_process';
 import { rmSync } from 'node:fs';
@@ -13,6 +13,7 @@ await build({
   entryPoints: {
     'relightable-photo': 'www/src/index.ts',
     'relightable-photo-worker': 'www/src/decode-worker.ts',
+    'relightable-photo-relighter': 'www/src/relight-worker.ts',
   },
   outdir: 'dist',
   bundle: true,

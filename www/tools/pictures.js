@@ -13,6 +13,13 @@ export function decodePng(bytes) {
   return { width, height, data };
 }
 
+/** @param {Picture} picture */
+export function encodePng({ width, height, data }) {
+  const png = new PNG({ width, height });
+  png.data = Buffer.from(data);
+  return PNG.sync.write(png);
+}
+
 /**
  * @param {Picture} a
  * @param {Picture} b

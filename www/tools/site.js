@@ -15,10 +15,11 @@ const PAGE_FILES = new Set(['/', '/index.html', '/page.css', '/page.js', '/icon.
 
 /**
  * What the element is made to live under: no other hosts, no inline code or style, no eval, no
- * `blob:` or `data:`. WebAssembly has to be allowed by name.
+ * `blob:` or `data:`. WebAssembly has to be allowed by name. Films that visitors choose are the page's
+ * own affair.
  */
 const CONTENT_SECURITY_POLICY =
-  "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self'; connect-src 'self'";
+  "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self'; connect-src 'self'; media-src blob:";
 
 /**
  * @param {{ photos: string }} options folder whose `.ltm` files are served below /photos/

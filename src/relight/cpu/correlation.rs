@@ -7,6 +7,7 @@
 
 use super::fft::{Between, Complex, Fft, Packed};
 use super::lanes::{LANES, Plain, Vector};
+use super::squares::even_reach;
 use crate::transport::{Basis, CHANNELS, QUAD, Window};
 
 /// Sides of transforms to choose from; the largest holds a window of 63 and as much again.
@@ -22,6 +23,8 @@ pub struct Correlator {
     fft: Fft,
     /// Origins along a square's side.
     reach: usize,
+    /// Elements along the side of what a square sees; not more than the transforms'.
+    sees: usize,
     quads: usize,
     /// Of the functions, mirrored; `[group, u, v]`.
     spectra: Vec<Packed>,
@@ -46,9 +49,11 @@ impl Correlator {
     pub fn new(basis: &Basis, window: Window, across: usize, down: usize) -> Self {
         let side = window.side() as usize;
         let n = side_for(basis.rank(), side, across, down);
+        let reach = even_reach(n + 1 - side, [across, down]);
         let mut correlator = Self {
             fft: Fft::new(n),
-            reach: n + 1 - side,
+            reach,
+            sees: reach + side - 1,
             quads: basis.rank().div_ceil(QUAD),
             spectra: Vec::new(),
         };
@@ -120,13 +125,15 @@ impl Correlator {
         }
     }
 
-    /// `C` of a square, as `[origin, channel, quad]`, of these `channels` of what `row` yields of the
-    /// light: elements of the row of that number, as many as a square sees.
+    /// `C` of a square, as `[origin, channel, quad]`, of the first `quads` of components and these
+    /// `channels` of what `row` yields of the light: elements of the row of that number, as many as a
+    /// square sees.
     #[inline(always)]
     pub fn correlate<'a, V: Vector>(
         &self,
         row: impl Fn(usize) -> &'a [[f32; 4]],
         channels: &[usize],
+        quads: usize,
         work: &mut Workspace,
         out: &mut [[f32; QUAD]],
     ) {
@@ -135,10 +142,11 @@ impl Correlator {
             self.along_u::<V>(&row, *channel, work);
             self.along_v::<V>(*channel, work);
         }
-        for (group, spectra) in self.spectra.chunks_exact(n * n).enumerate() {
+        let groups = self.spectra.chunks_exact(n * n);
+        for (group, spectra) in groups.take(quads.div_ceil(TOGETHER / QUAD)).enumerate() {
             for (i, channel) in channels.iter().enumerate() {
                 self.invert::<V>(spectra, *channel, work);
-                self.collect::<V>(group, (i, channels.len()), work, out);
+                self.collect::<V>(group, quads, (i, channels.len()), work, out);
             }
         }
     }
@@ -155,7 +163,12 @@ impl Correlator {
     ) {
         let n = self.fft.side();
         for first in (0..n).step_by(2 * LANES) {
-            let rows: [&[[f32; 4]]; 2 * LANES] = std::array::from_fn(|l| &row(first + l)[..n]);
+            // All is dark beyond what the square sees.
+            let rows: [&[[f32; 4]]; 2 * LANES] =
+                std::array::from_fn(|l| match first + l < self.sees {
+                    true => &row(first + l)[..self.sees],
+                    false => &[],
+                });
             let is_dark = |row: &[[f32; 4]]| row.iter().all(|element| element[channel] == 0.0);
             if rows.iter().all(|row| is_dark(row)) {
                 work.rows.fill(Packed::default());
@@ -164,8 +177,8 @@ impl Correlator {
                     &mut work.between,
                     #[inline(always)]
                     |u: usize| {
-                        let part =
-                            |first: usize| std::array::from_fn(|l| rows[first + l][u][channel]);
+                        let element = |l: usize| rows[l].get(u).map_or(0.0, |e| e[channel]);
+                        let part = |first: usize| std::array::from_fn(|l| element(first + l));
                         Packed {
                             re: part(0),
                             im: part(LANES),
@@ -252,14 +265,15 @@ impl Correlator {
     fn collect<V: Vector>(
         &self,
         group: usize,
+        quads: usize,
         (channel, channels): (usize, usize),
         work: &mut Workspace,
         out: &mut [[f32; QUAD]],
     ) {
         let first = group * TOGETHER / QUAD;
-        let quads = (self.quads - first).min(TOGETHER / QUAD);
-        let each = channels * self.quads;
-        let at = channel * self.quads + first;
+        let each = channels * quads;
+        let at = channel * quads + first;
+        let quads = (quads - first).min(TOGETHER / QUAD);
         for (v, out) in out.chunks_exact_mut(self.reach * each).enumerate() {
             self.fft.transform(
                 &mut work.between,
@@ -365,7 +379,8 @@ mod tests {
             let row = |v: usize| &light[v * n..(v + 1) * n];
             let mut out = vec![[0.0; QUAD]; reach * reach * CHANNELS * quads];
             let mut work = correlator.workspace();
-            correlator.correlate::<Plain>(row, &[0, 1, 2], &mut work, &mut out);
+            let quads = correlator.quads();
+            correlator.correlate::<Plain>(row, &[0, 1, 2], quads, &mut work, &mut out);
             for o in [0, 1, reach - 1, reach * reach / 2, reach * reach - 1] {
                 for c in 0..CHANNELS {
                     for k in 0..rank {

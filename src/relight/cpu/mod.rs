@@ -15,9 +15,11 @@ mod lanes;
 mod padded;
 mod squares;
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::ops::Range;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
-use super::{Light, LinearPicture, Rgba8Picture, Tint, tone};
+use super::display::Encoder;
+use super::{Display, Light, LinearPicture, Rgba8Picture, Tint, detailed};
 use crate::transport::{CHANNELS, QUAD, Tile, Transport};
 use crate::workers::Workers;
 use correlation::{Correlator, Workspace};
@@ -43,7 +45,11 @@ pub struct Relighter {
     squares: Squares,
     light: PaddedLight,
     /// Of each square's pixels; in a lock of its own for threads to share the squares out.
-    linear: Vec<Mutex<Vec<[f32; CHANNELS]>>>,
+    linear: Vec<RwLock<Vec<[f32; CHANNELS]>>>,
+    /// Of components, in fours, those that are used.
+    quads: usize,
+    /// Whether all has to be done anew, whatever of the light has changed.
+    stale: bool,
     /// Of threads that are not at work, kept from frame to frame.
     scratch: Mutex<Vec<Scratch>>,
 }
@@ -59,7 +65,7 @@ impl Relighter {
     /// Plans the work. All is dark until the first light.
     pub fn new(transport: Arc<Transport>) -> Self {
         let geometry = &transport.geometry;
-        let bounds = squares::bounds(&transport);
+        let bounds = squares::bounds(geometry);
         let factored = transport
             .tiles
             .iter()
@@ -76,9 +82,11 @@ impl Relighter {
             squares.origin,
             squares.seen(geometry.window.side() as usize),
         );
-        let dark = |square: &Square| Mutex::new(vec![[0.0; CHANNELS]; square.places.len()]);
+        let dark = |square: &Square| RwLock::new(vec![[0.0; CHANNELS]; square.places.len()]);
         Self {
             linear: squares.all.iter().map(dark).collect(),
+            quads: correlator.as_ref().map_or(0, Correlator::quads),
+            stale: false,
             correlator,
             squares,
             scratch: Mutex::default(),
@@ -92,6 +100,15 @@ impl Relighter {
         &self.transport
     }
 
+    /// Uses the first of the components only, a share of them of 0 to 1, from the next light on. They
+    /// come in fours, of which there is always one.
+    pub fn set_detail(&mut self, share: f32) {
+        let all = self.correlator.as_ref().map_or(0, Correlator::quads);
+        let quads = detailed(all, share);
+        self.stale |= quads != self.quads;
+        self.quads = quads;
+    }
+
     /// Takes a light in the place of the last one; does only what its changes ask for.
     ///
     /// # Panics
@@ -99,14 +116,30 @@ impl Relighter {
     pub fn relight(&mut self, light: &Light, workers: &impl Workers) {
         let extent = self.transport.geometry.light;
         assert_eq!(light.extent(), extent, "a light of another extent");
-        self.light.put(light);
+        self.relight_from(0, light, workers);
+    }
+
+    /// Rows of the light that any pixel sees.
+    pub fn light_rows(&self) -> Range<u32> {
+        self.light.rows_seen()
+    }
+
+    /// [`relight`](Self::relight) by a light's rows from `first` on, among them all that any pixel sees.
+    ///
+    /// # Panics
+    /// If rows are missing, or of another width.
+    pub fn relight_from(&mut self, first: u32, rows: &Light, workers: &impl Workers) {
+        let width = self.transport.geometry.light.width;
+        assert_eq!(rows.extent().width, width, "a light of another width");
+        self.light.put(rows, first);
         let side = self.squares.reach + self.transport.geometry.window.side() as usize - 1;
         let stale: Vec<usize> = (0..self.squares.all.len())
             .filter(|&i| {
                 let [u, v] = self.squares.all[i].at;
-                self.light.changed(u..u + side, v..v + side)
+                self.stale || self.light.changed(u..u + side, v..v + side)
             })
             .collect();
+        self.stale = false;
         let this = &*self;
         workers.map(stale.len(), |i| {
             let mut scratch = lock(&this.scratch).pop().unwrap_or_default();
@@ -122,7 +155,9 @@ impl Relighter {
     #[inline(always)]
     fn relight_square<V: Vector>(&self, i: usize, scratch: &mut Scratch) {
         let square = &self.squares.all[i];
-        let mut linear = lock(&self.linear[i]);
+        let mut linear = self.linear[i]
+            .write()
+            .unwrap_or_else(PoisonError::into_inner);
         let [u, v] = square.at;
         let side = self.squares.reach + self.transport.geometry.window.side() as usize - 1;
         let rows = (v..v + side).map(|v| &self.light.row(u, v)[..side]);
@@ -139,11 +174,11 @@ impl Relighter {
         {
             let work = scratch.work.get_or_insert_with(|| correlator.workspace());
             let channels = tint.channels();
-            let (reach, quads) = (correlator.reach(), correlator.quads());
+            let (reach, quads) = (correlator.reach(), self.quads);
             let texels = reach * reach * channels.len() * quads;
             scratch.seen.resize(texels, [0.0; QUAD]);
             let row = |r: usize| &self.light.row(u, v + r)[..side];
-            correlator.correlate::<V>(row, channels, work, &mut scratch.seen);
+            correlator.correlate::<V>(row, channels, quads, work, &mut scratch.seen);
             for run in &square.runs {
                 let tile = &self.tile(run).coefficients;
                 if !tile.is_dark() {
@@ -154,7 +189,7 @@ impl Relighter {
                         quads,
                         tint,
                     };
-                    combine::combine(tile, run.first, places, from, linear);
+                    combine::combine::<V>(tile, run.first, places, from, linear);
                 }
             }
         }
@@ -167,7 +202,7 @@ impl Relighter {
             for at in 0..run.length {
                 let place = usize::from(square.places[run.begin + at]);
                 let (column, row) = (place % self.squares.reach, place / self.squares.reach);
-                let seen = self.light.rows(u + column, v + row);
+                let seen = self.light.elements_from(u + column, v + row);
                 let sum = direct::sum(tile, run.first + at, seen, window, self.light.stride());
                 let y = &mut linear[run.begin + at];
                 (0..CHANNELS).for_each(|c| y[c] += sum[c]);
@@ -182,8 +217,9 @@ impl Relighter {
     /// The picture, in units of the measurement.
     pub fn linear(&self) -> LinearPicture {
         let mut picture = LinearPicture::black(self.transport.geometry.camera);
-        self.for_each_run(|run, linear| {
-            let at = self.transport.geometry.camera.index(run.pixel);
+        let camera = self.transport.geometry.camera;
+        self.for_each_run(0..camera.height, |run, linear| {
+            let at = camera.index(run.pixel);
             for (y, &[r, g, b]) in picture.pixels[at..at + run.length].iter_mut().zip(linear) {
                 *y = [r, g, b, 0.0];
             }
@@ -191,40 +227,65 @@ impl Relighter {
         picture
     }
 
-    /// The picture scaled by `exposure`, as 8-bit sRGB.
-    pub fn picture(&self, exposure: f32) -> Rgba8Picture {
+    /// The picture as a display shows it.
+    pub fn picture(&self, display: &Display, workers: &impl Workers) -> Rgba8Picture {
         let mut picture = Rgba8Picture::black(self.transport.geometry.camera);
-        self.tone_map(exposure, &mut picture);
+        self.show(
+            display,
+            0..picture.extent.height,
+            &mut picture.pixels,
+            workers,
+        );
         picture
     }
 
-    /// The picture scaled by `exposure`, as 8-bit sRGB, into one of the camera's extent.
+    /// These rows of the picture, as a display shows them.
     ///
     /// # Panics
-    /// If `picture` has another extent.
-    pub fn tone_map(&self, exposure: f32, picture: &mut Rgba8Picture) {
-        let camera = self.transport.geometry.camera;
-        assert_eq!(picture.extent, camera, "a picture of another extent");
-        picture.pixels.fill([0, 0, 0, 255]);
-        let curve = tone::Curve::get();
-        self.for_each_run(|run, linear| {
-            let at = camera.index(run.pixel);
-            for (y, linear) in picture.pixels[at..at + run.length].iter_mut().zip(linear) {
-                let [r, g, b] = linear.map(|y| curve.srgb8(y * exposure));
-                *y = [r, g, b, 255];
-            }
+    /// If `out` has not as many pixels.
+    pub fn show(
+        &self,
+        display: &Display,
+        rows: Range<u32>,
+        out: &mut [[u8; 4]],
+        workers: &impl Workers,
+    ) {
+        let width = self.transport.geometry.camera.width as usize;
+        assert_eq!(out.len(), rows.len() * width, "pixels of other rows");
+        let encoder = Encoder::new(display);
+        // A lock for each, as threads share them out.
+        let bands: Vec<_> = out
+            .chunks_mut((BAND_ROWS * width).max(1))
+            .map(Mutex::new)
+            .collect();
+        workers.map(bands.len(), |i| {
+            let first = rows.start + (i * BAND_ROWS) as u32;
+            self.show_band(&encoder, first, &mut lock(&bands[i]));
         });
     }
 
-    fn for_each_run(&self, mut each: impl FnMut(&Run, &[[f32; CHANNELS]])) {
+    fn show_band(&self, encoder: &Encoder, first: u32, out: &mut [[u8; 4]]) {
+        let width = self.transport.geometry.camera.width as usize;
+        let end = first + (out.len() / width) as u32;
+        out.fill([0, 0, 0, 255]);
+        self.for_each_run(first..end, |run, linear| {
+            let at = (run.pixel.y - first) as usize * width + run.pixel.x as usize;
+            encoder.encode(linear, run.pixel, &mut out[at..at + run.length]);
+        });
+    }
+
+    fn for_each_run(&self, rows: Range<u32>, mut each: impl FnMut(&Run, &[[f32; CHANNELS]])) {
         for (square, linear) in self.squares.all.iter().zip(&self.linear) {
-            let linear = lock(linear);
-            for run in &square.runs {
+            let linear = linear.read().unwrap_or_else(PoisonError::into_inner);
+            for run in square.runs.iter().filter(|run| rows.contains(&run.pixel.y)) {
                 each(run, &linear[run.begin..run.begin + run.length]);
             }
         }
     }
 }
+
+/// Rows that one thread encodes at a time.
+const BAND_ROWS: usize = 64;
 
 /// A square to relight.
 struct SquareWork<'a> {

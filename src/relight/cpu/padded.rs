@@ -30,8 +30,19 @@ impl PaddedLight {
         }
     }
 
-    /// Takes a light in the place of the last one.
-    pub fn put(&mut self, light: &Light) {
+    /// Rows of the light that are seen.
+    pub fn rows_seen(&self) -> Range<u32> {
+        let top = i64::from(self.origin.v);
+        let on_display = |row: i64| row.clamp(0, i64::from(self.light.height)) as u32;
+        on_display(top)..on_display(top + i64::from(self.extent.height))
+    }
+
+    /// Takes a light in the place of the last one: its rows from `first` on, which are all that are seen.
+    pub fn put(&mut self, light: &Light, first: u32) {
+        let seen = self.rows_seen();
+        let rows = first..first + light.extent().height;
+        let all = seen.is_empty() || (rows.start <= seen.start && seen.end <= rows.end);
+        assert!(all, "rows that are seen are missing");
         let (width, stride) = (self.light.width as usize, self.extent.width as usize);
         let rows = self
             .elements
@@ -42,11 +53,12 @@ impl PaddedLight {
             // The part of the row that is on the display.
             let left = i64::from(self.origin.u);
             let (from, to) = (left.max(0), (left + stride as i64).min(width as i64));
-            if !(0..self.light.height as i32).contains(&v) || from >= to {
+            if v < 0 || !seen.contains(&(v as u32)) || from >= to {
                 continue;
             }
             let length = (to - from) as usize;
-            let new = &light.elements()[v as usize * width + from as usize..][..length];
+            let row_of = (v as u32 - first) as usize * width;
+            let new = &light.elements()[row_of + from as usize..][..length];
             let start = (from - left) as usize;
             let old = &mut row[start..start + length];
             let differ = |(a, b): (&[f32; 4], &[f32; 4])| a != b;
@@ -75,7 +87,7 @@ impl PaddedLight {
 
     /// Elements from a column and row on, [`stride`](Self::stride) from row to row.
     #[inline(always)]
-    pub fn rows(&self, column: usize, row: usize) -> &[[f32; 4]] {
+    pub fn elements_from(&self, column: usize, row: usize) -> &[[f32; 4]] {
         &self.elements[row * self.stride() + column..]
     }
 

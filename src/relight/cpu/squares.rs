@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::transport::{CameraPx, Element, Extent, Transport};
+use crate::transport::{CameraPx, Element, Extent, Geometry, Transport};
 
 /// Origins along a square's side where nothing is correlated.
 pub const DIRECT_REACH: usize = 64;
@@ -42,33 +42,46 @@ pub struct Square {
     pub places: Vec<u16>,
 }
 
-/// All squares that any pixel looks at.
+/// The squares that pixels which may be lit look at.
 #[derive(Clone, Debug)]
 pub struct Squares {
-    /// The first origin of the first of them.
+    /// The first of the origins in any of them.
     pub origin: Element,
     /// Origins along each one's side, at most 256.
     pub reach: usize,
+    /// Origins along u, and along v, from the first to the last of them.
     across: usize,
     down: usize,
-    /// Those that any pixel looks at.
+    /// One by one.
     pub all: Vec<Square>,
 }
 
-/// The origins that matter: of pixels that are not dark, with windows not wholly off the display.
-pub fn bounds(transport: &Transport) -> Bounds {
+/// The origins that matter: of pixels with windows not wholly off the display. Those of dark tiles count
+/// too: where squares lie decides how sums are rounded, and a photograph's tiles may be shared out.
+pub fn bounds(geometry: &Geometry) -> Bounds {
     let mut bounds: Option<Bounds> = None;
-    for_each_pixel(transport, |_, _, _, Element { u, v }| {
-        let known = bounds.clone().unwrap_or(Bounds {
-            columns: u..u,
-            rows: v..v,
-        });
-        bounds = Some(Bounds {
-            columns: known.columns.start.min(u)..known.columns.end.max(u + 1),
-            rows: known.rows.start.min(v)..known.rows.end.max(v + 1),
-        });
-    });
+    for rect in geometry.tiles() {
+        for pixel in rect.pixels() {
+            let origin = geometry.window_origin(pixel);
+            if !geometry.reaches_display(origin) {
+                continue;
+            }
+            let Element { u, v } = origin;
+            let known = bounds.get_or_insert(Bounds {
+                columns: u..u + 1,
+                rows: v..v + 1,
+            });
+            known.columns = known.columns.start.min(u)..known.columns.end.max(u + 1);
+            known.rows = known.rows.start.min(v)..known.rows.end.max(v + 1);
+        }
+    }
     bounds.unwrap_or_default()
+}
+
+/// As many squares as a reach of at most `most` asks for along `spans`, but no larger than that takes.
+pub fn even_reach(most: usize, spans: [usize; 2]) -> usize {
+    let even = |span: usize| span.div_ceil(span.div_ceil(most).max(1));
+    spans.map(even).into_iter().fold(1, usize::max)
 }
 
 impl Squares {
@@ -76,12 +89,17 @@ impl Squares {
     pub fn new(transport: &Transport, bounds: &Bounds, reach: usize) -> Self {
         let across = bounds.columns.len().div_ceil(reach);
         let down = bounds.rows.len().div_ceil(reach);
+        // As much to spare on either side, so that halves of a photograph are halves of the squares.
+        let first = |origins: &Range<i32>, count: usize| {
+            origins.start - ((count * reach - origins.len()) / 2) as i32
+        };
+        let grid = Element {
+            u: first(&bounds.columns, across),
+            v: first(&bounds.rows, down),
+        };
         let mut all = vec![Square::default(); across * down];
         for_each_pixel(transport, |tile, p, pixel, Element { u, v }| {
-            let (u, v) = (
-                (u - bounds.columns.start) as usize,
-                (v - bounds.rows.start) as usize,
-            );
+            let (u, v) = ((u - grid.u) as usize, (v - grid.v) as usize);
             let square = &mut all[v / reach * across + u / reach];
             let place = v % reach * reach + u % reach;
             square.at = [u / reach * reach, v / reach * reach];
@@ -106,25 +124,33 @@ impl Squares {
             }
         });
         all.retain(|square| !square.places.is_empty());
+        // Of the grid, what is left.
+        let ends = |axis: usize| {
+            let places = all.iter().map(|square| square.at[axis]);
+            let end = places.clone().max().map_or(0, |last| last + reach);
+            places.min().unwrap_or(0)..end
+        };
+        let (columns, rows) = (ends(0), ends(1));
         for square in &mut all {
+            square.at = [square.at[0] - columns.start, square.at[1] - rows.start];
             square.runs.shrink_to_fit();
             square.places.shrink_to_fit();
         }
         Self {
             origin: Element {
-                u: bounds.columns.start,
-                v: bounds.rows.start,
+                u: grid.u + columns.start as i32,
+                v: grid.v + rows.start as i32,
             },
             reach,
-            across,
-            down,
+            across: columns.len(),
+            down: rows.len(),
             all,
         }
     }
 
     /// What all squares see, through windows of that side.
     pub fn seen(&self, window: usize) -> Extent {
-        let span = |count: usize| (count * self.reach + window - 1) as u32;
+        let span = |origins: usize| (origins + window - 1) as u32;
         Extent {
             width: span(self.across),
             height: span(self.down),

@@ -6,13 +6,15 @@ use crate::relight::texture_layout::{Fold, Params, TextureLayout};
 use crate::transport::{Basis, CHANNELS, Extent, Transport};
 
 /// What the shader's bindings stand for, in their order.
+#[derive(Debug)]
 pub(super) struct Textures {
     coefficients: wgpu::Texture,
     pub seen: wgpu::Texture,
     codes: wgpu::Texture,
-    pixels: wgpu::Texture,
+    origins: wgpu::Texture,
     steps: wgpu::Texture,
     pub light: wgpu::Texture,
+    tiles: wgpu::Texture,
     pub params: wgpu::Buffer,
     /// Pair by pair.
     basis: Vec<wgpu::Buffer>,
@@ -21,7 +23,7 @@ pub(super) struct Textures {
 
 impl Textures {
     pub fn new(device: &wgpu::Device, layout: &TextureLayout, basis: &Basis) -> Self {
-        use wgpu::TextureFormat::{Rgba16Sint, Rgba32Float, Rgba32Sint};
+        use wgpu::TextureFormat::{Rg16Sint, Rgba16Sint, Rgba32Float, Rgba32Sint};
         use wgpu::TextureUsages;
         let texture = |label, Fold { extent, layers }, format, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
@@ -54,9 +56,15 @@ impl Textures {
                 TextureUsages::RENDER_ATTACHMENT,
             ),
             codes: texture("codes", layout.codes(), Rgba16Sint, given),
-            pixels: texture("pixels", flat(layout.pixels()), Rgba32Sint, given),
+            origins: texture("origins", flat(layout.origins()), Rg16Sint, given),
             steps: texture("steps", flat(layout.steps()), Rgba32Float, given),
-            light: texture("light", flat(layout.light()), Rgba32Float, given),
+            light: texture(
+                "light",
+                flat(layout.light()),
+                Rgba32Float,
+                given | TextureUsages::RENDER_ATTACHMENT,
+            ),
+            tiles: texture("tiles", flat(layout.tiles()), Rgba32Sint, given),
             params: uniforms("params", &[0; size_of::<Params>()]),
             basis: pairs
                 .iter()
@@ -97,9 +105,12 @@ impl Textures {
             );
             Ok::<_, std::convert::Infallible>(())
         });
-        let pixels = layout.pixel_texels(transport);
-        let texels = bytemuck::cast_slice(&pixels);
-        write_texture(queue, &self.pixels, texels, [0; 3], layout.pixels());
+        let origins = layout.origin_texels();
+        let texels = bytemuck::cast_slice(&origins);
+        write_texture(queue, &self.origins, texels, [0; 3], layout.origins());
+        let tiles = layout.tile_texels(transport);
+        let texels = bytemuck::cast_slice(&tiles);
+        write_texture(queue, &self.tiles, texels, [0; 3], layout.tiles());
         let steps = layout.step_texels(transport);
         let texels = bytemuck::cast_slice(&steps);
         write_texture(queue, &self.steps, texels, [0; 3], layout.steps());
@@ -118,9 +129,10 @@ impl Textures {
             array(&self.coefficients),
             array(&self.seen),
             array(&self.codes),
-            self.pixels.create_view(&Default::default()),
+            self.origins.create_view(&Default::default()),
             self.steps.create_view(&Default::default()),
             self.light.create_view(&Default::default()),
+            self.tiles.create_view(&Default::default()),
         ];
         let textures = (0..)
             .zip(&views)
@@ -128,7 +140,7 @@ impl Textures {
                 binding,
                 resource: wgpu::BindingResource::TextureView(view),
             });
-        let entries: Vec<_> = textures.chain([uniform(6, &self.params)]).collect();
+        let entries: Vec<_> = textures.chain([uniform(7, &self.params)]).collect();
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("relight"),
             layout: &pipeline.get_bind_group_layout(0),
@@ -154,9 +166,9 @@ impl Textures {
                             binding: 5,
                             resource: wgpu::BindingResource::TextureView(&light),
                         },
-                        uniform(6, &self.params),
-                        uniform(7, basis),
-                        uniform(8, channel),
+                        uniform(7, &self.params),
+                        uniform(8, basis),
+                        uniform(9, channel),
                     ],
                 })
             });
@@ -175,6 +187,31 @@ impl Textures {
             })
         };
         (0..self.seen.depth_or_array_layers()).map(layer).collect()
+    }
+}
+
+impl Drop for Textures {
+    /// Frees the device's memory now; the garbage collector does not know how much there is.
+    fn drop(&mut self) {
+        for texture in [
+            &self.coefficients,
+            &self.seen,
+            &self.codes,
+            &self.origins,
+            &self.steps,
+            &self.light,
+            &self.tiles,
+        ] {
+            texture.destroy();
+        }
+        for buffer in self
+            .basis
+            .iter()
+            .chain(&self.channels)
+            .chain([&self.params])
+        {
+            buffer.destroy();
+        }
     }
 }
 

@@ -1,0 +1,66 @@
+//! Photographs with made-up coefficients: the time that relighting takes does not depend on their values.
+
+use relightable_photo::transport::{
+    BandTile, Basis, CHANNELS, Correspondence, Extent, Geometry, QUAD, TexelCode, Window,
+};
+
+const WINDOW: u32 = 15;
+
+/// Sides of the pictures, in camera pixels, and numbers of components.
+pub const SIDES: [u32; 3] = [128, 512, 2048];
+pub const RANKS: [usize; 3] = [8, 16, 32];
+
+/// A square picture, two camera pixels a light element.
+pub fn geometry(side: u32) -> Geometry {
+    Geometry {
+        camera: square(side),
+        light: square(side / 2),
+        window: Window::new(WINDOW).unwrap(),
+        correspondence: Correspondence {
+            affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
+        },
+        tile_side: 128,
+    }
+}
+
+pub fn square(side: u32) -> Extent {
+    Extent {
+        width: side,
+        height: side,
+    }
+}
+
+pub fn basis(geometry: &Geometry, rank: usize) -> Basis {
+    let area = geometry.window.area();
+    let kernel = |k: usize| {
+        (0..area)
+            .map(|s| noise(k * area + s) / WINDOW as f32)
+            .collect()
+    };
+    Basis {
+        kernels: (0..rank).map(kernel).collect(),
+    }
+}
+
+/// A tile by its number.
+pub fn tile(geometry: &Geometry, rank: usize, number: usize) -> BandTile {
+    let mut tile = BandTile::dark(geometry.tile(number));
+    let values = tile.rect.extent.area() * rank;
+    let coefficient = |i| [0, 1, 2].map(|c| (noise(3 * (i + number * values) + c) - 0.3) * 0.02);
+    tile.coefficients = (0..values).map(coefficient).collect();
+    tile
+}
+
+/// Codes that a frame reads, and the picture it writes.
+pub fn bytes(side: u32, rank: usize) -> usize {
+    let codes = CHANNELS * rank.div_ceil(QUAD) * size_of::<TexelCode>();
+    square(side).area() * (codes + size_of::<[u8; 4]>())
+}
+
+/// A number from 0 to 1 for every other number.
+pub fn noise(i: usize) -> f32 {
+    let mut h = (i as u32).wrapping_mul(0x9e37_79b9);
+    h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
+    h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
+    (h ^ (h >> 16)) as f32 / u32::MAX as f32
+}

@@ -1,0 +1,15 @@
+/** Copies its own memory: takes some where it is told how much, and copies it whenever it is told 0. */
+
+const scope = /** @type {any} */ (globalThis);
+let from = new Uint8Array();
+let to = new Uint8Array();
+
+scope.onmessage = (/** @type {MessageEvent<number>} */ { data: bytes }) => {
+  if (bytes > 0) {
+    from = new Uint8Array(bytes).fill(1);
+    to = new Uint8Array(bytes).fill(2);
+  } else {
+    to.set(from);
+  }
+  scope.postMessage(null);
+};

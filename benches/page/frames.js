@@ -1,0 +1,237 @@
+/** In the page: an element on one back end, and how long its frames take. */
+
+import { devices, drawCount, drawn, waitForScreen } from './hooks.js';
+
+/** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
+/** @typedef {'video' | 'torch' | 'exposure' | 'canvas'} KindName */
+
+/** Lights that frames take turns with. */
+const LIGHTS = 4;
+const FEWEST = 3;
+/** Even so few are not waited for longer than this many times as long. */
+const LONGEST = 5;
+const MOST = 200;
+const CANVAS = { width: 640, height: 360 };
+/** So large the element is on the page. */
+const SHOWN = '256px';
+
+/**
+ * Puts an element into the page; settles once it shows its photograph, and rejects with its error.
+ *
+ * @param {string} src
+ * @param {string | null} backend
+ * @returns {Promise<RelightablePhoto>}
+ */
+export async function mount(src, backend) {
+  await customElements.whenDefined('relightable-photo');
+  const photo = document.createElement('relightable-photo');
+  photo.style.width = SHOWN;
+  if (backend) photo.backend = backend;
+  photo.src = src;
+  const loaded = new Promise((resolve, reject) => {
+    photo.addEventListener('load', resolve);
+    photo.addEventListener('error', ({ code, message }) =>
+      reject(new Error(`${code}: ${message}`)),
+    );
+  });
+  document.body.append(photo);
+  await loaded;
+  return photo;
+}
+
+/** A number from 0 to 1. */
+const noise = () => Math.random();
+
+/** @type {Record<KindName, (photo: RelightablePhoto) => (frame: number) => void>} */
+const KINDS = {
+  /** Every element of the light is new and coloured in each frame. */
+  video(photo) {
+    const { lightWidth: width, lightHeight: height } = /** @type {any} */ (photo.info);
+    const films = Array.from({ length: LIGHTS }, () =>
+      Float32Array.from({ length: 3 * width * height }, noise),
+    );
+    const source = { data: films[0], width, height };
+    photo.lightSource = /** @type {any} */ (source);
+    return (frame) => {
+      source.data = films[frame % LIGHTS];
+      photo.lightChanged();
+    };
+  },
+  /** Another picture on a canvas in each frame. */
+  canvas(photo) {
+    const films = Array.from({ length: LIGHTS }, () => {
+      const film = new OffscreenCanvas(CANVAS.width, CANVAS.height);
+      const pixels = new ImageData(CANVAS.width, CANVAS.height);
+      pixels.data.forEach((_, i) => {
+        pixels.data[i] = i % 4 === 3 ? 255 : 256 * noise();
+      });
+      film.getContext('2d')?.putImageData(pixels, 0, 0);
+      return film.transferToImageBitmap();
+    });
+    const canvas = Object.assign(document.createElement('canvas'), CANVAS);
+    const context = canvas.getContext('2d');
+    photo.lightSource = canvas;
+    return (frame) => {
+      context?.drawImage(/** @type {ImageBitmap} */ (films[frame % LIGHTS]), 0, 0);
+      photo.lightChanged();
+    };
+  },
+  torch(photo) {
+    photo.lightSource = null;
+    photo.light = 'torch';
+    return (frame) => {
+      photo.torch = { x: 0.3 + 0.04 * (frame % LIGHTS), y: 0.5 };
+    };
+  },
+  /** Under a light that stays: the last of those above. */
+  exposure(photo) {
+    return (frame) => {
+      photo.exposure = 1 + 0.1 * (frame % LIGHTS);
+    };
+  },
+};
+
+/**
+ * Waits until what was drawn is there. A WebGPU device says so. Of a canvas drawn in 2D, which may be a
+ * graphics device's memory too, one pixel is read, and by another canvas: one that is read itself is
+ * taken out of that memory by browsers.
+ *
+ * @param {RelightablePhoto} photo
+ */
+async function finished(photo) {
+  if (photo.activeBackend === 'webgpu') {
+    await Promise.all([...devices].map((device) => device.queue.onSubmittedWorkDone()));
+    return;
+  }
+  readPixel(canvasOf(photo));
+}
+
+/** @param {RelightablePhoto} photo */
+const canvasOf = (photo) =>
+  /** @type {HTMLCanvasElement} */ (photo.shadowRoot?.querySelector('canvas'));
+
+const probe = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
+
+/** @param {HTMLCanvasElement} canvas */
+function readPixel(canvas) {
+  probe?.drawImage(canvas, 0, 0, 1, 1, 0, 0, 1, 1);
+  probe?.getImageData(0, 0, 1, 1);
+}
+
+/**
+ * Draws frames of a kind one after the other, for so many seconds, and gives milliseconds from the change
+ * until the element has drawn (`issued`), and until the picture is there too (`done`).
+ *
+ * @param {RelightablePhoto} photo
+ * @param {KindName} name
+ * @param {number} seconds
+ */
+export async function time(photo, name, seconds) {
+  const change = KINDS[name](photo);
+  waitForScreen(false);
+  await frame(photo, change, 1);
+  const times = { issued: /** @type {number[]} */ ([]), done: /** @type {number[]} */ ([]) };
+  const start = performance.now();
+  for (let i = 0; i < MOST; i += 1) {
+    const passed = (performance.now() - start) / 1000;
+    if (i >= FEWEST ? passed > seconds : passed > LONGEST * seconds) break;
+    // Another than before, the first too.
+    const { issued, done } = await frame(photo, change, i + 2);
+    times.issued.push(issued);
+    times.done.push(done);
+  }
+  waitForScreen(true);
+  return times;
+}
+
+/**
+ * @param {RelightablePhoto} photo
+ * @param {(frame: number) => void} change
+ * @param {number} i
+ */
+async function frame(photo, change, i) {
+  const drawing = drawn();
+  const start = performance.now();
+  change(i);
+  await drawing;
+  const issued = performance.now() - start;
+  await finished(photo);
+  return { issued, done: performance.now() - start };
+}
+
+/**
+ * Draws so many frames, not waiting for the screen.
+ *
+ * @param {RelightablePhoto} photo
+ * @param {KindName} name
+ * @param {number} count
+ */
+export async function draw(photo, name, count) {
+  const change = KINDS[name](photo);
+  waitForScreen(false);
+  for (let i = 1; i <= count; i += 1) await frame(photo, change, i);
+  waitForScreen(true);
+}
+
+/**
+ * Milliseconds of a frame where several are drawn before they are waited for. About the same as one that
+ * is waited for: nothing is left when the wait is over.
+ *
+ * @param {RelightablePhoto} photo
+ * @param {KindName} name
+ * @param {number} each
+ */
+export async function timeTogether(photo, name, each) {
+  const change = KINDS[name](photo);
+  waitForScreen(false);
+  const times = [];
+  for (let turn = 0; turn < FEWEST; turn += 1) {
+    const start = performance.now();
+    for (let i = 0; i < each; i += 1) {
+      const drawing = drawn();
+      change(i);
+      await drawing;
+    }
+    await finished(photo);
+    times.push((performance.now() - start) / each);
+  }
+  waitForScreen(true);
+  return times;
+}
+
+/** Milliseconds of waiting for a picture that is there. @param {RelightablePhoto} photo */
+export async function timeWaiting(photo) {
+  const times = [];
+  for (let i = 0; i < FEWEST; i += 1) {
+    const start = performance.now();
+    await finished(photo);
+    times.push(performance.now() - start);
+  }
+  return times;
+}
+
+/**
+ * Frames a second as the page shows them: one for each the screen asks for, where that is kept up with.
+ *
+ * @param {RelightablePhoto} photo
+ * @param {KindName} name
+ * @param {number} seconds
+ */
+export async function showFor(photo, name, seconds) {
+  const change = KINDS[name](photo);
+  const start = performance.now();
+  let frames = 0;
+  for (; performance.now() - start < 1000 * seconds; frames += 1) {
+    const drawing = drawn();
+    change(frames);
+    await drawing;
+  }
+  return frames / ((performance.now() - start) / 1000);
+}
+
+/** Frames that are drawn while nothing is asked for. @param {number} seconds */
+export async function unasked(seconds) {
+  const before = drawCount();
+  await new Promise((resolve) => setTimeout(resolve, 1000 * seconds));
+  return drawCount() - before;
+}

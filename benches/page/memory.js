@@ -1,0 +1,178 @@
+/** Memory that elements take, and what of it is left when they are gone. */
+
+import { inPage, isSoftware, openPage } from './pages.js';
+
+/** @typedef {import('playwright-core').Page} Page */
+/** @typedef {import('./hooks.js').Backend} Backend */
+
+const FRAMES = 10_000;
+/** On a device that is a program, which takes its time. */
+const FEWER_FRAMES = 1000;
+const CYCLES = 200;
+const MB = 1e6;
+
+/** Memory of the WebAssembly of the page and of those of its workers that relight. @param {Page} page */
+async function modules(page) {
+  const bytes = async () => {
+    const module = '/relightable-photo/wasm/relightable_photo.js';
+    return /** @type {number} */ (
+      (await (await import(module)).default()).memory.buffer.byteLength
+    );
+  };
+  const relighters = page.workers().filter((worker) => worker.url().includes('relighter'));
+  return Promise.all([page.evaluate(bytes), ...relighters.map((worker) => worker.evaluate(bytes))]);
+}
+
+/** What a page holds once garbage is collected. @param {Page} page */
+async function holdings(page) {
+  const session = await page.context().newCDPSession(page);
+  // Twice: what the first finds is let go by the second, where it is held by the browser's own objects.
+  for (let i = 0; i < 2; i += 1) await session.send('HeapProfiler.collectGarbage');
+  await page.waitForTimeout(200);
+  await session.send('HeapProfiler.collectGarbage');
+  const usage = /** @type {any} */ (await session.send('Runtime.getHeapUsage'));
+  const { nodes, jsEventListeners } = await session.send('Memory.getDOMCounters');
+  await session.detach();
+  const wasm = (await modules(page)).reduce((sum, bytes) => sum + bytes, 0);
+  const [contexts, devices] = await inPage(page, async ({ hooks }) => [
+    hooks.liveContexts(),
+    hooks.devices.size,
+  ]);
+  return {
+    wasm_mb: wasm / MB,
+    heap_mb: usage.usedSize / MB,
+    buffers_mb: (usage.backingStorageSize ?? 0) / MB,
+    nodes,
+    listeners: jsEventListeners,
+    contexts,
+    devices,
+    workers: page.workers().length,
+  };
+}
+
+/** @typedef {Awaited<ReturnType<typeof holdings>>} Holdings */
+
+/**
+ * Prints what was held first and last, and gives what came on top.
+ *
+ * @param {string} name
+ * @param {Holdings} first
+ * @param {Holdings} last
+ */
+function report(name, first, last) {
+  const keys = /** @type {(keyof Holdings)[]} */ (Object.keys(first));
+  const text = keys.map((key) => `${key} ${short(first[key])} → ${short(last[key])}`);
+  console.log(`${name}\n    ${text.join(', ')}`);
+  return Object.fromEntries(
+    keys.map((key) => [`${name.replaceAll(' ', '_')}_more_${key}`, last[key] - first[key]]),
+  );
+}
+
+const short = (/** @type {number} */ value) => String(Math.round(100 * value) / 100);
+
+/**
+ * WebAssembly memory with a photograph on the CPU, by two workers, over the bytes it decodes to: when it is
+ * shown, and after frames of each kind.
+ *
+ * @param {string} src
+ */
+async function overDecoded(src) {
+  const page = await openPage({ workers: 2 });
+  const decoded = await inPage(
+    page,
+    async ({ frames }, src) => (await frames.mount(src, 'cpu')).info?.decodedBytes ?? Number.NaN,
+    src,
+  );
+  /** @type {Record<string, number>} */
+  const figures = {};
+  for (const kind of /** @type {const} */ (['loaded', 'torch', 'video'])) {
+    if (kind !== 'loaded') await inPage(page, drawSome, kind);
+    const bytes = await modules(page);
+    const total = bytes.reduce((sum, n) => sum + n, 0);
+    const percent = 100 * (total / decoded - 1);
+    const [own, ...crew] = bytes.map((n) => short(n / MB));
+    console.log(
+      `${kind}: wasm memory ${short(total / MB)} MB (page ${own}, workers ${crew.join(' and ')}), ` +
+        `decoded ${short(decoded / MB)} MB: ${percent.toFixed(1)} % over`,
+    );
+    figures[`memory_over_decoded_${kind}_percent`] = percent;
+  }
+  await page.context().close();
+  return figures;
+}
+
+/** In the page. @param {import('./pages.js').Modules} modules @param {'torch' | 'video'} kind */
+async function drawSome({ frames }, kind) {
+  const photo = document.querySelector('relightable-photo');
+  if (photo) await frames.draw(photo, kind, 20);
+}
+
+/**
+ * What comes on top in many frames of a torch.
+ *
+ * @param {string} src
+ * @param {Backend} backend
+ */
+async function overFrames(src, backend) {
+  const page = await openPage({});
+  const draw = (/** @type {number} */ count) =>
+    inPage(
+      page,
+      async ({ frames }, { src, backend, count }) => {
+        const photo = document.querySelector('relightable-photo');
+        await frames.draw(photo ?? (await frames.mount(src, backend)), 'torch', count);
+      },
+      { src, backend, count },
+    );
+  await draw(100);
+  const kernel = await page.evaluate("document.querySelector('relightable-photo').kernel");
+  const frames = isSoftware(String(kernel)) ? FEWER_FRAMES : FRAMES;
+  const first = await holdings(page);
+  await draw(frames);
+  const last = await holdings(page);
+  await page.context().close();
+  return report(`${frames} frames ${backend}`, first, last);
+}
+
+/**
+ * What comes on top when elements are made and removed again and again. None is left at either time.
+ *
+ * @param {string} src
+ * @param {Backend} backend
+ */
+async function overCycles(src, backend) {
+  const page = await openPage({});
+  const cycle = (/** @type {number} */ count) =>
+    inPage(
+      page,
+      async ({ frames }, { src, backend, count }) => {
+        for (let i = 0; i < count; i += 1) {
+          const photo = await frames.mount(src, backend);
+          await frames.draw(photo, 'torch', 2);
+          photo.remove();
+          await new Promise((resolve) => setTimeout(resolve));
+        }
+      },
+      { src, backend, count },
+    );
+  await cycle(10);
+  const first = await holdings(page);
+  await cycle(CYCLES);
+  const last = await holdings(page);
+  await page.context().close();
+  return report(`${CYCLES} cycles ${backend}`, first, last);
+}
+
+/**
+ * @param {{ small: string, large: string }} photos addresses: of one for many frames, and of one that
+ *   memory is held against
+ */
+export async function memory({ small, large }) {
+  console.log('\nMemory, after garbage is collected, first and last:\n');
+  const figures = await overDecoded(large);
+  for (const backend of /** @type {const} */ (['cpu', 'webgl2', 'webgpu'])) {
+    Object.assign(figures, await overFrames(small, backend));
+    Object.assign(figures, await overCycles(small, backend));
+  }
+  return figures;
+}

@@ -1,0 +1,88 @@
+/** One Chromium and one server for all measurements. */
+
+import { readFile } from 'node:fs/promises';
+import { join } from 'node:path';
+import { launchChromium } from '../../www/tools/chromium.js';
+import { listen } from '../../www/tools/serve.js';
+import { site } from '../../www/tools/site.js';
+
+/** @typedef {{ frames: typeof import('./frames.js'), hooks: typeof import('./hooks.js'), peers: typeof import('./peers.js'), copying: typeof import('./copying.js') }} Modules */
+
+const HTML = `<!doctype html><html lang="en"><title>Bench</title>
+<script type="module" src="/bench/hooks.js"></script>
+<script type="module" src="/relightable-photo/relightable-photo.js"></script>`;
+/** Pages so isolated are told the time to 5 microseconds. */
+const ISOLATED = {
+  'Cross-Origin-Opener-Policy': 'same-origin',
+  'Cross-Origin-Embedder-Policy': 'require-corp',
+};
+
+/** @type {string} */
+let origin;
+/** @type {import('playwright-core').Browser} */
+let browser;
+
+/**
+ * Serves a folder's photographs, and starts the browser.
+ *
+ * @param {string} photos
+ * @returns {Promise<() => Promise<void>>} ends both
+ */
+export async function start(photos) {
+  const serveSite = site({ photos });
+  const server = await listen(async (request, response) => {
+    for (const [name, value] of Object.entries(ISOLATED)) response.setHeader(name, value);
+    const [path = ''] = (request.url ?? '').split('?');
+    const script = /^\/bench\/([a-z-]+\.js)$/.exec(path)?.[1];
+    if (path === '/bench') response.setHeader('Content-Type', 'text/html').end(HTML);
+    else if (script) {
+      response.setHeader('Content-Type', 'text/javascript');
+      response.end(await readFile(join(import.meta.dirname, script)));
+    } else serveSite(request, response);
+  }, 0);
+  origin = server.url;
+  browser = await launchChromium();
+  return async () => {
+    await browser.close();
+    await server.close();
+  };
+}
+
+export const browserVersion = () => browser.version();
+
+/**
+ * A page of its own; whoever opens it closes its context. With `workers`, it believes to have so many
+ * cores.
+ *
+ * @param {{ workers?: number }} options
+ */
+export async function openPage({ workers }) {
+  const context = await browser.newContext();
+  const page = await context.newPage();
+  page.setDefaultTimeout(0);
+  page.on('pageerror', (error) => console.error(`page: ${error}`));
+  await page.goto(`${origin}bench${workers ? `?workers=${workers}` : ''}`);
+  return page;
+}
+
+/** Whether a graphics device is a program that makes up for a missing one. @param {string} adapter */
+export const isSoftware = (adapter) => /swiftshader|llvmpipe|basic render/i.test(adapter);
+
+/**
+ * Runs a function in a page, with the modules of this folder that are for pages.
+ *
+ * @template A, R
+ * @param {import('playwright-core').Page} page
+ * @param {(modules: Modules, argument: A) => Promise<R>} work
+ * @param {A} [argument]
+ * @returns {Promise<R>}
+ */
+export async function inPage(page, work, argument) {
+  const text = `(async () => {
+    const names = ['frames', 'hooks', 'peers', 'copying'];
+    const all = await Promise.all(names.map((name) => import('/bench/' + name + '.js')));
+    const modules = Object.fromEntries(names.map((name, i) => [name, all[i]]));
+    return (${work})(modules, ${JSON.stringify(argument) ?? 'undefined'});
+  })()`;
+  return /** @type {R} */ (await page.evaluate(text));
+}

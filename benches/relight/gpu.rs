@@ -1,0 +1,96 @@
+//! Frames on a graphics device, if the machine has one.
+
+use std::rc::Rc;
+use std::time::Instant;
+
+use pollster::block_on;
+use relightable_photo::relight::backend::Frame;
+use relightable_photo::relight::webgpu::{Device, Offscreen};
+use relightable_photo::relight::{Display, Light};
+
+use super::film::{self, Kind};
+use super::{Figures, RANKS, made_up};
+
+const SIDES: [u32; 2] = [512, 2048];
+/// Copied to measure the memory's speed.
+const COPIED: u64 = 256 << 20;
+
+/// Milliseconds of a frame, of the fastest of a few runs of many: whole frames under a video, and the last
+/// pass alone, which is all that another exposure asks for.
+pub fn frames(figures: &mut Figures) {
+    let device = match block_on(Device::offscreen()) {
+        Ok(device) => Rc::new(device),
+        Err(error) => {
+            println!("\nNo graphics device: {error}");
+            return;
+        }
+    };
+    let of = match device.is_software() {
+        true => "software",
+        false => "gpu",
+    };
+    println!("\n{} ({of})", device.kernel());
+    if device.is_software() {
+        println!("A program in the place of a graphics processor: these are no figures of one.");
+    }
+    let copied = 2.0 * COPIED as f64 / device.copy_seconds(COPIED).unwrap();
+    figures.insert(format!("{of}_copy_bandwidth_gb_s"), copied / 1e9);
+    println!("copies {:.1} GB/s, read and written\n", copied / 1e9);
+    println!(
+        "{:20} {:>10} {:>10} {:>12}",
+        "", "video", "last pass", "of copying"
+    );
+    for side in SIDES {
+        for rank in RANKS {
+            let transport = film::transport(side, rank);
+            let photo = block_on(Offscreen::new(device.clone(), &transport));
+            let Ok(mut photo) = photo.inspect_err(|error| println!("{side}² rank {rank}: {error}"))
+            else {
+                continue;
+            };
+            let lights = Kind::Video.lights(transport.geometry.light);
+            let video = time(&device, |i| {
+                draw(&mut photo, &lights[i % lights.len()], 1.0);
+            });
+            let last = time(&device, |i| {
+                draw(&mut photo, &lights[0], 1.0 + i as f32 / 100.0);
+            });
+            let fraction = made_up::bytes(side, rank) as f64 / (last / 1e3) / copied;
+            println!(
+                "{:20} {video:10.3} {last:10.3} {:11.0}%",
+                format!("{side}² rank {rank}"),
+                100.0 * fraction
+            );
+            let key = |what: &str| format!("{of}_{side}_r{rank}_{what}");
+            figures.insert(key("video_ms"), video);
+            figures.insert(key("last_pass_ms"), last);
+            figures.insert(key("last_pass_copy_fraction"), fraction);
+        }
+    }
+}
+
+fn draw(photo: &mut Offscreen, light: &Light, exposure: f32) {
+    let frame = Frame {
+        light: Some(light),
+        display: Display::srgb(exposure),
+        detail: 1.0,
+    };
+    photo.draw(&frame).unwrap();
+}
+
+/// Of one of many that follow each other, as the device has them in turn.
+fn time(device: &Device, mut draw: impl FnMut(usize)) -> f64 {
+    let mut best = f64::INFINITY;
+    let mut run = |frames: usize| {
+        let start = Instant::now();
+        (0..frames).for_each(&mut draw);
+        device.wait().unwrap();
+        start.elapsed().as_secs_f64() * 1e3 / frames as f64
+    };
+    // So many that a run takes a tenth of a second.
+    let frames = (100.0 / run(1).min(run(2))).clamp(1.0, 300.0) as usize;
+    for _ in 0..5 {
+        best = best.min(run(frames));
+    }
+    best
+}

@@ -1,0 +1,104 @@
+/** A canvas that a crew of workers draws. */
+
+import type { CanvasSurface } from './canvas.js';
+import { blobOf } from './canvas.js';
+import type { Crew, Shift } from './crew.js';
+import type { Engine, Gamut } from './engine.js';
+import { PhotoError } from './errors.js';
+import { letGo } from './hand.js';
+import { Lamp } from './lamp.js';
+import type { LightSetting } from './lights.js';
+import type { Look } from './look.js';
+import type { Photograph } from './photograph.js';
+
+/** See the module. */
+export class CrewDrawing implements CanvasSurface {
+  readonly canvas: HTMLCanvasElement;
+  readonly kernel: string;
+  readonly gamut: Gamut;
+  readonly #lamp: Lamp;
+  readonly #photograph: Photograph;
+  readonly #crew: Crew;
+  readonly #context: CanvasRenderingContext2D;
+  #freed = false;
+
+  private constructor(
+    engine: Pick<Engine, 'Light'>,
+    photograph: Photograph,
+    crew: Crew,
+    context: CanvasRenderingContext2D,
+    kernel: string,
+    gamut: Gamut,
+  ) {
+    this.canvas = context.canvas;
+    this.kernel = kernel;
+    this.gamut = gamut;
+    this.#lamp = new Lamp(engine);
+    this.#photograph = photograph;
+    this.#crew = crew;
+    this.#context = context;
+  }
+
+  /** Rejects with `worker-unavailable` where there can be no workers; the photograph is whole then. */
+  static async create(
+    engine: Pick<Engine, 'Light'>,
+    photograph: Photograph,
+    crew: Crew,
+    wanted: Gamut,
+  ): Promise<CrewDrawing> {
+    const canvas = document.createElement('canvas');
+    canvas.width = photograph.facts.width;
+    canvas.height = photograph.facts.height;
+    // In the page's memory, where the pixels come from: where there is no graphics processor, every
+    // frame would go to a program in the place of one and back.
+    const context = canvas.getContext('2d', { colorSpace: wanted, willReadFrequently: true });
+    if (!context) {
+      throw new PhotoError('backend-unavailable', 'The canvas gives no 2D context.');
+    }
+    const kernel = await photograph.withCrew(crew, describe);
+    // Browsers that know no other gamut say nothing of it.
+    const gamut = context.getContextAttributes?.().colorSpace === wanted ? wanted : 'srgb';
+    return new CrewDrawing(engine, photograph, crew, context, kernel, gamut);
+  }
+
+  async render(setting: LightSetting, look: Look, detail: number): Promise<PhotoError | null> {
+    // Before its tiles are brought to the workers for nothing.
+    if (this.#freed) throw letGo();
+    try {
+      return await this.#photograph.withCrew(this.#crew, async (shift, photo) => {
+        if (this.#freed) throw letGo();
+        const { light, fault } = this.#lamp.turnTo(setting, photo);
+        const rows = await shift.relight(light, { look, gamut: this.gamut, detail });
+        const settings = { colorSpace: this.gamut };
+        if (this.#freed) throw letGo();
+        // All at once, and before their memory is used again.
+        for (const { first, count, pixels } of rows) {
+          const data = new Uint8ClampedArray(pixels);
+          this.#context.putImageData(
+            new ImageData(data, this.canvas.width, count, settings),
+            0,
+            first,
+          );
+        }
+        return fault;
+      });
+    } catch (thrown) {
+      if (!(thrown instanceof PhotoError && thrown.code === 'worker-unavailable')) throw thrown;
+      // Without workers this cannot draw, but a photograph that is fetched anew is drawn by the page.
+      throw new PhotoError('photo-lost', thrown.message, thrown);
+    }
+  }
+
+  toBlob(type: string, quality?: number): Promise<Blob> {
+    return blobOf(this.canvas, type, quality);
+  }
+
+  free(): void {
+    this.#freed = true;
+    this.#lamp.free();
+  }
+}
+
+function describe({ kernel, size }: Shift): string {
+  return `${kernel}, ${size} ${size === 1 ? 'worker' : 'workers'}`;
+}

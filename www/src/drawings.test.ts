@@ -1,0 +1,210 @@
+import assert from 'node:assert/strict';
+import test, { type TestContext } from 'node:test';
+import type { CanvasSurface } from './canvas.js';
+import { crewOf, type FakeWorker, light, photoOf, settle } from './crew-fakes.js';
+import type { Devices } from './devices.js';
+import { drawer } from './drawings.js';
+import type { Backend, Engine } from './engine.js';
+import { PhotoError } from './errors.js';
+import { Photograph } from './photograph.js';
+import { Player, type Settings } from './player.js';
+import { exposed, PLAIN, wanting } from './settings-fakes.js';
+
+const SETTINGS: Settings = {
+  src: 'a.ltm',
+  wanted: wanting(['cpu']),
+  light: { name: 'flood', torch: null, picture: null },
+  look: exposed(1),
+};
+
+/** Stands in for what of the document is used. */
+function fakeDocument(t: TestContext): void {
+  const newCanvas = () => {
+    const canvas = {
+      width: 0,
+      height: 0,
+      addEventListener: () => {},
+      getContext: () => ({ canvas, putImageData: () => {} }),
+    };
+    return canvas;
+  };
+  const fakes = { document: { createElement: newCanvas }, ImageData: class {} };
+  Object.assign(globalThis, fakes);
+  t.after(() => {
+    for (const name of Object.keys(fakes)) Reflect.deleteProperty(globalThis, name);
+  });
+}
+
+/** The module, which notes how many tiles it has when a back end is set up. */
+function fakeEngine(has: ReadonlySet<number>) {
+  const setUps: string[] = [];
+  const engine = {
+    Light: { builtin: () => light, torch: () => light },
+    Display: class {
+      free() {}
+    },
+  };
+  /** Devices that are had once `ask` has no objections. */
+  const devicesThat = (ask: (backend: Backend) => Promise<void>) => {
+    const lease = async (_: unknown, backend: Backend) => {
+      await ask(backend);
+      const draw = async () => {
+        setUps.push(`${backend} of ${has.size}`);
+        return { kernel: 'fake', gamut: 'srgb', render: () => {}, free: () => {} };
+      };
+      const release = () => released.push(backend);
+      return { graphics: { kernel: 'fake', software: backend === 'webgl2', draw }, release };
+    };
+    return { lease } as unknown as Devices;
+  };
+  const released: Backend[] = [];
+  return { engine: engine as unknown as Engine, devicesThat, setUps, released };
+}
+
+/** A player of a photograph of four tiles, which two workers draw. */
+async function playing(t: TestContext, ask = async (_: Backend): Promise<void> => {}) {
+  fakeDocument(t);
+  const { crew, workers, alive } = crewOf(2);
+  const { photo, has } = photoOf(4);
+  const { engine, devicesThat, setUps, released } = fakeEngine(has);
+  const frames: (() => void)[] = [];
+  const changes: string[] = [];
+  const player = new Player<CanvasSurface>(
+    {
+      open: async () => Photograph.decoded(photo),
+      draw: drawer(async () => engine, crew, devicesThat(ask)),
+      nextFrame: (callback) => frames.push(callback),
+      later: () => () => {},
+      now: () => 0,
+    },
+    {
+      loading: () => {},
+      progress: () => {},
+      drawn: () => {},
+      detailChanged: () => {},
+      loaded: () => {},
+      backendChanged: (_, backend) => changes.push(backend),
+      failed: (error) => changes.push(error.code),
+      recovered: () => {},
+    },
+  );
+  player.set(SETTINGS);
+  await settle();
+  assert.equal(has.size, 0);
+  return { player, workers, alive, has, setUps, released, frames, changes };
+}
+
+test('frames that wait when the back end is switched are drawn by the new one, and move no tiles', async (t) => {
+  const { player, workers, alive, has, setUps, frames, changes } = await playing(t);
+  for (const worker of workers) worker.slow = true;
+  player.set({ ...SETTINGS, look: exposed(2) });
+  frames.shift()?.();
+  await settle();
+  const waiting = player.renderNow();
+  player.set({ ...SETTINGS, wanted: wanting(['webgl2']) });
+  const during = player.renderNow();
+  await settle();
+  for (const worker of workers) worker.hurry();
+  await settle();
+  assert.deepEqual(changes, ['cpu', 'webgl2']);
+  assert.equal(await waiting, player.drawing);
+  assert.equal(await during, player.drawing);
+  await settle();
+  assert.deepEqual([has.size, alive()], [4, 0]);
+  assert.deepEqual(setUps, ['webgl2 of 4']);
+  assert.equal(workers.length, 2, 'none is started for a frame that nobody sees');
+});
+
+test('a picture of a photograph that is replaced in the middle of a frame is not-loaded', async (t) => {
+  const { player, workers } = await playing(t);
+  for (const worker of workers as FakeWorker[]) worker.slow = true;
+  const asked = [player.renderNow(), player.renderNow()].map((picture) =>
+    assert.rejects(picture, { code: 'not-loaded' }),
+  );
+  await settle();
+  player.set({ ...SETTINGS, src: null });
+  await Promise.all(asked);
+});
+
+/** Asks for back ends, and answers when the test does. */
+function asking() {
+  const asked: Backend[] = [];
+  let answer = (_: boolean): void => {};
+  const ask = (backend: Backend): Promise<void> => {
+    asked.push(backend);
+    return new Promise((resolve, reject) => {
+      const missing = new PhotoError('backend-unavailable', 'there is none');
+      answer = (yes) => (yes ? resolve() : reject(missing));
+    });
+  };
+  const answers = async (yes: boolean) => {
+    answer(yes);
+    await settle();
+  };
+  return { ask, asked, answers };
+}
+
+test('back ends that cannot be had leave tiles with the workers', async (t) => {
+  const { ask, asked, answers } = asking();
+  const { player, workers, has, changes } = await playing(t, ask);
+  player.set({ ...SETTINGS, wanted: wanting(['webgpu', 'webgl2', 'cpu']) });
+  await settle();
+  await answers(false);
+  await answers(false);
+  await player.renderNow();
+  assert.deepEqual(asked, ['webgpu', 'webgl2']);
+  assert.deepEqual([has.size, changes], [0, ['cpu']]);
+  assert.ok(workers.every(({ log }) => !log.includes('take')));
+});
+
+test('a device that is a program is passed over, unless back ends were named', async (t) => {
+  const { player, has, changes, setUps, released } = await playing(t);
+  const order = wanting(['webgl2', 'cpu']);
+  player.set({ ...SETTINGS, wanted: { ...order, software: false } });
+  await player.renderNow();
+  assert.deepEqual([has.size, changes, setUps], [0, ['cpu'], []]);
+  assert.deepEqual(released, ['webgl2']);
+  player.set({ ...SETTINGS, wanted: order });
+  await player.renderNow();
+  assert.deepEqual([changes, setUps], [['cpu', 'webgl2'], ['webgl2 of 4']]);
+  player.stop();
+  assert.deepEqual(released, ['webgl2', 'webgl2']);
+});
+
+test('back ends that do not answer keep nobody waiting who has given them up, and get nothing', async (t) => {
+  const { ask, asked, answers } = asking();
+  const { player, workers, setUps } = await playing(t, ask);
+  player.set({ ...SETTINGS, wanted: wanting(['webgpu']) });
+  await settle();
+  player.set(SETTINGS);
+  assert.equal((await player.renderNow()).kernel, 'fake, 2 workers');
+  await answers(true);
+  assert.deepEqual([asked, setUps], [['webgpu'], []]);
+  assert.ok(workers.every(({ log }) => !log.includes('take')));
+});
+
+test('a drawing that was freed draws nothing, and leaves tiles where they are', async (t) => {
+  fakeDocument(t);
+  const { crew, workers, alive } = crewOf(2);
+  const { photo, has } = photoOf(4);
+  const { engine, devicesThat } = fakeEngine(has);
+  const photograph = Photograph.decoded(photo);
+  const drawing = await drawer(
+    async () => engine,
+    crew,
+    devicesThat(async () => {}),
+  )('cpu', photograph, SETTINGS.wanted, () => {}, new AbortController().signal);
+  for (const worker of workers) worker.slow = true;
+  const frame = assert.rejects(Promise.resolve(drawing.render(SETTINGS.light, PLAIN, 1)), {
+    code: 'internal',
+  });
+  await settle();
+  drawing.free();
+  for (const worker of workers) worker.hurry();
+  await frame;
+  await photograph.inPage(() => {});
+  await assert.rejects(Promise.resolve(drawing.render(SETTINGS.light, PLAIN, 1)), {
+    code: 'internal',
+  });
+  assert.deepEqual([has.size, alive()], [4, 0]);
+});

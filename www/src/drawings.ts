@@ -1,0 +1,76 @@
+/** Who draws for an element: a back end in the page, or on the CPU the page's crew of workers. */
+
+import type { CanvasSurface } from './canvas.js';
+import { Crew } from './crew.js';
+import { CrewDrawing } from './crew-drawing.js';
+import { Devices, slowerThanCpu } from './devices.js';
+import { type Backend, type Engine, loadEngine } from './engine.js';
+import { PhotoError } from './errors.js';
+import type { Photograph } from './photograph.js';
+import type { Wanted } from './player.js';
+import { CanvasDrawing } from './surface.js';
+
+/** More would wait for memory, and for each other. */
+const MOST_WORKERS = 4;
+
+/** Sets a back end up on a canvas of its own: one used by one API cannot be used by another. */
+export type Draw = (
+  backend: Backend,
+  photograph: Photograph,
+  wanted: Wanted,
+  lost: (reason: string) => void,
+  signal: AbortSignal,
+) => Promise<CanvasSurface>;
+
+/**
+ * Draws by the module that `load` gives, and on the CPU by a crew where it can have workers. A device
+ * that cannot be had leaves tiles where they are, and keeps nobody from them while it is asked for.
+ */
+export function drawer(load: () => Promise<Engine>, crew: Crew, devices: Devices): Draw {
+  return async (backend, photograph, { gamut, software }, lost, signal) => {
+    const engine = await load();
+    if (backend === 'cpu') {
+      try {
+        return await CrewDrawing.create(engine, photograph, crew, gamut);
+      } catch (thrown) {
+        // Without workers the page does it.
+        if (!(thrown instanceof PhotoError && thrown.code === 'worker-unavailable')) throw thrown;
+      }
+      return photograph.inPage((photo) => {
+        const canvas = document.createElement('canvas');
+        const relighter = new engine.Relighter(photo, canvas, gamut);
+        return new CanvasDrawing(engine, photo, relighter, canvas);
+      }, signal);
+    }
+    const lease = await devices.lease(engine, backend, lost);
+    const { graphics } = lease;
+    try {
+      if (graphics.software && !software) throw slowerThanCpu(backend, graphics.kernel);
+      return await photograph.inPage(async (photo) => {
+        const canvas = document.createElement('canvas');
+        const relighter = await graphics.draw(photo, canvas, gamut);
+        return new CanvasDrawing(engine, photo, relighter, canvas, lease);
+      }, signal);
+    } catch (thrown) {
+      lease.release();
+      throw thrown;
+    }
+  };
+}
+
+const crewSize = Math.min(MOST_WORKERS, globalThis.navigator?.hardwareConcurrency ?? 1);
+
+/** Draws for the elements of this page. */
+export const draw = drawer(loadEngine, new Crew(startWorker, crewSize), new Devices());
+
+/** `null` where a script of this origin may not be a worker, or modules cannot be. */
+function startWorker(): Worker | null {
+  try {
+    // The address is written out for bundlers, which look for exactly this form.
+    return new Worker(new URL('./relightable-photo-relighter.js', import.meta.url), {
+      type: 'module',
+    });
+  } catch {
+    return null;
+  }
+}

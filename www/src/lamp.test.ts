@@ -1,0 +1,59 @@
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import type { Engine, Light, Photo } from './engine.js';
+import { PhotoError } from './errors.js';
+import { Lamp } from './lamp.js';
+import type { LightPicture, LinearLight } from './light-source.js';
+import type { LightSetting } from './lights.js';
+
+const PHOTO = {} as Photo;
+const GOOD: LinearLight = { data: new Float32Array(3), width: 1, height: 1 };
+const BAD: LinearLight = { data: new Float32Array(1), width: 1, height: 1 };
+
+const setting = (picture: LightPicture | null): LightSetting => ({
+  name: 'fire',
+  torch: null,
+  picture,
+});
+
+/** A lamp whose lights have names, and the names of those that are not freed. */
+function lamp() {
+  const lit = new Set<string>();
+  const light = (name: string) => {
+    lit.add(name);
+    return { name, free: () => lit.delete(name) } as unknown as Light;
+  };
+  const engine = {
+    Light: {
+      builtin: (_: Photo, name: string) => light(name),
+      fromLinear: (_: Photo, values: Float32Array) => {
+        if (values.length !== 3) throw new PhotoError('light-size', 'three values');
+        return light('linear');
+      },
+    },
+  };
+  const lamp = new Lamp(engine as unknown as Pick<Engine, 'Light'>);
+  return { lamp, lit };
+}
+
+test('a lamp has one light at a time', () => {
+  const { lamp: it, lit } = lamp();
+  it.turnTo(setting(null), PHOTO);
+  it.turnTo(setting(GOOD), PHOTO);
+  assert.deepEqual([...lit], ['linear']);
+  it.free();
+  assert.equal(lit.size, 0);
+});
+
+test('a light that cannot be had leaves the last one, and before any the built-in one', () => {
+  const { lamp: it, lit } = lamp();
+  const first = it.turnTo(setting(BAD), PHOTO);
+  assert.equal(first.fault?.code, 'light-size');
+  assert.deepEqual([...lit], ['fire']);
+  it.turnTo(setting(GOOD), PHOTO);
+  const last = it.turnTo(setting(BAD), PHOTO);
+  assert.equal(last.fault?.code, 'light-size');
+  assert.deepEqual([...lit], ['linear']);
+  assert.equal(it.turnTo(setting(null), PHOTO).fault, null);
+  assert.deepEqual([...lit], ['fire']);
+});

@@ -1,0 +1,87 @@
+/** A worker that relights rows of photographs: what a `Hand` starts and talks to. */
+
+import type { Answer, Request, Task } from './crew-protocol.js';
+import { type BandRelighter, type Engine, loadEngine, type Photo } from './engine.js';
+import { messageOf } from './errors.js';
+import { makeDisplay } from './look.js';
+import { workerScope } from './worker-scope.js';
+
+/** Rows of a photograph. */
+interface Band {
+  readonly photo: Photo;
+  readonly firstRow: number;
+  readonly rows: number;
+  /** None while tiles come and go. */
+  relighter: BandRelighter | null;
+}
+
+const scope = workerScope<Request, Answer>();
+const bands = new Map<number, Band>();
+const NOTHING = new ArrayBuffer(0);
+
+function answer(engine: Engine, photo: number, task: Task): ArrayBuffer {
+  if (task.kind === 'open') {
+    const { geometry, basis, firstRow, rows } = task;
+    const room = engine.Photo.receive(geometry, basis, '');
+    bands.set(photo, { photo: room, firstRow, rows, relighter: null });
+    return NOTHING;
+  }
+  const band = bands.get(photo);
+  if (!band) throw new Error('It was asked for what it does not have.');
+  switch (task.kind) {
+    case 'plan':
+      return Uint32Array.from(planned(engine, band).lightRows).buffer;
+    case 'relight': {
+      const { light, showing, pixels } = task;
+      const display = makeDisplay(engine, showing.look, showing.gamut);
+      try {
+        const out = new Uint8Array(pixels);
+        planned(engine, band).relight(light, display, showing.detail, out);
+      } finally {
+        display.free();
+      }
+      return pixels;
+    }
+    case 'put':
+      stop(band);
+      band.photo.putTile(task.index, task.bytes);
+      return NOTHING;
+    case 'take':
+      stop(band);
+      return (band.photo.takeTile(task.index) as Uint8Array<ArrayBuffer>).buffer;
+    case 'close':
+      stop(band);
+      band.photo.free();
+      bands.delete(photo);
+      return NOTHING;
+  }
+}
+
+function planned(engine: Engine, band: Band): BandRelighter {
+  band.relighter ??= new engine.BandRelighter(band.photo, band.firstRow, band.rows);
+  return band.relighter;
+}
+
+function stop(band: Band): void {
+  band.relighter?.free();
+  band.relighter = null;
+}
+
+function fail(thrown: unknown): void {
+  scope.postMessage({ kind: 'broken', message: messageOf(thrown) });
+}
+
+try {
+  const engine = await loadEngine();
+  scope.onmessage = ({ data: { number, photo, task } }) => {
+    try {
+      const bytes = answer(engine, photo, task);
+      scope.postMessage({ kind: 'done', number, bytes }, bytes.byteLength > 0 ? [bytes] : []);
+    } catch (thrown) {
+      fail(thrown);
+    }
+  };
+  scope.postMessage({ kind: 'ready', kernel: engine.cpuKernel() });
+} catch (thrown) {
+  fail(thrown);
+}

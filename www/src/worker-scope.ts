@@ -1,0 +1,12 @@
+/** The global scope of a worker; the compiler knows that of pages only. */
+
+/** What of it is used, by a worker that is asked for one kind of thing and says another. */
+export interface WorkerScope<Request, Answer> {
+  onmessage: ((event: MessageEvent<Request>) => void) | null;
+  postMessage(message: Answer, transfer?: Transferable[]): void;
+}
+
+/** That of the worker that this runs in. */
+export function workerScope<Request, Answer>(): WorkerScope<Request, Answer> {
+  return globalThis as unknown as WorkerScope<Request, Answer>;
+}
