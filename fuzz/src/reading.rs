@@ -254,14 +254,8 @@ pub fn check_error(
         assert!(claimed.0 > snr.0 - 0.5, "{claimed}: {given:?}, {wanted:?}");
     }
     let said = energy * 10f64.powf(-claimed.0 / 10.0);
-    // Of half floats it is said what rounding leaves on the whole. At worst, in a picture of few pixels,
-    // that is half as much again, and rounding of the basis may point the same way.
-    let at_worst = match wanted {
-        Wanted::Lossless => 2.2,
-        _ => 1.6,
-    };
-    // The two may point the same way.
-    let most = ((at_worst * said).sqrt() + codes.sqrt()).powi(2) + 1e-9 * energy;
+    // Rounding the basis adds a fiftieth, which may point the same way, as may what codes add.
+    let most = ((1.6 * said).sqrt() + codes.sqrt()).powi(2) + 1e-9 * energy;
     assert!(
         error <= most,
         "{error:e} of {energy:e}, where {claimed} are {said:e} and codes {codes:e}: \

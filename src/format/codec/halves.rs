@@ -26,14 +26,24 @@ pub fn step_for(peak: f32) -> f32 {
 /// Compresses values in units of `step`. Those that are not finite become zero, those too large the
 /// largest there are.
 pub fn encode(values: &[f32], step: f32) -> Result<Vec<u8>, FormatError> {
-    let half = |value: &f32| {
-        let value = value / step;
-        match value.is_finite() {
-            true => f16::from_f32(value.clamp(f16::MIN.to_f32(), f16::MAX.to_f32())).to_bits(),
-            false => 0,
-        }
-    };
-    compress(&split(values.iter().map(half)))
+    compress(&split(
+        values.iter().map(|value| half(*value, step).to_bits()),
+    ))
+}
+
+/// The sum of the squares of what [`encode`] changes about finite values.
+pub fn error(values: &[f32], step: f32) -> f64 {
+    let off =
+        |value: &f32| f64::from(half(*value, step).to_f32()) * f64::from(step) - f64::from(*value);
+    values.iter().map(|value| off(value).powi(2)).sum()
+}
+
+fn half(value: f32, step: f32) -> f16 {
+    let value = value / step;
+    match value.is_finite() {
+        true => f16::from_f32(value.clamp(f16::MIN.to_f32(), f16::MAX.to_f32())),
+        false => f16::ZERO,
+    }
 }
 
 /// Adds values in the order `[place, channel, pixel]` to `values` as `[pixel, place]`, of which
@@ -85,10 +95,17 @@ mod tests {
             let values: Vec<Pixel> = (0..5 * 40).map(value).collect();
             let step = step_for(peak);
             let mut got = vec![[0.0; CHANNELS]; values.len()];
+            let mut said = 0.0;
             for places in [&[3, 0][..], &[1, 2, 4]] {
-                let frame = encode(&gather(&values, 5, places), step).unwrap();
+                let gathered = gather(&values, 5, places);
+                let frame = encode(&gathered, step).unwrap();
                 add(&mut got, 5, places, step, &frame).unwrap();
+                said += error(&gathered, step);
             }
+            let off = |(got, want): (&f32, &f32)| f64::from(got - want).powi(2);
+            let pairs = got.as_flattened().iter().zip(values.as_flattened());
+            let off: f64 = pairs.map(off).sum();
+            assert!((off / said - 1.0).abs() < 1e-3, "{off:e}, not {said:e}");
             for (got, want) in got.as_flattened().iter().zip(values.as_flattened()) {
                 assert!((got - want).abs() <= want.abs() / 2048.0 + peak * 1e-7);
             }
