@@ -567,22 +567,28 @@ impl<'a> Encoder<'a> {
             basis::Rounded::new(&turn.functions, &steps.collect::<Vec<_>>())
         });
         let mut known = 0;
+        let mut of_basis = 0.0;
         let mut parts = Vec::new();
         let mut entries = Vec::with_capacity(scans.len() * tiles);
         for ((scan, chunks), error) in scans.iter_mut().zip(chunks).zip(errors) {
-            let energy = self.energy;
-            let snr = Rounding { energy, error }.snr();
-            scan.snr = Decibels(f64::from(snr.0 as f32));
             let brings = scan.brings(known);
-            if let Some(rounded) = &rounded
+            if let (Some(rounded), Some(turn)) = (&rounded, &self.turn)
                 && brings > 0
             {
                 let bytes = rounded.encode(known, brings, area)?;
+                for k in known..known + brings {
+                    of_basis += turn.energies[k] * rounded.error(k, &turn.functions[k]);
+                }
                 known += brings;
                 scan.basis_bytes = bytes.len() as u32; // at most MOST_PLAIN, about
                 scan.basis_crc = crc32c::crc32c(&bytes);
                 parts.push(bytes);
             }
+            let rounding = Rounding {
+                energy: self.energy,
+                error: error + of_basis,
+            };
+            scan.snr = Decibels(f64::from(rounding.snr().0 as f32));
             for chunk in chunks {
                 entries.push(
                     chunk

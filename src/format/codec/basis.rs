@@ -37,6 +37,15 @@ impl Rounded {
         rounded
     }
 
+    /// The sum of the squares of what rounding changed about a function, the `k`th.
+    pub fn error(&self, k: usize, function: &[f32]) -> f64 {
+        let codes = self.codes.chunks_exact(function.len()).nth(k);
+        let pairs = codes.unwrap_or_default().iter().zip(function);
+        let off =
+            |(&code, v): (&i16, &f32)| f64::from(value(code, self.exponents[k])) - f64::from(*v);
+        pairs.map(|pair| off(pair).powi(2)).sum()
+    }
+
     /// The functions as a reader will have them.
     #[cfg(test)]
     pub fn functions(&self, area: usize) -> Vec<Vec<f32>> {
@@ -99,6 +108,11 @@ mod tests {
         ]
         .concat();
         assert_eq!(got, want);
+        for (k, (got, given)) in got.iter().zip(&functions).enumerate() {
+            let square = |(a, b): (&f32, &f32)| (f64::from(*a) - f64::from(*b)).powi(2);
+            let squares: f64 = got.iter().zip(given).map(square).sum();
+            assert!((rounded.error(k, given) - squares).abs() <= 1e-12 * squares);
+        }
         for ((got, given), step) in got.iter().zip(&functions).zip(steps) {
             let off = got.iter().zip(given).map(|(a, b)| (a - b).abs());
             let bound = 0.5 * step.max(2e-5);
