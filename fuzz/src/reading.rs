@@ -228,11 +228,11 @@ pub fn check_error(
 ) {
     let (mut energy, mut error, mut codes) = (0.0, 0.0, 0.0);
     for (i, tile) in transport.tiles.iter().enumerate() {
+        energy += given.energy(i);
         let got = tile.functions(&transport.geometry, &transport.basis).tau;
         for (got, want) in got.iter().zip(given.functions(i).tau) {
             for c in 0..CHANNELS {
                 let (got, want) = (f64::from(got[c]), f64::from(want[c]));
-                energy += want * want;
                 error += (got - want) * (got - want);
             }
         }
@@ -254,10 +254,10 @@ pub fn check_error(
         assert!(claimed.0 > snr.0 - 0.5, "{claimed}: {given:?}, {wanted:?}");
     }
     let said = energy * 10f64.powf(-claimed.0 / 10.0);
-    // What is said adds up what rounding does to coefficients, to the first function of the basis and to
-    // the others, as if none had to do with another: in a picture of few pixels they may all point the
-    // same way, as may what codes add.
-    let most = ((3.0 * said).sqrt() + codes.sqrt()).powi(2) + 1e-9 * energy;
+    // What is said adds up what rounding does to coefficients, to colours, to the first function of the
+    // basis and to the others, as if none had to do with another: in a picture of few pixels they may all
+    // point the same way, as may what codes add.
+    let most = ((4.0 * said).sqrt() + codes.sqrt()).powi(2) + 1e-9 * energy;
     assert!(
         error <= most,
         "{error:e} of {energy:e}, where {claimed} are {said:e} and codes {codes:e}: \

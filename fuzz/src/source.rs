@@ -209,6 +209,17 @@ impl Given {
         self.tiles[i].clone().functions(&self.geometry, &basis)
     }
 
+    /// Squared elements of tile `i`, of its coefficients and of its functions each by themselves: where they
+    /// cancel, what is left of them is no measure of what is coded.
+    pub fn energy(&self, i: usize) -> f64 {
+        let basis = self.basis.clone().unwrap_or_default();
+        let mut coefficients = self.tiles[i].clone();
+        let functions = std::mem::take(&mut coefficients.functions);
+        let of_coefficients = coefficients.functions(&self.geometry, &basis).tau;
+        let elements = of_coefficients.iter().chain(&functions).flatten();
+        elements.map(|v| f64::from(*v).powi(2)).sum()
+    }
+
     /// Whether every window lies on the display whole.
     pub fn inside(&self) -> bool {
         let side = i64::from(self.geometry.window.side());

@@ -671,6 +671,7 @@ impl Numbers {
             left[1] = numbers.energy;
         }
         let mut coming = coming.map(Vec::into_iter);
+        let of_palette = self.coefficients.as_ref().map_or(0.0, |n| n.of_palette);
         let mut encoded = EncodedTile::default();
         for scan in scans {
             let kind = usize::from(scan.coding.is_direct());
@@ -679,7 +680,7 @@ impl Numbers {
                 (chunk, left[kind]) = next;
             }
             encoded.chunks.push(chunk);
-            encoded.errors.push(left.iter().sum());
+            encoded.errors.push(left.iter().sum::<f64>() + of_palette);
         }
         Ok(encoded)
     }
