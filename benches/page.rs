@@ -11,22 +11,11 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::Command;
 
-use rayon::prelude::*;
 use relightable_photo::format::{EncodedFile, Metadata, Quality, Source};
-use relightable_photo::workers::Workers;
 use serde_json::{Value, json};
 
 use figures::Figures;
-use made_up::{RANKS, SIDES};
-
-/// All cores.
-struct Cores;
-
-impl Workers for Cores {
-    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-        (0..count).into_par_iter().map(work).collect()
-    }
-}
+use made_up::{Cores, RANKS, SIDES};
 
 fn main() {
     let folder = figures::folder().join("page");
@@ -48,17 +37,24 @@ fn main() {
     figures::report("page", &measured);
 }
 
-/// A photograph, written where it is not there yet, and what is to be known of it.
+/// A photograph, written where it is not there as this program writes it, and what is to be known of it.
 fn photograph(folder: &Path, side: u32, rank: usize) -> Value {
     let name = format!("{side}-r{rank}.ltm");
     let path = folder.join(&name);
-    if !path.exists() {
+    if !is_of_this_program(&path) {
         // Under another name until it is whole.
         let part = path.with_extension("part");
         write(&part, side, rank);
         fs::rename(part, path).unwrap();
     }
     json!({"name": name, "side": side, "rank": rank, "frame_bytes": made_up::bytes(side, rank)})
+}
+
+/// Whether a file is there that is no older than what would write it.
+fn is_of_this_program(path: &Path) -> bool {
+    let changed = |path: &Path| fs::metadata(path)?.modified();
+    let program = std::env::current_exe().and_then(|program| changed(&program));
+    matches!((changed(path), program), (Ok(file), Ok(program)) if file >= program)
 }
 
 fn write(path: &Path, side: u32, rank: usize) {

@@ -13,7 +13,7 @@ use common::relit::{self, Kind};
 use common::{band_tile, tiled};
 use js_sys::{Float32Array, Object, Reflect, Uint8ClampedArray};
 use relightable_photo::format::{EncodedFile, Limits, Metadata, Quality, Reader, Source};
-use relightable_photo::relight::{self, Rgba8Picture, reference};
+use relightable_photo::relight::{self, BuiltinLight, Rgba8Picture, reference};
 use relightable_photo::transport::{Extent, Geometry, Tile, Transport};
 use relightable_photo::web::{CodedError, Decoder, Display, Graphics, Light, Photo, Relighter};
 use relightable_photo::workers::OneThread;
@@ -163,8 +163,12 @@ struct Drawn {
 
 impl Drawn {
     fn render(&mut self, light: &Light, exposure: f64) -> Result<(), CodedError> {
+        self.render_by(light, exposure, 1.0)
+    }
+
+    fn render_by(&mut self, light: &Light, exposure: f64, detail: f64) -> Result<(), CodedError> {
         let display = Display::new(exposure, &[1.0; 3], "clip", "srgb")?;
-        self.relighter.render(light, &display, 1.0)
+        self.relighter.render(light, &display, detail)
     }
 }
 
@@ -302,6 +306,35 @@ async fn webgl2_draws_the_reference() {
 #[wasm_bindgen_test]
 async fn webgpu_draws_the_reference() {
     assert_backend_draws_the_reference("webgpu").await;
+}
+
+#[wasm_bindgen_test]
+async fn less_detail_is_the_first_components_whatever_came_before() {
+    let transport = filed(&transport(0));
+    let quads = transport.basis.rank().div_ceil(4);
+    assert!(quads > 1);
+    for backend in BACKENDS {
+        let photo = photo(&transport);
+        let canvas = new_canvas();
+        let mut relighter = relighter(backend, &photo, &canvas).await.unwrap();
+        for name in ["flood", "spectrum"] {
+            let light = Light::builtin(&photo, name).unwrap();
+            let seen = BuiltinLight::from_name(name)
+                .unwrap()
+                .render(transport.geometry.light);
+            // Of one light, then of the same in full, and in less again.
+            for used in [1, quads, 1] {
+                let detail = used as f64 / quads as f64;
+                relighter.render_by(&light, 1.0, detail).unwrap();
+                let of = relit::first_quads(&transport, used);
+                let want = reference::picture(&of, &seen, &shown(1.0));
+                let what = format!("{backend}, {name}, {used} of {quads}");
+                relit::assert_within_one_code(&read_back(&canvas), &want, &what);
+                pause().await;
+            }
+        }
+        canvas.remove();
+    }
 }
 
 #[wasm_bindgen_test]
@@ -530,7 +563,7 @@ async fn a_canvas_in_use_is_refused() {
 async fn a_photo_may_go_and_another_take_its_place() {
     for backend in BACKENDS {
         for transport in [0, 2].map(transport) {
-            // A freed WebGL2 back end gives its context up, and the canvas with it.
+            // A canvas serves one relighter only.
             let canvas = new_canvas();
             let photo = photo(&transport);
             let light = Light::builtin(&photo, "spectrum").unwrap();

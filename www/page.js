@@ -22,6 +22,8 @@ const lights = /** @type {NodeListOf<HTMLInputElement>} */ (
 let reason = '';
 /** Puts away what the visitor has lit the picture by. */
 let putAway = () => {};
+/** Counts what the visitor has asked for: what comes late gives way to what was asked for later. */
+let wishes = 0;
 
 const asked = new URLSearchParams(location.search);
 const light = asked.get('light');
@@ -54,9 +56,16 @@ if (photo.info) tell();
 file.addEventListener('change', async () => {
   const chosen = file.files?.[0];
   if (!chosen) return;
+  wishes += 1;
+  const wish = wishes;
   try {
-    if (chosen.type.startsWith('video/')) await showFilm(chosen);
-    else shine(await createImageBitmap(chosen), file);
+    if (chosen.type.startsWith('video/')) {
+      await showFilm(chosen, wish);
+    } else {
+      const bitmap = await createImageBitmap(chosen);
+      if (wish === wishes) shine(bitmap, file, () => bitmap.close());
+      else bitmap.close();
+    }
   } catch {
     status.textContent = `This browser cannot show ${chosen.name}.`;
   }
@@ -67,18 +76,32 @@ file.addEventListener('change', async () => {
 const cameras = navigator.mediaDevices;
 /** @type {HTMLElement} */ (document.getElementById('with-camera')).hidden = !cameras;
 camera.addEventListener('click', async () => {
+  wishes += 1;
+  const wish = wishes;
   try {
     const stream = await cameras.getUserMedia({ video: { width: 640 } });
-    shine(stream, camera, () => {
+    const stop = () => {
       for (const track of stream.getTracks()) track.stop();
-    });
-  } catch {
-    status.textContent = 'The camera could not be used.';
+    };
+    if (wish === wishes) shine(stream, camera, stop);
+    else stop();
+  } catch (error) {
+    const name = error instanceof DOMException ? error.name : '';
+    status.textContent =
+      {
+        NotAllowedError:
+          'The camera may not be used: allow it in the browser’s settings for this page.',
+        NotFoundError: 'There is no camera.',
+        NotReadableError: 'Another program has the camera: close that, and try again.',
+      }[name] ?? 'The camera could not be used.';
   }
 });
 
-/** @param {File} chosen */
-async function showFilm(chosen) {
+/**
+ * @param {File} chosen
+ * @param {number} wish
+ */
+async function showFilm(chosen, wish) {
   const src = URL.createObjectURL(chosen);
   const film = Object.assign(document.createElement('video'), {
     src,
@@ -98,7 +121,8 @@ async function showFilm(chosen) {
     stop();
     throw error;
   }
-  shine(film, file, stop);
+  if (wish === wishes) shine(film, file, stop);
+  else stop();
 }
 
 /**
@@ -109,11 +133,12 @@ async function showFilm(chosen) {
  * @param {() => void} [stop]
  */
 function shine(source, control, stop = () => {}) {
+  wishes += 1;
   photo.lightSource = source;
   putAway();
   putAway = stop;
   file.nextElementSibling?.classList.toggle('lit', control === file);
-  camera.classList.toggle('lit', control === camera);
+  camera.setAttribute('aria-pressed', String(control === camera));
   if (!source) return;
   for (const input of lights) input.checked = false;
   hint.classList.add('off');

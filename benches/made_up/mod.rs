@@ -1,14 +1,25 @@
 //! Photographs with made-up coefficients: the time that relighting takes does not depend on their values.
 
+use rayon::prelude::*;
 use relightable_photo::transport::{
     BandTile, Basis, CHANNELS, Correspondence, Extent, Geometry, QUAD, TexelCode, Window,
 };
+use relightable_photo::workers::Workers;
 
 const WINDOW: u32 = 15;
 
 /// Sides of the pictures, in camera pixels, and numbers of components.
 pub const SIDES: [u32; 3] = [128, 512, 2048];
 pub const RANKS: [usize; 3] = [8, 16, 32];
+
+/// All cores.
+pub struct Cores;
+
+impl Workers for Cores {
+    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        (0..count).into_par_iter().map(work).collect()
+    }
+}
 
 /// A square picture, two camera pixels a light element.
 pub fn geometry(side: u32) -> Geometry {

@@ -8,19 +8,10 @@ use relightable_photo::relight::{Display, Light, Rgba8Picture, TorchPose, cpu};
 use relightable_photo::transport::{Extent, LightPx, Tile, Transport};
 use relightable_photo::workers::{OneThread, Workers};
 
-use crate::made_up::{self, noise, square};
+use crate::made_up::{self, Cores, noise, square};
 
 /// Lights that frames take turns with.
 const LIGHTS: usize = 4;
-
-/// All cores.
-pub struct Cores;
-
-impl Workers for Cores {
-    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-        (0..count).into_par_iter().map(work).collect()
-    }
-}
 
 /// How the light changes from frame to frame.
 #[derive(Clone, Copy)]

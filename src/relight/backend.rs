@@ -134,7 +134,7 @@ pub enum BackendError {
     #[error("the graphics device does not take the photograph: {0}")]
     Upload(String),
     /// The device went away after it had been working.
-    #[error("the graphics device was lost: {0}; create the back end anew")]
+    #[error("the graphics device was lost: {0}")]
     Lost(String),
 }
 

@@ -33,7 +33,7 @@ pub enum Gamut {
 pub enum ToneCurve {
     /// Shown as it is up to full brightness, and cut off there.
     Clip,
-    /// Dark tones as they are, bright ones rolled off until 5.6 times full brightness: the curve of
+    /// Dark tones by a quarter darker, brighter ones rolled off until 5.6 times full brightness: the curve of
     /// J. Hable, "Filmic tonemapping operators", 2010, with the constants given there.
     Filmic,
 }

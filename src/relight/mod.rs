@@ -34,6 +34,3 @@ pub use tint::Tint;
 fn detailed(all: usize, share: f32) -> usize {
     ((all as f32 * share).ceil() as usize).clamp(all.min(1), all)
 }
-
-/// The WGSL source of both GPU back ends.
-pub const SHADER: &str = include_str!("shaders/relight.wgsl");

@@ -31,7 +31,7 @@ const BLOCK_ROWS: u32 = 256;
 /// What a device allows.
 #[derive(Clone, Copy, Debug)]
 pub struct TextureLimits {
-    /// Largest width and height of a texture, and of a canvas.
+    /// Largest width and height of a texture.
     pub side: u32,
     /// Most layers in a texture array.
     pub layers: u32,
@@ -62,6 +62,9 @@ pub type PairOfQuads = [[[f32; QUAD]; 2]; BASIS_SLOTS];
 /// Most bytes for what is seen: of a light of 1024² by 16 components it is 0.2 GB.
 const MOST_SEEN: u64 = 256 << 20;
 
+/// Most bytes for a picture on its way to be the light: film of 8K takes 0.2 GB.
+const MOST_PICTURE: u64 = 256 << 20;
+
 /// Slots of a window that a pass has room for.
 const BASIS_SLOTS: usize = (16 << 10) / (2 * QUAD * size_of::<f32>());
 
@@ -74,6 +77,15 @@ pub struct Pass {
     pub pair: usize,
     /// The first of the layers.
     pub layer: u32,
+}
+
+/// The uniforms of a dispatch that sees, which the shader describes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Part {
+    share: [f32; 4],
+    layer: i32,
+    unused: [i32; 3],
 }
 
 /// Rows of one tile's coefficients in one layer.
@@ -301,16 +313,39 @@ impl TextureLayout {
         [0.0, 0.0, 1.0, 0.0],
     ];
 
+    /// Whether a picture of this extent may become the light on the device: its texels of 4 bytes, and means
+    /// of its columns, of 16.
+    pub fn takes(&self, picture: Extent, limits: TextureLimits) -> bool {
+        let columns = u64::from(picture.height) * u64::from(self.geometry.light.width);
+        let bytes = 4 * picture.area() as u64 + 16 * columns;
+        picture.width.max(picture.height) <= limits.side && bytes <= MOST_PICTURE
+    }
+
+    /// Uniforms of each dispatch that sees a light of one tint by this channel, pair of quads by pair; a light
+    /// of many tints takes those of any.
+    pub fn parts(&self, channel: usize) -> impl Iterator<Item = Part> {
+        (0..self.pairs() as i32).map(move |pair| Part {
+            share: Self::CHANNELS[channel],
+            layer: 2 * pair,
+            unused: [0; 3],
+        })
+    }
+
+    /// Pairs of quads that are used of all.
+    pub fn used_pairs(&self, detail: f32) -> usize {
+        self.used(detail).div_ceil(2) as usize
+    }
+
     /// Passes for a light: the channel and the pair of quads each sees, and the first of the two
     /// layers it fills.
     pub fn passes(&self, tint: Tint, detail: f32) -> Vec<Pass> {
         let channels = (0..).zip(tint.channels());
-        let (all, used) = (self.pairs(), self.used(detail).div_ceil(2));
+        let (all, used) = (self.pairs(), self.used_pairs(detail));
         let passes = channels.flat_map(|(i, &channel)| {
             (0..used).map(move |pair| Pass {
                 channel,
-                pair: pair as usize,
-                layer: 2 * (i * all + pair),
+                pair,
+                layer: 2 * (i * all + pair as u32),
             })
         });
         passes.collect()

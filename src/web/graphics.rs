@@ -14,7 +14,8 @@ use crate::relight::backend::Backend;
 use crate::relight::webgl2::{Context, WebGl2};
 use crate::relight::webgpu::{Device, WebGpu};
 
-/// A WebGPU device, or a WebGL2 context. Freeing it frees all that is on it.
+/// A WebGPU device, or a WebGL2 context. Freeing it frees all that is on a device, whatever still draws
+/// there; a context goes with the last that does.
 #[wasm_bindgen]
 #[derive(Debug)]
 pub struct Graphics(Kind);

@@ -40,9 +40,10 @@ export async function firstWorking<T>(
       failures.push(`${BACKEND_TITLES[backend]}: ${sentence(messageOf(thrown))}`);
     }
   }
+  const remedy = order.includes('cpu') ? '' : ' The CPU might: leave the backend attribute out.';
   throw new PhotoError(
     'backend-unavailable',
-    `This browser cannot draw the photograph. ${failures.join(' ')}`,
+    `This browser cannot draw the photograph. ${failures.join(' ')}${remedy}`,
     last,
   );
 }
@@ -57,6 +58,7 @@ export function from(order: readonly Backend[], lost: Backend): readonly Backend
   return order.slice(order.indexOf(lost));
 }
 
-function sentence(text: string): string {
+/** With an end to it. */
+export function sentence(text: string): string {
   return /[.!?]$/.test(text) ? text : `${text}.`;
 }

@@ -27,8 +27,8 @@ interface Share {
 
 /** After so many incidents without a frame between, workers are done without. */
 const MOST_INCIDENTS = 3;
-/** Largest frames take a second or two on slow machines, and slow networks a minute for the module. */
-const PATIENCE: Patience = { lookMs: 1000, looks: 10, startLooks: 60 };
+/** Largest frames take a second or two on slow machines. The module the page has had already. */
+const PATIENCE: Patience = { lookMs: 1000, looks: 10, startLooks: 15 };
 
 /** See the module. */
 export class Crew {

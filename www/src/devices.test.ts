@@ -13,6 +13,7 @@ function world() {
   let now = 0;
   let missing: Error | null = null;
   let silent = false;
+  let unanswered = 0;
   const device = (name: string, lost: Graphics['lost']): Graphics => ({
     kernel: name,
     software: false,
@@ -24,7 +25,10 @@ function world() {
     Graphics: {
       webgpu: async () => {
         if (missing) throw missing;
-        if (silent) return new Promise<never>(() => {});
+        if (silent) {
+          unanswered += 1;
+          return new Promise<never>(() => {});
+        }
         const number = loses.length;
         const lost = new Promise<{ message: string }>((resolve) => {
           loses.push((message) => resolve({ message }));
@@ -53,6 +57,7 @@ function world() {
     engine,
     loses,
     canvases,
+    unanswered: () => unanswered,
     happened: () => log.splice(0),
     note: (name: string) => (reason: string) => log.push(`${name}: ${reason}`),
     pass: (ms: number) => {
@@ -149,4 +154,8 @@ test('a browser that never answers has no device', async () => {
   const asked = w.devices.lease(w.engine, 'webgpu', w.note('a'));
   const message = /does not answer within/;
   await assert.rejects(asked, { code: 'backend-unavailable', message });
+  // Nor does anyone wait for it again.
+  const again = w.devices.lease(w.engine, 'webgpu', w.note('b'));
+  await assert.rejects(again, { code: 'backend-unavailable', message });
+  assert.equal(w.unanswered(), 1);
 });

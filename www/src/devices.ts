@@ -45,6 +45,8 @@ export class Devices {
   readonly #page: Page;
   readonly #longestMs: number;
   readonly #shared = new Map<GraphicsBackend, Shared>();
+  /** Those that never answered, and why they are not asked again. */
+  readonly #mute = new Map<GraphicsBackend, PhotoError>();
   readonly #losses = new Map<GraphicsBackend, { count: number; last: number }>();
 
   constructor(page: Page = thisPage(), longestMs = LONGEST_MS) {
@@ -61,6 +63,8 @@ export class Devices {
     backend: GraphicsBackend,
     lost: (reason: string) => void,
   ): Promise<Lease> {
+    const mute = this.#mute.get(backend);
+    if (mute) throw mute;
     this.#refuseFickle(backend);
     const shared = this.#shared.get(backend) ?? this.#open(engine, backend);
     // One function may hold several shares.
@@ -109,9 +113,15 @@ export class Devices {
     const late = new Promise<never>((_, reject) => {
       const why = `it does not answer within ${this.#longestMs / 1000} seconds`;
       timer = setTimeout(() => {
-        reject(unavailable(why));
+        const error = unavailable(why);
+        // Else each photograph would wait as long.
+        this.#mute.set('webgpu', error);
+        reject(error);
         asked.then(
-          (device) => device.free(),
+          (device) => {
+            this.#mute.delete('webgpu');
+            device.free();
+          },
           () => {},
         );
       }, this.#longestMs);

@@ -167,8 +167,12 @@ test('a device that is a program is passed over, unless back ends were named', a
   player.set({ ...SETTINGS, wanted: order });
   await player.renderNow();
   assert.deepEqual([changes, setUps], [['cpu', 'webgl2'], ['webgl2 of 4']]);
+  // Nor does it stay once they are not named any more.
+  player.set({ ...SETTINGS, wanted: { ...order, software: false } });
+  await player.renderNow();
+  assert.deepEqual(changes, ['cpu', 'webgl2', 'cpu']);
   player.stop();
-  assert.deepEqual(released, ['webgl2', 'webgl2']);
+  assert.deepEqual(released, ['webgl2', 'webgl2', 'webgl2']);
 });
 
 test('back ends that do not answer keep nobody waiting who has given them up, and get nothing', async (t) => {

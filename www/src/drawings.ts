@@ -27,15 +27,20 @@ export type Draw = (
  * that cannot be had leaves tiles where they are, and keeps nobody from them while it is asked for.
  */
 export function drawer(load: () => Promise<Engine>, crew: Crew, devices: Devices): Draw {
+  // What the page has once drawn on the CPU it may be drawing still, which keeps tiles from workers.
+  const inPage = new WeakSet<Photograph>();
   return async (backend, photograph, { gamut, software }, lost, signal) => {
     const engine = await load();
     if (backend === 'cpu') {
       try {
-        return await CrewDrawing.create(engine, photograph, crew, gamut);
+        if (!inPage.has(photograph)) {
+          return await CrewDrawing.create(engine, photograph, crew, gamut);
+        }
       } catch (thrown) {
         // Without workers the page does it.
         if (!(thrown instanceof PhotoError && thrown.code === 'worker-unavailable')) throw thrown;
       }
+      inPage.add(photograph);
       return photograph.inPage((photo) => {
         const canvas = document.createElement('canvas');
         const relighter = new engine.Relighter(photo, canvas, gamut);

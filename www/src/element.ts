@@ -98,7 +98,7 @@ export class RelightablePhoto extends Base {
   #scheduled = false;
   #attributeFault: string | null = null;
   #playerFault: string | null = null;
-  #lightFault: string | null = null;
+  #lightFault: PhotoError | null = null;
   /** The light of the last attributes that were right. */
   #lit: LightSetting | null = null;
 
@@ -134,9 +134,9 @@ export class RelightablePhoto extends Base {
           this.dispatchEvent(progressEvent(loaded, total));
         },
         drawn: (fault) => {
-          // A light that stays wrong says so once, not at every frame.
-          if ((fault?.message ?? null) === this.#lightFault) return;
-          this.#lightFault = fault?.message ?? null;
+          // A light that stays wrong says so once, not at every frame with other numbers.
+          if (fault?.code === this.#lightFault?.code) return;
+          this.#lightFault = fault;
           this.#lightFaultChanged(fault);
         },
         detailChanged: (detail) => this.dispatchEvent(new QualityChangeEvent(detail)),
@@ -438,7 +438,9 @@ export class RelightablePhoto extends Base {
 
   #showFault(): void {
     const source = this.#follower?.fault?.message;
-    this.#view.message(this.#attributeFault ?? this.#playerFault ?? source ?? this.#lightFault);
+    this.#view.message(
+      this.#attributeFault ?? this.#playerFault ?? source ?? this.#lightFault?.message ?? null,
+    );
   }
 
   #listen(): void {

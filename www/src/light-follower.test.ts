@@ -197,6 +197,10 @@ test('a stream is played while somebody looks, and its tracks are left alone', a
   assert.equal(streamed.srcObject, stream);
   streamed.frame();
   assert.deepEqual(happened(), ['changed']);
+  streamed.happens('ended');
+  assert.deepEqual(happened(), ['light-source'], 'a camera may be unplugged');
+  streamed.frame();
+  assert.deepEqual(happened(), ['well', 'changed']);
   follower.stop();
   assert.equal(streamed.srcObject, null);
   streamed.played = () => Promise.reject(new Error('not allowed'));

@@ -91,6 +91,13 @@ export class LightFollower {
       video.pause();
       video.srcObject = null;
     });
+    const ended = () => {
+      const message =
+        'The stream that is the light has ended, or what it came from was taken away.';
+      this.#fail(new PhotoError('light-source', message));
+    };
+    video.addEventListener('ended', ended, { signal });
+    if (stream.active === false) ended();
     video.srcObject = stream;
     video.play().catch((cause: unknown) => {
       if (signal.aborted) return;

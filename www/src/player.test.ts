@@ -2,6 +2,7 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { Backend } from './engine.js';
 import { PhotoError } from './errors.js';
+import type { LightPicture } from './light-source.js';
 import type { Photograph } from './photograph.js';
 import { type Drawing, Player, type Settings } from './player.js';
 import { exposed, wanting } from './settings-fakes.js';
@@ -30,7 +31,7 @@ function world() {
   let lostAtRender = false;
   let lightFault: PhotoError | null = null;
   /** Ends frames that take time, in order; null while all are drawn at once. */
-  let slow: { done(): void; fail(error: Error): void }[] | null = null;
+  let slow: { done(fault?: PhotoError): void; fail(error: Error): void }[] | null = null;
   const player = new Player<Drawing>(
     {
       open: (src, signal) =>
@@ -53,7 +54,9 @@ function world() {
               now += cost * detail;
               const frames = slow;
               return frames
-                ? new Promise((done, fail) => frames.push({ done: () => done(null), fail }))
+                ? new Promise((done, fail) =>
+                    frames.push({ done: (fault) => done(fault ?? null), fail }),
+                  )
                 : lightFault;
             },
             free: () => log.push(`free ${backend}`),
@@ -347,6 +350,19 @@ test('a back end lost while it is being set up is passed over with its reason', 
   ]);
 });
 
+test('a back end that cannot be set up as it was lost says that', async () => {
+  const w = world();
+  w.player.set(SETTINGS);
+  await w.opened('a.ltm');
+  w.losses[0]?.('the device is gone.');
+  await w.drawFails(0, 'null pointer passed to rust');
+  await w.drawn(1);
+  assert.match(
+    w.happened().join(),
+    /WebGPU: it was lost while it was being set up: the device is gone/,
+  );
+});
+
 test('a back end lost at any moment after it was set up is replaced, and freed once', async () => {
   for (let ticks = 0; ticks < 10; ticks += 1) {
     const w = world();
@@ -451,6 +467,32 @@ test('a back end lost at a frame that takes time is replaced', async () => {
     'backend webgpu -> cpu (WebGPU was lost: the device is gone. WebGPU: no adapter.)',
     'cpu draws flood',
   ]);
+});
+
+test('a picture at which a loss is found is drawn by what comes in its place', async () => {
+  const w = await loadedWorld();
+  const frames = w.slowDown();
+  const asked = w.player.renderNow();
+  w.losses[0]?.('the device is gone.');
+  frames[0]?.fail(new PhotoError('backend-lost', 'the device is gone.'));
+  await settle();
+  await w.drawFails(1, 'no adapter');
+  await w.drawn(2);
+  frames[1]?.done();
+  assert.equal(await asked, w.player.drawing);
+  assert.deepEqual([w.player.backend, w.player.detail], ['cpu', 1]);
+});
+
+test('what was wrong with another light than there is now is not told', async () => {
+  const w = await loadedWorld();
+  const frames = w.slowDown();
+  const picture = {} as LightPicture;
+  w.player.set({ ...SETTINGS, light: { ...SETTINGS.light, picture } });
+  await w.frame();
+  w.player.set(SETTINGS);
+  frames[0]?.done(new PhotoError('light-tainted', 'of another origin'));
+  await settle();
+  assert.deepEqual(w.happened(), ['webgpu draws flood']);
 });
 
 test('what becomes of a frame of another photograph is nobody’s concern', async () => {

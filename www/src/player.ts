@@ -5,7 +5,7 @@
  * changed since is aborted and freed.
  */
 
-import { after, BACKEND_TITLES, firstWorking, from } from './backends.js';
+import { after, BACKEND_TITLES, firstWorking, from, sentence } from './backends.js';
 import type { Backend, Freeable, Gamut } from './engine.js';
 import { PhotoError, toPhotoError } from './errors.js';
 import type { LightSetting } from './lights.js';
@@ -270,6 +270,7 @@ export class Player<D extends Drawing> {
 
   async #draw(): Promise<D> {
     const active = this.#active;
+    const held = this.#held;
     const whole = this.#whole;
     this.#whole = false;
     if (!active || !this.#settings) throw notLoaded();
@@ -287,11 +288,17 @@ export class Player<D extends Drawing> {
       }
       this.#fetches = 0;
       active.drew = true;
-      if (active === this.#active) this.#tell(drawn, detail);
+      // Another light may have been set meanwhile, with which nothing is wrong.
+      const sameLight = light.picture === this.#settings?.light.picture;
+      if (active === this.#active) this.#tell(sameLight ? drawn : null, detail);
       return active.drawing;
     } catch (thrown) {
-      // What becomes of one that has been let go is nobody's concern.
-      if (active !== this.#active) throw notLoaded(thrown);
+      if (active !== this.#active) {
+        // What becomes of one that has been let go is nobody's concern. What comes in its place draws.
+        if (held !== this.#held || !this.#search) throw notLoaded(thrown);
+        this.#whole ||= whole;
+        return this.#renderSoon();
+      }
       const error = toPhotoError(thrown);
       this.#stopped(active, error);
       throw error;
@@ -447,7 +454,11 @@ export class Player<D extends Drawing> {
     signal: AbortSignal,
   ): Promise<SetUp<D>> {
     const active = this.#active;
-    const serves = active?.backend === backend && active.wanted.gamut === wanted.gamut;
+    const serves =
+      active?.backend === backend &&
+      active.wanted.gamut === wanted.gamut &&
+      // Nobody knows here whether a device that might be a program is one.
+      (backend === 'cpu' || wanted.software || !active.wanted.software);
     if (active && serves && active.lost === null) return active;
     let done: SetUp<D> | null = null;
     let lostEarly: string | null = null;
@@ -457,6 +468,8 @@ export class Player<D extends Drawing> {
     };
     const setUp = this.#ports.draw(backend, photo, wanted, lost, signal);
     const drawing = await setUp.catch((thrown: unknown) => {
+      // Whatever else went wrong, this is why.
+      if (lostEarly !== null) throw lostInSetUp(lostEarly, thrown);
       const error = toPhotoError(thrown);
       // Nor could any other back end be set up. This ends the search.
       if (error.code === 'photo-lost' && !signal.aborted) this.#fetchAnew(error.message);
@@ -468,7 +481,7 @@ export class Player<D extends Drawing> {
     }
     if (lostEarly !== null) {
       drawing.free();
-      throw new PhotoError('backend-lost', `it was lost while it was being set up: ${lostEarly}`);
+      throw lostInSetUp(lostEarly);
     }
     done = new SetUp(backend, wanted, drawing);
     return done;
@@ -525,8 +538,8 @@ export class Player<D extends Drawing> {
 
   /**
    * A back end that stopped working is set up anew, or replaced by the next of the order where it cannot
-   * be had any more, or never drew a frame. While one is being looked for, that search goes on, and what it finds is the
-   * replacement.
+   * be had any more, or never drew a frame. While one is being looked for, that search goes on, and what
+   * it finds is the replacement.
    */
   #lost(lost: SetUp<D>, reason: string): void {
     lost.lost ??= reason;
@@ -543,11 +556,14 @@ export class Player<D extends Drawing> {
     before: string,
   ): void {
     this.#dropActive();
-    const lost = `${BACKEND_TITLES[backend]} was lost: ${reason}`;
+    const lost = sentence(`${BACKEND_TITLES[backend]} was lost: ${reason}`);
     const why = [before, lost].filter(Boolean).join(' ');
     const backends = drew ? from(wanted.backends, backend) : after(wanted.backends, backend);
     if (backends.length > 0) void this.#choose({ ...wanted, backends }, previous, why);
-    else this.#fail(new PhotoError('backend-lost', `${why} No other back end is left to try.`));
+    else
+      this.#fail(
+        new PhotoError('backend-lost', `${why} No other back end is left to try. Reload the page.`),
+      );
   }
 
   #fail(error: PhotoError): void {
@@ -575,6 +591,11 @@ export class Player<D extends Drawing> {
     this.#stale = false;
     this.#whole = false;
   }
+}
+
+function lostInSetUp(reason: string, cause?: unknown): PhotoError {
+  const message = `it was lost while it was being set up: ${reason}`;
+  return new PhotoError('backend-lost', message, cause);
 }
 
 function notLoaded(cause?: unknown): PhotoError {

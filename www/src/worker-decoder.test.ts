@@ -132,6 +132,14 @@ test('a worker that dies at it is worker-unavailable', async () => {
   await assert.rejects(feeding, { code: 'worker-unavailable', message: /out of memory/ });
 });
 
+test('a worker that falls silent is worker-unavailable', async () => {
+  const worker = new FakeWorker(() => []);
+  const starting = WorkerDecoder.start(worker, page().engine, { lookMs: 1, looks: 3 });
+  worker.say({ kind: 'ready', state: stateAt(0) });
+  const decoder = await starting;
+  await assert.rejects(decoder.feed(0, new Uint8Array(1)), { code: 'worker-unavailable' });
+});
+
 test('a decoder that is freed keeps nobody waiting', async () => {
   const { worker, decoder } = await started(() => []);
   const feeding = decoder.feed(0, new Uint8Array(1));

@@ -32,6 +32,10 @@ export type WorkerLike = Pick<Worker, 'postMessage' | 'terminate'> & {
   onmessageerror: ((event: MessageEvent) => void) | null;
 };
 
+/** After so much silence a worker that owes an answer counts as gone: browsers do not tell of all that they
+ * end. Looks and not time, as a page that sleeps looks no more than its workers work. */
+const PATIENCE = { lookMs: 1000, looks: 30 };
+
 /** Somebody waits for the next answers. */
 interface Waiting {
   readonly take: (answer: Answer) => void;
@@ -42,14 +46,23 @@ interface Waiting {
 export class WorkerDecoder implements PhotoDecoder {
   readonly #worker: WorkerLike;
   readonly #engine: () => Promise<Pick<Engine, 'Photo'>>;
+  readonly #patience: typeof PATIENCE;
   #state: DecoderState = { bytesFed: 0, fileBytes: undefined, wants: [] };
   #waiting: Waiting | null = null;
   #failure: PhotoError | null = null;
+  /** Since it last said something. */
+  #looks = 0;
 
-  private constructor(worker: WorkerLike, engine: () => Promise<Pick<Engine, 'Photo'>>) {
+  private constructor(
+    worker: WorkerLike,
+    engine: () => Promise<Pick<Engine, 'Photo'>>,
+    patience: typeof PATIENCE,
+  ) {
     this.#worker = worker;
     this.#engine = engine;
+    this.#patience = patience;
     worker.onmessage = ({ data }) => {
+      this.#looks = 0;
       if (data.kind === 'failed') this.#fail(new PhotoError(data.code, data.message));
       else this.#waiting?.take(data);
     };
@@ -69,8 +82,9 @@ export class WorkerDecoder implements PhotoDecoder {
   static async start(
     worker: WorkerLike,
     engine: () => Promise<Pick<Engine, 'Photo'>>,
+    patience = PATIENCE,
   ): Promise<WorkerDecoder> {
-    const decoder = new WorkerDecoder(worker, engine);
+    const decoder = new WorkerDecoder(worker, engine, patience);
     try {
       await decoder.#until('ready');
       return decoder;
@@ -86,7 +100,7 @@ export class WorkerDecoder implements PhotoDecoder {
 
   async feed(offset: number, bytes: Uint8Array): Promise<void> {
     this.#ask({ kind: 'feed', offset, bytes });
-    await this.#until('fed');
+    await this.#watched(this.#until('fed'));
   }
 
   async finish(): Promise<Photograph> {
@@ -95,10 +109,11 @@ export class WorkerDecoder implements PhotoDecoder {
       this.#ask({ kind: 'finish' });
       const heads: (Answer & { kind: 'photo' })[] = [];
       const tiles: TileBytes[] = [];
-      await this.#until('done', (answer) => {
+      const done = this.#until('done', (answer) => {
         if (answer.kind === 'photo') heads.push(answer);
         else if (answer.kind === 'tile') tiles.push(answer.bytes);
       });
+      await this.#watched(done);
       const [head] = heads;
       if (!head) throw new PhotoError('internal', 'The decoding worker gave no photograph.');
       const photo = Photo.receive(head.geometry, head.basis, head.metadata);
@@ -150,6 +165,22 @@ export class WorkerDecoder implements PhotoDecoder {
         },
       };
     });
+  }
+
+  /** Fails where the worker, which is up, says nothing for too long. */
+  async #watched(answer: Promise<void>): Promise<void> {
+    this.#looks = 0;
+    const watch = setInterval(() => {
+      this.#looks += 1;
+      if (this.#looks <= this.#patience.looks) return;
+      const message = 'The decoding worker stopped. It does not answer. Load the photograph again.';
+      this.#fail(new PhotoError('worker-unavailable', message));
+    }, this.#patience.lookMs);
+    try {
+      await answer;
+    } finally {
+      clearInterval(watch);
+    }
   }
 
   #fail(error: PhotoError): void {

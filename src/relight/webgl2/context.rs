@@ -137,19 +137,22 @@ impl Context {
 
     /// Gets ready to draw a picture, from the canvas's upper left corner on.
     pub(super) fn aim(&self, extent: Extent, gamut: Gamut) -> Result<(), BackendError> {
-        let Extent { width, height } = extent;
-        // It only grows: photographs of several sizes take turns on it.
-        if self.canvas.width() < width {
-            self.canvas.set_width(width);
-        }
-        if self.canvas.height() < height {
-            self.canvas.set_height(height);
-        }
         let gl = &self.gl;
-        let (given_width, given) = (gl.drawing_buffer_width(), gl.drawing_buffer_height());
-        if given_width < width as i32 || given < height as i32 {
-            let reason = format!("{extent} pixels were asked for, {given_width}x{given} given");
-            return Err(canvas_error(&reason));
+        let before = self.size();
+        // Large enough for photographs of several sizes, which take turns on it, if there can be so much;
+        // browsers give less where it is too much.
+        let [room, own] = [
+            Extent {
+                width: before.width.max(extent.width),
+                height: before.height.max(extent.height),
+            },
+            extent,
+        ];
+        if !self.resize(room) && !self.resize(own) {
+            self.resize(before);
+            return Err(BackendError::Upload(format!(
+                "its {extent} pixels are more than the browser draws by {API} at once"
+            )));
         }
         if self.gamut.replace(gamut) != gamut {
             let space = gamut.color_space().into();
@@ -158,8 +161,37 @@ impl Context {
             // Chromium tells what copies the canvas of it only once it has new memory.
             self.canvas.set_width(self.canvas.width());
         }
-        gl.viewport(0, given - height as i32, width as i32, height as i32);
+        let [width, height] = [extent.width, extent.height].map(|side| side as i32);
+        gl.viewport(0, gl.drawing_buffer_height() - height, width, height);
         Ok(())
+    }
+
+    fn size(&self) -> Extent {
+        Extent {
+            width: self.canvas.width(),
+            height: self.canvas.height(),
+        }
+    }
+
+    /// Makes the canvas that large; whether what is drawn into is.
+    fn resize(&self, extent: Extent) -> bool {
+        let Extent { width, height } = self.size();
+        if extent.width != width {
+            self.canvas.set_width(extent.width);
+        }
+        if extent.height != height {
+            self.canvas.set_height(extent.height);
+        }
+        let given = [
+            self.gl.drawing_buffer_width(),
+            self.gl.drawing_buffer_height(),
+        ];
+        given == [extent.width as i32, extent.height as i32]
+    }
+
+    /// Forgets errors of what other photographs did.
+    pub(super) fn forget_errors(&self) {
+        while !matches!(self.gl.get_error(), Gl::NO_ERROR | Gl::CONTEXT_LOST_WEBGL) {}
     }
 
     /// The first error since the last call. Waits for the device.

@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use js_sys::{Float32Array, Int16Array, Int32Array, Object};
-use wasm_bindgen::JsValue;
+use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{WebGl2RenderingContext as Gl, WebGlBuffer, WebGlFramebuffer, WebGlTexture};
 
 use super::context::{
@@ -47,6 +47,7 @@ impl Scene {
     /// Uploads a transport, or fails without leaving anything in the context.
     pub fn new(context: Rc<Context>, transport: &Transport) -> Result<Self, BackendError> {
         let layout = TextureLayout::new(transport, context.limits)?;
+        context.forget_errors();
         if layout.pairs() > 0 && context.floats.is_none() {
             return Err(BackendError::Device {
                 api: API,
@@ -103,6 +104,7 @@ impl Scene {
             gl.active_texture(Gl::TEXTURE0 + LIGHT);
             write_rows(gl, self.layout.light(), FLOATS, &self.light)?;
             self.lit = Lit::of(light);
+            self.pictures = None;
         }
         let tint = self.lit.tint();
         let params = self.layout.params(tint, display, detail);
@@ -124,8 +126,10 @@ impl Scene {
     /// refuses it.
     pub fn take_picture(&mut self, picture: &JsValue, extent: Extent) -> Result<bool, JsValue> {
         let context = &*self.context;
-        let too_large = extent.width.max(extent.height) > context.limits.side;
-        let (Some(floats), false) = (&context.floats, too_large) else {
+        let (Some(floats), true) = (
+            &context.floats,
+            self.layout.takes(extent, context.limits) && !is_bitmap(picture),
+        ) else {
             return Ok(false);
         };
         let fits = |pictures: &Pictures| pictures.extent() == extent;
@@ -133,8 +137,10 @@ impl Scene {
             Some(pictures) => pictures,
             None => {
                 let light = self.memory.texture(LIGHT);
-                let Some(made) = Pictures::new(&context.gl, extent, light, self.layout.light())
-                else {
+                context.forget_errors();
+                let made = Pictures::new(&context.gl, extent, light, self.layout.light());
+                // There is no room, but for what is there already.
+                let (Some(made), Ok(())) = (made, context.check()) else {
                     return Ok(false);
                 };
                 made
@@ -146,6 +152,12 @@ impl Scene {
         self.lit = Lit::default();
         Ok(true)
     }
+}
+
+/// Unlike other pictures, bitmaps are taken as they are, and nothing tells whether their colours have been
+/// multiplied by alpha.
+fn is_bitmap(picture: &JsValue) -> bool {
+    picture.is_instance_of::<web_sys::ImageBitmap>()
 }
 
 impl Memory {

@@ -51,15 +51,13 @@ impl WebGpu {
         gamut: Gamut,
     ) -> Result<Self, BackendError> {
         let scene = Scene::new(device.clone(), transport).await?;
-        let surface = device.attempt(|| {
+        let refused = |reason| BackendError::Canvas { api: API, reason };
+        let configured = device.attempt(|| {
             let target = wgpu::SurfaceTarget::Canvas(canvas.clone());
             let surface = device.instance.create_surface(target);
-            let surface = surface.map_err(|e| BackendError::Canvas {
-                api: API,
-                reason: e.to_string(),
-            })?;
+            let surface = surface.map_err(|e| refused(e.to_string()))?;
             let camera = transport.geometry.camera;
-            let configuration = wgpu::SurfaceConfiguration {
+            let configuration = |gamut| wgpu::SurfaceConfiguration {
                 usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
                 format: device.format,
                 color_space: match gamut {
@@ -73,10 +71,16 @@ impl WebGpu {
                 alpha_mode: wgpu::CompositeAlphaMode::Opaque,
                 view_formats: Vec::new(),
             };
-            surface.configure(&device.device, &configuration);
-            Ok(surface)
+            // Whether the browser takes it shows at the first picture.
+            for gamut in [gamut, Gamut::Srgb] {
+                surface.configure(&device.device, &configuration(gamut));
+                if picture(&surface).is_ok() {
+                    return Ok((surface, gamut));
+                }
+            }
+            Err(refused("it takes no configuration".into()))
         });
-        let surface = surface.await?;
+        let (surface, gamut) = configured.await??;
         Ok(Self {
             scene,
             surface,
@@ -104,15 +108,20 @@ impl Backend for WebGpu {
 
     fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
         self.scene.device().check()?;
-        let target = match self.surface.get_current_texture() {
-            wgpu::CurrentSurfaceTexture::Success(target)
-            | wgpu::CurrentSurfaceTexture::Suboptimal(target) => target,
-            other => return Err(BackendError::Lost(format!("no frame: {other:?}"))),
-        };
+        let target = picture(&self.surface).map_err(BackendError::Lost)?;
         let view = target.texture.create_view(&Default::default());
         self.scene.draw(frame, view);
         self.scene.device().queue.present(target);
         Ok(())
+    }
+}
+
+/// What the canvas shows next.
+fn picture(surface: &wgpu::Surface<'_>) -> Result<wgpu::SurfaceTexture, String> {
+    match surface.get_current_texture() {
+        wgpu::CurrentSurfaceTexture::Success(picture)
+        | wgpu::CurrentSurfaceTexture::Suboptimal(picture) => Ok(picture),
+        other => Err(format!("its canvas gives no picture: {other:?}")),
     }
 }
 

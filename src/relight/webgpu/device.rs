@@ -2,12 +2,16 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::relight::SHADER;
 use crate::relight::backend::BackendError;
 use crate::relight::texture_layout::TextureLimits;
 
 /// What errors call the interface.
 pub(super) const API: &str = "WebGPU";
+/// The module; the first file is WebGL2's source as well.
+const SHADER: &str = concat!(
+    include_str!("../shaders/relight.wgsl"),
+    include_str!("../shaders/see.wgsl")
+);
 
 /// A device that any number of photographs share.
 #[derive(Debug)]
@@ -18,7 +22,7 @@ pub struct Device {
     pub(super) queue: wgpu::Queue,
     /// Of what is drawn last.
     pub(super) format: wgpu::TextureFormat,
-    pub(super) see: wgpu::RenderPipeline,
+    pub(super) see: wgpu::ComputePipeline,
     pub(super) relight: wgpu::RenderPipeline,
     #[cfg(target_arch = "wasm32")]
     pub(super) shrink: [wgpu::RenderPipeline; 2],
@@ -51,19 +55,21 @@ impl Device {
             required_limits: wgpu::Limits {
                 max_texture_dimension_2d: limits.side,
                 max_texture_array_layers: limits.layers,
-                ..wgpu::Limits::downlevel_webgl2_defaults()
+                ..wgpu::Limits::downlevel_defaults()
             },
             ..Default::default()
         };
         let given = adapter.request_device(&described).await;
         let (device, queue) = given.map_err(|e| error(e.to_string()))?;
-        let pipelines = Pipelines::new(&device, format);
+        let lost = watch(&device);
+        let pipelines = attempt(&device, || Pipelines::new(&device, format)).await;
+        let pipelines = pipelines.map_err(error)?;
         let info = adapter.get_info();
         let kernel = describe(&info, &device);
         Ok(Self {
             software: is_software(&info, &kernel),
             kernel,
-            lost: watch(&device),
+            lost,
             #[cfg(target_arch = "wasm32")]
             instance,
             device,
@@ -101,21 +107,23 @@ impl Device {
     }
 
     /// Runs `work`, and fails where the device refuses any of it.
-    pub(super) async fn attempt<T>(
-        &self,
-        work: impl FnOnce() -> Result<T, BackendError>,
-    ) -> Result<T, BackendError> {
-        let invalid = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let done = work();
-        // Both before anything is waited for, as others may use the device meanwhile; innermost first.
-        let (memory, invalid) = (memory.pop(), invalid.pop());
-        let refused = [memory.await, invalid.await];
-        let done = done?;
-        match refused.into_iter().flatten().next() {
-            Some(error) => Err(BackendError::Upload(error.to_string())),
-            None => Ok(done),
-        }
+    pub(super) async fn attempt<T>(&self, work: impl FnOnce() -> T) -> Result<T, BackendError> {
+        let done = attempt(&self.device, work).await;
+        done.map_err(BackendError::Upload)
+    }
+}
+
+/// Runs `work`; what the device has against it, if anything.
+async fn attempt<T>(device: &wgpu::Device, work: impl FnOnce() -> T) -> Result<T, String> {
+    let invalid = device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    let done = work();
+    // Both before anything is waited for, as others may use the device meanwhile; innermost first.
+    let (memory, invalid) = (memory.pop(), invalid.pop());
+    let refused = [memory.await, invalid.await];
+    match refused.into_iter().flatten().next() {
+        Some(error) => Err(error.to_string()),
+        None => Ok(done),
     }
 }
 
@@ -160,7 +168,7 @@ fn is_software(info: &wgpu::AdapterInfo, kernel: &str) -> bool {
 }
 
 struct Pipelines {
-    see: wgpu::RenderPipeline,
+    see: wgpu::ComputePipeline,
     relight: wgpu::RenderPipeline,
     /// A picture to the light's columns, then to its rows.
     #[cfg(target_arch = "wasm32")]
@@ -196,9 +204,17 @@ impl Pipelines {
                 cache: None,
             })
         };
+        #[cfg(target_arch = "wasm32")]
         let floats = Some(wgpu::TextureFormat::Rgba32Float.into());
         Self {
-            see: pipeline("see", &[floats.clone(), floats.clone()]),
+            see: device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some("see"),
+                layout: None,
+                module: &module,
+                entry_point: Some("see_together"),
+                compilation_options: Default::default(),
+                cache: None,
+            }),
             relight: pipeline("relight", &[Some(format.into())]),
             #[cfg(target_arch = "wasm32")]
             shrink: ["across", "down"]

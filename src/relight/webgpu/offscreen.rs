@@ -70,7 +70,7 @@ impl Offscreen {
         let scene = Scene::new(device.clone(), transport).await?;
         let extent = transport.geometry.camera;
         let picture = device.attempt(|| {
-            Ok(device.device.create_texture(&wgpu::TextureDescriptor {
+            device.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("picture"),
                 size: wgpu::Extent3d {
                     width: extent.width,
@@ -83,7 +83,7 @@ impl Offscreen {
                 format: device.format,
                 usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
                 view_formats: &[],
-            }))
+            })
         });
         let picture = picture.await?;
         Ok(Self {

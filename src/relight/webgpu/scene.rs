@@ -5,8 +5,11 @@ use std::rc::Rc;
 use super::device::Device;
 use super::textures::{Textures, write_texture};
 use crate::relight::backend::{BackendError, Frame, Lit};
-use crate::relight::texture_layout::{Pass, TextureLayout};
-use crate::transport::{CHANNELS, Transport};
+use crate::relight::texture_layout::TextureLayout;
+use crate::transport::{CHANNELS, Extent, Transport};
+
+/// The shader's: window origins that are seen together.
+const GROUP: [u32; 2] = [32, 4];
 
 /// A transport in a device's memory, and what is seen of the last light.
 #[derive(Debug)]
@@ -14,10 +17,8 @@ pub struct Scene {
     device: Rc<Device>,
     layout: TextureLayout,
     textures: Textures,
-    /// What the passes that see read: `[channel][pair]`.
+    /// What the dispatches that see read and write: `[channel][pair]`.
     sights: [Vec<wgpu::BindGroup>; CHANNELS],
-    /// What they draw into.
-    layers: Vec<wgpu::TextureView>,
     /// What the last pass reads.
     bindings: wgpu::BindGroup,
     /// The light that is there.
@@ -30,21 +31,19 @@ impl Scene {
     /// Uploads a transport, or fails without leaving anything on the device.
     pub async fn new(device: Rc<Device>, transport: &Transport) -> Result<Self, BackendError> {
         let layout = TextureLayout::new(transport, device.limits)?;
-        let textures = Textures::new(&device.device, &layout, &transport.basis);
-        let bound = device.attempt(|| {
+        // All in one, so that a device that has no room for it is not taken for a broken one.
+        let made = device.attempt(|| {
+            let textures = Textures::new(&device.device, &layout, &transport.basis);
             textures.upload(&device.queue, &layout, transport);
-            Ok((
-                textures.bind_passes(&device.device, &device.see),
-                textures.layers(),
-                textures.bind(&device.device, &device.relight),
-            ))
+            let sights = textures.bind_parts(&device.device, &device.see);
+            let bindings = textures.bind(&device.device, &device.relight);
+            (textures, sights, bindings)
         });
-        let (sights, layers, bindings) = bound.await?;
+        let (textures, sights, bindings) = made.await?;
         Ok(Self {
             layout,
             textures,
             sights,
-            layers,
             bindings,
             lit: Lit::default(),
             #[cfg(target_arch = "wasm32")]
@@ -78,20 +77,22 @@ impl Scene {
             let extent = self.layout.light();
             write_texture(queue, &self.textures.light, elements, [0; 3], extent);
             self.lit = Lit::of(light);
+            #[cfg(target_arch = "wasm32")]
+            drop(self.pictures.take());
         }
         let tint = self.lit.tint();
         let params = self.layout.params(tint, display, detail);
         queue.write_buffer(&self.textures.params, 0, bytemuck::bytes_of(&params));
         let mut encoder = device.create_command_encoder(&Default::default());
         if self.lit.look(detail) {
-            for Pass {
-                channel,
-                pair,
-                layer,
-            } in self.layout.passes(tint, detail)
-            {
-                let layers = &self.layers[layer as usize..][..2];
-                cover(&mut encoder, see, &self.sights[channel][pair], layers);
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(see);
+            let Extent { width, height } = self.textures.seen();
+            let [x, y] = GROUP;
+            let sights = &self.sights[tint.channels()[0]];
+            for sight in &sights[..self.layout.used_pairs(detail)] {
+                pass.set_bind_group(0, sight, &[]);
+                pass.dispatch_workgroups(width.div_ceil(x), height.div_ceil(y), 1);
             }
         }
         cover(&mut encoder, relight, &self.bindings, &[target]);
@@ -101,7 +102,7 @@ impl Scene {
 
 #[cfg(target_arch = "wasm32")]
 impl Scene {
-    /// Takes a picture as the light; `false` where it is larger than a texture. Nothing changes where
+    /// Takes a picture as the light; `false` where it is too large. Nothing changes where
     /// the browser refuses it.
     pub fn take_picture(
         &mut self,
@@ -109,7 +110,7 @@ impl Scene {
         extent: crate::transport::Extent,
     ) -> Result<bool, wasm_bindgen::JsValue> {
         let device = &*self.device;
-        if extent.width.max(extent.height) > device.limits.side {
+        if !self.layout.takes(extent, device.limits) {
             return Ok(false);
         }
         let light = &self.textures.light;

@@ -9,7 +9,7 @@ use crate::transport::{Basis, CHANNELS, Extent, Transport};
 #[derive(Debug)]
 pub(super) struct Textures {
     coefficients: wgpu::Texture,
-    pub seen: wgpu::Texture,
+    seen: wgpu::Texture,
     codes: wgpu::Texture,
     origins: wgpu::Texture,
     steps: wgpu::Texture,
@@ -18,7 +18,8 @@ pub(super) struct Textures {
     pub params: wgpu::Buffer,
     /// Pair by pair.
     basis: Vec<wgpu::Buffer>,
-    channels: [wgpu::Buffer; CHANNELS],
+    /// `[channel][pair]`.
+    parts: [Vec<wgpu::Buffer>; CHANNELS],
 }
 
 impl Textures {
@@ -53,7 +54,7 @@ impl Textures {
                 "seen",
                 layout.seen(),
                 Rgba32Float,
-                TextureUsages::RENDER_ATTACHMENT,
+                TextureUsages::STORAGE_BINDING,
             ),
             codes: texture("codes", layout.codes(), Rgba16Sint, given),
             origins: texture("origins", flat(layout.origins()), Rg16Sint, given),
@@ -70,8 +71,12 @@ impl Textures {
                 .iter()
                 .map(|pair| uniforms("basis", bytemuck::cast_slice(pair)))
                 .collect(),
-            channels: TextureLayout::CHANNELS
-                .map(|channel| uniforms("channel", bytemuck::cast_slice(&channel))),
+            parts: std::array::from_fn(|channel| {
+                let parts = layout.parts(channel);
+                parts
+                    .map(|part| uniforms("part", bytemuck::bytes_of(&part)))
+                    .collect()
+            }),
         }
     }
 
@@ -118,13 +123,6 @@ impl Textures {
 
     /// What the last pass reads.
     pub fn bind(&self, device: &wgpu::Device, pipeline: &wgpu::RenderPipeline) -> wgpu::BindGroup {
-        let array = |texture: &wgpu::Texture| {
-            // An array of one layer is still an array to the shader.
-            texture.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2Array),
-                ..Default::default()
-            })
-        };
         let views = [
             array(&self.coefficients),
             array(&self.seen),
@@ -134,12 +132,7 @@ impl Textures {
             self.light.create_view(&Default::default()),
             self.tiles.create_view(&Default::default()),
         ];
-        let textures = (0..)
-            .zip(&views)
-            .map(|(binding, view)| wgpu::BindGroupEntry {
-                binding,
-                resource: wgpu::BindingResource::TextureView(view),
-            });
+        let textures = (0..).zip(&views).map(|(binding, of)| view(binding, of));
         let entries: Vec<_> = textures.chain([uniform(7, &self.params)]).collect();
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("relight"),
@@ -148,45 +141,38 @@ impl Textures {
         })
     }
 
-    /// What the passes before read: `[channel][pair]`.
-    pub fn bind_passes(
+    /// What the dispatches before read and write: `[channel][pair]`.
+    pub fn bind_parts(
         &self,
         device: &wgpu::Device,
-        pipeline: &wgpu::RenderPipeline,
+        pipeline: &wgpu::ComputePipeline,
     ) -> [Vec<wgpu::BindGroup>; CHANNELS] {
         let layout = pipeline.get_bind_group_layout(0);
         let light = self.light.create_view(&Default::default());
-        self.channels.each_ref().map(|channel| {
-            let pairs = self.basis.iter().map(|basis| {
-                device.create_bind_group(&wgpu::BindGroupDescriptor {
-                    label: Some("see"),
-                    layout: &layout,
-                    entries: &[
-                        wgpu::BindGroupEntry {
-                            binding: 5,
-                            resource: wgpu::BindingResource::TextureView(&light),
-                        },
-                        uniform(7, &self.params),
-                        uniform(8, basis),
-                        uniform(9, channel),
-                    ],
-                })
-            });
-            pairs.collect()
-        })
-    }
-
-    /// Each layer of what is seen, to draw into.
-    pub fn layers(&self) -> Vec<wgpu::TextureView> {
-        let layer = |layer| {
-            self.seen.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2),
-                base_array_layer: layer,
-                array_layer_count: Some(1),
-                ..Default::default()
+        let seen = array(&self.seen);
+        let bind = |(basis, part): (&wgpu::Buffer, &wgpu::Buffer)| {
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("see"),
+                layout: &layout,
+                entries: &[
+                    view(5, &light),
+                    uniform(7, &self.params),
+                    uniform(8, basis),
+                    view(12, &seen),
+                    uniform(13, part),
+                ],
             })
         };
-        (0..self.seen.depth_or_array_layers()).map(layer).collect()
+        let of = |parts: &Vec<wgpu::Buffer>| self.basis.iter().zip(parts).map(bind).collect();
+        self.parts.each_ref().map(of)
+    }
+
+    /// Texels of a layer of what is seen.
+    pub fn seen(&self) -> Extent {
+        Extent {
+            width: self.seen.width(),
+            height: self.seen.height(),
+        }
     }
 }
 
@@ -207,11 +193,26 @@ impl Drop for Textures {
         for buffer in self
             .basis
             .iter()
-            .chain(&self.channels)
+            .chain(self.parts.iter().flatten())
             .chain([&self.params])
         {
             buffer.destroy();
         }
+    }
+}
+
+/// All layers: an array of one is still an array to the shader.
+fn array(texture: &wgpu::Texture) -> wgpu::TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2Array),
+        ..Default::default()
+    })
+}
+
+fn view(binding: u32, view: &wgpu::TextureView) -> wgpu::BindGroupEntry<'_> {
+    wgpu::BindGroupEntry {
+        binding,
+        resource: wgpu::BindingResource::TextureView(view),
     }
 }
 

@@ -1,0 +1,80 @@
+//! Writes the seeds of the targets that take files: one in each coding, as small as can be.
+//!
+//! `cargo run --manifest-path fuzz/Cargo.toml --example seeds`, after a change of the format.
+
+use std::path::Path;
+
+use fuzzing::choices::Choices;
+use fuzzing::source::Given;
+use relightable_photo::format::{Metadata, Quality};
+use relightable_photo::transport::{
+    BandTile, Basis, Correspondence, Decibels, Extent, Geometry, Window,
+};
+use relightable_photo::workers::OneThread;
+
+/// Two tiles of 8 by 8 pixels and less: the first over a basis, or all functions by element.
+fn given(rank: usize) -> Given {
+    let geometry = Geometry {
+        camera: Extent { width: 10, height: 8 },
+        light: Extent { width: 5, height: 4 },
+        window: Window::new(3).expect("an odd side"),
+        correspondence: Correspondence {
+            affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
+        },
+        tile_side: 8,
+    };
+    // Noise that needs no bytes of an input.
+    let mut noise = Choices(&[7]).noise();
+    let mut colours = |count: usize| -> Vec<[f32; 3]> {
+        (0..count)
+            .map(|i| [1.0, 0.7, 0.3].map(|c| c / (1 + i % 9) as f32 + 0.03 * noise.signed()))
+            .collect()
+    };
+    let area = geometry.window.area();
+    let tiles = geometry.tiles().enumerate().map(|(i, rect)| {
+        let (pixels, mut tile) = (rect.extent.area(), BandTile::dark(rect));
+        match i < 1 && rank > 0 {
+            true => tile.coefficients = colours(pixels * rank),
+            false => tile.functions = colours(pixels * area),
+        }
+        tile
+    });
+    let kernel = |k: usize| (0..area).map(|s| ((s * k) as f32).cos()).collect();
+    Given {
+        geometry,
+        tiles: tiles.collect(),
+        basis: (rank > 0).then(|| Basis {
+            kernels: (0..rank).map(kernel).collect(),
+        }),
+        metadata: Metadata::default(),
+        extensions: Vec::new(),
+        tame: true,
+    }
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("seeds");
+    let snr = Quality::Snr(Decibels(20.0));
+    for (name, rank, quality) in [
+        ("transform", 3, snr),
+        ("halves", 2, Quality::Lossless),
+        ("direct", 0, snr),
+        ("direct-halves", 0, Quality::Lossless),
+    ] {
+        let file = given(rank).encode(quality, &OneThread)?;
+        let mut bytes = Vec::new();
+        file.write(&mut bytes)?;
+        let head = file.head().header.head_bytes() as usize;
+        println!("{name}: {} bytes, {head} of head", bytes.len());
+        for (target, seed) in [
+            ("open", bytes[..head].to_vec()),
+            ("decode", bytes.clone()),
+            ("chunked", [&bytes[..], &[0; 64]].concat()),
+        ] {
+            let folder = seeds.join(target);
+            std::fs::create_dir_all(&folder)?;
+            std::fs::write(folder.join(name), seed)?;
+        }
+    }
+    Ok(())
+}
