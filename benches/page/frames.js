@@ -11,6 +11,9 @@ const FEWEST = 3;
 /** Even so few are not waited for longer than this many times as long. */
 const LONGEST = 5;
 const MOST = 200;
+/** Frames that take longer would be drawn by less of the photograph, unless each is a motion of its own. */
+const SLOW_MS = 30;
+const REST_MS = 120;
 const CANVAS = { width: 640, height: 360 };
 /** So large the element is on the page. */
 const SHOWN = '256px';
@@ -137,8 +140,11 @@ export async function time(photo, name, seconds) {
     if (i >= FEWEST ? passed > seconds : passed > LONGEST * seconds) break;
     // Another than before, the first too.
     const { issued, done } = await frame(photo, change, i + 2);
+    if (photo.detail !== 1)
+      throw new Error(`a frame was drawn by ${photo.detail} of the components`);
     times.issued.push(issued);
     times.done.push(done);
+    if (done > SLOW_MS) await new Promise((resolve) => setTimeout(resolve, REST_MS));
   }
   waitForScreen(true);
   return times;
