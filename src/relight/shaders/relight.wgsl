@@ -1,6 +1,6 @@
 // y = pT, and what a display makes of it, for the camera pixel under each fragment.
 //
-// The one shader source of both GPU back ends; the .glsl files beside it are translated from it
+// The shader source of both GPU back ends, which see.wgsl follows on WebGPU; the .glsl files beside it are translated from it
 // (tests/shaders.rs). Only textures and small uniforms: WebGL2 has no storage buffers. What the
 // textures hold and where is laid out in texture_layout.rs.
 

@@ -87,7 +87,7 @@ impl Scene {
         if self.lit.look(detail) {
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(see);
-            let Extent { width, height } = self.textures.seen();
+            let Extent { width, height } = self.layout.seen().extent;
             let [x, y] = GROUP;
             let sights = &self.sights[tint.channels()[0]];
             for sight in &sights[..self.layout.used_pairs(detail)] {

@@ -166,14 +166,6 @@ impl Textures {
         let of = |parts: &Vec<wgpu::Buffer>| self.basis.iter().zip(parts).map(bind).collect();
         self.parts.each_ref().map(of)
     }
-
-    /// Texels of a layer of what is seen.
-    pub fn seen(&self) -> Extent {
-        Extent {
-            width: self.seen.width(),
-            height: self.seen.height(),
-        }
-    }
 }
 
 impl Drop for Textures {
