@@ -18,41 +18,31 @@ impl Tint {
     /// Of all elements of these rows.
     #[inline(always)]
     pub fn of<'a>(rows: impl Iterator<Item = &'a [[f32; 4]]> + Clone) -> Self {
-        if differs(rows.clone().flatten()) {
-            return Self::Many;
-        }
-        let mut sums = [0.0f32; 4];
-        for row in rows.clone() {
-            for element in row {
-                (0..4).for_each(|c| sums[c] += element[c]);
-            }
-        }
-        let base = (1..CHANNELS).fold(0, |best, c| if sums[c] > sums[best] { c } else { best });
-        if sums[base] <= 0.0 {
+        let brightest = brightest(rows.clone());
+        let base = (1..CHANNELS).fold(0, |best, c| match brightest[c] > brightest[best] {
+            true => c,
+            false => best,
+        });
+        if brightest[base] <= 0.0 {
             return Self::One(base, [0.0; CHANNELS]);
         }
-        // From the brightest element: sums have rounding of their own.
-        let brightest = rows
-            .clone()
-            .flatten()
-            .max_by(|a, b| a[base].total_cmp(&b[base]));
-        let brightest = brightest.copied().unwrap_or_default();
-        let factors = std::array::from_fn(|c| brightest[c] / brightest[base]);
+        let factors = brightest.map(|value| value / brightest[base]);
         for row in rows {
-            let mut off = [0.0f32; CHANNELS];
+            let mut off = [0.0f32; 4];
             for element in row {
+                let base = element[base];
                 // The smallest numbers there are have no such precision.
-                let size = element[0].max(element[1]).max(element[2]);
-                let most = ROUNDING * size + f32::MIN_POSITIVE;
-                for c in 0..CHANNELS {
-                    off[c] = off[c].max((element[c] - factors[c] * element[base]).abs() - most);
+                let most = ROUNDING * base + f32::MIN_POSITIVE;
+                for c in 0..4 {
+                    off[c] = larger(off[c], (element[c] - factors[c] * base).abs() - most);
                 }
             }
-            if off.iter().any(|off| *off > 0.0) {
+            if off[..CHANNELS].iter().any(|off| *off > 0.0) {
                 return Self::Many;
             }
         }
-        Self::One(base, factors)
+        let [red, green, blue, _] = factors;
+        Self::One(base, [red, green, blue])
     }
 
     /// Whether there is no light.
@@ -70,22 +60,34 @@ impl Tint {
     }
 }
 
-/// Whether elements have plainly another colour than the first that shines: what most lights of many
-/// colours show at once.
+/// The most of each channel.
 #[inline(always)]
-fn differs<'a>(elements: impl Iterator<Item = &'a [f32; 4]>) -> bool {
-    let of = |element: &[f32; 4]| element[0].max(element[1]).max(element[2]);
-    // The smallest numbers there are have no colour to speak of.
-    let mut shining = elements.filter(|element| of(element) > 1e-20);
-    let Some(first) = shining.next() else {
-        return false;
-    };
-    let colour = first.map(|value| value / of(first));
-    let off = |element: &[f32; 4]| {
-        let size = of(element);
-        (0..CHANNELS).any(|c| (element[c] - colour[c] * size).abs() > 1e-3 * size)
-    };
-    shining.any(off)
+fn brightest<'a>(rows: impl Iterator<Item = &'a [[f32; 4]]>) -> [f32; 4] {
+    // Four by four: each maximum waits for the last.
+    let mut most = [[0.0f32; 4]; 4];
+    for row in rows {
+        let (fours, rest) = row.as_chunks::<4>();
+        for four in fours {
+            for (most, element) in most.iter_mut().zip(four) {
+                for c in 0..4 {
+                    most[c] = larger(most[c], element[c]);
+                }
+            }
+        }
+        for element in rest {
+            for c in 0..4 {
+                most[0][c] = larger(most[0][c], element[c]);
+            }
+        }
+    }
+    let [a, b, c, d] = most;
+    std::array::from_fn(|i| larger(larger(a[i], b[i]), larger(c[i], d[i])))
+}
+
+/// Of numbers that are numbers, for which this is one instruction.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 #[cfg(test)]

@@ -79,59 +79,56 @@ fn each<V: Vector, const SEEN: usize>(
     let outs = out.chunks_exact_mut(V::Pixels::COUNT);
     for (i, (places, out)) in places.zip(outs).enumerate() {
         // SAFETY: all places are seen, and there is a code for each of the pixels, as was asserted.
-        let sums = unsafe {
+        unsafe {
             let seen = [
                 texels.add(usize::from(places[0]) * texels_each),
                 texels.add(usize::from(places[V::Pixels::COUNT - 1]) * texels_each),
             ];
             let from = from.add(first + i * V::Pixels::COUNT);
-            sums::<V::Pixels, SEEN>(from, seen, quads, codes)
-        };
-        for (p, out) in out.iter_mut().enumerate() {
-            for c in 0..CHANNELS {
-                out[c] = sums[c][p] * gain[c];
-            }
+            pixels_of::<V::Pixels, SEEN>(from, seen, quads, codes, gain, out.as_mut_ptr());
         }
     }
     for (i, (place, out)) in rest.iter().zip(out_rest).enumerate() {
         // SAFETY: as above.
-        let sums = unsafe {
+        unsafe {
             let seen = [texels.add(usize::from(*place) * texels_each); 2];
-            sums::<Single, SEEN>(from.add(first + whole + i), seen, quads, codes)
-        };
-        for c in 0..CHANNELS {
-            out[c] = sums[c][0] * gain[c];
+            let from = from.add(first + whole + i);
+            pixels_of::<Single, SEEN>(from, seen, quads, codes, gain, out);
         }
     }
 }
 
-/// Of each channel, of one or two pixels.
+/// One or two pixels.
 ///
 /// # Safety
 /// `from` points at codes of the pixels in the first of `quads` planes of each channel, `seen` at as
-/// many texels of `SEEN` channels.
+/// many texels of `SEEN` channels; there is room in `out`.
 #[inline(always)]
-unsafe fn sums<P: Pixels, const SEEN: usize>(
+unsafe fn pixels_of<P: Pixels, const SEEN: usize>(
     from: *const TexelCode,
     seen: [*const [f32; QUAD]; 2],
     quads: usize,
     Codes { plane, channel, .. }: Codes<'_>,
-) -> [[f32; 2]; CHANNELS] {
+    gain: [f32; CHANNELS],
+    out: *mut [f32; CHANNELS],
+) {
     // Loops and no closures, which would not be compiled for the vectors' registers.
-    let mut sums = [[0.0; 2]; CHANNELS];
-    for (c, sums) in sums.iter_mut().enumerate() {
-        let of_channel = if SEEN == 1 { 0 } else { c * quads };
-        let mut sum = P::zero();
-        for q in 0..quads {
+    let mut sums = [P::zero(); CHANNELS];
+    for q in 0..quads {
+        let mut texels = [P::zero(); SEEN];
+        for (c, texels) in texels.iter_mut().enumerate() {
+            let at = c * quads + q;
             // SAFETY: as above.
-            sum = unsafe {
-                let seen = [seen[0].add(of_channel + q), seen[1].add(of_channel + q)];
-                sum.plus_products(from.add(c * channel + q * plane), seen)
-            };
+            *texels = unsafe { P::load([seen[0].add(at), seen[1].add(at)]) };
         }
-        *sums = sum.sums();
+        for (c, sum) in sums.iter_mut().enumerate() {
+            let seen = texels[if SEEN == 1 { 0 } else { c }];
+            // SAFETY: as above.
+            *sum = unsafe { sum.plus_products(from.add(c * channel + q * plane), seen) };
+        }
     }
-    sums
+    // SAFETY: as above.
+    unsafe { P::store_sums(sums, gain, out) };
 }
 
 #[cfg(test)]

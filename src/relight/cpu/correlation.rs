@@ -42,7 +42,14 @@ pub struct Workspace {
     spectrum: Vec<[[f32; 2]; CHANNELS]>,
     /// `[u, v]`, of `v` as many as a square has.
     columns: Vec<Packed>,
+    /// `C`; `[origin, channel, quad]`.
+    seen: Vec<Line>,
 }
+
+/// Texels, where a cache's line begins.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C, align(64))]
+struct Line([f32; 16]);
 
 impl Correlator {
     /// For window origins that span `across` times `down`.
@@ -122,6 +129,7 @@ impl Correlator {
             half: vec![Packed::default(); blocks(n) * n],
             spectrum: vec![Default::default(); n * n],
             columns: vec![Packed::default(); n * self.reach],
+            seen: Vec::new(),
         }
     }
 
@@ -129,15 +137,17 @@ impl Correlator {
     /// `channels` of what `row` yields of the light: elements of the row of that number, as many as a
     /// square sees.
     #[inline(always)]
-    pub fn correlate<'a, V: Vector>(
+    pub fn correlate<'a, 'w, V: Vector>(
         &self,
         row: impl Fn(usize) -> &'a [[f32; 4]],
         channels: &[usize],
         quads: usize,
-        work: &mut Workspace,
-        out: &mut [[f32; QUAD]],
-    ) {
+        work: &'w mut Workspace,
+    ) -> &'w [[f32; QUAD]] {
         let n = self.fft.side();
+        let texels = self.reach * self.reach * channels.len() * quads;
+        let lines = (texels * size_of::<[f32; QUAD]>()).div_ceil(size_of::<Line>());
+        work.seen.resize(lines, Line::default());
         for channel in channels {
             self.along_u::<V>(&row, *channel, work);
             self.along_v::<V>(*channel, work);
@@ -146,9 +156,10 @@ impl Correlator {
         for (group, spectra) in groups.take(quads.div_ceil(TOGETHER / QUAD)).enumerate() {
             for (i, channel) in channels.iter().enumerate() {
                 self.invert::<V>(spectra, *channel, work);
-                self.collect::<V>(group, quads, (i, channels.len()), work, out);
+                self.collect::<V>(group, quads, (i, channels.len()), work);
             }
         }
+        &bytemuck::cast_slice(&work.seen)[..texels]
     }
 
     /// Transforms one channel of the light along `u`. Rows are real, so that two share a transform:
@@ -268,24 +279,35 @@ impl Correlator {
         quads: usize,
         (channel, channels): (usize, usize),
         work: &mut Workspace,
-        out: &mut [[f32; QUAD]],
     ) {
         let first = group * TOGETHER / QUAD;
         let each = channels * quads;
         let at = channel * quads + first;
         let quads = (quads - first).min(TOGETHER / QUAD);
-        for (v, out) in out.chunks_exact_mut(self.reach * each).enumerate() {
+        let out: &mut [[f32; QUAD]] = bytemuck::cast_slice_mut(&mut work.seen);
+        for (v, out) in out
+            .chunks_exact_mut(self.reach * each)
+            .take(self.reach)
+            .enumerate()
+        {
+            let columns = &work.columns;
             self.fft.transform(
                 &mut work.between,
                 #[inline(always)]
-                |u: usize| work.columns[u * self.reach + v].load::<V>(),
+                |u: usize| columns[u * self.reach + v].load::<V>(),
                 #[inline(always)]
                 |u: usize, value: Complex<V>| {
                     let Some(out) = out.get_mut(u * each + at..u * each + at + quads) else {
                         return; // Beyond the square's origins.
                     };
+                    let value = value.exchanged();
+                    if let ([re, im], []) = out.as_flattened_mut().as_chunks_mut() {
+                        value.re.store(re);
+                        value.im.store(im);
+                        return;
+                    }
                     let mut packed = Packed::default();
-                    value.exchanged().store(&mut packed);
+                    value.store(&mut packed);
                     let texels = packed
                         .re
                         .as_chunks()
@@ -377,10 +399,8 @@ mod tests {
             };
             let light: Vec<[f32; 4]> = (0..n * n).map(element).collect();
             let row = |v: usize| &light[v * n..(v + 1) * n];
-            let mut out = vec![[0.0; QUAD]; reach * reach * CHANNELS * quads];
             let mut work = correlator.workspace();
-            let quads = correlator.quads();
-            correlator.correlate::<Plain>(row, &[0, 1, 2], quads, &mut work, &mut out);
+            let out = correlator.correlate::<Plain>(row, &[0, 1, 2], quads, &mut work);
             for o in [0, 1, reach - 1, reach * reach / 2, reach * reach - 1] {
                 for c in 0..CHANNELS {
                     for k in 0..rank {

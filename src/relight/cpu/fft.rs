@@ -10,7 +10,9 @@ use super::lanes::{LANES, Vector};
 
 /// One complex number of each transform, as it lies in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(C, align(32))]
+#[repr(C)]
+#[cfg_attr(not(target_arch = "wasm32"), repr(align(64)))] // a cache's line, which is as many
+#[cfg_attr(target_arch = "wasm32", repr(align(32)))]
 pub struct Packed {
     /// Real parts.
     pub re: [f32; LANES],

@@ -1,7 +1,7 @@
 //! Numbers that are worked on at once: a register of them where there is one, as the compiler does not
 //! find it by itself.
 
-use crate::transport::{QUAD, TexelCode};
+use crate::transport::{CHANNELS, QUAD, TexelCode};
 
 /// How many.
 pub const LANES: usize = if cfg!(target_arch = "wasm32") { 4 } else { 8 };
@@ -25,7 +25,7 @@ pub trait Vector: Copy {
     fn times(self, other: Self) -> Self;
 }
 
-/// Sums of four products for each of some pixels. They are added up alike in all kinds.
+/// Four numbers for each of some pixels. They are added up alike in all kinds.
 pub trait Pixels: Copy {
     /// One or two.
     const COUNT: usize;
@@ -33,15 +33,27 @@ pub trait Pixels: Copy {
     /// Nothing summed up.
     fn zero() -> Self;
 
+    /// What pixels see.
+    ///
+    /// # Safety
+    /// Points at what each of the pixels sees, or where there is one, at that twice.
+    unsafe fn load(seen: [*const [f32; QUAD]; 2]) -> Self;
+
     /// And each pixel's codes times what it sees.
     ///
     /// # Safety
-    /// `codes` points at texels of so many pixels, `seen` at what each of them sees, or where there is
-    /// one, at that twice.
-    unsafe fn plus_products(self, codes: *const TexelCode, seen: [*const [f32; QUAD]; 2]) -> Self;
+    /// `codes` points at texels of so many pixels.
+    unsafe fn plus_products(self, codes: *const TexelCode, seen: Self) -> Self;
 
-    /// The four of each added up.
-    fn sums(self) -> [f32; 2];
+    /// Adds up the four of each channel, times that channel's gain.
+    ///
+    /// # Safety
+    /// There is room for so many pixels.
+    unsafe fn store_sums(
+        channels: [Self; CHANNELS],
+        gain: [f32; CHANNELS],
+        to: *mut [f32; CHANNELS],
+    );
 }
 
 /// What can be done by any kind of vector.
@@ -99,23 +111,34 @@ impl Pixels for Single {
     }
 
     #[inline(always)]
-    unsafe fn plus_products(
-        mut self,
-        codes: *const TexelCode,
-        [seen, _]: [*const [f32; QUAD]; 2],
-    ) -> Self {
-        // SAFETY: both point at a pixel's.
-        let (codes, seen) = unsafe { (*codes, *seen) };
+    unsafe fn load([seen, _]: [*const [f32; QUAD]; 2]) -> Self {
+        // SAFETY: points at what the pixel sees.
+        Self(unsafe { *seen })
+    }
+
+    #[inline(always)]
+    unsafe fn plus_products(mut self, codes: *const TexelCode, seen: Self) -> Self {
+        // SAFETY: points at a pixel's.
+        let codes = unsafe { *codes };
         for lane in 0..QUAD {
-            self.0[lane] += f32::from(codes[lane]) * seen[lane];
+            self.0[lane] += f32::from(codes[lane]) * seen.0[lane];
         }
         self
     }
 
     #[inline(always)]
-    fn sums(self) -> [f32; 2] {
-        let [a, b, c, d] = self.0;
-        [(a + c) + (b + d); 2]
+    unsafe fn store_sums(
+        channels: [Self; CHANNELS],
+        gain: [f32; CHANNELS],
+        to: *mut [f32; CHANNELS],
+    ) {
+        let mut sums = [0.0; CHANNELS];
+        for c in 0..CHANNELS {
+            let [a, b, d, e] = channels[c].0;
+            sums[c] = ((a + d) + (b + e)) * gain[c];
+        }
+        // SAFETY: there is room for a pixel.
+        unsafe { *to = sums };
     }
 }
 
@@ -156,15 +179,15 @@ impl Vector for Plain {
 #[cfg(target_arch = "x86_64")]
 mod avx {
     use std::arch::x86_64::{
-        __m256, _mm_add_ps, _mm_add_ss, _mm_cvtss_f32, _mm_loadu_ps, _mm_loadu_si128,
-        _mm_movehl_ps, _mm_shuffle_ps, _mm256_add_ps, _mm256_castps256_ps128,
+        __m256, _mm_castps_pd, _mm_loadu_ps, _mm_loadu_si128, _mm_movehl_ps, _mm_set_ps,
+        _mm_store_ss, _mm_storel_pd, _mm_storeu_ps, _mm256_add_ps, _mm256_castps256_ps128,
         _mm256_cvtepi16_epi32, _mm256_cvtepi32_ps, _mm256_extractf128_ps, _mm256_loadu_ps,
-        _mm256_mul_ps, _mm256_set_m128, _mm256_set1_ps, _mm256_setzero_ps, _mm256_storeu_ps,
-        _mm256_sub_ps,
+        _mm256_mul_ps, _mm256_set_m128, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps,
+        _mm256_storeu_ps, _mm256_sub_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
     };
 
     use super::{LANES, Pixels, Vector};
-    use crate::transport::{QUAD, TexelCode};
+    use crate::transport::{CHANNELS, QUAD, TexelCode};
 
     /// A register of AVX. Named in [`widest`](super::widest) alone, where the machine is known to
     /// have it.
@@ -185,33 +208,54 @@ mod avx {
         }
 
         #[inline(always)]
-        unsafe fn plus_products(
-            self,
-            codes: *const TexelCode,
-            [first, second]: [*const [f32; QUAD]; 2],
-        ) -> Self {
-            // SAFETY: the machine has AVX2; there are codes of two pixels, and what they see.
+        unsafe fn load([first, second]: [*const [f32; QUAD]; 2]) -> Self {
+            // SAFETY: the machine has AVX; there is what two pixels see.
             Self(unsafe {
-                let codes = _mm256_cvtepi16_epi32(_mm_loadu_si128(codes.cast()));
-                let seen = _mm256_set_m128(_mm_loadu_ps(second.cast()), _mm_loadu_ps(first.cast()));
-                _mm256_add_ps(self.0, _mm256_mul_ps(_mm256_cvtepi32_ps(codes), seen))
+                _mm256_set_m128(_mm_loadu_ps(second.cast()), _mm_loadu_ps(first.cast()))
             })
         }
 
         #[inline(always)]
-        fn sums(self) -> [f32; 2] {
-            // SAFETY: the machine has AVX.
+        unsafe fn plus_products(self, codes: *const TexelCode, seen: Self) -> Self {
+            // SAFETY: the machine has AVX2; there are codes of two pixels.
+            Self(unsafe {
+                let codes = _mm256_cvtepi16_epi32(_mm_loadu_si128(codes.cast()));
+                _mm256_add_ps(self.0, _mm256_mul_ps(_mm256_cvtepi32_ps(codes), seen.0))
+            })
+        }
+
+        #[inline(always)]
+        unsafe fn store_sums(
+            [red, green, blue]: [Self; CHANNELS],
+            [r, g, b]: [f32; CHANNELS],
+            to: *mut [f32; CHANNELS],
+        ) {
+            // SAFETY: the machine has AVX, and there is room for six numbers.
             unsafe {
-                let halves = [
-                    _mm256_castps256_ps128(self.0),
-                    _mm256_extractf128_ps::<1>(self.0),
-                ];
-                let mut sums = [0.0; 2];
-                for (sum, quad) in sums.iter_mut().zip(halves) {
-                    let two = _mm_add_ps(quad, _mm_movehl_ps(quad, quad));
-                    *sum = _mm_cvtss_f32(_mm_add_ss(two, _mm_shuffle_ps::<1>(two, two)));
-                }
-                sums
+                // In each half, of red and green by turns: the first and third, the second and fourth.
+                let two = _mm256_add_ps(
+                    _mm256_unpacklo_ps(red.0, green.0),
+                    _mm256_unpackhi_ps(red.0, green.0),
+                );
+                let one = _mm256_add_ps(
+                    _mm256_unpacklo_ps(blue.0, blue.0),
+                    _mm256_unpackhi_ps(blue.0, blue.0),
+                );
+                let sums = _mm256_add_ps(
+                    _mm256_shuffle_ps::<0b0100_0100>(two, one),
+                    _mm256_shuffle_ps::<0b1110_1110>(two, one),
+                );
+                let gain = _mm_set_ps(b, b, g, r);
+                let pixels = _mm256_mul_ps(sums, _mm256_set_m128(gain, gain));
+                let to: *mut f32 = to.cast();
+                // The fourth number is written over by the second pixel, which itself is put in two.
+                let (first, second) = (
+                    _mm256_castps256_ps128(pixels),
+                    _mm256_extractf128_ps::<1>(pixels),
+                );
+                _mm_storeu_ps(to, first);
+                _mm_storel_pd(to.add(CHANNELS).cast(), _mm_castps_pd(second));
+                _mm_store_ss(to.add(CHANNELS + 2), _mm_movehl_ps(second, second));
             }
         }
     }
@@ -260,12 +304,13 @@ mod avx {
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 mod simd128 {
     use std::arch::wasm32::{
-        f32x4_add, f32x4_convert_i32x4, f32x4_extract_lane, f32x4_mul, f32x4_splat, f32x4_sub,
-        i32x4_load_extend_i16x4, i32x4_shuffle, v128, v128_load, v128_store,
+        f32x4, f32x4_add, f32x4_convert_i32x4, f32x4_mul, f32x4_splat, f32x4_sub,
+        i32x4_load_extend_i16x4, i32x4_shuffle, v128, v128_load, v128_store, v128_store32_lane,
+        v128_store64_lane,
     };
 
     use super::{LANES, Pixels, Vector};
-    use crate::transport::{QUAD, TexelCode};
+    use crate::transport::{CHANNELS, QUAD, TexelCode};
 
     /// A vector of WebAssembly's.
     #[derive(Clone, Copy)]
@@ -284,29 +329,43 @@ mod simd128 {
         }
 
         #[inline(always)]
-        unsafe fn plus_products(
-            self,
-            codes: *const TexelCode,
-            [seen, _]: [*const [f32; QUAD]; 2],
-        ) -> Self {
-            // SAFETY: there are a pixel's four codes, and what it sees.
-            let (codes, seen) = unsafe {
-                (
-                    i32x4_load_extend_i16x4(codes.cast()),
-                    v128_load(seen.cast()),
-                )
-            };
+        unsafe fn load([seen, _]: [*const [f32; QUAD]; 2]) -> Self {
+            // SAFETY: points at what the pixel sees.
+            Self(unsafe { v128_load(seen.cast()) })
+        }
+
+        #[inline(always)]
+        unsafe fn plus_products(self, codes: *const TexelCode, seen: Self) -> Self {
+            // SAFETY: there are a pixel's four codes.
+            let codes = unsafe { i32x4_load_extend_i16x4(codes.cast()) };
             Self(f32x4_add(
                 self.0,
-                f32x4_mul(f32x4_convert_i32x4(codes), seen),
+                f32x4_mul(f32x4_convert_i32x4(codes), seen.0),
             ))
         }
 
         #[inline(always)]
-        fn sums(self) -> [f32; 2] {
-            let two = f32x4_add(self.0, i32x4_shuffle::<2, 3, 2, 3>(self.0, self.0));
-            let sum = f32x4_extract_lane::<0>(two) + f32x4_extract_lane::<1>(two);
-            [sum; 2]
+        unsafe fn store_sums(
+            [red, green, blue]: [Self; CHANNELS],
+            [r, g, b]: [f32; CHANNELS],
+            to: *mut [f32; CHANNELS],
+        ) {
+            // Of red and green by turns: the first and third, the second and fourth.
+            let two = f32x4_add(
+                i32x4_shuffle::<0, 4, 1, 5>(red.0, green.0),
+                i32x4_shuffle::<2, 6, 3, 7>(red.0, green.0),
+            );
+            let one = f32x4_add(blue.0, i32x4_shuffle::<2, 3, 2, 3>(blue.0, blue.0));
+            let sums = f32x4_add(
+                i32x4_shuffle::<0, 1, 4, 4>(two, one),
+                i32x4_shuffle::<2, 3, 5, 5>(two, one),
+            );
+            let pixel = f32x4_mul(sums, f32x4(r, g, b, b));
+            // SAFETY: there is room for three numbers.
+            unsafe {
+                v128_store64_lane::<0>(pixel, to.cast());
+                v128_store32_lane::<2>(pixel, to.cast::<u32>().add(2));
+            }
         }
     }
 

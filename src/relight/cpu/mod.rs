@@ -20,7 +20,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use super::display::Encoder;
 use super::{Display, Light, LinearPicture, Rgba8Picture, Tint, detailed};
-use crate::transport::{CHANNELS, QUAD, Tile, Transport};
+use crate::transport::{CHANNELS, Tile, Transport};
 use crate::workers::Workers;
 use correlation::{Correlator, Workspace};
 use lanes::{Vector, Work, widest};
@@ -51,14 +51,7 @@ pub struct Relighter {
     /// Whether all has to be done anew, whatever of the light has changed.
     stale: bool,
     /// Of threads that are not at work, kept from frame to frame.
-    scratch: Mutex<Vec<Scratch>>,
-}
-
-/// What a thread works with.
-#[derive(Debug, Default)]
-struct Scratch {
-    work: Option<Workspace>,
-    seen: Vec<[f32; QUAD]>,
+    spare: Mutex<Vec<Workspace>>,
 }
 
 impl Relighter {
@@ -89,7 +82,7 @@ impl Relighter {
             stale: false,
             correlator,
             squares,
-            scratch: Mutex::default(),
+            spare: Mutex::default(),
             light,
             transport,
         }
@@ -142,18 +135,18 @@ impl Relighter {
         self.stale = false;
         let this = &*self;
         workers.map(stale.len(), |i| {
-            let mut scratch = lock(&this.scratch).pop().unwrap_or_default();
+            let mut work = lock(&this.spare).pop();
             widest(SquareWork {
                 relighter: this,
                 square: stale[i],
-                scratch: &mut scratch,
+                work: &mut work,
             });
-            lock(&this.scratch).push(scratch);
+            lock(&this.spare).extend(work);
         });
     }
 
     #[inline(always)]
-    fn relight_square<V: Vector>(&self, i: usize, scratch: &mut Scratch) {
+    fn relight_square<V: Vector>(&self, i: usize, work: &mut Option<Workspace>) {
         let square = &self.squares.all[i];
         let mut linear = self.linear[i]
             .write()
@@ -162,35 +155,31 @@ impl Relighter {
         let side = self.squares.reach + self.transport.geometry.window.side() as usize - 1;
         let rows = (v..v + side).map(|v| &self.light.row(u, v)[..side]);
         let tint = Tint::of(rows);
-        linear.fill([0.0; CHANNELS]);
+        let is_factored = |run: &Run| !self.tile(run).coefficients.is_dark();
         if tint.is_dark() {
+            linear.fill([0.0; CHANNELS]);
             return;
         }
+        for run in square.runs.iter().filter(|run| !is_factored(run)) {
+            linear[run.begin..run.begin + run.length].fill([0.0; CHANNELS]);
+        }
         if let Some(correlator) = &self.correlator
-            && square
-                .runs
-                .iter()
-                .any(|run| !self.tile(run).coefficients.is_dark())
+            && square.runs.iter().any(is_factored)
         {
-            let work = scratch.work.get_or_insert_with(|| correlator.workspace());
-            let channels = tint.channels();
-            let (reach, quads) = (correlator.reach(), self.quads);
-            let texels = reach * reach * channels.len() * quads;
-            scratch.seen.resize(texels, [0.0; QUAD]);
+            let work = work.get_or_insert_with(|| correlator.workspace());
+            let quads = self.quads;
             let row = |r: usize| &self.light.row(u, v + r)[..side];
-            correlator.correlate::<V>(row, channels, quads, work, &mut scratch.seen);
-            for run in &square.runs {
+            let texels = correlator.correlate::<V>(row, tint.channels(), quads, work);
+            let from = combine::Seen {
+                texels,
+                quads,
+                tint,
+            };
+            for run in square.runs.iter().filter(|run| is_factored(run)) {
                 let tile = &self.tile(run).coefficients;
-                if !tile.is_dark() {
-                    let places = &square.places[run.begin..run.begin + run.length];
-                    let linear = &mut linear[run.begin..run.begin + run.length];
-                    let from = combine::Seen {
-                        texels: &scratch.seen,
-                        quads,
-                        tint,
-                    };
-                    combine::combine::<V>(tile, run.first, places, from, linear);
-                }
+                let places = &square.places[run.begin..run.begin + run.length];
+                let linear = &mut linear[run.begin..run.begin + run.length];
+                combine::combine::<V>(tile, run.first, places, from, linear);
             }
         }
         let window = self.transport.geometry.window.side() as usize;
@@ -291,14 +280,13 @@ const BAND_ROWS: usize = 64;
 struct SquareWork<'a> {
     relighter: &'a Relighter,
     square: usize,
-    scratch: &'a mut Scratch,
+    work: &'a mut Option<Workspace>,
 }
 
 impl Work for SquareWork<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        self.relighter
-            .relight_square::<V>(self.square, self.scratch);
+        self.relighter.relight_square::<V>(self.square, self.work);
     }
 }
 
