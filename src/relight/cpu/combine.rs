@@ -1,6 +1,6 @@
 //! Pixels from what their windows see: `y_n = Σ_k c_nk C_k(o_n)`.
 
-use super::lanes::{Pixels, Single, Vector};
+use super::lanes::{MOST_PIXELS, Pixels, Single, Vector};
 use crate::relight::Tint;
 use crate::transport::{CHANNELS, CoefficientTile, QUAD, TexelCode};
 
@@ -24,35 +24,21 @@ pub fn combine<V: Vector>(
     seen: Seen<'_>,
     out: &mut [[f32; CHANNELS]],
 ) {
-    let plane = CoefficientTile::plane(tile.rect);
-    let channel = tile.codes.len() / CHANNELS;
-    let codes = Codes {
-        codes: &tile.codes,
-        plane,
-        channel,
-    };
     match seen.tint {
         Tint::One(_, factors) => {
-            let gain = std::array::from_fn(|c| tile.step[c] * factors[c]);
-            each::<V, 1>(codes, first, places, seen, gain, out);
+            let mut gain = tile.step;
+            for c in 0..CHANNELS {
+                gain[c] *= factors[c];
+            }
+            each::<V, 1>(tile, first, places, seen, gain, out);
         }
-        Tint::Many => each::<V, CHANNELS>(codes, first, places, seen, tile.step, out),
+        Tint::Many => each::<V, CHANNELS>(tile, first, places, seen, tile.step, out),
     }
-}
-
-/// Of a tile, `[channel, quad, pixel]`.
-#[derive(Clone, Copy)]
-struct Codes<'a> {
-    codes: &'a [TexelCode],
-    /// From one quad to the next.
-    plane: usize,
-    /// From one channel to the next.
-    channel: usize,
 }
 
 #[inline(always)]
 fn each<V: Vector, const SEEN: usize>(
-    codes: Codes<'_>,
+    tile: &CoefficientTile,
     first: usize,
     places: &[u16],
     Seen { texels, quads, .. }: Seen<'_>,
@@ -65,76 +51,108 @@ fn each<V: Vector, const SEEN: usize>(
     let Some(most) = places.iter().copied().max() else {
         return;
     };
-    let texels_each = SEEN * quads;
-    assert!((usize::from(most) + 1) * texels_each <= texels.len());
-    let Codes { plane, channel, .. } = codes;
+    assert!((usize::from(most) + 1) * SEEN * quads <= texels.len());
+    let plane = CoefficientTile::plane(tile.rect);
+    let channel = tile.codes.len() / CHANNELS;
     let last = (CHANNELS - 1) * channel + quads.saturating_sub(1) * plane + first + pixels;
-    assert!(last <= codes.codes.len());
-    let whole = pixels - pixels % V::Pixels::COUNT;
-    let (pairs, rest) = places.split_at(whole);
-    let (out, out_rest) = out.split_at_mut(whole);
-    let texels = texels.as_ptr();
-    let from = codes.codes.as_ptr();
-    let places = pairs.chunks_exact(V::Pixels::COUNT);
-    let outs = out.chunks_exact_mut(V::Pixels::COUNT);
-    for (i, (places, out)) in places.zip(outs).enumerate() {
-        // SAFETY: all places are seen, and there is a code for each of the pixels, as was asserted.
-        unsafe {
-            let seen = [
-                texels.add(usize::from(places[0]) * texels_each),
-                texels.add(usize::from(places[V::Pixels::COUNT - 1]) * texels_each),
-            ];
-            let from = from.add(first + i * V::Pixels::COUNT);
-            pixels_of::<V::Pixels, SEEN>(from, seen, quads, codes, gain, out.as_mut_ptr());
+    assert!(last <= tile.codes.len());
+    let row = Row {
+        texels: texels.as_ptr(),
+        quads,
+        places,
+        codes: tile.codes[first..].as_ptr(),
+        plane,
+        channel,
+        gain,
+        out: out.as_mut_ptr(),
+    };
+    let at_once = V::Pixels::COUNT;
+    let mut done = 0;
+    // SAFETY: there is a place for each of the pixels and all are seen, and a code, as was asserted.
+    unsafe {
+        while done + at_once <= pixels {
+            row.combine::<V::Pixels, SEEN>(done);
+            done += at_once;
         }
-    }
-    for (i, (place, out)) in rest.iter().zip(out_rest).enumerate() {
-        // SAFETY: as above.
-        unsafe {
-            let seen = [texels.add(usize::from(*place) * texels_each); 2];
-            let from = from.add(first + whole + i);
-            pixels_of::<Single, SEEN>(from, seen, quads, codes, gain, out);
+        if done < pixels && pixels >= at_once {
+            // The last, some of them once more.
+            row.combine::<V::Pixels, SEEN>(pixels - at_once);
+            done = pixels;
+        }
+        while done < pixels {
+            row.combine::<Single, SEEN>(done);
+            done += 1;
         }
     }
 }
 
-/// One or two pixels.
-///
-/// # Safety
-/// `from` points at codes of the pixels in the first of `quads` planes of each channel, `seen` at as
-/// many texels of `SEEN` channels; there is room in `out`.
-#[inline(always)]
-unsafe fn pixels_of<P: Pixels, const SEEN: usize>(
-    from: *const TexelCode,
-    seen: [*const [f32; QUAD]; 2],
+/// Pixels side by side.
+struct Row<'a> {
+    /// `[origin, channel, quad]`.
+    texels: *const [f32; QUAD],
     quads: usize,
-    Codes { plane, channel, .. }: Codes<'_>,
+    /// Of each pixel.
+    places: &'a [u16],
+    /// Of each pixel, `[channel, quad, pixel]`.
+    codes: *const TexelCode,
+    /// From one quad to the next.
+    plane: usize,
+    /// From one channel to the next.
+    channel: usize,
     gain: [f32; CHANNELS],
+    /// Of each pixel.
     out: *mut [f32; CHANNELS],
-) {
-    // Loops and no closures, which would not be compiled for the vectors' registers.
-    let mut sums = [P::zero(); CHANNELS];
-    for q in 0..quads {
-        let mut texels = [P::zero(); SEEN];
-        for (c, texels) in texels.iter_mut().enumerate() {
-            let at = c * quads + q;
+}
+
+impl Row<'_> {
+    /// As many pixels as are worked on at once, from `first` on.
+    ///
+    /// # Safety
+    /// There are so many of them, and texels of `SEEN` channels at their places.
+    #[inline(always)]
+    unsafe fn combine<P: Pixels, const SEEN: usize>(&self, first: usize) {
+        // Loops and no closures, which would not be compiled for the vectors' registers.
+        let mut seen = [[self.texels; MOST_PIXELS]; SEEN];
+        for p in 0..P::COUNT {
             // SAFETY: as above.
-            *texels = unsafe { P::load([seen[0].add(at), seen[1].add(at)]) };
+            unsafe {
+                let place = usize::from(*self.places.get_unchecked(first + p));
+                let texels = self.texels.add(place * SEEN * self.quads);
+                for (c, seen) in seen.iter_mut().enumerate() {
+                    seen[p] = texels.add(c * self.quads);
+                }
+            }
         }
-        for (c, sum) in sums.iter_mut().enumerate() {
-            let seen = texels[if SEEN == 1 { 0 } else { c }];
-            // SAFETY: as above.
-            *sum = unsafe { sum.plus_products(from.add(c * channel + q * plane), seen) };
+        let mut sums = [P::zero(); CHANNELS];
+        for q in 0..self.quads {
+            let mut texels = [P::zero(); SEEN];
+            for c in 0..SEEN {
+                let mut at = seen[c];
+                for at in &mut at {
+                    // Of pixels that are not asked for it is not read.
+                    *at = at.wrapping_add(q);
+                }
+                // SAFETY: as above.
+                texels[c] = unsafe { P::load(at) };
+            }
+            for (c, sum) in sums.iter_mut().enumerate() {
+                let seen = texels[if SEEN == 1 { 0 } else { c }];
+                // SAFETY: as above.
+                *sum = unsafe {
+                    let codes = self.codes.add(c * self.channel + q * self.plane + first);
+                    sum.plus_products(codes, seen)
+                };
+            }
         }
+        // SAFETY: as above.
+        unsafe { P::store_sums(sums, self.gain, self.out.add(first)) };
     }
-    // SAFETY: as above.
-    unsafe { P::store_sums(sums, gain, out) };
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::relight::cpu::lanes::{Plain, Work, widest};
+    use crate::relight::cpu::lanes::{Kind, Work};
     use crate::transport::{Extent, TileRect};
 
     struct Combine<'a> {
@@ -181,9 +199,9 @@ mod tests {
                         quads: used,
                         tint,
                     };
-                    let combined = |by: &dyn Fn(Combine<'_>)| {
+                    let combined = |kind: Kind| {
                         let mut out = vec![[7.0; CHANNELS]; count];
-                        by(Combine {
+                        kind.run(Combine {
                             tile: &tile,
                             first,
                             places: &places,
@@ -192,8 +210,10 @@ mod tests {
                         });
                         out
                     };
-                    let plain = combined(&|work| work.run::<Plain>());
-                    assert_eq!(plain, combined(&|work| widest(work)));
+                    let plain = combined(Kind::Plain);
+                    for kind in Kind::all() {
+                        assert_eq!(plain, combined(kind), "{kind:?}");
+                    }
                     for (i, got) in plain.iter().enumerate() {
                         for c in 0..CHANNELS {
                             let (channels, of_channel, gain) = match tint {

@@ -5,7 +5,7 @@
 //! Through the Fourier transform, square by square: some 60 operations a value where a window of 15
 //! takes 450.
 
-use super::fft::{Between, Complex, Fft, Packed};
+use super::fft::{Between, Complex, Fft, Kept, Packed};
 use super::lanes::{LANES, Plain, Vector};
 use super::squares::even_reach;
 use crate::transport::{Basis, CHANNELS, QUAD, Window};
@@ -34,14 +34,16 @@ pub struct Correlator {
 #[derive(Debug)]
 pub struct Workspace {
     between: Between,
-    /// Of some rows of the light, two a lane; `[u]`.
-    rows: Vec<Packed>,
-    /// Of one channel of the light along `u` alone: `[block of u, v]`, of the first half of `u`.
+    /// One channel of the light, `[v, u]`; dark beyond what a square sees.
+    plane: Vec<[f32; LANES]>,
+    /// Of some columns of it; `[v]`.
+    columns: Kept,
+    /// Of it along `v` alone: `[block of v, u]`, of the first half of `v`.
     half: Vec<Packed>,
-    /// Of the light, `[u, v, channel]`.
-    spectrum: Vec<[[f32; 2]; CHANNELS]>,
+    /// Of it: `[u, part, v]`.
+    spectrum: Vec<f32>,
     /// `[u, v]`, of `v` as many as a square has.
-    columns: Vec<Packed>,
+    lines: Vec<Packed>,
     /// `C`; `[origin, channel, quad]`.
     seen: Vec<Line>,
 }
@@ -91,9 +93,9 @@ impl Correlator {
             self.fft.transform(
                 &mut between,
                 #[inline(always)]
-                |u| given[u].load(),
+                |u| Complex::load(|_| &given[u]),
                 #[inline(always)]
-                |u: usize, value: Complex<Plain>| value.store(&mut row[u]),
+                |u: usize, value: Complex<Plain>| value.store(0, &mut row[u]),
             );
         }
         for u in 0..n {
@@ -103,9 +105,9 @@ impl Correlator {
             self.fft.transform(
                 &mut between,
                 #[inline(always)]
-                |v| square[v * n + u].load(),
+                |v| Complex::load(|_| &square[v * n + u]),
                 #[inline(always)]
-                |v: usize, value: Complex<Plain>| value.store(&mut self.spectra[start + v]),
+                |v: usize, value: Complex<Plain>| value.store(0, &mut self.spectra[start + v]),
             );
         }
     }
@@ -125,10 +127,11 @@ impl Correlator {
         let n = self.fft.side();
         Workspace {
             between: Between::new(n),
-            rows: vec![Packed::default(); n],
+            plane: vec![[0.0; LANES]; n * n / LANES],
+            columns: Kept::new(n),
             half: vec![Packed::default(); blocks(n) * n],
-            spectrum: vec![Default::default(); n * n],
-            columns: vec![Packed::default(); n * self.reach],
+            spectrum: vec![0.0; 2 * n * n],
+            lines: vec![Packed::default(); n * self.reach],
             seen: Vec::new(),
         }
     }
@@ -148,123 +151,187 @@ impl Correlator {
         let texels = self.reach * self.reach * channels.len() * quads;
         let lines = (texels * size_of::<[f32; QUAD]>()).div_ceil(size_of::<Line>());
         work.seen.resize(lines, Line::default());
-        for channel in channels {
-            self.along_u::<V>(&row, *channel, work);
-            self.along_v::<V>(*channel, work);
-        }
-        let groups = self.spectra.chunks_exact(n * n);
-        for (group, spectra) in groups.take(quads.div_ceil(TOGETHER / QUAD)).enumerate() {
-            for (i, channel) in channels.iter().enumerate() {
-                self.invert::<V>(spectra, *channel, work);
+        for (i, channel) in channels.iter().enumerate() {
+            self.separate(&row, *channel, &mut work.plane);
+            self.along_v::<V>(work);
+            self.along_u::<V>(work);
+            let groups = self.spectra.chunks_exact(n * n);
+            for (group, spectra) in groups.take(quads.div_ceil(TOGETHER / QUAD)).enumerate() {
+                self.invert::<V>(spectra, work);
                 self.collect::<V>(group, quads, (i, channels.len()), work);
             }
         }
         &bytemuck::cast_slice(&work.seen)[..texels]
     }
 
-    /// Transforms one channel of the light along `u`. Rows are real, so that two share a transform:
-    /// of `f = a + ib`, `a` has the spectrum `(f(u) + f̄(-u)) / 2` and `b` has `(f(u) - f̄(-u)) / 2i`.
-    /// They are left as twice that, and for `u` up to the middle, which tells the others.
+    /// Takes one channel of the light. All is dark beyond what the square sees.
     #[inline(always)]
-    fn along_u<'a, V: Vector>(
+    fn separate<'a>(
         &self,
         row: impl Fn(usize) -> &'a [[f32; 4]],
         channel: usize,
-        work: &mut Workspace,
+        plane: &mut [[f32; LANES]],
     ) {
-        let n = self.fft.side();
-        for first in (0..n).step_by(2 * LANES) {
-            // All is dark beyond what the square sees.
-            let rows: [&[[f32; 4]]; 2 * LANES] =
-                std::array::from_fn(|l| match first + l < self.sees {
-                    true => &row(first + l)[..self.sees],
-                    false => &[],
-                });
-            let is_dark = |row: &[[f32; 4]]| row.iter().all(|element| element[channel] == 0.0);
-            if rows.iter().all(|row| is_dark(row)) {
-                work.rows.fill(Packed::default());
-            } else {
-                self.fft.transform(
-                    &mut work.between,
-                    #[inline(always)]
-                    |u: usize| {
-                        let element = |l: usize| rows[l].get(u).map_or(0.0, |e| e[channel]);
-                        let part = |first: usize| std::array::from_fn(|l| element(first + l));
-                        Packed {
-                            re: part(0),
-                            im: part(LANES),
-                        }
-                        .load()
-                    },
-                    #[inline(always)]
-                    |u: usize, value: Complex<V>| value.store(&mut work.rows[u]),
-                );
+        let plane = plane.as_flattened_mut();
+        for (v, out) in plane
+            .chunks_exact_mut(self.fft.side())
+            .take(self.sees)
+            .enumerate()
+        {
+            let elements = &row(v)[..self.sees];
+            for (out, element) in out.iter_mut().zip(elements) {
+                *out = element[channel];
             }
-            for u in 0..=n / 2 {
-                let (f, g) = (&work.rows[u], &work.rows[(n - u) % n]);
-                let rows = &mut work.half[u / LANES * n + first..][..2 * LANES];
-                let (of_a, of_b) = rows.split_at_mut(LANES);
-                for l in 0..LANES {
-                    of_a[l].re[u % LANES] = f.re[l] + g.re[l];
-                    of_a[l].im[u % LANES] = f.im[l] - g.im[l];
-                    of_b[l].re[u % LANES] = f.im[l] + g.im[l];
-                    of_b[l].im[u % LANES] = g.re[l] - f.re[l];
+        }
+    }
+
+    /// Transforms that along `v`. Columns are real, so that two share a transform: of `f = a + ib`,
+    /// `a` has the spectrum `(f(v) + f̄(-v)) / 2` and `b` has `(f(v) - f̄(-v)) / 2i`. They are left as
+    /// twice that, and for `v` up to the middle, which tells the others.
+    #[inline(always)]
+    fn along_v<V: Vector>(&self, work: &mut Workspace) {
+        let n = self.fft.side();
+        let blocks_a_row = n / LANES;
+        let columns = work.columns.of::<V>();
+        let plane = &work.plane;
+        for first in (0..blocks_a_row).step_by(2 * V::LINES) {
+            self.fft.transform(
+                &mut work.between,
+                #[inline(always)]
+                |v: usize| {
+                    let blocks = &plane[v * blocks_a_row + first..][..2 * V::LINES];
+                    Complex {
+                        re: V::load(
+                            #[inline(always)]
+                            |line| &blocks[2 * line],
+                        ),
+                        im: V::load(
+                            #[inline(always)]
+                            |line| &blocks[2 * line + 1],
+                        ),
+                    }
+                },
+                #[inline(always)]
+                |v: usize, value: Complex<V>| value.keep(&mut columns[v]),
+            );
+            for v in 0..=n / 2 {
+                let (f, g) = (
+                    Complex::<V>::kept(&columns[v]),
+                    Complex::kept(&columns[(n - v) % n]),
+                );
+                let both = [
+                    Complex {
+                        re: f.re.plus(g.re),
+                        im: f.im.minus(g.im),
+                    },
+                    Complex {
+                        re: f.im.plus(g.im),
+                        im: g.re.minus(f.re),
+                    },
+                ];
+                for line in 0..V::LINES {
+                    for (part, value) in both.into_iter().enumerate() {
+                        let mut packed = Packed::default();
+                        value.store(line, &mut packed);
+                        let u = (first + 2 * line + part) * LANES;
+                        let to = &mut work.half[v / LANES * n + u..][..LANES];
+                        for lane in 0..LANES {
+                            to[lane].re[v % LANES] = packed.re[lane];
+                            to[lane].im[v % LANES] = packed.im[lane];
+                        }
+                    }
                 }
             }
         }
     }
 
-    /// Transforms what that left along `v`. What is beyond the middle is the conjugate of what is as
+    /// Transforms what that left along `u`. What is beyond the middle is the conjugate of what is as
     /// far before it.
     #[inline(always)]
-    fn along_v<V: Vector>(&self, channel: usize, work: &mut Workspace) {
+    fn along_u<V: Vector>(&self, work: &mut Workspace) {
         let n = self.fft.side();
-        for (block, half) in work.half.chunks_exact(n).enumerate() {
-            let first = block * LANES;
-            let lanes = LANES.min(n / 2 + 1 - first);
-
+        let (half, spectrum) = (&work.half, &mut work.spectrum);
+        let last = blocks(n) - 1;
+        for first in (0..=last).step_by(V::LINES) {
             self.fft.transform(
                 &mut work.between,
                 #[inline(always)]
-                |v| half[v].load(),
+                |u: usize| {
+                    Complex::load(
+                        #[inline(always)]
+                        |line| &half[(first + line).min(last) * n + u],
+                    )
+                },
                 #[inline(always)]
-                |v: usize, value: Complex<V>| {
-                    let mut packed = Packed::default();
-                    value.store(&mut packed);
-                    let Packed { re, im } = packed;
-                    for lane in 0..lanes {
-                        let (u, re, im) = (first + lane, re[lane], im[lane]);
-                        work.spectrum[u * n + v][channel] = [re, im];
-                        if u > 0 {
-                            work.spectrum[(n - u) * n + (n - v) % n][channel] = [re, -im];
+                |u: usize, value: Complex<V>| {
+                    for line in 0..V::LINES {
+                        let v = (first + line).min(last) * LANES;
+                        let (re, im) = spectrum[2 * u * n..][..2 * n].split_at_mut(n);
+                        if let (Some(re), Some(im)) =
+                            (re[v..].first_chunk_mut(), im[v..].first_chunk_mut())
+                        {
+                            value.re.store(line, re);
+                            value.im.store(line, im);
                         }
                     }
                 },
             );
         }
+        for u in 0..=n / 2 {
+            let (to_here, after) = spectrum.split_at_mut(2 * (u + 1) * n);
+            let here = to_here[2 * u * n..].chunks_exact_mut(n);
+            let opposite = (n - u) % n;
+            if opposite > u {
+                let there = &mut after[2 * (opposite - u - 1) * n..][..2 * n];
+                for ((here, there), sign) in here.zip(there.chunks_exact_mut(n)).zip([1.0, -1.0]) {
+                    let (here, beyond_here) = here.split_at_mut(n / 2 + 1);
+                    let (there, beyond_there) = there.split_at_mut(n / 2 + 1);
+                    mirror(here, sign, beyond_there);
+                    mirror(there, sign, beyond_here);
+                }
+            } else {
+                for (here, sign) in here.zip([1.0, -1.0]) {
+                    let (here, beyond) = here.split_at_mut(n / 2 + 1);
+                    mirror(here, sign, beyond);
+                }
+            }
+        }
     }
 
     /// The product of the spectra, transformed back along `v`.
     #[inline(always)]
-    fn invert<V: Vector>(&self, spectra: &[Packed], channel: usize, work: &mut Workspace) {
+    fn invert<V: Vector>(&self, spectra: &[Packed], work: &mut Workspace) {
         let n = self.fft.side();
-        let lines = spectra.chunks_exact(n).zip(work.spectrum.chunks_exact(n));
-        for ((functions, light), column) in lines.zip(work.columns.chunks_exact_mut(self.reach)) {
-            let (functions, light) = (&functions[..n], &light[..n]);
-
+        for first in (0..n).step_by(V::LINES) {
+            let functions = &spectra[first * n..][..V::LINES * n];
+            let light = &work.spectrum[2 * first * n..][..2 * V::LINES * n];
+            let lines = &mut work.lines[first * self.reach..][..V::LINES * self.reach];
             self.fft.transform(
                 &mut work.between,
                 #[inline(always)]
                 |v: usize| {
-                    functions[v]
-                        .load::<V>()
-                        .times(light[v][channel])
-                        .exchanged()
+                    let functions = Complex::<V>::load(
+                        #[inline(always)]
+                        |line| &functions[line * n + v],
+                    );
+                    let light = Complex {
+                        re: V::splat_lines(
+                            #[inline(always)]
+                            |line| light[2 * line * n + v],
+                        ),
+                        im: V::splat_lines(
+                            #[inline(always)]
+                            |line| light[2 * line * n + n + v],
+                        ),
+                    };
+                    functions.times(light).exchanged()
                 },
                 #[inline(always)]
                 |v: usize, value: Complex<V>| {
-                    if let Some(place) = column.get_mut(v) {
-                        value.store(place);
+                    if v < self.reach {
+                        for line in 0..V::LINES {
+                            value.store(line, &mut lines[line * self.reach + v]);
+                        }
                     }
                 },
             );
@@ -280,46 +347,56 @@ impl Correlator {
         (channel, channels): (usize, usize),
         work: &mut Workspace,
     ) {
-        let first = group * TOGETHER / QUAD;
+        let begin = group * TOGETHER / QUAD;
         let each = channels * quads;
-        let at = channel * quads + first;
-        let quads = (quads - first).min(TOGETHER / QUAD);
-        let out: &mut [[f32; QUAD]] = bytemuck::cast_slice_mut(&mut work.seen);
-        for (v, out) in out
-            .chunks_exact_mut(self.reach * each)
-            .take(self.reach)
-            .enumerate()
-        {
-            let columns = &work.columns;
+        let at = channel * quads + begin;
+        let quads = (quads - begin).min(TOGETHER / QUAD);
+        let seen: &mut [[f32; QUAD]] = bytemuck::cast_slice_mut(&mut work.seen);
+        let lines = &work.lines;
+        for first in (0..self.reach).step_by(V::LINES) {
             self.fft.transform(
                 &mut work.between,
                 #[inline(always)]
-                |u: usize| columns[u * self.reach + v].load::<V>(),
+                |u: usize| {
+                    Complex::load(
+                        #[inline(always)]
+                        |line| &lines[u * self.reach + (first + line).min(self.reach - 1)],
+                    )
+                },
                 #[inline(always)]
                 |u: usize, value: Complex<V>| {
-                    let Some(out) = out.get_mut(u * each + at..u * each + at + quads) else {
-                        return; // Beyond the square's origins.
-                    };
-                    let value = value.exchanged();
-                    if let ([re, im], []) = out.as_flattened_mut().as_chunks_mut() {
-                        value.re.store(re);
-                        value.im.store(im);
+                    if u >= self.reach {
                         return;
                     }
-                    let mut packed = Packed::default();
-                    value.store(&mut packed);
-                    let texels = packed
-                        .re
-                        .as_chunks()
-                        .0
-                        .iter()
-                        .chain(packed.im.as_chunks().0);
-                    for (out, texel) in out.iter_mut().zip(texels) {
-                        *out = *texel;
+                    let value = value.exchanged();
+                    for line in 0..V::LINES {
+                        let v = (first + line).min(self.reach - 1);
+                        let out = &mut seen[(v * self.reach + u) * each + at..][..quads];
+                        if let ([re, im], []) = out.as_flattened_mut().as_chunks_mut() {
+                            value.re.store(line, re);
+                            value.im.store(line, im);
+                            continue;
+                        }
+                        let mut packed = Packed::default();
+                        value.store(line, &mut packed);
+                        let re = packed.re.as_chunks().0;
+                        let im = packed.im.as_chunks().0;
+                        for (out, texel) in out.iter_mut().zip(re.iter().chain(im)) {
+                            *out = *texel;
+                        }
                     }
                 },
             );
         }
+    }
+}
+
+/// What is beyond the middle of a line of a spectrum, from the first half of its opposite.
+#[inline(always)]
+fn mirror(opposite: &[f32], sign: f32, beyond: &mut [f32]) {
+    let middle = opposite.len() - 1;
+    for (value, opposite) in beyond.iter_mut().zip(opposite[1..middle].iter().rev()) {
+        *value = sign * opposite;
     }
 }
 
@@ -352,6 +429,26 @@ fn side_for(rank: usize, window: usize, across: usize, down: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::relight::cpu::lanes::{Kind, Work};
+
+    /// All channels of a square, through all functions.
+    struct Correlate<'a> {
+        correlator: &'a Correlator,
+        light: &'a [[f32; 4]],
+        seen: &'a mut Vec<[f32; QUAD]>,
+    }
+
+    impl Work for Correlate<'_> {
+        #[inline(always)]
+        fn run<V: Vector>(self) {
+            let row = |v: usize| &self.light[v * self.correlator.sees..];
+            let (quads, mut work) = (self.correlator.quads(), self.correlator.workspace());
+            let seen = self
+                .correlator
+                .correlate::<V>(row, &[0, 1, 2], quads, &mut work);
+            *self.seen = seen.to_vec();
+        }
+    }
 
     #[test]
     fn sides_take_little_work_and_memory() {
@@ -398,9 +495,19 @@ mod tests {
                 _ => std::array::from_fn(|c| number(4 * i + c).abs()),
             };
             let light: Vec<[f32; 4]> = (0..n * n).map(element).collect();
-            let row = |v: usize| &light[v * n..(v + 1) * n];
-            let mut work = correlator.workspace();
-            let out = correlator.correlate::<Plain>(row, &[0, 1, 2], quads, &mut work);
+            let correlated = |kind: Kind| {
+                let mut seen = Vec::new();
+                kind.run(Correlate {
+                    correlator: &correlator,
+                    light: &light,
+                    seen: &mut seen,
+                });
+                seen
+            };
+            let out = correlated(Kind::Plain);
+            for kind in Kind::all() {
+                assert!(out == correlated(kind), "{kind:?}");
+            }
             for o in [0, 1, reach - 1, reach * reach / 2, reach * reach - 1] {
                 for c in 0..CHANNELS {
                     for k in 0..rank {
