@@ -16,6 +16,9 @@ WASM_BINDGEN_ROOT=$CACHE/wasm-bindgen-$WASM_BINDGEN_VERSION
 PATH="$WASM_BINDGEN_ROOT/bin:$PATH"
 export PATH
 
+# Of the module's stack, which every worker has one of, a quarter of what the linker gives on its own.
+WASM_FLAGS="-C link-arg=-zstack-size=262144"
+
 first_command() {
   local name
   for name; do

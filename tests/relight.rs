@@ -9,8 +9,8 @@ use std::sync::Arc;
 use common::relit::{self, Kind};
 use common::tiled;
 use proptest::prelude::*;
-use relightable_photo::relight::{Display, Light, LightError, TorchPose, cpu, reference};
-use relightable_photo::transport::{Extent, Geometry, LightPx, MAX_WINDOW, Tile};
+use relightable_photo::relight::{Display, Light, TorchPose, cpu, reference};
+use relightable_photo::transport::{Geometry, LightPx, MAX_WINDOW, Tile};
 use relightable_photo::workers::OneThread;
 
 /// Grids, windows and tiles of all shapes, with correspondences that turn, mirror and shift the
@@ -122,8 +122,8 @@ proptest! {
             whole.relight(&light, &OneThread);
             let mut shared = Vec::new();
             for (relighter, rows) in &mut parts {
-                let (first, seen) = rows_seen(relighter, &light)?;
-                relighter.relight_from(first, &seen, &OneThread);
+                let seen = RowsSeen { light: &light, rows: relighter.light_rows() };
+                relighter.relight_rows(seen, &OneThread);
                 let mut out = vec![[0; 4]; rows.len() * extent.width as usize];
                 relighter.show(&display, rows.clone(), &mut out, &OneThread);
                 shared.append(&mut out);
@@ -165,16 +165,17 @@ fn less_detail_is_the_first_components_and_goes_as_it_came() {
     }
 }
 
-/// The rows of a light that anything sees, and the first one's number.
-fn rows_seen(relighter: &cpu::Relighter, light: &Light) -> Result<(u32, Light), LightError> {
-    let Extent { width, height } = light.extent();
-    let Range { start, end } = relighter.light_rows();
-    assert!(end <= height);
-    let extent = Extent {
-        width,
-        height: end - start,
-    };
-    let elements = &light.elements()[(start * width) as usize..(end * width) as usize];
-    let values: Vec<f32> = elements.iter().flat_map(|e| [e[0], e[1], e[2]]).collect();
-    Ok((start, Light::from_linear_rgb(extent, &values)?))
+/// A light of which no other rows may be asked for.
+struct RowsSeen<'a> {
+    light: &'a Light,
+    rows: Range<u32>,
+}
+
+impl cpu::LightRows for RowsSeen<'_> {
+    fn row(&mut self, v: u32) -> &[[f32; 4]] {
+        assert_eq!(v, self.rows.start);
+        self.rows.start += 1;
+        let width = self.light.extent().width;
+        &self.light.elements()[(v * width) as usize..((v + 1) * width) as usize]
+    }
 }

@@ -48,6 +48,7 @@ const SHOWN_SECONDS = 2;
 const SIDE = 512;
 const RANK = 16;
 const SMALL = 128;
+const LARGE = 2048;
 const LEAST_RANK = 8;
 
 /** @type {readonly Way[]} */
@@ -373,8 +374,9 @@ try {
   }
   if (parts.has('peers')) showPeers();
   if (parts.has('memory')) {
-    const [small, large] = [photoOf(SMALL, LEAST_RANK), photoOf(SIDE, RANK)].map(addressOf);
-    Object.assign(figures, await memory({ small: small ?? '', large: large ?? '' }));
+    const held = [SIDE, LARGE].map((side) => photoOf(side, RANK));
+    const photos = held.map((photo) => ({ name: nameOf(photo), src: addressOf(photo) }));
+    Object.assign(figures, await memory(addressOf(photoOf(SMALL, LEAST_RANK)), photos));
   }
   writeFileSync(join(folder, 'figures.json'), JSON.stringify(figures));
 } finally {

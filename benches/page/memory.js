@@ -75,8 +75,9 @@ const short = (/** @type {number} */ value) => String(Math.round(100 * value) / 
  * shown, and after frames of each kind.
  *
  * @param {string} src
+ * @param {string} name
  */
-async function overDecoded(src) {
+async function overDecoded(src, name) {
   const page = await openPage({ workers: 2 });
   const decoded = await inPage(
     page,
@@ -92,10 +93,10 @@ async function overDecoded(src) {
     const percent = 100 * (total / decoded - 1);
     const [own, ...crew] = bytes.map((n) => short(n / MB));
     console.log(
-      `${kind}: wasm memory ${short(total / MB)} MB (page ${own}, workers ${crew.join(' and ')}), ` +
+      `${name} ${kind}: wasm memory ${short(total / MB)} MB (page ${own}, workers ${crew.join(' and ')}), ` +
         `decoded ${short(decoded / MB)} MB: ${percent.toFixed(1)} % over`,
     );
-    figures[`memory_over_decoded_${kind}_percent`] = percent;
+    figures[`memory_over_decoded_${name}_${kind}_percent`] = percent;
   }
   await page.context().close();
   return figures;
@@ -164,12 +165,14 @@ async function overCycles(src, backend) {
 }
 
 /**
- * @param {{ small: string, large: string }} photos addresses: of one for many frames, and of one that
- *   memory is held against
+ * @param {string} small address of a photograph for many frames
+ * @param {readonly { name: string, src: string }[]} held those that memory is held against
  */
-export async function memory({ small, large }) {
+export async function memory(small, held) {
   console.log('\nMemory, after garbage is collected, first and last:\n');
-  const figures = await overDecoded(large);
+  /** @type {Record<string, number>} */
+  const figures = {};
+  for (const { name, src } of held) Object.assign(figures, await overDecoded(src, name));
   for (const backend of /** @type {const} */ (['cpu', 'webgl2', 'webgpu'])) {
     Object.assign(figures, await overFrames(small, backend));
     Object.assign(figures, await overCycles(small, backend));

@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-use js_sys::Uint8Array;
+use js_sys::{Float32Array, Uint8Array};
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{CodedError, Display, Photo};
-use crate::relight::{Light, cpu};
-use crate::transport::Extent;
+use crate::relight::cpu;
+use crate::transport::CHANNELS;
 use crate::workers::OneThread;
 
 /// Relights some rows of a photograph on the CPU. Only their tiles need be there.
@@ -40,35 +40,73 @@ impl BandRelighter {
     }
 
     /// The picture's rows under a light, of which `light` has linear RGB values of the
-    /// [`lightRows`](Self::light_rows), by a share of the components, into `out`: RGBA, row by row.
+    /// [`lightRows`](Self::light_rows), or under the last one, by a share of the components, into `out`:
+    /// RGBA, row by row. Both stay where they are but for a few rows: this memory never shrinks.
     pub fn relight(
         &mut self,
-        light: &[f32],
+        light: Option<Float32Array>,
         display: &Display,
         detail: f64,
         out: &Uint8Array,
     ) -> Result<(), CodedError> {
         let geometry = self.relighter.transport().geometry;
-        let pixels = self.rows.len() * geometry.camera.width as usize;
-        if out.length() as usize != 4 * pixels {
+        let width = geometry.camera.width;
+        if u64::from(out.length()) != 4 * self.rows.len() as u64 * u64::from(width) {
             return Err(CodedError::new("internal", "room for other rows"));
         }
-        let seen = self.relighter.light_rows();
-        let extent = Extent {
-            width: geometry.light.width,
-            height: seen.len() as u32,
-        };
-        let light = Light::from_linear_rgb(extent, light)?;
         self.relighter.set_detail(detail as f32);
-        self.relighter.relight_from(seen.start, &light, &OneThread);
-        // So that its memory serves for the pixels.
-        drop(light);
-        let mut picture = vec![[0; 4]; pixels];
-        let rows = self.rows.clone();
-        self.relighter
-            .show(&display.inner(), rows, &mut picture, &OneThread);
-        out.copy_from(picture.as_flattened());
+        match light {
+            Some(values) => {
+                let seen = self.relighter.light_rows();
+                let width = geometry.light.width as usize;
+                if values.length() as usize != CHANNELS * width * seen.len() {
+                    return Err(CodedError::new("internal", "other rows of the light"));
+                }
+                let rows = ValueRows {
+                    values,
+                    first: seen.start,
+                    linear: vec![[0.0; CHANNELS]; width],
+                    row: vec![[0.0; 4]; width],
+                };
+                self.relighter.relight_rows(rows, &OneThread);
+            }
+            None => self.relighter.update(&OneThread),
+        }
+        let display = display.inner();
+        let mut picture = vec![[0; 4]; cpu::BAND_ROWS.min(self.rows.len()) * width as usize];
+        for first in self.rows.clone().step_by(cpu::BAND_ROWS) {
+            let rows = first..self.rows.end.min(first + cpu::BAND_ROWS as u32);
+            let pixels = &mut picture[..rows.len() * width as usize];
+            self.relighter
+                .show(&display, rows.clone(), pixels, &OneThread);
+            let [start, end] =
+                [rows.start, rows.end].map(|row| 4 * (row - self.rows.start) * width);
+            out.subarray(start, end).copy_from(pixels.as_flattened());
+        }
         Ok(())
+    }
+}
+
+/// A light's rows that a script has.
+struct ValueRows {
+    /// Linear RGB.
+    values: Float32Array,
+    /// The row that they begin with.
+    first: u32,
+    linear: Vec<[f32; CHANNELS]>,
+    row: Vec<[f32; 4]>,
+}
+
+impl cpu::LightRows for ValueRows {
+    fn row(&mut self, v: u32) -> &[[f32; 4]] {
+        let values = self.linear.as_flattened_mut();
+        let length = values.len() as u32;
+        let start = (v - self.first) * length;
+        self.values.subarray(start, start + length).copy_to(values);
+        for (element, [r, g, b]) in self.row.iter_mut().zip(&self.linear) {
+            *element = [*r, *g, *b, 0.0];
+        }
+        &self.row
     }
 }
 

@@ -5,7 +5,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{CodedError, Photo};
 use crate::relight::{self, BuiltinLight, LightError, TorchPose};
-use crate::transport::Extent;
+use crate::transport::{CHANNELS, Extent};
 
 /// What each element of a photograph's light plane emits.
 #[wasm_bindgen]
@@ -92,13 +92,22 @@ impl Light {
 
     /// Linear RGB values of the rows from `first` up to `end`, row by row.
     #[wasm_bindgen(js_name = linearRgb)]
-    pub fn linear_rgb(&self, first: usize, end: usize) -> Vec<f32> {
+    pub fn linear_rgb(&self, first: usize, end: usize) -> Float32Array {
         let Extent { width, height } = self.0.extent();
-        let end = end.min(height as usize) * width as usize;
-        let first = (first * width as usize).min(end);
-        let mut values = Vec::with_capacity(3 * (end - first)); // no larger, or the memory stays
-        for [r, g, b, _] in &self.0.elements()[first..end] {
-            values.extend([r, g, b]);
+        let (width, end) = (width as usize, end.min(height as usize));
+        let first = first.min(end);
+        let length = CHANNELS * width;
+        let values = Float32Array::new_with_length((length * (end - first)) as u32);
+        // Row by row: this memory never shrinks.
+        let mut row = vec![[0.0; CHANNELS]; width];
+        let elements = &self.0.elements()[first * width..end * width];
+        for (i, elements) in elements.chunks_exact(width.max(1)).enumerate() {
+            for (value, [r, g, b, _]) in row.iter_mut().zip(elements) {
+                *value = [*r, *g, *b];
+            }
+            let (start, end) = (i * length, (i + 1) * length);
+            let place = values.subarray(start as u32, end as u32);
+            place.copy_from(row.as_flattened());
         }
         values
     }

@@ -52,7 +52,7 @@ type _BandOf = Extends<
   ConstructorParameters<typeof Simd.BandRelighter>
 >;
 type _BandRelight = Extends<
-  [Float32Array, Simd.Display, number, Uint8Array],
+  [Float32Array | null, Simd.Display, number, Uint8Array],
   Parameters<Simd.BandRelighter['relight']>
 >;
 type _Kernel = Extends<typeof Simd.cpuKernel, Engine['cpuKernel']>;

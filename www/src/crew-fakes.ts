@@ -23,6 +23,8 @@ export class FakeWorker implements WorkerLike {
   /** What it was asked, in order. */
   readonly log: string[] = [];
   ended = false;
+  /** Photographs that a light was brought to. */
+  readonly lit = new Set<number>();
   /** Asked, and not answered while it is slow. */
   readonly owed: Request[] = [];
   slow = false;
@@ -71,9 +73,15 @@ export class FakeWorker implements WorkerLike {
       assert.ok(tiles?.delete(task.index), `tile ${task.index} is there`);
       bytes = Uint8Array.of(task.index).buffer;
     }
+    // Tiles that come and go leave what is made of them behind.
+    if (task.kind === 'put' || task.kind === 'take') this.lit.delete(photo);
     if (task.kind === 'plan') bytes = Uint32Array.of(2, 5).buffer;
     if (task.kind === 'relight') {
-      assert.deepEqual(task.light, Float32Array.of(2, 5));
+      if (task.light) {
+        assert.deepEqual(task.light, Float32Array.of(2, 5));
+        this.lit.add(photo);
+      }
+      assert.ok(this.lit.has(photo), 'a light is there');
       assert.equal(task.pixels.byteLength, 4 * (tiles?.size ?? 0));
       new Uint32Array(task.pixels).set([...(tiles ?? [])].sort((a, b) => a - b));
       bytes = task.pixels;

@@ -31,8 +31,8 @@ export type Task =
   /** Relight them. The answer has their pixels, RGBA row by row, in the same memory. */
   | {
       readonly kind: 'relight';
-      /** Linear R, G and B of the rows that are seen. */
-      readonly light: Float32Array;
+      /** Linear R, G and B of the rows that are seen; `null` for those of the last time. */
+      readonly light: Float32Array | null;
       readonly showing: Showing;
       readonly pixels: ArrayBuffer;
     }

@@ -60,6 +60,28 @@ test('the memory of a picture is used again', async () => {
   assert.equal(workers[0]?.log.filter((kind) => kind === 'relight').length, 2);
 });
 
+test('a light is brought once, and again where tiles have come and gone', async () => {
+  const { crew, workers } = crewOf(2);
+  const { photo } = photoOf(4);
+  const shift = await placed(crew, photo);
+  const brought: number[] = [];
+  const counted = {
+    ...light,
+    linearRgb: (first: number, end: number) => {
+      brought.push(first);
+      return light.linearRgb(first, end);
+    },
+  };
+  for (let frame = 0; frame < 3; frame += 1) await shift.relight(counted, SHOWING);
+  assert.equal(brought.length, 2, 'to each worker');
+  assert.equal(workers[0]?.log.filter((kind) => kind === 'relight').length, 3);
+  await shift.put(0, await shift.take(0));
+  await shift.plan();
+  await shift.relight(counted, SHOWING);
+  await shift.relight({ ...counted }, SHOWING);
+  assert.equal(brought.length, 6);
+});
+
 test('photographs share the workers, which end with the last of them', async () => {
   const { crew, workers, alive } = crewOf(2);
   const [one, other] = await Promise.all([4, 6].map((tiles) => placed(crew, photoOf(tiles).photo)));

@@ -145,6 +145,8 @@ export class Shift {
   readonly #width: number;
   /** Rows of the light that each share sees, from one up to another; `null` while tiles come and go. */
   #seen: readonly (readonly [first: number, end: number])[] | null = null;
+  /** The light that each share has; `null` where it has none. */
+  #lit: (Light | null)[] = [];
   #over = false;
 
   constructor(
@@ -201,7 +203,9 @@ export class Shift {
 
   /** Gets ready to relight, once all tiles are in. */
   async plan(): Promise<void> {
-    this.#seen ??= await allEnded(
+    if (this.#seen) return;
+    this.#lit = [];
+    this.#seen = await allEnded(
       this.#hands.map(async (hand) => {
         const rows = new Uint32Array(await this.#ask(hand, { kind: 'plan' }));
         return [rows[0] ?? 0, rows[1] ?? 0] as const;
@@ -211,7 +215,8 @@ export class Shift {
 
   /**
    * The whole picture. The memory it is in is used again for the next. Comes after `plan`, and not again
-   * before it has settled, which is when all workers are done. `light` may be freed at once.
+   * before it has settled, which is when all workers are done. `light` may be freed at once; the same one
+   * again is not brought to the workers again.
    */
   async relight(light: Light, showing: Showing): Promise<Rows[]> {
     const work = this.#shares.map((share, i) => this.#relightShare(share, i, light, showing));
@@ -227,13 +232,15 @@ export class Shift {
     showing: Showing,
   ): Promise<Rows> {
     const [from, to] = this.#seen?.[i] ?? [0, 0];
-    const seen = light.linearRgb(from, to) as Float32Array<ArrayBuffer>;
+    const seen =
+      light === this.#lit[i] ? null : (light.linearRgb(from, to) as Float32Array<ArrayBuffer>);
     const room = this.#pixels[i] ?? new ArrayBuffer(4 * this.#width * count);
     this.#pixels[i] = null;
     const task = { kind: 'relight', light: seen, showing, pixels: room } as const;
-    const lent = [seen.buffer, room];
+    const lent = seen ? [seen.buffer, room] : [room];
     const pixels = await this.#ask(this.#hands[i] as Hand, task, lent);
     this.#pixels[i] = pixels;
+    this.#lit[i] = light;
     return { first, count, pixels };
   }
 

@@ -43,6 +43,9 @@ function fakeEngine(has: ReadonlySet<number>) {
     Display: class {
       free() {}
     },
+    Relighter: class {
+      readonly kernel = 'fake, in the page';
+    },
   };
   /** Devices that are had once `ask` has no objections. */
   const devicesThat = (ask: (backend: Backend) => Promise<void>) => {
@@ -124,6 +127,25 @@ test('a picture of a photograph that is replaced in the middle of a frame is not
   await settle();
   player.set({ ...SETTINGS, src: null });
   await Promise.all(asked);
+});
+
+test('a photograph that the page draws for want of workers says why', async (t) => {
+  fakeDocument(t);
+  const { crew } = crewOf(2, (worker) => worker.die());
+  const { photo, has } = photoOf(4);
+  const { engine, devicesThat } = fakeEngine(has);
+  const draw = drawer(
+    async () => engine,
+    crew,
+    devicesThat(async () => {}),
+  );
+  const photograph = Photograph.decoded(photo);
+  const { signal } = new AbortController();
+  for (let time = 0; time < 2; time += 1) {
+    const drawing = await draw('cpu', photograph, wanting(['cpu']), () => {}, signal);
+    assert.equal(drawing.kernel, 'fake, in the page');
+    assert.match(drawing.flaw ?? '', /without workers: .*out of memory/);
+  }
 });
 
 /** Asks for back ends, and answers when the test does. */

@@ -27,8 +27,9 @@ export type Draw = (
  * that cannot be had leaves tiles where they are, and keeps nobody from them while it is asked for.
  */
 export function drawer(load: () => Promise<Engine>, crew: Crew, devices: Devices): Draw {
-  // What the page has once drawn on the CPU it may be drawing still, which keeps tiles from workers.
-  const inPage = new WeakSet<Photograph>();
+  // What the page has once drawn on the CPU it may be drawing still, which keeps tiles from workers; and
+  // why it did.
+  const inPage = new WeakMap<Photograph, string>();
   return async (backend, photograph, { gamut, software }, lost, signal) => {
     const engine = await load();
     if (backend === 'cpu') {
@@ -39,12 +40,13 @@ export function drawer(load: () => Promise<Engine>, crew: Crew, devices: Devices
       } catch (thrown) {
         // Without workers the page does it.
         if (!(thrown instanceof PhotoError && thrown.code === 'worker-unavailable')) throw thrown;
+        inPage.set(photograph, `The page relights without workers: ${thrown.message}`);
       }
-      inPage.add(photograph);
+      const flaw = inPage.get(photograph) ?? '';
       return photograph.inPage((photo) => {
         const canvas = document.createElement('canvas');
         const relighter = new engine.Relighter(photo, canvas, gamut);
-        return new CanvasDrawing(engine, photo, relighter, canvas);
+        return new CanvasDrawing(engine, photo, relighter, canvas, { flaw });
       }, signal);
     }
     const lease = await devices.lease(engine, backend, lost);
@@ -54,7 +56,7 @@ export function drawer(load: () => Promise<Engine>, crew: Crew, devices: Devices
       return await photograph.inPage(async (photo) => {
         const canvas = document.createElement('canvas');
         const relighter = await graphics.draw(photo, canvas, gamut);
-        return new CanvasDrawing(engine, photo, relighter, canvas, lease);
+        return new CanvasDrawing(engine, photo, relighter, canvas, { lease });
       }, signal);
     } catch (thrown) {
       lease.release();

@@ -92,10 +92,10 @@ export interface BandRelighter extends Freeable {
   /** The first row of the light that is seen, and the first after it that is not. */
   readonly lightRows: Uint32Array;
   /**
-   * Takes linear R, G and B of those rows, and a share of the components, and writes RGBA into `out`,
-   * row by row.
+   * Takes linear R, G and B of those rows, or the last ones again, and a share of the components, and
+   * writes RGBA into `out`, row by row.
    */
-  relight(light: Float32Array, display: Display, detail: number, out: Uint8Array): void;
+  relight(light: Float32Array | null, display: Display, detail: number, out: Uint8Array): void;
 }
 
 /** What the module exports. */

@@ -26,6 +26,7 @@ function lamp() {
   const engine = {
     Light: {
       builtin: (_: Photo, name: string) => light(name),
+      torch: (_: Photo, x: number, y: number) => light(`torch ${x} ${y}`),
       fromLinear: (_: Photo, values: Float32Array) => {
         if (values.length !== 3) throw new PhotoError('light-size', 'three values');
         return light('linear');
@@ -43,6 +44,20 @@ test('a lamp has one light at a time', () => {
   assert.deepEqual([...lit], ['linear']);
   it.free();
   assert.equal(lit.size, 0);
+});
+
+test('a built-in light is made again only where it is another one', () => {
+  const { lamp: it, lit } = lamp();
+  const turn = (setting: LightSetting) => it.turnTo(setting, PHOTO).light;
+  const fire = turn(setting(null));
+  assert.equal(turn({ ...setting(null) }), fire);
+  const torch = turn({ name: 'torch', torch: { x: 0.5, y: 0.5 }, picture: null });
+  assert.equal(turn({ name: 'torch', torch: { x: 0.5, y: 0.5 }, picture: null }), torch);
+  assert.notEqual(turn({ name: 'torch', torch: { x: 0.5, y: 0.6 }, picture: null }), torch);
+  const picture = turn(setting(GOOD));
+  assert.notEqual(turn(setting(GOOD)), picture, 'what a picture shows may have changed');
+  assert.notEqual(turn(setting(null)), fire);
+  assert.equal(lit.size, 1);
 });
 
 test('a light that cannot be had leaves the last one, and before any the built-in one', () => {

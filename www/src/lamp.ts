@@ -2,11 +2,11 @@
 
 import type { Engine, Freeable, Light, Photo } from './engine.js';
 import { type PhotoError, toPhotoError } from './errors.js';
-import { builtinLight, type LightSetting, pictureLight } from './lights.js';
+import { type BuiltinSetting, builtinLight, type LightSetting, pictureLight } from './lights.js';
 
 /** What a lamp was turned to. */
 export interface Lit {
-  /** Stays the lamp's. */
+  /** Stays the lamp's. The same as the last time only where it is as it was then. */
   readonly light: Light;
   /** Whether it is the light that was asked for. */
   readonly asked: boolean;
@@ -18,6 +18,8 @@ export interface Lit {
 export class Lamp implements Freeable {
   readonly #engine: Pick<Engine, 'Light'>;
   #light: Light | null = null;
+  /** What that is, where it is built in. */
+  #builtin: BuiltinSetting | null = null;
 
   constructor(engine: Pick<Engine, 'Light'>) {
     this.#engine = engine;
@@ -28,26 +30,40 @@ export class Lamp implements Freeable {
    * is none, the built-in one stands in.
    */
   turnTo(setting: LightSetting, photo: Photo): Lit {
-    let light: Light | null = null;
     let asked = true;
     let fault: PhotoError | null = null;
     if (setting.picture) {
+      let light: Light | null = null;
       try {
         light = pictureLight(this.#engine, photo, setting.picture);
       } catch (thrown) {
         fault = toPhotoError(thrown);
       }
       asked = light !== null;
-      light ??= this.#light;
+      if (light) this.#keep(light, null);
     }
-    light ??= builtinLight(this.#engine, photo, setting);
-    if (light !== this.#light) this.free();
-    this.#light = light;
+    const builtin = this.#builtin && isSame(this.#builtin, setting);
+    if (this.#light && (setting.picture || builtin)) return { light: this.#light, asked, fault };
+    // Before it is made, as lights are large and it can be had.
+    this.free();
+    const light = builtinLight(this.#engine, photo, setting);
+    this.#keep(light, setting);
     return { light, asked, fault };
   }
 
   free(): void {
     this.#light?.free();
     this.#light = null;
+    this.#builtin = null;
   }
+
+  #keep(light: Light, builtin: BuiltinSetting | null): void {
+    this.free();
+    this.#light = light;
+    this.#builtin = builtin;
+  }
+}
+
+function isSame(a: BuiltinSetting, b: BuiltinSetting): boolean {
+  return a.name === b.name && a.torch?.x === b.torch?.x && a.torch?.y === b.torch?.y;
 }

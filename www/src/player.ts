@@ -39,6 +39,8 @@ export interface Drawing extends Freeable {
   readonly kernel: string;
   /** What is shown. */
   readonly gamut: Gamut;
+  /** Why it is slower than it could be elsewhere; nothing where it is not. */
+  readonly flaw?: string;
   /**
    * Draws by a share of the components, at once or by the time the promise settles; not called again
    * before. Where the light cannot be had, draws by the last one that could, and gives the reason.
@@ -425,7 +427,7 @@ export class Player<D extends Drawing> {
         this.#dropActive();
         this.#active = found;
       }
-      const reason = [why, chosen.reason].filter(Boolean).join(' ');
+      const reason = [why, chosen.reason, found.drawing.flaw].filter(Boolean).join(' ');
       if (found.lost !== null) {
         this.#replace(found, found.lost, wanted, previous, reason);
         return;

@@ -16,6 +16,7 @@ type DrawEngine = Pick<Engine, 'Display' | 'Light'>;
 /** See the module. */
 export class CanvasDrawing implements CanvasSurface {
   readonly canvas: HTMLCanvasElement;
+  readonly flaw: string;
   readonly #engine: Pick<Engine, 'Display'>;
   readonly #lamp: Lamp;
   readonly #photo: Photo;
@@ -30,13 +31,17 @@ export class CanvasDrawing implements CanvasSurface {
     photo: Photo,
     relighter: Relighter,
     canvas: HTMLCanvasElement,
-    lease: Pick<Lease, 'fail' | 'release'> | null = null,
+    {
+      lease = null,
+      flaw = '',
+    }: { lease?: Pick<Lease, 'fail' | 'release'> | null; flaw?: string } = {},
   ) {
     this.#engine = engine;
     this.#lamp = new Lamp(engine);
     this.#photo = photo;
     this.#relighter = relighter;
     this.#lease = lease;
+    this.flaw = flaw;
     this.canvas = canvas;
   }
 

@@ -24,6 +24,7 @@ use crate::transport::{CHANNELS, Tile, Transport};
 use crate::workers::Workers;
 use correlation::{Correlator, Workspace};
 use lanes::{Vector, Work, widest};
+pub use padded::LightRows;
 use padded::PaddedLight;
 use squares::{Run, Square, Squares};
 
@@ -93,8 +94,8 @@ impl Relighter {
         &self.transport
     }
 
-    /// Uses the first of the components only, a share of them of 0 to 1, from the next light on. They
-    /// come in fours, of which there is always one.
+    /// Uses the first of the components only, a share of them of 0 to 1, from the next light or
+    /// [`update`](Self::update) on. They come in fours, of which there is always one.
     pub fn set_detail(&mut self, share: f32) {
         let all = self.correlator.as_ref().map_or(0, Correlator::quads);
         let quads = detailed(all, share);
@@ -109,7 +110,7 @@ impl Relighter {
     pub fn relight(&mut self, light: &Light, workers: &impl Workers) {
         let extent = self.transport.geometry.light;
         assert_eq!(light.extent(), extent, "a light of another extent");
-        self.relight_from(0, light, workers);
+        self.relight_rows(light, workers);
     }
 
     /// Rows of the light that any pixel sees.
@@ -117,14 +118,18 @@ impl Relighter {
         self.light.rows_seen()
     }
 
-    /// [`relight`](Self::relight) by a light's rows from `first` on, among them all that any pixel sees.
+    /// [`relight`](Self::relight) by each of the [`light_rows`](Self::light_rows), asked for from the
+    /// first on.
     ///
     /// # Panics
-    /// If rows are missing, or of another width.
-    pub fn relight_from(&mut self, first: u32, rows: &Light, workers: &impl Workers) {
-        let width = self.transport.geometry.light.width;
-        assert_eq!(rows.extent().width, width, "a light of another width");
-        self.light.put(rows, first);
+    /// If a row has another width.
+    pub fn relight_rows(&mut self, light: impl LightRows, workers: &impl Workers) {
+        self.light.put(light);
+        self.update(workers);
+    }
+
+    /// Does what [`set_detail`](Self::set_detail) asks for under the light that is there.
+    pub fn update(&mut self, workers: &impl Workers) {
         let side = self.squares.reach + self.transport.geometry.window.side() as usize - 1;
         let stale: Vec<usize> = (0..self.squares.all.len())
             .filter(|&i| {
@@ -143,6 +148,7 @@ impl Relighter {
             });
             lock(&this.spare).extend(work);
         });
+        self.light.settle();
     }
 
     #[inline(always)]
@@ -273,8 +279,8 @@ impl Relighter {
     }
 }
 
-/// Rows that one thread encodes at a time.
-const BAND_ROWS: usize = 64;
+/// Rows that are encoded at a time.
+pub const BAND_ROWS: usize = 64;
 
 /// A square to relight.
 struct SquareWork<'a> {

@@ -5,6 +5,19 @@ use std::ops::Range;
 use crate::relight::Light;
 use crate::transport::{Element, Extent};
 
+/// A light that is there row by row.
+pub trait LightRows {
+    /// Emission of the elements of a row.
+    fn row(&mut self, v: u32) -> &[[f32; 4]];
+}
+
+impl LightRows for &Light {
+    fn row(&mut self, v: u32) -> &[[f32; 4]] {
+        let width = self.extent().width as usize;
+        &self.elements()[v as usize * width..][..width]
+    }
+}
+
 /// The light as all windows see it, those that hang over the display's edge too. Remembers the last
 /// light it was given.
 #[derive(Clone, Debug)]
@@ -14,7 +27,7 @@ pub struct PaddedLight {
     extent: Extent,
     light: Extent,
     elements: Vec<[f32; 4]>,
-    /// Columns that the last light changed, row by row.
+    /// Columns that have changed, row by row.
     changed: Vec<Range<usize>>,
 }
 
@@ -37,34 +50,35 @@ impl PaddedLight {
         on_display(top)..on_display(top + i64::from(self.extent.height))
     }
 
-    /// Takes a light in the place of the last one: its rows from `first` on, which are all that are seen.
-    pub fn put(&mut self, light: &Light, first: u32) {
+    /// Takes a light in the place of the last one: each row that is seen, from the first on.
+    ///
+    /// # Panics
+    /// If a row has another width.
+    pub fn put(&mut self, mut light: impl LightRows) {
         let seen = self.rows_seen();
-        let rows = first..first + light.extent().height;
-        let all = seen.is_empty() || (rows.start <= seen.start && seen.end <= rows.end);
-        assert!(all, "rows that are seen are missing");
         let (width, stride) = (self.light.width as usize, self.extent.width as usize);
-        let rows = self
-            .elements
-            .chunks_exact_mut(stride.max(1))
-            .zip(self.origin.v..);
-        for ((row, v), changed) in rows.zip(&mut self.changed) {
-            *changed = 0..0;
-            // The part of the row that is on the display.
-            let left = i64::from(self.origin.u);
-            let (from, to) = (left.max(0), (left + stride as i64).min(width as i64));
-            if v < 0 || !seen.contains(&(v as u32)) || from >= to {
-                continue;
-            }
-            let length = (to - from) as usize;
-            let row_of = (v as u32 - first) as usize * width;
-            let new = &light.elements()[row_of + from as usize..][..length];
-            let start = (from - left) as usize;
-            let old = &mut row[start..start + length];
+        // The part of a row that is on the display.
+        let left = i64::from(self.origin.u);
+        let (from, to) = (left.max(0), (left + stride as i64).min(width as i64));
+        if from >= to {
+            return;
+        }
+        let (from, start, length) = (from as usize, (from - left) as usize, (to - from) as usize);
+        for v in seen {
+            let new = light.row(v);
+            assert_eq!(new.len(), width, "a light of another width");
+            let new = &new[from..from + length];
+            let row = (i64::from(v) - i64::from(self.origin.v)) as usize;
+            let old = &mut self.elements[row * stride + start..][..length];
             let differing = differing(old, new);
             old[differing.clone()].copy_from_slice(&new[differing.clone()]);
-            *changed = start + differing.start..start + differing.end;
+            self.changed[row] = start + differing.start..start + differing.end;
         }
+    }
+
+    /// From here on nothing has changed.
+    pub fn settle(&mut self) {
+        self.changed.fill(0..0);
     }
 
     /// Whether anything has changed in a rectangle.
