@@ -158,6 +158,16 @@ fn less_detail_is_the_first_components_and_goes_as_it_came() {
             relighter.relight(&light, &OneThread);
             let want = reference::picture(&relit::first_quads(&transport, quads), &light, &display);
             relit::assert_within_one_code(&relighter.picture(&display, &OneThread), &want, name);
+            // The same under the light that is there.
+            let less = relighter.linear();
+            relighter.set_detail(1.0);
+            relighter.update(&OneThread);
+            assert_eq!(relighter.linear(), whole, "{name}");
+            relighter.update(&OneThread);
+            assert_eq!(relighter.linear(), whole, "{name}");
+            relighter.set_detail(share);
+            relighter.update(&OneThread);
+            assert_eq!(relighter.linear(), less, "{name}");
         }
         relighter.set_detail(1.0);
         relighter.relight(&light, &OneThread);

@@ -56,7 +56,10 @@ export class BackendChangeEvent extends Event {
   readonly backend: Backend;
   /** The one it replaces, `null` for the first. */
   readonly previous: Backend | null;
-  /** Why not the one before it or those preferred to it; empty where it was the first choice. */
+  /**
+   * Why not the one before it or those preferred to it, and why it is slower than it could be; empty where
+   * there is nothing to say.
+   */
   readonly reason: string;
 
   constructor(backend: Backend, previous: Backend | null, reason: string) {

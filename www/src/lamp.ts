@@ -47,7 +47,8 @@ export class Lamp implements Freeable {
     // Before it is made, as lights are large and it can be had.
     this.free();
     const light = builtinLight(this.#engine, photo, setting);
-    this.#keep(light, setting);
+    // Without a picture that it may stand in for.
+    this.#keep(light, { name: setting.name, torch: setting.torch });
     return { light, asked, fault };
   }
 

@@ -39,7 +39,7 @@ export interface Drawing extends Freeable {
   readonly kernel: string;
   /** What is shown. */
   readonly gamut: Gamut;
-  /** Why it is slower than it could be elsewhere; nothing where it is not. */
+  /** Why it is slower than it could be, for who hears of it; nothing where it is not. */
   readonly flaw?: string;
   /**
    * Draws by a share of the components, at once or by the time the promise settles; not called again

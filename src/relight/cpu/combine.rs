@@ -111,6 +111,7 @@ impl Row<'_> {
     /// There are so many of them, and texels of `SEEN` channels at their places.
     #[inline(always)]
     unsafe fn combine<P: Pixels, const SEEN: usize>(&self, first: usize) {
+        const { assert!(P::COUNT <= MOST_PIXELS) };
         // Loops and no closures, which would not be compiled for the vectors' registers.
         let mut seen = [[self.texels; MOST_PIXELS]; SEEN];
         for p in 0..P::COUNT {
@@ -192,7 +193,7 @@ mod tests {
                 .map(|i| [0, 1, 2, 3].map(|l| number(4 * i + l + 5)))
                 .collect();
             for used in 1..=quads {
-                for (first, count) in [(0, 27), (3, 8), (26, 1), (5, 0), (1, 13)] {
+                for (first, count) in [(0, 27), (3, 8), (26, 1), (5, 0), (1, 13), (0, 2), (4, 3)] {
                     let places: Vec<u16> = (0..count).map(|i| (i * 5 / 2 % 20) as u16).collect();
                     let seen = Seen {
                         texels: &texels[..20 * used * tint.channels().len()],
@@ -200,15 +201,17 @@ mod tests {
                         tint,
                     };
                     let combined = |kind: Kind| {
-                        let mut out = vec![[7.0; CHANNELS]; count];
+                        // With others on either side, which are not to be touched.
+                        let mut out = vec![[7.0; CHANNELS]; count + 2];
                         kind.run(Combine {
                             tile: &tile,
                             first,
                             places: &places,
                             seen,
-                            out: &mut out,
+                            out: &mut out[1..=count],
                         });
-                        out
+                        assert_eq!([out[0], out[count + 1]], [[7.0; CHANNELS]; 2]);
+                        out[1..=count].to_vec()
                     };
                     let plain = combined(Kind::Plain);
                     for kind in Kind::all() {

@@ -150,7 +150,9 @@ impl Correlator {
         let n = self.fft.side();
         let texels = self.reach * self.reach * channels.len() * quads;
         let lines = (texels * size_of::<[f32; QUAD]>()).div_ceil(size_of::<Line>());
-        work.seen.resize(lines, Line::default());
+        if work.seen.len() < lines {
+            work.seen.resize(lines, Line::default());
+        }
         for (i, channel) in channels.iter().enumerate() {
             self.separate(&row, *channel, &mut work.plane);
             self.along_v::<V>(work);
@@ -194,7 +196,8 @@ impl Correlator {
         let blocks_a_row = n / LANES;
         let columns = work.columns.of::<V>();
         let plane = &work.plane;
-        for first in (0..blocks_a_row).step_by(2 * V::LINES) {
+        // What the square does not see stays dark.
+        for first in (0..self.sees.div_ceil(LANES)).step_by(2 * V::LINES) {
             self.fft.transform(
                 &mut work.between,
                 #[inline(always)]
@@ -434,6 +437,7 @@ mod tests {
     /// All channels of a square, through all functions.
     struct Correlate<'a> {
         correlator: &'a Correlator,
+        quads: usize,
         light: &'a [[f32; 4]],
         seen: &'a mut Vec<[f32; QUAD]>,
     }
@@ -442,10 +446,10 @@ mod tests {
         #[inline(always)]
         fn run<V: Vector>(self) {
             let row = |v: usize| &self.light[v * self.correlator.sees..];
-            let (quads, mut work) = (self.correlator.quads(), self.correlator.workspace());
+            let (channels, mut work) = ([0, 1, 2], self.correlator.workspace());
             let seen = self
                 .correlator
-                .correlate::<V>(row, &[0, 1, 2], quads, &mut work);
+                .correlate::<V>(row, &channels, self.quads, &mut work);
             *self.seen = seen.to_vec();
         }
     }
@@ -474,6 +478,7 @@ mod tests {
             (3, 5, 40),
             (17, 21, 18),
             (63, 9, 70),
+            (7, 40, 60),
         ] {
             let area = side * side;
             let basis = Basis {
@@ -495,18 +500,26 @@ mod tests {
                 _ => std::array::from_fn(|c| number(4 * i + c).abs()),
             };
             let light: Vec<[f32; 4]> = (0..n * n).map(element).collect();
-            let correlated = |kind: Kind| {
+            let correlated = |kind: Kind, quads: usize| {
                 let mut seen = Vec::new();
                 kind.run(Correlate {
                     correlator: &correlator,
+                    quads,
                     light: &light,
                     seen: &mut seen,
                 });
                 seen
             };
-            let out = correlated(Kind::Plain);
+            let out = correlated(Kind::Plain, quads);
+            // The first of them are the same without the others.
+            let fewer = quads.div_ceil(2);
+            let first: Vec<_> = out
+                .chunks(quads)
+                .flat_map(|all| all[..fewer].to_vec())
+                .collect();
             for kind in Kind::all() {
-                assert!(out == correlated(kind), "{kind:?}");
+                assert!(out == correlated(kind, quads), "{kind:?}");
+                assert!(first == correlated(kind, fewer), "{kind:?}");
             }
             for o in [0, 1, reach - 1, reach * reach / 2, reach * reach - 1] {
                 for c in 0..CHANNELS {

@@ -136,6 +136,7 @@ impl Kept {
     /// As vectors of one kind have them; not fewer than were asked for.
     #[inline(always)]
     pub fn of<V: Vector>(&mut self) -> &mut [[V::Kept; 2]] {
+        const { assert!(V::LINES <= MOST_LINES) };
         bytemuck::cast_slice_mut(&mut self.0)
     }
 }

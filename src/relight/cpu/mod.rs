@@ -137,7 +137,6 @@ impl Relighter {
                 self.stale || self.light.changed(u..u + side, v..v + side)
             })
             .collect();
-        self.stale = false;
         let this = &*self;
         workers.map(stale.len(), |i| {
             let mut work = lock(&this.spare).pop();
@@ -148,6 +147,7 @@ impl Relighter {
             });
             lock(&this.spare).extend(work);
         });
+        self.stale = false;
         self.light.settle();
     }
 

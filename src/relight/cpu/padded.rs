@@ -7,7 +7,7 @@ use crate::transport::{Element, Extent};
 
 /// A light that is there row by row.
 pub trait LightRows {
-    /// Emission of the elements of a row.
+    /// Emission of the elements of a row, as [`Light::elements`] has it: finite, and none below zero.
     fn row(&mut self, v: u32) -> &[[f32; 4]];
 }
 
@@ -71,8 +71,16 @@ impl PaddedLight {
             let row = (i64::from(v) - i64::from(self.origin.v)) as usize;
             let old = &mut self.elements[row * stride + start..][..length];
             let differing = differing(old, new);
+            if differing.is_empty() {
+                continue;
+            }
             old[differing.clone()].copy_from_slice(&new[differing.clone()]);
-            self.changed[row] = start + differing.start..start + differing.end;
+            let (first, end) = (start + differing.start, start + differing.end);
+            let changed = &mut self.changed[row];
+            *changed = match changed.start < changed.end {
+                true => changed.start.min(first)..changed.end.max(end),
+                false => first..end,
+            };
         }
     }
 
@@ -83,9 +91,9 @@ impl PaddedLight {
 
     /// Whether anything has changed in a rectangle.
     pub fn changed(&self, columns: Range<usize>, rows: Range<usize>) -> bool {
-        self.changed[rows]
-            .iter()
-            .any(|changed| changed.start < columns.end && columns.start < changed.end)
+        self.changed[rows].iter().any(|changed| {
+            !changed.is_empty() && changed.start < columns.end && columns.start < changed.end
+        })
     }
 
     /// Elements of a row, from a column on.
@@ -127,4 +135,49 @@ fn differing(old: &[[f32; 4]], new: &[[f32; 4]]) -> Range<usize> {
     let end = old.len().min((last + 1) * AT_ONCE);
     let start = (first * AT_ONCE..end).find(one).unwrap_or(end);
     start..(start..end).rfind(one).map_or(start, |last| last + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_are_what_differs_until_they_are_settled() {
+        let extent = Extent {
+            width: 20,
+            height: 3,
+        };
+        // Seven columns and rows of darkness on each side.
+        let origin = Element { u: -7, v: -7 };
+        let seen = Extent {
+            width: 34,
+            height: 17,
+        };
+        let mut padded = PaddedLight::new(extent, origin, seen);
+        let mut values = vec![0.0; 60 * 3];
+        let mut put = |padded: &mut PaddedLight, element: usize, value: f32| {
+            values[3 * element] = value;
+            let light = Light::from_linear_rgb(extent, &values).unwrap();
+            padded.put(&light);
+        };
+        let is_all = |padded: &PaddedLight, columns: Range<usize>| {
+            assert!(padded.changed(columns.clone(), 8..9));
+            assert!(!padded.changed(0..columns.start, 0..17));
+            assert!(!padded.changed(columns.end..34, 0..17));
+            assert!(!padded.changed(0..34, 0..8) && !padded.changed(0..34, 9..17));
+        };
+        put(&mut padded, 20, 1.0);
+        is_all(&padded, 7..8);
+        padded.settle();
+        put(&mut padded, 20, 1.0);
+        assert!(!padded.changed(0..34, 0..17));
+        put(&mut padded, 38, 0.5);
+        is_all(&padded, 25..26);
+        // Two lights before anybody looks.
+        put(&mut padded, 29, 0.5);
+        is_all(&padded, 16..26);
+        padded.settle();
+        put(&mut padded, 20, 0.0);
+        is_all(&padded, 7..8);
+    }
 }

@@ -3,11 +3,11 @@
 //! Named where the machine is known to have AVX2 alone, which is what makes all here sound.
 
 use std::arch::x86_64::{
-    __m256, _mm_castps_pd, _mm_loadu_ps, _mm_loadu_si128, _mm_movehl_ps, _mm_set_ps, _mm_store_ss,
-    _mm_storel_pd, _mm_storeu_ps, _mm256_add_ps, _mm256_castps256_ps128, _mm256_cvtepi16_epi32,
-    _mm256_cvtepi32_ps, _mm256_extractf128_ps, _mm256_loadu_ps, _mm256_mul_ps, _mm256_set_m128,
-    _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_storeu_ps, _mm256_sub_ps,
-    _mm256_unpackhi_ps, _mm256_unpacklo_ps,
+    __m256, _mm_castps_si128, _mm_loadu_ps, _mm_loadu_si128, _mm_movehl_ps, _mm_set_ps,
+    _mm_store_ss, _mm_storel_epi64, _mm_storeu_ps, _mm256_add_ps, _mm256_castps256_ps128,
+    _mm256_cvtepi16_epi32, _mm256_cvtepi32_ps, _mm256_extractf128_ps, _mm256_loadu_ps,
+    _mm256_mul_ps, _mm256_set_m128, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps,
+    _mm256_storeu_ps, _mm256_sub_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
 };
 
 use super::{LANES, MOST_PIXELS, Pixels, Vector};
@@ -132,7 +132,7 @@ impl Pixels for Two {
             // The fourth number is written over by the second pixel, which itself is put in two.
             let to: *mut f32 = to.cast();
             _mm_storeu_ps(to, first);
-            _mm_storel_pd(to.add(CHANNELS).cast(), _mm_castps_pd(second));
+            _mm_storel_epi64(to.add(CHANNELS).cast(), _mm_castps_si128(second));
             _mm_store_ss(to.add(CHANNELS + 2), _mm_movehl_ps(second, second));
         }
     }

@@ -152,7 +152,7 @@ impl Kind {
                 fn avx512(work: impl Work) {
                     work.run::<avx512::Avx512>();
                 }
-                // SAFETY: the machine has what is enabled, as was just asked.
+                // SAFETY: the machine has what was just asked for, and what is in all that have that.
                 unsafe { avx512(work) }
             }
             #[cfg(target_arch = "x86_64")]
