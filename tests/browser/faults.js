@@ -92,6 +92,25 @@ describe('an attribute that is', () => {
     const happened = await page.evaluate('happened');
     assert.equal(happened.filter((/** @type {any} */ e) => e.type === 'error').length, 1);
   });
+
+  test('wrong takes nothing else along', async (t) => {
+    const page = await openPage(t, '/bench');
+    await mount(page, { src: '/photos/glass.ltm', light: 'moon', exposure: 'much' });
+    await happenedUntil(page, 'load');
+    await page.evaluate("photo.light = 'torch', photo.torch = { x: 0.2, y: 0.4 }");
+    await page.evaluate("photo.tone = 'hdr', photo.src = 'http://['");
+    await page.waitForFunction("happened.filter(({ type }) => type === 'error').length === 4");
+    const happened = await page.evaluate('happened');
+    const told = happened.filter((/** @type {any} */ e) => e.type === 'error');
+    assert.deepEqual(
+      told.map((/** @type {any} */ e) => /“(.*?)”/.exec(e.message)?.[1]),
+      ['moon', 'much', 'hdr', 'http://['],
+    );
+    const changes = happened.filter((/** @type {any} */ e) => e.type === 'lightchange');
+    assert.deepEqual(changes.at(-1)?.torch, { x: 0.2, y: 0.4 });
+    assert.equal(await page.locator('relightable-photo canvas').count(), 1);
+    assert.equal(happened.filter((/** @type {any} */ e) => e.type === 'load').length, 1);
+  });
 });
 
 describe('a page that is', () => {

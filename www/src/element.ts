@@ -1,10 +1,11 @@
 /** `<relightable-photo>`: attributes and pointer in, events and a picture out. */
 
+import { Attributes } from './attributes.js';
 import type { CanvasSurface } from './canvas.js';
 import { newDecoder } from './decoders.js';
 import { draw } from './drawings.js';
 import type { Backend, Gamut } from './engine.js';
-import { PhotoError, toPhotoError } from './errors.js';
+import { PhotoError } from './errors.js';
 import {
   BackendChangeEvent,
   LightChangeEvent,
@@ -96,7 +97,7 @@ export class RelightablePhoto extends Base {
   #seen = true;
   #reload = false;
   #scheduled = false;
-  #attributeFault: string | null = null;
+  readonly #attributes = new Attributes();
   #playerFault: string | null = null;
   #lightFault: PhotoError | null = null;
   /** The light of the last attributes that were right. */
@@ -350,7 +351,7 @@ export class RelightablePhoto extends Base {
       this.#follower?.stop();
       this.#player.stop();
       this.#view.clear();
-      this.#attributeFault = null;
+      this.#attributes.clear();
       this.#playerFault = null;
       this.#lightFault = null;
       return;
@@ -361,42 +362,40 @@ export class RelightablePhoto extends Base {
       this.#follow();
     });
     this.#follow();
-    try {
-      const name = parseLight(this.getAttribute('light'));
-      const order = parseBackends(this.getAttribute('backend'));
-      const look = {
-        exposure: parseExposure(this.getAttribute('exposure')),
-        whiteBalance: parseWhiteBalance(this.getAttribute('white-balance')),
-        tone: parseTone(this.getAttribute('tone')),
-      };
-      const wanted = {
-        backends: order ?? BACKENDS,
-        // Who names back ends knows better.
-        software: order !== null,
-        gamut: parseGamut(this.getAttribute('gamut')),
-      };
-      const src = this.#address();
-      this.#attributeFault = null;
-      this.#showFault();
-      const lit = this.#lit;
-      const torch = name === 'torch' ? this.#torch : null;
-      const picture = this.#follower?.picture ?? null;
-      const light = { name, torch, picture };
-      this.#lit = light;
-      this.#describe();
-      const reload = this.#reload;
-      this.#reload = false;
-      this.#player.set({ src, wanted, look, light }, reload);
-      if (lit && !sameLight(lit, light)) {
-        const moved = picture ? null : torch;
-        this.dispatchEvent(new LightChangeEvent(name, moved, this.lightSource));
-      }
-    } catch (thrown) {
-      this.#describe();
-      const error = toPhotoError(thrown);
-      if (error.message === this.#attributeFault) return;
-      this.#attributeFault = error.message;
-      this.#fail(error);
+    const read = <T>(name: string, parse: (value: string | null) => T): T =>
+      this.#attributes.read(name, this.getAttribute(name), parse);
+    const name = read('light', parseLight);
+    const order = read('backend', parseBackends);
+    const look = {
+      exposure: read('exposure', parseExposure),
+      whiteBalance: read('white-balance', parseWhiteBalance),
+      tone: read('tone', parseTone),
+    };
+    const wanted = {
+      backends: order ?? BACKENDS,
+      // Who names back ends knows better.
+      software: order !== null,
+      gamut: read('gamut', parseGamut),
+    };
+    const src = read('src', (value) => this.#address(value));
+    const lit = this.#lit;
+    const torch = name === 'torch' ? this.#torch : null;
+    const picture = this.#follower?.picture ?? null;
+    const light = { name, torch, picture };
+    this.#lit = light;
+    this.#describe();
+    this.#showFault();
+    for (const fault of this.#attributes.takeFaults()) {
+      this.dispatchEvent(new PhotoErrorEvent(fault));
+    }
+    // An address that is none is no reason to load what was there before, or to miss it.
+    const badAddress = this.#attributes.isWrong('src');
+    const reload = this.#reload && !badAddress;
+    this.#reload = false;
+    if (src !== null || !badAddress) this.#player.set({ src, wanted, look, light }, reload);
+    if (lit && !sameLight(lit, light)) {
+      const moved = picture ? null : torch;
+      this.dispatchEvent(new LightChangeEvent(name, moved, this.lightSource));
     }
   }
 
@@ -414,8 +413,8 @@ export class RelightablePhoto extends Base {
     this.#view.describe(this.getAttribute('alt'), this.#holdsTorch);
   }
 
-  #address(): string | null {
-    const src = this.getAttribute('src')?.trim();
+  #address(value: string | null): string | null {
+    const src = value?.trim();
     if (!src) return null;
     try {
       return new URL(src, this.baseURI).href;
@@ -439,7 +438,7 @@ export class RelightablePhoto extends Base {
   #showFault(): void {
     const source = this.#follower?.fault?.message;
     this.#view.message(
-      this.#attributeFault ?? this.#playerFault ?? source ?? this.#lightFault?.message ?? null,
+      this.#attributes.message ?? this.#playerFault ?? source ?? this.#lightFault?.message ?? null,
     );
   }
 

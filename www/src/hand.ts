@@ -141,10 +141,11 @@ export class Hand {
 
   #fail(why: string, tell = true): void {
     if (this.#failure) return;
-    this.#failure = new PhotoError(
-      'worker-unavailable',
-      `A relighting worker stopped. ${why}`.trim(),
-    );
+    const what = this.#started
+      ? 'A relighting worker stopped.'
+      : "A relighting worker did not start: its script has to lie beside the element's, and a content " +
+        'security policy has to allow it in worker-src.';
+    this.#failure = new PhotoError('worker-unavailable', `${what} ${why}`.trim());
     clearTimeout(this.#look);
     this.#worker.onmessage = null;
     this.#worker.terminate();
