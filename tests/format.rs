@@ -158,7 +158,8 @@ fn read(file: &[u8], piece: usize) -> Result<Reader, FormatError> {
 }
 
 fn decode(file: &[u8], piece: usize) -> Result<(Transport, Metadata), FormatError> {
-    read(file, piece)?.finish()
+    let (transport, metadata) = read(file, piece)?.finish()?;
+    Ok((transport, metadata.read()?))
 }
 
 fn metadata() -> Metadata {
@@ -261,7 +262,8 @@ proptest! {
         }
         prop_assert_eq!(reader.progress().tiles, want.0.tiles.len());
         prop_assert_eq!(reader.progress().bytes, file.len() as u64);
-        prop_assert!(reader.finish().unwrap() == want);
+        let (transport, metadata) = reader.finish().unwrap();
+        prop_assert!((transport, metadata.read().unwrap()) == want);
     }
 }
 
@@ -315,8 +317,26 @@ fn every_scan_makes_it_better_and_says_by_how_much() {
             };
             assert!(reader.wants(&enough).is_empty(), "scan {s}");
             reader.feed(3, &file[3..end]).unwrap(); // once more, which changes nothing
+            let scans = reader.progress().scans;
+            let preview = reader.preview().unwrap();
+            assert_eq!(preview.is_none(), scans == head.scans.len());
             let (transport, _) = reader.finish_early().unwrap();
             let snr = recovered.error(&transport).snr().unwrap().0;
+            if let Some(preview) = preview {
+                // What has come, and no room for what has not.
+                let error = recovered.error(&preview).snr().unwrap().0;
+                assert!(
+                    (error - snr).abs() < 0.05,
+                    "scan {s}: {error} dB, not {snr}"
+                );
+                let ends = head.scans[..scans]
+                    .iter()
+                    .filter(|scan| !scan.coding.is_direct());
+                let rank = ends.map(|scan| scan.end()).max().unwrap_or(0);
+                assert_eq!(preview.basis.rank(), rank);
+                let bytes = |t: &Transport| t.tiles.iter().map(Tile::bytes).sum::<usize>();
+                assert!(bytes(&preview) <= bytes(&transport));
+            }
             // Colour axes that are not final yet, and codes of twelve bits, take their part.
             let [snr, claimed] = [snr, scan.snr.0].map(|snr| snr.min(55.0));
             assert!(

@@ -13,14 +13,26 @@ const MB = 1e6;
 
 /** Memory of the WebAssembly of the page and of those of its workers that relight. @param {Page} page */
 async function modules(page) {
-  const bytes = async () => {
-    const module = '/relightable-photo/wasm/relightable_photo.js';
-    return /** @type {number} */ (
-      (await (await import(module)).default()).memory.buffer.byteLength
-    );
+  /** @param {readonly string[]} loaded */
+  const bytes = async (loaded) => {
+    let sum = 0;
+    for (const module of loaded) {
+      sum += (await (await import(module)).default()).memory.buffer.byteLength;
+    }
+    return sum;
   };
+  const loaded = await page.evaluate(() =>
+    performance
+      .getEntriesByType('resource')
+      .map(({ name }) => name)
+      .filter((name) => /\/wasm\/\w+\.js$/.test(name)),
+  );
+  const cpu = loaded.filter((name) => /\/cpu(_scalar)?\.js$/.test(name));
   const relighters = page.workers().filter((worker) => worker.url().includes('relighter'));
-  return Promise.all([page.evaluate(bytes), ...relighters.map((worker) => worker.evaluate(bytes))]);
+  return Promise.all([
+    page.evaluate(bytes, loaded),
+    ...relighters.map((worker) => worker.evaluate(bytes, cpu)),
+  ]);
 }
 
 /** What a page holds once garbage is collected. @param {Page} page */

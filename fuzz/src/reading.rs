@@ -1,7 +1,7 @@
 //! Reading a file in all the ways there are, and what must hold of each.
 
 use relightable_photo::format::{
-    self, FIRST_BYTES, FormatError, HEADER_BYTES, Head, Interest, Limits, Metadata, Reader,
+    self, FIRST_BYTES, FormatError, HEADER_BYTES, Head, Interest, Limits, MetadataJson, Reader,
 };
 use relightable_photo::transport::{CHANNELS, CoefficientTile, Decibels, Tile, Transport};
 
@@ -19,7 +19,7 @@ const MOST_PLAIN: u64 = 8 << 20;
 const SMALL: usize = 64 << 10;
 
 /// What a file gives.
-pub type Read = Result<(Transport, Metadata), FormatError>;
+pub type Read = Result<(Transport, MetadataJson), FormatError>;
 
 /// The whole file in one piece, to its end.
 pub fn whole(file: &[u8]) -> Read {

@@ -89,8 +89,9 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
             report.relit.insert(name, psnr);
         }
     }
+    let used = file.head.metadata.read()?.shots_used;
     let held: Vec<usize> = (0..manifest.shots.len())
-        .filter(|i| !file.head.metadata.shots_used.contains(i))
+        .filter(|i| !used.contains(i))
         .collect();
     let dark = folder.read_dark()?;
     let errors = against_shots(&mut relighter, &folder, &dark, &held)?;

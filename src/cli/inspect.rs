@@ -136,7 +136,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
             .map(|scan| ScanReport::new(&head, scan))
             .collect(),
         file_bytes: head.header.file_bytes,
-        metadata: head.metadata.clone(),
+        metadata: head.metadata.read()?,
     };
     if args.json {
         return report::print_json(&report);

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::io::{self, Write};
 
-use super::codec::{basis, direct, halves, transform};
+use super::codec::{basis, checksum, direct, halves, transform};
 use super::extension::Extension;
 use super::head::Head;
 use super::quality::{Rounding, step_for};
@@ -581,7 +581,7 @@ impl<'a> Encoder<'a> {
                 }
                 known += brings;
                 scan.basis_bytes = bytes.len() as u32; // at most MOST_PLAIN, about
-                scan.basis_crc = crc32c::crc32c(&bytes);
+                scan.basis_crc = checksum(&bytes);
                 parts.push(bytes);
             }
             let rounding = Rounding {
@@ -596,7 +596,7 @@ impl<'a> Encoder<'a> {
                         .map_or(ChunkEntry::default(), |chunk| ChunkEntry {
                             bytes: chunk.bytes.len() as u32, // a chunk is below some times MOST_PLAIN
                             plain: chunk.plain,
-                            crc: crc32c::crc32c(&chunk.bytes),
+                            crc: checksum(&chunk.bytes),
                         }),
                 );
                 parts.extend(chunk.map(|chunk| chunk.bytes));
@@ -616,8 +616,7 @@ impl<'a> Encoder<'a> {
             metadata_crc: 0,
         };
         let (extensions, metadata) = (&self.source.extensions, &self.source.metadata);
-        let (head, head_bytes) =
-            Head::new(header, scans, entries, extensions.clone(), metadata.clone())?;
+        let (head, head_bytes) = Head::new(header, scans, entries, extensions.clone(), metadata)?;
         debug_assert!(head.parts().count() == parts.len());
         Ok(EncodedFile {
             head,

@@ -91,7 +91,10 @@ pub enum FormatError {
     MetadataLength(u64),
     /// The metadata is not JSON of the expected form.
     #[error("the metadata is invalid: {0}")]
-    Metadata(serde_json::Error),
+    Metadata(String),
+    /// The metadata is not text.
+    #[error("the metadata is invalid: {0}")]
+    MetadataText(std::str::Utf8Error),
     /// A part does not decompress to what the header asks for.
     #[error("the {part} does not decompress: {reason}")]
     Decompress {

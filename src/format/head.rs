@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use super::codec::{compress, decompress, intact};
+use super::codec::{checksum, compress, decompress, intact};
 use super::error::Part;
 use super::extension::{self, Extension};
 use super::header::HEADER_BYTES;
-use super::{ChunkEntry, Coding, FormatError, Header, Limits, Metadata, Scan};
+use super::{ChunkEntry, Coding, FormatError, Header, Limits, Metadata, MetadataJson, Scan};
 use crate::transport::Geometry;
 
 /// What a reader knows before it has any chunk.
@@ -19,7 +19,7 @@ pub struct Head {
     /// Extensions that readers may pass over.
     pub extensions: Vec<Extension>,
     /// Where the file came from.
-    pub metadata: Metadata,
+    pub metadata: MetadataJson,
     /// `[scan, tile]`.
     entries: Vec<ChunkEntry>,
     /// Where parts begin, and where the last ends: of each scan its functions of the basis, then
@@ -64,7 +64,7 @@ impl Head {
             scans,
             entries,
             extensions,
-            metadata: Metadata::decode(metadata).map_err(FormatError::Metadata)?,
+            metadata: MetadataJson::decode(metadata)?,
         };
         let (end, file_bytes) = (head.end(), header.file_bytes);
         if end != file_bytes {
@@ -83,27 +83,28 @@ impl Head {
         scans: Vec<Scan>,
         entries: Vec<ChunkEntry>,
         extensions: Vec<Extension>,
-        metadata: Metadata,
+        metadata: &Metadata,
     ) -> Result<(Self, Vec<u8>), FormatError> {
         let tiles = header.geometry.tile_grid().area();
         assert_eq!(entries.len(), scans.len() * tiles, "one entry of each");
         let directory = compress(&encode_directory(&scans, &entries))?;
         let extension_bytes = extension::encode(&extensions);
-        let json = serde_json::to_vec(&metadata).map_err(FormatError::Metadata)?;
+        let metadata = MetadataJson::of(metadata)?;
+        let json = metadata.text().as_bytes();
         let length = |bytes: &[u8]| u32::try_from(bytes.len()).unwrap_or(u32::MAX);
         header.scans = scans.len() as u32; // the plan makes few
         header.directory_bytes = length(&directory);
-        header.directory_crc = crc32c::crc32c(&directory);
+        header.directory_crc = checksum(&directory);
         header.extension_bytes = length(&extension_bytes);
-        header.extension_crc = crc32c::crc32c(&extension_bytes);
-        header.metadata_bytes = length(&json);
-        header.metadata_crc = crc32c::crc32c(&json);
+        header.extension_crc = checksum(&extension_bytes);
+        header.metadata_bytes = length(json);
+        header.metadata_crc = checksum(json);
         let offsets = offsets(&header, &scans, &entries);
         header.file_bytes = offsets.last().copied().unwrap_or(header.head_bytes());
         let fixed = header.encode();
         // What a reader would refuse is better not written.
         Header::decode(&fixed)?;
-        let bytes = [&fixed[..], &directory, &extension_bytes, &json].concat();
+        let bytes = [&fixed[..], &directory, &extension_bytes, json].concat();
         let head = Self {
             header,
             scans,

@@ -1,6 +1,6 @@
 //! The fixed header.
 
-use super::codec::intact;
+use super::codec::{checksum, intact};
 use super::error::{Part, TextDamage};
 use super::fields::Fields;
 use super::metadata::MAX_METADATA_BYTES;
@@ -101,7 +101,7 @@ impl Header {
         ] {
             out.extend(field.to_le_bytes());
         }
-        out.extend(crc32c::crc32c(&out).to_le_bytes());
+        out.extend(checksum(&out).to_le_bytes());
         let mut header = [0; HEADER_BYTES];
         header.copy_from_slice(&out);
         header

@@ -7,6 +7,8 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::FormatError;
+
 /// Longest metadata a reader accepts: room for any caption, none for an attack.
 pub(super) const MAX_METADATA_BYTES: u32 = 1 << 20;
 
@@ -49,16 +51,52 @@ pub struct CaptureNote {
     pub photographs: usize,
 }
 
-impl Metadata {
-    /// Reads the JSON of a file.
-    pub(super) fn decode(json: &[u8]) -> Result<Self, serde_json::Error> {
-        // Strings that are passed over would go unchecked.
-        let json = str::from_utf8(json).map_err(serde::de::Error::custom)?;
-        let mut json = serde_json::Deserializer::from_str(json);
-        let metadata = object(&mut json)?;
-        json.end()?;
-        Ok(metadata)
+/// Metadata as a file has them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MetadataJson(String);
+
+impl MetadataJson {
+    /// What is to be written of `metadata`.
+    pub(super) fn of(metadata: &Metadata) -> Result<Self, FormatError> {
+        let json = serde_json::to_string(metadata).map_err(wrong)?;
+        Ok(Self(json))
     }
+
+    /// Takes the bytes of a file. That they are metadata is left to who has JSON at hand in browsers, where
+    /// reading it here would be a tenth of the decoder.
+    pub(super) fn decode(json: &[u8]) -> Result<Self, FormatError> {
+        // Strings that are passed over would go unchecked.
+        let text = str::from_utf8(json).map_err(FormatError::MetadataText)?;
+        let json = Self(text.to_owned());
+        #[cfg(not(target_arch = "wasm32"))]
+        json.read()?;
+        Ok(json)
+    }
+
+    /// The JSON.
+    pub fn text(&self) -> &str {
+        &self.0
+    }
+
+    /// What it says.
+    ///
+    /// # Errors
+    /// `FormatError::Metadata` where it is not JSON of the expected form, which a reader has found out
+    /// already outside browsers.
+    pub fn read(&self) -> Result<Metadata, FormatError> {
+        let read = || {
+            let mut json = serde_json::Deserializer::from_str(&self.0);
+            let metadata = object(&mut json)?;
+            json.end()?;
+            Ok(metadata)
+        };
+        read().map_err(wrong)
+    }
+}
+
+/// As text, for browsers not to load what says more.
+fn wrong(error: serde_json::Error) -> FormatError {
+    FormatError::Metadata(error.to_string())
 }
 
 /// Reads an object. In a list, which serde takes too, fields have no names to know them by.
@@ -78,18 +116,17 @@ fn object<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<T, 
     from.deserialize_map(Object(PhantomData))
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests {
     use super::*;
 
     #[test]
     fn metadata_are_one_object_of_text() {
-        let title = Metadata::decode(br#"{"title": "A", "other": ["B"]}"#)
-            .unwrap()
-            .title;
+        let json = MetadataJson::decode(br#"{"title": "A", "other": ["B"]}"#).unwrap();
+        let title = json.read().unwrap().title;
         assert_eq!(title, "A");
         for bad in [&b"[]"[..], b"{} {}", b"", b"{\"other\": \"\xFF\"}"] {
-            assert!(Metadata::decode(bad).is_err(), "{}", bad.escape_ascii());
+            assert!(MetadataJson::decode(bad).is_err(), "{}", bad.escape_ascii());
         }
     }
 }

@@ -40,7 +40,7 @@ pub use extension::Extension;
 pub use head::{Head, PartNumber};
 pub use header::{FIRST_BYTES, HEADER_BYTES, Header};
 pub use limits::Limits;
-pub use metadata::{CaptureNote, Metadata};
+pub use metadata::{CaptureNote, Metadata, MetadataJson};
 pub use reader::{Interest, Progress, Reader};
 pub use scan::{Coding, Scan};
 pub use tile::{decode_basis, decode_tile};

@@ -8,7 +8,7 @@ use super::error::Part;
 use super::head::{Head, PartNumber, tiles_in};
 use super::header::{self, FIRST_BYTES, HEADER_BYTES, Header};
 use super::tile::TileNumbers;
-use super::{FormatError, Limits, Metadata};
+use super::{FormatError, Limits, MetadataJson};
 use crate::transport::{Basis, CoefficientTile, Decibels, DirectTile, Tile, Transport};
 
 /// An incremental reader. [`wants`](Self::wants) says which bytes are of use,
@@ -202,7 +202,7 @@ impl Reader {
     }
 
     /// The whole transport, once every byte has been fed.
-    pub fn finish(self) -> Result<(Transport, Metadata), FormatError> {
+    pub fn finish(self) -> Result<(Transport, MetadataJson), FormatError> {
         let cut_short = self.cut_short();
         match self.opened {
             Some(opened) if opened.missing.iter().all(|missing| *missing == 0) => opened.finish(),
@@ -210,8 +210,19 @@ impl Reader {
         }
     }
 
+    /// A coarser transport, by the components that are there for every tile; none before those of the
+    /// first scan are, and once all is there, which is left to [`finish`](Self::finish).
+    pub fn preview(&self) -> Result<Option<Transport>, FormatError> {
+        match &self.opened {
+            Some(opened) if (1..opened.missing.len()).contains(&opened.scans()) => {
+                opened.preview().map(Some)
+            }
+            _ => Ok(None),
+        }
+    }
+
     /// The transport as far as it has come, once the head has.
-    pub fn finish_early(self) -> Result<(Transport, Metadata), FormatError> {
+    pub fn finish_early(self) -> Result<(Transport, MetadataJson), FormatError> {
         match self.opened {
             Some(opened) => opened.finish(),
             None => self.finish(),
@@ -414,21 +425,22 @@ impl Opened {
         match &mut self.tiles[tile] {
             Coming::Numbers(numbers) if numbers.scans == self.head.scans.len() => {
                 let numbers = std::mem::take(numbers);
-                self.tiles[tile] = Coming::Whole(self.codes(tile, numbers)?);
+                let codes = self.codes(tile, numbers, self.basis.rank())?;
+                self.tiles[tile] = Coming::Whole(codes);
                 Ok(())
             }
             _ => Ok(()),
         }
     }
 
-    /// The codes of what has come of a tile.
-    fn codes(&self, tile: usize, numbers: TileNumbers) -> Result<Tile, FormatError> {
+    /// The codes of what has come of a tile, of the first `rank` components.
+    fn codes(&self, tile: usize, numbers: TileNumbers, rank: usize) -> Result<Tile, FormatError> {
         let part = Part::Chunk {
             scan: self.head.scans.len().saturating_sub(1),
             tile,
         };
-        let band = numbers.band_tile(&self.head, tile)?;
-        let (rect, rank) = (band.rect, self.basis.rank());
+        let band = numbers.band_tile(&self.head, tile, rank)?;
+        let rect = band.rect;
         let mut codes = Tile::dark(rect);
         if !band.coefficients.is_empty() {
             let room = zeros(CoefficientTile::texels(rect, rank)).map_err(|e| e.of(part))?;
@@ -443,13 +455,34 @@ impl Opened {
         Ok(codes)
     }
 
-    fn finish(mut self) -> Result<(Transport, Metadata), FormatError> {
+    fn preview(&self) -> Result<Transport, FormatError> {
+        let rank = self.head.functions(self.scans() - 1).end;
+        let tile = |(i, tile): (usize, &Coming)| match tile {
+            Coming::Numbers(numbers) => self.codes(i, numbers.clone(), rank),
+            // The scans to come have nothing for it.
+            Coming::Whole(tile) => Ok(tile.first_components(self.basis.rank(), rank)),
+        };
+        Ok(Transport {
+            geometry: self.head.header.geometry,
+            basis: Basis {
+                kernels: self.basis.kernels[..rank].to_vec(),
+            },
+            tiles: self
+                .tiles
+                .iter()
+                .enumerate()
+                .map(tile)
+                .collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn finish(mut self) -> Result<(Transport, MetadataJson), FormatError> {
         let mut tiles = Vec::with_capacity(self.tiles.len());
         for i in 0..self.tiles.len() {
             let none = Coming::Numbers(TileNumbers::default());
             tiles.push(match std::mem::replace(&mut self.tiles[i], none) {
                 Coming::Whole(tile) => tile,
-                Coming::Numbers(numbers) => self.codes(i, numbers)?,
+                Coming::Numbers(numbers) => self.codes(i, numbers, self.basis.rank())?,
             });
         }
         let transport = Transport {

@@ -8,7 +8,7 @@ use super::{Coding, FormatError};
 use crate::transport::{BandTile, Basis, CHANNELS};
 
 /// The numbers of a tile so far.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct TileNumbers {
     /// Scans that it is done with.
     pub scans: usize,
@@ -74,14 +74,17 @@ impl TileNumbers {
         }
     }
 
-    /// The tile as far as it has come.
-    pub fn band_tile(self, head: &Head, tile: usize) -> Result<BandTile, FormatError> {
+    /// The tile as far as it has come, by the first `rank` components of the basis.
+    pub fn band_tile(self, head: &Head, tile: usize, rank: usize) -> Result<BandTile, FormatError> {
         let rect = head.header.geometry.tile(tile);
+        let all = usize::from(head.header.rank);
         let coefficients = match self.planes.is_dark() {
-            true => Ok(self.coefficients),
-            false => self
-                .planes
-                .coefficients(rect.extent, head.header.rank.into()),
+            true if rank == all => Ok(self.coefficients),
+            true => {
+                let pixels = self.coefficients.chunks_exact(all.max(1));
+                Ok(pixels.flat_map(|pixel| &pixel[..rank]).copied().collect())
+            }
+            false => self.planes.coefficients(rect.extent, rank),
         };
         let scan = self.scans.saturating_sub(1);
         Ok(BandTile {
@@ -113,7 +116,7 @@ pub fn decode_tile<E: From<FormatError>>(
         head.check_crc(part, &bytes)?;
         numbers.add(head, &order, tile, &bytes)?;
     }
-    Ok(numbers.band_tile(head, tile)?)
+    Ok(numbers.band_tile(head, tile, head.header.rank.into())?)
 }
 
 /// Decodes the basis of a file, of the bytes that `fetch` has for each scan that brings some.

@@ -176,6 +176,27 @@ impl CoefficientTile {
         CHANNELS * rank.div_ceil(QUAD) * Self::plane(rect)
     }
 
+    /// The first `rank` components of all that a tile over a basis of `all` functions has.
+    pub(crate) fn first_components(&self, all: usize, rank: usize) -> Self {
+        let (plane, quads) = (Self::plane(self.rect), rank.div_ceil(QUAD));
+        let mut codes = Vec::with_capacity(self.codes.len().min(CHANNELS * quads * plane));
+        for channel in self.codes.chunks_exact(all.div_ceil(QUAD).max(1) * plane) {
+            codes.extend_from_slice(&channel[..quads * plane]);
+            let last = match rank % QUAD {
+                0 => codes.len(),
+                _ => codes.len() - plane,
+            };
+            for texel in &mut codes[last..] {
+                texel[rank % QUAD..].fill(0);
+            }
+        }
+        Self {
+            rect: self.rect,
+            step: self.step,
+            codes,
+        }
+    }
+
     /// Coefficient `k` of pixel `p` (in tile order), for a basis of `rank` functions.
     pub fn coefficient(&self, rank: usize, p: usize, k: usize) -> [f32; CHANNELS] {
         let (plane, quads) = (Self::plane(self.rect), rank.div_ceil(QUAD));
@@ -245,6 +266,14 @@ impl Tile {
             tile.expand_into(geometry, basis, &mut functions.tau);
         }
         functions
+    }
+
+    /// The tile by the first `rank` components of a basis of `all` functions.
+    pub(crate) fn first_components(&self, all: usize, rank: usize) -> Self {
+        Self {
+            coefficients: self.coefficients.first_components(all, rank),
+            functions: self.functions.clone(),
+        }
     }
 
     /// Bytes of its codes.

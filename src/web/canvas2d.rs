@@ -7,6 +7,8 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{Clamped, JsCast, JsValue};
 use web_sys::{CanvasRenderingContext2d, HtmlCanvasElement};
 
+use super::drawing::display::parse_gamut;
+use super::{CodedError, Photo, Relighter};
 use crate::relight::backend::{Backend, BackendError, Frame};
 use crate::relight::canvas2d::{Keep, open_2d};
 use crate::relight::{Gamut, Rgba8Picture, cpu};
@@ -56,6 +58,22 @@ impl Canvas2d {
             gamut,
             settings,
         })
+    }
+}
+
+#[wasm_bindgen]
+impl Relighter {
+    /// One that draws on this thread. A canvas serves one `Relighter` only: give the next, also after a
+    /// failure, a new one.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        photo: &Photo,
+        canvas: HtmlCanvasElement,
+        #[wasm_bindgen(unchecked_param_type = "\"srgb\" | \"display-p3\"")] gamut: &str,
+    ) -> Result<Relighter, CodedError> {
+        let gamut = parse_gamut(gamut)?;
+        let backend = Canvas2d::new(photo.transport(), &canvas, gamut)?;
+        Ok(Self::of(Box::new(backend), photo.geometry().light))
     }
 }
 

@@ -50,21 +50,24 @@ impl Decoder {
         self.0.progress().file_bytes.map(|bytes| bytes as f64)
     }
 
-    /// Tiles that are whole.
-    #[wasm_bindgen(getter, js_name = tilesDone)]
-    pub fn tiles_done(&self) -> usize {
-        self.0.progress().tiles
-    }
-
     /// Scans that are there for every tile.
     #[wasm_bindgen(getter, js_name = scansDone)]
     pub fn scans_done(&self) -> usize {
         self.0.progress().scans
     }
 
+    /// A coarser photograph of what has come of every tile; none before the first scan is there, and once
+    /// all is.
+    pub fn preview(&self) -> Result<Option<Photo>, CodedError> {
+        let (Some(transport), Some(head)) = (self.0.preview()?, self.0.head()) else {
+            return Ok(None);
+        };
+        Ok(Some(Photo::new(transport, &head.metadata)))
+    }
+
     /// The photograph, once nothing is wanted any more.
     pub fn finish(self) -> Result<Photo, CodedError> {
         let (transport, metadata) = self.0.finish()?;
-        Photo::new(transport, &metadata)
+        Ok(Photo::new(transport, &metadata))
     }
 }

@@ -8,10 +8,12 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen_futures::future_to_promise;
 use web_sys::HtmlCanvasElement;
 
-use super::display::parse_gamut;
+use super::drawing::display::parse_gamut;
 use super::{CodedError, Photo, Relighter};
 use crate::relight::backend::Backend;
+#[cfg(feature = "webgl2")]
 use crate::relight::webgl2::{Context, WebGl2};
+#[cfg(feature = "webgpu")]
 use crate::relight::webgpu::{Device, WebGpu};
 
 /// A WebGPU device, or a WebGL2 context. Freeing it frees all that is on a device, whatever still draws
@@ -22,13 +24,16 @@ pub struct Graphics(Kind);
 
 #[derive(Clone, Debug)]
 enum Kind {
+    #[cfg(feature = "webgpu")]
     WebGpu(Rc<Device>),
+    #[cfg(feature = "webgl2")]
     WebGl2(Rc<Context>),
 }
 
 #[wasm_bindgen]
 impl Graphics {
     /// A WebGPU device.
+    #[cfg(feature = "webgpu")]
     #[wasm_bindgen(unchecked_return_type = "Promise<Graphics>")]
     pub fn webgpu() -> Promise {
         future_to_promise(async {
@@ -39,6 +44,7 @@ impl Graphics {
 
     /// A WebGL2 context, on a canvas that is for it alone and need not be seen. The canvas tells when
     /// the context is lost.
+    #[cfg(feature = "webgl2")]
     pub fn webgl2(canvas: HtmlCanvasElement) -> Result<Graphics, CodedError> {
         Ok(Self(Kind::WebGl2(Rc::new(Context::new(canvas)?))))
     }
@@ -47,7 +53,9 @@ impl Graphics {
     #[wasm_bindgen(getter)]
     pub fn kernel(&self) -> String {
         match &self.0 {
+            #[cfg(feature = "webgpu")]
             Kind::WebGpu(device) => device.kernel().into(),
+            #[cfg(feature = "webgl2")]
             Kind::WebGl2(context) => context.kernel().into(),
         }
     }
@@ -56,7 +64,9 @@ impl Graphics {
     #[wasm_bindgen(getter)]
     pub fn software(&self) -> bool {
         match &self.0 {
+            #[cfg(feature = "webgpu")]
             Kind::WebGpu(device) => device.is_software(),
+            #[cfg(feature = "webgl2")]
             Kind::WebGl2(context) => context.is_software(),
         }
     }
@@ -68,7 +78,9 @@ impl Graphics {
     )]
     pub fn lost(&self) -> Option<Promise> {
         match &self.0 {
+            #[cfg(feature = "webgpu")]
             Kind::WebGpu(device) => device.lost(),
+            #[cfg(feature = "webgl2")]
             Kind::WebGl2(_) => None,
         }
     }
@@ -88,9 +100,11 @@ impl Graphics {
             let gamut = parse_gamut(&gamut)?;
             let light = transport.geometry.light;
             let backend: Result<Box<dyn Backend>, _> = match kind {
+                #[cfg(feature = "webgpu")]
                 Kind::WebGpu(device) => WebGpu::new(device, &transport, &canvas, gamut)
                     .await
                     .map(|backend| Box::new(backend) as _),
+                #[cfg(feature = "webgl2")]
                 Kind::WebGl2(context) => WebGl2::new(context, &transport, &canvas, gamut)
                     .map(|backend| Box::new(backend) as _),
             };
@@ -102,8 +116,11 @@ impl Graphics {
 
 impl Drop for Graphics {
     fn drop(&mut self) {
-        if let Kind::WebGpu(device) = &self.0 {
-            device.destroy();
+        match &self.0 {
+            #[cfg(feature = "webgpu")]
+            Kind::WebGpu(device) => device.destroy(),
+            #[cfg(feature = "webgl2")]
+            Kind::WebGl2(_) => {}
         }
     }
 }

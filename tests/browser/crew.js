@@ -48,14 +48,14 @@ const keepingWorkers = () => {
 };
 
 /**
- * Bytes of the modules' memory, of the page's and of each worker's.
+ * Bytes of the CPU modules' memory, of the page's and of each worker's.
  *
  * @param {import('playwright-core').Page} page
  * @returns {Promise<number[]>}
  */
 function memory(page) {
   const bytes = async () => {
-    const module = '/relightable-photo/wasm/relightable_photo.js';
+    const module = '/relightable-photo/wasm/cpu.js';
     return (await (await import(module)).default()).memory.buffer.byteLength;
   };
   return Promise.all([

@@ -3,17 +3,22 @@
  * against. Needs pkg-scripts/build to have run.
  */
 
-import type * as Simd from '../../dist/wasm/relightable_photo.js';
-import type * as Scalar from '../../dist/wasm/relightable_photo_scalar.js';
+import type * as Cpu from '../../dist/wasm/cpu.js';
+import type * as CpuScalar from '../../dist/wasm/cpu_scalar.js';
+import type * as Decoders from '../../dist/wasm/decoder.js';
+import type * as DecodersScalar from '../../dist/wasm/decoder_scalar.js';
+import type * as WebGl2 from '../../dist/wasm/webgl2.js';
+import type * as WebGpu from '../../dist/wasm/webgpu.js';
 import type {
   BandRelighter,
+  DecodedPhoto,
   Decoder,
   Display,
-  Engine,
+  DrawingModule,
+  DrawnPhoto,
   Gamut,
   Graphics,
   Light,
-  Photo,
   Relighter,
 } from '../../www/src/engine.js';
 
@@ -21,79 +26,188 @@ import type {
 // they give and take can.
 type Extends<A extends B, B> = A;
 
-type _Builds = Extends<typeof Scalar, Pick<typeof Scalar, keyof typeof Simd>>;
-type _Decoder = Extends<Simd.Decoder, Omit<Decoder, 'finish'>>;
-type _Constructor = Extends<[number?], ConstructorParameters<typeof Simd.Decoder>>;
-type _Finish = Extends<ReturnType<Simd.Decoder['finish']>, Photo>;
-type _Receive = Extends<ReturnType<typeof Simd.Photo.receive>, Photo>;
-type _Parcels = Extends<
-  [Float64Array, Float32Array, string],
-  Parameters<typeof Simd.Photo.receive>
+type _Builds = Extends<typeof CpuScalar, Pick<typeof CpuScalar, keyof typeof Cpu>>;
+type _Decoders = Extends<typeof DecodersScalar, Pick<typeof DecodersScalar, keyof typeof Decoders>>;
+type _Decoder = Extends<Decoders.Decoder, Omit<Decoder, 'finish' | 'preview'>>;
+type _Constructor = Extends<[number?], ConstructorParameters<typeof Decoders.Decoder>>;
+type _Finish = Extends<ReturnType<Decoders.Decoder['finish']>, DecodedPhoto>;
+type _Preview = Extends<ReturnType<Decoders.Decoder['preview']>, DecodedPhoto | undefined>;
+
+type _CpuReceive = Extends<ReturnType<typeof Cpu.Photo.receive>, DrawnPhoto>;
+type _CpuParcels = Extends<[Float64Array, Float32Array], Parameters<typeof Cpu.Photo.receive>>;
+type _CpuLight = Extends<ReturnType<typeof Cpu.Light.builtin>, Light>;
+type _CpuBuiltin = Extends<[Cpu.Photo, string], Parameters<typeof Cpu.Light.builtin>>;
+type _CpuTorch = Extends<[Cpu.Photo, number, number, number?], Parameters<typeof Cpu.Light.torch>>;
+type _CpuLinear = Extends<
+  [Cpu.Photo, Float32Array, number, number],
+  Parameters<typeof Cpu.Light.fromLinear>
 >;
-type _Light = Extends<ReturnType<typeof Simd.Light.builtin>, Light>;
-type _Builtin = Extends<[Simd.Photo, string], Parameters<typeof Simd.Light.builtin>>;
-type _Torch = Extends<[Simd.Photo, number, number, number?], Parameters<typeof Simd.Light.torch>>;
-type _Linear = Extends<
-  [Simd.Photo, Float32Array, number, number],
-  Parameters<typeof Simd.Light.fromLinear>
+type _CpuSrgb = Extends<
+  [Cpu.Photo, Uint8ClampedArray, number, number],
+  Parameters<typeof Cpu.Light.fromSrgb>
 >;
-type _Srgb = Extends<
-  [Simd.Photo, Uint8ClampedArray, number, number],
-  Parameters<typeof Simd.Light.fromSrgb>
+type _CpuDisplay = Extends<Cpu.Display, Display>;
+type _CpuDisplayOf = Extends<
+  ConstructorParameters<DrawingModule['Display']>,
+  ConstructorParameters<typeof Cpu.Display>
 >;
-type _Display = Extends<Simd.Display, Display>;
-type _DisplayOf = Extends<
-  ConstructorParameters<Engine['Display']>,
-  ConstructorParameters<typeof Simd.Display>
+type _CpuRelighter = Extends<Cpu.Relighter, Omit<Relighter, 'render' | 'renderPicture'>>;
+type _CpuRender = Extends<[Cpu.Light, Cpu.Display, number], Parameters<Cpu.Relighter['render']>>;
+type _CpuRenderPicture = Extends<[Cpu.Display, number], Parameters<Cpu.Relighter['renderPicture']>>;
+
+type _WebGl2Receive = Extends<ReturnType<typeof WebGl2.Photo.receive>, DrawnPhoto>;
+type _WebGl2Parcels = Extends<
+  [Float64Array, Float32Array],
+  Parameters<typeof WebGl2.Photo.receive>
 >;
-type _Band = Extends<Simd.BandRelighter, Omit<BandRelighter, 'relight'>>;
+type _WebGl2Light = Extends<ReturnType<typeof WebGl2.Light.builtin>, Light>;
+type _WebGl2Builtin = Extends<[WebGl2.Photo, string], Parameters<typeof WebGl2.Light.builtin>>;
+type _WebGl2Torch = Extends<
+  [WebGl2.Photo, number, number, number?],
+  Parameters<typeof WebGl2.Light.torch>
+>;
+type _WebGl2Linear = Extends<
+  [WebGl2.Photo, Float32Array, number, number],
+  Parameters<typeof WebGl2.Light.fromLinear>
+>;
+type _WebGl2Srgb = Extends<
+  [WebGl2.Photo, Uint8ClampedArray, number, number],
+  Parameters<typeof WebGl2.Light.fromSrgb>
+>;
+type _WebGl2Display = Extends<WebGl2.Display, Display>;
+type _WebGl2DisplayOf = Extends<
+  ConstructorParameters<DrawingModule['Display']>,
+  ConstructorParameters<typeof WebGl2.Display>
+>;
+type _WebGl2Relighter = Extends<WebGl2.Relighter, Omit<Relighter, 'render' | 'renderPicture'>>;
+type _WebGl2Render = Extends<
+  [WebGl2.Light, WebGl2.Display, number],
+  Parameters<WebGl2.Relighter['render']>
+>;
+type _WebGl2RenderPicture = Extends<
+  [WebGl2.Display, number],
+  Parameters<WebGl2.Relighter['renderPicture']>
+>;
+
+type _WebGpuReceive = Extends<ReturnType<typeof WebGpu.Photo.receive>, DrawnPhoto>;
+type _WebGpuParcels = Extends<
+  [Float64Array, Float32Array],
+  Parameters<typeof WebGpu.Photo.receive>
+>;
+type _WebGpuLight = Extends<ReturnType<typeof WebGpu.Light.builtin>, Light>;
+type _WebGpuBuiltin = Extends<[WebGpu.Photo, string], Parameters<typeof WebGpu.Light.builtin>>;
+type _WebGpuTorch = Extends<
+  [WebGpu.Photo, number, number, number?],
+  Parameters<typeof WebGpu.Light.torch>
+>;
+type _WebGpuLinear = Extends<
+  [WebGpu.Photo, Float32Array, number, number],
+  Parameters<typeof WebGpu.Light.fromLinear>
+>;
+type _WebGpuSrgb = Extends<
+  [WebGpu.Photo, Uint8ClampedArray, number, number],
+  Parameters<typeof WebGpu.Light.fromSrgb>
+>;
+type _WebGpuDisplay = Extends<WebGpu.Display, Display>;
+type _WebGpuDisplayOf = Extends<
+  ConstructorParameters<DrawingModule['Display']>,
+  ConstructorParameters<typeof WebGpu.Display>
+>;
+type _WebGpuRelighter = Extends<WebGpu.Relighter, Omit<Relighter, 'render' | 'renderPicture'>>;
+type _WebGpuRender = Extends<
+  [WebGpu.Light, WebGpu.Display, number],
+  Parameters<WebGpu.Relighter['render']>
+>;
+type _WebGpuRenderPicture = Extends<
+  [WebGpu.Display, number],
+  Parameters<WebGpu.Relighter['renderPicture']>
+>;
+
+type _RelighterOf = Extends<
+  [Cpu.Photo, HTMLCanvasElement, Gamut],
+  ConstructorParameters<typeof Cpu.Relighter>
+>;
+type _Band = Extends<Cpu.BandRelighter, Omit<BandRelighter, 'relight'>>;
 type _BandOf = Extends<
-  [Simd.Photo, number, number],
-  ConstructorParameters<typeof Simd.BandRelighter>
+  [Cpu.Photo, number, number],
+  ConstructorParameters<typeof Cpu.BandRelighter>
 >;
 type _BandRelight = Extends<
-  [Float32Array | null, Simd.Display, number, Uint8Array],
-  Parameters<Simd.BandRelighter['relight']>
+  [Float32Array | null, Cpu.Display, number, Uint8Array],
+  Parameters<Cpu.BandRelighter['relight']>
 >;
-type _Kernel = Extends<typeof Simd.cpuKernel, Engine['cpuKernel']>;
-type _Graphics = Extends<Simd.Graphics, Omit<Graphics, 'draw'>>;
-type _WebGpu = Extends<ReturnType<typeof Simd.Graphics.webgpu>, Promise<Simd.Graphics>>;
-type _WebGl2 = Extends<[HTMLCanvasElement], Parameters<typeof Simd.Graphics.webgl2>>;
-type _Draw = Extends<[Simd.Photo, HTMLCanvasElement, Gamut], Parameters<Simd.Graphics['draw']>>;
-type _Drawn = Extends<ReturnType<Simd.Graphics['draw']>, Promise<Simd.Relighter>>;
-type _Relighter = Extends<Simd.Relighter, Omit<Relighter, 'render' | 'renderPicture'>>;
-type _RenderPicture = Extends<[Simd.Display, number], Parameters<Simd.Relighter['renderPicture']>>;
-type _RelighterOf = Extends<
-  [Simd.Photo, HTMLCanvasElement, Gamut],
-  ConstructorParameters<typeof Simd.Relighter>
+type _Kernel = Extends<ReturnType<typeof Cpu.cpuKernel>, string>;
+
+type _WebGl2Graphics = Extends<WebGl2.Graphics, Omit<Graphics, 'draw'>>;
+type _WebGl2Draw = Extends<
+  [WebGl2.Photo, HTMLCanvasElement, Gamut],
+  Parameters<WebGl2.Graphics['draw']>
 >;
-type _Render = Extends<[Simd.Light, Simd.Display, number], Parameters<Simd.Relighter['render']>>;
+type _WebGl2Drawn = Extends<ReturnType<WebGl2.Graphics['draw']>, Promise<WebGl2.Relighter>>;
+
+type _WebGpuGraphics = Extends<WebGpu.Graphics, Omit<Graphics, 'draw'>>;
+type _WebGpuDraw = Extends<
+  [WebGpu.Photo, HTMLCanvasElement, Gamut],
+  Parameters<WebGpu.Graphics['draw']>
+>;
+type _WebGpuDrawn = Extends<ReturnType<WebGpu.Graphics['draw']>, Promise<WebGpu.Relighter>>;
+type _WebGpuOpen = Extends<ReturnType<typeof WebGpu.Graphics.webgpu>, Promise<WebGpu.Graphics>>;
+type _WebGl2Open = Extends<[HTMLCanvasElement], Parameters<typeof WebGl2.Graphics.webgl2>>;
 
 export type Contract = [
   _Builds,
+  _Decoders,
   _Decoder,
   _Constructor,
   _Finish,
-  _Receive,
-  _Parcels,
-  _Light,
-  _Builtin,
-  _Torch,
-  _Display,
-  _DisplayOf,
-  _Linear,
-  _Srgb,
+  _Preview,
+  _CpuReceive,
+  _CpuParcels,
+  _CpuLight,
+  _CpuBuiltin,
+  _CpuTorch,
+  _CpuLinear,
+  _CpuSrgb,
+  _CpuDisplay,
+  _CpuDisplayOf,
+  _CpuRelighter,
+  _CpuRender,
+  _CpuRenderPicture,
+  _WebGl2Receive,
+  _WebGl2Parcels,
+  _WebGl2Light,
+  _WebGl2Builtin,
+  _WebGl2Torch,
+  _WebGl2Linear,
+  _WebGl2Srgb,
+  _WebGl2Display,
+  _WebGl2DisplayOf,
+  _WebGl2Relighter,
+  _WebGl2Render,
+  _WebGl2RenderPicture,
+  _WebGpuReceive,
+  _WebGpuParcels,
+  _WebGpuLight,
+  _WebGpuBuiltin,
+  _WebGpuTorch,
+  _WebGpuLinear,
+  _WebGpuSrgb,
+  _WebGpuDisplay,
+  _WebGpuDisplayOf,
+  _WebGpuRelighter,
+  _WebGpuRender,
+  _WebGpuRenderPicture,
+  _RelighterOf,
   _Band,
   _BandOf,
   _BandRelight,
   _Kernel,
-  _Graphics,
-  _WebGpu,
-  _WebGl2,
-  _Draw,
-  _Drawn,
-  _Relighter,
-  _RelighterOf,
-  _Render,
-  _RenderPicture,
+  _WebGl2Graphics,
+  _WebGl2Draw,
+  _WebGl2Drawn,
+  _WebGpuGraphics,
+  _WebGpuDraw,
+  _WebGpuDrawn,
+  _WebGpuOpen,
+  _WebGl2Open,
 ];

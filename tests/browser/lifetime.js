@@ -98,9 +98,9 @@ describe('an element', () => {
       const page = await openPage(t, '/bench');
       await mount(page, { src: '/photos/glass.ltm', backend });
       await loaded(page);
-      const growth = await page.evaluate(async () => {
+      const growth = await page.evaluate(async (backend) => {
         const { photo } = /** @type {any} */ (globalThis);
-        const module = '/relightable-photo/wasm/relightable_photo.js';
+        const module = `/relightable-photo/wasm/${backend}.js`;
         const { memory } = await (await import(module)).default();
         const bytes = () => memory.buffer.byteLength;
         const again = async () => {
@@ -121,7 +121,7 @@ describe('an element', () => {
           if (bytes() === before) break;
         }
         return { before, after: bytes(), photo: photo.info.decodedBytes };
-      });
+      }, backend);
       // Ten loads may cost what an allocator wastes, but not one photograph.
       assert.ok(growth.after - growth.before < growth.photo, JSON.stringify(growth));
     });

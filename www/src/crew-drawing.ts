@@ -3,7 +3,7 @@
 import type { CanvasSurface } from './canvas.js';
 import { blobOf } from './canvas.js';
 import type { Crew, Shift } from './crew.js';
-import type { Engine, Gamut } from './engine.js';
+import type { CpuModule, DrawnPhoto, Gamut } from './engine.js';
 import { PhotoError } from './errors.js';
 import { letGo } from './hand.js';
 import { Lamp } from './lamp.js';
@@ -17,13 +17,15 @@ export class CrewDrawing implements CanvasSurface {
   readonly kernel: string;
   readonly gamut: Gamut;
   readonly #lamp: Lamp;
+  /** What lights are made for. */
+  readonly #plane: DrawnPhoto;
   readonly #photograph: Photograph;
   readonly #crew: Crew;
   readonly #context: CanvasRenderingContext2D;
   #freed = false;
 
   private constructor(
-    engine: Pick<Engine, 'Light'>,
+    module: CpuModule,
     photograph: Photograph,
     crew: Crew,
     context: CanvasRenderingContext2D,
@@ -33,7 +35,8 @@ export class CrewDrawing implements CanvasSurface {
     this.canvas = context.canvas;
     this.kernel = kernel;
     this.gamut = gamut;
-    this.#lamp = new Lamp(engine);
+    this.#lamp = new Lamp(module);
+    this.#plane = photograph.plane(module);
     this.#photograph = photograph;
     this.#crew = crew;
     this.#context = context;
@@ -41,7 +44,7 @@ export class CrewDrawing implements CanvasSurface {
 
   /** Rejects with `worker-unavailable` where there can be no workers; the photograph is whole then. */
   static async create(
-    engine: Pick<Engine, 'Light'>,
+    module: CpuModule,
     photograph: Photograph,
     crew: Crew,
     wanted: Gamut,
@@ -58,16 +61,16 @@ export class CrewDrawing implements CanvasSurface {
     const kernel = await photograph.withCrew(crew, describe);
     // Browsers that know no other gamut say nothing of it.
     const gamut = context.getContextAttributes?.().colorSpace === wanted ? wanted : 'srgb';
-    return new CrewDrawing(engine, photograph, crew, context, kernel, gamut);
+    return new CrewDrawing(module, photograph, crew, context, kernel, gamut);
   }
 
   async render(setting: LightSetting, look: Look, detail: number): Promise<PhotoError | null> {
     // Before its tiles are brought to the workers for nothing.
     if (this.#freed) throw letGo();
     try {
-      return await this.#photograph.withCrew(this.#crew, async (shift, photo) => {
+      return await this.#photograph.withCrew(this.#crew, async (shift) => {
         if (this.#freed) throw letGo();
-        const { light, fault } = this.#lamp.turnTo(setting, photo);
+        const { light, fault } = this.#lamp.turnTo(setting, this.#plane);
         const rows = await shift.relight(light, { look, gamut: this.gamut, detail });
         const settings = { colorSpace: this.gamut };
         if (this.#freed) throw letGo();
@@ -94,8 +97,10 @@ export class CrewDrawing implements CanvasSurface {
   }
 
   free(): void {
+    if (this.#freed) return;
     this.#freed = true;
     this.#lamp.free();
+    this.#plane.free();
   }
 }
 

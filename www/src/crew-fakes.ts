@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { Crew } from './crew.js';
 import type { Answer, Request, Showing } from './crew-protocol.js';
-import type { Light, Photo } from './engine.js';
+import type { CpuModule, DecodedPhoto, DrawnPhoto, Light } from './engine.js';
 import type { Patience, WorkerLike } from './hand.js';
 import { PLAIN } from './settings-fakes.js';
 
@@ -102,34 +102,66 @@ export class FakeWorker implements WorkerLike {
 /** For tests of silence, which cannot be told from slowness on a slow machine. */
 export const IMPATIENT: Patience = { lookMs: 10, looks: 3, startLooks: 3 };
 
-/** A photograph of so many tiles, one below the other, and those that are in the page's module. */
+/**
+ * A photograph of so many tiles, one below the other, in the decoder's module; one that draws, and the tiles that
+ * are in either; and how many photographs in modules are alive.
+ */
 export function photoOf(tiles: number) {
   const has = new Set(Array.from({ length: tiles }, (_, i) => i));
-  const state = { freed: 0 };
-  const photo = {
+  const state = { alive: 0, refuses: false };
+  const room = (own: Set<number>) => {
+    let freed = false;
+    state.alive += 1;
+    return {
+      takeTile: (index: number) => {
+        assert.ok(
+          !freed && own.delete(index) && has.delete(index),
+          `tile ${index} is in one place`,
+        );
+        return Uint8Array.of(index);
+      },
+      putTile: (index: number, bytes: Uint8Array) => {
+        assert.ok(!freed);
+        if (state.refuses) {
+          throw Object.assign(new Error('there is no memory'), { code: 'format-limit' });
+        }
+        assert.equal(bytes[0], index);
+        own.add(index);
+        has.add(index);
+      },
+      free: () => {
+        assert.ok(!freed);
+        freed = true;
+        state.alive -= 1;
+      },
+    } satisfies DrawnPhoto;
+  };
+  const photo: DecodedPhoto = {
     width: 1,
     height: tiles,
+    lightWidth: 1,
+    lightHeight: tiles,
     tileSide: SIDE,
     tiles,
     metadata: '{}',
     decodedBytes: tiles,
     geometryParcel: () => new Float64Array(12),
     basisParcel: () => new Float32Array(9),
-    takeTile: (index: number) => {
-      assert.equal(state.freed, 0);
-      assert.ok(has.delete(index), `tile ${index} is in one place`);
-      return Uint8Array.of(index);
-    },
-    putTile: (index: number, bytes: Uint8Array) => {
-      assert.equal(state.freed, 0);
-      assert.equal(bytes[0], index);
-      has.add(index);
-    },
-    free: () => {
-      state.freed += 1;
-    },
+    ...room(new Set(has)),
   };
-  return { photo: photo as unknown as Photo, has, state };
+  const module = {
+    Photo: { receive: () => room(new Set()) },
+    Light: { builtin: () => light, torch: () => light },
+    Display: class {
+      free() {}
+    },
+    cpuKernel: () => 'fake, in the page',
+    Relighter: class {
+      readonly gamut = 'srgb';
+      free() {}
+    },
+  } as unknown as CpuModule;
+  return { photo, has, state, module };
 }
 
 /** A light that tells which of its rows were asked for. */

@@ -11,13 +11,14 @@ import {
   SHOWING,
   settle,
 } from './crew-fakes.js';
-import type { Photo } from './engine.js';
+import type { DecodedPhoto } from './engine.js';
+import { headOf } from './photograph.js';
 
 const SILENT = /does not answer/;
 
 /** A place with a crew for a photograph, and all its tiles there. */
-async function placed(crew: Crew, photo: Photo) {
-  const shift = await crew.open(photo);
+async function placed(crew: Crew, photo: DecodedPhoto) {
+  const shift = await crew.open(headOf(photo));
   for (const index of shift.tiles.flat()) {
     await shift.put(index, photo.takeTile(index) as Uint8Array<ArrayBuffer>);
   }
@@ -124,11 +125,11 @@ test('workers that do not start leave the photograph alone, and are not tried ag
   const broken = crewOf(2, (worker) => worker.say({ kind: 'broken', message: 'no module' }));
   for (const { crew, workers, alive } of [refused, missing, broken]) {
     const { photo, has } = photoOf(4);
-    await assert.rejects(crew.open(photo), { code: 'worker-unavailable' });
+    await assert.rejects(crew.open(headOf(photo)), { code: 'worker-unavailable' });
     assert.equal(has.size, 4);
     assert.equal(alive(), 0);
     const started = workers.length;
-    await assert.rejects(crew.open(photo), { code: 'worker-unavailable' });
+    await assert.rejects(crew.open(headOf(photo)), { code: 'worker-unavailable' });
     assert.equal(workers.length, started);
   }
 });
@@ -136,14 +137,17 @@ test('workers that do not start leave the photograph alone, and are not tried ag
 test('workers that take long to start are waited for longer than for work', async () => {
   const patience = { lookMs: 10, looks: 2, startLooks: 1000 };
   const { crew } = crewOf(2, (worker) => setTimeout(() => worker.start(), 100), patience);
-  assert.equal((await crew.open(photoOf(4).photo)).size, 2);
+  assert.equal((await crew.open(headOf(photoOf(4).photo))).size, 2);
 });
 
 test('workers that do not start in time are tried again for the next photograph', async () => {
   let starting = false;
   const { crew, alive } = crewOf(2, (worker) => starting && worker.start(), IMPATIENT);
   const { photo, has } = photoOf(4);
-  await assert.rejects(crew.open(photo), { code: 'worker-unavailable', message: /not answer/ });
+  await assert.rejects(crew.open(headOf(photo)), {
+    code: 'worker-unavailable',
+    message: /not answer/,
+  });
   assert.deepEqual([has.size, alive()], [4, 0]);
   starting = true;
   await placed(crew, photo);
@@ -163,7 +167,7 @@ for (const [how, stop, why] of [
     const { crew, workers } = crewOf(2, undefined, why === SILENT ? IMPATIENT : undefined);
     const [whole, small] = [
       await placed(crew, photoOf(4).photo),
-      await crew.open(photoOf(1).photo),
+      await crew.open(headOf(photoOf(1).photo)),
     ];
     for (const worker of workers) worker.slow = true;
     const frames = Promise.all([
@@ -222,7 +226,7 @@ test('workers that stop again and again before they have drawn are done without'
   const { crew, workers } = crewOf(4);
   const alive = () => workers.filter(({ ended }) => !ended);
   for (let i = 0; i < 3; i += 1) await incident(crew, alive, false);
-  await assert.rejects(crew.open(photoOf(4).photo), { code: 'worker-unavailable' });
+  await assert.rejects(crew.open(headOf(photoOf(4).photo)), { code: 'worker-unavailable' });
   assert.equal(workers.length, 12);
 });
 

@@ -4,9 +4,10 @@
  */
 
 import type { Showing, Task } from './crew-protocol.js';
-import type { Light, Photo } from './engine.js';
+import type { Light } from './engine.js';
 import { PhotoError } from './errors.js';
 import { Hand, letGo, type Patience, type WorkerLike } from './hand.js';
+import type { Head } from './photograph.js';
 import { allEnded } from './promises.js';
 
 /** Rows of a picture. */
@@ -55,7 +56,7 @@ export class Crew {
    * Makes room for a photograph's tiles. Rejects with `worker-unavailable` where workers cannot be had;
    * once that is for good, at once.
    */
-  async open(photo: Photo): Promise<Shift> {
+  async open(photo: Head): Promise<Shift> {
     this.#shifts += 1;
     let hands: Hand[] = [];
     try {
@@ -151,7 +152,7 @@ export class Shift {
 
   constructor(
     id: number,
-    photo: Photo,
+    photo: Head,
     hands: readonly Hand[],
     shares: readonly Share[],
     kernel: string,
@@ -164,7 +165,7 @@ export class Shift {
     this.kernel = kernel;
     this.#pixels = shares.map(() => null);
     this.#width = photo.width;
-    const [geometry, basis] = [photo.geometryParcel(), photo.basisParcel()];
+    const { geometry, basis } = photo;
     hands.forEach((hand, i) => {
       const { firstRow, rows } = shares[i] as Share;
       // Where this fails, so does all that is asked next.
@@ -265,7 +266,7 @@ export class Shift {
 }
 
 /** Rows of whole tiles, about as many for each worker. */
-function sharesOf(photo: Photo, most: number): Share[] {
+function sharesOf(photo: Head, most: number): Share[] {
   const { width, height, tileSide } = photo;
   const [across, down] = [Math.ceil(width / tileSide), Math.ceil(height / tileSide)];
   const count = Math.min(most, down);

@@ -1,10 +1,12 @@
 /** The worker that decodes one photograph: what `WorkerDecoder` starts and talks to. */
 
 import { stateOf } from './decoding.js';
-import { type Decoder, loadEngine } from './engine.js';
+import type { DecodedPhoto, Decoder } from './engine.js';
 import { toPhotoError } from './errors.js';
+import { loadModule, setModuleFolder } from './modules.js';
+import { headOf } from './photograph.js';
 import type { Answer, Request } from './worker-decoder.js';
-import { workerScope } from './worker-scope.js';
+import { started, workerScope } from './worker-scope.js';
 
 const scope = workerScope<Request, Answer>();
 
@@ -19,20 +21,25 @@ function answer(decoder: Decoder, request: Request): void {
     scope.postMessage({ kind: 'fed', state: stateOf(decoder) });
     return;
   }
-  const photo = decoder.finish();
-  const { decodedBytes, metadata } = photo;
-  const [geometry, basis] = [photo.geometryParcel(), photo.basisParcel()];
-  scope.postMessage({ kind: 'photo', geometry, basis, metadata, decodedBytes });
-  for (let index = 0; index < photo.tiles; index += 1) {
-    const bytes = photo.takeTile(index) as Uint8Array<ArrayBuffer>;
-    scope.postMessage({ kind: 'tile', bytes }, [bytes.buffer]);
-  }
+  const photo = request.kind === 'finish' ? decoder.finish() : decoder.preview();
+  if (photo) give(photo);
   scope.postMessage({ kind: 'done' });
 }
 
+function give(photo: DecodedPhoto): void {
+  const head = headOf(photo);
+  scope.postMessage({ kind: 'head', head });
+  for (let index = 0; index < head.tiles; index += 1) {
+    const bytes = photo.takeTile(index) as Uint8Array<ArrayBuffer>;
+    scope.postMessage({ kind: 'tile', bytes }, [bytes.buffer]);
+  }
+  photo.free();
+}
+
 try {
-  const engine = await loadEngine();
-  const decoder = new engine.Decoder();
+  setModuleFolder((await started(workerScope())).modules);
+  const { Decoder } = await loadModule('decoder');
+  const decoder = new Decoder();
   scope.onmessage = ({ data }) => {
     try {
       answer(decoder, data);

@@ -1,6 +1,6 @@
 /** Decoding on the page's own thread, in turns. */
 
-import type { Decoder, Engine } from './engine.js';
+import type { Decoder, DecoderModule } from './engine.js';
 import { Photograph } from './photograph.js';
 import type { ByteRange } from './source.js';
 
@@ -9,6 +9,8 @@ export interface DecoderState {
   /** Each byte counted once. */
   readonly bytesFed: number;
   readonly fileBytes: number | undefined;
+  /** Scans that are there for every tile. */
+  readonly scansDone: number;
   /** The most important first; none once all has come. */
   readonly wants: readonly ByteRange[];
 }
@@ -21,6 +23,8 @@ export interface PhotoDecoder {
   readonly state: DecoderState;
   /** Takes the file's bytes from `offset` on; those of a range in order. */
   feed(offset: number, bytes: Uint8Array, turn: Turn): Promise<void>;
+  /** A coarser photograph of what has come, if there is one. */
+  preview(): Promise<Photograph | null>;
   /** Ends the decoder, whether it succeeds or throws. */
   finish(): Promise<Photograph>;
   /** Ends the decoder, if it has not ended. What `finish` is at is not waited for. */
@@ -42,8 +46,8 @@ export class LocalDecoder implements PhotoDecoder {
   #turned: number;
 
   /** `now` tells milliseconds, from any start. */
-  constructor(engine: Pick<Engine, 'Decoder'>, now: () => number) {
-    this.#decoder = new engine.Decoder();
+  constructor(module: DecoderModule, now: () => number) {
+    this.#decoder = new module.Decoder();
     this.#now = now;
     this.#turned = now();
   }
@@ -59,6 +63,11 @@ export class LocalDecoder implements PhotoDecoder {
       await turn();
       this.#turned = this.#now();
     }
+  }
+
+  async preview(): Promise<Photograph | null> {
+    const photo = this.#decoder.preview();
+    return photo ? Photograph.decoded(photo, shareOf(this.state)) : null;
   }
 
   async finish(): Promise<Photograph> {
@@ -79,5 +88,11 @@ export function stateOf(decoder: Decoder): DecoderState {
   for (let i = 0; i + 1 < bounds.length; i += 2) {
     wants.push({ start: bounds[i] as number, end: bounds[i + 1] as number });
   }
-  return { bytesFed: decoder.bytesFed, fileBytes: decoder.fileBytes, wants };
+  const { bytesFed, fileBytes, scansDone } = decoder;
+  return { bytesFed, fileBytes, scansDone, wants };
+}
+
+/** How much of a file has come, 0 to 1. */
+export function shareOf({ bytesFed, fileBytes }: DecoderState): number {
+  return fileBytes ? Math.min(1, bytesFed / fileBytes) : 0;
 }

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { Devices, type Page } from './devices.js';
-import type { Engine, Graphics } from './engine.js';
+import { Devices, type LoadGraphics, type Page } from './devices.js';
+import type { Graphics } from './engine.js';
 
 const settle = () => new Promise((resolve) => setImmediate(resolve));
 
@@ -21,7 +21,7 @@ function world() {
     draw: () => Promise.reject(new Error('not here')),
     free: () => log.push(`free ${name}`),
   });
-  const engine: Pick<Engine, 'Graphics'> = {
+  const module = {
     Graphics: {
       webgpu: async () => {
         if (missing) throw missing;
@@ -41,7 +41,10 @@ function world() {
       },
     },
   };
+  const load = (async () => module) as unknown as LoadGraphics;
+  let adapter = true;
   const page: Page = {
+    hasWebGpu: async () => adapter,
     newCanvas: () => {
       let lose = (): void => {};
       canvases.push({ lose: () => lose() });
@@ -54,7 +57,11 @@ function world() {
   };
   return {
     devices: new Devices(page, 20),
-    engine,
+    load,
+    /** Has no WebGPU from now on. */
+    lack: () => {
+      adapter = false;
+    },
     loses,
     canvases,
     unanswered: () => unanswered,
@@ -76,7 +83,7 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
   test(`all who ask for ${backend} at once share one device, which goes with the last`, async () => {
     const w = world();
     const leases = await Promise.all(
-      ['a', 'b', 'c'].map((name) => w.devices.lease(w.engine, backend, w.note(name))),
+      ['a', 'b', 'c'].map((name) => w.devices.lease(w.load, backend, w.note(name))),
     );
     assert.equal(new Set(leases.map(({ graphics }) => graphics)).size, 1);
     for (const { release } of leases.slice(1)) release();
@@ -91,7 +98,7 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
     w.canvases[0]?.lose();
     await settle();
     assert.deepEqual(w.happened(), []);
-    const next = await w.devices.lease(w.engine, backend, w.note('d'));
+    const next = await w.devices.lease(w.load, backend, w.note('d'));
     assert.equal(next.graphics.kernel, `${backend} 1`);
   });
 
@@ -100,7 +107,7 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
     const lose = (i: number) =>
       backend === 'webgpu' ? w.loses[i]?.('gone.') : w.canvases[i]?.lose();
     const leases = await Promise.all(
-      ['a', 'b'].map((name) => w.devices.lease(w.engine, backend, w.note(name))),
+      ['a', 'b'].map((name) => w.devices.lease(w.load, backend, w.note(name))),
     );
     lose(0);
     lose(0);
@@ -108,7 +115,7 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
     leases[0]?.fail('a draw failed');
     const reason = backend === 'webgpu' ? 'gone.' : 'the browser took it away.';
     assert.deepEqual(w.happened().sort(), [`a: ${reason}`, `b: ${reason}`, `free ${backend} 0`]);
-    const next = await w.devices.lease(w.engine, backend, w.note('c'));
+    const next = await w.devices.lease(w.load, backend, w.note('c'));
     for (const { release } of leases) release();
     await settle();
     assert.deepEqual(w.happened(), [], 'the one that was lost takes nothing of the next along');
@@ -121,17 +128,17 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
 test('a device that is lost again and again is refused for a while', async () => {
   const w = world();
   for (let i = 0; i < 3; i += 1) {
-    await w.devices.lease(w.engine, 'webgpu', w.note('a'));
+    await w.devices.lease(w.load, 'webgpu', w.note('a'));
     w.loses[i]?.('gone.');
     await settle();
     w.pass(10_000);
   }
   const refused = { code: 'backend-unavailable', message: /lost 3 times/ };
-  await assert.rejects(w.devices.lease(w.engine, 'webgpu', w.note('a')), refused);
-  assert.ok(await w.devices.lease(w.engine, 'webgl2', w.note('a')), 'another is had');
+  await assert.rejects(w.devices.lease(w.load, 'webgpu', w.note('a')), refused);
+  assert.ok(await w.devices.lease(w.load, 'webgl2', w.note('a')), 'another is had');
   w.pass(60_000);
   for (let i = 3; i < 8; i += 1) {
-    await w.devices.lease(w.engine, 'webgpu', w.note('a'));
+    await w.devices.lease(w.load, 'webgpu', w.note('a'));
     w.loses[i]?.('gone.');
     await settle();
     w.pass(70_000);
@@ -142,20 +149,30 @@ test('a device that cannot be had is asked for again by the next', async () => {
   for (const backend of ['webgpu', 'webgl2'] as const) {
     const w = world();
     w.miss(new Error('none here'));
-    await assert.rejects(w.devices.lease(w.engine, backend, w.note('a')), /none here/);
+    await assert.rejects(w.devices.lease(w.load, backend, w.note('a')), /none here/);
     w.miss(null);
-    assert.ok(await w.devices.lease(w.engine, backend, w.note('a')));
+    assert.ok(await w.devices.lease(w.load, backend, w.note('a')));
   }
 });
 
 test('a browser that never answers has no device', async () => {
   const w = world();
   w.fallSilent();
-  const asked = w.devices.lease(w.engine, 'webgpu', w.note('a'));
+  const asked = w.devices.lease(w.load, 'webgpu', w.note('a'));
   const message = /does not answer within/;
   await assert.rejects(asked, { code: 'backend-unavailable', message });
   // Nor does anyone wait for it again.
-  const again = w.devices.lease(w.engine, 'webgpu', w.note('b'));
+  const again = w.devices.lease(w.load, 'webgpu', w.note('b'));
   await assert.rejects(again, { code: 'backend-unavailable', message });
   assert.equal(w.unanswered(), 1);
+});
+
+test('where there is no WebGPU adapter, its module is not loaded', async () => {
+  const w = world();
+  w.lack();
+  const load = (() => assert.fail('it is of no use')) as unknown as LoadGraphics;
+  await assert.rejects(w.devices.lease(load, 'webgpu', w.note('a')), {
+    code: 'backend-unavailable',
+    message: /none to offer/,
+  });
 });

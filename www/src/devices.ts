@@ -4,14 +4,19 @@
  */
 
 import { BACKEND_TITLES } from './backends.js';
-import type { Backend, Engine, Graphics } from './engine.js';
+import type { Backend, Graphics, Modules } from './engine.js';
 import { PhotoError } from './errors.js';
 
 /** A back end that is a graphics device. */
 export type GraphicsBackend = Exclude<Backend, 'cpu'>;
 
+/** Gives the modules of devices. */
+export type LoadGraphics = <N extends GraphicsBackend>(name: N) => Promise<Modules[N]>;
+
 /** What of the page is used. */
 export interface Page {
+  /** Whether there is a WebGPU adapter: a module that has none to drive need not be loaded. */
+  hasWebGpu(): Promise<boolean>;
   newCanvas(): HTMLCanvasElement;
   now(): number;
 }
@@ -59,14 +64,14 @@ export class Devices {
    * `backend-unavailable` where there is none to have, or has been too often.
    */
   async lease(
-    engine: Pick<Engine, 'Graphics'>,
+    load: LoadGraphics,
     backend: GraphicsBackend,
     lost: (reason: string) => void,
   ): Promise<Lease> {
     const mute = this.#mute.get(backend);
     if (mute) throw mute;
     this.#refuseFickle(backend);
-    const shared = this.#shared.get(backend) ?? this.#open(engine, backend);
+    const shared = this.#shared.get(backend) ?? this.#open(load, backend);
     // One function may hold several shares.
     const holder = (reason: string): void => lost(reason);
     shared.holders.add(holder);
@@ -93,9 +98,9 @@ export class Devices {
     throw unavailable(`it was lost ${losses.count} times within a short time`);
   }
 
-  #open(engine: Pick<Engine, 'Graphics'>, backend: GraphicsBackend): Shared {
+  #open(load: LoadGraphics, backend: GraphicsBackend): Shared {
     const lose = (reason: string): void => this.#lose(backend, shared, reason);
-    const graphics = backend === 'webgpu' ? this.#webGpu(engine) : this.#webGl2(engine, lose);
+    const graphics = backend === 'webgpu' ? this.#webGpu(load) : this.#webGl2(load, lose);
     const shared: Shared = { graphics, holders: new Set(), over: false };
     this.#shared.set(backend, shared);
     graphics.then(
@@ -107,9 +112,9 @@ export class Devices {
     return shared;
   }
 
-  async #webGpu({ Graphics }: Pick<Engine, 'Graphics'>): Promise<Graphics> {
+  async #webGpu(load: LoadGraphics): Promise<Graphics> {
     let timer: ReturnType<typeof setTimeout> | undefined;
-    const asked = Graphics.webgpu();
+    const asked = this.#askWebGpu(load);
     const late = new Promise<never>((_, reject) => {
       const why = `it does not answer within ${this.#longestMs / 1000} seconds`;
       timer = setTimeout(() => {
@@ -133,10 +138,13 @@ export class Devices {
     }
   }
 
-  async #webGl2(
-    { Graphics }: Pick<Engine, 'Graphics'>,
-    lose: (reason: string) => void,
-  ): Promise<Graphics> {
+  async #askWebGpu(load: LoadGraphics): Promise<Graphics> {
+    if (!(await this.#page.hasWebGpu())) throw unavailable('this browser has none to offer');
+    return await (await load('webgpu')).Graphics.webgpu();
+  }
+
+  async #webGl2(load: LoadGraphics, lose: (reason: string) => void): Promise<Graphics> {
+    const { Graphics } = await load('webgl2');
     const canvas = this.#page.newCanvas();
     const graphics = Graphics.webgl2(canvas);
     canvas.addEventListener('webglcontextlost', () => lose('the browser took it away.'));
@@ -178,6 +186,10 @@ export function slowerThanCpu(backend: GraphicsBackend, kernel: string): PhotoEr
 
 function thisPage(): Page {
   return {
+    hasWebGpu: async () => {
+      const { gpu } = navigator as { gpu?: { requestAdapter(): Promise<unknown> } };
+      return Boolean(await gpu?.requestAdapter());
+    },
     newCanvas: () => document.createElement('canvas'),
     now: () => performance.now(),
   };

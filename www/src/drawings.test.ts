@@ -1,10 +1,10 @@
 import assert from 'node:assert/strict';
 import test, { type TestContext } from 'node:test';
 import type { CanvasSurface } from './canvas.js';
-import { crewOf, type FakeWorker, light, photoOf, settle } from './crew-fakes.js';
+import { crewOf, type FakeWorker, photoOf, settle } from './crew-fakes.js';
 import type { Devices } from './devices.js';
-import { drawer } from './drawings.js';
-import type { Backend, Engine } from './engine.js';
+import { drawer, type Load } from './drawings.js';
+import type { Backend } from './engine.js';
 import { PhotoError } from './errors.js';
 import { Photograph } from './photograph.js';
 import { Player, type Settings } from './player.js';
@@ -35,18 +35,12 @@ function fakeDocument(t: TestContext): void {
   });
 }
 
-/** The module, which notes how many tiles it has when a back end is set up. */
-function fakeEngine(has: ReadonlySet<number>) {
+/** Any module, from anywhere. */
+const loading = (module: unknown) => (async () => module) as unknown as Load;
+
+/** Devices, which note how many tiles modules have when one is set up. */
+function fakeDevices(has: ReadonlySet<number>) {
   const setUps: string[] = [];
-  const engine = {
-    Light: { builtin: () => light, torch: () => light },
-    Display: class {
-      free() {}
-    },
-    Relighter: class {
-      readonly kernel = 'fake, in the page';
-    },
-  };
   /** Devices that are had once `ask` has no objections. */
   const devicesThat = (ask: (backend: Backend) => Promise<void>) => {
     const lease = async (_: unknown, backend: Backend) => {
@@ -61,21 +55,21 @@ function fakeEngine(has: ReadonlySet<number>) {
     return { lease } as unknown as Devices;
   };
   const released: Backend[] = [];
-  return { engine: engine as unknown as Engine, devicesThat, setUps, released };
+  return { devicesThat, setUps, released };
 }
 
 /** A player of a photograph of four tiles, which two workers draw. */
 async function playing(t: TestContext, ask = async (_: Backend): Promise<void> => {}) {
   fakeDocument(t);
   const { crew, workers, alive } = crewOf(2);
-  const { photo, has } = photoOf(4);
-  const { engine, devicesThat, setUps, released } = fakeEngine(has);
+  const { photo, has, module } = photoOf(4);
+  const { devicesThat, setUps, released } = fakeDevices(has);
   const frames: (() => void)[] = [];
   const changes: string[] = [];
   const player = new Player<CanvasSurface>(
     {
       open: async () => Photograph.decoded(photo),
-      draw: drawer(async () => engine, crew, devicesThat(ask)),
+      draw: drawer(loading(module), crew, devicesThat(ask)),
       nextFrame: (callback) => frames.push(callback),
       later: () => () => {},
       now: () => 0,
@@ -86,7 +80,8 @@ async function playing(t: TestContext, ask = async (_: Backend): Promise<void> =
       drawn: () => {},
       detailChanged: () => {},
       loaded: () => {},
-      backendChanged: (_, backend) => changes.push(backend),
+      show: () => {},
+      backendChanged: (backend) => changes.push(backend),
       failed: (error) => changes.push(error.code),
       recovered: () => {},
     },
@@ -132,10 +127,10 @@ test('a picture of a photograph that is replaced in the middle of a frame is not
 test('a photograph that the page draws for want of workers says why', async (t) => {
   fakeDocument(t);
   const { crew } = crewOf(2, (worker) => worker.die());
-  const { photo, has } = photoOf(4);
-  const { engine, devicesThat } = fakeEngine(has);
+  const { photo, has, module } = photoOf(4);
+  const { devicesThat } = fakeDevices(has);
   const draw = drawer(
-    async () => engine,
+    loading(module),
     crew,
     devicesThat(async () => {}),
   );
@@ -212,11 +207,11 @@ test('back ends that do not answer keep nobody waiting who has given them up, an
 test('a drawing that was freed draws nothing, and leaves tiles where they are', async (t) => {
   fakeDocument(t);
   const { crew, workers, alive } = crewOf(2);
-  const { photo, has } = photoOf(4);
-  const { engine, devicesThat } = fakeEngine(has);
+  const { photo, has, module } = photoOf(4);
+  const { devicesThat } = fakeDevices(has);
   const photograph = Photograph.decoded(photo);
   const drawing = await drawer(
-    async () => engine,
+    loading(module),
     crew,
     devicesThat(async () => {}),
   )('cpu', photograph, SETTINGS.wanted, () => {}, new AbortController().signal);
@@ -228,7 +223,7 @@ test('a drawing that was freed draws nothing, and leaves tiles where they are', 
   drawing.free();
   for (const worker of workers) worker.hurry();
   await frame;
-  await photograph.inPage(() => {});
+  await photograph.inPage(module, () => {});
   await assert.rejects(Promise.resolve(drawing.render(SETTINGS.light, PLAIN, 1)), {
     code: 'internal',
   });

@@ -4,11 +4,14 @@ import type { CanvasSurface } from './canvas.js';
 import { Crew } from './crew.js';
 import { CrewDrawing } from './crew-drawing.js';
 import { Devices, slowerThanCpu } from './devices.js';
-import { type Backend, type Engine, loadEngine } from './engine.js';
+import type { Backend, ModuleName, Modules } from './engine.js';
 import { PhotoError } from './errors.js';
+import { loadModule, moduleFolder } from './modules.js';
+import { PageDrawing } from './page-drawing.js';
 import type { Photograph } from './photograph.js';
 import type { Wanted } from './player.js';
 import { CanvasDrawing } from './surface.js';
+import type { Start } from './worker-scope.js';
 
 /** More would wait for memory, and for each other. */
 const MOST_WORKERS = 4;
@@ -22,20 +25,23 @@ export type Draw = (
   signal: AbortSignal,
 ) => Promise<CanvasSurface>;
 
+/** Gives modules by name. */
+export type Load = <N extends ModuleName>(name: N) => Promise<Modules[N]>;
+
 /**
- * Draws by the module that `load` gives, and on the CPU by a crew where it can have workers. A device
+ * Draws by the modules that `load` gives, and on the CPU by a crew where it can have workers. A device
  * that cannot be had leaves tiles where they are, and keeps nobody from them while it is asked for.
  */
-export function drawer(load: () => Promise<Engine>, crew: Crew, devices: Devices): Draw {
+export function drawer(load: Load, crew: Crew, devices: Devices): Draw {
   // What the page has once drawn on the CPU it may be drawing still, which keeps tiles from workers; and
   // why it did.
   const inPage = new WeakMap<Photograph, string>();
   return async (backend, photograph, { gamut, software }, lost, signal) => {
-    const engine = await load();
     if (backend === 'cpu') {
+      const module = await load('cpu');
       try {
         if (!inPage.has(photograph)) {
-          return await CrewDrawing.create(engine, photograph, crew, gamut);
+          return await CrewDrawing.create(module, photograph, crew, gamut);
         }
       } catch (thrown) {
         // Without workers the page does it.
@@ -43,21 +49,23 @@ export function drawer(load: () => Promise<Engine>, crew: Crew, devices: Devices
         inPage.set(photograph, `The page relights without workers: ${thrown.message}`);
       }
       const flaw = inPage.get(photograph) ?? '';
-      return photograph.inPage((photo) => {
-        const canvas = document.createElement('canvas');
-        const relighter = new engine.Relighter(photo, canvas, gamut);
-        return new CanvasDrawing(engine, photo, relighter, canvas, { flaw });
-      }, signal);
+      return await PageDrawing.create(module, photograph, gamut, flaw, signal);
     }
-    const lease = await devices.lease(engine, backend, lost);
+    const lease = await devices.lease(load, backend, lost);
     const { graphics } = lease;
     try {
       if (graphics.software && !software) throw slowerThanCpu(backend, graphics.kernel);
-      return await photograph.inPage(async (photo) => {
-        const canvas = document.createElement('canvas');
-        const relighter = await graphics.draw(photo, canvas, gamut);
-        return new CanvasDrawing(engine, photo, relighter, canvas, { lease });
-      }, signal);
+      const module = await load(backend);
+      return await photograph.inPage(
+        module,
+        async (photo) => {
+          const canvas = document.createElement('canvas');
+          const relighter = await graphics.draw(photo, canvas, gamut);
+          const plane = photograph.plane(module);
+          return new CanvasDrawing(module, plane, relighter, canvas, { lease });
+        },
+        { signal },
+      );
     } catch (thrown) {
       lease.release();
       throw thrown;
@@ -68,15 +76,17 @@ export function drawer(load: () => Promise<Engine>, crew: Crew, devices: Devices
 const crewSize = Math.min(MOST_WORKERS, globalThis.navigator?.hardwareConcurrency ?? 1);
 
 /** Draws for the elements of this page. */
-export const draw = drawer(loadEngine, new Crew(startWorker, crewSize), new Devices());
+export const draw = drawer(loadModule, new Crew(startWorker, crewSize), new Devices());
 
 /** `null` where a script of this origin may not be a worker, or modules cannot be. */
 function startWorker(): Worker | null {
   try {
     // The address is written out for bundlers, which look for exactly this form.
-    return new Worker(new URL('./relightable-photo-relighter.js', import.meta.url), {
+    const worker = new Worker(new URL('./relightable-photo-relighter.js', import.meta.url), {
       type: 'module',
     });
+    worker.postMessage({ kind: 'start', modules: moduleFolder() } satisfies Start);
+    return worker;
   } catch {
     return null;
   }

@@ -65,10 +65,7 @@ const PROPERTIES = [
 const CENTRE: PicturePoint = { x: 0.5, y: 0.5 };
 
 /** What is known of a photograph once it has loaded. */
-export interface PhotoInfo extends Omit<Facts, 'metadata'> {
-  /** What the file says of itself. */
-  readonly metadata: unknown;
-}
+export type PhotoInfo = Facts;
 
 /** Options of `toBlob`. */
 export interface BlobOptions {
@@ -108,11 +105,12 @@ export class RelightablePhoto extends Base {
     this.#view = new View(this.attachShadow({ mode: 'open' }));
     this.#player = new Player(
       {
-        open: (src, signal, onProgress) =>
-          openPhoto(src, signal, onProgress, {
+        open: (src, signal, onProgress, onPreview) =>
+          openPhoto(src, signal, onProgress, onPreview, {
             decoder: newDecoder,
             fetch: (...request) => fetch(...request),
             pause,
+            now: () => performance.now(),
           }),
         draw,
         nextFrame: requestAnimationFrame.bind(globalThis),
@@ -145,8 +143,8 @@ export class RelightablePhoto extends Base {
           this.#view.progress(null);
           this.dispatchEvent(loadEvent());
         },
-        backendChanged: (drawing, backend, previous, reason) => {
-          this.#view.show(drawing.canvas);
+        show: (drawing) => this.#view.show(drawing.canvas),
+        backendChanged: (backend, previous, reason) => {
           this.dispatchEvent(new BackendChangeEvent(backend, previous, reason));
         },
         failed: (error) => {
@@ -298,8 +296,7 @@ export class RelightablePhoto extends Base {
 
   /** What is known of the photograph, `null` until it is decoded. */
   get info(): PhotoInfo | null {
-    const facts = this.#player.photo?.facts;
-    return facts ? { ...facts, metadata: JSON.parse(facts.metadata) as unknown } : null;
+    return this.#player.photo?.facts ?? null;
   }
 
   /**

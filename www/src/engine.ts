@@ -1,6 +1,5 @@
-/** The WebAssembly module: its surface, and how the right build of it is found and started. */
+/** The WebAssembly modules: their surfaces. */
 
-import { messageOf, PhotoError } from './errors.js';
 import type { LivePicture } from './light-source.js';
 
 /** The name of a back end. */
@@ -17,23 +16,32 @@ export interface Freeable {
   free(): void;
 }
 
-/** A decoded photograph. */
+/** A photograph in the memory of a module, or as many of its tiles as are there. */
 export interface Photo extends Freeable {
+  /** A tile for another module; it is dark here afterwards. Not while a CPU is at the photograph. */
+  takeTile(index: number): Uint8Array;
+}
+
+/** One that was decoded. */
+export interface DecodedPhoto extends Photo {
   readonly width: number;
   readonly height: number;
   readonly lightWidth: number;
   readonly lightHeight: number;
+  /** Text that should be a JSON object. */
   readonly metadata: string;
   readonly decodedBytes: number;
   /** Number of tiles, which lie row by row. */
   readonly tiles: number;
   /** Pixels along a tile's side; those at the right and lower edges may be smaller. */
   readonly tileSide: number;
-  /** What `Photo.receive` in another module takes. */
+  /** What `Photo.receive` of another module takes. */
   geometryParcel(): Float64Array;
   basisParcel(): Float32Array;
-  /** A tile for another module; it is dark here afterwards. Not while a CPU is at the photograph. */
-  takeTile(index: number): Uint8Array;
+}
+
+/** One that another module decoded, to be drawn. */
+export interface DrawnPhoto extends Photo {
   /** Takes a tile that `takeTile` gave. Not while a CPU is at the photograph. */
   putTile(index: number, bytes: Uint8Array): void;
 }
@@ -53,8 +61,15 @@ export interface Decoder extends Freeable {
   /** Each byte counted once. */
   readonly bytesFed: number;
   readonly fileBytes: number | undefined;
+  /** Scans that are there for every tile. */
+  readonly scansDone: number;
+  /**
+   * A coarser photograph of what has come of every tile; none before the first scan is there, and once all
+   * is.
+   */
+  preview(): DecodedPhoto | undefined;
   /** Ends the decoder, whether it succeeds or throws. */
-  finish(): Photo;
+  finish(): DecodedPhoto;
 }
 
 /** How a picture is shown. */
@@ -68,7 +83,7 @@ export interface Graphics extends Freeable {
   /** Settles when a WebGPU device goes away; the canvas of a WebGL2 context tells itself. */
   readonly lost: Promise<{ readonly message: string }> | undefined;
   /** Brings a photograph to the device, to be drawn into a canvas of its own. */
-  draw(photo: Photo, canvas: HTMLCanvasElement, gamut: Gamut): Promise<Relighter>;
+  draw(photo: DrawnPhoto, canvas: HTMLCanvasElement, gamut: Gamut): Relighter | Promise<Relighter>;
 }
 
 /** One photograph, on one canvas. */
@@ -98,73 +113,58 @@ export interface BandRelighter extends Freeable {
   relight(light: Float32Array | null, display: Display, detail: number, out: Uint8Array): void;
 }
 
-/** What the module exports. */
-export interface Engine {
-  /** What relights on the CPU: `simd128` or `scalar`. */
-  cpuKernel(): string;
+/** The module that decodes. */
+export interface DecoderModule {
   Decoder: { new (maxDecodedBytes?: number): Decoder };
+}
+
+/** What every module that draws has. */
+export interface DrawingModule {
   Photo: {
     /** A photograph that another module decoded, without its tiles as yet. */
-    receive(geometry: Float64Array, basis: Float32Array, metadata: string): Photo;
+    receive(geometry: Float64Array, basis: Float32Array): DrawnPhoto;
   };
+  /** A photograph without tiles will do for those. */
   Light: {
-    builtin(photo: Photo, name: string): Light;
-    torch(photo: Photo, x: number, y: number, size?: number): Light;
+    builtin(photo: DrawnPhoto, name: string): Light;
+    torch(photo: DrawnPhoto, x: number, y: number, size?: number): Light;
     /** A picture of any size, in linear RGB, row by row. */
-    fromLinear(photo: Photo, values: Float32Array, width: number, height: number): Light;
+    fromLinear(photo: DrawnPhoto, values: Float32Array, width: number, height: number): Light;
     /** A picture of any size, in sRGB: RGBA, row by row, colours apart from alpha. */
-    fromSrgb(photo: Photo, rgba: Uint8ClampedArray, width: number, height: number): Light;
+    fromSrgb(photo: DrawnPhoto, rgba: Uint8ClampedArray, width: number, height: number): Light;
   };
-  BandRelighter: { new (photo: Photo, firstRow: number, rows: number): BandRelighter };
   Display: {
     new (exposure: number, balance: Float64Array, curve: ToneCurve, gamut: Gamut): Display;
   };
-  Graphics: {
-    webgpu(): Promise<Graphics>;
-    /** On a canvas for it alone. */
-    webgl2(canvas: HTMLCanvasElement): Graphics;
-  };
+}
+
+/** The module that draws on the CPU. */
+export interface CpuModule extends DrawingModule {
+  /** What relights: `simd128` or `scalar`. */
+  cpuKernel(): string;
+  BandRelighter: { new (photo: DrawnPhoto, firstRow: number, rows: number): BandRelighter };
   /** One that draws on this thread. */
-  Relighter: { new (photo: Photo, canvas: HTMLCanvasElement, gamut: Gamut): Relighter };
+  Relighter: { new (photo: DrawnPhoto, canvas: HTMLCanvasElement, gamut: Gamut): Relighter };
 }
 
-// The smallest module with a 128-bit operation: () => i8x16.splat(0), dropped.
-const SIMD_PROBE = new Uint8Array([
-  0, 97, 115, 109, 1, 0, 0, 0, 1, 4, 1, 96, 0, 0, 3, 2, 1, 0, 10, 9, 1, 7, 0, 65, 0, 253, 15, 26,
-  11,
-]);
-
-let loading: Promise<Engine> | undefined;
-
-/** The module, loaded once a page; a load that failed is tried again at the next call. */
-export function loadEngine(): Promise<Engine> {
-  loading ??= start().catch((cause: unknown) => {
-    loading = undefined;
-    throw new PhotoError(
-      'wasm-unavailable',
-      'The relighting module could not be started. Its wasm folder has to lie beside the script, and ' +
-        "a content security policy has to allow 'wasm-unsafe-eval' in script-src, and the folder's " +
-        'address in connect-src. ' +
-        `The browser says: ${messageOf(cause)}`,
-      cause,
-    );
-  });
-  return loading;
+/** The module that draws by WebGPU. */
+export interface WebGpuModule extends DrawingModule {
+  Graphics: { webgpu(): Promise<Graphics> };
 }
 
-async function start(): Promise<Engine> {
-  // A build with SIMD does not even load where SIMD is missing, so there are two. The addresses are
-  // written out for bundlers, which look for exactly this form.
-  const [script, wasm] = WebAssembly.validate(SIMD_PROBE)
-    ? [
-        new URL('./wasm/relightable_photo.js', import.meta.url),
-        new URL('./wasm/relightable_photo_bg.wasm', import.meta.url),
-      ]
-    : [
-        new URL('./wasm/relightable_photo_scalar.js', import.meta.url),
-        new URL('./wasm/relightable_photo_scalar_bg.wasm', import.meta.url),
-      ];
-  const engine = await import(/* @vite-ignore */ /* webpackIgnore: true */ script.href);
-  await engine.default({ module_or_path: wasm });
-  return engine as Engine;
+/** The module that draws by WebGL2. */
+export interface WebGl2Module extends DrawingModule {
+  /** On a canvas for it alone. */
+  Graphics: { webgl2(canvas: HTMLCanvasElement): Graphics };
 }
+
+/** All modules by name. Each has a memory of its own. */
+export interface Modules {
+  decoder: DecoderModule;
+  cpu: CpuModule;
+  webgl2: WebGl2Module;
+  webgpu: WebGpuModule;
+}
+
+/** The name of a module. */
+export type ModuleName = keyof Modules;

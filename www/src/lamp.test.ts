@@ -1,12 +1,12 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { Engine, Light, Photo } from './engine.js';
+import type { DrawingModule, DrawnPhoto, Light } from './engine.js';
 import { PhotoError } from './errors.js';
 import { Lamp } from './lamp.js';
 import type { LightPicture, LinearLight } from './light-source.js';
 import type { LightSetting } from './lights.js';
 
-const PHOTO = {} as Photo;
+const PHOTO = {} as DrawnPhoto;
 const GOOD: LinearLight = { data: new Float32Array(3), width: 1, height: 1 };
 const BAD: LinearLight = { data: new Float32Array(1), width: 1, height: 1 };
 
@@ -25,15 +25,15 @@ function lamp() {
   };
   const engine = {
     Light: {
-      builtin: (_: Photo, name: string) => light(name),
-      torch: (_: Photo, x: number, y: number) => light(`torch ${x} ${y}`),
-      fromLinear: (_: Photo, values: Float32Array) => {
+      builtin: (_: DrawnPhoto, name: string) => light(name),
+      torch: (_: DrawnPhoto, x: number, y: number) => light(`torch ${x} ${y}`),
+      fromLinear: (_: DrawnPhoto, values: Float32Array) => {
         if (values.length !== 3) throw new PhotoError('light-size', 'three values');
         return light('linear');
       },
     },
   };
-  const lamp = new Lamp(engine as unknown as Pick<Engine, 'Light'>);
+  const lamp = new Lamp(engine as unknown as Pick<DrawingModule, 'Light'>);
   return { lamp, lit };
 }
 

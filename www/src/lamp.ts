@@ -1,6 +1,6 @@
 /** What shines on a drawing: the light that was made last, kept for when the next one cannot be. */
 
-import type { Engine, Freeable, Light, Photo } from './engine.js';
+import type { DrawingModule, DrawnPhoto, Freeable, Light } from './engine.js';
 import { type PhotoError, toPhotoError } from './errors.js';
 import { type BuiltinSetting, builtinLight, type LightSetting, pictureLight } from './lights.js';
 
@@ -16,26 +16,26 @@ export interface Lit {
 
 /** See the module. */
 export class Lamp implements Freeable {
-  readonly #engine: Pick<Engine, 'Light'>;
+  readonly #module: Pick<DrawingModule, 'Light'>;
   #light: Light | null = null;
   /** What that is, where it is built in. */
   #builtin: BuiltinSetting | null = null;
 
-  constructor(engine: Pick<Engine, 'Light'>) {
-    this.#engine = engine;
+  constructor(module: Pick<DrawingModule, 'Light'>) {
+    this.#module = module;
   }
 
   /**
    * Turns to a light. Where that cannot be had, or shows nothing as yet, the last one stays; where there
    * is none, the built-in one stands in.
    */
-  turnTo(setting: LightSetting, photo: Photo): Lit {
+  turnTo(setting: LightSetting, photo: DrawnPhoto): Lit {
     let asked = true;
     let fault: PhotoError | null = null;
     if (setting.picture) {
       let light: Light | null = null;
       try {
-        light = pictureLight(this.#engine, photo, setting.picture);
+        light = pictureLight(this.#module, photo, setting.picture);
       } catch (thrown) {
         fault = toPhotoError(thrown);
       }
@@ -46,7 +46,7 @@ export class Lamp implements Freeable {
     if (this.#light && (setting.picture || builtin)) return { light: this.#light, asked, fault };
     // Before it is made, as lights are large and it can be had.
     this.free();
-    const light = builtinLight(this.#engine, photo, setting);
+    const light = builtinLight(this.#module, photo, setting);
     // Without a picture that it may stand in for.
     this.#keep(light, { name: setting.name, torch: setting.torch });
     return { light, asked, fault };

@@ -1,6 +1,6 @@
 /** What shines on a photograph. */
 
-import type { Engine, Light, Photo } from './engine.js';
+import type { DrawingModule, DrawnPhoto, Light } from './engine.js';
 import { pixelsOf } from './light-pixels.js';
 import { isLinear, type LightPicture } from './light-source.js';
 import type { LightName, PicturePoint } from './settings.js';
@@ -16,12 +16,12 @@ export interface LightSetting extends BuiltinSetting {
   readonly picture: LightPicture | null;
 }
 
-type LightMaker = Pick<Engine, 'Light'>;
+type LightMaker = Pick<DrawingModule, 'Light'>;
 
 /** A built-in light in the module. */
 export function builtinLight(
   { Light }: LightMaker,
-  photo: Photo,
+  photo: DrawnPhoto,
   { name, torch }: BuiltinSetting,
 ): Light {
   return name === 'torch' && torch
@@ -35,7 +35,7 @@ export function builtinLight(
  */
 export function pictureLight(
   { Light }: LightMaker,
-  photo: Photo,
+  photo: DrawnPhoto,
   picture: LightPicture,
 ): Light | null {
   if (isLinear(picture)) {

@@ -5,8 +5,9 @@ import type { AddressInfo } from 'node:net';
 import test, { type TestContext } from 'node:test';
 import { gzipSync } from 'node:zlib';
 import { answer } from '../tools/ranges.js';
+import { photoOf } from './crew-fakes.js';
 import { LocalDecoder } from './decoding.js';
-import type { Decoder, Photo } from './engine.js';
+import type { DecodedPhoto, Decoder } from './engine.js';
 import { type LoadPorts, openPhoto } from './load.js';
 import type { Photograph } from './photograph.js';
 
@@ -59,9 +60,18 @@ class FakeDecoder implements Decoder {
     }
   }
 
-  finish(): Photo {
+  /** One at each 100 kB. */
+  get scansDone(): number {
+    return Math.floor(this.bytesFed / 100_000);
+  }
+
+  preview(): DecodedPhoto | undefined {
+    return this.scansDone > 0 ? photoOf(1).photo : undefined;
+  }
+
+  finish(): DecodedPhoto {
     this.free();
-    return { tiles: 0, free() {} } as Photo;
+    return photoOf(1).photo;
   }
 
   free(): void {
@@ -121,9 +131,13 @@ function portsOf(ports: Partial<LoadPorts> = {}): LoadPorts {
     decoder: async () => new LocalDecoder({ Decoder: FakeDecoder }, () => time++),
     fetch: (input, init) => fetch(input, init),
     pause: () => Promise.resolve(),
+    now: () => 0,
     ...ports,
   };
 }
+
+/** For who does not care for coarser ones. */
+const drop = (preview: Photograph) => preview.free();
 
 /** Opens a photograph and makes sure that nothing of that is left. */
 async function opened(
@@ -132,7 +146,7 @@ async function opened(
 ): Promise<{ told: [number, number][]; photo: Photograph }> {
   const told: [number, number][] = [];
   try {
-    const photo = await openPhoto(url, never, (...p) => told.push(p), portsOf(ports));
+    const photo = await openPhoto(url, never, (...p) => told.push(p), drop, portsOf(ports));
     return { told, photo };
   } finally {
     assert.equal(FakeDecoder.alive, 0);
@@ -327,11 +341,11 @@ test('an abort between two pieces frees the decoder and ends the transfer', asyn
     const stop = (loaded: number) => {
       if (loaded > FIRST_BYTES) abort.abort(new Error('another src'));
     };
-    await assert.rejects(openPhoto(site.url, abort.signal, stop, portsOf()), /another src/);
+    await assert.rejects(openPhoto(site.url, abort.signal, stop, drop, portsOf()), /another src/);
     assert.equal(FakeDecoder.alive, 0);
     assert.equal(getEventListeners(abort.signal, 'abort').length, 0);
     await Promise.all(site.closed);
-    await assert.rejects(openPhoto(site.url, abort.signal, stop, portsOf()), /another src/);
+    await assert.rejects(openPhoto(site.url, abort.signal, stop, drop, portsOf()), /another src/);
     assert.equal(site.asked.length, ranges ? 2 : 1, 'nothing is asked for any more');
   }
 });
@@ -342,7 +356,7 @@ test('an abort while the page has its turn is noticed', async (t) => {
   const pause = async () => abort.abort(new Error('another src'));
   const ports = portsOf({ pause });
   await assert.rejects(
-    openPhoto(site.url, abort.signal, () => {}, ports),
+    openPhoto(site.url, abort.signal, () => {}, drop, ports),
     /another src/,
   );
   assert.equal(FakeDecoder.alive, 0);
@@ -354,7 +368,7 @@ test('an abort while the module loads does not wait for it', async (t) => {
   const decoder = () => new Promise<never>(() => {});
   setTimeout(() => abort.abort(new Error('another src')), 20);
   await assert.rejects(
-    openPhoto(site.url, abort.signal, () => {}, portsOf({ decoder })),
+    openPhoto(site.url, abort.signal, () => {}, drop, portsOf({ decoder })),
     /another src/,
   );
 });
@@ -384,7 +398,7 @@ test('the page gets its turn, with what has been decoded by then', async (t) => 
     turns.push(loaded);
   };
   // Eight looks at the clock make a turn, and there is one after each slice.
-  await openPhoto(site.url, never, (bytes) => (loaded = bytes), portsOf({ pause }));
+  await openPhoto(site.url, never, (bytes) => (loaded = bytes), drop, portsOf({ pause }));
   assert.ok(turns.length > 70, `${turns.length} turns`);
   const steps = turns.map((at, i) => at - (turns[i - 1] ?? 0));
   assert.ok(
@@ -401,4 +415,20 @@ test('a decoder that is never content ends in an error', async (t) => {
   const decoder = async () => new LocalDecoder({ Decoder: Glutton }, () => 0);
   await assert.rejects(opened(site.url, { decoder }), { code: 'internal', message: /fed/ });
   assert.equal(site.asked.length, 2);
+});
+
+test('coarser photographs come while the file does, each of twice as much, and not one after the other', async (t) => {
+  const file = fileOf();
+  const site = await serve(t, (request, response) => send(request, response, file));
+  let now = 0;
+  const shares: number[] = [];
+  const keep = (preview: Photograph) => shares.push(preview.share);
+  const at = { now: () => now };
+  await openPhoto(site.url, never, () => (now += 1000), keep, portsOf(at));
+  assert.ok(shares.length >= 2 && shares.length <= 3, String(shares));
+  assert.ok((shares[0] ?? 0) >= 0.125 && (shares[0] ?? 1) < 0.25, String(shares));
+  assert.ok(shares.every((share, i) => i === 0 || share >= 2 * (shares[i - 1] ?? 1)));
+  shares.length = 0;
+  await openPhoto(site.url, never, () => {}, keep, portsOf(at));
+  assert.equal(shares.length, 1, 'no time has passed');
 });

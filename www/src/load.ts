@@ -11,10 +11,15 @@ import { type ByteRange, HttpSource, type Piece, type SourceOptions } from './so
  * meanwhile counts anew. */
 export type OnProgress = (loaded: number, total: number) => void;
 
+/** Given coarser photographs while the file comes, each to be freed by who takes it. */
+export type OnPreview = (photograph: Photograph) => void;
+
 /** What loading needs from the world around it. */
 export interface LoadPorts {
   readonly decoder: () => Promise<PhotoDecoder>;
   readonly fetch: typeof fetch;
+  /** Milliseconds since any moment. */
+  readonly now: () => number;
   /** Lets the page draw and take input. */
   readonly pause: () => Promise<void>;
 }
@@ -26,6 +31,9 @@ const IN_ORDER: Partial<SourceOptions> = {
   concurrency: 1,
   maxRangeBytes: Number.POSITIVE_INFINITY,
 };
+/** A coarser photograph is worth its trouble where more time than this has passed since the last. */
+const PREVIEW_MS = 400;
+
 /**
  * Fetches and decodes a file while it arrives. One that is replaced meanwhile is begun anew, once.
  * Throws a `PhotoError`, or the signal's reason once aborted; what was decoded till then is freed.
@@ -34,15 +42,16 @@ export async function openPhoto(
   url: string,
   signal: AbortSignal,
   onProgress: OnProgress,
+  onPreview: OnPreview,
   ports: LoadPorts,
 ): Promise<Photograph> {
   try {
-    return await open(url, signal, onProgress, ports);
+    return await open(url, signal, onProgress, onPreview, ports);
   } catch (thrown) {
     if (!(thrown instanceof PhotoError && thrown.code === 'http-changed')) throw thrown;
     // A cache may still have parts of the file that was.
     const anew: typeof fetch = (input, init) => ports.fetch(input, { ...init, cache: 'reload' });
-    return await open(url, signal, onProgress, { ...ports, fetch: anew });
+    return await open(url, signal, onProgress, onPreview, { ...ports, fetch: anew });
   }
 }
 
@@ -50,6 +59,7 @@ async function open(
   url: string,
   signal: AbortSignal,
   onProgress: OnProgress,
+  onPreview: OnPreview,
   ports: LoadPorts,
 ): Promise<Photograph> {
   const stop = new AbortController();
@@ -70,7 +80,7 @@ async function open(
     signal.throwIfAborted();
     taken = true;
     const pieces = piecesOf(first, opening, decoder, source, stop.signal);
-    return await decode(decoder, pieces, signal, onProgress, ports);
+    return await decode(decoder, pieces, signal, onProgress, onPreview, ports);
   } catch (thrown) {
     // A transfer that nobody waits for any more is not left running.
     stop.abort();
@@ -109,9 +119,11 @@ async function decode(
   pieces: AsyncIterable<Piece>,
   signal: AbortSignal,
   onProgress: OnProgress,
+  onPreview: OnPreview,
   ports: LoadPorts,
 ): Promise<Photograph> {
   let told = 0;
+  const previews = new Previews(decoder, ports.now);
   const tell = () => {
     const { bytesFed, fileBytes } = decoder.state;
     if (bytesFed > told) onProgress(bytesFed, fileBytes ?? 0);
@@ -131,6 +143,10 @@ async function decode(
       signal.throwIfAborted();
       tell();
       signal.throwIfAborted();
+      const preview = await previews.next();
+      if (signal.aborted) preview?.free();
+      else if (preview) onPreview(preview);
+      signal.throwIfAborted();
     }
     const photo = await decoder.finish();
     if (signal.aborted) photo.free();
@@ -139,6 +155,35 @@ async function decode(
   } finally {
     signal.removeEventListener('abort', stop);
     stop();
+  }
+}
+
+/** When a coarser photograph is made of what has come. */
+class Previews {
+  readonly #decoder: PhotoDecoder;
+  readonly #now: () => number;
+  #scans = 0;
+  #bytes = 0;
+  #at = Number.NEGATIVE_INFINITY;
+
+  constructor(decoder: PhotoDecoder, now: () => number) {
+    this.#decoder = decoder;
+    this.#now = now;
+  }
+
+  /**
+   * The first as soon as there is one. Each takes as long as decoding what has come, so that the next is of
+   * twice as much, and none is made that the whole photograph would soon take the place of.
+   */
+  async next(): Promise<Photograph | null> {
+    const { scansDone, bytesFed, wants } = this.#decoder.state;
+    if (scansDone <= this.#scans || bytesFed < 2 * this.#bytes || wants.length === 0) return null;
+    if (this.#now() - this.#at < PREVIEW_MS) return null;
+    this.#scans = scansDone;
+    this.#bytes = bytesFed;
+    const preview = await this.#decoder.preview();
+    this.#at = this.#now();
+    return preview;
   }
 }
 

@@ -1,6 +1,6 @@
 /** How a picture is shown. */
 
-import type { Display, Engine, Gamut, ToneCurve } from './engine.js';
+import type { Display, DrawingModule, Gamut, ToneCurve } from './engine.js';
 
 /** What a picture's brightness and colour are multiplied by, and how they are rendered. */
 export interface Look {
@@ -13,7 +13,7 @@ export interface Look {
 
 /** That look in the module, for a canvas of a gamut. */
 export function makeDisplay(
-  { Display }: Pick<Engine, 'Display'>,
+  { Display }: Pick<DrawingModule, 'Display'>,
   { exposure, whiteBalance, tone }: Look,
   gamut: Gamut,
 ): Display {

@@ -1,20 +1,17 @@
 /**
- * A photograph on the page, wherever its tiles are: as they came, in the page's own module, or with a
+ * A photograph on the page, wherever its tiles are: as they came, in one of the page's modules, or with a
  * crew of workers. They move only when they have to, and what is done with them is done one thing after
  * the other.
  */
 
 import type { Crew, Shift } from './crew.js';
-import type { Freeable, Photo } from './engine.js';
+import type { DecodedPhoto, DrawingModule, DrawnPhoto, Freeable, Photo } from './engine.js';
 import { messageOf, PhotoError } from './errors.js';
 import { letGo } from './hand.js';
 import { allEnded } from './promises.js';
 
 /** Bytes of a tile that another module gave. */
 export type TileBytes = Uint8Array<ArrayBuffer>;
-
-/** Where a tile is: in the page's module, with the crew, on its way from or to it, or here. */
-type Place = 'page' | 'crew' | 'away' | TileBytes;
 
 /** What is known of a photograph. */
 export interface Facts {
@@ -26,64 +23,124 @@ export interface Facts {
   readonly lightHeight: number;
   /** Memory its light transport takes, in bytes. */
   readonly decodedBytes: number;
-  /** What the file says of itself, as JSON. */
-  readonly metadata: string;
+  /** What the file says of itself. */
+  readonly metadata: unknown;
 }
+
+/** All of a photograph but its tiles, as modules give and take it. */
+export interface Head extends Omit<Facts, 'metadata'> {
+  readonly metadata: string;
+  /** Number of tiles, which lie row by row. */
+  readonly tiles: number;
+  /** Pixels along a tile's side; those at the right and lower edges may be smaller. */
+  readonly tileSide: number;
+  readonly geometry: Float64Array;
+  readonly basis: Float32Array;
+}
+
+/** That of a photograph in the decoder's module. */
+export function headOf(photo: DecodedPhoto): Head {
+  const { width, height, lightWidth, lightHeight, decodedBytes, metadata, tiles, tileSide } = photo;
+  const [geometry, basis] = [photo.geometryParcel(), photo.basisParcel()];
+  const facts = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
+  return { ...facts, tiles, tileSide, geometry, basis };
+}
+
+/** A module's memory with tiles in it. */
+interface Room {
+  /** `null` for the one that decoded them. */
+  readonly module: DrawingModule | null;
+  readonly photo: Photo;
+  /** Told before tiles leave. */
+  readonly users: Set<() => void>;
+}
+
+/** Where a tile is: in a module of the page, with the crew, on its way from or to it, or here. */
+type Place = Room | 'crew' | 'away' | TileBytes;
 
 /** See the module. */
 export class Photograph implements Freeable {
   readonly facts: Facts;
-  readonly #photo: Photo;
+  readonly head: Head;
+  /** How much of the file it is of, from 0 to 1, which is all. */
+  readonly share: number;
   readonly #tiles: Place[];
+  /** Those in modules of the page: one, unless tiles were kept from moving. */
+  readonly #rooms = new Set<Room>();
   #shift: Shift | null = null;
   /** Why it can no longer be used: tiles are gone, or it was freed. */
   #over: PhotoError | null = null;
   /** Settles when all that was asked for so far is done. */
   #last: Promise<unknown> = Promise.resolve();
 
-  private constructor(photo: Photo, tiles: Place[], decodedBytes: number) {
-    const { width, height, lightWidth, lightHeight, metadata } = photo;
-    this.facts = { width, height, lightWidth, lightHeight, metadata, decodedBytes };
-    this.#photo = photo;
+  private constructor(head: Head, tiles: Place[], share: number) {
+    const { width, height, lightWidth, lightHeight, decodedBytes } = head;
+    const metadata = readMetadata(head.metadata);
+    this.facts = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
+    this.head = head;
+    this.share = share;
     this.#tiles = tiles;
   }
 
-  /** One that the page's module has decoded, which is freed with this. */
-  static decoded(photo: Photo): Photograph {
-    const tiles = Array.from({ length: photo.tiles }, () => 'page' as const);
-    return new Photograph(photo, tiles, photo.decodedBytes);
+  /** One that a module of the page has decoded, which is freed with this. Throws `format-invalid`. */
+  static decoded(photo: DecodedPhoto, share = 1): Photograph {
+    const room: Room = { module: null, photo, users: new Set() };
+    try {
+      const head = headOf(photo);
+      const tiles = Array.from({ length: head.tiles }, () => room);
+      const photograph = new Photograph(head, tiles, share);
+      photograph.#rooms.add(room);
+      return photograph;
+    } catch (thrown) {
+      photo.free();
+      throw thrown;
+    }
   }
 
-  /** One that another module has decoded; `photo`, which is freed with this, has all but its tiles. */
-  static received(photo: Photo, tiles: TileBytes[], decodedBytes: number): Photograph {
-    return new Photograph(photo, tiles, decodedBytes);
+  /** One that was decoded elsewhere. Throws `format-invalid`. */
+  static received(head: Head, tiles: TileBytes[], share = 1): Photograph {
+    return new Photograph(head, tiles, share);
   }
 
-  /** Does something with all tiles in the page's module, unless `signal` is aborted by then. */
-  inPage<T>(use: (photo: Photo) => T | Promise<T>, signal?: AbortSignal): Promise<T> {
+  /** The photograph in a module, without tiles: what lights are made for. Freed by who asks. */
+  plane(module: DrawingModule): DrawnPhoto {
+    return module.Photo.receive(this.head.geometry, this.head.basis);
+  }
+
+  /**
+   * Does something with all tiles in a module of the page, unless `signal` is aborted by then. `leave` is
+   * told before tiles leave it again; what it has made of `photo` is to be freed then.
+   */
+  inPage<T>(
+    module: DrawingModule,
+    use: (photo: DrawnPhoto) => T | Promise<T>,
+    { signal, leave }: { signal?: AbortSignal; leave?: () => void } = {},
+  ): Promise<T> {
     return this.#next(async () => {
       signal?.throwIfAborted();
-      await this.#toPage();
-      return await use(this.#photo);
+      const room = await this.#toPage(module);
+      const used = await use(room.photo);
+      if (leave) room.users.add(leave);
+      return used;
     });
   }
 
   /**
-   * Does something with all tiles with a crew, always the same one; `photo` has none of them. Where
-   * the crew can have no workers, rejects with `worker-unavailable`, and the photograph is as it was.
+   * Does something with all tiles with a crew, always the same one. Where the crew can have no workers,
+   * rejects with `worker-unavailable`, and the photograph is as it was.
    */
-  withCrew<T>(crew: Crew, use: (shift: Shift, photo: Photo) => T | Promise<T>): Promise<T> {
-    return this.#next(async () => {
-      const shift = await this.#toCrew(crew);
-      return await use(shift, this.#photo);
-    });
+  withCrew<T>(crew: Crew, use: (shift: Shift) => T | Promise<T>): Promise<T> {
+    return this.#next(async () => use(await this.#toCrew(crew)));
   }
 
   free(): void {
     this.#over ??= letGo();
     this.#shift?.end();
     // What is under way may read it still.
-    void this.#last.finally(() => this.#photo.free());
+    void this.#last.finally(() => {
+      this.#tiles.fill('away');
+      this.#sweep();
+    });
   }
 
   /** Does some work after all that was asked for before. Rejects with `photo-lost` once tiles are gone. */
@@ -105,7 +162,7 @@ export class Photograph implements Freeable {
     const gone = this.#shift?.failure;
     if (!this.#tiles.includes('away') && !(gone && this.#tiles.includes('crew'))) {
       // The next use has other workers.
-      if (gone) this.#leave();
+      if (gone) this.#leaveCrew();
       return null;
     }
     this.#over ??= new PhotoError(
@@ -117,32 +174,50 @@ export class Photograph implements Freeable {
     return this.#over;
   }
 
-  async #toPage(): Promise<void> {
+  async #toPage(module: DrawingModule): Promise<Room & { readonly photo: DrawnPhoto }> {
     const shift = this.#shift;
     if (shift) {
       await this.#each(shift, async (index) => {
         if (this.#tiles[index] !== 'crew') return;
         this.#tiles[index] = 'away';
         this.#tiles[index] = await shift.take(index);
-        this.#keep(index);
       });
-      this.#leave();
+      this.#leaveCrew();
     }
-    for (const index of this.#tiles.keys()) this.#keep(index);
+    const [room, photo] = this.#roomIn(module);
+    this.#vacate(room);
+    // Tile by tile, so that few are in two memories.
+    for (const index of this.#tiles.keys()) {
+      if (this.#tiles[index] === room) continue;
+      const bytes = this.#takeOut(index);
+      photo.putTile(index, bytes);
+      this.#tiles[index] = room;
+    }
+    this.#sweep();
+    return { ...room, photo };
+  }
+
+  #roomIn(module: DrawingModule): [Room, DrawnPhoto] {
+    for (const room of this.#rooms) {
+      if (room.module === module) return [room, room.photo as DrawnPhoto];
+    }
+    const photo = this.plane(module);
+    const room = { module, photo, users: new Set<() => void>() };
+    this.#rooms.add(room);
+    return [room, photo];
   }
 
   async #toCrew(crew: Crew): Promise<Shift> {
-    this.#shift ??= await crew.open(this.#photo);
+    this.#shift ??= await crew.open(this.head);
     const shift = this.#shift;
     if (this.#over) {
       shift.end();
       throw this.#over;
     }
+    this.#vacate();
     await this.#each(shift, async (index) => {
-      const place = this.#tiles[index] as Place;
-      if (place === 'crew') return;
-      const bytes =
-        place instanceof Uint8Array ? place : (this.#photo.takeTile(index) as TileBytes);
+      if (this.#tiles[index] === 'crew') return;
+      const bytes = this.#takeOut(index);
       this.#tiles[index] = 'away';
       try {
         await shift.put(index, bytes);
@@ -153,11 +228,40 @@ export class Photograph implements Freeable {
         throw thrown;
       }
     });
+    this.#sweep();
     await shift.plan();
     return shift;
   }
 
-  #leave(): void {
+  /** A tile that is in a module of the page, or here; it is here then. */
+  #takeOut(index: number): TileBytes {
+    const place = this.#tiles[index] as Room | TileBytes;
+    if (place instanceof Uint8Array) return place;
+    const bytes = place.photo.takeTile(index) as TileBytes;
+    this.#tiles[index] = bytes;
+    return bytes;
+  }
+
+  /** Tells those who use tiles in the page's modules that they leave, but for one of them. */
+  #vacate(but?: Room): void {
+    for (const room of this.#rooms) {
+      if (room === but) continue;
+      for (const leave of room.users) leave();
+      room.users.clear();
+    }
+  }
+
+  /** Frees rooms that no tile is in. */
+  #sweep(): void {
+    for (const room of this.#rooms) {
+      if (this.#tiles.includes(room)) continue;
+      for (const leave of room.users) leave();
+      room.photo.free();
+      this.#rooms.delete(room);
+    }
+  }
+
+  #leaveCrew(): void {
     this.#shift?.end();
     this.#shift = null;
   }
@@ -170,12 +274,17 @@ export class Photograph implements Freeable {
       }),
     );
   }
+}
 
-  /** Takes a tile that is here into the page's module. */
-  #keep(index: number): void {
-    const bytes = this.#tiles[index];
-    if (!(bytes instanceof Uint8Array)) return;
-    this.#photo.putTile(index, bytes);
-    this.#tiles[index] = 'page';
+/** The metadata of a file. Throws `format-invalid`. */
+function readMetadata(json: string): unknown {
+  try {
+    const metadata: unknown = JSON.parse(json);
+    if (typeof metadata === 'object' && metadata !== null && !Array.isArray(metadata)) {
+      return metadata;
+    }
+  } catch {
+    // No JSON.
   }
+  throw new PhotoError('format-invalid', 'The metadata is invalid: it is no JSON object.');
 }

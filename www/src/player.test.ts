@@ -20,7 +20,10 @@ const settle = () => new Promise((resolve) => setImmediate(resolve));
 /** A world in which each load and each set-up of a back end waits for the test. */
 function world() {
   const log: string[] = [];
-  const opens = new Map<string, { resolve(): void; reject(error: Error): void }>();
+  const opens = new Map<
+    string,
+    { preview(share: number): void; resolve(): void; reject(error: Error): void }
+  >();
   const draws: { backend: Backend; resolve(): void; reject(error: Error): void }[] = [];
   const losses: ((reason: string) => void)[] = [];
   const frames: (() => void)[] = [];
@@ -34,12 +37,17 @@ function world() {
   let slow: { done(fault?: PhotoError): void; fail(error: Error): void }[] | null = null;
   const player = new Player<Drawing>(
     {
-      open: (src, signal) =>
+      open: (src, signal, _, onPreview) =>
         new Promise((resolve, reject) => {
           signal.addEventListener('abort', () => log.push(`abort ${src}`));
           opens.set(src, {
+            preview: (share) =>
+              onPreview({
+                share,
+                free: () => log.push(`free ${share} of ${src}`),
+              } as unknown as Photograph),
             resolve: () =>
-              resolve({ free: () => log.push(`free ${src}`) } as unknown as Photograph),
+              resolve({ share: 1, free: () => log.push(`free ${src}`) } as unknown as Photograph),
             reject,
           });
         }),
@@ -77,7 +85,8 @@ function world() {
       drawn: (fault) => fault && log.push(`not that light: ${fault.message}`),
       detailChanged: (detail) => log.push(`detail ${detail}`),
       loaded: () => log.push('loaded'),
-      backendChanged: (_, backend, previous, reason) =>
+      show: () => {},
+      backendChanged: (backend, previous, reason) =>
         log.push(`backend ${previous} -> ${backend}${reason && ` (${reason})`}`),
       failed: (error) => log.push(`failed ${error.code}: ${error.message}`),
       recovered: () => log.push('recovered'),
@@ -93,6 +102,10 @@ function world() {
     happened: () => log.splice(0),
     async opened(src: string) {
       opens.get(src)?.resolve();
+      await settle();
+    },
+    async previewed(src: string, share: number) {
+      opens.get(src)?.preview(share);
       await settle();
     },
     async openFails(src: string, error: Error) {
@@ -241,7 +254,7 @@ test('another order changes the back end; the photograph is not loaded again', a
   const w = await loadedWorld();
   w.player.set({ ...SETTINGS, wanted: wanting(['cpu']) });
   await w.drawn(1);
-  assert.deepEqual(w.happened(), ['free webgpu', 'backend webgpu -> cpu', 'cpu draws flood']);
+  assert.deepEqual(w.happened(), ['backend webgpu -> cpu', 'cpu draws flood', 'free webgpu']);
   // One that begins with the back end in use leaves it alone.
   w.player.set({ ...SETTINGS, wanted: wanting(['cpu', 'webgpu']) });
   await settle();
@@ -255,9 +268,9 @@ test('the last of two quick changes of order wins', async () => {
   await w.drawn(2);
   await w.drawn(1);
   assert.deepEqual(w.happened(), [
-    'free webgpu',
     'backend webgpu -> cpu',
     'cpu draws flood',
+    'free webgpu',
     'free webgl2',
   ]);
 });
@@ -668,7 +681,7 @@ test('the first picture, another back end’s, and one that is asked for are dra
   assert.equal(w.happened().at(-1), 'loaded');
   w.player.set({ ...SETTINGS, wanted: wanting(['cpu']) });
   await w.drawn(1);
-  assert.equal(w.happened().at(-1), 'cpu draws flood');
+  assert.deepEqual(w.happened().slice(-2), ['cpu draws flood', 'free webgpu']);
   w.player.redraw();
   await w.player.renderNow();
   assert.deepEqual(w.happened(), ['cpu draws flood']);
@@ -851,7 +864,7 @@ test('another back end, and another photograph, start in full detail', async () 
   const w = await softWorld();
   w.player.set({ ...SETTINGS, wanted: wanting(['cpu']) });
   await w.drawn(1);
-  assert.deepEqual(w.happened().slice(-2), ['cpu draws flood', 'detail 1']);
+  assert.deepEqual(w.happened().slice(-3), ['cpu draws flood', 'free webgpu', 'detail 1']);
   await move(w, 20, 60);
   assert.equal(w.player.detail, 0.5);
   w.player.set({ ...SETTINGS, src: 'b.ltm' });
@@ -863,4 +876,93 @@ test('another back end, and another photograph, start in full detail', async () 
   assert.deepEqual(w.happened(), [], 'what came to rest is gone');
   await move(w, 2, 60);
   assert.deepEqual(new Set(w.happened()), new Set(['webgpu draws flood']));
+});
+
+test('coarser photographs are drawn while the file comes, each by the back end of the one before', async () => {
+  const w = world();
+  w.player.set(SETTINGS);
+  await w.previewed('a.ltm', 0.125);
+  await w.drawFails(0, 'no adapter');
+  await w.drawn(1);
+  assert.deepEqual(w.happened(), [
+    'loading',
+    'backend null -> cpu (WebGPU: no adapter.)',
+    'cpu draws flood',
+    'detail 0.125',
+  ]);
+  assert.equal(w.player.detail, 0.125);
+  w.player.redraw();
+  await w.frame();
+  assert.deepEqual(w.happened(), ['cpu draws flood'], 'the light may move');
+  await w.previewed('a.ltm', 0.5);
+  await w.previewed('a.ltm', 0.75);
+  assert.deepEqual(w.happened(), ['free 0.75 of a.ltm'], 'one is on its way to the screen');
+  await w.drawn(2);
+  const replaced = ['cpu draws flood', 'free cpu', 'free 0.125 of a.ltm', 'detail 0.5'];
+  assert.deepEqual(w.happened(), replaced);
+  await w.opened('a.ltm');
+  await w.drawn(3);
+  assert.deepEqual(
+    w.draws.map(({ backend }) => backend),
+    ['webgpu', 'cpu', 'cpu', 'cpu'],
+  );
+  assert.deepEqual(w.happened(), [
+    'cpu draws flood',
+    'free cpu',
+    'free 0.5 of a.ltm',
+    'detail 1',
+    'loaded',
+  ]);
+});
+
+test('a whole photograph does not wait for a coarser one to be drawn', async () => {
+  const w = world();
+  w.player.set(SETTINGS);
+  await w.previewed('a.ltm', 0.5);
+  await w.opened('a.ltm');
+  await w.drawn(1);
+  await w.drawn(0);
+  assert.deepEqual(w.happened(), [
+    'loading',
+    'backend null -> webgpu',
+    'webgpu draws flood',
+    'loaded',
+    'free webgpu',
+    'free 0.5 of a.ltm',
+  ]);
+});
+
+test('a coarser photograph that no back end draws, or that is lost, is made up for by the whole one', async () => {
+  const w = world();
+  w.player.set({ ...SETTINGS, wanted: wanting(['cpu']) });
+  await w.previewed('a.ltm', 0.25);
+  await w.drawFails(0, 'no canvas');
+  assert.deepEqual(w.happened(), ['loading']);
+  await w.previewed('a.ltm', 0.5);
+  w.draws[1]?.reject(new PhotoError('photo-lost', 'a worker stopped'));
+  await settle();
+  await w.opened('a.ltm');
+  await w.drawn(2);
+  assert.deepEqual(w.happened(), [
+    'free 0.25 of a.ltm',
+    'free 0.5 of a.ltm',
+    'backend null -> cpu',
+    'cpu draws flood',
+    'loaded',
+  ]);
+});
+
+test('a photograph that fails to come whole leaves its last picture, and says so', async () => {
+  const w = world();
+  w.player.set(SETTINGS);
+  await w.previewed('a.ltm', 0.5);
+  await w.drawn(0);
+  w.happened();
+  await w.openFails('a.ltm', new PhotoError('http-short', 'it ended'));
+  assert.deepEqual(w.happened(), ['failed http-short: it ended']);
+  w.player.redraw();
+  await w.frame();
+  assert.deepEqual(w.happened(), ['webgpu draws flood']);
+  w.player.stop();
+  assert.deepEqual(w.happened(), ['free webgpu', 'free 0.5 of a.ltm']);
 });

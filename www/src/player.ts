@@ -9,7 +9,7 @@ import { after, BACKEND_TITLES, firstWorking, from, sentence } from './backends.
 import type { Backend, Freeable, Gamut } from './engine.js';
 import { PhotoError, toPhotoError } from './errors.js';
 import type { LightSetting } from './lights.js';
-import { missingSource, type OnProgress } from './load.js';
+import { missingSource, type OnPreview, type OnProgress } from './load.js';
 import type { Look } from './look.js';
 import type { Photograph } from './photograph.js';
 import { UnderWay } from './promises.js';
@@ -54,7 +54,12 @@ export type Drawn = PhotoError | null;
 
 /** What the player needs done. */
 export interface Ports<D extends Drawing> {
-  open(src: string, signal: AbortSignal, onProgress: OnProgress): Promise<Photograph>;
+  open(
+    src: string,
+    signal: AbortSignal,
+    onProgress: OnProgress,
+    onPreview: OnPreview,
+  ): Promise<Photograph>;
   /**
    * Sets a back end up on a surface of its own; throws `backend-unavailable`, or `photo-lost`. Need not
    * go on once `signal` is aborted.
@@ -79,14 +84,16 @@ export interface Listener<D extends Drawing> {
   /** A load begins: what was shown is gone. */
   loading(): void;
   progress: OnProgress;
+  /** A drawing has its first frame, and is to be shown from now on. */
+  show(drawing: D): void;
   /** A frame was drawn. */
   drawn(fault: Drawn): void;
-  /** That frame has another share of the components than the one before it; the first has all. */
+  /** That frame is by another share of the photograph than the one before it; the first is by all. */
   detailChanged(detail: number): void;
-  /** The photograph is drawn for the first time, or the first since it had to be fetched anew. */
+  /** The whole photograph is drawn for the first time, or the first since it had to be fetched anew. */
   loaded(): void;
-  /** A back end was taken up; `drawing` is to be shown from now on. */
-  backendChanged(drawing: D, backend: Backend, previous: Backend | null, reason: string): void;
+  /** Another back end was taken up, or the same again after it was lost. */
+  backendChanged(backend: Backend, previous: Backend | null, reason: string): void;
   failed(error: PhotoError): void;
   /** Nothing is wrong any more. */
   recovered(): void;
@@ -97,6 +104,7 @@ class SetUp<D extends Drawing> {
   readonly backend: Backend;
   readonly wanted: Wanted;
   readonly drawing: D;
+  readonly held: Held;
   readonly quality = new Quality();
   /** Why it no longer works, once it does not. */
   lost: string | null = null;
@@ -105,10 +113,17 @@ class SetUp<D extends Drawing> {
   /** The one that is being drawn, where that takes time. */
   frame: UnderWay | null = null;
 
-  constructor(backend: Backend, wanted: Wanted, drawing: D) {
+  constructor(backend: Backend, wanted: Wanted, drawing: D, held: Held) {
     this.backend = backend;
     this.wanted = wanted;
     this.drawing = drawing;
+    this.held = held;
+    held.hold();
+  }
+
+  free(): void {
+    this.drawing.free();
+    this.held.release();
   }
 }
 
@@ -159,20 +174,29 @@ export class Player<D extends Drawing> {
   #search: Search | null = null;
   #held: Held | null = null;
   #active: SetUp<D> | null = null;
+  /** What is shown until `#active` has drawn. */
+  #outgoing: SetUp<D> | null = null;
   /** The frame that is to follow what is under way. */
   #next: Promise<D> | null = null;
   /** How often the photograph was fetched anew since it was last drawn. */
   #fetches = 0;
+  /** Whether there is a picture of the photograph, and whether one of all of it. */
   #drawn = false;
+  #loaded = false;
   #failed = false;
+  /** The photograph did not come whole, which frames of what came do not mend. */
+  #cutShort = false;
   #frameAsked = false;
+  /** What the listener was told to show last. */
+  #shows: D | null = null;
   #visible = true;
   /** What was drawn last is out of date. */
   #stale = false;
   /** The next frame is to be in full detail, whatever the back end has time for. */
   #whole = false;
-  /** Of the frame that was told last. */
+  /** The share of the photograph, and that of it that the back end has time for, in the last frame. */
   #detail = 1;
+  #timeFor = 1;
   /** Keeps the picture from being drawn again once it is at rest. */
   #keepMoving = (): void => {};
 
@@ -227,7 +251,7 @@ export class Player<D extends Drawing> {
     this.#visible = visible;
     if (!visible) this.#keepMoving();
     else if (this.#stale) this.#askForFrame();
-    else if (this.#detail < 1) this.#awaitRest();
+    else if (this.#timeFor < 1) this.#awaitRest();
   }
 
   /** Lets everything go. */
@@ -288,11 +312,11 @@ export class Player<D extends Drawing> {
         active.frame = new UnderWay();
         drawn = await drawn;
       }
-      this.#fetches = 0;
+      if (active.held.photo.share === 1) this.#fetches = 0;
       active.drew = true;
       // Another light may have been set meanwhile, with which nothing is wrong.
       const sameLight = light.picture === this.#settings?.light.picture;
-      if (active === this.#active) this.#tell(sameLight ? drawn : null, detail);
+      if (active === this.#active) this.#tell(active, sameLight ? drawn : null, detail);
       return active.drawing;
     } catch (thrown) {
       if (active !== this.#active) {
@@ -321,10 +345,18 @@ export class Player<D extends Drawing> {
     this.#awaitFrame();
   }
 
-  #tell(drawn: Drawn, detail: number): void {
+  #tell({ drawing, held }: SetUp<D>, drawn: Drawn, timeFor: number): void {
+    const detail = timeFor * held.photo.share;
     const changed = detail !== this.#detail;
     this.#detail = detail;
-    if (detail < 1 && !this.#stale && !this.#unseen) this.#awaitRest();
+    this.#timeFor = timeFor;
+    if (timeFor < 1 && !this.#stale && !this.#unseen) this.#awaitRest();
+    if (this.#shows !== drawing) {
+      this.#shows = drawing;
+      this.#listener.show(drawing);
+      this.#outgoing?.free();
+      this.#outgoing = null;
+    }
     this.#listener.drawn(drawn);
     if (changed) this.#listener.detailChanged(detail);
   }
@@ -346,8 +378,10 @@ export class Player<D extends Drawing> {
   /** A frame could not be drawn. */
   #stopped(active: SetUp<D>, error: PhotoError): void {
     if (error.code === 'backend-lost') this.#lost(active, error.message);
-    else if (error.code === 'photo-lost') this.#fetchAnew(error.message);
-    else this.#fail(error);
+    else if (error.code !== 'photo-lost') this.#fail(error);
+    else if (active.held.photo.share === 1) this.#fetchAnew(error.message);
+    // What was lost is about to be replaced.
+    else this.#dropActive();
   }
 
   #begin(src: string | null): void {
@@ -383,21 +417,44 @@ export class Player<D extends Drawing> {
     this.#load = load;
     const { signal } = load;
     try {
-      const photo = await this.#ports.open(src, signal, (loaded, total) => {
-        if (!signal.aborted) this.#listener.progress(loaded, total);
-      });
+      const photo = await this.#ports.open(
+        src,
+        signal,
+        (loaded, total) => {
+          if (!signal.aborted) this.#listener.progress(loaded, total);
+        },
+        (preview) => {
+          // While the last one is on its way to the screen, none comes in its place.
+          if (signal.aborted || this.#search) preview.free();
+          else void this.#take(preview, previous, why);
+        },
+      );
       if (signal.aborted) {
         photo.free();
         return;
       }
-      this.#held = new Held(photo);
+      this.#load = null;
+      await this.#take(photo, previous, why);
     } catch (thrown) {
-      if (!signal.aborted) this.#fail(toPhotoError(thrown));
+      if (signal.aborted) return;
+      this.#cutShort = true;
+      this.#fail(toPhotoError(thrown));
       return;
     } finally {
       if (this.#load === load) this.#load = null;
     }
-    if (this.#settings) await this.#choose(this.#settings.wanted, previous, why);
+  }
+
+  /** Has a photograph drawn from now on: the whole one, or a coarser one until that is there. */
+  async #take(photo: Photograph, previous: Backend | null, why: string): Promise<void> {
+    this.#held?.release();
+    this.#held = new Held(photo);
+    const { backend } = this;
+    if (!this.#settings) return;
+    const { wanted } = this.#settings;
+    // What could not draw the one before will not draw this one.
+    const backends = backend ? from(wanted.backends, backend) : wanted.backends;
+    await this.#choose({ ...wanted, backends }, backend ?? previous, backend ? '' : why);
   }
 
   /**
@@ -416,29 +473,29 @@ export class Player<D extends Drawing> {
     try {
       const chosen = await firstWorking(
         wanted.backends,
-        (backend) => this.#setUp(backend, wanted, held.photo, signal),
+        (backend) => this.#setUp(backend, wanted, held, signal),
         () => signal.throwIfAborted(),
       );
       signal.throwIfAborted();
       this.#search = null;
       const found = chosen.value;
       const changed = found !== this.#active;
-      if (changed) {
-        this.#dropActive();
-        this.#active = found;
-      }
+      const again = why !== '' || (this.#active?.lost ?? null) !== null;
+      if (changed) this.#replaceActive(found);
       const reason = [why, chosen.reason, found.drawing.flaw].filter(Boolean).join(' ');
       if (found.lost !== null) {
         this.#replace(found, found.lost, wanted, previous, reason);
         return;
       }
-      if (changed) {
-        this.#listener.backendChanged(found.drawing, found.backend, previous, reason);
+      if (changed && (found.backend !== previous || again)) {
+        this.#listener.backendChanged(found.backend, previous, reason);
       }
       this.#renderWhole();
     } catch (thrown) {
       if (signal.aborted) return;
       this.#search = null;
+      // The whole photograph will tell.
+      if (held.photo.share < 1) return;
       this.#dropActive();
       const { code, message } = toPhotoError(thrown);
       this.#fail(new PhotoError(code, why ? `${why} ${message}` : message, thrown));
@@ -452,12 +509,14 @@ export class Player<D extends Drawing> {
   async #setUp(
     backend: Backend,
     wanted: Wanted,
-    photo: Photograph,
+    held: Held,
     signal: AbortSignal,
   ): Promise<SetUp<D>> {
+    const { photo } = held;
     const active = this.#active;
     const serves =
-      active?.backend === backend &&
+      active?.held === held &&
+      active.backend === backend &&
       active.wanted.gamut === wanted.gamut &&
       // Nobody knows here whether a device that might be a program is one.
       (backend === 'cpu' || wanted.software || !active.wanted.software);
@@ -474,7 +533,8 @@ export class Player<D extends Drawing> {
       if (lostEarly !== null) throw lostInSetUp(lostEarly, thrown);
       const error = toPhotoError(thrown);
       // Nor could any other back end be set up. This ends the search.
-      if (error.code === 'photo-lost' && !signal.aborted) this.#fetchAnew(error.message);
+      const whole = photo.share === 1;
+      if (error.code === 'photo-lost' && !signal.aborted && whole) this.#fetchAnew(error.message);
       throw error;
     });
     if (signal.aborted) {
@@ -485,7 +545,7 @@ export class Player<D extends Drawing> {
       drawing.free();
       throw lostInSetUp(lostEarly);
     }
-    done = new SetUp(backend, wanted, drawing);
+    done = new SetUp(backend, wanted, drawing, held);
     return done;
   }
 
@@ -528,12 +588,13 @@ export class Player<D extends Drawing> {
   }
 
   #shown(): void {
-    if (this.#failed) {
+    if (this.#failed && !this.#cutShort) {
       this.#failed = false;
       this.#listener.recovered();
     }
-    if (!this.#drawn) {
-      this.#drawn = true;
+    this.#drawn = true;
+    if (!this.#loaded && this.#held?.photo.share === 1) {
+      this.#loaded = true;
       this.#listener.loaded();
     }
   }
@@ -575,8 +636,20 @@ export class Player<D extends Drawing> {
 
   #dropActive(): void {
     this.#keepMoving();
-    this.#active?.drawing.free();
+    this.#active?.free();
     this.#active = null;
+    this.#outgoing?.free();
+    this.#outgoing = null;
+  }
+
+  /** Takes something else up. What is shown stays until that has drawn. */
+  #replaceActive(found: SetUp<D>): void {
+    this.#keepMoving();
+    const active = this.#active;
+    this.#active = found;
+    if (!active) return;
+    if (active.drawing === this.#shows && active.lost === null) this.#outgoing = active;
+    else active.free();
   }
 
   #release(): void {
@@ -589,7 +662,10 @@ export class Player<D extends Drawing> {
     this.#held?.release();
     this.#held = null;
     this.#drawn = false;
+    this.#loaded = false;
+    this.#shows = null;
     this.#failed = false;
+    this.#cutShort = false;
     this.#stale = false;
     this.#whole = false;
   }

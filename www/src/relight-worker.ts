@@ -1,14 +1,15 @@
 /** A worker that relights rows of photographs: what a `Hand` starts and talks to. */
 
 import type { Answer, Request, Task } from './crew-protocol.js';
-import { type BandRelighter, type Engine, loadEngine, type Photo } from './engine.js';
+import type { BandRelighter, CpuModule, DrawnPhoto } from './engine.js';
 import { messageOf } from './errors.js';
 import { makeDisplay } from './look.js';
-import { workerScope } from './worker-scope.js';
+import { loadModule, setModuleFolder } from './modules.js';
+import { started, workerScope } from './worker-scope.js';
 
 /** Rows of a photograph. */
 interface Band {
-  readonly photo: Photo;
+  readonly photo: DrawnPhoto;
   readonly firstRow: number;
   readonly rows: number;
   /** None while tiles come and go. */
@@ -19,10 +20,10 @@ const scope = workerScope<Request, Answer>();
 const bands = new Map<number, Band>();
 const NOTHING = new ArrayBuffer(0);
 
-function answer(engine: Engine, photo: number, task: Task): ArrayBuffer {
+function answer(module: CpuModule, photo: number, task: Task): ArrayBuffer {
   if (task.kind === 'open') {
     const { geometry, basis, firstRow, rows } = task;
-    const room = engine.Photo.receive(geometry, basis, '');
+    const room = module.Photo.receive(geometry, basis);
     bands.set(photo, { photo: room, firstRow, rows, relighter: null });
     return NOTHING;
   }
@@ -30,13 +31,13 @@ function answer(engine: Engine, photo: number, task: Task): ArrayBuffer {
   if (!band) throw new Error('It was asked for what it does not have.');
   switch (task.kind) {
     case 'plan':
-      return Uint32Array.from(planned(engine, band).lightRows).buffer;
+      return Uint32Array.from(planned(module, band).lightRows).buffer;
     case 'relight': {
       const { light, showing, pixels } = task;
-      const display = makeDisplay(engine, showing.look, showing.gamut);
+      const display = makeDisplay(module, showing.look, showing.gamut);
       try {
         const out = new Uint8Array(pixels);
-        planned(engine, band).relight(light, display, showing.detail, out);
+        planned(module, band).relight(light, display, showing.detail, out);
       } finally {
         display.free();
       }
@@ -57,8 +58,8 @@ function answer(engine: Engine, photo: number, task: Task): ArrayBuffer {
   }
 }
 
-function planned(engine: Engine, band: Band): BandRelighter {
-  band.relighter ??= new engine.BandRelighter(band.photo, band.firstRow, band.rows);
+function planned(module: CpuModule, band: Band): BandRelighter {
+  band.relighter ??= new module.BandRelighter(band.photo, band.firstRow, band.rows);
   return band.relighter;
 }
 
@@ -72,16 +73,17 @@ function fail(thrown: unknown): void {
 }
 
 try {
-  const engine = await loadEngine();
+  setModuleFolder((await started(workerScope())).modules);
+  const module = await loadModule('cpu');
   scope.onmessage = ({ data: { number, photo, task } }) => {
     try {
-      const bytes = answer(engine, photo, task);
+      const bytes = answer(module, photo, task);
       scope.postMessage({ kind: 'done', number, bytes }, bytes.byteLength > 0 ? [bytes] : []);
     } catch (thrown) {
       fail(thrown);
     }
   };
-  scope.postMessage({ kind: 'ready', kernel: engine.cpuKernel() });
+  scope.postMessage({ kind: 'ready', kernel: module.cpuKernel() });
 } catch (thrown) {
   fail(thrown);
 }

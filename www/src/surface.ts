@@ -2,7 +2,7 @@
 
 import { blobOf, type CanvasSurface } from './canvas.js';
 import type { Lease } from './devices.js';
-import type { Engine, Gamut, Photo, Relighter } from './engine.js';
+import type { DrawingModule, DrawnPhoto, Gamut, Relighter } from './engine.js';
 import { type PhotoError, toPhotoError } from './errors.js';
 import { Lamp } from './lamp.js';
 import { sizeOf } from './light-pixels.js';
@@ -10,25 +10,23 @@ import { isLive, type LightPicture } from './light-source.js';
 import type { LightSetting } from './lights.js';
 import { type Look, makeDisplay } from './look.js';
 
-/** What of the module drawing needs. */
-type DrawEngine = Pick<Engine, 'Display' | 'Light'>;
-
 /** See the module. */
 export class CanvasDrawing implements CanvasSurface {
   readonly canvas: HTMLCanvasElement;
   readonly flaw: string;
-  readonly #engine: Pick<Engine, 'Display'>;
+  readonly #module: DrawingModule;
   readonly #lamp: Lamp;
-  readonly #photo: Photo;
+  /** What lights are made for; its own. */
+  readonly #plane: DrawnPhoto;
   readonly #relighter: Relighter;
   /** Whether the device has a picture as its light. */
   #pictured = false;
   readonly #lease: Pick<Lease, 'fail' | 'release'> | null;
 
-  /** On a device, `lease` is the share of it, which is given up at the end. */
+  /** `plane`, the photograph without tiles, is freed with this. On a device, `lease` is the share of it, which is given up at the end. */
   constructor(
-    engine: DrawEngine,
-    photo: Photo,
+    module: DrawingModule,
+    plane: DrawnPhoto,
     relighter: Relighter,
     canvas: HTMLCanvasElement,
     {
@@ -36,9 +34,9 @@ export class CanvasDrawing implements CanvasSurface {
       flaw = '',
     }: { lease?: Pick<Lease, 'fail' | 'release'> | null; flaw?: string } = {},
   ) {
-    this.#engine = engine;
-    this.#lamp = new Lamp(engine);
-    this.#photo = photo;
+    this.#module = module;
+    this.#lamp = new Lamp(module);
+    this.#plane = plane;
     this.#relighter = relighter;
     this.#lease = lease;
     this.flaw = flaw;
@@ -54,14 +52,14 @@ export class CanvasDrawing implements CanvasSurface {
   }
 
   render(setting: LightSetting, look: Look, detail: number): PhotoError | null {
-    const display = makeDisplay(this.#engine, look, this.gamut);
+    const display = makeDisplay(this.#module, look, this.gamut);
     try {
       if (this.#takes(setting.picture)) {
         this.#pictured = true;
         this.#relighter.renderPicture(display, detail);
         return null;
       }
-      const { light, asked, fault } = this.#lamp.turnTo(setting, this.#photo);
+      const { light, asked, fault } = this.#lamp.turnTo(setting, this.#plane);
       // A picture that cannot be had any more leaves what was had of it.
       this.#pictured &&= !asked;
       if (this.#pictured) this.#relighter.renderPicture(display, detail);
@@ -96,5 +94,6 @@ export class CanvasDrawing implements CanvasSurface {
     this.#relighter.free();
     this.#lease?.release();
     this.#lamp.free();
+    this.#plane.free();
   }
 }

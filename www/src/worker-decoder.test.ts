@@ -1,10 +1,15 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { DecoderState } from './decoding.js';
-import type { Photo } from './engine.js';
+import type { DrawingModule } from './engine.js';
 import { type Answer, type Request, WorkerDecoder, type WorkerLike } from './worker-decoder.js';
 
-const stateAt = (bytesFed: number): DecoderState => ({ bytesFed, fileBytes: 900, wants: [] });
+const stateAt = (bytesFed: number): DecoderState => ({
+  bytesFed,
+  fileBytes: 900,
+  scansDone: 0,
+  wants: [],
+});
 
 /** A worker that answers by a script. */
 class FakeWorker implements WorkerLike {
@@ -40,50 +45,35 @@ class FakeWorker implements WorkerLike {
   }
 }
 
-/** The page's module, and the photographs of two tiles that came of it. */
-function page() {
-  const photos: { tiles: [number, number][]; freed: boolean }[] = [];
-  const Photo = {
-    receive(_geometry: Float64Array, _basis: Float32Array, _metadata: string) {
-      const received = { tiles: [] as [number, number][], freed: false };
-      photos.push(received);
-      const photo = {
-        tiles: 2,
-        putTile: (index: number, bytes: Uint8Array) => received.tiles.push([index, bytes.length]),
-        free: () => {
-          received.freed = true;
-        },
-      };
-      return photo as unknown as Photo;
-    },
-  };
-  return { photos, engine: async () => ({ Photo }) };
-}
-
-const PHOTO: Answer = {
-  kind: 'photo',
-  geometry: new Float64Array(12),
-  basis: new Float32Array(9),
-  metadata: '{}',
-  decodedBytes: 700,
+const HEAD: Answer = {
+  kind: 'head',
+  head: {
+    width: 1,
+    height: 2,
+    lightWidth: 1,
+    lightHeight: 1,
+    tiles: 2,
+    tileSide: 1,
+    geometry: new Float64Array(12),
+    basis: new Float32Array(9),
+    metadata: '{}',
+    decodedBytes: 700,
+  },
 };
 const tile = (length: number): Answer => ({ kind: 'tile', bytes: new Uint8Array(length) });
 
-async function started(answers: (request: Request) => Answer[], engine = page().engine) {
+async function started(answers: (request: Request) => Answer[]) {
   const worker = new FakeWorker(answers);
-  const starting = WorkerDecoder.start(worker, engine);
+  const starting = WorkerDecoder.start(worker);
   worker.say({ kind: 'ready', state: stateAt(0) });
   return { worker, decoder: await starting };
 }
 
 test('bytes go to the worker and a photograph comes of them, tile by tile', async () => {
-  const { photos, engine } = page();
-  const { worker, decoder } = await started(
-    (request) =>
-      request.kind === 'feed'
-        ? [{ kind: 'fed', state: stateAt(request.offset + request.bytes.length) }]
-        : [PHOTO, tile(40), tile(50), { kind: 'done' }],
-    engine,
+  const { worker, decoder } = await started((request) =>
+    request.kind === 'feed'
+      ? [{ kind: 'fed', state: stateAt(request.offset + request.bytes.length) }]
+      : [HEAD, tile(40), tile(50), { kind: 'done' }],
   );
   assert.equal(decoder.state.bytesFed, 0);
   await decoder.feed(0, new Uint8Array(300));
@@ -92,14 +82,35 @@ test('bytes go to the worker and a photograph comes of them, tile by tile', asyn
   const photograph = await decoder.finish();
   assert.ok(worker.ended);
   assert.equal(photograph.facts.decodedBytes, 700);
-  // Nobody has asked for them yet, and they may be wanted elsewhere.
-  assert.deepEqual(photos, [{ tiles: [], freed: false }]);
-  await photograph.inPage(() => {});
-  const tiles = [
+  const sizes: [number, number][] = [];
+  const module = {
+    Photo: {
+      receive: () => ({
+        putTile: (index: number, bytes: Uint8Array) => sizes.push([index, bytes.length]),
+        free() {},
+      }),
+    },
+  } as unknown as DrawingModule;
+  await photograph.inPage(module, () => {});
+  assert.deepEqual(sizes, [
     [0, 40],
     [1, 50],
-  ];
-  assert.deepEqual(photos, [{ tiles, freed: false }]);
+  ]);
+});
+
+test('a coarser photograph comes of what is there by then, and the decoder goes on', async () => {
+  const { worker, decoder } = await started((request) =>
+    request.kind === 'feed'
+      ? [{ kind: 'fed', state: stateAt(300) }]
+      : request.kind === 'preview' && decoder.state.bytesFed > 0
+        ? [HEAD, tile(4), tile(5), { kind: 'done' }]
+        : [{ kind: 'done' }],
+  );
+  assert.equal(await decoder.preview(), null);
+  await decoder.feed(0, new Uint8Array(300));
+  const preview = await decoder.preview();
+  assert.equal(preview?.share, 1 / 3);
+  assert.ok(!worker.ended);
 });
 
 test('what is wrong with a file keeps its code', async () => {
@@ -118,7 +129,7 @@ test('a worker that does not start is told, and ended', async () => {
     (worker: FakeWorker) => worker.say({ kind: 'failed', code: 'wasm-unavailable', message: '' }),
   ]) {
     const worker = new FakeWorker(() => []);
-    const starting = WorkerDecoder.start(worker, page().engine);
+    const starting = WorkerDecoder.start(worker);
     fail(worker);
     await assert.rejects(starting, { name: 'PhotoError' });
     assert.ok(worker.ended);
@@ -134,7 +145,7 @@ test('a worker that dies at it is worker-unavailable', async () => {
 
 test('a worker that falls silent is worker-unavailable', async () => {
   const worker = new FakeWorker(() => []);
-  const starting = WorkerDecoder.start(worker, page().engine, { lookMs: 1, looks: 3 });
+  const starting = WorkerDecoder.start(worker, { lookMs: 1, looks: 3 });
   worker.say({ kind: 'ready', state: stateAt(0) });
   const decoder = await starting;
   await assert.rejects(decoder.feed(0, new Uint8Array(1)), { code: 'worker-unavailable' });
@@ -150,14 +161,12 @@ test('a decoder that is freed keeps nobody waiting', async () => {
 
 test('a photograph that is not received whole is none', async () => {
   for (const answers of [
-    [PHOTO, tile(40), { kind: 'failed', code: 'internal', message: 'no memory' }],
-    [PHOTO, tile(40), { kind: 'done' }],
+    [HEAD, tile(40), { kind: 'failed', code: 'internal', message: 'no memory' }],
+    [HEAD, tile(40), { kind: 'done' }],
     [{ kind: 'done' }],
   ] as Answer[][]) {
-    const { photos, engine } = page();
-    const { worker, decoder } = await started(() => answers, engine);
+    const { worker, decoder } = await started(() => answers);
     await assert.rejects(decoder.finish(), { code: 'internal' });
-    assert.ok(photos.every(({ freed }) => freed));
     assert.ok(worker.ended);
   }
 });

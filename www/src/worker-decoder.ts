@@ -1,25 +1,18 @@
 /** Decoding in a worker of its own, which ends with the photograph and gives its memory back. */
 
-import type { DecoderState, PhotoDecoder } from './decoding.js';
-import type { Engine } from './engine.js';
+import { type DecoderState, type PhotoDecoder, shareOf } from './decoding.js';
 import { PhotoError } from './errors.js';
-import { Photograph, type TileBytes } from './photograph.js';
+import { type Head, Photograph, type TileBytes } from './photograph.js';
 
 /** What the page asks of the worker. One thing at a time. */
 export type Request =
   | { readonly kind: 'feed'; readonly offset: number; readonly bytes: Uint8Array }
-  | { readonly kind: 'finish' };
+  | { readonly kind: 'preview' | 'finish' };
 
 /** What the worker says. */
 export type Answer =
   | { readonly kind: 'ready' | 'fed'; readonly state: DecoderState }
-  | {
-      readonly kind: 'photo';
-      readonly geometry: Float64Array;
-      readonly basis: Float32Array;
-      readonly metadata: string;
-      readonly decodedBytes: number;
-    }
+  | { readonly kind: 'head'; readonly head: Head }
   /** One after the other. */
   | { readonly kind: 'tile'; readonly bytes: TileBytes }
   | { readonly kind: 'done' }
@@ -45,21 +38,15 @@ interface Waiting {
 /** See the module. */
 export class WorkerDecoder implements PhotoDecoder {
   readonly #worker: WorkerLike;
-  readonly #engine: () => Promise<Pick<Engine, 'Photo'>>;
   readonly #patience: typeof PATIENCE;
-  #state: DecoderState = { bytesFed: 0, fileBytes: undefined, wants: [] };
+  #state: DecoderState = { bytesFed: 0, fileBytes: undefined, scansDone: 0, wants: [] };
   #waiting: Waiting | null = null;
   #failure: PhotoError | null = null;
   /** Since it last said something. */
   #looks = 0;
 
-  private constructor(
-    worker: WorkerLike,
-    engine: () => Promise<Pick<Engine, 'Photo'>>,
-    patience: typeof PATIENCE,
-  ) {
+  private constructor(worker: WorkerLike, patience: typeof PATIENCE) {
     this.#worker = worker;
-    this.#engine = engine;
     this.#patience = patience;
     worker.onmessage = ({ data }) => {
       this.#looks = 0;
@@ -75,16 +62,9 @@ export class WorkerDecoder implements PhotoDecoder {
     worker.onmessageerror = () => died('Its answer could not be read.');
   }
 
-  /**
-   * A decoder in `worker`, once it is up; `engine` is the page's own module, for the photograph.
-   * Rejects where the worker does not start.
-   */
-  static async start(
-    worker: WorkerLike,
-    engine: () => Promise<Pick<Engine, 'Photo'>>,
-    patience = PATIENCE,
-  ): Promise<WorkerDecoder> {
-    const decoder = new WorkerDecoder(worker, engine, patience);
+  /** A decoder in `worker`, once it is up. Rejects where it does not start. */
+  static async start(worker: WorkerLike, patience = PATIENCE): Promise<WorkerDecoder> {
+    const decoder = new WorkerDecoder(worker, patience);
     try {
       await decoder.#until('ready');
       return decoder;
@@ -103,25 +83,15 @@ export class WorkerDecoder implements PhotoDecoder {
     await this.#watched(this.#until('fed'));
   }
 
+  async preview(): Promise<Photograph | null> {
+    return await this.#photograph('preview', shareOf(this.#state));
+  }
+
   async finish(): Promise<Photograph> {
     try {
-      const { Photo } = await this.#engine();
-      this.#ask({ kind: 'finish' });
-      const heads: (Answer & { kind: 'photo' })[] = [];
-      const tiles: TileBytes[] = [];
-      const done = this.#until('done', (answer) => {
-        if (answer.kind === 'photo') heads.push(answer);
-        else if (answer.kind === 'tile') tiles.push(answer.bytes);
-      });
-      await this.#watched(done);
-      const [head] = heads;
-      if (!head) throw new PhotoError('internal', 'The decoding worker gave no photograph.');
-      const photo = Photo.receive(head.geometry, head.basis, head.metadata);
-      if (photo.tiles === tiles.length) {
-        return Photograph.received(photo, tiles, head.decodedBytes);
-      }
-      photo.free();
-      throw new PhotoError('internal', 'The decoding worker gave a part of a photograph.');
+      const photograph = await this.#photograph('finish', 1);
+      if (photograph) return photograph;
+      throw new PhotoError('internal', 'The decoding worker gave no photograph.');
     } finally {
       this.free();
     }
@@ -130,6 +100,21 @@ export class WorkerDecoder implements PhotoDecoder {
   free(): void {
     this.#worker.terminate();
     this.#fail(new PhotoError('internal', 'The decoding worker was ended.'));
+  }
+
+  async #photograph(kind: 'preview' | 'finish', share: number): Promise<Photograph | null> {
+    this.#ask({ kind });
+    const heads: Head[] = [];
+    const tiles: TileBytes[] = [];
+    const done = this.#until('done', (answer) => {
+      if (answer.kind === 'head') heads.push(answer.head);
+      else if (answer.kind === 'tile') tiles.push(answer.bytes);
+    });
+    await this.#watched(done);
+    const [head] = heads;
+    if (!head) return null;
+    if (head.tiles === tiles.length) return Photograph.received(head, tiles, share);
+    throw new PhotoError('internal', 'The decoding worker gave a part of a photograph.');
   }
 
   #ask(request: Request): void {

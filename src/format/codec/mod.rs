@@ -9,6 +9,8 @@ pub(super) mod halves;
 mod tokens;
 pub(super) mod transform;
 
+use zstd::zstd_safe;
+
 use super::FormatError;
 use super::error::Part;
 
@@ -34,8 +36,8 @@ pub(super) fn compress(plain: &[u8]) -> Result<Vec<u8>, FormatError> {
 pub(super) fn decompress(frame: &[u8], need: usize) -> Result<Vec<u8>, PartError> {
     check_frame(frame)?;
     let mut plain = zeros(need)?;
-    let length = zstd::bulk::decompress_to_buffer(frame, &mut plain)
-        .map_err(|e| PartError::Damaged(e.to_string()))?;
+    let length = zstd_safe::decompress(&mut plain[..], frame)
+        .map_err(|code| damaged(zstd_safe::get_error_name(code)))?;
     match length == need {
         true => Ok(plain),
         false => Err(damaged(format!("it has {length} bytes, not {need}"))),
@@ -47,7 +49,7 @@ fn check_frame(frame: &[u8]) -> Result<(), PartError> {
     let &[0x28, 0xB5, 0x2F, 0xFD, descriptor, window, ..] = frame else {
         return Err(damaged("it is no zstd frame"));
     };
-    let one = zstd::zstd_safe::find_frame_compressed_size(frame) == Ok(frame.len());
+    let one = zstd_safe::find_frame_compressed_size(frame) == Ok(frame.len());
     if !one {
         return Err(damaged("it is not one zstd frame"));
     }
@@ -62,7 +64,20 @@ fn check_frame(frame: &[u8]) -> Result<(), PartError> {
 
 /// Whether bytes have the checksum they are to have. Fuzzing goes past it, to what it keeps away.
 pub(super) fn intact(bytes: &[u8], crc: u32) -> bool {
-    cfg!(fuzzing) || crc32c::crc32c(bytes) == crc
+    cfg!(fuzzing) || checksum(bytes) == crc
+}
+
+/// CRC-32C (RFC 3720, appendix B.4).
+#[cfg(not(target_arch = "wasm32"))]
+pub(super) fn checksum(bytes: &[u8]) -> u32 {
+    crc32c::crc32c(bytes)
+}
+
+/// CRC-32C by a table of 1 kB: browsers have no instruction for it, and would have to load larger ones.
+#[cfg(target_arch = "wasm32")]
+pub(super) fn checksum(bytes: &[u8]) -> u32 {
+    const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
+    CRC.checksum(bytes)
 }
 
 /// A vector of `length` zeros. A browser may refuse what the limits allow: that is an error, not

@@ -51,13 +51,14 @@ impl Planes {
         self.components.iter().all(Vec::is_empty)
     }
 
-    /// Red, green and blue as `[pixel, component]`, of `rank` components.
+    /// Red, green and blue as `[pixel, component]`, of the first `rank` components.
     pub fn coefficients(&self, extent: Extent, rank: usize) -> Result<Vec<Pixel>, PartError> {
         let pixels = extent.area();
         let mut coefficients: Vec<Pixel> = zeros(pixels * rank)?;
         let mut mirrors: Vec<Mirror> = Vec::new();
         if let (Some(palette), Some(plane)) = (self.palette, self.components.first())
             && !plane.is_empty()
+            && rank > 0
         {
             for p in 0..pixels {
                 let rgb = palette.turn_back(shares(plane, pixels, p));
@@ -67,7 +68,7 @@ impl Planes {
         } else {
             mirrors.resize(pixels, Mirror::of([0.0; CHANNELS]));
         }
-        let others = self.components.iter().enumerate().skip(1);
+        let others = self.components.iter().enumerate().take(rank).skip(1);
         for (k, plane) in others.filter(|(_, plane)| !plane.is_empty()) {
             for (p, mirror) in mirrors.iter().enumerate() {
                 coefficients[p * rank + k] = mirror.apply(shares(plane, pixels, p));

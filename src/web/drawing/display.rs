@@ -2,9 +2,9 @@
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::CodedError;
 use crate::relight::{self, Gamut, ToneCurve};
 use crate::transport::CHANNELS;
+use crate::web::CodedError;
 
 /// Brightness, white balance, gamut and tone curve; dithered.
 #[wasm_bindgen]
@@ -12,7 +12,7 @@ use crate::transport::CHANNELS;
 pub struct Display(relight::Display);
 
 impl Display {
-    pub(super) fn inner(&self) -> relight::Display {
+    pub(in crate::web) fn inner(&self) -> relight::Display {
         self.0
     }
 }
@@ -41,10 +41,11 @@ impl Display {
             // Neither has to be negative: two make a positive.
             let fits = exposure >= 0.0 && factor >= 0.0 && value <= f64::from(f32::MAX);
             if !fits {
-                return Err(error(format!(
-                    "the exposure is {exposure} and the white balance {balance:?}; they must be \
-                     numbers from 0 on, with products of 3.4e38 at most"
-                )));
+                return Err(error(
+                    "exposure and white balance must be numbers from 0 on, with products of 3.4e38 \
+                     at most"
+                        .into(),
+                ));
             }
             *gain = value as f32;
         }
@@ -67,7 +68,7 @@ impl Display {
 }
 
 /// A gamut by the name that CSS has for it.
-pub(super) fn parse_gamut(name: &str) -> Result<Gamut, CodedError> {
+pub(in crate::web) fn parse_gamut(name: &str) -> Result<Gamut, CodedError> {
     let known = [Gamut::Srgb, Gamut::DisplayP3];
     let found = known.into_iter().find(|gamut| gamut.color_space() == name);
     found.ok_or_else(|| {

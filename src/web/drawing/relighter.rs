@@ -2,14 +2,13 @@
 
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
-use web_sys::HtmlCanvasElement;
 
-use super::canvas2d::Canvas2d;
-use super::display::parse_gamut;
-use super::{CodedError, Display, Light, Photo};
+use super::display::Display;
+use super::light::Light;
 use crate::relight::LightError;
 use crate::relight::backend::{Backend, Frame};
 use crate::transport::Extent;
+use crate::web::CodedError;
 
 /// Draws a photograph into a canvas, by one back end.
 #[wasm_bindgen]
@@ -19,26 +18,13 @@ pub struct Relighter {
 }
 
 impl Relighter {
-    pub(super) fn of(backend: Box<dyn Backend>, light: Extent) -> Self {
+    pub(in crate::web) fn of(backend: Box<dyn Backend>, light: Extent) -> Self {
         Self { backend, light }
     }
 }
 
 #[wasm_bindgen]
 impl Relighter {
-    /// One that draws on this thread. [`Graphics::draw`](super::Graphics::draw) has those that draw on
-    /// devices; canvases are as there.
-    #[wasm_bindgen(constructor)]
-    pub fn new(
-        photo: &Photo,
-        canvas: HtmlCanvasElement,
-        #[wasm_bindgen(unchecked_param_type = "\"srgb\" | \"display-p3\"")] gamut: &str,
-    ) -> Result<Relighter, CodedError> {
-        let gamut = parse_gamut(gamut)?;
-        let backend = Canvas2d::new(photo.transport(), &canvas, gamut)?;
-        Ok(Self::of(Box::new(backend), photo.geometry().light))
-    }
-
     /// The back end's name.
     #[wasm_bindgen(getter)]
     pub fn backend(&self) -> String {

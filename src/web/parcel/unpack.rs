@@ -1,49 +1,11 @@
-//! What goes from one module to another: a photograph is decoded by a worker and drawn by the page,
-//! and both have a memory of their own.
+//! Out of parcels.
 
-use super::CodedError;
+use super::{Label, wrong};
 use crate::transport::{
-    Basis, CHANNELS, CoefficientTile, Correspondence, DirectTile, Extent, Geometry, TexelCode,
-    Tile, TileRect, Transport, Window,
+    Basis, CoefficientTile, Correspondence, DirectTile, Extent, Geometry, TexelCode, Tile,
+    TileRect, Transport, Window,
 };
-
-/// What a tile begins with.
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Label {
-    /// Of coefficients, and of functions.
-    steps: [[f32; CHANNELS]; 2],
-    /// Texels of each.
-    texels: [u32; 2],
-}
-
-/// A photograph that is not what the other module sent.
-pub fn wrong() -> CodedError {
-    CodedError::new(
-        "internal",
-        "a photograph arrived from its worker otherwise than it was sent",
-    )
-}
-
-pub fn pack_geometry(geometry: &Geometry) -> Vec<f64> {
-    let Geometry {
-        camera,
-        light,
-        window,
-        correspondence,
-        tile_side,
-    } = geometry;
-    let numbers = [
-        camera.width,
-        camera.height,
-        light.width,
-        light.height,
-        window.side(),
-        *tile_side,
-    ];
-    let affine = correspondence.affine.concat();
-    numbers.into_iter().map(f64::from).chain(affine).collect()
-}
+use crate::web::CodedError;
 
 /// A transport of dark tiles.
 pub fn unpack(geometry: &[f64], basis: &[f32]) -> Result<Transport, CodedError> {
@@ -75,17 +37,6 @@ pub fn unpack(geometry: &[f64], basis: &[f32]) -> Result<Transport, CodedError> 
         tiles: geometry.tiles().map(Tile::dark).collect(),
         geometry,
     })
-}
-
-/// A label, then codes of coefficients, then of functions.
-pub fn pack_tile(tile: &Tile) -> Vec<u8> {
-    let codes = [&tile.coefficients.codes, &tile.functions.codes];
-    let label = Label {
-        steps: [tile.coefficients.step, tile.functions.step],
-        texels: codes.map(|codes| codes.len() as u32), // of a tile, in a memory of 4 GiB
-    };
-    let codes = codes.map(|codes| bytemuck::cast_slice::<_, u8>(codes));
-    [bytemuck::bytes_of(&label), codes[0], codes[1]].concat()
 }
 
 pub fn unpack_tile(

@@ -3,16 +3,16 @@
 use js_sys::{Float32Array, Uint8ClampedArray};
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::{CodedError, Photo};
 use crate::relight::{self, BuiltinLight, LightError, TorchPose};
 use crate::transport::{CHANNELS, Extent};
+use crate::web::{CodedError, Photo};
 
 /// What each element of a photograph's light plane emits.
 #[wasm_bindgen]
 pub struct Light(relight::Light);
 
 impl Light {
-    pub(super) fn inner(&self) -> &relight::Light {
+    pub(in crate::web) fn inner(&self) -> &relight::Light {
         &self.0
     }
 }
@@ -39,12 +39,11 @@ impl Light {
         // Any larger, and squares of distances could overflow.
         const FAR: f64 = 1e6;
         if !(x.abs() <= FAR && y.abs() <= FAR && size > 0.0 && size <= FAR) {
+            // Without them: printing such numbers takes more of the module than torches do.
             return Err(CodedError::new(
                 "light-value",
-                format!(
-                    "a torch of size {size} at ({x}, {y}) cannot be: positions are fractions of \
-                     the picture, and the size a positive fraction of the light plane"
-                ),
+                "such a torch cannot be: positions are fractions of the picture, and the size a \
+                 positive fraction of the light plane",
             ));
         }
         let geometry = photo.geometry();

@@ -1,0 +1,38 @@
+//! Into parcels.
+
+use super::Label;
+#[cfg(feature = "decoder")]
+use crate::transport::Geometry;
+use crate::transport::Tile;
+
+#[cfg(feature = "decoder")]
+pub fn pack_geometry(geometry: &Geometry) -> Vec<f64> {
+    let Geometry {
+        camera,
+        light,
+        window,
+        correspondence,
+        tile_side,
+    } = geometry;
+    let numbers = [
+        camera.width,
+        camera.height,
+        light.width,
+        light.height,
+        window.side(),
+        *tile_side,
+    ];
+    let affine = correspondence.affine.concat();
+    numbers.into_iter().map(f64::from).chain(affine).collect()
+}
+
+/// A label, then codes of coefficients, then of functions.
+pub fn pack_tile(tile: &Tile) -> Vec<u8> {
+    let codes = [&tile.coefficients.codes, &tile.functions.codes];
+    let label = Label {
+        steps: [tile.coefficients.step, tile.functions.step],
+        texels: codes.map(|codes| codes.len() as u32), // of a tile, in a memory of 4 GiB
+    };
+    let codes = codes.map(|codes| bytemuck::cast_slice::<_, u8>(codes));
+    [bytemuck::bytes_of(&label), codes[0], codes[1]].concat()
+}
