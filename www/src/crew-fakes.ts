@@ -196,11 +196,17 @@ export function crewOf(
   return {
     crew: new Crew(start, size, patience),
     workers,
-    alive: () => workers.filter(({ ended }) => !ended).length,
+    /** Once those that nobody needs have ended. */
+    alive: async () => {
+      await settle();
+      return workers.filter(({ ended }) => !ended).length;
+    },
   };
 }
 
 /** Lets workers do all that they can. */
 export async function settle(): Promise<void> {
   for (let i = 0; i < 40; i += 1) await new Promise((resolve) => setImmediate(resolve));
+  // Where there is nothing to do, those took no time.
+  await new Promise((resolve) => setTimeout(resolve, 3));
 }

@@ -46,7 +46,7 @@ test('rows of tiles are shared out evenly, and together are the picture', async 
     }
     assert.equal((await shift.take(0))[0], 0);
     shift.end();
-    assert.equal(alive(), 0);
+    assert.equal(await alive(), 0);
   }
 });
 
@@ -98,10 +98,10 @@ test('photographs share the workers, which end with the last of them', async () 
   one.end();
   one.end();
   await settle();
-  assert.equal(alive(), 2);
+  assert.equal(await alive(), 2);
   assert.ok(workers.every(({ held }) => held.size === 1));
   other.end();
-  assert.equal(alive(), 0);
+  assert.equal(await alive(), 0);
   await placed(crew, photoOf(1).photo);
   assert.equal(workers.length, 3, 'others are started');
 });
@@ -127,7 +127,7 @@ test('workers that do not start leave the photograph alone, and are not tried ag
     const { photo, has } = photoOf(4);
     await assert.rejects(crew.open(headOf(photo)), { code: 'worker-unavailable' });
     assert.equal(has.size, 4);
-    assert.equal(alive(), 0);
+    assert.equal(await alive(), 0);
     const started = workers.length;
     await assert.rejects(crew.open(headOf(photo)), { code: 'worker-unavailable' });
     assert.equal(workers.length, started);
@@ -148,10 +148,10 @@ test('workers that do not start in time are tried again for the next photograph'
     code: 'worker-unavailable',
     message: /not answer/,
   });
-  assert.deepEqual([has.size, alive()], [4, 0]);
+  assert.deepEqual([has.size, await alive()], [4, 0]);
   starting = true;
   await placed(crew, photo);
-  assert.equal(alive(), 2);
+  assert.equal(await alive(), 2);
 });
 
 for (const [how, stop, why] of [
@@ -214,7 +214,7 @@ test('a slow worker that answers now and then is not given up', async () => {
 async function incident(crew: Crew, alive: () => FakeWorker[], draw: boolean) {
   const shift = await placed(crew, photoOf(4).photo);
   if (draw) await shift.relight(light, SHOWING);
-  for (const worker of alive()) {
+  for (const worker of await alive()) {
     worker.die();
     await settle();
   }

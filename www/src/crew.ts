@@ -119,6 +119,11 @@ export class Crew {
   #leave(hands: readonly Hand[]): void {
     for (const hand of hands) hand.photos -= 1;
     this.#shifts -= 1;
+    // Not at once: another photograph is often about to take the place of the last one.
+    if (this.#shifts === 0) setTimeout(() => this.#goHome());
+  }
+
+  #goHome(): void {
     if (this.#shifts > 0) return;
     for (const hand of this.#hands) hand.end();
     this.#hands = [];

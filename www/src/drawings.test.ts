@@ -108,7 +108,7 @@ test('frames that wait when the back end is switched are drawn by the new one, a
   assert.equal(await waiting, player.drawing);
   assert.equal(await during, player.drawing);
   await settle();
-  assert.deepEqual([has.size, alive()], [4, 0]);
+  assert.deepEqual([has.size, await alive()], [4, 0]);
   assert.deepEqual(setUps, ['webgl2 of 4']);
   assert.equal(workers.length, 2, 'none is started for a frame that nobody sees');
 });
@@ -227,5 +227,5 @@ test('a drawing that was freed draws nothing, and leaves tiles where they are', 
   await assert.rejects(Promise.resolve(drawing.render(SETTINGS.light, PLAIN, 1)), {
     code: 'internal',
   });
-  assert.deepEqual([has.size, alive()], [4, 0]);
+  assert.deepEqual([has.size, await alive()], [4, 0]);
 });

@@ -26,7 +26,7 @@ test('tiles go straight to the crew, and back into the page’s module when they
   assert.deepEqual(await picture(photograph, crew), ALL);
   assert.equal(has.size, 0);
   assert.equal(await photograph.inPage(module, () => has.size), 4);
-  assert.equal(alive(), 0, 'workers without a photograph end');
+  assert.equal(await alive(), 0, 'workers without a photograph end');
   assert.deepEqual(await picture(photograph, crew), ALL);
   assert.equal(has.size, 0);
   assert.equal(photograph.facts.decodedBytes, 4);
@@ -181,7 +181,7 @@ test('one that is freed keeps nobody waiting, and is freed once nobody reads it'
   await frame;
   await next;
   await settle();
-  assert.deepEqual([state.alive, alive()], [0, 0]);
+  assert.deepEqual([state.alive, await alive()], [0, 0]);
 });
 
 test('one that is freed while workers start takes none', async () => {
@@ -189,13 +189,13 @@ test('one that is freed while workers start takes none', async () => {
   const { photograph, state } = received();
   const frame = assert.rejects(picture(photograph, crew), { code: 'internal' });
   await settle();
-  assert.equal(alive(), 2);
+  assert.equal(await alive(), 2);
   photograph.free();
   await settle();
   for (const worker of workers) worker.start();
   await frame;
   await settle();
-  assert.deepEqual([state.alive, alive()], [0, 0]);
+  assert.deepEqual([state.alive, await alive()], [0, 0]);
   assert.ok(workers.every(({ log }) => !log.includes('put')));
 });
 

@@ -106,6 +106,7 @@ class SetUp<D extends Drawing> {
   readonly drawing: D;
   readonly held: Held;
   readonly quality = new Quality();
+  freed = false;
   /** Why it no longer works, once it does not. */
   lost: string | null = null;
   /** Whether it has drawn a frame. */
@@ -121,7 +122,10 @@ class SetUp<D extends Drawing> {
     held.hold();
   }
 
+  /** Once. */
   free(): void {
+    if (this.freed) return;
+    this.freed = true;
     this.drawing.free();
     this.held.release();
   }
@@ -319,6 +323,11 @@ export class Player<D extends Drawing> {
       if (active === this.#active) this.#tell(active, sameLight ? drawn : null, detail);
       return active.drawing;
     } catch (thrown) {
+      if (active === this.#active && active.freed) {
+        // The photograph that is there by now draws.
+        this.#whole ||= whole;
+        return this.#renderSoon();
+      }
       if (active !== this.#active) {
         // What becomes of one that has been let go is nobody's concern. What comes in its place draws.
         if (held !== this.#held || !this.#search) throw notLoaded(thrown);
@@ -450,6 +459,8 @@ export class Player<D extends Drawing> {
     this.#held?.release();
     this.#held = new Held(photo);
     const { backend } = this;
+    // On the CPU nothing of it is needed for its picture to stay, and memory may be for one only.
+    if (backend === 'cpu') this.#active?.free();
     if (!this.#settings) return;
     const { wanted } = this.#settings;
     // What could not draw the one before will not draw this one.
@@ -495,7 +506,10 @@ export class Player<D extends Drawing> {
       if (signal.aborted) return;
       this.#search = null;
       // The whole photograph will tell.
-      if (held.photo.share < 1) return;
+      if (held.photo.share < 1) {
+        if (this.#active?.freed) this.#active = null;
+        return;
+      }
       this.#dropActive();
       const { code, message } = toPhotoError(thrown);
       this.#fail(new PhotoError(code, why ? `${why} ${message}` : message, thrown));
