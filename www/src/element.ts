@@ -1,68 +1,52 @@
-/** `<relightable-photo>`: attributes and pointer in, events and a picture out. */
+/** `<relightable-photo>`: attributes and visitors in, events and a picture out. */
 
+import { type Asked, readAsked } from './asked.js';
 import { Attributes } from './attributes.js';
-import type { CanvasSurface } from './canvas.js';
+import { blobOf, type CanvasSurface, resampled } from './canvas.js';
+import { Curtain } from './curtain.js';
 import { newDecoder } from './decoders.js';
 import { draw } from './drawings.js';
 import type { Backend, Gamut } from './engine.js';
-import { PhotoError } from './errors.js';
+import type { PhotoError } from './errors.js';
 import {
   BackendChangeEvent,
+  ContextLostEvent,
   LightChangeEvent,
   loadEvent,
   PhotoErrorEvent,
   progressEvent,
   QualityChangeEvent,
   type RelightablePhotoEventMap,
+  ViewChangeEvent,
 } from './events.js';
-import { LightFollower } from './light-follower.js';
-import { checkLightSource, type LightSource } from './light-source.js';
-import type { LightSetting } from './lights.js';
+import { languageAt } from './language.js';
+import { checkLightSource, isLightSource, type LightSource } from './light-source.js';
+import { lightWords } from './light-words.js';
+import { Lighting } from './lighting.js';
 import { openPhoto } from './load.js';
 import type { Facts } from './photograph.js';
 import { Player } from './player.js';
+import { ATTRIBUTES, PROPERTIES, type Reflected, reflect } from './reflect.js';
 import {
   BACKENDS,
+  CENTRE,
   clampToPicture,
+  type LightName,
   type PicturePoint,
-  parseBackends,
-  parseExposure,
-  parseGamut,
   parseLight,
-  parseTone,
-  parseWhiteBalance,
-  stepTorch,
 } from './settings.js';
 import { unwatch, watch } from './sight.js';
+import { readState, writeState } from './state.js';
+import { mayTilt } from './tilting.js';
+import { browserColor, parseColor, tinted } from './tint.js';
+import { Toolbar } from './toolbar.js';
 import { View } from './view.js';
+import { clampView, type PhotoView, sameView, WHOLE } from './viewport.js';
+import { Visitor } from './visitor.js';
+import { type Language, say } from './words.js';
 
 // On a server there are no elements, but importing this module must not fail there.
 const Base = globalThis.HTMLElement ?? (class {} as unknown as typeof HTMLElement);
-
-const ATTRIBUTES = [
-  'src',
-  'alt',
-  'light',
-  'backend',
-  'exposure',
-  'white-balance',
-  'tone',
-  'gamut',
-] as const;
-/** Properties that a page may have set before this class was known. */
-const PROPERTIES = [
-  'src',
-  'alt',
-  'light',
-  'backend',
-  'exposure',
-  'whiteBalance',
-  'tone',
-  'gamut',
-  'torch',
-  'lightSource',
-] as const;
-const CENTRE: PicturePoint = { x: 0.5, y: 0.5 };
 
 /** What is known of a photograph once it has loaded. */
 export interface PhotoInfo extends Omit<Facts, 'metadata'> {
@@ -76,155 +60,115 @@ export interface BlobOptions {
   readonly type?: string;
   /** 0 to 1, for types that lose some. */
   readonly quality?: number;
+  /** Factor on the picture's pixels along either side, up to 4. */
+  readonly scale?: number;
 }
+
+/** What `setLight` takes of a built-in light. What is left out stays. */
+export interface LightPose {
+  readonly name?: LightName;
+  /** Where a torch shines, 0 to 1 across the picture, */
+  readonly x?: number;
+  /** and down. */
+  readonly y?: number;
+  /** Radius of a torch, as a fraction of the light plane's shorter side. */
+  readonly size?: number;
+  /** Any CSS colour. */
+  readonly color?: string;
+}
+
+/** What shines, as it is told. */
+interface Shining {
+  readonly name: LightName;
+  readonly torch: PicturePoint | null;
+  readonly source: LightSource | null;
+}
+
+const MAX_SCALE = 4;
+
+/** Attributes that take the place of what a visitor chose. */
+const OVERRULES = {
+  light: 'name',
+  'light-src': 'name',
+  'light-x': 'torch',
+  'light-y': 'torch',
+  'light-size': 'size',
+  'light-color': 'color',
+} as const;
 
 /**
  * A photograph that can be relit.
  *
- * Fires `load`, `progress`, `error`, `lightchange`, `backendchange` and `qualitychange`. Style it by
- * `::part(picture)`, `::part(canvas)`, `::part(progress)` and `::part(message)`, and by the custom
- * properties `--relightable-photo-background`, `-color`, `-accent`, `-focus` and `-aspect`, the last being
- * the space kept until the photograph is there.
+ * Fires `load`, `progress`, `error`, `lightchange`, `viewchange`, `backendchange`, `contextlost` and
+ * `qualitychange`. Takes the slots `poster`, `progress`, `controls` and `error`. Style it by
+ * `::part()` of picture, canvas, poster, progress, message, controls, menu, button, torch-handle, hint
+ * and status, and by the custom properties `--relightable-photo-background`, `-color`, `-accent`,
+ * `-focus` and `-aspect`, the last being the space kept until the photograph is there.
  */
-// biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the interface only adds overloads of methods that Base has
+// biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the interface adds the properties that are attributes, and overloads of methods that Base has
 export class RelightablePhoto extends Base {
-  static readonly observedAttributes: readonly string[] = ATTRIBUTES;
+  static readonly observedAttributes: readonly string[] = [...ATTRIBUTES, 'lang'];
+
+  static {
+    reflect(RelightablePhoto.prototype);
+  }
 
   readonly #view: View;
+  readonly #toolbar: Toolbar;
+  readonly #visitor: Visitor;
   readonly #player: Player<CanvasSurface>;
-  #torch: PicturePoint | null = null;
-  #follower: LightFollower | null = null;
-  #seen = true;
+  readonly #attributes = new Attributes();
+  readonly #curtain = new Curtain();
+  readonly #lighting = new Lighting({
+    changed: () => this.#player.redraw(),
+    faultChanged: (fault) => this.#lightFaultChanged(fault),
+  });
+  #asked: Asked | null = null;
+  #part = WHOLE;
+  #toldPart = WHOLE;
+  #told: Shining | null = null;
+  #exposure: number | null = null;
+  /** Whether somebody had things stop or go on that move by themselves. */
+  #paused: boolean | null = null;
+  #language: Language = 'en';
+  /** The address that was given to the player. */
+  #fetched: string | null | undefined;
   #reload = false;
   #scheduled = false;
-  readonly #attributes = new Attributes();
+  #listening: AbortController | null = null;
   #playerFault: string | null = null;
   #lightFault: PhotoError | null = null;
-  /** The light of the last attributes that were right. */
-  #lit: LightSetting | null = null;
 
   constructor() {
     super();
-    this.#view = new View(this.attachShadow({ mode: 'open' }));
-    this.#player = new Player(
-      {
-        open: (src, signal, onProgress) =>
-          openPhoto(src, signal, onProgress, {
-            decoder: newDecoder,
-            fetch: (...request) => fetch(...request),
-            pause,
-          }),
-        draw,
-        nextFrame: requestAnimationFrame.bind(globalThis),
-        later: (ms, callback) => {
-          const timer = setTimeout(callback, ms);
-          return () => clearTimeout(timer);
-        },
-        now: () => performance.now(),
+    const root = this.attachShadow({ mode: 'open' });
+    this.#view = new View(root);
+    this.#toolbar = new Toolbar({
+      choose: (item) => {
+        this.#lighting.item = item;
+        this.#visitor.touch();
+        this.#schedule();
       },
-      {
-        loading: () => {
-          this.#playerFault = null;
-          this.#lightFault = null;
-          this.#view.clear();
-          this.#view.progress(Number.NaN);
-          this.#showFault();
-        },
-        progress: (loaded, total) => {
-          this.#view.progress(total > 0 ? Math.min(1, loaded / total) : Number.NaN);
-          this.dispatchEvent(progressEvent(loaded, total));
-        },
-        drawn: (fault) => {
-          // A light that stays wrong says so once, not at every frame with other numbers.
-          if (fault?.code === this.#lightFault?.code) return;
-          this.#lightFault = fault;
-          this.#lightFaultChanged(fault);
-        },
-        detailChanged: (detail) => this.dispatchEvent(new QualityChangeEvent(detail)),
-        loaded: () => {
-          this.#view.progress(null);
-          this.dispatchEvent(loadEvent());
-        },
-        backendChanged: (drawing, backend, previous, reason) => {
-          this.#view.show(drawing.canvas);
-          this.dispatchEvent(new BackendChangeEvent(backend, previous, reason));
-        },
-        failed: (error) => {
-          this.#playerFault = error.message;
-          this.#fail(error);
-        },
-        recovered: () => {
-          this.#playerFault = null;
-          this.#showFault();
-        },
+      play: () => {
+        this.paused = !this.paused;
       },
-    );
-    this.#listen();
-  }
-
-  /** Address of the `.ltm` file. */
-  get src(): string {
-    return this.getAttribute('src') ?? '';
-  }
-  set src(value: string) {
-    this.setAttribute('src', value);
-  }
-
-  /** What the picture shows, in words. */
-  get alt(): string {
-    return this.getAttribute('alt') ?? '';
-  }
-  set alt(value: string) {
-    this.setAttribute('alt', value);
-  }
-
-  /** Name of a built-in light. */
-  get light(): string {
-    return this.getAttribute('light') ?? 'flood';
-  }
-  set light(value: string) {
-    this.setAttribute('light', value);
-  }
-
-  /** Back ends to try, in order, parted by spaces. */
-  get backend(): string {
-    return this.getAttribute('backend') ?? 'webgpu webgl2 cpu';
-  }
-  set backend(value: string) {
-    this.setAttribute('backend', value);
-  }
-
-  /** Factor on the light's brightness. */
-  get exposure(): number {
-    const value = this.getAttribute('exposure');
-    return value === null ? 1 : Number(value);
-  }
-  set exposure(value: number) {
-    this.setAttribute('exposure', String(value));
-  }
-
-  /** Factors on red, green and blue. */
-  get whiteBalance(): string {
-    return this.getAttribute('white-balance') ?? '1 1 1';
-  }
-  set whiteBalance(value: string) {
-    this.setAttribute('white-balance', value);
-  }
-
-  /** What becomes of brightness: `clip`, cut off at white, or `filmic`, rolled off before it. */
-  get tone(): string {
-    return this.getAttribute('tone') ?? 'clip';
-  }
-  set tone(value: string) {
-    this.setAttribute('tone', value);
-  }
-
-  /** Colours that the canvas is to show: `srgb` or `display-p3`. */
-  get gamut(): string {
-    return this.getAttribute('gamut') ?? 'srgb';
-  }
-  set gamut(value: string) {
-    this.setAttribute('gamut', value);
+      zoom: (by) => this.#visitor.zoom(by),
+      reset: () => this.reset(),
+      tilt: () => {
+        if (!this.#visitor.tilts) void this.requestTilt();
+        else this.#visitor.reset();
+        this.#schedule();
+      },
+      fullscreen: () => this.#toggleFullscreen(),
+    });
+    this.#view.furnish(this.#toolbar.menu, this.#toolbar.bar);
+    this.#player = this.#newPlayer();
+    this.#visitor = this.#newVisitor(root);
+    this.#view.revealButton.addEventListener('click', () => {
+      this.#visitor.touch();
+      this.dismissPoster();
+    });
+    this.addEventListener('fullscreenchange', () => this.#schedule());
   }
 
   /** Colours that the canvas shows: those asked for where the browser can; `null` without a picture. */
@@ -232,40 +176,60 @@ export class RelightablePhoto extends Base {
     return this.#player.drawing?.gamut ?? null;
   }
 
+  /** The built-in light that shines, or that a source stands in for: a visitor may have chosen it. */
+  get activeLight(): LightName {
+    return this.#lighting.name;
+  }
+
   /** Where the torch shines, on the picture; `null`: over the middle of the light. */
   get torch(): PicturePoint | null {
-    return this.#torch;
+    return this.#lighting.torch;
   }
   set torch(point: PicturePoint | null) {
     if (point && !(Number.isFinite(point.x) && Number.isFinite(point.y))) {
       throw new TypeError('torch must be null or have finite numbers x and y, from 0 to 1');
     }
-    this.#torch = point && clampToPicture(point);
+    this.#lighting.torch = point;
+    this.#schedule();
+  }
+
+  /** The part of the picture that is shown: its middle, and a magnification of no more than `zoom`. */
+  get view(): PhotoView {
+    return this.#part;
+  }
+  set view(view: PhotoView) {
+    if (![view?.zoom, view?.x, view?.y].every(Number.isFinite)) {
+      throw new TypeError('view must have finite numbers zoom, from 1, and x and y, from 0 to 1');
+    }
+    this.#part = clampView(view, this.zoom);
+    this.#schedule();
+  }
+
+  /** Whether what moves by itself stands still: fire, the film of `light-src`, the wandering torch. */
+  get paused(): boolean {
+    return this.#paused ?? motion().matches;
+  }
+  set paused(paused: boolean) {
+    this.#paused = paused;
     this.#schedule();
   }
 
   /**
-   * What shines in place of the built-in light; `null`, to begin with, where that one does. The built-in
+   * What shines in place of the built-in light, by a script; `null`, to begin with, where none does. The built-in
    * light or the last one stays until there is something to be seen, and where something is wrong with
    * the source. Frames of videos and streams are followed while the element is in view. A canvas that is
    * drawn on by WebGL has to have `preserveDrawingBuffer`, as it is looked at after its own frame.
    */
   get lightSource(): LightSource | null {
-    return this.#follower?.source ?? null;
+    return this.#lighting.source;
   }
   set lightSource(value: LightSource | null) {
     const source = value === null ? null : checkLightSource(value);
-    if (source === this.lightSource) {
+    if (source !== null && source === this.#lighting.shining) {
       this.lightChanged();
       return;
     }
-    this.#follower?.stop();
-    this.#follower =
-      source &&
-      new LightFollower(source, {
-        changed: () => this.#player.redraw(),
-        faultChanged: (fault) => this.#lightFaultChanged(fault),
-      });
+    this.#lighting.source = source;
     this.#lightFault = null;
     this.#schedule();
   }
@@ -275,7 +239,90 @@ export class RelightablePhoto extends Base {
    * telling.
    */
   lightChanged(): void {
-    if (this.#follower) this.#player.redraw();
+    if (this.#lighting.shining) this.#player.redraw();
+  }
+
+  /**
+   * Has a light shine until `reset`, or until an attribute asks for another: a built-in one by its name, with
+   * its place, size and colour if need be, or a source, as by `lightSource`. `null`: the page's own, without a source.
+   */
+  setLight(light: LightName | LightPose | LightSource | null): void {
+    if (light === null) {
+      this.lightSource = null;
+      this.#lighting.reset();
+    } else if (typeof light === 'string') {
+      this.setLight({ name: light });
+      return;
+    } else if (isLightSource(light)) {
+      this.lightSource = light;
+      return;
+    } else {
+      const { name, x, y, size, color } = light;
+      const torch = this.torch ?? CENTRE;
+      const placed = x !== undefined || y !== undefined;
+      this.#lighting.choose({
+        ...(name !== undefined && { name: parseLight(name) }),
+        ...(placed && { torch: clampToPicture({ x: x ?? torch.x, y: y ?? torch.y }) }),
+        ...(size !== undefined && { size }),
+        ...(color !== undefined && { color: parseColor(color, browserColor) }),
+      });
+    }
+    this.#schedule();
+  }
+
+  /** Light and view as the attributes and `lightSource` say. */
+  reset(): void {
+    this.#visitor.reset();
+    this.#lighting.reset();
+    this.#part = WHOLE;
+    this.#exposure = null;
+    this.#paused = null;
+    this.#schedule();
+  }
+
+  /** Light and view in a few letters, all of which addresses may hold. What a source shows is not among it. */
+  getState(): string {
+    const exposure = this.#exposure ?? this.exposure;
+    const asked = this.#asked ?? this.#read();
+    this.#lighting.ask(asked.light, asked.crossOrigin);
+    const { item, torch, size, color } = this.#lighting;
+    return writeState({
+      light: item === 'projection' ? null : item,
+      torch: item === 'torch' ? torch : null,
+      size: item === 'torch' ? size : null,
+      color: color?.hex ?? null,
+      exposure: exposure === 1 ? null : exposure,
+      view: this.#part,
+    });
+  }
+
+  /** Takes what `getState` gave, here or at another element. What it does not tell is as the page asks. */
+  setState(text: string): void {
+    const { state, faults } = readState(text);
+    this.reset();
+    this.#lighting.choose({
+      name: state.light,
+      torch: state.torch && clampToPicture(state.torch),
+      size: state.size,
+      color: parseColor(state.color, browserColor),
+    });
+    this.#exposure = state.exposure;
+    this.#part = clampView(state.view, this.zoom);
+    for (const fault of faults) this.dispatchEvent(new PhotoErrorEvent(fault));
+  }
+
+  /** Has the poster give way, as soon as there is a picture. */
+  dismissPoster(): void {
+    this.#curtain.lifted = true;
+    this.#schedule();
+  }
+
+  /**
+   * Has the torch follow how the device is held. Gives whether it may; some browsers ask the visitor, who
+   * must have pressed something just before. Ends with `reset`.
+   */
+  requestTilt(): Promise<boolean> {
+    return this.#visitor.tilt();
   }
 
   /** The back end that draws, `null` while there is none. */
@@ -303,18 +350,23 @@ export class RelightablePhoto extends Base {
   }
 
   /**
-   * Draws the picture as it is set now, in full detail, and encodes it. Rejects with `not-loaded` while there is no
-   * photograph, and where another takes its place meanwhile.
+   * Draws the picture as it is set now, all of it in full detail, and encodes it. Rejects with `not-loaded`
+   * while there is no photograph, and where another takes its place meanwhile.
    */
-  async toBlob({ type = 'image/png', quality }: BlobOptions = {}): Promise<Blob> {
+  async toBlob({ type = 'image/png', quality, scale = 1 }: BlobOptions = {}): Promise<Blob> {
+    if (!(scale > 0 && scale <= MAX_SCALE)) {
+      throw new RangeError(`scale must be more than 0 and at most ${MAX_SCALE}`);
+    }
     this.#update();
+    const drawing = await this.#player.renderNow();
     // The canvas of a GPU keeps its content only until the browser has shown it.
-    return (await this.#player.renderNow()).toBlob(type, quality);
+    if (scale === 1) return drawing.toBlob(type, quality);
+    return blobOf(resampled(drawing.canvas, scale, drawing.gamut), type, quality);
   }
 
   connectedCallback(): void {
     // Properties that were set before this class was known hide its setters.
-    for (const name of PROPERTIES) {
+    for (const name of [...PROPERTIES, 'torch', 'lightSource', 'view', 'paused'] as const) {
       if (Object.hasOwn(this, name)) {
         const value = this[name];
         delete (this as Record<string, unknown>)[name];
@@ -332,7 +384,135 @@ export class RelightablePhoto extends Base {
   attributeChangedCallback(name: string): void {
     // As with <img>, setting the same address again loads again.
     if (name === 'src') this.#reload = true;
+    if (name in OVERRULES) {
+      this.#lighting.choose({ [OVERRULES[name as keyof typeof OVERRULES]]: null });
+    }
     this.#schedule();
+  }
+
+  #newPlayer(): Player<CanvasSurface> {
+    return new Player(
+      {
+        open: (src, signal, onProgress) =>
+          openPhoto(src, signal, onProgress, {
+            decoder: newDecoder,
+            fetch: (...request) => fetch(...request),
+            pause,
+          }),
+        draw,
+        nextFrame: requestAnimationFrame.bind(globalThis),
+        later: (ms, callback) => {
+          const timer = setTimeout(callback, ms);
+          return () => clearTimeout(timer);
+        },
+        now: () => performance.now(),
+      },
+      {
+        loading: () => {
+          this.#clear();
+          this.#view.progress(Number.NaN);
+        },
+        progress: (loaded, total) => {
+          this.#view.progress(total > 0 ? Math.min(1, loaded / total) : Number.NaN);
+          this.dispatchEvent(progressEvent(loaded, total));
+        },
+        drawn: ({ asked, fault }, light) => {
+          if (!this.#curtain.drawn) {
+            this.#curtain.drawn = true;
+            this.#schedule();
+          }
+          if (asked && light.picture && light.picture === this.#lighting.setting.picture) {
+            this.#tellLight();
+          }
+          // A light that stays wrong says so once, not at every frame with other numbers.
+          if (fault?.code === this.#lightFault?.code) return;
+          this.#lightFault = fault;
+          this.#lightFaultChanged(fault);
+        },
+        detailChanged: (detail) => this.dispatchEvent(new QualityChangeEvent(detail)),
+        loaded: () => {
+          this.#view.progress(null);
+          this.#view.tell(say('loaded', this.#language));
+          this.dispatchEvent(loadEvent());
+        },
+        drawingChanged: (drawing) => {
+          this.#view.show(drawing.canvas);
+          this.#schedule();
+        },
+        backendChanged: (backend, previous, reason) => {
+          this.dispatchEvent(new BackendChangeEvent(backend, previous, reason));
+        },
+        lost: (backend, message) => this.dispatchEvent(new ContextLostEvent(backend, message)),
+        failed: (error) => {
+          this.#playerFault = error.message;
+          this.#view.progress(null);
+          this.#schedule();
+          this.#showFault();
+          this.dispatchEvent(new PhotoErrorEvent(error));
+        },
+        recovered: () => {
+          this.#playerFault = null;
+          this.#schedule();
+        },
+      },
+    );
+  }
+
+  #newVisitor(root: ShadowRoot): Visitor {
+    const element = this;
+    return new Visitor(root, this.#view, {
+      lighting: this.#lighting,
+      get view() {
+        return element.#part;
+      },
+      set view(view) {
+        if (sameView(view, element.#part)) return;
+        element.#part = view;
+        const zoom = view.zoom.toLocaleString(element.#language, { maximumFractionDigits: 1 });
+        element.#view.tell(say('zoomed', element.#language, zoom));
+        element.#schedule();
+      },
+      get mostZoom() {
+        return element.#asked?.zoom ?? 1;
+      },
+      get cooperative() {
+        return element.#asked?.cooperative ?? false;
+      },
+      get shown() {
+        return element.#shown;
+      },
+      get plays() {
+        return !element.paused;
+      },
+      get breathes() {
+        return element.#asked?.breathes ?? false;
+      },
+      changed: () => this.#schedule(),
+      lightChosen: () => {
+        this.#view.tell(
+          `${say('light', this.#language)}: ${say(this.#lighting.item, this.#language)}`,
+        );
+        this.#schedule();
+      },
+      leave: () => {
+        if (this.matches(':fullscreen')) this.#toggleFullscreen();
+        else (this.shadowRoot?.activeElement as HTMLElement | null)?.blur();
+      },
+      hint: (by) => {
+        const key = /mac|iphone|ipad/i.test(navigator.platform) ? '⌘' : 'Ctrl';
+        const word = by === 'wheel' ? 'wheelHint' : 'touchHint';
+        this.#view.hint(say(word, this.#language, key));
+      },
+      expired: () => {
+        this.reset();
+        this.#toolbar.close();
+        if (this.matches(':fullscreen')) this.#toggleFullscreen();
+      },
+      touched: (byKey) => {
+        if (byKey) this.#toolbar.stay();
+        else this.#toolbar.wake();
+      },
+    });
   }
 
   /** Changes come in bunches: they are looked at together, once the current script is done. */
@@ -347,132 +527,188 @@ export class RelightablePhoto extends Base {
   #update(): void {
     this.#scheduled = false;
     if (!this.isConnected) {
-      unwatch(this);
-      this.#follower?.stop();
-      this.#player.stop();
-      this.#view.clear();
-      this.#attributes.clear();
-      this.#playerFault = null;
-      this.#lightFault = null;
+      this.#letGo();
       return;
     }
-    watch(this, (seen) => {
-      this.#seen = seen;
-      this.#player.setVisible(seen);
-      this.#follow();
+    if (!this.#listening) {
+      this.#listening = new AbortController();
+      const { signal } = this.#listening;
+      motion().addEventListener('change', () => this.#schedule(), { signal });
+    }
+    watch(this, (sight, is) => {
+      this.#curtain[sight] = is;
+      if (sight === 'seen') this.#player.setVisible(is);
+      this.#schedule();
     });
-    this.#follow();
-    const read = <T>(name: string, parse: (value: string | null) => T): T =>
-      this.#attributes.read(name, this.getAttribute(name), parse);
-    const name = read('light', parseLight);
-    const order = read('backend', parseBackends);
-    const look = {
-      exposure: read('exposure', parseExposure),
-      whiteBalance: read('white-balance', parseWhiteBalance),
-      tone: read('tone', parseTone),
-    };
-    const wanted = {
-      backends: order ?? BACKENDS,
-      // Who names back ends knows better.
-      software: order !== null,
-      gamut: read('gamut', parseGamut),
-    };
-    const src = read('src', (value) => this.#address(value));
-    const lit = this.#lit;
-    const torch = name === 'torch' ? this.#torch : null;
-    const picture = this.#follower?.picture ?? null;
-    const light = { name, torch, picture };
-    this.#lit = light;
-    this.#describe();
-    this.#showFault();
+    const asked = this.#read();
+    this.#lighting.ask(asked.light, asked.crossOrigin);
+    this.#lighting.follow(this.#curtain.seen, !this.paused);
+    this.#part = clampView(this.#part, asked.zoom);
+    this.#language = languageAt(this);
+    this.#present(asked);
     for (const fault of this.#attributes.takeFaults()) {
       this.dispatchEvent(new PhotoErrorEvent(fault));
     }
+    this.#load(asked);
+    if (!this.#told || !this.#lighting.shining) this.#tellLight();
+    if (!sameView(this.#part, this.#toldPart)) {
+      this.#toldPart = this.#part;
+      this.dispatchEvent(new ViewChangeEvent(this.#part));
+    }
+  }
+
+  #read(): Asked {
+    this.#asked = readAsked(this, this.#attributes, browserColor);
+    return this.#asked;
+  }
+
+  /** Has the player do what is asked for, as soon as the photograph may be fetched. */
+  #load(asked: Asked): void {
+    const { src } = asked;
     // An address that is none is no reason to load what was there before, or to miss it.
     const badAddress = this.#attributes.isWrong('src');
+    if (src === null && badAddress) return;
     const reload = this.#reload && !badAddress;
-    this.#reload = false;
-    if (src !== null || !badAddress) this.#player.set({ src, wanted, look, light }, reload);
-    if (lit && !sameLight(lit, light)) {
-      const moved = picture ? null : torch;
-      this.dispatchEvent(new LightChangeEvent(name, moved, this.lightSource));
+    if (reload || src !== this.#fetched) {
+      if (src !== null && !this.#curtain.mayFetch(asked)) {
+        if (this.#fetched !== undefined && this.#fetched !== src) this.#forget();
+        return;
+      }
+      this.#reload = false;
+      this.#fetched = src;
     }
+    const tint = asked.light.color?.tint;
+    const color = this.#lighting.color?.tint ?? tint;
+    const whiteBalance = color ? tinted(asked.whiteBalance, color) : asked.whiteBalance;
+    const wanted = {
+      backends: asked.backends ?? BACKENDS,
+      // Who names back ends knows better.
+      software: asked.backends !== null,
+      gamut: asked.gamut,
+    };
+    const look = {
+      exposure: this.#exposure ?? asked.exposure,
+      whiteBalance,
+      tone: asked.tone,
+    };
+    this.#player.set({ src, wanted, look, light: this.#lighting.setting }, reload);
   }
 
-  /** Keeps up with the source of light while it matters. */
-  #follow(): void {
-    if (this.#seen && this.isConnected) this.#follower?.start();
-    else this.#follower?.stop();
-  }
-
-  get #holdsTorch(): boolean {
-    return this.#lit?.name === 'torch' && !this.#lit.picture;
-  }
-
-  #describe(): void {
-    this.#view.describe(this.getAttribute('alt'), this.#holdsTorch);
-  }
-
-  #address(value: string | null): string | null {
-    const src = value?.trim();
-    if (!src) return null;
-    try {
-      return new URL(src, this.baseURI).href;
-    } catch (cause) {
-      throw new PhotoError('attribute', `The address “${src}” in src is not a URL.`, cause);
-    }
-  }
-
-  #fail(error: PhotoError): void {
-    this.#view.progress(null);
+  /** Shows all of it but the picture itself. */
+  #present(asked: Asked): void {
+    const { zoom, cooperative, poster, crossOrigin } = asked;
+    const light = this.#shown && this.#lighting.holdsTorch;
+    const zooms = this.#shown && zoom > 1;
+    const zoomed = this.#part.zoom > 1;
+    const at = this.#lighting.torch ?? CENTRE;
+    this.#view.describe(this.getAttribute('alt'), this.#language);
+    const holds = zooms && !cooperative && (light || zoomed);
+    this.#view.arrange({
+      light,
+      focusable: zooms && !light,
+      zoomed,
+      touch: holds ? 'hold' : light || zooms ? 'scroll' : 'page',
+    });
+    this.#view.place(this.#part, at, lightWords(at, this.#language));
+    const covered = this.#playerFault !== null || this.#curtain.isDown(asked);
+    this.#view.poster(poster, crossOrigin, covered, this.#curtain.awaitsPress(asked));
     this.#showFault();
-    this.dispatchEvent(new PhotoErrorEvent(error));
+    this.#toolbar.bar.hidden = !asked.controls || !this.#shown;
+    if (this.#toolbar.bar.hidden) this.#toolbar.close();
+    else this.#fillToolbar(zoom);
+    this.#visitor.update(this.#curtain.seen, asked.kiosk);
   }
 
-  /** Nothing else ends by it: a photograph goes on loading. */
+  #fillToolbar(most: number): void {
+    const { items, item, holdsTorch, canPlay } = this.#lighting;
+    const { zoom } = this.#part;
+    const breathes = holdsTorch && this.#asked?.breathes;
+    this.#toolbar.update({
+      language: this.#language,
+      items,
+      item,
+      plays: canPlay || breathes ? !this.paused : null,
+      zoom: most > 1 ? { in: zoom < most, out: zoom > 1 } : null,
+      tilts: holdsTorch && mayTilt() ? this.#visitor.tilts : null,
+      fullscreen: document.fullscreenEnabled ? this.matches(':fullscreen') : null,
+    });
+  }
+
+  /** Whether there is a picture to be seen and touched. */
+  get #shown(): boolean {
+    const { drawn } = this.#curtain;
+    return drawn && !!this.#asked && !this.#curtain.isDown(this.#asked) && !this.#playerFault;
+  }
+
+  #tellLight(): void {
+    const { name, torch, picture } = this.#lighting.setting;
+    const drawn = picture !== null && this.#told !== null;
+    const source = drawn ? this.#lighting.shining : null;
+    const now = { name, torch: source ? null : torch, source };
+    const before = this.#told;
+    this.#told = now;
+    if (before && !sameShining(before, now)) {
+      this.dispatchEvent(new LightChangeEvent(name, now.torch, source));
+    }
+  }
+
   #lightFaultChanged(fault: PhotoError | null): void {
     this.#showFault();
+    // Nothing else ends by it: a photograph goes on loading.
     if (fault) this.dispatchEvent(new PhotoErrorEvent(fault));
   }
 
   #showFault(): void {
-    const source = this.#follower?.fault?.message;
-    this.#view.message(
-      this.#attributes.message ?? this.#playerFault ?? source ?? this.#lightFault?.message ?? null,
-    );
+    const source = this.#lighting.fault?.message;
+    const message =
+      this.#attributes.message ?? this.#playerFault ?? source ?? this.#lightFault?.message;
+    const fatal = this.#playerFault !== null;
+    this.#view.fault(message === undefined ? null : { fatal, message }, this.#language);
   }
 
-  #listen(): void {
-    const { picture } = this.#view;
-    const holdsTorch = () => this.#holdsTorch && this.activeBackend !== null;
-    const follow = (event: PointerEvent) => {
-      if (!holdsTorch()) return;
-      const { left, top, width, height } = picture.getBoundingClientRect();
-      if (width === 0 || height === 0) return;
-      this.torch = { x: (event.clientX - left) / width, y: (event.clientY - top) / height };
-    };
-    picture.addEventListener('pointermove', follow);
-    picture.addEventListener('pointerdown', (event) => {
-      if (!holdsTorch() || !event.isPrimary || event.button !== 0) return;
-      follow(event);
-      // A drag that leaves the picture keeps the torch at its edge. (A pointer that a script made up
-      // cannot be captured.)
-      if (event.isTrusted) picture.setPointerCapture(event.pointerId);
-    });
-    picture.addEventListener('keydown', (event) => {
-      if (!holdsTorch() || event.ctrlKey || event.metaKey || event.altKey) return;
-      const moved = stepTorch(this.#torch ?? CENTRE, event.key, event.shiftKey);
-      if (!moved) return;
-      event.preventDefault();
-      this.torch = moved;
-    });
+  #toggleFullscreen(): void {
+    // Refused where the page's own frame, or the visitor, does not allow it.
+    const done = this.matches(':fullscreen') ? document.exitFullscreen() : this.requestFullscreen();
+    void done.catch(() => {});
+  }
+
+  #clear(): void {
+    this.#curtain.drawn = false;
+    this.#playerFault = null;
+    this.#lightFault = null;
+    this.#view.clear();
+    this.#showFault();
+  }
+
+  /** What is shown is not what is asked for any more. */
+  #forget(): void {
+    this.#player.stop();
+    this.#fetched = undefined;
+    this.#clear();
+  }
+
+  #letGo(): void {
+    unwatch(this);
+    this.#listening?.abort();
+    this.#listening = null;
+    this.#curtain.near = false;
+    this.#curtain.seen = false;
+    this.#visitor.stop();
+    this.#lighting.follow(false, false);
+    this.#attributes.clear();
+    this.#forget();
   }
 }
 
-/** Under a picture, built-in lights do not shine. */
-function sameLight(a: LightSetting, b: LightSetting): boolean {
-  if (a.picture || b.picture) return a.picture === b.picture;
-  return a.name === b.name && a.torch === b.torch;
+/** Under a source, built-in lights do not shine. */
+function sameShining(a: Shining, b: Shining): boolean {
+  if (a.source || b.source) return a.source === b.source;
+  return a.name === b.name && a.torch?.x === b.torch?.x && a.torch?.y === b.torch?.y;
+}
+
+/** Whether the visitor asks for less motion. */
+function motion(): MediaQueryList {
+  return matchMedia('(prefers-reduced-motion: reduce)');
 }
 
 /** Gives the page its turn. */
@@ -481,8 +717,8 @@ function pause(): Promise<void> {
   return scheduler?.yield?.() ?? new Promise((resolve) => setTimeout(resolve));
 }
 
-/** Listeners with the element's own events, typed. */
-export interface RelightablePhoto {
+/** Attributes as properties, and listeners with the element's own events, typed. */
+export interface RelightablePhoto extends Reflected {
   addEventListener<K extends keyof RelightablePhotoEventMap>(
     type: K,
     listener: (this: RelightablePhoto, event: RelightablePhotoEventMap[K]) => unknown,

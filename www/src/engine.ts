@@ -110,6 +110,8 @@ export interface Engine {
   Light: {
     builtin(photo: Photo, name: string): Light;
     torch(photo: Photo, x: number, y: number, size?: number): Light;
+    /** A fire that has burnt for so many seconds. */
+    fire(photo: Photo, seconds: number): Light;
     /** A picture of any size, in linear RGB, row by row. */
     fromLinear(photo: Photo, values: Float32Array, width: number, height: number): Light;
     /** A picture of any size, in sRGB: RGBA, row by row, colours apart from alpha. */

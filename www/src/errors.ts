@@ -4,6 +4,8 @@
 export type PageErrorCode =
   /** An attribute has a value the element does not know. */
   | 'attribute'
+  /** What `setState` was given has something in it that cannot be. */
+  | 'state'
   /** There is no `src`. */
   | 'src-missing'
   /** The server could not be reached, or its answer may not be read from this page. */

@@ -2,7 +2,7 @@
 
 import { RelightablePhoto } from './element.js';
 
-export type { BlobOptions, PhotoInfo } from './element.js';
+export type { BlobOptions, LightPose, PhotoInfo } from './element.js';
 export { RelightablePhoto } from './element.js';
 export type { Backend } from './engine.js';
 export type { EngineErrorCode, ErrorCode, PageErrorCode } from './errors.js';
@@ -10,9 +10,11 @@ export { PhotoError } from './errors.js';
 export type { RelightablePhotoEventMap } from './events.js';
 export {
   BackendChangeEvent,
+  ContextLostEvent,
   LightChangeEvent,
   PhotoErrorEvent,
   QualityChangeEvent,
+  ViewChangeEvent,
 } from './events.js';
 export type {
   BrowserPicture,
@@ -20,8 +22,10 @@ export type {
   LightSource,
   LinearLight,
 } from './light-source.js';
-export type { LightName, PicturePoint } from './settings.js';
+export type { Reflected } from './reflect.js';
+export type { LightName, Loading, PicturePoint, Reveal } from './settings.js';
 export { BACKENDS, LIGHTS } from './settings.js';
+export type { PhotoView } from './viewport.js';
 
 /** The element's name in HTML. */
 export const TAG = 'relightable-photo';

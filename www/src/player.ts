@@ -49,8 +49,13 @@ export interface Drawing extends Freeable {
   render(light: LightSetting, look: Look, detail: number): Drawn | Promise<Drawn>;
 }
 
-/** Why a picture was drawn by another light than asked for; `null` where it was not. */
-export type Drawn = PhotoError | null;
+/** What a picture was drawn by. */
+export interface Drawn {
+  /** Whether by the light that was asked for, and not by the last one while that shows nothing. */
+  readonly asked: boolean;
+  /** Why not, where it should be. */
+  readonly fault: PhotoError | null;
+}
 
 /** What the player needs done. */
 export interface Ports<D extends Drawing> {
@@ -79,14 +84,18 @@ export interface Listener<D extends Drawing> {
   /** A load begins: what was shown is gone. */
   loading(): void;
   progress: OnProgress;
-  /** A frame was drawn. */
-  drawn(fault: Drawn): void;
+  /** A frame was drawn, and this light asked for. */
+  drawn(drawn: Drawn, light: LightSetting): void;
   /** That frame has another share of the components than the one before it; the first has all. */
   detailChanged(detail: number): void;
   /** The photograph is drawn for the first time, or the first since it had to be fetched anew. */
   loaded(): void;
-  /** A back end was taken up; `drawing` is to be shown from now on. */
-  backendChanged(drawing: D, backend: Backend, previous: Backend | null, reason: string): void;
+  /** That is to be shown from now on. */
+  drawingChanged(drawing: D): void;
+  /** A back end was taken up that is another, or has taken its own place. */
+  backendChanged(backend: Backend, previous: Backend | null, reason: string): void;
+  /** The back end in use is gone. */
+  lost(backend: Backend, reason: string): void;
   failed(error: PhotoError): void;
   /** Nothing is wrong any more. */
   recovered(): void;
@@ -292,7 +301,8 @@ export class Player<D extends Drawing> {
       active.drew = true;
       // Another light may have been set meanwhile, with which nothing is wrong.
       const sameLight = light.picture === this.#settings?.light.picture;
-      if (active === this.#active) this.#tell(sameLight ? drawn : null, detail);
+      const told = sameLight ? drawn : { ...drawn, fault: null };
+      if (active === this.#active) this.#tell(told, light, detail);
       return active.drawing;
     } catch (thrown) {
       if (active !== this.#active) {
@@ -321,11 +331,11 @@ export class Player<D extends Drawing> {
     this.#awaitFrame();
   }
 
-  #tell(drawn: Drawn, detail: number): void {
+  #tell(drawn: Drawn, light: LightSetting, detail: number): void {
     const changed = detail !== this.#detail;
     this.#detail = detail;
     if (detail < 1 && !this.#stale && !this.#unseen) this.#awaitRest();
-    this.#listener.drawn(drawn);
+    this.#listener.drawn(drawn, light);
     if (changed) this.#listener.detailChanged(detail);
   }
 
@@ -423,6 +433,7 @@ export class Player<D extends Drawing> {
       this.#search = null;
       const found = chosen.value;
       const changed = found !== this.#active;
+      const wasLost = this.#active !== null && this.#active.lost !== null;
       if (changed) {
         this.#dropActive();
         this.#active = found;
@@ -433,7 +444,11 @@ export class Player<D extends Drawing> {
         return;
       }
       if (changed) {
-        this.#listener.backendChanged(found.drawing, found.backend, previous, reason);
+        this.#listener.drawingChanged(found.drawing);
+        // The same for another gamut is nothing new.
+        if (why || wasLost || found.backend !== previous) {
+          this.#listener.backendChanged(found.backend, previous, reason);
+        }
       }
       this.#renderWhole();
     } catch (thrown) {
@@ -544,7 +559,9 @@ export class Player<D extends Drawing> {
    * it finds is the replacement.
    */
   #lost(lost: SetUp<D>, reason: string): void {
+    const early = lost.lost === null;
     lost.lost ??= reason;
+    if (early && this.#active === lost) this.#listener.lost(lost.backend, reason);
     if (this.#active !== lost || this.#search || !this.#settings) return;
     this.#replace(lost, reason, this.#settings.wanted, lost.backend, '');
   }

@@ -5,6 +5,7 @@ import { rmSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { join } from 'node:path';
 import { build } from 'esbuild';
+import { styles } from './styles.js';
 
 const repository = join(import.meta.dirname, '..', '..');
 
@@ -20,7 +21,9 @@ await build({
   format: 'esm',
   target: 'es2022',
   minify: true,
-  keepNames: true,
+  // Modules are UTF-8 wherever they come from.
+  charset: 'utf8',
+  plugins: [styles],
   sourcemap: 'linked',
   legalComments: 'none',
   logLevel: 'warning',
