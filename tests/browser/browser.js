@@ -215,12 +215,12 @@ export async function mount(page, attributes) {
     const photo = document.createElement('relightable-photo');
     /** @type {Happening[]} */
     const happened = [];
-    const changes = ['lightchange', 'backendchange', 'qualitychange'];
+    const changes = ['lightchange', 'viewchange', 'backendchange', 'contextlost', 'qualitychange'];
     for (const type of ['load', 'progress', 'error', ...changes]) {
       // On the document: events have to travel that far.
       document.addEventListener(type, (event) => {
         const fields = ['code', 'message', 'backend', 'previous', 'reason', 'light', 'torch'];
-        const data = [...fields, 'loaded', 'total', 'share']
+        const data = [...fields, 'loaded', 'total', 'share', 'zoom', 'x', 'y']
           .filter((field) => field in event)
           .map((field) => [field, /** @type {any} */ (event)[field]]);
         happened.push({ type, ...Object.fromEntries(data) });
@@ -296,6 +296,20 @@ export async function picture(page, attributes = {}, torch) {
 /** The element's visible message, as people and screen readers get it. @param {Page} page */
 export function message(page) {
   return page.getByRole('alert');
+}
+
+/**
+ * Looks closer at the element's message: visitors are told in short, and all of it where they ask.
+ *
+ * @param {Page} page
+ */
+export async function details(page) {
+  await message(page)
+    .getByText(/cannot be shown|not work as intended/)
+    .waitFor({ state: 'visible' });
+  const details = page.locator('relightable-photo details');
+  await details.evaluate((element) => element.setAttribute('open', ''));
+  return message(page);
 }
 
 /**

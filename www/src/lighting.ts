@@ -33,8 +33,10 @@ export type LightItem = LightName | 'projection';
 
 const PAGE: Choice = { name: null, torch: null, size: null, color: null };
 const NONE: AskedLight = { name: 'flood', src: null, place: null, size: null, color: null };
-/** Of the fire, a second. */
-const FIRE_FRAMES = 30;
+/** Of the fire, in seconds: 30 pictures in one. */
+const FIRE_PERIOD = 1 / 30;
+/** Screens that show no more do not keep time to the thousandth. */
+const FIRE_SLACK = 0.004;
 
 /** See the module. */
 export class Lighting {
@@ -46,7 +48,10 @@ export class Lighting {
   #follower: LightFollower | null = null;
   #watched = false;
   #plays = false;
+  /** How long the fire has burnt, as it is shown, and when it is to be shown next. */
   #fire = 0;
+  #fireShown = 0;
+  #fireDue = FIRE_PERIOD;
 
   constructor(listener: LightingListener) {
     this.#listener = listener;
@@ -54,16 +59,7 @@ export class Lighting {
 
   /** Takes what the page asks for by attributes. */
   ask(asked: AskedLight, crossOrigin: CrossOrigin): void {
-    const before = this.#asked;
     this.#asked = asked;
-    const choice = { ...this.#choice };
-    if (asked.name !== before.name || asked.src !== before.src) choice.name = null;
-    if (asked.place?.x !== before.place?.x || asked.place?.y !== before.place?.y) {
-      choice.torch = null;
-    }
-    if (asked.size !== before.size) choice.size = null;
-    if (asked.color?.hex !== before.color?.hex) choice.color = null;
-    this.#choice = choice;
     const media = this.#media;
     if (media?.address !== asked.src || media?.crossOrigin !== crossOrigin) {
       media?.stop();
@@ -147,11 +143,13 @@ export class Lighting {
     return this.burns || (this.#media?.isFilm === true && this.shining === this.#media.source);
   }
 
-  /** Lets fire burn on. Gives whether it looks different. */
+  /** Lets fire burn on. Gives whether it looks different: no more than 30 times a second. */
   burn(seconds: number): boolean {
-    const frame = Math.floor(this.#fire * FIRE_FRAMES);
     this.#fire += seconds;
-    return Math.floor(this.#fire * FIRE_FRAMES) !== frame;
+    if (this.#fire < this.#fireDue - FIRE_SLACK) return false;
+    this.#fireShown = this.#fire;
+    this.#fireDue = Math.max(this.#fireDue, this.#fire - FIRE_PERIOD) + FIRE_PERIOD;
+    return true;
   }
 
   get setting(): LightSetting {
@@ -163,7 +161,7 @@ export class Lighting {
       torch,
       picture,
       ...(name === 'torch' && size !== null && { size }),
-      ...(name === 'fire' && { seconds: Math.floor(this.#fire * FIRE_FRAMES) / FIRE_FRAMES }),
+      ...(name === 'fire' && { seconds: this.#fireShown }),
     };
   }
 
