@@ -603,12 +603,8 @@ export class RelightablePhoto extends Base {
     const at = this.#lighting.torch ?? CENTRE;
     this.#view.describe(this.getAttribute('alt'), this.#language);
     const holds = zooms && !cooperative && (light || zoomed);
-    this.#view.arrange({
-      light,
-      focusable: zooms && !light,
-      zoomed,
-      touch: holds ? 'hold' : light || zooms ? 'scroll' : 'page',
-    });
+    const touch = holds ? 'hold' : light || zooms ? 'scroll' : 'page';
+    this.#view.arrange({ light, focusable: zooms && !light, zoomed, touch }, this.#language);
     this.#view.place(this.#part, at, lightWords(at, this.#language));
     const covered = this.#playerFault !== null || this.#curtain.isDown(asked);
     this.#view.poster(poster, crossOrigin, covered, this.#curtain.awaitsPress(asked));

@@ -64,11 +64,13 @@ export class View {
     part: 'status',
     attributes: { role: 'status' },
   });
+  readonly #root: ShadowRoot;
   #canvas: HTMLCanvasElement | null = null;
   #telling: ReturnType<typeof setTimeout> | undefined;
   #hinting: ReturnType<typeof setTimeout> | undefined;
 
   constructor(root: ShadowRoot) {
+    this.#root = root;
     // A constructed sheet needs no 'unsafe-inline' in the page's content security policy.
     if (!sheet) {
       sheet = new CSSStyleSheet();
@@ -118,19 +120,24 @@ export class View {
     put(this.#bar, 'aria-label', say('loading', language));
     write(this.#revealText, say('reveal', language));
     write(this.#summary, say('details', language));
-    put(this.stage, 'aria-label', say('picture', language));
   }
 
-  arrange({ light, focusable, zoomed, touch }: StageState): void {
-    this.handle.hidden = !light;
-    const { classList } = this.stage;
-    classList.toggle('light', light);
-    classList.toggle('zoomed', zoomed);
-    classList.toggle('scrolls', touch === 'scroll');
-    classList.toggle('holds', touch === 'hold');
-    put(this.stage, 'tabindex', focusable ? '0' : null);
-    put(this.stage, 'role', focusable ? 'group' : null);
-    if (!focusable) put(this.stage, 'aria-label', null);
+  /** Under a light that does not move there is no handle; who holds it is left with the picture. */
+  arrange({ light, focusable, zoomed, touch }: StageState, language: Language): void {
+    const { handle, stage } = this;
+    const active = this.#root.activeElement;
+    const keeps = !light && (active === handle || active === stage);
+    handle.hidden = !light;
+    stage.classList.toggle('light', light);
+    stage.classList.toggle('zoomed', zoomed);
+    stage.classList.toggle('scrolls', touch === 'scroll');
+    stage.classList.toggle('holds', touch === 'hold');
+    const named = focusable || keeps;
+    put(stage, 'tabindex', focusable ? '0' : keeps ? '-1' : null);
+    put(stage, 'role', named ? 'group' : null);
+    put(stage, 'aria-label', named ? say('picture', language) : null);
+    if (keeps && active === handle) stage.focus({ preventScroll: true });
+    if (light && active === stage) handle.focus({ preventScroll: true });
   }
 
   /** Shows a canvas in place of the last one. */
