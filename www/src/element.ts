@@ -3,9 +3,8 @@
 import { type Asked, readAsked } from './asked.js';
 import { Attributes } from './attributes.js';
 import { blobOf, type CanvasSurface, resampled } from './canvas.js';
+import { Controls } from './controls.js';
 import { Curtain } from './curtain.js';
-import { newDecoder } from './decoders.js';
-import { draw } from './drawings.js';
 import type { Backend, Gamut } from './engine.js';
 import type { PhotoError } from './errors.js';
 import {
@@ -23,9 +22,9 @@ import { languageAt } from './language.js';
 import { checkLightSource, isLightSource, type LightSource } from './light-source.js';
 import { lightWords } from './light-words.js';
 import { Lighting } from './lighting.js';
-import { openPhoto } from './load.js';
 import type { Facts } from './photograph.js';
 import { Player } from './player.js';
+import { PORTS } from './ports.js';
 import { ATTRIBUTES, PROPERTIES, type Reflected, reflect } from './reflect.js';
 import {
   BACKENDS,
@@ -39,11 +38,11 @@ import { unwatch, watch } from './sight.js';
 import { readState, writeState } from './state.js';
 import { mayTilt } from './tilting.js';
 import { browserColor, parseColor, tinted } from './tint.js';
-import { Toolbar } from './toolbar.js';
+import type { ToolbarState } from './toolbar.js';
 import { View } from './view.js';
 import { clampView, type PhotoView, sameView, WHOLE } from './viewport.js';
 import { Visitor } from './visitor.js';
-import { type Language, say } from './words.js';
+import { fetchTranslations, isMissing, type Language, say } from './words.js';
 
 // On a server there are no elements, but importing this module must not fail there.
 const Base = globalThis.HTMLElement ?? (class {} as unknown as typeof HTMLElement);
@@ -114,7 +113,7 @@ export class RelightablePhoto extends Base {
   }
 
   readonly #view: View;
-  readonly #toolbar: Toolbar;
+  readonly #controls: Controls;
   readonly #visitor: Visitor;
   readonly #player: Player<CanvasSurface>;
   readonly #attributes = new Attributes();
@@ -143,25 +142,29 @@ export class RelightablePhoto extends Base {
     super();
     const root = this.attachShadow({ mode: 'open' });
     this.#view = new View(root);
-    this.#toolbar = new Toolbar({
-      choose: (item) => {
-        this.#lighting.item = item;
-        this.#visitor.touch();
-        this.#schedule();
+    this.#controls = new Controls(
+      this.#view,
+      {
+        choose: (item) => {
+          this.#lighting.item = item;
+          this.#visitor.touch();
+          this.#schedule();
+        },
+        play: () => {
+          this.paused = !this.paused;
+        },
+        zoom: (by) => this.#visitor.zoom(by),
+        reset: () => this.reset(),
+        tilt: () => {
+          if (!this.#visitor.tilts) void this.requestTilt();
+          else this.#visitor.reset();
+          this.#schedule();
+        },
+        fullscreen: () => this.#toggleFullscreen(),
       },
-      play: () => {
-        this.paused = !this.paused;
-      },
-      zoom: (by) => this.#visitor.zoom(by),
-      reset: () => this.reset(),
-      tilt: () => {
-        if (!this.#visitor.tilts) void this.requestTilt();
-        else this.#visitor.reset();
-        this.#schedule();
-      },
-      fullscreen: () => this.#toggleFullscreen(),
-    });
-    this.#view.furnish(this.#toolbar.menu, this.#toolbar.bar);
+      () => this.#schedule(),
+      (error) => this.dispatchEvent(new PhotoErrorEvent(error)),
+    );
     this.#player = this.#newPlayer();
     this.#visitor = this.#newVisitor(root);
     this.#view.revealButton.addEventListener('click', () => {
@@ -391,71 +394,54 @@ export class RelightablePhoto extends Base {
   }
 
   #newPlayer(): Player<CanvasSurface> {
-    return new Player(
-      {
-        open: (src, signal, onProgress) =>
-          openPhoto(src, signal, onProgress, {
-            decoder: newDecoder,
-            fetch: (...request) => fetch(...request),
-            pause,
-          }),
-        draw,
-        nextFrame: requestAnimationFrame.bind(globalThis),
-        later: (ms, callback) => {
-          const timer = setTimeout(callback, ms);
-          return () => clearTimeout(timer);
-        },
-        now: () => performance.now(),
+    return new Player(PORTS, {
+      loading: () => {
+        this.#clear();
+        this.#view.progress(Number.NaN);
       },
-      {
-        loading: () => {
-          this.#clear();
-          this.#view.progress(Number.NaN);
-        },
-        progress: (loaded, total) => {
-          this.#view.progress(total > 0 ? Math.min(1, loaded / total) : Number.NaN);
-          this.dispatchEvent(progressEvent(loaded, total));
-        },
-        drawn: ({ asked, fault }, light) => {
-          if (!this.#curtain.drawn) {
-            this.#curtain.drawn = true;
-            this.#schedule();
-          }
-          if (asked && light.picture && light.picture === this.#lighting.setting.picture) {
-            this.#tellLight();
-          }
-          // A light that stays wrong says so once, not at every frame with other numbers.
-          if (fault?.code === this.#lightFault?.code) return;
-          this.#lightFault = fault;
-          this.#lightFaultChanged(fault);
-        },
-        detailChanged: (detail) => this.dispatchEvent(new QualityChangeEvent(detail)),
-        loaded: () => {
-          this.#view.progress(null);
-          this.#view.tell(say('loaded', this.#language));
-          this.dispatchEvent(loadEvent());
-        },
-        drawingChanged: (drawing) => {
-          this.#view.show(drawing.canvas);
-          this.#schedule();
-        },
-        backendChanged: (backend, previous, reason) => {
-          this.dispatchEvent(new BackendChangeEvent(backend, previous, reason));
-        },
-        lost: (backend, message) => this.dispatchEvent(new ContextLostEvent(backend, message)),
-        failed: (error) => {
-          this.#playerFault = error.message;
-          this.#view.progress(null);
-          this.#schedule();
-          this.#showFault();
-          this.dispatchEvent(new PhotoErrorEvent(error));
-        },
-        recovered: () => {
-          this.#playerFault = null;
-          this.#schedule();
-        },
+      progress: (loaded, total) => {
+        this.#view.progress(total > 0 ? Math.min(1, loaded / total) : Number.NaN);
+        this.dispatchEvent(progressEvent(loaded, total));
       },
-    );
+      drawn: ({ asked, fault }, light) => {
+        if (!this.#curtain.drawn) {
+          this.#curtain.drawn = true;
+          this.#schedule();
+        }
+        if (asked && light.picture && light.picture === this.#lighting.setting.picture) {
+          this.#tellLight();
+        }
+        // A light that stays wrong says so once, not at every frame with other numbers.
+        if (fault?.code === this.#lightFault?.code) return;
+        this.#lightFault = fault;
+        this.#lightFaultChanged(fault);
+      },
+      detailChanged: (detail) => this.dispatchEvent(new QualityChangeEvent(detail)),
+      loaded: () => {
+        this.#view.progress(null);
+        this.#view.tell(say('loaded', this.#language));
+        this.dispatchEvent(loadEvent());
+      },
+      drawingChanged: (drawing) => {
+        this.#view.show(drawing.canvas);
+        this.#schedule();
+      },
+      backendChanged: (backend, previous, reason) => {
+        this.dispatchEvent(new BackendChangeEvent(backend, previous, reason));
+      },
+      lost: (backend, message) => this.dispatchEvent(new ContextLostEvent(backend, message)),
+      failed: (error) => {
+        this.#playerFault = error.message;
+        this.#view.progress(null);
+        this.#schedule();
+        this.#showFault();
+        this.dispatchEvent(new PhotoErrorEvent(error));
+      },
+      recovered: () => {
+        this.#playerFault = null;
+        this.#schedule();
+      },
+    });
   }
 
   #newVisitor(root: ShadowRoot): Visitor {
@@ -505,13 +491,10 @@ export class RelightablePhoto extends Base {
       },
       expired: () => {
         this.reset();
-        this.#toolbar.close();
+        this.#controls.close();
         if (this.matches(':fullscreen')) this.#toggleFullscreen();
       },
-      touched: (byKey) => {
-        if (byKey) this.#toolbar.stay();
-        else this.#toolbar.wake();
-      },
+      touched: (byKey) => this.#controls.wake(byKey),
     });
   }
 
@@ -545,6 +528,7 @@ export class RelightablePhoto extends Base {
     this.#lighting.follow(this.#curtain.seen, !this.paused);
     this.#part = clampView(this.#part, asked.zoom);
     this.#language = languageAt(this);
+    if (isMissing(this.#language)) void fetchTranslations().then(() => this.#schedule());
     this.#present(asked);
     for (const fault of this.#attributes.takeFaults()) {
       this.dispatchEvent(new PhotoErrorEvent(fault));
@@ -609,25 +593,23 @@ export class RelightablePhoto extends Base {
     const covered = this.#playerFault !== null || this.#curtain.isDown(asked);
     this.#view.poster(poster, crossOrigin, covered, this.#curtain.awaitsPress(asked));
     this.#showFault();
-    this.#toolbar.bar.hidden = !asked.controls || !this.#shown;
-    if (this.#toolbar.bar.hidden) this.#toolbar.close();
-    else this.#fillToolbar(zoom);
+    this.#controls.update(asked.controls && this.#shown ? this.#controlsState(asked) : null);
     this.#visitor.update(this.#curtain.seen, asked.kiosk);
   }
 
-  #fillToolbar(most: number): void {
+  #controlsState({ zoom: most, breathes }: Asked): ToolbarState {
     const { items, item, holdsTorch, canPlay } = this.#lighting;
     const { zoom } = this.#part;
-    const breathes = holdsTorch && this.#asked?.breathes;
-    this.#toolbar.update({
-      language: this.#language,
+    return {
+      language: `${this.#language} ${isMissing(this.#language)}`,
+      say: (word) => say(word, this.#language),
       items,
       item,
-      plays: canPlay || breathes ? !this.paused : null,
+      plays: canPlay || (holdsTorch && breathes) ? !this.paused : null,
       zoom: most > 1 ? { in: zoom < most, out: zoom > 1 } : null,
       tilts: holdsTorch && mayTilt() ? this.#visitor.tilts : null,
       fullscreen: document.fullscreenEnabled ? this.matches(':fullscreen') : null,
-    });
+    };
   }
 
   /** Whether there is a picture to be seen and touched. */
@@ -705,12 +687,6 @@ function sameShining(a: Shining, b: Shining): boolean {
 /** Whether the visitor asks for less motion. */
 function motion(): MediaQueryList {
   return matchMedia('(prefers-reduced-motion: reduce)');
-}
-
-/** Gives the page its turn. */
-function pause(): Promise<void> {
-  const { scheduler } = globalThis as { scheduler?: { yield?: () => Promise<void> } };
-  return scheduler?.yield?.() ?? new Promise((resolve) => setTimeout(resolve));
 }
 
 /** Attributes as properties, and listeners with the element's own events, typed. */

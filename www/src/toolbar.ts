@@ -1,13 +1,19 @@
-/** The buttons: one stop of the tab key, left and right between them; and the list of lights. */
+/**
+ * The buttons: one stop of the tab key, left and right between them; and the list of lights. A file of its
+ * own, for pages that ask for controls.
+ */
 
 import { make, put, write } from './dom.js';
 import { type IconName, icon, showIcon } from './icons.js';
 import type { LightItem } from './lighting.js';
-import { type Language, say, type Word } from './words.js';
+import STYLE from './toolbar.css';
+import type { Word } from './words.js';
 
 /** What the buttons show. `null`: there is no such button. */
 export interface ToolbarState {
-  readonly language: Language;
+  /** A text in the visitor's language, which it is called by as well. */
+  readonly say: (word: Word) => string;
+  readonly language: string;
   readonly items: readonly LightItem[];
   readonly item: LightItem;
   readonly plays: boolean | null;
@@ -32,6 +38,7 @@ const REST_MS = 3000;
 
 /** See the module. */
 export class Toolbar {
+  readonly style = STYLE;
   readonly bar: HTMLElement;
   readonly menu: HTMLElement;
   readonly #light: HTMLButtonElement;
@@ -85,24 +92,23 @@ export class Toolbar {
     });
   }
 
-  update({ language, items, item, plays, zoom, tilts, fullscreen }: ToolbarState): void {
-    this.#list(items, language);
+  update({ say, language, items, item, plays, zoom, tilts, fullscreen }: ToolbarState): void {
+    this.#list(items, language, say);
     for (const input of this.menu.querySelectorAll('input')) input.checked = input.value === item;
-    const named = (word: Word) => say(word, language);
-    put(this.bar, 'aria-label', named('controls'));
-    put(this.menu, 'aria-label', named('light'));
-    write(this.#lightName, named(item));
-    name(this.#light, `${named('light')}: ${named(item)}`);
-    show(this.#play, plays !== null, named(plays ? 'pause' : 'play'), plays ? 'pause' : 'play');
-    show(this.#zoomOut, zoom !== null, named('zoomOut'));
-    show(this.#zoomIn, zoom !== null, named('zoomIn'));
+    put(this.bar, 'aria-label', say('controls'));
+    put(this.menu, 'aria-label', say('light'));
+    write(this.#lightName, say(item));
+    name(this.#light, `${say('light')}: ${say(item)}`);
+    show(this.#play, plays !== null, say(plays ? 'pause' : 'play'), plays ? 'pause' : 'play');
+    show(this.#zoomOut, zoom !== null, say('zoomOut'));
+    show(this.#zoomIn, zoom !== null, say('zoomIn'));
     put(this.#zoomOut, 'aria-disabled', String(!zoom?.out));
     put(this.#zoomIn, 'aria-disabled', String(!zoom?.in));
-    show(this.#reset, true, named('reset'));
-    show(this.#tilt, tilts !== null, named('tilt'));
+    show(this.#reset, true, say('reset'));
+    show(this.#tilt, tilts !== null, say('tilt'));
     put(this.#tilt, 'aria-pressed', String(tilts === true));
     const screen = fullscreen ? 'leaveFullscreen' : 'fullscreen';
-    show(this.#fullscreen, fullscreen !== null, named(screen), screen);
+    show(this.#fullscreen, fullscreen !== null, say(screen), screen);
     // The one stop may have gone.
     const stops = this.#buttons.filter((button) => button.tabIndex === 0);
     if (stops.length !== 1) this.#stopAt(this.#light);
@@ -137,18 +143,13 @@ export class Toolbar {
     if (open) this.menu.querySelector<HTMLInputElement>('input:checked')?.focus();
   }
 
-  #list(items: readonly LightItem[], language: Language): void {
+  #list(items: readonly LightItem[], language: string, say: (word: Word) => string): void {
     const shown = `${items} ${language}`;
     if (shown === this.#shown) return;
     this.#shown = shown;
     const labels = items.map((item) => {
       const attributes = { type: 'radio', name: 'light', value: item };
-      return make(
-        'label',
-        {},
-        make('input', { attributes }),
-        make('span', {}, say(item, language)),
-      );
+      return make('label', {}, make('input', { attributes }), make('span', {}, say(item)));
     });
     this.menu.replaceChildren(...labels);
   }

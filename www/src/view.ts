@@ -4,6 +4,7 @@
 import { make, put, slot, write } from './dom.js';
 import { icon } from './icons.js';
 import type { PicturePoint } from './settings.js';
+import { adopt } from './sheets.js';
 import STYLE from './style.css';
 import { type PhotoView, toBox } from './viewport.js';
 import { type Language, say } from './words.js';
@@ -32,8 +33,6 @@ const PIXELS_FROM = 4;
 const SETTLES_MS = 400;
 const HINT_MS = 1800;
 
-let sheet: CSSStyleSheet | undefined;
-
 /** See the module. */
 export class View {
   /** The picture's box; takes pointers. */
@@ -46,7 +45,7 @@ export class View {
   });
   /** Has the poster give way. */
   readonly revealButton: HTMLButtonElement;
-  readonly #controls = make('div', { name: 'controls' });
+  readonly #controls = slot('controls');
   readonly #picture = make('div', { name: 'picture', part: 'picture' });
   readonly #poster: HTMLElement;
   readonly #posterImage = make('img', { part: 'poster', attributes: { alt: '' } });
@@ -71,12 +70,7 @@ export class View {
 
   constructor(root: ShadowRoot) {
     this.#root = root;
-    // A constructed sheet needs no 'unsafe-inline' in the page's content security policy.
-    if (!sheet) {
-      sheet = new CSSStyleSheet();
-      sheet.replaceSync(STYLE);
-    }
-    root.adoptedStyleSheets = [sheet];
+    adopt(root, STYLE);
     this.#poster = make('div', { name: 'poster' }, slot('poster', this.#posterImage));
     this.#posterImage.addEventListener('load', () => this.stage.classList.add('postered'));
     // One that cannot be had leaves its place empty.
@@ -99,13 +93,18 @@ export class View {
     this.#posterImage.hidden = true;
     for (const part of [this.handle, this.revealButton, this.#hint, this.#progress, this.#message])
       part.hidden = true;
-    this.#foot.append(this.#controls, this.#progress, this.#message);
+    this.#foot.append(
+      make('div', { name: 'controls' }, this.#controls),
+      this.#progress,
+      this.#message,
+    );
     root.append(this.stage, this.#foot, this.#status);
   }
 
   /** Puts in what is there unless a page has controls of its own. */
-  furnish(...controls: readonly HTMLElement[]): void {
-    this.#controls.append(slot('controls', ...controls));
+  furnish(controls: readonly HTMLElement[], style: string): void {
+    adopt(this.#root, style);
+    this.#controls.append(...controls);
   }
 
   /** Names things, for those who cannot see them. An empty text marks a picture as decoration. */

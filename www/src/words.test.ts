@@ -1,7 +1,8 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { lightWords } from './light-words.js';
-import { LANGUAGES, languageOf, say, WORDS, type Word } from './words.js';
+import { TRANSLATIONS } from './translations.js';
+import { ENGLISH, fetchTranslations, isMissing, LANGUAGES, languageOf, say } from './words.js';
 
 /** Words that are the same in English, as they should be. */
 const ENGLISH_TOO = new Set([
@@ -13,7 +14,11 @@ const ENGLISH_TOO = new Set([
   'fr projection',
 ]);
 
-const words = Object.entries(WORDS) as [Word, readonly string[]][];
+await fetchTranslations();
+
+const words = Object.entries(ENGLISH).map(
+  ([word, english]) => [word, [english, ...TRANSLATIONS[word as keyof typeof ENGLISH]]] as const,
+);
 
 test('every text is there in every language, translated, with the same places to fill in', () => {
   for (const [word, texts] of words) {
@@ -40,6 +45,7 @@ test('the language is the first that there are texts in', () => {
 });
 
 test('texts are filled in', () => {
+  assert.equal(isMissing('fr'), false);
   assert.equal(say('zoomed', 'en', '2.5'), 'Zoom 2.5×');
   assert.equal(say('wheelHint', 'de', 'Ctrl'), 'Zoomen mit Ctrl + Scrollen');
 });

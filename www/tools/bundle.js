@@ -9,10 +9,29 @@ import { styles } from './styles.js';
 
 const repository = join(import.meta.dirname, '..', '..');
 
+/** What is fetched only where it is asked for lies beside the element, under names of its own. */
+const APART = new Map([
+  ['./toolbar.js', './relightable-photo-controls.js'],
+  ['./translations.js', './relightable-photo-words.js'],
+]);
+
+/** @type {import('esbuild').Plugin} */
+const apart = {
+  name: 'apart',
+  setup({ onResolve }) {
+    onResolve({ filter: /^\.\// }, ({ kind, path }) => {
+      const file = kind === 'dynamic-import' ? APART.get(path) : undefined;
+      return file === undefined ? undefined : { path: file, external: true };
+    });
+  },
+};
+
 await build({
   absWorkingDir: repository,
   entryPoints: {
     'relightable-photo': 'www/src/index.ts',
+    'relightable-photo-controls': 'www/src/toolbar.ts',
+    'relightable-photo-words': 'www/src/translations.ts',
     'relightable-photo-worker': 'www/src/decode-worker.ts',
     'relightable-photo-relighter': 'www/src/relight-worker.ts',
   },
@@ -23,7 +42,7 @@ await build({
   minify: true,
   // Modules are UTF-8 wherever they come from.
   charset: 'utf8',
-  plugins: [styles],
+  plugins: [styles, apart],
   sourcemap: 'linked',
   legalComments: 'none',
   logLevel: 'warning',
