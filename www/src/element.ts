@@ -4,7 +4,6 @@ import { type Asked, readAsked } from './asked.js';
 import { Attributes } from './attributes.js';
 import { blobOf, type CanvasSurface, resampled } from './canvas.js';
 import { Controls } from './controls.js';
-import { Curtain } from './curtain.js';
 import type { Backend, Gamut } from './engine.js';
 import type { PhotoError } from './errors.js';
 import {
@@ -18,31 +17,25 @@ import {
   type RelightablePhotoEventMap,
   ViewChangeEvent,
 } from './events.js';
+import { Exhibit, type LightPose } from './exhibit.js';
 import { languageAt } from './language.js';
+import { LightNews, type Shining } from './light-news.js';
 import { checkLightSource, isLightSource, type LightSource } from './light-source.js';
 import { lightWords } from './light-words.js';
-import { Lighting } from './lighting.js';
+import type { Lighting } from './lighting.js';
 import type { Facts } from './photograph.js';
 import { Player } from './player.js';
 import { PORTS } from './ports.js';
 import { ATTRIBUTES, PROPERTIES, type Reflected, reflect } from './reflect.js';
-import {
-  BACKENDS,
-  CENTRE,
-  clampToPicture,
-  type LightName,
-  type PicturePoint,
-  parseLight,
-} from './settings.js';
+import { BACKENDS, CENTRE, type LightName, type PicturePoint } from './settings.js';
 import { unwatch, watch } from './sight.js';
-import { readState, writeState } from './state.js';
 import { mayTilt } from './tilting.js';
-import { browserColor, parseColor, tinted } from './tint.js';
+import { browserColor } from './tint.js';
 import type { ToolbarState } from './toolbar.js';
 import { View } from './view.js';
-import { clampView, type PhotoView, sameView, WHOLE } from './viewport.js';
+import { type PhotoView, WHOLE } from './viewport.js';
 import { Visitor } from './visitor.js';
-import { fetchTranslations, isMissing, type Language, say } from './words.js';
+import { fetchTranslations, isMissing, type Language, say, type Word } from './words.js';
 
 // On a server there are no elements, but importing this module must not fail there.
 const Base = globalThis.HTMLElement ?? (class {} as unknown as typeof HTMLElement);
@@ -63,37 +56,7 @@ export interface BlobOptions {
   readonly scale?: number;
 }
 
-/** What `setLight` takes of a built-in light. What is left out stays. */
-export interface LightPose {
-  readonly name?: LightName;
-  /** Where a torch shines, 0 to 1 across the picture, */
-  readonly x?: number;
-  /** and down. */
-  readonly y?: number;
-  /** Radius of a torch, as a fraction of the light plane's shorter side. */
-  readonly size?: number;
-  /** Any CSS colour. */
-  readonly color?: string;
-}
-
-/** What shines, as it is told. */
-interface Shining {
-  readonly name: LightName;
-  readonly torch: PicturePoint | null;
-  readonly source: LightSource | null;
-}
-
 const MAX_SCALE = 4;
-
-/** Attributes that take the place of what a visitor chose. */
-const OVERRULES = {
-  light: 'name',
-  'light-src': 'name',
-  'light-x': 'torch',
-  'light-y': 'torch',
-  'light-size': 'size',
-  'light-color': 'color',
-} as const;
 
 /**
  * A photograph that can be relit.
@@ -117,31 +80,29 @@ export class RelightablePhoto extends Base {
   readonly #visitor: Visitor;
   readonly #player: Player<CanvasSurface>;
   readonly #attributes = new Attributes();
-  readonly #curtain = new Curtain();
-  readonly #lighting = new Lighting({
-    changed: () => this.#player.redraw(),
-    faultChanged: (fault) => this.#lightFaultChanged(fault),
-  });
-  #asked: Asked | null = null;
-  #part = WHOLE;
-  #toldPart = WHOLE;
-  #told: Shining | null = null;
-  #exposure: number | null = null;
-  /** Whether somebody had things stop or go on that move by themselves. */
-  #paused: boolean | null = null;
+  readonly #exhibit: Exhibit;
+  readonly #news = new LightNews();
+  #toldView = WHOLE;
   #language: Language = 'en';
   /** The address that was given to the player. */
   #fetched: string | null | undefined;
   #reload = false;
   #scheduled = false;
   #listening: AbortController | null = null;
-  #playerFault: string | null = null;
   #lightFault: PhotoError | null = null;
 
   constructor() {
     super();
     const root = this.attachShadow({ mode: 'open' });
     this.#view = new View(root);
+    this.#exhibit = new Exhibit(
+      this.#read(),
+      {
+        changed: () => this.#player.redraw(),
+        faultChanged: (fault) => this.#lightFaultChanged(fault),
+      },
+      browserColor,
+    );
     this.#controls = new Controls(
       this.#view,
       {
@@ -198,22 +159,23 @@ export class RelightablePhoto extends Base {
 
   /** The part of the picture that is shown: its middle, and a magnification of no more than `zoom`. */
   get view(): PhotoView {
-    return this.#part;
+    return this.#exhibit.view;
   }
   set view(view: PhotoView) {
     if (![view?.zoom, view?.x, view?.y].every(Number.isFinite)) {
       throw new TypeError('view must have finite numbers zoom, from 1, and x and y, from 0 to 1');
     }
-    this.#part = clampView(view, this.zoom);
+    this.#exhibit.asked = this.#read();
+    this.#exhibit.view = view;
     this.#schedule();
   }
 
   /** Whether what moves by itself stands still: fire, the film of `light-src`, the wandering torch. */
   get paused(): boolean {
-    return this.#paused ?? motion().matches;
+    return this.#exhibit.paused ?? motion().matches;
   }
   set paused(paused: boolean) {
-    this.#paused = paused;
+    this.#exhibit.paused = paused;
     this.#schedule();
   }
 
@@ -250,25 +212,11 @@ export class RelightablePhoto extends Base {
    * its place, size and colour if need be, or a source, as by `lightSource`. `null`: the page's own, without a source.
    */
   setLight(light: LightName | LightPose | LightSource | null): void {
-    if (light === null) {
-      this.lightSource = null;
+    if (light === null || isLightSource(light)) {
       this.#lighting.reset();
-    } else if (typeof light === 'string') {
-      this.setLight({ name: light });
-      return;
-    } else if (isLightSource(light)) {
       this.lightSource = light;
-      return;
     } else {
-      const { name, x, y, size, color } = light;
-      const torch = this.torch ?? CENTRE;
-      const placed = x !== undefined || y !== undefined;
-      this.#lighting.choose({
-        ...(name !== undefined && { name: parseLight(name) }),
-        ...(placed && { torch: clampToPicture({ x: x ?? torch.x, y: y ?? torch.y }) }),
-        ...(size !== undefined && { size }),
-        ...(color !== undefined && { color: parseColor(color, browserColor) }),
-      });
+      this.#exhibit.pose(typeof light === 'string' ? { name: light } : light);
     }
     this.#schedule();
   }
@@ -276,47 +224,27 @@ export class RelightablePhoto extends Base {
   /** Light and view as the attributes and `lightSource` say. */
   reset(): void {
     this.#visitor.reset();
-    this.#lighting.reset();
-    this.#part = WHOLE;
-    this.#exposure = null;
-    this.#paused = null;
+    this.#exhibit.reset();
     this.#schedule();
   }
 
   /** Light and view in a few letters, all of which addresses may hold. What a source shows is not among it. */
   getState(): string {
-    const exposure = this.#exposure ?? this.exposure;
-    const asked = this.#asked ?? this.#read();
-    this.#lighting.ask(asked.light, asked.crossOrigin);
-    const { item, torch, size, color } = this.#lighting;
-    return writeState({
-      light: item === 'projection' ? null : item,
-      torch: item === 'torch' ? torch : null,
-      size: item === 'torch' ? size : null,
-      color: color?.hex ?? null,
-      exposure: exposure === 1 ? null : exposure,
-      view: this.#part,
-    });
+    this.#exhibit.asked = this.#read();
+    return this.#exhibit.state;
   }
 
   /** Takes what `getState` gave, here or at another element. What it does not tell is as the page asks. */
   setState(text: string): void {
-    const { state, faults } = readState(text);
     this.reset();
-    this.#lighting.choose({
-      name: state.light,
-      torch: state.torch && clampToPicture(state.torch),
-      size: state.size,
-      color: parseColor(state.color, browserColor),
-    });
-    this.#exposure = state.exposure;
-    this.#part = clampView(state.view, this.zoom);
+    this.#exhibit.asked = this.#read();
+    const faults = this.#exhibit.take(text);
     for (const fault of faults) this.dispatchEvent(new PhotoErrorEvent(fault));
   }
 
   /** Has the poster give way, as soon as there is a picture. */
   dismissPoster(): void {
-    this.#curtain.lifted = true;
+    this.#exhibit.curtain.lifted = true;
     this.#schedule();
   }
 
@@ -387,9 +315,7 @@ export class RelightablePhoto extends Base {
   attributeChangedCallback(name: string): void {
     // As with <img>, setting the same address again loads again.
     if (name === 'src') this.#reload = true;
-    if (name in OVERRULES) {
-      this.#lighting.choose({ [OVERRULES[name as keyof typeof OVERRULES]]: null });
-    }
+    this.#exhibit.overrule(name);
     this.#schedule();
   }
 
@@ -404,12 +330,12 @@ export class RelightablePhoto extends Base {
         this.dispatchEvent(progressEvent(loaded, total));
       },
       drawn: ({ asked, fault }, light) => {
-        if (!this.#curtain.drawn) {
-          this.#curtain.drawn = true;
-          this.#schedule();
-        }
-        if (asked && light.picture && light.picture === this.#lighting.setting.picture) {
-          this.#tellLight();
+        const { curtain } = this.#exhibit;
+        if (!curtain.drawn) this.#schedule();
+        curtain.drawn = true;
+        const { setting, shining } = this.#lighting;
+        if (asked && shining && light.picture === setting.picture) {
+          this.#tellLight(this.#news.drawn(setting.name, shining));
         }
         // A light that stays wrong says so once, not at every frame with other numbers.
         if (fault?.code === this.#lightFault?.code) return;
@@ -419,7 +345,7 @@ export class RelightablePhoto extends Base {
       detailChanged: (detail) => this.dispatchEvent(new QualityChangeEvent(detail)),
       loaded: () => {
         this.#view.progress(null);
-        this.#view.tell(say('loaded', this.#language));
+        this.#view.tell(this.#say('loaded'));
         this.dispatchEvent(loadEvent());
       },
       drawingChanged: (drawing) => {
@@ -431,63 +357,39 @@ export class RelightablePhoto extends Base {
       },
       lost: (backend, message) => this.dispatchEvent(new ContextLostEvent(backend, message)),
       failed: (error) => {
-        this.#playerFault = error.message;
+        this.#exhibit.fault = error.message;
         this.#view.progress(null);
         this.#schedule();
         this.#showFault();
         this.dispatchEvent(new PhotoErrorEvent(error));
       },
       recovered: () => {
-        this.#playerFault = null;
+        this.#exhibit.fault = null;
         this.#schedule();
       },
     });
   }
 
   #newVisitor(root: ShadowRoot): Visitor {
-    const element = this;
-    return new Visitor(root, this.#view, {
-      lighting: this.#lighting,
-      get view() {
-        return element.#part;
-      },
-      set view(view) {
-        if (sameView(view, element.#part)) return;
-        element.#part = view;
-        const zoom = view.zoom.toLocaleString(element.#language, { maximumFractionDigits: 1 });
-        element.#view.tell(say('zoomed', element.#language, zoom));
-        element.#schedule();
-      },
-      get mostZoom() {
-        return element.#asked?.zoom ?? 1;
-      },
-      get cooperative() {
-        return element.#asked?.cooperative ?? false;
-      },
-      get shown() {
-        return element.#shown;
-      },
-      get plays() {
-        return !element.paused;
-      },
-      get breathes() {
-        return element.#asked?.breathes ?? false;
-      },
+    return new Visitor(root, this.#view, this.#exhibit, {
       changed: () => this.#schedule(),
-      lightChosen: () => {
-        this.#view.tell(
-          `${say('light', this.#language)}: ${say(this.#lighting.item, this.#language)}`,
-        );
+      looked: () => {
+        const { zoom } = this.#exhibit.view;
+        const text = zoom.toLocaleString(this.#language, { maximumFractionDigits: 1 });
+        this.#view.tell(this.#say('zoomed', text));
+        this.#schedule();
+      },
+      lightChosen: (item) => {
+        this.#view.tell(`${this.#say('light')}: ${this.#say(item)}`);
         this.#schedule();
       },
       leave: () => {
         if (this.matches(':fullscreen')) this.#toggleFullscreen();
         else (this.shadowRoot?.activeElement as HTMLElement | null)?.blur();
       },
-      hint: (by) => {
+      scrolled: (by) => {
         const key = /mac|iphone|ipad/i.test(navigator.platform) ? '⌘' : 'Ctrl';
-        const word = by === 'wheel' ? 'wheelHint' : 'touchHint';
-        this.#view.hint(say(word, this.#language, key));
+        this.#view.hint(this.#say(by === 'wheel' ? 'wheelHint' : 'touchHint', key));
       },
       expired: () => {
         this.reset();
@@ -519,14 +421,13 @@ export class RelightablePhoto extends Base {
       motion().addEventListener('change', () => this.#schedule(), { signal });
     }
     watch(this, (sight, is) => {
-      this.#curtain[sight] = is;
+      this.#exhibit.curtain[sight] = is;
       if (sight === 'seen') this.#player.setVisible(is);
       this.#schedule();
     });
     const asked = this.#read();
-    this.#lighting.ask(asked.light, asked.crossOrigin);
-    this.#lighting.follow(this.#curtain.seen, !this.paused);
-    this.#part = clampView(this.#part, asked.zoom);
+    this.#exhibit.asked = asked;
+    this.#lighting.follow(this.#exhibit.curtain.seen, !this.paused);
     this.#language = languageAt(this);
     if (isMissing(this.#language)) void fetchTranslations().then(() => this.#schedule());
     this.#present(asked);
@@ -534,16 +435,16 @@ export class RelightablePhoto extends Base {
       this.dispatchEvent(new PhotoErrorEvent(fault));
     }
     this.#load(asked);
-    if (!this.#told || !this.#lighting.shining) this.#tellLight();
-    if (!sameView(this.#part, this.#toldPart)) {
-      this.#toldPart = this.#part;
-      this.dispatchEvent(new ViewChangeEvent(this.#part));
+    this.#tellLight(this.#news.asked(this.#lighting.setting));
+    const { view } = this.#exhibit;
+    if (view !== this.#toldView) {
+      this.#toldView = view;
+      this.dispatchEvent(new ViewChangeEvent(view));
     }
   }
 
   #read(): Asked {
-    this.#asked = readAsked(this, this.#attributes, browserColor);
-    return this.#asked;
+    return readAsked(this, this.#attributes, browserColor);
   }
 
   /** Has the player do what is asked for, as soon as the photograph may be fetched. */
@@ -554,55 +455,48 @@ export class RelightablePhoto extends Base {
     if (src === null && badAddress) return;
     const reload = this.#reload && !badAddress;
     if (reload || src !== this.#fetched) {
-      if (src !== null && !this.#curtain.mayFetch(asked)) {
+      if (src !== null && !this.#exhibit.curtain.mayFetch(asked)) {
         if (this.#fetched !== undefined && this.#fetched !== src) this.#forget();
         return;
       }
       this.#reload = false;
       this.#fetched = src;
     }
-    const tint = asked.light.color?.tint;
-    const color = this.#lighting.color?.tint ?? tint;
-    const whiteBalance = color ? tinted(asked.whiteBalance, color) : asked.whiteBalance;
     const wanted = {
       backends: asked.backends ?? BACKENDS,
       // Who names back ends knows better.
       software: asked.backends !== null,
       gamut: asked.gamut,
     };
-    const look = {
-      exposure: this.#exposure ?? asked.exposure,
-      whiteBalance,
-      tone: asked.tone,
-    };
+    const { look } = this.#exhibit;
     this.#player.set({ src, wanted, look, light: this.#lighting.setting }, reload);
   }
 
   /** Shows all of it but the picture itself. */
   #present(asked: Asked): void {
     const { zoom, cooperative, poster, crossOrigin } = asked;
-    const light = this.#shown && this.#lighting.holdsTorch;
-    const zooms = this.#shown && zoom > 1;
-    const zoomed = this.#part.zoom > 1;
+    const { view, shown, curtain } = this.#exhibit;
+    const light = shown && this.#lighting.holdsTorch;
+    const zooms = shown && zoom > 1;
+    const zoomed = view.zoom > 1;
     const at = this.#lighting.torch ?? CENTRE;
     this.#view.describe(this.getAttribute('alt'), this.#language);
     const holds = zooms && !cooperative && (light || zoomed);
     const touch = holds ? 'hold' : light || zooms ? 'scroll' : 'page';
     this.#view.arrange({ light, focusable: zooms && !light, zoomed, touch }, this.#language);
-    this.#view.place(this.#part, at, lightWords(at, this.#language));
-    const covered = this.#playerFault !== null || this.#curtain.isDown(asked);
-    this.#view.poster(poster, crossOrigin, covered, this.#curtain.awaitsPress(asked));
+    this.#view.place(view, at, lightWords(at, this.#language));
+    this.#view.poster(poster, crossOrigin, !shown, curtain.awaitsPress(asked));
     this.#showFault();
-    this.#controls.update(asked.controls && this.#shown ? this.#controlsState(asked) : null);
-    this.#visitor.update(this.#curtain.seen, asked.kiosk);
+    this.#controls.update(asked.controls && shown ? this.#controlsState(asked) : null);
+    this.#visitor.update(!this.paused);
   }
 
   #controlsState({ zoom: most, breathes }: Asked): ToolbarState {
     const { items, item, holdsTorch, canPlay } = this.#lighting;
-    const { zoom } = this.#part;
+    const { zoom } = this.#exhibit.view;
     return {
       language: `${this.#language} ${isMissing(this.#language)}`,
-      say: (word) => say(word, this.#language),
+      say: (word) => this.#say(word),
       items,
       item,
       plays: canPlay || (holdsTorch && breathes) ? !this.paused : null,
@@ -612,22 +506,16 @@ export class RelightablePhoto extends Base {
     };
   }
 
-  /** Whether there is a picture to be seen and touched. */
-  get #shown(): boolean {
-    const { drawn } = this.#curtain;
-    return drawn && !!this.#asked && !this.#curtain.isDown(this.#asked) && !this.#playerFault;
+  get #lighting(): Lighting {
+    return this.#exhibit.lighting;
   }
 
-  #tellLight(): void {
-    const { name, torch, picture } = this.#lighting.setting;
-    const drawn = picture !== null && this.#told !== null;
-    const source = drawn ? this.#lighting.shining : null;
-    const now = { name, torch: source ? null : torch, source };
-    const before = this.#told;
-    this.#told = now;
-    if (before && !sameShining(before, now)) {
-      this.dispatchEvent(new LightChangeEvent(name, now.torch, source));
-    }
+  #say(word: Word, ...values: readonly string[]): string {
+    return say(word, this.#language, ...values);
+  }
+
+  #tellLight(news: Shining | null): void {
+    if (news) this.dispatchEvent(new LightChangeEvent(news.name, news.torch, news.source));
   }
 
   #lightFaultChanged(fault: PhotoError | null): void {
@@ -639,8 +527,8 @@ export class RelightablePhoto extends Base {
   #showFault(): void {
     const source = this.#lighting.fault?.message;
     const message =
-      this.#attributes.message ?? this.#playerFault ?? source ?? this.#lightFault?.message;
-    const fatal = this.#playerFault !== null;
+      this.#attributes.message ?? this.#exhibit.fault ?? source ?? this.#lightFault?.message;
+    const fatal = this.#exhibit.fault !== null;
     this.#view.fault(message === undefined ? null : { fatal, message }, this.#language);
   }
 
@@ -651,8 +539,8 @@ export class RelightablePhoto extends Base {
   }
 
   #clear(): void {
-    this.#curtain.drawn = false;
-    this.#playerFault = null;
+    this.#exhibit.curtain.drawn = false;
+    this.#exhibit.fault = null;
     this.#lightFault = null;
     this.#view.clear();
     this.#showFault();
@@ -669,19 +557,13 @@ export class RelightablePhoto extends Base {
     unwatch(this);
     this.#listening?.abort();
     this.#listening = null;
-    this.#curtain.near = false;
-    this.#curtain.seen = false;
+    this.#exhibit.curtain.near = false;
+    this.#exhibit.curtain.seen = false;
     this.#visitor.stop();
     this.#lighting.follow(false, false);
     this.#attributes.clear();
     this.#forget();
   }
-}
-
-/** Under a source, built-in lights do not shine. */
-function sameShining(a: Shining, b: Shining): boolean {
-  if (a.source || b.source) return a.source === b.source;
-  return a.name === b.name && a.torch?.x === b.torch?.x && a.torch?.y === b.torch?.y;
 }
 
 /** Whether the visitor asks for less motion. */

@@ -2,7 +2,7 @@
 
 import { RelightablePhoto } from './element.js';
 
-export type { BlobOptions, LightPose, PhotoInfo } from './element.js';
+export type { BlobOptions, PhotoInfo } from './element.js';
 export { RelightablePhoto } from './element.js';
 export type { Backend } from './engine.js';
 export type { EngineErrorCode, ErrorCode, PageErrorCode } from './errors.js';
@@ -16,6 +16,7 @@ export {
   QualityChangeEvent,
   ViewChangeEvent,
 } from './events.js';
+export type { LightPose } from './exhibit.js';
 export type {
   BrowserPicture,
   LightPicture,

@@ -13,7 +13,7 @@ import { clampToPicture, LIGHTS, type LightName, type PicturePoint } from './set
 import type { LightColor } from './tint.js';
 
 /** Takes the place of what the page asks for; what is `null` does not. */
-interface Choice {
+export interface LightChoice {
   /** A built-in light, also in place of a source. */
   readonly name: LightName | null;
   readonly torch: PicturePoint | null;
@@ -31,7 +31,7 @@ export interface LightingListener {
 /** One of the lights that there are to choose from: what the page shines, or a built-in one. */
 export type LightItem = LightName | 'projection';
 
-const PAGE: Choice = { name: null, torch: null, size: null, color: null };
+const PAGE: LightChoice = { name: null, torch: null, size: null, color: null };
 const NONE: AskedLight = { name: 'flood', src: null, place: null, size: null, color: null };
 /** Of the fire, in seconds: 30 pictures in one. */
 const FIRE_PERIOD = 1 / 30;
@@ -42,7 +42,7 @@ const FIRE_SLACK = 0.004;
 export class Lighting {
   readonly #listener: LightingListener;
   #asked: AskedLight = NONE;
-  #choice: Choice = PAGE;
+  #choice: LightChoice = PAGE;
   #media: LightMedia | null = null;
   #source: LightSource | null = null;
   #follower: LightFollower | null = null;
@@ -105,7 +105,7 @@ export class Lighting {
   }
 
   /** Takes the place of what the page asks for, as far as it says something. */
-  choose(choice: Partial<Choice>): void {
+  choose(choice: Partial<LightChoice>): void {
     this.#choice = { ...this.#choice, ...choice };
     this.#update();
   }

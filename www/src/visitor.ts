@@ -1,11 +1,12 @@
 /** What a visitor does, by pointer, wheel, keyboard and tilt; and what happens while nobody does anything. */
 
+import type { Exhibit } from './exhibit.js';
 import { Frames } from './frames.js';
 import type { Allowed } from './gestures.js';
 import { Idle } from './idle.js';
 import type { Velocity } from './inertia.js';
 import { type Focus, type KeyAction, keyAction } from './keys.js';
-import type { Lighting } from './lighting.js';
+import type { LightItem } from './lighting.js';
 import { Movement } from './movement.js';
 import { Pointing } from './pointing.js';
 import { CENTRE, type PicturePoint } from './settings.js';
@@ -14,7 +15,6 @@ import type { View } from './view.js';
 import {
   type PhotoView,
   pan,
-  sameView,
   toggleZoom,
   toPicture,
   WHOLE,
@@ -22,26 +22,18 @@ import {
   zoomAt,
 } from './viewport.js';
 
-/** What visitors have before them. */
-export interface Exhibit {
-  readonly lighting: Lighting;
-  /** The part of the picture that is shown. */
-  view: PhotoView;
-  /** The furthest magnification. */
-  readonly mostZoom: number;
-  readonly cooperative: boolean;
-  /** Whether there is a picture to be seen. */
-  readonly shown: boolean;
-  /** Whether things may move by themselves, and whether the torch is to. */
-  readonly plays: boolean;
-  readonly breathes: boolean;
+/** What is told. */
+export interface VisitorListener {
   /** Something is another from now on. */
   changed(): void;
+  /** The part that is shown is another. */
+  looked(): void;
   /** A light was chosen by a key. */
-  lightChosen(): void;
+  lightChosen(item: LightItem): void;
   /** Escape. */
   leave(): void;
-  hint(by: 'wheel' | 'touch'): void;
+  /** The page scrolls where somebody may have wanted to zoom. */
+  scrolled(by: 'wheel' | 'touch'): void;
   /** Nobody is there any more. */
   expired(): void;
   /** Anything at all was done, by a key or otherwise. */
@@ -51,6 +43,7 @@ export interface Exhibit {
 /** See the module. */
 export class Visitor {
   readonly #exhibit: Exhibit;
+  readonly #listener: VisitorListener;
   readonly #view: View;
   readonly #pointing: Pointing;
   readonly #tilting: Tilting;
@@ -63,16 +56,17 @@ export class Visitor {
   /** Where the torch was before a drag. */
   #torch: PicturePoint | null = null;
 
-  constructor(root: ShadowRoot, view: View, exhibit: Exhibit) {
+  constructor(root: ShadowRoot, view: View, exhibit: Exhibit, listener: VisitorListener) {
     this.#exhibit = exhibit;
+    this.#listener = listener;
     this.#view = view;
-    this.#movement = new Movement(exhibit.lighting, this.#frames, () => exhibit.changed());
+    this.#movement = new Movement(exhibit.lighting, this.#frames, () => listener.changed());
     this.#idle = new Idle(later, {
       rested: () => {
         this.#awake = false;
-        exhibit.changed();
+        listener.changed();
       },
-      expired: () => exhibit.expired(),
+      expired: () => listener.expired(),
     });
     this.#tilting = new Tilting((point) => {
       if (!exhibit.lighting.holdsTorch) return;
@@ -81,9 +75,9 @@ export class Visitor {
     });
     this.#pointing = new Pointing(view.stage, {
       allowed: () => this.#allowed,
-      isCooperative: () => exhibit.cooperative,
-      wheel: (factor, at) => this.#look(zoomAt(exhibit.view, factor, at, exhibit.mostZoom)),
-      scrolled: (by) => exhibit.hint(by),
+      isCooperative: () => exhibit.asked.cooperative,
+      wheel: (factor, at) => this.#look(zoomAt(exhibit.view, factor, at, exhibit.asked.zoom)),
+      scrolled: (by) => listener.scrolled(by),
       touched: () => this.touch(),
       pressed: () => {
         const { handle, stage } = view;
@@ -95,18 +89,18 @@ export class Visitor {
       },
       undoLight: () => {
         exhibit.lighting.torch = this.#torch;
-        exhibit.changed();
+        listener.changed();
       },
       throwLight: (velocity) => this.#throw(velocity),
       pan: (dx, dy) => {
         const moved = this.#inBox(dx, dy);
-        this.#look(pan(exhibit.view, moved.x, moved.y, exhibit.mostZoom));
+        this.#look(pan(exhibit.view, moved.x, moved.y, exhibit.asked.zoom));
       },
       zoom: (factor, x, y) => {
-        this.#look(zoomAt(exhibit.view, factor, this.#inBox(x, y), exhibit.mostZoom));
+        this.#look(zoomAt(exhibit.view, factor, this.#inBox(x, y), exhibit.asked.zoom));
       },
       tapTwice: (x, y) => {
-        this.#look(toggleZoom(exhibit.view, this.#inBox(x, y), exhibit.mostZoom));
+        this.#look(toggleZoom(exhibit.view, this.#inBox(x, y), exhibit.asked.zoom));
       },
     });
     root.addEventListener('keydown', (event) => this.#press(event as KeyboardEvent));
@@ -117,21 +111,21 @@ export class Visitor {
     const focus = () => {
       this.#focused = view.handle.matches(':focus-visible');
       this.#pointing.pans = false;
-      exhibit.changed();
+      listener.changed();
     };
     view.handle.addEventListener('focus', focus);
     view.handle.addEventListener('blur', focus);
   }
 
   /** Begins and ends what moves by itself. */
-  update(watched: boolean, kiosk: number): void {
-    const { lighting, plays, breathes, shown } = this.#exhibit;
-    this.#idle.kiosk = kiosk;
-    this.#frames.allow(watched);
+  update(plays: boolean): void {
+    const { lighting, shown, asked, curtain } = this.#exhibit;
+    this.#idle.kiosk = asked.kiosk;
+    this.#frames.allow(curtain.seen);
     const free = !this.#awake && !this.#focused && !this.#tilting.on;
     this.#movement.update({
       fire: plays && shown && lighting.burns,
-      breath: plays && shown && breathes && lighting.holdsTorch && free,
+      breath: plays && shown && asked.breathes && lighting.holdsTorch && free,
     });
   }
 
@@ -139,7 +133,7 @@ export class Visitor {
   touch(byKey = false): void {
     this.#awake = true;
     this.#idle.touch();
-    this.#exhibit.touched(byKey);
+    this.#listener.touched(byKey);
   }
 
   get tilts(): boolean {
@@ -148,7 +142,7 @@ export class Visitor {
 
   async tilt(): Promise<boolean> {
     const may = await this.#tilting.request();
-    this.#exhibit.changed();
+    this.#listener.changed();
     return may;
   }
 
@@ -161,8 +155,8 @@ export class Visitor {
 
   /** Magnifies around the middle. */
   zoom(by: 1 | -1): void {
-    const { view, mostZoom } = this.#exhibit;
-    this.#look(zoomAt(view, ZOOM_STEP ** by, CENTRE, mostZoom));
+    const { view, asked } = this.#exhibit;
+    this.#look(zoomAt(view, ZOOM_STEP ** by, CENTRE, asked.zoom));
   }
 
   stop(): void {
@@ -172,10 +166,10 @@ export class Visitor {
   }
 
   get #allowed(): Allowed {
-    const { lighting, mostZoom, shown, view } = this.#exhibit;
+    const { lighting, asked, shown, view } = this.#exhibit;
     return {
       light: shown && lighting.holdsTorch,
-      zoom: shown && mostZoom > 1,
+      zoom: shown && asked.zoom > 1,
       zoomed: view.zoom > 1,
     };
   }
@@ -188,7 +182,7 @@ export class Visitor {
   #shineAt(point: PicturePoint): void {
     this.#movement.hold();
     this.#exhibit.lighting.torch = point;
-    this.#exhibit.changed();
+    this.#listener.changed();
   }
 
   #throw({ x, y }: Velocity): void {
@@ -200,8 +194,10 @@ export class Visitor {
 
   /** Gives whether that is something else than before. */
   #look(view: PhotoView): boolean {
-    const other = !sameView(view, this.#exhibit.view);
+    const before = this.#exhibit.view;
     this.#exhibit.view = view;
+    const other = this.#exhibit.view !== before;
+    if (other) this.#listener.looked();
     return other;
   }
 
@@ -228,7 +224,7 @@ export class Visitor {
 
   /** Gives whether that was the element's business. */
   #do(action: KeyAction): boolean {
-    const { lighting, view, mostZoom } = this.#exhibit;
+    const { lighting, view, asked } = this.#exhibit;
     const at = lighting.torch ?? CENTRE;
     switch (action.kind) {
       case 'move':
@@ -238,21 +234,17 @@ export class Visitor {
         this.#shineAt({ x: action.x, y: at.y });
         return true;
       case 'pan':
-        return this.#look(pan(view, action.dx, action.dy, mostZoom));
+        return this.#look(pan(view, action.dx, action.dy, asked.zoom));
       case 'zoom':
-        if (mostZoom > 1) this.zoom(action.by);
-        return mostZoom > 1;
+        if (asked.zoom > 1) this.zoom(action.by);
+        return asked.zoom > 1;
       case 'whole':
         return this.#look(WHOLE);
-      case 'light': {
-        const { items } = lighting;
-        const next = items.indexOf(lighting.item) + action.by;
-        lighting.item = items.at(next % items.length) ?? lighting.item;
-        this.#exhibit.lightChosen();
+      case 'light':
+        this.#listener.lightChosen(this.#exhibit.step(action.by));
         return true;
-      }
       case 'leave':
-        this.#exhibit.leave();
+        this.#listener.leave();
         return false;
     }
   }
