@@ -303,6 +303,10 @@ fn relit_pictures_agree_with_the_reference_and_follow_the_torch() {
     let right = relit("r.png", &["--light", "torch", "--at", "0.9,0.5"]);
     assert!(brightness(&left, true) > 2 * brightness(&left, false));
     assert!(brightness(&right, false) > 2 * brightness(&right, true));
+    // The built-in fire is the first moment of the one that burns.
+    let fire = relit("f.png", &["--light", "fire"]);
+    assert_eq!(fire, relit("f0.png", &["--light", "fire", "--time", "0"]));
+    assert_ne!(fire, relit("f2.png", &["--light", "fire", "--time", "2.5"]));
     // A picture as the light, larger than the light plane; then half as bright.
     let white = folder.path().join("white.png");
     image::RgbImage::from_pixel(90, 50, image::Rgb([255; 3]))
@@ -632,6 +636,9 @@ fn options_that_cannot_be_are_refused() {
     for wrong in [
         &["flood", "--at", "0.5,0.5"][..],
         &["torch", "--at", "here"],
+        &["torch", "--time", "2"],
+        &["fire", "--time", "now"],
+        &["fire", "--time", "inf"],
         &["flood", "--exposure=-1"],
     ] {
         assert_eq!(

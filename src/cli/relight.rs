@@ -24,6 +24,9 @@ pub struct RelightArgs {
     /// the middle of the light]
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = parse_position)]
     at: Option<[f64; 2]>,
+    /// The moment at which a fire is shown, in seconds [default: 0]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_seconds)]
+    time: Option<f64>,
     /// Factor on the picture's brightness
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| super::number_in(text, 0.0, 1e6))]
     exposure: f32,
@@ -58,9 +61,19 @@ fn parse_position(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds.is_finite() => Ok(seconds),
+        _ => Err("expected a number of seconds, as in 2.5".to_owned()),
+    }
+}
+
 pub fn run(args: &RelightArgs) -> Result<()> {
     if args.at.is_some() && args.light != "torch" {
         return Err(Usage("--at goes with --light torch").into());
+    }
+    if args.time.is_some() && args.light != "fire" {
+        return Err(Usage("--time goes with --light fire").into());
     }
     let output = files::Output::create(&args.output, files::Kind::Png)?;
     let file = files::read_ltm(&args.file, args.first)?;
@@ -72,9 +85,10 @@ pub fn run(args: &RelightArgs) -> Result<()> {
         );
     }
     let geometry = &file.head.header.geometry;
-    let light = match args.at {
-        None => lights::named(&args.light, geometry.light)?,
-        Some([x, y]) => Light::torch(geometry.light, TorchPose::behind(geometry, x, y)),
+    let light = match (args.at, args.time) {
+        (Some([x, y]), _) => Light::torch(geometry.light, TorchPose::behind(geometry, x, y)),
+        (None, Some(seconds)) => Light::fire(geometry.light, seconds),
+        (None, None) => lights::named(&args.light, geometry.light)?,
     };
     let display = Display::srgb(args.exposure);
     let picture = match args.backend {

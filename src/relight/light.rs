@@ -2,8 +2,8 @@
 
 use thiserror::Error;
 
-use super::Tint;
 use super::resample::AreaMeans;
+use super::{Tint, fire};
 use crate::transport::{Extent, Geometry, LightPx};
 
 /// Linear emission of every light element, 0 dark to 1 full brightness: R, G, B and an unused
@@ -65,7 +65,7 @@ pub enum BuiltinLight {
     Stripes,
     /// The rainbow from left to right.
     Spectrum,
-    /// One moment of a fire that burns along the lower edge.
+    /// One moment of a fire that burns along the lower edge: the first of [`Light::fire`].
     Fire,
 }
 
@@ -246,10 +246,12 @@ impl Light {
     }
 
     /// A fire that burns along the lower edge, `seconds` after it was first looked at: always the
-    /// same at the same time.
+    /// same at the same time, and never twice the same. Times that are not finite are taken as none.
     pub fn fire(extent: Extent, seconds: f64) -> Self {
-        let (w, h) = (f64::from(extent.width), f64::from(extent.height));
-        Self::from_fn(extent, |p| flame(p.u / w, 1.0 - p.v / h, seconds))
+        Self {
+            extent,
+            elements: fire::burning(extent, seconds),
+        }
     }
 
     /// What its channels have in common.
@@ -291,36 +293,6 @@ fn rainbow(x: f64) -> [f32; 3] {
     };
     // Violet is blue with a little red coming back.
     [lobe(0.12) + 0.35 * lobe(1.0), lobe(0.48), lobe(0.82)]
-}
-
-/// Glowing gas at a place of the unit square, as linear RGB: noise that rises, cools and frays.
-fn flame(x: f64, height: f64, seconds: f64) -> [f32; 3] {
-    let turbulence = |grain: f64| {
-        let rise = 0.5 * grain * seconds;
-        lattice_noise(x * grain, 0.5 * height * grain - rise)
-    };
-    let noise = 0.5 * turbulence(4.0) + 0.3 * turbulence(9.0) + 0.2 * turbulence(19.0);
-    let aside = (2.0 * x - 1.0).powi(4);
-    let heat = (1.3 - 1.75 * height - 0.5 * aside + 2.2 * (noise - 0.5)).clamp(0.0, 1.0);
-    // Black body colours: red first, then yellow, white at the hottest only.
-    [heat * heat, 0.55 * heat.powi(4), 0.16 * heat.powi(8)].map(|c| c as f32)
-}
-
-/// Smooth noise of unit grain, 0 to 1.
-fn lattice_noise(x: f64, y: f64) -> f64 {
-    let corner = |i: i64, j: i64| {
-        // Any good mix of the two will do (finaliser of MurmurHash3).
-        let mut h = (i as u32).wrapping_mul(0x9e37_79b9) ^ (j as u32).wrapping_mul(0x85eb_ca6b);
-        h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
-        h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
-        f64::from(h ^ (h >> 16)) / f64::from(u32::MAX)
-    };
-    let (i, j) = (x.floor(), y.floor());
-    let smooth = |t: f64| t * t * (3.0 - 2.0 * t);
-    let (s, t) = (smooth(x - i), smooth(y - j));
-    let (i, j) = (i as i64, j as i64);
-    let row = |j: i64| corner(i, j) * (1.0 - s) + corner(i + 1, j) * s;
-    row(j) * (1.0 - t) + row(j + 1) * t
 }
 
 #[cfg(test)]

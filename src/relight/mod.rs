@@ -12,6 +12,7 @@ pub mod backend;
 pub mod canvas2d;
 pub mod cpu;
 pub mod display;
+mod fire;
 mod light;
 mod picture;
 pub mod reference;

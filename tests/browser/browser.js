@@ -2,11 +2,12 @@
 
 import { after } from 'node:test';
 import { gzipSync } from 'node:zlib';
+import axe from 'axe-core';
 import { launchChromium } from '../../www/tools/chromium.js';
-import { decodePng } from '../../www/tools/pictures.js';
+import { decodePng, encodePng } from '../../www/tools/pictures.js';
 import { answer } from '../../www/tools/ranges.js';
 import { listen } from '../../www/tools/serve.js';
-import { site } from '../../www/tools/site.js';
+import { CONTENT_SECURITY_POLICY, site } from '../../www/tools/site.js';
 import { FOLDER, glassBytes } from './photos.js';
 
 /** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
@@ -53,6 +54,13 @@ function inParts(response, request, { etag = '"a"', bytes = glassBytes } = {}) {
   const content = { size: bytes.length, type: 'application/vnd.ltm', etag, read };
   answer(request, response, content).catch(() => {});
 }
+
+/** White on the left, black on the right. */
+const HALF = encodePng({
+  width: 10,
+  height: 10,
+  data: Uint8Array.from({ length: 400 }, (_, i) => (i % 4 === 3 || i % 40 < 20 ? 255 : 0)),
+});
 
 /**
  * Bad servers and odd ones, by path. `count` is 1 with the first request for an address.
@@ -130,6 +138,24 @@ const FAULTS = {
     response.end(glassBytes.subarray(1, 101));
   },
   '/faults/refused': (response) => response.writeHead(416).end(),
+  '/half.png': (response) => response.writeHead(200, { 'Content-Type': 'image/png' }).end(HALF),
+  // Under the policy that the element is made to live under; with axe-core, which is no part of it.
+  '/strict': (response, request) => {
+    const lang = new URL(request.url ?? '/', 'http://localhost').searchParams.get('lang') ?? 'en';
+    response
+      .writeHead(200, {
+        'Content-Type': 'text/html',
+        'Content-Security-Policy': CONTENT_SECURITY_POLICY,
+      })
+      .end(
+        `<!doctype html><html lang="${lang}"><meta name="viewport" content="width=device-width">` +
+          '<title>A window</title><script src="/axe.js"></script>' +
+          '<script type="module" src="/relightable-photo/relightable-photo.js"></script>' +
+          '<main><h1>A window</h1></main>',
+      );
+  },
+  '/axe.js': (response) =>
+    response.writeHead(200, { 'Content-Type': 'text/javascript' }).end(axe.source),
   '/blank': (response) =>
     response
       .writeHead(200, { 'Content-Type': 'text/html' })
@@ -215,12 +241,12 @@ export async function mount(page, attributes) {
     const photo = document.createElement('relightable-photo');
     /** @type {Happening[]} */
     const happened = [];
-    const changes = ['lightchange', 'backendchange', 'qualitychange'];
+    const changes = ['lightchange', 'viewchange', 'backendchange', 'contextlost', 'qualitychange'];
     for (const type of ['load', 'progress', 'error', ...changes]) {
       // On the document: events have to travel that far.
       document.addEventListener(type, (event) => {
         const fields = ['code', 'message', 'backend', 'previous', 'reason', 'light', 'torch'];
-        const data = [...fields, 'loaded', 'total', 'share']
+        const data = [...fields, 'loaded', 'total', 'share', 'zoom', 'x', 'y']
           .filter((field) => field in event)
           .map((field) => [field, /** @type {any} */ (event)[field]]);
         happened.push({ type, ...Object.fromEntries(data) });
@@ -229,7 +255,7 @@ export async function mount(page, attributes) {
     Object.assign(globalThis, { photo, happened });
     for (const [name, value] of Object.entries(attributes)) photo.setAttribute(name, value);
     photo.style.width = '64px';
-    document.body.append(photo);
+    (document.querySelector('main') ?? document.body).append(photo);
   }, attributes);
 }
 
@@ -296,6 +322,20 @@ export async function picture(page, attributes = {}, torch) {
 /** The element's visible message, as people and screen readers get it. @param {Page} page */
 export function message(page) {
   return page.getByRole('alert');
+}
+
+/**
+ * Looks closer at the element's message: visitors are told in short, and all of it where they ask.
+ *
+ * @param {Page} page
+ */
+export async function details(page) {
+  await message(page)
+    .getByText(/cannot be shown|not work as intended/)
+    .waitFor({ state: 'visible' });
+  const details = page.locator('relightable-photo details');
+  await details.evaluate((element) => element.setAttribute('open', ''));
+  return message(page);
 }
 
 /**

@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import { describe, test } from 'node:test';
 import { compare } from '../../www/tools/pictures.js';
 import {
+  details,
   happenedUntil,
   loaded,
   message,
@@ -72,7 +73,7 @@ describe('falling back', () => {
     await mount(page, { ...GLASS, backend: 'webgpu webgl2' });
     const happened = await happenedUntil(page, 'error');
     assert.equal(happened.at(-1)?.['code'], 'backend-unavailable');
-    await message(page).getByText('This browser cannot draw the photograph').waitFor();
+    await (await details(page)).getByText('This browser cannot draw the photograph').waitFor();
     await page.evaluate("photo.backend = 'webgpu webgl2 cpu'");
     await happenedUntil(page, 'load');
     await message(page).waitFor({ state: 'hidden' });

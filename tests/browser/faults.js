@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { describe, test } from 'node:test';
-import { happenedUntil, loaded, message, mount, openPage } from './browser.js';
+import { details, happenedUntil, loaded, message, mount, openPage } from './browser.js';
 import { DAMAGED } from './photos.js';
 
 /** @param {import('playwright-core').Page} page @param {string} code */
@@ -11,7 +11,7 @@ async function failsWith(page, code) {
   assert.equal(error?.['code'], code, String(error?.['message']));
   const text = String(error?.['message']);
   assert.match(text, /\S+ \S+ \S+/, 'a message people can read');
-  await message(page).getByText(text, { exact: true }).waitFor({ state: 'visible' });
+  await (await details(page)).getByText(text, { exact: true }).waitFor({ state: 'visible' });
   await page.getByRole('progressbar').waitFor({ state: 'hidden' });
   return text;
 }

@@ -6,6 +6,7 @@ import { join } from 'node:path';
 import { describe, test } from 'node:test';
 import { compare, decodePng, encodePng } from '../../www/tools/pictures.js';
 import {
+  details,
   happenedUntil,
   loaded,
   message,
@@ -407,7 +408,7 @@ describe('a light source', () => {
       );
       const error = (await happenedUntil(page, 'error')).find(({ type }) => type === 'error');
       assert.equal(error?.['code'], 'light-tainted');
-      await message(page).getByText('crossorigin').waitFor();
+      await (await details(page)).getByText('crossorigin').waitFor();
       assert.equal(compare(await picture(page), want).worst, 0);
       const brighter = await picture(page, { exposure: '2' });
       assert.ok(compare(brighter, want).worst > 20, 'the last light is still a light');
@@ -429,7 +430,7 @@ describe('a light source', () => {
         .filter((/** @type {any} */ { type }) => type === 'error')
         .map((/** @type {any} */ { code }) => code);
     await happenedUntil(page, 'error');
-    await message(page).getByText('needs 6').waitFor();
+    await (await details(page)).getByText('needs 6').waitFor();
     assert.ok(compare(await picture(page), nativePicture('spectrum', 'reference')).worst <= 1);
     for (const value of ['-1', 'NaN', 'Infinity']) {
       const light = `{ data: new Float32Array([1, 1, ${value}]), width: 1, height: 1 }`;
@@ -457,7 +458,7 @@ describe('a light source', () => {
     const values = Array(3).fill('light-value');
     const sources = Array(2).fill('light-source');
     assert.deepEqual(await codes(), ['light-size', ...values, 'light-size', ...sources]);
-    await message(page).getByText('cannot be played').waitFor();
+    await (await details(page)).getByText('cannot be played').waitFor();
     await page.evaluate('photo.lightSource = null');
     await message(page).waitFor({ state: 'hidden' });
   });

@@ -41,7 +41,7 @@ const moveTorch = (page) =>
 async function farBelow(t) {
   const page = await openPage(t, '/bench', { before: counting });
   await page.evaluate('document.body.innerHTML = \'<p style="height: 5000px"></p>\'');
-  await mount(page, GLASS);
+  await mount(page, { ...GLASS, loading: 'eager' });
   await loaded(page);
   // Until the browser has told what is in view.
   await page.waitForTimeout(200);

@@ -1,5 +1,6 @@
 /** What all canvases with a photograph on them have in common. */
 
+import type { Gamut } from './engine.js';
 import { PhotoError } from './errors.js';
 import type { Drawing } from './player.js';
 
@@ -19,4 +20,20 @@ export function blobOf(canvas: HTMLCanvasElement, type: string, quality?: number
         : reject(new PhotoError('internal', `The browser could not encode ${type}.`));
     canvas.toBlob(done, type, quality);
   });
+}
+
+/** A canvas as it looks now, of so many times the pixels along either side. */
+export function resampled(
+  canvas: HTMLCanvasElement,
+  scale: number,
+  gamut: Gamut,
+): HTMLCanvasElement {
+  const copy = document.createElement('canvas');
+  copy.width = Math.max(1, Math.round(canvas.width * scale));
+  copy.height = Math.max(1, Math.round(canvas.height * scale));
+  const context = copy.getContext('2d', { colorSpace: gamut });
+  if (!context) throw new PhotoError('internal', 'The browser gives no canvas to scale by.');
+  context.imageSmoothingQuality = 'high';
+  context.drawImage(canvas, 0, 0, copy.width, copy.height);
+  return copy;
 }

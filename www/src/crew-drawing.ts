@@ -10,6 +10,7 @@ import { Lamp } from './lamp.js';
 import type { LightSetting } from './lights.js';
 import type { Look } from './look.js';
 import type { Photograph } from './photograph.js';
+import type { Drawn } from './player.js';
 
 /** See the module. */
 export class CrewDrawing implements CanvasSurface {
@@ -64,13 +65,13 @@ export class CrewDrawing implements CanvasSurface {
     return new CrewDrawing(module, photograph, crew, context, kernel, gamut);
   }
 
-  async render(setting: LightSetting, look: Look, detail: number): Promise<PhotoError | null> {
+  async render(setting: LightSetting, look: Look, detail: number): Promise<Drawn> {
     // Before its tiles are brought to the workers for nothing.
     if (this.#freed) throw letGo();
     try {
       return await this.#photograph.withCrew(this.#crew, async (shift) => {
         if (this.#freed) throw letGo();
-        const { light, fault } = this.#lamp.turnTo(setting, this.#plane);
+        const { light, asked, fault } = this.#lamp.turnTo(setting, this.#plane);
         const rows = await shift.relight(light, { look, gamut: this.gamut, detail });
         const settings = { colorSpace: this.gamut };
         if (this.#freed) throw letGo();
@@ -83,7 +84,7 @@ export class CrewDrawing implements CanvasSurface {
             first,
           );
         }
-        return fault;
+        return { asked, fault };
       });
     } catch (thrown) {
       if (!(thrown instanceof PhotoError && thrown.code === 'worker-unavailable')) throw thrown;

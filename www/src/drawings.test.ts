@@ -12,6 +12,7 @@ import { exposed, PLAIN, wanting } from './settings-fakes.js';
 
 const SETTINGS: Settings = {
   src: 'a.ltm',
+  credentials: 'same-origin',
   wanted: wanting(['cpu']),
   light: { name: 'flood', torch: null, picture: null },
   look: exposed(1),
@@ -82,6 +83,7 @@ async function playing(t: TestContext, ask = async (_: Backend): Promise<void> =
       loaded: () => {},
       show: () => {},
       backendChanged: (backend) => changes.push(backend),
+      lost: () => {},
       failed: (error) => changes.push(error.code),
       recovered: () => {},
     },

@@ -1,68 +1,45 @@
-/** `<relightable-photo>`: attributes and pointer in, events and a picture out. */
+/** `<relightable-photo>`: attributes and visitors in, events and a picture out. */
 
+import { type Asked, readAsked } from './asked.js';
 import { Attributes } from './attributes.js';
-import type { CanvasSurface } from './canvas.js';
-import { newDecoder } from './decoders.js';
-import { draw } from './drawings.js';
+import { blobOf, type CanvasSurface, resampled } from './canvas.js';
+import { Controls } from './controls.js';
 import type { Backend, Gamut } from './engine.js';
-import { PhotoError } from './errors.js';
+import type { PhotoError } from './errors.js';
 import {
   BackendChangeEvent,
+  ContextLostEvent,
   LightChangeEvent,
   loadEvent,
   PhotoErrorEvent,
   progressEvent,
   QualityChangeEvent,
   type RelightablePhotoEventMap,
+  ViewChangeEvent,
 } from './events.js';
-import { LightFollower } from './light-follower.js';
-import { checkLightSource, type LightSource } from './light-source.js';
-import type { LightSetting } from './lights.js';
-import { openPhoto } from './load.js';
+import { Exhibit, type LightPose } from './exhibit.js';
+import { languageAt } from './language.js';
+import { LightNews, type Shining } from './light-news.js';
+import { checkLightSource, isLightSource, type LightSource } from './light-source.js';
+import { lightWords } from './light-words.js';
+import type { Lighting } from './lighting.js';
+import { setModuleFolder } from './modules.js';
 import type { Facts } from './photograph.js';
 import { Player } from './player.js';
-import {
-  BACKENDS,
-  clampToPicture,
-  type PicturePoint,
-  parseBackends,
-  parseExposure,
-  parseGamut,
-  parseLight,
-  parseTone,
-  parseWhiteBalance,
-  stepTorch,
-} from './settings.js';
+import { PORTS } from './ports.js';
+import { ATTRIBUTES, PROPERTIES, type Reflected, reflect } from './reflect.js';
+import { BACKENDS, CENTRE, type LightName, type PicturePoint } from './settings.js';
 import { unwatch, watch } from './sight.js';
+import { mayTilt } from './tilting.js';
+import { browserColor } from './tint.js';
+import type { ToolbarState } from './toolbar.js';
 import { View } from './view.js';
+import { type PhotoView, WHOLE } from './viewport.js';
+import { Visitor } from './visitor.js';
+import { fetchTranslations, isMissing, type Language, say, type Word } from './words.js';
 
 // On a server there are no elements, but importing this module must not fail there.
 const Base = globalThis.HTMLElement ?? (class {} as unknown as typeof HTMLElement);
-
-const ATTRIBUTES = [
-  'src',
-  'alt',
-  'light',
-  'backend',
-  'exposure',
-  'white-balance',
-  'tone',
-  'gamut',
-] as const;
-/** Properties that a page may have set before this class was known. */
-const PROPERTIES = [
-  'src',
-  'alt',
-  'light',
-  'backend',
-  'exposure',
-  'whiteBalance',
-  'tone',
-  'gamut',
-  'torch',
-  'lightSource',
-] as const;
-const CENTRE: PicturePoint = { x: 0.5, y: 0.5 };
 
 /** What is known of a photograph once it has loaded. */
 export type PhotoInfo = Facts;
@@ -73,156 +50,87 @@ export interface BlobOptions {
   readonly type?: string;
   /** 0 to 1, for types that lose some. */
   readonly quality?: number;
+  /** Factor on the picture's pixels along either side, up to 4. */
+  readonly scale?: number;
 }
+
+const MAX_SCALE = 4;
 
 /**
  * A photograph that can be relit.
  *
- * Fires `load`, `progress`, `error`, `lightchange`, `backendchange` and `qualitychange`. Style it by
- * `::part(picture)`, `::part(canvas)`, `::part(progress)` and `::part(message)`, and by the custom
- * properties `--relightable-photo-background`, `-color`, `-accent`, `-focus` and `-aspect`, the last being
- * the space kept until the photograph is there.
+ * Fires `load`, `progress`, `error`, `lightchange`, `viewchange`, `backendchange`, `contextlost` and
+ * `qualitychange`. Takes the slots `poster`, `progress`, `controls` and `error`. Style it by
+ * `::part()` of picture, canvas, poster, progress, message, controls, menu, button, torch-handle, hint
+ * and status, and by the custom properties `--relightable-photo-background`, `-color`, `-accent`,
+ * `-focus` and `-aspect`, the last being the space kept until the photograph is there.
  */
-// biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the interface only adds overloads of methods that Base has
+// biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the interface adds the properties that are attributes, and overloads of methods that Base has
 export class RelightablePhoto extends Base {
-  static readonly observedAttributes: readonly string[] = ATTRIBUTES;
+  static readonly observedAttributes: readonly string[] = [...ATTRIBUTES, 'lang'];
+
+  static {
+    reflect(RelightablePhoto.prototype);
+  }
 
   readonly #view: View;
+  readonly #controls: Controls;
+  readonly #visitor: Visitor;
   readonly #player: Player<CanvasSurface>;
-  #torch: PicturePoint | null = null;
-  #follower: LightFollower | null = null;
-  #seen = true;
+  readonly #attributes = new Attributes();
+  readonly #exhibit: Exhibit;
+  readonly #news = new LightNews();
+  #toldView = WHOLE;
+  #language: Language = 'en';
+  /** The address that was given to the player. */
+  #fetched: string | null | undefined;
   #reload = false;
   #scheduled = false;
-  readonly #attributes = new Attributes();
-  #playerFault: string | null = null;
+  #listening: AbortController | null = null;
   #lightFault: PhotoError | null = null;
-  /** The light of the last attributes that were right. */
-  #lit: LightSetting | null = null;
 
   constructor() {
     super();
-    this.#view = new View(this.attachShadow({ mode: 'open' }));
-    this.#player = new Player(
+    const root = this.attachShadow({ mode: 'open' });
+    this.#view = new View(root);
+    this.#exhibit = new Exhibit(
+      this.#read(),
       {
-        open: (src, signal, onProgress, onPreview) =>
-          openPhoto(src, signal, onProgress, onPreview, {
-            decoder: newDecoder,
-            fetch: (...request) => fetch(...request),
-            pause,
-            now: () => performance.now(),
-          }),
-        draw,
-        nextFrame: requestAnimationFrame.bind(globalThis),
-        later: (ms, callback) => {
-          const timer = setTimeout(callback, ms);
-          return () => clearTimeout(timer);
-        },
-        now: () => performance.now(),
+        changed: () => this.#player.redraw(),
+        faultChanged: (fault) => this.#lightFaultChanged(fault),
       },
-      {
-        loading: () => {
-          this.#playerFault = null;
-          this.#lightFault = null;
-          this.#view.clear();
-          this.#view.progress(Number.NaN);
-          this.#showFault();
-        },
-        progress: (loaded, total) => {
-          this.#view.progress(total > 0 ? Math.min(1, loaded / total) : Number.NaN);
-          this.dispatchEvent(progressEvent(loaded, total));
-        },
-        drawn: (fault) => {
-          // A light that stays wrong says so once, not at every frame with other numbers.
-          if (fault?.code === this.#lightFault?.code) return;
-          this.#lightFault = fault;
-          this.#lightFaultChanged(fault);
-        },
-        detailChanged: (detail) => this.dispatchEvent(new QualityChangeEvent(detail)),
-        loaded: () => {
-          this.#view.progress(null);
-          this.dispatchEvent(loadEvent());
-        },
-        show: (drawing) => this.#view.show(drawing.canvas),
-        backendChanged: (backend, previous, reason) => {
-          this.dispatchEvent(new BackendChangeEvent(backend, previous, reason));
-        },
-        failed: (error) => {
-          this.#playerFault = error.message;
-          this.#fail(error);
-        },
-        recovered: () => {
-          this.#playerFault = null;
-          this.#showFault();
-        },
-      },
+      browserColor,
     );
-    this.#listen();
-  }
-
-  /** Address of the `.ltm` file. */
-  get src(): string {
-    return this.getAttribute('src') ?? '';
-  }
-  set src(value: string) {
-    this.setAttribute('src', value);
-  }
-
-  /** What the picture shows, in words. */
-  get alt(): string {
-    return this.getAttribute('alt') ?? '';
-  }
-  set alt(value: string) {
-    this.setAttribute('alt', value);
-  }
-
-  /** Name of a built-in light. */
-  get light(): string {
-    return this.getAttribute('light') ?? 'flood';
-  }
-  set light(value: string) {
-    this.setAttribute('light', value);
-  }
-
-  /** Back ends to try, in order, parted by spaces. */
-  get backend(): string {
-    return this.getAttribute('backend') ?? 'webgpu webgl2 cpu';
-  }
-  set backend(value: string) {
-    this.setAttribute('backend', value);
-  }
-
-  /** Factor on the light's brightness. */
-  get exposure(): number {
-    const value = this.getAttribute('exposure');
-    return value === null ? 1 : Number(value);
-  }
-  set exposure(value: number) {
-    this.setAttribute('exposure', String(value));
-  }
-
-  /** Factors on red, green and blue. */
-  get whiteBalance(): string {
-    return this.getAttribute('white-balance') ?? '1 1 1';
-  }
-  set whiteBalance(value: string) {
-    this.setAttribute('white-balance', value);
-  }
-
-  /** What becomes of brightness: `clip`, cut off at white, or `filmic`, rolled off before it. */
-  get tone(): string {
-    return this.getAttribute('tone') ?? 'clip';
-  }
-  set tone(value: string) {
-    this.setAttribute('tone', value);
-  }
-
-  /** Colours that the canvas is to show: `srgb` or `display-p3`. */
-  get gamut(): string {
-    return this.getAttribute('gamut') ?? 'srgb';
-  }
-  set gamut(value: string) {
-    this.setAttribute('gamut', value);
+    this.#controls = new Controls(
+      this.#view,
+      {
+        choose: (item) => {
+          this.#lighting.item = item;
+          this.#visitor.touch();
+          this.#schedule();
+        },
+        play: () => {
+          this.paused = !this.paused;
+        },
+        zoom: (by) => this.#visitor.zoom(by),
+        reset: () => this.reset(),
+        tilt: () => {
+          if (!this.#visitor.tilts) void this.requestTilt();
+          else this.#visitor.reset();
+          this.#schedule();
+        },
+        fullscreen: () => this.#toggleFullscreen(),
+      },
+      () => this.#schedule(),
+      (error) => this.dispatchEvent(new PhotoErrorEvent(error)),
+    );
+    this.#player = this.#newPlayer();
+    this.#visitor = this.#newVisitor(root);
+    this.#view.revealButton.addEventListener('click', () => {
+      this.#visitor.touch();
+      this.dismissPoster();
+    });
+    this.addEventListener('fullscreenchange', () => this.#schedule());
   }
 
   /** Colours that the canvas shows: those asked for where the browser can; `null` without a picture. */
@@ -230,40 +138,61 @@ export class RelightablePhoto extends Base {
     return this.#player.drawing?.gamut ?? null;
   }
 
+  /** The built-in light that shines, or that a source stands in for: a visitor may have chosen it. */
+  get activeLight(): LightName {
+    return this.#lighting.name;
+  }
+
   /** Where the torch shines, on the picture; `null`: over the middle of the light. */
   get torch(): PicturePoint | null {
-    return this.#torch;
+    return this.#lighting.torch;
   }
   set torch(point: PicturePoint | null) {
     if (point && !(Number.isFinite(point.x) && Number.isFinite(point.y))) {
       throw new TypeError('torch must be null or have finite numbers x and y, from 0 to 1');
     }
-    this.#torch = point && clampToPicture(point);
+    this.#lighting.torch = point;
+    this.#schedule();
+  }
+
+  /** The part of the picture that is shown: its middle, and a magnification of no more than `zoom`. */
+  get view(): PhotoView {
+    return this.#exhibit.view;
+  }
+  set view(view: PhotoView) {
+    if (![view?.zoom, view?.x, view?.y].every(Number.isFinite)) {
+      throw new TypeError('view must have finite numbers zoom, from 1, and x and y, from 0 to 1');
+    }
+    this.#exhibit.asked = this.#read();
+    this.#exhibit.view = view;
+    this.#schedule();
+  }
+
+  /** Whether what moves by itself stands still: fire, the film of `light-src`, the wandering torch. */
+  get paused(): boolean {
+    return this.#exhibit.paused ?? motion().matches;
+  }
+  set paused(paused: boolean) {
+    this.#exhibit.paused = paused;
     this.#schedule();
   }
 
   /**
-   * What shines in place of the built-in light; `null`, to begin with, where that one does. The built-in
+   * What shines in place of the built-in light, by a script; `null`, to begin with, where none does. The built-in
    * light or the last one stays until there is something to be seen, and where something is wrong with
    * the source. Frames of videos and streams are followed while the element is in view. A canvas that is
    * drawn on by WebGL has to have `preserveDrawingBuffer`, as it is looked at after its own frame.
    */
   get lightSource(): LightSource | null {
-    return this.#follower?.source ?? null;
+    return this.#lighting.source;
   }
   set lightSource(value: LightSource | null) {
     const source = value === null ? null : checkLightSource(value);
-    if (source === this.lightSource) {
+    if (source !== null && source === this.#lighting.shining) {
       this.lightChanged();
       return;
     }
-    this.#follower?.stop();
-    this.#follower =
-      source &&
-      new LightFollower(source, {
-        changed: () => this.#player.redraw(),
-        faultChanged: (fault) => this.#lightFaultChanged(fault),
-      });
+    this.#lighting.source = source;
     this.#lightFault = null;
     this.#schedule();
   }
@@ -273,7 +202,56 @@ export class RelightablePhoto extends Base {
    * telling.
    */
   lightChanged(): void {
-    if (this.#follower) this.#player.redraw();
+    if (this.#lighting.shining) this.#player.redraw();
+  }
+
+  /**
+   * Has a light shine until `reset`, or until an attribute asks for another: a built-in one by its name, with
+   * its place, size and colour if need be, or a source, as by `lightSource`. `null`: the page's own, without a source.
+   */
+  setLight(light: LightName | LightPose | LightSource | null): void {
+    if (light === null || isLightSource(light)) {
+      this.#lighting.reset();
+      this.lightSource = light;
+    } else {
+      this.#exhibit.pose(typeof light === 'string' ? { name: light } : light);
+    }
+    this.#schedule();
+  }
+
+  /** Light and view as the attributes and `lightSource` say. */
+  reset(): void {
+    this.#visitor.reset();
+    this.#exhibit.reset();
+    this.#schedule();
+  }
+
+  /** Light and view in a few letters, all of which addresses may hold. What a source shows is not among it. */
+  getState(): string {
+    this.#exhibit.asked = this.#read();
+    return this.#exhibit.state;
+  }
+
+  /** Takes what `getState` gave, here or at another element. What it does not tell is as the page asks. */
+  setState(text: string): void {
+    this.reset();
+    this.#exhibit.asked = this.#read();
+    const faults = this.#exhibit.take(text);
+    for (const fault of faults) this.dispatchEvent(new PhotoErrorEvent(fault));
+  }
+
+  /** Has the poster give way, as soon as there is a picture. */
+  dismissPoster(): void {
+    this.#exhibit.curtain.lifted = true;
+    this.#schedule();
+  }
+
+  /**
+   * Has the torch follow how the device is held. Gives whether it may; some browsers ask the visitor, who
+   * must have pressed something just before. Ends with `reset`.
+   */
+  requestTilt(): Promise<boolean> {
+    return this.#visitor.tilt();
   }
 
   /** The back end that draws, `null` while there is none. */
@@ -300,18 +278,23 @@ export class RelightablePhoto extends Base {
   }
 
   /**
-   * Draws the picture as it is set now, in full detail, and encodes it. Rejects with `not-loaded` while there is no
-   * photograph, and where another takes its place meanwhile.
+   * Draws the picture as it is set now, all of it in full detail, and encodes it. Rejects with `not-loaded`
+   * while there is no photograph, and where another takes its place meanwhile.
    */
-  async toBlob({ type = 'image/png', quality }: BlobOptions = {}): Promise<Blob> {
+  async toBlob({ type = 'image/png', quality, scale = 1 }: BlobOptions = {}): Promise<Blob> {
+    if (!(scale > 0 && scale <= MAX_SCALE)) {
+      throw new RangeError(`scale must be more than 0 and at most ${MAX_SCALE}`);
+    }
     this.#update();
+    const drawing = await this.#player.renderNow();
     // The canvas of a GPU keeps its content only until the browser has shown it.
-    return (await this.#player.renderNow()).toBlob(type, quality);
+    if (scale === 1) return drawing.toBlob(type, quality);
+    return blobOf(resampled(drawing.canvas, scale, drawing.gamut), type, quality);
   }
 
   connectedCallback(): void {
     // Properties that were set before this class was known hide its setters.
-    for (const name of PROPERTIES) {
+    for (const name of [...PROPERTIES, 'torch', 'lightSource', 'view', 'paused'] as const) {
       if (Object.hasOwn(this, name)) {
         const value = this[name];
         delete (this as Record<string, unknown>)[name];
@@ -329,7 +312,89 @@ export class RelightablePhoto extends Base {
   attributeChangedCallback(name: string): void {
     // As with <img>, setting the same address again loads again.
     if (name === 'src') this.#reload = true;
+    this.#exhibit.overrule(name);
     this.#schedule();
+  }
+
+  #newPlayer(): Player<CanvasSurface> {
+    return new Player(PORTS, {
+      loading: () => {
+        this.#clear();
+        this.#view.progress(Number.NaN);
+      },
+      progress: (loaded, total) => {
+        this.#view.progress(total > 0 ? Math.min(1, loaded / total) : Number.NaN);
+        this.dispatchEvent(progressEvent(loaded, total));
+      },
+      drawn: ({ asked, fault }, light) => {
+        const { curtain } = this.#exhibit;
+        if (!curtain.drawn) this.#schedule();
+        curtain.drawn = true;
+        const { setting, shining } = this.#lighting;
+        if (asked && shining && light.picture === setting.picture) {
+          this.#tellLight(this.#news.drawn(setting.name, shining));
+        }
+        // A light that stays wrong says so once, not at every frame with other numbers.
+        if (fault?.code === this.#lightFault?.code) return;
+        this.#lightFault = fault;
+        this.#lightFaultChanged(fault);
+      },
+      detailChanged: (detail) => this.dispatchEvent(new QualityChangeEvent(detail)),
+      loaded: () => {
+        this.#view.progress(null);
+        this.#view.tell(this.#say('loaded'));
+        this.dispatchEvent(loadEvent());
+      },
+      show: (drawing) => {
+        this.#view.show(drawing.canvas);
+        this.#schedule();
+      },
+      backendChanged: (backend, previous, reason) => {
+        this.dispatchEvent(new BackendChangeEvent(backend, previous, reason));
+      },
+      lost: (backend, message) => this.dispatchEvent(new ContextLostEvent(backend, message)),
+      failed: (error) => {
+        this.#exhibit.fault = error.message;
+        this.#view.progress(null);
+        this.#schedule();
+        this.#showFault();
+        this.dispatchEvent(new PhotoErrorEvent(error));
+      },
+      recovered: () => {
+        this.#exhibit.fault = null;
+        this.#schedule();
+      },
+    });
+  }
+
+  #newVisitor(root: ShadowRoot): Visitor {
+    return new Visitor(root, this.#view, this.#exhibit, {
+      changed: () => this.#schedule(),
+      looked: () => {
+        const { zoom } = this.#exhibit.view;
+        const text = zoom.toLocaleString(this.#language, { maximumFractionDigits: 1 });
+        this.#view.tell(this.#say('zoomed', text));
+        this.#schedule();
+      },
+      lightChosen: (item) => {
+        this.#view.tell(`${this.#say('light')}: ${this.#say(item)}`);
+        this.#schedule();
+      },
+      leave: () => {
+        if (this.matches(':fullscreen')) this.#toggleFullscreen();
+        else (this.shadowRoot?.activeElement as HTMLElement | null)?.blur();
+      },
+      scrolled: (by) => {
+        const key = /mac|iphone|ipad/i.test(navigator.platform) ? '⌘' : 'Ctrl';
+        this.#view.hint(this.#say(by === 'wheel' ? 'wheelHint' : 'touchHint', key));
+      },
+      expired: () => {
+        this.reset();
+        this.#controls.close();
+        if (this.matches(':fullscreen')) this.#toggleFullscreen();
+      },
+      touched: (byKey) => this.#controls.wake(byKey),
+    });
   }
 
   /** Changes come in bunches: they are looked at together, once the current script is done. */
@@ -344,142 +409,170 @@ export class RelightablePhoto extends Base {
   #update(): void {
     this.#scheduled = false;
     if (!this.isConnected) {
-      unwatch(this);
-      this.#follower?.stop();
-      this.#player.stop();
-      this.#view.clear();
-      this.#attributes.clear();
-      this.#playerFault = null;
-      this.#lightFault = null;
+      this.#letGo();
       return;
     }
-    watch(this, (seen) => {
-      this.#seen = seen;
-      this.#player.setVisible(seen);
-      this.#follow();
+    if (!this.#listening) {
+      this.#listening = new AbortController();
+      const { signal } = this.#listening;
+      motion().addEventListener('change', () => this.#schedule(), { signal });
+    }
+    watch(this, (sight, is) => {
+      this.#exhibit.curtain[sight] = is;
+      if (sight === 'seen') this.#player.setVisible(is);
+      this.#schedule();
     });
-    this.#follow();
-    const read = <T>(name: string, parse: (value: string | null) => T): T =>
-      this.#attributes.read(name, this.getAttribute(name), parse);
-    const name = read('light', parseLight);
-    const order = read('backend', parseBackends);
-    const look = {
-      exposure: read('exposure', parseExposure),
-      whiteBalance: read('white-balance', parseWhiteBalance),
-      tone: read('tone', parseTone),
-    };
-    const wanted = {
-      backends: order ?? BACKENDS,
-      // Who names back ends knows better.
-      software: order !== null,
-      gamut: read('gamut', parseGamut),
-    };
-    const src = read('src', (value) => this.#address(value));
-    const lit = this.#lit;
-    const torch = name === 'torch' ? this.#torch : null;
-    const picture = this.#follower?.picture ?? null;
-    const light = { name, torch, picture };
-    this.#lit = light;
-    this.#describe();
-    this.#showFault();
+    const asked = this.#read();
+    this.#exhibit.asked = asked;
+    this.#lighting.follow(this.#exhibit.curtain.seen, !this.paused);
+    this.#language = languageAt(this);
+    if (isMissing(this.#language)) void fetchTranslations().then(() => this.#schedule());
+    this.#present(asked);
     for (const fault of this.#attributes.takeFaults()) {
       this.dispatchEvent(new PhotoErrorEvent(fault));
     }
+    this.#load(asked);
+    this.#tellLight(this.#news.asked(this.#lighting.setting));
+    const { view } = this.#exhibit;
+    if (view !== this.#toldView) {
+      this.#toldView = view;
+      this.dispatchEvent(new ViewChangeEvent(view));
+    }
+  }
+
+  #read(): Asked {
+    return readAsked(this, this.#attributes, browserColor);
+  }
+
+  /** Has the player do what is asked for, as soon as the photograph may be fetched. */
+  #load(asked: Asked): void {
+    const { src } = asked;
     // An address that is none is no reason to load what was there before, or to miss it.
     const badAddress = this.#attributes.isWrong('src');
+    if (src === null && badAddress) return;
     const reload = this.#reload && !badAddress;
-    this.#reload = false;
-    if (src !== null || !badAddress) this.#player.set({ src, wanted, look, light }, reload);
-    if (lit && !sameLight(lit, light)) {
-      const moved = picture ? null : torch;
-      this.dispatchEvent(new LightChangeEvent(name, moved, this.lightSource));
+    if (reload || src !== this.#fetched) {
+      if (src !== null && !this.#exhibit.curtain.mayFetch(asked)) {
+        if (this.#fetched !== undefined && this.#fetched !== src) this.#forget();
+        return;
+      }
+      this.#reload = false;
+      this.#fetched = src;
     }
+    const wanted = {
+      backends: asked.backends ?? BACKENDS,
+      // Who names back ends knows better.
+      software: asked.backends !== null,
+      gamut: asked.gamut,
+    };
+    if (asked.wasm !== null) setModuleFolder(asked.wasm);
+    const credentials = asked.crossOrigin === 'use-credentials' ? 'include' : 'same-origin';
+    const { look } = this.#exhibit;
+    const light = this.#lighting.setting;
+    this.#player.set({ src, credentials, wanted, look, light }, reload);
   }
 
-  /** Keeps up with the source of light while it matters. */
-  #follow(): void {
-    if (this.#seen && this.isConnected) this.#follower?.start();
-    else this.#follower?.stop();
-  }
-
-  get #holdsTorch(): boolean {
-    return this.#lit?.name === 'torch' && !this.#lit.picture;
-  }
-
-  #describe(): void {
-    this.#view.describe(this.getAttribute('alt'), this.#holdsTorch);
-  }
-
-  #address(value: string | null): string | null {
-    const src = value?.trim();
-    if (!src) return null;
-    try {
-      return new URL(src, this.baseURI).href;
-    } catch (cause) {
-      throw new PhotoError('attribute', `The address “${src}” in src is not a URL.`, cause);
-    }
-  }
-
-  #fail(error: PhotoError): void {
-    this.#view.progress(null);
+  /** Shows all of it but the picture itself. */
+  #present(asked: Asked): void {
+    const { zoom, cooperative, poster, crossOrigin } = asked;
+    const { view, shown, curtain } = this.#exhibit;
+    const light = shown && this.#lighting.holdsTorch;
+    const zooms = shown && zoom > 1;
+    const zoomed = view.zoom > 1;
+    const at = this.#lighting.torch ?? CENTRE;
+    this.#view.describe(this.getAttribute('alt'), this.#language);
+    const holds = zooms && !cooperative && (light || zoomed);
+    const touch = holds ? 'hold' : light || zooms ? 'scroll' : 'page';
+    this.#view.arrange({ light, focusable: zooms && !light, zoomed, touch }, this.#language);
+    this.#view.place(view, at, lightWords(at, this.#language));
+    this.#view.poster(poster, crossOrigin, !shown, curtain.awaitsPress(asked));
     this.#showFault();
-    this.dispatchEvent(new PhotoErrorEvent(error));
+    this.#controls.update(asked.controls && shown ? this.#controlsState(asked) : null);
+    this.#visitor.update(!this.paused);
   }
 
-  /** Nothing else ends by it: a photograph goes on loading. */
+  #controlsState({ zoom: most, breathes }: Asked): ToolbarState {
+    const { items, item, holdsTorch, canPlay } = this.#lighting;
+    const { zoom } = this.#exhibit.view;
+    return {
+      language: `${this.#language} ${isMissing(this.#language)}`,
+      say: (word) => this.#say(word),
+      items,
+      item,
+      plays: canPlay || (holdsTorch && breathes) ? !this.paused : null,
+      zoom: most > 1 ? { in: zoom < most, out: zoom > 1 } : null,
+      tilts: holdsTorch && mayTilt() ? this.#visitor.tilts : null,
+      fullscreen: document.fullscreenEnabled ? this.matches(':fullscreen') : null,
+    };
+  }
+
+  get #lighting(): Lighting {
+    return this.#exhibit.lighting;
+  }
+
+  #say(word: Word, ...values: readonly string[]): string {
+    return say(word, this.#language, ...values);
+  }
+
+  #tellLight(news: Shining | null): void {
+    if (news) this.dispatchEvent(new LightChangeEvent(news.name, news.torch, news.source));
+  }
+
   #lightFaultChanged(fault: PhotoError | null): void {
     this.#showFault();
+    // Nothing else ends by it: a photograph goes on loading.
     if (fault) this.dispatchEvent(new PhotoErrorEvent(fault));
   }
 
   #showFault(): void {
-    const source = this.#follower?.fault?.message;
-    this.#view.message(
-      this.#attributes.message ?? this.#playerFault ?? source ?? this.#lightFault?.message ?? null,
-    );
+    const source = this.#lighting.fault?.message;
+    const message =
+      this.#attributes.message ?? this.#exhibit.fault ?? source ?? this.#lightFault?.message;
+    const fatal = this.#exhibit.fault !== null;
+    this.#view.fault(message === undefined ? null : { fatal, message }, this.#language);
   }
 
-  #listen(): void {
-    const { picture } = this.#view;
-    const holdsTorch = () => this.#holdsTorch && this.activeBackend !== null;
-    const follow = (event: PointerEvent) => {
-      if (!holdsTorch()) return;
-      const { left, top, width, height } = picture.getBoundingClientRect();
-      if (width === 0 || height === 0) return;
-      this.torch = { x: (event.clientX - left) / width, y: (event.clientY - top) / height };
-    };
-    picture.addEventListener('pointermove', follow);
-    picture.addEventListener('pointerdown', (event) => {
-      if (!holdsTorch() || !event.isPrimary || event.button !== 0) return;
-      follow(event);
-      // A drag that leaves the picture keeps the torch at its edge. (A pointer that a script made up
-      // cannot be captured.)
-      if (event.isTrusted) picture.setPointerCapture(event.pointerId);
-    });
-    picture.addEventListener('keydown', (event) => {
-      if (!holdsTorch() || event.ctrlKey || event.metaKey || event.altKey) return;
-      const moved = stepTorch(this.#torch ?? CENTRE, event.key, event.shiftKey);
-      if (!moved) return;
-      event.preventDefault();
-      this.torch = moved;
-    });
+  #toggleFullscreen(): void {
+    // Refused where the page's own frame, or the visitor, does not allow it.
+    const done = this.matches(':fullscreen') ? document.exitFullscreen() : this.requestFullscreen();
+    void done.catch(() => {});
+  }
+
+  #clear(): void {
+    this.#exhibit.curtain.drawn = false;
+    this.#exhibit.fault = null;
+    this.#lightFault = null;
+    this.#view.clear();
+    this.#showFault();
+  }
+
+  /** What is shown is not what is asked for any more. */
+  #forget(): void {
+    this.#player.stop();
+    this.#fetched = undefined;
+    this.#clear();
+  }
+
+  #letGo(): void {
+    unwatch(this);
+    this.#listening?.abort();
+    this.#listening = null;
+    this.#exhibit.curtain.near = false;
+    this.#exhibit.curtain.seen = false;
+    this.#visitor.stop();
+    this.#lighting.follow(false, false);
+    this.#attributes.clear();
+    this.#forget();
   }
 }
 
-/** Under a picture, built-in lights do not shine. */
-function sameLight(a: LightSetting, b: LightSetting): boolean {
-  if (a.picture || b.picture) return a.picture === b.picture;
-  return a.name === b.name && a.torch === b.torch;
+/** Whether the visitor asks for less motion. */
+function motion(): MediaQueryList {
+  return matchMedia('(prefers-reduced-motion: reduce)');
 }
 
-/** Gives the page its turn. */
-function pause(): Promise<void> {
-  const { scheduler } = globalThis as { scheduler?: { yield?: () => Promise<void> } };
-  return scheduler?.yield?.() ?? new Promise((resolve) => setTimeout(resolve));
-}
-
-/** Listeners with the element's own events, typed. */
-export interface RelightablePhoto {
+/** Attributes as properties, and listeners with the element's own events, typed. */
+export interface RelightablePhoto extends Reflected {
   addEventListener<K extends keyof RelightablePhotoEventMap>(
     type: K,
     listener: (this: RelightablePhoto, event: RelightablePhotoEventMap[K]) => unknown,

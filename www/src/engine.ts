@@ -128,6 +128,8 @@ export interface DrawingModule {
   Light: {
     builtin(photo: DrawnPhoto, name: string): Light;
     torch(photo: DrawnPhoto, x: number, y: number, size?: number): Light;
+    /** A fire that has burnt for so many seconds. */
+    fire(photo: DrawnPhoto, seconds: number): Light;
     /** A picture of any size, in linear RGB, row by row. */
     fromLinear(photo: DrawnPhoto, values: Float32Array, width: number, height: number): Light;
     /** A picture of any size, in sRGB: RGBA, row by row, colours apart from alpha. */

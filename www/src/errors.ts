@@ -4,6 +4,8 @@
 export type PageErrorCode =
   /** An attribute has a value the element does not know. */
   | 'attribute'
+  /** What `setState` was given has something in it that cannot be. */
+  | 'state'
   /** There is no `src`. */
   | 'src-missing'
   /** The server could not be reached, or its answer may not be read from this page. */
@@ -24,6 +26,8 @@ export type PageErrorCode =
   | 'http-range'
   /** The WebAssembly module beside the script could not be loaded. */
   | 'wasm-unavailable'
+  /** The script of the buttons beside the element's could not be loaded. */
+  | 'controls-unavailable'
   /** The worker that decodes a photograph stopped at it, for want of memory for one. */
   | 'worker-unavailable'
   /** A worker that had a part of the photograph stopped. The photograph is fetched anew, a few times. */

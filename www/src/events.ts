@@ -4,6 +4,7 @@ import type { Backend } from './engine.js';
 import type { ErrorCode, PhotoError } from './errors.js';
 import type { LightSource } from './light-source.js';
 import type { LightName, PicturePoint } from './settings.js';
+import type { PhotoView } from './viewport.js';
 
 const TRAVELS: EventInit = { bubbles: true, composed: true };
 
@@ -84,12 +85,44 @@ export class QualityChangeEvent extends Event {
   }
 }
 
+/** `contextlost`: the back end that drew is gone; `backendchange` tells what takes its place. */
+export class ContextLostEvent extends Event {
+  readonly backend: Backend;
+  /** What the browser says of it. */
+  readonly message: string;
+
+  constructor(backend: Backend, message: string) {
+    super('contextlost', TRAVELS);
+    this.backend = backend;
+    this.message = message;
+  }
+}
+
+/** `viewchange`: another part of the picture is shown. */
+export class ViewChangeEvent extends Event {
+  /** Magnification; 1 shows all of the picture. */
+  readonly zoom: number;
+  /** The point of the picture in the middle, from 0 to 1. */
+  readonly x: number;
+  readonly y: number;
+
+  constructor({ zoom, x, y }: PhotoView) {
+    super('viewchange', TRAVELS);
+    this.zoom = zoom;
+    this.x = x;
+    this.y = y;
+  }
+}
+
 /** Events by name, for typed listeners. */
-export interface RelightablePhotoEventMap extends Omit<HTMLElementEventMap, 'error'> {
+export interface RelightablePhotoEventMap
+  extends Omit<HTMLElementEventMap, 'error' | 'contextlost'> {
   load: Event;
   progress: ProgressEvent<HTMLElement>;
   error: PhotoErrorEvent;
   lightchange: LightChangeEvent;
   backendchange: BackendChangeEvent;
   qualitychange: QualityChangeEvent;
+  viewchange: ViewChangeEvent;
+  contextlost: ContextLostEvent;
 }

@@ -10,18 +10,23 @@ export { PhotoError } from './errors.js';
 export type { RelightablePhotoEventMap } from './events.js';
 export {
   BackendChangeEvent,
+  ContextLostEvent,
   LightChangeEvent,
   PhotoErrorEvent,
   QualityChangeEvent,
+  ViewChangeEvent,
 } from './events.js';
+export type { LightPose } from './exhibit.js';
 export type {
   BrowserPicture,
   LightPicture,
   LightSource,
   LinearLight,
 } from './light-source.js';
-export type { LightName, PicturePoint } from './settings.js';
+export type { Reflected } from './reflect.js';
+export type { LightName, Loading, PicturePoint, Reveal } from './settings.js';
 export { BACKENDS, LIGHTS } from './settings.js';
+export type { PhotoView } from './viewport.js';
 
 /** The element's name in HTML. */
 export const TAG = 'relightable-photo';

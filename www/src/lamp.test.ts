@@ -26,7 +26,9 @@ function lamp() {
   const engine = {
     Light: {
       builtin: (_: DrawnPhoto, name: string) => light(name),
-      torch: (_: DrawnPhoto, x: number, y: number) => light(`torch ${x} ${y}`),
+      torch: (_: DrawnPhoto, x: number, y: number, size?: number) =>
+        light(`torch ${x} ${y} ${size}`),
+      fire: (_: DrawnPhoto, seconds: number) => light(`fire ${seconds}`),
       fromLinear: (_: DrawnPhoto, values: Float32Array) => {
         if (values.length !== 3) throw new PhotoError('light-size', 'three values');
         return light('linear');
@@ -64,11 +66,25 @@ test('a light that cannot be had leaves the last one, and before any the built-i
   const { lamp: it, lit } = lamp();
   const first = it.turnTo(setting(BAD), PHOTO);
   assert.equal(first.fault?.code, 'light-size');
-  assert.deepEqual([...lit], ['fire']);
+  assert.deepEqual([...lit], ['fire 0']);
   it.turnTo(setting(GOOD), PHOTO);
   const last = it.turnTo(setting(BAD), PHOTO);
   assert.equal(last.fault?.code, 'light-size');
   assert.deepEqual([...lit], ['linear']);
   assert.equal(it.turnTo(setting(null), PHOTO).fault, null);
-  assert.deepEqual([...lit], ['fire']);
+  assert.deepEqual([...lit], ['fire 0']);
+});
+
+test('a torch has a size, and a fire burns', () => {
+  const { lamp: it, lit } = lamp();
+  it.turnTo({ name: 'torch', torch: { x: 0.2, y: 0.3 }, size: 0.5, picture: null }, PHOTO);
+  assert.deepEqual([...lit], ['torch 0.2 0.3 0.5']);
+  it.turnTo({ name: 'torch', torch: null, size: 0.5, picture: null }, PHOTO);
+  assert.deepEqual([...lit], ['torch 0.5 0.5 0.5']);
+  it.turnTo({ name: 'fire', torch: null, seconds: 0.1, picture: null }, PHOTO);
+  assert.deepEqual([...lit], ['fire 0.1']);
+  const burning = it.turnTo({ name: 'fire', torch: null, seconds: 0.2, picture: null }, PHOTO);
+  assert.deepEqual([...lit], ['fire 0.2']);
+  const same = it.turnTo({ name: 'fire', torch: null, seconds: 0.2, picture: null }, PHOTO);
+  assert.equal(same.light, burning.light);
 });

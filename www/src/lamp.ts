@@ -48,7 +48,8 @@ export class Lamp implements Freeable {
     this.free();
     const light = builtinLight(this.#module, photo, setting);
     // Without a picture that it may stand in for.
-    this.#keep(light, { name: setting.name, torch: setting.torch });
+    const { picture: _, ...builtinSetting } = setting;
+    this.#keep(light, builtinSetting);
     return { light, asked, fault };
   }
 
@@ -66,5 +67,11 @@ export class Lamp implements Freeable {
 }
 
 function isSame(a: BuiltinSetting, b: BuiltinSetting): boolean {
-  return a.name === b.name && a.torch?.x === b.torch?.x && a.torch?.y === b.torch?.y;
+  return (
+    a.name === b.name &&
+    a.torch?.x === b.torch?.x &&
+    a.torch?.y === b.torch?.y &&
+    a.size === b.size &&
+    a.seconds === b.seconds
+  );
 }

@@ -68,9 +68,14 @@ export function isLinear(value: unknown): value is LinearLight {
   return data instanceof Float32Array && typeof width === 'number' && typeof height === 'number';
 }
 
+/** Whether something can light a photograph. */
+export function isLightSource(value: unknown): value is LightSource {
+  return isLinear(value) || CLASSES.some((name) => isA(name, value));
+}
+
 /** Throws a `TypeError` for anything that cannot light a photograph. */
 export function checkLightSource(value: unknown): LightSource {
-  if (isLinear(value) || CLASSES.some((name) => isA(name, value))) return value as LightSource;
+  if (isLightSource(value)) return value;
   throw new TypeError(
     'lightSource must be null, an image, canvas or video element, an OffscreenCanvas, ImageBitmap, ' +
       'ImageData or MediaStream, or linear light as { data: Float32Array, width, height }',

@@ -3,12 +3,16 @@
 import type { DrawingModule, DrawnPhoto, Light } from './engine.js';
 import { pixelsOf } from './light-pixels.js';
 import { isLinear, type LightPicture } from './light-source.js';
-import type { LightName, PicturePoint } from './settings.js';
+import { CENTRE, type LightName, type PicturePoint } from './settings.js';
 
 /** A built-in light; a torch may have been moved to a point of the picture. */
 export interface BuiltinSetting {
   readonly name: LightName;
   readonly torch: PicturePoint | null;
+  /** Radius of a torch, as a fraction of the light plane's shorter side; the usual one if left out. */
+  readonly size?: number;
+  /** How long a fire has burnt; not at all if left out. */
+  readonly seconds?: number;
 }
 
 /** That, or in its place a picture, as soon as there is something of it to be seen. */
@@ -22,11 +26,14 @@ type LightMaker = Pick<DrawingModule, 'Light'>;
 export function builtinLight(
   { Light }: LightMaker,
   photo: DrawnPhoto,
-  { name, torch }: BuiltinSetting,
+  { name, torch, size, seconds = 0 }: BuiltinSetting,
 ): Light {
-  return name === 'torch' && torch
-    ? Light.torch(photo, torch.x, torch.y)
-    : Light.builtin(photo, name);
+  if (name === 'fire') return Light.fire(photo, seconds);
+  if (name === 'torch' && (torch || size !== undefined)) {
+    const { x, y } = torch ?? CENTRE;
+    return Light.torch(photo, x, y, size);
+  }
+  return Light.builtin(photo, name);
 }
 
 /**

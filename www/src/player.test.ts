@@ -9,6 +9,7 @@ import { exposed, wanting } from './settings-fakes.js';
 
 const SETTINGS: Settings = {
   src: 'a.ltm',
+  credentials: 'same-origin',
   wanted: wanting(['webgpu', 'cpu']),
   light: { name: 'flood', torch: null, picture: null },
   look: exposed(1),
@@ -20,6 +21,8 @@ const settle = () => new Promise((resolve) => setImmediate(resolve));
 /** A world in which each load and each set-up of a back end waits for the test. */
 function world() {
   const log: string[] = [];
+  /** Back ends that were lost, and why. */
+  const losing: string[] = [];
   const opens = new Map<
     string,
     { preview(share: number): void; resolve(): void; reject(error: Error): void }
@@ -34,10 +37,10 @@ function world() {
   let lostAtRender = false;
   let lightFault: PhotoError | null = null;
   /** Ends frames that take time, in order; null while all are drawn at once. */
-  let slow: { done(fault?: PhotoError): void; fail(error: Error): void }[] | null = null;
+  let slow: { done(fault?: PhotoError | null): void; fail(error: Error): void }[] | null = null;
   const player = new Player<Drawing>(
     {
-      open: (src, signal, _, onPreview) =>
+      open: (src, _credentials, signal, _, onPreview) =>
         new Promise((resolve, reject) => {
           signal.addEventListener('abort', () => log.push(`abort ${src}`));
           opens.set(src, {
@@ -63,9 +66,9 @@ function world() {
               const frames = slow;
               return frames
                 ? new Promise((done, fail) =>
-                    frames.push({ done: (fault) => done(fault ?? null), fail }),
+                    frames.push({ done: (fault = null) => done({ asked: !fault, fault }), fail }),
                   )
-                : lightFault;
+                : { asked: !lightFault, fault: lightFault };
             },
             free: () => log.push(`free ${backend}`),
           };
@@ -82,10 +85,11 @@ function world() {
     {
       loading: () => log.push('loading'),
       progress: () => {},
-      drawn: (fault) => fault && log.push(`not that light: ${fault.message}`),
+      drawn: ({ fault }) => fault && log.push(`not that light: ${fault.message}`),
       detailChanged: (detail) => log.push(`detail ${detail}`),
       loaded: () => log.push('loaded'),
       show: () => {},
+      lost: (backend, reason) => losing.push(`${backend}: ${reason}`),
       backendChanged: (backend, previous, reason) =>
         log.push(`backend ${previous} -> ${backend}${reason && ` (${reason})`}`),
       failed: (error) => log.push(`failed ${error.code}: ${error.message}`),
@@ -95,6 +99,7 @@ function world() {
   return {
     player,
     log,
+    losing,
     draws,
     losses,
     frames,
@@ -345,6 +350,17 @@ test('a back end lost while another is looked for is set up anew when its turn c
     'backend webgl2 -> webgl2 (WebGPU: no adapter.)',
     'webgl2 draws flood',
   ]);
+});
+
+test('the loss of a back end in use is told once, and another gamut is no other back end', async () => {
+  const w = await loadedWorld({ ...SETTINGS, wanted: wanting(['webgl2']) });
+  w.player.set({ ...SETTINGS, wanted: { ...wanting(['webgl2']), gamut: 'display-p3' } });
+  await w.drawn(1);
+  assert.deepEqual(w.happened(), ['webgl2 draws flood', 'free webgl2']);
+  assert.deepEqual(w.losing, []);
+  w.losses[1]?.('the browser took it away.');
+  w.losses[1]?.('the browser took it away.');
+  assert.deepEqual(w.losing, ['webgl2: the browser took it away.']);
 });
 
 test('a back end lost while it is being set up is passed over with its reason', async () => {

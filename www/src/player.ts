@@ -19,6 +19,8 @@ import { Quality } from './quality.js';
 export interface Settings {
   /** Absolute address, or `null` where there is none. */
   readonly src: string | null;
+  /** Whether cookies go along. */
+  readonly credentials: RequestCredentials;
   readonly wanted: Wanted;
   readonly light: LightSetting;
   readonly look: Look;
@@ -49,13 +51,19 @@ export interface Drawing extends Freeable {
   render(light: LightSetting, look: Look, detail: number): Drawn | Promise<Drawn>;
 }
 
-/** Why a picture was drawn by another light than asked for; `null` where it was not. */
-export type Drawn = PhotoError | null;
+/** What a picture was drawn by. */
+export interface Drawn {
+  /** Whether by the light that was asked for, and not by the last one while that shows nothing. */
+  readonly asked: boolean;
+  /** Why not, where it should be. */
+  readonly fault: PhotoError | null;
+}
 
 /** What the player needs done. */
 export interface Ports<D extends Drawing> {
   open(
     src: string,
+    credentials: RequestCredentials,
     signal: AbortSignal,
     onProgress: OnProgress,
     onPreview: OnPreview,
@@ -86,14 +94,16 @@ export interface Listener<D extends Drawing> {
   progress: OnProgress;
   /** A drawing has its first frame, and is to be shown from now on. */
   show(drawing: D): void;
-  /** A frame was drawn. */
-  drawn(fault: Drawn): void;
+  /** A frame was drawn, and this light asked for. */
+  drawn(drawn: Drawn, light: LightSetting): void;
   /** That frame is by another share of the photograph than the one before it; the first is by all. */
   detailChanged(detail: number): void;
   /** The whole photograph is drawn for the first time, or the first since it had to be fetched anew. */
   loaded(): void;
   /** Another back end was taken up, or the same again after it was lost. */
   backendChanged(backend: Backend, previous: Backend | null, reason: string): void;
+  /** The back end in use is gone. */
+  lost(backend: Backend, reason: string): void;
   failed(error: PhotoError): void;
   /** Nothing is wrong any more. */
   recovered(): void;
@@ -233,7 +243,8 @@ export class Player<D extends Drawing> {
   set(settings: Settings, reload = false): void {
     const before = this.#settings;
     this.#settings = settings;
-    if (!before || reload || before.src !== settings.src) {
+    const sameFile = before?.src === settings.src && before.credentials === settings.credentials;
+    if (!before || reload || !sameFile) {
       this.#begin(settings.src);
     } else if (!same(before.wanted, settings.wanted)) {
       void this.#choose(settings.wanted, this.backend, '');
@@ -320,7 +331,8 @@ export class Player<D extends Drawing> {
       active.drew = true;
       // Another light may have been set meanwhile, with which nothing is wrong.
       const sameLight = light.picture === this.#settings?.light.picture;
-      if (active === this.#active) this.#tell(active, sameLight ? drawn : null, detail);
+      const told = sameLight ? drawn : { ...drawn, fault: null };
+      if (active === this.#active) this.#tell(active, told, light, detail);
       return active.drawing;
     } catch (thrown) {
       if (active === this.#active && active.freed) {
@@ -354,7 +366,7 @@ export class Player<D extends Drawing> {
     this.#awaitFrame();
   }
 
-  #tell({ drawing, held }: SetUp<D>, drawn: Drawn, timeFor: number): void {
+  #tell({ drawing, held }: SetUp<D>, drawn: Drawn, light: LightSetting, timeFor: number): void {
     const detail = timeFor * held.photo.share;
     const changed = detail !== this.#detail;
     this.#detail = detail;
@@ -366,7 +378,7 @@ export class Player<D extends Drawing> {
       this.#outgoing?.free();
       this.#outgoing = null;
     }
-    this.#listener.drawn(drawn);
+    this.#listener.drawn(drawn, light);
     if (changed) this.#listener.detailChanged(detail);
   }
 
@@ -428,6 +440,7 @@ export class Player<D extends Drawing> {
     try {
       const photo = await this.#ports.open(
         src,
+        this.#settings?.credentials ?? 'same-origin',
         signal,
         (loaded, total) => {
           if (!signal.aborted) this.#listener.progress(loaded, total);
@@ -498,6 +511,7 @@ export class Player<D extends Drawing> {
         this.#replace(found, found.lost, wanted, previous, reason);
         return;
       }
+      // The same for another gamut is nothing new.
       if (changed && (found.backend !== previous || again)) {
         this.#listener.backendChanged(found.backend, previous, reason);
       }
@@ -619,7 +633,9 @@ export class Player<D extends Drawing> {
    * it finds is the replacement.
    */
   #lost(lost: SetUp<D>, reason: string): void {
+    const early = lost.lost === null;
     lost.lost ??= reason;
+    if (early && this.#active === lost) this.#listener.lost(lost.backend, reason);
     if (this.#active !== lost || this.#search || !this.#settings) return;
     this.#replace(lost, reason, this.#settings.wanted, lost.backend, '');
   }

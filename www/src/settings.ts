@@ -19,13 +19,33 @@ export interface PicturePoint {
   readonly y: number;
 }
 
+/** The middle of the picture. */
+export const CENTRE: PicturePoint = { x: 0.5, y: 0.5 };
+
 const DEFAULT_LIGHT: LightName = 'flood';
 const DEFAULT_EXPOSURE = 1;
 const TONES = ['clip', 'filmic'] as const;
 const GAMUTS = ['srgb', 'display-p3'] as const;
+const LOADINGS = ['auto', 'lazy', 'eager'] as const;
+const REVEALS = ['auto', 'interaction', 'manual'] as const;
 /** More than any picture needs, and little enough for the module, which computes in 32-bit floats. */
-const MAX_EXPOSURE = 1e30;
+export const MAX_EXPOSURE = 1e30;
 const MAX_FACTOR = 1000;
+/** Of the light plane's shorter side: the whole of it shines alike by then. */
+export const MAX_SIZE = 100;
+/** What the module takes for a torch whose size is left out. */
+export const DEFAULT_SIZE = 1 / 7;
+/** `zoom` and `kiosk` without a value. */
+const ZOOM = 8;
+const KIOSK_SECONDS = 60;
+const MAX_ZOOM = 100;
+/** A day: timers of browsers count no farther than some weeks. */
+const MAX_KIOSK_SECONDS = 86_400;
+
+/** When the photograph is fetched. */
+export type Loading = (typeof LOADINGS)[number];
+/** When the poster gives way. */
+export type Reveal = (typeof REVEALS)[number];
 
 /** The `light` attribute; flood where there is none. */
 export function parseLight(value: string | null): LightName {
@@ -58,13 +78,48 @@ export function parseBackends(value: string | null): readonly Backend[] | null {
 
 /** The `exposure` attribute, a factor on the light's brightness; 1 where there is none. */
 export function parseExposure(value: string | null): number {
-  if (value === null || value.trim() === '') return DEFAULT_EXPOSURE;
-  const exposure = Number(value);
-  if (exposure >= 0 && exposure <= MAX_EXPOSURE) return exposure;
+  const right = '1 shows the photograph as taken';
+  return parseNumber(value, 'exposure', 0, MAX_EXPOSURE, right) ?? DEFAULT_EXPOSURE;
+}
+
+/** The `light-size` attribute, the torch's radius; `null` where there is none. */
+export function parseSize(value: string | null): number | null {
+  const what = 'light size';
+  const right = 'it is a fraction of the light’s shorter side';
+  return parseNumber(value, what, 1e-6, MAX_SIZE, right);
+}
+
+/** The `light-x` or `light-y` attribute; `null` where there is none. */
+export function parsePlace(value: string | null, name: string): number | null {
+  return parseNumber(value, name, 0, 1, '0 is the picture’s left or upper edge');
+}
+
+/** The `zoom` attribute, the furthest magnification: 1, which is none, where there is none. */
+export function parseZoom(value: string | null): number {
+  if (value?.trim() === '') return ZOOM;
+  return parseNumber(value, 'zoom', 1, MAX_ZOOM, '1 shows all of the picture') ?? 1;
+}
+
+/** The `kiosk` attribute, in seconds: 0, which is never, where there is none. */
+export function parseKiosk(value: string | null): number {
+  if (value?.trim() === '') return KIOSK_SECONDS;
+  return parseNumber(value, 'kiosk', 0, MAX_KIOSK_SECONDS, 'they are seconds, 0 is never') ?? 0;
+}
+
+/** A number; `null` where there is none. `right` is what helps to find the right one. */
+function parseNumber(
+  value: string | null,
+  what: string,
+  least: number,
+  most: number,
+  right: string,
+): number | null {
+  if (value === null || value.trim() === '') return null;
+  const number = Number(value);
+  if (number >= least && number <= most) return number;
   throw new PhotoError(
     'attribute',
-    `The exposure “${value}” is not a number from 0 to ${MAX_EXPOSURE}; ` +
-      '1 shows the photograph as taken.',
+    `The ${what} “${value}” is not a number from ${least} to ${most}; ${right}.`,
   );
 }
 
@@ -98,6 +153,33 @@ export function parseGamut(value: string | null): Gamut {
   return oneOf(value, GAMUTS, 'gamut');
 }
 
+/** The `loading` attribute; `auto` where there is none. */
+export function parseLoading(value: string | null): Loading {
+  return oneOf(value, LOADINGS, 'way of loading');
+}
+
+/** The `reveal` attribute; `auto` where there is none. */
+export function parseReveal(value: string | null): Reveal {
+  return oneOf(value, REVEALS, 'way of revealing');
+}
+
+/** The `crossorigin` attribute, as on images: what is neither name is the first. */
+export function parseCrossOrigin(value: string | null): 'anonymous' | 'use-credentials' | null {
+  if (value === null) return null;
+  return value.trim().toLowerCase() === 'use-credentials' ? 'use-credentials' : 'anonymous';
+}
+
+/** An attribute that is an address, absolute from then on; `null` where there is none. */
+export function parseAddress(value: string | null, name: string, base: string): string | null {
+  const address = value?.trim();
+  if (!address) return null;
+  try {
+    return new URL(address, base).href;
+  } catch (cause) {
+    throw new PhotoError('attribute', `The address “${address}” in ${name} is not a URL.`, cause);
+  }
+}
+
 /** One of some names, the first where there is none. */
 function oneOf<N extends string>(
   value: string | null,
@@ -113,28 +195,11 @@ function oneOf<N extends string>(
   );
 }
 
-/** Where an arrow key takes a torch, or `undefined` for any other key. Shift makes small steps. */
-export function stepTorch(
-  from: PicturePoint,
-  key: string,
-  fine: boolean,
-): PicturePoint | undefined {
-  const step = fine ? 0.01 : 0.05;
-  switch (key) {
-    case 'ArrowLeft':
-      return clampToPicture({ x: from.x - step, y: from.y });
-    case 'ArrowRight':
-      return clampToPicture({ x: from.x + step, y: from.y });
-    case 'ArrowUp':
-      return clampToPicture({ x: from.x, y: from.y - step });
-    case 'ArrowDown':
-      return clampToPicture({ x: from.x, y: from.y + step });
-    default:
-      return undefined;
-  }
+/** The nearest point that lies on the picture, as exact as states in addresses are. */
+export function clampToPicture({ x, y }: PicturePoint): PicturePoint {
+  return { x: clampPlace(x), y: clampPlace(y) };
 }
 
-/** The nearest point that lies on the picture. */
-export function clampToPicture({ x, y }: PicturePoint): PicturePoint {
-  return { x: Math.min(1, Math.max(0, x)), y: Math.min(1, Math.max(0, y)) };
+function clampPlace(value: number): number {
+  return Math.round(Math.min(1, Math.max(0, value)) * 1e4) / 1e4;
 }

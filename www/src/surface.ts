@@ -3,12 +3,13 @@
 import { blobOf, type CanvasSurface } from './canvas.js';
 import type { Lease } from './devices.js';
 import type { DrawingModule, DrawnPhoto, Gamut, Relighter } from './engine.js';
-import { type PhotoError, toPhotoError } from './errors.js';
+import { toPhotoError } from './errors.js';
 import { Lamp } from './lamp.js';
 import { sizeOf } from './light-pixels.js';
 import { isLive, type LightPicture } from './light-source.js';
 import type { LightSetting } from './lights.js';
 import { type Look, makeDisplay } from './look.js';
+import type { Drawn } from './player.js';
 
 /** See the module. */
 export class CanvasDrawing implements CanvasSurface {
@@ -51,20 +52,20 @@ export class CanvasDrawing implements CanvasSurface {
     return this.#relighter.gamut;
   }
 
-  render(setting: LightSetting, look: Look, detail: number): PhotoError | null {
+  render(setting: LightSetting, look: Look, detail: number): Drawn {
     const display = makeDisplay(this.#module, look, this.gamut);
     try {
       if (this.#takes(setting.picture)) {
         this.#pictured = true;
         this.#relighter.renderPicture(display, detail);
-        return null;
+        return { asked: true, fault: null };
       }
       const { light, asked, fault } = this.#lamp.turnTo(setting, this.#plane);
       // A picture that cannot be had any more leaves what was had of it.
       this.#pictured &&= !asked;
       if (this.#pictured) this.#relighter.renderPicture(display, detail);
       else this.#relighter.render(light, display, detail);
-      return fault;
+      return { asked, fault };
     } catch (thrown) {
       const { code, message } = toPhotoError(thrown);
       if (code === 'backend-lost') this.#lease?.fail(message);

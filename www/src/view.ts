@@ -1,124 +1,189 @@
-/** What is inside the element's shadow: the picture, a progress bar, a message. Holds no state that
- * is not on the screen. */
+/** What is inside the element's shadow: the picture and its poster, the light's handle, a progress bar, a
+ * message, and the place of the controls. Holds no state that is not on the screen. */
 
-/** Fallbacks stand at each use, so that a page need set none of these properties. */
-const STYLE = `
-:host {
-  display: block;
-  position: relative;
-  overflow: hidden;
-  background: var(--relightable-photo-background, #131211);
-  color: var(--relightable-photo-color, #f2efe9);
-  font: 0.875rem/1.45 system-ui, sans-serif;
-}
-:host([hidden]) { display: none; }
-.picture { position: relative; aspect-ratio: var(--relightable-photo-aspect, 1); }
-.picture.filled { aspect-ratio: auto; }
-.picture.torch { touch-action: pan-y; cursor: crosshair; user-select: none; -webkit-user-select: none; }
-.picture:focus { outline: none; }
-.picture:focus-visible::after {
-  content: "";
-  position: absolute;
-  inset: 0;
-  border: 3px solid var(--relightable-photo-focus, #ffc864);
-  box-shadow: inset 0 0 0 2px #000;
-  pointer-events: none;
-}
-canvas { display: block; width: 100%; height: auto; }
-.progress {
-  position: absolute;
-  inset: auto 0 0 0;
-  height: 4px;
-  background: rgb(255 255 255 / 0.18);
-  overflow: hidden;
-}
-.bar {
-  height: 100%;
-  width: 100%;
-  background: var(--relightable-photo-accent, #ffc864);
-  transform-origin: left;
-  transform: scaleX(0);
-}
-.progress.unknown .bar { width: 30%; transform: none; animation: seek 1.4s ease-in-out infinite alternate; }
-@keyframes seek { from { transform: translateX(0); } to { transform: translateX(233%); } }
-@media (prefers-reduced-motion: reduce) { .progress.unknown .bar { animation: none; width: 100%; opacity: 0.5; } }
-.message {
-  position: absolute;
-  inset: auto 0 0 0;
-  padding: 0.9em 1.1em;
-  background: rgb(20 16 14 / 0.92);
-  color: #f7ece2;
-  border-top: 2px solid #e06c4f;
-  overflow-wrap: anywhere;
-}
-.hint { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); white-space: nowrap; }
-[hidden] { display: none !important; }
-`;
+import { make, put, slot, write } from './dom.js';
+import { icon } from './icons.js';
+import type { PicturePoint } from './settings.js';
+import { adopt } from './sheets.js';
+import STYLE from './style.css';
+import { type PhotoView, toBox } from './viewport.js';
+import { type Language, say } from './words.js';
 
-let sheet: CSSStyleSheet | undefined;
+/** What is wrong, for visitors and for who is to mend it. */
+export interface Fault {
+  /** Whether there is no picture for it. */
+  readonly fatal: boolean;
+  readonly message: string;
+}
+
+/** What the picture is to whoever touches it. */
+export interface StageState {
+  /** A light can be taken along. */
+  readonly light: boolean;
+  /** The keyboard needs the picture itself, as there is no light to take. */
+  readonly focusable: boolean;
+  readonly zoomed: boolean;
+  /** Whether single fingers are left to the page's scrolling up and down, or to nothing but the picture. */
+  readonly touch: 'page' | 'scroll' | 'hold';
+}
+
+/** Beyond it, pixels are shown as such. */
+const PIXELS_FROM = 4;
+/** How long what is read out waits for what follows at once. */
+const SETTLES_MS = 400;
+const HINT_MS = 1800;
 
 /** See the module. */
 export class View {
-  /** The picture's box; takes the pointer and the keyboard. */
-  readonly picture: HTMLElement;
+  /** The picture's box; takes pointers. */
+  readonly stage = make('div', { name: 'stage' });
+  /** The light, for the keyboard. */
+  readonly handle = make('div', {
+    name: 'handle',
+    part: 'torch-handle',
+    attributes: { role: 'slider', tabindex: '0', 'aria-valuemin': '0', 'aria-valuemax': '100' },
+  });
+  /** Has the poster give way. */
+  readonly revealButton: HTMLButtonElement;
+  readonly #controls = slot('controls');
+  readonly #picture = make('div', { name: 'picture', part: 'picture' });
+  readonly #poster: HTMLElement;
+  readonly #posterImage = make('img', { part: 'poster', attributes: { alt: '' } });
+  readonly #revealText = make('span');
+  readonly #hint = make('div', { name: 'hint', part: 'hint' });
+  readonly #bar = make('div', { name: 'bar', attributes: { role: 'progressbar' } });
   readonly #progress: HTMLElement;
-  readonly #bar: HTMLElement;
+  readonly #foot = make('div', { name: 'foot' });
   readonly #message: HTMLElement;
+  readonly #short = make('p');
+  readonly #summary = make('summary');
+  readonly #long = make('p');
+  readonly #status = make('div', {
+    name: 'unseen',
+    part: 'status',
+    attributes: { role: 'status' },
+  });
+  readonly #root: ShadowRoot;
+  #canvas: HTMLCanvasElement | null = null;
+  #telling: ReturnType<typeof setTimeout> | undefined;
+  #hinting: ReturnType<typeof setTimeout> | undefined;
 
   constructor(root: ShadowRoot) {
-    // A constructed sheet needs no 'unsafe-inline' in the page's content security policy.
-    if (!sheet) {
-      sheet = new CSSStyleSheet();
-      sheet.replaceSync(STYLE);
-    }
-    root.adoptedStyleSheets = [sheet];
-    this.picture = box('picture', 'picture');
-    this.#progress = box('progress', 'progress');
-    this.#progress.setAttribute('role', 'progressbar');
-    this.#progress.setAttribute('aria-label', 'Loading the photograph');
-    this.#bar = box('bar');
-    this.#progress.append(this.#bar);
-    this.#progress.hidden = true;
-    this.#message = box('message', 'message');
-    this.#message.setAttribute('role', 'alert');
-    this.#message.hidden = true;
-    const hint = box('hint');
-    hint.id = 'hint';
-    hint.textContent = 'The arrow keys move the torch.';
-    root.append(this.picture, hint, this.#progress, this.#message);
+    this.#root = root;
+    adopt(root, STYLE);
+    this.#poster = make('div', { name: 'poster' }, slot('poster', this.#posterImage));
+    this.#posterImage.addEventListener('load', () => this.stage.classList.add('postered'));
+    // One that cannot be had leaves its place empty.
+    this.#posterImage.addEventListener('error', () => {
+      this.#posterImage.hidden = true;
+    });
+    this.revealButton = make(
+      'button',
+      { name: 'reveal', part: 'button', attributes: { type: 'button' } },
+      make('span', {}, icon('light'), this.#revealText),
+    );
+    this.stage.append(this.#picture, this.#poster, this.handle, this.revealButton, this.#hint);
+    this.#progress = make('div', { name: 'progress', part: 'progress' });
+    this.#progress.append(slot('progress', this.#bar));
+    this.#message = make(
+      'div',
+      { name: 'message', part: 'message', attributes: { role: 'alert' } },
+      slot('error', this.#short, make('details', {}, this.#summary, this.#long)),
+    );
+    this.#posterImage.hidden = true;
+    for (const part of [this.handle, this.revealButton, this.#hint, this.#progress, this.#message])
+      part.hidden = true;
+    this.#foot.append(
+      make('div', { name: 'controls' }, this.#controls),
+      this.#progress,
+      this.#message,
+    );
+    root.append(this.stage, this.#foot, this.#status);
   }
 
-  /**
-   * Names the picture for those who cannot see it, and says whether it holds a torch. An empty text
-   * marks it as decoration, which what holds a torch is not: it takes the keyboard.
-   */
-  describe(alt: string | null, torch: boolean): void {
-    this.picture.setAttribute('role', alt === '' && !torch ? 'presentation' : 'img');
-    if (alt) this.picture.setAttribute('aria-label', alt);
-    else this.picture.removeAttribute('aria-label');
-    this.picture.classList.toggle('torch', torch);
-    if (torch) {
-      this.picture.tabIndex = 0;
-      this.picture.setAttribute('aria-describedby', 'hint');
-    } else {
-      this.picture.removeAttribute('tabindex');
-      this.picture.removeAttribute('aria-describedby');
+  /** Puts in what is there unless a page has controls of its own. */
+  furnish(controls: readonly HTMLElement[], style: string): void {
+    adopt(this.#root, style);
+    this.#controls.append(...controls);
+  }
+
+  /** Names things, for those who cannot see them. An empty text marks a picture as decoration. */
+  describe(alt: string | null, language: Language): void {
+    put(this.#picture, 'role', alt === '' ? 'presentation' : 'img');
+    put(this.#picture, 'aria-label', alt || null);
+    for (const part of [this.handle, this.revealButton, this.#hint, this.#foot, this.#status]) {
+      part.lang = language;
     }
+    put(this.handle, 'aria-label', say('light', language));
+    put(this.handle, 'aria-roledescription', say('slider', language));
+    put(this.#bar, 'aria-label', say('loading', language));
+    write(this.#revealText, say('reveal', language));
+    write(this.#summary, say('details', language));
+  }
+
+  /** Under a light that does not move there is no handle; who holds it is left with the picture. */
+  arrange({ light, focusable, zoomed, touch }: StageState, language: Language): void {
+    const { handle, stage } = this;
+    const active = this.#root.activeElement;
+    const keeps = !light && (active === handle || active === stage);
+    handle.hidden = !light;
+    stage.classList.toggle('light', light);
+    stage.classList.toggle('zoomed', zoomed);
+    stage.classList.toggle('scrolls', touch === 'scroll');
+    stage.classList.toggle('holds', touch === 'hold');
+    const named = focusable || keeps;
+    put(stage, 'tabindex', focusable ? '0' : keeps ? '-1' : null);
+    put(stage, 'role', named ? 'group' : null);
+    put(stage, 'aria-label', named ? say('picture', language) : null);
+    if (keeps && active === handle) stage.focus({ preventScroll: true });
+    if (light && active === stage) handle.focus({ preventScroll: true });
   }
 
   /** Shows a canvas in place of the last one. */
   show(canvas: HTMLCanvasElement): void {
-    this.picture.classList.add('filled');
     canvas.setAttribute('part', 'canvas');
-    this.picture.replaceChildren(canvas);
+    this.#canvas = canvas;
+    this.#picture.replaceChildren(canvas);
+    this.stage.classList.add('filled');
+    this.stage.style.setProperty('--ratio', String(canvas.width / canvas.height));
   }
 
   /** Takes the picture away. */
   clear(): void {
-    this.picture.classList.remove('filled');
-    this.picture.replaceChildren();
+    this.stage.classList.remove('filled');
+    this.#canvas = null;
+    this.#picture.replaceChildren();
     this.progress(null);
-    this.message(null);
+    this.fault(null, 'en');
+  }
+
+  /** Shows a part of the picture, and the light where it is in it, or at the edge it is beyond. */
+  place(view: PhotoView, light: PicturePoint, words: string): void {
+    if (this.#canvas) {
+      const { zoom, x, y } = view;
+      const shift = (at: number) => `${100 * (0.5 - at * zoom)}%`;
+      this.#canvas.style.transform =
+        zoom > 1 ? `translate(${shift(x)}, ${shift(y)}) scale(${zoom})` : '';
+      this.#canvas.classList.toggle('pixels', zoom > PIXELS_FROM);
+    }
+    const { x, y } = toBox(view, light);
+    const within = (at: number) => `${100 * Math.min(1, Math.max(0, at))}%`;
+    this.handle.style.left = within(x);
+    this.handle.style.top = within(y);
+    put(this.handle, 'aria-valuenow', String(Math.round(100 * light.x)));
+    put(this.handle, 'aria-valuetext', words);
+  }
+
+  /** Shows a poster, or lets it go; `pressed` waits for somebody to press it. */
+  poster(src: string | null, crossOrigin: string | null, shown: boolean, pressed: boolean): void {
+    if (this.#posterImage.getAttribute('src') !== src) {
+      this.stage.classList.remove('postered');
+      this.#posterImage.hidden = src === null;
+      put(this.#posterImage, 'crossorigin', crossOrigin);
+      put(this.#posterImage, 'src', src);
+    }
+    this.#poster.classList.toggle('gone', !shown);
+    this.revealButton.hidden = !pressed;
   }
 
   /** Shows how far a load has come, from 0 to 1, `NaN` where that is not known; `null` hides it. */
@@ -127,25 +192,32 @@ export class View {
     if (fraction === null) return;
     const known = Number.isFinite(fraction);
     this.#progress.classList.toggle('unknown', !known);
-    if (known) {
-      this.#bar.style.transform = `scaleX(${fraction})`;
-      this.#progress.setAttribute('aria-valuenow', String(Math.round(fraction * 100)));
-    } else {
-      this.#bar.style.transform = '';
-      this.#progress.removeAttribute('aria-valuenow');
-    }
+    this.#bar.style.transform = known ? `scaleX(${fraction})` : '';
+    put(this.#bar, 'aria-valuenow', known ? String(Math.round(fraction * 100)) : null);
   }
 
   /** Shows a message over the picture; `null` takes it away. */
-  message(text: string | null): void {
-    this.#message.hidden = text === null;
-    this.#message.textContent = text ?? '';
+  fault(fault: Fault | null, language: Language): void {
+    if (fault) {
+      write(this.#short, say(fault.fatal ? 'broken' : 'flawed', language));
+      write(this.#long, fault.message);
+    }
+    this.#message.hidden = fault === null;
   }
-}
 
-function box(name: string, part?: string): HTMLElement {
-  const element = document.createElement('div');
-  element.className = name;
-  if (part) element.setAttribute('part', part);
-  return element;
+  /** Shows for a moment how something is done. */
+  hint(text: string): void {
+    write(this.#hint, text);
+    this.#hint.hidden = false;
+    clearTimeout(this.#hinting);
+    this.#hinting = setTimeout(() => {
+      this.#hint.hidden = true;
+    }, HINT_MS);
+  }
+
+  /** Has something read out, unless something else follows at once. */
+  tell(text: string): void {
+    clearTimeout(this.#telling);
+    this.#telling = setTimeout(() => write(this.#status, text), SETTLES_MS);
+  }
 }

@@ -18,7 +18,7 @@ const PAGE_FILES = new Set(['/', '/index.html', '/page.css', '/page.js', '/icon.
  * `blob:` or `data:`. WebAssembly has to be allowed by name. Films that visitors choose are the page's
  * own affair.
  */
-const CONTENT_SECURITY_POLICY =
+export const CONTENT_SECURITY_POLICY =
   "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self'; connect-src 'self'; media-src blob:";
 
 /**

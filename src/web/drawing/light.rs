@@ -55,6 +55,18 @@ impl Light {
         Ok(Self(relight::Light::torch(geometry.light, pose)))
     }
 
+    /// A fire that burns along the lower edge, `seconds` after it was first looked at: always the
+    /// same at the same time. The built-in light `fire` is its first moment.
+    pub fn fire(photo: &Photo, seconds: f64) -> Result<Light, CodedError> {
+        if !seconds.is_finite() {
+            return Err(CodedError::new(
+                "light-value",
+                format!("a fire at {seconds} seconds cannot be: the time is a finite number"),
+            ));
+        }
+        Ok(Self(relight::Light::fire(photo.geometry().light, seconds)))
+    }
+
     /// A picture as light: linear RGB values, 0 dark to 1 full brightness, row by row. Each element
     /// of the light emits the mean of what it covers.
     #[wasm_bindgen(js_name = fromLinear)]

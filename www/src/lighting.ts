@@ -1,0 +1,196 @@
+/**
+ * What shines: as the page asks by attributes and `lightSource`, until a visitor or `setLight` chooses
+ * something else. What was chosen goes with `reset`, and where the page asks for something new.
+ */
+
+import type { AskedLight } from './asked.js';
+import type { PhotoError } from './errors.js';
+import { LightFollower } from './light-follower.js';
+import { type CrossOrigin, LightMedia } from './light-media.js';
+import type { LightSource } from './light-source.js';
+import type { LightSetting } from './lights.js';
+import { clampToPicture, LIGHTS, type LightName, type PicturePoint } from './settings.js';
+import type { LightColor } from './tint.js';
+
+/** Takes the place of what the page asks for; what is `null` does not. */
+export interface LightChoice {
+  /** A built-in light, also in place of a source. */
+  readonly name: LightName | null;
+  readonly torch: PicturePoint | null;
+  readonly size: number | null;
+  readonly color: LightColor | null;
+}
+
+/** What is told. */
+export interface LightingListener {
+  /** What a source shows is another. */
+  changed(): void;
+  faultChanged(fault: PhotoError | null): void;
+}
+
+/** One of the lights that there are to choose from: what the page shines, or a built-in one. */
+export type LightItem = LightName | 'projection';
+
+const PAGE: LightChoice = { name: null, torch: null, size: null, color: null };
+const NONE: AskedLight = { name: 'flood', src: null, place: null, size: null, color: null };
+/** Of the fire, in seconds: 30 pictures in one. */
+const FIRE_PERIOD = 1 / 30;
+/** Screens that show no more do not keep time to the thousandth. */
+const FIRE_SLACK = 0.004;
+
+/** See the module. */
+export class Lighting {
+  readonly #listener: LightingListener;
+  #asked: AskedLight = NONE;
+  #choice: LightChoice = PAGE;
+  #media: LightMedia | null = null;
+  #source: LightSource | null = null;
+  #follower: LightFollower | null = null;
+  #watched = false;
+  #plays = false;
+  /** How long the fire has burnt, as it is shown, and when it is to be shown next. */
+  #fire = 0;
+  #fireShown = 0;
+  #fireDue = FIRE_PERIOD;
+
+  constructor(listener: LightingListener) {
+    this.#listener = listener;
+  }
+
+  /** Takes what the page asks for by attributes. */
+  ask(asked: AskedLight, crossOrigin: CrossOrigin): void {
+    this.#asked = asked;
+    const media = this.#media;
+    if (media?.address !== asked.src || media?.crossOrigin !== crossOrigin) {
+      media?.stop();
+      this.#media = asked.src === null ? null : new LightMedia(asked.src, crossOrigin);
+    }
+    this.#update();
+  }
+
+  /** What the page's script has put in the light's place. */
+  get source(): LightSource | null {
+    return this.#source;
+  }
+  set source(source: LightSource | null) {
+    this.#source = source;
+    this.#choice = { ...this.#choice, name: null };
+    this.#update();
+  }
+
+  /** What shines in the built-in lights' place. */
+  get shining(): LightSource | null {
+    return this.#follower?.source ?? null;
+  }
+
+  /** The built-in light that shines, or that a source stands in for. */
+  get name(): LightName {
+    return this.#choice.name ?? this.#asked.name;
+  }
+
+  /** Where a torch shines; `null` over the middle of the light. */
+  get torch(): PicturePoint | null {
+    return this.#choice.torch ?? this.#asked.place;
+  }
+  set torch(torch: PicturePoint | null) {
+    this.#choice = { ...this.#choice, torch: torch && clampToPicture(torch) };
+  }
+
+  get size(): number | null {
+    return this.#choice.size ?? this.#asked.size;
+  }
+
+  get color(): LightColor | null {
+    return this.#choice.color ?? this.#asked.color;
+  }
+
+  /** Takes the place of what the page asks for, as far as it says something. */
+  choose(choice: Partial<LightChoice>): void {
+    this.#choice = { ...this.#choice, ...choice };
+    this.#update();
+  }
+
+  /** As the page asks. */
+  reset(): void {
+    this.#choice = PAGE;
+    this.#update();
+  }
+
+  /** All that there are to choose from. */
+  get items(): readonly LightItem[] {
+    return this.#source || this.#media ? ['projection', ...LIGHTS] : LIGHTS;
+  }
+
+  get item(): LightItem {
+    return this.#follower ? 'projection' : this.name;
+  }
+  set item(item: LightItem) {
+    this.choose({ name: item === 'projection' ? null : item });
+  }
+
+  /** Whether a torch can be taken along. */
+  get holdsTorch(): boolean {
+    return this.#follower === null && this.name === 'torch';
+  }
+
+  /** Whether fire burns. */
+  get burns(): boolean {
+    return this.#follower === null && this.name === 'fire';
+  }
+
+  /** Whether something shines that can play: fire, or the page's own film. */
+  get canPlay(): boolean {
+    return this.burns || (this.#media?.isFilm === true && this.shining === this.#media.source);
+  }
+
+  /** Lets fire burn on. Gives whether it looks different: no more than 30 times a second. */
+  burn(seconds: number): boolean {
+    this.#fire += seconds;
+    if (this.#fire < this.#fireDue - FIRE_SLACK) return false;
+    this.#fireShown = this.#fire;
+    this.#fireDue = Math.max(this.#fireDue, this.#fire - FIRE_PERIOD) + FIRE_PERIOD;
+    return true;
+  }
+
+  get setting(): LightSetting {
+    const { name, size } = this;
+    const torch = name === 'torch' ? this.torch : null;
+    const picture = this.#follower?.picture ?? null;
+    return {
+      name,
+      torch,
+      picture,
+      ...(name === 'torch' && size !== null && { size }),
+      ...(name === 'fire' && { seconds: this.#fireShown }),
+    };
+  }
+
+  /** Why nothing is to be seen of a source. */
+  get fault(): PhotoError | null {
+    return this.#follower?.fault ?? null;
+  }
+
+  /** Keeps up with sources while anyone looks. `plays`: whether films may. */
+  follow(watched: boolean, plays: boolean): void {
+    this.#watched = watched;
+    this.#plays = plays;
+    this.#attend();
+  }
+
+  #update(): void {
+    const source = this.#choice.name === null ? (this.#source ?? this.#media?.source) : null;
+    if ((source ?? null) !== this.shining) {
+      this.#follower?.stop();
+      this.#follower = source ? new LightFollower(source, this.#listener) : null;
+    }
+    this.#attend();
+  }
+
+  #attend(): void {
+    if (this.#watched) this.#follower?.start();
+    else this.#follower?.stop();
+    if (this.#media) {
+      this.#media.plays = this.#plays && this.#watched && this.shining === this.#media.source;
+    }
+  }
+}

@@ -1,0 +1,31 @@
+/** What a player needs done, by the browser. */
+
+import type { CanvasSurface } from './canvas.js';
+import { newDecoder } from './decoders.js';
+import { draw } from './drawings.js';
+import { openPhoto } from './load.js';
+import type { Ports } from './player.js';
+
+/** For all elements of the page. */
+export const PORTS: Ports<CanvasSurface> = {
+  open: (src, credentials, signal, onProgress, onPreview) =>
+    openPhoto(src, signal, onProgress, onPreview, {
+      decoder: newDecoder,
+      fetch: (input, init) => fetch(input, { ...init, credentials }),
+      pause,
+      now: () => performance.now(),
+    }),
+  draw,
+  nextFrame: (callback) => requestAnimationFrame(callback),
+  later: (ms, callback) => {
+    const timer = setTimeout(callback, ms);
+    return () => clearTimeout(timer);
+  },
+  now: () => performance.now(),
+};
+
+/** Gives the page its turn. */
+function pause(): Promise<void> {
+  const { scheduler } = globalThis as { scheduler?: { yield?: () => Promise<void> } };
+  return scheduler?.yield?.() ?? new Promise((resolve) => setTimeout(resolve));
+}

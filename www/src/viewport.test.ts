@@ -1,0 +1,68 @@
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import {
+  clampView,
+  type PhotoView,
+  pan,
+  toBox,
+  toggleZoom,
+  toPicture,
+  WHOLE,
+  wheelFactor,
+  zoomAt,
+} from './viewport.js';
+
+const CLOSE: PhotoView = { zoom: 4, x: 0.4, y: 0.6 };
+
+function near(a: number, b: number): void {
+  assert.ok(Math.abs(a - b) < 1e-3, `${a} and ${b}`);
+}
+
+test('what is seen at a place of the box is seen there', () => {
+  for (const at of [WHOLE, { x: 0, y: 1 }, { x: 0.3, y: 0.9 }]) {
+    const box = toBox(CLOSE, toPicture(CLOSE, at));
+    near(box.x, at.x);
+    near(box.y, at.y);
+  }
+  assert.deepEqual(toPicture(CLOSE, { x: 0.5, y: 0.5 }), { x: 0.4, y: 0.6 });
+  assert.deepEqual(toPicture(WHOLE, { x: 0.2, y: 0.7 }), { x: 0.2, y: 0.7 });
+});
+
+test('zooming holds what is under the pointer', () => {
+  const at = { x: 0.7, y: 0.4 };
+  const before = toPicture(CLOSE, at);
+  const after = toPicture(zoomAt(CLOSE, 1.3, at, 8), at);
+  near(after.x, before.x);
+  near(after.y, before.y);
+});
+
+test('no view shows what is beyond the picture, or is closer than allowed', () => {
+  assert.deepEqual(clampView({ zoom: 0.2, x: 0, y: 9 }, 8), WHOLE);
+  assert.deepEqual(clampView({ zoom: 99, x: 0, y: 1 }, 8), { zoom: 8, x: 0.0625, y: 0.9375 });
+  assert.deepEqual(pan({ zoom: 2, x: 0.5, y: 0.5 }, 9, -9, 8), { zoom: 2, x: 0.25, y: 0.75 });
+  assert.deepEqual(zoomAt(CLOSE, 0.01, { x: 0, y: 0 }, 8), WHOLE);
+});
+
+test('what is panned follows the pointer', () => {
+  const at = { x: 0.5, y: 0.5 };
+  const before = toPicture(CLOSE, at);
+  const after = toPicture(pan(CLOSE, 0.1, -0.1, 8), { x: 0.6, y: 0.4 });
+  near(after.x, before.x);
+  near(after.y, before.y);
+});
+
+test('two taps go closer to what they hit, and back', () => {
+  const at = { x: 0.8, y: 0.5 };
+  const closer = toggleZoom(WHOLE, at, 8);
+  assert.equal(closer.zoom, 2.5);
+  near(toPicture(closer, at).x, 0.8);
+  assert.deepEqual(toggleZoom(closer, at, 8), WHOLE);
+  assert.equal(toggleZoom(WHOLE, at, 2).zoom, 2);
+});
+
+test('a wheel goes as far by lines as by pixels, and never leaps', () => {
+  assert.equal(wheelFactor(-120, 0), wheelFactor(-3, 1));
+  assert.equal(wheelFactor(1e6, 0), wheelFactor(1, 2));
+  near(wheelFactor(-100, 0) * wheelFactor(100, 0), 1);
+  assert.ok(wheelFactor(-50, 0) > 1);
+});
