@@ -30,18 +30,23 @@ function answer(decoder: Decoder, request: Request): void {
   scope.postMessage({ kind: 'done' });
 }
 
-try {
-  const engine = await loadEngine();
-  const decoder = new engine.Decoder();
-  scope.onmessage = ({ data }) => {
-    try {
-      answer(decoder, data);
-    } catch (thrown) {
-      fail(thrown);
-    }
-  };
-  // Nothing is asked of it before this.
-  scope.postMessage({ kind: 'ready', state: stateOf(decoder) });
-} catch (thrown) {
-  fail(thrown);
+// Not awaited at the top level, which bundlers cannot put into the classic workers that they make.
+async function start(): Promise<void> {
+  try {
+    const engine = await loadEngine();
+    const decoder = new engine.Decoder();
+    scope.onmessage = ({ data }) => {
+      try {
+        answer(decoder, data);
+      } catch (thrown) {
+        fail(thrown);
+      }
+    };
+    // Nothing is asked of it before this.
+    scope.postMessage({ kind: 'ready', state: stateOf(decoder) });
+  } catch (thrown) {
+    fail(thrown);
+  }
 }
+
+void start();

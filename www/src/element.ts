@@ -81,10 +81,25 @@ export interface BlobOptions {
 /**
  * A photograph that can be relit.
  *
- * Fires `load`, `progress`, `error`, `lightchange`, `backendchange` and `qualitychange`. Style it by
- * `::part(picture)`, `::part(canvas)`, `::part(progress)` and `::part(message)`, and by the custom
- * properties `--relightable-photo-background`, `-color`, `-accent`, `-focus` and `-aspect`, the last being
- * the space kept until the photograph is there.
+ * @fires {Event} load - The photograph is there and drawn.
+ * @fires {ProgressEvent} progress - More of the file has come: `loaded` bytes of `total`, which is 0 until known.
+ * @fires {PhotoErrorEvent} error - Something failed: `code` for programs, `message` for people, `cause`.
+ * @fires {LightChangeEvent} lightchange - The light is another, or the torch has moved: `light`, `torch`, `source`.
+ * @fires {BackendChangeEvent} backendchange - A back end was taken up: `backend`, `previous`, `reason`.
+ * @fires {QualityChangeEvent} qualitychange - The picture is drawn by another `share` of the photograph.
+ *
+ * @slot - What browsers show that run no script.
+ *
+ * @csspart picture - The picture with all that lies over it.
+ * @csspart canvas - The canvas that the photograph is drawn on.
+ * @csspart progress - The bar that tells how much of the file has come.
+ * @csspart message - What went wrong, in words.
+ *
+ * @cssprop --relightable-photo-background - Behind the picture, and where there is none.
+ * @cssprop --relightable-photo-color - Text on that.
+ * @cssprop --relightable-photo-accent - The bar of progress.
+ * @cssprop --relightable-photo-focus - The ring around what has the keyboard's focus.
+ * @cssprop --relightable-photo-aspect - Width / height of the space that is kept until the photograph is there.
  */
 // biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the interface only adds overloads of methods that Base has
 export class RelightablePhoto extends Base {

@@ -1,16 +1,14 @@
-/** The WebAssembly module: its surface, and how the right build of it is found and started. */
+/** The WebAssembly module: its surface, and how it is started. */
 
 import { messageOf, PhotoError } from './errors.js';
 import type { LivePicture } from './light-source.js';
+import type { Gamut, ToneCurve } from './names.js';
+import { startWasm } from './wasm-start.js';
 
-/** The name of a back end. */
-export type Backend = 'webgpu' | 'webgl2' | 'cpu';
+export type { Backend, Gamut, ToneCurve } from './names.js';
 
-/** What a canvas can show: colours of sRGB, or those of Display P3 too. */
-export type Gamut = 'srgb' | 'display-p3';
-
-/** What becomes of brightness: cut off at white, or rolled off before it. */
-export type ToneCurve = 'clip' | 'filmic';
+/** The module's name, for who has its code. */
+export const MODULE = 'relightable_photo';
 
 /** Holds memory inside the module until freed. */
 export interface Freeable {
@@ -128,12 +126,6 @@ export interface Engine {
   Relighter: { new (photo: Photo, canvas: HTMLCanvasElement, gamut: Gamut): Relighter };
 }
 
-// The smallest module with a 128-bit operation: () => i8x16.splat(0), dropped.
-const SIMD_PROBE = new Uint8Array([
-  0, 97, 115, 109, 1, 0, 0, 0, 1, 4, 1, 96, 0, 0, 3, 2, 1, 0, 10, 9, 1, 7, 0, 65, 0, 253, 15, 26,
-  11,
-]);
-
 let loading: Promise<Engine> | undefined;
 
 /** The module, loaded once a page; a load that failed is tried again at the next call. */
@@ -152,19 +144,13 @@ export function loadEngine(): Promise<Engine> {
   return loading;
 }
 
+// Written out for bundlers, which look for exactly these forms.
 async function start(): Promise<Engine> {
-  // A build with SIMD does not even load where SIMD is missing, so there are two. The addresses are
-  // written out for bundlers, which look for exactly this form.
-  const [script, wasm] = WebAssembly.validate(SIMD_PROBE)
-    ? [
-        new URL('./wasm/relightable_photo.js', import.meta.url),
-        new URL('./wasm/relightable_photo_bg.wasm', import.meta.url),
-      ]
-    : [
-        new URL('./wasm/relightable_photo_scalar.js', import.meta.url),
-        new URL('./wasm/relightable_photo_scalar_bg.wasm', import.meta.url),
-      ];
-  const engine = await import(/* @vite-ignore */ /* webpackIgnore: true */ script.href);
-  await engine.default({ module_or_path: wasm });
-  return engine as Engine;
+  const started = await startWasm({
+    name: MODULE,
+    glue: () => import('./wasm/relightable_photo.js'),
+    simd: () => new URL('./wasm/relightable_photo_bg.wasm', import.meta.url),
+    scalar: () => new URL('./wasm/relightable_photo_scalar_bg.wasm', import.meta.url),
+  });
+  return started as Engine;
 }

@@ -71,17 +71,22 @@ function fail(thrown: unknown): void {
   scope.postMessage({ kind: 'broken', message: messageOf(thrown) });
 }
 
-try {
-  const engine = await loadEngine();
-  scope.onmessage = ({ data: { number, photo, task } }) => {
-    try {
-      const bytes = answer(engine, photo, task);
-      scope.postMessage({ kind: 'done', number, bytes }, bytes.byteLength > 0 ? [bytes] : []);
-    } catch (thrown) {
-      fail(thrown);
-    }
-  };
-  scope.postMessage({ kind: 'ready', kernel: engine.cpuKernel() });
-} catch (thrown) {
-  fail(thrown);
+// Not awaited at the top level, which bundlers cannot put into the classic workers that they make.
+async function start(): Promise<void> {
+  try {
+    const engine = await loadEngine();
+    scope.onmessage = ({ data: { number, photo, task } }) => {
+      try {
+        const bytes = answer(engine, photo, task);
+        scope.postMessage({ kind: 'done', number, bytes }, bytes.byteLength > 0 ? [bytes] : []);
+      } catch (thrown) {
+        fail(thrown);
+      }
+    };
+    scope.postMessage({ kind: 'ready', kernel: engine.cpuKernel() });
+  } catch (thrown) {
+    fail(thrown);
+  }
 }
+
+void start();
