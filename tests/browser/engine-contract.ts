@@ -4,7 +4,6 @@
  */
 
 import type * as Simd from '../../dist/wasm/relightable_photo.js';
-import type * as Scalar from '../../dist/wasm/relightable_photo_scalar.js';
 import type {
   BandRelighter,
   Decoder,
@@ -21,7 +20,6 @@ import type {
 // they give and take can.
 type Extends<A extends B, B> = A;
 
-type _Builds = Extends<typeof Scalar, Pick<typeof Scalar, keyof typeof Simd>>;
 type _Decoder = Extends<Simd.Decoder, Omit<Decoder, 'finish'>>;
 type _Constructor = Extends<[number?], ConstructorParameters<typeof Simd.Decoder>>;
 type _Finish = Extends<ReturnType<Simd.Decoder['finish']>, Photo>;
@@ -70,7 +68,6 @@ type _RelighterOf = Extends<
 type _Render = Extends<[Simd.Light, Simd.Display, number], Parameters<Simd.Relighter['render']>>;
 
 export type Contract = [
-  _Builds,
   _Decoder,
   _Constructor,
   _Finish,
