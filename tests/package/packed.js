@@ -2,7 +2,15 @@
 
 import { execFileSync } from 'node:child_process';
 import { createHash } from 'node:crypto';
-import { cpSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import {
+  cpSync,
+  existsSync,
+  mkdirSync,
+  readdirSync,
+  readFileSync,
+  rmSync,
+  writeFileSync,
+} from 'node:fs';
 import { join } from 'node:path';
 
 export const REPOSITORY = join(import.meta.dirname, '../..');
@@ -43,12 +51,14 @@ function pack() {
 /** What `npm publish` would send. */
 export const packed = pack();
 
-/** The package as a folder below `node_modules`, installed with nothing else. */
-export function unpacked() {
-  const folder = join(WORK, 'unpacked');
+/** The package as a folder below `node_modules`, installed with nothing else. @param {string} [name] */
+export function unpacked(name = 'unpacked') {
+  const folder = join(WORK, name);
   const place = join(folder, 'node_modules/relightable-photo');
   rmSync(folder, { recursive: true, force: true });
   mkdirSync(place, { recursive: true });
+  // Nothing in it belongs to the repository around it, which has the same name.
+  writeFileSync(join(folder, 'package.json'), '{ "private": true }\n');
   run(folder, 'tar', '-xzf', packed.tarball, '-C', place, '--strip-components=1');
   return { folder, place };
 }
@@ -62,7 +72,9 @@ export function unpacked() {
 export function project(name) {
   const [source, folder] = [join(import.meta.dirname, name), join(WORK, name)];
   mkdirSync(folder, { recursive: true });
-  const lock = createHash('sha256').update(readFileSync(join(source, 'package-lock.json'))).digest('hex');
+  const lock = createHash('sha256')
+    .update(readFileSync(join(source, 'package-lock.json')))
+    .digest('hex');
   const stamp = join(folder, 'node_modules/.lock');
   const kept = existsSync(stamp) && readFileSync(stamp, 'utf8') === lock;
   for (const entry of readdirSync(folder)) {
@@ -75,6 +87,28 @@ export function project(name) {
     writeFileSync(stamp, lock);
   }
   rmSync(join(folder, 'node_modules/relightable-photo'), { recursive: true, force: true });
-  run(folder, 'npm', 'install', '--no-save', '--no-package-lock', '--offline', ...quiet, packed.tarball);
+  run(
+    folder,
+    'npm',
+    'install',
+    '--no-save',
+    '--no-package-lock',
+    '--offline',
+    ...quiet,
+    packed.tarball,
+  );
   return folder;
+}
+
+/**
+ * What the manifest of an installed package says of the element.
+ *
+ * @param {string} place
+ * @returns {import('../../www/tools/manifest.js').Declaration}
+ */
+export function manifestOf(place) {
+  const manifest = JSON.parse(readFileSync(join(place, 'dist/custom-elements.json'), 'utf8'));
+  return manifest.modules[0].declarations.find(
+    (/** @type {any} */ { customElement }) => customElement,
+  );
 }

@@ -8,8 +8,9 @@ import { answer } from '../../www/tools/ranges.js';
 import { listen } from '../../www/tools/serve.js';
 import { glassBytes } from '../browser/photos.js';
 
-export const CONTENT_SECURITY_POLICY =
-  "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self'; connect-src 'self'";
+/** What the element is made for. @param {string} scripts that may run besides */
+const policy = (scripts) =>
+  `default-src 'none'; script-src 'self' 'wasm-unsafe-eval'${scripts}; style-src 'self'; img-src 'self'; connect-src 'self'`;
 
 const browser = await launchChromium();
 after(() => browser.close());
@@ -31,15 +32,16 @@ after(() => browser.close());
  *
  * @param {{ at: string, folder: string }[]} mounts
  * @param {Record<string, string>} [attributes] to set then, and to wait for what they change to
+ * @param {string} [scripts] sources that the policy has besides, for what a tool writes into pages
  * @returns {Promise<Visit>}
  */
-export async function visit(mounts, attributes = {}) {
-  const server = await listen(serve(mounts), 0);
+export async function visit(mounts, attributes = {}, scripts = '') {
+  const server = await listen(serve(mounts, policy(scripts)), 0);
   const context = await browser.newContext();
   try {
     const page = await context.newPage();
-    /** @type {string[]} */
-    const [workers, requests, complaints] = [[], [], /** @type {string[]} */ ([])];
+    /** @type {{ workers: string[], requests: string[], complaints: string[] }} */
+    const { workers, requests, complaints } = { workers: [], requests: [], complaints: [] };
     page.on('worker', (worker) => workers.push(worker.url()));
     page.on('request', (request) => requests.push(request.url()));
     page.on('pageerror', (error) => complaints.push(String(error)));
@@ -64,9 +66,13 @@ export async function visit(mounts, attributes = {}) {
       });
     });
     await page.goto(server.url);
-    await page.waitForFunction(() => {
+    const drawn = page.waitForFunction(() => {
       const { loads, error } = Object(globalThis).state;
       return loads > 0 || error;
+    });
+    await drawn.catch((cause) => {
+      const seen = JSON.stringify({ complaints, workers, requests }, null, 2);
+      throw new Error(`The page shows no photograph: ${seen}`, { cause });
     });
     const url = await page.evaluate(async (attributes) => {
       const photo = /** @type {RelightablePhoto} */ (document.querySelector('relightable-photo'));
@@ -83,8 +89,14 @@ export async function visit(mounts, attributes = {}) {
     }, attributes);
     const state = await page.evaluate(() => {
       const photo = /** @type {RelightablePhoto} */ (document.querySelector('relightable-photo'));
-      const { activeBackend, kernel } = photo;
-      return { ...Object(globalThis).state, activeBackend, kernel };
+      const { activeBackend, kernel, shadowRoot } = photo;
+      const inside = [...(shadowRoot?.querySelectorAll('*') ?? [])];
+      const parts = inside.flatMap(({ part }) => [...part]);
+      const slots = inside
+        .filter((slot) => slot instanceof HTMLSlotElement)
+        .map(({ name }) => name);
+      const output = document.querySelector('output')?.textContent;
+      return { ...Object(globalThis).state, activeBackend, kernel, parts, slots, output };
     });
     const picture = decodePng(Buffer.from(url.slice(url.indexOf(',') + 1), 'base64'));
     return { picture, state, workers, requests, complaints, origin: new URL(server.url).origin };
@@ -95,13 +107,39 @@ export async function visit(mounts, attributes = {}) {
 }
 
 /**
+ * Opens a page that sends pixels as its title: width, height and RGBA, parted by commas.
+ *
  * @param {{ at: string, folder: string }[]} mounts
+ */
+export async function draw(mounts) {
+  const server = await listen(serve(mounts, policy('')), 0);
+  const page = await browser.newPage();
+  try {
+    /** @type {string[]} */
+    const complaints = [];
+    page.on('pageerror', (error) => complaints.push(String(error)));
+    page.on('console', (message) => complaints.push(message.text()));
+    await page.goto(server.url);
+    await page.waitForFunction(() => document.title !== '');
+    const title = await page.title();
+    const [width = 0, height = 0, ...data] = title.split(',').map(Number);
+    if (data.length === 0) complaints.push(title);
+    return { picture: { width, height, data: Uint8Array.from(data) }, complaints };
+  } finally {
+    await page.close();
+    await server.close();
+  }
+}
+
+/**
+ * @param {{ at: string, folder: string }[]} mounts
+ * @param {string} policy
  * @returns {import('node:http').RequestListener}
  */
-function serve(mounts) {
+function serve(mounts, policy) {
   const handlers = mounts.map(({ at, folder }) => ({ at, handle: sirv(folder, { dev: true }) }));
   return (request, response) => {
-    response.setHeader('Content-Security-Policy', CONTENT_SECURITY_POLICY);
+    response.setHeader('Content-Security-Policy', policy);
     const url = request.url ?? '/';
     if (url === '/favicon.ico') {
       response.writeHead(204).end();

@@ -1,11 +1,12 @@
 /** From a file, wherever it is, to a photograph in memory. */
 
+import { DecodedPhotograph } from './core-photograph.js';
 import { LocalDecoder, type PhotoDecoder } from './decoding.js';
 import { loadEngine } from './engine.js';
 import { PhotoError, toPhotoError } from './errors.js';
 import { tooLong } from './http-errors.js';
 import { openPhoto } from './load.js';
-import type { Facts, Photograph } from './photograph.js';
+import type { Photograph } from './photograph.js';
 import { readFile } from './wasm-start.js';
 
 /**
@@ -43,38 +44,6 @@ export interface CorePhotograph {
   readonly metadata: unknown;
   /** Gives its memory back. */
   free(): void;
-}
-
-/** What it is inside. */
-export class DecodedPhotograph implements CorePhotograph {
-  readonly width: number;
-  readonly height: number;
-  readonly lightWidth: number;
-  readonly lightHeight: number;
-  readonly decodedBytes: number;
-  readonly metadata: unknown;
-  readonly photograph: Photograph;
-  /** Told before it is freed. */
-  onFree: (() => void) | null = null;
-  #freed = false;
-
-  constructor(photograph: Photograph) {
-    const facts: Facts = photograph.facts;
-    this.width = facts.width;
-    this.height = facts.height;
-    this.lightWidth = facts.lightWidth;
-    this.lightHeight = facts.lightHeight;
-    this.decodedBytes = facts.decodedBytes;
-    this.metadata = JSON.parse(facts.metadata) as unknown;
-    this.photograph = photograph;
-  }
-
-  free(): void {
-    if (this.#freed) return;
-    this.#freed = true;
-    this.onFree?.();
-    this.photograph.free();
-  }
 }
 
 /**

@@ -1,6 +1,7 @@
 /** Pictures of a photograph under any light, by the CPU, on this thread. */
 
-import { type CorePhotograph, DecodedPhotograph } from './core-decode.js';
+import type { CorePhotograph } from './core-decode.js';
+import { DecodedPhotograph } from './core-photograph.js';
 import { type BandRelighter, type Engine, type Light, loadEngine, type Photo } from './engine.js';
 import { toPhotoError } from './errors.js';
 import { makeDisplay } from './look.js';

@@ -16,14 +16,14 @@ export type { Gamut, LightName, ToneCurve } from './names.js';
 export { LIGHTS } from './names.js';
 export type { WasmCode } from './wasm-start.js';
 
-import { MODULE } from './engine.js';
+import { MODULE } from './names.js';
 import { provideCode, type WasmCode } from './wasm-start.js';
 
 /** The WebAssembly modules, by name. */
 export type ModuleName = typeof MODULE;
 
 /**
- * Has modules started from this code, compiled or not, or from these addresses, in place of the files
+ * Has modules started from these bytes, or from these addresses, in place of the files
  * beside the script: for where those can be neither fetched nor read. To be called before the first
  * `decode`. Code with SIMD is for machines that have it.
  */

@@ -2,13 +2,10 @@
 
 import { messageOf, PhotoError } from './errors.js';
 import type { LivePicture } from './light-source.js';
-import type { Gamut, ToneCurve } from './names.js';
+import { type Gamut, MODULE, type ToneCurve } from './names.js';
 import { startWasm } from './wasm-start.js';
 
 export type { Backend, Gamut, ToneCurve } from './names.js';
-
-/** The module's name, for who has its code. */
-export const MODULE = 'relightable_photo';
 
 /** Holds memory inside the module until freed. */
 export interface Freeable {

@@ -14,3 +14,6 @@ export type Gamut = 'srgb' | 'display-p3';
 
 /** What becomes of brightness: cut off at white, or rolled off before it. */
 export type ToneCurve = 'clip' | 'filmic';
+
+/** The WebAssembly module, for who has its code. */
+export const MODULE = 'relightable_photo';

@@ -1,7 +1,7 @@
 /** How a WebAssembly module is found and started, in pages, in workers and in Node. */
 
-/** The code of a module: its bytes, compiled or not, or where they are. */
-export type WasmCode = BufferSource | WebAssembly.Module | URL | string;
+/** The code of a module: its bytes, or where they are. */
+export type WasmCode = ArrayBuffer | ArrayBufferView<ArrayBuffer> | URL | string;
 
 /** A module that comes in two builds, with one script for both. */
 export interface WasmBuilds {
@@ -15,9 +15,7 @@ export interface WasmBuilds {
 
 /** What wasm-bindgen makes. */
 interface Glue {
-  default(options: {
-    module_or_path: BufferSource | WebAssembly.Module | URL | Promise<Response>;
-  }): Promise<unknown>;
+  default(options: { module_or_path: BufferSource | Response }): Promise<unknown>;
 }
 
 /** What of Node is used: not an import, which bundlers for pages would have to resolve. */
@@ -52,11 +50,9 @@ export async function startWasm({ name, glue, simd, scalar }: WasmBuilds): Promi
   return module;
 }
 
-async function bytesOf(
-  code: WasmCode,
-): Promise<BufferSource | WebAssembly.Module | Promise<Response>> {
+async function bytesOf(code: WasmCode): Promise<BufferSource | Response> {
   if (typeof code !== 'string' && !(code instanceof URL)) return code;
-  return (await readFile(String(code))) ?? fetch(code);
+  return (await readFile(String(code))) ?? (await fetch(code));
 }
 
 /** A file's bytes; `null` for other addresses, and where files cannot be read. */

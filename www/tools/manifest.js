@@ -3,10 +3,17 @@
  * element's source, and from it the element's attributes in JSX.
  */
 
+import { readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 // @ts-expect-error: it comes without types
-import { cli } from '@custom-elements-manifest/analyzer/cli.js';
+import { create } from '@custom-elements-manifest/analyzer/src/create.js';
+
+/** The analyser's own compiler: later ones have no such interface. */
+const ts = createRequire(import.meta.resolve('@custom-elements-manifest/analyzer/cli.js'))(
+  'typescript',
+);
 
 const repository = join(import.meta.dirname, '..', '..');
 
@@ -14,6 +21,7 @@ const repository = join(import.meta.dirname, '..', '..');
 const CLASS_MODULE = 'dist/element.js';
 const DEFINING_MODULE = 'dist/index.js';
 const CLASS = 'RelightablePhoto';
+const SOURCES = ['www/src/element.ts', 'www/src/events.ts'];
 
 /**
  * @typedef {{ name: string, description?: string, type?: { text: string } }} Entry
@@ -24,9 +32,13 @@ const CLASS = 'RelightablePhoto';
 
 /** @returns {Promise<{ manifest: object, element: Declaration, attributes: string }>} needs dist/element.js */
 export async function makeManifest() {
-  const argv = ['analyze', '--quiet', '--globs', 'www/src/element.ts', 'www/src/events.ts'];
+  const sources = SOURCES.map((file) => {
+    const text = readFileSync(join(repository, file), 'utf8');
+    return ts.createSourceFile(file, text, ts.ScriptTarget.ES2022, true);
+  });
+  const context = { dev: false, thirdPartyCEMs: [] };
   /** @type {{ modules: { declarations: Declaration[] }[] }} */
-  const analysed = await cli({ argv, cwd: repository, noWrite: true });
+  const analysed = create({ modules: sources, plugins: [], context });
   const declarations = analysed.modules.flatMap(({ declarations }) => declarations);
   const element = declarations.find(({ name }) => name === CLASS);
   if (!element) throw new Error(`manifest: there is no class ${CLASS} in the sources`);

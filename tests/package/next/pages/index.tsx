@@ -1,11 +1,18 @@
 import 'relightable-photo';
+import { useEffect, useRef, useState } from 'react';
+import type { BackendChangeEvent, RelightablePhoto } from 'relightable-photo';
 import type {} from 'relightable-photo/react';
-import type { RelightablePhoto } from 'relightable-photo';
-import { useRef, useState } from 'react';
 
 export default function Page() {
   const photo = useRef<RelightablePhoto>(null);
   const [backend, setBackend] = useState('');
+  // React attaches no handlers to custom elements that it hydrates.
+  useEffect(() => {
+    const changed = (event: BackendChangeEvent) => setBackend(event.backend);
+    const element = photo.current;
+    element?.addEventListener('backendchange', changed);
+    return () => element?.removeEventListener('backendchange', changed);
+  }, []);
   return (
     <main>
       <relightable-photo
@@ -17,8 +24,6 @@ export default function Page() {
         exposure={1}
         white-balance="1 1 1"
         alt="A window."
-        onbackendchange={(event) => setBackend(event.backend)}
-        onload={() => photo.current?.setAttribute('data-loaded', '')}
       />
       <output>{backend}</output>
     </main>
