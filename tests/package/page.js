@@ -12,6 +12,9 @@ import { glassBytes } from '../browser/photos.js';
 const policy = (scripts) =>
   `default-src 'none'; script-src 'self' 'wasm-unsafe-eval'${scripts}; style-src 'self'; img-src 'self'; connect-src 'self'`;
 
+/** Machines that test may be busy with something else. */
+const PATIENCE_MS = 120_000;
+
 const browser = await launchChromium();
 after(() => browser.close());
 
@@ -40,6 +43,7 @@ export async function visit(mounts, attributes = {}, scripts = '') {
   const context = await browser.newContext();
   try {
     const page = await context.newPage();
+    page.setDefaultTimeout(PATIENCE_MS);
     /** @type {{ workers: string[], requests: string[], complaints: string[] }} */
     const { workers, requests, complaints } = { workers: [], requests: [], complaints: [] };
     page.on('worker', (worker) => workers.push(worker.url()));
@@ -114,6 +118,7 @@ export async function visit(mounts, attributes = {}, scripts = '') {
 export async function draw(mounts) {
   const server = await listen(serve(mounts, policy('')), 0);
   const page = await browser.newPage();
+  page.setDefaultTimeout(PATIENCE_MS);
   try {
     /** @type {string[]} */
     const complaints = [];
