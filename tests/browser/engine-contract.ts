@@ -4,9 +4,7 @@
  */
 
 import type * as Cpu from '../../dist/wasm/cpu.js';
-import type * as CpuScalar from '../../dist/wasm/cpu_scalar.js';
 import type * as Decoders from '../../dist/wasm/decoder.js';
-import type * as DecodersScalar from '../../dist/wasm/decoder_scalar.js';
 import type * as WebGl2 from '../../dist/wasm/webgl2.js';
 import type * as WebGpu from '../../dist/wasm/webgpu.js';
 import type {
@@ -26,8 +24,6 @@ import type {
 // they give and take can.
 type Extends<A extends B, B> = A;
 
-type _Builds = Extends<typeof CpuScalar, Pick<typeof CpuScalar, keyof typeof Cpu>>;
-type _Decoders = Extends<typeof DecodersScalar, Pick<typeof DecodersScalar, keyof typeof Decoders>>;
 type _Decoder = Extends<Decoders.Decoder, Omit<Decoder, 'finish' | 'preview'>>;
 type _Constructor = Extends<[number?], ConstructorParameters<typeof Decoders.Decoder>>;
 type _Finish = Extends<ReturnType<Decoders.Decoder['finish']>, DecodedPhoto>;
@@ -155,8 +151,6 @@ type _WebGpuOpen = Extends<ReturnType<typeof WebGpu.Graphics.webgpu>, Promise<We
 type _WebGl2Open = Extends<[HTMLCanvasElement], Parameters<typeof WebGl2.Graphics.webgl2>>;
 
 export type Contract = [
-  _Builds,
-  _Decoders,
   _Decoder,
   _Constructor,
   _Finish,

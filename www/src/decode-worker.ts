@@ -1,10 +1,11 @@
 /** The worker that decodes one photograph: what `WorkerDecoder` starts and talks to. */
 
+import { loadDecoder } from './decoder-module.js';
 import { stateOf } from './decoding.js';
 import type { DecodedPhoto, Decoder } from './engine.js';
 import { toPhotoError } from './errors.js';
-import { loadModule, setModuleFolder } from './modules.js';
 import { headOf } from './photograph.js';
+import { setModuleFolder } from './wasm-start.js';
 import type { Answer, Request } from './worker-decoder.js';
 import { started, workerScope } from './worker-scope.js';
 
@@ -36,19 +37,24 @@ function give(photo: DecodedPhoto): void {
   photo.free();
 }
 
-try {
-  setModuleFolder((await started(workerScope())).modules);
-  const { Decoder } = await loadModule('decoder');
-  const decoder = new Decoder();
-  scope.onmessage = ({ data }) => {
-    try {
-      answer(decoder, data);
-    } catch (thrown) {
-      fail(thrown);
-    }
-  };
-  // Nothing is asked of it before this.
-  scope.postMessage({ kind: 'ready', state: stateOf(decoder) });
-} catch (thrown) {
-  fail(thrown);
+// Not awaited at the top level, which bundlers cannot put into the classic workers that they make.
+async function start(): Promise<void> {
+  try {
+    setModuleFolder((await started(workerScope())).modules);
+    const { Decoder } = await loadDecoder();
+    const decoder = new Decoder();
+    scope.onmessage = ({ data }) => {
+      try {
+        answer(decoder, data);
+      } catch (thrown) {
+        fail(thrown);
+      }
+    };
+    // Nothing is asked of it before this.
+    scope.postMessage({ kind: 'ready', state: stateOf(decoder) });
+  } catch (thrown) {
+    fail(thrown);
+  }
 }
+
+void start();

@@ -1,7 +1,8 @@
 /** Which thread decodes: a worker's where there can be one, else the page's. */
 
+import { loadDecoder } from './decoder-module.js';
 import { LocalDecoder, type PhotoDecoder } from './decoding.js';
-import { loadModule, moduleFolder } from './modules.js';
+import { moduleFolder } from './wasm-start.js';
 import { WorkerDecoder } from './worker-decoder.js';
 import type { Start } from './worker-scope.js';
 
@@ -18,7 +19,7 @@ export async function newDecoder(): Promise<PhotoDecoder> {
     worker.terminate();
   }
   // Whatever keeps the module from starting, the page is told of here.
-  return new LocalDecoder(await loadModule('decoder'), () => performance.now());
+  return new LocalDecoder(await loadDecoder(), () => performance.now());
 }
 
 /** `null` where a script of this origin may not be a worker, or modules cannot be. */

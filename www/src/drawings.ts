@@ -1,16 +1,19 @@
 /** Who draws for an element: a back end in the page, or on the CPU the page's crew of workers. */
 
 import type { CanvasSurface } from './canvas.js';
+import { loadCpu } from './cpu-module.js';
 import { Crew } from './crew.js';
 import { CrewDrawing } from './crew-drawing.js';
 import { Devices, slowerThanCpu } from './devices.js';
-import type { Backend, ModuleName, Modules } from './engine.js';
+import type { Backend, Modules } from './engine.js';
 import { PhotoError } from './errors.js';
-import { loadModule, moduleFolder } from './modules.js';
 import { PageDrawing } from './page-drawing.js';
 import type { Photograph } from './photograph.js';
 import type { Wanted } from './player.js';
 import { CanvasDrawing } from './surface.js';
+import { moduleFolder } from './wasm-start.js';
+import { loadWebGl2 } from './webgl2-module.js';
+import { loadWebGpu } from './webgpu-module.js';
 import type { Start } from './worker-scope.js';
 
 /** More would wait for memory, and for each other. */
@@ -25,8 +28,8 @@ export type Draw = (
   signal: AbortSignal,
 ) => Promise<CanvasSurface>;
 
-/** Gives modules by name. */
-export type Load = <N extends ModuleName>(name: N) => Promise<Modules[N]>;
+/** Gives the modules that draw. */
+export type Load = <B extends Backend>(backend: B) => Promise<Modules[B]>;
 
 /**
  * Draws by the modules that `load` gives, and on the CPU by a crew where it can have workers. A device
@@ -73,10 +76,17 @@ export function drawer(load: Load, crew: Crew, devices: Devices): Draw {
   };
 }
 
+const LOADERS: { readonly [B in Backend]: () => Promise<Modules[B]> } = {
+  cpu: loadCpu,
+  webgl2: loadWebGl2,
+  webgpu: loadWebGpu,
+};
+const load: Load = (name) => LOADERS[name]();
+
 const crewSize = Math.min(MOST_WORKERS, globalThis.navigator?.hardwareConcurrency ?? 1);
 
 /** Draws for the elements of this page. */
-export const draw = drawer(loadModule, new Crew(startWorker, crewSize), new Devices());
+export const draw = drawer(load, new Crew(startWorker, crewSize), new Devices());
 
 /** `null` where a script of this origin may not be a worker, or modules cannot be. */
 function startWorker(): Worker | null {

@@ -23,7 +23,6 @@ import { LightNews, type Shining } from './light-news.js';
 import { checkLightSource, isLightSource, type LightSource } from './light-source.js';
 import { lightWords } from './light-words.js';
 import type { Lighting } from './lighting.js';
-import { setModuleFolder } from './modules.js';
 import type { Facts } from './photograph.js';
 import { Player } from './player.js';
 import { PORTS } from './ports.js';
@@ -36,6 +35,7 @@ import type { ToolbarState } from './toolbar.js';
 import { View } from './view.js';
 import { type PhotoView, WHOLE } from './viewport.js';
 import { Visitor } from './visitor.js';
+import { setModuleFolder } from './wasm-start.js';
 import { fetchTranslations, isMissing, type Language, say, type Word } from './words.js';
 
 // On a server there are no elements, but importing this module must not fail there.
@@ -59,11 +59,38 @@ const MAX_SCALE = 4;
 /**
  * A photograph that can be relit.
  *
- * Fires `load`, `progress`, `error`, `lightchange`, `viewchange`, `backendchange`, `contextlost` and
- * `qualitychange`. Takes the slots `poster`, `progress`, `controls` and `error`. Style it by
- * `::part()` of picture, canvas, poster, progress, message, controls, menu, button, torch-handle, hint
- * and status, and by the custom properties `--relightable-photo-background`, `-color`, `-accent`,
- * `-focus` and `-aspect`, the last being the space kept until the photograph is there.
+ * @fires {Event} load - The whole photograph is there and drawn.
+ * @fires {ProgressEvent} progress - More of the file has come: `loaded` bytes of `total`, which is 0 until known.
+ * @fires {PhotoErrorEvent} error - Something failed: `code` for programs, `message` for people, `cause`.
+ * @fires {LightChangeEvent} lightchange - The light is another, or the torch has moved: `light`, `torch`, `source`.
+ * @fires {ViewChangeEvent} viewchange - Another part of the picture is shown: `zoom`, `x`, `y`.
+ * @fires {BackendChangeEvent} backendchange - A back end was taken up: `backend`, `previous`, `reason`.
+ * @fires {ContextLostEvent} contextlost - The back end in use is gone: `backend`, `message`.
+ * @fires {QualityChangeEvent} qualitychange - The picture is drawn by another `share` of the photograph.
+ *
+ * @slot - What browsers show that run no script.
+ * @slot poster - Shown until the photograph is drawn, in the place of `poster`.
+ * @slot progress - Shown while the file comes, in the place of the bar.
+ * @slot controls - Shown in the place of the toolbar.
+ * @slot error - Shown where the photograph cannot be, in the place of the message.
+ *
+ * @csspart picture - The picture with all that lies over it.
+ * @csspart canvas - The canvas that the photograph is drawn on.
+ * @csspart poster - What is shown until the photograph is drawn.
+ * @csspart progress - The bar that tells how much of the file has come.
+ * @csspart message - What went wrong, in words.
+ * @csspart controls - The toolbar.
+ * @csspart menu - Its list of lights.
+ * @csspart button - Each button.
+ * @csspart torch-handle - What has the keyboard's focus while the torch is moved.
+ * @csspart hint - How to zoom where gestures are the page's.
+ * @csspart status - What is read out to those who cannot see it.
+ *
+ * @cssprop --relightable-photo-background - Behind the picture, and where there is none.
+ * @cssprop --relightable-photo-color - Text on that.
+ * @cssprop --relightable-photo-accent - The bar of progress.
+ * @cssprop --relightable-photo-focus - The ring around what has the keyboard's focus.
+ * @cssprop --relightable-photo-aspect - Width / height of the space that is kept until the photograph is there.
  */
 // biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the interface adds the properties that are attributes, and overloads of methods that Base has
 export class RelightablePhoto extends Base {

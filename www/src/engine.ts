@@ -1,15 +1,9 @@
 /** The WebAssembly modules: their surfaces. */
 
 import type { LivePicture } from './light-source.js';
+import type { Gamut, ModuleName, ToneCurve } from './names.js';
 
-/** The name of a back end. */
-export type Backend = 'webgpu' | 'webgl2' | 'cpu';
-
-/** What a canvas can show: colours of sRGB, or those of Display P3 too. */
-export type Gamut = 'srgb' | 'display-p3';
-
-/** What becomes of brightness: cut off at white, or rolled off before it. */
-export type ToneCurve = 'clip' | 'filmic';
+export type { Backend, Gamut, ToneCurve } from './names.js';
 
 /** Holds memory inside the module until freed. */
 export interface Freeable {
@@ -161,12 +155,9 @@ export interface WebGl2Module extends DrawingModule {
 }
 
 /** All modules by name. Each has a memory of its own. */
-export interface Modules {
+export interface Modules extends Record<ModuleName, unknown> {
   decoder: DecoderModule;
   cpu: CpuModule;
   webgl2: WebGl2Module;
   webgpu: WebGpuModule;
 }
-
-/** The name of a module. */
-export type ModuleName = keyof Modules;

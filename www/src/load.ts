@@ -42,7 +42,7 @@ export async function openPhoto(
   url: string,
   signal: AbortSignal,
   onProgress: OnProgress,
-  onPreview: OnPreview,
+  onPreview: OnPreview | null,
   ports: LoadPorts,
 ): Promise<Photograph> {
   try {
@@ -59,7 +59,7 @@ async function open(
   url: string,
   signal: AbortSignal,
   onProgress: OnProgress,
-  onPreview: OnPreview,
+  onPreview: OnPreview | null,
   ports: LoadPorts,
 ): Promise<Photograph> {
   const stop = new AbortController();
@@ -119,7 +119,7 @@ async function decode(
   pieces: AsyncIterable<Piece>,
   signal: AbortSignal,
   onProgress: OnProgress,
-  onPreview: OnPreview,
+  onPreview: OnPreview | null,
   ports: LoadPorts,
 ): Promise<Photograph> {
   let told = 0;
@@ -143,9 +143,9 @@ async function decode(
       signal.throwIfAborted();
       tell();
       signal.throwIfAborted();
-      const preview = await previews.next();
+      const preview = onPreview ? await previews.next() : null;
       if (signal.aborted) preview?.free();
-      else if (preview) onPreview(preview);
+      else if (preview) onPreview?.(preview);
       signal.throwIfAborted();
     }
     const photo = await decoder.finish();

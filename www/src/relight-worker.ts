@@ -1,10 +1,11 @@
 /** A worker that relights rows of photographs: what a `Hand` starts and talks to. */
 
+import { loadCpu } from './cpu-module.js';
 import type { Answer, Request, Task } from './crew-protocol.js';
 import type { BandRelighter, CpuModule, DrawnPhoto } from './engine.js';
 import { messageOf } from './errors.js';
 import { makeDisplay } from './look.js';
-import { loadModule, setModuleFolder } from './modules.js';
+import { setModuleFolder } from './wasm-start.js';
 import { started, workerScope } from './worker-scope.js';
 
 /** Rows of a photograph. */
@@ -72,18 +73,23 @@ function fail(thrown: unknown): void {
   scope.postMessage({ kind: 'broken', message: messageOf(thrown) });
 }
 
-try {
-  setModuleFolder((await started(workerScope())).modules);
-  const module = await loadModule('cpu');
-  scope.onmessage = ({ data: { number, photo, task } }) => {
-    try {
-      const bytes = answer(module, photo, task);
-      scope.postMessage({ kind: 'done', number, bytes }, bytes.byteLength > 0 ? [bytes] : []);
-    } catch (thrown) {
-      fail(thrown);
-    }
-  };
-  scope.postMessage({ kind: 'ready', kernel: module.cpuKernel() });
-} catch (thrown) {
-  fail(thrown);
+// Not awaited at the top level, which bundlers cannot put into the classic workers that they make.
+async function start(): Promise<void> {
+  try {
+    setModuleFolder((await started(workerScope())).modules);
+    const module = await loadCpu();
+    scope.onmessage = ({ data: { number, photo, task } }) => {
+      try {
+        const bytes = answer(module, photo, task);
+        scope.postMessage({ kind: 'done', number, bytes }, bytes.byteLength > 0 ? [bytes] : []);
+      } catch (thrown) {
+        fail(thrown);
+      }
+    };
+    scope.postMessage({ kind: 'ready', kernel: module.cpuKernel() });
+  } catch (thrown) {
+    fail(thrown);
+  }
 }
+
+void start();

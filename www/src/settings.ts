@@ -1,14 +1,10 @@
 /** Attribute values, checked. Each parser throws a `PhotoError` that names what it would take. */
 
-import type { Backend, Gamut, ToneCurve } from './engine.js';
 import { PhotoError } from './errors.js';
 import type { Look } from './look.js';
+import { type Backend, type Gamut, LIGHTS, type LightName, type ToneCurve } from './names.js';
 
-/** The built-in lights, in the order menus show them. */
-export const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum', 'fire'] as const;
-
-/** The name of a built-in light. */
-export type LightName = (typeof LIGHTS)[number];
+export { LIGHTS, type LightName } from './names.js';
 
 /** The back ends, the fastest first: the order in which they are tried. */
 export const BACKENDS: readonly Backend[] = ['webgpu', 'webgl2', 'cpu'];

@@ -1,13 +1,23 @@
-/** Bundles www/src into dist/relightable-photo.js and the workers beside it, and writes the types to dist/types. */
+/**
+ * Bundles www/src into dist, and writes the types to dist/types:
+ *
+ * - relightable-photo.js, the element in one file, for script tags; its toolbar and its translations, which it
+ *   fetches where they are asked for; and its workers;
+ * - index.js, element.js and core.js, which share chunks, for bundlers and import maps;
+ * - custom-elements.json, and the types of the element in JSX.
+ */
 
 import { execFileSync } from 'node:child_process';
-import { rmSync } from 'node:fs';
+import { copyFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { join } from 'node:path';
 import { build } from 'esbuild';
+import { writeIntegrity } from './integrity.js';
+import { makeManifest } from './manifest.js';
 import { styles } from './styles.js';
 
 const repository = join(import.meta.dirname, '..', '..');
+const dist = join(repository, 'dist');
 
 /** What is fetched only where it is asked for lies beside the element, under names of its own. */
 const APART = new Map([
@@ -26,15 +36,9 @@ const apart = {
   },
 };
 
-await build({
+/** @type {import('esbuild').BuildOptions} */
+const options = {
   absWorkingDir: repository,
-  entryPoints: {
-    'relightable-photo': 'www/src/index.ts',
-    'relightable-photo-controls': 'www/src/toolbar.ts',
-    'relightable-photo-words': 'www/src/translations.ts',
-    'relightable-photo-worker': 'www/src/decode-worker.ts',
-    'relightable-photo-relighter': 'www/src/relight-worker.ts',
-  },
   outdir: 'dist',
   bundle: true,
   format: 'esm',
@@ -42,15 +46,77 @@ await build({
   minify: true,
   // Modules are UTF-8 wherever they come from.
   charset: 'utf8',
-  plugins: [styles, apart],
+  plugins: [styles],
   sourcemap: 'linked',
   legalComments: 'none',
   logLevel: 'warning',
-});
+};
 
-rmSync(join(repository, 'dist/types'), { recursive: true, force: true });
+/** The modules' own scripts stay files: who needs one module does not load those of the others. */
+const external = ['./wasm/*'];
+
+/**
+ * A worker has its module's script in it: it needs no other, and bundlers make classic workers of it, which
+ * cannot load modules.
+ *
+ * @type {import('esbuild').Plugin}
+ */
+const glueInside = {
+  name: 'glue',
+  setup({ onResolve }) {
+    onResolve({ filter: /^\.\/wasm\// }, ({ path }) => ({ path: join(dist, path) }));
+  },
+};
+
+for (const name of readdirSync(dist)) {
+  if (/\.(js|js\.map|json)$/.test(name)) rmSync(join(dist, name));
+}
+await Promise.all([
+  build({
+    ...options,
+    external,
+    plugins: [styles, apart],
+    entryPoints: {
+      'relightable-photo': 'www/src/index.ts',
+      'relightable-photo-controls': 'www/src/toolbar.ts',
+      'relightable-photo-words': 'www/src/translations.ts',
+    },
+  }),
+  build({
+    ...options,
+    plugins: [glueInside],
+    entryPoints: {
+      'relightable-photo-worker': 'www/src/decode-worker.ts',
+      'relightable-photo-relighter': 'www/src/relight-worker.ts',
+    },
+  }),
+  build({
+    ...options,
+    external,
+    splitting: true,
+    // Beside the rest: addresses in them are relative.
+    chunkNames: 'chunk-[hash]',
+    entryPoints: {
+      index: 'www/src/index.ts',
+      element: 'www/src/element-entry.ts',
+      core: 'www/src/core.ts',
+    },
+  }),
+]);
+// For imports that a compiler does not drop.
+for (const name of ['react.js', 'jsx.js']) writeFileSync(join(dist, name), 'export {};\n');
+
+rmSync(join(dist, 'types'), { recursive: true, force: true });
 const tsc = createRequire(import.meta.url).resolve('typescript/package.json');
 execFileSync(process.execPath, [join(tsc, '../bin/tsc'), '-p', 'tsconfig.types.json'], {
   cwd: repository,
   stdio: 'inherit',
 });
+
+const { manifest, attributes } = await makeManifest();
+writeFileSync(join(dist, 'custom-elements.json'), `${JSON.stringify(manifest, null, 2)}\n`);
+writeFileSync(join(dist, 'types/jsx-attributes.d.ts'), attributes);
+for (const name of ['react.d.ts', 'jsx.d.ts']) {
+  copyFileSync(join(repository, 'www/types', name), join(dist, 'types', name));
+}
+writeIntegrity();

@@ -18,6 +18,7 @@ await build({
   bundle: true,
   format: 'esm',
   platform: 'node',
+  external: ['./wasm/*'],
   target: 'node20',
   sourcemap: 'inline',
   logLevel: 'warning',

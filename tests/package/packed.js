@@ -1,0 +1,114 @@
+/** The packed package, and projects that have it installed. */
+
+import { execFileSync } from 'node:child_process';
+import { createHash } from 'node:crypto';
+import {
+  cpSync,
+  existsSync,
+  mkdirSync,
+  readdirSync,
+  readFileSync,
+  rmSync,
+  writeFileSync,
+} from 'node:fs';
+import { join } from 'node:path';
+
+export const REPOSITORY = join(import.meta.dirname, '../..');
+const WORK = join(REPOSITORY, 'target/package');
+
+/** Without what packages would print or send. */
+const ENVIRONMENT = { ...process.env, NEXT_TELEMETRY_DISABLED: '1', CI: '1', NO_COLOR: '1' };
+
+/** @param {string} folder @param {string} program @param {string[]} args */
+export function run(folder, program, ...args) {
+  try {
+    return execFileSync(program, args, {
+      cwd: folder,
+      env: ENVIRONMENT,
+      encoding: 'utf8',
+      stdio: ['ignore', 'pipe', 'pipe'],
+    });
+  } catch (thrown) {
+    const { stdout, stderr } = /** @type {{ stdout: string, stderr: string }} */ (thrown);
+    throw new Error(`${program} ${args.join(' ')} failed in ${folder}:\n${stdout}${stderr}`);
+  }
+}
+
+/**
+ * @typedef {{ path: string, size: number }} PackedFile
+ * @typedef {{ filename: string, size: number, unpackedSize: number, files: PackedFile[] }} Packed
+ */
+
+/** @returns {Packed & { tarball: string }} */
+function pack() {
+  mkdirSync(WORK, { recursive: true });
+  const answer = JSON.parse(run(REPOSITORY, 'npm', 'pack', '--json', '--pack-destination', WORK));
+  /** @type {Packed} */
+  const packed = Array.isArray(answer) ? answer[0] : Object.values(answer)[0];
+  return { ...packed, tarball: join(WORK, packed.filename) };
+}
+
+/** What `npm publish` would send. */
+export const packed = pack();
+
+/** The package as a folder below `node_modules`, installed with nothing else. @param {string} [name] */
+export function unpacked(name = 'unpacked') {
+  const folder = join(WORK, name);
+  const place = join(folder, 'node_modules/relightable-photo');
+  rmSync(folder, { recursive: true, force: true });
+  mkdirSync(place, { recursive: true });
+  // Nothing in it belongs to the repository around it, which has the same name.
+  writeFileSync(join(folder, 'package.json'), '{ "private": true }\n');
+  run(folder, 'tar', '-xzf', packed.tarball, '-C', place, '--strip-components=1');
+  return { folder, place };
+}
+
+/**
+ * A project of this folder with its own packages installed, which are kept while its lock file stays, and this
+ * one's tarball.
+ *
+ * @param {string} name of a folder beside this file
+ */
+export function project(name) {
+  const [source, folder] = [join(import.meta.dirname, name), join(WORK, name)];
+  mkdirSync(folder, { recursive: true });
+  const lock = createHash('sha256')
+    .update(readFileSync(join(source, 'package-lock.json')))
+    .digest('hex');
+  const stamp = join(folder, 'node_modules/.lock');
+  const kept = existsSync(stamp) && readFileSync(stamp, 'utf8') === lock;
+  for (const entry of readdirSync(folder)) {
+    if (!(kept && entry === 'node_modules')) rmSync(join(folder, entry), { recursive: true });
+  }
+  cpSync(source, folder, { recursive: true });
+  const quiet = ['--no-audit', '--no-fund', '--loglevel=error'];
+  if (!kept) {
+    run(folder, 'npm', 'ci', ...quiet);
+    writeFileSync(stamp, lock);
+  }
+  rmSync(join(folder, 'node_modules/relightable-photo'), { recursive: true, force: true });
+  run(
+    folder,
+    'npm',
+    'install',
+    '--no-save',
+    '--no-package-lock',
+    '--offline',
+    ...quiet,
+    packed.tarball,
+  );
+  return folder;
+}
+
+/**
+ * What the manifest of an installed package says of the element.
+ *
+ * @param {string} place
+ * @returns {import('../../www/tools/manifest.js').Declaration}
+ */
+export function manifestOf(place) {
+  const manifest = JSON.parse(readFileSync(join(place, 'dist/custom-elements.json'), 'utf8'));
+  return manifest.modules[0].declarations.find(
+    (/** @type {any} */ { customElement }) => customElement,
+  );
+}

@@ -1,0 +1,167 @@
+/** Loads a built page in a browser, under the policy that the element is made for. */
+
+import { after } from 'node:test';
+import sirv from 'sirv';
+import { launchChromium } from '../../www/tools/chromium.js';
+import { decodePng } from '../../www/tools/pictures.js';
+import { answer } from '../../www/tools/ranges.js';
+import { listen } from '../../www/tools/serve.js';
+import { glassBytes } from '../browser/photos.js';
+
+/** What the element is made for. @param {string} scripts that may run besides */
+const policy = (scripts) =>
+  `default-src 'none'; script-src 'self' 'wasm-unsafe-eval'${scripts}; style-src 'self'; img-src 'self'; connect-src 'self'`;
+
+/** Machines that test may be busy with something else. */
+const PATIENCE_MS = 120_000;
+
+const browser = await launchChromium();
+after(() => browser.close());
+
+/** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
+
+/**
+ * @typedef {object} Visit
+ * @property {import('../../www/tools/pictures.js').Picture} picture under its first light
+ * @property {Record<string, unknown>} state of the element, by its properties
+ * @property {string[]} workers addresses
+ * @property {string[]} requests addresses
+ * @property {string[]} complaints of the page: what it logged as errors, threw, or was refused
+ * @property {string} origin
+ */
+
+/**
+ * Serves folders of a built site, opens its first page and waits until the photograph is drawn.
+ *
+ * @param {{ at: string, folder: string }[]} mounts
+ * @param {Record<string, string>} [attributes] to set then, and to wait for what they change to
+ * @param {string} [scripts] sources that the policy has besides, for what a tool writes into pages
+ * @returns {Promise<Visit>}
+ */
+export async function visit(mounts, attributes = {}, scripts = '') {
+  const server = await listen(serve(mounts, policy(scripts)), 0);
+  const context = await browser.newContext();
+  try {
+    const page = await context.newPage();
+    page.setDefaultTimeout(PATIENCE_MS);
+    /** @type {{ workers: string[], requests: string[], complaints: string[] }} */
+    const { workers, requests, complaints } = { workers: [], requests: [], complaints: [] };
+    page.on('worker', (worker) => workers.push(worker.url()));
+    page.on('request', (request) => requests.push(request.url()));
+    page.on('pageerror', (error) => complaints.push(String(error)));
+    page.on('console', (message) => {
+      if (['error', 'warning'].includes(message.type())) complaints.push(message.text());
+    });
+    page.on('response', (response) => {
+      if (response.status() >= 400) complaints.push(`${response.status()} for ${response.url()}`);
+    });
+    await page.exposeFunction('refused', (/** @type {string} */ what) => complaints.push(what));
+    await page.addInitScript(() => {
+      const state = { loads: 0, error: '' };
+      Object.assign(globalThis, { state });
+      document.addEventListener('load', ({ target }) => {
+        if (target instanceof Element && target.localName === 'relightable-photo') state.loads += 1;
+      });
+      document.addEventListener('error', (event) => {
+        state.error ||= Object(event).message ?? String(event);
+      });
+      document.addEventListener('securitypolicyviolation', ({ violatedDirective, blockedURI }) => {
+        Object(globalThis).refused(`${violatedDirective} refused ${blockedURI}`);
+      });
+    });
+    await page.goto(server.url);
+    const drawn = page.waitForFunction(() => {
+      const { loads, error } = Object(globalThis).state;
+      return loads > 0 || error;
+    });
+    await drawn.catch((cause) => {
+      const seen = JSON.stringify({ complaints, workers, requests }, null, 2);
+      throw new Error(`The page shows no photograph: ${seen}`, { cause });
+    });
+    const url = await page.evaluate(async (attributes) => {
+      const photo = /** @type {RelightablePhoto} */ (document.querySelector('relightable-photo'));
+      for (const [name, value] of Object.entries(attributes)) {
+        const changed = new Promise((resolve) => photo.addEventListener(`${name}change`, resolve));
+        photo.setAttribute(name, value);
+        await changed;
+      }
+      const blob = await photo.toBlob();
+      const reader = new FileReader();
+      reader.readAsDataURL(blob);
+      await new Promise((resolve) => reader.addEventListener('load', resolve));
+      return String(reader.result);
+    }, attributes);
+    const state = await page.evaluate(() => {
+      const photo = /** @type {RelightablePhoto} */ (document.querySelector('relightable-photo'));
+      const { activeBackend, kernel, shadowRoot } = photo;
+      const inside = [...(shadowRoot?.querySelectorAll('*') ?? [])];
+      const parts = inside.flatMap(({ part }) => [...part]);
+      const slots = inside
+        .filter((slot) => slot instanceof HTMLSlotElement)
+        .map(({ name }) => name);
+      const output = document.querySelector('output')?.textContent;
+      return { ...Object(globalThis).state, activeBackend, kernel, parts, slots, output };
+    });
+    const picture = decodePng(Buffer.from(url.slice(url.indexOf(',') + 1), 'base64'));
+    return { picture, state, workers, requests, complaints, origin: new URL(server.url).origin };
+  } finally {
+    await context.close();
+    await server.close();
+  }
+}
+
+/**
+ * Opens a page that sends pixels as its title: width, height and RGBA, parted by commas.
+ *
+ * @param {{ at: string, folder: string }[]} mounts
+ */
+export async function draw(mounts) {
+  const server = await listen(serve(mounts, policy('')), 0);
+  const page = await browser.newPage();
+  page.setDefaultTimeout(PATIENCE_MS);
+  try {
+    /** @type {string[]} */
+    const complaints = [];
+    page.on('pageerror', (error) => complaints.push(String(error)));
+    page.on('console', (message) => complaints.push(message.text()));
+    await page.goto(server.url);
+    await page.waitForFunction(() => document.title !== '');
+    const title = await page.title();
+    const [width = 0, height = 0, ...data] = title.split(',').map(Number);
+    if (data.length === 0) complaints.push(title);
+    return { picture: { width, height, data: Uint8Array.from(data) }, complaints };
+  } finally {
+    await page.close();
+    await server.close();
+  }
+}
+
+/**
+ * @param {{ at: string, folder: string }[]} mounts
+ * @param {string} policy
+ * @returns {import('node:http').RequestListener}
+ */
+function serve(mounts, policy) {
+  const handlers = mounts.map(({ at, folder }) => ({ at, handle: sirv(folder, { dev: true }) }));
+  return (request, response) => {
+    response.setHeader('Content-Security-Policy', policy);
+    const url = request.url ?? '/';
+    if (url === '/favicon.ico') {
+      response.writeHead(204).end();
+      return;
+    }
+    if (url === '/photos/glass.ltm') {
+      const read = (/** @type {number} */ start, /** @type {number} */ end) => [
+        glassBytes.subarray(start, end),
+      ];
+      const content = { size: glassBytes.length, type: 'application/vnd.ltm', etag: '"a"', read };
+      answer(request, response, content).catch(() => {});
+      return;
+    }
+    const mount = handlers.find(({ at }) => url.startsWith(at));
+    request.url = url.slice((mount?.at.length ?? 1) - 1);
+    const missing = () => void response.writeHead(404).end();
+    if (mount) mount.handle(request, response, missing);
+    else missing();
+  };
+}

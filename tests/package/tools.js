@@ -1,0 +1,121 @@
+/** The packed package in projects of others: built by their tools, and loaded in a browser. */
+
+import assert from 'node:assert/strict';
+import { createHash } from 'node:crypto';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { compare } from '../../www/tools/pictures.js';
+import { nativePicture } from '../browser/photos.js';
+import { manifestOf, project, run, unpacked } from './packed.js';
+import { draw, visit } from './page.js';
+
+const SCRIPT = 'relightable-photo.js';
+
+/** What the page's photograph looks like, whoever has built the page. */
+const expected = nativePicture('torch', 'cpu');
+
+/**
+ * Holds a visit against what every page has to be.
+ *
+ * @param {import('./page.js').Visit} visit
+ */
+function check({ picture, state, workers, requests, complaints, origin }) {
+  assert.deepEqual(complaints, []);
+  assert.equal(state['error'], '');
+  assert.equal(state['loads'], 1);
+  const { worst } = compare(picture, expected);
+  assert.ok(worst <= 1, `the picture differs by ${worst}/255 from that of ltm-export`);
+  assert.ok(picture.data.some((value, i) => i % 4 !== 3 && value > 100));
+  const others = [...requests, ...workers].filter((url) => new URL(url).origin !== origin);
+  assert.deepEqual(others, [], 'all is of the page’s own server');
+  assert.deepEqual(
+    [...requests, ...workers].filter((url) => !/^https?:/.test(url)),
+    [],
+  );
+}
+
+/** @param {import('./page.js').Visit} visit */
+function checkWorkers({ state, workers }) {
+  assert.equal(state['activeBackend'], 'cpu');
+  assert.match(String(state['kernel']), /^simd128, \d workers?$/);
+  // One that decodes and one that relights.
+  assert.ok(workers.length >= 2, `workers: ${workers}`);
+}
+
+/** @param {{ at: string, folder: string }[]} mounts @param {string} [scripts] as of `visit` */
+async function checkSite(mounts, scripts) {
+  const site = await visit(mounts, {}, scripts);
+  check(site);
+  checkWorkers(site);
+  const onGpu = await visit(mounts, { backend: 'webgl2' }, scripts);
+  check(onGpu);
+  assert.equal(onGpu.state['activeBackend'], 'webgl2');
+  return onGpu;
+}
+
+test('a plain script', async () => {
+  const { folder, place } = unpacked();
+  // With the hash that the package tells.
+  const hash = JSON.parse(readFileSync(join(place, 'dist/integrity.json'), 'utf8'))[SCRIPT];
+  const html = readFileSync(join(import.meta.dirname, 'plain/index.html'), 'utf8');
+  writeFileSync(
+    join(folder, 'index.html'),
+    html.replace(`${SCRIPT}"`, `${SCRIPT}" integrity="${hash}"`),
+  );
+  const { state } = await checkSite([
+    { at: '/relightable-photo/', folder: join(place, 'dist') },
+    { at: '/', folder },
+  ]);
+  const { cssParts, slots } = manifestOf(place);
+  const told = (/** @type {{ name: string }[]} */ entries) => entries.map(({ name }) => name);
+  const lacking = (/** @type {unknown} */ there, /** @type {string[]} */ known) =>
+    /** @type {string[]} */ (there).filter((name) => !known.includes(name));
+  assert.deepEqual(lacking(state['parts'], told(cssParts)), [], 'parts that the manifest lacks');
+  assert.deepEqual(lacking(state['slots'], told(slots)), [], 'slots that the manifest lacks');
+});
+
+test('the core in a worker of a page', async () => {
+  const { place } = unpacked();
+  const { picture, complaints } = await draw([
+    { at: '/relightable-photo/', folder: join(place, 'dist') },
+    { at: '/', folder: join(import.meta.dirname, 'core') },
+  ]);
+  assert.deepEqual(complaints, []);
+  const { worst } = compare(picture, expected);
+  assert.ok(worst <= 1, `the picture differs by ${worst}/255 from that of ltm-export`);
+});
+
+test('Vite', async () => {
+  const folder = project('vite');
+  run(folder, 'npm', 'run', 'build');
+  await checkSite([{ at: '/', folder: join(folder, 'dist') }]);
+});
+
+test('webpack', async () => {
+  const folder = project('webpack');
+  run(folder, 'npm', 'run', 'build');
+  await checkSite([{ at: '/', folder: join(folder, 'public') }]);
+});
+
+test('Next, which renders on the server first', async () => {
+  const folder = project('next');
+  run(folder, 'npm', 'run', 'build');
+  const html = readFileSync(join(folder, 'out/index.html'), 'utf8');
+  assert.match(html, /<relightable-photo [^>]*src="\/photos\/glass\.ltm"/);
+  assert.match(html, /<relightable-photo [^>]*white-balance="1 1 1"/);
+  // Next writes a script of its own into pages, which a policy has to name by its hash.
+  const mounts = [{ at: '/', folder: join(folder, 'out') }];
+  const { state } = await checkSite(mounts, hashesOfScripts(html));
+  // React has taken the page over.
+  assert.equal(state['output'], 'webgl2');
+  // The types without what Next's own lack.
+  run(folder, join(folder, 'node_modules/.bin/tsc'), '-p', 'types');
+});
+
+/** What a policy has to have for the scripts that are written into a page. @param {string} html */
+function hashesOfScripts(html) {
+  const scripts = [...html.matchAll(/<script>(.*?)<\/script>/gs)];
+  const hashes = scripts.map(([, text = '']) => createHash('sha256').update(text).digest('base64'));
+  return hashes.map((hash) => ` 'sha256-${hash}'`).join('');
+}

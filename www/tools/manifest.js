@@ -1,0 +1,145 @@
+/**
+ * The custom elements manifest (https://github.com/webcomponents/custom-elements-manifest), made from the
+ * element's source, and from it the element's attributes in JSX.
+ */
+
+import { readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { join } from 'node:path';
+import { pathToFileURL } from 'node:url';
+// @ts-expect-error: it comes without types
+import { create } from '@custom-elements-manifest/analyzer/src/create.js';
+
+/** The analyser's own compiler: later ones have no such interface. */
+const ts = createRequire(import.meta.resolve('@custom-elements-manifest/analyzer/cli.js'))(
+  'typescript',
+);
+
+const repository = join(import.meta.dirname, '..', '..');
+
+/** Where the package has the class, and where it is defined. */
+const CLASS_MODULE = 'dist/element.js';
+const DEFINING_MODULE = 'dist/index.js';
+const CLASS = 'RelightablePhoto';
+const SOURCES = ['www/src/element.ts', 'www/src/events.ts'];
+
+/**
+ * @typedef {{ name: string, description?: string, type?: { text: string } }} Entry
+ * @typedef {Entry & { kind: string, privacy?: string, static?: boolean, readonly?: boolean, attribute?: string, reflects?: boolean }} Member
+ * @typedef {Entry & { fieldName: string }} Attribute
+ * @typedef {{ kind: string, name: string, members: Member[], events: Entry[], attributes: Attribute[], cssParts: Entry[], cssProperties: Entry[], slots: Entry[], superclass?: unknown }} Declaration
+ */
+
+/** @returns {Promise<{ manifest: object, element: Declaration, attributes: string }>} needs dist/element.js */
+export async function makeManifest() {
+  const sources = SOURCES.map((file) => {
+    const text = readFileSync(join(repository, file), 'utf8');
+    return ts.createSourceFile(file, text, ts.ScriptTarget.ES2022, true);
+  });
+  const context = { dev: false, thirdPartyCEMs: [] };
+  /** @type {{ modules: { declarations: Declaration[] }[] }} */
+  const analysed = create({ modules: sources, plugins: [], context });
+  const declarations = analysed.modules.flatMap(({ declarations }) => declarations);
+  const element = declarations.find(({ name }) => name === CLASS);
+  if (!element) throw new Error(`manifest: there is no class ${CLASS} in the sources`);
+  /** @type {{ [CLASS]: { observedAttributes: readonly string[] } }} */
+  const { [CLASS]: built } = await import(pathToFileURL(join(repository, CLASS_MODULE)).href);
+  tidy(element, built.observedAttributes);
+  const events = declarations.filter(({ name }) => /Event$/.test(name));
+  for (const { members } of events) {
+    for (const member of members ?? []) if (member.privacy !== 'private') delete member.privacy;
+  }
+  const manifest = {
+    schemaVersion: '2.1.0',
+    readme: 'README.md',
+    modules: [
+      {
+        kind: 'javascript-module',
+        path: CLASS_MODULE,
+        declarations: [{ ...element, customElement: true }, ...events],
+        exports: [element, ...events].map(({ name }) => ({
+          kind: 'js',
+          name,
+          declaration: { name, module: CLASS_MODULE },
+        })),
+      },
+      {
+        kind: 'javascript-module',
+        path: DEFINING_MODULE,
+        declarations: [],
+        exports: [
+          {
+            kind: 'custom-element-definition',
+            name: 'relightable-photo',
+            declaration: { name: CLASS, module: CLASS_MODULE },
+          },
+        ],
+      },
+    ],
+  };
+  return { manifest, element, attributes: jsxAttributes(element) };
+}
+
+/**
+ * Leaves of a class what others may use, and joins attributes to their properties.
+ *
+ * @param {Declaration} element
+ * @param {readonly string[]} observed
+ */
+function tidy(element, observed) {
+  const callbacks = /Callback$/;
+  element.members = element.members.filter(
+    ({ name, privacy, static: ofClass }) =>
+      privacy !== 'private' && !name.startsWith('#') && !ofClass && !callbacks.test(name),
+  );
+  // The analyser guesses at others from calls of dispatchEvent.
+  element.events = element.events.filter(({ description }) => description);
+  element.superclass = { name: 'HTMLElement', package: 'global:' };
+  element.attributes = observed.map((name) => {
+    const asField = name.replaceAll('-', '');
+    const field = element.members.find((member) => member.name.toLowerCase() === asField);
+    if (!field) throw new Error(`manifest: the attribute ${name} has no property`);
+    field.attribute = name;
+    field.reflects = true;
+    const { type = { text: 'string' }, description = '' } = field;
+    return { name, fieldName: field.name, type, description };
+  });
+  for (const { name, description } of [...element.members, ...element.attributes]) {
+    if (!description) throw new Error(`manifest: ${name} has no description`);
+  }
+}
+
+/** @param {Declaration} element */
+function jsxAttributes({ attributes, events, members }) {
+  /** @param {string} description @param {string} name @param {string} type */
+  const line = (description, name, type) =>
+    `  /** ${description.replaceAll(/\s+/g, ' ')} */\n  ${name}?: ${type} | undefined;\n`;
+  const settable = members.filter(
+    ({ kind, readonly, attribute }) => kind === 'field' && !readonly && !attribute,
+  );
+  const own = new Set(
+    events.map(({ type }) => type?.text).filter((type) => /[a-z]Event$/.test(type ?? '')),
+  );
+  for (const builtin of ['Event', 'ProgressEvent']) own.delete(builtin);
+  return [
+    '/** Made from custom-elements.json. */\n\n',
+    `import type { ${[...own].sort().join(', ')} } from './events.js';\n`,
+    `import type { ${CLASS} } from './element.js';\n\n`,
+    '/** Attributes by their names in HTML, properties that are none of them, and handlers of events. */\n',
+    'export interface RelightablePhotoAttributes {\n',
+    ...attributes.map(({ name, type, description = '' }) =>
+      line(description, /-/.test(name) ? `'${name}'` : name, jsxType(type?.text ?? 'string')),
+    ),
+    ...settable.map(({ name, description = '' }) => line(description, name, `${CLASS}['${name}']`)),
+    ...events.map(({ name, type, description = '' }) =>
+      line(description, `on${name}`, `((event: ${type?.text ?? 'Event'}) => void)`),
+    ),
+    '}\n',
+  ].join('');
+}
+
+/** What may be written in JSX for an attribute whose property has this type. @param {string} type */
+function jsxType(type) {
+  if (type === 'boolean') return 'boolean';
+  return type === 'number' ? 'number | string' : 'string';
+}

@@ -1,0 +1,89 @@
+/**
+ * Writes dist/THIRD-PARTY.md: what is compiled into the WebAssembly modules, with its licences. Needs the crates'
+ * sources, which are there once the modules are built: node www/tools/third-party.js
+ */
+
+import { execFileSync } from 'node:child_process';
+import { existsSync, readdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
+import { dirname, join } from 'node:path';
+
+const repository = join(import.meta.dirname, '..', '..');
+const TARGET = 'wasm32-unknown-unknown';
+
+/** @param {string[]} args */
+function cargo(...args) {
+  const options = /** @type {const} */ ({ cwd: repository, encoding: 'utf8', maxBuffer: 1 << 28 });
+  return execFileSync('cargo', [...args, '--locked'], options);
+}
+
+/** @typedef {{ name: string, version: string, license: string | null, license_file: string | null, manifest_path: string, source: string | null }} Crate */
+
+/** Crates whose code is in the modules: not those that only run while they are built. */
+function compiledIn() {
+  const tree = cargo('tree', '--target', TARGET, '-e', 'normal,no-proc-macro', '--prefix', 'none');
+  const names = new Set(tree.split('\n').map((line) => line.split(' ').slice(0, 2).join(' ')));
+  /** @type {{ packages: Crate[] }} */
+  const { packages } = JSON.parse(
+    cargo('metadata', '--format-version', '1', '--filter-platform', TARGET),
+  );
+  return packages
+    .filter(({ name, version, source }) => source !== null && names.has(`${name} v${version}`))
+    .sort((a, b) => a.name.localeCompare(b.name) || a.version.localeCompare(b.version));
+}
+
+/**
+ * The texts of a crate's licence: of several to choose from, MIT's where that is one of them.
+ *
+ * @param {Crate} crate
+ */
+function licencesOf({ name, license, manifest_path }) {
+  const folder = dirname(manifest_path);
+  const files = readdirSync(folder).filter((file) => /^(licen[cs]e|copying|unlicense)/i.test(file));
+  const mit = files.filter((file) => /mit/i.test(file));
+  const chosen = (/\bMIT\b/.test(license ?? '') && mit.length > 0 ? mit : files).map((file) =>
+    join(folder, file),
+  );
+  // The C code that comes with a crate has a licence of its own.
+  for (const inner of readdirSync(folder)) {
+    const text = join(folder, inner, 'LICENSE');
+    if (existsSync(text) && statSync(text).isFile()) chosen.push(text);
+  }
+  const texts = chosen
+    .filter((path) => statSync(path).isFile())
+    .map((path) => readFileSync(path, 'utf8').trim());
+  return { name, texts };
+}
+
+/** @param {Crate} crate */
+const titleOf = ({ name, version, license }) => `${name} ${version} (${license ?? 'see below'})`;
+
+const crates = compiledIn();
+/** Crates by the text that they share. @type {Map<string, string[]>} */
+const byText = new Map();
+/** @type {string[]} */
+const without = [];
+for (const crate of crates) {
+  const { texts } = licencesOf(crate);
+  if (texts.length === 0) without.push(titleOf(crate));
+  for (const text of texts) byText.set(text, [...(byText.get(text) ?? []), titleOf(crate)]);
+}
+const sections = [...byText].map(
+  ([text, titles]) =>
+    `${titles.map((title) => `- ${title}`).join('\n')}\n\n\`\`\`text\n${text}\n\`\`\`\n`,
+);
+const rest =
+  without.length > 0
+    ? ['Without a text of their own:\n\n', ...without.map((title) => `- ${title}\n`)]
+    : [];
+writeFileSync(
+  join(repository, 'dist/THIRD-PARTY.md'),
+  [
+    '# What is compiled into the WebAssembly modules\n\n',
+    "Besides Rust's standard library (MIT OR Apache-2.0, https://www.rust-lang.org/policies/licenses):\n\n",
+    sections.join('\n'),
+    ...(rest.length > 0 ? ['\n', ...rest] : []),
+  ].join(''),
+);
+console.log(
+  `third-party: ${crates.length} crates, ${byText.size} texts, ${without.length} without`,
+);

@@ -1,0 +1,24 @@
+/** `<relightable-photo>` in the JSX of what looks for elements in the global namespace, as React 18 does. */
+
+import type { RelightablePhoto } from './element.js';
+import type { RelightablePhotoAttributes } from './jsx-attributes.js';
+
+/** What the element takes in JSX; keys, references and attributes of every element are not checked. */
+export interface RelightablePhotoProps extends RelightablePhotoAttributes {
+  readonly ref?: RelightablePhotoRef | undefined;
+  readonly [attribute: string]: unknown;
+}
+
+type RelightablePhotoRef =
+  | ((element: RelightablePhoto | null) => unknown)
+  | { current: RelightablePhoto | null }
+  | string
+  | null;
+
+declare global {
+  namespace JSX {
+    interface IntrinsicElements {
+      'relightable-photo': RelightablePhotoProps;
+    }
+  }
+}
