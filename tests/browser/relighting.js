@@ -16,7 +16,7 @@ const withoutWorkers = () => {
 describe('relighting', () => {
   for (const backend of BACKENDS) {
     test(`${backend} draws what the native program draws, to 1/255`, async (t) => {
-      const page = await openPage(t, '/bench');
+      const page = await openPage(t, '/bench', { reducedMotion: 'reduce' });
       await mount(page, { src: SRC, backend });
       const happened = await loaded(page);
       const change = happened.find((event) => event.type === 'backendchange');
@@ -76,6 +76,7 @@ describe('relighting', () => {
       for (const page of [crew, alone]) {
         await page.evaluate('globalThis.photo?.remove()');
         await mount(page, { src, backend: 'cpu' });
+        await page.evaluate('photo.paused = true');
         await loaded(page);
       }
       assert.match(await crew.evaluate('photo.kernel'), /^simd128, \d workers?$/);

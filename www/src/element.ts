@@ -18,25 +18,23 @@ import {
   ViewChangeEvent,
 } from './events.js';
 import { Exhibit, type LightPose } from './exhibit.js';
-import { languageAt } from './language.js';
+import { isFullscreen, toggleFullscreen } from './fullscreen.js';
 import { LightNews, type Shining } from './light-news.js';
 import { checkLightSource, isLightSource, type LightSource } from './light-source.js';
-import { lightWords } from './light-words.js';
 import type { Lighting } from './lighting.js';
 import type { Facts } from './photograph.js';
 import { Player } from './player.js';
 import { PORTS } from './ports.js';
+import { Presenter } from './presenter.js';
 import { ATTRIBUTES, PROPERTIES, type Reflected, reflect } from './reflect.js';
-import { BACKENDS, CENTRE, type LightName, type PicturePoint } from './settings.js';
+import { BACKENDS, type LightName, type PicturePoint } from './settings.js';
 import { unwatch, watch } from './sight.js';
-import { mayTilt } from './tilting.js';
 import { browserColor } from './tint.js';
-import type { ToolbarState } from './toolbar.js';
 import { View } from './view.js';
 import { type PhotoView, WHOLE } from './viewport.js';
 import { Visitor } from './visitor.js';
 import { setModuleFolder } from './wasm-start.js';
-import { fetchTranslations, isMissing, type Language, say, type Word } from './words.js';
+import { fetchTranslations, isMissing } from './words.js';
 
 // On a server there are no elements, but importing this module must not fail there.
 const Base = globalThis.HTMLElement ?? (class {} as unknown as typeof HTMLElement);
@@ -106,9 +104,9 @@ export class RelightablePhoto extends Base {
   readonly #player: Player<CanvasSurface>;
   readonly #attributes = new Attributes();
   readonly #exhibit: Exhibit;
+  readonly #presenter: Presenter;
   readonly #news = new LightNews();
   #toldView = WHOLE;
-  #language: Language = 'en';
   /** The address that was given to the player. */
   #fetched: string | null | undefined;
   #reload = false;
@@ -146,11 +144,12 @@ export class RelightablePhoto extends Base {
           else this.#visitor.reset();
           this.#schedule();
         },
-        fullscreen: () => this.#toggleFullscreen(),
+        fullscreen: () => toggleFullscreen(this),
       },
       () => this.#schedule(),
       (error) => this.dispatchEvent(new PhotoErrorEvent(error)),
     );
+    this.#presenter = new Presenter(this, this.#view, this.#controls, this.#exhibit);
     this.#player = this.#newPlayer();
     this.#visitor = this.#newVisitor(root);
     this.#view.revealButton.addEventListener('click', () => {
@@ -369,7 +368,7 @@ export class RelightablePhoto extends Base {
       detailChanged: (detail) => this.dispatchEvent(new QualityChangeEvent(detail)),
       loaded: () => {
         this.#view.progress(null);
-        this.#view.tell(this.#say('loaded'));
+        this.#presenter.tellLoaded();
         this.dispatchEvent(loadEvent());
       },
       show: (drawing) => {
@@ -398,27 +397,22 @@ export class RelightablePhoto extends Base {
     return new Visitor(root, this.#view, this.#exhibit, {
       changed: () => this.#schedule(),
       looked: () => {
-        const { zoom } = this.#exhibit.view;
-        const text = zoom.toLocaleString(this.#language, { maximumFractionDigits: 1 });
-        this.#view.tell(this.#say('zoomed', text));
+        this.#presenter.tellZoom();
         this.#schedule();
       },
       lightChosen: (item) => {
-        this.#view.tell(`${this.#say('light')}: ${this.#say(item)}`);
+        this.#presenter.tellLight(item);
         this.#schedule();
       },
       leave: () => {
-        if (this.matches(':fullscreen')) this.#toggleFullscreen();
+        if (isFullscreen(this)) toggleFullscreen(this);
         else (this.shadowRoot?.activeElement as HTMLElement | null)?.blur();
       },
-      scrolled: (by) => {
-        const key = /mac|iphone|ipad/i.test(navigator.platform) ? '⌘' : 'Ctrl';
-        this.#view.hint(this.#say(by === 'wheel' ? 'wheelHint' : 'touchHint', key));
-      },
+      scrolled: (by) => this.#presenter.hint(by),
       expired: () => {
         this.reset();
         this.#controls.close();
-        if (this.matches(':fullscreen')) this.#toggleFullscreen();
+        if (isFullscreen(this)) toggleFullscreen(this);
       },
       touched: (byKey) => this.#controls.wake(byKey),
     });
@@ -452,9 +446,10 @@ export class RelightablePhoto extends Base {
     const asked = this.#read();
     this.#exhibit.asked = asked;
     this.#lighting.follow(this.#exhibit.curtain.seen, !this.paused);
-    this.#language = languageAt(this);
-    if (isMissing(this.#language)) void fetchTranslations().then(() => this.#schedule());
-    this.#present(asked);
+    if (isMissing(this.#presenter.language)) void fetchTranslations().then(() => this.#schedule());
+    this.#presenter.present(this.paused, this.#visitor.tilts);
+    this.#showFault();
+    this.#visitor.update(!this.paused);
     for (const fault of this.#attributes.takeFaults()) {
       this.dispatchEvent(new PhotoErrorEvent(fault));
     }
@@ -499,46 +494,8 @@ export class RelightablePhoto extends Base {
     this.#player.set({ src, credentials, wanted, look, light }, reload);
   }
 
-  /** Shows all of it but the picture itself. */
-  #present(asked: Asked): void {
-    const { zoom, cooperative, poster, crossOrigin } = asked;
-    const { view, shown, curtain } = this.#exhibit;
-    const light = shown && this.#lighting.holdsTorch;
-    const zooms = shown && zoom > 1;
-    const zoomed = view.zoom > 1;
-    const at = this.#lighting.torch ?? CENTRE;
-    this.#view.describe(this.getAttribute('alt'), this.#language);
-    const holds = zooms && !cooperative && (light || zoomed);
-    const touch = holds ? 'hold' : light || zooms ? 'scroll' : 'page';
-    this.#view.arrange({ light, focusable: zooms && !light, zoomed, touch }, this.#language);
-    this.#view.place(view, at, lightWords(at, this.#language));
-    this.#view.poster(poster, crossOrigin, !shown, curtain.awaitsPress(asked));
-    this.#showFault();
-    this.#controls.update(asked.controls && shown ? this.#controlsState(asked) : null);
-    this.#visitor.update(!this.paused);
-  }
-
-  #controlsState({ zoom: most, breathes }: Asked): ToolbarState {
-    const { items, item, holdsTorch, canPlay } = this.#lighting;
-    const { zoom } = this.#exhibit.view;
-    return {
-      language: `${this.#language} ${isMissing(this.#language)}`,
-      say: (word) => this.#say(word),
-      items,
-      item,
-      plays: canPlay || (holdsTorch && breathes) ? !this.paused : null,
-      zoom: most > 1 ? { in: zoom < most, out: zoom > 1 } : null,
-      tilts: holdsTorch && mayTilt() ? this.#visitor.tilts : null,
-      fullscreen: document.fullscreenEnabled ? this.matches(':fullscreen') : null,
-    };
-  }
-
   get #lighting(): Lighting {
     return this.#exhibit.lighting;
-  }
-
-  #say(word: Word, ...values: readonly string[]): string {
-    return say(word, this.#language, ...values);
   }
 
   #tellLight(news: Shining | null): void {
@@ -552,17 +509,9 @@ export class RelightablePhoto extends Base {
   }
 
   #showFault(): void {
-    const source = this.#lighting.fault?.message;
-    const message =
-      this.#attributes.message ?? this.#exhibit.fault ?? source ?? this.#lightFault?.message;
-    const fatal = this.#exhibit.fault !== null;
-    this.#view.fault(message === undefined ? null : { fatal, message }, this.#language);
-  }
-
-  #toggleFullscreen(): void {
-    // Refused where the page's own frame, or the visitor, does not allow it.
-    const done = this.matches(':fullscreen') ? document.exitFullscreen() : this.requestFullscreen();
-    void done.catch(() => {});
+    const message = this.#attributes.message ?? this.#exhibit.fault;
+    const light = this.#lighting.fault?.message ?? this.#lightFault?.message;
+    this.#presenter.fault(message ?? light ?? null);
   }
 
   #clear(): void {

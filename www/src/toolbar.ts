@@ -4,7 +4,7 @@
  */
 
 import { make, put, write } from './dom.js';
-import { type IconName, icon, showIcon } from './icons.js';
+import { icon, LAMP, showIcon } from './icons.js';
 import type { LightItem } from './lighting.js';
 import STYLE from './toolbar.css';
 import type { Word } from './words.js';
@@ -32,6 +32,24 @@ export interface ToolbarActions {
   tilt(): void;
   fullscreen(): void;
 }
+
+const LENS = 'M10.5 4a6.5 6.5 0 1 0 0 13a6.5 6.5 0 1 0 0-13M15.3 15.3L20 20M8 10.5h5';
+
+const ICONS = {
+  light: LAMP,
+  play: 'M8.5 5.5v13l10-6.5z',
+  pause: 'M9 6v12M15 6v12',
+  zoomIn: `${LENS}M10.5 8v5`,
+  zoomOut: LENS,
+  reset: 'M5 12a7 7 0 1 0 2-4.9L5 9M5 4.5V9h4.5',
+  tilt:
+    'M8.5 4.5h7a1 1 0 0 1 1 1v13a1 1 0 0 1-1 1h-7a1 1 0 0 1-1-1v-13a1 1 0 0 1 1-1z' +
+    'M4 9l-1.5 3L4 15M20 9l1.5 3L20 15',
+  fullscreen: 'M5 9.5V5h4.5M14.5 5H19v4.5M19 14.5V19h-4.5M9.5 19H5v-4.5',
+  leaveFullscreen: 'M9.5 5v4.5H5M19 9.5h-4.5V5M14.5 19v-4.5H19M5 14.5h4.5V19',
+} as const;
+
+type IconName = keyof typeof ICONS;
 
 /** Who has moved no pointer for so long looks at the picture. */
 const REST_MS = 3000;
@@ -174,7 +192,11 @@ export class Toolbar {
 }
 
 function button(iconName: IconName, press: () => void): HTMLButtonElement {
-  const made = make('button', { part: 'button', attributes: { type: 'button' } }, icon(iconName));
+  const made = make(
+    'button',
+    { part: 'button', attributes: { type: 'button' } },
+    icon(ICONS[iconName]),
+  );
   made.addEventListener('click', () => {
     if (made.getAttribute('aria-disabled') !== 'true') press();
   });
@@ -189,5 +211,5 @@ function name(button: HTMLButtonElement, text: string): void {
 function show(button: HTMLButtonElement, shown: boolean, text: string, iconName?: IconName): void {
   button.hidden = !shown;
   name(button, text);
-  if (iconName && button.firstElementChild) showIcon(button.firstElementChild, iconName);
+  if (iconName && button.firstElementChild) showIcon(button.firstElementChild, ICONS[iconName]);
 }

@@ -2,7 +2,7 @@
  * message, and the place of the controls. Holds no state that is not on the screen. */
 
 import { make, put, slot, write } from './dom.js';
-import { icon } from './icons.js';
+import { icon, LAMP } from './icons.js';
 import type { PicturePoint } from './settings.js';
 import { adopt } from './sheets.js';
 import STYLE from './style.css';
@@ -80,7 +80,7 @@ export class View {
     this.revealButton = make(
       'button',
       { name: 'reveal', part: 'button', attributes: { type: 'button' } },
-      make('span', {}, icon('light'), this.#revealText),
+      make('span', {}, icon(LAMP), this.#revealText),
     );
     this.stage.append(this.#picture, this.#poster, this.handle, this.revealButton, this.#hint);
     this.#progress = make('div', { name: 'progress', part: 'progress' });
