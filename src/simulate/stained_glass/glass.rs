@@ -76,16 +76,19 @@ impl Glass {
 }
 
 /// Transmittance of piece number `piece` at `p`: Beer and Lambert's law through a sheet whose
-/// thickness varies from piece to piece and, in streaks, over each; less the bubbles' dark rims.
+/// thickness and colour vary from piece to piece and, in streaks, over each; less the bubbles' dark rims.
 pub(super) fn transmittance(optics: &Optics, piece: u32, p: Vec2) -> [f64; 3] {
-    let jitter = 0.86 + 0.30 * unit_hash(piece, 31);
+    let jitter = 0.80 + 0.45 * unit_hash(piece, 31);
+    // No two melts have quite the same colour.
+    let warm = 0.16 * (unit_hash(piece, 35) - 0.5);
+    let melt = [1.0 - warm, 1.0, 1.0 + warm];
     // Streaks run the way the sheet was drawn, another way in each piece.
     let along = p.rotated(unit_hash(piece, 32) * std::f64::consts::TAU);
     let along = along + vec2(17.0, 29.0) * unit_hash(piece, 33);
     let streak = layered_noise(vec2(along.x * 3.0, along.y * 14.0), 3, 34);
     let thickness = jitter * (1.0 + 1.6 * optics.streaks * streak).max(0.2);
     let clear = 1.0 - 0.5 * bubble_rim(along);
-    optics.transmittance.map(|t| t.powf(thickness) * clear)
+    std::array::from_fn(|c| optics.transmittance[c].powf(thickness * melt[c]) * clear)
 }
 
 /// 0 in plain glass to 1 on the rim of a bubble.

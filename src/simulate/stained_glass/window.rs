@@ -1,19 +1,24 @@
-//! The cartoon of the window: which piece of glass lies where, and where the lead.
+//! The cartoon of the window: which piece of glass lies where, and where the lead and the stone.
 //!
-//! From the middle outwards: a rosette, a ring of beads, twelve petals, twelve medallions, a
-//! jewelled border; then the corners of the square and its frame. A picture that is not square
-//! shows diamond quarries beside it. Unit coordinates throughout.
+//! A rose in Gothic tracery. From the middle outwards: a sun, twelve lancets with roundels in their
+//! heads, twenty-four narrower ones, eyelets wherever heads leave room, a ring of pearls; then
+//! quatrefoils in the corners of the square and its frame. A picture that is not square shows
+//! diamond quarries beside it. Unit coordinates throughout.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 use super::glass::Glass;
 use crate::simulate::plane::{Vec2, smoothstep, vec2};
-use crate::simulate::shapes::{circle, fold, segment, vesica};
-use crate::simulate::texture::cell_hash;
+use crate::simulate::shapes::{circle, fold, segment, smooth_union, star, vesica};
+use crate::simulate::texture::{cell_hash, noise};
 
-/// Half the width of the leads that hold the large parts together, and of the fine ones.
-const BOLD: f64 = 0.0120;
-const FINE: f64 = 0.0080;
+/// Half the width of the bars between lights that are cut from stone, of the leads that hold large
+/// parts together, and of the fine ones.
+const STONE: f64 = 0.0130;
+const BOLD: f64 = 0.0090;
+const FINE: f64 = 0.0062;
+/// How far solder spreads where leads meet.
+const SOLDER: f64 = 0.006;
 
 /// What is at a point of the window.
 #[derive(Clone, Copy, Debug)]
@@ -33,14 +38,15 @@ impl Spot {
         Self {
             piece,
             glass,
-            clearance: f64::INFINITY,
+            clearance: 1.0,
             paint: 0.0,
         }
     }
 
-    /// A lead along the line from which the point is `distance` away.
+    /// A lead along the line from which the point is `distance` away, soldered to those before it.
     fn lead(mut self, distance: f64, half_width: f64) -> Self {
-        self.clearance = self.clearance.min(distance.abs() - half_width);
+        let edge = distance.abs() - half_width;
+        self.clearance = smooth_union(self.clearance, edge, SOLDER);
         self
     }
 
@@ -50,6 +56,12 @@ impl Spot {
             self = Self::new(piece, glass);
         }
         self.lead(d, half_width)
+    }
+
+    /// Walls everything in but an opening of signed distance `d`.
+    fn within(mut self, d: f64) -> Self {
+        self.clearance = self.clearance.min(-d);
+        self
     }
 
     /// Paints with the given density.
@@ -64,215 +76,345 @@ fn stroke(distance: f64, half_width: f64) -> f64 {
     1.0 - smoothstep(0.5 * half_width, 1.5 * half_width, distance.abs())
 }
 
-/// Radius of the whole rose, of the circles within it and the half side of the frame's inside.
-const ROSE: f64 = 0.885;
-const BORDER: f64 = 0.795;
-const MEDALLIONS: f64 = 0.50;
-const PETALS: f64 = 0.185;
-const ROSETTE: f64 = 0.135;
-const FRAME: f64 = 0.915;
+/// A diaper of lozenges with a dot in each, as painters lay it under figures.
+fn diaper(p: Vec2, side: f64) -> f64 {
+    let (a, b) = ((p.x + p.y) / side, (p.x - p.y) / side);
+    let (a, b) = (a - a.round(), b - b.round());
+    let line = stroke(a.abs().min(b.abs()) * side, 0.0020);
+    let dot = stroke((0.5 - a.abs()).hypot(0.5 - b.abs()) * side, 0.0034);
+    0.42 * line.max(dot)
+}
+
+/// Leaves in pairs along a stem on the x axis, seen from its root.
+fn foliage(p: Vec2, spacing: f64) -> f64 {
+    let place = (p.x / spacing).round() * spacing;
+    let q = vec2(p.x - place, p.y.abs()).rotated(-0.85);
+    let leaf = vesica(q - vec2(0.55 * spacing, 0.0), 0.5 * spacing, 0.17 * spacing);
+    0.55 * stroke(p.y, 0.0026).max(stroke(leaf, 0.0024))
+}
+
+/// Radii of the circles between the parts: the sun's, that of the first lancets, of the second ones,
+/// the ring of pearls' and the whole rose's. Half the side of the frame's inside.
+const SUN: f64 = 0.160;
+const FIRST: f64 = 0.545;
+const SECOND: f64 = 0.868;
+const PEARLS: f64 = 0.914;
+const FRAME: f64 = 0.940;
 
 /// What is at `p`. Pieces are numbered by part, hundreds, and place in it.
 pub(super) fn spot(p: Vec2) -> Spot {
+    // Drawn by hand.
+    let p = p + vec2(noise(p * 6.0, 52).0, noise(p * 6.0, 53).0) * 0.005;
     let r = p.length();
     let square = p.x.abs().max(p.y.abs());
     if square > 1.0 {
         quarries(p).lead(square - 1.0, BOLD)
     } else if square > FRAME {
-        frame(p).lead(square - FRAME, FINE).lead(square - 1.0, BOLD)
-    } else if r > ROSE {
-        corner(p).lead(r - ROSE, BOLD).lead(square - FRAME, FINE)
-    } else if r > BORDER {
-        border(p, r).lead(r - ROSE, BOLD).lead(r - BORDER, BOLD)
-    } else if r > MEDALLIONS {
-        medallions(p, r)
-            .lead(r - BORDER, BOLD)
-            .lead(r - MEDALLIONS, FINE)
-    } else if r > PETALS {
-        petals(p, r)
-            .lead(r - MEDALLIONS, FINE)
-            .lead(r - PETALS, FINE)
-    } else if r > ROSETTE {
-        beads(p, r).lead(r - PETALS, FINE).lead(r - ROSETTE, FINE)
+        frame(p).lead(square - FRAME, BOLD).lead(square - 1.0, BOLD)
+    } else if r > PEARLS {
+        corner(p).lead(r - PEARLS, BOLD).lead(square - FRAME, BOLD)
+    } else if r > SECOND {
+        pearls(p, r).lead(r - PEARLS, BOLD).lead(r - SECOND, STONE)
+    } else if r > FIRST {
+        second_lancets(p).within(r - SECOND + STONE)
+    } else if r > SUN {
+        first_lancets(p)
     } else {
-        rosette(p).lead(r - ROSETTE, FINE)
+        sun(p).lead(r - SUN, STONE)
     }
 }
 
-fn rosette(p: Vec2) -> Spot {
-    let (k, q) = fold(p, 6, PI / 6.0);
-    let petal = vesica(q - vec2(0.082, 0.0), 0.058, 0.036);
-    Spot::new(10, Glass::Cobalt)
-        .inlay(petal, 0.6 * FINE, 20 + k, Glass::Rose)
-        .inlay(circle(p, 0.042), 0.8 * FINE, 11, Glass::Gold)
-        .painted(0.55 * stroke(circle(p, 0.018), 0.004))
+/// Twelve flaming points about a rose.
+fn sun(p: Vec2) -> Spot {
+    let (k, q) = fold(p, 12, 0.0);
+    let (gap, _) = fold(p, 12, PI / 12.0);
+    let rays = star(vec2(p.y, -p.x), 12, 0.146, 0.082);
+    let (petal, l) = fold(p, 6, PI / 6.0);
+    let petals = vesica(l - vec2(0.046, 0.0), 0.026, 0.017);
+    let glass = [Glass::Amber, Glass::Gold][(k % 2) as usize];
+    Spot::new(10 + gap, Glass::Cobalt)
+        .inlay(rays, FINE, 30 + k, glass)
+        .painted(0.5 * stroke(q.y, 0.0028) * smoothstep(0.0, 0.01, -rays))
+        .inlay(circle(p, 0.080), FINE, 50, Glass::Ruby)
+        .inlay(petals, 0.7 * FINE, 60 + petal, Glass::Opal)
+        .painted(0.5 * stroke(l.y, 0.002) * smoothstep(0.0, 0.006, -petals))
+        .inlay(circle(p, 0.022), 0.8 * FINE, 51, Glass::Gold)
 }
 
-fn beads(p: Vec2, r: f64) -> Spot {
-    let (k, q) = fold(p, 12, 0.0);
-    let (k2, _) = fold(p, 24, 0.0);
-    let half = PI / 12.0;
-    let glass = if k2 % 2 == 0 {
-        Glass::Gold
+/// The opening of a lancet whose sides point to the middle of the rose, `half` an angle from its
+/// axis, and whose head is round about `(head, 0)`: signed distance. Stone is left on its sides.
+fn lancet(q: Vec2, half: f64, head: f64, foot: f64) -> f64 {
+    let (s, c) = half.sin_cos();
+    let y = q.y.abs();
+    let d = if q.x * c + y * s > head * c {
+        circle(q - vec2(head, 0.0), head * s - STONE)
     } else {
-        Glass::Emerald
+        y * c - q.x * s + STONE
     };
-    let across = (q.y.atan2(q.x).abs() - half / 2.0) * r;
-    Spot::new(100 + if k2 % 2 == 0 { k } else { 50 + k2 }, glass).lead(across, 0.7 * FINE)
+    d.max(foot + STONE - q.length())
 }
 
-fn petals(p: Vec2, r: f64) -> Spot {
-    let (k, q) = fold(p, 12, 0.0);
+fn first_lancets(p: Vec2) -> Spot {
+    const HEAD: f64 = 0.428;
     let (gap, g) = fold(p, 12, PI / 12.0);
+    let eyelet = circle(g - vec2(0.507, 0.0), 0.028);
+    if eyelet < 0.0 {
+        let glass = [Glass::Gold, Glass::Rose][(gap % 2) as usize];
+        return Spot::new(200 + gap, glass)
+            .painted(0.5 * stroke(circle(g - vec2(0.507, 0.0), 0.011), 0.003))
+            .within(eyelet);
+    }
+    let (k, q) = fold(p, 12, 0.0);
+    let light = lancet(q, PI / 12.0, HEAD, SUN);
     let even = k % 2 == 0;
-    // Between the petals: ruby flames above, a deep blue root below.
-    let mut spot = Spot::new(200 + gap, Glass::Ruby);
-    let root = r - 0.335;
-    if root < 0.0 {
-        spot = Spot::new(220 + gap, Glass::Violet);
+    let (ground, edge) = if even {
+        (Glass::Cobalt, Glass::Ruby)
+    } else {
+        (Glass::Ruby, Glass::Cobalt)
+    };
+    let c = q - vec2(HEAD, 0.0);
+    // A narrow border all round, cut where its colour changes.
+    let step = (q.x / 0.058).floor();
+    let side = u32::from(q.y > 0.0);
+    let border = if step.rem_euclid(2.0) < 1.0 {
+        edge
+    } else {
+        Glass::Pale
+    };
+    let border = Spot::new(220 + 40 * k + 2 * (step as u32) + side, border)
+        .lead((q.x / 0.058 - (q.x / 0.058).round()) * 0.058, 0.7 * FINE)
+        .lead(q.y, 0.7 * FINE);
+    let field = light + 0.021;
+    let mut spot = border.inlay(field, FINE, 800 + k, ground);
+    if field < 0.0 {
+        spot = spot.painted(diaper(q, 0.020));
+        // A stem of leaves climbs to the roundel.
+        let stem = vesica(q - vec2(0.290, 0.0), 0.080, 0.030);
+        let leaves = [Glass::Emerald, Glass::Moss][usize::from(even)];
+        spot = spot.lead(segment(q, vec2(0.2, 0.0), vec2(0.35, 0.0)), 0.6 * FINE);
+        spot = spot.inlay(stem, 0.9 * FINE, 820 + k, leaves);
+        if stem < 0.0 {
+            spot = spot.painted(foliage(q - vec2(0.22, 0.0), 0.026));
+        }
     }
-    let spot = spot.lead(root, 0.8 * FINE);
-    let spot = spot.painted(0.4 * stroke(g.y, 0.004) * smoothstep(0.36, 0.42, r));
-    let centre = q - vec2(0.345, 0.0);
-    let petal = vesica(centre, 0.155, if even { 0.072 } else { 0.066 });
-    let glass = if even { Glass::Amber } else { Glass::Pale };
-    let spot = spot.inlay(petal, FINE, 240 + k, glass);
-    if petal > 0.0 {
-        return spot;
+    let medallion = circle(c, 0.070);
+    let (rim, flower) = if even {
+        (Glass::Violet, Glass::Opal)
+    } else {
+        (Glass::Azure, Glass::Amber)
+    };
+    spot = spot.inlay(medallion, 0.8 * BOLD, 840 + k, rim);
+    if medallion > 0.0 {
+        return spot.within(light);
     }
-    // A bright heart in each petal, veins painted from it.
-    let heart = vesica(centre + vec2(0.035, 0.0), 0.07, 0.026);
-    let inner = if even { Glass::Opal } else { Glass::Azure };
-    let rib = segment(centre, vec2(-0.12, 0.0), vec2(0.14, 0.0));
-    let slant = (centre.x - 2.0 * centre.y.abs()).rem_euclid(0.034) - 0.017;
-    let veins = 0.5 * stroke(slant, 0.0028) * smoothstep(0.0, 0.02, -petal - 0.008);
-    spot.painted(0.65 * stroke(rib, 0.004))
-        .painted(veins)
-        .inlay(heart, 0.6 * FINE, 270 + k, inner)
+    // Six petals, or a star with eight points, about a heart.
+    let (petal, l) = fold(c, 6, 0.0);
+    let (figure, piece, heart) = if even {
+        let petals = vesica(l - vec2(0.036, 0.0), 0.024, 0.0150);
+        (petals, 1000 + 10 * k + petal, Glass::Gold)
+    } else {
+        let tips = star(c, 8, 0.059, 0.033);
+        (tips, 880 + k, Glass::Ruby)
+    };
+    spot.painted(0.45 * stroke(circle(c, 0.056), 0.0022))
+        .inlay(figure, 0.7 * FINE, piece, flower)
+        .painted(0.45 * stroke(l.y, 0.002) * smoothstep(0.0, 0.005, -figure))
+        .inlay(circle(c, 0.0155), 0.6 * FINE, 860 + k, heart)
+        .within(light)
 }
 
-fn medallions(p: Vec2, r: f64) -> Spot {
-    const MIDDLE: f64 = 0.648;
-    let (k, q) = fold(p, 12, PI / 12.0);
-    let (gap, g) = fold(p, 12, 0.0);
-    // Fields between the medallions, leaded along the circle through their middles.
-    let outer = r > MIDDLE;
-    let field = match (outer, gap % 2) {
-        (true, _) => Spot::new(300 + gap, Glass::Cobalt),
-        (false, _) => Spot::new(320 + gap, Glass::Azure),
-    };
-    let field = field.lead(r - MIDDLE, FINE).lead(q.y, FINE);
-    // A leaf in the upper field.
-    let leaf = vesica(vec2(g.x - 0.735, g.y), 0.05, 0.026);
-    let field = field.inlay(leaf, 0.7 * FINE, 340 + gap, Glass::Moss);
-    let c = q - vec2(MIDDLE, 0.0);
-    let ring = circle(c, 0.123);
-    let (rim, flower) = match k % 3 {
-        0 => (Glass::Ruby, Glass::Gold),
-        1 => (Glass::Emerald, Glass::Opal),
-        _ => (Glass::Violet, Glass::Rose),
-    };
-    let spot = field.inlay(ring, BOLD * 0.85, 400 + k, rim);
-    if ring > 0.0 {
-        return spot;
+fn second_lancets(p: Vec2) -> Spot {
+    const HEAD: f64 = 0.738;
+    let (gap, g) = fold(p, 24, 0.0);
+    let eyelet = circle(g - vec2(0.826, 0.0), 0.030);
+    if eyelet < 0.0 {
+        let glass = [Glass::Ruby, Glass::Aqua, Glass::Gold][(gap % 3) as usize];
+        return Spot::new(1200 + gap, glass)
+            .painted(0.5 * stroke(circle(g - vec2(0.824, 0.0), 0.012), 0.003))
+            .within(eyelet);
     }
-    // Quatrefoil within, cut from the rim by its own lead.
+    let (k, q) = fold(p, 24, PI / 24.0);
+    let light = lancet(q, PI / 24.0, HEAD, FIRST);
+    let (ground, bar) = [
+        (Glass::Cobalt, Glass::Ruby),
+        (Glass::Azure, Glass::Amber),
+        (Glass::Cobalt, Glass::Emerald),
+        (Glass::Azure, Glass::Violet),
+    ][(k % 4) as usize];
+    // Panels one above the other, barred by leads.
+    let panel = (((q.x - 0.562) / 0.0565).floor().clamp(0.0, 2.0)) as u32;
+    let level = 0.562 + 0.0565 * ((q.x - 0.562) / 0.0565).round().clamp(1.0, 2.0);
+    let foot = Spot::new(1230 + 4 * k + panel, ground)
+        .lead(q.x - level, 0.8 * FINE)
+        .painted(diaper(q, 0.0175));
+    // A lozenge in each of the lower ones.
+    let middle = 0.562 + 0.0565 * (f64::from(panel.min(1)) + 0.5);
+    let l = q - vec2(middle, 0.0);
+    let lozenge = (l.x.abs() + 0.72 * l.y.abs() - 0.0235) * 0.81;
+    let spot = if panel < 2 {
+        let glass = if panel == 0 { bar } else { Glass::Pale };
+        foot.inlay(lozenge, 0.8 * FINE, 1340 + 2 * k + panel, glass)
+            .painted(if lozenge < 0.0 {
+                0.55 * stroke(circle(l, 0.007), 0.0026)
+            } else {
+                0.0
+            })
+    } else {
+        foot
+    };
+    let c = q - vec2(HEAD, 0.0);
+    let medallion = circle(c, 0.062);
+    let spot = spot.inlay(medallion, 0.8 * BOLD, 1400 + k, bar);
+    if medallion > 0.0 {
+        return spot.within(light);
+    }
     let (_, l) = fold(c, 4, 0.0);
-    let foil = circle(l - vec2(0.041, 0.0), 0.037);
-    let (_, rays) = fold(c, 16, 0.0);
-    let spot = spot.painted(0.45 * stroke(rays.y, 0.003) * smoothstep(0.075, 0.09, c.length()));
-    spot.inlay(foil, 0.7 * FINE, 420 + k, flower)
-        .painted(if foil < 0.0 {
-            0.5 * stroke(circle(l - vec2(0.041, 0.0), 0.018), 0.003)
+    let (_, rays) = fold(c, 16, PI / 16.0);
+    let figure = circle(l - vec2(0.0255, 0.0), 0.0215).min(circle(c, 0.024));
+    let glass = [Glass::Opal, Glass::Gold, Glass::Rose, Glass::Pale][(k % 4) as usize];
+    let heart = [Glass::Cobalt, Glass::Ruby][(k % 2) as usize];
+    spot.painted(0.45 * stroke(rays.y, 0.0022))
+        .inlay(figure, 0.8 * FINE, 1430 + k, glass)
+        .painted(if figure < 0.0 {
+            0.5 * stroke(circle(l - vec2(0.031, 0.0), 0.009), 0.0022)
         } else {
             0.0
         })
-        .inlay(circle(c, 0.024), 0.7 * FINE, 480 + k, Glass::Amber)
+        .inlay(circle(c, 0.0135), 0.6 * FINE, 1460 + k, heart)
+        .within(light)
 }
 
-fn border(p: Vec2, r: f64) -> Spot {
-    // Long ruby stones, short golden ones between them.
-    let (k, q) = fold(p, 24, PI / 24.0);
-    let angle = q.y.atan2(q.x).abs();
-    let edge = PI / 24.0 - 0.038;
-    let across = (angle - edge) * r;
-    let middle = 0.5 * (ROSE + BORDER);
-    if across < 0.0 {
-        let glass = if k % 2 == 0 {
-            Glass::Ruby
-        } else {
-            Glass::Cobalt
-        };
-        let jewel = stroke(circle(vec2((q.x - middle) * 1.0, q.y * 0.55), 0.020), 0.004);
-        Spot::new(500 + k, glass)
-            .lead(across, FINE)
-            .painted(0.5 * jewel)
-    } else {
-        let (gap, g) = fold(p, 24, 0.0);
-        let dot = stroke(circle(vec2(g.x - middle, g.y), 0.006), 0.005);
-        Spot::new(540 + gap, Glass::Gold)
-            .lead(across, FINE)
-            .painted(0.55 * dot)
-    }
+fn pearls(p: Vec2, r: f64) -> Spot {
+    const MIDDLE: f64 = 0.5 * (PEARLS + SECOND) + 0.002;
+    let (k, q) = fold(p, 36, 0.0);
+    let (gap, g) = fold(p, 36, PI / 36.0);
+    let glass = [Glass::Ruby, Glass::Cobalt][(gap % 2) as usize];
+    let leaf = stroke(vesica(vec2(g.y, r - MIDDLE), 0.028, 0.008), 0.0028);
+    Spot::new(1500 + gap, glass)
+        .painted(0.5 * leaf)
+        .lead(q.y, 0.8 * FINE)
+        .inlay(
+            circle(q - vec2(MIDDLE, 0.0), 0.0185),
+            0.7 * FINE,
+            1540 + k,
+            Glass::Opal,
+        )
 }
 
 fn corner(p: Vec2) -> Spot {
     let place = u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0);
     let q = vec2(p.x.abs(), p.y.abs());
-    // The circle that touches the rose and both sides of the frame, a little smaller.
-    const MIDDLE: f64 = 0.748;
-    const RADIUS: f64 = 0.135;
-    let c = q - vec2(MIDDLE, MIDDLE);
-    let beyond = (c.x + c.y) * FRAC_1_SQRT_2;
     let side = u32::from(q.x > q.y);
-    let angle = q.y.atan2(q.x);
-    let from_diagonal = (angle - PI / 4.0).abs();
-    let tail = (from_diagonal - 0.42) * q.length();
-    let spot = if beyond > 0.0 {
-        Spot::new(600 + place, Glass::Violet).lead(beyond, FINE)
-    } else if tail > 0.0 {
-        // Two corners' tails meet on the axis.
-        Spot::new(610 + 2 * place + side, Glass::Amber)
-            .lead(tail, FINE)
-            .lead(q.x.min(q.y), FINE)
+    let side_place = 2 * place + side;
+    // From here on in one half of the corner.
+    let h = vec2(q.x.min(q.y), q.x.max(q.y));
+    // The circles that touch the rose and the frame: a great one, and one on each side of it.
+    let c = q - vec2(0.7715, 0.7715);
+    let small = h - vec2(0.537, 0.857);
+    let great = circle(c, 0.158);
+    let ground = Spot::new(1600 + side_place, Glass::Cobalt)
+        .lead(q.x - q.y, FINE)
+        .lead(h.x, FINE);
+    let stars = star(h - vec2(0.645, 0.917), 4, 0.017, 0.006);
+    let ground =
+        ground
+            .painted(diaper(q, 0.024))
+            .inlay(stars, 0.4 * FINE, 1610 + side_place, Glass::Pale);
+    // Between the small circle and the axis, a tail of foliage with a jewel at its root.
+    let tail = h.x - 0.40;
+    let jewel = h - vec2(0.345, 0.896);
+    let ground = if tail < 0.0 {
+        Spot::new(1620 + side_place, Glass::Emerald)
+            .painted(foliage(vec2(h.x, h.y - 0.920), 0.036))
+            .lead(h.x, FINE)
+            .inlay(
+                circle(jewel, 0.029),
+                0.8 * FINE,
+                1630 + side_place,
+                Glass::Amber,
+            )
+            .painted(0.55 * stroke(circle(jewel, 0.014), 0.003))
     } else {
-        Spot::new(620 + 2 * place + side, Glass::Azure)
-            .lead(beyond, FINE)
-            .lead(tail, FINE)
-            .lead((q.x - q.y) * FRAC_1_SQRT_2, FINE)
+        ground
+    }
+    .lead(tail, FINE);
+
+    let rim = circle(small, 0.068);
+    let (petal, l) = fold(small, 5, 0.3);
+    let petals = circle(l - vec2(0.036, 0.0), 0.0205);
+    let ground = ground.inlay(rim, BOLD, 1640 + side_place, Glass::Violet);
+    let ground = if rim < 0.0 {
+        ground
+            .inlay(
+                petals,
+                0.7 * FINE,
+                1660 + 5 * side_place + petal,
+                Glass::Rose,
+            )
+            .painted(0.5 * stroke(l.y, 0.002) * smoothstep(0.0, 0.008, -petals))
+            .inlay(
+                circle(small, 0.017),
+                0.7 * FINE,
+                1710 + side_place,
+                Glass::Gold,
+            )
+    } else {
+        ground
     };
-    let spot = spot.inlay(circle(c, RADIUS), BOLD * 0.85, 640 + place, Glass::Emerald);
-    let (k, l) = fold(c, 8, PI / 8.0);
-    let petal = vesica(l - vec2(0.072, 0.0), 0.048, 0.024);
-    spot.inlay(
-        petal,
-        0.6 * FINE,
-        650 + 8 * place + k,
-        if k % 2 == 0 { Glass::Opal } else { Glass::Rose },
-    )
-    .inlay(circle(c, 0.034), 0.8 * FINE, 690 + place, Glass::Gold)
-    .painted(0.5 * stroke(circle(c, 0.015), 0.004))
+    if great > BOLD {
+        return ground.lead(great, BOLD);
+    }
+    // A quatrefoil cut from stone, a leaf in each foil.
+    let (foil, l) = fold(c, 4, 0.0);
+    let opening = circle(l - vec2(0.070, 0.0), 0.064).max(great + BOLD);
+    let leaf = vesica(l - vec2(0.088, 0.0), 0.043, 0.023);
+    let number = 4 * place + foil;
+    Spot::new(1730 + number, Glass::Ruby)
+        .lead((l.y.abs() - l.x) * FRAC_1_SQRT_2, FINE)
+        .painted(diaper(c, 0.018))
+        .inlay(leaf, 0.8 * FINE, 1750 + number, Glass::Emerald)
+        .painted(if leaf < 0.0 {
+            foliage(l - vec2(0.05, 0.0), 0.018)
+        } else {
+            0.0
+        })
+        .inlay(circle(c, 0.050), 0.8 * BOLD, 1770 + place, Glass::Cobalt)
+        .inlay(
+            star(c, 8, 0.040, 0.022),
+            0.6 * FINE,
+            1780 + place,
+            Glass::Gold,
+        )
+        .within(opening.min(circle(c, 0.056)))
 }
 
 fn frame(p: Vec2) -> Spot {
-    const STONES: f64 = 13.0;
+    const STONES: f64 = 12.0;
     let (along, side) = match (p.x.abs() > p.y.abs(), p.x > 0.0, p.y > 0.0) {
         (true, right, _) => (p.y, u32::from(right)),
         (false, _, below) => (p.x, 2 + u32::from(below)),
     };
     if along.abs() > FRAME {
         let place = u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0);
-        return Spot::new(700 + place, Glass::Gold).lead(along.abs() - FRAME, FINE);
+        return Spot::new(700 + place, Glass::Ruby).lead(along.abs() - FRAME, FINE);
     }
+    // Long stones of two blues, short golden ones where they meet.
     let length = 2.0 * FRAME / STONES;
     let t = (along + FRAME) / length;
-    let stone = (t.floor() as u32).min(STONES as u32 - 1);
-    let across = (t - t.round()) * length;
-    let glass = match stone % 2 {
-        0 => Glass::Cobalt,
-        _ => Glass::Ruby,
-    };
-    Spot::new(710 + 20 * side + stone, glass).lead(across, FINE)
+    let short = ((t - t.round()) * length).abs() - 0.021;
+    let middle = p.x.abs().max(p.y.abs()) - 0.5 * (1.0 + FRAME);
+    let from_joint = (t - t.round()) * length;
+    if short < 0.0 {
+        let dot = 0.55 * stroke(circle(vec2(from_joint, middle), 0.008), 0.003);
+        Spot::new(2000 + 20 * side + t.round() as u32, Glass::Gold).painted(dot)
+    } else {
+        let stone = (t.floor() as u32).min(STONES as u32 - 1);
+        let glass = [Glass::Cobalt, Glass::Azure][(stone % 2) as usize];
+        let centre = (t - t.floor() - 0.5) * length;
+        let leaf = stroke(vesica(vec2(centre, middle), 0.045, 0.013), 0.0028);
+        Spot::new(710 + 20 * side + stone, glass).painted(0.5 * leaf)
+    }
+    .lead(short, FINE)
 }
 
 fn quarries(p: Vec2) -> Spot {
