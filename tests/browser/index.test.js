@@ -12,4 +12,5 @@ import './fallback.js';
 import './devices.js';
 import './faults.js';
 import './lifetime.js';
+import './robustness.js';
 import './page.js';
