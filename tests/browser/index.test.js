@@ -13,4 +13,5 @@ import './devices.js';
 import './faults.js';
 import './lifetime.js';
 import './robustness.js';
+import './visual.js';
 import './page.js';
