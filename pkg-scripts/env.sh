@@ -72,4 +72,8 @@ export CC_wasm32_unknown_unknown AR_wasm32_unknown_unknown
 
 CHROMIUM=${CHROMIUM:-$(first_command chromium chromium-browser google-chrome google-chrome-stable)}
 CHROMEDRIVER=${CHROMEDRIVER:-$(first_command chromedriver chromium.chromedriver)}
-export CHROMIUM CHROMEDRIVER
+FIREFOX=${FIREFOX:-$(first_command firefox-esr firefox)}
+WEBKIT_DRIVER=${WEBKIT_DRIVER:-$(first_command WebKitWebDriver)}
+# Neither has graphics without a screen; this one nobody sees.
+if ! command -v Xvfb >/dev/null; then FIREFOX='' WEBKIT_DRIVER=''; fi
+export CHROMIUM CHROMEDRIVER FIREFOX WEBKIT_DRIVER

@@ -1,5 +1,7 @@
-/** One Chromium and one server for all tests, and what tests do with them. */
+/** One server for all tests, one Chromium for those that open pages in it, and what tests do with them. */
 
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
 import { after } from 'node:test';
 import { gzipSync } from 'node:zlib';
 import axe from 'axe-core';
@@ -9,15 +11,24 @@ import { answer } from '../../www/tools/ranges.js';
 import { listen } from '../../www/tools/serve.js';
 import { CONTENT_SECURITY_POLICY, site } from '../../www/tools/site.js';
 import { FOLDER, glassBytes } from './photos.js';
+import { watch } from './watch.js';
 
 /** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
 /** @typedef {import('playwright-core').Page} Page */
+/** @typedef {import('./any-browser.js').AnyPage} AnyPage */
 /** @typedef {{ type: string } & Record<string, unknown>} Happening an event, as data */
 /** @typedef {import('node:http').ServerResponse} Response */
 /** @typedef {import('node:http').IncomingMessage} Request */
 
 /** What elements ask for first. */
 export const FIRST_BYTES = 1 << 14;
+
+/** What the element is made to live under, with films of the page's own. */
+const STRICTEST =
+  "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self'; " +
+  "connect-src 'self'; media-src 'self'";
+const WATCH = `(${watch})()`;
+const FILM = readFileSync(join(import.meta.dirname, '../fixtures/red-then-blue.webm'));
 
 const SLOW_PIECES = 40;
 const UNTIL_MS = 10_000;
@@ -160,6 +171,27 @@ const FAULTS = {
     response
       .writeHead(200, { 'Content-Type': 'text/html' })
       .end('<!doctype html><html lang="en"><title>Blank</title>'),
+  '/strict': (response) =>
+    response
+      .writeHead(200, {
+        'Content-Type': 'text/html',
+        'Content-Security-Policy': STRICTEST,
+      })
+      .end(
+        '<!doctype html><html lang="en"><title>Strict</title>' +
+          '<link rel="icon" href="/icon.svg"><script src="/watch.js"></script>' +
+          '<script type="module" src="/relightable-photo/relightable-photo.js"></script>',
+      ),
+  '/watch.js': (response) =>
+    response.writeHead(200, { 'Content-Type': 'text/javascript' }).end(WATCH),
+  // For browsers that cannot make one themselves: a second of red, then one of blue.
+  '/film.webm': (response, request) => {
+    const read = (/** @type {number} */ start, /** @type {number} */ end) => [
+      FILM.subarray(start, end),
+    ];
+    const content = { size: FILM.length, type: 'video/webm', etag: '"film"', read };
+    answer(request, response, content).catch(() => {});
+  },
   '/bench': (response) =>
     response
       .writeHead(200, { 'Content-Type': 'text/html' })
@@ -190,10 +222,11 @@ const serve = (request, response) => {
   else serveSite(request, response);
 };
 const [server, otherServer] = await Promise.all([listen(serve, 0), listen(serve, 0)]);
-const chromium = await launchChromium();
+/** @type {Promise<import('playwright-core').Browser> | undefined} */
+let chromium;
 
 after(async () => {
-  await chromium.close();
+  await (await chromium)?.close();
   await Promise.all([server.close(), otherServer.close()]);
 });
 
@@ -210,7 +243,8 @@ export const otherOrigin = otherServer.url.replace(/\/$/, '');
  *   `before` runs in the page before its own scripts; a `refusal` is what a policy may refuse
  */
 export async function openPage(test, path, { before, refusal, ...options } = {}) {
-  const context = await chromium.newContext({ baseURL: origin, ...options });
+  chromium ??= launchChromium();
+  const context = await (await chromium).newContext({ baseURL: origin, ...options });
   const page = await context.newPage();
   /** @type {string[]} */
   const faults = [];
@@ -232,7 +266,7 @@ export async function openPage(test, path, { before, refusal, ...options } = {})
 /**
  * Puts an element with these attributes into a bench page and records its events.
  *
- * @param {Page} page
+ * @param {AnyPage} page
  * @param {Record<string, string>} attributes
  */
 export async function mount(page, attributes) {
@@ -262,7 +296,7 @@ export async function mount(page, attributes) {
 /**
  * Waits until an event of this type has happened, and gives all that have, from the first on.
  *
- * @param {Page} page
+ * @param {AnyPage} page
  * @param {string} type
  * @param {number} [times]
  * @returns {Promise<Happening[]>}
@@ -281,7 +315,7 @@ export async function happenedUntil(page, type, times = 1) {
 /**
  * Waits for `load`. An error in its place is thrown.
  *
- * @param {Page} page
+ * @param {AnyPage} page
  */
 export async function loaded(page) {
   await page.waitForFunction(() => {
@@ -298,7 +332,7 @@ export async function loaded(page) {
 /**
  * Sets attributes and takes the exact picture.
  *
- * @param {Page} page
+ * @param {AnyPage} page
  * @param {Record<string, string>} [attributes]
  * @param {{ x: number, y: number } | null} [torch]
  */

@@ -16,4 +16,6 @@ import './fallback.js';
 import './devices.js';
 import './faults.js';
 import './lifetime.js';
+import './robustness.js';
+import './visual.js';
 import './page.js';

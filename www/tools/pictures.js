@@ -56,3 +56,27 @@ export function brightest({ width, height, data }) {
   }
   return { x: x / sum / width, y: y / sum / height, mean: sum / (3 * width * height) };
 }
+
+/**
+ * Counts the pixels of which a code differs by more than `tolerance`.
+ *
+ * @param {Picture} a
+ * @param {Picture} b of the same size
+ * @param {number} tolerance out of 255
+ * @returns {{ count: number, difference: Picture }} the picture is white there, black elsewhere
+ */
+export function differing(a, b, tolerance) {
+  if (a.width !== b.width || a.height !== b.height) {
+    throw new Error(`a picture of ${a.width}x${a.height} and one of ${b.width}x${b.height}`);
+  }
+  const data = new Uint8Array(a.data.length);
+  let count = 0;
+  for (let at = 0; at < data.length; at += 4) {
+    const off = [0, 1, 2, 3].some(
+      (c) => Math.abs((a.data[at + c] ?? 0) - (b.data[at + c] ?? 0)) > tolerance,
+    );
+    if (off) count += 1;
+    data.set([off ? 255 : 0, off ? 255 : 0, off ? 255 : 0, 255], at);
+  }
+  return { count, difference: { width: a.width, height: a.height, data } };
+}
