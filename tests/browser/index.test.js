@@ -17,3 +17,4 @@ import './devices.js';
 import './faults.js';
 import './lifetime.js';
 import './page.js';
+import './site.js';

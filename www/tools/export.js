@@ -12,7 +12,9 @@ import { FILES, FOLDERS, MANIFEST } from './site.js';
 const repository = join(import.meta.dirname, '..', '..');
 const [photos, out, address] = process.argv.slice(2);
 if (!photos || !out || (address !== undefined && !URL.canParse(address))) {
-  console.error('export: takes the folder of photographs, where to write, and the address it will have');
+  console.error(
+    'export: takes the folder of photographs, where to write, and the address it will have',
+  );
   process.exit(2);
 }
 
@@ -32,7 +34,8 @@ for (const [at, file] of Object.entries(FILES)) {
 }
 mkdirSync(join(out, 'photos'), { recursive: true });
 for (const name of readdirSync(photos)) {
-  if (['.ltm', '.png'].includes(extname(name))) cpSync(join(photos, name), join(out, 'photos', name));
+  if (['.ltm', '.png'].includes(extname(name)))
+    cpSync(join(photos, name), join(out, 'photos', name));
 }
 const base = address === undefined ? '../' : new URL('.', address).href;
 writeFileSync(join(out, MANIFEST), manifestAt(base));
