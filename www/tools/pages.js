@@ -38,7 +38,7 @@ export function composePage(name) {
   };
   return read('pages/layout.html')
     .replaceAll(`<a href="${name}">`, `<a href="${name}" aria-current="page">`)
-    .replace(/{{(\w+)}}/g, (_, key) => fields[/** @type {keyof fields} */ (key)]);
+    .replace(/{{(\w+)}}/g, (_, key) => fields[/** @type {keyof typeof fields} */ (key)]);
 }
 
 /**

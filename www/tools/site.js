@@ -86,7 +86,7 @@ export function site({ photos }) {
       }
     }
     const page = path === '/' ? 'index.html' : path.slice(1);
-    const file = FILES[/** @type {keyof FILES} */ (path)];
+    const file = FILES[/** @type {keyof typeof FILES} */ (path)];
     if (PAGES.includes(page)) {
       options.setHeaders(response);
       response.setHeader('Content-Type', 'text/html; charset=utf-8').end(composePage(page));
