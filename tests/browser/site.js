@@ -67,7 +67,7 @@ describe('the site', () => {
     }
 
     test(`${name} asks nothing of other hosts, and complains of nothing`, async (t) => {
-      const page = await openPage(t, '/blank');
+      const page = await openPage(t, `/${name}`);
       /** @type {string[]} */
       const faults = [];
       page.on('console', (message) => {
@@ -79,7 +79,7 @@ describe('the site', () => {
       page.on('response', (response) => {
         if (response.status() >= 400) faults.push(`${response.status()} ${response.url()}`);
       });
-      await page.goto(`/${name}`);
+      await page.reload();
       await drawn(page);
       assert.deepEqual(faults, []);
     });
