@@ -59,7 +59,8 @@ form.addEventListener('change', ({ target }) => {
   else apply();
 });
 form.addEventListener('submit', (event) => event.preventDefault());
-form.addEventListener('reset', () => queueMicrotask(make));
+// The event comes before what it tells of.
+form.addEventListener('reset', () => setTimeout(make));
 document.getElementById('clear')?.addEventListener('click', () => log.replaceChildren());
 document.getElementById('take')?.addEventListener('click', () => {
   const state = /** @type {HTMLElement} */ (document.getElementById('state'));
