@@ -171,7 +171,7 @@ const FAULTS = {
     response
       .writeHead(200, { 'Content-Type': 'text/html' })
       .end('<!doctype html><html lang="en"><title>Blank</title>'),
-  '/strict': (response) =>
+  '/strictest': (response) =>
     response
       .writeHead(200, {
         'Content-Type': 'text/html',

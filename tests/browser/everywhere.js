@@ -9,7 +9,7 @@ import { LIGHTS, nativePicture } from './photos.js';
 /** @typedef {import('./any-browser.js').AnyPage} AnyPage */
 /** @typedef {import('./any-browser.js').AnyBrowser} AnyBrowser */
 
-const PAGE = '/strict';
+const PAGE = '/strictest';
 const SRC = '/photos/glass.ltm';
 const ELEMENTS = 16;
 const CYCLES = 10;

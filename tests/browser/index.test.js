@@ -19,3 +19,4 @@ import './lifetime.js';
 import './robustness.js';
 import './visual.js';
 import './page.js';
+import './site.js';

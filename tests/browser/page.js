@@ -1,4 +1,4 @@
-/** The demo page, as visitors meet it. */
+/** The gallery's first picture, as visitors meet it. */
 
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
@@ -10,25 +10,25 @@ import { SCREENSHOTS } from './photos.js';
 /** @param {import('playwright-core').Page} page */
 async function drawn(page) {
   await page.waitForFunction(() => document.querySelector('relightable-photo')?.activeBackend);
-  await page.locator('relightable-photo canvas').waitFor();
+  await page.locator('#photo canvas').waitFor();
 }
 
 /** @param {import('playwright-core').Page} page */
 async function onScreen(page) {
-  return brightest(decodePng(await page.locator('relightable-photo').screenshot()));
+  return brightest(decodePng(await page.locator('#photo').screenshot()));
 }
 
-describe('the demo page', () => {
+describe('the gallery', () => {
   for (const [backend, title] of [
     ['webgpu', 'WebGPU'],
     ['webgl2', 'WebGL2'],
     ['cpu', 'CPU'],
   ]) {
     test(`runs on ${backend}, and its torch follows the pointer`, async (t) => {
-      const page = await openPage(t, `/?backend=${backend}`);
+      const page = await openPage(t, `/?light=torch&backend=${backend}`);
       await drawn(page);
       await page.getByRole('status').getByText(`${title} (`).waitFor();
-      const box = await page.locator('relightable-photo').boundingBox();
+      const box = await page.locator('#photo').boundingBox();
       assert.ok(box);
       await page.mouse.move(box.x + 0.25 * box.width, box.y + 0.5 * box.height);
       const left = await onScreen(page);
@@ -41,9 +41,9 @@ describe('the demo page', () => {
   test('has a button for each light, by pointer and by key', async (t) => {
     const page = await openPage(t, '/');
     await drawn(page);
-    const light = () => page.evaluate("document.querySelector('relightable-photo').light");
-    assert.equal(await light(), 'torch');
-    for (const name of ['Flood', 'Checkerboard', 'Stripes', 'Spectrum', 'Torch']) {
+    const light = () => page.evaluate("document.getElementById('photo').light");
+    assert.equal(await light(), 'fire');
+    for (const name of ['Torch', 'Flood', 'Checkerboard', 'Spectrum', 'Stripes']) {
       await page.getByRole('radio', { name }).check();
       assert.equal(await light(), name.toLowerCase());
     }
@@ -119,10 +119,7 @@ describe('the demo page', () => {
     assert.equal(await state(), 'live');
     await page.getByRole('radio', { name: 'Stripes' }).check();
     assert.equal(await state(), 'ended');
-    assert.equal(
-      await page.evaluate("document.querySelector('relightable-photo').lightSource"),
-      null,
-    );
+    assert.equal(await page.evaluate("document.getElementById('photo').lightSource"), null);
   });
 
   test('changes the back end by its menu', async (t) => {
@@ -162,7 +159,7 @@ describe('the demo page', () => {
       await page.getByRole('radio', { name }).check();
       means.push((await onScreen(page)).mean);
       await page
-        .locator('.frame')
+        .locator('.hero .frame')
         .screenshot({ path: join(SCREENSHOTS, `${name.toLowerCase()}.png`) });
     }
     const [flood = 0, torch = 0, spectrum = 0] = means;

@@ -18,7 +18,7 @@ const GLASS = join(FOLDER, 'glass.ltm');
 export const TALL = join(FOLDER, 'tall.ltm');
 /** Rows of tiles, one of them a row, for workers to share. */
 export const TALL_ROWS = 4;
-const DEMO = join(repository, 'target/demo/photos/stained-glass.ltm');
+const DEMO = join(repository, 'target/demo/photos');
 
 mkdirSync(FOLDER, { recursive: true });
 mkdirSync(SCREENSHOTS, { recursive: true });
@@ -49,8 +49,17 @@ function makeTall() {
 
 export const glassBytes = readFileSync(GLASS);
 
-// The demo page asks for this one; the fixture stands in for it where the demo was never made.
-copyFileSync(existsSync(DEMO) ? DEMO : GLASS, join(FOLDER, 'stained-glass.ltm'));
+// The site asks for these; the fixture stands in for them where the demo was never made.
+for (const scene of ['stained-glass', 'cookies']) {
+  const made = join(DEMO, `${scene}.ltm`);
+  copyFileSync(existsSync(made) ? made : GLASS, join(FOLDER, `${scene}.ltm`));
+  for (const light of ['flood', 'torch', 'fire', 'stripes', 'spectrum']) {
+    const still = join(DEMO, `${scene}-${light}.png`);
+    const copy = join(FOLDER, `${scene}-${light}.png`);
+    if (existsSync(still)) copyFileSync(still, copy);
+    else run('relight', GLASS, '--light', light, '-o', copy);
+  }
+}
 export const demoBytes = readFileSync(join(FOLDER, 'stained-glass.ltm'));
 
 /** Names of damaged copies, with the code each of them has to end in. */

@@ -1,8 +1,10 @@
-/** The demo site as a request handler: the page, the built element, the photographs. */
+/** The site as a request handler: its pages, the built element, the photographs. */
 
+import { readFileSync } from 'node:fs';
 import { open } from 'node:fs/promises';
-import { join, resolve, sep } from 'node:path';
+import { extname, join, resolve, sep } from 'node:path';
 import sirv from 'sirv';
+import { composePage, manifestAt, PAGES } from './pages.js';
 import { answer } from './ranges.js';
 
 /** @typedef {import('node:http').IncomingMessage} Request */
@@ -10,19 +12,36 @@ import { answer } from './ranges.js';
 
 const repository = join(import.meta.dirname, '..', '..');
 
-/** All the page is made of. The folder also holds sources, which are nobody's to fetch. */
-const PAGE_FILES = new Set(['/', '/index.html', '/page.css', '/page.js', '/icon.svg']);
+/** Folders of the site, by where they are. What is not in them is nobody's to fetch. */
+export const FOLDERS = {
+  '/relightable-photo/': 'dist',
+  '/site/': 'www/site',
+  '/samples/': 'www/samples',
+  '/results/': 'docs/images/results',
+};
+
+/** Files that come with packages. */
+export const FILES = {
+  '/fonts/source-serif-4.woff2': font('source-serif-4-latin-wght-normal.woff2'),
+  '/fonts/source-serif-4-italic.woff2': font('source-serif-4-latin-wght-italic.woff2'),
+};
+
+/** Made for where the site is. */
+export const MANIFEST = '/samples/manifest.json';
 
 /**
  * What the element is made to live under: no other hosts, no inline code or style, no eval, no
- * `blob:` or `data:`. WebAssembly has to be allowed by name. Films that visitors choose are the page's
- * own affair.
+ * `blob:` or `data:`. WebAssembly has to be allowed by name. Fonts, and films that visitors choose, are the
+ * pages' own affair.
  */
 export const CONTENT_SECURITY_POLICY =
-  "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self'; connect-src 'self'; media-src blob:";
+  "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self'; font-src 'self'; connect-src 'self'; media-src 'self' blob:";
+
+/** @type {Record<string, string>} */
+const PHOTO_TYPES = { '.ltm': 'application/vnd.ltm', '.png': 'image/png' };
 
 /**
- * @param {{ photos: string }} options folder whose `.ltm` files are served below /photos/
+ * @param {{ photos: string }} options folder whose `.ltm` and `.png` files are served below /photos/
  * @returns {(request: Request, response: Response) => void}
  */
 export function site({ photos }) {
@@ -36,9 +55,11 @@ export function site({ photos }) {
       response.setHeader('Content-Security-Policy', CONTENT_SECURITY_POLICY);
     },
   };
-  const page = sirv(join(repository, 'www'), options);
   const mounts = [
-    { at: '/relightable-photo/', serve: sirv(join(repository, 'dist'), options) },
+    ...Object.entries(FOLDERS).map(([at, folder]) => ({
+      at,
+      serve: sirv(join(repository, folder), options),
+    })),
     { at: '/photos/', serve: photographs(photos) },
   ];
   return (request, response) => {
@@ -50,6 +71,13 @@ export function site({ photos }) {
       response.writeHead(405, { Allow: 'GET, HEAD' }).end();
       return;
     }
+    const path = url.split('?', 1)[0] ?? '';
+    if (path === MANIFEST) {
+      options.setHeaders(response);
+      response.setHeader('Content-Type', 'application/ld+json');
+      response.end(manifestAt(`http://${request.headers.host}/`));
+      return;
+    }
     for (const { at, serve } of mounts) {
       if (url.startsWith(at)) {
         request.url = url.slice(at.length - 1);
@@ -57,9 +85,21 @@ export function site({ photos }) {
         return;
       }
     }
-    if (PAGE_FILES.has(url.split('?', 1)[0] ?? '')) page(request, response, missing);
-    else missing();
+    const page = path === '/' ? 'index.html' : path.slice(1);
+    const file = FILES[/** @type {keyof typeof FILES} */ (path)];
+    if (PAGES.includes(page)) {
+      options.setHeaders(response);
+      response.setHeader('Content-Type', 'text/html; charset=utf-8').end(composePage(page));
+    } else if (file) {
+      options.setHeaders(response);
+      response.setHeader('Content-Type', 'font/woff2').end(readFileSync(file));
+    } else missing();
   };
+}
+
+/** @param {string} name */
+function font(name) {
+  return join(repository, 'node_modules/@fontsource-variable/source-serif-4/files', name);
 }
 
 /**
@@ -96,7 +136,7 @@ async function send(path, request, response, missing) {
     response.setHeader('Last-Modified', stats.mtime.toUTCString());
     await answer(request, response, {
       size: Number(stats.size),
-      type: 'application/vnd.ltm',
+      type: PHOTO_TYPES[extname(path)] ?? '',
       etag: `"${[stats.ino, stats.mtimeNs, stats.size].map((n) => n.toString(36)).join('-')}"`,
       read: (start, end) => file.createReadStream({ start, end: end - 1, autoClose: false }),
     });
@@ -114,7 +154,7 @@ async function send(path, request, response, missing) {
 function photographAt(root, url) {
   try {
     const path = join(root, decodeURIComponent(url.split('?', 1)[0] ?? ''));
-    return path.startsWith(root) && path.endsWith('.ltm') ? path : undefined;
+    return path.startsWith(root) && extname(path) in PHOTO_TYPES ? path : undefined;
   } catch {
     return undefined; // no text in UTF-8
   }

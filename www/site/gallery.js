@@ -1,7 +1,7 @@
 /**
- * The demo page. What it shows can be read from and set by its address: ?light=…&backend=…
+ * The gallery. What its first picture shows can be read from and set by its address: ?light=…&backend=…
  *
- * @typedef {import('./src/index.js').RelightablePhoto} RelightablePhoto
+ * @typedef {import('../src/index.js').RelightablePhoto} RelightablePhoto
  */
 
 const TITLES = /** @type {const} */ ({ webgpu: 'WebGPU', webgl2: 'WebGL2', cpu: 'CPU' });
@@ -12,6 +12,7 @@ const backend = /** @type {HTMLSelectElement} */ (document.getElementById('backe
 const status = /** @type {HTMLOutputElement} */ (document.getElementById('status'));
 const file = /** @type {HTMLInputElement} */ (document.getElementById('file'));
 const camera = /** @type {HTMLButtonElement} */ (document.getElementById('camera'));
+const play = /** @type {HTMLButtonElement} */ (document.getElementById('play'));
 const hint = /** @type {HTMLElement} */ (document.getElementById('hint'));
 
 const lights = /** @type {NodeListOf<HTMLInputElement>} */ (
@@ -73,6 +74,15 @@ file.addEventListener('change', async () => {
   file.value = '';
 });
 
+// Fire is still to begin with for who asks for less motion.
+play.addEventListener('click', () => {
+  photo.paused = !photo.paused;
+  tellPlay();
+});
+matchMedia('(prefers-reduced-motion: reduce)').addEventListener('change', tellPlay);
+// Not before: `paused` is the element's own word.
+customElements.whenDefined('relightable-photo').then(tellPlay);
+
 const cameras = navigator.mediaDevices;
 /** @type {HTMLElement} */ (document.getElementById('with-camera')).hidden = !cameras;
 camera.addEventListener('click', async () => {
@@ -128,7 +138,7 @@ async function showFilm(chosen, wish) {
 /**
  * Lights the picture by something of the visitor's, or by the built-in lights again.
  *
- * @param {import('./src/index.js').LightSource | null} source
+ * @param {import('../src/index.js').LightSource | null} source
  * @param {HTMLElement} [control] by which it was chosen
  * @param {() => void} [stop]
  */
@@ -142,6 +152,7 @@ function shine(source, control, stop = () => {}) {
   if (!source) return;
   for (const input of lights) input.checked = false;
   hint.classList.add('off');
+  tellPlay();
   tell();
 }
 
@@ -149,6 +160,7 @@ function apply() {
   // None is while something of the visitor's shines.
   const chosen = [...lights].find((input) => input.checked)?.value ?? photo.light;
   if (photo.getAttribute('light') !== chosen) photo.setAttribute('light', chosen);
+  tellPlay();
   // A hidden line is not read out either.
   hint.classList.toggle('off', chosen !== 'torch' || photo.lightSource !== null);
   if ((photo.getAttribute('backend') ?? '') === backend.value) return;
@@ -165,4 +177,9 @@ function tell() {
     `${info.lightWidth} × ${info.lightHeight} lights`,
   ];
   status.textContent = [parts.join(' · '), reason].filter(Boolean).join('. ');
+}
+
+function tellPlay() {
+  play.hidden = photo.light !== 'fire' || photo.lightSource != null || !photo.matches(':defined');
+  play.textContent = photo.paused ? 'Let the fire burn.' : 'Hold the fire still.';
 }

@@ -1,0 +1,42 @@
+/**
+ * Writes the site as a folder for any host of static files: node www/tools/export.js PHOTOS OUT [ADDRESS].
+ * ADDRESS is where it will be. Only the sample of a IIIF manifest needs it, in which addresses have to be
+ * whole: without it they are relative, which this site's own page can read.
+ */
+
+import { cpSync, mkdirSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { dirname, extname, join, resolve } from 'node:path';
+import { composePage, manifestAt, PAGES } from './pages.js';
+import { FILES, FOLDERS, MANIFEST } from './site.js';
+
+const repository = join(import.meta.dirname, '..', '..');
+const [photos, out, address] = process.argv.slice(2);
+if (!photos || !out || (address !== undefined && !URL.canParse(address))) {
+  console.error(
+    'export: takes the folder of photographs, where to write, and the address it will have',
+  );
+  process.exit(2);
+}
+
+rmSync(out, { recursive: true, force: true });
+mkdirSync(out, { recursive: true });
+for (const page of PAGES) writeFileSync(join(out, page), composePage(page));
+for (const [at, folder] of Object.entries(FOLDERS)) {
+  cpSync(join(repository, folder), join(out, at), {
+    recursive: true,
+    // For debugging and for TypeScript.
+    filter: (path) => !path.endsWith('.map') && !path.endsWith(join('dist', 'types')),
+  });
+}
+for (const [at, file] of Object.entries(FILES)) {
+  mkdirSync(dirname(join(out, at)), { recursive: true });
+  cpSync(file, join(out, at));
+}
+mkdirSync(join(out, 'photos'), { recursive: true });
+for (const name of readdirSync(photos)) {
+  if (['.ltm', '.png'].includes(extname(name)))
+    cpSync(join(photos, name), join(out, 'photos', name));
+}
+const base = address === undefined ? '../' : new URL('.', address).href;
+writeFileSync(join(out, MANIFEST), manifestAt(base));
+console.log(`${resolve(out)} holds the site: upload all of it.`);

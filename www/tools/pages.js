@@ -1,0 +1,72 @@
+/**
+ * The site's pages, put together from what is their own, in www/pages, and the layout they share. Samples
+ * of code stand in files of their own, so that what a page shows is what is tested.
+ */
+
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+
+const www = join(import.meta.dirname, '..');
+
+/** File names of the pages, in the order of the menu. */
+export const PAGES = [
+  'index.html',
+  'playground.html',
+  'how-it-works.html',
+  'integration.html',
+  'troubleshooting.html',
+];
+
+/**
+ * @param {string} name one of `PAGES`
+ * @returns {string} the whole page
+ */
+export function composePage(name) {
+  const source = read(`pages/${name}`);
+  const main = source
+    .replace(/^(<!-- \w+: .* -->\n)+/, '')
+    .replace(/^ *{{sample ([\w.-]+)}}$/gm, (_, file) => sample(file));
+  const fields = {
+    title: field(source, 'title'),
+    description: field(source, 'description'),
+    scripts: field(source, 'scripts')
+      .split(' ')
+      .filter(Boolean)
+      .map((src) => `<script type="module" src="${src}"></script>`)
+      .join('\n    '),
+    main,
+  };
+  return read('pages/layout.html')
+    .replaceAll(`<a href="${name}">`, `<a href="${name}" aria-current="page">`)
+    .replace(/{{(\w+)}}/g, (_, key) => fields[/** @type {keyof typeof fields} */ (key)]);
+}
+
+/**
+ * The sample of a IIIF manifest, in which addresses have to be whole, as it is where the site is.
+ *
+ * @param {string} base where the site is, with a slash at its end
+ */
+export function manifestAt(base) {
+  return read('samples/manifest.json').replaceAll('https://museum.example/', base);
+}
+
+/** @param {string} text */
+export function escapeHtml(text) {
+  return text.replaceAll('&', '&amp;').replaceAll('<', '&lt;').replaceAll('>', '&gt;');
+}
+
+/** @param {string} file in www/samples */
+function sample(file) {
+  const code = escapeHtml(read(`samples/${file}`).trimEnd());
+  return `<figure class="code"><figcaption>${file}</figcaption><pre tabindex="0" role="region" aria-label="${file}"><code data-sample="${file}">${code}</code></pre></figure>`;
+}
+
+/** @param {string} source @param {string} name of a comment at the beginning */
+function field(source, name) {
+  return new RegExp(`^<!-- ${name}: (.*) -->$`, 'm').exec(source)?.[1] ?? '';
+}
+
+/** @param {string} path in www */
+function read(path) {
+  return readFileSync(join(www, path), 'utf8');
+}
