@@ -2,7 +2,8 @@
 
 import assert from 'node:assert/strict';
 import { describe, test } from 'node:test';
-import { happenedUntil, loaded, mount, openPage } from './browser.js';
+import { compare } from '../../www/tools/pictures.js';
+import { happenedUntil, loaded, mount, openPage, picture } from './browser.js';
 
 /** @typedef {import('playwright-core').Page} Page */
 /** @typedef {import('node:test').TestContext} TestContext */
@@ -311,7 +312,7 @@ describe('the controls', () => {
 
   test('zoom, reset, and hide while a mouse rests', async (t) => {
     const { page, at } = await visit(t, { controls: '', zoom: '2' });
-    const bar = page.getByRole('toolbar', { name: 'Controls' });
+    await page.getByRole('toolbar', { name: 'Controls' }).waitFor();
     await page.getByRole('button', { name: 'Zoom in' }).click();
     assert.equal((await viewOf(page)).zoom, 1.5);
     await page.getByRole('button', { name: 'Zoom in' }).click();
@@ -324,8 +325,6 @@ describe('the controls', () => {
     assert.equal((await viewOf(page)).zoom, 1);
     assert.equal(await torchOf(page), null);
     await page.mouse.click(point.x, point.y);
-    const opacity = () => bar.evaluate((element) => getComputedStyle(element).opacity);
-    assert.equal(await opacity(), '1');
     await page.waitForFunction(
       "getComputedStyle(photo.shadowRoot.querySelector('[role=toolbar]')).opacity === '0'",
     );
@@ -365,6 +364,35 @@ describe('the controls', () => {
   });
 });
 
+describe('fire', () => {
+  /** @param {Page} page */
+  const shot = async (page) => page.locator('relightable-photo canvas').screenshot();
+
+  test('burns until it is told to stop, and is still where less motion is asked for', async (t) => {
+    const { page } = await visit(t, { light: 'fire', controls: '' });
+    const first = await shot(page);
+    await page.waitForTimeout(500);
+    assert.notDeepEqual(await shot(page), first);
+    await page.evaluate('photo.paused = true');
+    await page.waitForTimeout(400);
+    const still = await shot(page);
+    await page.waitForTimeout(400);
+    assert.deepEqual(await shot(page), still);
+    assert.equal(
+      await page.evaluate("happened.some(({ type }) => type === 'lightchange')"),
+      false,
+      'it is one light',
+    );
+    const { page: calm } = await visit(t, { light: 'fire' }, { reducedMotion: 'reduce' });
+    const before = await picture(calm);
+    await calm.waitForTimeout(400);
+    assert.equal(compare(await picture(calm), before).worst, 0);
+    await calm.evaluate('photo.paused = false');
+    await calm.waitForTimeout(500);
+    assert.notEqual(compare(await picture(calm), before).worst, 0);
+  });
+});
+
 describe('a light that wanders', () => {
   test('does so until somebody takes it, and again once they have gone', async (t) => {
     const { page, at } = await visit(t, { 'autoplay-light': '' });
@@ -392,7 +420,7 @@ describe('a light that wanders', () => {
 
 describe('a kiosk', () => {
   test('is as it was once its visitor has gone', async (t) => {
-    const { page, at } = await visit(t, { kiosk: '1', zoom: '', controls: '' });
+    const { page, at } = await visit(t, { kiosk: '5', zoom: '', controls: '' });
     const point = at(0.2, 0.2);
     await page.mouse.dblclick(point.x, point.y);
     await page.keyboard.press(']');

@@ -20,7 +20,12 @@ import {
 import { Exhibit, type LightPose } from './exhibit.js';
 import { isFullscreen, toggleFullscreen } from './fullscreen.js';
 import { LightNews, type Shining } from './light-news.js';
-import { checkLightSource, isLightSource, type LightSource } from './light-source.js';
+import {
+  checkLightSource,
+  isLightSource,
+  type LightPicture,
+  type LightSource,
+} from './light-source.js';
 import type { Lighting } from './lighting.js';
 import type { Facts } from './photograph.js';
 import { Player } from './player.js';
@@ -109,6 +114,9 @@ export class RelightablePhoto extends Base {
   #toldView = WHOLE;
   /** The address that was given to the player. */
   #fetched: string | null | undefined;
+  /** What the player was told last to draw, in words, and the picture that it is lit by. */
+  #drawn: string | null = null;
+  #drawnBy: LightPicture | null = null;
   #reload = false;
   #scheduled = false;
   #listening: AbortController | null = null;
@@ -491,6 +499,12 @@ export class RelightablePhoto extends Base {
     const credentials = asked.crossOrigin === 'use-credentials' ? 'include' : 'same-origin';
     const { look } = this.#exhibit;
     const light = this.#lighting.setting;
+    const { picture, ...builtin } = light;
+    // Where only the view or the controls are others, nothing is drawn again.
+    const drawn = JSON.stringify([src, credentials, wanted, look, builtin]);
+    if (!reload && drawn === this.#drawn && picture === this.#drawnBy) return;
+    this.#drawn = drawn;
+    this.#drawnBy = picture;
     this.#player.set({ src, credentials, wanted, look, light }, reload);
   }
 
@@ -525,6 +539,8 @@ export class RelightablePhoto extends Base {
   /** What is shown is not what is asked for any more. */
   #forget(): void {
     this.#player.stop();
+    this.#drawn = null;
+    this.#drawnBy = null;
     this.#fetched = undefined;
     this.#clear();
   }
