@@ -22,6 +22,10 @@ const CLASS_MODULE = 'dist/element.js';
 const DEFINING_MODULE = 'dist/index.js';
 const CLASS = 'RelightablePhoto';
 const SOURCES = ['www/src/element.ts', 'www/src/events.ts'];
+/** The interface that has the properties which are attributes. */
+const REFLECTED = { file: 'www/src/reflect.ts', name: 'Reflected' };
+/** Observed, and every element's. */
+const GLOBAL = ['lang'];
 
 /**
  * @typedef {{ name: string, description?: string, type?: { text: string } }} Entry
@@ -32,10 +36,7 @@ const SOURCES = ['www/src/element.ts', 'www/src/events.ts'];
 
 /** @returns {Promise<{ manifest: object, element: Declaration, attributes: string }>} needs dist/element.js */
 export async function makeManifest() {
-  const sources = SOURCES.map((file) => {
-    const text = readFileSync(join(repository, file), 'utf8');
-    return ts.createSourceFile(file, text, ts.ScriptTarget.ES2022, true);
-  });
+  const sources = SOURCES.map(parse);
   const context = { dev: false, thirdPartyCEMs: [] };
   /** @type {{ modules: { declarations: Declaration[] }[] }} */
   const analysed = create({ modules: sources, plugins: [], context });
@@ -44,7 +45,11 @@ export async function makeManifest() {
   if (!element) throw new Error(`manifest: there is no class ${CLASS} in the sources`);
   /** @type {{ [CLASS]: { observedAttributes: readonly string[] } }} */
   const { [CLASS]: built } = await import(pathToFileURL(join(repository, CLASS_MODULE)).href);
-  tidy(element, built.observedAttributes);
+  element.members.unshift(...reflected());
+  tidy(
+    element,
+    built.observedAttributes.filter((name) => !GLOBAL.includes(name)),
+  );
   const events = declarations.filter(({ name }) => /Event$/.test(name));
   for (const { members } of events) {
     for (const member of members ?? []) if (member.privacy !== 'private') delete member.privacy;
@@ -78,6 +83,29 @@ export async function makeManifest() {
     ],
   };
   return { manifest, element, attributes: jsxAttributes(element) };
+}
+
+/** @param {string} file */
+function parse(file) {
+  const text = readFileSync(join(repository, file), 'utf8');
+  return ts.createSourceFile(file, text, ts.ScriptTarget.ES2022, true);
+}
+
+/** Properties that the class has from elsewhere. @returns {Member[]} */
+function reflected() {
+  const source = parse(REFLECTED.file);
+  /** @type {any[]} */
+  const { statements } = source;
+  const found = statements.find(
+    (node) => ts.isInterfaceDeclaration(node) && node.name.text === REFLECTED.name,
+  );
+  if (!found) throw new Error(`manifest: there is no ${REFLECTED.name} in ${REFLECTED.file}`);
+  return found.members.map((/** @type {any} */ member) => ({
+    kind: 'field',
+    name: member.name.text,
+    type: { text: member.type.getText(source) },
+    description: ts.getTextOfJSDocComment(member.jsDoc?.[0]?.comment) ?? '',
+  }));
 }
 
 /**
