@@ -61,7 +61,7 @@ impl Light {
         if !seconds.is_finite() {
             return Err(CodedError::new(
                 "light-value",
-                format!("a fire at {seconds} seconds cannot be: the time is a finite number"),
+                "the time of a fire must be a finite number of seconds",
             ));
         }
         Ok(Self(relight::Light::fire(photo.geometry().light, seconds)))
