@@ -121,6 +121,34 @@ describe('a page that is', () => {
     await failsWith(page, 'wasm-unavailable');
   });
 
+  for (const [what, policy, code, text] of /** @type {const} */ ([
+    [
+      'not allowed to fetch',
+      "default-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; connect-src 'self'",
+      'csp-connect',
+      /window\.ltm .*http:\/\/127\.0\.0\.1:9 in connect-src/,
+    ],
+    [
+      'not allowed to run WebAssembly',
+      "default-src 'self' 'unsafe-inline'",
+      'csp-wasm',
+      /'wasm-unsafe-eval' in script-src/,
+    ],
+  ])) {
+    test(`${what} is ${code}`, async (t) => {
+      const page = await openPage(t, '/blank', { refusal: /violates|Refused|CompileError/ });
+      await page.route('**/bench', async (route) => {
+        const response = await route.fetch();
+        const headers = { ...response.headers(), 'content-security-policy': policy };
+        await route.fulfill({ response, headers });
+      });
+      await page.goto('/bench');
+      const src = code === 'csp-connect' ? 'http://127.0.0.1:9/window.ltm' : '/photos/glass.ltm';
+      await mount(page, { src });
+      assert.match(await failsWith(page, code), text);
+    });
+  }
+
   test('asking for a picture too early is told so', async (t) => {
     const page = await openPage(t, '/bench');
     await mount(page, { src: '/faults/slow' });

@@ -65,7 +65,9 @@ export function drawer(load: Load, crew: Crew, devices: Devices): Draw {
           const canvas = document.createElement('canvas');
           const relighter = await graphics.draw(photo, canvas, gamut);
           const plane = photograph.plane(module);
-          return new CanvasDrawing(module, plane, relighter, canvas, { lease });
+          const drawing = new CanvasDrawing(module, plane, relighter, canvas, { lease });
+          idle(() => load('cpu').catch(() => {}));
+          return drawing;
         },
         { signal },
       );
@@ -87,6 +89,14 @@ const crewSize = Math.min(MOST_WORKERS, globalThis.navigator?.hardwareConcurrenc
 
 /** Draws for the elements of this page. */
 export const draw = drawer(load, new Crew(startWorker, crewSize), new Devices());
+
+/** Does something once the page has nothing else to do: what takes a device's place is there when it is lost. */
+function idle(work: () => unknown): void {
+  const { requestIdleCallback } = globalThis;
+  // Not every browser has it.
+  if (requestIdleCallback) requestIdleCallback(() => void work());
+  else setTimeout(work, 1000);
+}
 
 /** `null` where a script of this origin may not be a worker, or modules cannot be. */
 function startWorker(): Worker | null {

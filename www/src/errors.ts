@@ -24,7 +24,11 @@ export type PageErrorCode =
   | 'http-encoding'
   /** The server does not have, or did not send, the part of the file that was asked for. */
   | 'http-range'
-  /** The WebAssembly module beside the script could not be loaded. */
+  /** The page's content security policy does not let the file be fetched. */
+  | 'csp-connect'
+  /** The page's content security policy does not let WebAssembly run. */
+  | 'csp-wasm'
+  /** A WebAssembly module could not be loaded. */
   | 'wasm-unavailable'
   /** The script of the buttons beside the element's could not be loaded. */
   | 'controls-unavailable'

@@ -42,6 +42,17 @@ export function unreachable(url: string, cause: unknown): Passing {
   );
 }
 
+/** A content security policy keeps the page from asking. */
+export function forbidden(url: string, directive: string, cause: unknown): PhotoError {
+  const origin = URL.canParse(url) ? new URL(url).origin : "the file's address";
+  return new PhotoError(
+    'csp-connect',
+    `${nameOf(url)} may not be fetched: the page's content security policy has to allow ` +
+      `${origin} in ${directive}.`,
+    cause,
+  );
+}
+
 export function stalled(url: string, ms: number): Passing {
   return new Passing(
     'http-stalled',

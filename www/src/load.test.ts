@@ -251,7 +251,7 @@ test('a damaged file keeps the decoder’s code and ends the transfer', async (t
     await assert.rejects(opened(site.url), {
       name: 'PhotoError',
       code: 'format-checksum',
-      message: 'tile 3 is damaged',
+      message: 'rose.ltm: tile 3 is damaged.',
     });
     await Promise.all(site.closed);
   }

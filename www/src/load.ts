@@ -1,8 +1,9 @@
 /** From an address to a decoded photograph. */
 
+import { sentence } from './backends.js';
 import type { PhotoDecoder } from './decoding.js';
 import { PhotoError, toPhotoError } from './errors.js';
-import { tooLong } from './http-errors.js';
+import { nameOf, tooLong } from './http-errors.js';
 import type { Photograph } from './photograph.js';
 import { within } from './retry.js';
 import { type ByteRange, HttpSource, type Piece, type SourceOptions } from './source.js';
@@ -85,10 +86,17 @@ async function open(
     // A transfer that nobody waits for any more is not left running.
     stop.abort();
     signal.throwIfAborted();
-    throw toPhotoError(thrown);
+    throw named(toPhotoError(thrown), url);
   } finally {
     signal.removeEventListener('abort', stopToo);
   }
+}
+
+/** What a decoder says is wrong, of the file that it is wrong with. */
+function named(error: PhotoError, url: string): PhotoError {
+  const { code, message, cause } = error;
+  if (!code.startsWith('format-') || message.includes(nameOf(url))) return error;
+  return new PhotoError(code, sentence(`${nameOf(url)}: ${message}`), cause);
 }
 
 /** All of a file that its decoder wants, after what was asked for without it. */

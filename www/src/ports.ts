@@ -3,15 +3,22 @@
 import type { CanvasSurface } from './canvas.js';
 import { newDecoder } from './decoders.js';
 import { draw } from './drawings.js';
+import { forbidden } from './http-errors.js';
 import { openPhoto } from './load.js';
 import type { Ports } from './player.js';
+import { allowed } from './policy.js';
 
 /** For all elements of the page. */
 export const PORTS: Ports<CanvasSurface> = {
   open: (src, credentials, signal, onProgress, onPreview) =>
     openPhoto(src, signal, onProgress, onPreview, {
       decoder: newDecoder,
-      fetch: (input, init) => fetch(input, { ...init, credentials }),
+      fetch: (input, init) =>
+        allowed(
+          () => fetch(input, { ...init, credentials }),
+          /^connect-src/,
+          (directive, cause) => forbidden(src, directive, cause),
+        ),
       pause,
       now: () => performance.now(),
     }),

@@ -6,6 +6,7 @@
 
 import { differ, type Head, readHead, sizeOfUnsatisfied, type Version } from './answer.js';
 import { type ByteRange, bytesOf, coalesce, RangeSet } from './coalesce.js';
+import { PhotoError } from './errors.js';
 import * as errors from './http-errors.js';
 import { Passing } from './http-errors.js';
 import { type Job, merge } from './merge.js';
@@ -311,7 +312,7 @@ export class HttpSource {
     const silence = () => errors.stalled(this.url, ms);
     return within(promise, signal, { ms, error: silence }).catch((cause: unknown) => {
       signal.throwIfAborted();
-      throw cause instanceof Passing ? cause : failure(cause);
+      throw cause instanceof PhotoError ? cause : failure(cause);
     });
   }
 }

@@ -2,6 +2,7 @@
 
 import { messageOf, PhotoError } from './errors.js';
 import type { ModuleName } from './names.js';
+import { allowed } from './policy.js';
 
 /** The code of a module: its bytes, or where they are. */
 export type WasmCode = ArrayBuffer | ArrayBufferView<ArrayBuffer> | URL | string;
@@ -59,19 +60,30 @@ export function moduleFolder(): string | null {
 export function loader<M>(name: ModuleName, what: string, builds: WasmBuilds): () => Promise<M> {
   let loading: Promise<M> | undefined;
   return () => {
-    loading ??= start<M>(name, builds).catch((cause: unknown) => {
-      loading = undefined;
-      throw new PhotoError(
-        'wasm-unavailable',
-        `The module that ${what} could not be started. The wasm folder has to lie beside the script, or ` +
-          "where wasm-url says, and a content security policy has to allow 'wasm-unsafe-eval' in " +
-          "script-src, and the folder's address in connect-src. " +
-          `The browser says: ${messageOf(cause)}`,
-        cause,
-      );
-    });
+    loading ??= allowed(() => start<M>(name, builds), /^script-src/, mayNotRun).catch(
+      (cause: unknown) => {
+        loading = undefined;
+        if (cause instanceof PhotoError) throw cause;
+        throw new PhotoError(
+          'wasm-unavailable',
+          `The module that ${what} could not be started. The wasm folder has to lie beside the script, or ` +
+            'where wasm-url says, and a content security policy has to allow its address in connect-src. ' +
+            `The browser says: ${messageOf(cause)}`,
+          cause,
+        );
+      },
+    );
     return loading;
   };
+}
+
+function mayNotRun(_: string, cause: unknown): PhotoError {
+  return new PhotoError(
+    'csp-wasm',
+    "WebAssembly may not run here: the page's content security policy has to allow " +
+      "'wasm-unsafe-eval' in script-src.",
+    cause,
+  );
 }
 
 /** Starts a module, in the build that this machine can run. */

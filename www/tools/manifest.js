@@ -94,10 +94,9 @@ function parse(file) {
 /** Properties that the class has from elsewhere. @returns {Member[]} */
 function reflected() {
   const source = parse(REFLECTED.file);
-  /** @type {any[]} */
-  const { statements } = source;
-  const found = statements.find(
-    (node) => ts.isInterfaceDeclaration(node) && node.name.text === REFLECTED.name,
+  const found = source.statements.find(
+    (/** @type {any} */ node) =>
+      ts.isInterfaceDeclaration(node) && node.name.text === REFLECTED.name,
   );
   if (!found) throw new Error(`manifest: there is no ${REFLECTED.name} in ${REFLECTED.file}`);
   return found.members.map((/** @type {any} */ member) => ({
