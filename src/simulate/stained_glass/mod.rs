@@ -246,7 +246,7 @@ mod tests {
             width: n,
             height: n,
         };
-        let scene = SceneKind::StainedGlass.build(side(96), side(48)).unwrap();
+        let scene = SceneKind::StainedGlass.build(side(192), side(96)).unwrap();
         let geometry = scene.geometry();
         let plane = UnitPlane::new(geometry.light);
         let (mut lead, mut glass) = (0, 0);
@@ -259,7 +259,7 @@ mod tests {
                 if covered(&plane, geometry, pixel) {
                     lead += 1;
                     assert!(flood < 0.004, "lead at {pixel:?} sends {flood}");
-                } else if clearance > 0.02 {
+                } else if clearance > 0.01 {
                     glass += 1;
                     assert!(flood > 0.03, "glass at {pixel:?} sends {flood}");
                 }
