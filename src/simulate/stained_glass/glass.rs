@@ -60,16 +60,16 @@ impl Glass {
         const OPALESCENT: [f64; 6] = [0.10, 0.95, 0.35, 0.24, 2.3, 0.28];
         match self {
             Self::Cobalt => sheet([0.055, 0.15, 0.74], ANTIQUE),
-            Self::Azure => sheet([0.13, 0.40, 0.86], STREAKY),
-            Self::Ruby => sheet([0.84, 0.038, 0.060], ANTIQUE),
-            Self::Rose => sheet([0.90, 0.34, 0.42], STREAKY),
-            Self::Amber => sheet([0.93, 0.47, 0.045], HAMMERED),
+            Self::Azure => sheet([0.13, 0.40, 0.91], STREAKY),
+            Self::Ruby => sheet([0.90, 0.038, 0.060], ANTIQUE),
+            Self::Rose => sheet([0.95, 0.34, 0.42], STREAKY),
+            Self::Amber => sheet([0.97, 0.47, 0.045], HAMMERED),
             Self::Gold => sheet([0.98, 0.74, 0.15], SATIN),
             Self::Emerald => sheet([0.060, 0.54, 0.21], HAMMERED),
             Self::Moss => sheet([0.30, 0.58, 0.10], STREAKY),
             Self::Violet => sheet([0.40, 0.105, 0.64], ANTIQUE),
             Self::Aqua => sheet([0.42, 0.78, 0.76], HAMMERED),
-            Self::Pale => sheet([0.95, 0.92, 0.78], HAMMERED),
+            Self::Pale => sheet([0.97, 0.94, 0.82], HAMMERED),
             Self::Opal => sheet([0.97, 0.95, 0.89], OPALESCENT),
         }
     }
@@ -78,7 +78,7 @@ impl Glass {
 /// Transmittance of piece number `piece` at `p`: Beer and Lambert's law through a sheet whose
 /// thickness and colour vary from piece to piece and, in streaks, over each; less the bubbles' dark rims.
 pub(super) fn transmittance(optics: &Optics, piece: u32, p: Vec2) -> [f64; 3] {
-    let jitter = 0.80 + 0.45 * unit_hash(piece, 31);
+    let jitter = 0.76 + 0.42 * unit_hash(piece, 31);
     // No two melts have quite the same colour.
     let warm = 0.16 * (unit_hash(piece, 35) - 0.5);
     let melt = [1.0 - warm, 1.0, 1.0 + warm];

@@ -23,7 +23,7 @@ const SAMPLES: u32 = 4;
 const LEAD: [f64; CHANNELS] = [0.0030, 0.0029, 0.0027];
 /// Light that still gets around the lead from an element wholly behind it: the pane stands a little
 /// off the display.
-const BEHIND_LEAD: f64 = 0.30;
+const BEHIND_LEAD: f64 = 0.50;
 /// Share of the light that the two faces do not reflect.
 const FACES: f64 = 0.97;
 /// Furthest the ballistic peak moves, in elements: with its width it stays inside the window.
@@ -168,7 +168,7 @@ fn seen_through(spot: &Spot, p: Vec2) -> [f64; CHANNELS] {
         return LEAD;
     }
     // Painters shade pieces towards the lead: it rounds them, and hides where the putty is.
-    let shade = mix(0.70, 1.0, smoothstep(0.0, 0.026, spot.clearance));
+    let shade = mix(0.72, 1.0, smoothstep(0.0, 0.013, spot.clearance));
     // The brown stops blue most.
     let paint = [0.78, 0.86, 0.92].map(|stopped| 1.0 - stopped * spot.paint);
     let glass = transmittance(&spot.glass.optics(), spot.piece, p);
@@ -246,7 +246,7 @@ mod tests {
             width: n,
             height: n,
         };
-        let scene = SceneKind::StainedGlass.build(side(96), side(48)).unwrap();
+        let scene = SceneKind::StainedGlass.build(side(192), side(96)).unwrap();
         let geometry = scene.geometry();
         let plane = UnitPlane::new(geometry.light);
         let (mut lead, mut glass) = (0, 0);
@@ -259,7 +259,7 @@ mod tests {
                 if covered(&plane, geometry, pixel) {
                     lead += 1;
                     assert!(flood < 0.004, "lead at {pixel:?} sends {flood}");
-                } else if clearance > 0.02 {
+                } else if clearance > 0.01 {
                     glass += 1;
                     assert!(flood > 0.03, "glass at {pixel:?} sends {flood}");
                 }

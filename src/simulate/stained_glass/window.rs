@@ -14,11 +14,11 @@ use crate::simulate::texture::{cell_hash, noise};
 
 /// Half the width of the bars between lights that are cut from stone, of the leads that hold large
 /// parts together, and of the fine ones.
-const STONE: f64 = 0.0130;
-const BOLD: f64 = 0.0090;
-const FINE: f64 = 0.0062;
+const STONE: f64 = 0.0076;
+const BOLD: f64 = 0.0060;
+const FINE: f64 = 0.0039;
 /// How far solder spreads where leads meet.
-const SOLDER: f64 = 0.006;
+const SOLDER: f64 = 0.005;
 
 /// What is at a point of the window.
 #[derive(Clone, Copy, Debug)]
@@ -82,7 +82,7 @@ fn diaper(p: Vec2, side: f64) -> f64 {
     let (a, b) = (a - a.round(), b - b.round());
     let line = stroke(a.abs().min(b.abs()) * side, 0.0020);
     let dot = stroke((0.5 - a.abs()).hypot(0.5 - b.abs()) * side, 0.0034);
-    0.42 * line.max(dot)
+    0.34 * line.max(dot)
 }
 
 /// Leaves in pairs along a stem on the x axis, seen from its root.
@@ -154,18 +154,27 @@ fn lancet(q: Vec2, half: f64, head: f64, foot: f64) -> f64 {
     d.max(foot + STONE - q.length())
 }
 
+/// A round of glass in the pale ground between the heads of lancets; the pieces' numbers.
+fn eyelet(p: Vec2, radius: f64, [ground, round]: [u32; 2], glass: Glass) -> Spot {
+    let ring = stroke(circle(p, 0.45 * radius), 0.003);
+    let edge = circle(p, radius);
+    Spot::new(ground, Glass::Pale)
+        .inlay(edge, FINE, round, glass)
+        .painted(if edge < 0.0 { 0.5 * ring } else { 0.0 })
+}
+
 fn first_lancets(p: Vec2) -> Spot {
     const HEAD: f64 = 0.428;
     let (gap, g) = fold(p, 12, PI / 12.0);
-    let eyelet = circle(g - vec2(0.507, 0.0), 0.028);
-    if eyelet < 0.0 {
-        let glass = [Glass::Gold, Glass::Rose][(gap % 2) as usize];
-        return Spot::new(200 + gap, glass)
-            .painted(0.5 * stroke(circle(g - vec2(0.507, 0.0), 0.011), 0.003))
-            .within(eyelet);
-    }
     let (k, q) = fold(p, 12, 0.0);
     let light = lancet(q, PI / 12.0, HEAD, SUN);
+    if light > 0.0 {
+        let eye = g - vec2(0.505, 0.0);
+        let glass = [Glass::Amber, Glass::Ruby][(gap % 2) as usize];
+        return eyelet(eye, 0.024, [200 + gap, 212 + gap], glass)
+            .within(2.0 * STONE - light)
+            .lead(p.length() - FIRST, STONE);
+    }
     let even = k % 2 == 0;
     let (ground, edge) = if even {
         (Glass::Cobalt, Glass::Ruby)
@@ -210,7 +219,7 @@ fn first_lancets(p: Vec2) -> Spot {
     // Six petals, or a star with eight points, about a heart.
     let (petal, l) = fold(c, 6, 0.0);
     let (figure, piece, heart) = if even {
-        let petals = vesica(l - vec2(0.036, 0.0), 0.024, 0.0150);
+        let petals = vesica(l - vec2(0.037, 0.0), 0.026, 0.0185);
         (petals, 1000 + 10 * k + petal, Glass::Gold)
     } else {
         let tips = star(c, 8, 0.059, 0.033);
@@ -224,17 +233,15 @@ fn first_lancets(p: Vec2) -> Spot {
 }
 
 fn second_lancets(p: Vec2) -> Spot {
-    const HEAD: f64 = 0.738;
+    const HEAD: f64 = 0.754;
     let (gap, g) = fold(p, 24, 0.0);
-    let eyelet = circle(g - vec2(0.826, 0.0), 0.030);
-    if eyelet < 0.0 {
-        let glass = [Glass::Ruby, Glass::Aqua, Glass::Gold][(gap % 3) as usize];
-        return Spot::new(1200 + gap, glass)
-            .painted(0.5 * stroke(circle(g - vec2(0.824, 0.0), 0.012), 0.003))
-            .within(eyelet);
-    }
     let (k, q) = fold(p, 24, PI / 24.0);
     let light = lancet(q, PI / 24.0, HEAD, FIRST);
+    if light > 0.0 {
+        let eye = g - vec2(0.830, 0.0);
+        let glass = [Glass::Ruby, Glass::Cobalt, Glass::Emerald][(gap % 3) as usize];
+        return eyelet(eye, 0.020, [1200 + gap, 1600 + gap], glass).within(2.0 * STONE - light);
+    }
     let (ground, bar) = [
         (Glass::Cobalt, Glass::Ruby),
         (Glass::Azure, Glass::Amber),
@@ -242,15 +249,15 @@ fn second_lancets(p: Vec2) -> Spot {
         (Glass::Azure, Glass::Violet),
     ][(k % 4) as usize];
     // Panels one above the other, barred by leads.
-    let panel = (((q.x - 0.562) / 0.0565).floor().clamp(0.0, 2.0)) as u32;
-    let level = 0.562 + 0.0565 * ((q.x - 0.562) / 0.0565).round().clamp(1.0, 2.0);
+    let panel = (((q.x - 0.562) / 0.0600).floor().clamp(0.0, 2.0)) as u32;
+    let level = 0.562 + 0.0600 * ((q.x - 0.562) / 0.0600).round().clamp(1.0, 2.0);
     let foot = Spot::new(1230 + 4 * k + panel, ground)
         .lead(q.x - level, 0.8 * FINE)
         .painted(diaper(q, 0.0175));
     // A lozenge in each of the lower ones.
-    let middle = 0.562 + 0.0565 * (f64::from(panel.min(1)) + 0.5);
+    let middle = 0.562 + 0.0600 * (f64::from(panel.min(1)) + 0.5);
     let l = q - vec2(middle, 0.0);
-    let lozenge = (l.x.abs() + 0.72 * l.y.abs() - 0.0235) * 0.81;
+    let lozenge = (l.x.abs() + 0.62 * l.y.abs() - 0.0280) * 0.81;
     let spot = if panel < 2 {
         let glass = if panel == 0 { bar } else { Glass::Pale };
         foot.inlay(lozenge, 0.8 * FINE, 1340 + 2 * k + panel, glass)
@@ -263,24 +270,24 @@ fn second_lancets(p: Vec2) -> Spot {
         foot
     };
     let c = q - vec2(HEAD, 0.0);
-    let medallion = circle(c, 0.062);
+    let medallion = circle(c, 0.068);
     let spot = spot.inlay(medallion, 0.8 * BOLD, 1400 + k, bar);
     if medallion > 0.0 {
         return spot.within(light);
     }
     let (_, l) = fold(c, 4, 0.0);
     let (_, rays) = fold(c, 16, PI / 16.0);
-    let figure = circle(l - vec2(0.0255, 0.0), 0.0215).min(circle(c, 0.024));
+    let figure = circle(l - vec2(0.0310, 0.0), 0.0270).min(circle(c, 0.030));
     let glass = [Glass::Opal, Glass::Gold, Glass::Rose, Glass::Pale][(k % 4) as usize];
     let heart = [Glass::Cobalt, Glass::Ruby][(k % 2) as usize];
     spot.painted(0.45 * stroke(rays.y, 0.0022))
         .inlay(figure, 0.8 * FINE, 1430 + k, glass)
         .painted(if figure < 0.0 {
-            0.5 * stroke(circle(l - vec2(0.031, 0.0), 0.009), 0.0022)
+            0.5 * stroke(circle(l - vec2(0.035, 0.0), 0.011), 0.0022)
         } else {
             0.0
         })
-        .inlay(circle(c, 0.0135), 0.6 * FINE, 1460 + k, heart)
+        .inlay(circle(c, 0.0155), 0.6 * FINE, 1460 + k, heart)
         .within(light)
 }
 
@@ -312,26 +319,26 @@ fn corner(p: Vec2) -> Spot {
     let c = q - vec2(0.7715, 0.7715);
     let small = h - vec2(0.537, 0.857);
     let great = circle(c, 0.158);
-    let ground = Spot::new(1600 + side_place, Glass::Cobalt)
+    let ground = Spot::new(1860 + side_place, Glass::Cobalt)
         .lead(q.x - q.y, FINE)
         .lead(h.x, FINE);
     let stars = star(h - vec2(0.645, 0.917), 4, 0.017, 0.006);
     let ground =
         ground
             .painted(diaper(q, 0.024))
-            .inlay(stars, 0.4 * FINE, 1610 + side_place, Glass::Pale);
+            .inlay(stars, 0.6 * FINE, 1870 + side_place, Glass::Pale);
     // Between the small circle and the axis, a tail of foliage with a jewel at its root.
     let tail = h.x - 0.40;
     let jewel = h - vec2(0.345, 0.896);
     let ground = if tail < 0.0 {
-        Spot::new(1620 + side_place, Glass::Emerald)
+        Spot::new(1880 + side_place, Glass::Gold)
             .painted(foliage(vec2(h.x, h.y - 0.920), 0.036))
             .lead(h.x, FINE)
             .inlay(
                 circle(jewel, 0.029),
                 0.8 * FINE,
-                1630 + side_place,
-                Glass::Amber,
+                1890 + side_place,
+                Glass::Ruby,
             )
             .painted(0.55 * stroke(circle(jewel, 0.014), 0.003))
     } else {
@@ -341,7 +348,7 @@ fn corner(p: Vec2) -> Spot {
 
     let rim = circle(small, 0.068);
     let (petal, l) = fold(small, 5, 0.3);
-    let petals = circle(l - vec2(0.036, 0.0), 0.0205);
+    let petals = circle(l - vec2(0.038, 0.0), 0.0225);
     let ground = ground.inlay(rim, BOLD, 1640 + side_place, Glass::Violet);
     let ground = if rim < 0.0 {
         ground
@@ -349,7 +356,7 @@ fn corner(p: Vec2) -> Spot {
                 petals,
                 0.7 * FINE,
                 1660 + 5 * side_place + petal,
-                Glass::Rose,
+                Glass::Opal,
             )
             .painted(0.5 * stroke(l.y, 0.002) * smoothstep(0.0, 0.008, -petals))
             .inlay(
@@ -366,9 +373,17 @@ fn corner(p: Vec2) -> Spot {
     }
     // A quatrefoil cut from stone, a leaf in each foil.
     let (foil, l) = fold(c, 4, 0.0);
-    let opening = circle(l - vec2(0.070, 0.0), 0.064).max(great + BOLD);
-    let leaf = vesica(l - vec2(0.088, 0.0), 0.043, 0.023);
+    let opening = circle(l - vec2(0.074, 0.0), 0.072)
+        .max(great + 2.0 * BOLD)
+        .min(circle(c, 0.056));
+    let leaf = vesica(l - vec2(0.092, 0.0), 0.046, 0.025);
     let number = 4 * place + foil;
+    if opening > 0.0 {
+        // Between the foils.
+        let (between, _) = fold(c, 4, PI / 4.0);
+        return Spot::new(1800 + 4 * place + between, Glass::Azure)
+            .within((2.0 * BOLD - opening).max(great + BOLD));
+    }
     Spot::new(1730 + number, Glass::Ruby)
         .lead((l.y.abs() - l.x) * FRAC_1_SQRT_2, FINE)
         .painted(diaper(c, 0.018))
@@ -385,7 +400,7 @@ fn corner(p: Vec2) -> Spot {
             1780 + place,
             Glass::Gold,
         )
-        .within(opening.min(circle(c, 0.056)))
+        .within(opening)
 }
 
 fn frame(p: Vec2) -> Spot {
@@ -401,7 +416,7 @@ fn frame(p: Vec2) -> Spot {
     // Long stones of two blues, short golden ones where they meet.
     let length = 2.0 * FRAME / STONES;
     let t = (along + FRAME) / length;
-    let short = ((t - t.round()) * length).abs() - 0.021;
+    let short = ((t - t.round()) * length).abs() - 0.030;
     let middle = p.x.abs().max(p.y.abs()) - 0.5 * (1.0 + FRAME);
     let from_joint = (t - t.round()) * length;
     if short < 0.0 {
