@@ -76,7 +76,7 @@ async function mountMore(page, count, src) {
     async ({ count, src }) => {
       const loads = Array.from({ length: count }, () => {
         const photo = document.createElement('relightable-photo');
-        Object.assign(photo, { src, backend: 'cpu', light: 'spectrum' });
+        Object.assign(photo, { src, backend: 'cpu', light: 'spectrum', loading: 'eager' });
         const load = new Promise((resolve, reject) => {
           photo.addEventListener('load', resolve);
           photo.addEventListener('error', (event) => reject(new Error(event.message)));

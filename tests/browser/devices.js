@@ -59,6 +59,7 @@ describe('graphics devices', () => {
         async ({ src, backend }) => {
           const photos = Array.from({ length: 64 }, (_, i) => {
             const photo = /** @type {any} */ (document.createElement('relightable-photo'));
+            photo.loading = 'eager';
             photo.style.width = '40px';
             photo.style.display = 'inline-block';
             photo.light = ['spectrum', 'torch'][i % 2];

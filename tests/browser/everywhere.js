@@ -251,7 +251,7 @@ export function testsIn(browser, { backends, missing, screenshots, namesGpus }) 
             const loads = Array.from({ length: count }, (_, i) => {
               const photo = document.createElement('relightable-photo');
               const light = lights[i % lights.length];
-              Object.assign(photo, { src: `${src}?${i}`, backend, light });
+              Object.assign(photo, { src: `${src}?${i}`, backend, light, loading: 'eager' });
               Object.assign(photo.style, { width: '64px', float: 'left' });
               const load = new Promise((resolve, reject) => {
                 photo.addEventListener('load', resolve);

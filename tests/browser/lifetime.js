@@ -134,7 +134,7 @@ describe('an element', () => {
     // Chromium has sixteen WebGL contexts for a page, and takes away the oldest for a new one.
     const backends = await page.evaluate(async () => {
       const other = document.createElement('relightable-photo');
-      Object.assign(other, { src: '/photos/glass.ltm', backend: 'webgl2 cpu' });
+      Object.assign(other, { src: '/photos/glass.ltm', backend: 'webgl2 cpu', loading: 'eager' });
       document.body.append(other);
       const used = [];
       for (let i = 0; i < 20; i += 1) {
@@ -158,6 +158,7 @@ describe('an element', () => {
     const light = await page.evaluate(async () => {
       const early = Object.assign(document.createElement('relightable-photo'), {
         src: '/photos/glass.ltm',
+        loading: 'eager',
         light: 'stripes',
         backend: 'cpu',
       });
@@ -180,7 +181,7 @@ describe('an element', () => {
     await loaded(page);
     await page.evaluate(async () => {
       const other = document.createElement('relightable-photo');
-      Object.assign(other, { src: '/photos/glass.ltm', light: 'flood' });
+      Object.assign(other, { src: '/photos/glass.ltm', light: 'flood', loading: 'eager' });
       document.body.append(other);
       await new Promise((resolve) => other.addEventListener('load', resolve));
       other.remove();

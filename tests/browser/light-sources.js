@@ -506,6 +506,7 @@ describe('a light source', () => {
       const early = document.createElement('relightable-photo');
       const light = { data: new Float32Array(3), width: 1, height: 1 };
       Object.assign(early, { src: '/photos/glass.ltm', backend: 'cpu', lightSource: light });
+      early.loading = 'eager';
       document.body.append(early);
       const load = new Promise((resolve) => early.addEventListener('load', resolve));
       const script = '/relightable-photo/relightable-photo.js';

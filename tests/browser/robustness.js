@@ -44,7 +44,12 @@ describe('sixteen elements', () => {
           await customElements.whenDefined('relightable-photo');
           const loads = Array.from({ length: count }, (_, i) => {
             const photo = document.createElement('relightable-photo');
-            Object.assign(photo, { src: `${src}?${i}`, backend, light: 'spectrum' });
+            Object.assign(photo, {
+              src: `${src}?${i}`,
+              backend,
+              light: 'spectrum',
+              loading: 'eager',
+            });
             photo.style.width = '64px';
             const load = new Promise((resolve, reject) => {
               photo.addEventListener('load', resolve);

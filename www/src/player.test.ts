@@ -932,21 +932,37 @@ test('coarser photographs are drawn while the file comes, each by the back end o
   ]);
 });
 
-test('a whole photograph does not wait for a coarser one to be drawn', async () => {
+test('a whole photograph waits for who draws a coarser one, and is drawn by the same', async () => {
   const w = world();
   w.player.set(SETTINGS);
   await w.previewed('a.ltm', 0.5);
   await w.opened('a.ltm');
-  await w.drawn(1);
+  assert.equal(w.draws.length, 1);
   await w.drawn(0);
+  await w.drawn(1);
   assert.deepEqual(w.happened(), [
     'loading',
     'backend null -> webgpu',
     'webgpu draws flood',
-    'loaded',
+    'detail 0.5',
+    'webgpu draws flood',
     'free webgpu',
     'free 0.5 of a.ltm',
+    'detail 1',
+    'loaded',
   ]);
+});
+
+test('a whole photograph that nobody wants any more is freed while it waits', async () => {
+  const w = world();
+  w.player.set(SETTINGS);
+  await w.previewed('a.ltm', 0.5);
+  await w.opened('a.ltm');
+  w.player.stop();
+  await settle();
+  assert.deepEqual(w.happened(), ['loading', 'abort a.ltm', 'free a.ltm']);
+  await w.drawn(0);
+  assert.deepEqual(w.happened(), ['free webgpu', 'free 0.5 of a.ltm']);
 });
 
 test('a coarser photograph that no back end draws, or that is lost, is made up for by the whole one', async () => {

@@ -451,6 +451,8 @@ export class Player<D extends Drawing> {
           else void this.#take(preview, previous, why);
         },
       );
+      // Who draws the coarser one has all that this one needs as well, and nothing is asked for twice.
+      while (this.#search && !signal.aborted) await this.#search.ended;
       if (signal.aborted) {
         photo.free();
         return;
