@@ -47,20 +47,42 @@ const keepingWorkers = () => {
   Object.assign(globalThis, { kept, spoilt: false });
 };
 
+/** What workers run first: notes the memory of their modules, which have no other way to it. */
+const NOTING = `
+  const memories = (globalThis.memories = []);
+  for (const name of ['instantiate', 'instantiateStreaming']) {
+    const make = WebAssembly[name];
+    WebAssembly[name] = async (...given) => {
+      const made = await make.apply(WebAssembly, given);
+      memories.push((made.instance ?? made).exports.memory);
+      return made;
+    };
+  }
+`;
+
+/** Has workers note their memory. @param {import('playwright-core').Page} page */
+function noteMemory(page) {
+  return page.route(`**${SCRIPT}`, async (route) => {
+    const response = await route.fetch();
+    await route.fulfill({ response, body: NOTING + (await response.text()) });
+  });
+}
+
 /**
- * Bytes of the CPU modules' memory, of the page's and of each worker's.
+ * Bytes of the CPU modules' memory, of the page's and of each worker's, which note theirs.
  *
  * @param {import('playwright-core').Page} page
  * @returns {Promise<number[]>}
  */
 function memory(page) {
-  const bytes = async () => {
+  const own = async () => {
     const module = '/relightable-photo/wasm/cpu.js';
     return (await (await import(module)).default()).memory.buffer.byteLength;
   };
+  const noted = 'memories.reduce((sum, { buffer }) => sum + buffer.byteLength, 0)';
   return Promise.all([
-    page.evaluate(bytes),
-    ...crewOf(page).map((worker) => worker.evaluate(bytes)),
+    page.evaluate(own),
+    ...crewOf(page).map((worker) => worker.evaluate(noted).then(Number)),
   ]);
 }
 
@@ -266,6 +288,7 @@ describe('workers that relight', () => {
   ])) {
     test(`have the only copy of its tiles${where}`, async (t) => {
       const page = await openPage(t, '/bench', before ? { before } : {});
+      await noteMemory(page);
       await mount(page, { src: TALL.src, light: TALL.light, ...(backend && { backend }) });
       await loaded(page);
       assert.equal(await page.evaluate('photo.activeBackend'), 'cpu');
@@ -287,6 +310,7 @@ describe('workers that relight', () => {
 
   test('need no more memory for two thousand frames than for one', async (t) => {
     const page = await openPage(t, '/bench');
+    await noteMemory(page);
     const session = await page.context().newCDPSession(page);
     const buffers = async () => {
       await session.send('HeapProfiler.collectGarbage');
@@ -315,6 +339,7 @@ describe('workers that relight', () => {
 
   test('and tiles that change places again and again need no more memory', async (t) => {
     const page = await openPage(t, '/bench');
+    await noteMemory(page);
     await mount(page, GLASS);
     await loaded(page);
     const change = (/** @type {string} */ backend) =>

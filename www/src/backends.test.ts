@@ -2,6 +2,7 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import { after, firstWorking, from } from './backends.js';
 import type { Backend } from './engine.js';
+import { PhotoError } from './errors.js';
 
 const always = () => {};
 
@@ -55,4 +56,19 @@ test('after a loss, those further down the order are left', () => {
   assert.deepEqual(after(['webgpu', 'webgl2', 'cpu'], 'webgl2'), ['cpu']);
   assert.deepEqual(after(['cpu'], 'cpu'), []);
   assert.deepEqual(from(['webgpu', 'webgl2', 'cpu'], 'webgl2'), ['webgl2', 'cpu']);
+});
+
+test('what no back end is allowed to do is told at once', async () => {
+  const tried: Backend[] = [];
+  const refused = new PhotoError('csp-wasm', 'WebAssembly may not run here.');
+  const search = firstWorking(
+    ['webgpu', 'cpu'],
+    (backend) => {
+      tried.push(backend);
+      return Promise.reject(refused);
+    },
+    () => {},
+  );
+  await assert.rejects(search, { code: 'csp-wasm' });
+  assert.deepEqual(tried, ['webgpu']);
 });

@@ -1,7 +1,7 @@
 /** Which back end draws: the first of an order that can. */
 
 import type { Backend } from './engine.js';
-import { messageOf, PhotoError } from './errors.js';
+import { messageOf, PhotoError, toPhotoError } from './errors.js';
 
 /** How people call the back ends. */
 export const BACKEND_TITLES: Readonly<Record<Backend, string>> = {
@@ -36,6 +36,8 @@ export async function firstWorking<T>(
       return { backend, value, reason: failures.join(' ') };
     } catch (thrown) {
       abandoned();
+      // Nor would any other be allowed to.
+      if (toPhotoError(thrown).code === 'csp-wasm') throw thrown;
       last = thrown;
       failures.push(`${BACKEND_TITLES[backend]}: ${sentence(messageOf(thrown))}`);
     }
