@@ -235,7 +235,8 @@ export function testsIn(browser, { backends, missing, screenshots, namesGpus }) 
           const alert = /** @type {HTMLElement | null} */ (root?.querySelector('[role=alert]'));
           return alert && !alert.hidden ? alert.textContent : null;
         });
-        assert.equal(shown, error?.['message']);
+        // Below what visitors read.
+        assert.ok(shown?.endsWith(String(error?.['message'])), String(shown));
         // It loads what is right afterwards.
         await page.evaluate(`void (photo.src = '${SRC}')`);
         await happenedUntil(page, 'load');
@@ -251,7 +252,8 @@ export function testsIn(browser, { backends, missing, screenshots, namesGpus }) 
             const loads = Array.from({ length: count }, (_, i) => {
               const photo = document.createElement('relightable-photo');
               const light = lights[i % lights.length];
-              Object.assign(photo, { src: `${src}?${i}`, backend, light, loading: 'eager' });
+              const still = { loading: 'eager', paused: true };
+              Object.assign(photo, { src: `${src}?${i}`, backend, light, ...still });
               Object.assign(photo.style, { width: '64px', float: 'left' });
               const load = new Promise((resolve, reject) => {
                 photo.addEventListener('load', resolve);
