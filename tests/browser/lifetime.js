@@ -33,7 +33,7 @@ describe('an element', () => {
     const page = await openPage(t, '/bench');
     await mount(page, { src: '/faults/slow', backend: 'cpu' });
     await happenedUntil(page, 'progress');
-    await page.getByRole('progressbar', { name: 'Loading the photograph' }).waitFor();
+    await page.getByRole('progressbar', { name: 'Loading the picture' }).waitFor();
     const progress = (await loaded(page)).filter((event) => event.type === 'progress');
     assert.ok(progress.length > 2, `${progress.length} events`);
     const sizes = progress.map((event) => Number(event['loaded']));
@@ -198,10 +198,11 @@ describe('an element', () => {
     await page.waitForFunction(() =>
       document.querySelector('relightable-photo')?.shadowRoot?.querySelector('[role=presentation]'),
     );
-    // What takes the keyboard is no decoration.
+    // What takes the keyboard is no decoration, but a part of its own.
     await page.evaluate("photo.light = 'torch'");
-    await page.getByRole('img').waitFor();
+    await page.getByRole('slider').waitFor();
+    assert.equal(await page.getByRole('img').count(), 0);
     await page.evaluate("photo.light = 'flood'");
-    await page.getByRole('img').waitFor({ state: 'detached' });
+    await page.getByRole('slider').waitFor({ state: 'hidden' });
   });
 });

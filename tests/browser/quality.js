@@ -68,6 +68,12 @@ function move(page, until, busy = '0') {
   })()`);
 }
 
+/** Waits for a photograph, and forgets what was drawn of it while it came. @param {import('playwright-core').Page} page */
+async function ready(page) {
+  await loaded(page);
+  await page.evaluate('void (happened.splice(0), globalThis.relit?.splice(0))');
+}
+
 /** What is on the canvas, without asking for it to be drawn. @param {import('playwright-core').Page} page */
 async function shown(page) {
   const url = String(
@@ -88,7 +94,7 @@ describe('a picture that moves', () => {
   test('is drawn by less where workers are slow, and in full once it rests', async (t) => {
     const page = await openPage(t, '/bench', { before: slowed });
     await mount(page, { ...GLASS, backend: 'cpu' });
-    await loaded(page);
+    await ready(page);
     assert.equal(await page.evaluate('photo.detail'), 1);
     await page.evaluate(`slow = ${SLOW_MS}`);
     await move(page, 'photo.detail === 0.25');
@@ -108,7 +114,7 @@ describe('a picture that moves', () => {
   test('is softer, but the same, and given in full to whoever asks', async (t) => {
     const page = await openPage(t, '/bench', { before: slowed });
     await mount(page, { ...GLASS, backend: 'cpu' });
-    await loaded(page);
+    await ready(page);
     await page.evaluate(`fakeClock(), slow = ${SLOW_MS}`);
     await move(page, 'photo.detail === 0.25');
     await page.evaluate(() => {
@@ -140,7 +146,7 @@ describe('a picture that moves', () => {
   test('has its detail back while it moves, once there is time', async (t) => {
     const page = await openPage(t, '/bench', { before: slowed });
     await mount(page, { ...GLASS, backend: 'cpu' });
-    await loaded(page);
+    await ready(page);
     await page.evaluate(`fakeClock(), slow = ${SLOW_MS}`);
     await move(page, 'photo.detail === 0.25');
     await page.evaluate('slow = 0');
@@ -151,7 +157,7 @@ describe('a picture that moves', () => {
   test('is drawn by less where the browser’s own frames are late', async (t) => {
     const page = await openPage(t, '/bench', { before: slowed });
     await mount(page, { ...GLASS, backend: 'webgl2' });
-    await loaded(page);
+    await ready(page);
     await page.evaluate('fakeClock()');
     await move(page, 'photo.detail === 0.25', `${SLOW_MS} * photo.detail`);
     await page.waitForFunction('photo.detail === 1');
@@ -163,7 +169,7 @@ describe('a picture that moves', () => {
   test('is left in full detail on a page that is slow by itself', async (t) => {
     const page = await openPage(t, '/bench', { before: slowed });
     await mount(page, { ...GLASS, backend: 'webgl2' });
-    await loaded(page);
+    await ready(page);
     await page.evaluate('fakeClock()');
     const tried = "happened.filter(({ type }) => type === 'qualitychange').length === 2";
     await move(page, `${tried} && (globalThis.after ??= step + 50) < step`, String(SLOW_MS));
