@@ -79,7 +79,7 @@ impl Graphics {
     pub fn lost(&self) -> Option<Promise> {
         match &self.0 {
             #[cfg(feature = "webgpu")]
-            Kind::WebGpu(device) => device.lost(),
+            Kind::WebGpu(device) => Some(device.lost()),
             #[cfg(feature = "webgl2")]
             Kind::WebGl2(_) => None,
         }

@@ -1,4 +1,4 @@
-//! Relighting by WebGL2, through web-sys: a tenth of the size of wgpu's own WebGL.
+//! Relighting by WebGL2, through web-sys.
 
 mod context;
 mod pictures;

@@ -2,11 +2,11 @@
 
 use std::rc::Rc;
 
-use js_sys::{Promise, Reflect};
-use wasm_bindgen::{JsCast, JsValue};
-use wgpu::util::is_browser_webgpu_supported;
+use js_sys::Promise;
+use wasm_bindgen::JsValue;
 
-use super::device::{API, Device};
+use super::device::Device;
+use super::gpu::{API, Canvas};
 use super::scene::Scene;
 use crate::relight::Gamut;
 use crate::relight::backend::{Backend, BackendError, Frame};
@@ -15,21 +15,12 @@ use crate::transport::{Extent, Transport};
 impl Device {
     /// A device that draws into canvases.
     pub async fn for_canvases() -> Result<Self, BackendError> {
-        if !is_browser_webgpu_supported().await {
-            return Err(BackendError::Missing(API));
-        }
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
-            backends: wgpu::Backends::BROWSER_WEBGPU,
-            ..wgpu::InstanceDescriptor::new_without_display_handle()
-        });
-        // The browser's preferred 8-bit format. Not an sRGB one: the shader encodes.
-        Self::of(instance, preferred_format()).await
+        Self::of(Canvas::preferred_format()).await
     }
 
     /// Settles, with an object that has a `message`, when the device goes away.
-    pub fn lost(&self) -> Option<Promise> {
-        let lost = Reflect::get(self.device.as_webgpu()?, &"lost".into());
-        lost.ok()?.dyn_into().ok()
+    pub fn lost(&self) -> Promise {
+        self.gpu.lost()
     }
 }
 
@@ -37,7 +28,7 @@ impl Device {
 #[derive(Debug)]
 pub struct WebGpu {
     scene: Scene,
-    surface: wgpu::Surface<'static>,
+    canvas: Canvas,
     gamut: Gamut,
 }
 
@@ -53,37 +44,22 @@ impl WebGpu {
         let scene = Scene::new(device.clone(), transport).await?;
         let refused = |reason| BackendError::Canvas { api: API, reason };
         let configured = device.attempt(|| {
-            let target = wgpu::SurfaceTarget::Canvas(canvas.clone());
-            let surface = device.instance.create_surface(target);
-            let surface = surface.map_err(|e| refused(e.to_string()))?;
             let camera = transport.geometry.camera;
-            let configuration = |gamut| wgpu::SurfaceConfiguration {
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
-                format: device.format,
-                color_space: match gamut {
-                    Gamut::Srgb => wgpu::SurfaceColorSpace::Srgb,
-                    Gamut::DisplayP3 => wgpu::SurfaceColorSpace::DisplayP3,
-                },
-                width: camera.width,
-                height: camera.height,
-                present_mode: wgpu::PresentMode::Fifo,
-                desired_maximum_frame_latency: 1,
-                alpha_mode: wgpu::CompositeAlphaMode::Opaque,
-                view_formats: Vec::new(),
-            };
+            canvas.set_width(camera.width);
+            canvas.set_height(camera.height);
+            let canvas = Canvas::of(canvas).map_err(refused)?;
             // Whether the browser takes it shows at the first picture.
-            for gamut in [gamut, Gamut::Srgb] {
-                surface.configure(&device.device, &configuration(gamut));
-                if picture(&surface).is_ok() {
-                    return Ok((surface, gamut));
-                }
-            }
-            Err(refused("it takes no configuration".into()))
+            let show = |gamut| {
+                canvas.configure(&device.gpu, device.format, gamut)?;
+                canvas.view().map(|_| gamut)
+            };
+            let shown = show(gamut).or_else(|_| show(Gamut::Srgb));
+            shown.map(|gamut| (canvas, gamut)).map_err(refused)
         });
-        let (surface, gamut) = configured.await??;
+        let (canvas, gamut) = configured.await??;
         Ok(Self {
             scene,
-            surface,
+            canvas,
             gamut,
         })
     }
@@ -108,34 +84,10 @@ impl Backend for WebGpu {
 
     fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
         self.scene.device().check()?;
-        let target = picture(&self.surface).map_err(BackendError::Lost)?;
-        let view = target.texture.create_view(&Default::default());
-        self.scene.draw(frame, view);
-        self.scene.device().queue.present(target);
+        let lost = |reason| BackendError::Lost(format!("its canvas gives no picture: {reason}"));
+        let view = self.canvas.view().map_err(lost)?;
+        self.scene.draw(frame, &view);
         Ok(())
-    }
-}
-
-/// What the canvas shows next.
-fn picture(surface: &wgpu::Surface<'_>) -> Result<wgpu::SurfaceTexture, String> {
-    match surface.get_current_texture() {
-        wgpu::CurrentSurfaceTexture::Success(picture)
-        | wgpu::CurrentSurfaceTexture::Suboptimal(picture) => Ok(picture),
-        other => Err(format!("its canvas gives no picture: {other:?}")),
-    }
-}
-
-/// What canvases show without a conversion.
-fn preferred_format() -> wgpu::TextureFormat {
-    let navigator = Reflect::get(&js_sys::global(), &"navigator".into());
-    let gpu = navigator.and_then(|navigator| Reflect::get(&navigator, &"gpu".into()));
-    let format = gpu.and_then(|gpu| {
-        let ask = Reflect::get(&gpu, &"getPreferredCanvasFormat".into())?;
-        ask.dyn_into::<js_sys::Function>()?.call0(&gpu)
-    });
-    match format.ok().and_then(|format| format.as_string()).as_deref() {
-        Some("rgba8unorm") => wgpu::TextureFormat::Rgba8Unorm,
-        _ => wgpu::TextureFormat::Bgra8Unorm,
     }
 }
 
@@ -144,6 +96,7 @@ mod tests {
     use super::*;
     use crate::relight::{BuiltinLight, Display};
     use crate::transport::{Basis, Correspondence, Geometry, Tile, Window};
+    use wasm_bindgen::JsCast;
     use wasm_bindgen_futures::JsFuture;
     use wasm_bindgen_test::wasm_bindgen_test;
 
@@ -178,7 +131,7 @@ mod tests {
             detail: 1.0,
         };
         webgpu.render(&frame).unwrap();
-        let lost = device.lost().unwrap();
+        let lost = device.lost();
         device.destroy();
         // The browser tells in a task of its own.
         JsFuture::from(lost).await.unwrap();

@@ -1,8 +1,9 @@
-//! Relighting by WebGPU, through wgpu: the browser's, and the system's own graphics devices.
+//! Relighting by WebGPU: the browser's, and the system's own graphics devices.
 
 #[cfg(target_arch = "wasm32")]
 mod canvas;
 mod device;
+mod gpu;
 #[cfg(not(target_arch = "wasm32"))]
 mod offscreen;
 #[cfg(target_arch = "wasm32")]

@@ -3,7 +3,8 @@
 use std::rc::Rc;
 use std::time::Instant;
 
-use super::device::{API, Device};
+use super::device::Device;
+use super::gpu::{API, Gpu, Texture, TextureDescriptor, TextureFormat, usage};
 use super::scene::Scene;
 use crate::relight::Rgba8Picture;
 use crate::relight::backend::{BackendError, Frame};
@@ -12,16 +13,12 @@ use crate::transport::{Extent, Transport};
 impl Device {
     /// A device that draws into memory.
     pub async fn offscreen() -> Result<Self, BackendError> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
-            backends: wgpu::Backends::PRIMARY,
-            ..wgpu::InstanceDescriptor::new_without_display_handle()
-        });
-        Self::of(instance, wgpu::TextureFormat::Rgba8Unorm).await
+        Self::of(TextureFormat::Rgba8Unorm).await
     }
 
     /// Waits until all that was asked for is done.
     pub fn wait(&self) -> Result<(), BackendError> {
-        let done = self.device.poll(wgpu::PollType::wait_indefinitely());
+        let done = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
         done.map_err(|e| BackendError::Lost(e.to_string()))?;
         self.check()
     }
@@ -33,7 +30,7 @@ impl Device {
     pub fn copy_seconds(&self, bytes: u64) -> Result<f64, BackendError> {
         const COPIES: u32 = 8;
         let buffer = || {
-            self.device.create_buffer(&wgpu::BufferDescriptor {
+            self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("copying"),
                 size: bytes,
                 usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
@@ -44,11 +41,11 @@ impl Device {
         let mut best = f64::INFINITY;
         for _ in 0..5 {
             let start = Instant::now();
-            let mut encoder = self.device.create_command_encoder(&Default::default());
+            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
             for _ in 0..COPIES {
                 encoder.copy_buffer_to_buffer(&buffers[0], 0, &buffers[1], 0, bytes);
             }
-            self.queue.submit([encoder.finish()]);
+            self.gpu.queue.submit([encoder.finish()]);
             self.wait()?;
             best = best.min(start.elapsed().as_secs_f64() / f64::from(COPIES));
         }
@@ -61,7 +58,7 @@ impl Device {
 pub struct Offscreen {
     scene: Scene,
     extent: Extent,
-    picture: wgpu::Texture,
+    picture: Texture,
 }
 
 impl Offscreen {
@@ -70,19 +67,12 @@ impl Offscreen {
         let scene = Scene::new(device.clone(), transport).await?;
         let extent = transport.geometry.camera;
         let picture = device.attempt(|| {
-            device.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("picture"),
-                size: wgpu::Extent3d {
-                    width: extent.width,
-                    height: extent.height,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
+            device.gpu.texture(&TextureDescriptor {
+                label: "picture",
+                extent,
+                layers: None,
                 format: device.format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
+                usage: usage::RENDER_ATTACHMENT | usage::COPY_SRC,
             })
         });
         let picture = picture.await?;
@@ -96,14 +86,14 @@ impl Offscreen {
     /// Asks for a picture; [`Device::wait`] tells when it is drawn.
     pub fn draw(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
         self.scene.device().check()?;
-        let view = self.picture.create_view(&Default::default());
-        self.scene.draw(frame, view);
+        self.scene.draw(frame, &self.picture.view);
         Ok(())
     }
 
     /// The picture that was drawn last.
     pub fn read(&self) -> Result<Rgba8Picture, BackendError> {
-        let Device { device, queue, .. } = self.scene.device();
+        let Gpu { device, queue, .. } = &self.scene.device().gpu;
+        let picture = &self.picture.texture;
         let Extent { width, height } = self.extent;
         // Rows begin where copies may.
         let stride = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
@@ -115,7 +105,7 @@ impl Offscreen {
         });
         let mut encoder = device.create_command_encoder(&Default::default());
         encoder.copy_texture_to_buffer(
-            self.picture.as_image_copy(),
+            picture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
                 buffer: &buffer,
                 layout: wgpu::TexelCopyBufferLayout {
@@ -124,7 +114,7 @@ impl Offscreen {
                     rows_per_image: None,
                 },
             },
-            self.picture.size(),
+            picture.size(),
         );
         queue.submit([encoder.finish()]);
         let refused = |reason: String| BackendError::Device { api: API, reason };
