@@ -1,6 +1,5 @@
 //! Reading without I/O: bytes in, tiles out.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::codec::{PartError, basis, direct, zeros};
@@ -69,14 +68,21 @@ struct Opened {
     /// Slots of the window in the order of direct scans.
     order: Vec<u16>,
     tiles: Vec<Coming>,
-    /// Parts that have come, `[scan, basis and tiles]`.
-    parts: Vec<bool>,
+    /// `[scan, basis and tiles]`.
+    parts: Vec<Received>,
     /// How many of each scan have not.
     missing: Vec<usize>,
-    /// Parts of which some bytes have come.
-    partial: BTreeMap<PartNumber, Vec<u8>>,
-    /// Chunks that wait for those of earlier scans.
-    early: BTreeMap<PartNumber, Vec<u8>>,
+}
+
+/// What has come of a part.
+#[derive(Clone, Debug)]
+enum Received {
+    /// Its first bytes, or none.
+    Some(Vec<u8>),
+    /// All, which wait for earlier scans of the tile.
+    Early(Vec<u8>),
+    /// All that there is, and it is decoded.
+    Whole,
 }
 
 /// A tile on its way.
@@ -245,15 +251,13 @@ impl Opened {
             tiles: (0..tiles)
                 .map(|_| Coming::Numbers(TileNumbers::default()))
                 .collect(),
-            parts: vec![true; scans * (tiles + 1)],
+            parts: vec![Received::Whole; scans * (tiles + 1)],
             missing: vec![0; scans],
-            partial: BTreeMap::new(),
-            early: BTreeMap::new(),
             head,
         };
         for part in opened.head.parts() {
             let at = opened.head.index(part);
-            opened.parts[at] = false;
+            opened.parts[at] = Received::Some(Vec::new());
             opened.missing[part.scan] += 1;
         }
         // Tiles that are all dark are whole from the beginning.
@@ -263,8 +267,12 @@ impl Opened {
         Ok(opened)
     }
 
-    fn has(&self, part: PartNumber) -> bool {
-        self.parts[self.head.index(part)]
+    /// How many of a part's first bytes have come; none if all have.
+    fn some(&self, part: PartNumber) -> Option<usize> {
+        match &self.parts[self.head.index(part)] {
+            Received::Some(bytes) => Some(bytes.len()),
+            Received::Early(_) | Received::Whole => None,
+        }
     }
 
     /// Scans that are there for every tile.
@@ -289,13 +297,11 @@ impl Opened {
             let chunks = tiles.iter().map(|&tile| Some(tile));
             for tile in std::iter::once(None).chain(chunks) {
                 let part = PartNumber { scan, tile };
-                if self.has(part) {
+                let Some(some) = self.some(part) else {
                     continue;
-                }
+                };
                 let mut range = self.head.range(part);
-                if let Some(bytes) = self.partial.get(&part) {
-                    range.start += bytes.len() as u64;
-                }
+                range.start += some as u64;
                 match ranges.last_mut() {
                     Some(last) if last.end == range.start => last.end = range.end,
                     _ => ranges.push(range),
@@ -324,16 +330,14 @@ impl Opened {
             let range = self.head.range(part);
             let here = bytes.len().min((range.end - offset) as usize); // a part is below 4 GiB
             let (now, later) = bytes.split_at(here);
-            if !self.has(part) {
-                new += self.feed_part(part, range, offset, now)?;
-            }
+            new += self.feed_part(part, range, offset, now)?;
             offset += here as u64;
             bytes = later;
         }
         Ok(new)
     }
 
-    /// Takes some bytes of one part.
+    /// Takes some bytes of one part; how many of them were new.
     fn feed_part(
         &mut self,
         part: PartNumber,
@@ -341,14 +345,17 @@ impl Opened {
         offset: u64,
         bytes: &[u8],
     ) -> Result<u64, FormatError> {
+        let index = self.head.index(part);
+        let Received::Some(partial) = &mut self.parts[index] else {
+            return Ok(0);
+        };
         let length = (range.end - range.start) as usize;
         if bytes.len() == length {
-            self.partial.remove(&part);
+            *partial = Vec::new();
             self.take(part, bytes)?;
             return Ok(length as u64);
         }
         let at = (offset - range.start) as usize;
-        let partial = self.partial.entry(part).or_default();
         if at > partial.len() {
             return Err(FormatError::Offset {
                 got: offset,
@@ -358,9 +365,8 @@ impl Opened {
         let fresh = bytes.get(partial.len() - at..).unwrap_or_default();
         partial.extend_from_slice(fresh);
         let new = fresh.len() as u64;
-        if partial.len() == length
-            && let Some(whole) = self.partial.remove(&part)
-        {
+        if partial.len() == length {
+            let whole = std::mem::take(partial);
             self.take(part, &whole)?;
         }
         Ok(new)
@@ -370,7 +376,7 @@ impl Opened {
     fn take(&mut self, part: PartNumber, bytes: &[u8]) -> Result<(), FormatError> {
         self.head.check_crc(part, bytes)?;
         let at = self.head.index(part);
-        self.parts[at] = true;
+        self.parts[at] = Received::Whole;
         self.missing[part.scan] -= 1;
         let Some(tile) = part.tile else {
             let functions = self.head.functions(part.scan);
@@ -386,7 +392,7 @@ impl Opened {
                 self.pass_over(tile)
             }
             _ => {
-                self.early.insert(part, bytes.to_vec());
+                self.parts[at] = Received::Early(bytes.to_vec());
                 Ok(())
             }
         }
@@ -403,11 +409,15 @@ impl Opened {
             };
             if self.head.entry(part.scan, tile).bytes == 0 {
                 numbers.scans += 1;
-            } else if let Some(bytes) = self.early.remove(&part) {
-                self.add(tile, &bytes)?;
-            } else {
-                break;
+                continue;
             }
+            let at = self.head.index(part);
+            let Received::Early(bytes) = &mut self.parts[at] else {
+                break;
+            };
+            let bytes = std::mem::take(bytes);
+            self.parts[at] = Received::Whole;
+            self.add(tile, &bytes)?;
         }
         self.complete(tile)
     }
