@@ -83,7 +83,6 @@ pub trait Backend {
 
 /// Whether a graphics device of that name is a program that makes up for a missing one.
 pub fn names_software(device: &str) -> bool {
-    let name = device.to_lowercase();
     let known = [
         "swiftshader",
         "llvmpipe",
@@ -92,7 +91,12 @@ pub fn names_software(device: &str) -> bool {
         "basic render",
         "software",
     ];
-    known.iter().any(|part| name.contains(part))
+    // By bytes: a search in text takes more of a module than all else that is asked of devices.
+    let named = |part: &str| {
+        let mut windows = device.as_bytes().windows(part.len());
+        windows.any(|window| window.eq_ignore_ascii_case(part.as_bytes()))
+    };
+    known.into_iter().any(named)
 }
 
 /// Why a back end does not draw.
