@@ -42,12 +42,15 @@ fn translate(wgsl: &str, entry_point: &str, shader_stage: ShaderStage) -> String
     )
     .and_then(|mut writer| writer.write())
     .expect("naga translates the shader");
-    // The version has to stay the first line.
-    glsl.replacen(
-        '\n',
-        "\n// naga made this of relight.wgsl: change that one.\n",
-        1,
-    )
+    // The version has to stay the first line. Indentation would only make the module larger.
+    let mut lines = glsl
+        .lines()
+        .map(str::trim_start)
+        .filter(|line| !line.is_empty());
+    let version = lines.next().unwrap_or_default();
+    let note = "// naga made this of relight.wgsl: change that one.";
+    let lines = [version, note].into_iter().chain(lines);
+    lines.flat_map(|line| [line, "\n"]).collect()
 }
 
 #[test]

@@ -1,14 +1,9 @@
 //! The graphics device, and the programs that run on it.
 
 use super::gpu::{API, ComputePipeline, Gpu, RenderPipeline, TextureFormat};
+use super::shader::SHADER;
 use crate::relight::backend::{BackendError, names_software};
 use crate::relight::texture_layout::TextureLimits;
-
-/// The module; the first file is WebGL2's source as well.
-const SHADER: &str = concat!(
-    include_str!("../shaders/relight.wgsl"),
-    include_str!("../shaders/see.wgsl")
-);
 
 /// A device that any number of photographs share.
 #[derive(Debug)]

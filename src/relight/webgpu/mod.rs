@@ -9,6 +9,7 @@ mod offscreen;
 #[cfg(target_arch = "wasm32")]
 mod pictures;
 mod scene;
+mod shader;
 mod textures;
 
 #[cfg(target_arch = "wasm32")]

@@ -357,7 +357,8 @@ fn watch(device: &js::Device) -> Loss {
     let (note, lost) = (loss.clone(), device.lost());
     spawn_local(async move {
         if let Ok(told) = JsFuture::from(lost).await {
-            note.note(told.unchecked_into::<js::Told>().message());
+            let told: js::Told = told.unchecked_into();
+            note.note([told.reason().unwrap_or_default(), told.message()].join(" "));
         }
     });
     let note = loss.clone();

@@ -135,6 +135,8 @@ extern "C" {
     /// An error, or why a device was lost.
     pub type Told;
     #[wasm_bindgen(method, getter)]
+    pub fn reason(this: &Told) -> Option<String>;
+    #[wasm_bindgen(method, getter)]
     pub fn message(this: &Told) -> String;
 
     pub type ErrorEvent;
