@@ -4,6 +4,7 @@
 //! goes from place to place; its colour is that of a glowing body. Everything follows from the time
 //! alone, by hashes of lattice points. Lengths are in heights of the plane, upwards.
 
+use super::math;
 use crate::transport::Extent;
 
 /// Most rows in which heat is computed; between them it is interpolated.
@@ -76,7 +77,7 @@ fn sparks(extent: Extent, seconds: f64, elements: &mut [[f32; 4]]) {
         let lives = seconds / life + unit(0, 91);
         let (number, age) = (lives.floor(), lives - lives.floor());
         let n = number.rem_euclid(4_294_967_296.0) as u32;
-        let sway = (age * (2.0 + 3.0 * unit(n, 92)) + 6.0 * unit(n, 93)).sin();
+        let sway = math::sin(age * (2.0 + 3.0 * unit(n, 92)) + 6.0 * unit(n, 93));
         let u = width * (0.08 + 0.84 * unit(n, 94)) + size * 0.05 * sway;
         let v = size * (0.92 - (0.35 + 0.55 * unit(n, 95)) * age);
         // It glows up and cools.

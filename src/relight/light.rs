@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::resample::AreaMeans;
-use super::{Tint, fire};
+use super::{Tint, fire, math};
 use crate::transport::{Extent, Geometry, LightPx};
 
 /// Linear emission of every light element, 0 dark to 1 full brightness: R, G, B and an unused
@@ -289,7 +289,7 @@ fn check_values(values: &[f32], first: usize) -> Result<(), LightError> {
 fn rainbow(x: f64) -> [f32; 3] {
     let lobe = |centre: f64| {
         let d = ((x - centre).abs() / 0.36).min(1.0);
-        (0.5 + 0.5 * (std::f64::consts::PI * d).cos()) as f32
+        (0.5 + 0.5 * math::cos(std::f64::consts::PI * d)) as f32
     };
     // Violet is blue with a little red coming back.
     [lobe(0.12) + 0.35 * lobe(1.0), lobe(0.48), lobe(0.82)]

@@ -14,6 +14,7 @@ pub mod cpu;
 pub mod display;
 mod fire;
 mod light;
+mod math;
 mod picture;
 pub mod reference;
 mod resample;

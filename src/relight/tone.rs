@@ -2,13 +2,15 @@
 
 use std::sync::LazyLock;
 
+use super::math;
+
 /// sRGB transfer function (IEC 61966-2-1), linear to encoded, clamped to 0..=1.
 pub fn srgb_encode(linear: f64) -> f64 {
     let y = linear.clamp(0.0, 1.0);
     if y <= 0.003_130_8 {
         12.92 * y
     } else {
-        1.055 * y.powf(1.0 / 2.4) - 0.055
+        1.055 * math::pow(y, 1.0 / 2.4) - 0.055
     }
 }
 
@@ -17,7 +19,7 @@ pub fn srgb_decode(encoded: f64) -> f64 {
     if encoded <= 0.040_45 {
         encoded / 12.92
     } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
+        math::pow((encoded + 0.055) / 1.055, 2.4)
     }
 }
 

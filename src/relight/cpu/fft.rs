@@ -7,6 +7,7 @@
 use std::f64::consts::TAU;
 
 use super::lanes::{LANES, MOST_LINES, Vector};
+use crate::relight::math;
 
 /// One complex number of each transform of a line, as it lies in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -167,7 +168,7 @@ impl Fft {
             for p in 0..n / 4 {
                 let power = |k: usize| {
                     let angle = -TAU * (k * p) as f64 / n as f64;
-                    [angle.cos() as f32, angle.sin() as f32]
+                    [math::cos(angle) as f32, math::sin(angle) as f32]
                 };
                 twiddles.push([power(1), power(2), power(3)]);
             }
