@@ -179,7 +179,7 @@ const FAULTS = {
       })
       .end(
         '<!doctype html><html lang="en"><title>Strict</title>' +
-          '<link rel="icon" href="/icon.svg"><script src="/watch.js"></script>' +
+          '<link rel="icon" href="/site/icon.svg"><script src="/watch.js"></script>' +
           '<script type="module" src="/relightable-photo/relightable-photo.js"></script>',
       ),
   '/watch.js': (response) =>

@@ -240,7 +240,7 @@ describe('a light source', () => {
         const canvas = Object.assign(document.createElement('canvas'), { width: 9, height: 9 });
         canvas.getContext('2d')?.drawImage(image, 0, 0, 9, 9);
         /** @type {any} */ (globalThis).photo.lightSource = canvas;
-      }, `${otherOrigin}/icon.svg`);
+      }, `${otherOrigin}/site/icon.svg`);
       const error = (await happenedUntil(page, 'error')).find(({ type }) => type === 'error');
       assert.equal(error?.['code'], 'light-tainted');
       assert.ok(compare(await picture(page, { exposure: '1' }), want).worst <= 1);
@@ -404,7 +404,7 @@ describe('a light source', () => {
           const bitmap = await createImageBitmap(canvas);
           photo.lightSource = { image, canvas, bitmap }[kind];
         },
-        { address: `${otherOrigin}/icon.svg`, kind },
+        { address: `${otherOrigin}/site/icon.svg`, kind },
       );
       const error = (await happenedUntil(page, 'error')).find(({ type }) => type === 'error');
       assert.equal(error?.['code'], 'light-tainted');

@@ -45,7 +45,7 @@ function world() {
           signal.addEventListener('abort', () => log.push(`abort ${src}`));
           opens.set(src, {
             preview: (share) =>
-              onPreview({
+              onPreview?.({
                 share,
                 free: () => log.push(`free ${share} of ${src}`),
               } as unknown as Photograph),
@@ -546,6 +546,9 @@ test('a photograph of which parts are gone is fetched anew, and its picture stay
   await asked;
   // Not 'loading', which would take the picture away.
   assert.deepEqual(w.happened(), ['cpu draws flood', 'free cpu', 'free a.ltm']);
+  // Nor a coarser one.
+  await w.previewed('a.ltm', 0.5);
+  assert.equal(w.draws.length, 1);
   await w.opened('a.ltm');
   await w.drawn(1);
   frames[1]?.done();

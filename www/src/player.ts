@@ -66,7 +66,7 @@ export interface Ports<D extends Drawing> {
     credentials: RequestCredentials,
     signal: AbortSignal,
     onProgress: OnProgress,
-    onPreview: OnPreview,
+    onPreview: OnPreview | null,
   ): Promise<Photograph>;
   /**
    * Sets a back end up on a surface of its own; throws `backend-unavailable`, or `photo-lost`. Need not
@@ -437,6 +437,11 @@ export class Player<D extends Drawing> {
     const load = new AbortController();
     this.#load = load;
     const { signal } = load;
+    const onPreview: OnPreview = (preview) => {
+      // While the last one is on its way to the screen, none comes in its place.
+      if (signal.aborted || this.#search) preview.free();
+      else void this.#take(preview, previous, why);
+    };
     try {
       const photo = await this.#ports.open(
         src,
@@ -445,11 +450,8 @@ export class Player<D extends Drawing> {
         (loaded, total) => {
           if (!signal.aborted) this.#listener.progress(loaded, total);
         },
-        (preview) => {
-          // While the last one is on its way to the screen, none comes in its place.
-          if (signal.aborted || this.#search) preview.free();
-          else void this.#take(preview, previous, why);
-        },
+        // One that was fetched before is shown, and is finer than what comes first.
+        this.#fetches === 0 ? onPreview : null,
       );
       // Who draws the coarser one has all that this one needs as well, and nothing is asked for twice.
       while (this.#search && !signal.aborted) await this.#search.ended;
