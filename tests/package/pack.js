@@ -13,7 +13,9 @@ import { manifestOf, packed, REPOSITORY, run, unpacked } from './packed.js';
 
 /** Scripts that find each other by their names. */
 const SCRIPTS = [
-  ...['relightable-photo', 'relightable-photo-worker', 'relightable-photo-relighter'],
+  ...['', '-controls', '-words', '-worker', '-cpu', '-relighter'].map(
+    (part) => `relightable-photo${part}`,
+  ),
   ...['index', 'element', 'core'],
 ];
 const CORE_MODULES = ['decoder', 'cpu'];

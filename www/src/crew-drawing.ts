@@ -4,9 +4,8 @@ import type { CanvasSurface } from './canvas.js';
 import { blobOf } from './canvas.js';
 import type { Crew, Shift } from './crew.js';
 import type { CpuModule, DrawnPhoto, Gamut } from './engine.js';
-import { PhotoError } from './errors.js';
-import { letGo } from './hand.js';
-import { Lamp } from './lamp.js';
+import { hasCode, letGo, messageOf, PhotoError } from './errors.js';
+import type { Lamp } from './lamp.js';
 import type { LightSetting } from './lights.js';
 import type { Look } from './look.js';
 import type { Photograph } from './photograph.js';
@@ -26,6 +25,7 @@ export class CrewDrawing implements CanvasSurface {
   #freed = false;
 
   private constructor(
+    lamp: Lamp,
     module: CpuModule,
     photograph: Photograph,
     crew: Crew,
@@ -36,7 +36,7 @@ export class CrewDrawing implements CanvasSurface {
     this.canvas = context.canvas;
     this.kernel = kernel;
     this.gamut = gamut;
-    this.#lamp = new Lamp(module);
+    this.#lamp = lamp;
     this.#plane = photograph.plane(module);
     this.#photograph = photograph;
     this.#crew = crew;
@@ -45,6 +45,7 @@ export class CrewDrawing implements CanvasSurface {
 
   /** Rejects with `worker-unavailable` where there can be no workers; the photograph is whole then. */
   static async create(
+    lamp: Lamp,
     module: CpuModule,
     photograph: Photograph,
     crew: Crew,
@@ -62,7 +63,7 @@ export class CrewDrawing implements CanvasSurface {
     const kernel = await photograph.withCrew(crew, describe);
     // Browsers that know no other gamut say nothing of it.
     const gamut = context.getContextAttributes?.().colorSpace === wanted ? wanted : 'srgb';
-    return new CrewDrawing(module, photograph, crew, context, kernel, gamut);
+    return new CrewDrawing(lamp, module, photograph, crew, context, kernel, gamut);
   }
 
   async render(setting: LightSetting, look: Look, detail: number): Promise<Drawn> {
@@ -87,9 +88,9 @@ export class CrewDrawing implements CanvasSurface {
         return { asked, fault };
       });
     } catch (thrown) {
-      if (!(thrown instanceof PhotoError && thrown.code === 'worker-unavailable')) throw thrown;
+      if (!hasCode(thrown, 'worker-unavailable')) throw thrown;
       // Without workers this cannot draw, but a photograph that is fetched anew is drawn by the page.
-      throw new PhotoError('photo-lost', thrown.message, thrown);
+      throw new PhotoError('photo-lost', messageOf(thrown), thrown);
     }
   }
 

@@ -5,8 +5,8 @@
 
 import type { Showing, Task } from './crew-protocol.js';
 import type { Light } from './engine.js';
-import { PhotoError } from './errors.js';
-import { Hand, letGo, type Patience, type WorkerLike } from './hand.js';
+import { letGo, PhotoError } from './errors.js';
+import { Hand, type Patience, type WorkerLike } from './hand.js';
 import type { Head } from './photograph.js';
 import { allEnded } from './promises.js';
 

@@ -1,9 +1,11 @@
 import assert from 'node:assert/strict';
 import test, { type TestContext } from 'node:test';
 import type { CanvasSurface } from './canvas.js';
+import { cpuDrawer } from './cpu-drawing.js';
+import type { Crew } from './crew.js';
 import { crewOf, type FakeWorker, photoOf, settle } from './crew-fakes.js';
 import type { Devices } from './devices.js';
-import { drawer, type Load } from './drawings.js';
+import { drawer, type Load, TOOLS } from './drawings.js';
 import type { Backend } from './engine.js';
 import { PhotoError } from './errors.js';
 import { Photograph } from './photograph.js';
@@ -35,6 +37,9 @@ function fakeDocument(t: TestContext): void {
     for (const name of Object.keys(fakes)) Reflect.deleteProperty(globalThis, name);
   });
 }
+
+/** What draws on the CPU, by a crew. */
+const onCpu = (crew: Crew) => async () => cpuDrawer(crew, TOOLS);
 
 /** Any module, from anywhere. */
 const loading = (module: unknown) => (async () => module) as unknown as Load;
@@ -70,7 +75,7 @@ async function playing(t: TestContext, ask = async (_: Backend): Promise<void> =
   const player = new Player<CanvasSurface>(
     {
       open: async () => Photograph.decoded(photo),
-      draw: drawer(loading(module), crew, devicesThat(ask)),
+      draw: drawer(loading(module), onCpu(crew), devicesThat(ask)),
       nextFrame: (callback) => frames.push(callback),
       later: () => () => {},
       now: () => 0,
@@ -133,7 +138,7 @@ test('a photograph that the page draws for want of workers says why', async (t) 
   const { devicesThat } = fakeDevices(has);
   const draw = drawer(
     loading(module),
-    crew,
+    onCpu(crew),
     devicesThat(async () => {}),
   );
   const photograph = Photograph.decoded(photo);
@@ -214,7 +219,7 @@ test('a drawing that was freed draws nothing, and leaves tiles where they are', 
   const photograph = Photograph.decoded(photo);
   const drawing = await drawer(
     loading(module),
-    crew,
+    onCpu(crew),
     devicesThat(async () => {}),
   )('cpu', photograph, SETTINGS.wanted, () => {}, new AbortController().signal);
   for (const worker of workers) worker.slow = true;

@@ -1,13 +1,13 @@
 /** Who draws for an element: a back end in the page, or on the CPU the page's crew of workers. */
 
 import type { CanvasSurface } from './canvas.js';
+import type { DrawOnCpu } from './cpu-drawing.js';
 import { loadCpu } from './cpu-module.js';
-import { Crew } from './crew.js';
-import { CrewDrawing } from './crew-drawing.js';
-import { Devices, slowerThanCpu } from './devices.js';
+import { Devices, slowerThanCpu, unavailable } from './devices.js';
 import type { Backend, Modules } from './engine.js';
-import { PhotoError } from './errors.js';
-import { PageDrawing } from './page-drawing.js';
+import { messageOf } from './errors.js';
+import { Lamp } from './lamp.js';
+import type { Tools } from './page-drawing.js';
 import type { Photograph } from './photograph.js';
 import type { Wanted } from './player.js';
 import { CanvasDrawing } from './surface.js';
@@ -32,27 +32,14 @@ export type Draw = (
 export type Load = <B extends Backend>(backend: B) => Promise<Modules[B]>;
 
 /**
- * Draws by the modules that `load` gives, and on the CPU by a crew where it can have workers. A device
- * that cannot be had leaves tiles where they are, and keeps nobody from them while it is asked for.
+ * Draws by the modules that `load` gives, on the CPU as `cpu` does. A device that cannot be had leaves tiles
+ * where they are, and keeps nobody from them while it is asked for.
  */
-export function drawer(load: Load, crew: Crew, devices: Devices): Draw {
-  // What the page has once drawn on the CPU it may be drawing still, which keeps tiles from workers; and
-  // why it did.
-  const inPage = new WeakMap<Photograph, string>();
+export function drawer(load: Load, cpu: () => Promise<DrawOnCpu>, devices: Devices): Draw {
   return async (backend, photograph, { gamut, software }, lost, signal) => {
     if (backend === 'cpu') {
-      const module = await load('cpu');
-      try {
-        if (!inPage.has(photograph)) {
-          return await CrewDrawing.create(module, photograph, crew, gamut);
-        }
-      } catch (thrown) {
-        // Without workers the page does it.
-        if (!(thrown instanceof PhotoError && thrown.code === 'worker-unavailable')) throw thrown;
-        inPage.set(photograph, `The page relights without workers: ${thrown.message}`);
-      }
-      const flaw = inPage.get(photograph) ?? '';
-      return await PageDrawing.create(module, photograph, gamut, flaw, signal);
+      const [module, drawOnCpu] = await Promise.all([load('cpu'), cpu()]);
+      return await drawOnCpu(module, photograph, gamut, signal);
     }
     const lease = await devices.lease(load, backend, lost);
     const { graphics } = lease;
@@ -66,7 +53,7 @@ export function drawer(load: Load, crew: Crew, devices: Devices): Draw {
           const relighter = await graphics.draw(photo, canvas, gamut);
           const plane = photograph.plane(module);
           const drawing = new CanvasDrawing(module, plane, relighter, canvas, { lease });
-          idle(() => load('cpu').catch(() => {}));
+          idle(() => Promise.allSettled([load('cpu'), cpu()]));
           return drawing;
         },
         { signal },
@@ -87,8 +74,29 @@ const load: Load = (name) => LOADERS[name]();
 
 const crewSize = Math.min(MOST_WORKERS, globalThis.navigator?.hardwareConcurrency ?? 1);
 
+export const TOOLS: Tools = {
+  newLamp: (module) => new Lamp(module),
+  newDrawing: (...parts) => new CanvasDrawing(...parts),
+};
+
+let drawOnCpu: Promise<DrawOnCpu> | null = null;
+
+/** The script that draws on the CPU, with the page's crew: fetched once, and again where it did not come. */
+function fetchCpu(): Promise<DrawOnCpu> {
+  drawOnCpu ??= import('./cpu-drawing.js').then(
+    ({ Crew, cpuDrawer }) => cpuDrawer(new Crew(startWorker, crewSize), TOOLS),
+    (cause) => {
+      drawOnCpu = null;
+      const remedy = "It has to lie beside the element's";
+      const what = `the script that draws could not be loaded (${messageOf(cause)})`;
+      throw unavailable(`${what}. ${remedy}`, cause);
+    },
+  );
+  return drawOnCpu;
+}
+
 /** Draws for the elements of this page. */
-export const draw = drawer(load, new Crew(startWorker, crewSize), new Devices());
+export const draw = drawer(load, fetchCpu, new Devices());
 
 /** Does something once the page has nothing else to do: what takes a device's place is there when it is lost. */
 function idle(work: () => unknown): void {

@@ -79,6 +79,16 @@ export function messageOf(thrown: unknown): string {
   return thrown instanceof Error ? thrown.message : String(thrown);
 }
 
+/** Whether that is what went wrong. Each script that is fetched apart has a `PhotoError` of its own. */
+export function hasCode(thrown: unknown, code: ErrorCode): boolean {
+  return thrown instanceof Error && (thrown as { code?: unknown }).code === code;
+}
+
+/** What becomes of what is asked for a photograph that nobody wants any more. */
+export function letGo(): PhotoError {
+  return new PhotoError('internal', 'The photograph was let go.');
+}
+
 /** Anything thrown as a `PhotoError`: those with a code keep it, others are faults of ours. */
 export function toPhotoError(thrown: unknown): PhotoError {
   if (thrown instanceof PhotoError) return thrown;

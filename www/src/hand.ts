@@ -1,7 +1,7 @@
 /** One worker that relights, seen from the page: what it is asked, and what it still owes. */
 
 import type { Answer, Request, Task } from './crew-protocol.js';
-import { PhotoError } from './errors.js';
+import { letGo, PhotoError } from './errors.js';
 
 /** What of a worker is used. */
 export type WorkerLike = Pick<Worker, 'terminate'> & {
@@ -27,11 +27,6 @@ interface Waiting {
   readonly photo: number;
   readonly resolve: (bytes: ArrayBuffer) => void;
   readonly reject: (error: PhotoError) => void;
-}
-
-/** What becomes of what is asked for a photograph that nobody wants any more. */
-export function letGo(): PhotoError {
-  return new PhotoError('internal', 'The photograph was let go.');
 }
 
 /** See the module. */

@@ -2,7 +2,7 @@
 
 import { sentence } from './backends.js';
 import type { PhotoDecoder } from './decoding.js';
-import { PhotoError, toPhotoError } from './errors.js';
+import { hasCode, PhotoError, toPhotoError } from './errors.js';
 import { nameOf, tooLong } from './http-errors.js';
 import type { Photograph } from './photograph.js';
 import { within } from './retry.js';
@@ -49,7 +49,7 @@ export async function openPhoto(
   try {
     return await open(url, signal, onProgress, onPreview, ports);
   } catch (thrown) {
-    if (!(thrown instanceof PhotoError && thrown.code === 'http-changed')) throw thrown;
+    if (!hasCode(thrown, 'http-changed')) throw thrown;
     // A cache may still have parts of the file that was.
     const anew: typeof fetch = (input, init) => ports.fetch(input, { ...init, cache: 'reload' });
     return await open(url, signal, onProgress, onPreview, { ...ports, fetch: anew });

@@ -6,8 +6,7 @@
 
 import type { Crew, Shift } from './crew.js';
 import type { DecodedPhoto, DrawingModule, DrawnPhoto, Freeable, Photo } from './engine.js';
-import { messageOf, PhotoError } from './errors.js';
-import { letGo } from './hand.js';
+import { letGo, messageOf, PhotoError } from './errors.js';
 import { allEnded } from './promises.js';
 
 /** Bytes of a tile that another module gave. */

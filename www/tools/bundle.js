@@ -21,6 +21,7 @@ const dist = join(repository, 'dist');
 
 /** What is fetched only where it is asked for lies beside the element, under names of its own. */
 const APART = new Map([
+  ['./cpu-drawing.js', './relightable-photo-cpu.js'],
   ['./toolbar.js', './relightable-photo-controls.js'],
   ['./translations.js', './relightable-photo-words.js'],
 ]);
@@ -78,6 +79,7 @@ await Promise.all([
     plugins: [styles, apart],
     entryPoints: {
       'relightable-photo': 'www/src/index.ts',
+      'relightable-photo-cpu': 'www/src/cpu-drawing.ts',
       'relightable-photo-controls': 'www/src/toolbar.ts',
       'relightable-photo-words': 'www/src/translations.ts',
     },

@@ -10,7 +10,7 @@ import { brotliCompressSync, constants } from 'node:zlib';
 
 const dist = join(import.meta.dirname, '..', '..', 'dist');
 
-/** What each module takes: its code in one of its builds, its script, and the worker that has it inside. */
+/** What each module takes: its code in one of its builds, and the scripts that go with it. */
 const MODULES = {
   decoder: {
     builds: ['wasm/decoder_bg.wasm', 'wasm/decoder_scalar_bg.wasm'],
@@ -18,7 +18,7 @@ const MODULES = {
   },
   cpu: {
     builds: ['wasm/cpu_bg.wasm', 'wasm/cpu_scalar_bg.wasm'],
-    scripts: ['wasm/cpu.js', 'relightable-photo-relighter.js'],
+    scripts: ['wasm/cpu.js', 'relightable-photo-cpu.js', 'relightable-photo-relighter.js'],
   },
   webgl2: { builds: ['wasm/webgl2_bg.wasm'], scripts: ['wasm/webgl2.js'] },
   webgpu: { builds: ['wasm/webgpu_bg.wasm'], scripts: ['wasm/webgpu.js'] },

@@ -1,0 +1,42 @@
+/**
+ * Drawing on the CPU: by the page's crew of workers, or by the page where it can have none. A script of its own,
+ * as most pages draw by a graphics device. It has copies of what it shares with the element's.
+ */
+
+import type { CanvasSurface } from './canvas.js';
+import type { Crew } from './crew.js';
+import { CrewDrawing } from './crew-drawing.js';
+import type { CpuModule, Gamut } from './engine.js';
+import { hasCode, messageOf } from './errors.js';
+import { PageDrawing, type Tools } from './page-drawing.js';
+import type { Photograph } from './photograph.js';
+
+export { Crew } from './crew.js';
+
+/** Sets drawing up on a canvas of its own. */
+export type DrawOnCpu = (
+  module: CpuModule,
+  photograph: Photograph,
+  gamut: Gamut,
+  signal: AbortSignal,
+) => Promise<CanvasSurface>;
+
+/** Draws by a crew where it can have workers. */
+export function cpuDrawer(crew: Crew, tools: Tools): DrawOnCpu {
+  // What the page has once drawn on the CPU it may be drawing still, which keeps tiles from workers; and
+  // why it did.
+  const inPage = new WeakMap<Photograph, string>();
+  return async (module, photograph, gamut, signal) => {
+    try {
+      if (!inPage.has(photograph)) {
+        return await CrewDrawing.create(tools.newLamp(module), module, photograph, crew, gamut);
+      }
+    } catch (thrown) {
+      // Without workers the page does it.
+      if (!hasCode(thrown, 'worker-unavailable')) throw thrown;
+      inPage.set(photograph, `The page relights without workers: ${messageOf(thrown)}`);
+    }
+    const flaw = inPage.get(photograph) ?? '';
+    return await PageDrawing.create(tools, module, photograph, gamut, flaw, signal);
+  };
+}
