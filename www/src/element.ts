@@ -20,17 +20,13 @@ import {
 import { Exhibit, type LightPose } from './exhibit.js';
 import { isFullscreen, toggleFullscreen } from './fullscreen.js';
 import { LightNews, type Shining } from './light-news.js';
-import {
-  checkLightSource,
-  isLightSource,
-  type LightPicture,
-  type LightSource,
-} from './light-source.js';
+import { checkLightSource, isLightSource, type LightSource } from './light-source.js';
 import type { Lighting } from './lighting.js';
 import type { Facts } from './photograph.js';
 import { Player } from './player.js';
 import { PORTS } from './ports.js';
 import { Presenter } from './presenter.js';
+import type { Projection } from './projection.js';
 import { ATTRIBUTES, PROPERTIES, type Reflected, reflect } from './reflect.js';
 import { BACKENDS, type LightName, type PicturePoint } from './settings.js';
 import { unwatch, watch } from './sight.js';
@@ -116,7 +112,7 @@ export class RelightablePhoto extends Base {
   #fetched: string | null | undefined;
   /** What the player was told last to draw, in words, and the picture that it is lit by. */
   #drawn: string | null = null;
-  #drawnBy: LightPicture | null = null;
+  #drawnBy: Projection | null = null;
   #reload = false;
   #scheduled = false;
   #listening: AbortController | null = null;
@@ -130,6 +126,7 @@ export class RelightablePhoto extends Base {
       this.#read(),
       {
         changed: () => this.#player.redraw(),
+        came: () => this.#schedule(),
         faultChanged: (fault) => this.#lightFaultChanged(fault),
       },
       browserColor,
@@ -320,6 +317,10 @@ export class RelightablePhoto extends Base {
       throw new RangeError(`scale must be more than 0 and at most ${MAX_SCALE}`);
     }
     this.#update();
+    if (this.#lighting.coming) {
+      await this.#lighting.coming;
+      this.#update();
+    }
     const drawing = await this.#player.renderNow();
     // The canvas of a GPU keeps its content only until the browser has shown it.
     if (scale === 1) return drawing.toBlob(type, quality);

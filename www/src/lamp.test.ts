@@ -5,6 +5,7 @@ import { PhotoError } from './errors.js';
 import { Lamp } from './lamp.js';
 import type { LightPicture, LinearLight } from './light-source.js';
 import type { LightSetting } from './lights.js';
+import { Projected } from './projected.js';
 
 const PHOTO = {} as DrawnPhoto;
 const GOOD: LinearLight = { data: new Float32Array(3), width: 1, height: 1 };
@@ -13,7 +14,7 @@ const BAD: LinearLight = { data: new Float32Array(1), width: 1, height: 1 };
 const setting = (picture: LightPicture | null): LightSetting => ({
   name: 'fire',
   torch: null,
-  picture,
+  picture: picture && new Projected(picture),
 });
 
 /** A lamp whose lights have names, and the names of those that are not freed. */

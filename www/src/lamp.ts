@@ -2,7 +2,7 @@
 
 import type { DrawingModule, DrawnPhoto, Freeable, Light } from './engine.js';
 import { type PhotoError, toPhotoError } from './errors.js';
-import { type BuiltinSetting, builtinLight, type LightSetting, pictureLight } from './lights.js';
+import { type BuiltinSetting, builtinLight, type LightSetting } from './lights.js';
 
 /** What a lamp was turned to. */
 export interface Lit {
@@ -35,7 +35,7 @@ export class Lamp implements Freeable {
     if (setting.picture) {
       let light: Light | null = null;
       try {
-        light = pictureLight(this.#module, photo, setting.picture);
+        light = setting.picture.light(this.#module, photo);
       } catch (thrown) {
         fault = toPhotoError(thrown);
       }

@@ -2,6 +2,8 @@
 
 import { messageOf, PhotoError } from './errors.js';
 import { isA, type LightPicture, type LightSource } from './light-source.js';
+import { Projected } from './projected.js';
+import type { Projection } from './projection.js';
 
 /** What is told of a source. */
 export interface SourceListener {
@@ -16,6 +18,7 @@ export class LightFollower {
   readonly source: LightSource;
   /** What is to be looked at: the source itself, or for a stream a video of it. */
   readonly picture: LightPicture;
+  readonly projection: Projection;
   readonly #listener: SourceListener;
   #following: AbortController | null = null;
   #fault: PhotoError | null = null;
@@ -25,6 +28,7 @@ export class LightFollower {
   constructor(source: LightSource, listener: SourceListener) {
     this.source = source;
     this.picture = isA('MediaStream', source) ? silentVideo() : source;
+    this.projection = new Projected(this.picture);
     this.#listener = listener;
     this.#seen = stateOf(this.picture);
   }

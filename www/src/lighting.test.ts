@@ -1,9 +1,12 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { AskedLight } from './asked.js';
+import type { PhotoError } from './errors.js';
 import { isFilm } from './light-media.js';
 import type { LinearLight } from './light-source.js';
+import * as sources from './light-sources.js';
 import { Lighting } from './lighting.js';
+import { UNSEEN } from './projection.js';
 
 const ASKED: AskedLight = {
   name: 'torch',
@@ -15,11 +18,19 @@ const ASKED: AskedLight = {
 const RED = { tint: [1, 0, 0], hex: '#ff0000' } as const;
 const SOURCE: LinearLight = { data: new Float32Array(3), width: 1, height: 1 };
 
-function lighting(asked = ASKED) {
-  const it = new Lighting({ changed: () => {}, faultChanged: () => {} });
+function lighting(asked = ASKED, fetch = async () => sources) {
+  const told: string[] = [];
+  const listener = {
+    changed: () => told.push('changed'),
+    came: () => told.push('came'),
+    faultChanged: (fault: PhotoError | null) => told.push(fault?.code ?? 'well'),
+  };
+  const it = new Lighting(listener, fetch);
   it.ask(asked, null);
-  return it;
+  return Object.assign(it, { told });
 }
+
+const settle = () => new Promise((resolve) => setImmediate(resolve));
 
 test('light is as the page asks, until somebody chooses, and again after that', () => {
   const it = lighting();
@@ -44,12 +55,17 @@ test('light is as the page asks, until somebody chooses, and again after that', 
   assert.equal(it.color, null);
 });
 
-test('a source stands in for built-in lights until one is chosen', () => {
+test('a source stands in for built-in lights until one is chosen', async () => {
   const it = lighting();
   assert.ok(it.holdsTorch && !it.items.includes('projection'));
   it.source = SOURCE;
   assert.deepEqual([it.item, it.items[0], it.holdsTorch], ['projection', 'projection', false]);
-  assert.equal(it.setting.picture, SOURCE);
+  // What follows it is on its way, and the light is as it was until then.
+  assert.equal(it.setting.picture, UNSEEN);
+  await settle();
+  assert.deepEqual(it.told, ['came']);
+  assert.ok(it.setting.picture && it.setting.picture !== UNSEEN);
+  assert.equal(it.shining, SOURCE);
   it.item = 'flood';
   assert.deepEqual([it.setting.picture, it.item], [null, 'flood']);
   it.item = 'projection';
@@ -60,6 +76,31 @@ test('a source stands in for built-in lights until one is chosen', () => {
   assert.equal(it.shining, SOURCE);
   it.source = null;
   assert.equal(it.item, 'spectrum');
+});
+
+test('what follows sources is fetched for none but them, once, and again where it did not come', async () => {
+  let fetched = 0;
+  let offline = true;
+  const it = lighting(ASKED, async () => {
+    fetched += 1;
+    if (offline) throw new Error('offline');
+    return sources;
+  });
+  await settle();
+  assert.equal(fetched, 0);
+  it.source = SOURCE;
+  await settle();
+  it.choose({});
+  await settle();
+  assert.deepEqual([it.told, fetched], [['light-source'], 1]);
+  assert.match(it.fault?.message ?? '', /offline.*beside the element's/);
+  assert.equal(it.setting.picture, UNSEEN, 'the last light stays');
+  it.source = null;
+  assert.equal(it.fault, null);
+  offline = false;
+  it.source = SOURCE;
+  await settle();
+  assert.deepEqual([it.told.at(-1), fetched, it.fault], ['came', 2, null]);
 });
 
 test('fire burns where it shines', () => {

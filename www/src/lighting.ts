@@ -4,11 +4,13 @@
  */
 
 import type { AskedLight } from './asked.js';
-import type { PhotoError } from './errors.js';
-import { LightFollower } from './light-follower.js';
-import { type CrossOrigin, LightMedia } from './light-media.js';
+import { messageOf, PhotoError } from './errors.js';
+import type { LightFollower } from './light-follower.js';
+import type { CrossOrigin, LightMedia } from './light-media.js';
 import type { LightSource } from './light-source.js';
+import type * as Sources from './light-sources.js';
 import type { LightSetting } from './lights.js';
+import { UNSEEN } from './projection.js';
 import { clampToPicture, LIGHTS, type LightName, type PicturePoint } from './settings.js';
 import type { LightColor } from './tint.js';
 
@@ -25,11 +27,16 @@ export interface LightChoice {
 export interface LightingListener {
   /** What a source shows is another. */
   changed(): void;
+  /** A source is followed from now on, which took until now. */
+  came(): void;
   faultChanged(fault: PhotoError | null): void;
 }
 
 /** One of the lights that there are to choose from: what the page shines, or a built-in one. */
 export type LightItem = LightName | 'projection';
+
+/** The script that follows sources. Fetched where there is one. */
+const fetchSources = (): Promise<typeof Sources> => import('./light-sources.js');
 
 const PAGE: LightChoice = { name: null, torch: null, size: null, color: null };
 const NONE: AskedLight = { name: 'flood', src: null, place: null, size: null, color: null };
@@ -41,8 +48,16 @@ const FIRE_SLACK = 0.004;
 /** See the module. */
 export class Lighting {
   readonly #listener: LightingListener;
+  readonly #fetchSources: () => Promise<typeof Sources>;
+  /** Once it is there; `undefined` while nobody has asked for it, or it could not be had. */
+  #sources: typeof Sources | null | undefined;
+  /** Settles when it is, or is not. */
+  #coming: Promise<void> | null = null;
+  /** Why it could not. */
+  #missing: PhotoError | null = null;
   #asked: AskedLight = NONE;
   #choice: LightChoice = PAGE;
+  #crossOrigin: CrossOrigin = null;
   #media: LightMedia | null = null;
   #source: LightSource | null = null;
   #follower: LightFollower | null = null;
@@ -53,18 +68,17 @@ export class Lighting {
   #fireShown = 0;
   #fireDue = FIRE_PERIOD;
 
-  constructor(listener: LightingListener) {
+  constructor(listener: LightingListener, sources = fetchSources) {
     this.#listener = listener;
+    this.#fetchSources = sources;
   }
 
   /** Takes what the page asks for by attributes. */
   ask(asked: AskedLight, crossOrigin: CrossOrigin): void {
+    // One that could not be had is tried again where something else is asked.
+    if (asked.src !== this.#asked.src) this.#missing = null;
     this.#asked = asked;
-    const media = this.#media;
-    if (media?.address !== asked.src || media?.crossOrigin !== crossOrigin) {
-      media?.stop();
-      this.#media = asked.src === null ? null : new LightMedia(asked.src, crossOrigin);
-    }
+    this.#crossOrigin = crossOrigin;
     this.#update();
   }
 
@@ -74,13 +88,23 @@ export class Lighting {
   }
   set source(source: LightSource | null) {
     this.#source = source;
+    this.#missing = null;
     this.#choice = { ...this.#choice, name: null };
     this.#update();
   }
 
-  /** What shines in the built-in lights' place. */
+  /** What shines in the built-in lights' place; that of `light-src` once it is followed. */
   get shining(): LightSource | null {
-    return this.#follower?.source ?? null;
+    return this.#projects ? (this.#source ?? this.#media?.source ?? null) : null;
+  }
+
+  /** Whether a source is to shine, in the built-in lights' place. */
+  get #projects(): boolean {
+    return this.#choice.name === null && this.#hasSource;
+  }
+
+  get #hasSource(): boolean {
+    return this.#source !== null || this.#asked.src !== null;
   }
 
   /** The built-in light that shines, or that a source stands in for. */
@@ -118,11 +142,11 @@ export class Lighting {
 
   /** All that there are to choose from. */
   get items(): readonly LightItem[] {
-    return this.#source || this.#media ? ['projection', ...LIGHTS] : LIGHTS;
+    return this.#hasSource ? ['projection', ...LIGHTS] : LIGHTS;
   }
 
   get item(): LightItem {
-    return this.#follower ? 'projection' : this.name;
+    return this.#projects ? 'projection' : this.name;
   }
   set item(item: LightItem) {
     this.choose({ name: item === 'projection' ? null : item });
@@ -130,12 +154,12 @@ export class Lighting {
 
   /** Whether a torch can be taken along. */
   get holdsTorch(): boolean {
-    return this.#follower === null && this.name === 'torch';
+    return !this.#projects && this.name === 'torch';
   }
 
   /** Whether fire burns. */
   get burns(): boolean {
-    return this.#follower === null && this.name === 'fire';
+    return !this.#projects && this.name === 'fire';
   }
 
   /** Whether something shines that can play: fire, or the page's own film. */
@@ -155,7 +179,7 @@ export class Lighting {
   get setting(): LightSetting {
     const { name, size } = this;
     const torch = name === 'torch' ? this.torch : null;
-    const picture = this.#follower?.picture ?? null;
+    const picture = this.#projects ? (this.#follower?.projection ?? UNSEEN) : null;
     return {
       name,
       torch,
@@ -165,9 +189,14 @@ export class Lighting {
     };
   }
 
+  /** Settles once sources are followed, or cannot be; `null` where nothing is waited for. */
+  get coming(): Promise<void> | null {
+    return this.#sources === null ? this.#coming : null;
+  }
+
   /** Why nothing is to be seen of a source. */
   get fault(): PhotoError | null {
-    return this.#follower?.fault ?? null;
+    return this.#follower?.fault ?? (this.#projects ? this.#missing : null);
   }
 
   /** Keeps up with sources while anyone looks. `plays`: whether films may. */
@@ -178,12 +207,37 @@ export class Lighting {
   }
 
   #update(): void {
-    const source = this.#choice.name === null ? (this.#source ?? this.#media?.source) : null;
-    if ((source ?? null) !== this.shining) {
+    const sources = this.#sources;
+    if (this.#hasSource && sources === undefined && !this.#missing) this.#coming = this.#fetch();
+    const { src } = this.#asked;
+    const media = this.#media;
+    if (media && (media.address !== src || media.crossOrigin !== this.#crossOrigin)) {
+      media.stop();
+      this.#media = null;
+    }
+    if (sources && src !== null) this.#media ??= new sources.LightMedia(src, this.#crossOrigin);
+    const source = this.shining;
+    if (source !== (this.#follower?.source ?? null) || !sources) {
       this.#follower?.stop();
-      this.#follower = source ? new LightFollower(source, this.#listener) : null;
+      this.#follower = source && sources ? new sources.LightFollower(source, this.#listener) : null;
     }
     this.#attend();
+  }
+
+  async #fetch(): Promise<void> {
+    this.#sources = null;
+    try {
+      this.#sources = await this.#fetchSources();
+      this.#update();
+      this.#listener.came();
+    } catch (cause) {
+      this.#sources = undefined;
+      const message =
+        `The script that lights by pictures could not be loaded (${messageOf(cause)}). It has to lie ` +
+        "beside the element's.";
+      this.#missing = new PhotoError('light-source', message, cause);
+      if (this.#projects) this.#listener.faultChanged(this.#missing);
+    }
   }
 
   #attend(): void {

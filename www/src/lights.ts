@@ -1,8 +1,7 @@
 /** What shines on a photograph. */
 
 import type { DrawingModule, DrawnPhoto, Light } from './engine.js';
-import { pixelsOf } from './light-pixels.js';
-import { isLinear, type LightPicture } from './light-source.js';
+import type { Projection } from './projection.js';
 import { CENTRE, type LightName, type PicturePoint } from './settings.js';
 
 /** A built-in light; a torch may have been moved to a point of the picture. */
@@ -17,7 +16,7 @@ export interface BuiltinSetting {
 
 /** That, or in its place a picture, as soon as there is something of it to be seen. */
 export interface LightSetting extends BuiltinSetting {
-  readonly picture: LightPicture | null;
+  readonly picture: Projection | null;
 }
 
 type LightMaker = Pick<DrawingModule, 'Light'>;
@@ -34,20 +33,4 @@ export function builtinLight(
     return Light.torch(photo, x, y, size);
   }
   return Light.builtin(photo, name);
-}
-
-/**
- * What a picture shows now as light in the module; `null` while there is nothing of it to be seen. Throws
- * `light-…` where it cannot be light.
- */
-export function pictureLight(
-  { Light }: LightMaker,
-  photo: DrawnPhoto,
-  picture: LightPicture,
-): Light | null {
-  if (isLinear(picture)) {
-    return Light.fromLinear(photo, picture.data, picture.width, picture.height);
-  }
-  const pixels = pixelsOf(picture);
-  return pixels && Light.fromSrgb(photo, pixels.data, pixels.width, pixels.height);
 }

@@ -2,9 +2,9 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { Backend } from './engine.js';
 import { PhotoError } from './errors.js';
-import type { LightPicture } from './light-source.js';
 import type { Photograph } from './photograph.js';
 import { type Drawing, Player, type Settings } from './player.js';
+import type { Projection } from './projection.js';
 import { exposed, wanting } from './settings-fakes.js';
 
 const SETTINGS: Settings = {
@@ -515,7 +515,7 @@ test('a picture at which a loss is found is drawn by what comes in its place', a
 test('what was wrong with another light than there is now is not told', async () => {
   const w = await loadedWorld();
   const frames = w.slowDown();
-  const picture = {} as LightPicture;
+  const picture = {} as Projection;
   w.player.set({ ...SETTINGS, light: { ...SETTINGS.light, picture } });
   await w.frame();
   w.player.set(SETTINGS);

@@ -5,11 +5,10 @@ import type { Lease } from './devices.js';
 import type { DrawingModule, DrawnPhoto, Gamut, Relighter } from './engine.js';
 import { toPhotoError } from './errors.js';
 import { Lamp } from './lamp.js';
-import { sizeOf } from './light-pixels.js';
-import { isLive, type LightPicture } from './light-source.js';
 import type { LightSetting } from './lights.js';
 import { type Look, makeDisplay } from './look.js';
 import type { Drawn } from './player.js';
+import type { Projection } from './projection.js';
 
 /** See the module. */
 export class CanvasDrawing implements CanvasSurface {
@@ -76,11 +75,11 @@ export class CanvasDrawing implements CanvasSurface {
   }
 
   /** Whether the device takes a picture as it is, which spares it a way through the page's memory. */
-  #takes(picture: LightPicture | null): boolean {
-    const size = picture && isLive(picture) && sizeOf(picture);
-    if (!size || size.width === 0 || size.height === 0) return false;
+  #takes(projection: Projection | null): boolean {
+    const live = projection?.live();
+    if (!live) return false;
     try {
-      return this.#relighter.takePicture(picture, size.width, size.height);
+      return this.#relighter.takePicture(live.picture, live.width, live.height);
     } catch {
       // Reading it tells what is wrong.
       return false;

@@ -22,6 +22,7 @@ const dist = join(repository, 'dist');
 /** What is fetched only where it is asked for lies beside the element, under names of its own. */
 const APART = new Map([
   ['./cpu-drawing.js', './relightable-photo-cpu.js'],
+  ['./light-sources.js', './relightable-photo-sources.js'],
   ['./toolbar.js', './relightable-photo-controls.js'],
   ['./translations.js', './relightable-photo-words.js'],
 ]);
@@ -80,6 +81,7 @@ await Promise.all([
     entryPoints: {
       'relightable-photo': 'www/src/index.ts',
       'relightable-photo-cpu': 'www/src/cpu-drawing.ts',
+      'relightable-photo-sources': 'www/src/light-sources.ts',
       'relightable-photo-controls': 'www/src/toolbar.ts',
       'relightable-photo-words': 'www/src/translations.ts',
     },
