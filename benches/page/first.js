@@ -1,0 +1,131 @@
+/**
+ * How soon a photograph is there: node first.js PHOTOS REPORT.json, with the folder of the demo's photographs.
+ * Over a line of 10 Mbit/s and 50 ms, with scripts and modules in the browser's cache, of which the server is
+ * asked each time whether they are still the same. The photograph is not in it. Times are from the navigation,
+ * and from `src` on a page that has relit a photograph before: to the first relit picture, which may be coarse,
+ * and to the whole photograph. The peer is a PNG of one picture of it, by the same line: navigation to its
+ * `load`.
+ */
+
+import { statSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { launchChromium } from '../../www/tools/chromium.js';
+import { listen } from '../../www/tools/serve.js';
+import { site } from '../../www/tools/site.js';
+import { slowLine } from './line.js';
+
+const LINE = { bytesPerSecond: 10e6 / 8, latencyMs: 50 };
+const TURNS = 5;
+
+const [photos = '', report = ''] = process.argv.slice(2);
+const GLASS = 'stained-glass';
+
+const PAGES = {
+  '/photo': `<relightable-photo src="/photos/${GLASS}.ltm?TURN" loading="eager"></relightable-photo>
+    <script type="module" src="/relightable-photo/relightable-photo.js"></script>`,
+  '/picture': `<img id="picture" src="/photos/${GLASS}-flood.png?TURN" alt="">`,
+};
+
+const serveSite = site({ photos });
+const server = await listen((request, response) => {
+  const { pathname, search } = new URL(request.url ?? '', 'http://localhost');
+  const body = /** @type {Record<string, string>} */ (PAGES)[pathname];
+  if (body === undefined) serveSite(request, response);
+  else {
+    response.writeHead(200, { 'Content-Type': 'text/html' });
+    response.end(
+      `<!doctype html><html lang="en"><title>First</title>${body.replace('TURN', search.slice(1))}`,
+    );
+  }
+}, 0);
+const line = await slowLine(Number(new URL(server.url).port), LINE);
+const browser = await launchChromium();
+
+/** In the page: when there is a picture, and when all of it is there. */
+const watch = () => {
+  const times = /** @type {any} */ ({ began: 0 });
+  Object.assign(globalThis, { times });
+  times.shown = new Promise((resolve) => {
+    const look = () => {
+      const photo = /** @type {any} */ (document.querySelector('relightable-photo'));
+      if (photo?.detail && !(times.old === photo.src)) resolve(performance.now() - times.began);
+      else requestAnimationFrame(look);
+    };
+    look();
+  });
+  times.whole = new Promise((resolve) => {
+    document.addEventListener('load', () => resolve(performance.now() - times.began), true);
+  });
+};
+
+/** @param {number[]} values */
+const median = (values) => values.toSorted((a, b) => a - b)[values.length >> 1] ?? Number.NaN;
+
+/** @type {Record<string, number[]>} */
+const times = { navigation_first: [], navigation_whole: [], src_first: [], src_whole: [], png: [] };
+
+try {
+  const context = await browser.newContext();
+  // The first turn fills the caches.
+  for (let turn = 0; turn <= TURNS; turn += 1) {
+    const page = await context.newPage();
+    await page.addInitScript(watch);
+    await page.goto(`${line.origin}/photo?${turn}`);
+    const first = await page.evaluate('times.shown');
+    const whole = await page.evaluate('times.whole');
+    await page.evaluate(watch);
+    const later = await page.evaluate(async (src) => {
+      const { times } = /** @type {any} */ (globalThis);
+      const photo = /** @type {any} */ (document.querySelector('relightable-photo'));
+      times.began = performance.now();
+      photo.src = src;
+      return { first: await times.shown, whole: await times.whole };
+    }, `/photos/${GLASS}.ltm?later${turn}`);
+    await page.goto(`${line.origin}/picture?${turn}`, { waitUntil: 'load' });
+    const png = await page.evaluate(
+      () =>
+        /** @type {PerformanceNavigationTiming} */ (performance.getEntriesByType('navigation')[0])
+          .loadEventStart,
+    );
+    await page.close();
+    if (turn === 0) continue;
+    const all = {
+      navigation_first: Number(first),
+      navigation_whole: Number(whole),
+      src_first: Number(later.first),
+      src_whole: Number(later.whole),
+      png,
+    };
+    for (const [name, ms] of Object.entries(all)) times[name]?.push(ms);
+    console.error(
+      `${turn}: ${Object.entries(all)
+        .map(([name, ms]) => `${name} ${ms.toFixed(0)} ms`)
+        .join(', ')}`,
+    );
+  }
+} finally {
+  await browser.close();
+  line.close();
+  await server.close();
+}
+
+const ms = Object.fromEntries(Object.entries(times).map(([name, all]) => [name, median(all)]));
+const bytes = statSync(join(photos, `${GLASS}.ltm`)).size;
+const pngBytes = statSync(join(photos, `${GLASS}-flood.png`)).size;
+console.log(
+  `\n10 Mbit/s, 50 ms, scripts and modules cached; ${GLASS}.ltm of ${(bytes / 1e6).toFixed(2)} MB; medians of ${TURNS}\n\n` +
+    `first relit picture: ${ms['navigation_first']?.toFixed(0)} ms after navigation, ${ms['src_first']?.toFixed(0)} ms after src\n` +
+    `whole photograph:    ${ms['navigation_whole']?.toFixed(0)} ms after navigation, ${ms['src_whole']?.toFixed(0)} ms after src\n` +
+    `a PNG of it, ${(pngBytes / 1e6).toFixed(2)} MB:  ${ms['png']?.toFixed(0)} ms after navigation: ` +
+    `${((ms['png'] ?? 0) / (ms['navigation_first'] ?? 1)).toFixed(2)} times the first relit picture`,
+);
+if (report) {
+  const figures = {
+    first_picture_ms: ms['navigation_first'],
+    first_picture_after_src_ms: ms['src_first'],
+    whole_photograph_ms: ms['navigation_whole'],
+    png_vs_first_picture: (ms['png'] ?? 0) / (ms['navigation_first'] ?? 1),
+  };
+  writeFileSync(report, `${JSON.stringify({ figures }, null, 2)}\n`);
+  console.log(`\n${report}`);
+}
