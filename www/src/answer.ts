@@ -1,6 +1,6 @@
 /** What the head of a server's answer says of the file, with every way this can go wrong told apart. */
 
-import type { ByteRange } from './coalesce.js';
+import type { ByteRange } from './byte-range.js';
 import { badStatus, compressed, otherPart, webPage } from './http-errors.js';
 
 /** The head of an answer that brings bytes of the file. */

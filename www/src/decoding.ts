@@ -1,8 +1,8 @@
 /** Decoding on the page's own thread, in turns. */
 
+import type { ByteRange } from './byte-range.js';
 import type { Decoder, DecoderModule } from './engine.js';
 import { Photograph } from './photograph.js';
-import type { ByteRange } from './source.js';
 
 /** How far decoding has come, and what it wants. */
 export interface DecoderState {

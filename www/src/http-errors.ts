@@ -1,6 +1,6 @@
 /** What can go wrong with a file on its way, in words. */
 
-import type { ByteRange } from './coalesce.js';
+import type { ByteRange } from './byte-range.js';
 import { messageOf, PhotoError } from './errors.js';
 
 /** A failure that may pass when asked again. */

@@ -1,12 +1,13 @@
 /** From an address to a decoded photograph. */
 
 import { sentence } from './backends.js';
+import type { ByteRange } from './byte-range.js';
 import type { PhotoDecoder } from './decoding.js';
 import { hasCode, PhotoError, toPhotoError } from './errors.js';
 import { nameOf, tooLong } from './http-errors.js';
 import type { Photograph } from './photograph.js';
 import { within } from './retry.js';
-import { type ByteRange, HttpSource, type Piece, type SourceOptions } from './source.js';
+import { HttpSource, type Piece } from './source.js';
 
 /** Told how much of the file has been decoded; `total` is 0 until known. A file that is replaced
  * meanwhile counts anew. */
@@ -25,13 +26,8 @@ export interface LoadPorts {
   readonly pause: () => Promise<void>;
 }
 
-/** What every file begins with. The source asks for more along with it: of most files, the head. */
-const HEADER: ByteRange = { start: 0, end: 144 };
-/** Decoders take a range in order, and all of a file is wanted: what is left comes as one answer. */
-const IN_ORDER: Partial<SourceOptions> = {
-  concurrency: 1,
-  maxRangeBytes: Number.POSITIVE_INFINITY,
-};
+/** What decoders want first. Of most files the head is in it, and small ones are as a whole. */
+const FIRST: ByteRange = { start: 0, end: 1 << 14 };
 /** A coarser photograph is worth its trouble where more time than this has passed since the last. */
 const PREVIEW_MS = 400;
 
@@ -68,8 +64,8 @@ async function open(
   signal.throwIfAborted();
   signal.addEventListener('abort', stopToo);
   try {
-    const source = new HttpSource(url, { fetch: ports.fetch }, IN_ORDER);
-    const opening = source.read([HEADER], stop.signal);
+    const source = new HttpSource(url, { fetch: ports.fetch });
+    const opening = source.read(FIRST, stop.signal);
     // The decoder gets ready while the server thinks.
     const starting = ports.decoder();
     let taken = false;
@@ -114,11 +110,13 @@ async function* piecesOf(
     const { fileBytes: end, wants, bytesFed } = decoder.state;
     const { size } = source;
     if (end !== undefined && size !== undefined && size > end) throw tooLong(source.url, end, size);
-    if (wants.length === 0) return;
+    // Of a file that comes in order, all that is left.
+    const [next] = wants;
+    if (!next) return;
     // It would be asked for again and again.
     if (bytesFed === fed) throw new Error('the decoder wants what it has been fed');
     fed = bytesFed;
-    yield* source.read(wants, signal);
+    yield* source.read(next, signal);
   }
 }
 

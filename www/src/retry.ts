@@ -60,7 +60,7 @@ export function within<T>(
     signal.addEventListener('abort', onAbort);
     if (limit) timer = setTimeout(() => reject(limit.error()), limit.ms);
   });
-  return Promise.race([promise, cut]).finally(() => {
+  return Promise.race([cut, promise]).finally(() => {
     clearTimeout(timer);
     signal.removeEventListener('abort', onAbort);
   });
