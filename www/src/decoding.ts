@@ -4,15 +4,16 @@ import type { ByteRange } from './byte-range.js';
 import type { Decoder, DecoderModule } from './engine.js';
 import { Photograph } from './photograph.js';
 
-/** How far decoding has come, and what it wants. */
+/** How far decoding has come, and what is to be fed to it. */
 export interface DecoderState {
   /** Each byte counted once. */
   readonly bytesFed: number;
   readonly fileBytes: number | undefined;
   /** Scans that are there for every tile. */
   readonly scansDone: number;
-  /** The most important first; none once all has come. */
-  readonly wants: readonly ByteRange[];
+  /** What matters most of what is missing. Of a file that comes in order that is all that is left of it, or
+   * of its head. Undefined once all has come. */
+  readonly next: ByteRange | undefined;
 }
 
 /** Lets the page draw and take input. Throws once nobody waits for the photograph any more. */
@@ -83,13 +84,10 @@ export class LocalDecoder implements PhotoDecoder {
 
 /** What a decoder of the module says of itself. */
 export function stateOf(decoder: Decoder): DecoderState {
-  const bounds = decoder.wants();
-  const wants: ByteRange[] = [];
-  for (let i = 0; i + 1 < bounds.length; i += 2) {
-    wants.push({ start: bounds[i] as number, end: bounds[i + 1] as number });
-  }
+  const [start = 0, end] = decoder.wants();
+  const next = end === undefined ? undefined : { start, end };
   const { bytesFed, fileBytes, scansDone } = decoder;
-  return { bytesFed, fileBytes, scansDone, wants };
+  return { bytesFed, fileBytes, scansDone, next };
 }
 
 /** How much of a file has come, 0 to 1. */

@@ -68,23 +68,20 @@ async function open(
     const opening = source.read(FIRST, stop.signal);
     // The decoder gets ready while the server thinks.
     const starting = ports.decoder();
-    let taken = false;
     stop.signal.addEventListener('abort', () => {
-      // One that nobody waits for any more is let go when it comes.
-      if (!taken) starting.then((decoder) => decoder.free()).catch(() => {});
+      // What a worker is at need not be waited for. One that nobody waits for is let go when it comes.
+      starting.then((decoder) => decoder.free()).catch(() => {});
     });
     const [decoder, first] = await Promise.all([within(starting, stop.signal), opening.next()]);
-    signal.throwIfAborted();
-    taken = true;
     const pieces = piecesOf(first, opening, decoder, source, stop.signal);
     return await decode(decoder, pieces, signal, onProgress, onPreview, ports);
   } catch (thrown) {
-    // A transfer that nobody waits for any more is not left running.
-    stop.abort();
     signal.throwIfAborted();
     throw named(toPhotoError(thrown), url);
   } finally {
     signal.removeEventListener('abort', stopToo);
+    // Neither a transfer nor a decoder is left running.
+    stop.abort();
   }
 }
 
@@ -107,11 +104,9 @@ async function* piecesOf(
   yield* opening;
   let fed = -1;
   for (;;) {
-    const { fileBytes: end, wants, bytesFed } = decoder.state;
+    const { fileBytes: end, next, bytesFed } = decoder.state;
     const { size } = source;
     if (end !== undefined && size !== undefined && size > end) throw tooLong(source.url, end, size);
-    // Of a file that comes in order, all that is left.
-    const [next] = wants;
     if (!next) return;
     // It would be asked for again and again.
     if (bytesFed === fed) throw new Error('the decoder wants what it has been fed');
@@ -140,28 +135,21 @@ async function decode(
     await ports.pause();
     signal.throwIfAborted();
   };
-  // What a worker is at need not be waited for.
-  const stop = () => decoder.free();
-  signal.addEventListener('abort', stop);
-  try {
-    for await (const { offset, bytes } of pieces) {
-      await decoder.feed(offset, bytes, turn);
-      signal.throwIfAborted();
-      tell();
-      signal.throwIfAborted();
-      const preview = onPreview ? await previews.next() : null;
-      if (signal.aborted) preview?.free();
-      else if (preview) onPreview?.(preview);
-      signal.throwIfAborted();
-    }
-    const photo = await decoder.finish();
-    if (signal.aborted) photo.free();
+  for await (const { offset, bytes } of pieces) {
     signal.throwIfAborted();
-    return photo;
-  } finally {
-    signal.removeEventListener('abort', stop);
-    stop();
+    await decoder.feed(offset, bytes, turn);
+    signal.throwIfAborted();
+    tell();
+    signal.throwIfAborted();
+    const preview = onPreview ? await previews.next() : null;
+    if (signal.aborted) preview?.free();
+    else if (preview) onPreview?.(preview);
+    signal.throwIfAborted();
   }
+  const photo = await decoder.finish();
+  if (signal.aborted) photo.free();
+  signal.throwIfAborted();
+  return photo;
 }
 
 /** When a coarser photograph is made of what has come. */
@@ -182,8 +170,8 @@ class Previews {
    * twice as much, and none is made that the whole photograph would soon take the place of.
    */
   async next(): Promise<Photograph | null> {
-    const { scansDone, bytesFed, wants } = this.#decoder.state;
-    if (scansDone <= this.#scans || bytesFed < 2 * this.#bytes || wants.length === 0) return null;
+    const { scansDone, bytesFed, next } = this.#decoder.state;
+    if (scansDone <= this.#scans || bytesFed < 2 * this.#bytes || !next) return null;
     if (this.#now() - this.#at < PREVIEW_MS) return null;
     this.#scans = scansDone;
     this.#bytes = bytesFed;

@@ -1,6 +1,5 @@
 /** Waiting for a server, and when to ask it again. */
 
-import type { PhotoError } from './errors.js';
 import type { Passing } from './http-errors.js';
 
 const FIRST_PAUSE_MS = 250;
@@ -33,32 +32,25 @@ function retryAfterMs(header: string | null, now: number): number {
   return Number.isNaN(date) ? 0 : date - now;
 }
 
-/** Waits, until aborted at the longest. */
+/** Waits, and rejects with the signal's reason once aborted. */
 export function sleep(ms: number, signal: AbortSignal): Promise<void> {
-  return new Promise((resolve) => {
-    const end = () => {
-      clearTimeout(timer);
-      signal.removeEventListener('abort', end);
-      resolve();
-    };
-    const timer = setTimeout(end, ms);
-    signal.addEventListener('abort', end);
-  });
+  return within(new Promise(() => {}), signal, { ms, end: () => {} });
 }
 
-/** Waits for a promise no longer than the signal allows, and no longer than `limit` says. */
+/** Waits for a promise no longer than the signal allows, and no longer than `limit` says, whose `end`
+ * then takes the promise's place. Rejects with the signal's reason once aborted. */
 export function within<T>(
   promise: Promise<T>,
   signal: AbortSignal,
-  limit?: { readonly ms: number; readonly error: () => PhotoError },
+  limit?: { readonly ms: number; readonly end: () => T | Promise<T> },
 ): Promise<T> {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let onAbort = () => {};
-  const cut = new Promise<never>((_, reject) => {
+  const cut = new Promise<T>((resolve, reject) => {
     onAbort = () => reject(signal.reason);
     if (signal.aborted) onAbort();
     signal.addEventListener('abort', onAbort);
-    if (limit) timer = setTimeout(() => reject(limit.error()), limit.ms);
+    if (limit) timer = setTimeout(() => resolve(limit.end()), limit.ms);
   });
   return Promise.race([cut, promise]).finally(() => {
     clearTimeout(timer);

@@ -109,7 +109,7 @@ function sourceOf(url: string, ports: Partial<SourcePorts> = {}): Kit {
   const sleep = async (ms: number) => {
     pauses.push(ms);
   };
-  const source = new HttpSource(url, { sleep, random: () => 0.5, ...ports });
+  const source = new HttpSource(url, { fetch, sleep, random: () => 0.5, ...ports });
   return { source, pauses };
 }
 
@@ -758,7 +758,7 @@ test('the port’s own pause ends with the abort', async (t) => {
     response.writeHead(503, { 'retry-after': '20' }).end(),
   );
   const controller = new AbortController();
-  const source = new HttpSource(site.url);
+  const source = new HttpSource(site.url, { fetch });
   setTimeout(() => controller.abort(new Error('no longer wanted')), 50);
   await assert.rejects(drain(source, range(0, 10), controller.signal), /no longer wanted/);
   assert.equal(site.asked.length, 1);

@@ -28,8 +28,7 @@ export interface SourcePorts extends ChancePorts {
   readonly retries: number;
 }
 
-const DEFAULT_PORTS: SourcePorts = {
-  fetch: (input, init) => fetch(input, init),
+const DEFAULT_PORTS: Omit<SourcePorts, 'fetch'> = {
   sleep,
   random: Math.random,
   now: Date.now,
@@ -59,7 +58,7 @@ export class HttpSource {
   /** The one that is left, once the server has answered with the whole file. */
   #whole: Transfer | undefined;
 
-  constructor(url: string, ports: Partial<SourcePorts> = {}) {
+  constructor(url: string, ports: Pick<SourcePorts, 'fetch'> & Partial<SourcePorts>) {
     this.url = url;
     this.#ports = { ...DEFAULT_PORTS, ...ports };
   }
@@ -194,8 +193,8 @@ export class HttpSource {
     failure: (cause: unknown) => Passing,
   ): Promise<T> {
     const ms = this.#ports.stallMs;
-    const silence = () => errors.stalled(this.url, ms);
-    return within(promise, signal, { ms, error: silence }).catch((cause: unknown) => {
+    const end = () => Promise.reject(errors.stalled(this.url, ms));
+    return within(promise, signal, { ms, end }).catch((cause: unknown) => {
       signal.throwIfAborted();
       throw cause instanceof PhotoError ? cause : failure(cause);
     });

@@ -8,7 +8,7 @@ const stateAt = (bytesFed: number): DecoderState => ({
   bytesFed,
   fileBytes: 900,
   scansDone: 0,
-  wants: [],
+  next: undefined,
 });
 
 /** A worker that answers by a script. */

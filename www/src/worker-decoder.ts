@@ -39,7 +39,7 @@ interface Waiting {
 export class WorkerDecoder implements PhotoDecoder {
   readonly #worker: WorkerLike;
   readonly #patience: typeof PATIENCE;
-  #state: DecoderState = { bytesFed: 0, fileBytes: undefined, scansDone: 0, wants: [] };
+  #state: DecoderState = { bytesFed: 0, fileBytes: undefined, scansDone: 0, next: undefined };
   #waiting: Waiting | null = null;
   #failure: PhotoError | null = null;
   /** Since it last said something. */
