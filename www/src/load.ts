@@ -124,7 +124,7 @@ async function decode(
   ports: LoadPorts,
 ): Promise<Photograph> {
   let told = 0;
-  const previews = new Previews(decoder, ports.now);
+  const nextPreview = previewsOf(decoder, ports.now);
   const tell = () => {
     const { bytesFed, fileBytes } = decoder.state;
     if (bytesFed > told) onProgress(bytesFed, fileBytes ?? 0);
@@ -141,7 +141,7 @@ async function decode(
     signal.throwIfAborted();
     tell();
     signal.throwIfAborted();
-    const preview = onPreview ? await previews.next() : null;
+    const preview = onPreview ? await nextPreview() : null;
     if (signal.aborted) preview?.free();
     else if (preview) onPreview?.(preview);
     signal.throwIfAborted();
@@ -152,33 +152,25 @@ async function decode(
   return photo;
 }
 
-/** When a coarser photograph is made of what has come. */
-class Previews {
-  readonly #decoder: PhotoDecoder;
-  readonly #now: () => number;
-  #scans = 0;
-  #bytes = 0;
-  #at = Number.NEGATIVE_INFINITY;
-
-  constructor(decoder: PhotoDecoder, now: () => number) {
-    this.#decoder = decoder;
-    this.#now = now;
-  }
-
-  /**
-   * The first as soon as there is one. Each takes as long as decoding what has come, so that the next is of
-   * twice as much, and none is made that the whole photograph would soon take the place of.
-   */
-  async next(): Promise<Photograph | null> {
-    const { scansDone, bytesFed, next } = this.#decoder.state;
-    if (scansDone <= this.#scans || bytesFed < 2 * this.#bytes || !next) return null;
-    if (this.#now() - this.#at < PREVIEW_MS) return null;
-    this.#scans = scansDone;
-    this.#bytes = bytesFed;
-    const preview = await this.#decoder.preview();
-    this.#at = this.#now();
+/**
+ * Makes coarser photographs of what has come: the first as soon as there is one. Each takes as long as
+ * decoding what has come, so that the next is of twice as much, and none is made that the whole photograph
+ * would soon take the place of.
+ */
+function previewsOf(decoder: PhotoDecoder, now: () => number): () => Promise<Photograph | null> {
+  let scans = 0;
+  let bytes = 0;
+  let at = Number.NEGATIVE_INFINITY;
+  return async () => {
+    const { scansDone, bytesFed, next } = decoder.state;
+    if (scansDone <= scans || bytesFed < 2 * bytes || !next) return null;
+    if (now() - at < PREVIEW_MS) return null;
+    scans = scansDone;
+    bytes = bytesFed;
+    const preview = await decoder.preview();
+    at = now();
     return preview;
-  }
+  };
 }
 
 /** A `PhotoError` for an element without an address. */

@@ -46,13 +46,13 @@ export function within<T>(
 ): Promise<T> {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let onAbort = () => {};
-  const cut = new Promise<T>((resolve, reject) => {
+  return new Promise<T>((resolve, reject) => {
     onAbort = () => reject(signal.reason);
     if (signal.aborted) onAbort();
     signal.addEventListener('abort', onAbort);
     if (limit) timer = setTimeout(() => resolve(limit.end()), limit.ms);
-  });
-  return Promise.race([cut, promise]).finally(() => {
+    promise.then(resolve, reject);
+  }).finally(() => {
     clearTimeout(timer);
     signal.removeEventListener('abort', onAbort);
   });
