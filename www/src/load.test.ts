@@ -417,6 +417,24 @@ test('a decoder that is never content ends in an error', async (t) => {
   assert.equal(site.asked.length, 2);
 });
 
+test('of several ranges that a decoder wants the first is asked for, then what it wants by then', async (t) => {
+  class InThree extends FakeDecoder {
+    override wants(): Float64Array {
+      const { bytesFed: at } = this;
+      const marks = [FIRST_BYTES, 50_000, 300_000, FILE_BYTES].filter((mark) => mark > at);
+      return Float64Array.from(
+        marks.flatMap((mark, i) => [i === 0 ? at : (marks[i - 1] ?? 0), mark]),
+      );
+    }
+  }
+  const file = fileOf();
+  const site = await serve(t, (request, response) => send(request, response, file));
+  const decoder = async () => new LocalDecoder({ Decoder: InThree }, () => 0);
+  await opened(site.url, { decoder });
+  assert.deepEqual(site.asked, ['0-16383', '16384-49999', '50000-299999', '300000-799999']);
+  assert.ok(FakeDecoder.fed.equals(file));
+});
+
 test('coarser photographs come while the file does, each of twice as much, and not one after the other', async (t) => {
   const file = fileOf();
   const site = await serve(t, (request, response) => send(request, response, file));
