@@ -7,7 +7,7 @@ import { type Backend, type Gamut, LIGHTS, type LightName, type ToneCurve } from
 export { LIGHTS, type LightName } from './names.js';
 
 /** The back ends, the fastest first: the order in which they are tried. */
-export const BACKENDS: readonly Backend[] = ['webgpu', 'webgl2', 'cpu'];
+export const BACKENDS: readonly [Backend, ...Backend[]] = ['webgpu', 'webgl2', 'cpu'];
 
 /** A position on the picture: 0, 0 is the top left corner and 1, 1 the bottom right. */
 export interface PicturePoint {
@@ -18,7 +18,6 @@ export interface PicturePoint {
 /** The middle of the picture. */
 export const CENTRE: PicturePoint = { x: 0.5, y: 0.5 };
 
-const DEFAULT_LIGHT: LightName = 'flood';
 const DEFAULT_EXPOSURE = 1;
 const TONES = ['clip', 'filmic'] as const;
 const GAMUTS = ['srgb', 'display-p3'] as const;
@@ -45,31 +44,14 @@ export type Reveal = (typeof REVEALS)[number];
 
 /** The `light` attribute; flood where there is none. */
 export function parseLight(value: string | null): LightName {
-  const name = value?.trim() || DEFAULT_LIGHT;
-  const known = LIGHTS.find((light) => light === name);
-  if (known) return known;
-  throw new PhotoError(
-    'attribute',
-    `There is no light named “${name}”. Known lights: ${LIGHTS.join(', ')}.`,
-  );
+  return oneOf(value, LIGHTS, 'light');
 }
 
 /** The `backend` attribute, a list in order of preference; `null` where there is none. */
 export function parseBackends(value: string | null): readonly Backend[] | null {
   const names = value?.split(/[\s,]+/).filter(Boolean) ?? [];
   if (names.length === 0) return null;
-  const order = new Set<Backend>();
-  for (const name of names) {
-    const known = BACKENDS.find((backend) => backend === name);
-    if (!known) {
-      throw new PhotoError(
-        'attribute',
-        `There is no back end named “${name}”. Known back ends: ${BACKENDS.join(', ')}.`,
-      );
-    }
-    order.add(known);
-  }
-  return [...order];
+  return [...new Set(names.map((name) => oneOf(name, BACKENDS, 'back end')))];
 }
 
 /** The `exposure` attribute, a factor on the light's brightness; 1 where there is none. */
@@ -179,7 +161,7 @@ export function parseAddress(value: string | null, name: string, base: string): 
 /** One of some names, the first where there is none. */
 function oneOf<N extends string>(
   value: string | null,
-  names: readonly [N, ...N[]],
+  names: readonly [N, ...(readonly N[])],
   what: string,
 ): N {
   const name = value?.trim() || names[0];

@@ -41,3 +41,14 @@ function difference(to: number, from: number, round: number): number {
   const turned = (((to - from) % round) + round) % round;
   return turned > round / 2 ? turned - round : turned;
 }
+
+/** Tells where the light is each time that the device is held in another way. */
+export function followTilt(tell: (point: PicturePoint) => void, signal: AbortSignal): void {
+  const tilt = new Tilt();
+  const turn = ({ beta, gamma }: DeviceOrientationEvent) => {
+    // Machines on a table have none.
+    if (beta === null || gamma === null) return;
+    tell(tilt.turn({ beta, gamma }, screen.orientation?.angle ?? 0));
+  };
+  if (!signal.aborted) addEventListener('deviceorientation', turn, { signal });
+}

@@ -1,7 +1,6 @@
 /** A device's tilt, where there is such a thing and the visitor allows it. */
 
 import type { PicturePoint } from './settings.js';
-import { Tilt } from './tilt.js';
 
 /** Some browsers ask the visitor. */
 type Asking = { requestPermission?: () => Promise<string> };
@@ -36,16 +35,16 @@ export class Tilting {
       return false;
     }
     this.stop();
-    this.#listening = new AbortController();
-    const tilt = new Tilt();
-    const { signal } = this.#listening;
-    const turn = ({ beta, gamma }: DeviceOrientationEvent) => {
-      // Machines on a table have none.
-      if (beta === null || gamma === null) return;
-      this.#tell(tilt.turn({ beta, gamma }, screen.orientation?.angle ?? 0));
-    };
-    addEventListener('deviceorientation', turn, { signal });
-    return true;
+    const listening = new AbortController();
+    this.#listening = listening;
+    try {
+      // A script of its own, and after the question: browsers let it be asked by a press only.
+      const { followTilt } = await import('./tilt.js');
+      followTilt(this.#tell, listening.signal);
+    } catch {
+      if (this.#listening === listening) this.stop();
+    }
+    return !listening.signal.aborted;
   }
 
   stop(): void {

@@ -20,11 +20,12 @@ export type ReadColor = (css: string) => readonly number[] | null;
 export function parseColor(value: string | null, read: ReadColor): LightColor | null {
   const css = value?.trim();
   if (!css) return null;
-  const [red = 0, green = 0, blue = 0, alpha = 255] = read(css) ?? [];
-  if (!read(css)) {
+  const seen = read(css);
+  if (!seen) {
     const message = `The light color “${css}” is no CSS colour; “white” tints nothing.`;
     throw new PhotoError('attribute', message);
   }
+  const [red = 0, green = 0, blue = 0, alpha = 255] = seen;
   const share = alpha / 255;
   const codes = alpha < 255 ? [red, green, blue, alpha] : [red, green, blue];
   return {

@@ -23,6 +23,7 @@ const dist = join(repository, 'dist');
 const APART = new Map([
   ['./cpu-drawing.js', './relightable-photo-cpu.js'],
   ['./light-sources.js', './relightable-photo-sources.js'],
+  ['./tilt.js', './relightable-photo-tilt.js'],
   ['./toolbar.js', './relightable-photo-controls.js'],
   ['./translations.js', './relightable-photo-words.js'],
 ]);
@@ -82,6 +83,7 @@ await Promise.all([
       'relightable-photo': 'www/src/index.ts',
       'relightable-photo-cpu': 'www/src/cpu-drawing.ts',
       'relightable-photo-sources': 'www/src/light-sources.ts',
+      'relightable-photo-tilt': 'www/src/tilt.ts',
       'relightable-photo-controls': 'www/src/toolbar.ts',
       'relightable-photo-words': 'www/src/translations.ts',
     },
