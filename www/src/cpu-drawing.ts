@@ -21,12 +21,19 @@ export type DrawOnCpu = (
   signal: AbortSignal,
 ) => Promise<CanvasSurface>;
 
+/** What draws on the CPU. */
+export interface CpuDrawer {
+  readonly draw: DrawOnCpu;
+  /** Has what draws get ready, and stay so until what it gives is called. */
+  prepare(): () => void;
+}
+
 /** Draws by a crew where it can have workers. */
-export function cpuDrawer(crew: Crew, tools: Tools): DrawOnCpu {
+export function cpuDrawer(crew: Crew, tools: Tools): CpuDrawer {
   // What the page has once drawn on the CPU it may be drawing still, which keeps tiles from workers; and
   // why it did.
   const inPage = new WeakMap<Photograph, string>();
-  return async (module, photograph, gamut, signal) => {
+  const draw: DrawOnCpu = async (module, photograph, gamut, signal) => {
     try {
       if (!inPage.has(photograph)) {
         return await CrewDrawing.create(tools.newLamp(module), module, photograph, crew, gamut);
@@ -39,4 +46,5 @@ export function cpuDrawer(crew: Crew, tools: Tools): DrawOnCpu {
     const flaw = inPage.get(photograph) ?? '';
     return await PageDrawing.create(tools, module, photograph, gamut, flaw, signal);
   };
+  return { draw, prepare: () => crew.gather() };
 }

@@ -75,6 +75,17 @@ export class Crew {
     }
   }
 
+  /** Has workers start before there is work for them. They stay until what it gives is called, and for work. */
+  gather(): () => void {
+    this.#shifts += 1;
+    try {
+      this.#pick(this.#size);
+    } catch {
+      // Told to who has work.
+    }
+    return () => this.#leave([]);
+  }
+
   /** Workers for so many shares: those with the least to do, and new ones before any has two. */
   #pick(count: number): Hand[] {
     const picked: Hand[] = [];

@@ -75,7 +75,8 @@ async function playing(t: TestContext, ask = async (_: Backend): Promise<void> =
   const player = new Player<CanvasSurface>(
     {
       open: async () => Photograph.decoded(photo),
-      draw: drawer(loading(module), onCpu(crew), devicesThat(ask)),
+      prepare: () => {},
+      draw: drawer(loading(module), onCpu(crew), devicesThat(ask)).draw,
       nextFrame: (callback) => frames.push(callback),
       later: () => () => {},
       now: () => 0,
@@ -136,7 +137,7 @@ test('a photograph that the page draws for want of workers says why', async (t) 
   const { crew } = crewOf(2, (worker) => worker.die());
   const { photo, has, module } = photoOf(4);
   const { devicesThat } = fakeDevices(has);
-  const draw = drawer(
+  const { draw } = drawer(
     loading(module),
     onCpu(crew),
     devicesThat(async () => {}),
@@ -221,7 +222,7 @@ test('a drawing that was freed draws nothing, and leaves tiles where they are', 
     loading(module),
     onCpu(crew),
     devicesThat(async () => {}),
-  )('cpu', photograph, SETTINGS.wanted, () => {}, new AbortController().signal);
+  ).draw('cpu', photograph, SETTINGS.wanted, () => {}, new AbortController().signal);
   for (const worker of workers) worker.slow = true;
   const frame = assert.rejects(Promise.resolve(drawing.render(SETTINGS.light, PLAIN, 1)), {
     code: 'internal',

@@ -1,7 +1,7 @@
 /** Who draws for an element: a back end in the page, or on the CPU the page's crew of workers. */
 
 import type { CanvasSurface } from './canvas.js';
-import type { DrawOnCpu } from './cpu-drawing.js';
+import type { CpuDrawer } from './cpu-drawing.js';
 import { loadCpu } from './cpu-module.js';
 import { Devices, slowerThanCpu, unavailable } from './devices.js';
 import type { Backend, Modules } from './engine.js';
@@ -28,18 +28,30 @@ export type Draw = (
   signal: AbortSignal,
 ) => Promise<CanvasSurface>;
 
+/**
+ * Has the first back end of an order that works get ready, which takes a while, and stay so until `over` is
+ * aborted. What goes wrong is told to who draws.
+ */
+export type Prepare = (wanted: Wanted, over: AbortSignal) => Promise<void>;
+
 /** Gives the modules that draw. */
 export type Load = <B extends Backend>(backend: B) => Promise<Modules[B]>;
+
+/** What draws. */
+export interface Drawer {
+  readonly draw: Draw;
+  readonly prepare: Prepare;
+}
 
 /**
  * Draws by the modules that `load` gives, on the CPU as `cpu` does. A device that cannot be had leaves tiles
  * where they are, and keeps nobody from them while it is asked for.
  */
-export function drawer(load: Load, cpu: () => Promise<DrawOnCpu>, devices: Devices): Draw {
-  return async (backend, photograph, { gamut, software }, lost, signal) => {
+export function drawer(load: Load, cpu: () => Promise<CpuDrawer>, devices: Devices): Drawer {
+  const draw: Draw = async (backend, photograph, { gamut, software }, lost, signal) => {
     if (backend === 'cpu') {
-      const [module, drawOnCpu] = await Promise.all([load('cpu'), cpu()]);
-      return await drawOnCpu(module, photograph, gamut, signal);
+      const [module, drawer] = await Promise.all([load('cpu'), cpu()]);
+      return await drawer.draw(module, photograph, gamut, signal);
     }
     const lease = await devices.lease(load, backend, lost);
     const { graphics } = lease;
@@ -63,6 +75,29 @@ export function drawer(load: Load, cpu: () => Promise<DrawOnCpu>, devices: Devic
       throw thrown;
     }
   };
+  const prepare: Prepare = async ({ backends, software }, over) => {
+    const hold = (letGo: () => void): void => {
+      if (over.aborted) letGo();
+      else over.addEventListener('abort', letGo);
+    };
+    for (const backend of backends) {
+      if (over.aborted) return;
+      try {
+        if (backend === 'cpu') {
+          const [, drawer] = await Promise.all([load(backend), cpu()]);
+          hold(drawer.prepare());
+          return;
+        }
+        const { graphics, release } = await devices.lease(load, backend, () => {});
+        // Also one that is passed over: it would be asked for again.
+        hold(release);
+        if (software || !graphics.software) return;
+      } catch {
+        // The next may work.
+      }
+    }
+  };
+  return { draw, prepare };
 }
 
 const LOADERS: { readonly [B in Backend]: () => Promise<Modules[B]> } = {
@@ -79,24 +114,24 @@ export const TOOLS: Tools = {
   newDrawing: (...parts) => new CanvasDrawing(...parts),
 };
 
-let drawOnCpu: Promise<DrawOnCpu> | null = null;
+let cpuDrawing: Promise<CpuDrawer> | null = null;
 
 /** The script that draws on the CPU, with the page's crew: fetched once, and again where it did not come. */
-function fetchCpu(): Promise<DrawOnCpu> {
-  drawOnCpu ??= import('./cpu-drawing.js').then(
+function fetchCpu(): Promise<CpuDrawer> {
+  cpuDrawing ??= import('./cpu-drawing.js').then(
     ({ Crew, cpuDrawer }) => cpuDrawer(new Crew(startWorker, crewSize), TOOLS),
     (cause) => {
-      drawOnCpu = null;
+      cpuDrawing = null;
       const remedy = "It has to lie beside the element's";
       const what = `the script that draws could not be loaded (${messageOf(cause)})`;
       throw unavailable(`${what}. ${remedy}`, cause);
     },
   );
-  return drawOnCpu;
+  return cpuDrawing;
 }
 
 /** Draws for the elements of this page. */
-export const draw = drawer(load, fetchCpu, new Devices());
+export const { draw, prepare } = drawer(load, fetchCpu, new Devices());
 
 /** Does something once the page has nothing else to do: what takes a device's place is there when it is lost. */
 function idle(work: () => unknown): void {

@@ -54,6 +54,7 @@ function world() {
             reject,
           });
         }),
+      prepare: () => {},
       draw: (backend, _photo, wanted, lost) =>
         new Promise((resolve, reject) => {
           const drawing: Drawing = {

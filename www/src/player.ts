@@ -68,6 +68,8 @@ export interface Ports<D extends Drawing> {
     onProgress: OnProgress,
     onPreview: OnPreview | null,
   ): Promise<Photograph>;
+  /** Has what is likely to draw get ready while a photograph comes, and stay so until `over` is aborted. */
+  prepare(wanted: Wanted, over: AbortSignal): void;
   /**
    * Sets a back end up on a surface of its own; throws `backend-unavailable`, or `photo-lost`. Need not
    * go on once `signal` is aborted.
@@ -437,6 +439,8 @@ export class Player<D extends Drawing> {
     const load = new AbortController();
     this.#load = load;
     const { signal } = load;
+    const drawn = new AbortController();
+    if (this.#settings) this.#ports.prepare(this.#settings.wanted, drawn.signal);
     const onPreview: OnPreview = (preview) => {
       // While the last one is on its way to the screen, none comes in its place.
       if (signal.aborted || this.#search) preview.free();
@@ -467,6 +471,7 @@ export class Player<D extends Drawing> {
       this.#fail(toPhotoError(thrown));
       return;
     } finally {
+      drawn.abort();
       if (this.#load === load) this.#load = null;
     }
   }

@@ -2,7 +2,7 @@
 
 import type { CanvasSurface } from './canvas.js';
 import { newDecoder } from './decoders.js';
-import { draw } from './drawings.js';
+import { draw, prepare } from './drawings.js';
 import { forbidden } from './http-errors.js';
 import { openPhoto } from './load.js';
 import type { Ports } from './player.js';
@@ -23,6 +23,7 @@ export const PORTS: Ports<CanvasSurface> = {
       now: () => performance.now(),
     }),
   draw,
+  prepare: (wanted, over) => void prepare(wanted, over),
   nextFrame: (callback) => requestAnimationFrame(callback),
   later: (ms, callback) => {
     const timer = setTimeout(callback, ms);

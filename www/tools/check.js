@@ -45,14 +45,14 @@ async function check() {
     if (message.type() === 'error') wrong.push(`the page complained: ${message.text()}`);
   });
   await page.goto(server.url);
-  // Either the picture or the reason why there is none.
+  // Either the whole picture or the reason why there is none.
   await page.waitForFunction(() => {
     const element = document.querySelector('relightable-photo');
     const alert = element?.shadowRoot?.querySelector('[role=alert]');
-    return element?.activeBackend || alert?.textContent;
+    return element?.detail === 1 || alert?.checkVisibility();
   });
-  const failure = await page.locator('relightable-photo').getByRole('alert').allTextContents();
-  if (failure.some(Boolean)) return [...wrong, ...failure];
+  const alert = page.locator('relightable-photo').first().getByRole('alert');
+  if (await alert.isVisible()) return [...wrong, await alert.innerText()];
   const backend = await page.evaluate(() => {
     const { activeBackend, kernel } = /** @type {any} */ (
       document.querySelector('relightable-photo')
