@@ -81,24 +81,6 @@ pub trait Backend {
     fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError>;
 }
 
-/// Whether a graphics device of that name is a program that makes up for a missing one.
-pub fn names_software(device: &str) -> bool {
-    let known = [
-        "swiftshader",
-        "llvmpipe",
-        "lavapipe",
-        "softpipe",
-        "basic render",
-        "software",
-    ];
-    // By bytes: a search in text takes more of a module than all else that is asked of devices.
-    let named = |part: &str| {
-        let mut windows = device.as_bytes().windows(part.len());
-        windows.any(|window| window.eq_ignore_ascii_case(part.as_bytes()))
-    };
-    known.into_iter().any(named)
-}
-
 /// Why a back end does not draw.
 #[derive(Debug, Error)]
 pub enum BackendError {

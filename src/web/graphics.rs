@@ -60,17 +60,6 @@ impl Graphics {
         }
     }
 
-    /// Whether it is a program that makes up for a missing graphics processor.
-    #[wasm_bindgen(getter)]
-    pub fn software(&self) -> bool {
-        match &self.0 {
-            #[cfg(feature = "webgpu")]
-            Kind::WebGpu(device) => device.is_software(),
-            #[cfg(feature = "webgl2")]
-            Kind::WebGl2(context) => context.is_software(),
-        }
-    }
-
     /// Settles when a WebGPU device goes away, after which nothing can be drawn.
     #[wasm_bindgen(
         getter,

@@ -13,7 +13,7 @@ import { manifestOf, packed, REPOSITORY, run, unpacked } from './packed.js';
 
 /** Scripts that find each other by their names. */
 const SCRIPTS = [
-  ...['', '-controls', '-words', '-worker', '-cpu', '-relighter', '-sources', '-tilt'].map(
+  ...['', '-controls', '-words', '-worker', '-cpu', '-gpu', '-relighter', '-sources', '-tilt'].map(
     (part) => `relightable-photo${part}`,
   ),
   ...['index', 'element', 'core'],

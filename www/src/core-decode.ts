@@ -1,5 +1,6 @@
 /** From a file, wherever it is, to a photograph in memory. */
 
+import { coreCode, readFile } from './core-code.js';
 import { DecodedPhotograph } from './core-photograph.js';
 import { loadDecoder } from './decoder-module.js';
 import { LocalDecoder, type PhotoDecoder } from './decoding.js';
@@ -7,7 +8,6 @@ import { PhotoError, toPhotoError } from './errors.js';
 import { tooLong } from './http-errors.js';
 import { openPhoto } from './load.js';
 import type { Photograph } from './photograph.js';
-import { readFile } from './wasm-start.js';
 
 /**
  * A `.ltm` file: its bytes, whole or as they come from its start on, or its address. That may be relative
@@ -55,7 +55,8 @@ export async function decode(
   { signal = new AbortController().signal, onProgress = () => {} }: DecodeOptions = {},
 ): Promise<CorePhotograph> {
   signal.throwIfAborted();
-  const decoder = async () => new LocalDecoder(await loadDecoder(), () => performance.now());
+  const decoder = async () =>
+    new LocalDecoder(await loadDecoder(coreCode), () => performance.now());
   if (typeof file !== 'string' && !(file instanceof URL)) {
     const taken = take(await decoder(), piecesOf(file), signal, onProgress);
     return new DecodedPhotograph(await taken);

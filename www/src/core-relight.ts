@@ -1,5 +1,6 @@
 /** Pictures of a photograph under any light, by the CPU, on this thread. */
 
+import { coreCode } from './core-code.js';
 import type { CorePhotograph } from './core-decode.js';
 import { DecodedPhotograph } from './core-photograph.js';
 import { loadCpu } from './cpu-module.js';
@@ -76,7 +77,7 @@ export async function relight(
   const shown = parseGamut(gamut ?? null);
   const { width, height } = photo;
   const pixels = new Uint8ClampedArray(4 * width * height);
-  const module = await loadCpu();
+  const module = await loadCpu(coreCode);
   try {
     await photo.photograph.inPage(module, (inside) => {
       const relighter = relighterOf(module, photo, inside);

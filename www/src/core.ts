@@ -1,5 +1,6 @@
 /** Decoding and relighting without a page: for Node, workers and scripts of one's own. No DOM, no side effects. */
 
+export type { WasmCode } from './core-code.js';
 export type { CorePhotograph as Photograph, DecodeOptions, PhotoFile } from './core-decode.js';
 export { decode } from './core-decode.js';
 export type {
@@ -14,10 +15,9 @@ export type { EngineErrorCode, ErrorCode, PageErrorCode } from './errors.js';
 export { PhotoError } from './errors.js';
 export type { Gamut, LightName, ToneCurve } from './names.js';
 export { LIGHTS } from './names.js';
-export type { WasmCode } from './wasm-start.js';
 
+import { provideCode, type WasmCode } from './core-code.js';
 import { CORE_MODULES } from './names.js';
-import { provideCode, type WasmCode } from './wasm-start.js';
 
 /** A WebAssembly module, by name. */
 export type ModuleName = (typeof CORE_MODULES)[number];

@@ -1,6 +1,6 @@
 /**
  * Drawing on the CPU: by the page's crew of workers, or by the page where it can have none. A script of its own,
- * as most pages draw by a graphics device. It has copies of what it shares with the element's.
+ * which has copies of what it shares with the element's.
  */
 
 import type { CanvasSurface } from './canvas.js';
@@ -8,7 +8,7 @@ import type { Crew } from './crew.js';
 import { CrewDrawing } from './crew-drawing.js';
 import type { CpuModule, Gamut } from './engine.js';
 import { hasCode, messageOf } from './errors.js';
-import { PageDrawing, type Tools } from './page-drawing.js';
+import { PageDrawing } from './page-drawing.js';
 import type { Photograph } from './photograph.js';
 
 export { Crew } from './crew.js';
@@ -29,14 +29,14 @@ export interface CpuDrawer {
 }
 
 /** Draws by a crew where it can have workers. */
-export function cpuDrawer(crew: Crew, tools: Tools): CpuDrawer {
+export function cpuDrawer(crew: Crew): CpuDrawer {
   // What the page has once drawn on the CPU it may be drawing still, which keeps tiles from workers; and
   // why it did.
   const inPage = new WeakMap<Photograph, string>();
   const draw: DrawOnCpu = async (module, photograph, gamut, signal) => {
     try {
       if (!inPage.has(photograph)) {
-        return await CrewDrawing.create(tools.newLamp(module), module, photograph, crew, gamut);
+        return await CrewDrawing.create(module, photograph, crew, gamut);
       }
     } catch (thrown) {
       // Without workers the page does it.
@@ -44,7 +44,7 @@ export function cpuDrawer(crew: Crew, tools: Tools): CpuDrawer {
       inPage.set(photograph, `The page relights without workers: ${messageOf(thrown)}`);
     }
     const flaw = inPage.get(photograph) ?? '';
-    return await PageDrawing.create(tools, module, photograph, gamut, flaw, signal);
+    return await PageDrawing.create(module, photograph, gamut, flaw, signal);
   };
   return { draw, prepare: () => crew.gather() };
 }

@@ -5,7 +5,7 @@ import { blobOf } from './canvas.js';
 import type { Crew, Shift } from './crew.js';
 import type { CpuModule, DrawnPhoto, Gamut } from './engine.js';
 import { hasCode, letGo, messageOf, PhotoError } from './errors.js';
-import type { Lamp } from './lamp.js';
+import { Lamp } from './lamp.js';
 import type { LightSetting } from './lights.js';
 import type { Look } from './look.js';
 import type { Photograph } from './photograph.js';
@@ -25,7 +25,6 @@ export class CrewDrawing implements CanvasSurface {
   #freed = false;
 
   private constructor(
-    lamp: Lamp,
     module: CpuModule,
     photograph: Photograph,
     crew: Crew,
@@ -36,7 +35,7 @@ export class CrewDrawing implements CanvasSurface {
     this.canvas = context.canvas;
     this.kernel = kernel;
     this.gamut = gamut;
-    this.#lamp = lamp;
+    this.#lamp = new Lamp(module);
     this.#plane = photograph.plane(module);
     this.#photograph = photograph;
     this.#crew = crew;
@@ -45,7 +44,6 @@ export class CrewDrawing implements CanvasSurface {
 
   /** Rejects with `worker-unavailable` where there can be no workers; the photograph is whole then. */
   static async create(
-    lamp: Lamp,
     module: CpuModule,
     photograph: Photograph,
     crew: Crew,
@@ -63,7 +61,7 @@ export class CrewDrawing implements CanvasSurface {
     const kernel = await photograph.withCrew(crew, describe);
     // Browsers that know no other gamut say nothing of it.
     const gamut = context.getContextAttributes?.().colorSpace === wanted ? wanted : 'srgb';
-    return new CrewDrawing(lamp, module, photograph, crew, context, kernel, gamut);
+    return new CrewDrawing(module, photograph, crew, context, kernel, gamut);
   }
 
   async render(setting: LightSetting, look: Look, detail: number): Promise<Drawn> {

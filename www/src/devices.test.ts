@@ -16,7 +16,6 @@ function world() {
   let unanswered = 0;
   const device = (name: string, lost: Graphics['lost']): Graphics => ({
     kernel: name,
-    software: false,
     lost,
     draw: () => Promise.reject(new Error('not here')),
     free: () => log.push(`free ${name}`),
@@ -42,9 +41,13 @@ function world() {
     },
   };
   const load = (async () => module) as unknown as LoadGraphics;
-  let adapter = true;
+  let name: string | null = 'A real one';
+  let asked = 0;
   const page: Page = {
-    hasWebGpu: async () => adapter,
+    nameOf: async () => {
+      asked += 1;
+      return name;
+    },
     newCanvas: () => {
       let lose = (): void => {};
       canvases.push({ lose: () => lose() });
@@ -58,10 +61,11 @@ function world() {
   return {
     devices: new Devices(page, 20),
     load,
-    /** Has no WebGPU from now on. */
-    lack: () => {
-      adapter = false;
+    /** Devices are called that from now on; `null`: there are none. */
+    call: (other: string | null) => {
+      name = other;
     },
+    asked: () => asked,
     loses,
     canvases,
     unanswered: () => unanswered,
@@ -83,7 +87,7 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
   test(`all who ask for ${backend} at once share one device, which goes with the last`, async () => {
     const w = world();
     const leases = await Promise.all(
-      ['a', 'b', 'c'].map((name) => w.devices.lease(w.load, backend, w.note(name))),
+      ['a', 'b', 'c'].map((name) => w.devices.lease(w.load, backend, true, w.note(name))),
     );
     assert.equal(new Set(leases.map(({ graphics }) => graphics)).size, 1);
     for (const { release } of leases.slice(1)) release();
@@ -98,7 +102,7 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
     w.canvases[0]?.lose();
     await settle();
     assert.deepEqual(w.happened(), []);
-    const next = await w.devices.lease(w.load, backend, w.note('d'));
+    const next = await w.devices.lease(w.load, backend, true, w.note('d'));
     assert.equal(next.graphics.kernel, `${backend} 1`);
   });
 
@@ -107,7 +111,7 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
     const lose = (i: number) =>
       backend === 'webgpu' ? w.loses[i]?.('gone.') : w.canvases[i]?.lose();
     const leases = await Promise.all(
-      ['a', 'b'].map((name) => w.devices.lease(w.load, backend, w.note(name))),
+      ['a', 'b'].map((name) => w.devices.lease(w.load, backend, true, w.note(name))),
     );
     lose(0);
     lose(0);
@@ -115,7 +119,7 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
     leases[0]?.fail('a draw failed');
     const reason = backend === 'webgpu' ? 'gone.' : 'the browser took it away.';
     assert.deepEqual(w.happened().sort(), [`a: ${reason}`, `b: ${reason}`, `free ${backend} 0`]);
-    const next = await w.devices.lease(w.load, backend, w.note('c'));
+    const next = await w.devices.lease(w.load, backend, true, w.note('c'));
     for (const { release } of leases) release();
     await settle();
     assert.deepEqual(w.happened(), [], 'the one that was lost takes nothing of the next along');
@@ -128,17 +132,17 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
 test('a device that is lost again and again is refused for a while', async () => {
   const w = world();
   for (let i = 0; i < 3; i += 1) {
-    await w.devices.lease(w.load, 'webgpu', w.note('a'));
+    await w.devices.lease(w.load, 'webgpu', true, w.note('a'));
     w.loses[i]?.('gone.');
     await settle();
     w.pass(10_000);
   }
   const refused = { code: 'backend-unavailable', message: /lost 3 times/ };
-  await assert.rejects(w.devices.lease(w.load, 'webgpu', w.note('a')), refused);
-  assert.ok(await w.devices.lease(w.load, 'webgl2', w.note('a')), 'another is had');
+  await assert.rejects(w.devices.lease(w.load, 'webgpu', true, w.note('a')), refused);
+  assert.ok(await w.devices.lease(w.load, 'webgl2', true, w.note('a')), 'another is had');
   w.pass(60_000);
   for (let i = 3; i < 8; i += 1) {
-    await w.devices.lease(w.load, 'webgpu', w.note('a'));
+    await w.devices.lease(w.load, 'webgpu', true, w.note('a'));
     w.loses[i]?.('gone.');
     await settle();
     w.pass(70_000);
@@ -149,30 +153,67 @@ test('a device that cannot be had is asked for again by the next', async () => {
   for (const backend of ['webgpu', 'webgl2'] as const) {
     const w = world();
     w.miss(new Error('none here'));
-    await assert.rejects(w.devices.lease(w.load, backend, w.note('a')), /none here/);
+    await assert.rejects(w.devices.lease(w.load, backend, true, w.note('a')), /none here/);
     w.miss(null);
-    assert.ok(await w.devices.lease(w.load, backend, w.note('a')));
+    assert.ok(await w.devices.lease(w.load, backend, true, w.note('a')));
   }
 });
 
 test('a browser that never answers has no device', async () => {
   const w = world();
   w.fallSilent();
-  const asked = w.devices.lease(w.load, 'webgpu', w.note('a'));
+  const asked = w.devices.lease(w.load, 'webgpu', true, w.note('a'));
   const message = /does not answer within/;
   await assert.rejects(asked, { code: 'backend-unavailable', message });
   // Nor does anyone wait for it again.
-  const again = w.devices.lease(w.load, 'webgpu', w.note('b'));
+  const again = w.devices.lease(w.load, 'webgpu', true, w.note('b'));
   await assert.rejects(again, { code: 'backend-unavailable', message });
   assert.equal(w.unanswered(), 1);
 });
 
-test('where there is no WebGPU adapter, its module is not loaded', async () => {
+test('where there is no device, its module is not loaded, and the next asks again', async () => {
+  for (const backend of ['webgpu', 'webgl2'] as const) {
+    const w = world();
+    w.call(null);
+    const load = (() => assert.fail('it is of no use')) as unknown as LoadGraphics;
+    await assert.rejects(w.devices.lease(load, backend, true, w.note('a')), {
+      code: 'backend-unavailable',
+      message: /none to offer/,
+    });
+    w.call('A real one');
+    assert.ok(await w.devices.lease(w.load, backend, true, w.note('a')));
+    await w.devices.lease(w.load, backend, true, w.note('b'));
+    assert.equal(w.asked(), 2, 'once there is one, it is known');
+  }
+});
+
+test('the module of a device that is a program is loaded only for who takes one', async () => {
+  for (const name of [
+    'google swiftshader',
+    'ANGLE (Mesa, llvmpipe (LLVM 19.1))',
+    'Microsoft Basic Render Driver',
+  ]) {
+    const w = world();
+    w.call(name);
+    const load = (() => assert.fail('it is of no use')) as unknown as LoadGraphics;
+    const refused = w.devices.lease(load, 'webgl2', false, w.note('a'));
+    await assert.rejects(refused, {
+      code: 'backend-unavailable',
+      message: /done by a program here/,
+    });
+    assert.ok(await w.devices.lease(w.load, 'webgl2', true, w.note('b')));
+  }
   const w = world();
-  w.lack();
-  const load = (() => assert.fail('it is of no use')) as unknown as LoadGraphics;
-  await assert.rejects(w.devices.lease(load, 'webgpu', w.note('a')), {
+  w.call('nvidia lovelace');
+  assert.ok(await w.devices.lease(w.load, 'webgpu', false, w.note('a')));
+});
+
+test('a browser that never tells a name has no device', async () => {
+  const w = world();
+  const page = { nameOf: () => new Promise<never>(() => {}), newCanvas: assert.fail, now: () => 0 };
+  const devices = new Devices(page, 20);
+  await assert.rejects(devices.lease(w.load, 'webgpu', true, w.note('a')), {
     code: 'backend-unavailable',
-    message: /none to offer/,
+    message: /does not answer within/,
   });
 });

@@ -15,8 +15,8 @@ export type LoadGraphics = <N extends GraphicsBackend>(name: N) => Promise<Modul
 
 /** What of the page is used. */
 export interface Page {
-  /** Whether there is a WebGPU adapter: a module that has none to drive need not be loaded. */
-  hasWebGpu(): Promise<boolean>;
+  /** What a device calls itself; `null` where there is none. A module that has none to drive is not loaded. */
+  nameOf(backend: GraphicsBackend): Promise<string | null>;
   newCanvas(): HTMLCanvasElement;
   now(): number;
 }
@@ -45,13 +45,18 @@ const FORGET_MS = 60_000;
 /** Where a device takes longer, none is to be expected: some browsers never answer. */
 const LONGEST_MS = 10_000;
 
+/** Programs that make up for a missing graphics processor. */
+const PROGRAMS = /swiftshader|llvmpipe|lavapipe|softpipe|basic render|software/i;
+
 /** See the module. */
 export class Devices {
   readonly #page: Page;
   readonly #longestMs: number;
   readonly #shared = new Map<GraphicsBackend, Shared>();
-  /** Those that never answered, and why they are not asked again. */
-  readonly #mute = new Map<GraphicsBackend, PhotoError>();
+  /** What devices call themselves, once asked. */
+  readonly #names = new Map<GraphicsBackend, Promise<string | null>>();
+  /** Why WebGPU, which never answered, is not asked again. */
+  #mute: PhotoError | null = null;
   readonly #losses = new Map<GraphicsBackend, { count: number; last: number }>();
 
   constructor(page: Page = thisPage(), longestMs = LONGEST_MS) {
@@ -60,17 +65,23 @@ export class Devices {
   }
 
   /**
-   * A share of a device, until it is released. `lost` is told at most once. Rejects with
-   * `backend-unavailable` where there is none to have, or has been too often.
+   * A share of a device, until it is released; `software`: also of one that is a program. `lost` is told at
+   * most once. Rejects with `backend-unavailable` where there is none to have, or has been too often.
    */
   async lease(
     load: LoadGraphics,
     backend: GraphicsBackend,
+    software: boolean,
     lost: (reason: string) => void,
   ): Promise<Lease> {
-    const mute = this.#mute.get(backend);
-    if (mute) throw mute;
+    if (backend === 'webgpu' && this.#mute) throw this.#mute;
     this.#refuseFickle(backend);
+    const name = await this.#nameOf(backend);
+    if (name === null) throw unavailable('this browser has none to offer');
+    if (!software && PROGRAMS.test(name)) {
+      const title = BACKEND_TITLES[backend];
+      throw unavailable(`${title} is done by a program here (${name}), and the CPU is faster`);
+    }
     const shared = this.#shared.get(backend) ?? this.#open(load, backend);
     // One function may hold several shares.
     const holder = (reason: string): void => lost(reason);
@@ -112,35 +123,40 @@ export class Devices {
     return shared;
   }
 
+  #nameOf(backend: GraphicsBackend): Promise<string | null> {
+    let name = this.#names.get(backend);
+    if (!name) {
+      name = this.#answered(this.#page.nameOf(backend), () => {});
+      this.#names.set(backend, name);
+      // One that there is none of may be there later: a driver starts anew.
+      const forget = () => this.#names.delete(backend);
+      name.then((known) => known ?? forget(), forget);
+    }
+    return name;
+  }
+
   async #webGpu(load: LoadGraphics): Promise<Graphics> {
+    const { Graphics } = await load('webgpu');
+    return await this.#answered(Graphics.webgpu(), (device) => device.free());
+  }
+
+  /** What is asked of WebGPU; `late` is given what comes when nobody waits for it any more. */
+  async #answered<T>(asked: Promise<T>, late: (answer: T) => void): Promise<T> {
     let timer: ReturnType<typeof setTimeout> | undefined;
-    const asked = this.#askWebGpu(load);
-    const late = new Promise<never>((_, reject) => {
-      const why = `it does not answer within ${this.#longestMs / 1000} seconds`;
+    const tooLate = new Promise<never>((_, reject) => {
       timer = setTimeout(() => {
-        const error = unavailable(why);
+        const why = `it does not answer within ${this.#longestMs / 1000} seconds`;
         // Else each photograph would wait as long.
-        this.#mute.set('webgpu', error);
-        reject(error);
-        asked.then(
-          (device) => {
-            this.#mute.delete('webgpu');
-            device.free();
-          },
-          () => {},
-        );
+        this.#mute = unavailable(why);
+        reject(this.#mute);
+        asked.then(late, () => {});
       }, this.#longestMs);
     });
     try {
-      return await Promise.race([asked, late]);
+      return await Promise.race([asked, tooLate]);
     } finally {
       clearTimeout(timer);
     }
-  }
-
-  async #askWebGpu(load: LoadGraphics): Promise<Graphics> {
-    if (!(await this.#page.hasWebGpu())) throw unavailable('this browser has none to offer');
-    return await (await load('webgpu')).Graphics.webgpu();
   }
 
   async #webGl2(load: LoadGraphics, lose: (reason: string) => void): Promise<Graphics> {
@@ -178,18 +194,41 @@ export function unavailable(why: string, cause?: unknown): PhotoError {
   return new PhotoError('backend-unavailable', why, cause);
 }
 
-/** That a device is a program. */
-export function slowerThanCpu(backend: GraphicsBackend, kernel: string): PhotoError {
-  const why = `${BACKEND_TITLES[backend]} is done by a program here (${kernel}), and the CPU is faster`;
-  return unavailable(why);
+/** What is used of WebGPU here, which types of browsers do not tell of yet. */
+interface Gpu {
+  requestAdapter(): Promise<{ readonly info?: AdapterInfo } | null>;
+}
+interface AdapterInfo {
+  readonly vendor?: string;
+  readonly architecture?: string;
+  readonly description?: string;
+  readonly isFallbackAdapter?: boolean;
+}
+
+async function webGpuName(): Promise<string | null> {
+  const adapter = await (navigator as { gpu?: Gpu }).gpu?.requestAdapter();
+  if (!adapter) return null;
+  const { vendor, architecture, description, isFallbackAdapter } = adapter.info ?? {};
+  return [vendor, architecture, description, isFallbackAdapter && 'software'].join(' ');
+}
+
+function webGl2Name(): string | null {
+  const gl = document.createElement('canvas').getContext('webgl2');
+  if (!gl) return null;
+  let name = String(gl.getParameter(gl.RENDERER));
+  // Some browsers tell only who asks twice; others complain of that.
+  if (name.startsWith('WebKit')) {
+    const info = gl.getExtension('WEBGL_debug_renderer_info');
+    if (info) name = gl.getParameter(info.UNMASKED_RENDERER_WEBGL);
+  }
+  // Browsers let pages have a few contexts only.
+  gl.getExtension('WEBGL_lose_context')?.loseContext();
+  return name;
 }
 
 function thisPage(): Page {
   return {
-    hasWebGpu: async () => {
-      const { gpu } = navigator as { gpu?: { requestAdapter(): Promise<unknown> } };
-      return Boolean(await gpu?.requestAdapter());
-    },
+    nameOf: async (backend) => (backend === 'webgpu' ? webGpuName() : webGl2Name()),
     newCanvas: () => document.createElement('canvas'),
     now: () => performance.now(),
   };

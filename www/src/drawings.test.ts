@@ -4,10 +4,11 @@ import type { CanvasSurface } from './canvas.js';
 import { cpuDrawer } from './cpu-drawing.js';
 import type { Crew } from './crew.js';
 import { crewOf, type FakeWorker, photoOf, settle } from './crew-fakes.js';
-import type { Devices } from './devices.js';
-import { drawer, type Load, TOOLS } from './drawings.js';
-import type { Backend } from './engine.js';
+import type { Devices, LoadGraphics } from './devices.js';
+import { drawer } from './drawings.js';
+import type { Backend, CpuModule } from './engine.js';
 import { PhotoError } from './errors.js';
+import { gpuDrawer } from './gpu-drawing.js';
 import { Photograph } from './photograph.js';
 import { Player, type Settings } from './player.js';
 import { exposed, PLAIN, wanting } from './settings-fakes.js';
@@ -38,25 +39,29 @@ function fakeDocument(t: TestContext): void {
   });
 }
 
-/** What draws on the CPU, by a crew. */
-const onCpu = (crew: Crew) => async () => cpuDrawer(crew, TOOLS);
-
-/** Any module, from anywhere. */
-const loading = (module: unknown) => (async () => module) as unknown as Load;
+/** Draws with one module for all, by a crew, and by devices. */
+const drawerOf = (module: unknown, crew: Crew, devices: Devices) =>
+  drawer({
+    gpu: async () => gpuDrawer((async () => module) as unknown as LoadGraphics, devices),
+    cpu: async () => cpuDrawer(crew),
+    cpuModule: async () => module as CpuModule,
+  });
 
 /** Devices, which note how many tiles modules have when one is set up. */
 function fakeDevices(has: ReadonlySet<number>) {
   const setUps: string[] = [];
   /** Devices that are had once `ask` has no objections. */
   const devicesThat = (ask: (backend: Backend) => Promise<void>) => {
-    const lease = async (_: unknown, backend: Backend) => {
+    const lease = async (_: unknown, backend: Backend, software: boolean) => {
       await ask(backend);
+      if (backend === 'webgl2' && !software)
+        throw new PhotoError('backend-unavailable', 'a program');
       const draw = async () => {
         setUps.push(`${backend} of ${has.size}`);
         return { kernel: 'fake', gamut: 'srgb', render: () => {}, free: () => {} };
       };
       const release = () => released.push(backend);
-      return { graphics: { kernel: 'fake', software: backend === 'webgl2', draw }, release };
+      return { graphics: { kernel: 'fake', draw }, release };
     };
     return { lease } as unknown as Devices;
   };
@@ -76,7 +81,7 @@ async function playing(t: TestContext, ask = async (_: Backend): Promise<void> =
     {
       open: async () => Photograph.decoded(photo),
       prepare: () => {},
-      draw: drawer(loading(module), onCpu(crew), devicesThat(ask)).draw,
+      draw: drawerOf(module, crew, devicesThat(ask)).draw,
       nextFrame: (callback) => frames.push(callback),
       later: () => () => {},
       now: () => 0,
@@ -137,9 +142,9 @@ test('a photograph that the page draws for want of workers says why', async (t) 
   const { crew } = crewOf(2, (worker) => worker.die());
   const { photo, has, module } = photoOf(4);
   const { devicesThat } = fakeDevices(has);
-  const { draw } = drawer(
-    loading(module),
-    onCpu(crew),
+  const { draw } = drawerOf(
+    module,
+    crew,
     devicesThat(async () => {}),
   );
   const photograph = Photograph.decoded(photo);
@@ -188,7 +193,6 @@ test('a device that is a program is passed over, unless back ends were named', a
   player.set({ ...SETTINGS, wanted: { ...order, software: false } });
   await player.renderNow();
   assert.deepEqual([has.size, changes, setUps], [0, ['cpu'], []]);
-  assert.deepEqual(released, ['webgl2']);
   player.set({ ...SETTINGS, wanted: order });
   await player.renderNow();
   assert.deepEqual([changes, setUps], [['cpu', 'webgl2'], ['webgl2 of 4']]);
@@ -197,7 +201,7 @@ test('a device that is a program is passed over, unless back ends were named', a
   await player.renderNow();
   assert.deepEqual(changes, ['cpu', 'webgl2', 'cpu']);
   player.stop();
-  assert.deepEqual(released, ['webgl2', 'webgl2', 'webgl2']);
+  assert.deepEqual(released, ['webgl2']);
 });
 
 test('back ends that do not answer keep nobody waiting who has given them up, and get nothing', async (t) => {
@@ -218,9 +222,9 @@ test('a drawing that was freed draws nothing, and leaves tiles where they are', 
   const { photo, has, module } = photoOf(4);
   const { devicesThat } = fakeDevices(has);
   const photograph = Photograph.decoded(photo);
-  const drawing = await drawer(
-    loading(module),
-    onCpu(crew),
+  const drawing = await drawerOf(
+    module,
+    crew,
     devicesThat(async () => {}),
   ).draw('cpu', photograph, SETTINGS.wanted, () => {}, new AbortController().signal);
   for (const worker of workers) worker.slow = true;

@@ -1,16 +1,13 @@
-/** Who draws for an element: a back end in the page, or on the CPU the page's crew of workers. */
+/** Who draws for an element: a graphics device, or the CPU. Each is a script of its own, fetched where it is needed. */
 
 import type { CanvasSurface } from './canvas.js';
 import type { CpuDrawer } from './cpu-drawing.js';
 import { loadCpu } from './cpu-module.js';
-import { Devices, slowerThanCpu, unavailable } from './devices.js';
-import type { Backend, Modules } from './engine.js';
-import { messageOf } from './errors.js';
-import { Lamp } from './lamp.js';
-import type { Tools } from './page-drawing.js';
+import type { Backend, CpuModule, Modules } from './engine.js';
+import { messageOf, PhotoError } from './errors.js';
+import type { GpuDrawer } from './gpu-drawing.js';
 import type { Photograph } from './photograph.js';
 import type { Wanted } from './player.js';
-import { CanvasDrawing } from './surface.js';
 import { moduleFolder } from './wasm-start.js';
 import { loadWebGl2 } from './webgl2-module.js';
 import { loadWebGpu } from './webgpu-module.js';
@@ -34,64 +31,45 @@ export type Draw = (
  */
 export type Prepare = (wanted: Wanted, over: AbortSignal) => Promise<void>;
 
-/** Gives the modules that draw. */
-export type Load = <B extends Backend>(backend: B) => Promise<Modules[B]>;
-
 /** What draws. */
 export interface Drawer {
   readonly draw: Draw;
   readonly prepare: Prepare;
 }
 
+/** Where what draws comes from. */
+export interface Drawers {
+  readonly gpu: () => Promise<GpuDrawer>;
+  readonly cpu: () => Promise<CpuDrawer>;
+  readonly cpuModule: () => Promise<CpuModule>;
+}
+
 /**
- * Draws by the modules that `load` gives, on the CPU as `cpu` does. A device that cannot be had leaves tiles
- * where they are, and keeps nobody from them while it is asked for.
+ * Draws by what is given. A device that cannot be had leaves tiles where they are, and keeps nobody from them
+ * while it is asked for.
  */
-export function drawer(load: Load, cpu: () => Promise<CpuDrawer>, devices: Devices): Drawer {
-  const draw: Draw = async (backend, photograph, { gamut, software }, lost, signal) => {
+export function drawer({ gpu, cpu, cpuModule }: Drawers): Drawer {
+  const draw: Draw = async (backend, photograph, wanted, lost, signal) => {
     if (backend === 'cpu') {
-      const [module, drawer] = await Promise.all([load('cpu'), cpu()]);
-      return await drawer.draw(module, photograph, gamut, signal);
+      const [module, drawer] = await Promise.all([cpuModule(), cpu()]);
+      return await drawer.draw(module, photograph, wanted.gamut, signal);
     }
-    const lease = await devices.lease(load, backend, lost);
-    const { graphics } = lease;
-    try {
-      if (graphics.software && !software) throw slowerThanCpu(backend, graphics.kernel);
-      const module = await load(backend);
-      return await photograph.inPage(
-        module,
-        async (photo) => {
-          const canvas = document.createElement('canvas');
-          const relighter = await graphics.draw(photo, canvas, gamut);
-          const plane = photograph.plane(module);
-          const drawing = new CanvasDrawing(module, plane, relighter, canvas, { lease });
-          idle(() => Promise.allSettled([load('cpu'), cpu()]));
-          return drawing;
-        },
-        { signal },
-      );
-    } catch (thrown) {
-      lease.release();
-      throw thrown;
-    }
+    const drawing = await (await gpu()).draw(backend, photograph, wanted, lost, signal);
+    idle(() => Promise.allSettled([cpuModule(), cpu()]));
+    return drawing;
   };
   const prepare: Prepare = async ({ backends, software }, over) => {
-    const hold = (letGo: () => void): void => {
-      if (over.aborted) letGo();
-      else over.addEventListener('abort', letGo);
-    };
     for (const backend of backends) {
       if (over.aborted) return;
       try {
-        if (backend === 'cpu') {
-          const [, drawer] = await Promise.all([load(backend), cpu()]);
-          hold(drawer.prepare());
-          return;
-        }
-        const { graphics, release } = await devices.lease(load, backend, () => {});
-        // Also one that is passed over: it would be asked for again.
-        hold(release);
-        if (software || !graphics.software) return;
+        const [letGo] = await Promise.all(
+          backend === 'cpu'
+            ? [cpu().then((drawer) => drawer.prepare()), cpuModule()]
+            : [(await gpu()).prepare(backend, software)],
+        );
+        if (over.aborted) letGo();
+        else over.addEventListener('abort', letGo);
+        return;
       } catch {
         // The next may work.
       }
@@ -105,33 +83,34 @@ const LOADERS: { readonly [B in Backend]: () => Promise<Modules[B]> } = {
   webgl2: loadWebGl2,
   webgpu: loadWebGpu,
 };
-const load: Load = (name) => LOADERS[name]();
 
 const crewSize = Math.min(MOST_WORKERS, globalThis.navigator?.hardwareConcurrency ?? 1);
 
-export const TOOLS: Tools = {
-  newLamp: (module) => new Lamp(module),
-  newDrawing: (...parts) => new CanvasDrawing(...parts),
-};
-
-let cpuDrawing: Promise<CpuDrawer> | null = null;
-
-/** The script that draws on the CPU, with the page's crew: fetched once, and again where it did not come. */
-function fetchCpu(): Promise<CpuDrawer> {
-  cpuDrawing ??= import('./cpu-drawing.js').then(
-    ({ Crew, cpuDrawer }) => cpuDrawer(new Crew(startWorker, crewSize), TOOLS),
-    (cause) => {
-      cpuDrawing = null;
-      const remedy = "It has to lie beside the element's";
-      const what = `the script that draws could not be loaded (${messageOf(cause)})`;
-      throw unavailable(`${what}. ${remedy}`, cause);
-    },
-  );
-  return cpuDrawing;
-}
-
 /** Draws for the elements of this page. */
-export const { draw, prepare } = drawer(load, fetchCpu, new Devices());
+export const { draw, prepare } = drawer({
+  gpu: once(async () => {
+    const { Devices, gpuDrawer } = await import('./gpu-drawing.js');
+    return gpuDrawer((name) => LOADERS[name](), new Devices());
+  }),
+  cpu: once(async () => {
+    const { Crew, cpuDrawer } = await import('./cpu-drawing.js');
+    return cpuDrawer(new Crew(startWorker, crewSize));
+  }),
+  cpuModule: loadCpu,
+});
+
+/** A script that draws: fetched once, and again where it did not come. */
+function once<T>(fetchScript: () => Promise<T>): () => Promise<T> {
+  let fetching: Promise<T> | null = null;
+  return () => {
+    fetching ??= fetchScript().catch((cause: unknown) => {
+      fetching = null;
+      const why = `the script that draws could not be loaded (${messageOf(cause)}). It has to lie beside the element's`;
+      throw new PhotoError('backend-unavailable', why, cause);
+    });
+    return fetching;
+  };
+}
 
 /** Does something once the page has nothing else to do: what takes a device's place is there when it is lost. */
 function idle(work: () => unknown): void {

@@ -72,8 +72,6 @@ export interface Display extends Freeable {}
 /** A graphics device, which photographs share. */
 export interface Graphics extends Freeable {
   readonly kernel: string;
-  /** Whether it is a program that makes up for a missing graphics processor. */
-  readonly software: boolean;
   /** Settles when a WebGPU device goes away; the canvas of a WebGL2 context tells itself. */
   readonly lost: Promise<{ readonly message: string }> | undefined;
   /** Brings a photograph to the device, to be drawn into a canvas of its own. */

@@ -93,6 +93,10 @@ export function letGo(): PhotoError {
 export function toPhotoError(thrown: unknown): PhotoError {
   if (thrown instanceof PhotoError) return thrown;
   const code = thrown instanceof Error ? (thrown as { code?: unknown }).code : undefined;
-  if (typeof code === 'string') return new PhotoError(code, messageOf(thrown), thrown);
+  if (typeof code === 'string') {
+    // One of another script's brings its own cause.
+    const { name, message, cause } = thrown as Error;
+    return new PhotoError(code, message, name === 'PhotoError' ? cause : thrown);
+  }
   return new PhotoError('internal', `Something went wrong inside: ${messageOf(thrown)}`, thrown);
 }

@@ -8,6 +8,14 @@ import type { PhotoView } from './viewport.js';
 
 const TRAVELS: EventInit = { bubbles: true, composed: true };
 
+/** What happened, and what is told of it. */
+class PhotoEvent extends Event {
+  constructor(type: string, told: object) {
+    super(type, TRAVELS);
+    Object.assign(this, told);
+  }
+}
+
 /** `load`: the photograph is there and drawn. */
 export function loadEvent(): Event {
   return new Event('load', TRAVELS);
@@ -19,55 +27,46 @@ export function progressEvent(loaded: number, total: number): ProgressEvent {
 }
 
 /** `error`: something failed; the same message stands inside the element. */
-export class PhotoErrorEvent extends Event {
+export class PhotoErrorEvent extends PhotoEvent {
   /** For programs. */
-  readonly code: ErrorCode;
+  declare readonly code: ErrorCode;
   /** For people. */
-  readonly message: string;
+  declare readonly message: string;
   /** What was caught, where there was something. */
-  readonly cause: unknown;
+  declare readonly cause: unknown;
 
-  constructor(error: PhotoError) {
-    super('error', TRAVELS);
-    this.code = error.code;
-    this.message = error.message;
-    this.cause = error.cause;
+  constructor({ code, message, cause }: PhotoError) {
+    super('error', { code, message, cause });
   }
 }
 
 /** `lightchange`: the light is another, or the torch has moved. Frames of one source do not tell. */
-export class LightChangeEvent extends Event {
+export class LightChangeEvent extends PhotoEvent {
   /** The built-in light; where there is a source, the one that it stands in for. */
-  readonly light: LightName;
+  declare readonly light: LightName;
   /** Where a torch that was moved shines; `null` for one in the middle, and for other lights. */
-  readonly torch: PicturePoint | null;
+  declare readonly torch: PicturePoint | null;
   /** What shines in the built-in light's place; `null` where that one does. */
-  readonly source: LightSource | null;
+  declare readonly source: LightSource | null;
 
   constructor(light: LightName, torch: PicturePoint | null, source: LightSource | null) {
-    super('lightchange', TRAVELS);
-    this.light = light;
-    this.torch = torch;
-    this.source = source;
+    super('lightchange', { light, torch, source });
   }
 }
 
 /** `backendchange`: a back end was taken up, the first one too. */
-export class BackendChangeEvent extends Event {
-  readonly backend: Backend;
+export class BackendChangeEvent extends PhotoEvent {
+  declare readonly backend: Backend;
   /** The one it replaces, `null` for the first. */
-  readonly previous: Backend | null;
+  declare readonly previous: Backend | null;
   /**
    * Why not the one before it or those preferred to it, and why it is slower than it could be; empty where
    * there is nothing to say.
    */
-  readonly reason: string;
+  declare readonly reason: string;
 
   constructor(backend: Backend, previous: Backend | null, reason: string) {
-    super('backendchange', TRAVELS);
-    this.backend = backend;
-    this.previous = previous;
-    this.reason = reason;
+    super('backendchange', { backend, previous, reason });
   }
 }
 
@@ -75,42 +74,36 @@ export class BackendChangeEvent extends Event {
  * `qualitychange`: what is shown is drawn by another share of the photograph than before. It is less than
  * 1 only while the picture moves faster than all of it can be drawn.
  */
-export class QualityChangeEvent extends Event {
+export class QualityChangeEvent extends PhotoEvent {
   /** 0 to 1, in full detail; the first picture is. */
-  readonly share: number;
+  declare readonly share: number;
 
   constructor(share: number) {
-    super('qualitychange', TRAVELS);
-    this.share = share;
+    super('qualitychange', { share });
   }
 }
 
 /** `contextlost`: the back end that drew is gone; `backendchange` tells what takes its place. */
-export class ContextLostEvent extends Event {
-  readonly backend: Backend;
+export class ContextLostEvent extends PhotoEvent {
+  declare readonly backend: Backend;
   /** What the browser says of it. */
-  readonly message: string;
+  declare readonly message: string;
 
   constructor(backend: Backend, message: string) {
-    super('contextlost', TRAVELS);
-    this.backend = backend;
-    this.message = message;
+    super('contextlost', { backend, message });
   }
 }
 
 /** `viewchange`: another part of the picture is shown. */
-export class ViewChangeEvent extends Event {
+export class ViewChangeEvent extends PhotoEvent {
   /** Magnification; 1 shows all of the picture. */
-  readonly zoom: number;
+  declare readonly zoom: number;
   /** The point of the picture in the middle, from 0 to 1. */
-  readonly x: number;
-  readonly y: number;
+  declare readonly x: number;
+  declare readonly y: number;
 
   constructor({ zoom, x, y }: PhotoView) {
-    super('viewchange', TRAVELS);
-    this.zoom = zoom;
-    this.x = x;
-    this.y = y;
+    super('viewchange', { zoom, x, y });
   }
 }
 

@@ -1,25 +1,13 @@
 /** A canvas that the page draws on the CPU. Tiles may leave its module; they are back for the next picture. */
 
 import { blobOf, type CanvasSurface } from './canvas.js';
-import type { CpuModule, DrawingModule, DrawnPhoto, Gamut, Relighter } from './engine.js';
+import type { CpuModule, Gamut } from './engine.js';
 import { letGo } from './errors.js';
-import type { Lamp } from './lamp.js';
 import type { LightSetting } from './lights.js';
 import type { Look } from './look.js';
 import type { Photograph } from './photograph.js';
 import type { Drawn } from './player.js';
-import type { CanvasDrawing } from './surface.js';
-
-/** What the page's scripts share, and draw by. */
-export interface Tools {
-  newLamp(module: DrawingModule): Lamp;
-  newDrawing(
-    module: DrawingModule,
-    plane: DrawnPhoto,
-    relighter: Relighter,
-    canvas: HTMLCanvasElement,
-  ): CanvasDrawing;
-}
+import { CanvasDrawing } from './surface.js';
 
 /** See the module. */
 export class PageDrawing implements CanvasSurface {
@@ -27,21 +15,13 @@ export class PageDrawing implements CanvasSurface {
   readonly kernel: string;
   readonly flaw: string;
   gamut: Gamut;
-  readonly #tools: Tools;
   readonly #module: CpuModule;
   readonly #photograph: Photograph;
   /** None while tiles are elsewhere. */
   #drawing: CanvasDrawing | null = null;
   #freed = false;
 
-  private constructor(
-    tools: Tools,
-    module: CpuModule,
-    photograph: Photograph,
-    gamut: Gamut,
-    flaw: string,
-  ) {
-    this.#tools = tools;
+  private constructor(module: CpuModule, photograph: Photograph, gamut: Gamut, flaw: string) {
     this.canvas = document.createElement('canvas');
     this.kernel = module.cpuKernel();
     this.gamut = gamut;
@@ -51,14 +31,13 @@ export class PageDrawing implements CanvasSurface {
   }
 
   static async create(
-    tools: Tools,
     module: CpuModule,
     photograph: Photograph,
     gamut: Gamut,
     flaw: string,
     signal: AbortSignal,
   ): Promise<PageDrawing> {
-    const drawing = new PageDrawing(tools, module, photograph, gamut, flaw);
+    const drawing = new PageDrawing(module, photograph, gamut, flaw);
     drawing.gamut = (await drawing.#begin(signal)).gamut;
     return drawing;
   }
@@ -82,7 +61,7 @@ export class PageDrawing implements CanvasSurface {
       if (this.#freed) throw letGo();
       const relighter = new this.#module.Relighter(photo, this.canvas, this.gamut);
       const plane = this.#photograph.plane(this.#module);
-      this.#drawing = this.#tools.newDrawing(this.#module, plane, relighter, this.canvas);
+      this.#drawing = new CanvasDrawing(this.#module, plane, relighter, this.canvas);
       return this.#drawing;
     };
     const leave = () => this.#stop();

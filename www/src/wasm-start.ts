@@ -4,8 +4,10 @@ import { messageOf, PhotoError } from './errors.js';
 import type { ModuleName } from './names.js';
 import { allowed } from './policy.js';
 
-/** The code of a module: its bytes, or where they are. */
-export type WasmCode = ArrayBuffer | ArrayBufferView<ArrayBuffer> | URL | string;
+/** Gives the code of a module that is at an address. */
+export type Provide = (name: ModuleName, at: URL | string) => Promise<BufferSource | Response>;
+
+export const fetchCode: Provide = (_, at) => fetch(at);
 
 /** Where a module is: written out for bundlers, which look for exactly such forms. */
 export interface WasmBuilds {
@@ -21,27 +23,14 @@ interface Glue {
   default(options: { module_or_path: BufferSource | Response }): Promise<unknown>;
 }
 
-/** What of Node is used: not an import, which bundlers for pages would have to resolve. */
-interface NodeProcess {
-  getBuiltinModule?(
-    name: 'node:fs/promises',
-  ): { readFile(file: URL): Promise<Uint8Array> } | undefined;
-}
-
 // The smallest module with a 128-bit operation: () => i8x16.splat(0), dropped.
 const SIMD_PROBE = new Uint8Array([
   0, 97, 115, 109, 1, 0, 0, 0, 1, 4, 1, 96, 0, 0, 3, 2, 1, 0, 10, 9, 1, 7, 0, 65, 0, 253, 15, 26,
   11,
 ]);
 
-const provided = new Map<ModuleName, WasmCode>();
 /** Where modules are, if not beside this script: an address that ends in a slash. */
 let folder: string | null = null;
-
-/** Has a module started from this code, not from the file beside the script. One that runs stays. */
-export function provideCode(name: ModuleName, code: WasmCode): void {
-  provided.set(name, code);
-}
 
 /** Has modules started from files in another folder from now on. Those that run stay. */
 export function setModuleFolder(address: string | null): void {
@@ -57,10 +46,14 @@ export function moduleFolder(): string | null {
  * How a module is loaded, once a page; a load that failed is tried again at the next call. `what` says what
  * the module does.
  */
-export function loader<M>(name: ModuleName, what: string, builds: WasmBuilds): () => Promise<M> {
+export function loader<M>(
+  name: ModuleName,
+  what: string,
+  builds: WasmBuilds,
+): (provide?: Provide) => Promise<M> {
   let loading: Promise<M> | undefined;
-  return () => {
-    loading ??= allowed(() => start<M>(name, builds), /^script-src/, mayNotRun).catch(
+  return (provide = fetchCode) => {
+    loading ??= allowed(() => start<M>(name, builds, provide), /^script-src/, mayNotRun).catch(
       (cause: unknown) => {
         loading = undefined;
         if (cause instanceof PhotoError) throw cause;
@@ -87,28 +80,19 @@ function mayNotRun(_: string, cause: unknown): PhotoError {
 }
 
 /** Starts a module, in the build that this machine can run. */
-async function start<M>(name: ModuleName, { glue, simd, scalar }: WasmBuilds): Promise<M> {
+async function start<M>(
+  name: ModuleName,
+  { glue, simd, scalar }: WasmBuilds,
+  provide: Provide,
+): Promise<M> {
   // A build with SIMD does not even load where SIMD is missing.
   const old = scalar && !WebAssembly.validate(SIMD_PROBE) ? scalar : null;
-  const there = folder === null ? null : `${folder}${name}${old ? '_scalar' : ''}_bg.wasm`;
-  const code = provided.get(name) ?? there ?? (old ?? simd)();
+  const beside = old ?? simd;
+  const at = folder === null ? beside() : `${folder}${name}${old ? '_scalar' : ''}_bg.wasm`;
   // Both at once: each is of no use without the other.
-  const bytes = bytesOf(code);
+  const bytes = provide(name, at);
   bytes.catch(() => {});
   const module = (await glue()) as Glue;
   await module.default({ module_or_path: await bytes });
   return module as M;
-}
-
-async function bytesOf(code: WasmCode): Promise<BufferSource | Response> {
-  if (typeof code !== 'string' && !(code instanceof URL)) return code;
-  return (await readFile(String(code))) ?? (await fetch(code));
-}
-
-/** A file's bytes; `null` for other addresses, and where files cannot be read. */
-export async function readFile(address: string): Promise<Uint8Array<ArrayBuffer> | null> {
-  if (!address.startsWith('file:')) return null;
-  const { process } = globalThis as { process?: NodeProcess };
-  const files = process?.getBuiltinModule?.('node:fs/promises');
-  return files ? new Uint8Array(await files.readFile(new URL(address))) : null;
 }

@@ -22,6 +22,7 @@ const dist = join(repository, 'dist');
 /** What is fetched only where it is asked for lies beside the element, under names of its own. */
 const APART = new Map([
   ['./cpu-drawing.js', './relightable-photo-cpu.js'],
+  ['./gpu-drawing.js', './relightable-photo-gpu.js'],
   ['./light-sources.js', './relightable-photo-sources.js'],
   ['./tilt.js', './relightable-photo-tilt.js'],
   ['./toolbar.js', './relightable-photo-controls.js'],
@@ -82,6 +83,7 @@ await Promise.all([
     entryPoints: {
       'relightable-photo': 'www/src/index.ts',
       'relightable-photo-cpu': 'www/src/cpu-drawing.ts',
+      'relightable-photo-gpu': 'www/src/gpu-drawing.ts',
       'relightable-photo-sources': 'www/src/light-sources.ts',
       'relightable-photo-tilt': 'www/src/tilt.ts',
       'relightable-photo-controls': 'www/src/toolbar.ts',

@@ -20,7 +20,10 @@ const MODULES = {
     builds: ['wasm/cpu_bg.wasm', 'wasm/cpu_scalar_bg.wasm'],
     scripts: ['wasm/cpu.js', 'relightable-photo-cpu.js', 'relightable-photo-relighter.js'],
   },
-  webgl2: { builds: ['wasm/webgl2_bg.wasm'], scripts: ['wasm/webgl2.js'] },
+  webgl2: {
+    builds: ['wasm/webgl2_bg.wasm'],
+    scripts: ['wasm/webgl2.js', 'relightable-photo-gpu.js'],
+  },
   webgpu: { builds: ['wasm/webgpu_bg.wasm'], scripts: ['wasm/webgpu.js'] },
 };
 const ELEMENT = 'relightable-photo.js';

@@ -125,11 +125,6 @@ impl Context {
         &self.kernel
     }
 
-    /// Whether it is a program that makes up for a missing graphics processor.
-    pub fn is_software(&self) -> bool {
-        crate::relight::backend::names_software(&self.kernel)
-    }
-
     /// Whether pixels can be of that gamut.
     pub(super) fn shows(&self, gamut: Gamut) -> bool {
         gamut == Gamut::Srgb || Reflect::has(&self.gl, &COLOR_SPACE.into()).unwrap_or(false)

@@ -2,7 +2,7 @@
 
 use super::gpu::{API, ComputePipeline, Gpu, RenderPipeline, TextureFormat};
 use super::shader::SHADER;
-use crate::relight::backend::{BackendError, names_software};
+use crate::relight::backend::BackendError;
 use crate::relight::texture_layout::TextureLimits;
 
 /// A device that any number of photographs share.
@@ -14,6 +14,7 @@ pub struct Device {
     pub(super) pipelines: Pipelines,
     pub(super) limits: TextureLimits,
     kernel: String,
+    #[cfg(not(target_arch = "wasm32"))]
     software: bool,
 }
 
@@ -28,7 +29,8 @@ impl Device {
             name => name,
         };
         Ok(Self {
-            software: adapter.fallback || names_software(kernel),
+            #[cfg(not(target_arch = "wasm32"))]
+            software: adapter.fallback,
             kernel: kernel.into(),
             gpu,
             format,
@@ -42,7 +44,8 @@ impl Device {
         &self.kernel
     }
 
-    /// Whether it is a program that makes up for a missing graphics processor.
+    /// Whether it is a program that makes up for a missing graphics processor. Pages ask browsers themselves.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn is_software(&self) -> bool {
         self.software
     }

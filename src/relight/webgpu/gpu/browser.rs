@@ -99,12 +99,7 @@ impl Gpu {
                 fields.flatten().collect::<Vec<_>>().join(" ")
             }
         };
-        let fallback = info.as_ref().and_then(js::AdapterInfo::is_fallback_adapter);
-        let adapter = Adapter {
-            limits,
-            name,
-            fallback: fallback == Some(true),
-        };
+        let adapter = Adapter { limits, name };
         let gpu = Self {
             queue: device.queue(),
             loss: watch(&device),

@@ -28,6 +28,7 @@ pub struct Adapter {
     pub limits: TextureLimits,
     /// In full, by vendor and architecture, or empty.
     pub name: String,
+    #[cfg(not(target_arch = "wasm32"))]
     /// Whether the system says that it is a program that makes up for a missing graphics processor.
     pub fallback: bool,
 }

@@ -37,8 +37,6 @@ extern "C" {
     pub fn vendor(this: &AdapterInfo) -> Option<String>;
     #[wasm_bindgen(method, getter)]
     pub fn architecture(this: &AdapterInfo) -> Option<String>;
-    #[wasm_bindgen(method, getter, js_name = isFallbackAdapter)]
-    pub fn is_fallback_adapter(this: &AdapterInfo) -> Option<bool>;
 
     #[derive(Clone, Debug)]
     pub type Device;
