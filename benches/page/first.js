@@ -43,18 +43,25 @@ const browser = await launchChromium();
 
 /** In the page: when there is a picture, and when all of it is there. */
 const watch = () => {
-  const times = /** @type {any} */ ({ began: 0 });
+  const times = /** @type {any} */ ({
+    began: document.readyState === 'loading' ? 0 : performance.now(),
+  });
   Object.assign(globalThis, { times });
   times.shown = new Promise((resolve) => {
     const look = () => {
       const photo = /** @type {any} */ (document.querySelector('relightable-photo'));
-      if (photo?.detail && !(times.old === photo.src)) resolve(performance.now() - times.began);
+      if (photo?.detail) resolve(performance.now() - times.began);
       else requestAnimationFrame(look);
     };
     look();
   });
   times.whole = new Promise((resolve) => {
-    document.addEventListener('load', () => resolve(performance.now() - times.began), true);
+    const tell = (/** @type {Event} */ { target }) => {
+      if (/** @type {Element} */ (target).localName !== 'relightable-photo') return;
+      document.removeEventListener('load', tell, true);
+      resolve(performance.now() - times.began);
+    };
+    document.addEventListener('load', tell, true);
   });
 };
 
@@ -73,14 +80,15 @@ try {
     await page.goto(`${line.origin}/photo?${turn}`);
     const first = await page.evaluate('times.shown');
     const whole = await page.evaluate('times.whole');
-    await page.evaluate(watch);
-    const later = await page.evaluate(async (src) => {
-      const { times } = /** @type {any} */ (globalThis);
+    await page.evaluate((src) => {
       const photo = /** @type {any} */ (document.querySelector('relightable-photo'));
-      times.began = performance.now();
       photo.src = src;
-      return { first: await times.shown, whole: await times.whole };
     }, `/photos/${GLASS}.ltm?later${turn}`);
+    await page.evaluate(watch);
+    const later = await page.evaluate(async () => {
+      const { times } = /** @type {any} */ (globalThis);
+      return { first: await times.shown, whole: await times.whole };
+    });
     await page.goto(`${line.origin}/picture?${turn}`, { waitUntil: 'load' });
     const png = await page.evaluate(
       () =>
