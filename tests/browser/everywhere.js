@@ -160,9 +160,10 @@ export function testsIn(browser, { backends, missing, screenshots, namesGpus }) 
       for (const name of ['worker', 'relighter']) {
         const some = workers.filter(({ url }) => url.endsWith(`relightable-photo-${name}.js`));
         assert.ok(some.length > 0, `no ${name}`);
-        // The first says that it is up, the next ones that it works.
+        assert.ok(!some.some(({ failed }) => failed), `a ${name} failed`);
+        // The first answer says that it is up, the next ones that it works. Small photographs need one only.
         assert.ok(
-          some.every(({ answers, failed }) => answers > 1 && !failed),
+          some.some(({ answers }) => answers > 1),
           `no ${name} at work`,
         );
       }
@@ -282,7 +283,8 @@ export function testsIn(browser, { backends, missing, screenshots, namesGpus }) 
 
       test(`removed and put back leaves no memory behind on ${backend}`, async (t) => {
         const page = await browser.open(t, PAGE);
-        await mount(page, { src: SRC, backend, light: 'spectrum' });
+        // Not once it is seen: without a screen, Firefox and WebKit may not look again once a device is gone.
+        await mount(page, { src: SRC, backend, light: 'spectrum', loading: 'eager' });
         await loaded(page);
         const growth = await page.evaluate(async (cycles) => {
           const { photo } = /** @type {any} */ (globalThis);
@@ -292,8 +294,10 @@ export function testsIn(browser, { backends, missing, screenshots, namesGpus }) 
           const again = async () => {
             photo.remove();
             await new Promise((resolve) => setTimeout(resolve));
-            const load = new Promise((resolve) => {
+            const load = new Promise((resolve, reject) => {
               photo.addEventListener('load', resolve, { once: true });
+              const failed = (/** @type {ErrorEvent} */ { message }) => reject(new Error(message));
+              photo.addEventListener('error', failed, { once: true });
             });
             document.body.append(photo);
             await load;

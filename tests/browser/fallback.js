@@ -87,7 +87,7 @@ describe('falling back', () => {
     assert.equal(change?.['backend'], 'cpu');
     assert.match(
       String(change?.['reason']),
-      /WebGPU is done by a program.*WebGL2 is done by a program/,
+      /WebGPU: it is done by a program.*WebGL2: it is done by a program/,
     );
     await drawsRight(page);
   });

@@ -3,7 +3,6 @@
  * last of them. One that is lost is made anew for who asks next, unless it is lost again and again.
  */
 
-import { BACKEND_TITLES } from './backends.js';
 import type { Backend, Graphics, Modules } from './engine.js';
 import { PhotoError } from './errors.js';
 
@@ -79,8 +78,7 @@ export class Devices {
     const name = await this.#nameOf(backend);
     if (name === null) throw unavailable('this browser has none to offer');
     if (!software && PROGRAMS.test(name)) {
-      const title = BACKEND_TITLES[backend];
-      throw unavailable(`${title} is done by a program here (${name}), and the CPU is faster`);
+      throw unavailable(`it is done by a program here (${name}), and the CPU is faster`);
     }
     const shared = this.#shared.get(backend) ?? this.#open(load, backend);
     // One function may hold several shares.

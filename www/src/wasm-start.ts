@@ -4,8 +4,11 @@ import { messageOf, PhotoError } from './errors.js';
 import type { ModuleName } from './names.js';
 import { allowed } from './policy.js';
 
+/** Bytes of WebAssembly, or the answer that brings them. */
+type Code = ArrayBuffer | ArrayBufferView<ArrayBuffer> | Response;
+
 /** Gives the code of a module that is at an address. */
-export type Provide = (name: ModuleName, at: URL | string) => Promise<BufferSource | Response>;
+export type Provide = (name: ModuleName, at: URL | string) => Promise<Code>;
 
 export const fetchCode: Provide = (_, at) => fetch(at);
 
@@ -20,7 +23,7 @@ export interface WasmBuilds {
 
 /** What wasm-bindgen makes. */
 interface Glue {
-  default(options: { module_or_path: BufferSource | Response }): Promise<unknown>;
+  default(options: { module_or_path: Code }): Promise<unknown>;
 }
 
 // The smallest module with a 128-bit operation: () => i8x16.splat(0), dropped.
