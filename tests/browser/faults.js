@@ -2,8 +2,9 @@
 
 import assert from 'node:assert/strict';
 import { describe, test } from 'node:test';
-import { details, happenedUntil, loaded, message, mount, openPage } from './browser.js';
-import { DAMAGED } from './photos.js';
+import { compare } from '../../www/tools/pictures.js';
+import { details, happenedUntil, loaded, message, mount, openPage, picture } from './browser.js';
+import { DAMAGED, nativePicture } from './photos.js';
 
 /** @param {import('playwright-core').Page} page @param {string} code */
 async function failsWith(page, code) {
@@ -119,6 +120,40 @@ describe('a page that is', () => {
     await page.route('**/wasm/*', (route) => route.fulfill({ status: 404, body: 'gone' }));
     await mount(page, { src: '/photos/glass.ltm' });
     await failsWith(page, 'wasm-unavailable');
+  });
+
+  test('without the script that draws is backend-unavailable, and tells which', async (t) => {
+    const page = await openPage(t, '/bench');
+    await page.route('**/relightable-photo-cpu.js', (route) => route.fulfill({ status: 404 }));
+    await mount(page, { src: '/photos/glass.ltm', backend: 'cpu' });
+    assert.match(await failsWith(page, 'backend-unavailable'), /relightable-photo-cpu\.js/);
+  });
+
+  test('without the script that lights by pictures keeps its light, and has light-source', async (t) => {
+    const page = await openPage(t, '/bench');
+    await page.route('**/relightable-photo-sources.js', (route) => route.fulfill({ status: 404 }));
+    await mount(page, {
+      src: '/photos/glass.ltm',
+      'light-src': '/site/icon.svg',
+      light: 'stripes',
+    });
+    const happened = await happenedUntil(page, 'load');
+    const error = happened.find(({ type }) => type === 'error');
+    assert.equal(error?.['code'], 'light-source');
+    assert.match(String(error?.['message']), /relightable-photo-sources\.js/);
+    const want = nativePicture('stripes', 'reference');
+    assert.ok(compare(await picture(page), want).worst <= 1);
+  });
+
+  test('without the script of the buttons is controls-unavailable, and all else works', async (t) => {
+    const page = await openPage(t, '/bench');
+    await page.route('**/relightable-photo-controls.js', (route) => route.abort());
+    await mount(page, { src: '/photos/glass.ltm', controls: '', light: 'stripes' });
+    await happenedUntil(page, 'load');
+    const error = (await happenedUntil(page, 'error')).find(({ type }) => type === 'error');
+    assert.equal(error?.['code'], 'controls-unavailable');
+    const want = nativePicture('stripes', 'reference');
+    assert.ok(compare(await picture(page), want).worst <= 1);
   });
 
   for (const [what, policy, code, text] of /** @type {const} */ ([
