@@ -55,14 +55,28 @@ const watch = () => {
     };
     look();
   });
-  times.whole = new Promise((resolve) => {
+  times.whole = new Promise((resolve, reject) => {
     const tell = (/** @type {Event} */ { target }) => {
       if (/** @type {Element} */ (target).localName !== 'relightable-photo') return;
       document.removeEventListener('load', tell, true);
       resolve(performance.now() - times.began);
     };
     document.addEventListener('load', tell, true);
+    document.addEventListener('error', ({ message }) => reject(new Error(message)), true);
   });
+};
+
+/** In the page. @param {() => void} watch @param {string} src */
+const begin = async (watch, src) => {
+  const photo = /** @type {any} */ (document.querySelector('relightable-photo'));
+  const began = performance.now();
+  photo.src = src;
+  // Until it takes that up, it has the picture that it had.
+  await Promise.resolve();
+  watch();
+  const { times } = /** @type {any} */ (globalThis);
+  times.began = began;
+  return { first: await times.shown, whole: await times.whole };
 };
 
 /** @param {number[]} values */
@@ -80,15 +94,7 @@ try {
     await page.goto(`${line.origin}/photo?${turn}`);
     const first = await page.evaluate('times.shown');
     const whole = await page.evaluate('times.whole');
-    await page.evaluate((src) => {
-      const photo = /** @type {any} */ (document.querySelector('relightable-photo'));
-      photo.src = src;
-    }, `/photos/${GLASS}.ltm?later${turn}`);
-    await page.evaluate(watch);
-    const later = await page.evaluate(async () => {
-      const { times } = /** @type {any} */ (globalThis);
-      return { first: await times.shown, whole: await times.whole };
-    });
+    const later = await page.evaluate(`(${begin})(${watch}, '/photos/${GLASS}.ltm?later${turn}')`);
     await page.goto(`${line.origin}/picture?${turn}`, { waitUntil: 'load' });
     const png = await page.evaluate(
       () =>

@@ -27,11 +27,14 @@ async function modules(page) {
       .map(({ name }) => name)
       .filter((name) => /\/wasm\/\w+\.js$/.test(name)),
   );
-  const cpu = loaded.filter((name) => /\/cpu(_scalar)?\.js$/.test(name));
   const relighters = page.workers().filter((worker) => worker.url().includes('relighter'));
   return Promise.all([
     page.evaluate(bytes, loaded),
-    ...relighters.map((worker) => worker.evaluate(bytes, cpu)),
+    ...relighters.map((worker) =>
+      worker
+        .evaluate('memories.reduce((sum, { buffer }) => sum + buffer.byteLength, 0)')
+        .then(Number),
+    ),
   ]);
 }
 

@@ -17,6 +17,20 @@ const ISOLATED = {
   'Cross-Origin-Embedder-Policy': 'require-corp',
 };
 
+/** Relighters note the memory of their modules, to which there is no other way. */
+const RELIGHTER = '/relightable-photo/relightable-photo-relighter.js';
+const NOTING = `
+  const memories = (globalThis.memories = []);
+  for (const name of ['instantiate', 'instantiateStreaming']) {
+    const make = WebAssembly[name];
+    WebAssembly[name] = async (...given) => {
+      const made = await make.apply(WebAssembly, given);
+      memories.push((made.instance ?? made).exports.memory);
+      return made;
+    };
+  }
+`;
+
 /** @type {string} */
 let origin;
 /** @type {import('playwright-core').Browser} */
@@ -38,6 +52,10 @@ export async function start(photos) {
     else if (script) {
       response.setHeader('Content-Type', 'text/javascript');
       response.end(await readFile(join(import.meta.dirname, script)));
+    } else if (path === RELIGHTER) {
+      const script = join(import.meta.dirname, '../../dist/relightable-photo-relighter.js');
+      response.setHeader('Content-Type', 'text/javascript');
+      response.end(NOTING + (await readFile(script, 'utf8')));
     } else serveSite(request, response);
   }, 0);
   origin = server.url;

@@ -351,9 +351,9 @@ impl Opened {
         };
         let length = (range.end - range.start) as usize;
         if bytes.len() == length {
-            *partial = Vec::new();
+            let known = std::mem::take(partial).len();
             self.take(part, bytes)?;
-            return Ok(length as u64);
+            return Ok((length - known) as u64);
         }
         let at = (offset - range.start) as usize;
         if at > partial.len() {

@@ -7,8 +7,6 @@ import type { Drawing } from './player.js';
 /** A drawing that is a canvas. */
 export interface CanvasSurface extends Drawing {
   readonly canvas: HTMLCanvasElement;
-  /** The picture as it was drawn last, in the turn of the event loop that drew it. */
-  toBlob(type: string, quality?: number): Promise<Blob>;
 }
 
 /** What a canvas shows, encoded. */

@@ -1,7 +1,6 @@
 /** A canvas that a crew of workers draws. */
 
 import type { CanvasSurface } from './canvas.js';
-import { blobOf } from './canvas.js';
 import type { Crew, Shift } from './crew.js';
 import type { CpuModule, DrawnPhoto, Gamut } from './engine.js';
 import { hasCode, letGo, messageOf, PhotoError } from './errors.js';
@@ -90,10 +89,6 @@ export class CrewDrawing implements CanvasSurface {
       // Without workers this cannot draw, but a photograph that is fetched anew is drawn by the page.
       throw new PhotoError('photo-lost', messageOf(thrown), thrown);
     }
-  }
-
-  toBlob(type: string, quality?: number): Promise<Blob> {
-    return blobOf(this.canvas, type, quality);
   }
 
   free(): void {

@@ -31,6 +31,9 @@ const MOST_INCIDENTS = 3;
 /** Largest frames take a second or two on slow machines. The module the page has had already. */
 const PATIENCE: Patience = { lookMs: 1000, looks: 10, startLooks: 15 };
 
+/** So many start unasked: few photographs are too small for them. */
+const GATHERED = 2;
+
 /** See the module. */
 export class Crew {
   readonly #start: () => WorkerLike | null;
@@ -75,11 +78,14 @@ export class Crew {
     }
   }
 
-  /** Has workers start before there is work for them. They stay until what it gives is called, and for work. */
+  /**
+   * Has some workers start before it is known how many there is work for. They stay until what it gives is
+   * called, and for work.
+   */
   gather(): () => void {
     this.#shifts += 1;
     try {
-      this.#pick(this.#size);
+      this.#pick(Math.min(this.#size, GATHERED));
     } catch {
       // Told to who has work.
     }

@@ -217,3 +217,37 @@ test('a browser that never tells a name has no device', async () => {
     message: /does not answer within/,
   });
 });
+
+test('a browser that answers late is asked again', async () => {
+  const w = world();
+  let answer = (_: string): void => {};
+  const names = [
+    new Promise<string>((resolve) => {
+      answer = resolve;
+    }),
+    Promise.resolve('A real one'),
+  ];
+  const page = {
+    nameOf: () => names.shift() ?? Promise.resolve(null),
+    newCanvas: assert.fail,
+    now: () => 0,
+  };
+  const devices = new Devices(page, 20);
+  const lease = () => devices.lease(w.load, 'webgpu', true, w.note('a'));
+  await assert.rejects(lease(), /does not answer within/);
+  answer('A real one');
+  await settle();
+  assert.ok(await lease());
+});
+
+test('what takes the place of a lost device is asked its name', async () => {
+  const w = world();
+  await w.devices.lease(w.load, 'webgpu', false, w.note('a'));
+  w.call('google swiftshader');
+  w.loses[0]?.('gone.');
+  await settle();
+  await assert.rejects(
+    w.devices.lease(w.load, 'webgpu', false, w.note('a')),
+    /done by a program here/,
+  );
+});

@@ -147,7 +147,14 @@ export class Devices {
         // Else each photograph would wait as long.
         this.#mute = unavailable(why);
         reject(this.#mute);
-        asked.then(late, () => {});
+        asked.then(
+          (answer) => {
+            // A page that slept, say.
+            this.#mute = null;
+            late(answer);
+          },
+          () => {},
+        );
       }, this.#longestMs);
     });
     try {
@@ -171,6 +178,8 @@ export class Devices {
     const now = this.#page.now();
     const recent = now - losses.last <= FORGET_MS;
     this.#losses.set(backend, { count: recent ? losses.count + 1 : 1, last: now });
+    // What comes in its place may be a program.
+    this.#names.delete(backend);
     const holders = [...shared.holders];
     this.#close(backend, shared);
     for (const lost of holders) lost(reason);
@@ -207,15 +216,15 @@ async function webGpuName(): Promise<string | null> {
   const adapter = await (navigator as { gpu?: Gpu }).gpu?.requestAdapter();
   if (!adapter) return null;
   const { vendor, architecture, description, isFallbackAdapter } = adapter.info ?? {};
-  return [vendor, architecture, description, isFallbackAdapter && 'software'].join(' ');
+  return [vendor, architecture, description, isFallbackAdapter ? 'software' : ''].join(' ').trim();
 }
 
 function webGl2Name(): string | null {
   const gl = document.createElement('canvas').getContext('webgl2');
   if (!gl) return null;
-  let name = String(gl.getParameter(gl.RENDERER));
+  let name: string | null = gl.getParameter(gl.RENDERER);
   // Some browsers tell only who asks twice; others complain of that.
-  if (name.startsWith('WebKit')) {
+  if (name?.startsWith('WebKit')) {
     const info = gl.getExtension('WEBGL_debug_renderer_info');
     if (info) name = gl.getParameter(info.UNMASKED_RENDERER_WEBGL);
   }

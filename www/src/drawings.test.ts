@@ -241,3 +241,47 @@ test('a drawing that was freed draws nothing, and leaves tiles where they are', 
   });
   assert.deepEqual([has.size, await alive()], [4, 0]);
 });
+
+/** A drawer on the CPU, whose module comes when the test says. */
+function preparing(t: TestContext) {
+  fakeDocument(t);
+  const { crew, workers, alive } = crewOf(4);
+  const { module } = photoOf(4);
+  let come = (_: CpuModule): void => {};
+  let fail = (_: Error): void => {};
+  const cpuModule = new Promise<CpuModule>((resolve, reject) => {
+    come = resolve;
+    fail = reject;
+  });
+  const { prepare } = drawer({
+    gpu: () => Promise.reject(new PhotoError('backend-unavailable', 'none here')),
+    cpu: async () => cpuDrawer(crew),
+    cpuModule: () => cpuModule,
+  });
+  const over = new AbortController();
+  const done = prepare({ ...wanting(['webgl2', 'cpu']), software: false }, over.signal);
+  return { come: () => come(module as unknown as CpuModule), fail, over, done, workers, alive };
+}
+
+test('workers get ready once their module is there, and go home unless there is work', async (t) => {
+  const { come, over, done, workers, alive } = preparing(t);
+  await settle();
+  assert.equal(workers.length, 0);
+  come();
+  await done;
+  assert.equal(workers.length, 2);
+  over.abort();
+  await settle();
+  assert.equal(await alive(), 0);
+});
+
+test('no worker gets ready for what is over by then, or has no module', async (t) => {
+  const first = preparing(t);
+  first.over.abort();
+  first.come();
+  await first.done;
+  const second = preparing(t);
+  second.fail(new Error('offline'));
+  await second.done;
+  assert.equal(first.workers.length + second.workers.length, 0);
+});

@@ -54,7 +54,9 @@ export function drawer({ gpu, cpu, cpuModule }: Drawers): Drawer {
       const [module, drawer] = await Promise.all([cpuModule(), cpu()]);
       return await drawer.draw(module, photograph, wanted.gamut, signal);
     }
-    const drawing = await (await gpu()).draw(backend, photograph, wanted, lost, signal);
+    const drawer = await gpu();
+    signal.throwIfAborted();
+    const drawing = await drawer.draw(backend, photograph, wanted, lost, signal);
     idle(() => Promise.allSettled([cpuModule(), cpu()]));
     return drawing;
   };
@@ -62,11 +64,17 @@ export function drawer({ gpu, cpu, cpuModule }: Drawers): Drawer {
     for (const backend of backends) {
       if (over.aborted) return;
       try {
-        const [letGo] = await Promise.all(
-          backend === 'cpu'
-            ? [cpu().then((drawer) => drawer.prepare()), cpuModule()]
-            : [(await gpu()).prepare(backend, software)],
-        );
+        let letGo: () => void;
+        if (backend === 'cpu') {
+          // Workers that start sooner would have to wait for a module that the page waits for too.
+          const [drawer] = await Promise.all([cpu(), cpuModule()]);
+          if (over.aborted) return;
+          letGo = drawer.prepare();
+        } else {
+          const drawer = await gpu();
+          if (over.aborted) return;
+          letGo = await drawer.prepare(backend, software);
+        }
         if (over.aborted) letGo();
         else over.addEventListener('abort', letGo);
         return;
@@ -99,7 +107,7 @@ export const { draw, prepare } = drawer({
   cpuModule: loadCpu,
 });
 
-/** A script that draws: fetched once, and again where it did not come. */
+/** A script that draws: fetched once. Where it did not come, the next asks again; some browsers answer as before. */
 function once<T>(fetchScript: () => Promise<T>): () => Promise<T> {
   let fetching: Promise<T> | null = null;
   return () => {

@@ -323,8 +323,8 @@ export class RelightablePhoto extends Base {
     }
     const drawing = await this.#player.renderNow();
     // The canvas of a GPU keeps its content only until the browser has shown it.
-    if (scale === 1) return drawing.toBlob(type, quality);
-    return blobOf(resampled(drawing.canvas, scale, drawing.gamut), type, quality);
+    const { canvas, gamut } = drawing;
+    return blobOf(scale === 1 ? canvas : resampled(canvas, scale, gamut), type, quality);
   }
 
   connectedCallback(): void {
@@ -520,7 +520,7 @@ export class RelightablePhoto extends Base {
   #lightFaultChanged(fault: PhotoError | null): void {
     this.#showFault();
     // Nothing else ends by it: a photograph goes on loading.
-    if (fault) this.dispatchEvent(new PhotoErrorEvent(fault));
+    if (fault && this.isConnected) this.dispatchEvent(new PhotoErrorEvent(fault));
   }
 
   #showFault(): void {

@@ -29,6 +29,7 @@ export function gpuDrawer(load: LoadGraphics, devices: Devices): GpuDrawer {
       const lease = await devices.lease(load, backend, software, lost);
       const { graphics } = lease;
       try {
+        signal.throwIfAborted();
         const module = await load(backend);
         return await photograph.inPage(
           module,

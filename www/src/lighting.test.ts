@@ -22,7 +22,10 @@ function lighting(asked = ASKED, fetch = async () => sources) {
   const told: string[] = [];
   const listener = {
     changed: () => told.push('changed'),
-    came: () => told.push('came'),
+    came: () => {
+      told.push('came');
+      it.ask(asked, null);
+    },
     faultChanged: (fault: PhotoError | null) => told.push(fault?.code ?? 'well'),
   };
   const it = new Lighting(listener, fetch);

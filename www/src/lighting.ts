@@ -27,7 +27,7 @@ export interface LightChoice {
 export interface LightingListener {
   /** What a source shows is another. */
   changed(): void;
-  /** A source is followed from now on, which took until now. */
+  /** Sources can be followed from now on: `ask` again, unless nobody is there any more. */
   came(): void;
   faultChanged(fault: PhotoError | null): void;
 }
@@ -191,7 +191,7 @@ export class Lighting {
 
   /** Settles once sources are followed, or cannot be; `null` where nothing is waited for. */
   get coming(): Promise<void> | null {
-    return this.#sources === null ? this.#coming : null;
+    return this.#sources === null && this.#projects ? this.#coming : null;
   }
 
   /** Why nothing is to be seen of a source. */
@@ -228,8 +228,6 @@ export class Lighting {
     this.#sources = null;
     try {
       this.#sources = await this.#fetchSources();
-      this.#update();
-      this.#listener.came();
     } catch (cause) {
       this.#sources = undefined;
       const message =
@@ -237,7 +235,9 @@ export class Lighting {
         "beside the element's.";
       this.#missing = new PhotoError('light-source', message, cause);
       if (this.#projects) this.#listener.faultChanged(this.#missing);
+      return;
     }
+    this.#listener.came();
   }
 
   #attend(): void {

@@ -1,6 +1,6 @@
 /** A canvas that the page draws on the CPU. Tiles may leave its module; they are back for the next picture. */
 
-import { blobOf, type CanvasSurface } from './canvas.js';
+import type { CanvasSurface } from './canvas.js';
 import type { CpuModule, Gamut } from './engine.js';
 import { letGo } from './errors.js';
 import type { LightSetting } from './lights.js';
@@ -45,10 +45,6 @@ export class PageDrawing implements CanvasSurface {
   render(setting: LightSetting, look: Look, detail: number): Drawn | Promise<Drawn> {
     if (this.#drawing) return this.#drawing.render(setting, look, detail);
     return this.#begin().then((drawing) => drawing.render(setting, look, detail));
-  }
-
-  toBlob(type: string, quality?: number): Promise<Blob> {
-    return blobOf(this.canvas, type, quality);
   }
 
   free(): void {

@@ -203,6 +203,8 @@ export class Player<D extends Drawing> {
   /** The photograph did not come whole, which frames of what came do not mend. */
   #cutShort = false;
   #frameAsked = false;
+  /** Whether a picture of this photograph is on the screen, be it of one that was let go. */
+  #onScreen = false;
   /** What the listener was told to show last. */
   #shows: D | null = null;
   #visible = true;
@@ -376,6 +378,7 @@ export class Player<D extends Drawing> {
     if (timeFor < 1 && !this.#stale && !this.#unseen) this.#awaitRest();
     if (this.#shows !== drawing) {
       this.#shows = drawing;
+      this.#onScreen = true;
       this.#listener.show(drawing);
       this.#outgoing?.free();
       this.#outgoing = null;
@@ -410,6 +413,7 @@ export class Player<D extends Drawing> {
   #begin(src: string | null): void {
     this.#release();
     this.#fetches = 0;
+    this.#onScreen = false;
     this.#listener.loading();
     if (src === null) {
       this.#fail(missingSource());
@@ -454,8 +458,8 @@ export class Player<D extends Drawing> {
         (loaded, total) => {
           if (!signal.aborted) this.#listener.progress(loaded, total);
         },
-        // One that was fetched before is shown, and is finer than what comes first.
-        this.#fetches === 0 ? onPreview : null,
+        // What is on the screen is finer than what comes first.
+        this.#onScreen ? null : onPreview,
       );
       // Who draws the coarser one has all that this one needs as well, and nothing is asked for twice.
       while (this.#search && !signal.aborted) await this.#search.ended;

@@ -1,6 +1,6 @@
 /** A canvas with a back end of the page's own module on it. */
 
-import { blobOf, type CanvasSurface } from './canvas.js';
+import type { CanvasSurface } from './canvas.js';
 import type { Lease } from './devices.js';
 import type { DrawingModule, DrawnPhoto, Gamut, Relighter } from './engine.js';
 import { toPhotoError } from './errors.js';
@@ -84,10 +84,6 @@ export class CanvasDrawing implements CanvasSurface {
       // Reading it tells what is wrong.
       return false;
     }
-  }
-
-  toBlob(type: string, quality?: number): Promise<Blob> {
-    return blobOf(this.canvas, type, quality);
   }
 
   free(): void {

@@ -23,7 +23,11 @@ impl Device {
     pub(super) async fn of(format: TextureFormat) -> Result<Self, BackendError> {
         let (gpu, adapter) = Gpu::open().await?;
         let pipelines = gpu.attempt(|| Pipelines::new(&gpu, format)).await;
-        let pipelines = pipelines.map_err(|reason| BackendError::Device { api: API, reason })?;
+        let pipelines = pipelines.map_err(|reason| {
+            // Who asks again gets another.
+            gpu.destroy();
+            BackendError::Device { api: API, reason }
+        })?;
         let kernel = match adapter.name.trim() {
             "" => API,
             name => name,
