@@ -127,6 +127,59 @@ describe('an element', () => {
     });
   }
 
+  test('that comes and goes 200 times leaves nothing behind', async (t) => {
+    const page = await openPage(t, '/bench');
+    const session = await page.context().newCDPSession(page);
+    const held = async () => {
+      // What the first collection finds is let go by the next.
+      for (let i = 0; i < 3; i += 1) {
+        await session.send('HeapProfiler.collectGarbage');
+        await page.waitForTimeout(100);
+      }
+      const { usedSize } = await session.send('Runtime.getHeapUsage');
+      const { nodes, jsEventListeners: listeners } = await session.send('Memory.getDOMCounters');
+      const wasm = Number(
+        await page.evaluate(async () => {
+          const modules = ['decoder', 'cpu'].map((name) => `/relightable-photo/wasm/${name}.js`);
+          const started = performance.getEntriesByType('resource').map(({ name }) => name);
+          let sum = 0;
+          for (const module of modules) {
+            if (!started.some((name) => name.endsWith(module))) continue;
+            sum += (await (await import(module)).default()).memory.buffer.byteLength;
+          }
+          return sum;
+        }),
+      );
+      return { heap: usedSize, nodes, listeners, wasm, workers: page.workers().length };
+    };
+    const cycle = (/** @type {number} */ times) =>
+      page.evaluate(async (times) => {
+        for (let i = 0; i < times; i += 1) {
+          const photo = document.createElement('relightable-photo');
+          Object.assign(photo, { src: '/photos/glass.ltm', backend: 'cpu', loading: 'eager' });
+          const load = new Promise((resolve, reject) => {
+            photo.addEventListener('load', resolve);
+            photo.addEventListener('error', ({ message }) => reject(new Error(message)));
+          });
+          document.body.append(photo);
+          await load;
+          photo.remove();
+          await new Promise((resolve) => setTimeout(resolve));
+        }
+      }, times);
+    await cycle(20);
+    const before = await held();
+    await cycle(200);
+    const after = await held();
+    t.diagnostic(`${JSON.stringify(before)} → ${JSON.stringify(after)}`);
+    assert.equal(after.wasm, before.wasm);
+    assert.equal(after.workers, before.workers);
+    assert.ok(after.nodes - before.nodes < 200, 'nodes');
+    assert.ok(after.listeners - before.listeners < 200, 'listeners');
+    // What is compiled meanwhile takes some, once; an element that stays takes ten kilobytes.
+    assert.ok(after.heap - before.heap < 200 * 2500, 'the heap of scripts');
+  });
+
   test('loaded again and again leaves the graphics of others alone', async (t) => {
     const page = await openPage(t, '/bench');
     await mount(page, { src: '/photos/glass.ltm', backend: 'webgl2 cpu', light: 'spectrum' });
