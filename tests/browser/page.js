@@ -9,7 +9,7 @@ import { SCREENSHOTS } from './photos.js';
 
 /** @param {import('playwright-core').Page} page */
 async function drawn(page) {
-  await page.waitForFunction(() => document.querySelector('relightable-photo')?.activeBackend);
+  await page.waitForFunction(() => document.querySelector('relightable-photo')?.detail === 1);
   await page.locator('#photo canvas').waitFor();
 }
 

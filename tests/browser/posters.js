@@ -118,10 +118,10 @@ describe('a poster', () => {
 
   test('that is missing is asked for once', async (t) => {
     const page = await openPage(t, '/bench');
-    await mount(page, { ...GLASS, poster: '/none.png', reveal: 'manual' });
+    await mount(page, { ...GLASS, poster: '/no-poster.png', reveal: 'manual' });
     await loaded(page);
     for (let i = 1; i < 9; i += 1) await page.evaluate(`photo.torch = { x: ${i / 9}, y: 0.5 }`);
-    assert.equal(asked.get('/none.png')?.length, 1);
+    assert.equal(asked.get('/no-poster.png')?.length, 1);
     assert.equal(await posterShown(page), false);
   });
 });

@@ -51,34 +51,37 @@ async function farBelow(t) {
 describe('an element out of view', () => {
   test('is drawn when it has loaded, and then once it comes into view', async (t) => {
     const page = await farBelow(t);
-    assert.equal(await draws(page), 1);
+    // Of the beginning of the file too, where there was time.
+    const first = await draws(page);
+    assert.ok(first >= 1);
     await moveTorch(page);
-    assert.equal(await draws(page), 1);
+    assert.equal(await draws(page), first);
     await page.evaluate('photo.scrollIntoView()');
-    await page.waitForFunction('counts.draws === 2');
+    await page.waitForFunction(`counts.draws === ${first + 1}`);
     const shown = decodePng(await page.locator('relightable-photo').screenshot());
     const want = nativePicture('torch', 'reference', 1, { x: 0.3, y: 0.65 });
     assert.ok(compare(shown, want).worst <= 2);
-    assert.equal(await draws(page), 2);
+    assert.equal(await draws(page), first + 1);
     // Nothing has changed meanwhile.
     await page.evaluate('scrollTo(0, 0)');
     await page.waitForTimeout(200);
     await page.evaluate('photo.scrollIntoView()');
     await page.waitForTimeout(200);
-    assert.equal(await draws(page), 2);
+    assert.equal(await draws(page), first + 1);
     await moveTorch(page);
-    assert.ok((await draws(page)) > 5);
+    assert.ok((await draws(page)) > first + 4);
   });
 
   test('gives its picture to whoever asks', async (t) => {
     const page = await farBelow(t);
+    const first = await draws(page);
     await moveTorch(page);
     const want = nativePicture('torch', 'reference', 1, { x: 0.3, y: 0.65 });
     assert.ok(compare(await picture(page), want).worst <= 1);
-    assert.equal(await draws(page), 2);
+    assert.equal(await draws(page), first + 1);
     await page.evaluate('photo.scrollIntoView()');
     await page.waitForTimeout(200);
-    assert.equal(await draws(page), 2, 'it was up to date');
+    assert.equal(await draws(page), first + 1, 'it was up to date');
   });
 
   test('nor displayed is drawn once it is', async (t) => {
