@@ -9,8 +9,10 @@ import { SCREENSHOTS } from './photos.js';
 
 /** @param {import('playwright-core').Page} page */
 async function drawn(page) {
-  await page.waitForFunction(() => document.querySelector('relightable-photo')?.detail === 1);
+  await page.waitForFunction(() => document.querySelector('relightable-photo')?.activeBackend);
   await page.locator('#photo canvas').waitFor();
+  // Of all of the photograph.
+  await page.locator('#photo').getByRole('progressbar').waitFor({ state: 'hidden' });
 }
 
 /** @param {import('playwright-core').Page} page */
