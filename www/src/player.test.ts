@@ -1003,3 +1003,29 @@ test('a photograph that fails to come whole leaves its last picture, and says so
   w.player.stop();
   assert.deepEqual(w.happened(), ['free webgpu', 'free 0.5 of a.ltm']);
 });
+
+test('what waits for a frame of a coarser photograph is drawn by the whole one', async () => {
+  const cpu = { ...SETTINGS, wanted: wanting(['cpu']) };
+  const w = world();
+  const frames = w.slowDown();
+  w.player.set(cpu);
+  await w.previewed('a.ltm', 0.5);
+  await w.drawn(0);
+  frames.shift()?.done();
+  await settle();
+  w.player.set({ ...cpu, look: exposed(2) });
+  await w.frame();
+  assert.equal(frames.length, 1);
+  // Asked for while that is drawn.
+  const waiting = w.player.renderNow();
+  await w.opened('a.ltm');
+  frames.shift()?.fail(new PhotoError('internal', 'it was let go'));
+  await settle();
+  await w.drawn(1);
+  for (let i = 0; i < 5; i += 1) {
+    frames.shift()?.done();
+    await settle();
+  }
+  assert.ok(w.happened().includes('loaded'));
+  assert.equal(await waiting, w.player.drawing);
+});

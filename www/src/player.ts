@@ -194,6 +194,8 @@ export class Player<D extends Drawing> {
   #outgoing: SetUp<D> | null = null;
   /** The frame that is to follow what is under way. */
   #next: Promise<D> | null = null;
+  /** How often what there was was let go: what waits then waits in vain. */
+  #releases = 0;
   /** How often the photograph was fetched anew since it was last drawn. */
   #fetches = 0;
   /** Whether there is a picture of the photograph, and whether one of all of it. */
@@ -304,10 +306,11 @@ export class Player<D extends Drawing> {
   }
 
   async #drawNext(): Promise<D> {
-    const held = this.#held;
+    const releases = this.#releases;
     while (this.#busy) {
       await this.#busy;
-      if (this.#held !== held) throw notLoaded();
+      // A finer photograph in the place of a coarser one is drawn all the same.
+      if (this.#releases !== releases) throw notLoaded();
     }
     this.#next = null;
     return await this.#draw();
@@ -315,7 +318,7 @@ export class Player<D extends Drawing> {
 
   async #draw(): Promise<D> {
     const active = this.#active;
-    const held = this.#held;
+    const releases = this.#releases;
     const whole = this.#whole;
     this.#whole = false;
     if (!active || !this.#settings) throw notLoaded();
@@ -346,7 +349,7 @@ export class Player<D extends Drawing> {
       }
       if (active !== this.#active) {
         // What becomes of one that has been let go is nobody's concern. What comes in its place draws.
-        if (held !== this.#held || !this.#search) throw notLoaded(thrown);
+        if (releases !== this.#releases || !this.#search) throw notLoaded(thrown);
         this.#whole ||= whole;
         return this.#renderSoon();
       }
@@ -696,6 +699,7 @@ export class Player<D extends Drawing> {
   }
 
   #release(): void {
+    this.#releases += 1;
     this.#load?.abort();
     this.#load = null;
     this.#search?.abort();
