@@ -18,7 +18,7 @@ import type {
   Graphics,
   Light,
   Relighter,
-} from '../../www/src/engine.js';
+} from '../../www/src/engine/types.js';
 
 // Its classes are nominal, so functions of one cannot be assigned to functions of the other; what
 // they give and take can.

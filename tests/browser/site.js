@@ -155,7 +155,7 @@ describe('the site', () => {
   });
 
   test('tells of every failure there is a code for', () => {
-    const codes = readFileSync(join(repository, 'www/src/errors.ts'), 'utf8').matchAll(
+    const codes = readFileSync(join(repository, 'www/src/shared/errors.ts'), 'utf8').matchAll(
       /^ +\| '([a-z-]+)'/gm,
     );
     const page = composePage('troubleshooting.html');

@@ -1,23 +1,23 @@
 /** Decoding and relighting without a page: for Node, workers and scripts of one's own. No DOM, no side effects. */
 
-export type { WasmCode } from './core-code.js';
-export type { CorePhotograph as Photograph, DecodeOptions, PhotoFile } from './core-decode.js';
-export { decode } from './core-decode.js';
+export type { CorePhotograph as Photograph, DecodeOptions, PhotoFile } from './core/decode.js';
+export { decode } from './core/decode.js';
 export type {
   CoreLight as Light,
   Picture,
   PictureLight,
   RelightOptions,
   Torch,
-} from './core-relight.js';
-export { relight } from './core-relight.js';
-export type { EngineErrorCode, ErrorCode, PageErrorCode } from './errors.js';
-export { PhotoError } from './errors.js';
-export type { Gamut, LightName, ToneCurve } from './names.js';
-export { LIGHTS } from './names.js';
+} from './core/relight.js';
+export { relight } from './core/relight.js';
+export type { WasmCode } from './core/wasm-code.js';
+export type { EngineErrorCode, ErrorCode, PageErrorCode } from './shared/errors.js';
+export { PhotoError } from './shared/errors.js';
+export type { Gamut, LightName, ToneCurve } from './shared/names.js';
+export { LIGHTS } from './shared/names.js';
 
-import { provideCode, type WasmCode } from './core-code.js';
-import { CORE_MODULES } from './names.js';
+import { provideCode, type WasmCode } from './core/wasm-code.js';
+import { CORE_MODULES } from './shared/names.js';
 
 /** A WebAssembly module, by name. */
 export type ModuleName = (typeof CORE_MODULES)[number];

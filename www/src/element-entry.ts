@@ -1,11 +1,9 @@
 /** The element's class and all that goes with it. Importing this has no side effects. */
 
-export { defineRelightablePhoto, TAG } from './define.js';
-export type { BlobOptions, PhotoInfo } from './element.js';
-export { RelightablePhoto } from './element.js';
-export type { EngineErrorCode, ErrorCode, PageErrorCode } from './errors.js';
-export { PhotoError } from './errors.js';
-export type { RelightablePhotoEventMap } from './events.js';
+export { defineRelightablePhoto, TAG } from './element/define.js';
+export type { BlobOptions, PhotoInfo } from './element/element.js';
+export { RelightablePhoto } from './element/element.js';
+export type { RelightablePhotoEventMap } from './element/events.js';
 export {
   BackendChangeEvent,
   ContextLostEvent,
@@ -13,16 +11,18 @@ export {
   PhotoErrorEvent,
   QualityChangeEvent,
   ViewChangeEvent,
-} from './events.js';
-export type { LightPose } from './exhibit.js';
+} from './element/events.js';
+export type { Reflected } from './element/reflect.js';
 export type {
   BrowserPicture,
   LightPicture,
   LightSource,
   LinearLight,
-} from './light-source.js';
-export type { Backend, Gamut, LightName, ToneCurve } from './names.js';
-export type { Reflected } from './reflect.js';
-export type { Loading, PicturePoint, Reveal } from './settings.js';
-export { BACKENDS, LIGHTS } from './settings.js';
-export type { PhotoView } from './viewport.js';
+} from './lights/light-source.js';
+export type { EngineErrorCode, ErrorCode, PageErrorCode } from './shared/errors.js';
+export { PhotoError } from './shared/errors.js';
+export type { Backend, Gamut, LightName, ToneCurve } from './shared/names.js';
+export type { Loading, PicturePoint, Reveal } from './shared/settings.js';
+export { BACKENDS, LIGHTS } from './shared/settings.js';
+export type { LightPose } from './state/viewer-state.js';
+export type { PhotoView } from './state/viewport.js';

@@ -1,6 +1,6 @@
 /** Importing this defines `<relightable-photo>`, in a browser; on a server it does nothing. */
 
-import { defineRelightablePhoto } from './define.js';
+import { defineRelightablePhoto } from './element/define.js';
 
 export * from './element-entry.js';
 

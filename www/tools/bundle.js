@@ -10,32 +10,35 @@
 import { execFileSync } from 'node:child_process';
 import { copyFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
-import { join } from 'node:path';
+import { join, relative } from 'node:path';
 import { build } from 'esbuild';
 import { writeIntegrity } from './integrity.js';
 import { makeManifest } from './manifest.js';
 import { styles } from './styles.js';
 
 const repository = join(import.meta.dirname, '..', '..');
+const sources = join(repository, 'www/src');
 const dist = join(repository, 'dist');
 
 /** What is fetched only where it is asked for lies beside the element, under names of its own. */
 const APART = new Map([
-  ['./cpu-drawing.js', './relightable-photo-cpu.js'],
-  ['./gpu-drawing.js', './relightable-photo-gpu.js'],
-  ['./light-sources.js', './relightable-photo-sources.js'],
-  ['./tilt.js', './relightable-photo-tilt.js'],
-  ['./toolbar.js', './relightable-photo-controls.js'],
-  ['./translations.js', './relightable-photo-words.js'],
+  ['renderers/cpu/cpu-renderer', 'relightable-photo-cpu'],
+  ['renderers/gpu/gpu-renderer', 'relightable-photo-gpu'],
+  ['lights/light-sources', 'relightable-photo-sources'],
+  ['input/tilt', 'relightable-photo-tilt'],
+  ['ui/toolbar', 'relightable-photo-controls'],
+  ['i18n/translations', 'relightable-photo-words'],
 ]);
 
 /** @type {import('esbuild').Plugin} */
 const apart = {
   name: 'apart',
   setup({ onResolve }) {
-    onResolve({ filter: /^\.\// }, ({ kind, path }) => {
-      const file = kind === 'dynamic-import' ? APART.get(path) : undefined;
-      return file === undefined ? undefined : { path: file, external: true };
+    onResolve({ filter: /^\.\.?\// }, ({ kind, path, resolveDir }) => {
+      if (kind !== 'dynamic-import') return undefined;
+      const source = relative(sources, join(resolveDir, path)).replace(/\.js$/, '');
+      const file = APART.get(source);
+      return file === undefined ? undefined : { path: `./${file}.js`, external: true };
     });
   },
 };
@@ -82,20 +85,15 @@ await Promise.all([
     plugins: [styles, apart],
     entryPoints: {
       'relightable-photo': 'www/src/index.ts',
-      'relightable-photo-cpu': 'www/src/cpu-drawing.ts',
-      'relightable-photo-gpu': 'www/src/gpu-drawing.ts',
-      'relightable-photo-sources': 'www/src/light-sources.ts',
-      'relightable-photo-tilt': 'www/src/tilt.ts',
-      'relightable-photo-controls': 'www/src/toolbar.ts',
-      'relightable-photo-words': 'www/src/translations.ts',
+      ...Object.fromEntries([...APART].map(([source, file]) => [file, `www/src/${source}.ts`])),
     },
   }),
   build({
     ...options,
     plugins: [glueInside],
     entryPoints: {
-      'relightable-photo-worker': 'www/src/decode-worker.ts',
-      'relightable-photo-relighter': 'www/src/relight-worker.ts',
+      'relightable-photo-worker': 'www/src/photo/decode-worker.ts',
+      'relightable-photo-relighter': 'www/src/renderers/cpu/relight-worker.ts',
     },
   }),
   build({

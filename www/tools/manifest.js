@@ -21,9 +21,9 @@ const repository = join(import.meta.dirname, '..', '..');
 const CLASS_MODULE = 'dist/element.js';
 const DEFINING_MODULE = 'dist/index.js';
 const CLASS = 'RelightablePhoto';
-const SOURCES = ['www/src/element.ts', 'www/src/events.ts'];
+const SOURCES = ['www/src/element/element.ts', 'www/src/element/events.ts'];
 /** The interface that has the properties which are attributes. */
-const REFLECTED = { file: 'www/src/reflect.ts', name: 'Reflected' };
+const REFLECTED = { file: 'www/src/element/reflect.ts', name: 'Reflected' };
 /** Observed, and every element's. */
 const GLOBAL = ['lang'];
 

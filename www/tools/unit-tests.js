@@ -1,4 +1,4 @@
-/** Compiles www/src/*.test.ts and runs them in Node. */
+/** Compiles the tests beside the sources in www/src and runs them in Node. */
 
 import { spawnSync } from 'node:child_process';
 import { readdirSync, rmSync } from 'node:fs';
@@ -8,12 +8,15 @@ import { build } from 'esbuild';
 const repository = join(import.meta.dirname, '..', '..');
 const source = join(repository, 'www/src');
 const out = join(repository, 'target/www-tests');
-const tests = readdirSync(source).filter((name) => name.endsWith('.test.ts'));
+const tests = readdirSync(source, { recursive: true, encoding: 'utf8' }).filter((name) =>
+  name.endsWith('.test.ts'),
+);
 
 rmSync(out, { recursive: true, force: true });
 await build({
   entryPoints: tests.map((name) => join(source, name)),
   outdir: out,
+  outbase: source,
   outExtension: { '.js': '.mjs' },
   bundle: true,
   format: 'esm',

@@ -1,0 +1,452 @@
+import assert from 'node:assert/strict';
+import { getEventListeners, once } from 'node:events';
+import { createServer, type IncomingMessage, type ServerResponse } from 'node:http';
+import type { AddressInfo } from 'node:net';
+import test, { type TestContext } from 'node:test';
+import { gzipSync } from 'node:zlib';
+import { answer } from '../../tools/ranges.js';
+import type { DecodedPhoto, Decoder } from '../engine/types.js';
+import { LocalDecoder } from '../photo/main-thread-decoder.js';
+import type { Photograph } from '../photo/photograph.js';
+import { photoOf } from '../renderers/cpu/worker-pool-fakes.js';
+import { type LoadPorts, openPhoto } from './load.js';
+
+const never = new AbortController().signal;
+const FIRST_BYTES = 16_384;
+/** What the demo's photograph takes. */
+const FILE_BYTES = 800_000;
+/** Where a file must not have a 255. */
+const TENDER = 20_000;
+
+/** A file for `FakeDecoder`, in which no place looks like the next. */
+function fileOf(size = FILE_BYTES, headBytes = 1000): Buffer {
+  const file = Buffer.alloc(
+    size,
+    Uint8Array.from({ length: 251 }, (_, i) => i),
+  );
+  file.writeUInt32LE(size, 0);
+  file.writeUInt32LE(headBytes, 4);
+  return file;
+}
+
+/** Counts those alive; the bytes that the last one was fed stay. */
+class FakeDecoder implements Decoder {
+  static alive = 0;
+  static fed = Buffer.alloc(0);
+  bytesFed = 0;
+  readonly #bytes = Buffer.alloc(10_000_000);
+
+  constructor() {
+    FakeDecoder.alive += 1;
+  }
+
+  get fileBytes(): number | undefined {
+    return this.bytesFed < 144 ? undefined : this.#bytes.readUInt32LE(0);
+  }
+
+  wants(): Float64Array {
+    const headBytes = this.bytesFed < 144 ? FIRST_BYTES : this.#bytes.readUInt32LE(4);
+    const end = this.bytesFed < headBytes ? headBytes : (this.fileBytes ?? 0);
+    return this.bytesFed < end ? Float64Array.of(this.bytesFed, end) : new Float64Array();
+  }
+
+  feed(offset: number, bytes: Uint8Array): void {
+    assert.ok(offset <= this.bytesFed, 'in order');
+    this.#bytes.set(bytes, offset);
+    this.bytesFed = Math.max(this.bytesFed, offset + bytes.byteLength);
+    FakeDecoder.fed = this.#bytes.subarray(0, this.bytesFed);
+    if (FakeDecoder.fed[TENDER] === 255) {
+      throw Object.assign(new Error('tile 3 is damaged'), { code: 'format-checksum' });
+    }
+  }
+
+  /** One at each 100 kB. */
+  get scansDone(): number {
+    return Math.floor(this.bytesFed / 100_000);
+  }
+
+  preview(): DecodedPhoto | undefined {
+    return this.scansDone > 0 ? photoOf(1).photo : undefined;
+  }
+
+  finish(): DecodedPhoto {
+    this.free();
+    return photoOf(1).photo;
+  }
+
+  free(): void {
+    FakeDecoder.alive -= 1;
+  }
+}
+
+interface Site {
+  readonly url: string;
+  /** What has been asked for, in order. */
+  readonly asked: (string | undefined)[];
+  /** Answers that have been ended, by either side. */
+  readonly closed: Promise<unknown>[];
+}
+
+/** A server of its own for a test. `count` is 1 with the first request. */
+async function serve(
+  t: TestContext,
+  handler: (request: IncomingMessage, response: ServerResponse, count: number) => unknown,
+): Promise<Site> {
+  const asked: (string | undefined)[] = [];
+  const closed: Promise<unknown>[] = [];
+  const server = createServer((request, response) => {
+    closed.push(once(response, 'close'));
+    handler(request, response, asked.push(request.headers.range?.replace('bytes=', '')));
+  });
+  server.listen(0, '127.0.0.1');
+  await once(server, 'listening');
+  t.after(() => {
+    server.close();
+    server.closeAllConnections();
+  });
+  const { port } = server.address() as AddressInfo;
+  return { url: `http://127.0.0.1:${port}/rose.ltm`, asked, closed };
+}
+
+/** Answers as servers do that know ranges. */
+function send(request: IncomingMessage, response: ServerResponse, file: Buffer, etag = '"a"') {
+  const read = (start: number, end: number) => [file.subarray(start, end)];
+  const content = { size: file.length, type: 'application/vnd.ltm', etag, read };
+  answer(request, response, content).catch(() => {});
+}
+
+/** Bytes that requests ask for, those beyond the file's end left out. */
+function bytesOf(asked: Site['asked'], size: number): number {
+  const lengths = asked.map((range) => {
+    const [first = 0, last = size - 1] = range?.split('-').map(Number) ?? [];
+    return Math.min(last + 1, size) - first;
+  });
+  return lengths.reduce((sum, length) => sum + length, 0);
+}
+
+/** A world in which every look at the clock takes a millisecond. */
+function portsOf(ports: Partial<LoadPorts> = {}): LoadPorts {
+  let time = 0;
+  return {
+    decoder: async () => new LocalDecoder({ Decoder: FakeDecoder }, () => time++),
+    fetch: (input, init) => fetch(input, init),
+    pause: () => Promise.resolve(),
+    now: () => 0,
+    ...ports,
+  };
+}
+
+/** For who does not care for coarser ones. */
+const drop = (preview: Photograph) => preview.free();
+
+/** Opens a photograph and makes sure that nothing of that is left. */
+async function opened(
+  url: string,
+  ports: Partial<LoadPorts> = {},
+): Promise<{ told: [number, number][]; photo: Photograph }> {
+  const told: [number, number][] = [];
+  try {
+    const photo = await openPhoto(url, never, (...p) => told.push(p), drop, portsOf(ports));
+    return { told, photo };
+  } finally {
+    assert.equal(FakeDecoder.alive, 0);
+    assert.equal(getEventListeners(never, 'abort').length, 0);
+  }
+}
+
+test('a file opens with two requests, of which no byte is for nothing', async (t) => {
+  const file = fileOf();
+  const site = await serve(t, (request, response) => send(request, response, file));
+  const { told } = await opened(site.url);
+  assert.deepEqual(site.asked, ['0-16383', '16384-799999']);
+  const ratio = bytesOf(site.asked, file.length) / file.length;
+  assert.ok(ratio <= 1.05, `${ratio} bytes asked for each that is needed`);
+  assert.ok(FakeDecoder.fed.equals(file));
+  const sizes = told.map(([loaded]) => loaded);
+  assert.deepEqual(
+    sizes,
+    [...new Set(sizes)].sort((a, b) => a - b),
+  );
+  assert.ok(told.every(([, total]) => total === FILE_BYTES));
+  assert.equal(sizes.at(-1), FILE_BYTES);
+});
+
+test('a small file opens with one request', async (t) => {
+  const file = fileOf(5000);
+  const site = await serve(t, (request, response) => send(request, response, file));
+  await opened(site.url);
+  assert.deepEqual(site.asked, ['0-16383']);
+  assert.ok(FakeDecoder.fed.equals(file));
+});
+
+test('a long head is asked for first', async (t) => {
+  const file = fileOf(FILE_BYTES, 50_000);
+  const site = await serve(t, (request, response) => send(request, response, file));
+  await opened(site.url);
+  assert.deepEqual(site.asked, ['0-16383', '16384-49999', '50000-799999']);
+  assert.ok(FakeDecoder.fed.equals(file));
+});
+
+test('a large file is not cut up', async (t) => {
+  const file = fileOf(9_000_000);
+  const site = await serve(t, (request, response) => send(request, response, file));
+  await opened(site.url);
+  assert.equal(site.asked.length, 2);
+  assert.equal(FakeDecoder.fed.length, file.length);
+});
+
+test('a server that knows no ranges is asked once', async (t) => {
+  const file = fileOf();
+  const site = await serve(t, (_, response) => response.end(file));
+  const { told } = await opened(site.url);
+  assert.deepEqual(site.asked, ['0-16383']);
+  assert.ok(FakeDecoder.fed.equals(file));
+  assert.deepEqual(told.at(-1), [FILE_BYTES, FILE_BYTES]);
+});
+
+test('a server that knows ranges no longer is asked once more', async (t) => {
+  const file = fileOf();
+  const site = await serve(t, (request, response, count) =>
+    count === 1 ? send(request, response, file) : response.end(file),
+  );
+  await opened(site.url);
+  assert.equal(site.asked.length, 2);
+  assert.ok(FakeDecoder.fed.equals(file));
+});
+
+test('whatever length the server tells, the file’s own is the total', async (t) => {
+  const file = fileOf();
+  for (const level of [0, 9]) {
+    const zipped = gzipSync(file, { level });
+    const site = await serve(t, (_, response) => {
+      response.writeHead(200, { 'content-encoding': 'gzip', 'content-length': zipped.length });
+      response.end(zipped);
+    });
+    const { told } = await opened(site.url);
+    assert.ok(told.every(([, total]) => total === FILE_BYTES));
+    assert.deepEqual(told.at(-1), [FILE_BYTES, FILE_BYTES]);
+  }
+});
+
+test('a transfer that breaks off goes on where it ended', async (t) => {
+  const file = fileOf();
+  const site = await serve(t, (request, response, count) => {
+    if (count !== 2) return send(request, response, file);
+    response.writeHead(206, { 'content-range': 'bytes 16384-799999/800000', etag: '"a"' });
+    response.write(file.subarray(FIRST_BYTES, 100_000), () => response.socket?.destroySoon());
+    return undefined;
+  });
+  await opened(site.url);
+  assert.deepEqual(site.asked, ['0-16383', '16384-799999', '100000-799999']);
+  assert.ok(FakeDecoder.fed.equals(file));
+});
+
+test('a damaged file keeps the decoder’s code and ends the transfer', async (t) => {
+  const file = fileOf(8_000_000);
+  file[TENDER] = 255;
+  for (const ranges of [true, false]) {
+    const site = await serve(t, (request, response) =>
+      ranges ? send(request, response, file) : response.end(file),
+    );
+    await assert.rejects(opened(site.url), {
+      name: 'PhotoError',
+      code: 'format-checksum',
+      message: 'rose.ltm: tile 3 is damaged.',
+    });
+    await Promise.all(site.closed);
+  }
+});
+
+test('a file short on the server is told from one short in transfer', async (t) => {
+  const short = fileOf().subarray(0, 300_000);
+  const parts = await serve(t, (request, response) => send(request, response, short));
+  await assert.rejects(opened(parts.url), {
+    code: 'format-truncated',
+    message: /rose\.ltm is too short: bytes 16384 to 799999 are needed, .* has only 300000\./,
+  });
+  assert.equal(parts.asked.length, 1, 'the rest is of no use');
+  const whole = await serve(t, (_, response) => {
+    response.writeHead(200, { 'content-length': short.length }).end(short);
+  });
+  await assert.rejects(opened(whole.url), { code: 'format-truncated', message: /only 300000/ });
+  const lengthless = await serve(t, (_, response) => {
+    response.writeHead(200, { 'transfer-encoding': 'chunked' }).end(short);
+  });
+  await assert.rejects(opened(lengthless.url), {
+    code: 'http-short',
+    message: /rose\.ltm arrived incomplete: .* at byte 300000, before byte 800000/,
+  });
+});
+
+test('a file that goes on after its end is format-invalid', async (t) => {
+  const file = Buffer.concat([fileOf(), Buffer.alloc(10)]);
+  const site = await serve(t, (request, response) => send(request, response, file));
+  await assert.rejects(opened(site.url), {
+    code: 'format-invalid',
+    message: /rose\.ltm goes on after its end at byte 800000: the server has 800010\./,
+  });
+  assert.equal(site.asked.length, 1);
+});
+
+test('an empty file is format-truncated', async (t) => {
+  const parts = await serve(t, (request, response) => send(request, response, Buffer.alloc(0)));
+  const whole = await serve(t, (_, response) => {
+    response.writeHead(200, { 'content-length': 0 }).end();
+  });
+  for (const { url } of [parts, whole]) {
+    await assert.rejects(opened(url), {
+      code: 'format-truncated',
+      message: /rose\.ltm is too short: .* the server has only 0\./,
+    });
+  }
+});
+
+test('a file that is replaced meanwhile is begun anew, past any cache', async (t) => {
+  const [before, after] = [fileOf(), fileOf(700_000)];
+  const site = await serve(t, (request, response, count) =>
+    count === 1 ? send(request, response, before) : send(request, response, after, '"b"'),
+  );
+  const caches: (RequestCache | undefined)[] = [];
+  const { told } = await opened(site.url, {
+    fetch: (input, init) => {
+      caches.push(init?.cache);
+      return fetch(input, init);
+    },
+  });
+  assert.deepEqual(site.asked, ['0-16383', '16384-799999', '0-16383', '16384-699999']);
+  assert.deepEqual(caches, [undefined, undefined, 'reload', 'reload']);
+  assert.ok(FakeDecoder.fed.equals(after));
+  assert.deepEqual(told.at(-1), [700_000, 700_000]);
+});
+
+test('a file that is replaced again and again is http-changed', async (t) => {
+  const site = await serve(t, (request, response, count) =>
+    send(request, response, fileOf(), `"${count}"`),
+  );
+  await assert.rejects(opened(site.url), {
+    name: 'PhotoError',
+    code: 'http-changed',
+    message: /rose\.ltm was replaced on the server/,
+  });
+  assert.equal(site.asked.length, 4);
+});
+
+test('an abort between two pieces frees the decoder and ends the transfer', async (t) => {
+  const file = fileOf(8_000_000);
+  for (const ranges of [true, false]) {
+    const site = await serve(t, (request, response) =>
+      ranges ? send(request, response, file) : response.end(file),
+    );
+    const abort = new AbortController();
+    const stop = (loaded: number) => {
+      if (loaded > FIRST_BYTES) abort.abort(new Error('another src'));
+    };
+    await assert.rejects(openPhoto(site.url, abort.signal, stop, drop, portsOf()), /another src/);
+    assert.equal(FakeDecoder.alive, 0);
+    assert.equal(getEventListeners(abort.signal, 'abort').length, 0);
+    await Promise.all(site.closed);
+    await assert.rejects(openPhoto(site.url, abort.signal, stop, drop, portsOf()), /another src/);
+    assert.equal(site.asked.length, ranges ? 2 : 1, 'nothing is asked for any more');
+  }
+});
+
+test('an abort while the page has its turn is noticed', async (t) => {
+  const site = await serve(t, (request, response) => send(request, response, fileOf()));
+  const abort = new AbortController();
+  const pause = async () => abort.abort(new Error('another src'));
+  const ports = portsOf({ pause });
+  await assert.rejects(
+    openPhoto(site.url, abort.signal, () => {}, drop, ports),
+    /another src/,
+  );
+  assert.equal(FakeDecoder.alive, 0);
+});
+
+test('an abort while the module loads does not wait for it', async (t) => {
+  const site = await serve(t, (request, response) => send(request, response, fileOf()));
+  const abort = new AbortController();
+  const decoder = () => new Promise<never>(() => {});
+  setTimeout(() => abort.abort(new Error('another src')), 20);
+  await assert.rejects(
+    openPhoto(site.url, abort.signal, () => {}, drop, portsOf({ decoder })),
+    /another src/,
+  );
+});
+
+test('a module that does not start ends the transfer too', async (t) => {
+  const site = await serve(t, (_, response) => response.write('…'));
+  const decoder = async () => {
+    while (site.closed.length === 0) await new Promise((resolve) => setTimeout(resolve));
+    throw new Error('no wasm');
+  };
+  await assert.rejects(opened(site.url, { decoder }), { code: 'internal', message: /no wasm/ });
+  await Promise.all(site.closed);
+});
+
+test('what the server says is told before the module is there', async (t) => {
+  const site = await serve(t, (_, response) => response.writeHead(404).end());
+  const decoder = () => new Promise<never>(() => {});
+  await assert.rejects(opened(site.url, { decoder }), { code: 'http-status' });
+});
+
+test('the page gets its turn, with what has been decoded by then', async (t) => {
+  const file = fileOf();
+  const site = await serve(t, (request, response) => send(request, response, file));
+  let loaded = 0;
+  const turns: number[] = [];
+  const pause = async () => {
+    turns.push(loaded);
+  };
+  // Eight looks at the clock make a turn, and there is one after each slice.
+  await openPhoto(site.url, never, (bytes) => (loaded = bytes), drop, portsOf({ pause }));
+  assert.ok(turns.length > 70, `${turns.length} turns`);
+  const steps = turns.map((at, i) => at - (turns[i - 1] ?? 0));
+  assert.ok(
+    steps.every((step) => step > 0 && step <= 10 << 10),
+    String(steps),
+  );
+});
+
+test('a decoder that is never content ends in an error', async (t) => {
+  class Glutton extends FakeDecoder {
+    override wants = () => Float64Array.of(0, 100);
+  }
+  const site = await serve(t, (request, response) => send(request, response, fileOf()));
+  const decoder = async () => new LocalDecoder({ Decoder: Glutton }, () => 0);
+  await assert.rejects(opened(site.url, { decoder }), { code: 'internal', message: /fed/ });
+  assert.equal(site.asked.length, 2);
+});
+
+test('of several ranges that a decoder wants the first is asked for, then what it wants by then', async (t) => {
+  class InThree extends FakeDecoder {
+    override wants(): Float64Array {
+      const { bytesFed: at } = this;
+      const marks = [FIRST_BYTES, 50_000, 300_000, FILE_BYTES].filter((mark) => mark > at);
+      return Float64Array.from(
+        marks.flatMap((mark, i) => [i === 0 ? at : (marks[i - 1] ?? 0), mark]),
+      );
+    }
+  }
+  const file = fileOf();
+  const site = await serve(t, (request, response) => send(request, response, file));
+  const decoder = async () => new LocalDecoder({ Decoder: InThree }, () => 0);
+  await opened(site.url, { decoder });
+  assert.deepEqual(site.asked, ['0-16383', '16384-49999', '50000-299999', '300000-799999']);
+  assert.ok(FakeDecoder.fed.equals(file));
+});
+
+test('coarser photographs come while the file does, each of twice as much, and not one after the other', async (t) => {
+  const file = fileOf();
+  const site = await serve(t, (request, response) => send(request, response, file));
+  let now = 0;
+  const shares: number[] = [];
+  const keep = (preview: Photograph) => shares.push(preview.share);
+  const at = { now: () => now };
+  await openPhoto(site.url, never, () => (now += 1000), keep, portsOf(at));
+  assert.ok(shares.length >= 2 && shares.length <= 3, String(shares));
+  assert.ok((shares[0] ?? 0) >= 0.125 && (shares[0] ?? 1) < 0.25, String(shares));
+  assert.ok(shares.every((share, i) => i === 0 || share >= 2 * (shares[i - 1] ?? 1)));
+  shares.length = 0;
+  await openPhoto(site.url, never, () => {}, keep, portsOf(at));
+  assert.equal(shares.length, 1, 'no time has passed');
+});

@@ -1,0 +1,17 @@
+/** Settings that tests share. */
+
+import type { Look } from '../engine/output-settings.js';
+import type { Backend } from '../engine/types.js';
+import type { Wanted } from './photo-session.js';
+
+/** A photograph shown as taken. */
+export const PLAIN: Look = { exposure: 1, whiteBalance: [1, 1, 1], tone: 'clip' };
+
+export function exposed(exposure: number): Look {
+  return { ...PLAIN, exposure };
+}
+
+/** Back ends that were named. */
+export function wanting(backends: readonly Backend[]): Wanted {
+  return { backends, software: true, gamut: 'srgb' };
+}

@@ -1,0 +1,104 @@
+/** A canvas that a crew of workers draws. */
+
+import type { Look } from '../../engine/output-settings.js';
+import type { CpuModule, DrawnPhoto, Gamut } from '../../engine/types.js';
+import { Lamp } from '../../lights/light-cache.js';
+import type { LightSetting } from '../../lights/light-setting.js';
+import type { Photograph } from '../../photo/photograph.js';
+import type { Drawn } from '../../player/photo-session.js';
+import { hasCode, letGo, messageOf, PhotoError } from '../../shared/errors.js';
+import type { CanvasSurface } from '../canvas-surface.js';
+import type { Crew, Shift } from './worker-pool.js';
+
+/** See the module. */
+export class CrewDrawing implements CanvasSurface {
+  readonly canvas: HTMLCanvasElement;
+  readonly kernel: string;
+  readonly gamut: Gamut;
+  readonly #lamp: Lamp;
+  /** What lights are made for. */
+  readonly #plane: DrawnPhoto;
+  readonly #photograph: Photograph;
+  readonly #crew: Crew;
+  readonly #context: CanvasRenderingContext2D;
+  #freed = false;
+
+  private constructor(
+    module: CpuModule,
+    photograph: Photograph,
+    crew: Crew,
+    context: CanvasRenderingContext2D,
+    kernel: string,
+    gamut: Gamut,
+  ) {
+    this.canvas = context.canvas;
+    this.kernel = kernel;
+    this.gamut = gamut;
+    this.#lamp = new Lamp(module);
+    this.#plane = photograph.plane(module);
+    this.#photograph = photograph;
+    this.#crew = crew;
+    this.#context = context;
+  }
+
+  /** Rejects with `worker-unavailable` where there can be no workers; the photograph is whole then. */
+  static async create(
+    module: CpuModule,
+    photograph: Photograph,
+    crew: Crew,
+    wanted: Gamut,
+  ): Promise<CrewDrawing> {
+    const canvas = document.createElement('canvas');
+    canvas.width = photograph.facts.width;
+    canvas.height = photograph.facts.height;
+    // In the page's memory, where the pixels come from: where there is no graphics processor, every
+    // frame would go to a program in the place of one and back.
+    const context = canvas.getContext('2d', { colorSpace: wanted, willReadFrequently: true });
+    if (!context) {
+      throw new PhotoError('backend-unavailable', 'The canvas gives no 2D context.');
+    }
+    const kernel = await photograph.withCrew(crew, describe);
+    // Browsers that know no other gamut say nothing of it.
+    const gamut = context.getContextAttributes?.().colorSpace === wanted ? wanted : 'srgb';
+    return new CrewDrawing(module, photograph, crew, context, kernel, gamut);
+  }
+
+  async render(setting: LightSetting, look: Look, detail: number): Promise<Drawn> {
+    // Before its tiles are brought to the workers for nothing.
+    if (this.#freed) throw letGo();
+    try {
+      return await this.#photograph.withCrew(this.#crew, async (shift) => {
+        if (this.#freed) throw letGo();
+        const { light, asked, fault } = this.#lamp.turnTo(setting, this.#plane);
+        const rows = await shift.relight(light, { look, gamut: this.gamut, detail });
+        const settings = { colorSpace: this.gamut };
+        if (this.#freed) throw letGo();
+        // All at once, and before their memory is used again.
+        for (const { first, count, pixels } of rows) {
+          const data = new Uint8ClampedArray(pixels);
+          this.#context.putImageData(
+            new ImageData(data, this.canvas.width, count, settings),
+            0,
+            first,
+          );
+        }
+        return { asked, fault };
+      });
+    } catch (thrown) {
+      if (!hasCode(thrown, 'worker-unavailable')) throw thrown;
+      // Without workers this cannot draw, but a photograph that is fetched anew is drawn by the page.
+      throw new PhotoError('photo-lost', messageOf(thrown), thrown);
+    }
+  }
+
+  free(): void {
+    if (this.#freed) return;
+    this.#freed = true;
+    this.#lamp.free();
+    this.#plane.free();
+  }
+}
+
+function describe({ kernel, size }: Shift): string {
+  return `${kernel}, ${size} ${size === 1 ? 'worker' : 'workers'}`;
+}

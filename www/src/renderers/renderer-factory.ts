@@ -1,0 +1,143 @@
+/** Who draws for an element: a graphics device, or the CPU. Each is a script of its own, fetched where it is needed. */
+
+import { loadCpu } from '../engine/cpu-module.js';
+import type { Backend, CpuModule, Modules } from '../engine/types.js';
+import { moduleFolder } from '../engine/wasm-loader.js';
+import { loadWebGl2 } from '../engine/webgl2-module.js';
+import { loadWebGpu } from '../engine/webgpu-module.js';
+import type { Photograph } from '../photo/photograph.js';
+import type { Wanted } from '../player/photo-session.js';
+import { messageOf, PhotoError } from '../shared/errors.js';
+import type { Start } from '../shared/worker-scope.js';
+import type { CanvasSurface } from './canvas-surface.js';
+import type { CpuDrawer } from './cpu/cpu-renderer.js';
+import type { GpuDrawer } from './gpu/gpu-renderer.js';
+
+/** More would wait for memory, and for each other. */
+const MOST_WORKERS = 4;
+
+/** Sets a back end up on a canvas of its own: one used by one API cannot be used by another. */
+export type Draw = (
+  backend: Backend,
+  photograph: Photograph,
+  wanted: Wanted,
+  lost: (reason: string) => void,
+  signal: AbortSignal,
+) => Promise<CanvasSurface>;
+
+/**
+ * Has the first back end of an order that works get ready, which takes a while, and stay so until `over` is
+ * aborted. What goes wrong is told to who draws.
+ */
+export type Prepare = (wanted: Wanted, over: AbortSignal) => Promise<void>;
+
+/** What draws. */
+export interface Drawer {
+  readonly draw: Draw;
+  readonly prepare: Prepare;
+}
+
+/** Where what draws comes from. */
+export interface Drawers {
+  readonly gpu: () => Promise<GpuDrawer>;
+  readonly cpu: () => Promise<CpuDrawer>;
+  readonly cpuModule: () => Promise<CpuModule>;
+}
+
+/**
+ * Draws by what is given. A device that cannot be had leaves tiles where they are, and keeps nobody from them
+ * while it is asked for.
+ */
+export function drawer({ gpu, cpu, cpuModule }: Drawers): Drawer {
+  const draw: Draw = async (backend, photograph, wanted, lost, signal) => {
+    if (backend === 'cpu') {
+      const [module, drawer] = await Promise.all([cpuModule(), cpu()]);
+      return await drawer.draw(module, photograph, wanted.gamut, signal);
+    }
+    const drawer = await gpu();
+    signal.throwIfAborted();
+    const drawing = await drawer.draw(backend, photograph, wanted, lost, signal);
+    idle(() => Promise.allSettled([cpuModule(), cpu()]));
+    return drawing;
+  };
+  const prepare: Prepare = async ({ backends, software }, over) => {
+    for (const backend of backends) {
+      if (over.aborted) return;
+      try {
+        let letGo: () => void;
+        if (backend === 'cpu') {
+          // Workers that start sooner would have to wait for a module that the page waits for too.
+          const [drawer] = await Promise.all([cpu(), cpuModule()]);
+          if (over.aborted) return;
+          letGo = drawer.prepare();
+        } else {
+          const drawer = await gpu();
+          if (over.aborted) return;
+          letGo = await drawer.prepare(backend, software);
+        }
+        if (over.aborted) letGo();
+        else over.addEventListener('abort', letGo);
+        return;
+      } catch {
+        // The next may work.
+      }
+    }
+  };
+  return { draw, prepare };
+}
+
+const LOADERS: { readonly [B in Backend]: () => Promise<Modules[B]> } = {
+  cpu: loadCpu,
+  webgl2: loadWebGl2,
+  webgpu: loadWebGpu,
+};
+
+const crewSize = Math.min(MOST_WORKERS, globalThis.navigator?.hardwareConcurrency ?? 1);
+
+/** Draws for the elements of this page. */
+export const { draw, prepare } = drawer({
+  gpu: once(async () => {
+    const { Devices, gpuDrawer } = await import('./gpu/gpu-renderer.js');
+    return gpuDrawer((name) => LOADERS[name](), new Devices());
+  }),
+  cpu: once(async () => {
+    const { Crew, cpuDrawer } = await import('./cpu/cpu-renderer.js');
+    return cpuDrawer(new Crew(startWorker, crewSize));
+  }),
+  cpuModule: loadCpu,
+});
+
+/** A script that draws: fetched once. Where it did not come, the next asks again; some browsers answer as before. */
+function once<T>(fetchScript: () => Promise<T>): () => Promise<T> {
+  let fetching: Promise<T> | null = null;
+  return () => {
+    fetching ??= fetchScript().catch((cause: unknown) => {
+      fetching = null;
+      const why = `the script that draws could not be loaded (${messageOf(cause)}). It has to lie beside the element's`;
+      throw new PhotoError('backend-unavailable', why, cause);
+    });
+    return fetching;
+  };
+}
+
+/** Does something once the page has nothing else to do: what takes a device's place is there when it is lost. */
+function idle(work: () => unknown): void {
+  const { requestIdleCallback } = globalThis;
+  // Not every browser has it.
+  if (requestIdleCallback) requestIdleCallback(() => void work());
+  else setTimeout(work, 1000);
+}
+
+/** `null` where a script of this origin may not be a worker, or modules cannot be. */
+function startWorker(): Worker | null {
+  try {
+    // The address is written out for bundlers, which look for exactly this form.
+    const worker = new Worker(new URL('./relightable-photo-relighter.js', import.meta.url), {
+      type: 'module',
+    });
+    worker.postMessage({ kind: 'start', modules: moduleFolder() } satisfies Start);
+    return worker;
+  } catch {
+    return null;
+  }
+}
