@@ -3,7 +3,7 @@
 import { loadDecoder } from '../engine/decoder-module.js';
 import { tooLong } from '../loading/http-errors.js';
 import { openPhoto } from '../loading/load.js';
-import { LocalDecoder, type PhotoDecoder } from '../photo/main-thread-decoder.js';
+import { MainThreadDecoder, type PhotoDecoder } from '../photo/main-thread-decoder.js';
 import type { Photograph } from '../photo/photograph.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
 import { DecodedPhotograph } from './decoded-photo.js';
@@ -56,7 +56,7 @@ export async function decode(
 ): Promise<CorePhotograph> {
   signal.throwIfAborted();
   const decoder = async () =>
-    new LocalDecoder(await loadDecoder(coreCode), () => performance.now());
+    new MainThreadDecoder(await loadDecoder(coreCode), () => performance.now());
   if (typeof file !== 'string' && !(file instanceof URL)) {
     const taken = take(await decoder(), piecesOf(file), signal, onProgress);
     return new DecodedPhotograph(await taken);

@@ -1,6 +1,6 @@
 /** What a photograph of the core is inside: apart from its face, whose types need no DOM. */
 
-import type { Facts, Photograph } from '../photo/photograph.js';
+import type { Photograph, PhotoInfo } from '../photo/photograph.js';
 import type { CorePhotograph } from './decode.js';
 
 /** See the module. */
@@ -17,13 +17,13 @@ export class DecodedPhotograph implements CorePhotograph {
   #freed = false;
 
   constructor(photograph: Photograph) {
-    const facts: Facts = photograph.facts;
-    this.width = facts.width;
-    this.height = facts.height;
-    this.lightWidth = facts.lightWidth;
-    this.lightHeight = facts.lightHeight;
-    this.decodedBytes = facts.decodedBytes;
-    this.metadata = facts.metadata;
+    const info: PhotoInfo = photograph.info;
+    this.width = info.width;
+    this.height = info.height;
+    this.lightWidth = info.lightWidth;
+    this.lightHeight = info.lightHeight;
+    this.decodedBytes = info.decodedBytes;
+    this.metadata = info.metadata;
     this.photograph = photograph;
   }
 

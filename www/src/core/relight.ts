@@ -85,7 +85,7 @@ export async function relight(
   const pixels = new Uint8ClampedArray(4 * width * height);
   const module = await loadCpu(coreCode);
   try {
-    await photo.photograph.inPage(module, (inside) => {
+    await photo.photograph.withModule(module, (inside) => {
       const relighter = relighterOf(module, photo, inside);
       const made = makeLight(module, inside, light);
       const display = makeDisplay(module, look, shown);

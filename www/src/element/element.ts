@@ -7,10 +7,11 @@ import { Visitor } from '../input/interaction.js';
 import { checkLightSource, isLightSource, type LightSource } from '../lights/light-source.js';
 import type { Projection } from '../lights/projection.js';
 import { browserColor } from '../lights/tint.js';
-import type { Facts } from '../photo/photograph.js';
-import { Player } from '../player/photo-session.js';
-import { PORTS } from '../player/ports.js';
-import { blobOf, type CanvasSurface, resampled } from '../renderers/canvas-surface.js';
+import type { PhotoInfo } from '../photo/photograph.js';
+import { PhotoSession } from '../player/photo-session.js';
+import { BROWSER_PORTS } from '../player/ports.js';
+import { encodeCanvas, resampleCanvas } from '../renderers/canvas-export.js';
+import type { CanvasRenderer } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
 import { BACKENDS, type LightName, type PicturePoint } from '../shared/settings.js';
 import { Attributes } from '../state/attribute-reader.js';
@@ -40,8 +41,7 @@ import { unwatch, watch } from './visibility.js';
 // On a server there are no elements, but importing this module must not fail there.
 const Base = globalThis.HTMLElement ?? (class {} as unknown as typeof HTMLElement);
 
-/** What is known of a photograph once it has loaded. */
-export type PhotoInfo = Facts;
+export type { PhotoInfo };
 
 /** Options of `toBlob`. */
 export interface BlobOptions {
@@ -102,7 +102,7 @@ export class RelightablePhoto extends Base {
   readonly #view: View;
   readonly #controls: Controls;
   readonly #visitor: Visitor;
-  readonly #player: Player<CanvasSurface>;
+  readonly #session: PhotoSession<CanvasRenderer>;
   readonly #attributes = new Attributes();
   readonly #exhibit: Exhibit;
   readonly #presenter: Presenter;
@@ -125,7 +125,7 @@ export class RelightablePhoto extends Base {
     this.#exhibit = new Exhibit(
       this.#read(),
       {
-        changed: () => this.#player.redraw(),
+        changed: () => this.#session.redraw(),
         came: () => this.#schedule(),
         faultChanged: (fault) => this.#lightFaultChanged(fault),
       },
@@ -155,7 +155,7 @@ export class RelightablePhoto extends Base {
       (error) => this.dispatchEvent(new PhotoErrorEvent(error)),
     );
     this.#presenter = new Presenter(this, this.#view, this.#controls, this.#exhibit);
-    this.#player = this.#newPlayer();
+    this.#session = this.#newSession();
     this.#visitor = this.#newVisitor(root);
     this.#view.revealButton.addEventListener('click', () => {
       this.#visitor.touch();
@@ -166,7 +166,7 @@ export class RelightablePhoto extends Base {
 
   /** Colours that the canvas shows: those asked for where the browser can; `null` without a picture. */
   get activeGamut(): Gamut | null {
-    return this.#player.drawing?.gamut ?? null;
+    return this.#session.renderer?.gamut ?? null;
   }
 
   /** The built-in light that shines, or that a source stands in for: a visitor may have chosen it. */
@@ -233,7 +233,7 @@ export class RelightablePhoto extends Base {
    * telling.
    */
   lightChanged(): void {
-    if (this.#lighting.shining) this.#player.redraw();
+    if (this.#lighting.shining) this.#session.redraw();
   }
 
   /**
@@ -287,7 +287,7 @@ export class RelightablePhoto extends Base {
 
   /** The back end that draws, `null` while there is none. */
   get activeBackend(): Backend | null {
-    return this.#player.backend;
+    return this.#session.backend;
   }
 
   /**
@@ -295,17 +295,17 @@ export class RelightablePhoto extends Base {
    * while it moves faster than all of it can be drawn. `null` while there is no picture.
    */
   get detail(): number | null {
-    return this.#player.detail;
+    return this.#session.quality;
   }
 
   /** What the back end says of itself: the kernel, the adapter. */
   get kernel(): string | null {
-    return this.#player.drawing?.kernel ?? null;
+    return this.#session.renderer?.kernel ?? null;
   }
 
   /** What is known of the photograph, `null` until it is decoded. */
   get info(): PhotoInfo | null {
-    return this.#player.photo?.facts ?? null;
+    return this.#session.photo?.info ?? null;
   }
 
   /**
@@ -321,10 +321,10 @@ export class RelightablePhoto extends Base {
       await this.#lighting.coming;
       this.#update();
     }
-    const drawing = await this.#player.renderNow();
+    const renderer = await this.#session.renderNow();
     // The canvas of a GPU keeps its content only until the browser has shown it.
-    const { canvas, gamut } = drawing;
-    return blobOf(scale === 1 ? canvas : resampled(canvas, scale, gamut), type, quality);
+    const { canvas, gamut } = renderer;
+    return encodeCanvas(scale === 1 ? canvas : resampleCanvas(canvas, scale, gamut), type, quality);
   }
 
   connectedCallback(): void {
@@ -351,9 +351,9 @@ export class RelightablePhoto extends Base {
     this.#schedule();
   }
 
-  #newPlayer(): Player<CanvasSurface> {
-    return new Player(PORTS, {
-      loading: () => {
+  #newSession(): PhotoSession<CanvasRenderer> {
+    return new PhotoSession(BROWSER_PORTS, {
+      loadStarted: () => {
         this.#clear();
         this.#view.progress(Number.NaN);
       },
@@ -361,12 +361,12 @@ export class RelightablePhoto extends Base {
         this.#view.progress(total > 0 ? Math.min(1, loaded / total) : Number.NaN);
         this.dispatchEvent(progressEvent(loaded, total));
       },
-      drawn: ({ asked, fault }, light) => {
+      frameDrawn: ({ lightApplied, lightError: fault }, light) => {
         const { curtain } = this.#exhibit;
         if (!curtain.drawn) this.#schedule();
         curtain.drawn = true;
         const { setting, shining } = this.#lighting;
-        if (asked && shining && light.picture === setting.picture) {
+        if (lightApplied && shining && light.picture === setting.picture) {
           this.#tellLight(this.#news.drawn(setting.name, shining));
         }
         // A light that stays wrong says so once, not at every frame with other numbers.
@@ -374,20 +374,20 @@ export class RelightablePhoto extends Base {
         this.#lightFault = fault;
         this.#lightFaultChanged(fault);
       },
-      detailChanged: (detail) => this.dispatchEvent(new QualityChangeEvent(detail)),
+      qualityChanged: (quality) => this.dispatchEvent(new QualityChangeEvent(quality)),
       loaded: () => {
         this.#view.progress(null);
         this.#presenter.tellLoaded();
         this.dispatchEvent(loadEvent());
       },
-      show: (drawing) => {
-        this.#view.show(drawing.canvas);
+      rendererChanged: (renderer) => {
+        this.#view.show(renderer.canvas);
         this.#schedule();
       },
       backendChanged: (backend, previous, reason) => {
         this.dispatchEvent(new BackendChangeEvent(backend, previous, reason));
       },
-      lost: (backend, message) => this.dispatchEvent(new ContextLostEvent(backend, message)),
+      backendLost: (backend, message) => this.dispatchEvent(new ContextLostEvent(backend, message)),
       failed: (error) => {
         this.#exhibit.fault = error.message;
         this.#view.progress(null);
@@ -449,7 +449,7 @@ export class RelightablePhoto extends Base {
     }
     watch(this, (sight, is) => {
       this.#exhibit.curtain[sight] = is;
-      if (sight === 'seen') this.#player.setVisible(is);
+      if (sight === 'seen') this.#session.setVisible(is);
       this.#schedule();
     });
     const asked = this.#read();
@@ -490,7 +490,7 @@ export class RelightablePhoto extends Base {
       this.#reload = false;
       this.#fetched = src;
     }
-    const wanted = {
+    const renderOptions = {
       backends: asked.backends ?? BACKENDS,
       // Who names back ends knows better.
       software: asked.backends !== null,
@@ -502,11 +502,11 @@ export class RelightablePhoto extends Base {
     const light = this.#lighting.setting;
     const { picture, ...builtin } = light;
     // Where only the view or the controls are others, nothing is drawn again.
-    const drawn = JSON.stringify([src, credentials, wanted, look, builtin]);
+    const drawn = JSON.stringify([src, credentials, renderOptions, look, builtin]);
     if (!reload && drawn === this.#drawn && picture === this.#drawnBy) return;
     this.#drawn = drawn;
     this.#drawnBy = picture;
-    this.#player.set({ src, credentials, wanted, look, light }, reload);
+    this.#session.set({ src, credentials, renderOptions, look, light }, reload);
   }
 
   get #lighting(): Lighting {
@@ -539,7 +539,7 @@ export class RelightablePhoto extends Base {
 
   /** What is shown is not what is asked for any more. */
   #forget(): void {
-    this.#player.stop();
+    this.#session.stop();
     this.#drawn = null;
     this.#drawnBy = null;
     this.#fetched = undefined;

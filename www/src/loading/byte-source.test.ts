@@ -124,8 +124,8 @@ class Copy {
     this.times = new Uint8Array(length);
   }
 
-  async read(source: HttpSource, wanted: ByteRange, signal = never): Promise<this> {
-    for await (const { offset, bytes } of source.read(wanted, signal)) {
+  async read(source: HttpSource, renderOptions: ByteRange, signal = never): Promise<this> {
+    for await (const { offset, bytes } of source.read(renderOptions, signal)) {
       assert.ok(bytes.byteLength > 0 && offset + bytes.byteLength <= this.bytes.length);
       this.bytes.set(bytes, offset);
       for (let i = 0; i < bytes.byteLength; i++) (this.times[offset + i] as number)++;
@@ -149,8 +149,8 @@ class Copy {
   }
 }
 
-async function drain(source: HttpSource, wanted: ByteRange, signal = never): Promise<void> {
-  await new Copy(1 << 22).read(source, wanted, signal);
+async function drain(source: HttpSource, renderOptions: ByteRange, signal = never): Promise<void> {
+  await new Copy(1 << 22).read(source, renderOptions, signal);
 }
 
 test('a range comes with one request, of no header that other origins must allow', async (t) => {
@@ -209,7 +209,7 @@ test('pieces are handed over as they arrive', async (t) => {
   assert.ok((await pieces.next()).done);
 });
 
-test('nothing wanted, nothing asked', async (t) => {
+test('nothing renderOptions, nothing asked', async (t) => {
   const site = await serve(t, (_, response) => response.end());
   const { source } = sourceOf(site.url);
   await drain(source, range(0, 0));
@@ -370,7 +370,7 @@ test('who stops early ends the transfer, and gets the rest of a whole file later
   assert.equal(site.asked.length, 2);
 });
 
-test('an empty file has nothing that could be wanted', async (t) => {
+test('an empty file has nothing that could be renderOptions', async (t) => {
   const whole = await serve(t, (_, response) => response.end());
   await assert.rejects(drain(sourceOf(whole.url).source, range(0, 100)), {
     message: /rose\.ltm/,
@@ -649,7 +649,7 @@ async function abortWhen(
   ports: (abort: () => void) => Partial<SourcePorts> = () => ({}),
 ): Promise<void> {
   const controller = new AbortController();
-  const reason = new Error('no longer wanted');
+  const reason = new Error('no longer renderOptions');
   const abort = () => controller.abort(reason);
   const closed: Promise<unknown>[] = [];
   const site = await serve(t, (_, response) => {
@@ -689,8 +689,8 @@ test('an abort ends every wait at once, with its reason', async (t) => {
 test('an abort ends the wait of a fetch that does not listen', async () => {
   const controller = new AbortController();
   const { source } = sourceOf('rose.ltm', { fetch: () => new Promise(() => {}) });
-  setTimeout(() => controller.abort(new Error('no longer wanted')), 5);
-  await assert.rejects(drain(source, range(0, 10), controller.signal), /no longer wanted/);
+  setTimeout(() => controller.abort(new Error('no longer renderOptions')), 5);
+  await assert.rejects(drain(source, range(0, 10), controller.signal), /no longer renderOptions/);
 });
 
 test('an abort between two pieces is noticed with the next', async (t) => {
@@ -703,9 +703,9 @@ test('an abort between two pieces is noticed with the next', async (t) => {
   const { source } = sourceOf(site.url);
   const pieces = source.read(range(0, 4_000_000), controller.signal);
   await pieces.next();
-  controller.abort(new Error('no longer wanted'));
+  controller.abort(new Error('no longer renderOptions'));
   await Promise.all(closed);
-  await assert.rejects(pieces.next(), /no longer wanted/);
+  await assert.rejects(pieces.next(), /no longer renderOptions/);
   assert.equal(getEventListeners(controller.signal, 'abort').length, 0);
 });
 
@@ -724,8 +724,8 @@ test('an abort is noticed where the rest is there already, and no one else liste
   const controller = new AbortController();
   const pieces = source.read(range(0, 200), controller.signal);
   await pieces.next();
-  controller.abort(new Error('no longer wanted'));
-  await assert.rejects(pieces.next(), /no longer wanted/);
+  controller.abort(new Error('no longer renderOptions'));
+  await assert.rejects(pieces.next(), /no longer renderOptions/);
 });
 
 test('who stops early leaves no listener', async (t) => {
@@ -759,8 +759,8 @@ test('the port’s own pause ends with the abort', async (t) => {
   );
   const controller = new AbortController();
   const source = new HttpSource(site.url, { fetch });
-  setTimeout(() => controller.abort(new Error('no longer wanted')), 50);
-  await assert.rejects(drain(source, range(0, 10), controller.signal), /no longer wanted/);
+  setTimeout(() => controller.abort(new Error('no longer renderOptions')), 50);
+  await assert.rejects(drain(source, range(0, 10), controller.signal), /no longer renderOptions/);
   assert.equal(site.asked.length, 1);
 });
 
@@ -782,13 +782,13 @@ test('whatever happens on the way, the bytes are the file’s', async (t) => {
   });
   for (let round = 0; round < 20; round++) {
     const { source } = sourceOf(site.url, { retries: 30 });
-    const wanted = Array.from({ length: 8 }, (_, i) => {
+    const renderOptions = Array.from({ length: 8 }, (_, i) => {
       const start = i * 25_000 + random(10_000);
       return range(start, start + random(15_000));
     }).sort(() => random(3) - 1);
     const copy = new Copy(200_000);
-    for (const each of wanted) await copy.read(source, each);
+    for (const each of renderOptions) await copy.read(source, each);
     // All of it where nothing was heard at first; else the last byte is not wanted.
-    copy.has(file, ...(copy.times.at(-1) ? [range(0, 200_000)] : wanted));
+    copy.has(file, ...(copy.times.at(-1) ? [range(0, 200_000)] : renderOptions));
   }
 });

@@ -6,7 +6,7 @@ import test, { type TestContext } from 'node:test';
 import { gzipSync } from 'node:zlib';
 import { answer } from '../../tools/ranges.js';
 import type { DecodedPhoto, Decoder } from '../engine/types.js';
-import { LocalDecoder } from '../photo/main-thread-decoder.js';
+import { MainThreadDecoder } from '../photo/main-thread-decoder.js';
 import type { Photograph } from '../photo/photograph.js';
 import { photoOf } from '../renderers/cpu/worker-pool-fakes.js';
 import { type LoadPorts, openPhoto } from './load.js';
@@ -128,7 +128,7 @@ function bytesOf(asked: Site['asked'], size: number): number {
 function portsOf(ports: Partial<LoadPorts> = {}): LoadPorts {
   let time = 0;
   return {
-    decoder: async () => new LocalDecoder({ Decoder: FakeDecoder }, () => time++),
+    decoder: async () => new MainThreadDecoder({ Decoder: FakeDecoder }, () => time++),
     fetch: (input, init) => fetch(input, init),
     pause: () => Promise.resolve(),
     now: () => 0,
@@ -412,7 +412,7 @@ test('a decoder that is never content ends in an error', async (t) => {
     override wants = () => Float64Array.of(0, 100);
   }
   const site = await serve(t, (request, response) => send(request, response, fileOf()));
-  const decoder = async () => new LocalDecoder({ Decoder: Glutton }, () => 0);
+  const decoder = async () => new MainThreadDecoder({ Decoder: Glutton }, () => 0);
   await assert.rejects(opened(site.url, { decoder }), { code: 'internal', message: /fed/ });
   assert.equal(site.asked.length, 2);
 });
@@ -429,7 +429,7 @@ test('of several ranges that a decoder wants the first is asked for, then what i
   }
   const file = fileOf();
   const site = await serve(t, (request, response) => send(request, response, file));
-  const decoder = async () => new LocalDecoder({ Decoder: InThree }, () => 0);
+  const decoder = async () => new MainThreadDecoder({ Decoder: InThree }, () => 0);
   await opened(site.url, { decoder });
   assert.deepEqual(site.asked, ['0-16383', '16384-49999', '50000-299999', '300000-799999']);
   assert.ok(FakeDecoder.fed.equals(file));

@@ -3,7 +3,7 @@
 import { loadDecoder } from '../engine/decoder-module.js';
 import { moduleFolder } from '../engine/wasm-loader.js';
 import type { Start } from '../shared/worker-scope.js';
-import { LocalDecoder, type PhotoDecoder } from './main-thread-decoder.js';
+import { MainThreadDecoder, type PhotoDecoder } from './main-thread-decoder.js';
 import { WorkerDecoder } from './worker-decoder.js';
 
 /** How long a worker may take to start, which takes a download and a compilation. */
@@ -19,7 +19,7 @@ export async function newDecoder(): Promise<PhotoDecoder> {
     worker.terminate();
   }
   // Whatever keeps the module from starting, the page is told of here.
-  return new LocalDecoder(await loadDecoder(), () => performance.now());
+  return new MainThreadDecoder(await loadDecoder(), () => performance.now());
 }
 
 /** `null` where a script of this origin may not be a worker, or modules cannot be. */

@@ -39,7 +39,7 @@ const SLICE_BYTES = 1 << 10;
 const TURN_MS = 8;
 
 /** See the module. */
-export class LocalDecoder implements PhotoDecoder {
+export class MainThreadDecoder implements PhotoDecoder {
   readonly #decoder: Decoder;
   readonly #now: () => number;
   #ended = false;

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { DrawingModule } from '../engine/types.js';
-import { Crew } from '../renderers/cpu/worker-pool.js';
+import { WorkerPool } from '../renderers/cpu/worker-pool.js';
 import {
   crewOf,
   type FakeWorker,
@@ -24,24 +24,26 @@ function received() {
   return { photograph: Photograph.received(head, tiles), has, state, module };
 }
 
-async function picture(photograph: Photograph, crew: Crew): Promise<number[]> {
-  return photograph.withCrew(crew, async (shift) => painted(await shift.relight(light, SHOWING)));
+async function picture(photograph: Photograph, pool: WorkerPool): Promise<number[]> {
+  return photograph.withWorkers(pool, async (session) =>
+    painted(await session.relight(light, SHOWING)),
+  );
 }
 
-test('tiles go straight to the crew, and back into the page’s module when they are wanted there', async () => {
-  const { crew, alive } = crewOf(2);
+test('tiles go straight to the pool, and back into the page’s module when they are renderOptions there', async () => {
+  const { pool, alive } = crewOf(2);
   const { photograph, has, module } = received();
-  assert.deepEqual(await picture(photograph, crew), ALL);
+  assert.deepEqual(await picture(photograph, pool), ALL);
   assert.equal(has.size, 0);
-  assert.equal(await photograph.inPage(module, () => has.size), 4);
+  assert.equal(await photograph.withModule(module, () => has.size), 4);
   assert.equal(await alive(), 0, 'workers without a photograph end');
-  assert.deepEqual(await picture(photograph, crew), ALL);
+  assert.deepEqual(await picture(photograph, pool), ALL);
   assert.equal(has.size, 0);
-  assert.equal(photograph.facts.decodedBytes, 4);
+  assert.equal(photograph.info.decodedBytes, 4);
 });
 
 test('what is asked for is done in order, whatever takes long', async () => {
-  const { crew } = crewOf(2);
+  const { pool } = crewOf(2);
   const { photo, has, module } = photoOf(4);
   const photograph = Photograph.decoded(photo);
   const order: string[] = [];
@@ -49,11 +51,11 @@ test('what is asked for is done in order, whatever takes long', async () => {
     order.push(`${what} ${has.size}`);
   };
   await Promise.all([
-    picture(photograph, crew).then(note('picture')),
-    photograph.inPage(module, note('page')),
-    picture(photograph, crew).then(note('picture')),
-    picture(photograph, crew).then(note('picture')),
-    photograph.inPage(module, note('page')),
+    picture(photograph, pool).then(note('picture')),
+    photograph.withModule(module, note('page')),
+    picture(photograph, pool).then(note('picture')),
+    picture(photograph, pool).then(note('picture')),
+    photograph.withModule(module, note('page')),
   ]);
   const steps = order.map((step) => step.split(' ')[0]);
   assert.deepEqual(steps, ['picture', 'page', 'picture', 'picture', 'page']);
@@ -65,31 +67,31 @@ test('what is asked for is done in order, whatever takes long', async () => {
 
 test('a failure of one use is not the next one’s', async () => {
   const { photograph, has, module } = received();
-  const failing = photograph.inPage(module, () => Promise.reject(new Error('no adapter')));
-  const next = photograph.inPage(module, () => has.size);
+  const failing = photograph.withModule(module, () => Promise.reject(new Error('no adapter')));
+  const next = photograph.withModule(module, () => has.size);
   await assert.rejects(failing, /no adapter/);
   assert.equal(await next, 4);
 });
 
 test('without workers all tiles stay', async () => {
   const { photograph, has, module } = received();
-  const crew = new Crew(() => null, 2);
-  await assert.rejects(picture(photograph, crew), { code: 'worker-unavailable' });
-  assert.equal(await photograph.inPage(module, () => has.size), 4);
+  const pool = new WorkerPool(() => null, 2);
+  await assert.rejects(picture(photograph, pool), { code: 'worker-unavailable' });
+  assert.equal(await photograph.withModule(module, () => has.size), 4);
 });
 
 /** @param to does something while a worker stops */
 async function loses(
-  to: (photograph: Photograph, crew: Crew, module: DrawingModule) => Promise<unknown>,
+  to: (photograph: Photograph, pool: WorkerPool, module: DrawingModule) => Promise<unknown>,
   idle: boolean,
 ) {
-  const { crew, workers } = crewOf(2);
+  const { pool, workers } = crewOf(2);
   const { photograph, state, module } = received();
-  await picture(photograph, crew);
+  await picture(photograph, pool);
   const worker = workers[1] as FakeWorker;
   if (idle) worker.die();
   else worker.slow = true;
-  const doing = assert.rejects(to(photograph, crew, module), {
+  const doing = assert.rejects(to(photograph, pool, module), {
     code: 'photo-lost',
     message: /out of memory/,
   });
@@ -98,10 +100,10 @@ async function loses(
   await doing;
   // Never again as if it were whole.
   await assert.rejects(
-    photograph.inPage(module, () => {}),
+    photograph.withModule(module, () => {}),
     { code: 'photo-lost' },
   );
-  await assert.rejects(picture(photograph, crew), { code: 'photo-lost' });
+  await assert.rejects(picture(photograph, pool), { code: 'photo-lost' });
   await settle();
   assert.ok(workers.every(({ ended }) => ended));
   photograph.free();
@@ -113,11 +115,11 @@ for (const idle of [true, false]) {
   const when = idle ? 'before' : 'while';
   test(`tiles lost ${when} it is relit make it useless`, () => loses(picture, idle));
   test(`tiles lost ${when} they are given back make it useless`, () =>
-    loses((photograph, _, module) => photograph.inPage(module, () => {}), idle));
+    loses((photograph, _, module) => photograph.withModule(module, () => {}), idle));
 }
 
 test('tiles lost on their way to a worker make it useless', async () => {
-  const { crew } = crewOf(1, (worker) => {
+  const { pool } = crewOf(1, (worker) => {
     worker.start();
     const answer = worker.answer.bind(worker);
     worker.answer = (request) => {
@@ -126,62 +128,62 @@ test('tiles lost on their way to a worker make it useless', async () => {
     };
   });
   const { photograph, module } = received();
-  await assert.rejects(picture(photograph, crew), { code: 'photo-lost' });
+  await assert.rejects(picture(photograph, pool), { code: 'photo-lost' });
   await assert.rejects(
-    photograph.inPage(module, () => {}),
+    photograph.withModule(module, () => {}),
     { code: 'photo-lost' },
   );
 });
 
 test('tiles that cannot be sent to a worker are not lost, nor where it stops afterwards', async () => {
-  const { crew, workers } = crewOf(1, (worker) => {
+  const { pool, workers } = crewOf(1, (worker) => {
     worker.start();
     if (workers.length === 1) worker.refusal = new Error('no memory to send it');
   });
   const { photograph } = received();
-  await assert.rejects(picture(photograph, crew), /no memory/);
+  await assert.rejects(picture(photograph, pool), /no memory/);
   workers[0]?.die();
-  await assert.rejects(picture(photograph, crew), { code: 'worker-unavailable' });
-  assert.deepEqual(await picture(photograph, crew), ALL);
+  await assert.rejects(picture(photograph, pool), { code: 'worker-unavailable' });
+  assert.deepEqual(await picture(photograph, pool), ALL);
   assert.equal(workers.length, 2);
 });
 
 test('a worker that stops while another starts loses nothing', async () => {
-  const { crew, workers } = crewOf(2, () => {});
+  const { pool, workers } = crewOf(2, () => {});
   const { photograph, has, module } = received();
-  const frame = assert.rejects(picture(photograph, crew), { code: 'worker-unavailable' });
+  const frame = assert.rejects(picture(photograph, pool), { code: 'worker-unavailable' });
   await settle();
   workers[0]?.start();
   await settle();
   workers[0]?.die();
   workers[1]?.start();
   await frame;
-  assert.equal(await photograph.inPage(module, () => has.size), 4);
+  assert.equal(await photograph.withModule(module, () => has.size), 4);
 });
 
 test('a tile that the page’s module has no memory for is not lost', async () => {
-  const { crew } = crewOf(2);
+  const { pool } = crewOf(2);
   const { photo, has, state, module } = photoOf(4);
   const photograph = Photograph.decoded(photo);
-  await picture(photograph, crew);
+  await picture(photograph, pool);
   state.refuses = true;
   await assert.rejects(
-    photograph.inPage(module, () => {}),
+    photograph.withModule(module, () => {}),
     { code: 'format-limit' },
   );
   state.refuses = false;
-  assert.deepEqual(await picture(photograph, crew), ALL);
-  assert.equal(await photograph.inPage(module, () => has.size), 4);
+  assert.deepEqual(await picture(photograph, pool), ALL);
+  assert.equal(await photograph.withModule(module, () => has.size), 4);
 });
 
 test('one that is freed keeps nobody waiting, and is freed once nobody reads it', async () => {
-  const { crew, workers, alive } = crewOf(2);
+  const { pool, workers, alive } = crewOf(2);
   const { photograph, state, module } = received();
-  await picture(photograph, crew);
+  await picture(photograph, pool);
   for (const worker of workers) worker.slow = true;
-  const frame = assert.rejects(picture(photograph, crew), { code: 'internal' });
+  const frame = assert.rejects(picture(photograph, pool), { code: 'internal' });
   const next = assert.rejects(
-    photograph.inPage(module, () => {}),
+    photograph.withModule(module, () => {}),
     { code: 'internal' },
   );
   await settle();
@@ -193,9 +195,9 @@ test('one that is freed keeps nobody waiting, and is freed once nobody reads it'
 });
 
 test('one that is freed while workers start takes none', async () => {
-  const { crew, workers, alive } = crewOf(2, () => {});
+  const { pool, workers, alive } = crewOf(2, () => {});
   const { photograph, state } = received();
-  const frame = assert.rejects(picture(photograph, crew), { code: 'internal' });
+  const frame = assert.rejects(picture(photograph, pool), { code: 'internal' });
   await settle();
   assert.equal(await alive(), 2);
   photograph.free();
@@ -212,12 +214,12 @@ test('tiles go from one module of the page to another, and who uses them is told
   const photograph = Photograph.decoded(photo);
   const told: string[] = [];
   const leave = () => told.push(`${has.size} to leave`);
-  await photograph.inPage(module, () => {}, { leave });
+  await photograph.withModule(module, () => {}, { leave });
   assert.deepEqual([has.size, state.alive, told], [4, 1, []]);
-  await photograph.inPage({ ...module }, () => {});
+  await photograph.withModule({ ...module }, () => {});
   assert.deepEqual([has.size, state.alive, told], [4, 1, ['4 to leave']]);
-  const { crew } = crewOf(2);
-  assert.deepEqual(await picture(photograph, crew), ALL);
+  const { pool } = crewOf(2);
+  assert.deepEqual(await picture(photograph, pool), ALL);
   assert.deepEqual([has.size, state.alive, told], [0, 0, ['4 to leave']]);
 });
 
@@ -226,11 +228,11 @@ test('tiles that a module has no memory for stay where they were', async () => {
   const photograph = Photograph.decoded(photo);
   state.refuses = true;
   await assert.rejects(
-    photograph.inPage(module, () => {}),
+    photograph.withModule(module, () => {}),
     { code: 'format-limit' },
   );
   state.refuses = false;
-  assert.equal(await photograph.inPage({ ...module }, () => has.size), 4);
+  assert.equal(await photograph.withModule({ ...module }, () => has.size), 4);
   assert.equal(state.alive, 1);
   photograph.free();
   await settle();

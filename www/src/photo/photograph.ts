@@ -5,7 +5,7 @@
  */
 
 import type { DecodedPhoto, DrawingModule, DrawnPhoto, Freeable, Photo } from '../engine/types.js';
-import type { Crew, Shift } from '../renderers/cpu/worker-pool.js';
+import type { PoolSession, WorkerPool } from '../renderers/cpu/worker-pool.js';
 import { letGo, messageOf, PhotoError } from '../shared/errors.js';
 import { allEnded } from '../shared/promises.js';
 
@@ -13,7 +13,7 @@ import { allEnded } from '../shared/promises.js';
 export type TileBytes = Uint8Array<ArrayBuffer>;
 
 /** What is known of a photograph. */
-export interface Facts {
+export interface PhotoInfo {
   /** Picture, in pixels. */
   readonly width: number;
   readonly height: number;
@@ -27,7 +27,7 @@ export interface Facts {
 }
 
 /** All of a photograph but its tiles, as modules give and take it. */
-export interface Head extends Omit<Facts, 'metadata'> {
+export interface Head extends Omit<PhotoInfo, 'metadata'> {
   readonly metadata: string;
   /** Number of tiles, which lie row by row. */
   readonly tiles: number;
@@ -41,8 +41,8 @@ export interface Head extends Omit<Facts, 'metadata'> {
 export function headOf(photo: DecodedPhoto): Head {
   const { width, height, lightWidth, lightHeight, decodedBytes, metadata, tiles, tileSide } = photo;
   const [geometry, basis] = [photo.geometryParcel(), photo.basisParcel()];
-  const facts = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
-  return { ...facts, tiles, tileSide, geometry, basis };
+  const info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
+  return { ...info, tiles, tileSide, geometry, basis };
 }
 
 /** A module's memory with tiles in it. */
@@ -55,18 +55,18 @@ interface Room {
 }
 
 /** Where a tile is: in a module of the page, with the crew, on its way from or to it, or here. */
-type Place = Room | 'crew' | 'away' | TileBytes;
+type Place = Room | 'pool' | 'away' | TileBytes;
 
 /** See the module. */
 export class Photograph implements Freeable {
-  readonly facts: Facts;
+  readonly info: PhotoInfo;
   readonly head: Head;
   /** How much of the file it is of, from 0 to 1, which is all. */
   readonly share: number;
   readonly #tiles: Place[];
   /** Those in modules of the page: one, unless tiles were kept from moving. */
   readonly #rooms = new Set<Room>();
-  #shift: Shift | null = null;
+  #session: PoolSession | null = null;
   /** Why it can no longer be used: tiles are gone, or it was freed. */
   #over: PhotoError | null = null;
   /** Settles when all that was asked for so far is done. */
@@ -75,7 +75,7 @@ export class Photograph implements Freeable {
   private constructor(head: Head, tiles: Place[], share: number) {
     const { width, height, lightWidth, lightHeight, decodedBytes } = head;
     const metadata = readMetadata(head.metadata);
-    this.facts = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
+    this.info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
     this.head = head;
     this.share = share;
     this.#tiles = tiles;
@@ -110,7 +110,7 @@ export class Photograph implements Freeable {
    * Does something with all tiles in a module of the page, unless `signal` is aborted by then. `leave` is
    * told before tiles leave it again; what it has made of `photo` is to be freed then.
    */
-  inPage<T>(
+  withModule<T>(
     module: DrawingModule,
     use: (photo: DrawnPhoto) => T | Promise<T>,
     { signal, leave }: { signal?: AbortSignal; leave?: () => void } = {},
@@ -128,13 +128,13 @@ export class Photograph implements Freeable {
    * Does something with all tiles with a crew, always the same one. Where the crew can have no workers,
    * rejects with `worker-unavailable`, and the photograph is as it was.
    */
-  withCrew<T>(crew: Crew, use: (shift: Shift) => T | Promise<T>): Promise<T> {
-    return this.#next(async () => use(await this.#toCrew(crew)));
+  withWorkers<T>(pool: WorkerPool, use: (session: PoolSession) => T | Promise<T>): Promise<T> {
+    return this.#next(async () => use(await this.#toCrew(pool)));
   }
 
   free(): void {
     this.#over ??= letGo();
-    this.#shift?.end();
+    this.#session?.end();
     // What is under way may read it still.
     void this.#last.finally(() => {
       this.#tiles.fill('away');
@@ -158,8 +158,8 @@ export class Photograph implements Freeable {
 
   /** What to tell in the place of a failure after which tiles are missing. */
   #loss(thrown: unknown): PhotoError | null {
-    const gone = this.#shift?.failure;
-    if (!this.#tiles.includes('away') && !(gone && this.#tiles.includes('crew'))) {
+    const gone = this.#session?.failure;
+    if (!this.#tiles.includes('away') && !(gone && this.#tiles.includes('pool'))) {
       // The next use has other workers.
       if (gone) this.#leaveCrew();
       return null;
@@ -169,17 +169,17 @@ export class Photograph implements Freeable {
       `${messageOf(thrown)} A part of the photograph went with it.`,
       thrown,
     );
-    this.#shift?.end();
+    this.#session?.end();
     return this.#over;
   }
 
   async #toPage(module: DrawingModule): Promise<Room & { readonly photo: DrawnPhoto }> {
-    const shift = this.#shift;
-    if (shift) {
-      await this.#each(shift, async (index) => {
-        if (this.#tiles[index] !== 'crew') return;
+    const session = this.#session;
+    if (session) {
+      await this.#each(session, async (index) => {
+        if (this.#tiles[index] !== 'pool') return;
         this.#tiles[index] = 'away';
-        this.#tiles[index] = await shift.take(index);
+        this.#tiles[index] = await session.take(index);
       });
       this.#leaveCrew();
     }
@@ -206,21 +206,21 @@ export class Photograph implements Freeable {
     return [room, photo];
   }
 
-  async #toCrew(crew: Crew): Promise<Shift> {
-    this.#shift ??= await crew.open(this.head);
-    const shift = this.#shift;
+  async #toCrew(pool: WorkerPool): Promise<PoolSession> {
+    this.#session ??= await pool.open(this.head);
+    const session = this.#session;
     if (this.#over) {
-      shift.end();
+      session.end();
       throw this.#over;
     }
     this.#vacate();
-    await this.#each(shift, async (index) => {
-      if (this.#tiles[index] === 'crew') return;
+    await this.#each(session, async (index) => {
+      if (this.#tiles[index] === 'pool') return;
       const bytes = this.#takeOut(index);
       this.#tiles[index] = 'away';
       try {
-        await shift.put(index, bytes);
-        this.#tiles[index] = 'crew';
+        await session.put(index, bytes);
+        this.#tiles[index] = 'pool';
       } catch (thrown) {
         // What has left has no bytes here.
         if (bytes.byteLength > 0) this.#tiles[index] = bytes;
@@ -228,8 +228,8 @@ export class Photograph implements Freeable {
       }
     });
     this.#sweep();
-    await shift.plan();
-    return shift;
+    await session.plan();
+    return session;
   }
 
   /** A tile that is in a module of the page, or here; it is here then. */
@@ -261,14 +261,14 @@ export class Photograph implements Freeable {
   }
 
   #leaveCrew(): void {
-    this.#shift?.end();
-    this.#shift = null;
+    this.#session?.end();
+    this.#session = null;
   }
 
   /** Tile by tile, so that few are in two places, with all workers at once. */
-  async #each(shift: Shift, move: (index: number) => Promise<void>): Promise<void> {
+  async #each(session: PoolSession, move: (index: number) => Promise<void>): Promise<void> {
     await allEnded(
-      shift.tiles.map(async (tiles) => {
+      session.tiles.map(async (tiles) => {
         for (const index of tiles) await move(index);
       }),
     );

@@ -81,7 +81,7 @@ test('bytes go to the worker and a photograph comes of them, tile by tile', asyn
   assert.deepEqual(decoder.state, stateAt(900));
   const photograph = await decoder.finish();
   assert.ok(worker.ended);
-  assert.equal(photograph.facts.decodedBytes, 700);
+  assert.equal(photograph.info.decodedBytes, 700);
   const sizes: [number, number][] = [];
   const module = {
     Photo: {
@@ -91,7 +91,7 @@ test('bytes go to the worker and a photograph comes of them, tile by tile', asyn
       }),
     },
   } as unknown as DrawingModule;
-  await photograph.inPage(module, () => {});
+  await photograph.withModule(module, () => {});
   assert.deepEqual(sizes, [
     [0, 40],
     [1, 50],

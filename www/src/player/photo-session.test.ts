@@ -3,14 +3,15 @@ import test from 'node:test';
 import type { Backend } from '../engine/types.js';
 import type { Projection } from '../lights/projection.js';
 import type { Photograph } from '../photo/photograph.js';
+import type { Renderer } from '../renderers/types.js';
 import { PhotoError } from '../shared/errors.js';
-import { type Drawing, Player, type Settings } from './photo-session.js';
+import { PhotoSession, type SessionSettings } from './photo-session.js';
 import { exposed, wanting } from './settings-fakes.js';
 
-const SETTINGS: Settings = {
+const SETTINGS: SessionSettings = {
   src: 'a.ltm',
   credentials: 'same-origin',
-  wanted: wanting(['webgpu', 'cpu']),
+  renderOptions: wanting(['webgpu', 'cpu']),
   light: { name: 'flood', torch: null, picture: null },
   look: exposed(1),
 };
@@ -38,7 +39,7 @@ function world() {
   let lightFault: PhotoError | null = null;
   /** Ends frames that take time, in order; null while all are drawn at once. */
   let slow: { done(fault?: PhotoError | null): void; fail(error: Error): void }[] | null = null;
-  const player = new Player<Drawing>(
+  const session = new PhotoSession<Renderer>(
     {
       open: (src, _credentials, signal, _, onPreview) =>
         new Promise((resolve, reject) => {
@@ -55,11 +56,11 @@ function world() {
           });
         }),
       prepare: () => {},
-      draw: (backend, _photo, wanted, lost) =>
+      draw: (backend, _photo, renderOptions, lost) =>
         new Promise((resolve, reject) => {
-          const drawing: Drawing = {
+          const renderer: Renderer = {
             kernel: 'fake',
-            gamut: wanted.gamut,
+            gamut: renderOptions.gamut,
             render: ({ name }, _look, detail) => {
               if (lostAtRender) throw new PhotoError('backend-lost', 'the device is gone.');
               log.push(`${backend} draws ${name}${detail < 1 ? ` by ${detail}` : ''}`);
@@ -67,14 +68,17 @@ function world() {
               const frames = slow;
               return frames
                 ? new Promise((done, fail) =>
-                    frames.push({ done: (fault = null) => done({ asked: !fault, fault }), fail }),
+                    frames.push({
+                      done: (fault = null) => done({ lightApplied: !fault, lightError: fault }),
+                      fail,
+                    }),
                   )
-                : { asked: !lightFault, fault: lightFault };
+                : { lightApplied: !lightFault, lightError: lightFault };
             },
             free: () => log.push(`free ${backend}`),
           };
           losses.push(lost);
-          draws.push({ backend, resolve: () => resolve(drawing), reject });
+          draws.push({ backend, resolve: () => resolve(renderer), reject });
         }),
       nextFrame: (callback) => frames.push(callback),
       later: (ms, callback) => {
@@ -84,13 +88,14 @@ function world() {
       now: () => now,
     },
     {
-      loading: () => log.push('loading'),
+      loadStarted: () => log.push('loading'),
       progress: () => {},
-      drawn: ({ fault }) => fault && log.push(`not that light: ${fault.message}`),
-      detailChanged: (detail) => log.push(`detail ${detail}`),
+      frameDrawn: ({ lightError }) =>
+        lightError && log.push(`not that light: ${lightError.message}`),
+      qualityChanged: (detail) => log.push(`detail ${detail}`),
       loaded: () => log.push('loaded'),
-      show: () => {},
-      lost: (backend, reason) => losing.push(`${backend}: ${reason}`),
+      rendererChanged: () => {},
+      backendLost: (backend, reason) => losing.push(`${backend}: ${reason}`),
       backendChanged: (backend, previous, reason) =>
         log.push(`backend ${previous} -> ${backend}${reason && ` (${reason})`}`),
       failed: (error) => log.push(`failed ${error.code}: ${error.message}`),
@@ -98,7 +103,7 @@ function world() {
     },
   );
   return {
-    player,
+    session,
     log,
     losing,
     draws,
@@ -166,7 +171,7 @@ function world() {
 
 async function loadedWorld(settings = SETTINGS) {
   const w = world();
-  w.player.set(settings);
+  w.session.set(settings);
   await w.opened('a.ltm');
   await w.drawn(0);
   w.happened();
@@ -175,7 +180,7 @@ async function loadedWorld(settings = SETTINGS) {
 
 test('a photograph is loaded, given a back end, drawn', async () => {
   const w = world();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.opened('a.ltm');
   await w.drawn(0);
   assert.deepEqual(w.happened(), [
@@ -188,8 +193,8 @@ test('a photograph is loaded, given a back end, drawn', async () => {
 
 test('another address in the middle of a load aborts it, and only the new one shows', async () => {
   const w = world();
-  w.player.set(SETTINGS);
-  w.player.set({ ...SETTINGS, src: 'b.ltm' });
+  w.session.set(SETTINGS);
+  w.session.set({ ...SETTINGS, src: 'b.ltm' });
   // The old load may still succeed, late.
   await w.opened('a.ltm');
   await w.opened('b.ltm');
@@ -205,19 +210,19 @@ test('another address in the middle of a load aborts it, and only the new one sh
   ]);
 });
 
-test('a removed photograph is freed, its drawing first', async () => {
+test('a removed photograph is freed, its renderer first', async () => {
   const w = await loadedWorld();
-  w.player.stop();
+  w.session.stop();
   assert.deepEqual(w.happened(), ['free webgpu', 'free a.ltm']);
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   assert.deepEqual(w.happened(), ['loading']);
 });
 
 test('a photograph removed while a back end is being set up is freed once that is done', async () => {
   const w = world();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.opened('a.ltm');
-  w.player.stop();
+  w.session.stop();
   assert.deepEqual(w.happened(), ['loading']);
   await w.drawn(0);
   assert.deepEqual(w.happened(), ['free webgpu', 'free a.ltm']);
@@ -225,8 +230,8 @@ test('a photograph removed while a back end is being set up is freed once that i
 
 test('changes of one frame are drawn once', async () => {
   const w = await loadedWorld();
-  w.player.set({ ...SETTINGS, light: { name: 'torch', torch: { x: 0, y: 0 }, picture: null } });
-  w.player.set({ ...SETTINGS, light: { name: 'torch', torch: { x: 1, y: 0 }, picture: null } });
+  w.session.set({ ...SETTINGS, light: { name: 'torch', torch: { x: 0, y: 0 }, picture: null } });
+  w.session.set({ ...SETTINGS, light: { name: 'torch', torch: { x: 1, y: 0 }, picture: null } });
   assert.equal(w.frames.length, 1);
   w.frames[0]?.();
   assert.deepEqual(w.happened(), ['webgpu draws torch']);
@@ -234,7 +239,7 @@ test('changes of one frame are drawn once', async () => {
 
 test('a back end that cannot be had is passed over with its reason', async () => {
   const w = world();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.opened('a.ltm');
   await w.drawFails(0, 'no adapter');
   await w.drawn(1);
@@ -247,30 +252,30 @@ test('a back end that cannot be had is passed over with its reason', async () =>
 
 test('no back end at all fails, and another order is tried when it comes', async () => {
   const w = world();
-  w.player.set({ ...SETTINGS, wanted: wanting(['webgpu']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['webgpu']) });
   await w.opened('a.ltm');
   await w.drawFails(0, 'no adapter');
   assert.match(w.happened()[1] ?? '', /^failed backend-unavailable: .*WebGPU: no adapter\./);
-  w.player.set({ ...SETTINGS, wanted: wanting(['cpu']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['cpu']) });
   await w.drawn(1);
   assert.deepEqual(w.happened(), ['backend null -> cpu', 'cpu draws flood', 'recovered', 'loaded']);
 });
 
 test('another order changes the back end; the photograph is not loaded again', async () => {
   const w = await loadedWorld();
-  w.player.set({ ...SETTINGS, wanted: wanting(['cpu']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['cpu']) });
   await w.drawn(1);
   assert.deepEqual(w.happened(), ['backend webgpu -> cpu', 'cpu draws flood', 'free webgpu']);
   // One that begins with the back end in use leaves it alone.
-  w.player.set({ ...SETTINGS, wanted: wanting(['cpu', 'webgpu']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['cpu', 'webgpu']) });
   await settle();
   assert.deepEqual(w.happened(), ['cpu draws flood']);
 });
 
 test('the last of two quick changes of order wins', async () => {
   const w = await loadedWorld();
-  w.player.set({ ...SETTINGS, wanted: wanting(['webgl2']) });
-  w.player.set({ ...SETTINGS, wanted: wanting(['cpu']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['webgl2']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['cpu']) });
   await w.drawn(2);
   await w.drawn(1);
   assert.deepEqual(w.happened(), [
@@ -281,14 +286,14 @@ test('the last of two quick changes of order wins', async () => {
   ]);
 });
 
-for (const how of ['by the browser', 'at the next drawing']) {
+for (const how of ['by the browser', 'at the next renderer']) {
   test(`a back end lost ${how} is set up anew`, async () => {
     const w = await loadedWorld();
     if (how === 'by the browser') {
       w.losses[0]?.('the device is gone.');
     } else {
       w.loseAtRender(true);
-      w.player.set({ ...SETTINGS, look: exposed(2) });
+      w.session.set({ ...SETTINGS, look: exposed(2) });
       await w.frame();
       w.loseAtRender(false);
     }
@@ -315,7 +320,7 @@ test('a back end lost that cannot be had any more is replaced by the next', asyn
 
 test('a back end that draws nothing before it is lost is not tried again', async () => {
   const w = world();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.opened('a.ltm');
   w.loseAtRender(true);
   await w.drawn(0);
@@ -332,8 +337,8 @@ test('a back end that draws nothing before it is lost is not tried again', async
 });
 
 test('a back end lost while another is looked for does not end that search', async () => {
-  const w = await loadedWorld({ ...SETTINGS, wanted: wanting(['webgl2']) });
-  w.player.set({ ...SETTINGS, wanted: wanting(['webgpu', 'webgl2', 'cpu']) });
+  const w = await loadedWorld({ ...SETTINGS, renderOptions: wanting(['webgl2']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['webgpu', 'webgl2', 'cpu']) });
   w.losses[0]?.('the browser took it away.');
   assert.deepEqual(w.happened(), []);
   await w.drawn(1);
@@ -341,8 +346,8 @@ test('a back end lost while another is looked for does not end that search', asy
 });
 
 test('a back end lost while another is looked for is set up anew when its turn comes', async () => {
-  const w = await loadedWorld({ ...SETTINGS, wanted: wanting(['webgl2']) });
-  w.player.set({ ...SETTINGS, wanted: wanting(['webgpu', 'webgl2', 'cpu']) });
+  const w = await loadedWorld({ ...SETTINGS, renderOptions: wanting(['webgl2']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['webgpu', 'webgl2', 'cpu']) });
   w.losses[0]?.('the browser took it away.');
   await w.drawFails(1, 'no adapter');
   await w.drawn(2);
@@ -354,8 +359,8 @@ test('a back end lost while another is looked for is set up anew when its turn c
 });
 
 test('the loss of a back end in use is told once, and another gamut is no other back end', async () => {
-  const w = await loadedWorld({ ...SETTINGS, wanted: wanting(['webgl2']) });
-  w.player.set({ ...SETTINGS, wanted: { ...wanting(['webgl2']), gamut: 'display-p3' } });
+  const w = await loadedWorld({ ...SETTINGS, renderOptions: wanting(['webgl2']) });
+  w.session.set({ ...SETTINGS, renderOptions: { ...wanting(['webgl2']), gamut: 'display-p3' } });
   await w.drawn(1);
   assert.deepEqual(w.happened(), ['webgl2 draws flood', 'free webgl2']);
   assert.deepEqual(w.losing, []);
@@ -366,7 +371,7 @@ test('the loss of a back end in use is told once, and another gamut is no other 
 
 test('a back end lost while it is being set up is passed over with its reason', async () => {
   const w = world();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.opened('a.ltm');
   w.losses[0]?.('the device is gone.');
   await w.drawn(0);
@@ -382,7 +387,7 @@ test('a back end lost while it is being set up is passed over with its reason', 
 
 test('a back end that cannot be set up as it was lost says that', async () => {
   const w = world();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.opened('a.ltm');
   w.losses[0]?.('the device is gone.');
   await w.drawFails(0, 'null pointer passed to rust');
@@ -396,7 +401,7 @@ test('a back end that cannot be set up as it was lost says that', async () => {
 test('a back end lost at any moment after it was set up is replaced, and freed once', async () => {
   for (let ticks = 0; ticks < 10; ticks += 1) {
     const w = world();
-    w.player.set(SETTINGS);
+    w.session.set(SETTINGS);
     await w.opened('a.ltm');
     w.draws[0]?.resolve();
     for (let tick = 0; tick < ticks; tick += 1) await Promise.resolve();
@@ -411,12 +416,12 @@ test('a back end lost at any moment after it was set up is replaced, and freed o
     assert.deepEqual(lasting.sort(), expected.sort(), `after ${ticks} ticks`);
     const reasons = happened.filter((line) => line.startsWith('backend'));
     assert.match(reasons.at(-1) ?? '', /-> cpu \(WebGPU.* lost.*: the device is gone\./);
-    assert.equal(w.player.backend, 'cpu');
+    assert.equal(w.session.backend, 'cpu');
   }
 });
 
 test('the last back end lost says so, and what came of the next try', async () => {
-  const w = await loadedWorld({ ...SETTINGS, wanted: wanting(['webgpu']) });
+  const w = await loadedWorld({ ...SETTINGS, renderOptions: wanting(['webgpu']) });
   w.losses[0]?.('the device is gone.');
   await w.drawFails(1, 'no adapter');
   const [freed, failed] = w.happened();
@@ -425,14 +430,14 @@ test('the last back end lost says so, and what came of the next try', async () =
     failed ?? '',
     /^failed backend-unavailable: WebGPU was lost: the device is gone\..* WebGPU: no adapter\./,
   );
-  await assert.rejects(w.player.renderNow(), { code: 'not-loaded' });
+  await assert.rejects(w.session.renderNow(), { code: 'not-loaded' });
 });
 
 test('of settings that come faster than frames, the newest is drawn next', async () => {
   const w = await loadedWorld();
   const frames = w.slowDown();
   for (const name of ['torch', 'fire', 'stripes'] as const) {
-    w.player.set({ ...SETTINGS, light: { name, torch: null, picture: null } });
+    w.session.set({ ...SETTINGS, light: { name, torch: null, picture: null } });
     await w.frame();
   }
   assert.deepEqual(w.happened(), ['webgpu draws torch']);
@@ -449,12 +454,12 @@ test('a picture that is asked for is the next, however many frames are asked for
   const w = await loadedWorld();
   const frames = w.slowDown();
   const light = (name: 'torch' | 'fire' | 'stripes') => {
-    w.player.set({ ...SETTINGS, light: { name, torch: null, picture: null } });
+    w.session.set({ ...SETTINGS, light: { name, torch: null, picture: null } });
     return w.frame();
   };
   await light('torch');
   let given = false;
-  const asked = w.player.renderNow().then(() => {
+  const asked = w.session.renderNow().then(() => {
     given = true;
   });
   await light('fire');
@@ -470,7 +475,7 @@ test('a picture that is asked for is the next, however many frames are asked for
 test('a photograph is loaded once its first frame is there', async () => {
   const w = world();
   const frames = w.slowDown();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.opened('a.ltm');
   await w.drawn(0);
   assert.ok(!w.happened().includes('loaded'));
@@ -482,15 +487,15 @@ test('a photograph is loaded once its first frame is there', async () => {
 test('a back end lost at a frame that takes time is replaced', async () => {
   const w = await loadedWorld();
   const frames = w.slowDown();
-  w.player.set({ ...SETTINGS, look: exposed(2) });
+  w.session.set({ ...SETTINGS, look: exposed(2) });
   await w.frame();
-  const asked = w.player.renderNow();
+  const asked = w.session.renderNow();
   frames[0]?.fail(new PhotoError('backend-lost', 'the device is gone.'));
   await settle();
   await w.drawFails(1, 'no adapter');
   await w.drawn(2);
   frames[1]?.done();
-  assert.equal(await asked, w.player.drawing, 'the replacement draws what was asked for');
+  assert.equal(await asked, w.session.renderer, 'the replacement draws what was asked for');
   assert.deepEqual(w.happened(), [
     'webgpu draws flood',
     'free webgpu',
@@ -502,24 +507,24 @@ test('a back end lost at a frame that takes time is replaced', async () => {
 test('a picture at which a loss is found is drawn by what comes in its place', async () => {
   const w = await loadedWorld();
   const frames = w.slowDown();
-  const asked = w.player.renderNow();
+  const asked = w.session.renderNow();
   w.losses[0]?.('the device is gone.');
   frames[0]?.fail(new PhotoError('backend-lost', 'the device is gone.'));
   await settle();
   await w.drawFails(1, 'no adapter');
   await w.drawn(2);
   frames[1]?.done();
-  assert.equal(await asked, w.player.drawing);
-  assert.deepEqual([w.player.backend, w.player.detail], ['cpu', 1]);
+  assert.equal(await asked, w.session.renderer);
+  assert.deepEqual([w.session.backend, w.session.quality], ['cpu', 1]);
 });
 
 test('what was wrong with another light than there is now is not told', async () => {
   const w = await loadedWorld();
   const frames = w.slowDown();
   const picture = {} as Projection;
-  w.player.set({ ...SETTINGS, light: { ...SETTINGS.light, picture } });
+  w.session.set({ ...SETTINGS, light: { ...SETTINGS.light, picture } });
   await w.frame();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   frames[0]?.done(new PhotoError('light-tainted', 'of another origin'));
   await settle();
   assert.deepEqual(w.happened(), ['webgpu draws flood']);
@@ -528,9 +533,9 @@ test('what was wrong with another light than there is now is not told', async ()
 test('what becomes of a frame of another photograph is nobody’s concern', async () => {
   const w = await loadedWorld();
   const frames = w.slowDown();
-  w.player.set({ ...SETTINGS, look: exposed(2) });
+  w.session.set({ ...SETTINGS, look: exposed(2) });
   await w.frame();
-  w.player.set({ ...SETTINGS, src: 'b.ltm' });
+  w.session.set({ ...SETTINGS, src: 'b.ltm' });
   w.happened();
   frames[0]?.fail(new PhotoError('photo-lost', 'the photograph was let go'));
   await settle();
@@ -538,11 +543,11 @@ test('what becomes of a frame of another photograph is nobody’s concern', asyn
 });
 
 test('a photograph of which parts are gone is fetched anew, and its picture stays until then', async () => {
-  const w = await loadedWorld({ ...SETTINGS, wanted: wanting(['cpu']) });
+  const w = await loadedWorld({ ...SETTINGS, renderOptions: wanting(['cpu']) });
   const frames = w.slowDown();
-  w.player.set({ ...SETTINGS, wanted: wanting(['cpu']), look: exposed(2) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['cpu']), look: exposed(2) });
   await w.frame();
-  const asked = assert.rejects(w.player.renderNow(), { name: 'PhotoError' });
+  const asked = assert.rejects(w.session.renderNow(), { name: 'PhotoError' });
   frames[0]?.fail(new PhotoError('photo-lost', 'a worker stopped.'));
   await asked;
   // Not 'loading', which would take the picture away.
@@ -562,8 +567,8 @@ test('a photograph of which parts are gone is fetched anew, and its picture stay
 });
 
 test('a photograph that loses parts to a back end is fetched anew, and no other is tried', async () => {
-  const w = await loadedWorld({ ...SETTINGS, wanted: wanting(['cpu']) });
-  w.player.set({ ...SETTINGS, wanted: wanting(['webgl2', 'webgpu']) });
+  const w = await loadedWorld({ ...SETTINGS, renderOptions: wanting(['cpu']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['webgl2', 'webgpu']) });
   await w.drawLost(1, 'a worker stopped.');
   assert.deepEqual(w.happened(), ['free cpu', 'free a.ltm']);
   assert.equal(w.draws.length, 2);
@@ -577,18 +582,18 @@ test('a photograph that loses parts to a back end is fetched anew, and no other 
 });
 
 test('a photograph that cannot be fetched anew fails', async () => {
-  const w = await loadedWorld({ ...SETTINGS, wanted: wanting(['cpu']) });
-  w.player.set({ ...SETTINGS, wanted: wanting(['webgl2']) });
+  const w = await loadedWorld({ ...SETTINGS, renderOptions: wanting(['cpu']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['webgl2']) });
   await w.drawLost(1, 'a worker stopped.');
   await w.openFails('a.ltm', new PhotoError('http-network', 'the server cannot be reached'));
   assert.equal(w.happened().at(-1), 'failed http-network: the server cannot be reached');
 });
 
 test('a photograph that loses parts again and again fails, unless it is drawn between', async () => {
-  const cpu: Settings = { ...SETTINGS, wanted: wanting(['cpu']) };
+  const cpu: SessionSettings = { ...SETTINGS, renderOptions: wanting(['cpu']) };
   const w = await loadedWorld(cpu);
   const frames = w.slowDown();
-  w.player.set({ ...cpu, look: exposed(2) });
+  w.session.set({ ...cpu, look: exposed(2) });
   await w.frame();
   let fetched = 0;
   const lose = async () => {
@@ -603,13 +608,13 @@ test('a photograph that loses parts again and again fails, unless it is drawn be
   for (let i = 0; i < 4; i += 1) assert.ok(await lose());
   frames.pop()?.done();
   await settle();
-  w.player.set(cpu);
+  w.session.set(cpu);
   await w.frame();
   while (fetched < 100 && (await lose()));
   assert.equal(fetched, 4 + 5);
-  assert.equal(w.player.backend, null);
+  assert.equal(w.session.backend, null);
   // Whoever asks for it gets it.
-  w.player.set(cpu, true);
+  w.session.set(cpu, true);
   await w.opened('a.ltm');
   await w.drawn(w.draws.length - 1);
   assert.ok(await lose());
@@ -617,10 +622,10 @@ test('a photograph that loses parts again and again fails, unless it is drawn be
 
 test('a load that fails says so, and the same address can be tried again', async () => {
   const w = world();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.openFails('a.ltm', new PhotoError('http-status', 'the server answered 404'));
   assert.deepEqual(w.happened(), ['loading', 'failed http-status: the server answered 404']);
-  w.player.set(SETTINGS, true);
+  w.session.set(SETTINGS, true);
   await w.opened('a.ltm');
   await w.drawn(0);
   assert.equal(w.happened().at(-1), 'loaded');
@@ -628,14 +633,14 @@ test('a load that fails says so, and the same address can be tried again', async
 
 test('no address is src-missing', () => {
   const w = world();
-  w.player.set({ ...SETTINGS, src: null });
+  w.session.set({ ...SETTINGS, src: null });
   assert.match(w.happened()[1] ?? '', /^failed src-missing/);
 });
 
 test('a light that cannot be had is told with each frame, which counts as drawn', async () => {
   const w = world();
   w.spoilLights(new PhotoError('light-tainted', 'of another origin'));
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.opened('a.ltm');
   await w.drawn(0);
   assert.deepEqual(w.happened().slice(2), [
@@ -644,14 +649,14 @@ test('a light that cannot be had is told with each frame, which counts as drawn'
     'loaded',
   ]);
   w.spoilLights(null);
-  w.player.redraw();
+  w.session.redraw();
   await w.frame();
   assert.deepEqual(w.happened(), ['webgpu draws flood']);
 });
 
 test('frames of a light that come before a browser’s own are one', async () => {
   const w = await loadedWorld();
-  for (let i = 0; i < 3; i += 1) w.player.redraw();
+  for (let i = 0; i < 3; i += 1) w.session.redraw();
   assert.equal(w.frames.length, 1);
   await w.frame();
   assert.deepEqual(w.happened(), ['webgpu draws flood']);
@@ -659,7 +664,7 @@ test('frames of a light that come before a browser’s own are one', async () =>
 
 test('what a page changes before each of the browser’s frames is in that frame', async () => {
   const w = await loadedWorld();
-  for (let i = 0; i < 10; i += 1) await w.frame(() => w.player.redraw());
+  for (let i = 0; i < 10; i += 1) await w.frame(() => w.session.redraw());
   assert.equal(w.happened().length, 9, 'there was none to wait for before the first');
   await w.frame();
   assert.equal(w.frames.length, 0);
@@ -667,45 +672,45 @@ test('what a page changes before each of the browser’s frames is in that frame
 
 test('what nobody sees is not drawn, and once when it comes into view', async () => {
   const w = await loadedWorld();
-  w.player.setVisible(false);
+  w.session.setVisible(false);
   for (const exposure of [2, 3]) {
-    w.player.set({ ...SETTINGS, look: exposed(exposure) });
-    w.player.redraw();
+    w.session.set({ ...SETTINGS, look: exposed(exposure) });
+    w.session.redraw();
   }
   assert.equal(w.frames.length, 0);
-  w.player.setVisible(true);
+  w.session.setVisible(true);
   await w.frame();
   assert.deepEqual(w.happened(), ['webgpu draws flood']);
-  for (const visible of [false, true]) w.player.setVisible(visible);
+  for (const visible of [false, true]) w.session.setVisible(visible);
   await w.frame();
   assert.deepEqual(w.happened(), [], 'nothing has changed');
 });
 
 test('what goes out of view before its frame waits until it is back', async () => {
   const w = await loadedWorld();
-  w.player.redraw();
-  w.player.setVisible(false);
+  w.session.redraw();
+  w.session.setVisible(false);
   await w.frame();
   assert.deepEqual(w.happened(), []);
-  w.player.setVisible(true);
+  w.session.setVisible(true);
   await w.frame();
   assert.deepEqual(w.happened(), ['webgpu draws flood']);
 });
 
 test('the first picture, another back end’s, and one that is asked for are drawn unseen', async () => {
   const w = world();
-  w.player.setVisible(false);
-  w.player.set(SETTINGS);
+  w.session.setVisible(false);
+  w.session.set(SETTINGS);
   await w.opened('a.ltm');
   await w.drawn(0);
   assert.equal(w.happened().at(-1), 'loaded');
-  w.player.set({ ...SETTINGS, wanted: wanting(['cpu']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['cpu']) });
   await w.drawn(1);
   assert.deepEqual(w.happened().slice(-2), ['cpu draws flood', 'free webgpu']);
-  w.player.redraw();
-  await w.player.renderNow();
+  w.session.redraw();
+  await w.session.renderNow();
   assert.deepEqual(w.happened(), ['cpu draws flood']);
-  w.player.setVisible(true);
+  w.session.setVisible(true);
   assert.equal(w.frames.length, 0, 'it is up to date');
 });
 
@@ -717,9 +722,9 @@ type World = Awaited<ReturnType<typeof loadedWorld>>;
  */
 async function move(w: World, count: number, ms: number): Promise<void> {
   for (let frame = 0; frame < count; frame += 1) {
-    w.player.redraw();
+    w.session.redraw();
     await w.frame();
-    await w.pass(ms * (w.player.detail ?? 1));
+    await w.pass(ms * (w.session.quality ?? 1));
   }
 }
 
@@ -739,9 +744,9 @@ async function softWorld() {
 
 test('frames that are late are drawn by less, and once more in full at rest', async () => {
   const w = await loadedWorld();
-  assert.equal(w.player.detail, 1);
+  assert.equal(w.session.quality, 1);
   await move(w, 12, 60);
-  assert.equal(w.player.detail, 0.5);
+  assert.equal(w.session.quality, 0.5);
   const happened = w.happened();
   assert.deepEqual(new Set(happened.slice(0, 8)), new Set(['webgpu draws flood']));
   assert.equal(happened.filter((line) => line.startsWith('detail')).join(), 'detail 0.5');
@@ -750,7 +755,7 @@ test('frames that are late are drawn by less, and once more in full at rest', as
   assert.deepEqual(w.happened(), [], 'not yet');
   await w.pass(10);
   assert.deepEqual(w.happened(), ['webgpu draws flood', 'detail 1']);
-  assert.equal(w.player.detail, 1);
+  assert.equal(w.session.quality, 1);
   await w.pass(10_000);
   await w.frame();
   assert.deepEqual(w.happened(), []);
@@ -766,13 +771,13 @@ test('frames that take time themselves are drawn by less where that is long', as
     const w = await loadedWorld();
     const frames = w.slowDown();
     for (let frame = 0; frame < 12; frame += 1) {
-      w.player.redraw();
+      w.session.redraw();
       await w.frame();
       await w.pass(ms);
       frames.shift()?.done();
       await settle();
     }
-    assert.equal(w.player.detail, detail, `${ms} ms`);
+    assert.equal(w.session.quality, detail, `${ms} ms`);
   }
 });
 
@@ -783,8 +788,8 @@ test('frames that keep the page busy are drawn by less where that is long', asyn
   ] as const) {
     const w = await loadedWorld();
     w.spend(ms);
-    for (let i = 0; i < 30; i += 1) await w.frame(() => w.player.redraw());
-    assert.equal(w.player.detail, detail, `${ms} ms`);
+    for (let i = 0; i < 30; i += 1) await w.frame(() => w.session.redraw());
+    assert.equal(w.session.quality, detail, `${ms} ms`);
   }
 });
 
@@ -804,7 +809,7 @@ test('a newer frame comes before the one in full', async () => {
   const w = await softWorld();
   await w.frame();
   await w.pass(80);
-  w.player.redraw();
+  w.session.redraw();
   await w.pass(1000);
   assert.deepEqual(w.happened(), [], 'it waits for the browser');
   await w.frame();
@@ -816,7 +821,7 @@ test('a newer frame comes before the one in full', async () => {
 test('a picture whose frames are far apart, as the browser is late, is not at rest', async () => {
   const w = await softWorld();
   for (let i = 0; i < 10; i += 1) {
-    await w.frame(() => w.player.redraw());
+    await w.frame(() => w.session.redraw());
     await w.pass(500);
   }
   assert.ok(!w.happened().includes('webgpu draws flood'));
@@ -824,27 +829,27 @@ test('a picture whose frames are far apart, as the browser is late, is not at re
 
 test('a picture at rest is drawn in full once it is in view', async () => {
   const w = await softWorld();
-  w.player.setVisible(false);
+  w.session.setVisible(false);
   await rest(w);
   assert.deepEqual(w.happened(), []);
-  w.player.setVisible(true);
+  w.session.setVisible(true);
   await w.frame();
-  w.player.setVisible(false);
+  w.session.setVisible(false);
   await rest(w);
   assert.deepEqual(w.happened(), [], 'nor if it was so for a moment');
-  w.player.setVisible(true);
+  w.session.setVisible(true);
   await rest(w);
   assert.deepEqual(w.happened(), ['webgpu draws flood', 'detail 1']);
-  w.player.setVisible(false);
-  w.player.setVisible(true);
+  w.session.setVisible(false);
+  w.session.setVisible(true);
   await rest(w);
   assert.deepEqual(w.happened(), [], 'it is');
 });
 
 test('a picture that is let go does not come to rest', async () => {
   const w = await softWorld();
-  w.player.stop();
-  assert.equal(w.player.detail, null);
+  w.session.stop();
+  assert.equal(w.session.quality, null);
   w.happened();
   await rest(w);
   assert.deepEqual(w.happened(), []);
@@ -852,22 +857,22 @@ test('a picture that is let go does not come to rest', async () => {
 
 test('a picture that is asked for is in full detail, in the middle of a motion', async () => {
   const w = await softWorld();
-  await w.player.renderNow();
+  await w.session.renderNow();
   assert.deepEqual(w.happened(), ['webgpu draws flood', 'detail 1']);
   await rest(w);
   assert.deepEqual(w.happened(), [], 'so there is none to come');
-  w.player.redraw();
-  await w.player.renderNow();
+  w.session.redraw();
+  await w.session.renderNow();
   await w.frame();
   assert.deepEqual(w.happened(), ['webgpu draws flood'], 'nor one that was asked for before');
   const frames = w.slowDown();
   const light = { name: 'torch', torch: null, picture: null } as const;
-  w.player.set({ ...SETTINGS, light });
+  w.session.set({ ...SETTINGS, light });
   await w.frame();
   // Whether or not a frame of the motion is to come next.
-  w.player.redraw();
+  w.session.redraw();
   await w.frame();
-  const asked = w.player.renderNow();
+  const asked = w.session.renderNow();
   frames[0]?.done();
   await settle();
   frames[1]?.done();
@@ -882,15 +887,15 @@ test('a picture that is asked for is in full detail, in the middle of a motion',
 
 test('another back end, and another photograph, start in full detail', async () => {
   const w = await softWorld();
-  w.player.set({ ...SETTINGS, wanted: wanting(['cpu']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['cpu']) });
   await w.drawn(1);
   assert.deepEqual(w.happened().slice(-3), ['cpu draws flood', 'free webgpu', 'detail 1']);
   await move(w, 20, 60);
-  assert.equal(w.player.detail, 0.5);
-  w.player.set({ ...SETTINGS, src: 'b.ltm' });
+  assert.equal(w.session.quality, 0.5);
+  w.session.set({ ...SETTINGS, src: 'b.ltm' });
   await w.opened('b.ltm');
   await w.drawn(2);
-  assert.equal(w.player.detail, 1);
+  assert.equal(w.session.quality, 1);
   w.happened();
   await rest(w);
   assert.deepEqual(w.happened(), [], 'what came to rest is gone');
@@ -900,7 +905,7 @@ test('another back end, and another photograph, start in full detail', async () 
 
 test('coarser photographs are drawn while the file comes, each by the back end of the one before', async () => {
   const w = world();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.previewed('a.ltm', 0.125);
   await w.drawFails(0, 'no adapter');
   await w.drawn(1);
@@ -910,15 +915,15 @@ test('coarser photographs are drawn while the file comes, each by the back end o
     'cpu draws flood',
     'detail 0.125',
   ]);
-  assert.equal(w.player.detail, 0.125);
-  w.player.redraw();
+  assert.equal(w.session.quality, 0.125);
+  w.session.redraw();
   await w.frame();
   assert.deepEqual(w.happened(), ['cpu draws flood'], 'the light may move');
   await w.previewed('a.ltm', 0.5);
   await w.previewed('a.ltm', 0.75);
   const left = ['free cpu', 'free 0.125 of a.ltm', 'free 0.75 of a.ltm'];
   assert.deepEqual(w.happened(), left, 'one is on its way to the screen');
-  assert.equal(w.player.backend, 'cpu');
+  assert.equal(w.session.backend, 'cpu');
   await w.drawn(2);
   assert.deepEqual(w.happened(), ['cpu draws flood', 'detail 0.5']);
   await w.opened('a.ltm');
@@ -938,7 +943,7 @@ test('coarser photographs are drawn while the file comes, each by the back end o
 
 test('a whole photograph waits for who draws a coarser one, and is drawn by the same', async () => {
   const w = world();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.previewed('a.ltm', 0.5);
   await w.opened('a.ltm');
   assert.equal(w.draws.length, 1);
@@ -959,10 +964,10 @@ test('a whole photograph waits for who draws a coarser one, and is drawn by the 
 
 test('a whole photograph that nobody wants any more is freed while it waits', async () => {
   const w = world();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.previewed('a.ltm', 0.5);
   await w.opened('a.ltm');
-  w.player.stop();
+  w.session.stop();
   await settle();
   assert.deepEqual(w.happened(), ['loading', 'abort a.ltm', 'free a.ltm']);
   await w.drawn(0);
@@ -971,7 +976,7 @@ test('a whole photograph that nobody wants any more is freed while it waits', as
 
 test('a coarser photograph that no back end draws, or that is lost, is made up for by the whole one', async () => {
   const w = world();
-  w.player.set({ ...SETTINGS, wanted: wanting(['cpu']) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['cpu']) });
   await w.previewed('a.ltm', 0.25);
   await w.drawFails(0, 'no canvas');
   assert.deepEqual(w.happened(), ['loading']);
@@ -991,33 +996,33 @@ test('a coarser photograph that no back end draws, or that is lost, is made up f
 
 test('a photograph that fails to come whole leaves its last picture, and says so', async () => {
   const w = world();
-  w.player.set(SETTINGS);
+  w.session.set(SETTINGS);
   await w.previewed('a.ltm', 0.5);
   await w.drawn(0);
   w.happened();
   await w.openFails('a.ltm', new PhotoError('http-short', 'it ended'));
   assert.deepEqual(w.happened(), ['failed http-short: it ended']);
-  w.player.redraw();
+  w.session.redraw();
   await w.frame();
   assert.deepEqual(w.happened(), ['webgpu draws flood']);
-  w.player.stop();
+  w.session.stop();
   assert.deepEqual(w.happened(), ['free webgpu', 'free 0.5 of a.ltm']);
 });
 
 test('what waits for a frame of a coarser photograph is drawn by the whole one', async () => {
-  const cpu = { ...SETTINGS, wanted: wanting(['cpu']) };
+  const cpu = { ...SETTINGS, renderOptions: wanting(['cpu']) };
   const w = world();
   const frames = w.slowDown();
-  w.player.set(cpu);
+  w.session.set(cpu);
   await w.previewed('a.ltm', 0.5);
   await w.drawn(0);
   frames.shift()?.done();
   await settle();
-  w.player.set({ ...cpu, look: exposed(2) });
+  w.session.set({ ...cpu, look: exposed(2) });
   await w.frame();
   assert.equal(frames.length, 1);
   // Asked for while that is drawn.
-  const waiting = w.player.renderNow();
+  const waiting = w.session.renderNow();
   await w.opened('a.ltm');
   frames.shift()?.fail(new PhotoError('internal', 'it was let go'));
   await settle();
@@ -1027,5 +1032,5 @@ test('what waits for a frame of a coarser photograph is drawn by the whole one',
     await settle();
   }
   assert.ok(w.happened().includes('loaded'));
-  assert.equal(await waiting, w.player.drawing);
+  assert.equal(await waiting, w.session.renderer);
 });

@@ -6,61 +6,29 @@
  */
 
 import type { Look } from '../engine/output-settings.js';
-import type { Backend, Freeable, Gamut } from '../engine/types.js';
+import type { Backend } from '../engine/types.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import { missingSource, type OnPreview, type OnProgress } from '../loading/load.js';
 import type { Photograph } from '../photo/photograph.js';
+import type { FrameResult, Renderer, RenderOptions } from '../renderers/types.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
-import { UnderWay } from '../shared/promises.js';
+import { Deferred } from '../shared/promises.js';
 import { after, BACKEND_TITLES, firstWorking, from, sentence } from './backends.js';
 import { Quality } from './quality.js';
 
 /** All that attributes and the pointer say. */
-export interface Settings {
+export interface SessionSettings {
   /** Absolute address, or `null` where there is none. */
   readonly src: string | null;
   /** Whether cookies go along. */
   readonly credentials: RequestCredentials;
-  readonly wanted: Wanted;
+  readonly renderOptions: RenderOptions;
   readonly light: LightSetting;
   readonly look: Look;
 }
 
-/** What drawing is to be done by. */
-export interface Wanted {
-  /** To be tried in this order. */
-  readonly backends: readonly Backend[];
-  /** Whether a graphics device may be a program that makes up for a missing one. */
-  readonly software: boolean;
-  /** What the canvas is to show, where the browser can. */
-  readonly gamut: Gamut;
-}
-
-/** A photograph on a surface, ready to be drawn. */
-export interface Drawing extends Freeable {
-  readonly kernel: string;
-  /** What is shown. */
-  readonly gamut: Gamut;
-  /** Why it is slower than it could be, for who hears of it; nothing where it is not. */
-  readonly flaw?: string;
-  /**
-   * Draws by a share of the components, at once or by the time the promise settles; not called again
-   * before. Where the light cannot be had, draws by the last one that could, and gives the reason.
-   * Throws or rejects with `backend-lost`, or with `photo-lost` where parts of the photograph are gone.
-   */
-  render(light: LightSetting, look: Look, detail: number): Drawn | Promise<Drawn>;
-}
-
-/** What a picture was drawn by. */
-export interface Drawn {
-  /** Whether by the light that was asked for, and not by the last one while that shows nothing. */
-  readonly asked: boolean;
-  /** Why not, where it should be. */
-  readonly fault: PhotoError | null;
-}
-
-/** What the player needs done. */
-export interface Ports<D extends Drawing> {
+/** What the session needs done. */
+export interface SessionPorts<D extends Renderer> {
   open(
     src: string,
     credentials: RequestCredentials,
@@ -69,7 +37,7 @@ export interface Ports<D extends Drawing> {
     onPreview: OnPreview | null,
   ): Promise<Photograph>;
   /** Has what is likely to draw get ready while a photograph comes, and stay so until `over` is aborted. */
-  prepare(wanted: Wanted, over: AbortSignal): void;
+  prepare(renderOptions: RenderOptions, over: AbortSignal): void;
   /**
    * Sets a back end up on a surface of its own; throws `backend-unavailable`, or `photo-lost`. Need not
    * go on once `signal` is aborted.
@@ -77,7 +45,7 @@ export interface Ports<D extends Drawing> {
   draw(
     backend: Backend,
     photo: Photograph,
-    wanted: Wanted,
+    renderOptions: RenderOptions,
     lost: (reason: string) => void,
     signal: AbortSignal,
   ): Promise<D>;
@@ -89,33 +57,33 @@ export interface Ports<D extends Drawing> {
   now(): number;
 }
 
-/** What the player tells. */
-export interface Listener<D extends Drawing> {
+/** What the session tells. */
+export interface SessionListener<D extends Renderer> {
   /** A load begins: what was shown is gone. */
-  loading(): void;
+  loadStarted(): void;
   progress: OnProgress;
   /** A drawing has its first frame, and is to be shown from now on. */
-  show(drawing: D): void;
+  rendererChanged(renderer: D): void;
   /** A frame was drawn, and this light asked for. */
-  drawn(drawn: Drawn, light: LightSetting): void;
+  frameDrawn(frame: FrameResult, light: LightSetting): void;
   /** That frame is by another share of the photograph than the one before it; the first is by all. */
-  detailChanged(detail: number): void;
+  qualityChanged(detail: number): void;
   /** The whole photograph is drawn for the first time, or the first since it had to be fetched anew. */
   loaded(): void;
   /** Another back end was taken up, or the same again after it was lost. */
   backendChanged(backend: Backend, previous: Backend | null, reason: string): void;
   /** The back end in use is gone. */
-  lost(backend: Backend, reason: string): void;
+  backendLost(backend: Backend, reason: string): void;
   failed(error: PhotoError): void;
   /** Nothing is wrong any more. */
   recovered(): void;
 }
 
 /** A back end that was set up. */
-class SetUp<D extends Drawing> {
+class SetUp<D extends Renderer> {
   readonly backend: Backend;
-  readonly wanted: Wanted;
-  readonly drawing: D;
+  readonly renderOptions: RenderOptions;
+  readonly renderer: D;
   readonly held: Held;
   readonly quality = new Quality();
   freed = false;
@@ -124,12 +92,12 @@ class SetUp<D extends Drawing> {
   /** Whether it has drawn a frame. */
   drew = false;
   /** The one that is being drawn, where that takes time. */
-  frame: UnderWay | null = null;
+  frame: Deferred | null = null;
 
-  constructor(backend: Backend, wanted: Wanted, drawing: D, held: Held) {
+  constructor(backend: Backend, renderOptions: RenderOptions, renderer: D, held: Held) {
     this.backend = backend;
-    this.wanted = wanted;
-    this.drawing = drawing;
+    this.renderOptions = renderOptions;
+    this.renderer = renderer;
     this.held = held;
     held.hold();
   }
@@ -138,13 +106,13 @@ class SetUp<D extends Drawing> {
   free(): void {
     if (this.freed) return;
     this.freed = true;
-    this.drawing.free();
+    this.renderer.free();
     this.held.release();
   }
 }
 
 /** A search for a back end. It has ended also once nobody wants it any more. */
-class Search extends UnderWay {
+class Search extends Deferred {
   readonly #abort = new AbortController();
 
   get signal(): AbortSignal {
@@ -182,10 +150,10 @@ const MOST_FETCHES = 5;
 const REST_MS = 150;
 
 /** See the module. */
-export class Player<D extends Drawing> {
-  readonly #ports: Ports<D>;
-  readonly #listener: Listener<D>;
-  #settings: Settings | null = null;
+export class PhotoSession<D extends Renderer> {
+  readonly #ports: SessionPorts<D>;
+  readonly #listener: SessionListener<D>;
+  #settings: SessionSettings | null = null;
   #load: AbortController | null = null;
   #search: Search | null = null;
   #held: Held | null = null;
@@ -220,7 +188,7 @@ export class Player<D extends Drawing> {
   /** Keeps the picture from being drawn again once it is at rest. */
   #keepMoving = (): void => {};
 
-  constructor(ports: Ports<D>, listener: Listener<D>) {
+  constructor(ports: SessionPorts<D>, listener: SessionListener<D>) {
     this.#ports = ports;
     this.#listener = listener;
   }
@@ -236,24 +204,24 @@ export class Player<D extends Drawing> {
   }
 
   /** What is drawn on. */
-  get drawing(): D | null {
-    return this.#active?.drawing ?? null;
+  get renderer(): D | null {
+    return this.#active?.renderer ?? null;
   }
 
   /** The share of the components that the picture is drawn by; `null` while there is none. */
-  get detail(): number | null {
+  get quality(): number | null {
     return this.#active?.drew ? this.#detail : null;
   }
 
   /** Takes new settings. `reload` loads even where the address is the same. */
-  set(settings: Settings, reload = false): void {
+  set(settings: SessionSettings, reload = false): void {
     const before = this.#settings;
     this.#settings = settings;
     const sameFile = before?.src === settings.src && before.credentials === settings.credentials;
     if (!before || reload || !sameFile) {
       this.#begin(settings.src);
-    } else if (!same(before.wanted, settings.wanted)) {
-      void this.#choose(settings.wanted, this.backend, '');
+    } else if (!same(before.renderOptions, settings.renderOptions)) {
+      void this.#choose(settings.renderOptions, this.backend, '');
     } else {
       this.#askForFrame();
     }
@@ -328,19 +296,19 @@ export class Player<D extends Drawing> {
     this.#keepMoving();
     try {
       const began = this.#ports.now();
-      let drawn = active.drawing.render(light, look, detail);
+      let drawn = active.renderer.render(light, look, detail);
       if (!whole) this.#clock(active, began, drawn);
       if (drawn instanceof Promise) {
-        active.frame = new UnderWay();
+        active.frame = new Deferred();
         drawn = await drawn;
       }
       if (active.held.photo.share === 1) this.#fetches = 0;
       active.drew = true;
       // Another light may have been set meanwhile, with which nothing is wrong.
       const sameLight = light.picture === this.#settings?.light.picture;
-      const told = sameLight ? drawn : { ...drawn, fault: null };
+      const told = sameLight ? drawn : { ...drawn, lightError: null };
       if (active === this.#active) this.#tell(active, told, light, detail);
-      return active.drawing;
+      return active.renderer;
     } catch (thrown) {
       if (active === this.#active && active.freed) {
         // The photograph that is there by now draws.
@@ -364,30 +332,35 @@ export class Player<D extends Drawing> {
   }
 
   /** A frame of a motion has begun. */
-  #clock({ quality }: SetUp<D>, began: number, drawing: Drawn | Promise<Drawn>): void {
+  #clock({ quality }: SetUp<D>, began: number, renderer: FrameResult | Promise<FrameResult>): void {
     const drew = () => quality.drew(began, this.#ports.now());
-    if (drawing instanceof Promise) drawing.then(drew, () => {});
+    if (renderer instanceof Promise) renderer.then(drew, () => {});
     // A graphics device is still at it, and holds up the browser's next frame.
     else this.#ports.nextFrame(drew);
     // What a page changes in its own turn before that frame is in time for it.
     this.#awaitFrame();
   }
 
-  #tell({ drawing, held }: SetUp<D>, drawn: Drawn, light: LightSetting, timeFor: number): void {
+  #tell(
+    { renderer, held }: SetUp<D>,
+    drawn: FrameResult,
+    light: LightSetting,
+    timeFor: number,
+  ): void {
     const detail = timeFor * held.photo.share;
     const changed = detail !== this.#detail;
     this.#detail = detail;
     this.#timeFor = timeFor;
     if (timeFor < 1 && !this.#stale && !this.#unseen) this.#awaitRest();
-    if (this.#shows !== drawing) {
-      this.#shows = drawing;
+    if (this.#shows !== renderer) {
+      this.#shows = renderer;
       this.#onScreen = true;
-      this.#listener.show(drawing);
+      this.#listener.rendererChanged(renderer);
       this.#outgoing?.free();
       this.#outgoing = null;
     }
-    this.#listener.drawn(drawn, light);
-    if (changed) this.#listener.detailChanged(detail);
+    this.#listener.frameDrawn(drawn, light);
+    if (changed) this.#listener.qualityChanged(detail);
   }
 
   /** Draws once more, in full detail, unless a newer frame comes first. */
@@ -417,7 +390,7 @@ export class Player<D extends Drawing> {
     this.#release();
     this.#fetches = 0;
     this.#onScreen = false;
-    this.#listener.loading();
+    this.#listener.loadStarted();
     if (src === null) {
       this.#fail(missingSource());
       return;
@@ -447,7 +420,7 @@ export class Player<D extends Drawing> {
     this.#load = load;
     const { signal } = load;
     const drawn = new AbortController();
-    if (this.#settings) this.#ports.prepare(this.#settings.wanted, drawn.signal);
+    if (this.#settings) this.#ports.prepare(this.#settings.renderOptions, drawn.signal);
     const onPreview: OnPreview = (preview) => {
       // While the last one is on its way to the screen, none comes in its place.
       if (signal.aborted || this.#search) preview.free();
@@ -491,17 +464,21 @@ export class Player<D extends Drawing> {
     // On the CPU nothing of it is needed for its picture to stay, and memory may be for one only.
     if (backend === 'cpu') this.#active?.free();
     if (!this.#settings) return;
-    const { wanted } = this.#settings;
+    const { renderOptions } = this.#settings;
     // What could not draw the one before will not draw this one.
-    const backends = backend ? from(wanted.backends, backend) : wanted.backends;
-    await this.#choose({ ...wanted, backends }, backend ?? previous, backend ? '' : why);
+    const backends = backend ? from(renderOptions.backends, backend) : renderOptions.backends;
+    await this.#choose({ ...renderOptions, backends }, backend ?? previous, backend ? '' : why);
   }
 
   /**
    * Takes up the first back end of `order` that works, in the place of `previous`; `why` tells what
    * became of that one. Does nothing before the photograph is there: its load will search.
    */
-  async #choose(wanted: Wanted, previous: Backend | null, why: string): Promise<void> {
+  async #choose(
+    renderOptions: RenderOptions,
+    previous: Backend | null,
+    why: string,
+  ): Promise<void> {
     this.#search?.abort();
     const held = this.#held;
     if (!held) return;
@@ -512,8 +489,8 @@ export class Player<D extends Drawing> {
     held.hold();
     try {
       const chosen = await firstWorking(
-        wanted.backends,
-        (backend) => this.#setUp(backend, wanted, held, signal),
+        renderOptions.backends,
+        (backend) => this.#setUp(backend, renderOptions, held, signal),
         () => signal.throwIfAborted(),
       );
       signal.throwIfAborted();
@@ -522,9 +499,9 @@ export class Player<D extends Drawing> {
       const changed = found !== this.#active;
       const again = why !== '' || (this.#active?.lost ?? null) !== null;
       if (changed) this.#replaceActive(found);
-      const reason = [why, chosen.reason, found.drawing.flaw].filter(Boolean).join(' ');
+      const reason = [why, chosen.reason, found.renderer.warning].filter(Boolean).join(' ');
       if (found.lost !== null) {
-        this.#replace(found, found.lost, wanted, previous, reason);
+        this.#replace(found, found.lost, renderOptions, previous, reason);
         return;
       }
       // The same for another gamut is nothing new.
@@ -552,7 +529,7 @@ export class Player<D extends Drawing> {
   /** One back end, set up, or the one in use where it is the same and works. */
   async #setUp(
     backend: Backend,
-    wanted: Wanted,
+    renderOptions: RenderOptions,
     held: Held,
     signal: AbortSignal,
   ): Promise<SetUp<D>> {
@@ -561,9 +538,9 @@ export class Player<D extends Drawing> {
     const serves =
       active?.held === held &&
       active.backend === backend &&
-      active.wanted.gamut === wanted.gamut &&
+      active.renderOptions.gamut === renderOptions.gamut &&
       // Nobody knows here whether a device that might be a program is one.
-      (backend === 'cpu' || wanted.software || !active.wanted.software);
+      (backend === 'cpu' || renderOptions.software || !active.renderOptions.software);
     if (active && serves && active.lost === null) return active;
     let done: SetUp<D> | null = null;
     let lostEarly: string | null = null;
@@ -571,8 +548,8 @@ export class Player<D extends Drawing> {
       if (done) this.#lost(done, reason);
       else lostEarly ??= reason;
     };
-    const setUp = this.#ports.draw(backend, photo, wanted, lost, signal);
-    const drawing = await setUp.catch((thrown: unknown) => {
+    const setUp = this.#ports.draw(backend, photo, renderOptions, lost, signal);
+    const renderer = await setUp.catch((thrown: unknown) => {
       // Whatever else went wrong, this is why.
       if (lostEarly !== null) throw lostInSetUp(lostEarly, thrown);
       const error = toPhotoError(thrown);
@@ -582,14 +559,14 @@ export class Player<D extends Drawing> {
       throw error;
     });
     if (signal.aborted) {
-      drawing.free();
+      renderer.free();
       signal.throwIfAborted();
     }
     if (lostEarly !== null) {
-      drawing.free();
+      renderer.free();
       throw lostInSetUp(lostEarly);
     }
-    done = new SetUp(backend, wanted, drawing, held);
+    done = new SetUp(backend, renderOptions, renderer, held);
     return done;
   }
 
@@ -651,24 +628,26 @@ export class Player<D extends Drawing> {
   #lost(lost: SetUp<D>, reason: string): void {
     const early = lost.lost === null;
     lost.lost ??= reason;
-    if (early && this.#active === lost) this.#listener.lost(lost.backend, reason);
+    if (early && this.#active === lost) this.#listener.backendLost(lost.backend, reason);
     if (this.#active !== lost || this.#search || !this.#settings) return;
-    this.#replace(lost, reason, this.#settings.wanted, lost.backend, '');
+    this.#replace(lost, reason, this.#settings.renderOptions, lost.backend, '');
   }
 
   /** Takes up a lost back end anew, or what comes after it, in the place of `previous`. */
   #replace(
     { backend, drew }: SetUp<D>,
     reason: string,
-    wanted: Wanted,
+    renderOptions: RenderOptions,
     previous: Backend | null,
     before: string,
   ): void {
     this.#dropActive();
     const lost = sentence(`${BACKEND_TITLES[backend]} was lost: ${reason}`);
     const why = [before, lost].filter(Boolean).join(' ');
-    const backends = drew ? from(wanted.backends, backend) : after(wanted.backends, backend);
-    if (backends.length > 0) void this.#choose({ ...wanted, backends }, previous, why);
+    const backends = drew
+      ? from(renderOptions.backends, backend)
+      : after(renderOptions.backends, backend);
+    if (backends.length > 0) void this.#choose({ ...renderOptions, backends }, previous, why);
     else
       this.#fail(
         new PhotoError('backend-lost', `${why} No other back end is left to try. Reload the page.`),
@@ -694,7 +673,7 @@ export class Player<D extends Drawing> {
     const active = this.#active;
     this.#active = found;
     if (!active) return;
-    if (active.drawing === this.#shows && active.lost === null) this.#outgoing = active;
+    if (active.renderer === this.#shows && active.lost === null) this.#outgoing = active;
     else active.free();
   }
 
@@ -728,7 +707,7 @@ function notLoaded(cause?: unknown): PhotoError {
   return new PhotoError('not-loaded', message, cause);
 }
 
-function same(a: Wanted, b: Wanted): boolean {
+function same(a: RenderOptions, b: RenderOptions): boolean {
   const order = [a, b].map(({ backends }) => backends.join());
   return order[0] === order[1] && a.software === b.software && a.gamut === b.gamut;
 }

@@ -3,13 +3,13 @@
 import { forbidden } from '../loading/http-errors.js';
 import { openPhoto } from '../loading/load.js';
 import { newDecoder } from '../photo/decoders.js';
-import type { CanvasSurface } from '../renderers/canvas-surface.js';
 import { draw, prepare } from '../renderers/renderer-factory.js';
+import type { CanvasRenderer } from '../renderers/types.js';
 import { allowed } from '../shared/policy.js';
-import type { Ports } from './photo-session.js';
+import type { SessionPorts } from './photo-session.js';
 
 /** For all elements of the page. */
-export const PORTS: Ports<CanvasSurface> = {
+export const BROWSER_PORTS: SessionPorts<CanvasRenderer> = {
   open: (src, credentials, signal, onProgress, onPreview) =>
     openPhoto(src, signal, onProgress, onPreview, {
       decoder: newDecoder,
@@ -23,7 +23,7 @@ export const PORTS: Ports<CanvasSurface> = {
       now: () => performance.now(),
     }),
   draw,
-  prepare: (wanted, over) => void prepare(wanted, over),
+  prepare: (renderOptions, over) => void prepare(renderOptions, over),
   nextFrame: (callback) => requestAnimationFrame(callback),
   later: (ms, callback) => {
     const timer = setTimeout(callback, ms);

@@ -2,7 +2,7 @@
 
 import type { Look } from '../engine/output-settings.js';
 import type { Backend } from '../engine/types.js';
-import type { Wanted } from './photo-session.js';
+import type { RenderOptions } from '../renderers/types.js';
 
 /** A photograph shown as taken. */
 export const PLAIN: Look = { exposure: 1, whiteBalance: [1, 1, 1], tone: 'clip' };
@@ -12,6 +12,6 @@ export function exposed(exposure: number): Look {
 }
 
 /** Back ends that were named. */
-export function wanting(backends: readonly Backend[]): Wanted {
+export function wanting(backends: readonly Backend[]): RenderOptions {
   return { backends, software: true, gamut: 'srgb' };
 }

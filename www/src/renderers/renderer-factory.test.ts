@@ -2,21 +2,21 @@ import assert from 'node:assert/strict';
 import test, { type TestContext } from 'node:test';
 import type { Backend, CpuModule } from '../engine/types.js';
 import { Photograph } from '../photo/photograph.js';
-import { Player, type Settings } from '../player/photo-session.js';
+import { PhotoSession, type SessionSettings } from '../player/photo-session.js';
 import { exposed, PLAIN, wanting } from '../player/settings-fakes.js';
 import { PhotoError } from '../shared/errors.js';
-import type { CanvasSurface } from './canvas-surface.js';
-import { cpuDrawer } from './cpu/cpu-renderer.js';
-import type { Crew } from './cpu/worker-pool.js';
+import { cpuRenderers } from './cpu/cpu-renderer.js';
+import type { WorkerPool } from './cpu/worker-pool.js';
 import { crewOf, type FakeWorker, photoOf, settle } from './cpu/worker-pool-fakes.js';
 import type { Devices, LoadGraphics } from './gpu/devices.js';
-import { gpuDrawer } from './gpu/gpu-renderer.js';
+import { gpuRenderers } from './gpu/gpu-renderer.js';
 import { drawer } from './renderer-factory.js';
+import type { CanvasRenderer } from './types.js';
 
-const SETTINGS: Settings = {
+const SETTINGS: SessionSettings = {
   src: 'a.ltm',
   credentials: 'same-origin',
-  wanted: wanting(['cpu']),
+  renderOptions: wanting(['cpu']),
   light: { name: 'flood', torch: null, picture: null },
   look: exposed(1),
 };
@@ -40,10 +40,10 @@ function fakeDocument(t: TestContext): void {
 }
 
 /** Draws with one module for all, by a crew, and by devices. */
-const drawerOf = (module: unknown, crew: Crew, devices: Devices) =>
+const drawerOf = (module: unknown, pool: WorkerPool, devices: Devices) =>
   drawer({
-    gpu: async () => gpuDrawer((async () => module) as unknown as LoadGraphics, devices),
-    cpu: async () => cpuDrawer(crew),
+    gpu: async () => gpuRenderers((async () => module) as unknown as LoadGraphics, devices),
+    cpu: async () => cpuRenderers(pool),
     cpuModule: async () => module as CpuModule,
   });
 
@@ -69,57 +69,57 @@ function fakeDevices(has: ReadonlySet<number>) {
   return { devicesThat, setUps, released };
 }
 
-/** A player of a photograph of four tiles, which two workers draw. */
+/** A session of a photograph of four tiles, which two workers draw. */
 async function playing(t: TestContext, ask = async (_: Backend): Promise<void> => {}) {
   fakeDocument(t);
-  const { crew, workers, alive } = crewOf(2);
+  const { pool, workers, alive } = crewOf(2);
   const { photo, has, module } = photoOf(4);
   const { devicesThat, setUps, released } = fakeDevices(has);
   const frames: (() => void)[] = [];
   const changes: string[] = [];
-  const player = new Player<CanvasSurface>(
+  const session = new PhotoSession<CanvasRenderer>(
     {
       open: async () => Photograph.decoded(photo),
       prepare: () => {},
-      draw: drawerOf(module, crew, devicesThat(ask)).draw,
+      draw: drawerOf(module, pool, devicesThat(ask)).draw,
       nextFrame: (callback) => frames.push(callback),
       later: () => () => {},
       now: () => 0,
     },
     {
-      loading: () => {},
+      loadStarted: () => {},
       progress: () => {},
-      drawn: () => {},
-      detailChanged: () => {},
+      frameDrawn: () => {},
+      qualityChanged: () => {},
       loaded: () => {},
-      show: () => {},
+      rendererChanged: () => {},
       backendChanged: (backend) => changes.push(backend),
-      lost: () => {},
+      backendLost: () => {},
       failed: (error) => changes.push(error.code),
       recovered: () => {},
     },
   );
-  player.set(SETTINGS);
+  session.set(SETTINGS);
   await settle();
   assert.equal(has.size, 0);
-  return { player, workers, alive, has, setUps, released, frames, changes };
+  return { session, workers, alive, has, setUps, released, frames, changes };
 }
 
 test('frames that wait when the back end is switched are drawn by the new one, and move no tiles', async (t) => {
-  const { player, workers, alive, has, setUps, frames, changes } = await playing(t);
+  const { session, workers, alive, has, setUps, frames, changes } = await playing(t);
   for (const worker of workers) worker.slow = true;
-  player.set({ ...SETTINGS, look: exposed(2) });
+  session.set({ ...SETTINGS, look: exposed(2) });
   frames.shift()?.();
   await settle();
-  const waiting = player.renderNow();
-  player.set({ ...SETTINGS, wanted: wanting(['webgl2']) });
-  const during = player.renderNow();
+  const waiting = session.renderNow();
+  session.set({ ...SETTINGS, renderOptions: wanting(['webgl2']) });
+  const during = session.renderNow();
   await settle();
   for (const worker of workers) worker.hurry();
   await settle();
   assert.deepEqual(changes, ['cpu', 'webgl2']);
-  assert.equal(await waiting, player.drawing);
-  assert.equal(await during, player.drawing);
+  assert.equal(await waiting, session.renderer);
+  assert.equal(await during, session.renderer);
   await settle();
   assert.deepEqual([has.size, await alive()], [4, 0]);
   assert.deepEqual(setUps, ['webgl2 of 4']);
@@ -127,32 +127,32 @@ test('frames that wait when the back end is switched are drawn by the new one, a
 });
 
 test('a picture of a photograph that is replaced in the middle of a frame is not-loaded', async (t) => {
-  const { player, workers } = await playing(t);
+  const { session, workers } = await playing(t);
   for (const worker of workers as FakeWorker[]) worker.slow = true;
-  const asked = [player.renderNow(), player.renderNow()].map((picture) =>
+  const asked = [session.renderNow(), session.renderNow()].map((picture) =>
     assert.rejects(picture, { code: 'not-loaded' }),
   );
   await settle();
-  player.set({ ...SETTINGS, src: null });
+  session.set({ ...SETTINGS, src: null });
   await Promise.all(asked);
 });
 
 test('a photograph that the page draws for want of workers says why', async (t) => {
   fakeDocument(t);
-  const { crew } = crewOf(2, (worker) => worker.die());
+  const { pool } = crewOf(2, (worker) => worker.die());
   const { photo, has, module } = photoOf(4);
   const { devicesThat } = fakeDevices(has);
   const { draw } = drawerOf(
     module,
-    crew,
+    pool,
     devicesThat(async () => {}),
   );
   const photograph = Photograph.decoded(photo);
   const { signal } = new AbortController();
   for (let time = 0; time < 2; time += 1) {
-    const drawing = await draw('cpu', photograph, wanting(['cpu']), () => {}, signal);
-    assert.equal(drawing.kernel, 'fake, in the page');
-    assert.match(drawing.flaw ?? '', /without workers: .*out of memory/);
+    const renderer = await draw('cpu', photograph, wanting(['cpu']), () => {}, signal);
+    assert.equal(renderer.kernel, 'fake, in the page');
+    assert.match(renderer.warning ?? '', /without workers: .*out of memory/);
   }
 });
 
@@ -176,67 +176,67 @@ function asking() {
 
 test('back ends that cannot be had leave tiles with the workers', async (t) => {
   const { ask, asked, answers } = asking();
-  const { player, workers, has, changes } = await playing(t, ask);
-  player.set({ ...SETTINGS, wanted: wanting(['webgpu', 'webgl2', 'cpu']) });
+  const { session, workers, has, changes } = await playing(t, ask);
+  session.set({ ...SETTINGS, renderOptions: wanting(['webgpu', 'webgl2', 'cpu']) });
   await settle();
   await answers(false);
   await answers(false);
-  await player.renderNow();
+  await session.renderNow();
   assert.deepEqual(asked, ['webgpu', 'webgl2']);
   assert.deepEqual([has.size, changes], [0, ['cpu']]);
   assert.ok(workers.every(({ log }) => !log.includes('take')));
 });
 
 test('a device that is a program is passed over, unless back ends were named', async (t) => {
-  const { player, has, changes, setUps, released } = await playing(t);
+  const { session, has, changes, setUps, released } = await playing(t);
   const order = wanting(['webgl2', 'cpu']);
-  player.set({ ...SETTINGS, wanted: { ...order, software: false } });
-  await player.renderNow();
+  session.set({ ...SETTINGS, renderOptions: { ...order, software: false } });
+  await session.renderNow();
   assert.deepEqual([has.size, changes, setUps], [0, ['cpu'], []]);
-  player.set({ ...SETTINGS, wanted: order });
-  await player.renderNow();
+  session.set({ ...SETTINGS, renderOptions: order });
+  await session.renderNow();
   assert.deepEqual([changes, setUps], [['cpu', 'webgl2'], ['webgl2 of 4']]);
   // Nor does it stay once they are not named any more.
-  player.set({ ...SETTINGS, wanted: { ...order, software: false } });
-  await player.renderNow();
+  session.set({ ...SETTINGS, renderOptions: { ...order, software: false } });
+  await session.renderNow();
   assert.deepEqual(changes, ['cpu', 'webgl2', 'cpu']);
-  player.stop();
+  session.stop();
   assert.deepEqual(released, ['webgl2']);
 });
 
 test('back ends that do not answer keep nobody waiting who has given them up, and get nothing', async (t) => {
   const { ask, asked, answers } = asking();
-  const { player, workers, setUps } = await playing(t, ask);
-  player.set({ ...SETTINGS, wanted: wanting(['webgpu']) });
+  const { session, workers, setUps } = await playing(t, ask);
+  session.set({ ...SETTINGS, renderOptions: wanting(['webgpu']) });
   await settle();
-  player.set(SETTINGS);
-  assert.equal((await player.renderNow()).kernel, 'fake, 2 workers');
+  session.set(SETTINGS);
+  assert.equal((await session.renderNow()).kernel, 'fake, 2 workers');
   await answers(true);
   assert.deepEqual([asked, setUps], [['webgpu'], []]);
   assert.ok(workers.every(({ log }) => !log.includes('take')));
 });
 
-test('a drawing that was freed draws nothing, and leaves tiles where they are', async (t) => {
+test('a renderer that was freed draws nothing, and leaves tiles where they are', async (t) => {
   fakeDocument(t);
-  const { crew, workers, alive } = crewOf(2);
+  const { pool, workers, alive } = crewOf(2);
   const { photo, has, module } = photoOf(4);
   const { devicesThat } = fakeDevices(has);
   const photograph = Photograph.decoded(photo);
-  const drawing = await drawerOf(
+  const renderer = await drawerOf(
     module,
-    crew,
+    pool,
     devicesThat(async () => {}),
-  ).draw('cpu', photograph, SETTINGS.wanted, () => {}, new AbortController().signal);
+  ).draw('cpu', photograph, SETTINGS.renderOptions, () => {}, new AbortController().signal);
   for (const worker of workers) worker.slow = true;
-  const frame = assert.rejects(Promise.resolve(drawing.render(SETTINGS.light, PLAIN, 1)), {
+  const frame = assert.rejects(Promise.resolve(renderer.render(SETTINGS.light, PLAIN, 1)), {
     code: 'internal',
   });
   await settle();
-  drawing.free();
+  renderer.free();
   for (const worker of workers) worker.hurry();
   await frame;
-  await photograph.inPage(module, () => {});
-  await assert.rejects(Promise.resolve(drawing.render(SETTINGS.light, PLAIN, 1)), {
+  await photograph.withModule(module, () => {});
+  await assert.rejects(Promise.resolve(renderer.render(SETTINGS.light, PLAIN, 1)), {
     code: 'internal',
   });
   assert.deepEqual([has.size, await alive()], [4, 0]);
@@ -245,7 +245,7 @@ test('a drawing that was freed draws nothing, and leaves tiles where they are', 
 /** A drawer on the CPU, whose module comes when the test says. */
 function preparing(t: TestContext) {
   fakeDocument(t);
-  const { crew, workers, alive } = crewOf(4);
+  const { pool, workers, alive } = crewOf(4);
   const { module } = photoOf(4);
   let come = (_: CpuModule): void => {};
   let fail = (_: Error): void => {};
@@ -255,7 +255,7 @@ function preparing(t: TestContext) {
   });
   const { prepare } = drawer({
     gpu: () => Promise.reject(new PhotoError('backend-unavailable', 'none here')),
-    cpu: async () => cpuDrawer(crew),
+    cpu: async () => cpuRenderers(pool),
     cpuModule: () => cpuModule,
   });
   const over = new AbortController();

@@ -6,12 +6,11 @@ import { moduleFolder } from '../engine/wasm-loader.js';
 import { loadWebGl2 } from '../engine/webgl2-module.js';
 import { loadWebGpu } from '../engine/webgpu-module.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { Wanted } from '../player/photo-session.js';
 import { messageOf, PhotoError } from '../shared/errors.js';
 import type { Start } from '../shared/worker-scope.js';
-import type { CanvasSurface } from './canvas-surface.js';
-import type { CpuDrawer } from './cpu/cpu-renderer.js';
-import type { GpuDrawer } from './gpu/gpu-renderer.js';
+import type { CpuRenderers } from './cpu/cpu-renderer.js';
+import type { GpuRenderers } from './gpu/gpu-renderer.js';
+import type { CanvasRenderer, RenderOptions } from './types.js';
 
 /** More would wait for memory, and for each other. */
 const MOST_WORKERS = 4;
@@ -20,27 +19,27 @@ const MOST_WORKERS = 4;
 export type Draw = (
   backend: Backend,
   photograph: Photograph,
-  wanted: Wanted,
+  renderOptions: RenderOptions,
   lost: (reason: string) => void,
   signal: AbortSignal,
-) => Promise<CanvasSurface>;
+) => Promise<CanvasRenderer>;
 
 /**
  * Has the first back end of an order that works get ready, which takes a while, and stay so until `over` is
  * aborted. What goes wrong is told to who draws.
  */
-export type Prepare = (wanted: Wanted, over: AbortSignal) => Promise<void>;
+export type Prepare = (renderOptions: RenderOptions, over: AbortSignal) => Promise<void>;
 
 /** What draws. */
-export interface Drawer {
+export interface RendererFactory {
   readonly draw: Draw;
   readonly prepare: Prepare;
 }
 
 /** Where what draws comes from. */
-export interface Drawers {
-  readonly gpu: () => Promise<GpuDrawer>;
-  readonly cpu: () => Promise<CpuDrawer>;
+export interface RendererScripts {
+  readonly gpu: () => Promise<GpuRenderers>;
+  readonly cpu: () => Promise<CpuRenderers>;
   readonly cpuModule: () => Promise<CpuModule>;
 }
 
@@ -48,17 +47,17 @@ export interface Drawers {
  * Draws by what is given. A device that cannot be had leaves tiles where they are, and keeps nobody from them
  * while it is asked for.
  */
-export function drawer({ gpu, cpu, cpuModule }: Drawers): Drawer {
-  const draw: Draw = async (backend, photograph, wanted, lost, signal) => {
+export function drawer({ gpu, cpu, cpuModule }: RendererScripts): RendererFactory {
+  const draw: Draw = async (backend, photograph, renderOptions, lost, signal) => {
     if (backend === 'cpu') {
       const [module, drawer] = await Promise.all([cpuModule(), cpu()]);
-      return await drawer.draw(module, photograph, wanted.gamut, signal);
+      return await drawer.draw(module, photograph, renderOptions.gamut, signal);
     }
     const drawer = await gpu();
     signal.throwIfAborted();
-    const drawing = await drawer.draw(backend, photograph, wanted, lost, signal);
+    const renderer = await drawer.draw(backend, photograph, renderOptions, lost, signal);
     idle(() => Promise.allSettled([cpuModule(), cpu()]));
-    return drawing;
+    return renderer;
   };
   const prepare: Prepare = async ({ backends, software }, over) => {
     for (const backend of backends) {
@@ -97,12 +96,12 @@ const crewSize = Math.min(MOST_WORKERS, globalThis.navigator?.hardwareConcurrenc
 /** Draws for the elements of this page. */
 export const { draw, prepare } = drawer({
   gpu: once(async () => {
-    const { Devices, gpuDrawer } = await import('./gpu/gpu-renderer.js');
-    return gpuDrawer((name) => LOADERS[name](), new Devices());
+    const { Devices, gpuRenderers } = await import('./gpu/gpu-renderer.js');
+    return gpuRenderers((name) => LOADERS[name](), new Devices());
   }),
   cpu: once(async () => {
-    const { Crew, cpuDrawer } = await import('./cpu/cpu-renderer.js');
-    return cpuDrawer(new Crew(startWorker, crewSize));
+    const { WorkerPool, cpuRenderers } = await import('./cpu/cpu-renderer.js');
+    return cpuRenderers(new WorkerPool(startWorker, crewSize));
   }),
   cpuModule: loadCpu,
 });

@@ -5,15 +5,14 @@ import type { DrawingModule, DrawnPhoto, Gamut, Relighter } from '../engine/type
 import { Lamp } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { Projection } from '../lights/projection.js';
-import type { Drawn } from '../player/photo-session.js';
 import { toPhotoError } from '../shared/errors.js';
-import type { CanvasSurface } from './canvas-surface.js';
 import type { Lease } from './gpu/devices.js';
+import type { CanvasRenderer, FrameResult } from './types.js';
 
 /** See the module. */
-export class CanvasDrawing implements CanvasSurface {
+export class WasmRenderer implements CanvasRenderer {
   readonly canvas: HTMLCanvasElement;
-  readonly flaw: string;
+  readonly warning: string;
   readonly #module: DrawingModule;
   readonly #lamp: Lamp;
   /** What lights are made for; its own. */
@@ -31,15 +30,15 @@ export class CanvasDrawing implements CanvasSurface {
     canvas: HTMLCanvasElement,
     {
       lease = null,
-      flaw = '',
-    }: { lease?: Pick<Lease, 'fail' | 'release'> | null; flaw?: string } = {},
+      warning = '',
+    }: { lease?: Pick<Lease, 'fail' | 'release'> | null; warning?: string } = {},
   ) {
     this.#module = module;
     this.#lamp = new Lamp(module);
     this.#plane = plane;
     this.#relighter = relighter;
     this.#lease = lease;
-    this.flaw = flaw;
+    this.warning = warning;
     this.canvas = canvas;
   }
 
@@ -51,20 +50,20 @@ export class CanvasDrawing implements CanvasSurface {
     return this.#relighter.gamut;
   }
 
-  render(setting: LightSetting, look: Look, detail: number): Drawn {
+  render(setting: LightSetting, look: Look, detail: number): FrameResult {
     const display = makeDisplay(this.#module, look, this.gamut);
     try {
       if (this.#takes(setting.picture)) {
         this.#pictured = true;
         this.#relighter.renderPicture(display, detail);
-        return { asked: true, fault: null };
+        return { lightApplied: true, lightError: null };
       }
       const { light, asked, fault } = this.#lamp.turnTo(setting, this.#plane);
       // A picture that cannot be had any more leaves what was had of it.
       this.#pictured &&= !asked;
       if (this.#pictured) this.#relighter.renderPicture(display, detail);
       else this.#relighter.render(light, display, detail);
-      return { asked, fault };
+      return { lightApplied: asked, lightError: fault };
     } catch (thrown) {
       const { code, message } = toPhotoError(thrown);
       if (code === 'backend-lost') this.#lease?.fail(message);

@@ -10,7 +10,7 @@ export async function allEnded<T>(work: readonly Promise<T>[]): Promise<T[]> {
 }
 
 /** Something that others wait for the end of. */
-export class UnderWay {
+export class Deferred {
   readonly ended: Promise<void>;
   #end = (): void => {};
 

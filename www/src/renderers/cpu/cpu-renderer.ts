@@ -1,17 +1,17 @@
 /**
- * Drawing on the CPU: by the page's crew of workers, or by the page where it can have none. A script of its own,
+ * Renderer on the CPU: by the page's crew of workers, or by the page where it can have none. A script of its own,
  * which has copies of what it shares with the element's.
  */
 
 import type { CpuModule, Gamut } from '../../engine/types.js';
 import type { Photograph } from '../../photo/photograph.js';
 import { hasCode, messageOf } from '../../shared/errors.js';
-import type { CanvasSurface } from '../canvas-surface.js';
-import { PageDrawing } from './main-thread-renderer.js';
-import type { Crew } from './worker-pool.js';
-import { CrewDrawing } from './worker-renderer.js';
+import type { CanvasRenderer } from '../types.js';
+import { MainThreadRenderer } from './main-thread-renderer.js';
+import type { WorkerPool } from './worker-pool.js';
+import { WorkerRenderer } from './worker-renderer.js';
 
-export { Crew } from './worker-pool.js';
+export { WorkerPool } from './worker-pool.js';
 
 /** Sets drawing up on a canvas of its own. */
 export type DrawOnCpu = (
@@ -19,32 +19,32 @@ export type DrawOnCpu = (
   photograph: Photograph,
   gamut: Gamut,
   signal: AbortSignal,
-) => Promise<CanvasSurface>;
+) => Promise<CanvasRenderer>;
 
 /** What draws on the CPU. */
-export interface CpuDrawer {
+export interface CpuRenderers {
   readonly draw: DrawOnCpu;
   /** Has what draws get ready, and stay so until what it gives is called. */
   prepare(): () => void;
 }
 
 /** Draws by a crew where it can have workers. */
-export function cpuDrawer(crew: Crew): CpuDrawer {
+export function cpuRenderers(pool: WorkerPool): CpuRenderers {
   // What the page has once drawn on the CPU it may be drawing still, which keeps tiles from workers; and
   // why it did.
-  const inPage = new WeakMap<Photograph, string>();
+  const withModule = new WeakMap<Photograph, string>();
   const draw: DrawOnCpu = async (module, photograph, gamut, signal) => {
     try {
-      if (!inPage.has(photograph)) {
-        return await CrewDrawing.create(module, photograph, crew, gamut);
+      if (!withModule.has(photograph)) {
+        return await WorkerRenderer.create(module, photograph, pool, gamut);
       }
     } catch (thrown) {
       // Without workers the page does it.
       if (!hasCode(thrown, 'worker-unavailable')) throw thrown;
-      inPage.set(photograph, `The page relights without workers: ${messageOf(thrown)}`);
+      withModule.set(photograph, `The page relights without workers: ${messageOf(thrown)}`);
     }
-    const flaw = inPage.get(photograph) ?? '';
-    return await PageDrawing.create(module, photograph, gamut, flaw, signal);
+    const warning = withModule.get(photograph) ?? '';
+    return await MainThreadRenderer.create(module, photograph, gamut, warning, signal);
   };
-  return { draw, prepare: () => crew.gather() };
+  return { draw, prepare: () => pool.gather() };
 }

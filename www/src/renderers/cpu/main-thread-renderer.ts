@@ -4,28 +4,27 @@ import type { Look } from '../../engine/output-settings.js';
 import type { CpuModule, Gamut } from '../../engine/types.js';
 import type { LightSetting } from '../../lights/light-setting.js';
 import type { Photograph } from '../../photo/photograph.js';
-import type { Drawn } from '../../player/photo-session.js';
 import { letGo } from '../../shared/errors.js';
-import type { CanvasSurface } from '../canvas-surface.js';
-import { CanvasDrawing } from '../surface.js';
+import { WasmRenderer } from '../surface.js';
+import type { CanvasRenderer, FrameResult } from '../types.js';
 
 /** See the module. */
-export class PageDrawing implements CanvasSurface {
+export class MainThreadRenderer implements CanvasRenderer {
   readonly canvas: HTMLCanvasElement;
   readonly kernel: string;
-  readonly flaw: string;
+  readonly warning: string;
   gamut: Gamut;
   readonly #module: CpuModule;
   readonly #photograph: Photograph;
   /** None while tiles are elsewhere. */
-  #drawing: CanvasDrawing | null = null;
+  #renderer: WasmRenderer | null = null;
   #freed = false;
 
-  private constructor(module: CpuModule, photograph: Photograph, gamut: Gamut, flaw: string) {
+  private constructor(module: CpuModule, photograph: Photograph, gamut: Gamut, warning: string) {
     this.canvas = document.createElement('canvas');
     this.kernel = module.cpuKernel();
     this.gamut = gamut;
-    this.flaw = flaw;
+    this.warning = warning;
     this.#module = module;
     this.#photograph = photograph;
   }
@@ -34,17 +33,17 @@ export class PageDrawing implements CanvasSurface {
     module: CpuModule,
     photograph: Photograph,
     gamut: Gamut,
-    flaw: string,
+    warning: string,
     signal: AbortSignal,
-  ): Promise<PageDrawing> {
-    const drawing = new PageDrawing(module, photograph, gamut, flaw);
-    drawing.gamut = (await drawing.#begin(signal)).gamut;
-    return drawing;
+  ): Promise<MainThreadRenderer> {
+    const renderer = new MainThreadRenderer(module, photograph, gamut, warning);
+    renderer.gamut = (await renderer.#begin(signal)).gamut;
+    return renderer;
   }
 
-  render(setting: LightSetting, look: Look, detail: number): Drawn | Promise<Drawn> {
-    if (this.#drawing) return this.#drawing.render(setting, look, detail);
-    return this.#begin().then((drawing) => drawing.render(setting, look, detail));
+  render(setting: LightSetting, look: Look, detail: number): FrameResult | Promise<FrameResult> {
+    if (this.#renderer) return this.#renderer.render(setting, look, detail);
+    return this.#begin().then((renderer) => renderer.render(setting, look, detail));
   }
 
   free(): void {
@@ -52,20 +51,20 @@ export class PageDrawing implements CanvasSurface {
     this.#stop();
   }
 
-  #begin(signal?: AbortSignal): Promise<CanvasDrawing> {
-    const use = (photo: Parameters<Parameters<Photograph['inPage']>[1]>[0]) => {
+  #begin(signal?: AbortSignal): Promise<WasmRenderer> {
+    const use = (photo: Parameters<Parameters<Photograph['withModule']>[1]>[0]) => {
       if (this.#freed) throw letGo();
       const relighter = new this.#module.Relighter(photo, this.canvas, this.gamut);
       const plane = this.#photograph.plane(this.#module);
-      this.#drawing = new CanvasDrawing(this.#module, plane, relighter, this.canvas);
-      return this.#drawing;
+      this.#renderer = new WasmRenderer(this.#module, plane, relighter, this.canvas);
+      return this.#renderer;
     };
     const leave = () => this.#stop();
-    return this.#photograph.inPage(this.#module, use, signal ? { signal, leave } : { leave });
+    return this.#photograph.withModule(this.#module, use, signal ? { signal, leave } : { leave });
   }
 
   #stop(): void {
-    this.#drawing?.free();
-    this.#drawing = null;
+    this.#renderer?.free();
+    this.#renderer = null;
   }
 }

@@ -1,4 +1,4 @@
-/** A worker that relights rows of photographs: what a `Hand` starts and talks to. */
+/** A worker that relights rows of photographs: what a `WorkerClient` starts and talks to. */
 
 import { loadCpu } from '../../engine/cpu-module.js';
 import { makeDisplay } from '../../engine/output-settings.js';

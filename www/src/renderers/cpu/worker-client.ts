@@ -30,14 +30,14 @@ interface Waiting {
 }
 
 /** See the module. */
-export class Hand {
+export class WorkerClient {
   /** What does the work, once the worker is up. Rejects where it does not start. */
   readonly ready: Promise<string>;
   /** Photographs it has rows of, as its crew counts them. */
   photos = 0;
   readonly #worker: WorkerLike;
   readonly #patience: Patience;
-  readonly #stopped: (hand: Hand) => void;
+  readonly #stopped: (client: WorkerClient) => void;
   readonly #waiting = new Map<number, Waiting>();
   #asked = 0;
   #started = false;
@@ -48,7 +48,7 @@ export class Hand {
   #look: ReturnType<typeof setTimeout> | undefined;
 
   /** `stopped` is told once, where the worker fails before it is ended. */
-  constructor(worker: WorkerLike, patience: Patience, stopped: (hand: Hand) => void) {
+  constructor(worker: WorkerLike, patience: Patience, stopped: (client: WorkerClient) => void) {
     this.#worker = worker;
     this.#patience = patience;
     this.#stopped = stopped;

@@ -5,7 +5,7 @@ import type { CpuModule, DecodedPhoto, DrawnPhoto, Light } from '../../engine/ty
 import { PLAIN } from '../../player/settings-fakes.js';
 import type { Answer, Request, Showing } from './protocol.js';
 import type { Patience, WorkerLike } from './worker-client.js';
-import { Crew } from './worker-pool.js';
+import { WorkerPool } from './worker-pool.js';
 
 /** As taken, in full. */
 export const SHOWING: Showing = { look: PLAIN, gamut: 'srgb', detail: 1 };
@@ -194,7 +194,7 @@ export function crewOf(
     return worker;
   };
   return {
-    crew: new Crew(start, size, patience),
+    pool: new WorkerPool(start, size, patience),
     workers,
     /** Once those that nobody needs have ended. */
     alive: async () => {

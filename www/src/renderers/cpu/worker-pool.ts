@@ -8,7 +8,7 @@ import type { Head } from '../../photo/photograph.js';
 import { letGo, PhotoError } from '../../shared/errors.js';
 import { allEnded } from '../../shared/promises.js';
 import type { Showing, Task } from './protocol.js';
-import { Hand, type Patience, type WorkerLike } from './worker-client.js';
+import { type Patience, WorkerClient, type WorkerLike } from './worker-client.js';
 
 /** Rows of a picture. */
 export interface Rows {
@@ -35,15 +35,15 @@ const PATIENCE: Patience = { lookMs: 1000, looks: 10, startLooks: 15 };
 const GATHERED = 2;
 
 /** See the module. */
-export class Crew {
+export class WorkerPool {
   readonly #start: () => WorkerLike | null;
   readonly #size: number;
   readonly #patience: Patience;
-  #hands: Hand[] = [];
+  #clients: WorkerClient[] = [];
   #shifts = 0;
   #incidents = 0;
   /** Those that were there at the last incident: where they stop too, it is a part of it. */
-  #involved: ReadonlySet<Hand> = new Set();
+  #involved: ReadonlySet<WorkerClient> = new Set();
   #lastId = 0;
   /** Why the page is better off without workers. */
   #unfit: PhotoError | null = null;
@@ -59,21 +59,21 @@ export class Crew {
    * Makes room for a photograph's tiles. Rejects with `worker-unavailable` where workers cannot be had;
    * once that is for good, at once.
    */
-  async open(photo: Head): Promise<Shift> {
+  async open(photo: Head): Promise<PoolSession> {
     this.#shifts += 1;
-    let hands: Hand[] = [];
+    let clients: WorkerClient[] = [];
     try {
       const shares = sharesOf(photo, this.#size);
-      hands = this.#pick(shares.length);
-      for (const hand of hands) hand.photos += 1;
-      const kernels = await Promise.all(hands.map((hand) => hand.ready));
+      clients = this.#pick(shares.length);
+      for (const client of clients) client.photos += 1;
+      const kernels = await Promise.all(clients.map((client) => client.ready));
       // Meanwhile one that was up may have stopped.
-      for (const { failure } of hands) if (failure) throw failure;
+      for (const { failure } of clients) if (failure) throw failure;
       this.#lastId += 1;
-      const tell = { leave: () => this.#leave(hands), drew: () => this.#recover() };
-      return new Shift(this.#lastId, photo, hands, shares, kernels[0] ?? '', tell);
+      const tell = { leave: () => this.#leave(clients), drew: () => this.#recover() };
+      return new PoolSession(this.#lastId, photo, clients, shares, kernels[0] ?? '', tell);
     } catch (thrown) {
-      this.#leave(hands);
+      this.#leave(clients);
       throw thrown;
     }
   }
@@ -93,38 +93,39 @@ export class Crew {
   }
 
   /** Workers for so many shares: those with the least to do, and new ones before any has two. */
-  #pick(count: number): Hand[] {
-    const picked: Hand[] = [];
+  #pick(count: number): WorkerClient[] {
+    const picked: WorkerClient[] = [];
     while (picked.length < count) {
       if (this.#unfit) throw this.#unfit;
-      const others = this.#hands.filter((hand) => !picked.includes(hand));
+      const others = this.#clients.filter((client) => !picked.includes(client));
       const idlest = others.sort((a, b) => a.photos - b.photos)[0];
-      if (idlest && (idlest.photos === 0 || this.#hands.length >= this.#size)) picked.push(idlest);
+      if (idlest && (idlest.photos === 0 || this.#clients.length >= this.#size))
+        picked.push(idlest);
       else picked.push(this.#hire());
     }
     return picked;
   }
 
-  #hire(): Hand {
+  #hire(): WorkerClient {
     const worker = this.#start();
     if (!worker) {
       this.#unfit = new PhotoError('worker-unavailable', 'The page may not start workers.');
       throw this.#unfit;
     }
-    const hand = new Hand(worker, this.#patience, () => this.#stopped(hand));
-    this.#hands.push(hand);
-    return hand;
+    const client = new WorkerClient(worker, this.#patience, () => this.#stopped(client));
+    this.#clients.push(client);
+    return client;
   }
 
-  #stopped(hand: Hand): void {
-    if (!this.#involved.has(hand)) {
+  #stopped(client: WorkerClient): void {
+    if (!this.#involved.has(client)) {
       this.#incidents += 1;
-      this.#involved = new Set(this.#hands);
+      this.#involved = new Set(this.#clients);
     }
-    this.#hands = this.#hands.filter((other) => other !== hand);
+    this.#clients = this.#clients.filter((other) => other !== client);
     // One that says that it cannot start is not worth another try.
-    const hopeless = !hand.started && !hand.silent;
-    if (hopeless || this.#incidents >= MOST_INCIDENTS) this.#unfit ??= hand.failure;
+    const hopeless = !client.started && !client.silent;
+    if (hopeless || this.#incidents >= MOST_INCIDENTS) this.#unfit ??= client.failure;
   }
 
   /** A frame was drawn: whatever happened before is over. */
@@ -133,8 +134,8 @@ export class Crew {
     this.#involved = new Set();
   }
 
-  #leave(hands: readonly Hand[]): void {
-    for (const hand of hands) hand.photos -= 1;
+  #leave(clients: readonly WorkerClient[]): void {
+    for (const client of clients) client.photos -= 1;
     this.#shifts -= 1;
     // Not at once: another photograph is often about to take the place of the last one.
     if (this.#shifts === 0) setTimeout(() => this.#goHome());
@@ -142,8 +143,8 @@ export class Crew {
 
   #goHome(): void {
     if (this.#shifts > 0) return;
-    for (const hand of this.#hands) hand.end();
-    this.#hands = [];
+    for (const client of this.#clients) client.end();
+    this.#clients = [];
   }
 }
 
@@ -156,11 +157,11 @@ interface Listener {
 }
 
 /** A photograph's place with a crew. */
-export class Shift {
+export class PoolSession {
   /** What does the work. */
   readonly kernel: string;
   readonly #id: number;
-  readonly #hands: readonly Hand[];
+  readonly #clients: readonly WorkerClient[];
   readonly #shares: readonly Share[];
   readonly #listener: Listener;
   /** Memory for those of each share; `null` where a worker has it. */
@@ -175,34 +176,34 @@ export class Shift {
   constructor(
     id: number,
     photo: Head,
-    hands: readonly Hand[],
+    clients: readonly WorkerClient[],
     shares: readonly Share[],
     kernel: string,
     listener: Listener,
   ) {
     this.#id = id;
-    this.#hands = hands;
+    this.#clients = clients;
     this.#shares = shares;
     this.#listener = listener;
     this.kernel = kernel;
     this.#pixels = shares.map(() => null);
     this.#width = photo.width;
     const { geometry, basis } = photo;
-    hands.forEach((hand, i) => {
+    clients.forEach((client, i) => {
       const { firstRow, rows } = shares[i] as Share;
       // Where this fails, so does all that is asked next.
-      void hand.ask(id, { kind: 'open', geometry, basis, firstRow, rows }).catch(() => {});
+      void client.ask(id, { kind: 'open', geometry, basis, firstRow, rows }).catch(() => {});
     });
   }
 
   /** Workers at it. */
   get size(): number {
-    return this.#hands.length;
+    return this.#clients.length;
   }
 
   /** Why it cannot go on, once a worker has stopped; its tiles are gone then. */
   get failure(): PhotoError | null {
-    return this.#hands.find((hand) => hand.failure)?.failure ?? null;
+    return this.#clients.find((client) => client.failure)?.failure ?? null;
   }
 
   /** The tiles of each worker, by number. */
@@ -229,8 +230,8 @@ export class Shift {
     if (this.#seen) return;
     this.#lit = [];
     this.#seen = await allEnded(
-      this.#hands.map(async (hand) => {
-        const rows = new Uint32Array(await this.#ask(hand, { kind: 'plan' }));
+      this.#clients.map(async (client) => {
+        const rows = new Uint32Array(await this.#ask(client, { kind: 'plan' }));
         return [rows[0] ?? 0, rows[1] ?? 0] as const;
       }),
     );
@@ -261,7 +262,7 @@ export class Shift {
     this.#pixels[i] = null;
     const task = { kind: 'relight', light: seen, showing, pixels: room } as const;
     const lent = seen ? [seen.buffer, room] : [room];
-    const pixels = await this.#ask(this.#hands[i] as Hand, task, lent);
+    const pixels = await this.#ask(this.#clients[i] as WorkerClient, task, lent);
     this.#pixels[i] = pixels;
     this.#lit[i] = light;
     return { first, count, pixels };
@@ -271,19 +272,23 @@ export class Shift {
   end(): void {
     if (this.#over) return;
     this.#over = true;
-    for (const hand of this.#hands) hand.forget(this.#id);
+    for (const client of this.#clients) client.forget(this.#id);
     this.#listener.leave();
   }
 
   /** A worker asked for a photograph that it has let go would take it for a fault of its own. */
-  async #ask(hand: Hand, task: Task, transfer: Transferable[] = []): Promise<ArrayBuffer> {
+  async #ask(
+    client: WorkerClient,
+    task: Task,
+    transfer: Transferable[] = [],
+  ): Promise<ArrayBuffer> {
     if (this.#over) throw letGo();
-    return await hand.ask(this.#id, task, transfer);
+    return await client.ask(this.#id, task, transfer);
   }
 
-  #of(tile: number): Hand {
+  #of(tile: number): WorkerClient {
     const share = this.#shares.findIndex(({ endTile }) => tile < endTile);
-    return this.#hands[share] as Hand;
+    return this.#clients[share] as WorkerClient;
   }
 }
 

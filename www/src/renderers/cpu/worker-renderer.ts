@@ -5,13 +5,12 @@ import type { CpuModule, DrawnPhoto, Gamut } from '../../engine/types.js';
 import { Lamp } from '../../lights/light-cache.js';
 import type { LightSetting } from '../../lights/light-setting.js';
 import type { Photograph } from '../../photo/photograph.js';
-import type { Drawn } from '../../player/photo-session.js';
 import { hasCode, letGo, messageOf, PhotoError } from '../../shared/errors.js';
-import type { CanvasSurface } from '../canvas-surface.js';
-import type { Crew, Shift } from './worker-pool.js';
+import type { CanvasRenderer, FrameResult } from '../types.js';
+import type { PoolSession, WorkerPool } from './worker-pool.js';
 
 /** See the module. */
-export class CrewDrawing implements CanvasSurface {
+export class WorkerRenderer implements CanvasRenderer {
   readonly canvas: HTMLCanvasElement;
   readonly kernel: string;
   readonly gamut: Gamut;
@@ -19,14 +18,14 @@ export class CrewDrawing implements CanvasSurface {
   /** What lights are made for. */
   readonly #plane: DrawnPhoto;
   readonly #photograph: Photograph;
-  readonly #crew: Crew;
+  readonly #pool: WorkerPool;
   readonly #context: CanvasRenderingContext2D;
   #freed = false;
 
   private constructor(
     module: CpuModule,
     photograph: Photograph,
-    crew: Crew,
+    pool: WorkerPool,
     context: CanvasRenderingContext2D,
     kernel: string,
     gamut: Gamut,
@@ -37,7 +36,7 @@ export class CrewDrawing implements CanvasSurface {
     this.#lamp = new Lamp(module);
     this.#plane = photograph.plane(module);
     this.#photograph = photograph;
-    this.#crew = crew;
+    this.#pool = pool;
     this.#context = context;
   }
 
@@ -45,32 +44,36 @@ export class CrewDrawing implements CanvasSurface {
   static async create(
     module: CpuModule,
     photograph: Photograph,
-    crew: Crew,
-    wanted: Gamut,
-  ): Promise<CrewDrawing> {
+    pool: WorkerPool,
+    renderOptions: Gamut,
+  ): Promise<WorkerRenderer> {
     const canvas = document.createElement('canvas');
-    canvas.width = photograph.facts.width;
-    canvas.height = photograph.facts.height;
+    canvas.width = photograph.info.width;
+    canvas.height = photograph.info.height;
     // In the page's memory, where the pixels come from: where there is no graphics processor, every
     // frame would go to a program in the place of one and back.
-    const context = canvas.getContext('2d', { colorSpace: wanted, willReadFrequently: true });
+    const context = canvas.getContext('2d', {
+      colorSpace: renderOptions,
+      willReadFrequently: true,
+    });
     if (!context) {
       throw new PhotoError('backend-unavailable', 'The canvas gives no 2D context.');
     }
-    const kernel = await photograph.withCrew(crew, describe);
+    const kernel = await photograph.withWorkers(pool, describe);
     // Browsers that know no other gamut say nothing of it.
-    const gamut = context.getContextAttributes?.().colorSpace === wanted ? wanted : 'srgb';
-    return new CrewDrawing(module, photograph, crew, context, kernel, gamut);
+    const gamut =
+      context.getContextAttributes?.().colorSpace === renderOptions ? renderOptions : 'srgb';
+    return new WorkerRenderer(module, photograph, pool, context, kernel, gamut);
   }
 
-  async render(setting: LightSetting, look: Look, detail: number): Promise<Drawn> {
+  async render(setting: LightSetting, look: Look, detail: number): Promise<FrameResult> {
     // Before its tiles are brought to the workers for nothing.
     if (this.#freed) throw letGo();
     try {
-      return await this.#photograph.withCrew(this.#crew, async (shift) => {
+      return await this.#photograph.withWorkers(this.#pool, async (session) => {
         if (this.#freed) throw letGo();
         const { light, asked, fault } = this.#lamp.turnTo(setting, this.#plane);
-        const rows = await shift.relight(light, { look, gamut: this.gamut, detail });
+        const rows = await session.relight(light, { look, gamut: this.gamut, detail });
         const settings = { colorSpace: this.gamut };
         if (this.#freed) throw letGo();
         // All at once, and before their memory is used again.
@@ -82,7 +85,7 @@ export class CrewDrawing implements CanvasSurface {
             first,
           );
         }
-        return { asked, fault };
+        return { lightApplied: asked, lightError: fault };
       });
     } catch (thrown) {
       if (!hasCode(thrown, 'worker-unavailable')) throw thrown;
@@ -99,6 +102,6 @@ export class CrewDrawing implements CanvasSurface {
   }
 }
 
-function describe({ kernel, size }: Shift): string {
+function describe({ kernel, size }: PoolSession): string {
   return `${kernel}, ${size} ${size === 1 ? 'worker' : 'workers'}`;
 }

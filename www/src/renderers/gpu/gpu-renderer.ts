@@ -1,29 +1,28 @@
-/** Drawing by graphics devices. A script of its own, which has copies of what it shares with the element's. */
+/** Renderer by graphics devices. A script of its own, which has copies of what it shares with the element's. */
 
 import type { Photograph } from '../../photo/photograph.js';
-import type { Wanted } from '../../player/photo-session.js';
-import type { CanvasSurface } from '../canvas-surface.js';
-import { CanvasDrawing } from '../surface.js';
+import { WasmRenderer } from '../surface.js';
+import type { CanvasRenderer, RenderOptions } from '../types.js';
 import type { Devices, GraphicsBackend, LoadGraphics } from './devices.js';
 
 export { Devices } from './devices.js';
 
 /** What draws by graphics devices. */
-export interface GpuDrawer {
+export interface GpuRenderers {
   /** Sets drawing up on a canvas of its own. `lost` is told at most once. */
   draw(
     backend: GraphicsBackend,
     photograph: Photograph,
-    wanted: Wanted,
+    renderOptions: RenderOptions,
     lost: (reason: string) => void,
     signal: AbortSignal,
-  ): Promise<CanvasSurface>;
+  ): Promise<CanvasRenderer>;
   /** Has a device get ready, and stay so until what it gives is called; `software`: also a program. */
   prepare(backend: GraphicsBackend, software: boolean): Promise<() => void>;
 }
 
 /** Draws by devices, with the modules that `load` gives. */
-export function gpuDrawer(load: LoadGraphics, devices: Devices): GpuDrawer {
+export function gpuRenderers(load: LoadGraphics, devices: Devices): GpuRenderers {
   return {
     async draw(backend, photograph, { gamut, software }, lost, signal) {
       const lease = await devices.lease(load, backend, software, lost);
@@ -31,13 +30,13 @@ export function gpuDrawer(load: LoadGraphics, devices: Devices): GpuDrawer {
       try {
         signal.throwIfAborted();
         const module = await load(backend);
-        return await photograph.inPage(
+        return await photograph.withModule(
           module,
           async (photo) => {
             const canvas = document.createElement('canvas');
             const relighter = await graphics.draw(photo, canvas, gamut);
             const plane = photograph.plane(module);
-            return new CanvasDrawing(module, plane, relighter, canvas, { lease });
+            return new WasmRenderer(module, plane, relighter, canvas, { lease });
           },
           { signal },
         );

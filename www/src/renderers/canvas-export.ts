@@ -1,16 +1,14 @@
-/** What all canvases with a photograph on them have in common. */
+/** Encoding and scaling the picture on a canvas. */
 
 import type { Gamut } from '../engine/types.js';
-import type { Drawing } from '../player/photo-session.js';
 import { PhotoError } from '../shared/errors.js';
 
-/** A drawing that is a canvas. */
-export interface CanvasSurface extends Drawing {
-  readonly canvas: HTMLCanvasElement;
-}
-
 /** What a canvas shows, encoded. */
-export function blobOf(canvas: HTMLCanvasElement, type: string, quality?: number): Promise<Blob> {
+export function encodeCanvas(
+  canvas: HTMLCanvasElement,
+  type: string,
+  quality?: number,
+): Promise<Blob> {
   return new Promise((resolve, reject) => {
     const done = (blob: Blob | null) =>
       blob
@@ -21,7 +19,7 @@ export function blobOf(canvas: HTMLCanvasElement, type: string, quality?: number
 }
 
 /** A canvas as it looks now, of so many times the pixels along either side. */
-export function resampled(
+export function resampleCanvas(
   canvas: HTMLCanvasElement,
   scale: number,
   gamut: Gamut,

@@ -1,0 +1,46 @@
+/** The interface that every backend implements: a renderer draws one photograph on one canvas. */
+
+import type { Look } from '../engine/output-settings.js';
+import type { Backend, Freeable, Gamut } from '../engine/types.js';
+import type { LightSetting } from '../lights/light-setting.js';
+import type { PhotoError } from '../shared/errors.js';
+
+/** Which backends may draw, and in which colours. */
+export interface RenderOptions {
+  /** In the order in which they are tried. */
+  readonly backends: readonly Backend[];
+  /** Whether WebGPU and WebGL2 may be software renderers. */
+  readonly software: boolean;
+  /** The gamut of the canvas, where the browser supports it. */
+  readonly gamut: Gamut;
+}
+
+/** Draws one photograph with one backend. */
+export interface Renderer extends Freeable {
+  /** The implementation, for people: the SIMD level or the graphics adapter. */
+  readonly kernel: string;
+  /** The gamut that the canvas really has. */
+  readonly gamut: Gamut;
+  /** Reason for degraded rendering, if any. */
+  readonly warning?: string;
+  /**
+   * Draws one frame with a share of the components (`quality`, 0 to 1). Call it again only after the
+   * last promise has settled. If the light is unavailable, the last available one is used and
+   * `FrameResult` has the error. Throws or rejects with `backend-lost`, or with `photo-lost` if parts of
+   * the photograph are lost.
+   */
+  render(light: LightSetting, look: Look, quality: number): FrameResult | Promise<FrameResult>;
+}
+
+/** A renderer whose surface is a canvas element. */
+export interface CanvasRenderer extends Renderer {
+  readonly canvas: HTMLCanvasElement;
+}
+
+/** The light with which a frame was drawn. */
+export interface FrameResult {
+  /** False if the frame shows the last light, because the requested one has no picture (yet). */
+  readonly lightApplied: boolean;
+  /** Why the requested light is unavailable; `null` if it is not, or is only loading. */
+  readonly lightError: PhotoError | null;
+}
