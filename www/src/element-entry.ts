@@ -22,7 +22,8 @@ export type {
 export type { EngineErrorCode, ErrorCode, PageErrorCode } from './shared/errors.js';
 export { PhotoError } from './shared/errors.js';
 export type { Backend, Gamut, LightName, ToneCurve } from './shared/names.js';
-export type { Loading, PicturePoint, Reveal } from './shared/settings.js';
-export { BACKENDS, LIGHTS } from './shared/settings.js';
+export { BACKENDS, LIGHTS } from './shared/names.js';
+export type { PicturePoint } from './shared/values.js';
+export type { Loading, Reveal } from './state/attribute-values.js';
 export type { LightPose } from './state/viewer-state.js';
 export type { PhotoView } from './state/viewport.js';

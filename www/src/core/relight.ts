@@ -11,7 +11,7 @@ import {
   parseLight,
   parseTone,
   parseWhiteBalance,
-} from '../shared/settings.js';
+} from '../shared/parse-settings.js';
 import type { CorePhotograph } from './decode.js';
 import { DecodedPhotograph } from './decoded-photo.js';
 import { coreCode } from './wasm-code.js';
@@ -75,7 +75,7 @@ export async function relight(
     throw new TypeError('relight takes what decode has given');
   }
   const { exposure = 1, whiteBalance = [1, 1, 1], tone, gamut, detail = 1 } = options;
-  const look = {
+  const output = {
     exposure: parseExposure(String(exposure)),
     whiteBalance: parseWhiteBalance(whiteBalance.join(' ')),
     tone: parseTone(tone ?? null),
@@ -88,7 +88,7 @@ export async function relight(
     await photo.photograph.withModule(module, (inside) => {
       const relighter = relighterOf(module, photo, inside);
       const made = makeLight(module, inside, light);
-      const display = makeDisplay(module, look, shown);
+      const display = makeDisplay(module, output, shown);
       try {
         const [first = 0, end = 0] = relighter.lightRows;
         const out = new Uint8Array(pixels.buffer);

@@ -4,16 +4,17 @@ import type { Backend, Gamut } from '../engine/types.js';
 import { setModuleFolder } from '../engine/wasm-loader.js';
 import { fetchTranslations, isMissing } from '../i18n/strings.js';
 import { Visitor } from '../input/interaction.js';
+import type { ImageLight } from '../lights/image-light.js';
+import { parseCssColor } from '../lights/light-color.js';
 import { checkLightSource, isLightSource, type LightSource } from '../lights/light-source.js';
-import type { Projection } from '../lights/projection.js';
-import { browserColor } from '../lights/tint.js';
 import type { PhotoInfo } from '../photo/photograph.js';
 import { PhotoSession } from '../player/photo-session.js';
 import { BROWSER_PORTS } from '../player/ports.js';
 import { encodeCanvas, resampleCanvas } from '../renderers/canvas-export.js';
 import type { CanvasRenderer } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
-import { BACKENDS, type LightName, type PicturePoint } from '../shared/settings.js';
+import { BACKENDS, type LightName } from '../shared/names.js';
+import type { PicturePoint } from '../shared/values.js';
 import { Attributes } from '../state/attribute-reader.js';
 import { LightNews, type Shining } from '../state/light-change.js';
 import type { Lighting } from '../state/lighting.js';
@@ -112,7 +113,7 @@ export class RelightablePhoto extends Base {
   #fetched: string | null | undefined;
   /** What the player was told last to draw, in words, and the picture that it is lit by. */
   #drawn: string | null = null;
-  #drawnBy: Projection | null = null;
+  #drawnBy: ImageLight | null = null;
   #reload = false;
   #scheduled = false;
   #listening: AbortController | null = null;
@@ -127,9 +128,9 @@ export class RelightablePhoto extends Base {
       {
         changed: () => this.#session.redraw(),
         came: () => this.#schedule(),
-        faultChanged: (fault) => this.#lightFaultChanged(fault),
+        errorChanged: (fault) => this.#lightFaultChanged(fault),
       },
-      browserColor,
+      parseCssColor,
     );
     this.#controls = new Controls(
       this.#view,
@@ -366,7 +367,7 @@ export class RelightablePhoto extends Base {
         if (!curtain.drawn) this.#schedule();
         curtain.drawn = true;
         const { setting, shining } = this.#lighting;
-        if (lightApplied && shining && light.picture === setting.picture) {
+        if (lightApplied && shining && light.image === setting.image) {
           this.#tellLight(this.#news.drawn(setting.name, shining));
         }
         // A light that stays wrong says so once, not at every frame with other numbers.
@@ -472,7 +473,7 @@ export class RelightablePhoto extends Base {
   }
 
   #read(): Asked {
-    return readAsked(this, this.#attributes, browserColor);
+    return readAsked(this, this.#attributes, parseCssColor);
   }
 
   /** Has the player do what is asked for, as soon as the photograph may be fetched. */
@@ -498,15 +499,15 @@ export class RelightablePhoto extends Base {
     };
     if (asked.wasm !== null) setModuleFolder(asked.wasm);
     const credentials = asked.crossOrigin === 'use-credentials' ? 'include' : 'same-origin';
-    const { look } = this.#exhibit;
+    const { output } = this.#exhibit;
     const light = this.#lighting.setting;
-    const { picture, ...builtin } = light;
+    const { image: picture, ...builtin } = light;
     // Where only the view or the controls are others, nothing is drawn again.
-    const drawn = JSON.stringify([src, credentials, renderOptions, look, builtin]);
+    const drawn = JSON.stringify([src, credentials, renderOptions, output, builtin]);
     if (!reload && drawn === this.#drawn && picture === this.#drawnBy) return;
     this.#drawn = drawn;
     this.#drawnBy = picture;
-    this.#session.set({ src, credentials, renderOptions, look, light }, reload);
+    this.#session.set({ src, credentials, renderOptions, output, light }, reload);
   }
 
   get #lighting(): Lighting {

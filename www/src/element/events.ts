@@ -3,7 +3,8 @@
 import type { Backend } from '../engine/types.js';
 import type { LightSource } from '../lights/light-source.js';
 import type { ErrorCode, PhotoError } from '../shared/errors.js';
-import type { LightName, PicturePoint } from '../shared/settings.js';
+import type { LightName } from '../shared/names.js';
+import type { PicturePoint } from '../shared/values.js';
 import type { PhotoView } from '../state/viewport.js';
 
 const TRAVELS: EventInit = { bubbles: true, composed: true };

@@ -87,7 +87,7 @@ test('attributes are read together, and what is wrong is told with its name', ()
   const { src, light, wasm, crossOrigin, cooperative, breathes } = asked();
   assert.equal(src, 'https://a.org/page/window.ltm');
   assert.deepEqual(light.place, { x: 0.25, y: 0.5 });
-  assert.deepEqual(light.color?.tint, [1, 0, 0]);
+  assert.deepEqual(light.color?.factors, [1, 0, 0]);
   assert.equal(wasm, 'https://a.org/wasm/');
   assert.deepEqual([crossOrigin, cooperative, breathes], ['anonymous', true, false]);
   it.setAttribute('light-x', 'left');

@@ -1,18 +1,18 @@
 /** Attributes as typed properties: what the attribute says, or what goes without saying. */
 
+import { parseExposure } from '../shared/parse-settings.js';
 import {
-  DEFAULT_SIZE,
+  DEFAULT_TORCH_SIZE,
   type Loading,
+  parseCoordinate,
   parseCrossOrigin,
-  parseExposure,
   parseKiosk,
   parseLoading,
-  parsePlace,
   parseReveal,
-  parseSize,
+  parseTorchSize,
   parseZoom,
   type Reveal,
-} from '../shared/settings.js';
+} from '../state/attribute-values.js';
 
 /** The properties. Numbers and names are those that go without saying where the attribute is wrong. */
 export interface Reflected {
@@ -78,9 +78,9 @@ const REFLECTED: { readonly [P in keyof Reflected]: Reflection<Reflected[P]> } =
   light: text('light', 'flood'),
   lightSrc: text('light-src'),
   lightColor: text('light-color', 'white'),
-  lightSize: parsed('light-size', (value) => parseSize(value) ?? DEFAULT_SIZE),
-  lightX: parsed('light-x', (value) => parsePlace(value, 'light-x') ?? 0.5),
-  lightY: parsed('light-y', (value) => parsePlace(value, 'light-y') ?? 0.5),
+  lightSize: parsed('light-size', (value) => parseTorchSize(value) ?? DEFAULT_TORCH_SIZE),
+  lightX: parsed('light-x', (value) => parseCoordinate(value, 'light-x') ?? 0.5),
+  lightY: parsed('light-y', (value) => parseCoordinate(value, 'light-y') ?? 0.5),
   exposure: parsed('exposure', parseExposure),
   whiteBalance: text('white-balance', '1 1 1'),
   tone: text('tone', 'clip'),

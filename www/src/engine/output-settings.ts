@@ -1,20 +1,20 @@
-/** How a picture is shown. */
+/** The output transform's settings: how a linear picture becomes codes on the canvas. */
 
+import type { RgbFactors } from '../shared/values.js';
 import type { Display, DrawingModule, Gamut, ToneCurve } from './types.js';
 
-/** What a picture's brightness and colour are multiplied by, and how they are rendered. */
-export interface Look {
+/** Immutable: a change makes a new object. */
+export interface OutputSettings {
   /** Factor on the picture's brightness. */
   readonly exposure: number;
-  /** Factors on red, green and blue. */
-  readonly whiteBalance: readonly [red: number, green: number, blue: number];
+  readonly whiteBalance: RgbFactors;
   readonly tone: ToneCurve;
 }
 
-/** That look in the module, for a canvas of a gamut. */
+/** The output transform in a WebAssembly module, for a canvas of the given gamut. */
 export function makeDisplay(
   { Display }: Pick<DrawingModule, 'Display'>,
-  { exposure, whiteBalance, tone }: Look,
+  { exposure, whiteBalance, tone }: OutputSettings,
   gamut: Gamut,
 ): Display {
   return new Display(exposure, Float64Array.from(whiteBalance), tone, gamut);

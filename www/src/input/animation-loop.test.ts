@@ -40,7 +40,7 @@ test('while nobody looks all stands still, and then goes on where it was', () =>
 });
 
 function moving(asked: { name: 'fire' | 'torch' }) {
-  const lighting = new Lighting({ changed: () => {}, came: () => {}, faultChanged: () => {} });
+  const lighting = new Lighting({ changed: () => {}, came: () => {}, errorChanged: () => {} });
   lighting.ask({ ...asked, src: null, place: null, size: null, color: null }, null);
   const { frames, frame } = clock();
   let changes = 0;

@@ -1,6 +1,6 @@
 /** What a visitor does, by pointer, wheel, keyboard and tilt; and what happens while nobody does anything. */
 
-import { CENTRE, type PicturePoint } from '../shared/settings.js';
+import { CENTRE, type PicturePoint } from '../shared/values.js';
 import type { LightItem } from '../state/lighting.js';
 import type { Exhibit } from '../state/viewer-state.js';
 import {

@@ -1,6 +1,6 @@
 /** How light moves by itself: fire, the torch that wanders, the torch that was thrown. */
 
-import { CENTRE } from '../shared/settings.js';
+import { CENTRE } from '../shared/values.js';
 import type { Lighting } from '../state/lighting.js';
 import type { Frames } from './animation-loop.js';
 import { glide, speed, type Velocity } from './inertia.js';

@@ -1,6 +1,6 @@
 /** Pointers and the wheel over the picture: the browser's events, told as gestures. */
 
-import type { PicturePoint } from '../shared/settings.js';
+import type { PicturePoint } from '../shared/values.js';
 import { wheelFactor } from '../state/viewport.js';
 import { type Allowed, type GestureListener, Gestures, type Pointer } from './gestures.js';
 

@@ -1,6 +1,6 @@
 /** A device's tilt, where there is such a thing and the visitor allows it. */
 
-import type { PicturePoint } from '../shared/settings.js';
+import type { PicturePoint } from '../shared/values.js';
 
 /** Some browsers ask the visitor. */
 type Asking = { requestPermission?: () => Promise<string> };

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { PicturePoint } from '../shared/settings.js';
+import type { PicturePoint } from '../shared/values.js';
 import { type Pose, Tilt } from './tilt.js';
 
 /** Where the light comes to rest. */

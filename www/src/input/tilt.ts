@@ -1,6 +1,6 @@
 /** A device that is tilted, as light: where it is held to begin with, the light is in the middle. */
 
-import { clampToPicture, type PicturePoint } from '../shared/settings.js';
+import { clampToPicture, type PicturePoint } from '../shared/values.js';
 
 /** How a device is held, in degrees, as `deviceorientation` tells it. */
 export interface Pose {

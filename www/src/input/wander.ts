@@ -1,6 +1,6 @@
 /** What happens while nobody does anything: the light breathes, and a kiosk goes back to its beginning. */
 
-import type { PicturePoint } from '../shared/settings.js';
+import type { PicturePoint } from '../shared/values.js';
 
 /** Calls back once after so many milliseconds, unless what it gives is called first. */
 export type Later = (ms: number, callback: () => void) => () => void;

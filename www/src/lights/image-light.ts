@@ -1,31 +1,26 @@
-/** A picture that shines. */
+/** An image that is used as light in place of a built-in light, as renderers see it. */
 
 import type { DrawingModule, DrawnPhoto, Light } from '../engine/types.js';
-import { pixelsOf, sizeOf } from './light-pixels.js';
-import { isLinear, isLive, type LightPicture } from './light-source.js';
-import type { Live, Projection } from './projection.js';
+import type { LivePicture } from './light-source.js';
 
-/** See the module. */
-export class Projected implements Projection {
-  readonly #picture: LightPicture;
-
-  constructor(picture: LightPicture) {
-    this.#picture = picture;
-  }
-
-  live(): Live | null {
-    const picture = this.#picture;
-    const size = isLive(picture) ? sizeOf(picture) : null;
-    if (!isLive(picture) || !size || size.width === 0 || size.height === 0) return null;
-    return { picture, width: size.width, height: size.height };
-  }
-
-  light({ Light }: Pick<DrawingModule, 'Light'>, photo: DrawnPhoto): Light | null {
-    const picture = this.#picture;
-    if (isLinear(picture)) {
-      return Light.fromLinear(photo, picture.data, picture.width, picture.height);
-    }
-    const pixels = pixelsOf(picture);
-    return pixels && Light.fromSrgb(photo, pixels.data, pixels.width, pixels.height);
-  }
+/** An image that a graphics device can upload directly, and its size in pixels. */
+export interface UploadableImage {
+  readonly image: LivePicture;
+  readonly width: number;
+  readonly height: number;
 }
+
+/** Its content may change between frames. */
+export interface ImageLight {
+  /** The current content, if a graphics device can upload it. */
+  uploadable(): UploadableImage | null;
+  /**
+   * The current content as a light of a WebAssembly module; `null` while nothing is loaded.
+   *
+   * @throws `light-tainted`, `light-size`, `light-value` or `light-source`
+   */
+  createLight(module: Pick<DrawingModule, 'Light'>, photo: DrawnPhoto): Light | null;
+}
+
+/** An image that is not loaded yet. */
+export const PENDING_IMAGE: ImageLight = { uploadable: () => null, createLight: () => null };

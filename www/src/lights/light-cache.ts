@@ -1,77 +1,61 @@
-/** What shines on a drawing: the light that was made last, kept for when the next one cannot be. */
+/** Keeps the last light that was made in a WebAssembly module, for as long as its setting is unchanged. */
 
 import type { DrawingModule, DrawnPhoto, Freeable, Light } from '../engine/types.js';
 import { type PhotoError, toPhotoError } from '../shared/errors.js';
-import { type BuiltinSetting, builtinLight, type LightSetting } from './light-setting.js';
+import { createBuiltinLight, type LightSetting } from './light-setting.js';
 
-/** What a lamp was turned to. */
-export interface Lit {
-  /** Stays the lamp's. The same as the last time only where it is as it was then. */
+export interface LightResult {
+  /** Owned by the cache. The same object as last time if and only if its content is unchanged. */
   readonly light: Light;
-  /** Whether it is the light that was asked for. */
-  readonly asked: boolean;
-  /** Why it is not the light that was asked for, where it should be. */
-  readonly fault: PhotoError | null;
+  /** Whether this is the requested light and not a substitute. */
+  readonly lightApplied: boolean;
+  /** The reason for a substitute; `null` also while an image is loading. */
+  readonly lightError: PhotoError | null;
 }
 
-/** See the module. */
-export class Lamp implements Freeable {
+export class LightCache implements Freeable {
   readonly #module: Pick<DrawingModule, 'Light'>;
   #light: Light | null = null;
-  /** What that is, where it is built in. */
-  #builtin: BuiltinSetting | null = null;
+  /** The setting of `#light`; `null` for an image, whose content may change. */
+  #setting: LightSetting | null = null;
 
   constructor(module: Pick<DrawingModule, 'Light'>) {
     this.#module = module;
   }
 
   /**
-   * Turns to a light. Where that cannot be had, or shows nothing as yet, the last one stays; where there
-   * is none, the built-in one stands in.
+   * The light of a setting. While its image cannot be read, the last light substitutes for it, or, if there is
+   * none, the built-in light.
    */
-  turnTo(setting: LightSetting, photo: DrawnPhoto): Lit {
-    let asked = true;
-    let fault: PhotoError | null = null;
-    if (setting.picture) {
+  get(setting: LightSetting, photo: DrawnPhoto): LightResult {
+    let lightApplied = true;
+    let lightError: PhotoError | null = null;
+    if (setting.image) {
       let light: Light | null = null;
       try {
-        light = setting.picture.light(this.#module, photo);
+        light = setting.image.createLight(this.#module, photo);
       } catch (thrown) {
-        fault = toPhotoError(thrown);
+        lightError = toPhotoError(thrown);
       }
-      asked = light !== null;
-      if (light) this.#keep(light, null);
+      lightApplied = light !== null;
+      if (light) this.#replace(light, null);
     }
-    const builtin = this.#builtin && isSame(this.#builtin, setting);
-    if (this.#light && (setting.picture || builtin)) return { light: this.#light, asked, fault };
-    // Before it is made, as lights are large and it can be had.
+    const isCurrent = setting.image !== null || setting === this.#setting;
+    if (this.#light && isCurrent) return { light: this.#light, lightApplied, lightError };
+    // Lights are large: free the old one before making the new one.
     this.free();
-    const light = builtinLight(this.#module, photo, setting);
-    // Without a picture that it may stand in for.
-    const { picture: _, ...builtinSetting } = setting;
-    this.#keep(light, builtinSetting);
-    return { light, asked, fault };
+    const light = createBuiltinLight(this.#module, photo, setting);
+    this.#replace(light, setting);
+    return { light, lightApplied, lightError };
   }
 
   free(): void {
+    this.#replace(null, null);
+  }
+
+  #replace(light: Light | null, setting: LightSetting | null): void {
     this.#light?.free();
-    this.#light = null;
-    this.#builtin = null;
-  }
-
-  #keep(light: Light, builtin: BuiltinSetting | null): void {
-    this.free();
     this.#light = light;
-    this.#builtin = builtin;
+    this.#setting = setting;
   }
-}
-
-function isSame(a: BuiltinSetting, b: BuiltinSetting): boolean {
-  return (
-    a.name === b.name &&
-    a.torch?.x === b.torch?.x &&
-    a.torch?.y === b.torch?.y &&
-    a.size === b.size &&
-    a.seconds === b.seconds
-  );
 }

@@ -1,53 +1,51 @@
-/** The picture or film of the `light-src` attribute. */
+/** The image or video of the `light-src` attribute. */
 
-/** How files of other origins are asked for. */
+/** The request mode for files of other origins. */
 export type CrossOrigin = 'anonymous' | 'use-credentials' | null;
 
-const FILM = /\.(mp4|m4v|webm|ogv|mov)$/i;
+const VIDEO_EXTENSION = /\.(mp4|m4v|webm|ogv|mov)$/i;
 
-/** Whether an address is that of a film, by the end of its path. */
-export function isFilm(address: string): boolean {
-  return FILM.test(new URL(address).pathname);
+/** Whether an address is that of a video, judged by its path's extension. */
+export function isVideoAddress(address: string): boolean {
+  return VIDEO_EXTENSION.test(new URL(address).pathname);
 }
 
-/** See the module. Made anew for another address. */
+/** One address; another address needs another object. */
 export class LightMedia {
   readonly address: string;
   readonly crossOrigin: CrossOrigin;
   readonly source: HTMLImageElement | HTMLVideoElement;
-  readonly #film: HTMLVideoElement | null = null;
-  #plays = false;
+  readonly #video: HTMLVideoElement | null = null;
+  #playing = false;
 
   constructor(address: string, crossOrigin: CrossOrigin) {
     this.address = address;
     this.crossOrigin = crossOrigin;
-    if (isFilm(address)) {
-      const film = document.createElement('video');
-      Object.assign(film, { muted: true, loop: true, playsInline: true, preload: 'auto' });
-      this.#film = film;
+    if (isVideoAddress(address)) {
+      const video = document.createElement('video');
+      Object.assign(video, { muted: true, loop: true, playsInline: true, preload: 'auto' });
+      this.#video = video;
     }
-    this.source = this.#film ?? new Image();
+    this.source = this.#video ?? new Image();
     this.source.crossOrigin = crossOrigin;
     this.source.src = address;
   }
 
-  /** Whether it can play. */
-  get isFilm(): boolean {
-    return this.#film !== null;
+  get isVideo(): boolean {
+    return this.#video !== null;
   }
 
-  /** Plays a film, or holds it where it is. */
-  set plays(plays: boolean) {
-    if (!this.#film || plays === this.#plays) return;
-    this.#plays = plays;
-    // A film that cannot be played tells by its own events; one that may not stays at its first frame.
-    if (plays) void this.#film.play().catch(() => {});
-    else this.#film.pause();
+  set playing(playing: boolean) {
+    if (!this.#video || playing === this.#playing) return;
+    this.#playing = playing;
+    // A video that cannot play fires an error event; a video that may not play stays at its first frame.
+    if (playing) void this.#video.play().catch(() => {});
+    else this.#video.pause();
   }
 
-  /** Lets it go. */
-  stop(): void {
+  /** Stops loading and releases the video decoder. */
+  release(): void {
     this.source.removeAttribute('src');
-    this.#film?.load();
+    this.#video?.load();
   }
 }

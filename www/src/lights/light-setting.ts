@@ -1,31 +1,28 @@
-/** What shines on a photograph. */
+/** The light of one frame. Immutable: a change makes a new object. */
 
 import type { DrawingModule, DrawnPhoto, Light } from '../engine/types.js';
-import { CENTRE, type LightName, type PicturePoint } from '../shared/settings.js';
-import type { Projection } from './projection.js';
+import type { LightName } from '../shared/names.js';
+import { CENTRE, type PicturePoint } from '../shared/values.js';
+import type { ImageLight } from './image-light.js';
 
-/** A built-in light; a torch may have been moved to a point of the picture. */
-export interface BuiltinSetting {
+export interface LightSetting {
+  /** The built-in light. */
   readonly name: LightName;
+  /** The torch's position; `null` behind the centre of the picture, and for other lights. */
   readonly torch: PicturePoint | null;
-  /** Radius of a torch, as a fraction of the light plane's shorter side; the usual one if left out. */
+  /** The torch's radius in units of the light plane's shorter side; the module's default if absent. */
   readonly size?: number;
-  /** How long a fire has burnt; not at all if left out. */
+  /** The fire's time since it was lit, in seconds; 0 if absent. */
   readonly seconds?: number;
+  /** Replaces the built-in light as soon as it is loaded. */
+  readonly image: ImageLight | null;
 }
 
-/** That, or in its place a picture, as soon as there is something of it to be seen. */
-export interface LightSetting extends BuiltinSetting {
-  readonly picture: Projection | null;
-}
-
-type LightMaker = Pick<DrawingModule, 'Light'>;
-
-/** A built-in light in the module. */
-export function builtinLight(
-  { Light }: LightMaker,
+/** Makes the built-in light of a setting. */
+export function createBuiltinLight(
+  { Light }: Pick<DrawingModule, 'Light'>,
   photo: DrawnPhoto,
-  { name, torch, size, seconds = 0 }: BuiltinSetting,
+  { name, torch, size, seconds = 0 }: LightSetting,
 ): Light {
   if (name === 'fire') return Light.fire(photo, seconds);
   if (name === 'torch' && (torch || size !== undefined)) {

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { type TestContext, test } from 'node:test';
 import { checkLightSource, type LightSource } from './light-source.js';
-import { LightFollower } from './light-source-observer.js';
+import { LightSourceObserver } from './light-source-observer.js';
 
 /** Counts listeners, as an `EventTarget` does not. */
 class Target extends EventTarget {
@@ -101,9 +101,9 @@ function browser(t: TestContext) {
 
 function follow(source: unknown) {
   const log: string[] = [];
-  const follower = new LightFollower(source as LightSource, {
+  const follower = new LightSourceObserver(source as LightSource, {
     changed: () => log.push('changed'),
-    faultChanged: (fault) => log.push(fault ? fault.code : 'well'),
+    errorChanged: (fault) => log.push(fault ? fault.code : 'well'),
   });
   return { follower, happened: () => log.splice(0) };
 }
@@ -167,13 +167,13 @@ test('an image is told of when it has loaded, or cannot', async (t) => {
   follower.start();
   assert.deepEqual(happened(), []);
   image.happens('error');
-  assert.match(follower.fault?.message ?? '', /a\.png/);
+  assert.match(follower.error?.message ?? '', /a\.png/);
   image.happens('error');
   assert.deepEqual(happened(), ['light-source']);
   image.happens('load');
   await settle();
   assert.deepEqual(happened(), ['well', 'changed']);
-  assert.equal(follower.fault, null);
+  assert.equal(follower.error, null);
   image.happens('load');
   follower.stop();
   await settle();

@@ -1,103 +1,100 @@
-/** A source of light that tells what becomes of it, for as long as anyone looks. */
+/** Observes a light source: reports when its content changes and when it fails. */
 
 import { messageOf, PhotoError } from '../shared/errors.js';
-import { Projected } from './image-light.js';
-import { isA, type LightPicture, type LightSource } from './light-source.js';
-import type { Projection } from './projection.js';
+import type { ImageLight } from './image-light.js';
+import { toImageLight } from './image-pixels.js';
+import { isInstance, type LightPicture, type LightSource } from './light-source.js';
 
-/** What is told of a source. */
-export interface SourceListener {
-  /** It shows something else. */
+export interface LightSourceListener {
+  /** The source shows something else. */
   changed(): void;
-  /** It cannot be had, or can again. */
-  faultChanged(fault: PhotoError | null): void;
+  /** The source has failed, or works again (`null`). */
+  errorChanged(error: PhotoError | null): void;
 }
 
-/** See the module. Holds on to nothing before `start` and after `stop`. */
-export class LightFollower {
+/** Holds listeners and plays streams only between `start` and `stop`. */
+export class LightSourceObserver {
   readonly source: LightSource;
-  /** What is to be looked at: the source itself, or for a stream a video of it. */
+  /** The source itself, or a video that plays the stream. */
   readonly picture: LightPicture;
-  readonly projection: Projection;
-  readonly #listener: SourceListener;
-  #following: AbortController | null = null;
-  #fault: PhotoError | null = null;
-  /** What was to be seen when it was last looked at. */
-  #seen: string;
+  readonly image: ImageLight;
+  readonly #listener: LightSourceListener;
+  #observing: AbortController | null = null;
+  #error: PhotoError | null = null;
+  /** The fingerprint of the content when the observer was last active. */
+  #fingerprint: string;
 
-  constructor(source: LightSource, listener: SourceListener) {
+  constructor(source: LightSource, listener: LightSourceListener) {
     this.source = source;
-    this.picture = isA('MediaStream', source) ? silentVideo() : source;
-    this.projection = new Projected(this.picture);
+    this.picture = isInstance('MediaStream', source) ? createMutedVideo() : source;
+    this.image = toImageLight(this.picture);
     this.#listener = listener;
-    this.#seen = stateOf(this.picture);
+    this.#fingerprint = fingerprintOf(this.picture);
   }
 
-  /** Why nothing is to be seen. */
-  get fault(): PhotoError | null {
-    return this.#fault;
+  get error(): PhotoError | null {
+    return this.#error;
   }
 
-  /** Tells of every change from now on, and whether there was one since it stopped. */
+  /** Reports all changes from now on, and at once a change since `stop`. */
   start(): void {
-    if (this.#following) return;
-    this.#following = new AbortController();
-    const { signal } = this.#following;
+    if (this.#observing) return;
+    this.#observing = new AbortController();
+    const { signal } = this.#observing;
     const { source, picture } = this;
-    if (isA('HTMLImageElement', picture)) this.#followImage(picture, signal);
-    if (isA('HTMLVideoElement', picture)) this.#followVideo(picture, signal);
-    if (isA('MediaStream', source)) this.#play(source, picture as HTMLVideoElement, signal);
-    if (stateOf(picture) !== this.#seen) this.#changed();
+    if (isInstance('HTMLImageElement', picture)) this.#observeImage(picture, signal);
+    if (isInstance('HTMLVideoElement', picture)) this.#observeVideo(picture, signal);
+    if (isInstance('MediaStream', source)) this.#play(source, picture as HTMLVideoElement, signal);
+    if (fingerprintOf(picture) !== this.#fingerprint) this.#changed();
   }
 
   stop(): void {
-    if (!this.#following) return;
-    this.#following.abort();
-    this.#following = null;
-    this.#seen = stateOf(this.picture);
+    if (!this.#observing) return;
+    this.#observing.abort();
+    this.#observing = null;
+    this.#fingerprint = fingerprintOf(this.picture);
   }
 
-  #followImage(image: HTMLImageElement, signal: AbortSignal): void {
+  #observeImage(image: HTMLImageElement, signal: AbortSignal): void {
     const fail = () => {
-      const message = `The image that is the light could not be loaded: ${image.currentSrc}`;
+      const message = `The light image could not be loaded: ${image.currentSrc}`;
       this.#fail(new PhotoError('light-source', message));
     };
-    // Decoded beside the page, which would wait for it when it is first drawn. One that is given
-    // another address meanwhile rejects, and loads again.
-    const take = () =>
+    // decode() works off the main thread; the first drawImage would block the page otherwise. It rejects
+    // if the image gets another address meanwhile, which fires another load event.
+    const decode = () =>
       image.decode().then(
         () => signal.aborted || this.#changed(),
         () => signal.aborted || !image.complete || fail(),
       );
-    image.addEventListener('load', take, { signal });
+    image.addEventListener('load', decode, { signal });
     image.addEventListener('error', fail, { signal });
     if (image.complete && image.currentSrc && image.naturalWidth === 0) fail();
   }
 
-  #followVideo(video: HTMLVideoElement, signal: AbortSignal): void {
+  #observeVideo(video: HTMLVideoElement, signal: AbortSignal): void {
     const fail = () => {
-      const said = video.error?.message || 'it does not know the format, or was not sent the file.';
-      const message = `The video that is the light cannot be played. The browser says: ${said}`;
+      const reason = video.error?.message || 'the format is unknown, or the file did not arrive.';
+      const message = `The light video cannot be played. The browser says: ${reason}`;
       this.#fail(new PhotoError('light-source', message, video.error));
     };
     const changed = () => this.#changed();
-    // New frames are told while it plays, on some browsers only then.
+    // Some browsers report frames only while the video plays.
     video.addEventListener('loadeddata', changed, { signal });
     video.addEventListener('seeked', changed, { signal });
     video.addEventListener('error', fail, { signal });
     if (video.error) fail();
-    eachFrame(video, changed, signal);
+    observeFrames(video, changed, signal);
   }
 
   #play(stream: MediaStream, video: HTMLVideoElement, signal: AbortSignal): void {
-    // The tracks are the page's: they go on without this.
+    // The tracks belong to the page and keep running.
     signal.addEventListener('abort', () => {
       video.pause();
       video.srcObject = null;
     });
     const ended = () => {
-      const message =
-        'The stream that is the light has ended, or what it came from was taken away.';
+      const message = 'The light stream has ended, or its device was disconnected.';
       this.#fail(new PhotoError('light-source', message));
     };
     video.addEventListener('ended', ended, { signal });
@@ -105,67 +102,67 @@ export class LightFollower {
     video.srcObject = stream;
     video.play().catch((cause: unknown) => {
       if (signal.aborted) return;
-      const message = `The stream that is the light cannot be played: ${messageOf(cause)}`;
+      const message = `The light stream cannot be played: ${messageOf(cause)}`;
       this.#fail(new PhotoError('light-source', message, cause));
     });
   }
 
   #changed(): void {
-    if (this.#fault) {
-      this.#fault = null;
-      this.#listener.faultChanged(null);
+    if (this.#error) {
+      this.#error = null;
+      this.#listener.errorChanged(null);
     }
     this.#listener.changed();
   }
 
-  #fail(fault: PhotoError): void {
-    if (fault.message === this.#fault?.message) return;
-    this.#fault = fault;
-    this.#listener.faultChanged(fault);
+  #fail(error: PhotoError): void {
+    if (error.message === this.#error?.message) return;
+    this.#error = error;
+    this.#listener.errorChanged(error);
   }
 }
 
 /** Calls back for each frame that a video shows. */
-function eachFrame(video: HTMLVideoElement, tell: () => void, signal: AbortSignal): void {
+function observeFrames(video: HTMLVideoElement, onFrame: () => void, signal: AbortSignal): void {
   let handle = 0;
   if (typeof video.requestVideoFrameCallback === 'function') {
-    const next = () => {
+    const requestNext = () => {
       handle = video.requestVideoFrameCallback(() => {
-        next();
-        tell();
+        requestNext();
+        onFrame();
       });
     };
     signal.addEventListener('abort', () => video.cancelVideoFrameCallback(handle));
-    next();
+    requestNext();
     return;
   }
-  const next = () => {
+  const requestNext = () => {
     handle = requestAnimationFrame(() => {
       if (video.paused || video.ended) return;
-      next();
-      tell();
+      requestNext();
+      onFrame();
     });
   };
-  const begin = () => {
+  const restart = () => {
     cancelAnimationFrame(handle);
-    next();
+    requestNext();
   };
-  video.addEventListener('playing', begin, { signal });
+  video.addEventListener('playing', restart, { signal });
   signal.addEventListener('abort', () => cancelAnimationFrame(handle));
-  if (!video.paused) begin();
+  if (!video.paused) restart();
 }
 
-/** Changes wherever what is to be seen may have, as far as a picture tells of itself. */
-function stateOf(picture: LightPicture): string {
-  if (isA('HTMLImageElement', picture)) return `${picture.complete} ${picture.currentSrc}`;
-  if (isA('HTMLVideoElement', picture)) {
+/** A text that changes with the content, as far as the browser exposes it. */
+function fingerprintOf(picture: LightPicture): string {
+  if (isInstance('HTMLImageElement', picture)) return `${picture.complete} ${picture.currentSrc}`;
+  if (isInstance('HTMLVideoElement', picture)) {
     return `${picture.readyState >= 2} ${picture.currentTime} ${picture.currentSrc}`;
   }
   return '';
 }
 
-/** One that browsers let play without a click, and within the page. */
-function silentVideo(): HTMLVideoElement {
+/** Browsers play a muted inline video without a click. */
+function createMutedVideo(): HTMLVideoElement {
   const video = document.createElement('video');
   video.muted = true;
   video.playsInline = true;

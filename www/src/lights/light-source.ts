@@ -1,29 +1,29 @@
-/** What a page may light a photograph with, besides the built-in lights. */
+/** The light sources that a page may use in place of the built-in lights. */
 
-/** A picture of light by its numbers, of any size. */
+/** A light image of any size in linear values. */
 export interface LinearLight {
-  /** Linear red, green and blue, 0 dark and 1 full brightness, row by row. */
+  /** Linear red, green and blue, row by row: 0 is dark, 1 is full brightness. */
   readonly data: Float32Array;
   readonly width: number;
   readonly height: number;
 }
 
-/** A picture that may change at any time, or was made to be drawn, and is as large as it says. */
+/** A picture that a graphics device can upload directly, and that may change at any time. */
 export type LivePicture = HTMLCanvasElement | OffscreenCanvas | ImageBitmap | HTMLVideoElement;
 
-/** A picture that the browser has; codes stand for light as sRGB has it. */
+/** A picture in one of the browser's classes, in sRGB. */
 export type BrowserPicture = HTMLImageElement | ImageData | LivePicture;
 
-/** What can be looked at at any time. */
+/** A picture whose pixels can be read at any time. */
 export type LightPicture = BrowserPicture | LinearLight;
 
 /**
- * What shines on a photograph: its upper left is the light's. Transparent parts are dark. Of a video or
- * a stream every frame is taken up; canvases and numbers are read again by `lightChanged()`.
+ * Lights the photograph: the source's upper left corner is that of the light plane. Transparent pixels are dark.
+ * The element follows every frame of a video or stream; it reads canvases and numbers again on `lightChanged()`.
  */
 export type LightSource = LightPicture | MediaStream;
 
-interface Classes {
+interface BrowserClasses {
   HTMLImageElement: HTMLImageElement;
   HTMLCanvasElement: HTMLCanvasElement;
   OffscreenCanvas: OffscreenCanvas;
@@ -33,47 +33,47 @@ interface Classes {
   MediaStream: MediaStream;
 }
 
-const CLASSES: readonly (keyof Classes)[] = [
-  'HTMLImageElement',
+type ClassName = keyof BrowserClasses;
+
+const LIVE_CLASSES: readonly ClassName[] = [
   'HTMLCanvasElement',
   'OffscreenCanvas',
   'ImageBitmap',
-  'ImageData',
   'HTMLVideoElement',
+];
+
+const CLASSES: readonly ClassName[] = [
+  ...LIVE_CLASSES,
+  'HTMLImageElement',
+  'ImageData',
   'MediaStream',
 ];
 
-/** Whether something is of one of the browser's classes; not every browser has them all. */
-export function isA<K extends keyof Classes>(name: K, value: unknown): value is Classes[K] {
+/** Whether `value` is an instance of a browser class. Some browsers lack some of the classes. */
+export function isInstance<K extends ClassName>(
+  name: K,
+  value: unknown,
+): value is BrowserClasses[K] {
   const type = (globalThis as Record<string, unknown>)[name];
   return typeof type === 'function' && value instanceof type;
 }
 
-const LIVE: readonly (keyof Classes)[] = [
-  'HTMLCanvasElement',
-  'OffscreenCanvas',
-  'ImageBitmap',
-  'HTMLVideoElement',
-];
-
-/** Whether a picture may change at any time, or was made to be drawn. */
-export function isLive(picture: LightPicture): picture is LivePicture {
-  return LIVE.some((name) => isA(name, picture));
+export function isLivePicture(picture: LightPicture): picture is LivePicture {
+  return LIVE_CLASSES.some((name) => isInstance(name, picture));
 }
 
-/** Whether it is light by its numbers; whether they fit each other is found out later. */
-export function isLinear(value: unknown): value is LinearLight {
+/** Checks the types only; the WebAssembly module checks that the size fits the data. */
+export function isLinearLight(value: unknown): value is LinearLight {
   if (typeof value !== 'object' || value === null) return false;
   const { data, width, height } = value as Partial<LinearLight>;
   return data instanceof Float32Array && typeof width === 'number' && typeof height === 'number';
 }
 
-/** Whether something can light a photograph. */
 export function isLightSource(value: unknown): value is LightSource {
-  return isLinear(value) || CLASSES.some((name) => isA(name, value));
+  return isLinearLight(value) || CLASSES.some((name) => isInstance(name, value));
 }
 
-/** Throws a `TypeError` for anything that cannot light a photograph. */
+/** @throws {TypeError} if `value` is not a light source */
 export function checkLightSource(value: unknown): LightSource {
   if (isLightSource(value)) return value;
   throw new TypeError(

@@ -1,7 +1,7 @@
 /**
- * Pictures, films, cameras and numbers as light. A script of its own, as most pages do with the built-in lights.
- * It has copies of what it shares with the element's.
+ * Support for images, videos, cameras and numbers as light. The element fetches this script only when a page uses
+ * such a light; the script contains its own copies of the modules that it shares with the element.
  */
 
 export { LightMedia } from './light-media.js';
-export { LightFollower } from './light-source-observer.js';
+export { LightSourceObserver } from './light-source-observer.js';

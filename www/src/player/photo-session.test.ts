@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { Backend } from '../engine/types.js';
-import type { Projection } from '../lights/projection.js';
+import type { ImageLight } from '../lights/image-light.js';
 import type { Photograph } from '../photo/photograph.js';
 import type { Renderer } from '../renderers/types.js';
 import { PhotoError } from '../shared/errors.js';
@@ -12,8 +12,8 @@ const SETTINGS: SessionSettings = {
   src: 'a.ltm',
   credentials: 'same-origin',
   renderOptions: wanting(['webgpu', 'cpu']),
-  light: { name: 'flood', torch: null, picture: null },
-  look: exposed(1),
+  light: { name: 'flood', torch: null, image: null },
+  output: exposed(1),
 };
 
 /** Lets every promise that can settle do so. */
@@ -230,8 +230,8 @@ test('a photograph removed while a back end is being set up is freed once that i
 
 test('changes of one frame are drawn once', async () => {
   const w = await loadedWorld();
-  w.session.set({ ...SETTINGS, light: { name: 'torch', torch: { x: 0, y: 0 }, picture: null } });
-  w.session.set({ ...SETTINGS, light: { name: 'torch', torch: { x: 1, y: 0 }, picture: null } });
+  w.session.set({ ...SETTINGS, light: { name: 'torch', torch: { x: 0, y: 0 }, image: null } });
+  w.session.set({ ...SETTINGS, light: { name: 'torch', torch: { x: 1, y: 0 }, image: null } });
   assert.equal(w.frames.length, 1);
   w.frames[0]?.();
   assert.deepEqual(w.happened(), ['webgpu draws torch']);
@@ -293,7 +293,7 @@ for (const how of ['by the browser', 'at the next renderer']) {
       w.losses[0]?.('the device is gone.');
     } else {
       w.loseAtRender(true);
-      w.session.set({ ...SETTINGS, look: exposed(2) });
+      w.session.set({ ...SETTINGS, output: exposed(2) });
       await w.frame();
       w.loseAtRender(false);
     }
@@ -437,7 +437,7 @@ test('of settings that come faster than frames, the newest is drawn next', async
   const w = await loadedWorld();
   const frames = w.slowDown();
   for (const name of ['torch', 'fire', 'stripes'] as const) {
-    w.session.set({ ...SETTINGS, light: { name, torch: null, picture: null } });
+    w.session.set({ ...SETTINGS, light: { name, torch: null, image: null } });
     await w.frame();
   }
   assert.deepEqual(w.happened(), ['webgpu draws torch']);
@@ -454,7 +454,7 @@ test('a picture that is asked for is the next, however many frames are asked for
   const w = await loadedWorld();
   const frames = w.slowDown();
   const light = (name: 'torch' | 'fire' | 'stripes') => {
-    w.session.set({ ...SETTINGS, light: { name, torch: null, picture: null } });
+    w.session.set({ ...SETTINGS, light: { name, torch: null, image: null } });
     return w.frame();
   };
   await light('torch');
@@ -487,7 +487,7 @@ test('a photograph is loaded once its first frame is there', async () => {
 test('a back end lost at a frame that takes time is replaced', async () => {
   const w = await loadedWorld();
   const frames = w.slowDown();
-  w.session.set({ ...SETTINGS, look: exposed(2) });
+  w.session.set({ ...SETTINGS, output: exposed(2) });
   await w.frame();
   const asked = w.session.renderNow();
   frames[0]?.fail(new PhotoError('backend-lost', 'the device is gone.'));
@@ -521,8 +521,8 @@ test('a picture at which a loss is found is drawn by what comes in its place', a
 test('what was wrong with another light than there is now is not told', async () => {
   const w = await loadedWorld();
   const frames = w.slowDown();
-  const picture = {} as Projection;
-  w.session.set({ ...SETTINGS, light: { ...SETTINGS.light, picture } });
+  const image = {} as ImageLight;
+  w.session.set({ ...SETTINGS, light: { ...SETTINGS.light, image } });
   await w.frame();
   w.session.set(SETTINGS);
   frames[0]?.done(new PhotoError('light-tainted', 'of another origin'));
@@ -533,7 +533,7 @@ test('what was wrong with another light than there is now is not told', async ()
 test('what becomes of a frame of another photograph is nobody’s concern', async () => {
   const w = await loadedWorld();
   const frames = w.slowDown();
-  w.session.set({ ...SETTINGS, look: exposed(2) });
+  w.session.set({ ...SETTINGS, output: exposed(2) });
   await w.frame();
   w.session.set({ ...SETTINGS, src: 'b.ltm' });
   w.happened();
@@ -545,7 +545,7 @@ test('what becomes of a frame of another photograph is nobody’s concern', asyn
 test('a photograph of which parts are gone is fetched anew, and its picture stays until then', async () => {
   const w = await loadedWorld({ ...SETTINGS, renderOptions: wanting(['cpu']) });
   const frames = w.slowDown();
-  w.session.set({ ...SETTINGS, renderOptions: wanting(['cpu']), look: exposed(2) });
+  w.session.set({ ...SETTINGS, renderOptions: wanting(['cpu']), output: exposed(2) });
   await w.frame();
   const asked = assert.rejects(w.session.renderNow(), { name: 'PhotoError' });
   frames[0]?.fail(new PhotoError('photo-lost', 'a worker stopped.'));
@@ -593,7 +593,7 @@ test('a photograph that loses parts again and again fails, unless it is drawn be
   const cpu: SessionSettings = { ...SETTINGS, renderOptions: wanting(['cpu']) };
   const w = await loadedWorld(cpu);
   const frames = w.slowDown();
-  w.session.set({ ...cpu, look: exposed(2) });
+  w.session.set({ ...cpu, output: exposed(2) });
   await w.frame();
   let fetched = 0;
   const lose = async () => {
@@ -674,7 +674,7 @@ test('what nobody sees is not drawn, and once when it comes into view', async ()
   const w = await loadedWorld();
   w.session.setVisible(false);
   for (const exposure of [2, 3]) {
-    w.session.set({ ...SETTINGS, look: exposed(exposure) });
+    w.session.set({ ...SETTINGS, output: exposed(exposure) });
     w.session.redraw();
   }
   assert.equal(w.frames.length, 0);
@@ -866,7 +866,7 @@ test('a picture that is asked for is in full detail, in the middle of a motion',
   await w.frame();
   assert.deepEqual(w.happened(), ['webgpu draws flood'], 'nor one that was asked for before');
   const frames = w.slowDown();
-  const light = { name: 'torch', torch: null, picture: null } as const;
+  const light = { name: 'torch', torch: null, image: null } as const;
   w.session.set({ ...SETTINGS, light });
   await w.frame();
   // Whether or not a frame of the motion is to come next.
@@ -1018,7 +1018,7 @@ test('what waits for a frame of a coarser photograph is drawn by the whole one',
   await w.drawn(0);
   frames.shift()?.done();
   await settle();
-  w.session.set({ ...cpu, look: exposed(2) });
+  w.session.set({ ...cpu, output: exposed(2) });
   await w.frame();
   assert.equal(frames.length, 1);
   // Asked for while that is drawn.

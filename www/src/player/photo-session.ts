@@ -5,7 +5,7 @@
  * changed since is aborted and freed.
  */
 
-import type { Look } from '../engine/output-settings.js';
+import type { OutputSettings } from '../engine/output-settings.js';
 import type { Backend } from '../engine/types.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import { missingSource, type OnPreview, type OnProgress } from '../loading/load.js';
@@ -24,7 +24,7 @@ export interface SessionSettings {
   readonly credentials: RequestCredentials;
   readonly renderOptions: RenderOptions;
   readonly light: LightSetting;
-  readonly look: Look;
+  readonly output: OutputSettings;
 }
 
 /** What the session needs done. */
@@ -290,13 +290,13 @@ export class PhotoSession<D extends Renderer> {
     const whole = this.#whole;
     this.#whole = false;
     if (!active || !this.#settings) throw notLoaded();
-    const { light, look } = this.#settings;
+    const { light, output } = this.#settings;
     const detail = whole ? 1 : active.quality.detail;
     this.#stale = false;
     this.#keepMoving();
     try {
       const began = this.#ports.now();
-      let drawn = active.renderer.render(light, look, detail);
+      let drawn = active.renderer.render(light, output, detail);
       if (!whole) this.#clock(active, began, drawn);
       if (drawn instanceof Promise) {
         active.frame = new Deferred();
@@ -305,7 +305,7 @@ export class PhotoSession<D extends Renderer> {
       if (active.held.photo.share === 1) this.#fetches = 0;
       active.drew = true;
       // Another light may have been set meanwhile, with which nothing is wrong.
-      const sameLight = light.picture === this.#settings?.light.picture;
+      const sameLight = light.image === this.#settings?.light.image;
       const told = sameLight ? drawn : { ...drawn, lightError: null };
       if (active === this.#active) this.#tell(active, told, light, detail);
       return active.renderer;

@@ -17,8 +17,8 @@ const SETTINGS: SessionSettings = {
   src: 'a.ltm',
   credentials: 'same-origin',
   renderOptions: wanting(['cpu']),
-  light: { name: 'flood', torch: null, picture: null },
-  look: exposed(1),
+  light: { name: 'flood', torch: null, image: null },
+  output: exposed(1),
 };
 
 /** Stands in for what of the document is used. */
@@ -108,7 +108,7 @@ async function playing(t: TestContext, ask = async (_: Backend): Promise<void> =
 test('frames that wait when the back end is switched are drawn by the new one, and move no tiles', async (t) => {
   const { session, workers, alive, has, setUps, frames, changes } = await playing(t);
   for (const worker of workers) worker.slow = true;
-  session.set({ ...SETTINGS, look: exposed(2) });
+  session.set({ ...SETTINGS, output: exposed(2) });
   frames.shift()?.();
   await settle();
   const waiting = session.renderNow();

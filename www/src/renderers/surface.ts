@@ -1,10 +1,10 @@
 /** A canvas with a back end of the page's own module on it. */
 
-import { type Look, makeDisplay } from '../engine/output-settings.js';
+import { makeDisplay, type OutputSettings } from '../engine/output-settings.js';
 import type { DrawingModule, DrawnPhoto, Gamut, Relighter } from '../engine/types.js';
-import { Lamp } from '../lights/light-cache.js';
+import type { ImageLight } from '../lights/image-light.js';
+import { LightCache } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
-import type { Projection } from '../lights/projection.js';
 import { toPhotoError } from '../shared/errors.js';
 import type { Lease } from './gpu/devices.js';
 import type { CanvasRenderer, FrameResult } from './types.js';
@@ -14,7 +14,7 @@ export class WasmRenderer implements CanvasRenderer {
   readonly canvas: HTMLCanvasElement;
   readonly warning: string;
   readonly #module: DrawingModule;
-  readonly #lamp: Lamp;
+  readonly #lights: LightCache;
   /** What lights are made for; its own. */
   readonly #plane: DrawnPhoto;
   readonly #relighter: Relighter;
@@ -34,7 +34,7 @@ export class WasmRenderer implements CanvasRenderer {
     }: { lease?: Pick<Lease, 'fail' | 'release'> | null; warning?: string } = {},
   ) {
     this.#module = module;
-    this.#lamp = new Lamp(module);
+    this.#lights = new LightCache(module);
     this.#plane = plane;
     this.#relighter = relighter;
     this.#lease = lease;
@@ -50,20 +50,20 @@ export class WasmRenderer implements CanvasRenderer {
     return this.#relighter.gamut;
   }
 
-  render(setting: LightSetting, look: Look, detail: number): FrameResult {
-    const display = makeDisplay(this.#module, look, this.gamut);
+  render(setting: LightSetting, output: OutputSettings, detail: number): FrameResult {
+    const display = makeDisplay(this.#module, output, this.gamut);
     try {
-      if (this.#takes(setting.picture)) {
+      if (this.#takes(setting.image)) {
         this.#pictured = true;
         this.#relighter.renderPicture(display, detail);
         return { lightApplied: true, lightError: null };
       }
-      const { light, asked, fault } = this.#lamp.turnTo(setting, this.#plane);
+      const { light, lightApplied, lightError } = this.#lights.get(setting, this.#plane);
       // A picture that cannot be had any more leaves what was had of it.
-      this.#pictured &&= !asked;
+      this.#pictured &&= !lightApplied;
       if (this.#pictured) this.#relighter.renderPicture(display, detail);
       else this.#relighter.render(light, display, detail);
-      return { lightApplied: asked, lightError: fault };
+      return { lightApplied, lightError };
     } catch (thrown) {
       const { code, message } = toPhotoError(thrown);
       if (code === 'backend-lost') this.#lease?.fail(message);
@@ -74,11 +74,11 @@ export class WasmRenderer implements CanvasRenderer {
   }
 
   /** Whether the device takes a picture as it is, which spares it a way through the page's memory. */
-  #takes(projection: Projection | null): boolean {
-    const live = projection?.live();
-    if (!live) return false;
+  #takes(image: ImageLight | null): boolean {
+    const source = image?.uploadable();
+    if (!source) return false;
     try {
-      return this.#relighter.takePicture(live.picture, live.width, live.height);
+      return this.#relighter.takePicture(source.image, source.width, source.height);
     } catch {
       // Reading it tells what is wrong.
       return false;
@@ -88,7 +88,7 @@ export class WasmRenderer implements CanvasRenderer {
   free(): void {
     this.#relighter.free();
     this.#lease?.release();
-    this.#lamp.free();
+    this.#lights.free();
     this.#plane.free();
   }
 }

@@ -1,6 +1,6 @@
 /** The interface that every backend implements: a renderer draws one photograph on one canvas. */
 
-import type { Look } from '../engine/output-settings.js';
+import type { OutputSettings } from '../engine/output-settings.js';
 import type { Backend, Freeable, Gamut } from '../engine/types.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { PhotoError } from '../shared/errors.js';
@@ -29,7 +29,11 @@ export interface Renderer extends Freeable {
    * `FrameResult` has the error. Throws or rejects with `backend-lost`, or with `photo-lost` if parts of
    * the photograph are lost.
    */
-  render(light: LightSetting, look: Look, quality: number): FrameResult | Promise<FrameResult>;
+  render(
+    light: LightSetting,
+    output: OutputSettings,
+    quality: number,
+  ): FrameResult | Promise<FrameResult>;
 }
 
 /** A renderer whose surface is a canvas element. */

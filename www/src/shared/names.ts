@@ -1,22 +1,25 @@
-/** What attributes, options and events call things. No DOM, as the core's types are made of it. */
+/** Names that attributes, options and events use. Free of DOM types, because the core's types depend on it. */
 
-/** The built-in lights, in the order menus show them. */
+/** The built-in lights, in the order of the light menu. */
 export const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum', 'fire'] as const;
 
 /** The name of a built-in light. */
 export type LightName = (typeof LIGHTS)[number];
 
-/** The name of a back end. */
+/** The backends from fastest to slowest, which is the order in which they are tried. */
+export const BACKENDS: readonly [Backend, ...Backend[]] = ['webgpu', 'webgl2', 'cpu'];
+
+/** The name of a backend. */
 export type Backend = 'webgpu' | 'webgl2' | 'cpu';
 
-/** What a canvas can show: colours of sRGB, or those of Display P3 too. */
+/** The colour space of the canvas. */
 export type Gamut = 'srgb' | 'display-p3';
 
-/** What becomes of brightness: cut off at white, or rolled off before it. */
+/** How brightness above white is shown: `clip` cuts it off, `filmic` compresses it. */
 export type ToneCurve = 'clip' | 'filmic';
 
-/** The WebAssembly modules: one that decodes, and one for each back end. */
+/** The WebAssembly modules: the decoder and one for each backend. */
 export type ModuleName = 'decoder' | Backend;
 
-/** Those that the core is made of. */
+/** The modules that the core uses. */
 export const CORE_MODULES = ['decoder', 'cpu'] as const satisfies readonly ModuleName[];

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { parseExposure, parseLight } from '../shared/settings.js';
+import { parseExposure, parseLight } from '../shared/parse-settings.js';
 import { Attributes } from './attribute-reader.js';
 
 test('what is wrong leaves what was right, is told once, and takes nothing else along', () => {

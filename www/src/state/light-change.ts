@@ -2,7 +2,8 @@
 
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
-import type { LightName, PicturePoint } from '../shared/settings.js';
+import type { LightName } from '../shared/names.js';
+import type { PicturePoint } from '../shared/values.js';
 
 /** What shines, as it is told. */
 export interface Shining {
@@ -18,10 +19,10 @@ export class LightNews {
   #told: Shining | null = null;
 
   /** What is new, if anything is. */
-  asked({ name, torch, picture }: LightSetting): Shining | null {
+  asked({ name, torch, image }: LightSetting): Shining | null {
     // The first light is what the page asks for, which is no news.
-    if (this.#told && picture) return null;
-    return this.#tell({ name, torch: picture ? null : torch, source: null });
+    if (this.#told && image) return null;
+    return this.#tell({ name, torch: image ? null : torch, source: null });
   }
 
   drawn(name: LightName, source: LightSource): Shining | null {

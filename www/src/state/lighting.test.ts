@@ -1,9 +1,9 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { isFilm } from '../lights/light-media.js';
+import { PENDING_IMAGE } from '../lights/image-light.js';
+import { isVideoAddress } from '../lights/light-media.js';
 import type { LinearLight } from '../lights/light-source.js';
 import * as sources from '../lights/light-sources.js';
-import { UNSEEN } from '../lights/projection.js';
 import type { PhotoError } from '../shared/errors.js';
 import { Lighting } from './lighting.js';
 import type { AskedLight } from './options.js';
@@ -15,7 +15,7 @@ const ASKED: AskedLight = {
   size: 0.1,
   color: null,
 };
-const RED = { tint: [1, 0, 0], hex: '#ff0000' } as const;
+const RED = { factors: [1, 0, 0], hex: '#ff0000' } as const;
 const SOURCE: LinearLight = { data: new Float32Array(3), width: 1, height: 1 };
 
 function lighting(asked = ASKED, fetch = async () => sources) {
@@ -26,7 +26,7 @@ function lighting(asked = ASKED, fetch = async () => sources) {
       told.push('came');
       it.ask(asked, null);
     },
-    faultChanged: (fault: PhotoError | null) => told.push(fault?.code ?? 'well'),
+    errorChanged: (fault: PhotoError | null) => told.push(fault?.code ?? 'well'),
   };
   const it = new Lighting(listener, fetch);
   it.ask(asked, null);
@@ -37,9 +37,9 @@ const settle = () => new Promise((resolve) => setImmediate(resolve));
 
 test('light is as the page asks, until somebody chooses, and again after that', () => {
   const it = lighting();
-  assert.deepEqual(it.setting, { name: 'torch', torch: ASKED.place, picture: null, size: 0.1 });
+  assert.deepEqual(it.setting, { name: 'torch', torch: ASKED.place, image: null, size: 0.1 });
   it.choose({ name: 'stripes', torch: { x: 0.5, y: 0.5 }, color: RED });
-  assert.deepEqual(it.setting, { name: 'stripes', torch: null, picture: null });
+  assert.deepEqual(it.setting, { name: 'stripes', torch: null, image: null });
   assert.equal(it.color, RED);
   it.item = 'torch';
   assert.deepEqual(it.torch, { x: 0.5, y: 0.5 });
@@ -52,7 +52,7 @@ test('light is as the page asks, until somebody chooses, and again after that', 
   assert.deepEqual(it.setting, {
     name: 'torch',
     torch: { x: 0.9, y: 0.9 },
-    picture: null,
+    image: null,
     size: 0.1,
   });
   assert.equal(it.color, null);
@@ -64,13 +64,13 @@ test('a source stands in for built-in lights until one is chosen', async () => {
   it.source = SOURCE;
   assert.deepEqual([it.item, it.items[0], it.holdsTorch], ['projection', 'projection', false]);
   // What follows it is on its way, and the light is as it was until then.
-  assert.equal(it.setting.picture, UNSEEN);
+  assert.equal(it.setting.image, PENDING_IMAGE);
   await settle();
   assert.deepEqual(it.told, ['came']);
-  assert.ok(it.setting.picture && it.setting.picture !== UNSEEN);
+  assert.ok(it.setting.image && it.setting.image !== PENDING_IMAGE);
   assert.equal(it.shining, SOURCE);
   it.item = 'flood';
-  assert.deepEqual([it.setting.picture, it.item], [null, 'flood']);
+  assert.deepEqual([it.setting.image, it.item], [null, 'flood']);
   it.item = 'projection';
   assert.equal(it.shining, SOURCE);
   it.item = 'fire';
@@ -97,7 +97,7 @@ test('what follows sources is fetched for none but them, once, and again where i
   await settle();
   assert.deepEqual([it.told, fetched], [['light-source'], 1]);
   assert.match(it.fault?.message ?? '', /offline.*beside the element's/);
-  assert.equal(it.setting.picture, UNSEEN, 'the last light stays');
+  assert.equal(it.setting.image, PENDING_IMAGE, 'the last light stays');
   it.source = null;
   assert.equal(it.fault, null);
   offline = false;
@@ -118,7 +118,7 @@ test('fire burns where it shines', () => {
 
 test('films are told by the end of their address', () => {
   for (const film of ['a.mp4', 'a.M4V', 'a.webm?x=1', 'b/a.ogv#t=2', 'a.mov']) {
-    assert.ok(isFilm(new URL(film, 'https://a.org').href), film);
+    assert.ok(isVideoAddress(new URL(film, 'https://a.org').href), film);
   }
-  assert.ok(!isFilm('https://a.org/a.png?b=c.mp4'));
+  assert.ok(!isVideoAddress('https://a.org/a.png?b=c.mp4'));
 });

@@ -3,15 +3,17 @@
  * something else. What was chosen goes with `reset`, and where the page asks for something new.
  */
 
+import { PENDING_IMAGE } from '../lights/image-light.js';
+import type { LightColor } from '../lights/light-color.js';
 import type { CrossOrigin, LightMedia } from '../lights/light-media.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
-import type { LightFollower } from '../lights/light-source-observer.js';
+import type { LightSourceObserver } from '../lights/light-source-observer.js';
 import type * as Sources from '../lights/light-sources.js';
-import { UNSEEN } from '../lights/projection.js';
-import type { LightColor } from '../lights/tint.js';
 import { messageOf, PhotoError } from '../shared/errors.js';
-import { clampToPicture, LIGHTS, type LightName, type PicturePoint } from '../shared/settings.js';
+import { LIGHTS, type LightName } from '../shared/names.js';
+import { reuse } from '../shared/reuse.js';
+import { clampToPicture, type PicturePoint } from '../shared/values.js';
 import type { AskedLight } from './options.js';
 
 /** Takes the place of what the page asks for; what is `null` does not. */
@@ -29,7 +31,7 @@ export interface LightingListener {
   changed(): void;
   /** Sources can be followed from now on: `ask` again, unless nobody is there any more. */
   came(): void;
-  faultChanged(fault: PhotoError | null): void;
+  errorChanged(fault: PhotoError | null): void;
 }
 
 /** One of the lights that there are to choose from: what the page shines, or a built-in one. */
@@ -60,7 +62,8 @@ export class Lighting {
   #crossOrigin: CrossOrigin = null;
   #media: LightMedia | null = null;
   #source: LightSource | null = null;
-  #follower: LightFollower | null = null;
+  #follower: LightSourceObserver | null = null;
+  #setting: LightSetting | null = null;
   #watched = false;
   #plays = false;
   /** How long the fire has burnt, as it is shown, and when it is to be shown next. */
@@ -164,7 +167,7 @@ export class Lighting {
 
   /** Whether something shines that can play: fire, or the page's own film. */
   get canPlay(): boolean {
-    return this.burns || (this.#media?.isFilm === true && this.shining === this.#media.source);
+    return this.burns || (this.#media?.isVideo === true && this.shining === this.#media.source);
   }
 
   /** Lets fire burn on. Gives whether it looks different: no more than 30 times a second. */
@@ -179,14 +182,15 @@ export class Lighting {
   get setting(): LightSetting {
     const { name, size } = this;
     const torch = name === 'torch' ? this.torch : null;
-    const picture = this.#projects ? (this.#follower?.projection ?? UNSEEN) : null;
-    return {
+    const image = this.#projects ? (this.#follower?.image ?? PENDING_IMAGE) : null;
+    this.#setting = reuse(this.#setting, {
       name,
       torch,
-      picture,
+      image,
       ...(name === 'torch' && size !== null && { size }),
       ...(name === 'fire' && { seconds: this.#fireShown }),
-    };
+    });
+    return this.#setting;
   }
 
   /** Settles once sources are followed, or cannot be; `null` where nothing is waited for. */
@@ -196,7 +200,7 @@ export class Lighting {
 
   /** Why nothing is to be seen of a source. */
   get fault(): PhotoError | null {
-    return this.#follower?.fault ?? (this.#projects ? this.#missing : null);
+    return this.#follower?.error ?? (this.#projects ? this.#missing : null);
   }
 
   /** Keeps up with sources while anyone looks. `plays`: whether films may. */
@@ -212,14 +216,15 @@ export class Lighting {
     const { src } = this.#asked;
     const media = this.#media;
     if (media && (media.address !== src || media.crossOrigin !== this.#crossOrigin)) {
-      media.stop();
+      media.release();
       this.#media = null;
     }
     if (sources && src !== null) this.#media ??= new sources.LightMedia(src, this.#crossOrigin);
     const source = this.shining;
     if (source !== (this.#follower?.source ?? null) || !sources) {
       this.#follower?.stop();
-      this.#follower = source && sources ? new sources.LightFollower(source, this.#listener) : null;
+      this.#follower =
+        source && sources ? new sources.LightSourceObserver(source, this.#listener) : null;
     }
     this.#attend();
   }
@@ -234,7 +239,7 @@ export class Lighting {
         `The script that lights by pictures could not be loaded (${messageOf(cause)}). It has to lie ` +
         "beside the element's.";
       this.#missing = new PhotoError('light-source', message, cause);
-      if (this.#projects) this.#listener.faultChanged(this.#missing);
+      if (this.#projects) this.#listener.errorChanged(this.#missing);
       return;
     }
     this.#listener.came();
@@ -244,7 +249,7 @@ export class Lighting {
     if (this.#watched) this.#follower?.start();
     else this.#follower?.stop();
     if (this.#media) {
-      this.#media.plays = this.#plays && this.#watched && this.shining === this.#media.source;
+      this.#media.playing = this.#plays && this.#watched && this.shining === this.#media.source;
     }
   }
 }

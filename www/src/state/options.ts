@@ -1,28 +1,30 @@
 /** All that a page asks for by attributes. */
 
 import type { Backend, Gamut, ToneCurve } from '../engine/types.js';
-import { type LightColor, parseColor, type ReadColor, type Tint } from '../lights/tint.js';
+import { type CssColorParser, type LightColor, parseLightColor } from '../lights/light-color.js';
+import type { LightName } from '../shared/names.js';
 import {
-  type LightName,
-  type Loading,
-  type PicturePoint,
-  parseAddress,
-  parseBackends,
-  parseCrossOrigin,
   parseExposure,
   parseGamut,
-  parseKiosk,
   parseLight,
-  parseLoading,
-  parsePlace,
-  parseReveal,
-  parseSize,
   parseTone,
   parseWhiteBalance,
+} from '../shared/parse-settings.js';
+import type { PicturePoint, RgbFactors } from '../shared/values.js';
+import type { Attributes } from './attribute-reader.js';
+import {
+  type Loading,
+  parseAddress,
+  parseBackends,
+  parseCoordinate,
+  parseCrossOrigin,
+  parseKiosk,
+  parseLoading,
+  parseReveal,
+  parseTorchSize,
   parseZoom,
   type Reveal,
-} from '../shared/settings.js';
-import type { Attributes } from './attribute-reader.js';
+} from './attribute-values.js';
 
 /** See the module. Addresses are absolute. */
 export interface Asked {
@@ -31,7 +33,7 @@ export interface Asked {
   readonly backends: readonly Backend[] | null;
   readonly gamut: Gamut;
   readonly exposure: number;
-  readonly whiteBalance: Tint;
+  readonly whiteBalance: RgbFactors;
   readonly tone: ToneCurve;
   readonly light: AskedLight;
   readonly poster: string | null;
@@ -72,21 +74,21 @@ export interface AttributeSource {
 export function readAsked(
   element: AttributeSource,
   attributes: Attributes,
-  readColor: ReadColor,
+  readColor: CssColorParser,
 ): Asked {
   const read = <T>(name: string, parse: (value: string | null, name: string) => T): T =>
     attributes.read(name, element.getAttribute(name), (value) => parse(value, name));
   const address = (value: string | null, name: string) =>
     parseAddress(value, name, element.baseURI);
   const has = (name: string) => element.getAttribute(name) !== null;
-  const [x, y] = [read('light-x', parsePlace), read('light-y', parsePlace)];
+  const [x, y] = [read('light-x', parseCoordinate), read('light-y', parseCoordinate)];
   return {
     light: {
       name: read('light', parseLight),
       src: read('light-src', address),
       place: x === null && y === null ? null : { x: x ?? 0.5, y: y ?? 0.5 },
-      size: read('light-size', parseSize),
-      color: read('light-color', (value) => parseColor(value, readColor)),
+      size: read('light-size', parseTorchSize),
+      color: read('light-color', (value) => parseLightColor(value, readColor)),
     },
     backends: read('backend', parseBackends),
     exposure: read('exposure', parseExposure),

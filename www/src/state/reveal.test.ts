@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { Loading, Reveal } from '../shared/settings.js';
+import type { Loading, Reveal } from './attribute-values.js';
 import { Curtain } from './reveal.js';
 
 const asked = (loading: Loading, reveal: Reveal = 'auto') => ({ loading, reveal });

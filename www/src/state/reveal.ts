@@ -1,6 +1,6 @@
 /** When a photograph is fetched, and when its poster gives way to it. */
 
-import type { Loading, Reveal } from '../shared/settings.js';
+import type { Loading, Reveal } from './attribute-values.js';
 
 /** What a page asks of it. */
 export interface CurtainAsked {

@@ -1,13 +1,10 @@
 /** Light and view as text, for addresses: `l=torch&x=0.312&y=0.64&z=2&vx=0.5&vy=0.41&e=1.2`. */
 
 import { PhotoError } from '../shared/errors.js';
-import {
-  LIGHTS,
-  type LightName,
-  MAX_EXPOSURE,
-  MAX_SIZE,
-  type PicturePoint,
-} from '../shared/settings.js';
+import { LIGHTS, type LightName } from '../shared/names.js';
+import { MAX_EXPOSURE } from '../shared/parse-settings.js';
+import type { PicturePoint } from '../shared/values.js';
+import { MAX_TORCH_SIZE } from './attribute-values.js';
 import { type PhotoView, WHOLE } from './viewport.js';
 
 /** What a visitor may have changed; `null` is as the page has it. */
@@ -73,7 +70,7 @@ export function readState(text: string): { state: PhotoState; faults: readonly P
     state: {
       light,
       torch,
-      size: number('s', 1e-6, MAX_SIZE),
+      size: number('s', 1e-6, MAX_TORCH_SIZE),
       color: isColor ? `#${hex}` : null,
       exposure: number('e', 0, MAX_EXPOSURE),
       view: { zoom, x: vx ?? WHOLE.x, y: vy ?? WHOLE.y },

@@ -3,16 +3,13 @@
  * it, until somebody chooses something else. Knows no DOM.
  */
 
-import type { Look } from '../engine/output-settings.js';
-import { parseColor, type ReadColor, tinted } from '../lights/tint.js';
+import type { OutputSettings } from '../engine/output-settings.js';
+import { type CssColorParser, multiplyRgb, parseLightColor } from '../lights/light-color.js';
 import type { PhotoError } from '../shared/errors.js';
-import {
-  CENTRE,
-  clampToPicture,
-  type LightName,
-  parseLight,
-  parseSize,
-} from '../shared/settings.js';
+import type { LightName } from '../shared/names.js';
+import { parseLight } from '../shared/parse-settings.js';
+import { CENTRE, clampToPicture } from '../shared/values.js';
+import { parseTorchSize } from './attribute-values.js';
 import { type LightChoice, type LightItem, Lighting, type LightingListener } from './lighting.js';
 import type { Asked } from './options.js';
 import { Curtain } from './reveal.js';
@@ -46,7 +43,7 @@ const OVERRULES: Readonly<Record<string, keyof LightChoice>> = {
 export class Exhibit {
   readonly lighting: Lighting;
   readonly curtain = new Curtain();
-  readonly #readColor: ReadColor;
+  readonly #readColor: CssColorParser;
   #asked: Asked;
   #view = WHOLE;
   #exposure: number | null = null;
@@ -54,7 +51,7 @@ export class Exhibit {
   /** Why there is no picture. */
   fault: string | null = null;
 
-  constructor(asked: Asked, listener: LightingListener, readColor: ReadColor) {
+  constructor(asked: Asked, listener: LightingListener, readColor: CssColorParser) {
     this.#asked = asked;
     this.lighting = new Lighting(listener);
     this.#readColor = readColor;
@@ -98,12 +95,12 @@ export class Exhibit {
     return this.fault === null && !this.curtain.isDown(this.#asked);
   }
 
-  get look(): Look {
+  get output(): OutputSettings {
     const { exposure, whiteBalance, tone } = this.#asked;
     const { color } = this.lighting;
     return {
       exposure: this.#exposure ?? exposure,
-      whiteBalance: color ? tinted(whiteBalance, color.tint) : whiteBalance,
+      whiteBalance: color ? multiplyRgb(whiteBalance, color.factors) : whiteBalance,
       tone,
     };
   }
@@ -120,8 +117,8 @@ export class Exhibit {
       }
       choice.torch = clampToPicture(torch);
     }
-    if (size !== undefined) choice.size = parseSize(String(size));
-    if (color !== undefined) choice.color = parseColor(color, this.#readColor);
+    if (size !== undefined) choice.size = parseTorchSize(String(size));
+    if (color !== undefined) choice.color = parseLightColor(color, this.#readColor);
     this.lighting.choose(choice);
   }
 
@@ -143,7 +140,7 @@ export class Exhibit {
 
   get state(): string {
     const { item, torch, size, color } = this.lighting;
-    const { exposure } = this.look;
+    const { exposure } = this.output;
     return writeState({
       light: item === 'projection' ? null : item,
       torch: item === 'torch' ? torch : null,
@@ -163,7 +160,7 @@ export class Exhibit {
       name,
       torch: torch && clampToPicture(torch),
       size,
-      color: parseColor(color, this.#readColor),
+      color: parseLightColor(color, this.#readColor),
     });
     this.#exposure = exposure;
     this.view = view;

@@ -1,6 +1,6 @@
 /** Which part of a picture is seen: zooming and panning, never past its edges. */
 
-import type { PicturePoint } from '../shared/settings.js';
+import type { PicturePoint } from '../shared/values.js';
 
 /** What part of the picture is shown. */
 export interface PhotoView {

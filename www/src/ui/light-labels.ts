@@ -1,7 +1,7 @@
 /** Where a light is, in words. */
 
 import { type Language, say, type Word } from '../i18n/strings.js';
-import type { PicturePoint } from '../shared/settings.js';
+import type { PicturePoint } from '../shared/values.js';
 
 const PLACES: readonly (readonly Word[])[] = [
   ['upperLeft', 'above', 'upperRight'],

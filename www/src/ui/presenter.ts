@@ -3,7 +3,7 @@
 import { languageAt } from '../i18n/language.js';
 import { isMissing, type Language, say, type Word } from '../i18n/strings.js';
 import { mayTilt } from '../input/tilt-sensor.js';
-import { CENTRE } from '../shared/settings.js';
+import { CENTRE } from '../shared/values.js';
 import type { LightItem } from '../state/lighting.js';
 import type { Exhibit } from '../state/viewer-state.js';
 import type { Controls } from './controls.js';

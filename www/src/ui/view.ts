@@ -2,7 +2,7 @@
  * message, and the place of the controls. Holds no state that is not on the screen. */
 
 import { type Language, say } from '../i18n/strings.js';
-import type { PicturePoint } from '../shared/settings.js';
+import type { PicturePoint } from '../shared/values.js';
 import { type PhotoView, toBox } from '../state/viewport.js';
 import { adopt } from './adopted-styles.js';
 import { make, put, slot, write } from './dom.js';

@@ -1,6 +1,6 @@
 /** A canvas that the page draws on the CPU. Tiles may leave its module; they are back for the next picture. */
 
-import type { Look } from '../../engine/output-settings.js';
+import type { OutputSettings } from '../../engine/output-settings.js';
 import type { CpuModule, Gamut } from '../../engine/types.js';
 import type { LightSetting } from '../../lights/light-setting.js';
 import type { Photograph } from '../../photo/photograph.js';
@@ -41,9 +41,13 @@ export class MainThreadRenderer implements CanvasRenderer {
     return renderer;
   }
 
-  render(setting: LightSetting, look: Look, detail: number): FrameResult | Promise<FrameResult> {
-    if (this.#renderer) return this.#renderer.render(setting, look, detail);
-    return this.#begin().then((renderer) => renderer.render(setting, look, detail));
+  render(
+    setting: LightSetting,
+    output: OutputSettings,
+    detail: number,
+  ): FrameResult | Promise<FrameResult> {
+    if (this.#renderer) return this.#renderer.render(setting, output, detail);
+    return this.#begin().then((renderer) => renderer.render(setting, output, detail));
   }
 
   free(): void {

@@ -1,11 +1,11 @@
 /** What the page and a worker that relights say to each other: one answer to each request. */
 
-import type { Look } from '../../engine/output-settings.js';
+import type { OutputSettings } from '../../engine/output-settings.js';
 import type { Gamut } from '../../engine/types.js';
 
 /** How a picture is drawn. */
 export interface Showing {
-  readonly look: Look;
+  readonly output: OutputSettings;
   /** Of the canvas. */
   readonly gamut: Gamut;
   /** Share of the components, 0 to 1. */

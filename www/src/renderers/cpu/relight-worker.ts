@@ -35,7 +35,7 @@ function answer(module: CpuModule, photo: number, task: Task): ArrayBuffer {
       return Uint32Array.from(planned(module, band).lightRows).buffer;
     case 'relight': {
       const { light, showing, pixels } = task;
-      const display = makeDisplay(module, showing.look, showing.gamut);
+      const display = makeDisplay(module, showing.output, showing.gamut);
       try {
         const out = new Uint8Array(pixels);
         planned(module, band).relight(light, display, showing.detail, out);

@@ -8,7 +8,7 @@ import type { Patience, WorkerLike } from './worker-client.js';
 import { WorkerPool } from './worker-pool.js';
 
 /** As taken, in full. */
-export const SHOWING: Showing = { look: PLAIN, gamut: 'srgb', detail: 1 };
+export const SHOWING: Showing = { output: PLAIN, gamut: 'srgb', detail: 1 };
 
 /** A tile is one row of one pixel, which its number paints. */
 const SIDE = 1;

@@ -1,8 +1,8 @@
 /** A canvas that a crew of workers draws. */
 
-import type { Look } from '../../engine/output-settings.js';
+import type { OutputSettings } from '../../engine/output-settings.js';
 import type { CpuModule, DrawnPhoto, Gamut } from '../../engine/types.js';
-import { Lamp } from '../../lights/light-cache.js';
+import { LightCache } from '../../lights/light-cache.js';
 import type { LightSetting } from '../../lights/light-setting.js';
 import type { Photograph } from '../../photo/photograph.js';
 import { hasCode, letGo, messageOf, PhotoError } from '../../shared/errors.js';
@@ -14,7 +14,7 @@ export class WorkerRenderer implements CanvasRenderer {
   readonly canvas: HTMLCanvasElement;
   readonly kernel: string;
   readonly gamut: Gamut;
-  readonly #lamp: Lamp;
+  readonly #lights: LightCache;
   /** What lights are made for. */
   readonly #plane: DrawnPhoto;
   readonly #photograph: Photograph;
@@ -33,7 +33,7 @@ export class WorkerRenderer implements CanvasRenderer {
     this.canvas = context.canvas;
     this.kernel = kernel;
     this.gamut = gamut;
-    this.#lamp = new Lamp(module);
+    this.#lights = new LightCache(module);
     this.#plane = photograph.plane(module);
     this.#photograph = photograph;
     this.#pool = pool;
@@ -66,14 +66,18 @@ export class WorkerRenderer implements CanvasRenderer {
     return new WorkerRenderer(module, photograph, pool, context, kernel, gamut);
   }
 
-  async render(setting: LightSetting, look: Look, detail: number): Promise<FrameResult> {
+  async render(
+    setting: LightSetting,
+    output: OutputSettings,
+    detail: number,
+  ): Promise<FrameResult> {
     // Before its tiles are brought to the workers for nothing.
     if (this.#freed) throw letGo();
     try {
       return await this.#photograph.withWorkers(this.#pool, async (session) => {
         if (this.#freed) throw letGo();
-        const { light, asked, fault } = this.#lamp.turnTo(setting, this.#plane);
-        const rows = await session.relight(light, { look, gamut: this.gamut, detail });
+        const { light, lightApplied, lightError } = this.#lights.get(setting, this.#plane);
+        const rows = await session.relight(light, { output, gamut: this.gamut, detail });
         const settings = { colorSpace: this.gamut };
         if (this.#freed) throw letGo();
         // All at once, and before their memory is used again.
@@ -85,7 +89,7 @@ export class WorkerRenderer implements CanvasRenderer {
             first,
           );
         }
-        return { lightApplied: asked, lightError: fault };
+        return { lightApplied, lightError };
       });
     } catch (thrown) {
       if (!hasCode(thrown, 'worker-unavailable')) throw thrown;
@@ -97,7 +101,7 @@ export class WorkerRenderer implements CanvasRenderer {
   free(): void {
     if (this.#freed) return;
     this.#freed = true;
-    this.#lamp.free();
+    this.#lights.free();
     this.#plane.free();
   }
 }

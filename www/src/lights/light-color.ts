@@ -1,0 +1,75 @@
+/**
+ * The colour of a light. The light transport matrix keeps channels apart, so a coloured light multiplies the
+ * picture's channels: the renderer applies the colour as part of the white balance.
+ */
+
+import { PhotoError } from '../shared/errors.js';
+import type { RgbFactors } from '../shared/values.js';
+
+export interface LightColor {
+  readonly factors: RgbFactors;
+  /** The CSS colour in hexadecimal, with `#`. */
+  readonly hex: string;
+}
+
+/** Parses a CSS colour into red, green, blue and alpha from 0 to 255; `null` if it is invalid. */
+export type CssColorParser = (css: string) => readonly number[] | null;
+
+/**
+ * The `light-color` attribute; `null`, which is white, for an empty value. Alpha scales the brightness.
+ *
+ * @throws `attribute` for an invalid colour
+ */
+export function parseLightColor(value: string | null, parse: CssColorParser): LightColor | null {
+  const css = value?.trim();
+  if (!css) return null;
+  const rgba = parse(css);
+  if (!rgba) {
+    const message = `The light color “${css}” is not a CSS color. Use a color such as “orange” or “#ffc080”.`;
+    throw new PhotoError('attribute', message);
+  }
+  const [red = 0, green = 0, blue = 0, alpha = 255] = rgba;
+  const opacity = alpha / 255;
+  const codes = alpha < 255 ? [red, green, blue, alpha] : [red, green, blue];
+  return {
+    factors: [opacity * decodeSrgb(red), opacity * decodeSrgb(green), opacity * decodeSrgb(blue)],
+    hex: `#${codes.map((code) => code.toString(16).padStart(2, '0')).join('')}`,
+  };
+}
+
+/** Multiplies channel by channel. */
+export function multiplyRgb(a: RgbFactors, b: RgbFactors): RgbFactors {
+  return [a[0] * b[0], a[1] * b[1], a[2] * b[2]];
+}
+
+/** Linear brightness from 0 to 1 of an sRGB code (IEC 61966-2-1). */
+function decodeSrgb(code: number): number {
+  const value = code / 255;
+  return value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4;
+}
+
+let context: CanvasRenderingContext2D | null = null;
+const parsed = new Map<string, readonly number[] | null>();
+
+/** Parses with a canvas of one pixel, which supports every colour syntax of the browser. */
+export const parseCssColor: CssColorParser = (css) => {
+  const cached = parsed.get(css);
+  if (cached !== undefined) return cached;
+  context ??= document.createElement('canvas').getContext('2d', { willReadFrequently: true });
+  if (!context) return null;
+  const canvas = context;
+  // An invalid colour leaves the previous fillStyle.
+  const fillAfter = (previous: string): unknown => {
+    canvas.fillStyle = previous;
+    canvas.fillStyle = css;
+    return canvas.fillStyle;
+  };
+  let rgba: readonly number[] | null = null;
+  if (fillAfter('#000') === fillAfter('#fff')) {
+    canvas.clearRect(0, 0, 1, 1);
+    canvas.fillRect(0, 0, 1, 1);
+    rgba = [...canvas.getImageData(0, 0, 1, 1).data];
+  }
+  parsed.set(css, rgba);
+  return rgba;
+};
