@@ -1,22 +1,22 @@
-# Sourced by the other scripts, never run: where the tools are. Installs nothing and prints nothing;
-# a tool that is missing leaves its variable empty, for pkg-scripts/setup to deal with.
+# Sourced by the other scripts, never run: finds the tools. Installs nothing and prints nothing; the variable of a
+# missing tool stays empty, and pkg-scripts/setup installs the tool.
 
 REPO=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/relightable-photo
 
-# Scripts and tests look for what cargo built here, wherever the user's own settings would have it.
+# Scripts and tests expect cargo's output here, whatever the user's own settings say.
 export CARGO_TARGET_DIR="$REPO/target"
 
-# rustup's own place, for shells that were started before it was installed.
+# rustup's folder, for shells that were started before rustup was installed.
 [ -d "${CARGO_HOME:-$HOME/.cargo}/bin" ] && PATH="$PATH:${CARGO_HOME:-$HOME/.cargo}/bin"
 
-# The crate and the command of wasm-bindgen only work together at the same version.
+# wasm-bindgen's crate and command work together only at the same version.
 WASM_BINDGEN_VERSION=$(awk '/^name = "wasm-bindgen"$/ { getline; gsub(/version = |"/, ""); print; exit }' "$REPO/Cargo.lock")
 WASM_BINDGEN_ROOT=$CACHE/wasm-bindgen-$WASM_BINDGEN_VERSION
 PATH="$WASM_BINDGEN_ROOT/bin:$PATH"
 export PATH
 
-# Of the module's stack, which every worker has one of, a quarter of what the linker gives on its own.
+# Every worker has a stack of its own: a quarter of the linker's default is enough.
 WASM_FLAGS="-C link-arg=-zstack-size=262144"
 
 first_command() {
@@ -26,7 +26,7 @@ first_command() {
   done
 }
 
-# Prints the python of an environment with exactly these packages, made where there is none.
+# Prints the Python of a virtual environment with exactly these packages; makes the environment if it is missing.
 python_with() { # name, packages…
   local name=$1 python environment
   shift
@@ -48,12 +48,12 @@ python_with() { # name, packages…
 }
 
 clang_targets_wasm() {
-  # The header is part of the question: some packages of clang come without their own.
+  # Some packages of clang lack its own headers.
   echo '#include <stddef.h>' |
     "$1" --target=wasm32-unknown-unknown -ffreestanding -x c -c - -o /dev/null 2>/dev/null
 }
 
-# Prints a clang that can target wasm32 and the llvm-ar to go with it.
+# Prints a clang that can target wasm32, and the matching llvm-ar.
 find_wasm_c_tools() {
   local version clang ar
   for version in "" -22 -21 -20 -19 -18 -17 -16 -15 -14; do
@@ -64,7 +64,7 @@ find_wasm_c_tools() {
   done
 }
 
-# For the C code of zstd. Whoever sets these knows better.
+# These compile the C code of zstd. Values from the user's environment stay.
 if [ -z "${CC_wasm32_unknown_unknown:-}" ] || [ -z "${AR_wasm32_unknown_unknown:-}" ]; then
   read -r CC_wasm32_unknown_unknown AR_wasm32_unknown_unknown < <(find_wasm_c_tools) || true
 fi
@@ -74,6 +74,6 @@ CHROMIUM=${CHROMIUM:-$(first_command chromium chromium-browser google-chrome goo
 CHROMEDRIVER=${CHROMEDRIVER:-$(first_command chromedriver chromium.chromedriver)}
 FIREFOX=${FIREFOX:-$(first_command firefox-esr firefox)}
 WEBKIT_DRIVER=${WEBKIT_DRIVER:-$(first_command WebKitWebDriver)}
-# Neither has graphics without a screen; this one nobody sees.
+# Without a screen neither has a graphics device: both run on a virtual one.
 if ! command -v Xvfb >/dev/null; then FIREFOX='' WEBKIT_DRIVER=''; fi
 export CHROMIUM CHROMEDRIVER FIREFOX WEBKIT_DRIVER

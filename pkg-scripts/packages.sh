@@ -1,13 +1,13 @@
 # Sourced by other scripts, never run: installs system packages. Uses the script's own say and stop.
 
-install_missing() { # what lists the missing packages, what else to do about them…
+install_missing() { # function that lists the missing packages, advice…
   local packages missing=$1 as_root=()
   shift
   mapfile -t packages < <("$missing")
   if [ ${#packages[@]} -eq 0 ]; then return; fi
   if ! command -v apt-get >/dev/null; then
     stop "These are missing, and there is no apt-get to install them with: ${packages[*]}" \
-      "Install what your system calls them, then run this again." "$@"
+      "Install your system's packages of them, then run this again." "$@"
   fi
   if [ "$(id -u)" -ne 0 ]; then
     as_root=(sudo -n)

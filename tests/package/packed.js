@@ -51,23 +51,35 @@ function pack() {
 /** What `npm publish` would send. */
 export const packed = pack();
 
-/** The package as a folder below `node_modules`, installed with nothing else. @param {string} [name] */
+/**
+ * Installs the tarball as a package manager does. The package has no dependencies, so nothing is resolved and no
+ * registry is asked.
+ *
+ * @param {string} place folder of the package
+ */
+function unpackInto(place) {
+  rmSync(place, { recursive: true, force: true });
+  mkdirSync(place, { recursive: true });
+  run(place, 'tar', '-xzf', packed.tarball, '--strip-components=1');
+}
+
+/** Makes a project that has this package alone. @param {string} [name] of its folder in target/package */
 export function unpacked(name = 'unpacked') {
   const folder = join(WORK, name);
   const place = join(folder, 'node_modules/relightable-photo');
   rmSync(folder, { recursive: true, force: true });
-  mkdirSync(place, { recursive: true });
-  // Nothing in it belongs to the repository around it, which has the same name.
+  unpackInto(place);
+  // Node would otherwise resolve the name to the repository, whose package.json has the same one.
   writeFileSync(join(folder, 'package.json'), '{ "private": true }\n');
-  run(folder, 'tar', '-xzf', packed.tarball, '-C', place, '--strip-components=1');
   return { folder, place };
 }
 
 /**
- * A project of this folder with its own packages installed, which are kept while its lock file stays, and this
- * one's tarball.
+ * Copies a project of this folder to target/package, installs the packages of its lock file (once, until that file
+ * changes), and adds this package's tarball.
  *
- * @param {string} name of a folder beside this file
+ * @param {string} name folder beside this file
+ * @returns {string} the copy
  */
 export function project(name) {
   const [source, folder] = [join(import.meta.dirname, name), join(WORK, name)];
@@ -81,22 +93,11 @@ export function project(name) {
     if (!(kept && entry === 'node_modules')) rmSync(join(folder, entry), { recursive: true });
   }
   cpSync(source, folder, { recursive: true });
-  const quiet = ['--no-audit', '--no-fund', '--loglevel=error'];
   if (!kept) {
-    run(folder, 'npm', 'ci', ...quiet);
+    run(folder, 'npm', 'ci', '--no-audit', '--no-fund', '--loglevel=error');
     writeFileSync(stamp, lock);
   }
-  rmSync(join(folder, 'node_modules/relightable-photo'), { recursive: true, force: true });
-  run(
-    folder,
-    'npm',
-    'install',
-    '--no-save',
-    '--no-package-lock',
-    '--offline',
-    ...quiet,
-    packed.tarball,
-  );
+  unpackInto(join(folder, 'node_modules/relightable-photo'));
   return folder;
 }
 
