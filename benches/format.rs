@@ -22,12 +22,12 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use npyz::WriterBuilder;
+use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{
     EncodedFile, HEADER_BYTES, Head, Limits, Metadata, PartNumber, Quality, Reader, Source,
     decode_basis, decode_tile,
 };
 use relightable_photo::transport::{BandTile, Basis, CHANNELS, Decibels, TransportError};
-use relightable_photo::workers::OneThread;
 use serde_json::{Value, json};
 
 use figures::Figures;
@@ -277,7 +277,7 @@ fn rates(files: &Files, figures: &mut Figures) {
         extensions: Vec::new(),
     };
     let start = Instant::now();
-    EncodedFile::new(source, Quality::Snr(Decibels(33.0)), &OneThread).unwrap();
+    EncodedFile::new(source, Quality::Snr(Decibels(33.0)), &SequentialExecutor).unwrap();
     let encoding = megabytes(&given) / start.elapsed().as_secs_f64();
     figures.insert("encode_native_mb_s".to_owned(), encoding);
     let fastest = (0..5).map(|_| {

@@ -32,9 +32,8 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 use relightable_photo::capture::{Measurements, Noise, Pattern, Picture, Rows};
-use relightable_photo::recover::{
-    Homotopy, Method, Nnls, OneThread, Recovery, Settings, SparsityBasis, Workers,
-};
+use relightable_photo::executor::{Executor, SequentialExecutor};
+use relightable_photo::recover::{Homotopy, Method, Nnls, Recovery, Settings, SparsityBasis};
 use relightable_photo::simulate::{
     Camera, Codes, Ensemble, Exposure, NoiseStream, SceneKind, emission,
 };
@@ -137,7 +136,12 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
 
 fn prepare(measurements: &Measurements, method: Method) -> Recovery {
     let window = Window::new(WINDOW).unwrap();
-    Recovery::prepare(measurements, Settings { method, window }, &OneThread).unwrap()
+    Recovery::prepare(
+        measurements,
+        Settings { method, window },
+        &SequentialExecutor,
+    )
+    .unwrap()
 }
 
 fn tile(recovery: &Recovery, measurements: &Measurements, rect: TileRect) -> TransportFunctions {
@@ -468,7 +472,7 @@ const SIDES: [u32; 3] = [128, 192, 256];
 /// Threads of a pool.
 struct Pool(rayon::ThreadPool);
 
-impl Workers for Pool {
+impl Executor for Pool {
     fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         self.0
             .install(|| (0..count).into_par_iter().map(work).collect())

@@ -23,8 +23,9 @@ pub mod calibrate;
 pub mod capture;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod cli;
-mod eigen;
+pub mod executor;
 pub mod format;
+mod linalg;
 pub mod recover;
 pub mod relight;
 #[cfg(not(target_arch = "wasm32"))]
@@ -32,10 +33,8 @@ pub mod simulate;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod study;
 pub mod transport;
-mod vectorised;
 #[cfg(target_arch = "wasm32")]
 pub mod web;
-pub mod workers;
 
 // Unit tests of wasm32 run where the kernels and canvases are: in a browser.
 #[cfg(all(test, target_arch = "wasm32"))]

@@ -12,12 +12,12 @@ use std::path::Path;
 use std::sync::Once;
 
 use common::{Noise, functions, tiled};
+use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{
     self, CaptureNote, EncodedFile, Extension, FormatError, Head, Limits, Metadata, PartNumber,
     Quality, Reader, Source,
 };
 use relightable_photo::transport::{BandTile, Basis, CHANNELS, Decibels, Geometry, Tile, TileRect};
-use relightable_photo::workers::OneThread;
 
 /// What each file is, as `docs/format.md` lists them.
 const NAMES: [&str; 7] = [
@@ -120,7 +120,7 @@ impl Synthetic {
             extensions,
         };
         let mut file = Vec::new();
-        let encoded = EncodedFile::new(source, quality, &OneThread).unwrap();
+        let encoded = EncodedFile::new(source, quality, &SequentialExecutor).unwrap();
         encoded.write(&mut file).unwrap();
         file
     }

@@ -5,6 +5,7 @@ mod common;
 
 use common::{Noise, functions, geometry, sealed};
 use proptest::prelude::*;
+use relightable_photo::executor::{Executor, SequentialExecutor};
 use relightable_photo::format::{
     self, Coding, EncodedFile, Extension, FormatError, HEADER_BYTES, Interest, Judge, Limits,
     Metadata, Part, PartNumber, Quality, Reader, Source, TextDamage,
@@ -13,7 +14,6 @@ use relightable_photo::transport::{
     BandTile, Basis, CHANNELS, Decibels, FactoredTile, Geometry, RecoveredTile, Tile, Transport,
     TransportError, TransportFunctions,
 };
-use relightable_photo::workers::{OneThread, Workers};
 
 /// What a recovery yields.
 #[derive(Clone)]
@@ -81,13 +81,13 @@ impl Recovered {
     }
 
     fn encode(&self, quality: Quality<'_>) -> Result<EncodedFile, FormatError> {
-        self.encode_by(quality, &OneThread, Vec::new())
+        self.encode_by(quality, &SequentialExecutor, Vec::new())
     }
 
     fn encode_by(
         &self,
         quality: Quality<'_>,
-        workers: &impl Workers,
+        executor: &impl Executor,
         extensions: Vec<Extension>,
     ) -> Result<EncodedFile, FormatError> {
         let source = Source {
@@ -97,7 +97,7 @@ impl Recovered {
             metadata: metadata(),
             extensions,
         };
-        EncodedFile::new(source, quality, workers)
+        EncodedFile::new(source, quality, executor)
     }
 
     fn file(&self, quality: Quality<'_>) -> Vec<u8> {
@@ -270,7 +270,7 @@ proptest! {
 /// A worker who does the last first.
 struct Backwards;
 
-impl Workers for Backwards {
+impl Executor for Backwards {
     fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         let mut results: Vec<T> = (0..count).rev().map(work).collect();
         results.reverse();
@@ -715,7 +715,7 @@ fn other_minor_versions_and_unknown_extensions_are_read_unless_they_must_be_unde
     let encode = |extensions| {
         bytes(
             &recovered
-                .encode_by(QUALITY, &OneThread, extensions)
+                .encode_by(QUALITY, &SequentialExecutor, extensions)
                 .unwrap(),
         )
     };

@@ -9,9 +9,9 @@ use std::sync::Arc;
 use common::relit::{self, Kind};
 use common::tiled;
 use proptest::prelude::*;
+use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::relight::{Display, Light, TorchPose, cpu, reference};
 use relightable_photo::transport::{Geometry, LightPx, MAX_WINDOW, Tile};
-use relightable_photo::workers::OneThread;
 
 /// Grids, windows and tiles of all shapes, with correspondences that turn, mirror and shift the
 /// picture until windows hang over the display's edges, or miss it.
@@ -38,9 +38,9 @@ proptest! {
         // One for all lights: what is left of the last must not show.
         let mut relighter = cpu::Relighter::new(transport.clone());
         for (name, light) in relit::lights(geometry.light) {
-            relighter.relight(&light, &OneThread);
+            relighter.relight(&light, &SequentialExecutor);
             let display = relit::displays(exposure)[seed as usize / 3 % 4];
-            let got = relighter.picture(&display, &OneThread);
+            let got = relighter.picture(&display, &SequentialExecutor);
             let want = reference::picture(&transport, &light, &display);
             relit::assert_within_one_code(&got, &want, name);
         }
@@ -55,8 +55,8 @@ fn a_window_off_the_display_sees_nothing() {
         let transport = Arc::new(relit::asymmetric_transport(geometry, Kind::Mixed, 1));
         let mut relighter = cpu::Relighter::new(transport);
         for (name, light) in relit::lights(geometry.light) {
-            relighter.relight(&light, &OneThread);
-            let picture = relighter.picture(&Display::srgb(1.0), &OneThread);
+            relighter.relight(&light, &SequentialExecutor);
+            let picture = relighter.picture(&Display::srgb(1.0), &SequentialExecutor);
             assert!(
                 picture.pixels.iter().all(|p| *p == [0, 0, 0, 255]),
                 "{name}, {shift}"
@@ -91,9 +91,9 @@ fn a_light_that_moves_leaves_nothing_behind() {
             elements.extend([r, g, b].map(|c| if *c < 1e-3 { 0.0 } else { *c }));
         }
         let light = Light::from_linear_rgb(geometry.light, &elements).unwrap();
-        moved.relight(&light, &OneThread);
+        moved.relight(&light, &SequentialExecutor);
         let mut anew = cpu::Relighter::new(transport.clone());
-        anew.relight(&light, &OneThread);
+        anew.relight(&light, &SequentialExecutor);
         assert_eq!(moved.linear(), anew.linear(), "step {step}");
     }
 }
@@ -119,19 +119,19 @@ proptest! {
         let mut whole = cpu::Relighter::new(Arc::new(transport));
         let display = relit::displays(1.0)[seed as usize / 3 % 4];
         for (name, light) in relit::lights(geometry.light) {
-            whole.relight(&light, &OneThread);
+            whole.relight(&light, &SequentialExecutor);
             let mut shared = Vec::new();
             for (relighter, rows) in &mut parts {
                 let seen = RowsSeen { light: &light, rows: relighter.light_rows() };
-                relighter.relight_rows(seen, &OneThread);
+                relighter.relight_rows(seen, &SequentialExecutor);
                 let mut out = vec![[0; 4]; rows.len() * extent.width as usize];
-                relighter.show(&display, rows.clone(), &mut out, &OneThread);
+                relighter.show(&display, rows.clone(), &mut out, &SequentialExecutor);
                 shared.append(&mut out);
                 let [start, end] = [rows.start, rows.end].map(|row| (row * extent.width) as usize);
                 let (part, whole) = (relighter.linear(), whole.linear());
                 prop_assert!(part.pixels[start..end] == whole.pixels[start..end], "{name}");
             }
-            prop_assert!(whole.picture(&display, &OneThread).pixels == shared, "{name}");
+            prop_assert!(whole.picture(&display, &SequentialExecutor).pixels == shared, "{name}");
         }
     }
 }
@@ -149,28 +149,32 @@ fn less_detail_is_the_first_components_and_goes_as_it_came() {
     let mut relighter = cpu::Relighter::new(transport.clone());
     for (name, light) in relit::lights(geometry.light) {
         relighter.set_detail(1.0);
-        relighter.relight(&light, &OneThread);
+        relighter.relight(&light, &SequentialExecutor);
         let whole = relighter.linear();
         // One quad of three, then two.
         for (share, quads) in [(0.0, 1), (0.3, 1), (0.34, 2)] {
             let display = Display::srgb(1.0);
             relighter.set_detail(share);
-            relighter.relight(&light, &OneThread);
+            relighter.relight(&light, &SequentialExecutor);
             let want = reference::picture(&relit::first_quads(&transport, quads), &light, &display);
-            relit::assert_within_one_code(&relighter.picture(&display, &OneThread), &want, name);
+            relit::assert_within_one_code(
+                &relighter.picture(&display, &SequentialExecutor),
+                &want,
+                name,
+            );
             // The same under the light that is there.
             let less = relighter.linear();
             relighter.set_detail(1.0);
-            relighter.update(&OneThread);
+            relighter.update(&SequentialExecutor);
             assert_eq!(relighter.linear(), whole, "{name}");
-            relighter.update(&OneThread);
+            relighter.update(&SequentialExecutor);
             assert_eq!(relighter.linear(), whole, "{name}");
             relighter.set_detail(share);
-            relighter.update(&OneThread);
+            relighter.update(&SequentialExecutor);
             assert_eq!(relighter.linear(), less, "{name}");
         }
         relighter.set_detail(1.0);
-        relighter.relight(&light, &OneThread);
+        relighter.relight(&light, &SequentialExecutor);
         assert_eq!(relighter.linear(), whole, "{name}");
     }
 }

@@ -12,11 +12,11 @@ mod common;
 use common::relit::{self, Kind};
 use common::{band_tile, tiled};
 use js_sys::{Float32Array, Object, Reflect, Uint8ClampedArray};
+use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{EncodedFile, Limits, Metadata, Quality, Reader, Source};
 use relightable_photo::relight::{self, BuiltinLight, Rgba8Picture, reference};
 use relightable_photo::transport::{Extent, Geometry, Tile, Transport};
 use relightable_photo::web::{CodedError, Decoder, Display, Graphics, Light, Photo, Relighter};
-use relightable_photo::workers::OneThread;
 use wasm_bindgen::convert::TryFromJsValue;
 use wasm_bindgen::{JsCast, JsValue};
 use wasm_bindgen_futures::JsFuture;
@@ -118,7 +118,7 @@ fn file(transport: &Transport, metadata: &Metadata) -> Vec<u8> {
         extensions: Vec::new(),
     };
     let mut bytes = Vec::new();
-    let file = EncodedFile::new(source, Quality::Lossless, &OneThread).unwrap();
+    let file = EncodedFile::new(source, Quality::Lossless, &SequentialExecutor).unwrap();
     file.write(&mut bytes).unwrap();
     bytes
 }

@@ -1,10 +1,10 @@
 //! Photographs with made-up coefficients: the time that relighting takes does not depend on their values.
 
 use rayon::prelude::*;
+use relightable_photo::executor::Executor;
 use relightable_photo::transport::{
     BandTile, Basis, CHANNELS, Correspondence, Extent, Geometry, QUAD, TexelCode, Window,
 };
-use relightable_photo::workers::Workers;
 
 const WINDOW: u32 = 15;
 
@@ -15,7 +15,7 @@ pub const RANKS: [usize; 3] = [8, 16, 32];
 /// All cores.
 pub struct Cores;
 
-impl Workers for Cores {
+impl Executor for Cores {
     fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         (0..count).into_par_iter().map(work).collect()
     }

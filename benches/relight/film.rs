@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
+use relightable_photo::executor::{Executor, SequentialExecutor};
 use relightable_photo::relight::{Display, Light, Rgba8Picture, TorchPose, cpu};
 use relightable_photo::transport::{Extent, LightPx, Tile, Transport};
-use relightable_photo::workers::{OneThread, Workers};
 
 use crate::made_up::{self, Cores, noise, square};
 
@@ -89,16 +89,16 @@ impl Film {
         self.show(&Cores);
     }
 
-    fn show(&mut self, workers: &impl Workers) -> Time {
+    fn show(&mut self, executor: &impl Executor) -> Time {
         let light = &self.lights[self.shown % self.lights.len()];
         self.shown += 1;
         let start = Instant::now();
-        self.relighter.relight(light, workers);
+        self.relighter.relight(light, executor);
         let linear = start.elapsed();
         let rows = 0..self.picture.extent.height;
         let pixels = &mut self.picture.pixels;
         self.relighter
-            .show(&Display::srgb(1.0), rows, pixels, workers);
+            .show(&Display::srgb(1.0), rows, pixels, executor);
         let [linear, whole] = [linear, start.elapsed()].map(|time| time.as_secs_f64() * 1e3);
         Time { linear, whole }
     }
@@ -107,7 +107,7 @@ impl Film {
     pub fn fastest(&mut self, seconds: f64) -> [Time; 2] {
         let (start, mut best, mut frames) = (Instant::now(), [Time::NEVER; 2], 0);
         while frames < 5 || frames < 200 && start.elapsed().as_secs_f64() < seconds {
-            best[0] = best[0].min(self.show(&OneThread));
+            best[0] = best[0].min(self.show(&SequentialExecutor));
             best[1] = best[1].min(self.show(&Cores));
             frames += 1;
         }

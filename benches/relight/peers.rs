@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use rayon::prelude::*;
+use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::relight::{Light, cpu};
 use relightable_photo::transport::{CHANNELS, Transport};
-use relightable_photo::workers::OneThread;
 use serde_json::Value;
 use sprs::CsMatViewI;
 
@@ -151,7 +151,7 @@ fn planes(elements: impl Iterator<Item = [f32; 4]> + Clone) -> Planes {
 }
 
 fn ours(relighter: &mut cpu::Relighter, light: &Light) -> Planes {
-    relighter.relight(light, &OneThread);
+    relighter.relight(light, &SequentialExecutor);
     planes(relighter.linear().pixels.iter().copied())
 }
 

@@ -10,7 +10,7 @@ use relightable_photo::format::{Metadata, Quality};
 use relightable_photo::transport::{
     BandTile, Basis, Correspondence, Decibels, Extent, Geometry, Window,
 };
-use relightable_photo::workers::OneThread;
+use relightable_photo::executor::SequentialExecutor;
 
 /// Two tiles of 8 by 8 pixels and less: the first over a basis, or all functions by element.
 fn given(rank: usize) -> Given {
@@ -61,7 +61,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("direct", 0, snr),
         ("direct-halves", 0, Quality::Lossless),
     ] {
-        let file = given(rank).encode(quality, &OneThread)?;
+        let file = given(rank).encode(quality, &SequentialExecutor)?;
         let mut bytes = Vec::new();
         file.write(&mut bytes)?;
         let head = file.head().header.head_bytes() as usize;

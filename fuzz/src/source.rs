@@ -9,7 +9,7 @@ use relightable_photo::transport::{
     BandTile, Basis, CHANNELS, Correspondence, Decibels, Extent, Geometry, TileRect,
     TransportFunctions, Window,
 };
-use relightable_photo::workers::{OneThread, Workers};
+use relightable_photo::executor::{SequentialExecutor, Executor};
 
 use crate::choices::Choices;
 
@@ -191,7 +191,7 @@ impl Given {
     pub fn encode(
         &self,
         quality: Quality<'_>,
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Result<EncodedFile, FormatError> {
         let source = Source {
             geometry: self.geometry,
@@ -200,7 +200,7 @@ impl Given {
             metadata: self.metadata.clone(),
             extensions: self.extensions.clone(),
         };
-        EncodedFile::new(source, quality, workers)
+        EncodedFile::new(source, quality, executor)
     }
 
     /// Light transport functions of tile `i`.
@@ -236,7 +236,7 @@ impl Given {
 #[derive(Debug)]
 pub struct Backwards;
 
-impl Workers for Backwards {
+impl Executor for Backwards {
     fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         let mut results: Vec<T> = (0..count).rev().map(work).collect();
         results.reverse();
@@ -276,7 +276,7 @@ impl Wanted {
             Self::Lossless => Quality::Lossless,
             Self::Loss(most) => Quality::Loss(most, &judge),
         };
-        given.encode(quality, &OneThread)
+        given.encode(quality, &SequentialExecutor)
     }
 }
 

@@ -9,7 +9,7 @@
 use serde::Serialize;
 
 use super::Measurements;
-use crate::eigen::symmetric_eigen;
+use crate::linalg::symmetric_eigen;
 use crate::transport::{CHANNELS, CameraPx};
 
 /// Pixels along a block's side: enough that two pixels an element leave most ranks to noise.

@@ -10,16 +10,16 @@ use super::memory::Bytes;
 use super::process::Interrupt;
 use super::tile_record;
 use crate::format::{EncodedFile, FormatError, HEADER_BYTES, Judge, Metadata, Quality, Source};
-use crate::recover::{Recovery, Rehearsal};
+use crate::recover::{HoldoutValidation, Recovery};
 use crate::transport::{BandTile, Basis, Decibels, Geometry, RecoveredTile, TransportFunctions};
 
 /// Camera pixels along a tile's side in a file: more than those of a recovered tile, for what is
 /// compressed together is smaller, and few enough to fetch what is seen alone.
 pub const TILE_SIDE: u32 = 128;
-/// SNR that may be lost in a file unless another quality is asked for, by what the rehearsal tells. It
+/// SNR that may be lost in a file unless another quality is asked for, by what hold-out validation tells. It
 /// recovered from fewer patterns than the file is made of, and so a little more noise.
 const LOSS: Decibels = Decibels(0.5);
-/// SNR against what was recovered where there is no rehearsal: with so few patterns that is noisy.
+/// SNR against what was recovered where there is no hold-out validation: with so few patterns that is noisy.
 const USUAL: Decibels = Decibels(32.0);
 
 /// How good, or how small, the file is to be.
@@ -61,8 +61,8 @@ impl QualityArgs {
     }
 }
 
-/// The rehearsal of a recovery as the judge of a file.
-struct Judging<'a>(&'a Rehearsal);
+/// The hold-out validation of a recovery as the judge of a file.
+struct Judging<'a>(&'a HoldoutValidation);
 
 impl Judge for Judging<'_> {
     fn tiles(&self) -> Vec<BandTile> {
@@ -118,7 +118,7 @@ pub fn file(
         metadata,
         extensions: Vec::new(),
     };
-    let judge = recovery.rehearsal().map(Judging);
+    let judge = recovery.holdout_validation().map(Judging);
     EncodedFile::new(source, args.quality(judge.as_ref()), &interrupt.cores())
 }
 

@@ -126,7 +126,7 @@ impl Plan {
             budget: budget.0,
             fixed,
         };
-        let rows = plan.row * u64::from((tile_side + 2 * method.most_halo()).min(camera.height));
+        let rows = plan.row * u64::from((tile_side + 2 * method.max_halo()).min(camera.height));
         plan.ensure_at_least(plan.fixed + tile + rows)?;
         // All photographs, or half of what is left, the rest for the tiles worked on: at least one.
         let left = plan.budget - plan.fixed;

@@ -11,18 +11,18 @@ use rayon::prelude::*;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-use crate::recover::Workers;
+use crate::executor::Executor;
 
 /// All of the machine's cores, until told to stop.
 #[derive(Clone, Debug)]
 pub struct Cores(Interrupt);
 
-impl Workers for Cores {
+impl Executor for Cores {
     fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         AllCores.map(count, work)
     }
 
-    fn stopped(&self) -> bool {
+    fn is_cancelled(&self) -> bool {
         self.0.told()
     }
 }
@@ -31,7 +31,7 @@ impl Workers for Cores {
 #[derive(Clone, Copy, Debug)]
 pub struct AllCores;
 
-impl Workers for AllCores {
+impl Executor for AllCores {
     fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         (0..count).into_par_iter().map(work).collect()
     }

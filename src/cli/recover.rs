@@ -22,7 +22,8 @@ use super::{Usage, files, process, report, tile_record};
 use crate::capture::{self, CaptureFolder, DarkFrame, Measurements, Noise, Rows, Shot};
 use crate::format::{CaptureNote, FormatError, Metadata};
 use crate::recover::{
-    self, Band, Method, Reach, RecoverError, Recovery, Rehearsal, Settings, SparsityBasis,
+    self, BandwidthEstimate, HoldoutValidation, Method, RecoverError, Recovery, Settings,
+    SparsityBasis, WindowEstimate,
 };
 use crate::transport::{Basis, CHANNELS, Decibels, Window};
 
@@ -82,7 +83,7 @@ impl WindowChoice {
     /// The largest window that it may come to.
     fn most(self) -> Window {
         match self {
-            Self::Auto => Band::MOST,
+            Self::Auto => WindowEstimate::MAX_WINDOW,
             Self::Fixed(window) => window,
         }
     }
@@ -188,9 +189,9 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         );
     }
     let shots = choose_shots(&manifest.shots, args.patterns)?;
-    if shots.len() < recover::FEWEST_PATTERNS {
+    if shots.len() < recover::MIN_PATTERNS {
         let manifest = folder.manifest_path().display().to_string();
-        return Err(RecoverError::FewPatterns(shots.len())).context(manifest);
+        return Err(RecoverError::TooFewPatterns(shots.len())).context(manifest);
     }
     let threads = rayon::current_num_threads();
     let plan = Plan::new(
@@ -202,7 +203,7 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         threads,
     )?;
     if let WindowChoice::Fixed(window) = args.window {
-        plan.encoders(window, args.method().most_rank(window))?;
+        plan.encoders(window, args.method().max_rank(window))?;
     }
     let mut report =
         pool(plan.tiles_at_once)?.install(|| recover(args, &folder, &shots, &plan, &interrupt))?;
@@ -267,28 +268,30 @@ fn recover(
     measurements.noise = Noise::with_gain_from(&measurements);
     warn_of_saturation(saturated, &measurements);
     let failed = |error| match error {
-        RecoverError::Stopped => interrupted(&checkpoint),
-        RecoverError::Astray(patterns) => astray(folder, patterns.iter().map(|&l| shots[l])),
+        RecoverError::Cancelled(_) => interrupted(&checkpoint),
+        RecoverError::MismatchedPatterns(patterns) => {
+            astray(folder, patterns.iter().map(|&l| shots[l]))
+        }
         other => anyhow::Error::new(other).context(args.capture.display().to_string()),
     };
     let band = match args.window {
-        WindowChoice::Auto => {
-            Some(Band::estimate(&measurements, &interrupt.cores()).map_err(failed)?)
-        }
+        WindowChoice::Auto => Some(
+            WindowEstimate::from_measurements(&measurements, &interrupt.cores()).map_err(failed)?,
+        ),
         WindowChoice::Fixed(_) => None,
     };
     match band {
-        Some(Band {
+        Some(WindowEstimate {
             window,
-            reach: Reach::Beyond,
+            bandwidth: BandwidthEstimate::Unbounded,
         }) => eprintln!(
             "warning: the band is at least as wide as the window of {0}x{0} light elements that was \
              looked at; a wider one can be asked for with --window",
             window.side()
         ),
-        Some(Band {
+        Some(WindowEstimate {
             window,
-            reach: Reach::Unclear,
+            bandwidth: BandwidthEstimate::Undetermined,
         }) => eprintln!(
             "warning: these photographs do not tell how wide the band is; {0}x{0} light elements are \
              taken for it, and another number can be given with --window",
@@ -304,7 +307,7 @@ fn recover(
     let recovery =
         Recovery::prepare(&measurements, settings, &interrupt.cores()).map_err(failed)?;
     spinner.finish_and_clear();
-    check_rehearsal(folder, &recovery)?;
+    check_holdout_validation(folder, &recovery)?;
     let rank = recovery.basis().map(Basis::rank);
     let encoders = plan.encoders(settings.window, rank.unwrap_or(0))?;
     checkpoint.prepared(recovery.fingerprint())?;
@@ -390,14 +393,16 @@ fn recover(
         method: settings.method,
         basis: settings.method.basis(),
         window: settings.window.side(),
-        leak: band.and_then(|band| match band.reach {
-            Reach::Within { leak } => Some(leak),
-            Reach::Beyond | Reach::Unclear => None,
+        leak: band.and_then(|band| match band.bandwidth {
+            BandwidthEstimate::Bounded { tail_fraction } => Some(tail_fraction),
+            BandwidthEstimate::Unbounded | BandwidthEstimate::Undetermined => None,
         }),
         rank,
         patterns,
         photographs: shots.len(),
-        expected_snr_db: recovery.rehearsal().and_then(Rehearsal::snr),
+        expected_snr_db: recovery
+            .holdout_validation()
+            .and_then(HoldoutValidation::snr),
         file_snr_db: file.snr(),
         common_mode: recovery.common_mode(),
         noise,
@@ -421,18 +426,18 @@ fn astray(folder: &CaptureFolder, shots: impl ExactSizeIterator<Item = usize>) -
 }
 
 /// Says so where the photographs tell little, and refuses those that tell nothing.
-fn check_rehearsal(folder: &CaptureFolder, recovery: &Recovery) -> Result<()> {
-    let Some(rehearsal) = recovery.rehearsal() else {
+fn check_holdout_validation(folder: &CaptureFolder, recovery: &Recovery) -> Result<()> {
+    let Some(validation) = recovery.holdout_validation() else {
         return Ok(());
     };
-    if !rehearsal.has_signal() {
+    if !validation.has_signal() {
         bail!(
             "{}: photographs do not differ from pattern to pattern by more than their noise; check \
              that each of \"shots\" names a photo of its own, and that the display was on",
             folder.manifest_path().display()
         );
     }
-    if let Some(snr) = rehearsal.snr().filter(|snr| snr.0 < POOR) {
+    if let Some(snr) = validation.snr().filter(|snr| snr.0 < POOR) {
         eprintln!(
             "warning: patterns held out are predicted badly, to {snr} of SNR: are the photographs \
              linear, was the light steady, does the correspondence fit? With few patterns, or by \
@@ -517,7 +522,7 @@ impl Run<'_> {
                 self.bar.inc(1);
             }
             Ok(match saturated {
-                true => measurements.overexposed_pixels(rect, recover::FEWEST_PATTERNS),
+                true => measurements.overexposed_pixels(rect, recover::MIN_PATTERNS),
                 false => 0,
             })
         });

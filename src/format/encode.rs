@@ -9,11 +9,11 @@ use super::head::Head;
 use super::quality::{Rounding, step_for};
 use super::turn::{Turn, moment};
 use super::{Chunk, ChunkEntry, Coding, FormatError, Header, Metadata, Scan};
+use crate::executor::Executor;
 use crate::transport::{
     BandTile, Basis, CHANNELS, Decibels, Extent, FactoredTile, Geometry, TileRect,
     TransportFunctions,
 };
-use crate::workers::Workers;
 
 /// What a file is made of.
 pub struct Source<'a> {
@@ -110,14 +110,14 @@ impl EncodedFile {
     pub fn new(
         source: Source<'_>,
         quality: Quality<'_>,
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Result<Self, FormatError> {
-        let encoder = Encoder::new(source, workers)?;
+        let encoder = Encoder::new(source, executor)?;
         match quality {
-            Quality::Loss(most, judge) => encoder.of_loss(most, judge, workers),
-            Quality::Snr(snr) => encoder.of_quality(snr, workers),
-            Quality::Bytes(most) => encoder.of_size(most, workers),
-            Quality::Lossless => encoder.lossless(workers),
+            Quality::Loss(most, judge) => encoder.of_loss(most, judge, executor),
+            Quality::Snr(snr) => encoder.of_quality(snr, executor),
+            Quality::Bytes(most) => encoder.of_size(most, executor),
+            Quality::Lossless => encoder.lossless(executor),
         }
     }
 
@@ -167,7 +167,7 @@ struct Look {
 }
 
 impl<'a> Encoder<'a> {
-    fn new(source: Source<'a>, workers: &impl Workers) -> Result<Self, FormatError> {
+    fn new(source: Source<'a>, executor: &impl Executor) -> Result<Self, FormatError> {
         let rank = source.basis.map_or(0, Basis::rank);
         let area = source.geometry.window.area();
         if let Some(basis) = source.basis {
@@ -199,7 +199,7 @@ impl<'a> Encoder<'a> {
             peak: 0.0,
         };
         let mut lit = Vec::new();
-        for_tiles(&source, workers, look, |i, of_tile| {
+        for_tiles(&source, executor, look, |i, of_tile| {
             if of_tile.peak > 0.0 {
                 lit.push(i);
             }
@@ -235,10 +235,10 @@ impl<'a> Encoder<'a> {
     fn of_quality(
         mut self,
         snr: Decibels,
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Result<EncodedFile, FormatError> {
         let sample = self.sample()?;
-        self.at_snr(snr, &sample, workers)
+        self.at_snr(snr, &sample, executor)
     }
 
     /// The file whose numbers keep this SNR, by a sample of them. Leaves components out.
@@ -246,11 +246,11 @@ impl<'a> Encoder<'a> {
         &mut self,
         snr: Decibels,
         sample: &[Sampled],
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Result<EncodedFile, FormatError> {
-        let step = step_for(snr, |step| self.rounding(sample, step, workers));
-        self.cut(step.unwrap_or(1.0), sample, workers);
-        self.encode(step, workers)
+        let step = step_for(snr, |step| self.rounding(sample, step, executor));
+        self.cut(step.unwrap_or(1.0), sample, executor);
+        self.encode(step, executor)
     }
 
     /// The coarsest file by which no more is lost than `most`.
@@ -258,7 +258,7 @@ impl<'a> Encoder<'a> {
         mut self,
         most: Decibels,
         judge: &dyn Judge,
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Result<EncodedFile, FormatError> {
         let tiles = self.coded_alike(judge.tiles());
         // What few of them are recovered element by element tells the step of the others as well.
@@ -268,13 +268,13 @@ impl<'a> Encoder<'a> {
         let pixels = self.source.geometry.camera.area() as f64;
         let coarsest = 16.0 * (self.energy / pixels).sqrt() as f32;
         if !coarsest.is_normal() {
-            return self.encode(None, workers);
+            return self.encode(None, executor);
         }
         let [mut fine, mut coarse] = STEPS_FOR_LOSS;
         for _ in 0..LOSS_TRIALS {
             let middle = 0.5 * (fine + coarse);
             let scans = self.plan(coarsest * middle.exp2());
-            let decoded = workers.map(tiles.len(), |i| self.decoded(&tiles[i], &scans));
+            let decoded = executor.map(tiles.len(), |i| self.decoded(&tiles[i], &scans));
             match judge.loss(&decoded).0 <= most.0 {
                 true => fine = middle,
                 false => coarse = middle,
@@ -282,8 +282,8 @@ impl<'a> Encoder<'a> {
         }
         self.has_functions = has_functions;
         let step = coarsest * fine.exp2();
-        self.cut(step, &self.sample()?, workers);
-        self.encode(Some(step), workers)
+        self.cut(step, &self.sample()?, executor);
+        self.encode(Some(step), executor)
     }
 
     /// A judge's tiles as the file would have them: where it has no components, element by element.
@@ -323,12 +323,12 @@ impl<'a> Encoder<'a> {
     }
 
     /// The best file that is small enough, or nearly that.
-    fn of_size(mut self, most: u64, workers: &impl Workers) -> Result<EncodedFile, FormatError> {
+    fn of_size(mut self, most: u64, executor: &impl Executor) -> Result<EncodedFile, FormatError> {
         let sample = self.sample()?;
         let turn = self.turn.clone();
         let mut try_snr = |snr: f64| {
             self.turn.clone_from(&turn);
-            self.at_snr(Decibels(snr), &sample, workers)
+            self.at_snr(Decibels(snr), &sample, executor)
         };
         let [mut low, mut high] = SNR_FOR_SIZE;
         let mut best = try_snr(low)?;
@@ -349,7 +349,7 @@ impl<'a> Encoder<'a> {
         Ok(best)
     }
 
-    fn lossless(self, workers: &impl Workers) -> Result<EncodedFile, FormatError> {
+    fn lossless(self, executor: &impl Executor) -> Result<EncodedFile, FormatError> {
         let step = halves::step_for(self.peak);
         let most = direct::most_slots(self.source.geometry.tile_side) as usize;
         let mut scans: Vec<Scan> = components(self.rank(), most)
@@ -388,7 +388,7 @@ impl<'a> Encoder<'a> {
             }
             Ok(encoded)
         };
-        self.assemble(scans.clone(), encode, workers)
+        self.assemble(scans.clone(), encode, executor)
     }
 
     fn rank(&self) -> usize {
@@ -439,9 +439,9 @@ impl<'a> Encoder<'a> {
     }
 
     /// What rounding to `step` does to some tiles.
-    fn rounding(&self, sample: &[Sampled], step: f32, workers: &impl Workers) -> Rounding {
+    fn rounding(&self, sample: &[Sampled], step: f32, executor: &impl Executor) -> Rounding {
         let scans = self.plan(step);
-        let each = workers.map(sample.len(), |i| {
+        let each = executor.map(sample.len(), |i| {
             let Sampled { tile, weight } = &sample[i];
             self.numbers(tile, &scans, false).rounding().times(*weight)
         });
@@ -450,8 +450,8 @@ impl<'a> Encoder<'a> {
     }
 
     /// Leaves out the components that matter little against what rounding to `step` does.
-    fn cut(&mut self, step: f32, sample: &[Sampled], workers: &impl Workers) {
-        let Rounding { energy, error } = self.rounding(sample, step, workers);
+    fn cut(&mut self, step: f32, sample: &[Sampled], executor: &impl Executor) {
+        let Rounding { energy, error } = self.rounding(sample, step, executor);
         let allowed = CUT_SHARE * self.energy * error / energy.max(f64::MIN_POSITIVE);
         if let Some(turn) = &mut self.turn {
             let mut left_out = 0.0;
@@ -527,11 +527,11 @@ impl<'a> Encoder<'a> {
     fn encode(
         &self,
         step: Option<f32>,
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Result<EncodedFile, FormatError> {
         let scans = step.map_or(Vec::new(), |step| self.plan(step));
         let encode = |tile: BandTile| self.numbers(&tile, &scans, false).encode(&scans);
-        self.assemble(scans.clone(), encode, workers)
+        self.assemble(scans.clone(), encode, executor)
     }
 
     /// Encodes all tiles, and puts the file together.
@@ -539,7 +539,7 @@ impl<'a> Encoder<'a> {
         &self,
         mut scans: Vec<Scan>,
         encode: impl Fn(BandTile) -> Result<EncodedTile, FormatError> + Sync + Send,
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Result<EncodedFile, FormatError> {
         let geometry = self.source.geometry;
         let (tiles, area) = (geometry.tile_grid().area(), geometry.window.area());
@@ -548,7 +548,7 @@ impl<'a> Encoder<'a> {
         let kept = self.turn.as_ref().map_or(0.0, Turn::energy);
         let left_out = (self.coefficient_energy - kept).max(0.0);
         let mut errors = vec![left_out; scans.len()];
-        for_tiles(&self.source, workers, encode, |_, tile| {
+        for_tiles(&self.source, executor, encode, |_, tile| {
             let tile = tile?;
             for (sum, error) in errors.iter_mut().zip(&tile.errors) {
                 *sum += error;
@@ -738,13 +738,13 @@ fn scattered(n: usize) -> usize {
 /// Fetches each tile, works on it, and takes the results in order.
 fn for_tiles<T: Send>(
     source: &Source<'_>,
-    workers: &impl Workers,
+    executor: &impl Executor,
     work: impl Fn(BandTile) -> T + Sync + Send,
     mut take: impl FnMut(usize, T) -> Result<(), FormatError>,
 ) -> Result<(), FormatError> {
     let count = source.geometry.tile_grid().area();
     for first in (0..count).step_by(AT_ONCE) {
-        let results = workers.map(AT_ONCE.min(count - first), |i| {
+        let results = executor.map(AT_ONCE.min(count - first), |i| {
             (source.tile)(first + i).map(&work)
         });
         for (i, result) in results.into_iter().enumerate() {

@@ -1,6 +1,6 @@
 //! The basis of a file: another one of the same span, in the order in which a reader wants it.
 
-use crate::eigen::symmetric_eigen;
+use crate::linalg::symmetric_eigen;
 use crate::transport::{BandTile, Basis, CHANNELS};
 
 /// Share of the largest direction's below which a direction of the span is none.

@@ -3,7 +3,7 @@
 /// Weight of the equation `mean(y) = mean(P̂)τ` against one that says nothing beyond noise.
 ///
 /// Patterns are non-negative, so every equation shares one large direction: their mean over all
-/// patterns. Split off, `‖y − P̂τ‖² = ‖y_c − P̂_c τ‖² + L (ȳ − p̄τ)²`, where the first term is
+/// patterns. HoldoutSplit off, `‖y − P̂τ‖² = ‖y_c − P̂_c τ‖² + L (ȳ − p̄τ)²`, where the first term is
 /// centred over patterns. Noise is all that disturbs the centred equations; the mean row is
 /// disturbed by every constant offset as well, which averaging does not lower: light from beyond
 /// the window, a dark frame's own noise, a black level that drifts. So it is kept, but with a

@@ -1,6 +1,6 @@
 //! Patterns held out, by which all is chosen that measurements themselves must tell.
 
-use super::FEWEST_PATTERNS;
+use super::MIN_PATTERNS;
 use crate::capture::{self, Measurements, Pattern};
 use crate::transport::CHANNELS;
 
@@ -9,29 +9,33 @@ const EVERY: usize = 10;
 
 /// Patterns to learn from and patterns to choose by.
 #[derive(Clone, Debug)]
-pub(super) struct Split {
+pub(super) struct HoldoutSplit {
     /// All patterns.
     pub all: Vec<usize>,
     /// All but those held out.
-    pub learn: Vec<usize>,
+    pub training: Vec<usize>,
     /// Patterns held out; none where that would leave too few.
-    pub held: Vec<usize>,
+    pub held_out: Vec<usize>,
 }
 
-impl Split {
+impl HoldoutSplit {
     /// Holds out every tenth of the patterns that differ. Shots of one pattern, by several exposures,
     /// stay together: what was learned from cannot tell what was learned well.
     pub fn new(measurements: &Measurements) -> Self {
         let all: Vec<usize> = (0..measurements.patterns.len()).collect();
         let numbers = numbers(&measurements.patterns);
-        let (held, learn): (Vec<usize>, Vec<usize>) =
+        let (held_out, training): (Vec<usize>, Vec<usize>) =
             all.iter().partition(|&&l| numbers[l] % EVERY == EVERY / 2);
-        match learn.len() >= FEWEST_PATTERNS && !held.is_empty() {
-            true => Self { all, learn, held },
-            false => Self {
-                learn: all.clone(),
+        match training.len() >= MIN_PATTERNS && !held_out.is_empty() {
+            true => Self {
                 all,
-                held: Vec::new(),
+                training,
+                held_out,
+            },
+            false => Self {
+                training: all.clone(),
+                all,
+                held_out: Vec::new(),
             },
         }
     }

@@ -10,34 +10,29 @@
 //!
 //! [`Recovery`] is pure and works tile by tile: whoever has threads runs tiles on them.
 
-mod agreement;
-mod band;
+mod bandwidth;
 mod bpdn;
 mod common_mode;
-mod dense;
-mod design;
-mod direct;
+mod gram_cache;
 mod holdout;
+mod holdout_validation;
 mod learned;
 mod nnls;
-mod passive;
+mod passive_set;
+mod pattern_check;
+mod pixelwise;
 mod pooled;
 mod recovery;
-mod rehearsal;
-mod sample;
+mod sampling;
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod test_problems;
-mod vector;
-mod workers;
 
-pub use band::{Band, Reach};
+pub use bandwidth::{BandwidthEstimate, WindowEstimate};
 pub use bpdn::{Constraint, Homotopy, InteriorPoint, Solution, SparsityBasis};
 pub use common_mode::CommonMode;
+pub use holdout_validation::HoldoutValidation;
 pub use nnls::Nnls;
 pub use recovery::{Method, RecoverError, Recovery, Settings};
-pub use rehearsal::Rehearsal;
-
-pub use crate::workers::{OneThread, Workers};
 
 /// Fewest patterns that recovery makes sense with.
-pub(crate) const FEWEST_PATTERNS: usize = 4;
+pub(crate) const MIN_PATTERNS: usize = 4;

@@ -5,8 +5,8 @@
 //! from nothing: of the set of a neighbouring pixel or channel so much has to leave again that it is
 //! no quicker to start from, and what rounding its inverse has gathered comes along.
 
-use super::passive::PassiveSet;
-use super::vector::{LANES, vectorised, whole_blocks};
+use super::passive_set::PassiveSet;
+use crate::linalg::{LANES, padded_len, vectorise};
 
 /// Solver for right-hand sides that share one Gram matrix.
 #[derive(Debug)]
@@ -39,14 +39,14 @@ impl<'a> Nnls<'a> {
             passive: PassiveSet::new(gram, k),
             x: Vec::with_capacity(k),
             gradient: vec![0.0; k],
-            slopes: vec![f64::NEG_INFINITY; whole_blocks(k)],
+            slopes: vec![f64::NEG_INFINITY; padded_len(k)],
         }
     }
 
     /// Minimises `½xᵀGx − hᵀx` subject to `x ≥ 0`, with `h = Aᵀb`, `[k]`. Returns `x`, `[k]`, which
     /// is feasible always and optimal to rounding: it satisfies the Karush–Kuhn–Tucker conditions.
     pub fn solve(&mut self, h: &[f64]) -> Vec<f64> {
-        vectorised(
+        vectorise(
             #[inline(always)]
             || self.search(h),
         );

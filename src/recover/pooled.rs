@@ -1,12 +1,14 @@
 //! One light transport function for all pixels: what tells whether there is anything to recover,
 //! and where learning starts.
 
-use super::holdout::Split;
-use super::sample::{mean_variance, reaches_display, spread, unsaturated, windows};
-use super::vector::{add_scaled, dot, vectorised};
-use super::workers::go_on;
-use super::{Nnls, RecoverError, Workers, agreement, dense};
+use super::holdout::HoldoutSplit;
+use super::sampling::{
+    mean_variance, pixels_by_window, reaches_display, spread_squares, unsaturated,
+};
+use super::{Nnls, RecoverError, pattern_check};
 use crate::capture::Measurements;
+use crate::executor::Executor;
+use crate::linalg::{self, add_scaled, dot, vectorise};
 use crate::transport::{CHANNELS, CameraPx, Element, Geometry, TileRect, Window};
 
 /// Rounds of finding brightness and mean function in turn. A brightness that is a few per cent off,
@@ -25,15 +27,15 @@ pub(super) const MEAN_WEIGHT: f64 = 0.3;
 /// Squares that are looked at, and their side in pixels.
 const SQUARES: (usize, u32) = (128, 4);
 /// Most channels of pixels in them.
-pub(super) const MOST_SAMPLES: usize = SQUARES.0 * (SQUARES.1 * SQUARES.1) as usize * CHANNELS;
+pub(super) const MAX_SAMPLES: usize = SQUARES.0 * (SQUARES.1 * SQUARES.1) as usize * CHANNELS;
 /// About the most memory that [`mean_function`] takes, in bytes.
 pub(super) fn bytes(window: Window) -> usize {
     (PARTS + 2) * window.area() * window.area() * size_of::<f64>()
 }
 
 /// The squares that are looked at.
-pub(super) fn squares(measurements: &Measurements) -> Vec<TileRect> {
-    spread(measurements, SQUARES.1, SQUARES.0)
+pub(super) fn sample_squares(measurements: &Measurements) -> Vec<TileRect> {
+    spread_squares(measurements, SQUARES.1, SQUARES.0)
 }
 
 /// The mean light transport function, non-negative, of sum 1, `[element]`; an error where what was
@@ -41,17 +43,17 @@ pub(super) fn squares(measurements: &Measurements) -> Vec<TileRect> {
 pub(super) fn mean_function(
     measurements: &Measurements,
     geometry: &Geometry,
-    split: &Split,
-    workers: &impl Workers,
+    split: &HoldoutSplit,
+    executor: &impl Executor,
 ) -> Result<Vec<f64>, RecoverError> {
-    let squares = squares(measurements);
+    let squares = sample_squares(measurements);
     if !reaches_display(geometry) {
-        return Err(RecoverError::NoLight);
+        return Err(RecoverError::CorrespondenceOffLightPlane);
     }
-    let mean = pooled_mean(measurements, geometry, &split.learn, &squares, workers)?
+    let mean = pooled_mean(measurements, geometry, &split.training, &squares, executor)?
         .ok_or_else(|| dark_or_overexposed(measurements, &squares))?;
-    go_on(workers)?;
-    agreement::check(measurements, geometry, split, &mean, &squares, workers)?;
+    executor.check_cancelled()?;
+    pattern_check::check_patterns(measurements, geometry, split, &mean, &squares, executor)?;
     Ok(mean)
 }
 
@@ -62,13 +64,13 @@ fn pooled_mean(
     geometry: &Geometry,
     rows: &[usize],
     squares: &[TileRect],
-    workers: &impl Workers,
+    executor: &impl Executor,
 ) -> Result<Option<Vec<f64>>, RecoverError> {
     let area = geometry.window.area();
     let mut mean = vec![1.0 / area as f64; area];
     for _ in 0..POOLED_ROUNDS {
-        go_on(workers)?;
-        let right = pooled_round(measurements, geometry, rows, squares, &mean, workers);
+        executor.check_cancelled()?;
+        let right = pooled_round(measurements, geometry, rows, squares, &mean, executor);
         let sum: f64 = right.iter().sum();
         if sum.is_nan() || sum <= 0.0 {
             return Ok(None);
@@ -85,7 +87,7 @@ fn pooled_round(
     rows: &[usize],
     squares: &[TileRect],
     mean: &[f64],
-    workers: &impl Workers,
+    executor: &impl Executor,
 ) -> Vec<f64> {
     let area = geometry.window.area();
     let whole = |square: &&TileRect| {
@@ -93,17 +95,17 @@ fn pooled_round(
         pixels.all(|pixel| on_display(geometry, geometry.window_origin(pixel)))
     };
     let only_whole = 4 * squares.iter().filter(whole).count() >= squares.len();
-    let parts = workers.map(PARTS, |part| {
+    let parts = executor.map(PARTS, |part| {
         let mut sums = Pooled {
             gram: vec![0.0; area * area],
             right: vec![0.0; area],
         };
         for square in squares.iter().skip(part).step_by(PARTS) {
-            for (origin, pixels) in windows(geometry, *square) {
+            for (origin, pixels) in pixels_by_window(geometry, *square) {
                 if only_whole && !on_display(geometry, origin) {
                     continue;
                 }
-                vectorised(
+                vectorise(
                     #[inline(always)]
                     || sums.add(measurements, geometry, rows, mean, (origin, &pixels)),
                 );
@@ -119,7 +121,7 @@ fn pooled_round(
         add_scaled(&mut total.gram, 1.0, &part.gram);
         add_scaled(&mut total.right, 1.0, &part.right);
     }
-    dense::mirror(&mut total.gram, area);
+    linalg::mirror_upper(&mut total.gram, area);
     Nnls::new(&total.gram, area).solve(&total.right)
 }
 
@@ -230,6 +232,6 @@ pub(super) fn dark_or_overexposed(
     });
     match 2 * saturated > all {
         true => RecoverError::Overexposed,
-        false => RecoverError::Dark,
+        false => RecoverError::NoSignal,
     }
 }

@@ -5,13 +5,14 @@ use std::fmt::Write;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::direct::Direct;
-use super::holdout::Split;
+use super::holdout::HoldoutSplit;
+use super::holdout_validation::HoldoutValidation;
 use super::learned::Learned;
+use super::pixelwise::PixelwiseRecovery;
 use super::pooled;
-use super::rehearsal::Rehearsal;
-use super::{CommonMode, FEWEST_PATTERNS, SparsityBasis, Workers};
+use super::{CommonMode, MIN_PATTERNS, SparsityBasis};
 use crate::capture::Measurements;
+use crate::executor::{Cancelled, Executor};
 use crate::transport::{Basis, Geometry, GeometryError, RecoveredTile, TileRect, Window};
 
 /// How light transport functions are recovered.
@@ -56,7 +57,7 @@ impl Method {
     /// About the most memory that recovering one tile takes beside the measurements and the tile's
     /// functions, in bytes.
     pub fn tile_bytes(self, window: Window, patterns: usize) -> usize {
-        let direct = Direct::tile_bytes(window, patterns);
+        let direct = PixelwiseRecovery::tile_bytes(window, patterns);
         match self {
             // Tiles may be blended with least squares.
             Self::Learned => direct.max(Learned::tile_bytes(window)),
@@ -65,17 +66,17 @@ impl Method {
     }
 
     /// The most components that tiles may be combined from.
-    pub fn most_rank(self, window: Window) -> usize {
+    pub fn max_rank(self, window: Window) -> usize {
         match self {
-            Self::Learned => Learned::most_rank(window),
+            Self::Learned => Learned::max_rank(window),
             Self::Nnls | Self::Bpdn(_) => 0,
         }
     }
 
     /// The most camera pixels around a tile whose measurements may go into it.
-    pub fn most_halo(self) -> u32 {
+    pub fn max_halo(self) -> u32 {
         match self {
-            Self::Learned => Learned::MOST_HALO,
+            Self::Learned => Learned::MAX_HALO,
             Self::Nnls | Self::Bpdn(_) => 0,
         }
     }
@@ -112,9 +113,9 @@ pub struct Settings {
 pub enum RecoverError {
     /// Too few patterns.
     #[error(
-        "{0} patterns are too few; recovery needs at least {FEWEST_PATTERNS}, and about 80 to be good"
+        "{0} patterns are too few; recovery needs at least {MIN_PATTERNS}, and about 80 to be good"
     )]
-    FewPatterns(usize),
+    TooFewPatterns(usize),
     /// The window does not fit.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
@@ -122,29 +123,29 @@ pub enum RecoverError {
     #[error(
         "no camera pixel looks at the light plane; check \"correspondence\" and \"light\" in the capture's manifest"
     )]
-    NoLight,
+    CorrespondenceOffLightPlane,
     /// Nothing in the photographs stands out of their noise.
     #[error(
         "the photographs show no light from the display; check \"camera.black\", the exposure, and that photographs are listed with the patterns they show"
     )]
-    Dark,
+    NoSignal,
     /// Patterns do not tell what photographs show.
     #[error(
         "what the photographs show does not follow from the patterns; check that each is listed with the pattern it shows, \"correspondence\" in the capture's manifest, and the exposure"
     )]
-    Unrelated,
+    UncorrelatedPatterns,
     /// Some patterns do not tell what their photographs show, as others do: which, among the
     /// measurements'.
     #[error("what the photographs of {} of the patterns show is not of them", .0.len())]
-    Astray(Vec<usize>),
+    MismatchedPatterns(Vec<usize>),
     /// No pixel looked at can be learned from.
     #[error(
         "too many pixels are saturated in too many photographs; photograph with less exposure, or add shots with less (\"exposure\" in capture.json)"
     )]
     Overexposed,
-    /// The [`Workers`] were told to stop.
-    #[error("the recovery was stopped")]
-    Stopped,
+    /// The caller cancelled the recovery.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 /// The crc32c of what is written.
@@ -163,13 +164,13 @@ impl Write for Checksum {
 pub struct Recovery {
     geometry: Geometry,
     solver: Solver,
-    rehearsal: Option<Rehearsal>,
+    holdout_validation: Option<HoldoutValidation>,
 }
 
 #[derive(Debug)]
 enum Solver {
     Learned(Box<Learned>),
-    Direct(Direct),
+    Direct(PixelwiseRecovery),
 }
 
 impl Recovery {
@@ -179,7 +180,7 @@ impl Recovery {
     pub fn prepare(
         measurements: &Measurements,
         settings: Settings,
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Result<Self, RecoverError> {
         let geometry = Geometry {
             camera: measurements.camera,
@@ -189,43 +190,44 @@ impl Recovery {
             tile_side: Geometry::DEFAULT_TILE_SIDE,
         }
         .validate()?;
-        if measurements.patterns.len() < FEWEST_PATTERNS {
-            return Err(RecoverError::FewPatterns(measurements.patterns.len()));
+        if measurements.patterns.len() < MIN_PATTERNS {
+            return Err(RecoverError::TooFewPatterns(measurements.patterns.len()));
         }
-        let split = Split::new(measurements);
-        let mean = pooled::mean_function(measurements, &geometry, &split, workers)?;
+        let split = HoldoutSplit::new(measurements);
+        let mean = pooled::mean_function(measurements, &geometry, &split, executor)?;
         let solver = match settings.method {
             Method::Learned => {
-                let learned = Learned::new(measurements, geometry, split.clone(), &mean, workers)?;
+                let learned = Learned::new(measurements, geometry, split.clone(), &mean, executor)?;
                 Solver::Learned(Box::new(learned))
             }
-            Method::Nnls => Solver::Direct(Direct::least_squares(
+            Method::Nnls => Solver::Direct(PixelwiseRecovery::least_squares(
                 measurements,
                 geometry,
                 &split,
-                workers,
+                executor,
             )?),
-            Method::Bpdn(basis) => Solver::Direct(Direct::denoising(
+            Method::Bpdn(basis) => Solver::Direct(PixelwiseRecovery::denoising(
                 measurements,
                 geometry,
                 basis,
                 &split,
-                workers,
+                executor,
             )?),
         };
         let mut recovery = Self {
             geometry,
             solver,
-            rehearsal: None,
+            holdout_validation: None,
         };
-        let rehearse = |rect: TileRect| match &recovery.solver {
-            Solver::Learned(learned) => learned.rehearse(measurements, rect),
+        let training_tile = |rect: TileRect| match &recovery.solver {
+            Solver::Learned(learned) => learned.training_tile(measurements, rect),
             Solver::Direct(direct) => {
-                RecoveredTile::Direct(direct.tile_from(measurements, &split.learn, rect))
+                RecoveredTile::Direct(direct.tile_from(measurements, &split.training, rect))
             }
         };
         let setting = (&geometry, recovery.basis());
-        recovery.rehearsal = Rehearsal::new(measurements, setting, &split, workers, rehearse)?;
+        recovery.holdout_validation =
+            HoldoutValidation::new(measurements, setting, &split, executor, training_tile)?;
         Ok(recovery)
     }
 
@@ -261,8 +263,8 @@ impl Recovery {
     }
 
     /// How well it does on patterns held out; none where there are too few to hold any out.
-    pub fn rehearsal(&self) -> Option<&Rehearsal> {
-        self.rehearsal.as_ref()
+    pub fn holdout_validation(&self) -> Option<&HoldoutValidation> {
+        self.holdout_validation.as_ref()
     }
 
     /// Camera pixels around a tile whose measurements go into it.

@@ -6,7 +6,8 @@ use super::known::{Known, error_of};
 use super::methods::judged;
 use super::{StudyError, blocks};
 use crate::capture::Measurements;
-use crate::recover::{Method, Recovery, Settings, Workers};
+use crate::executor::Executor;
+use crate::recover::{Method, Recovery, Settings};
 use crate::transport::{Decibels, TransportError};
 
 /// How well a method did, and what it cost.
@@ -29,23 +30,23 @@ pub(super) fn judge(
     measurements: &Measurements,
     method: Method,
     pixels: usize,
-    workers: &impl Workers,
+    executor: &impl Executor,
 ) -> Result<Accuracy, StudyError> {
     let start = Instant::now();
     let settings = Settings {
         method,
         window: known.geometry().window,
     };
-    let recovery = Recovery::prepare(measurements, settings, workers)?;
+    let recovery = Recovery::prepare(measurements, settings, executor)?;
     let prepared = start.elapsed().as_secs_f64();
     let geometry = *recovery.geometry();
     let rects = judged(method, &geometry, pixels);
-    let functions = workers.map(rects.len(), |i| {
+    let functions = executor.map(rects.len(), |i| {
         let tile = recovery.tile(measurements, rects[i]);
         tile.functions(&geometry, recovery.basis())
     });
     let recovered = start.elapsed().as_secs_f64();
-    let errors = workers.map(functions.len(), |i| {
+    let errors = executor.map(functions.len(), |i| {
         error_of(known, &geometry, &functions[i])
     });
     let pixels = blocks::pixels(&rects);

@@ -14,7 +14,7 @@ use super::photograph::first_shots;
 use super::report::{Section, Table, cell, seconds};
 use super::{Photographer, Picture, Progress, StudyError, blocks, unwindowed};
 use crate::capture::Measurements;
-use crate::recover::Workers;
+use crate::executor::Executor;
 use crate::simulate::{Codes, Ensemble};
 use crate::transport::{CHANNELS, Decibels, Extent, TransportError};
 
@@ -48,7 +48,7 @@ pub fn comparison(
     name: &str,
     photographer: Photographer,
     ensemble: Ensemble,
-    workers: &impl Workers,
+    executor: &impl Executor,
     progress: Progress,
 ) -> Result<Section, StudyError> {
     let known = SceneTruth(photographer.scene);
@@ -56,7 +56,7 @@ pub fn comparison(
         let geometry = photographer.scene.geometry();
         (geometry.camera, geometry.light)
     };
-    let truth = Dense::new(&known, workers);
+    let truth = Dense::new(&known, executor);
     let elements = light.area();
     let counts = |most: usize| PHOTOGRAPHS.into_iter().filter(move |&k| k <= most);
     let tell = |curve: &Curve| {
@@ -70,7 +70,7 @@ pub fn comparison(
         }
     };
 
-    let scans = photographer.photographs(&single_elements(light), workers)?;
+    let scans = photographer.photographs(&single_elements(light), executor)?;
     let start = Instant::now();
     let scanned = brute_force::scan(&truth, &scans);
     let taken = start.elapsed().as_secs_f64();
@@ -93,7 +93,7 @@ pub fn comparison(
         points: Vec::new(),
     };
     for photographs in counts(2 * elements.min(camera.area())) {
-        let (snr, seconds) = low_rank(&truth, &photographer, &scans, photographs, workers)?;
+        let (snr, seconds) = low_rank(&truth, &photographer, &scans, photographs, executor)?;
         nystrom.points.push(Point {
             photographs,
             snr,
@@ -104,7 +104,7 @@ pub fn comparison(
     curves.push(nystrom);
     drop(scans);
 
-    let measurements = photographer.measure(ensemble, MOST_PATTERNS, workers)?;
+    let measurements = photographer.measure(ensemble, MOST_PATTERNS, executor)?;
     let mut whole = Curve {
         name: "no window, nnls".to_owned(),
         points: Vec::new(),
@@ -112,7 +112,7 @@ pub fn comparison(
     for l in counts(MOST_PATTERNS) {
         let measurements = first_shots(&measurements, l);
         let (errors, seconds) =
-            unwindowed::recover(&truth, &measurements, UNWINDOWED_PIXELS, workers);
+            unwindowed::recover(&truth, &measurements, UNWINDOWED_PIXELS, executor);
         let share = errors.len() as f64 / truth.pixels() as f64;
         whole.points.push(Point {
             photographs: l,
@@ -132,7 +132,7 @@ pub fn comparison(
         let wanted = |l: &usize| !methods::slow(method) || SLOW_PATTERNS.contains(l);
         for l in counts(MOST_PATTERNS).filter(wanted) {
             let measurements = first_shots(&measurements, l);
-            let accuracy = judge(&known, &measurements, method, camera.area(), workers)?;
+            let accuracy = judge(&known, &measurements, method, camera.area(), executor)?;
             curve.points.push(Point {
                 photographs: l,
                 snr: accuracy.snr,
@@ -263,13 +263,13 @@ fn low_rank(
     photographer: &Photographer,
     scans: &[Picture],
     photographs: usize,
-    workers: &impl Workers,
+    executor: &impl Executor,
 ) -> Result<(Option<Decibels>, f64), StudyError> {
     let elements = blocks::draw(truth.elements, photographs / 2);
     let pixels = blocks::draw(truth.pixels(), photographs - photographs / 2);
     let black = vec![[0.0; CHANNELS]; truth.elements];
     let dark = photographer.noisy(&black, ROW_NOISE)?;
-    let rows = workers.map(pixels.len(), |i| {
+    let rows = executor.map(pixels.len(), |i| {
         let row = truth.pixel(pixels[i]).to_vec();
         photographer.noisy(&row, ROW_NOISE + 1 + pixels[i] as u32)
     });
@@ -291,9 +291,9 @@ fn low_rank(
                 pixels: pixels.clone(),
                 light: truth.elements,
             },
-            workers,
+            executor,
         );
-        let errors = workers.map(truth.pixels(), |n| {
+        let errors = executor.map(truth.pixels(), |n| {
             let mut estimate = nystrom.pixel(n);
             // What was photographed is better known than what is predicted from it.
             for &m in &elements {
@@ -338,7 +338,7 @@ fn photographs_for(wanted: f64, points: &[Point]) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recover::OneThread;
+    use crate::executor::SequentialExecutor;
     use crate::simulate::SceneKind;
 
     fn point(photographs: usize, db: f64) -> Point {
@@ -374,7 +374,7 @@ mod tests {
             "tiny",
             photographer,
             Ensemble::Bernoulli,
-            &OneThread,
+            &SequentialExecutor,
             &|_| {},
         )
         .unwrap();

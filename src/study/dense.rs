@@ -1,7 +1,7 @@
 //! Small transports as whole matrices, for methods that know no window.
 
 use super::known::Known;
-use crate::recover::Workers;
+use crate::executor::Executor;
 use crate::transport::{CHANNELS, CameraPx};
 
 /// Every element of a transport.
@@ -15,10 +15,10 @@ pub(super) struct Dense {
 
 impl Dense {
     /// All of `known`.
-    pub fn new(known: &impl Known, workers: &impl Workers) -> Self {
+    pub fn new(known: &impl Known, executor: &impl Executor) -> Self {
         let geometry = known.geometry();
         let elements = geometry.light.area();
-        let rows = workers.map(geometry.camera.area(), |n| {
+        let rows = executor.map(geometry.camera.area(), |n| {
             let width = geometry.camera.width;
             let pixel = CameraPx {
                 x: n as u32 % width,

@@ -6,7 +6,7 @@
 //! the kernel `f(x) = x^γ`, taken element by element, flattens the light so that fewer rows and
 //! columns carry more of it.
 
-use crate::recover::Workers;
+use crate::executor::Executor;
 
 /// Exponents γ to choose from.
 const EXPONENTS: [f64; 5] = [1.0, 0.7, 0.5, 0.35, 0.25];
@@ -44,14 +44,14 @@ pub struct Nystrom {
 
 impl Nystrom {
     /// Chooses exponent and ridge by how well held-out rows are predicted, then uses all rows.
-    pub fn new(samples: &Samples, workers: &impl Workers) -> Self {
+    pub fn new(samples: &Samples, executor: &impl Executor) -> Self {
         let candidates: Vec<(f64, f64)> = EXPONENTS
             .iter()
             .flat_map(|&exponent| RIDGES.map(|ridge| (exponent, ridge)))
             .collect();
         let (held, kept): (Vec<usize>, Vec<usize>) =
             (0..samples.pixels.len()).partition(|i| i % HOLD_OUT_EVERY == HOLD_OUT_EVERY - 1);
-        let errors = workers.map(candidates.len(), |i| {
+        let errors = executor.map(candidates.len(), |i| {
             let (exponent, ridge) = candidates[i];
             let fit = Self::fit(samples, &kept, exponent, ridge);
             let rows = held.iter().map(|&h| {
@@ -184,7 +184,7 @@ fn solve_in_place(matrix: &mut [f64], right: &mut [f64], k: usize, width: usize)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recover::OneThread;
+    use crate::executor::SequentialExecutor;
 
     #[test]
     fn a_matrix_of_low_rank_comes_back() {
@@ -208,7 +208,7 @@ mod tests {
             pixels: sampled,
             light,
         };
-        let nystrom = Nystrom::new(&samples, &OneThread);
+        let nystrom = Nystrom::new(&samples, &SequentialExecutor);
         let (mut signal, mut error) = (0.0, 0.0);
         for n in 0..pixels {
             for (m, estimate) in nystrom.pixel(n).into_iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use super::{Picture, StudyError};
 use crate::capture::{Measurements, Noise, Pattern, Rows};
-use crate::recover::Workers;
+use crate::executor::Executor;
 use crate::simulate::{Camera, Codes, Ensemble, Exposure, NoiseStream, Scene, emission};
 use crate::transport::CHANNELS;
 
@@ -36,7 +36,7 @@ impl Photographer<'_> {
         &self,
         ensemble: Ensemble,
         count: usize,
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Result<Measurements, StudyError> {
         let geometry = self.scene.geometry();
         let codes = (0..count)
@@ -47,7 +47,7 @@ impl Photographer<'_> {
                 )
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let pictures = self.photographs(&codes, workers)?;
+        let pictures = self.photographs(&codes, executor)?;
         let camera = self.camera();
         let code = 1.0 / (camera.white - camera.black);
         let mut measurements = Measurements {
@@ -75,13 +75,13 @@ impl Photographer<'_> {
     pub(super) fn photographs(
         &self,
         lights: &[Codes],
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Result<Vec<Picture>, StudyError> {
-        let mut pictures = self.expose(lights, workers);
+        let mut pictures = self.expose(lights, executor);
         let dark = self.dark()?;
         let mut done = 0;
         for batch in pictures.chunks_mut(BATCH) {
-            let noisy = workers.map(batch.len(), |i| {
+            let noisy = executor.map(batch.len(), |i| {
                 self.noisy(&batch[i], (1 + done + i) as u32)
             });
             done += batch.len();
@@ -108,7 +108,7 @@ impl Photographer<'_> {
     }
 
     /// The scene under each light, without noise.
-    fn expose(&self, lights: &[Codes], workers: &impl Workers) -> Vec<Picture> {
+    fn expose(&self, lights: &[Codes], executor: &impl Executor) -> Vec<Picture> {
         let geometry = self.scene.geometry();
         let exposure = Exposure::new(geometry.light, lights);
         let mut pictures = vec![vec![[0.0; CHANNELS]; geometry.camera.area()]; lights.len()];
@@ -116,7 +116,7 @@ impl Photographer<'_> {
         let tiles: Vec<_> = geometry.tiles().collect();
         // A row of tiles at a time bounds the memory.
         for row in tiles.chunks(across) {
-            let seen = workers.map(row.len(), |i| {
+            let seen = executor.map(row.len(), |i| {
                 exposure.expose(geometry, &self.scene.tile(row[i]))
             });
             for (rect, seen) in row.iter().zip(seen) {

@@ -8,7 +8,8 @@ use super::report::{Section, Table, cell};
 use super::sheet::{Captioned, Panel, Sheet};
 use super::{Progress, StudyError};
 use crate::capture::Measurements;
-use crate::recover::{Recovery, Settings, Workers};
+use crate::executor::Executor;
+use crate::recover::{Recovery, Settings};
 use crate::relight::{BuiltinLight, Light, area_resample};
 use crate::transport::{BandTile, CHANNELS, Decibels, Extent, Tile};
 
@@ -53,7 +54,7 @@ pub fn relit_pictures(
     known: &impl Known,
     measurements: &Measurements,
     lights: Vec<RelitLight>,
-    workers: &impl Workers,
+    executor: &impl Executor,
     progress: Progress,
 ) -> Result<Section, StudyError> {
     let patterns = measurements.patterns.len();
@@ -62,7 +63,7 @@ pub fn relit_pictures(
         methods::name(DEFAULT)
     ));
     let tenth = |tenths: usize| progress(&format!("{name}: relighting, {tenths}0 %"));
-    let (truth, ours) = pictures(known, measurements, &lights, workers, &tenth)?;
+    let (truth, ours) = pictures(known, measurements, &lights, executor, &tenth)?;
     let camera = measurements.camera;
     let flood: Vec<f64> = truth
         .iter()
@@ -157,20 +158,20 @@ fn pictures(
     known: &impl Known,
     measurements: &Measurements,
     lights: &[RelitLight],
-    workers: &impl Workers,
+    executor: &impl Executor,
     tenth: &(impl Fn(usize) + Sync),
 ) -> Result<(Pictures, Pictures), StudyError> {
     let settings = Settings {
         method: DEFAULT,
         window: known.geometry().window,
     };
-    let recovery = Recovery::prepare(measurements, settings, workers)?;
+    let recovery = Recovery::prepare(measurements, settings, executor)?;
     let geometry = *recovery.geometry();
     let basis = recovery.basis().cloned().unwrap_or_default();
     let area = geometry.window.area();
     let rects: Vec<_> = geometry.tiles().collect();
     let done = AtomicUsize::new(0);
-    let tiles = workers.map(rects.len(), |i| {
+    let tiles = executor.map(rects.len(), |i| {
         let mut tile = BandTile::dark(rects[i]);
         tile.put(recovery.tile(measurements, rects[i]));
         // Rounded to codes, as they are when a file is relit.

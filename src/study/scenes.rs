@@ -5,7 +5,7 @@ use super::known::SceneTruth;
 use super::methods::{self, DEFAULT, METHODS};
 use super::report::{Section, Table, cell};
 use super::{Photographer, Progress, StudyError};
-use crate::recover::Workers;
+use crate::executor::Executor;
 use crate::simulate::{Ensemble, SceneKind};
 use crate::transport::Extent;
 
@@ -67,7 +67,7 @@ const ALLOWED: f64 = 0.3;
 /// The table of scenes. Methods that recover each pixel on its own are judged on about `pixels`.
 pub fn scenes_table(
     pixels: usize,
-    workers: &impl Workers,
+    executor: &impl Executor,
     progress: Progress,
 ) -> Result<Section, StudyError> {
     let mut header = vec![
@@ -96,11 +96,11 @@ pub fn scenes_table(
             electrons: setting.electrons,
             seed: setting.seed,
         };
-        let measurements = photographer.measure(setting.ensemble, setting.patterns, workers)?;
+        let measurements = photographer.measure(setting.ensemble, setting.patterns, executor)?;
         let mut levels = Vec::new();
         for &method in METHODS {
             let known = SceneTruth(scene.as_ref());
-            levels.push(judge(&known, &measurements, method, pixels, workers)?.snr);
+            levels.push(judge(&known, &measurements, method, pixels, executor)?.snr);
         }
         let mut row = vec![
             scene_name(setting.kind).to_owned(),

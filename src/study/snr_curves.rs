@@ -7,7 +7,7 @@ use super::methods::{self, METHODS};
 use super::report::{Section, Table, cell, seconds};
 use super::{Progress, StudyError};
 use crate::capture::{Measurements, Noise};
-use crate::recover::Workers;
+use crate::executor::Executor;
 
 /// Numbers of patterns, `L`, rising.
 pub const SNR_PATTERNS: [usize; 11] = [10, 14, 20, 28, 40, 56, 80, 112, 160, 224, 320];
@@ -25,7 +25,7 @@ pub fn snr_curves(
     known: &impl Known,
     mut measurements: Measurements,
     pixels: usize,
-    workers: &impl Workers,
+    executor: &impl Executor,
     progress: Progress,
 ) -> Result<Section, StudyError> {
     let available = measurements.patterns.len();
@@ -47,7 +47,7 @@ pub fn snr_curves(
             if methods::slow(method) && !SLOW_PATTERNS.contains(&l) {
                 continue;
             }
-            let accuracy = judge(known, &measurements, method, pixels, workers)?;
+            let accuracy = judge(known, &measurements, method, pixels, executor)?;
             progress(&format!(
                 "{name}: {} from {l} patterns: {} dB",
                 methods::name(method),

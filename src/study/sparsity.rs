@@ -6,7 +6,7 @@ use super::known::Known;
 use super::report::{Section, Table};
 use super::sheet::{Captioned, Panel, Sheet};
 use super::{Progress, StudyError};
-use crate::recover::Workers;
+use crate::executor::Executor;
 use crate::transport::{CHANNELS, CameraPx, Extent, Geometry};
 
 /// Low mantissa bits that do not count: elements within 1/64 of each other are one class.
@@ -114,12 +114,12 @@ impl SparsityProfile {
 pub fn sparsity(
     name: &str,
     known: &impl Known,
-    workers: &impl Workers,
+    executor: &impl Executor,
     progress: Progress,
 ) -> Result<Section, StudyError> {
     progress(&format!("{name}: structure of the transport"));
     let geometry = known.geometry();
-    let rows = workers.map(geometry.camera.height as usize, |y| {
+    let rows = executor.map(geometry.camera.height as usize, |y| {
         survey_row(known, y as u32)
     });
     let mut whole = SparsityProfile::default();

@@ -5,7 +5,8 @@ use std::time::Instant;
 use super::blocks;
 use super::dense::Dense;
 use crate::capture::Measurements;
-use crate::recover::{Nnls, Workers};
+use crate::executor::Executor;
+use crate::recover::Nnls;
 use crate::transport::TransportError;
 
 /// Recovers about `pixels` pixels drawn at random, each on its own, by non-negative least squares
@@ -18,14 +19,14 @@ pub(super) fn recover(
     truth: &Dense,
     measurements: &Measurements,
     pixels: usize,
-    workers: &impl Workers,
+    executor: &impl Executor,
 ) -> (Vec<TransportError>, f64) {
     let start = Instant::now();
-    let gram = gram(measurements, workers);
+    let gram = gram(measurements, executor);
     let once = start.elapsed().as_secs_f64();
     let drawn = blocks::draw(truth.pixels(), pixels);
     let start = Instant::now();
-    let functions = workers.map(drawn.len(), |i| {
+    let functions = executor.map(drawn.len(), |i| {
         let mut solver = Nnls::new(&gram, truth.elements);
         [0, 1, 2].map(|c| solver.solve(&right_hand_side(measurements, drawn[i], c)))
     });
@@ -43,9 +44,9 @@ pub(super) fn recover(
 }
 
 /// `PᵀP`, `[M, M]`.
-fn gram(measurements: &Measurements, workers: &impl Workers) -> Vec<f64> {
+fn gram(measurements: &Measurements, executor: &impl Executor) -> Vec<f64> {
     let elements = measurements.light.area();
-    let rows = workers.map(elements, |i| {
+    let rows = executor.map(elements, |i| {
         let mut row = vec![0.0; elements];
         for pattern in &measurements.patterns {
             let plane = pattern.plane(0);
@@ -77,7 +78,7 @@ mod tests {
 
     use super::*;
     use crate::capture::{Noise, Pattern, Rows};
-    use crate::recover::OneThread;
+    use crate::executor::SequentialExecutor;
     use crate::simulate::NoiseStream;
     use crate::transport::{CHANNELS, Correspondence, Extent};
 
@@ -120,7 +121,7 @@ mod tests {
             patterns: patterns.into_iter().map(Pattern::Grey).collect(),
         };
         let truth = Dense { elements: 16, tau };
-        let (errors, _) = recover(&truth, &measurements, 1, &OneThread);
+        let (errors, _) = recover(&truth, &measurements, 1, &SequentialExecutor);
         assert!(errors[0].snr().is_none_or(|snr| snr.0 > 60.0), "{errors:?}");
     }
 }

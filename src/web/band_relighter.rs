@@ -6,9 +6,9 @@ use js_sys::{Float32Array, Uint8Array};
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{CodedError, Display, Photo};
+use crate::executor::SequentialExecutor;
 use crate::relight::cpu;
 use crate::transport::CHANNELS;
-use crate::workers::OneThread;
 
 /// Relights some rows of a photograph on the CPU. Only their tiles need be there.
 #[wasm_bindgen]
@@ -68,9 +68,9 @@ impl BandRelighter {
                     linear: vec![[0.0; CHANNELS]; width],
                     row: vec![[0.0; 4]; width],
                 };
-                self.relighter.relight_rows(rows, &OneThread);
+                self.relighter.relight_rows(rows, &SequentialExecutor);
             }
-            None => self.relighter.update(&OneThread),
+            None => self.relighter.update(&SequentialExecutor),
         }
         let display = display.inner();
         let mut picture = vec![[0; 4]; cpu::BAND_ROWS.min(self.rows.len()) * width as usize];
@@ -78,7 +78,7 @@ impl BandRelighter {
             let rows = first..self.rows.end.min(first + cpu::BAND_ROWS as u32);
             let pixels = &mut picture[..rows.len() * width as usize];
             self.relighter
-                .show(&display, rows.clone(), pixels, &OneThread);
+                .show(&display, rows.clone(), pixels, &SequentialExecutor);
             let [start, end] =
                 [rows.start, rows.end].map(|row| 4 * (row - self.rows.start) * width);
             out.subarray(start, end).copy_from(pixels.as_flattened());

@@ -9,11 +9,11 @@ use web_sys::{CanvasRenderingContext2d, HtmlCanvasElement};
 
 use super::drawing::display::parse_gamut;
 use super::{CodedError, Photo, Relighter};
+use crate::executor::SequentialExecutor;
 use crate::relight::backend::{Backend, BackendError, Frame};
 use crate::relight::canvas2d::{Keep, open_2d};
 use crate::relight::{Gamut, Rgba8Picture, cpu};
 use crate::transport::{Extent, Transport};
-use crate::workers::OneThread;
 
 #[wasm_bindgen]
 extern "C" {
@@ -94,12 +94,12 @@ impl Backend for Canvas2d {
         self.relighter.set_detail(frame.detail);
         // It takes no pictures, so there is one.
         if let Some(light) = frame.light {
-            self.relighter.relight(light, &OneThread);
+            self.relighter.relight(light, &SequentialExecutor);
         }
         let rows = 0..self.picture.extent.height;
         let pixels = &mut self.picture.pixels;
         self.relighter
-            .show(&frame.display, rows, pixels, &OneThread);
+            .show(&frame.display, rows, pixels, &SequentialExecutor);
         let bytes = Clamped(self.picture.pixels.as_flattened());
         let Extent { width, height } = self.picture.extent;
         let image = Image::new(bytes, width, height, &self.settings).map_err(lost)?;

@@ -8,7 +8,8 @@
 mod glass_s;
 
 use relightable_photo::capture::Measurements;
-use relightable_photo::recover::{Method, OneThread, Recovery, Settings, SparsityBasis};
+use relightable_photo::executor::SequentialExecutor;
+use relightable_photo::recover::{Method, Recovery, Settings, SparsityBasis};
 use relightable_photo::transport::{Extent, Geometry, TileRect, TransportError};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::{wasm_bindgen_test, wasm_bindgen_test_configure};
@@ -78,7 +79,7 @@ fn parts(method: Method, geometry: &Geometry) -> Vec<TileRect> {
 fn recover(measurements: &Measurements, method: Method, truth: &[[f64; 3]]) -> TransportError {
     let window = glass_s::true_window();
     let settings = Settings { method, window };
-    let recovery = Recovery::prepare(measurements, settings, &OneThread).unwrap();
+    let recovery = Recovery::prepare(measurements, settings, &SequentialExecutor).unwrap();
     let (geometry, area) = (recovery.geometry(), window.area());
     let mut error = TransportError::default();
     for rect in parts(method, geometry) {

@@ -1,6 +1,6 @@
 //! Colour axes in which most of a pixel lies on the first.
 
-use crate::eigen::symmetric_eigen;
+use crate::linalg::symmetric_eigen;
 use crate::transport::CHANNELS;
 
 /// Red, green, blue, or shares of other axes.

@@ -5,8 +5,8 @@
 //! down. Along a segment the residual is quadratic in the step, so that the point where
 //! `‖y − Ax‖ = ε` is a root and no search over λ. At it `x` solves the constrained problem.
 
-use super::super::passive::PassiveSet;
-use super::super::vector::{add_scaled, vectorised};
+use super::super::passive_set::PassiveSet;
+use crate::linalg::{add_scaled, vectorise};
 
 /// Solver for right-hand sides that share one Gram matrix.
 #[derive(Debug)]
@@ -57,7 +57,7 @@ impl<'a> Homotopy<'a> {
     /// `energy = ‖y‖²`. Returns `x`, `[k]`: `‖y − Ax‖ = epsilon` to rounding, unless zero satisfies
     /// the constraint or nothing does, where it is the non-negative least-squares solution.
     pub fn solve(&mut self, h: &[f64], energy: f64, epsilon: f64) -> Vec<f64> {
-        vectorised(
+        vectorise(
             #[inline(always)]
             || self.follow(h, energy, epsilon * epsilon),
         );

@@ -8,11 +8,10 @@
 //! to twenty steps. Splitting methods, whose steps are cheap, take thousands of them: with few
 //! patterns, or as ε nears ‖y‖, the problem nears a linear program.
 
-use super::super::dense;
-use super::super::vector::{add_scaled, dot, vectorised};
 use super::SparsityBasis;
 use super::solution::{Constraint, Solution};
 use super::window::Window;
+use crate::linalg::{self, add_scaled, dot, vectorise};
 
 /// Relative duality gap at which a solution is good: noise moves the objective by far more.
 const GAP: f64 = 2e-3;
@@ -68,12 +67,12 @@ impl InteriorPoint {
             let least = window.difference(constraint.least_squares, constraint.y);
             if !dark && dot(&least, &least).sqrt() < constraint.epsilon {
                 let gram = gram.get_or_insert_with(|| {
-                    vectorised(
+                    vectorise(
                         #[inline(always)]
                         || window.gram(),
                     )
                 });
-                vectorised(
+                vectorise(
                     #[inline(always)]
                     || improve(window, gram, constraint, &mut best),
                 );
@@ -308,7 +307,7 @@ impl<'a> System<'a> {
             }
             row[i] += point.w[i] / point.x[i];
         }
-        dense::cholesky(&mut factor, k)?;
+        linalg::cholesky(&mut factor, k)?;
         Some(Self {
             window,
             point,
@@ -383,7 +382,7 @@ impl<'a> System<'a> {
                 - self.missing[i]
                 - *x;
         }
-        dense::solve(&self.factor, &mut x);
+        linalg::cholesky_solve(&self.factor, &mut x);
         let coefficients = self.window.coefficients(&x);
         for ((s, curvature), c) in s.iter_mut().zip(&self.curvature).zip(&coefficients) {
             *s += curvature * c;
@@ -429,7 +428,7 @@ mod tests {
         let side = 5;
         let slots: Vec<usize> = (missing..side * side).collect();
         let problem = Problem::random(slots.len(), rows, seed, 0.5);
-        let columns = dense::transpose(&problem.matrix, slots.len());
+        let columns = linalg::transpose(&problem.matrix, slots.len());
         let denoiser = InteriorPoint::new(basis, &columns, rows, &slots, side);
         (problem, denoiser)
     }

@@ -4,8 +4,8 @@
 //! constraints satisfy them with a little of the constant basis vector mixed in, and then bound the
 //! objective of every feasible x from below: the distance to the optimum is known at any time.
 
-use super::super::vector::dot;
 use super::window::Window;
+use crate::linalg::dot;
 
 /// Steps of the search for the best mixture in a bound.
 const THIRDS: usize = 40;

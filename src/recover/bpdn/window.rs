@@ -1,8 +1,7 @@
 //! One window's equations, and the basis in which its functions are sparse.
 
-use super::super::dense;
-use super::super::vector::{add_scaled, dot};
 use super::SparsityBasis;
+use crate::linalg::{self, add_scaled, dot};
 
 /// `Ax` and `φᵀx` for functions x on the unknowns of a window.
 #[derive(Debug)]
@@ -46,9 +45,9 @@ impl Window {
             rows,
             slots: slots.to_vec(),
             columns: columns.to_vec(),
-            synthesis: dense::transpose(&analysis, side),
+            synthesis: linalg::transpose(&analysis, side),
             analysis,
-            transposed: dense::transpose(&products, side),
+            transposed: linalg::transpose(&products, side),
             products,
             pair,
         }
@@ -90,7 +89,7 @@ impl Window {
     #[inline(always)]
     fn transform(&self, along: &[f64], input: &[f64]) -> Vec<f64> {
         let side = self.side;
-        let half = dense::product(along, input, side, side);
+        let half = linalg::multiply(along, input, side, side);
         let rows = half.chunks_exact(side);
         rows.flat_map(|row| along.chunks_exact(side).map(move |b| dot(row, b)))
             .collect()
@@ -137,8 +136,8 @@ impl Window {
         let (side, k) = (self.side, self.unknowns());
         let pairs = self.products.len() / side;
         // Along one axis for each coefficient of the other, then along that one.
-        let along = dense::product(d, &self.transposed, side, pairs);
-        let both = dense::product(&self.products, &along, side, pairs);
+        let along = linalg::multiply(d, &self.transposed, side, pairs);
+        let both = linalg::multiply(&self.products, &along, side, pairs);
         let mut out = vec![0.0; k * k];
         for (i, row) in out.chunks_exact_mut(k.max(1)).enumerate() {
             let (v, u) = (self.slots[i] / side, self.slots[i] % side);

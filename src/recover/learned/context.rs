@@ -11,9 +11,8 @@ use super::equations::{Equations, Member, PHASES};
 use super::nonnegative::NonNegative;
 use super::posterior::{Gaussian, Workspace};
 use super::prior::{Prior, Threshold, bright};
-use crate::recover::Workers;
-use crate::recover::dense;
-use crate::recover::vector::{add_scaled, vectorised};
+use crate::executor::Executor;
+use crate::linalg::{self, add_scaled, vectorise};
 use crate::transport::{CHANNELS, Extent, TileRect};
 
 /// Pixels around one that it is predicted from.
@@ -80,7 +79,7 @@ impl Field {
             evidence: Vec::with_capacity(members),
             bright: Vec::with_capacity(members),
         };
-        vectorised(
+        vectorise(
             #[inline(always)]
             || {
                 let mut work = Workspace::new(rank);
@@ -104,7 +103,7 @@ impl Field {
     /// r]`.
     pub fn refine(&self, patch: &Patch, prior: &Prior, nonnegative: &NonNegative) -> Vec<f64> {
         let mut out = Vec::with_capacity(patch.inner.extent.area() * CHANNELS * self.rank);
-        vectorised(
+        vectorise(
             #[inline(always)]
             || {
                 let mut work = Workspace::new(self.rank);
@@ -202,16 +201,16 @@ impl Context {
         patches: &[Patch],
         prior: &Prior,
         threshold: &Threshold,
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Option<Self> {
         let rank = prior.rank;
         let features = features();
         let width = 1 + features.len();
-        let parts = workers.map(PARTS, |part| {
+        let parts = executor.map(PARTS, |part| {
             let mut normals = vec![Normal::new(width, rank); CLASSES];
             let mut count = 0usize;
             for patch in patches.iter().skip(part).step_by(PARTS) {
-                vectorised(
+                vectorise(
                     #[inline(always)]
                     || {
                         for (x, y, c, member) in patch.field.members(patch.inner) {
@@ -240,7 +239,7 @@ impl Context {
         if count < 4 * width * CLASSES {
             return None;
         }
-        let factors = workers.map(CLASSES, |i| normals[i].factors(width, rank));
+        let factors = executor.map(CLASSES, |i| normals[i].factors(width, rank));
         let rights: Vec<Vec<f64>> = normals.into_iter().map(|n| n.right).collect();
         let mut context = Self {
             rank,
@@ -249,13 +248,13 @@ impl Context {
             gaussian: prior.gaussian.clone(),
             share: 0.5,
         };
-        context.regress(&factors, &rights, workers);
+        context.regress(&factors, &rights, executor);
         context.gaussian = context.first_guess(patches, prior, threshold);
         for _ in 0..ROUNDS {
-            let parts = workers.map(PARTS, |part| {
+            let parts = executor.map(PARTS, |part| {
                 let mut sums = Expected::new(width, rank);
                 for patch in patches.iter().skip(part).step_by(PARTS) {
-                    vectorised(
+                    vectorise(
                         #[inline(always)]
                         || context.expect(patch, prior.noise, &mut sums),
                     );
@@ -268,23 +267,23 @@ impl Context {
                 .moment
                 .iter_mut()
                 .for_each(|m| *m /= total.weight.max(1.0));
-            dense::mirror(&mut total.moment, rank);
+            linalg::mirror_upper(&mut total.moment, rank);
             context.gaussian = Gaussian::new(&total.moment, rank);
             context.share = (total.weight / total.count.max(1.0)).clamp(0.01, 0.99);
-            context.regress(&factors, &total.right, workers);
+            context.regress(&factors, &total.right, executor);
         }
         Some(context)
     }
 
     /// Solves all regressions for their right-hand sides.
-    fn regress(&mut self, factors: &[Vec<f64>], rights: &[Vec<f64>], workers: &impl Workers) {
+    fn regress(&mut self, factors: &[Vec<f64>], rights: &[Vec<f64>], executor: &impl Executor) {
         let (rank, width) = (self.rank, 1 + self.features.len());
-        self.weights = workers.map(CLASSES, |i| {
+        self.weights = executor.map(CLASSES, |i| {
             let mut weights = vec![0.0; width * rank];
             let mut b = vec![0.0; width];
             for (k, factor) in factors[i].chunks_exact(width * width).enumerate() {
                 (0..width).for_each(|f| b[f] = rights[i][f * rank + k]);
-                dense::solve(factor, &mut b);
+                linalg::cholesky_solve(factor, &mut b);
                 (0..width).for_each(|f| weights[f * rank + k] = b[f]);
             }
             weights
@@ -331,7 +330,7 @@ impl Context {
         for k in 0..rank {
             moment[k * rank + k] += 0.5 * spread[k] / f64::max(sampled, 1.0);
         }
-        dense::mirror(&mut moment, rank);
+        linalg::mirror_upper(&mut moment, rank);
         Gaussian::new(&moment, rank)
     }
 
@@ -412,7 +411,7 @@ impl Context {
     pub fn refine(&self, patch: &Patch, noise: f64, nonnegative: &NonNegative) -> Vec<f64> {
         let rank = self.rank;
         let mut out = Vec::with_capacity(patch.inner.extent.area() * CHANNELS * rank);
-        vectorised(
+        vectorise(
             #[inline(always)]
             || {
                 let mut work = Workspace::new(rank);
@@ -489,7 +488,7 @@ impl Normal {
                 }
                 a[i * width + i] += ridge;
             }
-            if dense::cholesky(&mut a, width).is_none() {
+            if linalg::cholesky(&mut a, width).is_none() {
                 // Nothing to learn from in this class: predict nothing.
                 a.fill(0.0);
                 (0..width).for_each(|i| a[i * width + i] = 1e150);

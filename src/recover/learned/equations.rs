@@ -5,10 +5,10 @@ use std::ops::Range;
 
 use super::kernels::Kernels;
 use crate::capture::Measurements;
-use crate::recover::FEWEST_PATTERNS;
+use crate::linalg::{dot, vectorise};
+use crate::recover::MIN_PATTERNS;
 use crate::recover::pooled::MEAN_WEIGHT;
-use crate::recover::sample::windows;
-use crate::recover::vector::{dot, vectorised};
+use crate::recover::sampling::pixels_by_window;
 use crate::transport::{CHANNELS, CameraPx, Geometry, TileRect};
 
 /// Sub-element position classes along one axis. At two camera pixels an element, neighbours lie in
@@ -94,10 +94,10 @@ impl Equations {
             rights: vec![0.0; pixels * CHANNELS * rank],
         };
         let weights = measurements.weights();
-        for (origin, pixels) in windows(geometry, rect) {
+        for (origin, pixels) in pixels_by_window(geometry, rect) {
             for (plane, channels) in measurements.planes() {
                 let projected = kernels.project(measurements, geometry, origin, plane);
-                vectorised(
+                vectorise(
                     #[inline(always)]
                     || {
                         let fill = Fill {
@@ -123,7 +123,7 @@ impl Equations {
         rows: &[usize],
         rect: TileRect,
     ) -> usize {
-        let windows = windows(geometry, rect);
+        let windows = pixels_by_window(geometry, rect);
         let sets = |pixels: &[(usize, CameraPx)], channels: Range<usize>| {
             let sets: BTreeSet<Vec<usize>> = pixels
                 .iter()
@@ -181,7 +181,7 @@ impl Projected {
 fn usable(measurements: &Measurements, rows: &[usize], pixel: CameraPx, c: usize) -> Vec<usize> {
     let finite = |l: &usize| measurements.sample(*l, pixel, c).is_finite();
     let usable: Vec<usize> = rows.iter().copied().filter(finite).collect();
-    match usable.len() < FEWEST_PATTERNS {
+    match usable.len() < MIN_PATTERNS {
         true => rows.to_vec(),
         false => usable,
     }

@@ -2,7 +2,7 @@
 
 use super::equations::Projected;
 use crate::capture::Measurements;
-use crate::recover::vector::vectorised;
+use crate::linalg::vectorise;
 use crate::transport::{Basis, Element, Geometry};
 
 /// Responses computed together: two vector registers of f32 on the narrowest machine of note.
@@ -103,7 +103,7 @@ impl Kernels {
                     (v + line as i64) as usize * width + (u + columns.start as i64) as usize;
                 out.copy_from_slice(&pattern[first..first + columns.len()]);
             }
-            vectorised(
+            vectorise(
                 #[inline(always)]
                 || respond(&emission, &kernels, row),
             );

@@ -28,13 +28,13 @@ use kernels::Kernels;
 use nonnegative::NonNegative;
 use prior::{Prior, Threshold};
 
-use super::direct::{Direct, held_out_misses};
-use super::holdout::Split;
+use super::holdout::HoldoutSplit;
+use super::pixelwise::{PixelwiseRecovery, held_out_residuals};
 use super::pooled;
-use super::sample::{spread, windows};
-use super::workers::go_on;
-use super::{CommonMode, RecoverError, Workers};
+use super::sampling::{pixels_by_window, spread_squares};
+use super::{CommonMode, RecoverError};
 use crate::capture::Measurements;
+use crate::executor::Executor;
 use crate::transport::{
     Basis, CHANNELS, Extent, FactoredTile, Geometry, RecoveredTile, TileRect, TransportFunctions,
     Window,
@@ -79,9 +79,9 @@ pub(super) struct Learned {
     prior: Prior,
     context: Option<Context>,
     threshold: Threshold,
-    split: Split,
+    split: HoldoutSplit,
     /// Least squares, where it is worth trying tile by tile.
-    direct: Option<Direct>,
+    direct: Option<PixelwiseRecovery>,
 }
 
 impl Learned {
@@ -90,7 +90,7 @@ impl Learned {
     pub fn preparation_bytes(window: Window) -> usize {
         // Where each pixel and channel is saturated in other photographs.
         let rank = start::KERNELS.min(window.area());
-        let samples = pooled::MOST_SAMPLES * rank * rank * size_of::<f64>();
+        let samples = pooled::MAX_SAMPLES * rank * rank * size_of::<f64>();
         samples.max(2 * PATCH_BYTES)
     }
 
@@ -98,12 +98,12 @@ impl Learned {
     /// matrices, where each pixel and channel is saturated in other photographs.
     pub fn tile_bytes(window: Window) -> usize {
         let pixels = (Geometry::DEFAULT_TILE_SIDE as usize + 2 * REACH as usize).pow(2);
-        let rank = Self::most_rank(window);
+        let rank = Self::max_rank(window);
         pixels * CHANNELS * rank * rank * size_of::<f64>()
     }
 
     /// The most kernels there may be.
-    pub fn most_rank(window: Window) -> usize {
+    pub fn max_rank(window: Window) -> usize {
         RANKS.into_iter().max().unwrap_or(0).min(window.area())
     }
 
@@ -112,26 +112,26 @@ impl Learned {
     pub fn new(
         measurements: &Measurements,
         geometry: Geometry,
-        split: Split,
+        split: HoldoutSplit,
         mean_function: &[f64],
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Result<Self, RecoverError> {
         let area = geometry.window.area();
-        let squares = pooled::squares(measurements);
+        let squares = pooled::sample_squares(measurements);
         let mean = start::blur(mean_function, geometry.window.side() as usize);
         let (functions, mut prior) =
-            start::first_prior(&mean, geometry.window.side() as usize, workers);
+            start::first_prior(&mean, geometry.window.side() as usize, executor);
         let kernels = Kernels::new(&functions, &mean);
         let equations = |kernels: &Kernels, rows: &[usize], rects: &[TileRect]| {
-            workers.map(rects.len(), |i| {
+            executor.map(rects.len(), |i| {
                 Equations::new(measurements, &geometry, kernels, rows, rects[i])
             })
         };
-        let samples = equations(&kernels, &split.learn, &squares);
+        let samples = equations(&kernels, &split.training, &squares);
         let threshold = threshold(&samples);
         for _ in 0..ROUNDS {
-            go_on(workers)?;
-            prior.improve(&samples, &threshold, workers);
+            executor.check_cancelled()?;
+            prior.improve(&samples, &threshold, executor);
         }
         drop(samples);
 
@@ -141,7 +141,7 @@ impl Learned {
         let mut ranks = RANKS.map(|rank| rank.min(prior.rank)).to_vec();
         ranks.dedup();
         for rank in ranks {
-            go_on(workers)?;
+            executor.check_cancelled()?;
             let (functions, prior) = start::cut(&functions, &prior, rank, area);
             let kernels = Kernels::new(&functions, &mean);
             let learned = Self {
@@ -155,31 +155,31 @@ impl Learned {
                 split: split.clone(),
                 direct: None,
             };
-            let error = learned.held_out_error(measurements, &squares, workers);
+            let error = learned.held_out_error(measurements, &squares, executor);
             let least = chosen.as_ref().map_or(error, |(least, _)| least.min(error));
             if error <= (1.0 + NO_WORSE) * least {
                 chosen = Some((least, learned));
             }
         }
-        let (_, mut learned) = chosen.ok_or(RecoverError::Dark)?;
+        let (_, mut learned) = chosen.ok_or(RecoverError::NoSignal)?;
 
         // What neighbours tell, and whether it helps.
-        go_on(workers)?;
-        let inner = learned.patches(measurements, &split.all, workers);
-        learned.learn_context(measurements, &split.learn, &inner, workers);
-        if !split.held.is_empty() {
-            let with = learned.held_out_error(measurements, &inner, workers);
+        executor.check_cancelled()?;
+        let inner = learned.patches(measurements, &split.all, executor);
+        learned.learn_context(measurements, &split.training, &inner, executor);
+        if !split.held_out.is_empty() {
+            let with = learned.held_out_error(measurements, &inner, executor);
             let context = learned.context.take();
-            let without = learned.held_out_error(measurements, &inner, workers);
+            let without = learned.held_out_error(measurements, &inner, executor);
             let helps = context.is_some() && with < without;
             if helps {
                 learned.context = context;
             }
-            go_on(workers)?;
-            learned.direct = learned.rival(measurements, &inner, workers)?;
+            executor.check_cancelled()?;
+            learned.direct = learned.rival(measurements, &inner, executor)?;
             // All is chosen: every pattern may teach.
-            go_on(workers)?;
-            learned.learn_context(measurements, &split.all, &inner, workers);
+            executor.check_cancelled()?;
+            learned.learn_context(measurements, &split.all, &inner, executor);
             if !helps {
                 learned.context = None;
             }
@@ -199,16 +199,16 @@ impl Learned {
 
     /// Weight of the patterns' common mode in the least squares that tiles are blended with, if any.
     pub fn common_mode(&self) -> Option<CommonMode> {
-        self.direct.as_ref().map(Direct::common_mode)
+        self.direct.as_ref().map(PixelwiseRecovery::common_mode)
     }
 
     /// The most camera pixels around a tile whose measurements may go into it.
-    pub const MOST_HALO: u32 = REACH as u32;
+    pub const MAX_HALO: u32 = REACH as u32;
 
     /// Camera pixels around a tile whose measurements go into it.
     pub fn halo(&self) -> u32 {
         if self.context.is_some() {
-            Self::MOST_HALO
+            Self::MAX_HALO
         } else {
             0
         }
@@ -235,13 +235,13 @@ impl Learned {
     }
 
     /// What [`tile`](Self::tile) would be without the patterns held out, all of `rect` blended alike.
-    pub fn rehearse(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
-        let ours = self.factored(measurements, &self.split.learn, rect);
+    pub fn training_tile(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
+        let ours = self.factored(measurements, &self.split.training, rect);
         let Some(direct) = &self.direct else {
             return RecoveredTile::Factored(ours);
         };
         let mut functions = ours.expand(&self.geometry, &self.basis);
-        let theirs = direct.tile_from(measurements, &self.split.learn, rect);
+        let theirs = direct.tile_from(measurements, &self.split.training, rect);
         let share = self
             .comparison(measurements, &functions, &theirs)
             .best_share(LEAST_GAIN);
@@ -270,10 +270,10 @@ impl Learned {
         &self,
         measurements: &Measurements,
         rows: &[usize],
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Vec<TileRect> {
-        let patches = spread(measurements, PATCHES.1, PATCHES.0);
-        let grams = workers.map(patches.len(), |i| {
+        let patches = spread_squares(measurements, PATCHES.1, PATCHES.0);
+        let grams = executor.map(patches.len(), |i| {
             let rect = grown(measurements, patches[i], REACH as u32);
             Equations::count_grams(measurements, &self.geometry, rows, rect)
         });
@@ -283,7 +283,7 @@ impl Learned {
             true => patches,
             false => {
                 let fit = PATCH_BYTES / (bytes / patches.len()).max(1);
-                spread(measurements, PATCHES.1, fit.max(FEWEST_PATCHES))
+                spread_squares(measurements, PATCHES.1, fit.max(FEWEST_PATCHES))
             }
         }
     }
@@ -294,16 +294,16 @@ impl Learned {
         measurements: &Measurements,
         rows: &[usize],
         inner: &[TileRect],
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) {
-        let equations = workers.map(inner.len(), |i| {
+        let equations = executor.map(inner.len(), |i| {
             let rect = grown(measurements, inner[i], REACH as u32);
             Equations::new(measurements, &self.geometry, &self.kernels, rows, rect)
         });
         for _ in 0..LATE_ROUNDS {
-            self.prior.improve(&equations, &self.threshold, workers);
+            self.prior.improve(&equations, &self.threshold, executor);
         }
-        let fields = workers.map(equations.len(), |i| {
+        let fields = executor.map(equations.len(), |i| {
             Field::new(&equations[i], &self.prior, &self.threshold)
         });
         let parts = equations.into_iter().zip(fields).zip(inner);
@@ -314,7 +314,7 @@ impl Learned {
                 inner,
             })
             .collect();
-        self.context = Context::learn(&patches, &self.prior, &self.threshold, workers);
+        self.context = Context::learn(&patches, &self.prior, &self.threshold, executor);
     }
 
     /// Coefficients `f z` of `rect` from the patterns `rows`, `[pixel, component]`.
@@ -357,9 +357,9 @@ impl Learned {
         &self,
         measurements: &Measurements,
         rects: &[TileRect],
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> f64 {
-        let errors = workers.map(rects.len(), |i| {
+        let errors = executor.map(rects.len(), |i| {
             let misses = self.misses(measurements, rects[i]);
             let seen = misses.iter().filter(|miss| miss.is_finite());
             seen.map(|miss| miss * miss).sum::<f64>()
@@ -370,17 +370,17 @@ impl Learned {
     /// What is missed, `[pixel, held, channel]`, in predicting the patterns held out from the others;
     /// NaN where saturated.
     fn misses(&self, measurements: &Measurements, rect: TileRect) -> Vec<f64> {
-        let coefficients = self.solve(measurements, &self.split.learn, rect);
-        let (rank, held) = (self.rank(), self.split.held.len());
+        let coefficients = self.solve(measurements, &self.split.training, rect);
+        let (rank, held) = (self.rank(), self.split.held_out.len());
         let mut misses = vec![f64::NAN; rect.extent.area() * held * CHANNELS];
-        for (origin, pixels) in windows(&self.geometry, rect) {
+        for (origin, pixels) in pixels_by_window(&self.geometry, rect) {
             for (plane, channels) in measurements.planes() {
                 let projected = self
                     .kernels
                     .project(measurements, &self.geometry, origin, plane);
                 for &(p, pixel) in &pixels {
                     let coefficients = &coefficients[p * rank..(p + 1) * rank];
-                    for (i, &l) in self.split.held.iter().enumerate() {
+                    for (i, &l) in self.split.held_out.iter().enumerate() {
                         for c in channels.clone() {
                             let row = projected.row(l).iter().zip(coefficients);
                             let y: f64 = row.map(|(b, z)| f64::from(b * z[c])).sum();
@@ -395,10 +395,15 @@ impl Learned {
     }
 
     /// The learned prior and least squares on the patterns held out, on one tile.
-    fn compare(&self, measurements: &Measurements, direct: &Direct, rect: TileRect) -> Comparison {
-        let ours = self.factored(measurements, &self.split.learn, rect);
+    fn compare(
+        &self,
+        measurements: &Measurements,
+        direct: &PixelwiseRecovery,
+        rect: TileRect,
+    ) -> Comparison {
+        let ours = self.factored(measurements, &self.split.training, rect);
         let ours = ours.expand(&self.geometry, &self.basis);
-        let theirs = direct.tile_from(measurements, &self.split.learn, rect);
+        let theirs = direct.tile_from(measurements, &self.split.training, rect);
         self.comparison(measurements, &ours, &theirs)
     }
 
@@ -410,7 +415,12 @@ impl Learned {
         theirs: &TransportFunctions,
     ) -> Comparison {
         let [ours, theirs] = [ours, theirs].map(|functions| {
-            held_out_misses(&self.geometry, measurements, &self.split.held, functions)
+            held_out_residuals(
+                &self.geometry,
+                measurements,
+                &self.split.held_out,
+                functions,
+            )
         });
         let mut comparison = Comparison::default();
         for (a, b) in ours.into_iter().zip(theirs) {
@@ -428,10 +438,11 @@ impl Learned {
         &self,
         measurements: &Measurements,
         rects: &[TileRect],
-        workers: &impl Workers,
-    ) -> Result<Option<Direct>, RecoverError> {
-        let direct = Direct::least_squares(measurements, self.geometry, &self.split, workers)?;
-        let parts = workers.map(rects.len(), |i| {
+        executor: &impl Executor,
+    ) -> Result<Option<PixelwiseRecovery>, RecoverError> {
+        let direct =
+            PixelwiseRecovery::least_squares(measurements, self.geometry, &self.split, executor)?;
+        let parts = executor.map(rects.len(), |i| {
             self.compare(measurements, &direct, part(rects[i], GLANCED))
         });
         let mut total = Comparison::default();

@@ -10,8 +10,7 @@
 //! window.
 
 use super::kernels::Kernels;
-use crate::recover::dense;
-use crate::recover::vector::{add_scaled, dot};
+use crate::linalg::{self, add_scaled, dot};
 
 /// Light below zero that weighs as much as one standard deviation of the posterior, as a share of
 /// the mean function's peak.
@@ -92,7 +91,7 @@ impl NonNegative {
             }
         }
         solved.copy_from_slice(left);
-        dense::solve(factor, solved);
+        linalg::cholesky_solve(factor, solved);
         direction.copy_from_slice(solved);
         image.copy_from_slice(left);
         let mut descent = dot(left, solved);
@@ -110,7 +109,7 @@ impl NonNegative {
             add_scaled(z, step, direction);
             add_scaled(left, -step, curved);
             solved.copy_from_slice(left);
-            dense::solve(factor, solved);
+            linalg::cholesky_solve(factor, solved);
             let next = dot(left, solved);
             let share = next / descent;
             descent = next;
@@ -148,7 +147,7 @@ mod tests {
             }
         }
         let mut factor = precision.clone();
-        dense::cholesky(&mut factor, rank).unwrap();
+        linalg::cholesky(&mut factor, rank).unwrap();
         let start: Vec<f64> = (50..50 + rank).map(wave).collect();
         let mut z = start.clone();
         nonnegative.pull(&factor, &mut z, &mut Pull::new(rank));
@@ -170,8 +169,8 @@ mod tests {
             }
         }
         assert!(below > 1 && below < area, "{below}");
-        dense::cholesky(&mut system, rank).unwrap();
-        dense::solve(&system, &mut right);
+        linalg::cholesky(&mut system, rank).unwrap();
+        linalg::cholesky_solve(&system, &mut right);
         for k in 0..rank {
             assert!((z[k] - start[k] - right[k]).abs() < 1e-6, "{z:?}");
         }

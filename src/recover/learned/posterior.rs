@@ -2,8 +2,7 @@
 
 use super::equations::Equations;
 use super::nonnegative::{NonNegative, Pull};
-use crate::recover::dense;
-use crate::recover::vector::dot;
+use crate::linalg::{self, dot};
 
 /// A covariance ready for use.
 #[derive(Clone, Debug)]
@@ -25,10 +24,10 @@ impl Gaussian {
         loop {
             let mut u = covariance.to_vec();
             (0..rank).for_each(|k| u[k * rank + k] += ridge);
-            if let Some(log_det) = dense::cholesky(&mut u, rank) {
+            if let Some(log_det) = linalg::cholesky(&mut u, rank) {
                 let mut precision = vec![0.0; rank * rank];
-                dense::invert(&u, rank, &mut vec![0.0; rank * rank], &mut precision);
-                dense::mirror(&mut precision, rank);
+                linalg::cholesky_inverse(&u, rank, &mut vec![0.0; rank * rank], &mut precision);
+                linalg::mirror_upper(&mut precision, rank);
                 return Self { precision, log_det };
             }
             if !ridge.is_finite() {
@@ -94,18 +93,18 @@ impl Workspace {
         for ((x, p), g) in self.factor.iter_mut().zip(&prior.precision).zip(gram) {
             *x = p + a * g;
         }
-        dense::multiply(gram, mean, &mut self.image);
+        linalg::multiply_vector(gram, mean, &mut self.image);
         for k in 0..rank {
             self.step[k] = b * (right[k] - of.scale * self.image[k]);
         }
         let quadratic = a * dot(mean, &self.image) - 2.0 * b * dot(mean, right);
         self.z.copy_from_slice(&self.step);
         // The prior's precision is positive definite and a Gram matrix takes nothing from it.
-        let Some(log_det) = dense::cholesky(&mut self.factor, rank) else {
+        let Some(log_det) = linalg::cholesky(&mut self.factor, rank) else {
             self.z.copy_from_slice(mean);
             return f64::NEG_INFINITY;
         };
-        dense::solve(&self.factor, &mut self.z);
+        linalg::cholesky_solve(&self.factor, &mut self.z);
         let explained = dot(&self.step, &self.z);
         for (z, m) in self.z.iter_mut().zip(mean) {
             *z += m;
@@ -123,7 +122,7 @@ impl Workspace {
     #[inline(always)]
     pub fn covariance(&mut self) {
         let rank = self.z.len();
-        dense::invert(&self.factor, rank, &mut self.scratch, &mut self.inverse);
+        linalg::cholesky_inverse(&self.factor, rank, &mut self.scratch, &mut self.inverse);
     }
 
     /// Expected squared residual `E‖y − f B z‖²` under the posterior just inferred, of which
@@ -133,7 +132,7 @@ impl Workspace {
         let rank = equations.rank;
         let of = &equations.members[member];
         let gram = equations.gram(member);
-        dense::multiply(gram, &self.z, &mut self.image);
+        linalg::multiply_vector(gram, &self.z, &mut self.image);
         let mut spread = 0.0;
         for i in 0..rank {
             let (h, p) = (

@@ -2,9 +2,8 @@
 
 use super::equations::{Equations, PHASES};
 use super::posterior::{Gaussian, Workspace};
-use crate::recover::Workers;
-use crate::recover::dense;
-use crate::recover::vector::{add_scaled, vectorised};
+use crate::executor::Executor;
+use crate::linalg::{self, add_scaled, vectorise};
 use crate::transport::CHANNELS;
 
 /// Coefficients of light transport functions, scaled by the pixel's brightness, as Gaussian: a mean
@@ -65,7 +64,7 @@ impl Prior {
         &mut self,
         patches: &[Equations],
         threshold: &Threshold,
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) {
         let rank = self.rank;
         // Where much of a window lies off the display little is seen of its functions, and learning
@@ -77,8 +76,8 @@ impl Prior {
             .count();
         let all: usize = patches.iter().map(|p| p.members.len()).sum();
         let only_whole = ENOUGH_WHOLE * whole >= all;
-        let parts = workers.map(patches.len(), |i| {
-            vectorised(
+        let parts = executor.map(patches.len(), |i| {
+            vectorise(
                 #[inline(always)]
                 || self.expect(&patches[i], threshold, only_whole),
             )
@@ -109,7 +108,7 @@ impl Prior {
             }
         }
         covariance.iter_mut().for_each(|c| *c /= count);
-        dense::mirror(&mut covariance, rank);
+        linalg::mirror_upper(&mut covariance, rank);
         self.gaussian = Gaussian::new(&covariance, rank);
         self.covariance = covariance;
         self.noise = (total.residual / total.rows).max(LEAST_NOISE);

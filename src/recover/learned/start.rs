@@ -1,8 +1,8 @@
 //! Where learning starts: smooth variations of the mean light transport function.
 
 use super::prior::Prior;
-use crate::recover::vector::{add_scaled, dot};
-use crate::recover::{Workers, dense};
+use crate::executor::Executor;
+use crate::linalg::{self, add_scaled, dot};
 
 /// Kernels that learning starts with. Together with the mean a whole number of vector registers.
 pub(super) const KERNELS: usize = 95;
@@ -42,10 +42,14 @@ pub(super) fn blur(mean: &[f64], side: usize) -> Vec<f64> {
 
 /// Kernels that span the likely variations of `mean`, `[r, element]`, orthonormal, and the prior on
 /// them: covariance `0.3 h(s) h(t) exp(-|s - t|)`.
-pub(super) fn first_prior(mean: &[f64], side: usize, workers: &impl Workers) -> (Vec<f64>, Prior) {
+pub(super) fn first_prior(
+    mean: &[f64],
+    side: usize,
+    executor: &impl Executor,
+) -> (Vec<f64>, Prior) {
     let area = side * side;
     let rank = KERNELS.min(area);
-    let rows = workers.map(area, |s| {
+    let rows = executor.map(area, |s| {
         let (v, u) = ((s / side) as f64, (s % side) as f64);
         (0..area)
             .map(|t| {
@@ -55,7 +59,7 @@ pub(super) fn first_prior(mean: &[f64], side: usize, workers: &impl Workers) -> 
             .collect::<Vec<f64>>()
     });
     let apply = |kernels: &[f64]| -> Vec<f64> {
-        workers
+        executor
             .map(rank, |k| {
                 let kernel = &kernels[k * area..(k + 1) * area];
                 rows.iter()
@@ -78,9 +82,9 @@ pub(super) fn first_prior(mean: &[f64], side: usize, workers: &impl Workers) -> 
         kernels = apply(&kernels);
         orthonormalise(&mut kernels, area);
     }
-    let covariance = dense::product(
+    let covariance = linalg::multiply(
         &apply(&kernels),
-        &dense::transpose(&kernels, area),
+        &linalg::transpose(&kernels, area),
         area,
         rank,
     );
@@ -144,22 +148,22 @@ pub(super) fn cut(kernels: &[f64], prior: &Prior, rank: usize, area: usize) -> (
             add_scaled(&mut moment[i * full..(i + 1) * full], share, mean);
         }
     }
-    let (_, vectors) = crate::eigen::symmetric_eigen(moment, full);
+    let (_, vectors) = crate::linalg::symmetric_eigen(moment, full);
     let kept = &vectors[..rank * full];
-    let rotated = dense::product(kept, &prior.covariance, full, full);
-    let covariance = dense::product(&rotated, &dense::transpose(kept, full), full, rank);
+    let rotated = linalg::multiply(kept, &prior.covariance, full, full);
+    let covariance = linalg::multiply(&rotated, &linalg::transpose(kept, full), full, rank);
     let mut cut = Prior::new(&vec![0.0; rank], covariance);
     cut.noise = prior.noise;
     for (mean, old) in cut.mean.iter_mut().zip(&prior.mean) {
         *mean = kept.chunks_exact(full).map(|v| dot(v, old)).collect();
     }
-    (dense::product(kept, kernels, full, area), cut)
+    (linalg::multiply(kept, kernels, full, area), cut)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recover::OneThread;
+    use crate::executor::SequentialExecutor;
 
     #[test]
     fn first_kernels_are_orthonormal() {
@@ -167,7 +171,7 @@ mod tests {
         let mut mean = vec![0.0; side * side];
         mean[60] = 0.7;
         mean[61] = 0.3;
-        let (kernels, prior) = first_prior(&blur(&mean, side), side, &OneThread);
+        let (kernels, prior) = first_prior(&blur(&mean, side), side, &SequentialExecutor);
         for i in 0..prior.rank {
             for j in 0..=i {
                 let row = |k: usize| &kernels[k * 121..(k + 1) * 121];

@@ -4,13 +4,14 @@ use super::equations::Equations;
 use super::posterior::{Gaussian, Workspace};
 use super::*;
 use crate::capture::{Noise, Pattern, Rows};
-use crate::recover::{Band, OneThread, Reach, Workers};
+use crate::executor::{Executor, SequentialExecutor};
+use crate::recover::{BandwidthEstimate, WindowEstimate};
 use crate::transport::{CameraPx, Correspondence, TransportFunctions, Window};
 
 /// Works backwards: what comes out must not depend on the order.
 struct Backwards;
 
-impl Workers for Backwards {
+impl Executor for Backwards {
     fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         let mut results: Vec<T> = (0..count).rev().map(work).collect();
         results.reverse();
@@ -161,22 +162,22 @@ fn snr(tiles: &[TransportFunctions], tau: &[[f64; CHANNELS]]) -> f64 {
     10.0 * (signal / error).log10()
 }
 
-fn learn(measurements: &Measurements, workers: &impl Workers) -> Result<Learned, RecoverError> {
-    let split = Split::new(measurements);
-    let mean = pooled::mean_function(measurements, &geometry(), &split, workers)?;
-    Learned::new(measurements, geometry(), split, &mean, workers)
+fn learn(measurements: &Measurements, executor: &impl Executor) -> Result<Learned, RecoverError> {
+    let split = HoldoutSplit::new(measurements);
+    let mean = pooled::mean_function(measurements, &geometry(), &split, executor)?;
+    Learned::new(measurements, geometry(), split, &mean, executor)
 }
 
 #[test]
 fn few_patterns_suffice_where_functions_are_alike() {
     let geometry = geometry();
     let (measurements, tau) = measurements(20, 7);
-    let learned = learn(&measurements, &OneThread).unwrap();
-    let direct = Direct::least_squares(
+    let learned = learn(&measurements, &SequentialExecutor).unwrap();
+    let direct = PixelwiseRecovery::least_squares(
         &measurements,
         geometry,
-        &Split::new(&measurements),
-        &OneThread,
+        &HoldoutSplit::new(&measurements),
+        &SequentialExecutor,
     )
     .unwrap();
     let ours: Vec<_> = geometry
@@ -210,9 +211,11 @@ fn short_exposures_do_not_drown_long_ones() {
     }
     let geometry = geometry();
     let recovered = |measurements: &Measurements| {
-        let learned = learn(measurements, &OneThread).unwrap();
-        let split = Split::new(measurements);
-        let direct = Direct::least_squares(measurements, geometry, &split, &OneThread).unwrap();
+        let learned = learn(measurements, &SequentialExecutor).unwrap();
+        let split = HoldoutSplit::new(measurements);
+        let direct =
+            PixelwiseRecovery::least_squares(measurements, geometry, &split, &SequentialExecutor)
+                .unwrap();
         let learned = geometry.tiles().map(|rect| {
             let tile = learned.tile(measurements, rect);
             tile.functions(&geometry, Some(learned.basis()))
@@ -233,7 +236,7 @@ fn short_exposures_do_not_drown_long_ones() {
 fn order_and_threads_leave_every_bit_as_it_is() {
     let geometry = geometry();
     let (measurements, _) = measurements(12, 3);
-    let one = learn(&measurements, &OneThread).unwrap();
+    let one = learn(&measurements, &SequentialExecutor).unwrap();
     let other = learn(&measurements, &Backwards).unwrap();
     assert_eq!(one.basis(), other.basis());
     let rect = geometry.tile(1);
@@ -251,13 +254,13 @@ fn order_and_threads_leave_every_bit_as_it_is() {
 fn pixels_that_all_saturate_somewhere_teach_all_the_same() {
     let geometry = geometry();
     let (mut measurements, tau) = measurements(20, 7);
-    let windows = windows(&geometry, whole());
+    let windows = pixels_by_window(&geometry, whole());
     for (i, pixels) in windows.values().enumerate() {
         for &(n, _) in pixels {
             measurements.pictures[i % 20][n] = [f32::NAN; CHANNELS];
         }
     }
-    let learned = learn(&measurements, &OneThread).unwrap();
+    let learned = learn(&measurements, &SequentialExecutor).unwrap();
     let tiles = geometry.tiles().map(|rect| {
         let tile = learned.tile(&measurements, rect);
         tile.functions(&geometry, Some(learned.basis()))
@@ -269,12 +272,12 @@ fn pixels_that_all_saturate_somewhere_teach_all_the_same() {
 #[test]
 fn the_band_is_as_wide_as_it_was_made() {
     let (measurements, _) = measurements(80, 7);
-    let band = Band::estimate(&measurements, &OneThread).unwrap();
+    let band = WindowEstimate::from_measurements(&measurements, &SequentialExecutor).unwrap();
     // To within the ring that is left as a margin.
     let side = band.window.side();
     assert!((WINDOW..=WINDOW + 2).contains(&side), "{band:?}");
     assert!(
-        matches!(band.reach, Reach::Within { leak } if leak < 0.01),
+        matches!(band.bandwidth, BandwidthEstimate::Bounded { tail_fraction } if tail_fraction < 0.01),
         "{band:?}"
     );
 }
@@ -309,7 +312,7 @@ fn sparse_functions_each_a_case_of_its_own_are_blended_and_better_for_it() {
         }
     }
     let measurements = photographed(40, 7, &tau);
-    let mut learned = learn(&measurements, &OneThread).unwrap();
+    let mut learned = learn(&measurements, &SequentialExecutor).unwrap();
     assert!(learned.direct.is_some());
     let recovered = |learned: &Learned| -> Vec<_> {
         let tiles = geometry.tiles().map(|rect| {
@@ -330,10 +333,10 @@ fn whiteness_is_an_error_that_says_so() {
     for picture in &mut measurements.pictures {
         picture.fill([f32::NAN; CHANNELS]);
     }
-    let error = learn(&measurements, &OneThread).unwrap_err();
+    let error = learn(&measurements, &SequentialExecutor).unwrap_err();
     assert!(matches!(error, RecoverError::Overexposed), "{error}");
-    let band = Band::estimate(&measurements, &OneThread).unwrap();
-    assert_eq!(band.reach, Reach::Unclear);
+    let band = WindowEstimate::from_measurements(&measurements, &SequentialExecutor).unwrap();
+    assert_eq!(band.bandwidth, BandwidthEstimate::Undetermined);
 }
 
 #[test]
@@ -342,21 +345,24 @@ fn darkness_is_an_error_that_says_so() {
     for picture in &mut measurements.pictures {
         picture.fill([0.0; CHANNELS]);
     }
-    let error = learn(&measurements, &OneThread).unwrap_err();
-    assert!(matches!(error, RecoverError::Dark), "{error}");
+    let error = learn(&measurements, &SequentialExecutor).unwrap_err();
+    assert!(matches!(error, RecoverError::NoSignal), "{error}");
 }
 
 #[test]
 fn photographs_that_do_not_go_with_their_patterns_are_an_error_that_says_so() {
     let (mut measurements, _) = measurements(30, 1);
     measurements.pictures.rotate_left(1);
-    let error = learn(&measurements, &OneThread).unwrap_err();
-    assert!(matches!(error, RecoverError::Unrelated), "{error}");
+    let error = learn(&measurements, &SequentialExecutor).unwrap_err();
+    assert!(
+        matches!(error, RecoverError::UncorrelatedPatterns),
+        "{error}"
+    );
     measurements.pictures.rotate_right(1);
     measurements.pictures.swap(4, 20);
-    let error = learn(&measurements, &OneThread).unwrap_err();
+    let error = learn(&measurements, &SequentialExecutor).unwrap_err();
     assert!(
-        matches!(&error, RecoverError::Astray(l) if l == &[4, 20]),
+        matches!(&error, RecoverError::MismatchedPatterns(l) if l == &[4, 20]),
         "{error}"
     );
     // Nothing but the noise of the sensor.
@@ -364,8 +370,11 @@ fn photographs_that_do_not_go_with_their_patterns_are_an_error_that_says_so() {
     for sample in measurements.pictures.iter_mut().flatten().flatten() {
         *sample = 1e-3 * (random() - 0.499) as f32;
     }
-    let error = learn(&measurements, &OneThread).unwrap_err();
-    assert!(matches!(error, RecoverError::Unrelated), "{error}");
+    let error = learn(&measurements, &SequentialExecutor).unwrap_err();
+    assert!(
+        matches!(error, RecoverError::UncorrelatedPatterns),
+        "{error}"
+    );
 }
 
 /// Kernels that are single elements, so that the posterior can be worked out by hand.

@@ -20,8 +20,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use super::display::Encoder;
 use super::{Display, Light, LinearPicture, Rgba8Picture, Tint, detailed};
+use crate::executor::Executor;
 use crate::transport::{CHANNELS, Tile, Transport};
-use crate::workers::Workers;
 use correlation::{Correlator, Workspace};
 use lanes::{Vector, Work, widest};
 pub use padded::LightRows;
@@ -107,10 +107,10 @@ impl Relighter {
     ///
     /// # Panics
     /// If the light's extent is not the transport's.
-    pub fn relight(&mut self, light: &Light, workers: &impl Workers) {
+    pub fn relight(&mut self, light: &Light, executor: &impl Executor) {
         let extent = self.transport.geometry.light;
         assert_eq!(light.extent(), extent, "a light of another extent");
-        self.relight_rows(light, workers);
+        self.relight_rows(light, executor);
     }
 
     /// Rows of the light that any pixel sees.
@@ -123,13 +123,13 @@ impl Relighter {
     ///
     /// # Panics
     /// If a row has another width.
-    pub fn relight_rows(&mut self, light: impl LightRows, workers: &impl Workers) {
+    pub fn relight_rows(&mut self, light: impl LightRows, executor: &impl Executor) {
         self.light.put(light);
-        self.update(workers);
+        self.update(executor);
     }
 
     /// Does what [`set_detail`](Self::set_detail) asks for under the light that is there.
-    pub fn update(&mut self, workers: &impl Workers) {
+    pub fn update(&mut self, executor: &impl Executor) {
         let side = self.squares.reach + self.transport.geometry.window.side() as usize - 1;
         let stale: Vec<usize> = (0..self.squares.all.len())
             .filter(|&i| {
@@ -138,7 +138,7 @@ impl Relighter {
             })
             .collect();
         let this = &*self;
-        workers.map(stale.len(), |i| {
+        executor.map(stale.len(), |i| {
             let mut work = lock(&this.spare).pop();
             widest(SquareWork {
                 relighter: this,
@@ -223,13 +223,13 @@ impl Relighter {
     }
 
     /// The picture as a display shows it.
-    pub fn picture(&self, display: &Display, workers: &impl Workers) -> Rgba8Picture {
+    pub fn picture(&self, display: &Display, executor: &impl Executor) -> Rgba8Picture {
         let mut picture = Rgba8Picture::black(self.transport.geometry.camera);
         self.show(
             display,
             0..picture.extent.height,
             &mut picture.pixels,
-            workers,
+            executor,
         );
         picture
     }
@@ -243,7 +243,7 @@ impl Relighter {
         display: &Display,
         rows: Range<u32>,
         out: &mut [[u8; 4]],
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) {
         let width = self.transport.geometry.camera.width as usize;
         assert_eq!(out.len(), rows.len() * width, "pixels of other rows");
@@ -253,7 +253,7 @@ impl Relighter {
             .chunks_mut((BAND_ROWS * width).max(1))
             .map(Mutex::new)
             .collect();
-        workers.map(bands.len(), |i| {
+        executor.map(bands.len(), |i| {
             let first = rows.start + (i * BAND_ROWS) as u32;
             self.show_band(&encoder, first, &mut lock(&bands[i]));
         });

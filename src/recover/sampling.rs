@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::FEWEST_PATTERNS;
+use super::MIN_PATTERNS;
 use crate::capture::Measurements;
 use crate::transport::{CameraPx, Element, Extent, Geometry, TileRect};
 
 /// Squares of `side` pixels spread evenly over the picture, none over another, at most `most`: all
 /// there are room for where the picture is small. Only such whose measurements are at hand.
-pub(super) fn spread(measurements: &Measurements, side: u32, most: usize) -> Vec<TileRect> {
+pub(super) fn spread_squares(measurements: &Measurements, side: u32, most: usize) -> Vec<TileRect> {
     let camera = measurements.camera;
     squares(camera, side, most, |square| measurements.covers(square))
 }
@@ -57,7 +57,7 @@ fn squares(
 }
 
 /// All pixels of a region by their common window: (number in the region, pixel).
-pub(super) fn windows(
+pub(super) fn pixels_by_window(
     geometry: &Geometry,
     rect: TileRect,
 ) -> BTreeMap<Element, Vec<(usize, CameraPx)>> {
@@ -91,7 +91,7 @@ pub(super) fn unsaturated(
         })
     };
     let usable: Vec<usize> = rows.iter().copied().filter(seen).collect();
-    match usable.len() >= FEWEST_PATTERNS {
+    match usable.len() >= MIN_PATTERNS {
         true => usable,
         false => rows.to_vec(),
     }

@@ -1,12 +1,12 @@
 //! How good an answer is, and how much of it is lost on the way to a file, as far as patterns held out
 //! can tell.
 
-use super::direct::predictions;
-use super::holdout::Split;
-use super::sample::spread;
-use super::workers::go_on;
-use super::{RecoverError, Workers};
+use super::RecoverError;
+use super::holdout::HoldoutSplit;
+use super::pixelwise::predictions;
+use super::sampling::spread_squares;
 use crate::capture::{Measurements, Pattern};
+use crate::executor::Executor;
 use crate::transport::{
     Basis, CHANNELS, Decibels, Geometry, RecoveredTile, TileRect, TransportFunctions,
 };
@@ -22,7 +22,7 @@ const RESOLUTION: f64 = 0.1;
 /// Elements of patterns vary independently, so that measurements vary between patterns by
 /// `var(p) ‖τ‖²` and predictions are missed by `var(p) ‖τ − τ̂‖²`, plus noise of known variance.
 #[derive(Clone, Debug)]
-pub struct Rehearsal {
+pub struct HoldoutValidation {
     geometry: Geometry,
     held: Vec<Pattern>,
     squares: Vec<Square>,
@@ -41,29 +41,29 @@ struct Square {
     seen: Vec<f64>,
 }
 
-impl Rehearsal {
-    /// Recovers squares by `rehearse`, which takes only the patterns to learn from. None where there
+impl HoldoutValidation {
+    /// Recovers squares by `training_tile`, which takes only the patterns to learn from. None where there
     /// are too few patterns to hold any out.
     pub(super) fn new(
         measurements: &Measurements,
         (geometry, basis): (&Geometry, Option<&Basis>),
-        split: &Split,
-        workers: &impl Workers,
-        rehearse: impl Fn(TileRect) -> RecoveredTile + Sync + Send,
+        split: &HoldoutSplit,
+        executor: &impl Executor,
+        training_tile: impl Fn(TileRect) -> RecoveredTile + Sync + Send,
     ) -> Result<Option<Self>, RecoverError> {
-        go_on(workers)?;
-        if split.held.len() < 2 {
+        executor.check_cancelled()?;
+        if split.held_out.len() < 2 {
             return Ok(None);
         }
-        let rects = spread(measurements, SQUARES.1, SQUARES.0);
-        let parts = workers.map(rects.len(), |i| {
+        let rects = spread_squares(measurements, SQUARES.1, SQUARES.0);
+        let parts = executor.map(rects.len(), |i| {
             let mut seen = Vec::new();
             for pixel in rects[i].pixels() {
-                for &l in &split.held {
+                for &l in &split.held_out {
                     seen.extend((0..CHANNELS).map(|c| measurements.sample(l, pixel, c)));
                 }
             }
-            let tile = rehearse(rects[i]);
+            let tile = training_tile(rects[i]);
             (
                 Square { tile, seen },
                 variances(measurements, split, rects[i]),
@@ -72,7 +72,7 @@ impl Rehearsal {
         let mut rehearsal = Self {
             geometry: *geometry,
             held: split
-                .held
+                .held_out
                 .iter()
                 .map(|&l| measurements.patterns[l].clone())
                 .collect(),
@@ -86,7 +86,7 @@ impl Rehearsal {
             rehearsal.signal += signal;
             rehearsal.noise += noise;
         }
-        let functions = workers.map(rehearsal.squares.len(), |i| {
+        let functions = executor.map(rehearsal.squares.len(), |i| {
             rehearsal.squares[i].tile.clone().functions(geometry, basis)
         });
         rehearsal.missed = rehearsal.missed(&functions);
@@ -143,7 +143,7 @@ impl Rehearsal {
 
 /// Variances between patterns, summed over pixels and channels that are nowhere saturated: of
 /// measurements less their noise, and of the noise of those held out.
-fn variances(measurements: &Measurements, split: &Split, rect: TileRect) -> (f64, f64) {
+fn variances(measurements: &Measurements, split: &HoldoutSplit, rect: TileRect) -> (f64, f64) {
     let (mut signal, mut noise) = (0.0, 0.0);
     for pixel in rect.pixels() {
         for c in 0..CHANNELS {
@@ -153,8 +153,8 @@ fn variances(measurements: &Measurements, split: &Split, rect: TileRect) -> (f64
             if seen.is_finite() {
                 signal += seen - mean(split.all.iter().map(noise_of));
             }
-            if split.held.iter().all(|l| sample(l).is_finite()) {
-                noise += mean(split.held.iter().map(noise_of));
+            if split.held_out.iter().all(|l| sample(l).is_finite()) {
+                noise += mean(split.held_out.iter().map(noise_of));
             }
         }
     }

@@ -1,23 +1,25 @@
-//! Eigenvalues and eigenvectors of small symmetric matrices.
+//! Eigenvalues and eigenvectors of a symmetric matrix, by cyclic Jacobi rotations (Golub and Van Loan,
+//! *Matrix Computations*, section 8.5): slower than by tridiagonal form, but short and exact to rounding.
 
-/// Sweeps over all off-diagonal entries; Jacobi's method converges quadratically, in about six.
-const MOST_SWEEPS: usize = 30;
+/// Sweeps over all off-diagonal entries. The method converges quadratically, after about six.
+const MAX_SWEEPS: usize = 30;
+/// Squared off-diagonal entries at which the matrix counts as diagonal, relative to all squared entries.
+const CONVERGED_ENERGY: f64 = 1e-24;
 
-/// The eigenvalues of the symmetric `[n, n]` matrix `a`, largest first, and their eigenvectors as
-/// the rows of an `[n, n]` matrix, by cyclic Jacobi rotations (Golub and Van Loan, *Matrix
-/// Computations*, section 8.5).
+/// Returns the eigenvalues of the symmetric `[n, n]` matrix `a`, largest first, and the eigenvectors as the
+/// rows of an `[n, n]` matrix.
 pub(crate) fn symmetric_eigen(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut vectors = vec![0.0; n * n];
     for i in 0..n {
         vectors[i * n + i] = 1.0;
     }
     let total: f64 = a.iter().map(|x| x * x).sum();
-    for _ in 0..MOST_SWEEPS {
-        let off: f64 = (0..n)
+    for _ in 0..MAX_SWEEPS {
+        let off_diagonal: f64 = (0..n)
             .flat_map(|i| (0..i).map(move |j| (i, j)))
             .map(|(i, j)| a[i * n + j] * a[i * n + j])
             .sum();
-        if off <= 1e-24 * total {
+        if off_diagonal <= CONVERGED_ENERGY * total {
             break;
         }
         for p in 0..n {
@@ -33,7 +35,7 @@ pub(crate) fn symmetric_eigen(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<f64>)
     (values, rows.copied().collect())
 }
 
-/// Turns rows and columns `p` and `q` such that `a[p, q]` becomes zero.
+/// Rotates rows and columns `p` and `q` such that `a[p, q]` becomes zero.
 fn rotate(a: &mut [f64], vectors: &mut [f64], n: usize, p: usize, q: usize) {
     let apq = a[p * n + q];
     if apq == 0.0 {
@@ -63,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn vectors_rebuild_the_matrix_and_are_orthonormal() {
+    fn eigenvectors_are_orthonormal_and_diagonalise_the_matrix() {
         let n = 7;
         let b: Vec<f64> = (0..n * n)
             .map(|i| ((i * i + 3 * i) % 11) as f64 - 4.0)

@@ -1,6 +1,6 @@
 //! The elements that an active-set solver lets above zero, with their equations kept solved.
 
-use super::vector::{LANES, add_blocks, add_rows, dot_blocks, whole_blocks};
+use crate::linalg::{LANES, add_scaled_padded, add_scaled_rows, dot_padded, padded_len};
 
 /// As many numbers as fill whole registers.
 type Block = [f64; LANES];
@@ -45,7 +45,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     /// If `gram` does not have `k²` entries.
     pub fn new(gram: &'a [f64], k: usize) -> Self {
         assert_eq!(gram.len(), k * k, "the Gram matrix is square");
-        let stride = whole_blocks(k.min(ROOM));
+        let stride = padded_len(k.min(ROOM));
         Self {
             gram,
             members: Vec::with_capacity(stride),
@@ -79,7 +79,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     /// `y += Gx` for an x that is zero outside the set.
     #[inline(always)]
     pub fn add_product(&self, y: &mut [f64], x: &[f64]) {
-        add_rows(y, self.gram, &self.members, x);
+        add_scaled_rows(y, self.gram, &self.members, x);
     }
 
     /// Values of the members as a vector of all elements, `[k]`.
@@ -109,7 +109,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     /// Length of vectors over the set with the zeros that fill the last register.
     #[inline(always)]
     fn width(&self) -> usize {
-        whole_blocks(self.members.len())
+        padded_len(self.members.len())
     }
 
     /// The solution of `G[P, P] z = b[P]` for right-hand side `which`.
@@ -133,7 +133,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         self.gather(left);
         self.multiply();
         let width = self.width();
-        add_blocks(
+        add_scaled_padded(
             &mut self.solutions[which][..width],
             1.0,
             &self.product[..width],
@@ -178,7 +178,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         let column = &self.column[..self.width()];
         let mut left = b;
         for (left, z) in left.iter_mut().zip(&self.solutions) {
-            *left -= dot_blocks(column, &z[..column.len()]);
+            *left -= dot_padded(column, &z[..column.len()]);
         }
         Offer {
             j,
@@ -200,7 +200,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     pub fn accept(&mut self, offer: Offer<N>) -> bool {
         self.multiply();
         let (n, before) = (self.members.len(), self.width());
-        let known = dot_blocks(&self.column[..before], &self.product[..before]);
+        let known = dot_padded(&self.column[..before], &self.product[..before]);
         let pivot = offer.diagonal - known;
         // NaN is refused as well.
         if pivot.is_nan() || pivot <= DEPENDENT * offer.diagonal {
@@ -212,7 +212,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         let inverse = 1.0 / pivot;
         for (z, left) in self.solutions.iter_mut().zip(offer.left) {
             let step = left * inverse;
-            add_blocks(&mut z[..before], -step, &self.product[..before]);
+            add_scaled_padded(&mut z[..before], -step, &self.product[..before]);
             z[n] = step;
         }
         // With −1 as the new element's entry, one outer product updates all of the inverse.
@@ -259,7 +259,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         let inverse = 1.0 / self.product[i];
         for z in &mut self.solutions {
             let step = z[i] * inverse;
-            add_blocks(&mut z[..width], -step, &self.product[..width]);
+            add_scaled_padded(&mut z[..width], -step, &self.product[..width]);
             z[i] = z[last];
             z[last] = 0.0;
         }
@@ -290,7 +290,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     fn widen(&mut self) {
         let (old, new) = (
             self.stride,
-            whole_blocks((2 * self.stride).min(self.is_member.len())),
+            padded_len((2 * self.stride).min(self.is_member.len())),
         );
         let mut inverse = vec![[0.0; LANES]; new * new / LANES];
         for (to, from) in inverse
@@ -332,8 +332,8 @@ fn panels(
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests {
     use super::super::test_problems::Problem;
-    use super::super::vector::add_scaled;
     use super::*;
+    use crate::linalg::add_scaled;
 
     #[test]
     fn solutions_follow_the_set() {

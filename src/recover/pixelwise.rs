@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::bpdn::{Constraint, Homotopy, InteriorPoint, SparsityBasis, Tolerance};
-use super::design::{Design, Patch};
-use super::holdout::Split;
-use super::sample::windows;
-use super::workers::go_on;
-use super::{CommonMode, FEWEST_PATTERNS, Nnls, RecoverError, Workers};
+use super::gram_cache::{Design, Patch};
+use super::holdout::HoldoutSplit;
+use super::sampling::pixels_by_window;
+use super::{CommonMode, MIN_PATTERNS, Nnls, RecoverError};
 use crate::capture::{Measurements, Pattern};
+use crate::executor::Executor;
 use crate::transport::{
     CHANNELS, CameraPx, Decibels, Element, Geometry, TileRect, TransportError, TransportFunctions,
     Window,
@@ -52,7 +52,7 @@ enum Problem {
 
 /// A solver of single windows, with what it chose on patterns held out.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Direct {
+pub(super) struct PixelwiseRecovery {
     geometry: Geometry,
     common_mode: CommonMode,
     problem: Problem,
@@ -68,7 +68,7 @@ struct Seen {
     y: Vec<f64>,
 }
 
-impl Direct {
+impl PixelwiseRecovery {
     /// About the most memory that recovering a tile takes beside its functions, in bytes.
     pub fn tile_bytes(window: Window, patterns: usize) -> usize {
         // What solvers keep of the Gram matrix's size, and of the equations'.
@@ -80,10 +80,10 @@ impl Direct {
     pub fn least_squares(
         measurements: &Measurements,
         geometry: Geometry,
-        split: &Split,
-        workers: &impl Workers,
+        split: &HoldoutSplit,
+        executor: &impl Executor,
     ) -> Result<Self, RecoverError> {
-        go_on(workers)?;
+        executor.check_cancelled()?;
         let trial = HeldOut::new(measurements, geometry, split, SCATTERED)?;
         Ok(trial.choose(
             CommonMode::CANDIDATES.map(|common_mode| Self {
@@ -91,7 +91,7 @@ impl Direct {
                 common_mode,
                 problem: Problem::LeastSquares,
             }),
-            workers,
+            executor,
         ))
     }
 
@@ -100,20 +100,20 @@ impl Direct {
         measurements: &Measurements,
         geometry: Geometry,
         basis: SparsityBasis,
-        split: &Split,
-        workers: &impl Workers,
+        split: &HoldoutSplit,
+        executor: &impl Executor,
     ) -> Result<Self, RecoverError> {
-        let least_squares = Self::least_squares(measurements, geometry, split, workers)?;
+        let least_squares = Self::least_squares(measurements, geometry, split, executor)?;
         let noise =
-            HeldOut::new(measurements, geometry, split, SCATTERED)?.noise(&least_squares, workers);
-        go_on(workers)?;
+            HeldOut::new(measurements, geometry, split, SCATTERED)?.noise(&least_squares, executor);
+        executor.check_cancelled()?;
         let trial = HeldOut::new(measurements, geometry, split, GATHERED)?;
         Ok(trial.choose(
             Tolerance::SHARES.map(|share| Self {
                 problem: Problem::Denoising(basis, Tolerance { share, ..noise }),
                 ..least_squares
             }),
-            workers,
+            executor,
         ))
     }
 
@@ -138,7 +138,7 @@ impl Direct {
         let area = self.geometry.window.area();
         let mut functions = TransportFunctions::zeros(rect, area);
         let mut blocks: BTreeMap<_, BTreeMap<_, _>> = BTreeMap::new();
-        for (origin, pixels) in windows(&self.geometry, rect) {
+        for (origin, pixels) in pixels_by_window(&self.geometry, rect) {
             let block = (origin.v.div_euclid(BLOCK), origin.u.div_euclid(BLOCK));
             blocks.entry(block).or_default().insert(origin, pixels);
         }
@@ -212,7 +212,7 @@ impl Direct {
                     .map(|&l| measurements.sample(l, at, channel))
                     .collect();
                 let saturated: Vec<usize> = (0..y.len()).filter(|&i| !y[i].is_finite()).collect();
-                if !saturated.is_empty() && rows.len() - saturated.len() >= FEWEST_PATTERNS {
+                if !saturated.is_empty() && rows.len() - saturated.len() >= MIN_PATTERNS {
                     // Saturated samples drop out, and with them the shared equations.
                     y.retain(|y| y.is_finite());
                     let own = patch.design(origin, self.common_mode, &saturated);
@@ -300,7 +300,7 @@ impl Direct {
 
 /// What is missed, `[pixel, held, channel]`, in predicting the patterns numbered `held` by a tile's
 /// functions; NaN where saturated.
-pub(super) fn held_out_misses(
+pub(super) fn held_out_residuals(
     geometry: &Geometry,
     measurements: &Measurements,
     held: &[usize],
@@ -365,20 +365,20 @@ struct HeldOut<'a> {
     measurements: &'a Measurements,
     geometry: Geometry,
     windows: Vec<(Element, Vec<CameraPx>)>,
-    split: &'a Split,
+    split: &'a HoldoutSplit,
 }
 
 impl<'a> HeldOut<'a> {
     fn new(
         measurements: &'a Measurements,
         geometry: Geometry,
-        split: &'a Split,
+        split: &'a HoldoutSplit,
         sample: Sample,
     ) -> Result<Self, RecoverError> {
         let mut lit: BTreeMap<_, Vec<_>> = BTreeMap::new();
         let covered = geometry.tiles().filter(|&tile| measurements.covers(tile));
         for rect in covered {
-            for (origin, pixels) in windows(&geometry, rect) {
+            for (origin, pixels) in pixels_by_window(&geometry, rect) {
                 if geometry.reaches_display(origin) {
                     let pixels = pixels.into_iter().take(sample.pixels);
                     lit.insert(origin, pixels.map(|(_, pixel)| pixel).collect());
@@ -386,7 +386,7 @@ impl<'a> HeldOut<'a> {
             }
         }
         if lit.is_empty() {
-            return Err(RecoverError::NoLight);
+            return Err(RecoverError::CorrespondenceOffLightPlane);
         }
         let every = lit.len().div_ceil(sample.windows);
         Ok(Self {
@@ -399,12 +399,16 @@ impl<'a> HeldOut<'a> {
 
     /// Of `candidates` the one that predicts the patterns held out best, or the first where none
     /// can be.
-    fn choose<const N: usize>(&self, candidates: [Direct; N], workers: &impl Workers) -> Direct {
+    fn choose<const N: usize>(
+        &self,
+        candidates: [PixelwiseRecovery; N],
+        executor: &impl Executor,
+    ) -> PixelwiseRecovery {
         let mut chosen = candidates[0];
-        if self.split.held.is_empty() {
+        if self.split.held_out.is_empty() {
             return chosen;
         }
-        let errors = workers.map(self.windows.len(), |i| {
+        let errors = executor.map(self.windows.len(), |i| {
             candidates.map(|candidate| self.error(&candidate, &self.windows[i]))
         });
         let mut best: Option<Decibels> = None;
@@ -423,7 +427,7 @@ impl<'a> HeldOut<'a> {
     /// Of what a candidate says that one window's pixels see under the patterns held out.
     fn error(
         &self,
-        candidate: &Direct,
+        candidate: &PixelwiseRecovery,
         (origin, pixels): &(Element, Vec<CameraPx>),
     ) -> TransportError {
         let mut error = TransportError::default();
@@ -432,9 +436,9 @@ impl<'a> HeldOut<'a> {
         candidate.block(
             self.measurements,
             &window,
-            &self.split.learn,
+            &self.split.training,
             |_, pixel, c, slots, x| {
-                for &l in &self.split.held {
+                for &l in &self.split.held_out {
                     let y = self.measurements.sample(l, pixels[pixel], c);
                     if y.is_finite() {
                         error.add(y, self.predict(l, c, *origin, slots, x));
@@ -458,10 +462,10 @@ impl<'a> HeldOut<'a> {
 
     /// The noise of the measurements, from what least squares leaves of them, degrees of freedom
     /// allowed for.
-    fn noise(&self, least_squares: &Direct, workers: &impl Workers) -> Tolerance {
+    fn noise(&self, least_squares: &PixelwiseRecovery, executor: &impl Executor) -> Tolerance {
         let rows: Vec<usize> = (0..self.measurements.patterns.len()).collect();
         let weights = self.measurements.weights();
-        let pairs = workers.map(self.windows.len(), |i| {
+        let pairs = executor.map(self.windows.len(), |i| {
             let (origin, pixel) = (self.windows[i].0, self.windows[i].1[0]);
             let patch = |c| {
                 Patch::new(
@@ -482,7 +486,7 @@ impl<'a> HeldOut<'a> {
                     .collect();
                 let saturated: Vec<usize> = (0..y.len()).filter(|&i| !y[i].is_finite()).collect();
                 y.retain(|y| y.is_finite());
-                if y.len() >= FEWEST_PATTERNS {
+                if y.len() >= MIN_PATTERNS {
                     let design =
                         patch(channel).design(origin, least_squares.common_mode, &saturated);
                     pairs.extend(mean_and_noise(&design, y));

@@ -1,8 +1,8 @@
 //! The equations that all pixels with the same window share.
 
 use super::CommonMode;
-use super::vector::{add_scaled, dot, vectorised};
 use crate::capture::Pattern;
+use crate::linalg::{add_scaled, dot, vectorise};
 use crate::transport::{Element, Extent, Window};
 
 /// A rectangle of light elements, all on the display.
@@ -115,7 +115,7 @@ impl Patch {
         if entries * size_of::<f64>() <= MOST_TABLE_BYTES
             && entries < windows * window.area().pow(2)
         {
-            patch.correlations = vectorised(
+            patch.correlations = vectorise(
                 #[inline(always)]
                 || patch.correlate(),
             );
@@ -207,7 +207,7 @@ impl Patch {
             };
             design.mean.push(level);
         }
-        vectorised(
+        vectorise(
             #[inline(always)]
             || {
                 match self.correlations.is_empty() {
@@ -317,7 +317,7 @@ impl Design {
     pub fn right_hand_side(&self, weighted_y: &[f64]) -> Vec<f64> {
         // Of (WP̂)ᵀ = (diag(w)P̂)ᵀ − (1 − ω) p̄wᵀ the second part only meets wᵀWy.
         let less = (1.0 - self.common_mode.weight()) * dot(&self.weights, weighted_y);
-        vectorised(
+        vectorise(
             #[inline(always)]
             || {
                 let columns = self.emissions.chunks_exact(self.rows().max(1));

@@ -6,10 +6,11 @@
 //! it may be off by chance is told by how much squares of the picture differ (clusters, as in Liang &
 //! Zeger 1986); what is too noisy to tell is let pass.
 
-use super::holdout::Split;
-use super::sample::windows;
-use super::{RecoverError, Workers};
+use super::RecoverError;
+use super::holdout::HoldoutSplit;
+use super::sampling::pixels_by_window;
 use crate::capture::Measurements;
+use crate::executor::Executor;
 use crate::transport::{CameraPx, Element, Geometry, TileRect};
 
 /// Share of the others' slope that a photograph of its pattern surely has.
@@ -24,21 +25,21 @@ const FEWEST_SQUARES: usize = 32;
 const FEWEST_HELD: usize = 2;
 
 /// Looks at `squares` of the picture. An error where patterns do not tell what their photographs
-/// show: [`RecoverError::Astray`] if those of some, [`RecoverError::Unrelated`] if of all.
-pub(super) fn check(
+/// show: [`RecoverError::MismatchedPatterns`] if those of some, [`RecoverError::UncorrelatedPatterns`] if of all.
+pub(super) fn check_patterns(
     measurements: &Measurements,
     geometry: &Geometry,
-    split: &Split,
+    split: &HoldoutSplit,
     mean_function: &[f64],
     squares: &[TileRect],
-    workers: &impl Workers,
+    executor: &impl Executor,
 ) -> Result<(), RecoverError> {
     if squares.len() < FEWEST_SQUARES {
         return Ok(());
     }
-    let by_square = workers.map(squares.len(), |i| {
+    let by_square = executor.map(squares.len(), |i| {
         let mut products = vec![Products::default(); split.all.len()];
-        for (origin, pixels) in windows(geometry, squares[i]) {
+        for (origin, pixels) in pixels_by_window(geometry, squares[i]) {
             let seen = (origin, &pixels[..]);
             add(
                 &mut products,
@@ -62,19 +63,19 @@ pub(super) fn check(
     let astray: Vec<usize> = (0..split.all.len()).filter(wrong).collect();
     // What is held out and not known to be wrong: that alone may be all that is wrong.
     let held: Vec<usize> = split
-        .held
+        .held_out
         .iter()
         .copied()
         .filter(|l| !astray.contains(l))
         .collect();
-    let unrelated = split.held.len() >= FEWEST_HELD
+    let unrelated = split.held_out.len() >= FEWEST_HELD
         && Slope::of(&by_square, &held).is_some_and(Slope::is_nothing);
     if unrelated || 2 * astray.len() > split.all.len() {
-        return Err(RecoverError::Unrelated);
+        return Err(RecoverError::UncorrelatedPatterns);
     }
     match astray.is_empty() {
         true => Ok(()),
-        false => Err(RecoverError::Astray(astray)),
+        false => Err(RecoverError::MismatchedPatterns(astray)),
     }
 }
 
@@ -127,7 +128,7 @@ fn add(
     products: &mut [Products],
     measurements: &Measurements,
     geometry: &Geometry,
-    split: &Split,
+    split: &HoldoutSplit,
     mean_function: &[f64],
     (origin, pixels): (Element, &[(usize, CameraPx)]),
 ) {
@@ -144,7 +145,7 @@ fn add(
         let pixels = pixels.iter().map(|&(_, pixel)| pixel);
         for (pixel, c) in pixels.flat_map(|pixel| channels.clone().map(move |c| (pixel, c))) {
             let sample = |l: usize| measurements.sample(l, pixel, c);
-            let known = split.learn.iter().filter(|&&l| sample(l).is_finite());
+            let known = split.training.iter().filter(|&&l| sample(l).is_finite());
             let [level, light, count] = known.fold([0.0; 3], |[level, light, count], &l| {
                 [level + shown[l], light + sample(l), count + 1.0]
             });

@@ -6,14 +6,15 @@
 //! imposed, so that rings beyond the band come out near zero, on either side of it, rather than
 //! gathering noise.
 
-use super::dense;
+use super::RecoverError;
 use super::holdout::numbers;
 use super::pooled::DEVIATION;
-use super::sample::{mean_variance, reaches_display, spread, unsaturated, windows};
-use super::vector::{add_scaled, dot, vectorised};
-use super::workers::go_on;
-use super::{RecoverError, Workers};
+use super::sampling::{
+    mean_variance, pixels_by_window, reaches_display, spread_squares, unsaturated,
+};
 use crate::capture::{Measurements, distinct};
+use crate::executor::Executor;
+use crate::linalg::{self, add_scaled, dot, vectorise};
 use crate::transport::{CameraPx, Element, Geometry, Window};
 
 /// Side of the window that the band is looked for in.
@@ -36,38 +37,38 @@ const PARTS: usize = 8;
 
 /// A window to recover with.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Band {
+pub struct WindowEstimate {
     /// The smallest window that holds nearly all of the band, as far as that is known.
     pub window: Window,
     /// What is known of the light from outside it.
-    pub reach: Reach,
+    pub bandwidth: BandwidthEstimate,
 }
 
 /// How far the band reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Reach {
+pub enum BandwidthEstimate {
     /// Not much farther than the window.
-    Within {
+    Bounded {
         /// Estimated share of a pixel's light that comes from outside the window.
-        leak: f64,
+        tail_fraction: f64,
     },
     /// As far as was looked, or farther.
-    Beyond,
+    Unbounded,
     /// Too few measurements to tell.
-    Unclear,
+    Undetermined,
 }
 
-impl Band {
+impl WindowEstimate {
     /// The largest window an estimate may come to.
-    pub const MOST: Window = match Window::new(PROBE) {
+    pub const MAX_WINDOW: Window = match Window::new(PROBE) {
         Ok(window) => window,
         Err(_) => panic!("the probing window is a window"),
     };
 
     /// Estimates the band from what is at hand of `measurements`.
-    pub fn estimate(
+    pub fn from_measurements(
         measurements: &Measurements,
-        workers: &impl Workers,
+        executor: &impl Executor,
     ) -> Result<Self, RecoverError> {
         let light = measurements.light;
         let probe = PROBE.min((light.width.min(light.height) / 2).saturating_sub(1) | 1);
@@ -80,20 +81,20 @@ impl Band {
         }
         .validate()?;
         if !reaches_display(&geometry) {
-            return Err(RecoverError::NoLight);
+            return Err(RecoverError::CorrespondenceOffLightPlane);
         }
         let patterns = distinct(&numbers(&measurements.patterns));
         let rings = Rings::new(probe, patterns);
-        let mut squares = spread(measurements, SQUARES.1, SQUARES.0);
+        let mut squares = spread_squares(measurements, SQUARES.1, SQUARES.0);
         // Each part a piece of the picture: what lies beside each other errs alike.
         squares.sort_by_key(|square| (square.y, square.x));
-        go_on(workers)?;
-        let parts = workers.map(PARTS, |part| {
+        executor.check_cancelled()?;
+        let parts = executor.map(PARTS, |part| {
             let mut sums = Sums::new(rings.sizes.len());
             let share = |part: usize| part * squares.len() / PARTS;
             for square in &squares[share(part)..share(part + 1)] {
-                for (origin, pixels) in windows(&geometry, *square) {
-                    vectorised(
+                for (origin, pixels) in pixels_by_window(&geometry, *square) {
+                    vectorise(
                         #[inline(always)]
                         || sums.add(measurements, &geometry, &rings, (origin, &pixels)),
                     );
@@ -175,7 +176,7 @@ impl Rings {
 }
 
 /// The band, where windows from the least on leave out `leaks`, give or take `errors`.
-fn band(leaks: &[f64], errors: &[f64], probe: u32) -> Result<Band, RecoverError> {
+fn band(leaks: &[f64], errors: &[f64], probe: u32) -> Result<WindowEstimate, RecoverError> {
     let rings = leaks.len();
     // One that is low by chance is not enough, and beyond the last there is none.
     let low = |i: usize| match (leaks.get(i), errors.get(i)) {
@@ -185,28 +186,28 @@ fn band(leaks: &[f64], errors: &[f64], probe: u32) -> Result<Band, RecoverError>
     let held = (0..rings).find(|&i| low(i) && low(i + 1));
     let side = |inside: usize| Window::new(LEAST.min(probe) + 2 * inside as u32);
     if let Some(inside) = held.map(|held| held + MARGIN).filter(|&i| i < rings) {
-        return Ok(Band {
+        return Ok(WindowEstimate {
             window: side(inside)?,
-            reach: Reach::Within {
-                leak: leaks[inside].max(0.0),
+            bandwidth: BandwidthEstimate::Bounded {
+                tail_fraction: leaks[inside].max(0.0),
             },
         });
     }
     // The last may be low: the band then ends where the looking does.
     let mut but_last = leaks.iter().zip(errors).take(rings.saturating_sub(1));
     match rings > 1 && but_last.all(|(leak, error)| *leak > LEAK + 2.0 * error) {
-        true => Ok(Band {
+        true => Ok(WindowEstimate {
             window: side(rings)?,
-            reach: Reach::Beyond,
+            bandwidth: BandwidthEstimate::Unbounded,
         }),
         false => unclear(probe),
     }
 }
 
-fn unclear(probe: u32) -> Result<Band, RecoverError> {
-    Ok(Band {
+fn unclear(probe: u32) -> Result<WindowEstimate, RecoverError> {
+    Ok(WindowEstimate {
         window: Window::new(USUAL.min(probe))?,
-        reach: Reach::Unclear,
+        bandwidth: BandwidthEstimate::Undetermined,
     })
 }
 
@@ -312,8 +313,8 @@ impl Sums {
 
     /// Flux of each ring; `None` without light.
     fn solve(mut self) -> Option<Vec<f64>> {
-        dense::cholesky(&mut self.gram, self.rings)?;
-        dense::solve(&self.gram, &mut self.right);
+        linalg::cholesky(&mut self.gram, self.rings)?;
+        linalg::cholesky_solve(&self.gram, &mut self.right);
         Some(self.right)
     }
 }
@@ -337,7 +338,7 @@ fn leave_out(own: &mut [f64], columns: &mut [f64], patterns: usize) -> bool {
             gram[i * k + j] = dot(own[i], own[j]);
         }
     }
-    if dense::cholesky(&mut gram, k).is_none() {
+    if linalg::cholesky(&mut gram, k).is_none() {
         return false;
     }
     let mut share = vec![0.0; k];
@@ -345,7 +346,7 @@ fn leave_out(own: &mut [f64], columns: &mut [f64], patterns: usize) -> bool {
         for (share, own) in share.iter_mut().zip(&own) {
             *share = dot(own, column);
         }
-        dense::solve(&gram, &mut share);
+        linalg::cholesky_solve(&gram, &mut share);
         for (share, own) in share.iter().zip(&own) {
             add_scaled(column, -share, own);
         }
@@ -370,15 +371,23 @@ mod tests {
         // A window of 11 leaves 0.5 %, and there is a ring of margin.
         let found = band(&leaks, &sure, 15).unwrap();
         assert_eq!(found.window.side(), 13);
-        assert!(matches!(found.reach, Reach::Within { leak } if close(leak, 0.001)));
+        assert!(
+            matches!(found.bandwidth, BandwidthEstimate::Bounded { tail_fraction } if close(tail_fraction, 0.001))
+        );
         // Where rings never stay dark the band is as wide as was looked, if that is sure.
         let far = [0.1, 0.06, 0.04, 0.02];
         let beyond = band(&far, &sure, 15).unwrap();
-        assert_eq!((beyond.window.side(), beyond.reach), (15, Reach::Beyond));
+        assert_eq!(
+            (beyond.window.side(), beyond.bandwidth),
+            (15, BandwidthEstimate::Unbounded)
+        );
         let edge = band(&[0.1, 0.06, 0.04, 0.002], &sure, 15).unwrap();
-        assert_eq!(edge.reach, Reach::Beyond);
+        assert_eq!(edge.bandwidth, BandwidthEstimate::Unbounded);
         let unclear = band(&[0.1; 12], &[0.06; 12], 31).unwrap();
-        assert_eq!((unclear.window.side(), unclear.reach), (15, Reach::Unclear));
+        assert_eq!(
+            (unclear.window.side(), unclear.bandwidth),
+            (15, BandwidthEstimate::Undetermined)
+        );
     }
 
     #[test]

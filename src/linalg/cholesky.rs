@@ -1,15 +1,17 @@
-//! Small dense matrices, row-major.
+//! Cholesky factorisation `A = UᵀU` of a symmetric positive definite `[n, n]` matrix, and what follows
+//! from it: solutions, determinant, inverse (Golub and Van Loan, *Matrix Computations*, section 4.2).
+//!
+//! `A` and `U` are read and written in the upper triangle only; the lower one may hold anything.
 
 use super::vector::{add_scaled, dot};
 
 /// Rows eliminated together: each row below is then loaded and stored a quarter as often.
 const BLOCK: usize = 4;
 
-/// Factors a symmetric positive definite `[n, n]` matrix as `UᵀU` in place. Reads and writes the
-/// upper triangle only. Returns the logarithm of the determinant, or `None` if the matrix is not
-/// positive definite to working precision.
+/// Replaces `A` by `U`. Returns the logarithm of A's determinant, or `None` if A is not positive definite
+/// to working precision.
 #[inline(always)]
-pub(in crate::recover) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
+pub(crate) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
     let mut log_det = 0.0;
     for first in (0..n).step_by(BLOCK) {
         let end = (first + BLOCK).min(n);
@@ -45,9 +47,9 @@ pub(in crate::recover) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
     Some(log_det)
 }
 
-/// Solves `UᵀU x = b` in place, `U` as [`cholesky`] leaves it.
+/// Replaces `b`, `[n]`, by the solution of `UᵀUx = b`.
 #[inline(always)]
-pub(in crate::recover) fn solve(u: &[f64], b: &mut [f64]) {
+pub(crate) fn cholesky_solve(u: &[f64], b: &mut [f64]) {
     let n = b.len();
     for k in 0..n {
         b[k] /= u[k * n + k];
@@ -60,9 +62,9 @@ pub(in crate::recover) fn solve(u: &[f64], b: &mut [f64]) {
     }
 }
 
-/// The inverse of `UᵀU`, upper triangle, into `inverse`; `scratch` is `[n, n]` too.
+/// Writes the upper triangle of `(UᵀU)⁻¹` into `inverse`; `scratch` is `[n, n]` too.
 #[inline(always)]
-pub(super) fn invert(u: &[f64], n: usize, scratch: &mut [f64], inverse: &mut [f64]) {
+pub(crate) fn cholesky_inverse(u: &[f64], n: usize, scratch: &mut [f64], inverse: &mut [f64]) {
     // W = U⁻¹ from the last row up, then WWᵀ.
     for k in (0..n).rev() {
         let (row, below) = scratch[k * n..].split_at_mut(n);
@@ -86,76 +88,39 @@ pub(super) fn invert(u: &[f64], n: usize, scratch: &mut [f64], inverse: &mut [f6
     }
 }
 
-/// `Ax` for a symmetric `[n, n]` matrix with both triangles.
-#[inline(always)]
-pub(super) fn multiply(a: &[f64], x: &[f64], y: &mut [f64]) {
-    let n = x.len();
-    for (y, row) in y.iter_mut().zip(a.chunks_exact(n)) {
-        *y = dot(row, x);
-    }
-}
-
-/// Copies the upper triangle over the lower one.
-pub(super) fn mirror(a: &mut [f64], n: usize) {
-    for i in 0..n {
-        for j in 0..i {
-            a[i * n + j] = a[j * n + i];
-        }
-    }
-}
-
-/// `A·B` for `A` `[rows, inner]` and `B` `[inner, columns]`, added to nothing.
-pub(super) fn product(a: &[f64], b: &[f64], inner: usize, columns: usize) -> Vec<f64> {
-    let mut out = vec![0.0; a.len() / inner.max(1) * columns];
-    for (row, out) in a.chunks_exact(inner).zip(out.chunks_exact_mut(columns)) {
-        for (&factor, b) in row.iter().zip(b.chunks_exact(columns)) {
-            add_scaled(out, factor, b);
-        }
-    }
-    out
-}
-
-/// The transpose of an `[rows, columns]` matrix.
-pub(super) fn transpose(a: &[f64], columns: usize) -> Vec<f64> {
-    let rows = a.len() / columns.max(1);
-    (0..a.len())
-        .map(|i| a[i % rows * columns + i / rows])
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::matrix::{mirror_upper, multiply, multiply_vector, transpose};
     use super::*;
 
-    /// A well-conditioned symmetric matrix.
-    fn matrix(n: usize) -> Vec<f64> {
+    fn positive_definite_matrix(n: usize) -> Vec<f64> {
         let b: Vec<f64> = (0..n * n)
             .map(|i| ((i * 37) % 101) as f64 / 50.0 - 1.0)
             .collect();
-        let mut a = product(&b, &transpose(&b, n), n, n);
+        let mut a = multiply(&b, &transpose(&b, n), n, n);
         (0..n).for_each(|i| a[i * n + i] += 1.0);
         a
     }
 
     #[test]
-    fn factors_solve_and_invert() {
+    fn factor_solves_and_inverts() {
         for n in [1, 3, 4, 5, 16, 23] {
-            let a = matrix(n);
+            let a = positive_definite_matrix(n);
             let mut u = a.clone();
             let log_det = cholesky(&mut u, n).unwrap();
             let diagonal: f64 = (0..n).map(|i| 2.0 * u[i * n + i].ln()).sum();
             assert!((log_det - diagonal).abs() < 1e-9 * (1.0 + diagonal.abs()));
             let x: Vec<f64> = (0..n).map(|i| i as f64 - 2.5).collect();
             let mut b = vec![0.0; n];
-            multiply(&a, &x, &mut b);
-            solve(&u, &mut b);
+            multiply_vector(&a, &x, &mut b);
+            cholesky_solve(&u, &mut b);
             for (x, b) in x.iter().zip(&b) {
                 assert!((x - b).abs() < 1e-8);
             }
             let (mut scratch, mut inverse) = (vec![0.0; n * n], vec![0.0; n * n]);
-            invert(&u, n, &mut scratch, &mut inverse);
-            mirror(&mut inverse, n);
-            let identity = product(&a, &inverse, n, n);
+            cholesky_inverse(&u, n, &mut scratch, &mut inverse);
+            mirror_upper(&mut inverse, n);
+            let identity = multiply(&a, &inverse, n, n);
             for (i, v) in identity.iter().enumerate() {
                 let expected = f64::from(u8::from(i / n == i % n));
                 assert!((v - expected).abs() < 1e-8, "{n}: {v}");
@@ -164,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_positive_definite_is_refused() {
+    fn indefinite_matrices_are_refused() {
         assert_eq!(cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2), None);
         assert_eq!(cholesky(&mut [f64::NAN], 1), None);
     }
