@@ -150,8 +150,8 @@ function jsxAttributes({ attributes, events, members }) {
   for (const builtin of ['Event', 'ProgressEvent']) own.delete(builtin);
   return [
     '/** Made from custom-elements.json. */\n\n',
-    `import type { ${[...own].sort().join(', ')} } from './events.js';\n`,
-    `import type { ${CLASS} } from './element.js';\n\n`,
+    `import type { ${[...own].sort().join(', ')} } from './element/events.js';\n`,
+    `import type { ${CLASS} } from './element/element.js';\n\n`,
     '/** Attributes by their names in HTML, properties that are none of them, and handlers of events. */\n',
     'export interface RelightablePhotoAttributes {\n',
     ...attributes.map(({ name, type, description = '' }) =>

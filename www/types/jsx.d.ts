@@ -1,6 +1,6 @@
 /** `<relightable-photo>` in the JSX of what looks for elements in the global namespace, as React 18 does. */
 
-import type { RelightablePhoto } from './element.js';
+import type { RelightablePhoto } from './element/element.js';
 import type { RelightablePhotoAttributes } from './jsx-attributes.js';
 
 /** What the element takes in JSX; keys, references and attributes of every element are not checked. */

@@ -1,7 +1,7 @@
 /** `<relightable-photo>` in React's JSX, from version 19 on. */
 
 import type { DetailedHTMLProps, HTMLAttributes } from 'react';
-import type { RelightablePhoto } from './element.js';
+import type { RelightablePhoto } from './element/element.js';
 import type { RelightablePhotoAttributes } from './jsx-attributes.js';
 
 /** What the element takes in JSX: its attributes by their names in HTML, and handlers such as `onlightchange`. */
