@@ -109,7 +109,7 @@ impl PixelwiseRecovery {
         executor.check_cancelled()?;
         let trial = HeldOut::new(measurements, geometry, split, GATHERED)?;
         Ok(trial.choose(
-            Tolerance::SHARES.map(|share| Self {
+            Tolerance::CANDIDATE_SHARES.map(|share| Self {
                 problem: Problem::Denoising(basis, Tolerance { share, ..noise }),
                 ..least_squares
             }),

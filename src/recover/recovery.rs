@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::holdout::HoldoutSplit;
 use super::holdout_validation::HoldoutValidation;
-use super::learned::Learned;
+use super::learned::LearnedRecovery;
 use super::pixelwise::PixelwiseRecovery;
 use super::pooled;
 use super::{CommonMode, MIN_PATTERNS, SparsityBasis};
@@ -48,7 +48,7 @@ impl Method {
     /// About the most memory that preparing a recovery takes beside the measurements, in bytes.
     pub fn preparation_bytes(self, window: Window) -> usize {
         let own = match self {
-            Self::Learned => Learned::preparation_bytes(window),
+            Self::Learned => LearnedRecovery::preparation_bytes(window),
             Self::Nnls | Self::Bpdn(_) => 0,
         };
         own.max(pooled::bytes(window))
@@ -60,7 +60,7 @@ impl Method {
         let direct = PixelwiseRecovery::tile_bytes(window, patterns);
         match self {
             // Tiles may be blended with least squares.
-            Self::Learned => direct.max(Learned::tile_bytes(window)),
+            Self::Learned => direct.max(LearnedRecovery::tile_bytes(window)),
             Self::Nnls | Self::Bpdn(_) => direct,
         }
     }
@@ -68,7 +68,7 @@ impl Method {
     /// The most components that tiles may be combined from.
     pub fn max_rank(self, window: Window) -> usize {
         match self {
-            Self::Learned => Learned::max_rank(window),
+            Self::Learned => LearnedRecovery::max_rank(window),
             Self::Nnls | Self::Bpdn(_) => 0,
         }
     }
@@ -76,7 +76,7 @@ impl Method {
     /// The most camera pixels around a tile whose measurements may go into it.
     pub fn max_halo(self) -> u32 {
         match self {
-            Self::Learned => Learned::MAX_HALO,
+            Self::Learned => LearnedRecovery::MAX_HALO,
             Self::Nnls | Self::Bpdn(_) => 0,
         }
     }
@@ -169,7 +169,7 @@ pub struct Recovery {
 
 #[derive(Debug)]
 enum Solver {
-    Learned(Box<Learned>),
+    Learned(Box<LearnedRecovery>),
     Direct(PixelwiseRecovery),
 }
 
@@ -197,7 +197,8 @@ impl Recovery {
         let mean = pooled::mean_function(measurements, &geometry, &split, executor)?;
         let solver = match settings.method {
             Method::Learned => {
-                let learned = Learned::new(measurements, geometry, split.clone(), &mean, executor)?;
+                let learned =
+                    LearnedRecovery::new(measurements, geometry, split.clone(), &mean, executor)?;
                 Solver::Learned(Box::new(learned))
             }
             Method::Nnls => Solver::Direct(PixelwiseRecovery::least_squares(

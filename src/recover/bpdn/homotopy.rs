@@ -1,9 +1,11 @@
-//! Basis pursuit denoising where light transport functions themselves are sparse: φ = I.
+//! Basis pursuit denoising with φ = I, where light transport functions themselves are sparse: the homotopy
+//! method.
 //!
-//! The solutions of `min ½‖y − Ax‖² + λ 1ᵀx, x ≥ 0` for all λ form a path of straight segments
-//! (Efron et al. 2004, LARS; for non-negative x Mørup et al. 2008). It is followed from `x = 0`
-//! down. Along a segment the residual is quadratic in the step, so that the point where
-//! `‖y − Ax‖ = ε` is a root and no search over λ. At it `x` solves the constrained problem.
+//! The solutions of `min ½‖y − Ax‖² + λ 1ᵀx, x ≥ 0` for all λ form a piecewise linear path (LARS, Efron et
+//! al. 2004; for non-negative x Mørup et al. 2008). [`Homotopy`] follows it from x = 0, the solution for
+//! large λ, towards λ = 0. On a segment the passive set P is fixed, `G[P, P] x = h[P] − λ` with `G = AᵀA` and
+//! `h = Aᵀy`. ‖y − Ax‖² is quadratic in λ there, so that the λ with `‖y − Ax‖ = ε`, where x solves the
+//! constrained problem, is the root of a quadratic equation.
 
 use super::super::passive_set::PassiveSet;
 use crate::linalg::{add_scaled, vectorise};
@@ -12,29 +14,33 @@ use crate::linalg::{add_scaled, vectorise};
 #[derive(Debug)]
 pub struct Homotopy<'a> {
     k: usize,
-    /// Elements above zero; solves for a vector of ones, and at the end for what rounding left.
+    /// P, with solutions for a vector of ones and, at the end of the path, for the rounding error.
     passive: PassiveSet<'a, 2>,
-    /// The passive elements' values. The set's solution for ones is how they grow as λ falls.
+    /// x on P. `G[P, P]⁻¹ 1` is its slope as λ falls.
     x: Vec<f64>,
-    /// `h − Gx`, and how it falls as λ falls: λ and 1 on the passive set.
+    /// `h − Gx`, and its slope: λ and 1 on P.
     correlation: Vec<f64>,
-    fall: Vec<f64>,
-    refused: Vec<bool>,
+    slope: Vec<f64>,
+    /// Elements whose columns depend linearly on those in P.
+    dependent: Vec<bool>,
 }
 
 /// Right-hand sides of the [`PassiveSet`].
-const RIGHT: usize = 0;
+const ROUNDING_ERROR: usize = 0;
 const ONES: usize = 1;
-/// Correlation, as a share of the largest right-hand side entry, at which the path has ended.
-const TOLERANCE: f64 = 1e-10;
+/// λ, as a share of its first value, at which the path ends.
+const MIN_RELATIVE_LAMBDA: f64 = 1e-10;
+/// Limit of segments for each unknown. A path has about as many segments as non-zero elements at its end.
+const MAX_SEGMENTS_PER_UNKNOWN: usize = 10;
 
-/// What ends a segment of the path.
-enum Event {
-    /// Here the residual is ε, or λ zero.
+/// The end of a segment of the path.
+enum PathEvent {
+    /// The residual is ε, or λ zero.
     End,
-    Enters(usize),
-    /// The member at this place turns zero.
-    Leaves(usize),
+    /// This element becomes positive.
+    Insert(usize),
+    /// The element at this position of the passive set becomes zero.
+    Remove(usize),
 }
 
 impl<'a> Homotopy<'a> {
@@ -48,8 +54,8 @@ impl<'a> Homotopy<'a> {
             passive: PassiveSet::new(gram, k),
             x: Vec::with_capacity(k),
             correlation: vec![0.0; k],
-            fall: vec![0.0; k],
-            refused: vec![false; k],
+            slope: vec![0.0; k],
+            dependent: vec![false; k],
         }
     }
 
@@ -59,16 +65,17 @@ impl<'a> Homotopy<'a> {
     pub fn solve(&mut self, h: &[f64], energy: f64, epsilon: f64) -> Vec<f64> {
         vectorise(
             #[inline(always)]
-            || self.follow(h, energy, epsilon * epsilon),
+            || self.follow_path(h, energy, epsilon * epsilon),
         );
         self.passive.spread(&self.x)
     }
 
+    /// Follows the path to where ‖y − Ax‖² = `max_squared_residual`.
     #[inline(always)]
-    fn follow(&mut self, h: &[f64], energy: f64, most: f64) {
+    fn follow_path(&mut self, h: &[f64], energy: f64, max_squared_residual: f64) {
         self.passive.clear();
         self.x.clear();
-        self.refused.fill(false);
+        self.dependent.fill(false);
         self.correlation.copy_from_slice(h);
         let mut lambda = 0.0;
         let mut first = None;
@@ -77,94 +84,94 @@ impl<'a> Homotopy<'a> {
                 (lambda, first) = (h, Some(j));
             }
         }
-        let least = TOLERANCE * lambda;
-        let Some(first) = first.filter(|_| energy > most) else {
+        let min_lambda = MIN_RELATIVE_LAMBDA * lambda;
+        let Some(first) = first.filter(|_| energy > max_squared_residual) else {
             return;
         };
-        self.enter(first);
-        // Each event changes the set by one element; paths have about as many as members at the end.
-        for _ in 0..10 * self.k {
-            self.fall.fill(0.0);
+        self.insert(first);
+        for _ in 0..MAX_SEGMENTS_PER_UNKNOWN * self.k {
+            self.slope.fill(0.0);
             let passive = &self.passive;
-            passive.add_product(&mut self.fall, passive.solution(ONES));
-            let residual = energy - self.explained(h, lambda);
-            let (step, event) = self.next_event(lambda, residual - most);
+            passive.add_product(&mut self.slope, passive.solution(ONES));
+            let squared_residual = energy - self.explained(h, lambda);
+            let (step, event) = self.next_event(lambda, squared_residual - max_squared_residual);
             lambda -= step;
             add_scaled(&mut self.x, step, self.passive.solution(ONES));
-            add_scaled(&mut self.correlation, -step, &self.fall);
+            add_scaled(&mut self.correlation, -step, &self.slope);
             match event {
-                Event::End => break,
-                Event::Leaves(i) => {
+                PathEvent::End => break,
+                PathEvent::Remove(i) => {
                     self.x.swap_remove(i);
                     self.passive.leave(i);
-                    self.refused.fill(false);
+                    self.dependent.fill(false);
                 }
-                Event::Enters(j) => self.enter(j),
+                PathEvent::Insert(j) => self.insert(j),
             }
-            if lambda <= least {
+            if lambda <= min_lambda {
                 break;
             }
         }
-        self.settle(h, lambda);
+        self.refine(h, lambda);
     }
 
+    /// Adds an element to P unless its column depends linearly on those there.
     #[inline(always)]
-    fn enter(&mut self, j: usize) {
+    fn insert(&mut self, j: usize) {
         match self.passive.enter(j, [0.0, 1.0]) {
             true => self.x.push(0.0),
-            false => self.refused[j] = true,
+            false => self.dependent[j] = true,
         }
     }
 
-    /// `‖y‖² − ‖y − Ax‖²` at a point of the path: `h − Gx` is λ wherever x is not zero.
+    /// `‖y‖² − ‖y − Ax‖²` on the path, where `h − Gx = λ` on P.
     #[inline(always)]
     fn explained(&self, h: &[f64], lambda: f64) -> f64 {
         let terms = self.passive.members().iter().zip(&self.x);
         terms.map(|(&j, &x)| (h[j] + lambda) * x).sum()
     }
 
-    /// How far λ falls until something happens. `excess` is how far the squared residual now is above
-    /// what is allowed.
+    /// How far λ falls to the end of the segment, and that end. `excess` is the squared residual minus its
+    /// limit.
     #[inline(always)]
-    fn next_event(&self, lambda: f64, excess: f64) -> (f64, Event) {
-        // The squared residual falls by 2γλs − γ²s over a step γ.
+    fn next_event(&self, lambda: f64, excess: f64) -> (f64, PathEvent) {
+        // With s = 1ᵀG[P, P]⁻¹1 the squared residual falls by 2γλs − γ²s over a step γ.
         let direction = self.passive.solution(ONES);
         let root = lambda * lambda - excess / direction.iter().sum::<f64>();
         let mut step = match root > 0.0 {
             true => lambda - root.sqrt(),
             false => lambda,
         };
-        let mut event = Event::End;
+        let mut event = PathEvent::End;
         for (i, (&x, &d)) in self.x.iter().zip(direction).enumerate() {
             if d < 0.0 && x < -d * step {
-                (step, event) = ((-x / d).max(0.0), Event::Leaves(i));
+                (step, event) = ((-x / d).max(0.0), PathEvent::Remove(i));
             }
         }
-        for (j, (&c, &f)) in self.correlation.iter().zip(&self.fall).enumerate() {
-            // Whether the correlation c − γf is above λ − γ before the step is over.
+        for (j, (&c, &f)) in self.correlation.iter().zip(&self.slope).enumerate() {
+            // Whether the correlation c − γf reaches λ − γ within the step.
             if f < 1.0
                 && lambda - c < (1.0 - f) * step
                 && !self.passive.contains(j)
-                && !self.refused[j]
+                && !self.dependent[j]
             {
-                (step, event) = (((lambda - c) / (1.0 - f)).max(0.0), Event::Enters(j));
+                (step, event) = (((lambda - c) / (1.0 - f)).max(0.0), PathEvent::Insert(j));
             }
         }
         (step, event)
     }
 
-    /// `x` at λ from the equations instead of from the sum of all steps: the residual of
-    /// `G[P, P] x = h[P] − λ` is what rounding has gathered.
+    /// Removes the rounding error that x has gathered over the steps, by iterative refinement of
+    /// `G[P, P] x = h[P] − λ`.
     #[inline(always)]
-    fn settle(&mut self, h: &[f64], lambda: f64) {
+    fn refine(&mut self, h: &[f64], lambda: f64) {
         for _ in 0..2 {
             for (c, h) in self.correlation.iter_mut().zip(h) {
                 *c = lambda - h;
             }
             self.passive.add_product(&mut self.correlation, &self.x);
             self.correlation.iter_mut().for_each(|c| *c = -*c);
-            self.passive.carry(RIGHT, &self.correlation);
-            add_scaled(&mut self.x, 1.0, self.passive.solution(RIGHT));
+            self.passive.carry(ROUNDING_ERROR, &self.correlation);
+            add_scaled(&mut self.x, 1.0, self.passive.solution(ROUNDING_ERROR));
         }
         self.x.iter_mut().for_each(|x| *x = x.max(0.0));
     }
@@ -180,10 +187,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(200))]
 
-        /// Feasible, non-negative, and optimal: with `c = Aᵀ(y − Ax)`, the constraint active and
-        /// `c ≤ λ` with equality wherever `x > 0` are the Karush–Kuhn–Tucker conditions.
+        /// x ≥ 0, ‖y − Ax‖ = ε, and c ≤ λ with equality where x > 0 for c = Aᵀ(y − Ax).
         #[test]
-        fn answers_satisfy_kkt(
+        fn solutions_satisfy_the_kkt_conditions(
             k in 1usize..24, rows in 1usize..40, seed in any::<u64>(), offset in 0.0f64..2.0,
             share in 0.01f64..1.2,
         ) {
@@ -215,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn one_element_is_as_bright_as_it_must_be() {
+    fn one_unknown_has_the_smallest_feasible_value() {
         // |3 − x| ≤ 1
         let x = Homotopy::new(&[1.0], 1).solve(&[3.0], 9.0, 1.0);
         assert!((x[0] - 2.0).abs() < 1e-12);

@@ -1,20 +1,23 @@
 //! Basis pursuit denoising: `min ‖φᵀτ‖₁` subject to `‖y − P̂τ‖₂ ≤ ε` and `τ ≥ 0` (paper, section 3,
-//! case (b)), for the constraint as written.
+//! case (b)).
 //!
-//! With φ the identity the path of solutions over ε is followed from dark to where it meets ε
-//! ([`homotopy`]); with any other orthonormal φ Newton's method goes to the solution through the
-//! inside of all constraints ([`interior`]). Where ε is less than non-negative least squares can reach, no τ satisfies
-//! the constraint, and both return that least-squares solution.
+//! In this module A is the weighted P̂, `[L, k]`, of one window, and x, `[k]`, the unknown τ on the
+//! window's elements inside the light plane. With φ the identity, [`Homotopy`] follows the path of
+//! solutions from zero to where the residual is ε; for any other orthonormal φ, [`InteriorPoint`] applies
+//! Newton's method to the optimality conditions. If ε is less than the residual of non-negative least
+//! squares (NNLS), no τ satisfies the constraint, and both return the NNLS solution.
 
 mod homotopy;
-mod interior;
+mod interior_point;
+mod iterate;
+mod newton;
+mod sensing_operator;
 mod solution;
+mod sparsity_basis;
 mod tolerance;
-mod transform;
-mod window;
 
 pub use homotopy::Homotopy;
-pub use interior::InteriorPoint;
+pub use interior_point::InteriorPoint;
 pub use solution::{Constraint, Solution};
+pub use sparsity_basis::SparsityBasis;
 pub(super) use tolerance::Tolerance;
-pub use transform::SparsityBasis;

@@ -1,28 +1,32 @@
-//! What is asked for, what is answered, and the proof of how good the answer is.
+//! Constraint and solution of basis pursuit denoising, and the dual bound that proves a solution's quality.
 //!
-//! The dual problem is `max yᵀν − ε‖ν‖ : Aᵀν ≤ φs, ‖s‖_∞ ≤ 1`. Multipliers that nearly satisfy its
-//! constraints satisfy them with a little of the constant basis vector mixed in, and then bound the
-//! objective of every feasible x from below: the distance to the optimum is known at any time.
+//! The dual problem is
+//!
+//! ```text
+//! max yᵀν − ε‖ν‖   subject to   Aᵀν ≤ φs,   ‖s‖_∞ ≤ 1
+//! ```
+//!
+//! Any feasible (ν, s) bounds the objective of every feasible x from below. The multipliers of an iterate
+//! are nearly feasible; a scaled ν, and s mixed with a multiple of the constant basis vector, are feasible.
 
-use super::window::Window;
+use super::sensing_operator::SensingOperator;
 use crate::linalg::dot;
 
-/// Steps of the search for the best mixture in a bound.
-const THIRDS: usize = 40;
+/// Steps of the ternary search for the best mixture in a bound.
+const SEARCH_STEPS: usize = 40;
 
 /// One right-hand side of a [`super::InteriorPoint`].
 #[derive(Clone, Debug)]
 pub struct Constraint<'a> {
     /// Measurements, `[L]`.
     pub y: &'a [f64],
-    /// The most that `‖y − Ax‖` may be.
+    /// Upper bound of `‖y − Ax‖`.
     pub epsilon: f64,
-    /// Non-negative least squares' solution, `[k]`, which decides whether the constraint can be
-    /// satisfied, and keeps the answer feasible.
+    /// The non-negative least-squares solution, `[k]`: it decides whether the constraint can be satisfied.
     pub least_squares: &'a [f64],
 }
 
-/// A solution with the proof of how good it is.
+/// A solution with a bound on its distance from the optimum.
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// `x`, `[k]`.
@@ -34,112 +38,121 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// How far the objective may be above the optimum, as a share of it.
-    pub(super) fn gap(&self) -> f64 {
+    /// Upper bound on the objective's excess over the optimum, as a share of the optimum.
+    pub(super) fn relative_gap(&self) -> f64 {
         (self.objective - self.bound) / self.bound
     }
-}
 
-impl Window {
-    /// Keeps what is better than `best` of feasible points near x, and of the bound that multipliers
-    /// s near the optimal ones prove.
+    /// Replaces the solution by a feasible point near x, if that is better, and the bound by the one that
+    /// multipliers s near the optimal ones prove, if that is higher.
     #[inline(always)]
     pub(super) fn record(
-        &self,
+        &mut self,
+        operator: &SensingOperator,
         constraint: &Constraint,
         x: Vec<f64>,
         s: &[f64],
-        best: &mut Solution,
     ) {
-        for x in self.feasible(x, constraint) {
-            let objective = self.objective(&x);
-            if objective < best.objective {
-                (best.x, best.objective) = (x, objective);
+        for x in feasible_points(operator, constraint, x) {
+            let objective = operator.objective(&x);
+            if objective < self.objective {
+                (self.x, self.objective) = (x, objective);
             }
         }
-        // At the optimum ν points the residual's way.
-        let residual = self.difference(&best.x, constraint.y);
-        best.bound = best.bound.max(self.bound(constraint, s, &residual));
-    }
-
-    /// Points near `x` that satisfy the constraint: the darkest one along the ray through x, if that
-    /// meets the ball around y, and the nearest one on the way to the least-squares solution.
-    #[inline(always)]
-    fn feasible(&self, x: Vec<f64>, constraint: &Constraint) -> impl Iterator<Item = Vec<f64>> {
-        let &Constraint {
-            y,
-            epsilon,
-            least_squares,
-        } = constraint;
-        let from = self.difference(&x, y);
-        let seen: Vec<f64> = y.iter().zip(&from).map(|(y, from)| y - from).collect();
-        let to = self.difference(least_squares, y);
-        let step: Vec<f64> = to.iter().zip(&from).map(|(to, from)| to - from).collect();
-        let minus: Vec<f64> = seen.iter().map(|s| -s).collect();
-        let ray = reach(y, &minus, epsilon).map(|t| x.iter().map(|x| t * x).collect());
-        let onward = reach(&from, &step, epsilon).filter(|&t| t <= 1.0).map(|t| {
-            let both = x.iter().zip(least_squares);
-            both.map(|(x, least)| x + t * (least - x)).collect()
-        });
-        ray.into_iter().chain(onward)
-    }
-
-    /// A lower bound on the objective, from multipliers s within ±1 and the direction of ν.
-    #[inline(always)]
-    fn bound(&self, constraint: &Constraint, s: &[f64], direction: &[f64]) -> f64 {
-        let size = dot(direction, direction).sqrt();
-        let gain = dot(direction, constraint.y) - constraint.epsilon * size;
-        if gain <= 0.0 {
-            return 0.0;
-        }
-        let pairs: Vec<_> = (self.correlate(direction).into_iter())
-            .zip(self.synthesize(s))
-            .collect();
-        gain * farthest(&pairs, 1.0 / self.side() as f64)
+        // At the optimum ν is parallel to the residual.
+        let residual = operator.residual(&self.x, constraint.y);
+        let bound = dual_bound(operator, constraint, s, &residual);
+        self.bound = self.bound.max(bound);
     }
 }
 
-/// The least `t ≥ 0` at which `‖from + t step‖ ≤ ε`.
+/// Points near `x` that satisfy the constraint: the darkest multiple of x that does, and the nearest
+/// point on the line to the least-squares solution.
 #[inline(always)]
-fn reach(from: &[f64], step: &[f64], epsilon: f64) -> Option<f64> {
-    let (a, b) = (dot(step, step), -dot(step, from));
-    let c = dot(from, from) - epsilon * epsilon;
+fn feasible_points(
+    operator: &SensingOperator,
+    constraint: &Constraint,
+    x: Vec<f64>,
+) -> impl Iterator<Item = Vec<f64>> {
+    let &Constraint {
+        y,
+        epsilon,
+        least_squares,
+    } = constraint;
+    let residual = operator.residual(&x, y);
+    // −Ax, the change of the residual along the multiples of x.
+    let change: Vec<f64> = residual.iter().zip(y).map(|(r, y)| r - y).collect();
+    let multiple = first_feasible(y, &change, epsilon).map(|t| x.iter().map(|x| t * x).collect());
+    let least = operator.residual(least_squares, y);
+    let change: Vec<f64> = least.iter().zip(&residual).map(|(l, r)| l - r).collect();
+    let on_line = first_feasible(&residual, &change, epsilon).filter(|&t| t <= 1.0);
+    let on_line = on_line.map(|t| {
+        let both = x.iter().zip(least_squares);
+        both.map(|(x, least)| x + t * (least - x)).collect()
+    });
+    multiple.into_iter().chain(on_line)
+}
+
+/// The least `t ≥ 0` at which `‖residual + t change‖ ≤ ε`.
+#[inline(always)]
+fn first_feasible(residual: &[f64], change: &[f64], epsilon: f64) -> Option<f64> {
+    let (a, b) = (dot(change, change), -dot(change, residual));
+    let c = dot(residual, residual) - epsilon * epsilon;
     if c <= 0.0 {
         return Some(0.0);
     }
-    let root = b * b - a * c;
-    (b > 0.0 && root >= 0.0).then(|| c / (b + root.sqrt()))
+    let discriminant = b * b - a * c;
+    (b > 0.0 && discriminant >= 0.0).then(|| c / (b + discriminant.sqrt()))
 }
 
-/// The largest t for which `t p ≤ α q + (1 − α) c` for all pairs (p, q) and some α in [0, 1].
-///
-/// φ turns the constant basis vector into `c = 1/side` everywhere, so that, with q = φs and
-/// p = Aᵀν, the dual's constraint holds for tν and `αs` plus `1 − α` of that vector.
+/// A lower bound on the objective, from multipliers s within ±1 and the direction of ν.
 #[inline(always)]
-fn farthest(pairs: &[(f64, f64)], c: f64) -> f64 {
-    // What is allowed at α ends at `most`, and begins where p < 0 meets a negative right side.
-    let along = |alpha: f64| {
-        let (mut least, mut most) = (0.0f64, f64::INFINITY);
+fn dual_bound(
+    operator: &SensingOperator,
+    constraint: &Constraint,
+    s: &[f64],
+    direction: &[f64],
+) -> f64 {
+    let norm = dot(direction, direction).sqrt();
+    let gain = dot(direction, constraint.y) - constraint.epsilon * norm;
+    if gain <= 0.0 {
+        return 0.0;
+    }
+    let pairs: Vec<_> = (operator.correlate(direction).into_iter())
+        .zip(operator.synthesize(s))
+        .collect();
+    gain * max_scale(&pairs, 1.0 / operator.side() as f64)
+}
+
+/// The largest scale t with `t p ≤ α q + (1 − α) c` for all pairs (p, q) and some α in [0, 1].
+///
+/// With p = Aᵀν, q = φs and c = 1/side, the value of φ times the constant basis vector's unit coefficient,
+/// (tν, αs plus 1 − α of that vector) is dual feasible.
+#[inline(always)]
+fn max_scale(pairs: &[(f64, f64)], c: f64) -> f64 {
+    // The feasible scales at α; a negative right-hand side with p < 0 makes a lower limit.
+    let max_scale_at = |alpha: f64| {
+        let (mut min, mut max) = (0.0f64, f64::INFINITY);
         for &(p, q) in pairs {
-            let room = alpha * q + (1.0 - alpha) * c;
+            let limit = alpha * q + (1.0 - alpha) * c;
             if p > 0.0 {
-                most = most.min(room / p);
-            } else if room < 0.0 {
-                least = least.max(room / p);
+                max = max.min(limit / p);
+            } else if limit < 0.0 {
+                min = min.max(limit / p);
             }
         }
-        if least <= most { most } else { -1.0 }
+        if min <= max { max } else { -1.0 }
     };
-    // Concave in α as far as anything is allowed, which it is from zero on: by thirds.
+    // Concave in α on the feasible interval, which begins at zero: ternary search.
     let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..THIRDS {
+    for _ in 0..SEARCH_STEPS {
         let (a, b) = ((2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0);
-        if along(a) < along(b) {
+        if max_scale_at(a) < max_scale_at(b) {
             low = a;
         } else {
             high = b;
         }
     }
-    let best = along(low).max(along(high));
+    let best = max_scale_at(low).max(max_scale_at(high));
     if best.is_finite() { best.max(0.0) } else { 0.0 }
 }

@@ -1,35 +1,39 @@
-//! How far a light transport function may stay from its measurements.
+//! ε, the largest residual that basis pursuit denoising allows.
+//!
+//! The noise variance of a measurement is `σ² = gain · ȳ + floor`: photon noise, and noise independent of
+//! light. The true function has the squared residual L σ²; a fitted one has about (L − d) σ², where d degrees
+//! of freedom fit noise, so that ε² = L σ² smooths too much. d depends on patterns, scene and basis.
+//! Therefore `ε² = share · L σ²` with a share that is chosen on held-out patterns.
 
-/// The constraint's ε, for pixels of any brightness.
-///
-/// What keeps measurements from an exact fit is noise, of variance `gain · ȳ + floor` (photons, and
-/// all that does not depend on light). `ε² = L σ²` would be the residual of the *true* function; a
-/// fitted one has spent degrees of freedom on noise and comes to about `(L − dof) σ²`, so that
-/// asking for `L σ²` smooths too much. How much is spent depends on pattern, scene and basis:
-/// the share of `L σ²` is chosen on patterns held out.
+/// Iterations of the reweighted least-squares fit.
+const REWEIGHTINGS: usize = 4;
+/// Smallest expected variance, as a share of the mean variance: limits the weight of one pair.
+const MIN_EXPECTED_VARIANCE_SHARE: f64 = 0.1;
+
+/// The noise model and the share that determine ε.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
-    /// Variance a unit of measurement adds.
+    /// Noise variance for each unit of the measurement.
     pub gain: f64,
-    /// Variance without light.
+    /// Noise variance without light.
     pub floor: f64,
     /// `ε² / (L σ²)`.
     pub share: f64,
 }
 
 impl Tolerance {
-    /// Shares to choose from. At zero nothing satisfies the constraint and what is left is least
-    /// squares, so that a prior that only harms does none.
-    pub const SHARES: [f64; 7] = [1.0, 0.6, 0.35, 0.2, 0.1, 0.04, 0.0];
+    /// Shares to choose from. With 0 the constraint is infeasible and the solution is least squares, so that
+    /// sparsity that only harms is not used.
+    pub const CANDIDATE_SHARES: [f64; 7] = [1.0, 0.6, 0.35, 0.2, 0.1, 0.04, 0.0];
 
-    /// ε for `rows` measurements of this mean.
-    pub fn epsilon(self, rows: usize, mean: f64) -> f64 {
+    /// ε for `count` measurements with mean `mean`.
+    pub fn epsilon(self, count: usize, mean: f64) -> f64 {
         let variance = (self.gain * mean.max(0.0) + self.floor).max(0.0);
-        (self.share * rows as f64 * variance).sqrt()
+        (self.share * count as f64 * variance).sqrt()
     }
 
-    /// Fits gain and floor, both at least zero, to pairs of mean and variance, by least squares
-    /// relative to the variance expected: a bright pixel's variance is as uncertain as it is large.
+    /// Fits gain and floor, both at least zero, to pairs of mean and variance by least squares relative to
+    /// the expected variance: the uncertainty of a variance is proportional to it.
     pub fn fit(pairs: &[(f64, f64)]) -> Self {
         let mean = |f: &dyn Fn(&(f64, f64)) -> f64| {
             pairs.iter().map(f).sum::<f64>() / pairs.len().max(1) as f64
@@ -40,12 +44,12 @@ impl Tolerance {
             floor: variance,
             share: 1.0,
         };
-        // Weights follow from the fit: a few rounds settle both.
-        for _ in 0..ROUNDS {
+        // The weights depend on the fit.
+        for _ in 0..REWEIGHTINGS {
             let [mut w, mut wx, mut wxx, mut wy, mut wxy] = [0.0; 5];
             for &(x, y) in pairs {
-                // No pixel counts for more than one a tenth as noisy as the mean.
-                let expected = (fit.gain * x + fit.floor).max(0.1 * variance);
+                let expected =
+                    (fit.gain * x + fit.floor).max(MIN_EXPECTED_VARIANCE_SHARE * variance);
                 let weight = 1.0 / (expected * expected).max(f64::MIN_POSITIVE);
                 w += weight;
                 wx += weight * x;
@@ -73,14 +77,12 @@ impl Tolerance {
     }
 }
 
-const ROUNDS: usize = 4;
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn gain_and_floor_are_found() {
+    fn fit_recovers_gain_and_floor() {
         let pairs: Vec<_> = (1..50)
             .map(|i| f64::from(i) / 50.0)
             .map(|x| (x, 0.02 * x + 0.003))
@@ -92,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn neither_is_negative() {
+    fn gain_and_floor_are_not_negative() {
         let falling: Vec<_> = (0..9).map(|i| (f64::from(i), 9.0 - f64::from(i))).collect();
         let fit = Tolerance::fit(&falling);
         assert!(fit.gain == 0.0 && fit.floor > 0.0);

@@ -1,113 +1,127 @@
-//! A picture's measurements as equations over a few kernels.
+//! The measurements of a region as normal equations over the basis.
+//!
+//! An *observation* is one camera pixel in one channel: `y = f B z + noise`, `[L]`, with the pixel's
+//! brightness f, the responses B = P̂V of the basis on the pixel's window, `[L, r]`, and coefficients z,
+//! `[r]`. Inference needs only BᵀB, `[r, r]`, Bᵀy, `[r]`, ‖y‖² and the noise variance. Observations with
+//! the same window and the same unsaturated patterns share BᵀB.
+//!
+//! Each pattern has a weight, and columns are centred over the patterns; the equation of the patterns'
+//! common mode is added again with weight [`MEAN_WEIGHT`].
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::kernels::Kernels;
+use super::basis::{LearnedBasis, PatternResponses};
 use crate::capture::Measurements;
 use crate::linalg::{dot, vectorise};
 use crate::recover::MIN_PATTERNS;
 use crate::recover::pooled::MEAN_WEIGHT;
 use crate::recover::sampling::pixels_by_window;
-use crate::transport::{CHANNELS, CameraPx, Geometry, TileRect};
+use crate::transport::{CHANNELS, CameraPx, Extent, Geometry, TileRect};
 
-/// Sub-element position classes along one axis. At two camera pixels an element, neighbours lie in
-/// different halves of it, and so differ in what they see of their window.
-const HALVES: usize = 2;
-/// Sub-element position classes of a pixel.
-pub(super) const PHASES: usize = HALVES * HALVES;
+/// Sub-element positions along one axis. With two camera pixels for each light element, neighbours lie
+/// in different halves of it and see different parts of their window.
+const PHASES_PER_AXIS: usize = 2;
+/// Sub-element positions of a camera pixel.
+pub(super) const PHASES: usize = PHASES_PER_AXIS * PHASES_PER_AXIS;
 
-/// Where in its light element a pixel's centre lies: 0 to [`PHASES`] - 1.
-pub(super) fn phase(geometry: &Geometry, pixel: CameraPx) -> usize {
+/// Rounding variance of a 16-bit photograph, the least that a measurement has.
+const MIN_VARIANCE: f64 = 1.0 / (12.0 * 65536.0 * 65536.0);
+/// Share of the brightness at [`BRIGHT_PERCENTILE`] below which an observation is left out of training.
+const MIN_RELATIVE_BRIGHTNESS: f64 = 0.1;
+const BRIGHT_PERCENTILE: usize = 95;
+/// Ratio of brightness to noise below which an observation is left out of training.
+const MIN_CONTRAST: f64 = 4.0;
+
+/// Brightness below which an observation is left out of training, by channel.
+pub(super) type BrightnessThresholds = [f64; CHANNELS];
+
+/// The sub-element position of a pixel's correspondence, 0 to [`PHASES`] - 1.
+fn phase(geometry: &Geometry, pixel: CameraPx) -> usize {
     let at = geometry.correspondence.at(pixel);
-    let half = |x: f64| (((x - x.floor()) * HALVES as f64) as usize).min(HALVES - 1);
-    half(at.v) * HALVES + half(at.u)
+    let half = |x: f64| {
+        let position = ((x - x.floor()) * PHASES_PER_AXIS as f64) as usize;
+        position.min(PHASES_PER_AXIS - 1)
+    };
+    half(at.v) * PHASES_PER_AXIS + half(at.u)
 }
 
-/// One channel of one pixel: `y = f·B z + noise` over its window's kernels.
+/// One channel of one pixel, but for BᵀB and Bᵀy.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Member {
-    /// Which of the region's Gram matrices is its own.
-    pub gram: usize,
-    /// Brightness `f`, in units of the measurement: what the kernels' mean would send under full
-    /// light.
+pub(super) struct Observation {
+    /// Index of BᵀB among the region's Gram matrices.
+    gram: usize,
+    /// Brightness f, in units of the measurement: the response of the mean function under full light.
     pub scale: f64,
-    /// Variance of one measurement.
+    /// Noise variance of one measurement.
     pub variance: f64,
-    /// Sum of the weighted rows' squares, `‖y‖²`.
+    /// ‖y‖².
     pub power: f64,
-    /// Number of measurements; 0 if nothing usable is known.
-    pub rows: usize,
-    /// Sub-element position class.
+    /// Number of measurements; 0 if none is usable.
+    pub count: usize,
+    /// Sub-element position.
     pub phase: usize,
-    /// Whether all of its window lies on the display.
-    pub whole: bool,
+    /// Whether all of its window is inside the light plane.
+    pub has_full_window: bool,
 }
 
-impl Member {
-    /// Brightness against the noise of one measurement.
-    pub fn contrast(&self) -> f64 {
-        self.scale / self.variance.sqrt()
-    }
-}
-
-/// All equations of the pixels of a region.
+/// The normal equations of all observations of a region.
 #[derive(Debug)]
-pub(super) struct Equations {
-    /// The pixels covered.
+pub(super) struct RegionEquations {
+    /// The pixels.
     pub rect: TileRect,
-    /// Number of kernels, `r`.
+    /// Number of basis functions, r.
     pub rank: usize,
-    /// `BᵀB`, each `[r, r]`, for each window and set of usable patterns.
-    grams: Vec<Vec<f64>>,
     /// `[pixel, channel]`.
-    pub members: Vec<Member>,
-    /// `Bᵀy`, `[pixel, channel, r]`.
-    rights: Vec<f64>,
+    pub observations: Vec<Observation>,
+    /// BᵀB, `[r, r]` each, for each window and set of usable patterns.
+    gram_matrices: Vec<Vec<f64>>,
+    /// Bᵀy, `[pixel, channel, r]`.
+    right_hand_sides: Vec<f64>,
 }
 
-impl Equations {
-    /// The equations of `rect` from the patterns numbered `rows`.
+impl RegionEquations {
+    /// The equations of the pixels `rect` from the patterns `pattern_indices`.
     pub fn new(
         measurements: &Measurements,
         geometry: &Geometry,
-        kernels: &Kernels,
-        rows: &[usize],
+        basis: &LearnedBasis,
+        pattern_indices: &[usize],
         rect: TileRect,
     ) -> Self {
-        let rank = kernels.rank();
-        let pixels = rect.extent.area();
-        let unknown = Member {
+        let rank = basis.rank();
+        let count = rect.extent.area() * CHANNELS;
+        let unknown = Observation {
             gram: 0,
             scale: 0.0,
             variance: 1.0,
             power: 0.0,
-            rows: 0,
+            count: 0,
             phase: 0,
-            whole: false,
+            has_full_window: false,
         };
         let mut equations = Self {
             rect,
             rank,
-            grams: Vec::new(),
-            members: vec![unknown; pixels * CHANNELS],
-            rights: vec![0.0; pixels * CHANNELS * rank],
+            observations: vec![unknown; count],
+            gram_matrices: Vec::new(),
+            right_hand_sides: vec![0.0; count * rank],
         };
         let weights = measurements.weights();
         for (origin, pixels) in pixels_by_window(geometry, rect) {
             for (plane, channels) in measurements.planes() {
-                let projected = kernels.project(measurements, geometry, origin, plane);
+                let responses = basis.respond(measurements, geometry, origin, plane);
                 vectorise(
                     #[inline(always)]
                     || {
-                        let fill = Fill {
+                        let window = WindowData {
                             measurements,
                             geometry,
-                            projected: &projected,
-                            rows,
+                            responses: &responses,
+                            pattern_indices,
                             weights: &weights,
                         };
-                        fill.window(&mut equations, &pixels, channels);
+                        equations.add_window(&window, &pixels, channels);
                     },
                 );
             }
@@ -115,218 +129,292 @@ impl Equations {
         equations
     }
 
-    /// Number of Gram matrices that the equations of `rect` have: one for each window and set of
-    /// usable patterns.
-    pub fn count_grams(
+    /// Number of Gram matrices that the equations of `rect` have.
+    pub fn count_gram_matrices(
         measurements: &Measurements,
         geometry: &Geometry,
-        rows: &[usize],
+        pattern_indices: &[usize],
         rect: TileRect,
     ) -> usize {
         let windows = pixels_by_window(geometry, rect);
-        let sets = |pixels: &[(usize, CameraPx)], channels: Range<usize>| {
+        let count_sets = |pixels: &[(usize, CameraPx)], channels: Range<usize>| {
             let sets: BTreeSet<Vec<usize>> = pixels
                 .iter()
                 .flat_map(|&(_, pixel)| channels.clone().map(move |c| (pixel, c)))
-                .map(|(pixel, c)| usable(measurements, rows, pixel, c))
+                .map(|(pixel, c)| usable_patterns(measurements, pattern_indices, pixel, c))
                 .collect();
             sets.len()
         };
         let counts = windows.values().flat_map(|pixels| {
             let planes = measurements.planes();
-            planes.map(move |(_, channels)| sets(pixels, channels))
+            planes.map(move |(_, channels)| count_sets(pixels, channels))
         });
         counts.sum()
     }
 
-    /// `BᵀB` of a member, `[r, r]`, both triangles.
-    pub fn gram(&self, member: usize) -> &[f64] {
-        &self.grams[self.members[member].gram]
+    /// BᵀB of an observation, `[r, r]`, both triangles.
+    pub fn gram(&self, index: usize) -> &[f64] {
+        &self.gram_matrices[self.observations[index].gram]
     }
 
-    /// `Bᵀy` of a member, `[r]`.
-    pub fn right(&self, member: usize) -> &[f64] {
-        &self.rights[member * self.rank..(member + 1) * self.rank]
+    /// Bᵀy of an observation, `[r]`.
+    pub fn right_hand_side(&self, index: usize) -> &[f64] {
+        &self.right_hand_sides[index * self.rank..(index + 1) * self.rank]
+    }
+
+    /// Whether an observation is bright enough for training.
+    pub fn is_bright(&self, index: usize, thresholds: &BrightnessThresholds) -> bool {
+        let of = &self.observations[index];
+        of.count > 0
+            && of.scale > thresholds[index % CHANNELS]
+            && of.scale / of.variance.sqrt() > MIN_CONTRAST
+    }
+
+    #[inline(always)]
+    fn add_window(
+        &mut self,
+        window: &WindowData<'_>,
+        pixels: &[(usize, CameraPx)],
+        channels: Range<usize>,
+    ) {
+        let measurements = window.measurements;
+        let mut shared: Vec<CentredResponses<'_>> = Vec::new();
+        for &(p, pixel) in pixels {
+            for c in channels.clone() {
+                let usable = usable_patterns(measurements, window.pattern_indices, pixel, c);
+                let y = usable.iter().map(|&l| {
+                    let y = measurements.sample(l, pixel, c);
+                    match y.is_finite() {
+                        true => y,
+                        false => f64::from(measurements.full_scale[l]),
+                    }
+                });
+                let y: Vec<f64> = y.collect();
+                let known = shared.iter().position(|s| s.pattern_indices == usable);
+                let known = known.unwrap_or_else(|| {
+                    let centred = CentredResponses::new(window, usable, self.gram_matrices.len());
+                    self.gram_matrices.push(centred.gram_matrix());
+                    shared.push(centred);
+                    shared.len() - 1
+                });
+                let index = p * CHANNELS + c;
+                let right_hand_side =
+                    &mut self.right_hand_sides[index * self.rank..(index + 1) * self.rank];
+                self.observations[index] = shared[known].observe((pixel, c), &y, right_hand_side);
+            }
+        }
     }
 }
 
-/// The patterns of a window as its kernels see them, uncentred.
-#[derive(Debug)]
-pub(super) struct Projected {
-    /// `[pattern, stride]`: the kernels' responses, then the mean function's.
-    pub responses: Vec<f32>,
-    /// Values a pattern has, at least `rank + 1`.
-    pub stride: usize,
-    /// Number of kernels.
-    pub rank: usize,
-    /// Whether all of the window lies on the display.
-    pub whole: bool,
+/// The brightness below which observations are left out of training: by channel, a share of what the
+/// brightest 5 % of the observations in `regions` exceed.
+pub(super) fn brightness_thresholds(regions: &[RegionEquations]) -> BrightnessThresholds {
+    std::array::from_fn(|c| {
+        let observations = regions
+            .iter()
+            .flat_map(|region| region.observations.iter().skip(c).step_by(CHANNELS));
+        let mut scales: Vec<f64> = observations.map(|o| o.scale).collect();
+        scales.sort_by(f64::total_cmp);
+        let bright = scales.get(scales.len() * BRIGHT_PERCENTILE / 100);
+        MIN_RELATIVE_BRIGHTNESS * bright.copied().unwrap_or(0.0)
+    })
 }
 
-impl Projected {
-    /// Responses of the kernels to pattern `l`.
-    pub fn row(&self, l: usize) -> &[f32] {
-        &self.responses[l * self.stride..l * self.stride + self.rank]
-    }
-
-    /// Response of the mean light transport function to pattern `l`.
-    pub fn mean(&self, l: usize) -> f64 {
-        f64::from(self.responses[l * self.stride + self.rank])
+/// `rect` with a border of `margin` pixels, where the picture has such pixels and their measurements are
+/// loaded.
+pub(super) fn with_margin(measurements: &Measurements, rect: TileRect, margin: u32) -> TileRect {
+    let camera = measurements.camera;
+    let (right, bottom) = (rect.x + rect.extent.width, rect.y + rect.extent.height);
+    let is_loaded = |y: &u32| measurements.rows.place(*y).is_some();
+    let x = rect.x.saturating_sub(margin);
+    let above = (1..=margin.min(rect.y)).take_while(|d| is_loaded(&(rect.y - d)));
+    let y = rect.y - above.count() as u32;
+    let below = (bottom..camera.height.min(bottom + margin)).take_while(is_loaded);
+    TileRect {
+        x,
+        y,
+        extent: Extent {
+            width: (right + margin).min(camera.width) - x,
+            height: bottom + below.count() as u32 - y,
+        },
     }
 }
 
-/// The patterns of `rows` that say something of a channel of a pixel: those that do not saturate it.
-/// Of one saturated nearly always all that is known is that it is at least white, which all say.
+/// The patterns that do not saturate a pixel's channel; all patterns if those are too few. Then the
+/// saturated samples count as white, the least that they can be.
 #[inline(always)]
-fn usable(measurements: &Measurements, rows: &[usize], pixel: CameraPx, c: usize) -> Vec<usize> {
-    let finite = |l: &usize| measurements.sample(*l, pixel, c).is_finite();
-    let usable: Vec<usize> = rows.iter().copied().filter(finite).collect();
+fn usable_patterns(
+    measurements: &Measurements,
+    pattern_indices: &[usize],
+    pixel: CameraPx,
+    c: usize,
+) -> Vec<usize> {
+    let is_finite = |l: &usize| measurements.sample(*l, pixel, c).is_finite();
+    let usable: Vec<usize> = pattern_indices.iter().copied().filter(is_finite).collect();
     match usable.len() < MIN_PATTERNS {
-        true => rows.to_vec(),
+        true => pattern_indices.to_vec(),
         false => usable,
     }
 }
 
-/// What one window's equations are made from.
-struct Fill<'a> {
+/// What the equations of one window and colour plane are made from.
+#[derive(Clone, Copy)]
+struct WindowData<'a> {
     measurements: &'a Measurements,
     geometry: &'a Geometry,
-    projected: &'a Projected,
-    rows: &'a [usize],
-    /// What each pattern counts for, `[pattern]`.
+    responses: &'a PatternResponses,
+    pattern_indices: &'a [usize],
+    /// Weight of each pattern, `[pattern]`.
     weights: &'a [f64],
 }
 
-/// Centred kernels' responses for one set of patterns, times what the patterns count for.
-struct Centred<'a> {
-    rows: Vec<usize>,
-    /// `[rows]`, and the sum of their squares.
+/// Responses to one set of L patterns, centred over the patterns and weighted.
+struct CentredResponses<'a> {
+    window: WindowData<'a>,
+    pattern_indices: Vec<usize>,
+    /// `[L]`, and the sum of their squares.
     weights: Vec<f64>,
-    total: f64,
-    /// `[r, rows]`: a kernel's responses in one run.
+    total_weight: f64,
+    /// B, `[r, L]`: the responses of one basis function are contiguous.
     columns: Vec<f64>,
-    /// `[r]`.
-    mean: Vec<f64>,
-    /// Mean response of the mean function.
-    profile: f64,
+    /// Mean response of each basis function, `[r]`, and of the mean function.
+    means: Vec<f64>,
+    mean_function: f64,
+    /// Index of BᵀB.
     gram: usize,
-    projected: &'a Projected,
 }
 
-impl<'a> Fill<'a> {
+impl<'a> CentredResponses<'a> {
     #[inline(always)]
-    fn window(
-        &self,
-        equations: &mut Equations,
-        pixels: &[(usize, CameraPx)],
-        channels: Range<usize>,
-    ) {
-        let mut shared: Vec<Centred<'a>> = Vec::new();
-        for &(p, pixel) in pixels {
-            for c in channels.clone() {
-                let rows = usable(self.measurements, self.rows, pixel, c);
-                let y = rows.iter().map(|&l| {
-                    let y = self.measurements.sample(l, pixel, c);
-                    match y.is_finite() {
-                        true => y,
-                        false => f64::from(self.measurements.full_scale[l]),
-                    }
-                });
-                let y: Vec<f64> = y.collect();
-                let known = shared.iter().position(|centred| centred.rows == rows);
-                let at = known.unwrap_or_else(|| {
-                    shared.push(self.centre(equations, rows));
-                    shared.len() - 1
-                });
-                self.member(equations, &shared[at], p * CHANNELS + c, (pixel, c), &y);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn centre(&self, equations: &mut Equations, rows: Vec<usize>) -> Centred<'a> {
-        let (rank, count) = (self.projected.rank, rows.len());
+    fn new(window: &WindowData<'a>, pattern_indices: Vec<usize>, gram: usize) -> Self {
+        let (rank, count) = (window.responses.rank, pattern_indices.len());
         let mut columns = vec![0.0; rank * count];
-        for (i, &l) in rows.iter().enumerate() {
-            for (k, &b) in self.projected.row(l).iter().enumerate() {
+        for (i, &l) in pattern_indices.iter().enumerate() {
+            for (k, &b) in window.responses.row(l).iter().enumerate() {
                 columns[k * count + i] = f64::from(b);
             }
         }
-        let weights: Vec<f64> = rows.iter().map(|&l| self.weights[l]).collect();
-        let total = weights.iter().map(|w| w * w).sum::<f64>();
-        let mut mean = Vec::with_capacity(rank);
+        let weights: Vec<f64> = pattern_indices.iter().map(|&l| window.weights[l]).collect();
+        let total_weight = weights.iter().map(|w| w * w).sum::<f64>();
+        let mut means = Vec::with_capacity(rank);
         for column in columns.chunks_exact_mut(count.max(1)) {
-            let of = |(b, w): (&f64, &f64)| w * w * b;
-            let m = column.iter().zip(&weights).map(of).sum::<f64>() / total;
+            let products = column.iter().zip(&weights).map(|(b, w)| w * w * b);
+            let mean = products.sum::<f64>() / total_weight;
             let column = column.iter_mut().zip(&weights);
-            column.for_each(|(b, w)| *b = w * (*b - m));
-            mean.push(m);
+            column.for_each(|(b, w)| *b = w * (*b - mean));
+            means.push(mean);
         }
-        let weight = total * MEAN_WEIGHT * MEAN_WEIGHT;
+        let products = pattern_indices.iter().zip(&weights);
+        let products = products.map(|(&l, w)| w * w * window.responses.mean(l));
+        let mean_function = products.sum::<f64>() / total_weight;
+        Self {
+            window: *window,
+            pattern_indices,
+            weights,
+            total_weight,
+            columns,
+            means,
+            mean_function,
+            gram,
+        }
+    }
+
+    /// Squared weight of the common mode's equation.
+    fn common_mode_weight(&self) -> f64 {
+        self.total_weight * MEAN_WEIGHT * MEAN_WEIGHT
+    }
+
+    /// BᵀB, `[r, r]`.
+    #[inline(always)]
+    fn gram_matrix(&self) -> Vec<f64> {
+        let (rank, count) = (self.means.len(), self.pattern_indices.len());
+        let (weight, mean) = (self.common_mode_weight(), &self.means);
         let mut gram = vec![0.0; rank * rank];
         for i in 0..rank {
-            let a = &columns[i * count..(i + 1) * count];
+            let a = &self.columns[i * count..(i + 1) * count];
             for j in i..rank {
-                let b = &columns[j * count..(j + 1) * count];
+                let b = &self.columns[j * count..(j + 1) * count];
                 let value = dot(a, b) + weight * mean[i] * mean[j];
                 gram[i * rank + j] = value;
                 gram[j * rank + i] = value;
             }
         }
-        equations.grams.push(gram);
-        let profile = rows.iter().zip(&weights);
-        let profile: f64 = profile.map(|(&l, w)| w * w * self.projected.mean(l)).sum();
-        Centred {
-            rows,
-            weights,
-            total,
-            columns,
-            mean,
-            profile: profile / total,
-            gram: equations.grams.len() - 1,
-            projected: self.projected,
-        }
+        gram
     }
 
+    /// The observation of measurements `y`, `[L]`; writes Bᵀy to `right_hand_side`, `[r]`.
     #[inline(always)]
-    fn member(
+    fn observe(
         &self,
-        equations: &mut Equations,
-        centred: &Centred<'_>,
-        member: usize,
         (pixel, c): (CameraPx, usize),
         y: &[f64],
-    ) {
-        let (rank, count) = (centred.projected.rank, centred.rows.len());
-        let (weights, total) = (&centred.weights, centred.total);
+        right_hand_side: &mut [f64],
+    ) -> Observation {
+        let (weights, count) = (&self.weights, y.len());
+        let measurements = self.window.measurements;
         let weighted: Vec<f64> = y.iter().zip(weights).map(|(y, w)| w * y).collect();
-        let mean = dot(&weighted, weights) / total;
-        let weight = total * MEAN_WEIGHT * MEAN_WEIGHT;
-        let right = &mut equations.rights[member * rank..(member + 1) * rank];
+        let mean = dot(&weighted, weights) / self.total_weight;
+        let weight = self.common_mode_weight();
         // Centred columns are orthogonal to the weights, so y need not be centred.
-        for (k, column) in centred.columns.chunks_exact(count).enumerate() {
-            right[k] = dot(column, &weighted) + weight * centred.mean[k] * mean;
+        for (k, column) in self.columns.chunks_exact(count).enumerate() {
+            right_hand_side[k] = dot(column, &weighted) + weight * self.means[k] * mean;
         }
-        let samples = || centred.rows.iter().zip(weights).zip(y);
-        let variance = samples().map(|((&l, w), &y)| w * w * self.measurements.variance(l, c, y));
-        let deviation = samples().map(|((_, w), y)| (w * (y - mean)).powi(2));
-        let deviation = deviation.sum::<f64>();
-        let scale = if centred.profile > 0.0 {
-            mean / centred.profile
-        } else {
-            0.0
+        let samples = || self.pattern_indices.iter().zip(weights).zip(y);
+        let variances = samples().map(|((&l, w), &y)| w * w * measurements.variance(l, c, y));
+        let deviations = samples().map(|((_, w), y)| (w * (y - mean)).powi(2));
+        let deviation = deviations.sum::<f64>();
+        let scale = match self.mean_function > 0.0 {
+            true => mean / self.mean_function,
+            false => 0.0,
         };
-        equations.members[member] = Member {
-            gram: centred.gram,
+        Observation {
+            gram: self.gram,
             scale: scale.max(0.0),
-            variance: (variance.sum::<f64>() / count as f64).max(LEAST_VARIANCE),
+            variance: (variances.sum::<f64>() / count as f64).max(MIN_VARIANCE),
             power: deviation + weight * mean * mean,
-            rows: count,
-            phase: phase(self.geometry, pixel),
-            whole: centred.projected.whole,
-        };
+            count,
+            phase: phase(self.window.geometry, pixel),
+            has_full_window: self.window.responses.has_full_window,
+        }
     }
 }
 
-/// Variance below which no 16-bit photograph can go: its own rounding.
-const LEAST_VARIANCE: f64 = 1.0 / (12.0 * 65536.0 * 65536.0);
+#[cfg(test)]
+impl RegionEquations {
+    /// Observations of coefficients `z`, `[pixel, channel, r]`, with brightness 1, one diagonal Gram
+    /// matrix, `[r]`, and standard normal numbers `normal` for the noise.
+    pub fn synthetic(
+        rect: TileRect,
+        diagonal: &[f64],
+        z: &[f64],
+        variance: f64,
+        mut normal: impl FnMut() -> f64,
+    ) -> Self {
+        let rank = diagonal.len();
+        let mut gram = vec![0.0; rank * rank];
+        (0..rank).for_each(|k| gram[k * rank + k] = diagonal[k]);
+        let observations = rect.pixels().flat_map(|pixel| {
+            let observation = Observation {
+                gram: 0,
+                scale: 1.0,
+                variance,
+                power: 0.0,
+                count: rank,
+                phase: (pixel.y % 2 * 2 + pixel.x % 2) as usize,
+                has_full_window: true,
+            };
+            [observation; CHANNELS]
+        });
+        let right_hand_sides = z.iter().enumerate().map(|(i, z)| {
+            let g = diagonal[i % rank];
+            g * z + (variance * g).sqrt() * normal()
+        });
+        Self {
+            rect,
+            rank,
+            observations: observations.collect(),
+            gram_matrices: vec![gram],
+            right_hand_sides: right_hand_sides.collect(),
+        }
+    }
+}

@@ -1,40 +1,52 @@
-//! What one pixel's measurements and a Gaussian prior say together, in closed form.
+//! The posterior of one observation under a Gaussian prior, in closed form.
+//!
+//! For `y = f B z + noise` with noise variance σ² and the prior z ~ N(m, C):
+//!
+//! ```text
+//! K = C⁻¹ + (f²/σ²) BᵀB                         posterior precision, [r, r]
+//! ẑ = m + K⁻¹ (f/σ²) Bᵀ(y − f B m)              posterior mean, [r]
+//! ln p(y) = −½ ((f²/σ²)‖Bm‖² − (2f/σ²) mᵀBᵀy − dᵀKd + ln|K| + ln|C|) + constant,   d = ẑ − m
+//! ```
 
-use super::equations::Equations;
-use super::nonnegative::{NonNegative, Pull};
-use crate::linalg::{self, dot};
+use super::equations::RegionEquations;
+use super::nonnegativity::{NonNegativityPenalty, PenaltyWorkspace};
+use crate::linalg;
+use crate::linalg::dot;
 
-/// A covariance ready for use.
+/// Smallest variance along any direction, as a share of the mean variance: keeps the inverse finite.
+const MIN_VARIANCE_SHARE: f64 = 1e-9;
+
+/// The inverse of a prior's covariance.
 #[derive(Clone, Debug)]
-pub(super) struct Gaussian {
-    /// Inverse covariance, `[r, r]`.
-    precision: Vec<f64>,
-    /// Logarithm of the covariance's determinant.
-    log_det: f64,
+pub(super) struct PriorPrecision {
+    /// C⁻¹, `[r, r]`.
+    matrix: Vec<f64>,
+    /// ln|C|.
+    covariance_log_det: f64,
 }
 
-/// Smallest variance along any direction, as a share of the mean one: keeps the inverse finite.
-const LEAST_SHARE: f64 = 1e-9;
-
-impl Gaussian {
-    /// From a covariance `[r, r]`; a little is added to its diagonal until it can be inverted.
+impl PriorPrecision {
+    /// Inverts a covariance, `[r, r]`. A ridge on its diagonal grows until it is positive definite.
     pub fn new(covariance: &[f64], rank: usize) -> Self {
         let trace: f64 = (0..rank).map(|k| covariance[k * rank + k].abs()).sum();
-        let mut ridge = (trace / rank as f64 * LEAST_SHARE).max(f64::MIN_POSITIVE);
+        let mut ridge = (trace / rank as f64 * MIN_VARIANCE_SHARE).max(f64::MIN_POSITIVE);
         loop {
             let mut u = covariance.to_vec();
             (0..rank).for_each(|k| u[k * rank + k] += ridge);
-            if let Some(log_det) = linalg::cholesky(&mut u, rank) {
-                let mut precision = vec![0.0; rank * rank];
-                linalg::cholesky_inverse(&u, rank, &mut vec![0.0; rank * rank], &mut precision);
-                linalg::mirror_upper(&mut precision, rank);
-                return Self { precision, log_det };
+            if let Some(covariance_log_det) = linalg::cholesky(&mut u, rank) {
+                let mut matrix = vec![0.0; rank * rank];
+                linalg::cholesky_inverse(&u, rank, &mut vec![0.0; rank * rank], &mut matrix);
+                linalg::mirror_upper(&mut matrix, rank);
+                return Self {
+                    matrix,
+                    covariance_log_det,
+                };
             }
             if !ridge.is_finite() {
-                // A covariance that is no number says nothing.
+                // The covariance has a NaN: use a prior without information.
                 return Self {
-                    precision: vec![0.0; rank * rank],
-                    log_det: f64::INFINITY,
+                    matrix: vec![0.0; rank * rank],
+                    covariance_log_det: f64::INFINITY,
                 };
             }
             ridge = (ridge * 10.0).max(1e-300);
@@ -42,107 +54,104 @@ impl Gaussian {
     }
 }
 
-/// Room to work in, kept from one member to the next.
+/// Computes posteriors of rank r, one after the other, in buffers that it keeps.
 #[derive(Debug)]
-pub(super) struct Workspace {
+pub(super) struct PosteriorSolver {
+    /// Cholesky factor of K, `[r, r]`.
     factor: Vec<f64>,
     scratch: Vec<f64>,
-    /// Posterior covariance, `[r, r]`, upper triangle; only after [`Workspace::covariance`].
-    pub inverse: Vec<f64>,
-    image: Vec<f64>,
-    step: Vec<f64>,
-    pull: Pull,
-    /// Posterior mean, `[r]`.
-    pub z: Vec<f64>,
+    /// K⁻¹, `[r, r]`, upper triangle; valid after [`compute_covariance`](Self::compute_covariance).
+    pub covariance: Vec<f64>,
+    /// `BᵀB m` or `BᵀB ẑ`, `[r]`.
+    product: Vec<f64>,
+    gradient: Vec<f64>,
+    penalty: PenaltyWorkspace,
+    /// ẑ, `[r]`.
+    pub mean: Vec<f64>,
 }
 
-impl Workspace {
+impl PosteriorSolver {
     pub fn new(rank: usize) -> Self {
-        let square = vec![0.0; rank * rank];
-        let line = vec![0.0; rank];
+        let (matrix, vector) = (vec![0.0; rank * rank], vec![0.0; rank]);
         Self {
-            factor: square.clone(),
-            scratch: square.clone(),
-            inverse: square,
-            image: line.clone(),
-            step: line.clone(),
-            pull: Pull::new(rank),
-            z: line,
+            factor: matrix.clone(),
+            scratch: matrix.clone(),
+            covariance: matrix,
+            product: vector.clone(),
+            gradient: vector.clone(),
+            penalty: PenaltyWorkspace::new(rank),
+            mean: vector,
         }
     }
 
-    /// The posterior of `z ~ N(mean, prior)` given the equations of `member`, whose noise has
-    /// `noise` times its estimated variance. Leaves its mean in `z`; returns the logarithm of the
-    /// evidence, up to a constant that does not depend on the prior.
-    ///
-    /// With `a = f²/σ²`: precision `C⁻¹ + a BᵀB`, mean `m + (C⁻¹ + a BᵀB)⁻¹ (f/σ²) Bᵀ(y − f B m)`.
+    /// The posterior of observation `index` under the prior N(`prior_mean`, C). The noise has `noise`
+    /// times the estimated variance. Leaves ẑ in `mean`; returns ln p(y) up to a constant that does not
+    /// depend on the prior.
     #[inline(always)]
     pub fn infer(
         &mut self,
-        equations: &Equations,
-        member: usize,
+        equations: &RegionEquations,
+        index: usize,
         noise: f64,
-        prior: &Gaussian,
-        mean: &[f64],
+        prior: &PriorPrecision,
+        prior_mean: &[f64],
     ) -> f64 {
         let rank = equations.rank;
-        let of = &equations.members[member];
-        let (gram, right) = (equations.gram(member), equations.right(member));
+        let of = &equations.observations[index];
+        let (gram, right) = (equations.gram(index), equations.right_hand_side(index));
         let variance = of.variance * noise;
         let (a, b) = (of.scale * of.scale / variance, of.scale / variance);
-        for ((x, p), g) in self.factor.iter_mut().zip(&prior.precision).zip(gram) {
+        for ((x, p), g) in self.factor.iter_mut().zip(&prior.matrix).zip(gram) {
             *x = p + a * g;
         }
-        linalg::multiply_vector(gram, mean, &mut self.image);
+        linalg::multiply_vector(gram, prior_mean, &mut self.product);
         for k in 0..rank {
-            self.step[k] = b * (right[k] - of.scale * self.image[k]);
+            self.gradient[k] = b * (right[k] - of.scale * self.product[k]);
         }
-        let quadratic = a * dot(mean, &self.image) - 2.0 * b * dot(mean, right);
-        self.z.copy_from_slice(&self.step);
-        // The prior's precision is positive definite and a Gram matrix takes nothing from it.
+        let quadratic = a * dot(prior_mean, &self.product) - 2.0 * b * dot(prior_mean, right);
+        self.mean.copy_from_slice(&self.gradient);
+        // Fails on NaN only: C⁻¹ is positive definite and BᵀB semidefinite.
         let Some(log_det) = linalg::cholesky(&mut self.factor, rank) else {
-            self.z.copy_from_slice(mean);
+            self.mean.copy_from_slice(prior_mean);
             return f64::NEG_INFINITY;
         };
-        linalg::cholesky_solve(&self.factor, &mut self.z);
-        let explained = dot(&self.step, &self.z);
-        for (z, m) in self.z.iter_mut().zip(mean) {
+        linalg::cholesky_solve(&self.factor, &mut self.mean);
+        let explained = dot(&self.gradient, &self.mean);
+        for (z, m) in self.mean.iter_mut().zip(prior_mean) {
             *z += m;
         }
-        -0.5 * (quadratic - explained + log_det + prior.log_det)
+        -0.5 * (quadratic - explained + log_det + prior.covariance_log_det)
     }
 
-    /// Moves `z`, near the mean of the posterior just inferred, to where light is hardly negative.
+    /// Moves `z`, a point near the mean of the posterior just inferred, by the non-negativity penalty.
     #[inline(always)]
-    pub fn pull(&mut self, nonnegative: &NonNegative, z: &mut [f64]) {
-        nonnegative.pull(&self.factor, z, &mut self.pull);
+    pub fn apply_penalty(&mut self, penalty: &NonNegativityPenalty, z: &mut [f64]) {
+        penalty.apply(&self.factor, z, &mut self.penalty);
     }
 
-    /// The covariance of the posterior just inferred, into `inverse`.
+    /// Computes the covariance of the posterior just inferred.
     #[inline(always)]
-    pub fn covariance(&mut self) {
-        let rank = self.z.len();
-        linalg::cholesky_inverse(&self.factor, rank, &mut self.scratch, &mut self.inverse);
+    pub fn compute_covariance(&mut self) {
+        let rank = self.mean.len();
+        linalg::cholesky_inverse(&self.factor, rank, &mut self.scratch, &mut self.covariance);
     }
 
-    /// Expected squared residual `E‖y − f B z‖²` under the posterior just inferred, of which
-    /// `inverse` is the covariance.
+    /// E‖y − f B z‖² under the posterior just inferred, whose covariance has been computed.
     #[inline(always)]
-    pub fn residual(&mut self, equations: &Equations, member: usize) -> f64 {
+    pub fn expected_squared_residual(&mut self, equations: &RegionEquations, index: usize) -> f64 {
         let rank = equations.rank;
-        let of = &equations.members[member];
-        let gram = equations.gram(member);
-        linalg::multiply_vector(gram, &self.z, &mut self.image);
-        let mut spread = 0.0;
+        let of = &equations.observations[index];
+        let gram = equations.gram(index);
+        linalg::multiply_vector(gram, &self.mean, &mut self.product);
+        // tr(BᵀB K⁻¹)
+        let mut trace = 0.0;
         for i in 0..rank {
-            let (h, p) = (
-                &gram[i * rank + i..(i + 1) * rank],
-                &self.inverse[i * rank + i..(i + 1) * rank],
-            );
-            spread += 2.0 * dot(h, p) - h[0] * p[0];
+            let row = i * rank + i..(i + 1) * rank;
+            let (g, p) = (&gram[row.clone()], &self.covariance[row]);
+            trace += 2.0 * dot(g, p) - g[0] * p[0];
         }
         let f = of.scale;
-        of.power - 2.0 * f * dot(&self.z, equations.right(member))
-            + f * f * (dot(&self.z, &self.image) + spread)
+        of.power - 2.0 * f * dot(&self.mean, equations.right_hand_side(index))
+            + f * f * (dot(&self.mean, &self.product) + trace)
     }
 }

@@ -1,104 +1,151 @@
-//! The prior of one pixel on its own, learned by expectation–maximisation.
+//! The pixel prior: the distribution of one observation's coefficients, without its neighbours.
+//!
+//! z ~ N(m_p, C), with a mean for each sub-element position p and one covariance, `[r, r]`.
+//! Expectation–maximisation (EM) learns both from compressive measurements:
+//!
+//! - E step: posterior mean ẑ and covariance P of every bright observation ([`posterior`](super::posterior));
+//! - M step: m_p = mean of ẑ, C = mean of (ẑ − m_p)(ẑ − m_p)ᵀ + P. Without P, C shrinks with each iteration.
+//!
+//! The noise factor, E‖y − f B z‖² over its expected value, absorbs what the basis cannot represent.
 
-use super::equations::{Equations, PHASES};
-use super::posterior::{Gaussian, Workspace};
+use super::equations::{BrightnessThresholds, PHASES, RegionEquations};
+use super::posterior::{PosteriorSolver, PriorPrecision};
 use crate::executor::Executor;
-use crate::linalg::{self, add_scaled, vectorise};
-use crate::transport::CHANNELS;
+use crate::linalg;
+use crate::linalg::{add_scaled, vectorise};
 
-/// Coefficients of light transport functions, scaled by the pixel's brightness, as Gaussian: a mean
-/// for each sub-element position class, one covariance.
+/// If at least one in so many observations has a full window, the others are left out.
+const FULL_WINDOW_RATIO: usize = 4;
+/// Weight of the pooled mean in the mean of a sub-element position, in observations.
+const POOLED_MEAN_WEIGHT: f64 = 20.0;
+/// Smallest noise factor.
+const MIN_NOISE_FACTOR: f64 = 0.1;
+
+/// The prior of one observation.
 #[derive(Clone, Debug)]
 pub(super) struct Prior {
     pub rank: usize,
-    /// `[PHASES][r]`.
-    pub mean: Vec<Vec<f64>>,
-    /// `[r, r]`.
+    /// m, `[PHASES][r]`.
+    pub means: Vec<Vec<f64>>,
+    /// C, `[r, r]`.
     pub covariance: Vec<f64>,
-    pub gaussian: Gaussian,
-    /// Variance of measurements against what was estimated for them: takes up what the kernels
-    /// cannot show.
-    pub noise: f64,
+    /// C⁻¹.
+    pub precision: PriorPrecision,
+    /// Ratio of the residuals' variance to the estimated noise variance.
+    pub noise_factor: f64,
 }
 
-/// Who may be learned from: brightness below which a channel of a pixel is left out, by channel.
-pub(super) type Threshold = [f64; CHANNELS];
-
-/// Brightness against noise below which nothing can be learned from a pixel.
-const LEAST_CONTRAST: f64 = 4.0;
-
-/// Whether `member` is bright enough to learn from.
-pub(super) fn bright(equations: &Equations, member: usize, threshold: &Threshold) -> bool {
-    let of = &equations.members[member];
-    of.rows > 0 && of.scale > threshold[member % CHANNELS] && of.contrast() > LEAST_CONTRAST
-}
-
-/// What a round of expectation gathers.
+/// Sufficient statistics of one E step.
 #[derive(Debug)]
-struct Expected {
-    count: [f64; PHASES],
-    /// Posterior means, summed by class.
-    sum: Vec<Vec<f64>>,
-    /// `Σ zzᵀ + P`, upper triangle.
-    moment: Vec<f64>,
-    residual: f64,
-    rows: f64,
+struct PriorStatistics {
+    /// Observations by sub-element position.
+    counts: [f64; PHASES],
+    /// Σ ẑ by sub-element position.
+    sums: Vec<Vec<f64>>,
+    /// Σ ẑẑᵀ + P, upper triangle.
+    second_moment: Vec<f64>,
+    /// Σ E‖y − f B z‖² / σ², and the number of measurements.
+    squared_residual: f64,
+    measurements: f64,
 }
 
 impl Prior {
-    /// A prior of equal means, from a covariance `[r, r]`.
+    /// A prior with one mean, `[r]`, for all sub-element positions and a covariance, `[r, r]`.
     pub fn new(mean: &[f64], covariance: Vec<f64>) -> Self {
         let rank = mean.len();
         Self {
             rank,
-            mean: vec![mean.to_vec(); PHASES],
-            gaussian: Gaussian::new(&covariance, rank),
+            means: vec![mean.to_vec(); PHASES],
+            precision: PriorPrecision::new(&covariance, rank),
             covariance,
-            noise: 1.0,
+            noise_factor: 1.0,
         }
     }
 
-    /// One round of expectation–maximisation on all bright members of `patches`. The posterior
-    /// covariance is part of the second moment: without it the prior shrinks from round to round.
-    pub fn improve(
+    /// Infers observation `index` under this prior; see [`PosteriorSolver::infer`].
+    #[inline(always)]
+    pub fn infer(
+        &self,
+        equations: &RegionEquations,
+        index: usize,
+        solver: &mut PosteriorSolver,
+    ) -> f64 {
+        let mean = &self.means[equations.observations[index].phase];
+        solver.infer(equations, index, self.noise_factor, &self.precision, mean)
+    }
+
+    /// One iteration of EM over the bright observations of `regions`.
+    pub fn em_iteration(
         &mut self,
-        patches: &[Equations],
-        threshold: &Threshold,
+        regions: &[RegionEquations],
+        thresholds: &BrightnessThresholds,
         executor: &impl Executor,
     ) {
-        let rank = self.rank;
-        // Where much of a window lies off the display little is seen of its functions, and learning
-        // from them is slow: they are left out where there are others enough.
-        let whole = patches
-            .iter()
-            .flat_map(|p| &p.members)
-            .filter(|m| m.whole)
-            .count();
-        let all: usize = patches.iter().map(|p| p.members.len()).sum();
-        let only_whole = ENOUGH_WHOLE * whole >= all;
-        let parts = executor.map(patches.len(), |i| {
+        // An observation whose window is partly outside the light plane determines little of its
+        // function and slows EM down.
+        let observations = || regions.iter().flat_map(|region| &region.observations);
+        let full = observations().filter(|o| o.has_full_window).count();
+        let only_full = FULL_WINDOW_RATIO * full >= observations().count();
+        let parts = executor.map(regions.len(), |i| {
             vectorise(
                 #[inline(always)]
-                || self.expect(&patches[i], threshold, only_whole),
+                || self.expectation(&regions[i], thresholds, only_full),
             )
         });
-        let mut total = Expected::new(rank);
-        parts.iter().for_each(|part| total.add(part));
-        let count: f64 = total.count.iter().sum();
+        let mut total = PriorStatistics::new(self.rank);
+        parts.iter().for_each(|part| total.merge(part));
+        self.maximisation(total);
+    }
+
+    /// The E step over one region.
+    #[inline(always)]
+    fn expectation(
+        &self,
+        region: &RegionEquations,
+        thresholds: &BrightnessThresholds,
+        only_full: bool,
+    ) -> PriorStatistics {
+        let rank = self.rank;
+        let mut sums = PriorStatistics::new(rank);
+        let mut solver = PosteriorSolver::new(rank);
+        for (index, observation) in region.observations.iter().enumerate() {
+            if !region.is_bright(index, thresholds) || only_full && !observation.has_full_window {
+                continue;
+            }
+            self.infer(region, index, &mut solver);
+            solver.compute_covariance();
+            sums.counts[observation.phase] += 1.0;
+            add_scaled(&mut sums.sums[observation.phase], 1.0, &solver.mean);
+            for i in 0..rank {
+                let row = i * rank + i..(i + 1) * rank;
+                let moment = &mut sums.second_moment[row.clone()];
+                add_scaled(moment, solver.mean[i], &solver.mean[i..]);
+                add_scaled(moment, 1.0, &solver.covariance[row]);
+            }
+            sums.squared_residual +=
+                solver.expected_squared_residual(region, index) / observation.variance;
+            sums.measurements += observation.count as f64;
+        }
+        sums
+    }
+
+    /// The M step. Without observations the prior stays as it is.
+    fn maximisation(&mut self, statistics: PriorStatistics) {
+        let rank = self.rank;
+        let count: f64 = statistics.counts.iter().sum();
         if count < 1.0 {
             return;
         }
-        let pooled: Vec<f64> = (0..rank)
-            .map(|k| total.sum.iter().map(|sum| sum[k]).sum::<f64>() / count)
+        let pooled_mean: Vec<f64> = (0..rank)
+            .map(|k| statistics.sums.iter().map(|sum| sum[k]).sum::<f64>() / count)
             .collect();
-        let mut covariance = total.moment;
-        for (phase, sum) in total.sum.iter().enumerate() {
-            let n = total.count[phase];
-            // A class with few members leans on all the others.
-            self.mean[phase] = (0..rank)
-                .map(|k| (sum[k] + PULL * pooled[k]) / (n + PULL))
+        let mut covariance = statistics.second_moment;
+        for (phase, sum) in statistics.sums.iter().enumerate() {
+            let n = statistics.counts[phase];
+            self.means[phase] = (0..rank)
+                .map(|k| (sum[k] + POOLED_MEAN_WEIGHT * pooled_mean[k]) / (n + POOLED_MEAN_WEIGHT))
                 .collect();
-            let mean = &self.mean[phase];
+            let mean = &self.means[phase];
             for i in 0..rank {
                 for j in i..rank {
                     // Σ (z − m)(z − m)ᵀ = Σ zzᵀ − s mᵀ − m sᵀ + n m mᵀ
@@ -109,69 +156,31 @@ impl Prior {
         }
         covariance.iter_mut().for_each(|c| *c /= count);
         linalg::mirror_upper(&mut covariance, rank);
-        self.gaussian = Gaussian::new(&covariance, rank);
+        self.precision = PriorPrecision::new(&covariance, rank);
         self.covariance = covariance;
-        self.noise = (total.residual / total.rows).max(LEAST_NOISE);
-    }
-
-    #[inline(always)]
-    fn expect(&self, patch: &Equations, threshold: &Threshold, only_whole: bool) -> Expected {
-        let rank = self.rank;
-        let mut out = Expected::new(rank);
-        let mut work = Workspace::new(rank);
-        for member in (0..patch.members.len()).filter(|&m| bright(patch, m, threshold)) {
-            let of = patch.members[member];
-            if only_whole && !of.whole {
-                continue;
-            }
-            work.infer(
-                patch,
-                member,
-                self.noise,
-                &self.gaussian,
-                &self.mean[of.phase],
-            );
-            work.covariance();
-            out.count[of.phase] += 1.0;
-            add_scaled(&mut out.sum[of.phase], 1.0, &work.z);
-            for i in 0..rank {
-                let row = i * rank + i..(i + 1) * rank;
-                let moment = &mut out.moment[row.clone()];
-                add_scaled(moment, work.z[i], &work.z[i..]);
-                add_scaled(moment, 1.0, &work.inverse[row]);
-            }
-            out.residual += work.residual(patch, member) / of.variance;
-            out.rows += of.rows as f64;
-        }
-        out
+        let factor = statistics.squared_residual / statistics.measurements;
+        self.noise_factor = factor.max(MIN_NOISE_FACTOR);
     }
 }
 
-/// One in how many members must have its whole window on the display for the others to be left out.
-const ENOUGH_WHOLE: usize = 4;
-/// Members of the pooled mean that a class's mean starts from.
-const PULL: f64 = 20.0;
-/// Noise never comes out below this share of its estimate.
-const LEAST_NOISE: f64 = 0.1;
-
-impl Expected {
+impl PriorStatistics {
     fn new(rank: usize) -> Self {
         Self {
-            count: [0.0; PHASES],
-            sum: vec![vec![0.0; rank]; PHASES],
-            moment: vec![0.0; rank * rank],
-            residual: 0.0,
-            rows: 0.0,
+            counts: [0.0; PHASES],
+            sums: vec![vec![0.0; rank]; PHASES],
+            second_moment: vec![0.0; rank * rank],
+            squared_residual: 0.0,
+            measurements: 0.0,
         }
     }
 
-    fn add(&mut self, other: &Self) {
+    fn merge(&mut self, other: &Self) {
         for phase in 0..PHASES {
-            self.count[phase] += other.count[phase];
-            add_scaled(&mut self.sum[phase], 1.0, &other.sum[phase]);
+            self.counts[phase] += other.counts[phase];
+            add_scaled(&mut self.sums[phase], 1.0, &other.sums[phase]);
         }
-        add_scaled(&mut self.moment, 1.0, &other.moment);
-        self.residual += other.residual;
-        self.rows += other.rows;
+        add_scaled(&mut self.second_moment, 1.0, &other.second_moment);
+        self.squared_residual += other.squared_residual;
+        self.measurements += other.measurements;
     }
 }

@@ -1,17 +1,19 @@
-//! The learned prior on made-up objects whose functions are known.
+//! LearnedRecovery recovery of synthetic objects whose light transport functions are known.
 
-use super::equations::Equations;
-use super::posterior::{Gaussian, Workspace};
+use super::basis::LearnedBasis;
+use super::equations::RegionEquations;
+use super::posterior::{PosteriorSolver, PriorPrecision};
 use super::*;
 use crate::capture::{Noise, Pattern, Rows};
 use crate::executor::{Executor, SequentialExecutor};
-use crate::recover::{BandwidthEstimate, WindowEstimate};
-use crate::transport::{CameraPx, Correspondence, TransportFunctions, Window};
+use crate::recover::sampling::pixels_by_window;
+use crate::recover::{BandwidthEstimate, WindowEstimate, pooled};
+use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent, TransportFunctions, Window};
 
-/// Works backwards: what comes out must not depend on the order.
-struct Backwards;
+/// Runs jobs in reverse order, on which results must not depend.
+struct ReverseOrder;
 
-impl Executor for Backwards {
+impl Executor for ReverseOrder {
     fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         let mut results: Vec<T> = (0..count).rev().map(work).collect();
         results.reverse();
@@ -19,7 +21,7 @@ impl Executor for Backwards {
     }
 }
 
-/// Uniform numbers in [0, 1), always the same.
+/// Uniform pseudo-random numbers in [0, 1).
 fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     move || {
@@ -51,8 +53,7 @@ fn geometry() -> Geometry {
     }
 }
 
-/// All of the picture.
-fn whole() -> TileRect {
+fn picture() -> TileRect {
     TileRect {
         x: 0,
         y: 0,
@@ -60,16 +61,11 @@ fn whole() -> TileRect {
     }
 }
 
-/// Spots whose place and size change smoothly over the picture, `[pixel, element, channel]`.
+/// Gaussian spots whose position and size change smoothly over the picture, `[pixel, element]`.
 fn object(geometry: &Geometry) -> Vec<[f64; CHANNELS]> {
     let side = WINDOW as usize;
     let mut tau = Vec::new();
-    let all = TileRect {
-        x: 0,
-        y: 0,
-        extent: geometry.camera,
-    };
-    for pixel in all.pixels() {
+    for pixel in picture().pixels() {
         let (x, y) = (f64::from(pixel.x), f64::from(pixel.y));
         let (du, dv) = ((0.21 * x + 0.1 * y).sin(), (0.17 * y - 0.13 * x).cos());
         let at = geometry.correspondence.at(pixel);
@@ -90,29 +86,24 @@ fn object(geometry: &Geometry) -> Vec<[f64; CHANNELS]> {
 
 fn measurements(patterns: usize, seed: u64) -> (Measurements, Vec<[f64; CHANNELS]>) {
     let tau = object(&geometry());
-    (photographed(patterns, seed, &tau), tau)
+    (photograph(patterns, seed, &tau), tau)
 }
 
-/// `tau` under random patterns, with a little noise.
-fn photographed(patterns: usize, seed: u64, tau: &[[f64; CHANNELS]]) -> Measurements {
+/// Measurements of `tau` under random patterns, with a little noise.
+fn photograph(patterns: usize, seed: u64, tau: &[[f64; CHANNELS]]) -> Measurements {
     let geometry = geometry();
     let mut random = random(seed);
-    let shown: Vec<Vec<f32>> = (0..patterns)
+    let emissions: Vec<Vec<f32>> = (0..patterns)
         .map(|_| {
             let element = |_| if random() < 0.5 { 0.0 } else { 1.0 };
             (0..geometry.light.area()).map(element).collect()
         })
         .collect();
-    let all = TileRect {
-        x: 0,
-        y: 0,
-        extent: geometry.camera,
-    };
     let area = geometry.window.area();
-    let pictures = shown
+    let pictures = emissions
         .iter()
         .map(|pattern| {
-            let pixels = all.pixels().enumerate().map(|(n, pixel)| {
+            let pixels = picture().pixels().enumerate().map(|(n, pixel)| {
                 let origin = geometry.window_origin(pixel);
                 let mut y = [0.0; CHANNELS];
                 for s in 0..area {
@@ -132,7 +123,7 @@ fn photographed(patterns: usize, seed: u64, tau: &[[f64; CHANNELS]]) -> Measurem
         camera: geometry.camera,
         light: geometry.light,
         correspondence: geometry.correspondence,
-        patterns: shown.into_iter().map(Pattern::Grey).collect(),
+        patterns: emissions.into_iter().map(Pattern::Grey).collect(),
         full_scale: vec![1.0; patterns],
         rows: Rows::all(SIDE),
         pictures,
@@ -162,14 +153,17 @@ fn snr(tiles: &[TransportFunctions], tau: &[[f64; CHANNELS]]) -> f64 {
     10.0 * (signal / error).log10()
 }
 
-fn learn(measurements: &Measurements, executor: &impl Executor) -> Result<Learned, RecoverError> {
+fn learn(
+    measurements: &Measurements,
+    executor: &impl Executor,
+) -> Result<LearnedRecovery, RecoverError> {
     let split = HoldoutSplit::new(measurements);
     let mean = pooled::mean_function(measurements, &geometry(), &split, executor)?;
-    Learned::new(measurements, geometry(), split, &mean, executor)
+    LearnedRecovery::new(measurements, geometry(), split, &mean, executor)
 }
 
 #[test]
-fn few_patterns_suffice_where_functions_are_alike() {
+fn learned_recovery_beats_least_squares_with_few_patterns() {
     let geometry = geometry();
     let (measurements, tau) = measurements(20, 7);
     let learned = learn(&measurements, &SequentialExecutor).unwrap();
@@ -197,7 +191,7 @@ fn few_patterns_suffice_where_functions_are_alike() {
 }
 
 #[test]
-fn short_exposures_do_not_drown_long_ones() {
+fn short_exposures_weigh_less_than_long_ones() {
     let (mut measurements, tau) = measurements(32, 7);
     let mut random = random(5);
     let mut normal = || (0..12).map(|_| random()).sum::<f64>() - 6.0;
@@ -233,11 +227,11 @@ fn short_exposures_do_not_drown_long_ones() {
 }
 
 #[test]
-fn order_and_threads_leave_every_bit_as_it_is() {
+fn execution_order_does_not_change_the_result() {
     let geometry = geometry();
     let (measurements, _) = measurements(12, 3);
     let one = learn(&measurements, &SequentialExecutor).unwrap();
-    let other = learn(&measurements, &Backwards).unwrap();
+    let other = learn(&measurements, &ReverseOrder).unwrap();
     assert_eq!(one.basis(), other.basis());
     let rect = geometry.tile(1);
     match (
@@ -246,15 +240,15 @@ fn order_and_threads_leave_every_bit_as_it_is() {
     ) {
         (RecoveredTile::Factored(a), RecoveredTile::Factored(b)) => assert_eq!(a, b),
         (RecoveredTile::Direct(a), RecoveredTile::Direct(b)) => assert_eq!(a.tau, b.tau),
-        _ => panic!("tiles of different kinds"),
+        _ => panic!("one tile is factored, one direct"),
     }
 }
 
 #[test]
-fn pixels_that_all_saturate_somewhere_teach_all_the_same() {
+fn training_uses_pixels_with_saturated_samples() {
     let geometry = geometry();
     let (mut measurements, tau) = measurements(20, 7);
-    let windows = pixels_by_window(&geometry, whole());
+    let windows = pixels_by_window(&geometry, picture());
     for (i, pixels) in windows.values().enumerate() {
         for &(n, _) in pixels {
             measurements.pictures[i % 20][n] = [f32::NAN; CHANNELS];
@@ -270,10 +264,10 @@ fn pixels_that_all_saturate_somewhere_teach_all_the_same() {
 }
 
 #[test]
-fn the_band_is_as_wide_as_it_was_made() {
+fn estimated_band_is_as_wide_as_the_objects() {
     let (measurements, _) = measurements(80, 7);
     let band = WindowEstimate::from_measurements(&measurements, &SequentialExecutor).unwrap();
-    // To within the ring that is left as a margin.
+    // The estimate has a margin of one ring.
     let side = band.window.side();
     assert!((WINDOW..=WINDOW + 2).contains(&side), "{band:?}");
     assert!(
@@ -283,38 +277,26 @@ fn the_band_is_as_wide_as_it_was_made() {
 }
 
 #[test]
-fn a_blend_takes_of_each_what_misses_least() {
-    let share = |ours, both, theirs| Comparison { ours, both, theirs }.best_share(LEAST_GAIN);
-    assert_eq!(share(1.0, 0.0, 1.0), 0.5); // errors as large as each other that have nothing in common
-    assert!((share(1.0, 0.0, 3.0) - 0.25).abs() < 1e-6);
-    assert_eq!(share(1.0, 1.0, 4.0), 0.0); // theirs are ours and more
-    assert_eq!(share(4.0, 1.0, 1.0), 1.0);
-    assert_eq!(share(1.0, 1.0, 1.0), 0.0); // the same
-    assert_eq!(share(1.0, 0.97, 1.4), 0.0); // too little to be worth it
-    assert_eq!(share(f64::NAN, 0.0, 1.0), 0.0);
-}
-
-#[test]
-fn sparse_functions_each_a_case_of_its_own_are_blended_and_better_for_it() {
-    // Of each window two elements, drawn at random: nothing a Gaussian prior could know.
+fn blending_improves_sparse_unrelated_functions() {
+    // Two random elements in each window, which a Gaussian prior cannot represent.
     let geometry = geometry();
     let area = geometry.window.area();
-    let mut place = random(11);
+    let mut random_slot = random(11);
     let mut tau = vec![[0.0; CHANNELS]; geometry.camera.area() * area];
-    for (n, pixel) in whole().pixels().enumerate() {
+    for (n, pixel) in picture().pixels().enumerate() {
         let origin = geometry.window_origin(pixel);
         for _ in 0..2 {
-            let s = (place() * area as f64) as usize;
+            let s = (random_slot() * area as f64) as usize;
             let lit = geometry.window.element(origin, s).index_in(geometry.light);
             if lit.is_some() {
                 tau[n * area + s] = [0.5; CHANNELS];
             }
         }
     }
-    let measurements = photographed(40, 7, &tau);
+    let measurements = photograph(40, 7, &tau);
     let mut learned = learn(&measurements, &SequentialExecutor).unwrap();
-    assert!(learned.direct.is_some());
-    let recovered = |learned: &Learned| -> Vec<_> {
+    assert!(learned.nnls.is_some());
+    let recovered = |learned: &LearnedRecovery| -> Vec<_> {
         let tiles = geometry.tiles().map(|rect| {
             let tile = learned.tile(&measurements, rect);
             tile.functions(&geometry, Some(learned.basis()))
@@ -322,13 +304,13 @@ fn sparse_functions_each_a_case_of_its_own_are_blended_and_better_for_it() {
         tiles.collect()
     };
     let blended = snr(&recovered(&learned), &tau);
-    learned.direct = None;
+    learned.nnls = None;
     let alone = snr(&recovered(&learned), &tau);
     assert!(blended > alone + 1.0, "{blended} dB against {alone} dB");
 }
 
 #[test]
-fn whiteness_is_an_error_that_says_so() {
+fn saturated_photographs_are_an_overexposed_error() {
     let (mut measurements, _) = measurements(6, 1);
     for picture in &mut measurements.pictures {
         picture.fill([f32::NAN; CHANNELS]);
@@ -340,7 +322,7 @@ fn whiteness_is_an_error_that_says_so() {
 }
 
 #[test]
-fn darkness_is_an_error_that_says_so() {
+fn black_photographs_are_a_dark_error() {
     let (mut measurements, _) = measurements(6, 1);
     for picture in &mut measurements.pictures {
         picture.fill([0.0; CHANNELS]);
@@ -350,7 +332,7 @@ fn darkness_is_an_error_that_says_so() {
 }
 
 #[test]
-fn photographs_that_do_not_go_with_their_patterns_are_an_error_that_says_so() {
+fn photographs_of_other_patterns_are_an_error() {
     let (mut measurements, _) = measurements(30, 1);
     measurements.pictures.rotate_left(1);
     let error = learn(&measurements, &SequentialExecutor).unwrap_err();
@@ -365,7 +347,7 @@ fn photographs_that_do_not_go_with_their_patterns_are_an_error_that_says_so() {
         matches!(&error, RecoverError::MismatchedPatterns(l) if l == &[4, 20]),
         "{error}"
     );
-    // Nothing but the noise of the sensor.
+    // Sensor noise only.
     let mut random = random(3);
     for sample in measurements.pictures.iter_mut().flatten().flatten() {
         *sample = 1e-3 * (random() - 0.499) as f32;
@@ -377,19 +359,19 @@ fn photographs_that_do_not_go_with_their_patterns_are_an_error_that_says_so() {
     );
 }
 
-/// Kernels that are single elements, so that the posterior can be worked out by hand.
-fn single_elements() -> Kernels {
+/// A basis of three single light elements.
+fn single_elements() -> LearnedBasis {
     let area = (WINDOW * WINDOW) as usize;
-    let mut kernels = vec![0.0; 3 * area];
+    let mut functions = vec![0.0; 3 * area];
     for (k, s) in [24, 25, 31].into_iter().enumerate() {
-        kernels[k * area + s] = 1.0;
+        functions[k * area + s] = 1.0;
     }
     let mut mean = vec![0.0; area];
     mean[24] = 1.0;
-    Kernels::new(&kernels, &mean)
+    LearnedBasis::new(&functions, &mean)
 }
 
-fn square() -> TileRect {
+fn two_by_two() -> TileRect {
     TileRect {
         x: 20,
         y: 20,
@@ -401,70 +383,76 @@ fn square() -> TileRect {
 }
 
 #[test]
-fn the_posterior_mean_minimises_what_it_should() {
+fn posterior_mean_minimises_the_negative_log_posterior() {
     let (measurements, _) = measurements(10, 5);
-    let rows: Vec<usize> = (0..10).collect();
-    let kernels = single_elements();
-    let equations = Equations::new(&measurements, &geometry(), &kernels, &rows, square());
+    let all: Vec<usize> = (0..10).collect();
+    let basis = single_elements();
+    let equations = RegionEquations::new(&measurements, &geometry(), &basis, &all, two_by_two());
     let covariance = [2.0, 0.5, 0.1, 0.5, 1.0, 0.2, 0.1, 0.2, 0.7];
-    let prior = Gaussian::new(&covariance, 3);
+    let prior = PriorPrecision::new(&covariance, 3);
     let mean = [0.8, 0.1, -0.2];
-    let mut work = Workspace::new(3);
-    for member in 0..12 {
-        work.infer(&equations, member, 1.3, &prior, &mean);
-        let of = equations.members[member];
-        let gram = equations.gram(member);
+    let mut solver = PosteriorSolver::new(3);
+    for index in 0..12 {
+        solver.infer(&equations, index, 1.3, &prior, &mean);
+        let of = equations.observations[index];
+        let gram = equations.gram(index);
         let variance = 1.3 * of.variance;
         // The gradient of ‖y − fBz‖²/σ² + (z − m)ᵀC⁻¹(z − m) times C, which needs no inverse:
         // (z − m) − C f Bᵀ(y − fBz)/σ² = 0.
         let residual: Vec<f64> = (0..3)
             .map(|k| {
-                let image: f64 = (0..3).map(|j| gram[k * 3 + j] * work.z[j]).sum();
-                of.scale * (equations.right(member)[k] - of.scale * image) / variance
+                let product: f64 = (0..3).map(|j| gram[k * 3 + j] * solver.mean[j]).sum();
+                of.scale * (equations.right_hand_side(index)[k] - of.scale * product) / variance
             })
             .collect();
         for k in 0..3 {
-            let pull: f64 = (0..3).map(|j| covariance[k * 3 + j] * residual[j]).sum();
-            let off = work.z[k] - mean[k] - pull;
-            assert!(off.abs() < 1e-6 * (1.0 + pull.abs()), "{off} of {pull}");
+            let step: f64 = (0..3).map(|j| covariance[k * 3 + j] * residual[j]).sum();
+            let off = solver.mean[k] - mean[k] - step;
+            assert!(off.abs() < 1e-6 * (1.0 + step.abs()), "{off} of {step}");
         }
     }
 }
 
 #[test]
-fn a_saturated_sample_is_as_good_as_not_taken() {
+fn a_saturated_sample_counts_as_missing() {
     let (mut measurements, _) = measurements(10, 5);
-    let kernels = single_elements();
+    let basis = single_elements();
     let without: Vec<usize> = (0..10).filter(|&l| l != 4).collect();
-    let clean = Equations::new(&measurements, &geometry(), &kernels, &without, square());
+    let clean = RegionEquations::new(&measurements, &geometry(), &basis, &without, two_by_two());
     let n = geometry().camera.index(CameraPx { x: 21, y: 20 });
     measurements.pictures[4][n] = [f32::NAN; CHANNELS];
-    let rows: Vec<usize> = (0..10).collect();
-    let saturated = Equations::new(&measurements, &geometry(), &kernels, &rows, square());
-    for member in 3..6 {
-        assert_eq!(saturated.gram(member), clean.gram(member));
-        assert_eq!(saturated.right(member), clean.right(member));
-        assert_eq!(saturated.members[member].scale, clean.members[member].scale);
-        assert_eq!(saturated.members[member].rows, 9);
+    let all: Vec<usize> = (0..10).collect();
+    let saturated = RegionEquations::new(&measurements, &geometry(), &basis, &all, two_by_two());
+    for index in 3..6 {
+        assert_eq!(saturated.gram(index), clean.gram(index));
+        assert_eq!(
+            saturated.right_hand_side(index),
+            clean.right_hand_side(index)
+        );
+        assert_eq!(
+            saturated.observations[index].scale,
+            clean.observations[index].scale
+        );
+        assert_eq!(saturated.observations[index].count, 9);
     }
-    assert_eq!(saturated.members[0].rows, 10);
+    assert_eq!(saturated.observations[0].count, 10);
 }
 
 #[test]
-fn colour_patterns_of_one_colour_are_grey_ones() {
+fn rgb_patterns_with_equal_channels_equal_grey_patterns() {
     let (grey, _) = measurements(8, 9);
     let mut colour = grey.clone();
     for pattern in &mut colour.patterns {
         let plane = pattern.plane(0).to_vec();
         *pattern = Pattern::Rgb([plane.clone(), plane.clone(), plane]);
     }
-    let rows: Vec<usize> = (0..8).collect();
-    let kernels = single_elements();
-    let a = Equations::new(&grey, &geometry(), &kernels, &rows, square());
-    let b = Equations::new(&colour, &geometry(), &kernels, &rows, square());
-    for member in 0..12 {
-        assert_eq!(a.gram(member), b.gram(member));
-        assert_eq!(a.right(member), b.right(member));
-        assert_eq!(a.members[member].scale, b.members[member].scale);
+    let all: Vec<usize> = (0..8).collect();
+    let basis = single_elements();
+    let a = RegionEquations::new(&grey, &geometry(), &basis, &all, two_by_two());
+    let b = RegionEquations::new(&colour, &geometry(), &basis, &all, two_by_two());
+    for index in 0..12 {
+        assert_eq!(a.gram(index), b.gram(index));
+        assert_eq!(a.right_hand_side(index), b.right_hand_side(index));
+        assert_eq!(a.observations[index].scale, b.observations[index].scale);
     }
 }

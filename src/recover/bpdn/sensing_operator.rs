@@ -1,28 +1,34 @@
-//! One window's equations, and the basis in which its functions are sparse.
+//! The linear maps of one window's problem: Ax and φᵀx, their adjoints and Gram matrices.
+//!
+//! A, `[L, k]`, maps the unknowns, which are the window's elements inside the light plane, to measurements.
+//! φᵀ, `[side², k]`, maps them to coefficients in the sparsity basis. φ is separable, `B ⊗ B` with B,
+//! `[side, side]`, along one axis, so that a product costs O(side³) instead of O(side⁴).
 
 use super::SparsityBasis;
-use crate::linalg::{self, add_scaled, dot};
+use crate::linalg;
+use crate::linalg::{add_scaled, dot};
 
-/// `Ax` and `φᵀx` for functions x on the unknowns of a window.
+/// A and φ of one window.
 #[derive(Debug)]
-pub(super) struct Window {
+pub(super) struct SensingOperator {
     side: usize,
     rows: usize,
-    /// The unknowns' places in the window, `[k]`.
+    /// Slots of the unknowns, `[k]`.
     slots: Vec<usize>,
-    /// `Aᵀ`, `[k, rows]`.
+    /// Aᵀ, `[k, L]`.
     columns: Vec<f64>,
     /// φᵀ along one axis, and φ.
     analysis: Vec<f64>,
     synthesis: Vec<f64>,
-    /// Products `b_i b_j` of a basis vector's entries, `[pairs, side]`, its transpose, and which
-    /// pair i and j are, in either order, `[side, side]`.
+    /// For each pair i ≤ j of positions along an axis, the products `b_i b_j` of each basis vector's entries,
+    /// `[pairs, side]`; its transpose; and the index of the pair (i, j) in either order, `[side, side]`.
     products: Vec<f64>,
-    transposed: Vec<f64>,
-    pair: Vec<usize>,
+    transposed_products: Vec<f64>,
+    pair_indices: Vec<usize>,
 }
 
-impl Window {
+impl SensingOperator {
+    /// An operator with `Aᵀ = columns`, `[k, rows]`, on the elements `slots` of a window of `side²`.
     pub fn new(
         basis: SparsityBasis,
         columns: &[f64],
@@ -32,11 +38,11 @@ impl Window {
     ) -> Self {
         let analysis = basis.along_axis(side);
         let mut products = Vec::with_capacity(side * side * (side + 1) / 2);
-        let mut pair = vec![0; side * side];
+        let mut pair_indices = vec![0; side * side];
         for i in 0..side {
             for j in i..side {
-                let number = products.len() / side;
-                (pair[i * side + j], pair[j * side + i]) = (number, number);
+                let index = products.len() / side;
+                (pair_indices[i * side + j], pair_indices[j * side + i]) = (index, index);
                 products.extend((0..side).map(|p| analysis[p * side + i] * analysis[p * side + j]));
             }
         }
@@ -47,9 +53,9 @@ impl Window {
             columns: columns.to_vec(),
             synthesis: linalg::transpose(&analysis, side),
             analysis,
-            transposed: linalg::transpose(&products, side),
+            transposed_products: linalg::transpose(&products, side),
             products,
-            pair,
+            pair_indices,
         }
     }
 
@@ -57,7 +63,7 @@ impl Window {
         self.side
     }
 
-    /// How many unknowns there are.
+    /// Number of unknowns, k.
     pub fn unknowns(&self) -> usize {
         self.slots.len()
     }
@@ -78,33 +84,33 @@ impl Window {
         self.transform(&self.analysis, &window)
     }
 
-    /// φs on the unknowns, `[k]`.
+    /// φs, `[k]`.
     #[inline(always)]
     pub fn synthesize(&self, s: &[f64]) -> Vec<f64> {
         let window = self.transform(&self.synthesis, s);
         self.slots.iter().map(|&slot| window[slot]).collect()
     }
 
-    /// `M input Mᵀ` with `M` along one axis.
+    /// `M X Mᵀ` for a matrix M along one axis and X = `input`, all `[side, side]`.
     #[inline(always)]
-    fn transform(&self, along: &[f64], input: &[f64]) -> Vec<f64> {
+    fn transform(&self, matrix: &[f64], input: &[f64]) -> Vec<f64> {
         let side = self.side;
-        let half = linalg::multiply(along, input, side, side);
+        let half = linalg::multiply(matrix, input, side, side);
         let rows = half.chunks_exact(side);
-        rows.flat_map(|row| along.chunks_exact(side).map(move |b| dot(row, b)))
+        rows.flat_map(|row| matrix.chunks_exact(side).map(move |b| dot(row, b)))
             .collect()
     }
 
-    /// `y − Ax`, `[rows]`.
+    /// `y − Ax`, `[L]`.
     #[inline(always)]
-    pub fn difference(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
-        let mut difference = y.to_vec();
+    pub fn residual(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
+        let mut residual = y.to_vec();
         for (column, &x) in self.columns().zip(x) {
             if x != 0.0 {
-                add_scaled(&mut difference, -x, column);
+                add_scaled(&mut residual, -x, column);
             }
         }
-        difference
+        residual
     }
 
     /// `Aᵀr`, `[k]`.
@@ -130,26 +136,29 @@ impl Window {
         gram
     }
 
-    /// The upper triangle of `φ diag(d) φᵀ` between the unknowns, `[k, k]`.
+    /// The upper triangle of `φ diag(d) φᵀ` on the unknowns, `[k, k]`.
     #[inline(always)]
-    pub fn sandwich(&self, d: &[f64]) -> Vec<f64> {
+    pub fn weighted_gram(&self, d: &[f64]) -> Vec<f64> {
         let (side, k) = (self.side, self.unknowns());
         let pairs = self.products.len() / side;
-        // Along one axis for each coefficient of the other, then along that one.
-        let along = linalg::multiply(d, &self.transposed, side, pairs);
-        let both = linalg::multiply(&self.products, &along, side, pairs);
+        // Σ over one axis for each coefficient of the other, then over the other.
+        let one_axis = linalg::multiply(d, &self.transposed_products, side, pairs);
+        let both_axes = linalg::multiply(&self.products, &one_axis, side, pairs);
         let mut out = vec![0.0; k * k];
         for (i, row) in out.chunks_exact_mut(k.max(1)).enumerate() {
             let (v, u) = (self.slots[i] / side, self.slots[i] % side);
-            let (across, down) = (&self.pair[u * side..], &self.pair[v * side..]);
+            let (pairs_u, pairs_v) = (
+                &self.pair_indices[u * side..],
+                &self.pair_indices[v * side..],
+            );
             for (out, &slot) in row[i..].iter_mut().zip(&self.slots[i..]) {
-                *out = both[down[slot / side] * pairs + across[slot % side]];
+                *out = both_axes[pairs_v[slot / side] * pairs + pairs_u[slot % side]];
             }
         }
         out
     }
 
-    /// A's columns, one for each unknown.
+    /// The columns of A.
     fn columns(&self) -> impl Iterator<Item = &[f64]> {
         self.columns.chunks_exact(self.rows.max(1))
     }

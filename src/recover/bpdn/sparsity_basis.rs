@@ -1,21 +1,21 @@
-//! Orthonormal bases in which light transport functions may be sparse.
+//! The orthonormal bases φ in which light transport functions may be sparse (paper, section 3, case (b)).
 
 use std::f64::consts::PI;
 
-/// φ: the basis in which a light transport function has few large coefficients.
+/// φ, in which a light transport function has few large coefficients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SparsityBasis {
-    /// The function itself: opaque objects, which reflect or refract few directions.
+    /// The identity, for opaque objects, which reflect or refract few directions.
     Identity,
-    /// 2-D discrete cosine transform (DCT-II): translucent objects, which scatter smoothly.
+    /// The 2-D discrete cosine transform (DCT-II), for translucent objects, which scatter smoothly.
     Dct,
-    /// 2-D Haar wavelets: smooth patches with edges between them.
+    /// 2-D Haar wavelets, for piecewise smooth functions.
     Haar,
 }
 
 impl SparsityBasis {
-    /// The name by which options and reports call it.
+    /// The name in options and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Identity => "identity",
@@ -24,13 +24,12 @@ impl SparsityBasis {
         }
     }
 
-    /// The basis along one axis, `[side, side]`, a basis vector a row, the constant one first. The
-    /// basis of a window is its product with itself, and takes τ as a square to `B τ Bᵀ`.
+    /// B, the basis along one axis, `[side, side]`, a basis vector in each row, the constant one first. The
+    /// basis of a window is B ⊗ B: the coefficients of τ, as a square matrix, are B τ Bᵀ.
     ///
-    /// Window sides are odd, so that intervals cannot be halved for ever as Haar's are. They are
-    /// split as evenly as possible instead, and a wavelet is constant on either part, orthogonal to
-    /// one and of norm one: the unbalanced Haar transform (Girardi & Sweldens 1997), orthonormal
-    /// for every length.
+    /// Window sides are odd, so that Haar's intervals cannot be halved. The unbalanced Haar transform
+    /// (Girardi & Sweldens 1997) is orthonormal for every length: it splits intervals as evenly as possible,
+    /// and each wavelet is constant on either part, of mean zero and norm one.
     pub fn along_axis(self, side: usize) -> Vec<f64> {
         let mut basis = vec![0.0; side * side];
         match self {
@@ -48,7 +47,7 @@ impl SparsityBasis {
                 if let Some(constant) = rows.next() {
                     constant.fill(1.0 / (side as f64).sqrt());
                 }
-                // Intervals to split, coarse ones first.
+                // Intervals to split, by descending length.
                 let mut intervals = std::collections::VecDeque::from([(0, side)]);
                 while let Some((start, end)) = intervals.pop_front() {
                     if end - start < 2 {
@@ -73,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_basis_is_orthonormal_at_every_side() {
+    fn bases_are_orthonormal_for_every_side() {
         for basis in [
             SparsityBasis::Identity,
             SparsityBasis::Dct,

@@ -1,0 +1,241 @@
+//! Basis pursuit denoising in any orthonormal basis, by a primal-dual interior-point method
+//! (Boyd & Vandenberghe 2004, section 11.7) with Mehrotra's predictor-corrector step (1992).
+//!
+//! ```text
+//! min Σ t   subject to   −t ≤ φᵀx ≤ t,   x ≥ 0,   ½(ε² − ‖y − Ax‖²) ≥ 0
+//! ```
+//!
+//! with multipliers ½(1 + s) and ½(1 − s), w, and λ. The Karush–Kuhn–Tucker (KKT) conditions are
+//! `φs = w + λAᵀ(y − Ax)` and complementarity: each constraint's slack times its multiplier is zero.
+//! Newton's method drives these products to a common μ that falls from step to step. Eliminating t, s, w
+//! and λ leaves one system in x, `[k, k]`, to factor for each of ten to twenty steps. Splitting methods
+//! have cheaper steps but need thousands: with few patterns, or ε near ‖y‖, the problem is almost a linear
+//! program.
+
+use super::SparsityBasis;
+use super::iterate::Iterate;
+use super::newton::NewtonSystem;
+use super::sensing_operator::SensingOperator;
+use super::solution::{Constraint, Solution};
+use crate::linalg::{dot, vectorise};
+
+/// Relative duality gap at which a solution is accepted; noise changes the objective by far more.
+const MAX_RELATIVE_GAP: f64 = 2e-3;
+/// The dual bound is computed once the complementarity is at most this many times the accepted gap.
+const DUAL_BOUND_RATIO: f64 = 10.0;
+/// Limit of Newton steps for one right-hand side, several times the usual number.
+const MAX_STEPS: usize = 60;
+
+/// Solver for right-hand sides that share one matrix.
+#[derive(Debug)]
+pub struct InteriorPoint {
+    operator: SensingOperator,
+}
+
+impl InteriorPoint {
+    /// A solver for `Aᵀ = columns`, `[k, rows]`, whose unknowns are the elements `slots` of a window
+    /// of `side²`.
+    pub fn new(
+        basis: SparsityBasis,
+        columns: &[f64],
+        rows: usize,
+        slots: &[usize],
+        side: usize,
+    ) -> Self {
+        Self {
+            operator: SensingOperator::new(basis, columns, rows, slots, side),
+        }
+    }
+
+    /// Solves for any number of right-hand sides. Every `x` is non-negative, and
+    /// `‖y − Ax‖ ≤ epsilon` to rounding; where no x satisfies it, `x` is the least-squares solution.
+    pub fn solve(&self, constraints: &[Constraint]) -> Vec<Solution> {
+        let operator = &self.operator;
+        let mut gram = None;
+        let solve_one = |constraint: &Constraint| {
+            // Zero is the solution if it is feasible.
+            let zero_is_feasible = dot(constraint.y, constraint.y).sqrt() <= constraint.epsilon;
+            let x = match zero_is_feasible {
+                true => vec![0.0; operator.unknowns()],
+                false => constraint.least_squares.to_vec(),
+            };
+            let mut best = Solution {
+                objective: operator.objective(&x),
+                x,
+                bound: 0.0,
+            };
+            let residual = operator.residual(constraint.least_squares, constraint.y);
+            if !zero_is_feasible && dot(&residual, &residual).sqrt() < constraint.epsilon {
+                let gram = gram.get_or_insert_with(|| {
+                    vectorise(
+                        #[inline(always)]
+                        || operator.gram(),
+                    )
+                });
+                vectorise(
+                    #[inline(always)]
+                    || iterate(operator, gram, constraint, &mut best),
+                );
+            }
+            best
+        };
+        constraints.iter().map(solve_one).collect()
+    }
+}
+
+/// Improves `best`, which is feasible, until its gap is small enough or a step fails.
+#[inline(always)]
+fn iterate(operator: &SensingOperator, gram: &[f64], constraint: &Constraint, best: &mut Solution) {
+    let Some(mut point) = Iterate::new(operator, constraint) else {
+        return;
+    };
+    for _ in 0..MAX_STEPS {
+        if point.complementarity() <= DUAL_BOUND_RATIO * MAX_RELATIVE_GAP * best.objective {
+            best.record(operator, constraint, point.x.clone(), &point.s);
+            if best.relative_gap() <= MAX_RELATIVE_GAP {
+                return;
+            }
+        }
+        let Some(system) = NewtonSystem::new(operator, gram, &point) else {
+            break;
+        };
+        let step = system.predictor_corrector_step();
+        point.take_step(operator, constraint, &step);
+        if !point.is_strictly_feasible() {
+            return;
+        }
+    }
+    best.record(operator, constraint, point.x.clone(), &point.s);
+}
+
+#[cfg(all(test, not(target_arch = "wasm32")))] // where there is proptest
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::super::test_problems::Problem;
+    use super::*;
+    use crate::linalg;
+    use crate::recover::{Homotopy, Nnls};
+
+    /// A problem and its solver for a window of 5 × 5 elements, of which the first `missing` are outside the
+    /// light plane.
+    fn problem_and_solver(
+        basis: SparsityBasis,
+        rows: usize,
+        missing: usize,
+        seed: u64,
+    ) -> (Problem, InteriorPoint) {
+        let side = 5;
+        let slots: Vec<usize> = (missing..side * side).collect();
+        let problem = Problem::random(slots.len(), rows, seed, 0.5);
+        let columns = linalg::transpose(&problem.matrix, slots.len());
+        let solver = InteriorPoint::new(basis, &columns, rows, &slots, side);
+        (problem, solver)
+    }
+
+    fn norm_in_basis(basis: SparsityBasis, missing: usize, x: &[f64]) -> f64 {
+        let side = 5;
+        let b = basis.along_axis(side);
+        let mut total = 0.0f64;
+        for p in 0..side {
+            for q in 0..side {
+                let mut coefficient = 0.0;
+                for (i, &x) in x.iter().enumerate() {
+                    let (v, u) = ((i + missing) / side, (i + missing) % side);
+                    coefficient += b[p * side + v] * b[q * side + u] * x;
+                }
+                total += coefficient.abs();
+            }
+        }
+        total
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(200))]
+
+        /// For ε from 2 % of ‖y‖ to above it: feasible to rounding, non-negative, the stated objective, and a
+        /// small gap to a lower bound; least squares where nothing is feasible, zero where zero is.
+        #[test]
+        fn solutions_are_feasible_with_a_small_duality_gap(
+            dct in any::<bool>(), rows in 4usize..30, missing in 0usize..8, seed in any::<u64>(),
+            share in 0.02f64..1.1,
+        ) {
+            let basis = if dct { SparsityBasis::Dct } else { SparsityBasis::Haar };
+            let (problem, solver) = problem_and_solver(basis, rows, missing, seed);
+            let gram = problem.gram();
+            let k = 25 - missing;
+            let mut nnls = Nnls::new(&gram, k);
+            for y in &problem.measurements {
+                let least_squares = nnls.solve(&problem.right_hand_side(y));
+                let least = problem.residual(&least_squares, y);
+                let norm = Problem::energy(y).sqrt();
+                let epsilon = share * norm;
+                let constraint = Constraint { y, epsilon, least_squares: &least_squares };
+                let solution = solver.solve(&[constraint]).remove(0);
+                prop_assert!(solution.x.iter().all(|&x| x >= 0.0));
+                let objective = norm_in_basis(basis, missing, &solution.x);
+                prop_assert!((objective - solution.objective).abs() <= 1e-9 * (1.0 + objective));
+                if epsilon < norm && epsilon <= least {
+                    prop_assert_eq!(&solution.x, &least_squares);
+                    continue;
+                }
+                let residual = problem.residual(&solution.x, y);
+                prop_assert!(residual <= epsilon + 1e-9 * norm, "{residual} > {epsilon}");
+                prop_assert!(solution.bound <= objective * (1.0 + 1e-9));
+                prop_assert!(
+                    objective - solution.bound <= MAX_RELATIVE_GAP * objective,
+                    "{objective} is not near {} at {share}, least {}", solution.bound, least / norm
+                );
+            }
+        }
+
+        /// With φ = I the homotopy is an independent solver of the same problem.
+        #[test]
+        fn agrees_with_the_homotopy(rows in 4usize..30, seed in any::<u64>(), share in 0.02f64..0.98) {
+            let (problem, solver) = problem_and_solver(SparsityBasis::Identity, rows, 0, seed);
+            let gram = problem.gram();
+            for y in &problem.measurements {
+                let h = problem.right_hand_side(y);
+                let least_squares = Nnls::new(&gram, 25).solve(&h);
+                let least = problem.residual(&least_squares, y);
+                let epsilon = least + share * (Problem::energy(y).sqrt() - least);
+                let exact = Homotopy::new(&gram, 25).solve(&h, Problem::energy(y), epsilon);
+                let constraint = Constraint { y, epsilon, least_squares: &least_squares };
+                let found = solver.solve(&[constraint]).remove(0);
+                let best: f64 = exact.iter().sum();
+                prop_assert!((found.objective - best).abs() <= MAX_RELATIVE_GAP * best + 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn measurements_within_the_tolerance_give_zero() {
+        let (problem, solver) = problem_and_solver(SparsityBasis::Haar, 30, 0, 7);
+        let y = &problem.measurements[0];
+        let least_squares = Nnls::new(&problem.gram(), 25).solve(&problem.right_hand_side(y));
+        let constraint = Constraint {
+            y,
+            epsilon: 1.01 * Problem::energy(y).sqrt(),
+            least_squares: &least_squares,
+        };
+        let solution = solver.solve(&[constraint]).remove(0);
+        assert!(solution.x.iter().all(|&x| x == 0.0) && solution.objective == 0.0);
+    }
+
+    #[test]
+    fn an_infeasible_constraint_gives_least_squares() {
+        let (problem, solver) = problem_and_solver(SparsityBasis::Dct, 30, 0, 7);
+        let y = &problem.measurements[0];
+        let least_squares = Nnls::new(&problem.gram(), 25).solve(&problem.right_hand_side(y));
+        let epsilon = 0.5 * problem.residual(&least_squares, y);
+        let constraint = Constraint {
+            y,
+            epsilon,
+            least_squares: &least_squares,
+        };
+        let solution = solver.solve(&[constraint]).remove(0);
+        for (x, least) in solution.x.iter().zip(&least_squares) {
+            assert!((x - least).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! The basis that all light transport functions share, and its responses to the patterns.
+//!
+//! [`LearnedBasis`] holds V, `[S, r]`, orthonormal columns, and the mean light transport function h, `[S]`.
+//! For a window whose elements emit P̂, `[L, S]`, it computes P̂V, `[L, r]`, and P̂h, `[L]`, together.
+//! V and h are interleaved by light element in f32, which is as exact as the measurements, so that a
+//! block of responses stays in vector registers while a pattern is read once.
+
+use crate::capture::Measurements;
+use crate::linalg::vectorise;
+use crate::transport::{Basis, Element, Geometry};
+
+/// Responses computed together at least: two vector registers of f32 on the narrowest machine of note.
+const MIN_BLOCK_WIDTH: usize = 8;
+
+/// An orthonormal basis of functions on the window, and the mean light transport function.
+#[derive(Clone, Debug)]
+pub(super) struct LearnedBasis {
+    functions: Basis,
+    /// `[element, stride]`: basis functions, the mean function, zeros.
+    interleaved: Vec<f32>,
+    stride: usize,
+}
+
+impl LearnedBasis {
+    /// `functions` are `[r, element]`; `mean` is the mean light transport function, `[element]`.
+    pub fn new(functions: &[f64], mean: &[f64]) -> Self {
+        let area = mean.len();
+        let rank = functions.len() / area;
+        let stride = (rank + 1).next_multiple_of(MIN_BLOCK_WIDTH);
+        let mut interleaved = vec![0.0; area * stride];
+        for (s, values) in interleaved.chunks_exact_mut(stride).enumerate() {
+            for k in 0..rank {
+                values[k] = functions[k * area + s] as f32;
+            }
+            values[rank] = mean[s] as f32;
+        }
+        let functions = functions.chunks_exact(area);
+        Self {
+            functions: Basis {
+                kernels: functions
+                    .map(|v| v.iter().map(|&v| v as f32).collect())
+                    .collect(),
+            },
+            interleaved,
+            stride,
+        }
+    }
+
+    /// Number of basis functions, r.
+    pub fn rank(&self) -> usize {
+        self.functions.kernels.len()
+    }
+
+    /// The basis functions.
+    pub fn functions(&self) -> &Basis {
+        &self.functions
+    }
+
+    /// V, `[element, r]`, and the mean function's peak.
+    pub fn by_element(&self) -> (Vec<f64>, f64) {
+        let rank = self.rank();
+        let mut elements = Vec::with_capacity(self.interleaved.len());
+        let mut peak = 0.0f64;
+        for row in self.interleaved.chunks_exact(self.stride) {
+            elements.extend(row[..rank].iter().map(|&v| f64::from(v)));
+            peak = peak.max(f64::from(row[rank]));
+        }
+        (elements, peak)
+    }
+
+    /// The responses to every pattern, in the colour of channel `plane`, of the window at `origin`.
+    pub fn respond(
+        &self,
+        measurements: &Measurements,
+        geometry: &Geometry,
+        origin: Element,
+        plane: usize,
+    ) -> PatternResponses {
+        let (window, light) = (geometry.window, geometry.light);
+        let side = window.side() as usize;
+        let width = light.width as usize;
+        // The part of the window inside the light plane.
+        let clip = |at: i32, length: u32| {
+            let (at, length) = (i64::from(at), i64::from(length));
+            let first = (-at).clamp(0, side as i64);
+            let end = (length - at).clamp(first, side as i64);
+            (first as usize..end as usize, at)
+        };
+        let (columns, u) = clip(origin.u, light.width);
+        let (lines, v) = clip(origin.v, light.height);
+        let mut responses = vec![0.0; measurements.patterns.len() * self.stride];
+        let mut emission = vec![0.0f32; lines.len() * columns.len()];
+        let mut functions = Vec::with_capacity(emission.len() * self.stride);
+        for line in lines.clone() {
+            let first = (line * side + columns.start) * self.stride;
+            functions
+                .extend_from_slice(&self.interleaved[first..first + columns.len() * self.stride]);
+        }
+        let rows = responses.chunks_exact_mut(self.stride);
+        for (pattern, row) in measurements.patterns.iter().zip(rows) {
+            let pattern = pattern.plane(plane);
+            let emission_lines = emission.chunks_exact_mut(columns.len().max(1));
+            for (line, emission) in lines.clone().zip(emission_lines) {
+                let first =
+                    (v + line as i64) as usize * width + (u + columns.start as i64) as usize;
+                emission.copy_from_slice(&pattern[first..first + columns.len()]);
+            }
+            vectorise(
+                #[inline(always)]
+                || multiply(&emission, &functions, row),
+            );
+        }
+        PatternResponses {
+            has_full_window: columns.len() == side && lines.len() == side,
+            responses,
+            stride: self.stride,
+            rank: self.rank(),
+        }
+    }
+}
+
+/// Responses of the basis on one window to every pattern.
+#[derive(Debug)]
+pub(super) struct PatternResponses {
+    /// `[pattern, stride]`: the basis functions' responses, the mean function's, zeros.
+    responses: Vec<f32>,
+    stride: usize,
+    /// Number of basis functions.
+    pub rank: usize,
+    /// Whether all of the window is inside the light plane.
+    pub has_full_window: bool,
+}
+
+impl PatternResponses {
+    /// Responses of the basis functions to pattern `l`, `[r]`.
+    pub fn row(&self, l: usize) -> &[f32] {
+        &self.responses[l * self.stride..l * self.stride + self.rank]
+    }
+
+    /// Response of the mean light transport function to pattern `l`.
+    pub fn mean(&self, l: usize) -> f64 {
+        f64::from(self.responses[l * self.stride + self.rank])
+    }
+}
+
+/// `row = emission · functions`, `functions` `[element, stride]`.
+#[inline(always)]
+fn multiply(emission: &[f32], functions: &[f32], row: &mut [f32]) {
+    let stride = row.len();
+    let mut at = 0;
+    // As many sums at a time as the registers of the machine hold, then fewer for the rest.
+    while at < stride {
+        match stride - at {
+            32.. => at += multiply_block::<32>(emission, functions, row, at),
+            16.. => at += multiply_block::<16>(emission, functions, row, at),
+            _ => at += multiply_block::<MIN_BLOCK_WIDTH>(emission, functions, row, at),
+        }
+    }
+}
+
+/// Entries `at..at + WIDTH` of `row`; returns `WIDTH`.
+#[inline(always)]
+fn multiply_block<const WIDTH: usize>(
+    emission: &[f32],
+    functions: &[f32],
+    row: &mut [f32],
+    at: usize,
+) -> usize {
+    let mut sums = [0.0f32; WIDTH];
+    for (p, functions) in emission.iter().zip(functions.chunks_exact(row.len())) {
+        if let Some(values) = functions[at..].first_chunk::<WIDTH>() {
+            for (sum, v) in sums.iter_mut().zip(values) {
+                *sum += p * v;
+            }
+        }
+    }
+    row[at..at + WIDTH].copy_from_slice(&sums);
+    WIDTH
+}

@@ -1,0 +1,435 @@
+//! The Gaussian prior of one observation given its neighbours.
+//!
+//! Neighbouring pixels see the same pane of glass or the same dough: their posterior means predict this
+//! pixel's coefficients z.
+//!
+//! ```text
+//! z | neighbours ~ N(m, C),   m_k = w_k0 + Σ_j w_kj z_jk
+//! ```
+//!
+//! with weights w for each class of observations (sub-element position and channel; [`regression`]) and
+//! one covariance C, `[r, r]`, of the prediction error. The prediction fails at an edge of the object.
+//! Therefore the prior is a mixture: with probability π this one, else the pixel prior. By Bayes' rule
+//! an observation's measurements y give it the responsibility q:
+//!
+//! ```text
+//! ln q/(1 − q) = ln π/(1 − π) + ln p(y | neighbours) − ln p(y | pixel prior)
+//! ```
+//!
+//! Expectation–maximisation learns C, π and w: C = Σ q ((ẑ − m)(ẑ − m)ᵀ + P) / Σ q with the posterior mean
+//! ẑ and covariance P, π the mean of q, and w the regression of ẑ on the neighbours.
+//!
+//! [`regression`]: super::regression
+
+use super::equations::{Observation, PHASES};
+use super::posterior::{PosteriorSolver, PriorPrecision};
+use super::posterior_means::{Location, NeighbourOffset, PosteriorMeans};
+use super::prior::Prior;
+use super::regression::{RegressionSums, add_products, solve_regressions};
+use crate::executor::Executor;
+use crate::linalg;
+use crate::linalg::{add_scaled, vectorise};
+use crate::transport::CHANNELS;
+
+/// Iterations of expectation–maximisation.
+const EM_ITERATIONS: usize = 4;
+/// Groups of regions that sums are formed over. Fixed, so that results do not depend on the executor.
+const PARTS: usize = 8;
+/// Share of the pixel posterior's variance in the first estimate of C, and the observations, one in so
+/// many, whose posterior variance is computed for it.
+const POSTERIOR_VARIANCE_SHARE: f64 = 0.5;
+const VARIANCE_SAMPLING: usize = 64;
+/// Range of π.
+const MIXING_SHARE_RANGE: [f64; 2] = [0.01, 0.99];
+/// Observations for each weight of a regression, at least, for anything to be learned.
+const MIN_OBSERVATIONS_PER_WEIGHT: usize = 4;
+
+/// Classes of observations with regressions of their own.
+const CLASSES: usize = PHASES * CHANNELS;
+
+fn class(observation: &Observation, channel: usize) -> usize {
+    observation.phase * CHANNELS + channel
+}
+
+/// The prior given the neighbours.
+#[derive(Clone, Debug)]
+pub(super) struct NeighbourPrior {
+    rank: usize,
+    offsets: Vec<NeighbourOffset>,
+    /// w, `[phase, channel][1 + neighbour, r]`, first the constant.
+    weights: Vec<Vec<f64>>,
+    /// C⁻¹.
+    precision: PriorPrecision,
+    /// π.
+    mixing_share: f64,
+}
+
+/// Sufficient statistics of one E step.
+#[derive(Debug)]
+struct NeighbourStatistics {
+    /// Σ z_jk ẑ_k by class, `[1 + neighbour, r]`.
+    right_hand_sides: Vec<Vec<f64>>,
+    /// Σ q ((ẑ − m)(ẑ − m)ᵀ + P), upper triangle.
+    second_moment: Vec<f64>,
+    /// Σ q.
+    responsibility: f64,
+    count: f64,
+}
+
+impl NeighbourPrior {
+    /// Learns from the bright observations in the interiors of `regions`; `None` if they are too few.
+    pub fn learn(
+        regions: &[PosteriorMeans<'_>],
+        prior: &Prior,
+        executor: &impl Executor,
+    ) -> Option<Self> {
+        let rank = prior.rank;
+        let offsets = NeighbourOffset::all();
+        let parts = executor.map(PARTS, |part| {
+            let mut sums = vec![RegressionSums::new(offsets.len(), rank); CLASSES];
+            let mut count = 0usize;
+            for region in regions.iter().skip(part).step_by(PARTS) {
+                vectorise(
+                    #[inline(always)]
+                    || {
+                        for location in region.interior_locations() {
+                            if region.is_bright[location.index] {
+                                let of = &region.equations.observations[location.index];
+                                sums[class(of, location.channel)].add(region, &offsets, location);
+                                count += 1;
+                            }
+                        }
+                    },
+                );
+            }
+            (sums, count)
+        });
+        let count: usize = parts.iter().map(|(_, count)| count).sum();
+        let width = 1 + offsets.len();
+        if count < MIN_OBSERVATIONS_PER_WEIGHT * width * CLASSES {
+            return None;
+        }
+        let mut sums = vec![RegressionSums::new(offsets.len(), rank); CLASSES];
+        for (part, _) in &parts {
+            sums.iter_mut()
+                .zip(part)
+                .for_each(|(sum, part)| sum.merge(part));
+        }
+        drop(parts);
+        let factors = executor.map(CLASSES, |i| sums[i].cholesky_factors());
+        let solve = |right_hand_sides: &[Vec<f64>]| {
+            executor.map(CLASSES, |i| {
+                solve_regressions(&factors[i], &right_hand_sides[i], rank)
+            })
+        };
+        let sides: Vec<Vec<f64>> = sums.into_iter().map(|s| s.right_hand_side).collect();
+        let mut learned = Self {
+            rank,
+            weights: solve(&sides),
+            offsets,
+            precision: prior.precision.clone(),
+            mixing_share: 0.5,
+        };
+        learned.precision = learned.first_precision(regions, prior);
+        for _ in 0..EM_ITERATIONS {
+            let statistics = learned.expectation(regions, prior.noise_factor, executor);
+            let [low, high] = MIXING_SHARE_RANGE;
+            let share = statistics.responsibility / statistics.count.max(1.0);
+            learned.mixing_share = share.clamp(low, high);
+            let mut covariance = statistics.second_moment;
+            let responsibility = statistics.responsibility.max(1.0);
+            covariance.iter_mut().for_each(|c| *c /= responsibility);
+            linalg::mirror_upper(&mut covariance, rank);
+            learned.precision = PriorPrecision::new(&covariance, rank);
+            learned.weights = solve(&statistics.right_hand_sides);
+        }
+        Some(learned)
+    }
+
+    /// The first estimate of C⁻¹: from the prediction errors of the posterior means, and part of the
+    /// variance that these means have themselves.
+    fn first_precision(&self, regions: &[PosteriorMeans<'_>], prior: &Prior) -> PriorPrecision {
+        let rank = self.rank;
+        let mut covariance = vec![0.0; rank * rank];
+        let mut variance = vec![0.0; rank];
+        let (mut count, mut sampled) = (0.0, 0.0);
+        let mut solver = PosteriorSolver::new(rank);
+        let mut mean = vec![0.0; rank];
+        for region in regions {
+            for (i, location) in region.interior_locations().enumerate() {
+                let index = location.index;
+                if !region.is_bright[index] {
+                    continue;
+                }
+                self.predict(region, location, &mut mean);
+                let errors = region.mean(index).iter().zip(&mean);
+                let error: Vec<f64> = errors.map(|(z, m)| z - m).collect();
+                add_outer(&mut covariance, 1.0, &error);
+                count += 1.0;
+                if i % VARIANCE_SAMPLING == 0 {
+                    prior.infer(region.equations, index, &mut solver);
+                    solver.compute_covariance();
+                    (0..rank).for_each(|k| variance[k] += solver.covariance[k * rank + k]);
+                    sampled += 1.0;
+                }
+            }
+        }
+        covariance
+            .iter_mut()
+            .for_each(|c| *c /= f64::max(count, 1.0));
+        for k in 0..rank {
+            let mean_variance = variance[k] / f64::max(sampled, 1.0);
+            covariance[k * rank + k] += POSTERIOR_VARIANCE_SHARE * mean_variance;
+        }
+        linalg::mirror_upper(&mut covariance, rank);
+        PriorPrecision::new(&covariance, rank)
+    }
+
+    /// m, the prediction of an observation from its neighbours.
+    #[inline(always)]
+    fn predict(&self, means: &PosteriorMeans<'_>, location: Location, mean: &mut [f64]) {
+        let observation = &means.equations.observations[location.index];
+        let weights = &self.weights[class(observation, location.channel)];
+        let mut rows = weights.chunks_exact(self.rank);
+        if let Some(constant) = rows.next() {
+            mean.copy_from_slice(constant);
+        }
+        for (offset, weights) in self.offsets.iter().zip(rows) {
+            if let Some(z) = means.neighbour(location, offset) {
+                add_products(mean, weights, z);
+            }
+        }
+    }
+
+    /// Leaves the prediction m of an observation in `mean` and its posterior in `solver`; returns its
+    /// responsibility q.
+    #[inline(always)]
+    pub fn infer(
+        &self,
+        means: &PosteriorMeans<'_>,
+        noise: f64,
+        location: Location,
+        mean: &mut [f64],
+        solver: &mut PosteriorSolver,
+    ) -> f64 {
+        let index = location.index;
+        self.predict(means, location, mean);
+        let log_evidence = solver.infer(means.equations, index, noise, &self.precision, mean);
+        let prior_log_odds = (self.mixing_share / (1.0 - self.mixing_share)).ln();
+        let log_odds = prior_log_odds + log_evidence - means.log_evidence[index];
+        1.0 / (1.0 + (-log_odds).exp())
+    }
+
+    /// The E step over all regions.
+    fn expectation(
+        &self,
+        regions: &[PosteriorMeans<'_>],
+        noise: f64,
+        executor: &impl Executor,
+    ) -> NeighbourStatistics {
+        let width = 1 + self.offsets.len();
+        let parts = executor.map(PARTS, |part| {
+            let mut sums = NeighbourStatistics::new(width, self.rank);
+            for region in regions.iter().skip(part).step_by(PARTS) {
+                vectorise(
+                    #[inline(always)]
+                    || self.add_region(region, noise, &mut sums),
+                );
+            }
+            sums
+        });
+        let mut total = NeighbourStatistics::new(width, self.rank);
+        parts.iter().for_each(|part| total.merge(part));
+        total
+    }
+
+    #[inline(always)]
+    fn add_region(&self, region: &PosteriorMeans<'_>, noise: f64, sums: &mut NeighbourStatistics) {
+        let rank = self.rank;
+        let mut solver = PosteriorSolver::new(rank);
+        let (mut mean, mut error) = (vec![0.0; rank], vec![0.0; rank]);
+        for location in region.interior_locations() {
+            if !region.is_bright[location.index] {
+                continue;
+            }
+            let q = self.infer(region, noise, location, &mut mean, &mut solver);
+            solver.compute_covariance();
+            for k in 0..rank {
+                error[k] = solver.mean[k] - mean[k];
+            }
+            for i in 0..rank {
+                let row = i * rank + i..(i + 1) * rank;
+                let moment = &mut sums.second_moment[row.clone()];
+                add_scaled(moment, q * error[i], &error[i..]);
+                add_scaled(moment, q, &solver.covariance[row]);
+            }
+            sums.responsibility += q;
+            sums.count += 1.0;
+            let observation = &region.equations.observations[location.index];
+            let sides = &mut sums.right_hand_sides[class(observation, location.channel)];
+            let mut rows = sides.chunks_exact_mut(rank);
+            if let Some(constant) = rows.next() {
+                add_scaled(constant, 1.0, &solver.mean);
+            }
+            for (offset, row) in self.offsets.iter().zip(rows) {
+                if let Some(z) = region.neighbour(location, offset) {
+                    add_products(row, z, &solver.mean);
+                }
+            }
+        }
+    }
+}
+
+/// `sum += factor · x xᵀ`, upper triangle.
+fn add_outer(sum: &mut [f64], factor: f64, x: &[f64]) {
+    let n = x.len();
+    for i in 0..n {
+        add_scaled(&mut sum[i * n + i..(i + 1) * n], factor * x[i], &x[i..]);
+    }
+}
+
+impl NeighbourStatistics {
+    fn new(width: usize, rank: usize) -> Self {
+        Self {
+            right_hand_sides: vec![vec![0.0; width * rank]; CLASSES],
+            second_moment: vec![0.0; rank * rank],
+            responsibility: 0.0,
+            count: 0.0,
+        }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        for (sum, other) in self
+            .right_hand_sides
+            .iter_mut()
+            .zip(&other.right_hand_sides)
+        {
+            add_scaled(sum, 1.0, other);
+        }
+        add_scaled(&mut self.second_moment, 1.0, &other.second_moment);
+        self.responsibility += other.responsibility;
+        self.count += other.count;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::equations::RegionEquations;
+    use super::*;
+    use crate::executor::SequentialExecutor;
+    use crate::transport::{Extent, TileRect};
+
+    const SIDE: u32 = 40;
+    /// The posterior variances of the components without a prior are 0.01 and 0.5; the prior's are 1.
+    const GRAM_DIAGONAL: [f64; 2] = [1.0, 0.02];
+    const VARIANCE: f64 = 0.01;
+    const OUTLIERS: [(u32, u32); 3] = [(10, 10), (28, 13), (15, 30)];
+
+    fn normal() -> impl FnMut() -> f64 {
+        let mut state = 0x9E37_79B9_7F4A_7C15u64;
+        let mut uniform = move || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+
+    fn region(side: u32) -> TileRect {
+        TileRect {
+            x: 0,
+            y: 0,
+            extent: Extent {
+                width: side,
+                height: side,
+            },
+        }
+    }
+
+    /// Smooth coefficients, `[pixel, channel, 2]`, but for pixels unlike their neighbours.
+    fn coefficients(rect: TileRect) -> Vec<f64> {
+        let pixels = rect.pixels().flat_map(|pixel| {
+            let (x, y) = (f64::from(pixel.x), f64::from(pixel.y));
+            (0..CHANNELS).flat_map(move |c| {
+                let phase = 0.4 * c as f64;
+                let smooth = [(0.17 * x + phase).sin(), (0.13 * y - 0.1 * x + phase).cos()];
+                match OUTLIERS.contains(&(pixel.x, pixel.y)) {
+                    true => smooth.map(|z| z + 3.0),
+                    false => smooth,
+                }
+            })
+        });
+        pixels.collect()
+    }
+
+    fn unit_prior() -> Prior {
+        Prior::new(&[0.0; 2], vec![1.0, 0.0, 0.0, 1.0])
+    }
+
+    #[test]
+    fn neighbours_determine_what_a_pixel_measures_poorly() {
+        let rect = region(SIDE);
+        let z = coefficients(rect);
+        let equations = RegionEquations::synthetic(rect, &GRAM_DIAGONAL, &z, VARIANCE, normal());
+        let prior = unit_prior();
+        let means = [PosteriorMeans::new(
+            &equations,
+            rect,
+            &prior,
+            &[0.0; CHANNELS],
+        )];
+        let learned = NeighbourPrior::learn(&means, &prior, &SequentialExecutor).unwrap();
+
+        let (mut solver, mut mean) = (PosteriorSolver::new(2), vec![0.0; 2]);
+        let mut errors = [0.0; 2];
+        let (mut smooth, mut outliers) = (Vec::new(), Vec::new());
+        for (location, pixel) in means[0]
+            .interior_locations()
+            .zip(rect.pixels().flat_map(|pixel| [pixel; CHANNELS]))
+        {
+            let factor = prior.noise_factor;
+            let q = learned.infer(&means[0], factor, location, &mut mean, &mut solver);
+            match OUTLIERS.contains(&(pixel.x, pixel.y)) {
+                true => outliers.push(q),
+                false => {
+                    smooth.push(q);
+                    let truth = z[location.index * 2 + 1];
+                    let alone = means[0].mean(location.index)[1];
+                    errors[0] += (q * solver.mean[1] + (1.0 - q) * alone - truth).powi(2);
+                    errors[1] += (alone - truth).powi(2);
+                }
+            }
+        }
+        assert!(errors[0] < 0.5 * errors[1], "squared errors {errors:?}");
+        let average = smooth.iter().sum::<f64>() / smooth.len() as f64;
+        assert!(average > 0.9, "responsibility {average} of smooth pixels");
+        assert!(outliers.iter().all(|&q| q < 0.01), "{outliers:?}");
+    }
+
+    #[test]
+    fn too_few_observations_give_no_neighbour_prior() {
+        let rect = region(16);
+        let z = coefficients(rect);
+        let equations = RegionEquations::synthetic(rect, &GRAM_DIAGONAL, &z, VARIANCE, normal());
+        let prior = unit_prior();
+        let means = [PosteriorMeans::new(
+            &equations,
+            rect,
+            &prior,
+            &[0.0; CHANNELS],
+        )];
+        assert!(NeighbourPrior::learn(&means, &prior, &SequentialExecutor).is_none());
+        // Nor do dark ones count.
+        let rect = region(SIDE);
+        let z = coefficients(rect);
+        let equations = RegionEquations::synthetic(rect, &GRAM_DIAGONAL, &z, VARIANCE, normal());
+        let means = [PosteriorMeans::new(
+            &equations,
+            rect,
+            &prior,
+            &[2.0; CHANNELS],
+        )];
+        assert!(NeighbourPrior::learn(&means, &prior, &SequentialExecutor).is_none());
+    }
+}

@@ -1,0 +1,190 @@
+//! Training: from all measurements to the learned model.
+//!
+//! 1. [`Training::fit_basis`] starts from smooth variations of the mean function
+//!    ([`initial_prior`](super::initial_prior)), learns the pixel prior over them by
+//!    expectation–maximisation (EM) on small squares spread over the picture, and truncates the basis
+//!    to the smallest candidate rank whose error on held-out patterns is near the least.
+//! 2. [`Training::fit_neighbour_prior`] repeats EM on larger training regions, where neighbours of most
+//!    pixels are known, and learns the neighbour prior there.
+//! 3. [`Training::neighbour_prior_helps`] compares the errors on held-out patterns with and without it.
+
+use super::basis::LearnedBasis;
+use super::equations::{RegionEquations, brightness_thresholds, with_margin};
+use super::inference::LearnedModel;
+use super::initial_prior::{MAX_INITIAL_RANK, initial_prior, smooth, truncate_basis};
+use super::neighbour_prior::NeighbourPrior;
+use super::nonnegativity::NonNegativityPenalty;
+use super::posterior_means::{NEIGHBOURHOOD_RADIUS, PosteriorMeans};
+use crate::capture::Measurements;
+use crate::executor::Executor;
+use crate::recover::holdout::HoldoutSplit;
+use crate::recover::sampling::spread_squares;
+use crate::recover::{RecoverError, pooled};
+use crate::transport::{Geometry, TileRect, Window};
+
+/// Ranks to choose from; each fills vector registers together with the mean function.
+const CANDIDATE_RANKS: [usize; 3] = [23, 31, 47];
+/// Relative increase of the held-out error up to which a larger rank is preferred. Most of that error is
+/// noise, which tells little of the components that 80 patterns hardly determine. What a smaller basis
+/// cannot represent is lost, but the prior keeps an undetermined component from doing harm.
+const MAX_ERROR_INCREASE: f64 = 0.02;
+/// EM iterations over the initial basis.
+const INITIAL_EM_ITERATIONS: usize = 20;
+/// EM iterations over the truncated basis, on the training regions.
+const FINAL_EM_ITERATIONS: usize = 2;
+/// Training regions of the neighbour prior, and their side.
+const MAX_REGIONS: usize = 64;
+const REGION_SIDE_PX: u32 = 16;
+/// Memory for the regions' Gram matrices. Where many windows differ, or saturated samples leave pixels
+/// Gram matrices of their own, there are fewer regions, but at least `MIN_REGIONS`.
+const MAX_GRAM_BYTES: usize = 144 << 20;
+const MIN_REGIONS: usize = 8;
+
+/// The largest rank that training may choose.
+pub(super) fn max_rank(window: Window) -> usize {
+    CANDIDATE_RANKS
+        .into_iter()
+        .fold(0, usize::max)
+        .min(window.area())
+}
+
+/// Upper estimate of the memory that training takes beside the measurements, in bytes: the equations of
+/// the squares, each pixel and channel with a Gram matrix of its own, or later the regions' Gram matrices
+/// and as much again for the sums of their regressions.
+pub(super) fn max_bytes(window: Window) -> usize {
+    let rank = MAX_INITIAL_RANK.min(window.area());
+    let squares = pooled::MAX_SAMPLES * rank * rank * size_of::<f64>();
+    squares.max(2 * MAX_GRAM_BYTES)
+}
+
+/// What every stage of training uses.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Training<'a, E> {
+    pub measurements: &'a Measurements,
+    pub geometry: Geometry,
+    pub split: &'a HoldoutSplit,
+    pub executor: &'a E,
+}
+
+impl<E: Executor> Training<'_, E> {
+    /// Learns the basis and the pixel prior over it, starting from the mean function, `[S]`.
+    ///
+    /// # Errors
+    /// [`RecoverError::NoSignal`] where no rank has a finite error, [`RecoverError::Cancelled`] after
+    /// cancellation.
+    pub fn fit_basis(&self, mean_function: &[f64]) -> Result<LearnedModel, RecoverError> {
+        let side = self.geometry.window.side() as usize;
+        let mean = smooth(mean_function, side);
+        let (functions, mut prior) = initial_prior(&mean, side, self.executor);
+        let basis = LearnedBasis::new(&functions, &mean);
+        let squares = pooled::sample_squares(self.measurements);
+        let samples = self.executor.map(squares.len(), |i| {
+            self.equations(&basis, &self.split.training, squares[i])
+        });
+        let thresholds = brightness_thresholds(&samples);
+        for _ in 0..INITIAL_EM_ITERATIONS {
+            self.executor.check_cancelled()?;
+            prior.em_iteration(&samples, &thresholds, self.executor);
+        }
+        drop(samples);
+
+        let mut chosen: Option<(f64, LearnedModel)> = None;
+        // A small window has fewer candidates.
+        let mut ranks = CANDIDATE_RANKS.map(|rank| rank.min(prior.rank)).to_vec();
+        ranks.dedup();
+        for rank in ranks {
+            self.executor.check_cancelled()?;
+            let (functions, prior) = truncate_basis(&functions, &prior, rank, mean.len());
+            let basis = LearnedBasis::new(&functions, &mean);
+            let model = LearnedModel {
+                geometry: self.geometry,
+                penalty: NonNegativityPenalty::new(&basis),
+                basis,
+                prior,
+                neighbour_prior: None,
+                thresholds,
+            };
+            let error = self.held_out_error(&model, &squares);
+            let least = chosen.as_ref().map_or(error, |(least, _)| least.min(error));
+            if error <= (1.0 + MAX_ERROR_INCREASE) * least {
+                chosen = Some((least, model));
+            }
+        }
+        chosen.map(|(_, model)| model).ok_or(RecoverError::NoSignal)
+    }
+
+    /// The training regions of the neighbour prior, as many as there is memory for, without the border
+    /// that holds their outer neighbours.
+    pub fn regions(&self, rank: usize) -> Vec<TileRect> {
+        let regions = spread_squares(self.measurements, REGION_SIDE_PX, MAX_REGIONS);
+        let counts = self.executor.map(regions.len(), |i| {
+            let (geometry, rect) = (&self.geometry, self.with_neighbours(regions[i]));
+            RegionEquations::count_gram_matrices(self.measurements, geometry, &self.split.all, rect)
+        });
+        let bytes = counts.iter().sum::<usize>() * rank * rank * size_of::<f64>();
+        match bytes <= MAX_GRAM_BYTES {
+            true => regions,
+            false => {
+                let fit = MAX_GRAM_BYTES / (bytes / regions.len()).max(1);
+                spread_squares(self.measurements, REGION_SIDE_PX, fit.max(MIN_REGIONS))
+            }
+        }
+    }
+
+    /// Continues EM of the pixel prior on `regions` and learns the neighbour prior, both from the
+    /// patterns `pattern_indices`.
+    pub fn fit_neighbour_prior(
+        &self,
+        model: &mut LearnedModel,
+        pattern_indices: &[usize],
+        regions: &[TileRect],
+    ) {
+        let equations = self.executor.map(regions.len(), |i| {
+            let rect = self.with_neighbours(regions[i]);
+            self.equations(&model.basis, pattern_indices, rect)
+        });
+        let (prior, thresholds) = (&mut model.prior, &model.thresholds);
+        for _ in 0..FINAL_EM_ITERATIONS {
+            prior.em_iteration(&equations, thresholds, self.executor);
+        }
+        let means = self.executor.map(regions.len(), |i| {
+            PosteriorMeans::new(&equations[i], regions[i], prior, thresholds)
+        });
+        model.neighbour_prior = NeighbourPrior::learn(&means, prior, self.executor);
+    }
+
+    /// Whether the neighbour prior lowers the error on held-out patterns over `regions`.
+    pub fn neighbour_prior_helps(&self, model: &mut LearnedModel, regions: &[TileRect]) -> bool {
+        let with = self.held_out_error(model, regions);
+        let neighbour_prior = model.neighbour_prior.take();
+        let without = self.held_out_error(model, regions);
+        model.neighbour_prior = neighbour_prior;
+        model.neighbour_prior.is_some() && with < without
+    }
+
+    fn equations(
+        &self,
+        basis: &LearnedBasis,
+        pattern_indices: &[usize],
+        rect: TileRect,
+    ) -> RegionEquations {
+        RegionEquations::new(
+            self.measurements,
+            &self.geometry,
+            basis,
+            pattern_indices,
+            rect,
+        )
+    }
+
+    fn with_neighbours(&self, rect: TileRect) -> TileRect {
+        with_margin(self.measurements, rect, NEIGHBOURHOOD_RADIUS as u32)
+    }
+
+    fn held_out_error(&self, model: &LearnedModel, rects: &[TileRect]) -> f64 {
+        let errors = self.executor.map(rects.len(), |i| {
+            model.held_out_error(self.measurements, self.split, rects[i])
+        });
+        errors.iter().sum()
+    }
+}
