@@ -35,7 +35,7 @@ use relightable_photo::capture::{Measurements, Noise, Pattern, Picture, Rows};
 use relightable_photo::executor::{Executor, SequentialExecutor};
 use relightable_photo::recover::{Homotopy, Method, Nnls, Recovery, Settings, SparsityBasis};
 use relightable_photo::simulate::{
-    Camera, Codes, Ensemble, Exposure, NoiseStream, SceneKind, emission,
+    Camera, EmissionMatrix, Ensemble, LightCodes, RandomStream, SceneKind, emission,
 };
 use relightable_photo::transport::{
     CHANNELS, CameraPx, Extent, TileRect, TransportError, TransportFunctions, Window,
@@ -78,9 +78,9 @@ fn square(side: u32) -> Extent {
 fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
     let light = square(camera.width / 2);
     let scene = SceneKind::StainedGlass.build(camera, light).unwrap();
-    let codes: Vec<Codes> = (0..PATTERNS as u32)
+    let codes: Vec<LightCodes> = (0..PATTERNS as u32)
         .map(|i| {
-            let mut stream = NoiseStream::Pattern(i).start(SEED);
+            let mut stream = RandomStream::Pattern(i).start(SEED);
             Ensemble::Gaussian.draw(light, &mut stream).unwrap()
         })
         .collect();
@@ -90,7 +90,7 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
         electrons: 40_000.0,
         read_noise: 8.0,
     };
-    let exposure = Exposure::new(light, &codes);
+    let emissions = EmissionMatrix::new(light, &codes);
     let geometry = *scene.geometry();
     let truth: Vec<_> = (0..geometry.tile_grid().area())
         .into_par_iter()
@@ -98,7 +98,7 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
         .collect();
     let mut pictures = vec![vec![[0.0; CHANNELS]; camera.area()]; PATTERNS];
     for functions in &truth {
-        let seen = exposure.expose(&geometry, functions);
+        let seen = emissions.pictures(&geometry, functions);
         for (picture, seen) in pictures.iter_mut().zip(seen) {
             for (pixel, y) in functions.rect.pixels().zip(seen) {
                 picture[camera.index(pixel)] = y;
@@ -107,7 +107,7 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
     }
     let code = 1.0 / (sensor.white - sensor.black);
     let photograph = |seen: &[[f32; CHANNELS]], number: u32| -> Picture {
-        let mut noise = NoiseStream::Photograph(number).start(SEED);
+        let mut noise = RandomStream::Photograph(number).start(SEED);
         let photo = sensor.photograph(seen, &mut noise).unwrap();
         let linear = |value: u16| ((f64::from(value) - sensor.black) * code) as f32;
         photo.iter().map(|codes| codes.map(linear)).collect()
@@ -117,8 +117,10 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
     }
     let dark = photograph(&vec![[0.0; CHANNELS]; camera.area()], PATTERNS as u32);
     let patterns = codes.iter().map(|codes| match codes {
-        Codes::Grey(codes) => Pattern::Grey(codes.iter().map(|&c| emission(c) as f32).collect()),
-        Codes::Rgb(_) => unreachable!("this ensemble is grey"),
+        LightCodes::Grey(codes) => {
+            Pattern::Grey(codes.iter().map(|&c| emission(c) as f32).collect())
+        }
+        LightCodes::Rgb(_) => unreachable!("this ensemble is grey"),
     });
     let mut measurements = Measurements {
         camera,

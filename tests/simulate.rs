@@ -7,7 +7,9 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use relightable_photo::capture::{CaptureFolder, Pattern, Picture, Rows};
-use relightable_photo::simulate::{Camera, Codes, Exposure, NoiseStream, Scene, SceneKind};
+use relightable_photo::simulate::{
+    Camera, EmissionMatrix, LightCodes, RandomStream, SceneKind, SimulatedScene,
+};
 use relightable_photo::transport::{CHANNELS, Element, Extent, TileRect, TransportFunctions};
 
 fn simulate(out: &Path, args: &[&str]) -> Command {
@@ -244,7 +246,7 @@ const fn extent(width: u32, height: u32) -> Extent {
     Extent { width, height }
 }
 
-fn whole(scene: &dyn Scene) -> TransportFunctions {
+fn whole(scene: &dyn SimulatedScene) -> TransportFunctions {
     scene.tile(TileRect {
         x: 0,
         y: 0,
@@ -253,10 +255,12 @@ fn whole(scene: &dyn Scene) -> TransportFunctions {
 }
 
 /// The scene's noise-free picture under flood light, `[N]`.
-fn flood(scene: &dyn Scene) -> Vec<[f32; CHANNELS]> {
+fn flood(scene: &dyn SimulatedScene) -> Vec<[f32; CHANNELS]> {
     let light = scene.geometry().light;
-    let exposure = Exposure::new(light, &[Codes::uniform(light, 255)]);
-    exposure.expose(scene.geometry(), &whole(scene)).remove(0)
+    let emissions = EmissionMatrix::new(light, &[LightCodes::uniform(light, 255)]);
+    emissions
+        .pictures(scene.geometry(), &whole(scene))
+        .remove(0)
 }
 
 #[test]
@@ -422,7 +426,7 @@ fn fewer_electrons_are_noisier() {
             electrons,
             read_noise: 8.0,
         };
-        let mut noise = NoiseStream::Photograph(0).start(1);
+        let mut noise = RandomStream::Photograph(0).start(1);
         let codes = camera
             .photograph(&[[0.5; CHANNELS]; 5000], &mut noise)
             .unwrap();

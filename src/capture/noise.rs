@@ -276,7 +276,7 @@ fn quantile(values: &mut [f64], part: usize, of: usize) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::capture::{Pattern, Picture, Rows};
-    use crate::simulate::{Camera, Codes, Ensemble, Exposure, NoiseStream, SceneKind};
+    use crate::simulate::{Camera, EmissionMatrix, Ensemble, LightCodes, RandomStream, SceneKind};
     use crate::transport::{Extent, TileRect};
 
     /// Photographs a scene with `electrons` at full scale, every third shot at twice the exposure,
@@ -291,10 +291,10 @@ mod tests {
             read_noise: 8.0,
         };
         let draw = |i| {
-            let mut stream = NoiseStream::Pattern(i).start(7);
+            let mut stream = RandomStream::Pattern(i).start(7);
             Ensemble::Gaussian.draw(light, &mut stream).unwrap()
         };
-        let lights: Vec<Codes> = std::iter::once(Codes::uniform(light, 0))
+        let lights: Vec<LightCodes> = std::iter::once(LightCodes::uniform(light, 0))
             .chain((0..patterns).map(draw))
             .collect();
         let scene = kind.build(camera, light).unwrap();
@@ -306,14 +306,14 @@ mod tests {
         });
         let exposure = |i: usize| if i % 3 == 2 { 2.0 } else { 1.0 };
         let linear = |code: u16| (f64::from(code) - 512.0) / (60_000.0 - 512.0);
-        let seen = Exposure::new(light, &lights).expose(scene.geometry(), &functions);
+        let seen = EmissionMatrix::new(light, &lights).pictures(scene.geometry(), &functions);
         let mut pictures = seen.iter().enumerate().map(|(i, picture)| -> Picture {
             let exposed: Picture = picture
                 .iter()
                 .map(|y| y.map(|y| y * exposure(i) as f32))
                 .collect();
             let take = |take: u32| {
-                let mut stream = NoiseStream::Photograph(2 * i as u32 + take).start(7);
+                let mut stream = RandomStream::Photograph(2 * i as u32 + take).start(7);
                 sensor.photograph(&exposed, &mut stream).unwrap()
             };
             let pairs = take(0).into_iter().zip(take(1));

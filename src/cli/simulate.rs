@@ -18,8 +18,8 @@ use crate::capture::{
     Shot,
 };
 use crate::simulate::{
-    self, Camera, Codes, DISPLAY_GAMMA, Exposure, GrayCode, NoiseStream, Scene, SceneKind,
-    TruthLight,
+    self, Camera, DISPLAY_GAMMA, EmissionMatrix, GrayCodePattern, LightCodes, RandomStream,
+    SceneKind, SimulatedScene, TruthLight,
 };
 use crate::transport::{CHANNELS, Extent, TileRect, TransportFunctions};
 
@@ -132,12 +132,12 @@ enum Purpose {
 
 /// A whole capture, decided on but not yet computed.
 struct Plan {
-    scene: Box<dyn Scene>,
+    scene: Box<dyn SimulatedScene>,
     camera: Camera,
     seed: u64,
     manifest: Manifest,
     /// Every light, in step with `purposes`; patterns are the photographs' from `shots_from` on.
-    lights: Vec<Codes>,
+    lights: Vec<LightCodes>,
     purposes: Vec<Purpose>,
 }
 
@@ -193,7 +193,7 @@ impl Plan {
         };
         plan.add_calibration(args.light);
         for i in 0..args.patterns {
-            let mut stream = NoiseStream::Pattern(i).start(args.seed);
+            let mut stream = RandomStream::Pattern(i).start(args.seed);
             let (pattern, photo) = (format!("patterns/{i:04}.png"), format!("photos/{i:04}.png"));
             let codes = ensemble.draw(args.light, &mut stream)?;
             plan.photograph(codes, photo.clone());
@@ -213,9 +213,12 @@ impl Plan {
     /// Dark, flood and Gray code. They come first, so that their noise and that of the first
     /// shots does not depend on how many shots there are.
     fn add_calibration(&mut self, light: Extent) {
-        self.photograph(Codes::uniform(light, 0), "photos/dark.png".to_owned());
-        self.photograph(Codes::uniform(light, 255), "photos/flood.png".to_owned());
-        for code in GrayCode::all(light) {
+        self.photograph(LightCodes::uniform(light, 0), "photos/dark.png".to_owned());
+        self.photograph(
+            LightCodes::uniform(light, 255),
+            "photos/flood.png".to_owned(),
+        );
+        for code in GrayCodePattern::all(light) {
             let sign = if code.inverted { 'n' } else { 'p' };
             let photo = format!("graycode/{}{}{sign}.png", code.axis(), code.bit);
             self.photograph(code.codes(light), photo.clone());
@@ -228,7 +231,7 @@ impl Plan {
         }
     }
 
-    fn photograph(&mut self, codes: Codes, path: String) {
+    fn photograph(&mut self, codes: LightCodes, path: String) {
         self.lights.push(codes);
         self.purposes.push(Purpose::Photograph(path));
     }
@@ -266,7 +269,7 @@ fn write(plan: &Plan, root: &Path) -> Result<()> {
             let camera = plan.manifest.camera.extent();
             match purpose {
                 Purpose::Photograph(path) => {
-                    let mut noise = NoiseStream::Photograph(i as u32).start(plan.seed);
+                    let mut noise = RandomStream::Photograph(i as u32).start(plan.seed);
                     let codes = plan.camera.photograph(picture, &mut noise)?;
                     write_rgb16(&root.join(path), camera, &codes)?;
                 }
@@ -289,7 +292,7 @@ fn write(plan: &Plan, root: &Path) -> Result<()> {
 fn write_transport(plan: &Plan, truth: &Path) -> Result<Vec<Vec<[f32; CHANNELS]>>> {
     let geometry = plan.scene.geometry();
     let (camera, side) = (geometry.camera, u64::from(geometry.window.side()));
-    let exposure = Exposure::new(geometry.light, &plan.lights);
+    let emissions = EmissionMatrix::new(geometry.light, &plan.lights);
     let mut pictures = vec![Vec::with_capacity(camera.area()); plan.lights.len()];
     let n = camera.area() as u64;
     let mut tau_file = npy::<f16>(&truth.join("tau.npy"), &[n, side, side, CHANNELS as u64])?;
@@ -312,7 +315,7 @@ fn write_transport(plan: &Plan, truth: &Path) -> Result<Vec<Vec<[f32; CHANNELS]>
             .map(|&rect| {
                 let mut functions = plan.scene.tile(rect);
                 let rounded = round_to_f16(&mut functions);
-                (rounded, exposure.expose(geometry, &functions))
+                (rounded, emissions.pictures(geometry, &functions))
             })
             .collect();
         for (tau, seen) in computed {
@@ -381,10 +384,12 @@ fn write_rgb16(path: &Path, extent: Extent, codes: &[[u16; CHANNELS]]) -> Result
     )
 }
 
-fn write_codes(path: &Path, extent: Extent, codes: &Codes) -> Result<()> {
+fn write_codes(path: &Path, extent: Extent, codes: &LightCodes) -> Result<()> {
     match codes {
-        Codes::Grey(codes) => write_png(path, extent, codes, ExtendedColorType::L8),
-        Codes::Rgb(codes) => write_png(path, extent, codes.as_flattened(), ExtendedColorType::Rgb8),
+        LightCodes::Grey(codes) => write_png(path, extent, codes, ExtendedColorType::L8),
+        LightCodes::Rgb(codes) => {
+            write_png(path, extent, codes.as_flattened(), ExtendedColorType::Rgb8)
+        }
     }
 }
 

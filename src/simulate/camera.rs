@@ -22,14 +22,14 @@ pub struct Camera {
 /// Which of a capture's independent random sequences to draw from. The same seed and stream yield
 /// the same numbers, whatever else is drawn and in whatever order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NoiseStream {
+pub enum RandomStream {
     /// The elements of pattern number `.0`.
     Pattern(u32),
     /// The noise of photograph number `.0`.
     Photograph(u32),
 }
 
-impl NoiseStream {
+impl RandomStream {
     /// Starts the sequence.
     pub fn start(self, seed: u64) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -75,7 +75,7 @@ mod tests {
     #[test]
     fn noise_has_the_mean_and_variance_of_shot_and_read_noise() {
         for measurement in [0.0f32, 0.0001, 0.02, 0.7] {
-            let mut rng = NoiseStream::Photograph(3).start(1);
+            let mut rng = RandomStream::Photograph(3).start(1);
             let codes = CAMERA
                 .photograph(&[[measurement; 3]; 40_000], &mut rng)
                 .unwrap();
@@ -104,20 +104,20 @@ mod tests {
 
     #[test]
     fn streams_differ_and_repeat() {
-        let draw = |stream: NoiseStream, seed| {
+        let draw = |stream: RandomStream, seed| {
             let mut rng = stream.start(seed);
             CAMERA.photograph(&[[0.5; 3]; 8], &mut rng).unwrap()
         };
-        let first = draw(NoiseStream::Photograph(0), 1);
-        assert_eq!(first, draw(NoiseStream::Photograph(0), 1));
-        assert_ne!(first, draw(NoiseStream::Photograph(1), 1));
-        assert_ne!(first, draw(NoiseStream::Pattern(0), 1));
-        assert_ne!(first, draw(NoiseStream::Photograph(0), 2));
+        let first = draw(RandomStream::Photograph(0), 1);
+        assert_eq!(first, draw(RandomStream::Photograph(0), 1));
+        assert_ne!(first, draw(RandomStream::Photograph(1), 1));
+        assert_ne!(first, draw(RandomStream::Pattern(0), 1));
+        assert_ne!(first, draw(RandomStream::Photograph(0), 2));
     }
 
     #[test]
     fn too_much_light_saturates() {
-        let mut rng = NoiseStream::Photograph(0).start(1);
+        let mut rng = RandomStream::Photograph(0).start(1);
         let codes = CAMERA.photograph(&[[9.0; 3]], &mut rng).unwrap();
         assert_eq!(codes, [[u16::MAX; 3]]);
     }

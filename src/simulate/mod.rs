@@ -1,27 +1,27 @@
 //! Built-in scenes whose transport is known, and the camera that photographs them.
 //!
-//! A [`Scene`] is a picture drawn by formula, in coordinates that do not depend on any resolution,
+//! A [`SimulatedScene`] is a picture drawn by formula, in coordinates that do not depend on any resolution,
 //! together with the physics that turns each camera pixel into a light transport function. Lengths
 //! that make the band (scattering widths, refraction, parallax) are given in light elements: with
 //! more elements the same picture stands closer to the display, and the same window holds it.
 //!
-//! Pure computation: no threads, no files, no clock. Whoever has them calls [`Scene::tile`] for
-//! many tiles at once, [`Exposure`] to see them under many lights and [`Camera`] for the noise.
+//! Pure computation: no threads, no files, no clock. Whoever has them calls [`SimulatedScene::tile`] for
+//! many tiles at once, [`EmissionMatrix`] to see them under many lights and [`Camera`] for the noise.
 
 mod camera;
-mod codes;
 mod cookies;
-mod exposure;
-mod lights;
-mod plane;
+mod coordinates;
+mod emission_matrix;
+mod gradient_noise;
+mod light_codes;
 mod shapes;
 mod stained_glass;
-mod texture;
+mod truth_lights;
 
-pub use camera::{Camera, NoiseStream};
-pub use codes::{Codes, DISPLAY_GAMMA, Ensemble, GrayCode, emission};
-pub use exposure::Exposure;
-pub use lights::TruthLight;
+pub use camera::{Camera, RandomStream};
+pub use emission_matrix::EmissionMatrix;
+pub use light_codes::{DISPLAY_GAMMA, Ensemble, GrayCodePattern, LightCodes, emission};
+pub use truth_lights::TruthLight;
 
 use crate::transport::{
     CHANNELS, CameraPx, Correspondence, Extent, Geometry, GeometryError, TileRect,
@@ -33,20 +33,20 @@ use crate::transport::{
 pub const WINDOW_SIDE: u32 = 15;
 
 /// A scene of known transport.
-pub trait Scene: Sync {
+pub trait SimulatedScene: Sync {
     /// Grids, band and correspondence.
     fn geometry(&self) -> &Geometry;
 
     /// Writes the light transport function of one pixel, `[S]`, over zeros. Elements off the
     /// display have none.
-    fn function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]);
+    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]);
 
     /// The light transport functions of the pixels in `rect`.
     fn tile(&self, rect: TileRect) -> TransportFunctions {
         let area = self.geometry().window.area();
         let mut functions = TransportFunctions::zeros(rect, area);
         for (pixel, tau) in rect.pixels().zip(functions.tau.chunks_exact_mut(area)) {
-            self.function(pixel, tau);
+            self.transport_function(pixel, tau);
         }
         functions
     }
@@ -63,7 +63,11 @@ pub enum SceneKind {
 
 impl SceneKind {
     /// The scene seen by `camera` under a light plane of `light` elements.
-    pub fn build(self, camera: Extent, light: Extent) -> Result<Box<dyn Scene>, GeometryError> {
+    pub fn build(
+        self,
+        camera: Extent,
+        light: Extent,
+    ) -> Result<Box<dyn SimulatedScene>, GeometryError> {
         let geometry = Geometry {
             camera,
             light,

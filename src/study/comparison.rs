@@ -15,7 +15,7 @@ use super::report::{Section, Table, cell, seconds};
 use super::{Photographer, Picture, Progress, StudyError, blocks, unwindowed};
 use crate::capture::Measurements;
 use crate::executor::Executor;
-use crate::simulate::{Codes, Ensemble};
+use crate::simulate::{Ensemble, LightCodes};
 use crate::transport::{CHANNELS, Decibels, Extent, TransportError};
 
 /// Numbers of photographs that curves have points at, rising.
@@ -247,11 +247,11 @@ fn section(
 }
 
 /// Every element alone at full brightness.
-fn single_elements(light: Extent) -> Vec<Codes> {
+fn single_elements(light: Extent) -> Vec<LightCodes> {
     let single = |m: usize| {
         let mut codes = vec![0; light.area()];
         codes[m] = 255;
-        Codes::Grey(codes)
+        LightCodes::Grey(codes)
     };
     (0..light.area()).map(single).collect()
 }

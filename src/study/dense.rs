@@ -25,7 +25,7 @@ impl Dense {
                 y: n as u32 / width,
             };
             let mut band = vec![[0.0; CHANNELS]; geometry.window.area()];
-            known.function(pixel, &mut band);
+            known.transport_function(pixel, &mut band);
             let mut row = vec![[0.0; CHANNELS]; elements];
             let origin = known.origin(pixel);
             for (s, tau) in band.into_iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use crate::capture::Truth;
 use crate::relight::Light;
-use crate::simulate::Scene;
+use crate::simulate::SimulatedScene;
 use crate::transport::{
     CHANNELS, CameraPx, Correspondence, Element, Geometry, GeometryError, TileRect, TransportError,
     TransportFunctions,
@@ -19,21 +19,21 @@ pub trait Known: Sync {
     }
 
     /// Writes the light transport function of one pixel, `[S]`, in units of the measurement.
-    fn function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]);
+    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]);
 }
 
 /// A built-in scene.
 #[derive(Clone, Copy)]
-pub struct SceneTruth<'a>(pub &'a dyn Scene);
+pub struct SceneTruth<'a>(pub &'a dyn SimulatedScene);
 
 impl Known for SceneTruth<'_> {
     fn geometry(&self) -> &Geometry {
         self.0.geometry()
     }
 
-    fn function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
+    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
         tau.fill([0.0; CHANNELS]);
-        self.0.function(pixel, tau);
+        self.0.transport_function(pixel, tau);
     }
 }
 
@@ -68,7 +68,7 @@ impl Known for CaptureTruth {
         self.truth.window_origin(self.geometry.camera.index(pixel))
     }
 
-    fn function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
+    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
         let known = self.truth.tau(self.geometry.camera.index(pixel));
         for (tau, known) in tau.iter_mut().zip(known) {
             *tau = known.map(|t| t.to_f32());
@@ -89,7 +89,7 @@ pub(super) fn error_of(
     let recovered = functions.tau.chunks_exact(ours.area());
     for (pixel, estimate) in functions.rect.pixels().zip(recovered) {
         let (our_origin, their_origin) = (geometry.window_origin(pixel), known.origin(pixel));
-        known.function(pixel, &mut truth);
+        known.transport_function(pixel, &mut truth);
         for (s, truth) in truth.iter().enumerate() {
             let here = ours.slot(our_origin, theirs.element(their_origin, s));
             let estimate = here.map_or([0.0; CHANNELS], |s| estimate[s]);
@@ -117,7 +117,7 @@ pub(super) fn expose(known: &impl Known, rect: TileRect, light: &Light) -> Vec<[
     let geometry = known.geometry();
     let mut tau = vec![[0.0; CHANNELS]; geometry.window.area()];
     let lit = rect.pixels().map(|pixel| {
-        known.function(pixel, &mut tau);
+        known.transport_function(pixel, &mut tau);
         pixel_under(geometry, known.origin(pixel), &tau, light)
     });
     lit.collect()

@@ -3,7 +3,9 @@
 use super::{Picture, StudyError};
 use crate::capture::{Measurements, Noise, Pattern, Rows};
 use crate::executor::Executor;
-use crate::simulate::{Camera, Codes, Ensemble, Exposure, NoiseStream, Scene, emission};
+use crate::simulate::{
+    Camera, EmissionMatrix, Ensemble, LightCodes, RandomStream, SimulatedScene, emission,
+};
 use crate::transport::CHANNELS;
 
 /// Photographs whose noise is drawn at once, while those before and after it are without.
@@ -13,7 +15,7 @@ const BATCH: usize = 16;
 #[derive(Clone, Copy)]
 pub struct Photographer<'a> {
     /// What is photographed.
-    pub scene: &'a dyn Scene,
+    pub scene: &'a dyn SimulatedScene,
     /// Electrons at full scale.
     pub electrons: f64,
     /// Seed of patterns and noise.
@@ -43,7 +45,7 @@ impl Photographer<'_> {
             .map(|i| {
                 ensemble.draw(
                     geometry.light,
-                    &mut NoiseStream::Pattern(i as u32).start(self.seed),
+                    &mut RandomStream::Pattern(i as u32).start(self.seed),
                 )
             })
             .collect::<Result<Vec<_>, _>>()?;
@@ -74,10 +76,10 @@ impl Photographer<'_> {
     /// where saturated.
     pub(super) fn photographs(
         &self,
-        lights: &[Codes],
+        lights: &[LightCodes],
         executor: &impl Executor,
     ) -> Result<Vec<Picture>, StudyError> {
-        let mut pictures = self.expose(lights, executor);
+        let mut pictures = self.pictures(lights, executor);
         let dark = self.dark()?;
         let mut done = 0;
         for batch in pictures.chunks_mut(BATCH) {
@@ -98,7 +100,7 @@ impl Photographer<'_> {
     /// Photograph number `number` of `picture`, with noise.
     pub(super) fn noisy(&self, picture: &Picture, number: u32) -> Result<Picture, StudyError> {
         let camera = self.camera();
-        let mut noise = NoiseStream::Photograph(number).start(self.seed);
+        let mut noise = RandomStream::Photograph(number).start(self.seed);
         let codes = camera.photograph(picture, &mut noise)?;
         let linear = |code: u16| match f64::from(code) >= camera.white {
             true => f32::NAN,
@@ -108,16 +110,16 @@ impl Photographer<'_> {
     }
 
     /// The scene under each light, without noise.
-    fn expose(&self, lights: &[Codes], executor: &impl Executor) -> Vec<Picture> {
+    fn pictures(&self, lights: &[LightCodes], executor: &impl Executor) -> Vec<Picture> {
         let geometry = self.scene.geometry();
-        let exposure = Exposure::new(geometry.light, lights);
+        let emissions = EmissionMatrix::new(geometry.light, lights);
         let mut pictures = vec![vec![[0.0; CHANNELS]; geometry.camera.area()]; lights.len()];
         let across = geometry.tile_grid().width as usize;
         let tiles: Vec<_> = geometry.tiles().collect();
         // A row of tiles at a time bounds the memory.
         for row in tiles.chunks(across) {
             let seen = executor.map(row.len(), |i| {
-                exposure.expose(geometry, &self.scene.tile(row[i]))
+                emissions.pictures(geometry, &self.scene.tile(row[i]))
             });
             for (rect, seen) in row.iter().zip(seen) {
                 for (picture, seen) in pictures.iter_mut().zip(seen) {
@@ -131,11 +133,11 @@ impl Photographer<'_> {
     }
 }
 
-fn emitted(codes: &Codes) -> Pattern {
+fn emitted(codes: &LightCodes) -> Pattern {
     let linear = |code: &u8| emission(*code) as f32;
     match codes {
-        Codes::Grey(codes) => Pattern::Grey(codes.iter().map(linear).collect()),
-        Codes::Rgb(codes) => Pattern::Rgb(std::array::from_fn(|c| {
+        LightCodes::Grey(codes) => Pattern::Grey(codes.iter().map(linear).collect()),
+        LightCodes::Rgb(codes) => Pattern::Rgb(std::array::from_fn(|c| {
             codes.iter().map(|code| linear(&code[c])).collect()
         })),
     }

@@ -134,7 +134,7 @@ pub fn sparsity(
     }
     let pixel = median_pixel(geometry.camera, &energies);
     let mut tau = vec![[0.0; CHANNELS]; geometry.window.area()];
-    known.function(pixel, &mut tau);
+    known.transport_function(pixel, &mut tau);
     let mut one = SparsityProfile::default();
     tau.as_flattened().iter().for_each(|&t| one.add(t));
 
@@ -207,7 +207,7 @@ fn survey_row(known: &impl Known, y: u32) -> Row {
     let mut cells = std::collections::BTreeMap::new();
     for x in 0..geometry.camera.width {
         let pixel = CameraPx { x, y };
-        known.function(pixel, &mut tau);
+        known.transport_function(pixel, &mut tau);
         let origin = known.origin(pixel);
         let column = scale(geometry.camera.index(pixel), geometry.camera.area());
         let mut energy = 0.0;
@@ -321,7 +321,7 @@ fn zoom(known: &impl Known) -> Captioned {
     for i in 0..width {
         let pixel = CameraPx { x: left + i, y };
         let origin = known.origin(pixel);
-        known.function(pixel, &mut tau);
+        known.transport_function(pixel, &mut tau);
         for (s, tau) in tau.iter().enumerate() {
             let element = geometry.window.element(origin, s);
             let down = element.u - first;

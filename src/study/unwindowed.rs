@@ -79,7 +79,7 @@ mod tests {
     use super::*;
     use crate::capture::{Noise, Pattern, Rows};
     use crate::executor::SequentialExecutor;
-    use crate::simulate::NoiseStream;
+    use crate::simulate::RandomStream;
     use crate::transport::{CHANNELS, Correspondence, Extent};
 
     #[test]
@@ -89,7 +89,7 @@ mod tests {
         tau[3] = [0.5, 0.2, 0.1];
         tau[11] = [0.0, 0.3, 0.4];
         let random = |l: u32| -> Vec<f32> {
-            let mut stream = NoiseStream::Pattern(l).start(1);
+            let mut stream = RandomStream::Pattern(l).start(1);
             (0..16)
                 .map(|_| StandardUniform.sample(&mut stream))
                 .collect()

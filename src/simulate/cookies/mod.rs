@@ -5,13 +5,13 @@
 //! depth parallax. Where a taller neighbour stands in the way there is none: a cast shadow. What
 //! is left is light that lit neighbours reflect onto the spot.
 
-mod baking;
-mod relief;
+mod surface_grid;
+mod tray;
 
-use relief::{Relief, Spot};
+use surface_grid::{SurfaceGrid, SurfacePoint};
 
-use super::Scene;
-use super::plane::{Vec2, vec2};
+use super::SimulatedScene;
+use super::coordinates::{Vec2, vec2};
 use crate::transport::{CHANNELS, CameraPx, Element, Extent, Geometry, LightPx};
 
 /// Samples along each side of a camera pixel.
@@ -24,7 +24,7 @@ const TILT: Vec2 = vec2(3.7, 2.5);
 const TAN_TILT: f64 = 0.9;
 /// Side of the spot that a projector pixel is blurred by, in elements.
 const BLUR: f64 = 0.25;
-/// Exposure: a white card on the tray would measure this much.
+/// EmissionMatrix: a white card on the tray would measure this much.
 const EXPOSURE: f64 = 0.70;
 /// Brightest highlight, and how narrow highlights are.
 const HIGHLIGHT: f64 = 0.40;
@@ -39,14 +39,14 @@ const SHADING_HALF_SIDE: f64 = 32.0;
 pub(super) struct Cookies {
     geometry: Geometry,
     /// Surface samples, `SAMPLES` a side for each camera pixel.
-    fine: Relief,
+    fine: SurfaceGrid,
     /// One surface patch for each light element, for reflections between them.
-    patches: Vec<Patch>,
+    patches: Vec<Reflector>,
 }
 
 /// A piece of surface one element wide, as a reflector.
 #[derive(Clone, Copy, Debug)]
-struct Patch {
+struct Reflector {
     /// Height in elements.
     height: f64,
     /// Slope of the height.
@@ -65,15 +65,15 @@ impl Cookies {
             height: geometry.camera.height * SAMPLES,
         };
         let pitch = vec2(affine[0][0], affine[1][1]) * (1.0 / f64::from(SAMPLES));
-        let fine = Relief::new(geometry.light, samples, pitch);
-        let coarse = Relief::new(geometry.light, geometry.light, vec2(1.0, 1.0));
+        let fine = SurfaceGrid::new(geometry.light, samples, pitch);
+        let coarse = SurfaceGrid::new(geometry.light, geometry.light, vec2(1.0, 1.0));
         let scale = relief_in_elements();
         let patches = (0..geometry.light.height)
             .flat_map(|v| (0..geometry.light.width).map(move |u| (u, v)))
             .map(|(u, v)| {
                 let spot = coarse.spot(u, v);
                 let beam = beam_through(spot.at, spot.height);
-                Patch {
+                Reflector {
                     height: spot.height * scale,
                     slope: coarse.slope(u, v) * scale,
                     radiosity: reflected(&coarse, &spot).diffuse,
@@ -92,7 +92,12 @@ impl Cookies {
     }
 
     /// Light that reaches `pixel` by way of the patches around it.
-    fn reflections(&self, pixel: CameraPx, albedo: [f64; CHANNELS], window: &mut Band) {
+    fn reflections(
+        &self,
+        pixel: CameraPx,
+        albedo: [f64; CHANNELS],
+        window: &mut WindowAccumulator,
+    ) {
         let middle = SAMPLES / 2;
         let (i, j) = (pixel.x * SAMPLES + middle, pixel.y * SAMPLES + middle);
         let scale = relief_in_elements();
@@ -133,13 +138,13 @@ impl Cookies {
     }
 }
 
-impl Scene for Cookies {
+impl SimulatedScene for Cookies {
     fn geometry(&self) -> &Geometry {
         &self.geometry
     }
 
-    fn function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
-        let mut window = Band {
+    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
+        let mut window = WindowAccumulator {
             origin: self.geometry.window_origin(pixel),
             side: self.geometry.window.side(),
             light: self.geometry.light,
@@ -177,7 +182,7 @@ fn beam_through(at: LightPx, height: f64) -> LightPx {
 }
 
 /// What a spot sends on of the direct light, as a fraction of what a white tray would.
-struct Reflected {
+struct ReflectedLight {
     /// In all directions.
     diffuse: [f64; CHANNELS],
     /// Towards the camera only.
@@ -185,9 +190,9 @@ struct Reflected {
 }
 
 /// Direct light off a spot: none in shadow, more off slopes that face the projector.
-fn reflected(relief: &Relief, spot: &Spot) -> Reflected {
+fn reflected(relief: &SurfaceGrid, spot: &SurfacePoint) -> ReflectedLight {
     if relief.shaded(spot, TILT) {
-        return Reflected {
+        return ReflectedLight {
             diffuse: [0.0; CHANNELS],
             highlight: 0.0,
         };
@@ -201,21 +206,21 @@ fn reflected(relief: &Relief, spot: &Spot) -> Reflected {
     let to_projector = (1.0 + rake.dot(rake)).sqrt();
     let half = rake * (1.0 / (1.0 + to_projector));
     let aligned = (1.0 + slope.dot(half)) / (normal * (1.0 + half.dot(half)).sqrt());
-    Reflected {
+    ReflectedLight {
         diffuse: spot.albedo.map(|a| a * facing),
         highlight: spot.gloss * HIGHLIGHT * aligned.max(0.0).powf(SHININESS),
     }
 }
 
 /// One pixel's light transport function while it is being gathered.
-struct Band<'a> {
+struct WindowAccumulator<'a> {
     origin: Element,
     side: u32,
     light: Extent,
     tau: &'a mut [[f32; CHANNELS]],
 }
 
-impl Band<'_> {
+impl WindowAccumulator<'_> {
     /// Adds light from `element`, unless it is off the display or beyond the window.
     fn add(&mut self, element: Element, light: [f64; CHANNELS]) {
         let window = Extent {

@@ -1,7 +1,7 @@
 //! The glasses a window is made of.
 
-use crate::simulate::plane::{Vec2, smoothstep, vec2};
-use crate::simulate::texture::{cell_hash, layered_noise, unit_hash};
+use crate::simulate::coordinates::{Vec2, smoothstep, vec2};
+use crate::simulate::gradient_noise::{cell_hash, layered_noise, unit_hash};
 
 /// A sheet of glass, as a glazier would pick it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

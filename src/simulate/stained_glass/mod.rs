@@ -7,30 +7,30 @@
 //! Lead stops light on the camera's side, and shades the elements behind it.
 
 mod glass;
-mod window;
+mod rose;
 
 use glass::{Optics, transmittance};
-use window::{Spot, spot};
+use rose::{GlassPoint, glass_at};
 
-use super::Scene;
-use super::plane::{UnitPlane, Vec2, mix, smoothstep, vec2};
-use super::texture::{noise, unit_hash};
+use super::SimulatedScene;
+use super::coordinates::{UnitPlane, Vec2, mix, smoothstep, vec2};
+use super::gradient_noise::{noise, unit_hash};
 use crate::transport::{CHANNELS, CameraPx, Element, Geometry, LightPx};
 
 /// Samples along each side of a pixel or element when its coverage by lead is counted.
-const SAMPLES: u32 = 4;
+const SAMPLES_PER_SIDE: u32 = 4;
 /// What lead lets through to the camera: a trace of stray light.
-const LEAD: [f64; CHANNELS] = [0.0030, 0.0029, 0.0027];
+const LEAD_TRANSMITTANCE: [f64; CHANNELS] = [0.0030, 0.0029, 0.0027];
 /// Light that still gets around the lead from an element wholly behind it: the pane stands a little
 /// off the display.
-const BEHIND_LEAD: f64 = 0.50;
+const BEHIND_LEAD_SHARE: f64 = 0.50;
 /// Share of the light that the two faces do not reflect.
-const FACES: f64 = 0.97;
+const FACE_TRANSMITTANCE: f64 = 0.97;
 /// Furthest the ballistic peak moves, in elements: with its width it stays inside the window.
-const FURTHEST: f64 = 4.0;
+const MAX_DISPLACEMENT: f64 = 4.0;
 /// Width of the tail in each channel, relative to green: scattering grows with wavelength here
 /// because the blue light that would go furthest is absorbed.
-const TAIL_WIDTH: [f64; CHANNELS] = [1.14, 1.0, 0.88];
+const RELATIVE_TAIL_WIDTH: [f64; CHANNELS] = [1.14, 1.0, 0.88];
 
 /// The scene.
 #[derive(Debug)]
@@ -51,9 +51,9 @@ impl StainedGlass {
             for u in 0..geometry.light.width {
                 let corner = vec2(f64::from(u), f64::from(v));
                 let hidden = mean_over(corner, vec2(1.0, 1.0), |p| {
-                    f64::from(u8::from(spot(plane.at(p)).clearance < 0.0))
+                    f64::from(u8::from(glass_at(plane.at(p)).clearance < 0.0))
                 });
-                clear.push(mix(1.0, BEHIND_LEAD, hidden) as f32);
+                clear.push(mix(1.0, BEHIND_LEAD_SHARE, hidden) as f32);
             }
         }
         let affine = geometry.correspondence.affine;
@@ -69,14 +69,14 @@ impl StainedGlass {
     fn attenuation(&self, centre: Vec2) -> [f64; CHANNELS] {
         let mut sum = [0.0; CHANNELS];
         let corner = centre - self.pitch * 0.5;
-        each_sample(corner, self.pitch, |p| {
+        for_each_sample(corner, self.pitch, |p| {
             let p = self.plane.at(p);
-            let seen = seen_through(&spot(p), p);
+            let seen = transmitted(&glass_at(p), p);
             for c in 0..CHANNELS {
                 sum[c] += seen[c];
             }
         });
-        sum.map(|s| s / f64::from(SAMPLES * SAMPLES))
+        sum.map(|s| s / f64::from(SAMPLES_PER_SIDE * SAMPLES_PER_SIDE))
     }
 
     /// Where refraction moves the view of the point `centre` (light elements), in elements.
@@ -94,23 +94,23 @@ impl StainedGlass {
         let warp = noise(p * 1.7, 65).1;
         let d = faces * (optics.ripple * uneven / 0.9) + warp * 0.35;
         let length = d.length();
-        if length > FURTHEST {
-            d * (FURTHEST / length)
+        if length > MAX_DISPLACEMENT {
+            d * (MAX_DISPLACEMENT / length)
         } else {
             d
         }
     }
 }
 
-impl Scene for StainedGlass {
+impl SimulatedScene for StainedGlass {
     fn geometry(&self) -> &Geometry {
         &self.geometry
     }
 
-    fn function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
+    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
         let at = self.geometry.correspondence.at(pixel);
         let centre = vec2(at.u, at.v);
-        let Spot { piece, glass, .. } = spot(self.plane.at(at));
+        let GlassPoint { piece, glass, .. } = glass_at(self.plane.at(at));
         let optics = glass.optics();
         let seen = self.displacement(&optics, piece, centre);
         // How the footprint of a pixel is stretched by the slope of the displacement.
@@ -131,11 +131,11 @@ impl Scene for StainedGlass {
         // The tail has forgotten half of the way it was refracted.
         let middle = from_origin + seen * 0.5;
         let thick = 0.85 + 0.3 * unit_hash(piece, 66);
-        let ballistic = Blob::new(side, from_origin + seen, peak);
+        let ballistic = SeparableGaussian::new(side, from_origin + seen, peak);
         for c in 0..CHANNELS {
-            let wide = optics.tail * TAIL_WIDTH[c] * thick.sqrt();
-            let narrow = Blob::new(side, middle, vec2(0.5, 0.5) * wide);
-            let wide = Blob::new(side, middle, vec2(1.0, 1.0) * wide);
+            let wide = optics.tail * RELATIVE_TAIL_WIDTH[c] * thick.sqrt();
+            let narrow = SeparableGaussian::new(side, middle, vec2(0.5, 0.5) * wide);
+            let wide = SeparableGaussian::new(side, middle, vec2(1.0, 1.0) * wide);
             let straight = optics.ballistic.powf(thick);
             let scattered = 1.0 - straight;
             let parts = [
@@ -163,25 +163,25 @@ impl Scene for StainedGlass {
 }
 
 /// What the pane lets through at one point.
-fn seen_through(spot: &Spot, p: Vec2) -> [f64; CHANNELS] {
+fn transmitted(spot: &GlassPoint, p: Vec2) -> [f64; CHANNELS] {
     if spot.clearance < 0.0 {
-        return LEAD;
+        return LEAD_TRANSMITTANCE;
     }
     // Painters shade pieces towards the lead: it rounds them, and hides where the putty is.
     let shade = mix(0.72, 1.0, smoothstep(0.0, 0.013, spot.clearance));
     // The brown stops blue most.
     let paint = [0.78, 0.86, 0.92].map(|stopped| 1.0 - stopped * spot.paint);
     let glass = transmittance(&spot.glass.optics(), spot.piece, p);
-    std::array::from_fn(|c| glass[c] * paint[c] * shade * FACES)
+    std::array::from_fn(|c| glass[c] * paint[c] * shade * FACE_TRANSMITTANCE)
 }
 
 /// A Gaussian of unit weight, separated and integrated over each element of a window.
-struct Blob {
+struct SeparableGaussian {
     along_u: Vec<f64>,
     along_v: Vec<f64>,
 }
 
-impl Blob {
+impl SeparableGaussian {
     /// `centre` from the window's corner and `width` (standard deviation), in elements.
     fn new(side: usize, centre: Vec2, width: Vec2) -> Self {
         let axis = |centre: f64, width: f64| {
@@ -202,10 +202,10 @@ impl Blob {
 }
 
 /// Calls `f` at the centres of the cells of a grid over the box at `corner` of extent `size`.
-fn each_sample(corner: Vec2, size: Vec2, mut f: impl FnMut(LightPx)) {
-    let at = |i: u32| (f64::from(i) + 0.5) / f64::from(SAMPLES);
-    for j in 0..SAMPLES {
-        for i in 0..SAMPLES {
+fn for_each_sample(corner: Vec2, size: Vec2, mut f: impl FnMut(LightPx)) {
+    let at = |i: u32| (f64::from(i) + 0.5) / f64::from(SAMPLES_PER_SIDE);
+    for j in 0..SAMPLES_PER_SIDE {
+        for i in 0..SAMPLES_PER_SIDE {
             f(LightPx {
                 u: corner.x + at(i) * size.x,
                 v: corner.y + at(j) * size.y,
@@ -216,8 +216,8 @@ fn each_sample(corner: Vec2, size: Vec2, mut f: impl FnMut(LightPx)) {
 
 fn mean_over(corner: Vec2, size: Vec2, f: impl Fn(LightPx) -> f64) -> f64 {
     let mut sum = 0.0;
-    each_sample(corner, size, |p| sum += f(p));
-    sum / f64::from(SAMPLES * SAMPLES)
+    for_each_sample(corner, size, |p| sum += f(p));
+    sum / f64::from(SAMPLES_PER_SIDE * SAMPLES_PER_SIDE)
 }
 
 #[cfg(test)]
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn a_blob_has_unit_weight_at_its_place() {
-        let blob = Blob::new(15, vec2(6.3, 8.9), vec2(0.6, 1.4));
+        let blob = SeparableGaussian::new(15, vec2(6.3, 8.9), vec2(0.6, 1.4));
         for (axis, centre) in [(&blob.along_u, 6.3), (&blob.along_v, 8.9)] {
             let weight: f64 = axis.iter().sum();
             let mean: f64 = axis
@@ -255,7 +255,7 @@ mod tests {
             let area = geometry.window.area();
             for (pixel, tau) in rect.pixels().zip(functions.tau.chunks_exact(area)) {
                 let flood: f32 = tau.iter().flatten().sum::<f32>() / 3.0;
-                let clearance = spot(plane.at(geometry.correspondence.at(pixel))).clearance;
+                let clearance = glass_at(plane.at(geometry.correspondence.at(pixel))).clearance;
                 if covered(&plane, geometry, pixel) {
                     lead += 1;
                     assert!(flood < 0.004, "lead at {pixel:?} sends {flood}");
@@ -273,8 +273,8 @@ mod tests {
         let affine = geometry.correspondence.affine;
         let pitch = vec2(affine[0][0], affine[1][1]);
         let mut covered = true;
-        each_sample(vec2(at.u, at.v) - pitch * 0.5, pitch, |p| {
-            covered &= spot(plane.at(p)).clearance < 0.0;
+        for_each_sample(vec2(at.u, at.v) - pitch * 0.5, pitch, |p| {
+            covered &= glass_at(plane.at(p)).clearance < 0.0;
         });
         covered
     }

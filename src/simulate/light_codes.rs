@@ -20,14 +20,14 @@ pub(super) fn code_for(emitted: f64) -> u8 {
 
 /// 8-bit codes of every light element, row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Codes {
+pub enum LightCodes {
     /// One code for all three primaries.
     Grey(Vec<u8>),
     /// Red, green, blue.
     Rgb(Vec<[u8; 3]>),
 }
 
-impl Codes {
+impl LightCodes {
     /// The same code everywhere.
     pub fn uniform(light: Extent, code: u8) -> Self {
         Self::Grey(vec![code; light.area()])
@@ -45,7 +45,7 @@ pub enum Ensemble {
 
 impl Ensemble {
     /// A pattern, drawn from `stream`.
-    pub fn draw(self, light: Extent, stream: &mut ChaCha8Rng) -> Result<Codes, NormalError> {
+    pub fn draw(self, light: Extent, stream: &mut ChaCha8Rng) -> Result<LightCodes, NormalError> {
         let codes = match self {
             Self::Gaussian => {
                 // At 0.17 the clipping takes 0.3 % of the elements.
@@ -61,13 +61,13 @@ impl Ensemble {
                 (0..light.area()).map(code).collect()
             }
         };
-        Ok(Codes::Grey(codes))
+        Ok(LightCodes::Grey(codes))
     }
 }
 
 /// One picture of the Gray code that tells every column (or row) from the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct GrayCode {
+pub struct GrayCodePattern {
     /// Whether it numbers columns (`x`) or rows (`y`).
     pub columns: bool,
     /// Bit of the Gray code, 0 the least significant.
@@ -76,7 +76,7 @@ pub struct GrayCode {
     pub inverted: bool,
 }
 
-impl GrayCode {
+impl GrayCodePattern {
     /// All pictures a light plane needs: columns then rows, most significant bit first, each
     /// followed by its inverse.
     pub fn all(light: Extent) -> Vec<Self> {
@@ -101,7 +101,7 @@ impl GrayCode {
     }
 
     /// What to show.
-    pub fn codes(self, light: Extent) -> Codes {
+    pub fn codes(self, light: Extent) -> LightCodes {
         let mut codes = Vec::with_capacity(light.area());
         for v in 0..light.height {
             for u in 0..light.width {
@@ -110,7 +110,7 @@ impl GrayCode {
                 codes.push(if on != self.inverted { 255 } else { 0 });
             }
         }
-        Codes::Grey(codes)
+        LightCodes::Grey(codes)
     }
 }
 
@@ -124,7 +124,7 @@ mod tests {
             width: 20,
             height: 3,
         };
-        let pictures: Vec<_> = GrayCode::all(light)
+        let pictures: Vec<_> = GrayCodePattern::all(light)
             .into_iter()
             .filter(|g| g.columns && !g.inverted)
             .collect();
@@ -133,9 +133,9 @@ mod tests {
             [4, 3, 2, 1, 0]
         );
         let column = |u: usize| -> Vec<u8> {
-            let code = |g: &GrayCode| match g.codes(light) {
-                Codes::Grey(c) => c[u],
-                Codes::Rgb(_) => unreachable!(),
+            let code = |g: &GrayCodePattern| match g.codes(light) {
+                LightCodes::Grey(c) => c[u],
+                LightCodes::Rgb(_) => unreachable!(),
             };
             pictures.iter().map(code).collect()
         };

@@ -1,8 +1,8 @@
 //! The lights of `truth/`: what recovery never sees and is judged by.
 
-use super::codes::{Codes, code_for};
-use super::plane::{Vec2, mix3, smoothstep, vec2};
-use super::texture::layered_noise;
+use super::coordinates::{Vec2, mix3, smoothstep, vec2};
+use super::gradient_noise::layered_noise;
+use super::light_codes::{LightCodes, code_for};
 use crate::transport::Extent;
 
 /// A light for `truth/light_NAME.png`.
@@ -42,7 +42,7 @@ impl TruthLight {
     }
 
     /// The light on a plane of the given extent, always as RGB.
-    pub fn codes(self, light: Extent) -> Codes {
+    pub fn codes(self, light: Extent) -> LightCodes {
         let shorter = light.width.min(light.height);
         let white = |on: bool| [if on { 255 } else { 0 }; 3];
         let mut codes = Vec::with_capacity(light.area());
@@ -62,7 +62,7 @@ impl TruthLight {
                 });
             }
         }
-        Codes::Rgb(codes)
+        LightCodes::Rgb(codes)
     }
 }
 
@@ -105,7 +105,7 @@ mod tests {
         };
         let all = TruthLight::ALL.map(|l| l.codes(light));
         for (i, codes) in all.iter().enumerate() {
-            let Codes::Rgb(rgb) = codes else {
+            let LightCodes::Rgb(rgb) = codes else {
                 panic!("a truth light is always RGB")
             };
             assert_eq!(rgb.len(), light.area());

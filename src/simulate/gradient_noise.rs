@@ -1,6 +1,6 @@
 //! Reproducible irregularity: hashes and gradient noise (Perlin 2002).
 
-use super::plane::{Vec2, mix, vec2};
+use super::coordinates::{Vec2, mix, vec2};
 
 /// A well mixed number from a lattice point and a seed.
 fn hash(x: i32, y: i32, seed: u32) -> u32 {

@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::simulate::plane::{Vec2, mix, mix3, smoothstep, vec2};
+use crate::simulate::coordinates::{Vec2, mix, mix3, smoothstep, vec2};
+use crate::simulate::gradient_noise::{cell_hash, layered_noise};
 use crate::simulate::shapes::{circle, fold, heart, segment, smooth_union, star, vesica};
-use crate::simulate::texture::{cell_hash, layered_noise};
 use crate::transport::CHANNELS;
 
 /// What the camera and the projector meet at a point.
@@ -19,7 +19,7 @@ pub(super) struct Surface {
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Kind {
+enum CookieKind {
     ChocolateChip,
     DarkChocolate,
     Star,
@@ -34,13 +34,13 @@ enum Kind {
 
 /// One cookie: what, where, how large and turned by how much.
 struct Cookie {
-    kind: Kind,
+    kind: CookieKind,
     middle: Vec2,
     size: f64,
     turn: f64,
 }
 
-const fn cookie(kind: Kind, x: f64, y: f64, size: f64, turn: f64) -> Cookie {
+const fn cookie(kind: CookieKind, x: f64, y: f64, size: f64, turn: f64) -> Cookie {
     Cookie {
         kind,
         middle: vec2(x, y),
@@ -50,19 +50,19 @@ const fn cookie(kind: Kind, x: f64, y: f64, size: f64, turn: f64) -> Cookie {
 }
 
 const BATCH: [Cookie; 13] = [
-    cookie(Kind::ChocolateChip, -0.56, -0.57, 0.31, 0.0),
-    cookie(Kind::Star, 0.08, -0.62, 0.30, 0.2),
-    cookie(Kind::JamHeart, 0.62, -0.60, 0.29, -0.25),
-    cookie(Kind::Ring, -0.63, 0.10, 0.25, 0.5),
-    cookie(Kind::Gingerbread, -0.02, 0.16, 0.46, 0.12),
-    cookie(Kind::DarkChocolate, 0.62, 0.04, 0.28, 1.0),
-    cookie(Kind::JamFlower, -0.55, 0.66, 0.27, 0.3),
-    cookie(Kind::Pinwheel, 0.60, 0.63, 0.29, 2.2),
-    cookie(Kind::SmallStar, 0.09, 0.80, 0.13, -0.3),
-    cookie(Kind::Leaf, -0.20, -0.30, 0.13, 0.7),
-    cookie(Kind::Leaf, 0.33, -0.27, 0.11, 2.5),
-    cookie(Kind::SmallStar, 0.31, 0.33, 0.085, 0.5),
-    cookie(Kind::SmallStar, -0.17, 0.83, 0.085, 1.1),
+    cookie(CookieKind::ChocolateChip, -0.56, -0.57, 0.31, 0.0),
+    cookie(CookieKind::Star, 0.08, -0.62, 0.30, 0.2),
+    cookie(CookieKind::JamHeart, 0.62, -0.60, 0.29, -0.25),
+    cookie(CookieKind::Ring, -0.63, 0.10, 0.25, 0.5),
+    cookie(CookieKind::Gingerbread, -0.02, 0.16, 0.46, 0.12),
+    cookie(CookieKind::DarkChocolate, 0.62, 0.04, 0.28, 1.0),
+    cookie(CookieKind::JamFlower, -0.55, 0.66, 0.27, 0.3),
+    cookie(CookieKind::Pinwheel, 0.60, 0.63, 0.29, 2.2),
+    cookie(CookieKind::SmallStar, 0.09, 0.80, 0.13, -0.3),
+    cookie(CookieKind::Leaf, -0.20, -0.30, 0.13, 0.7),
+    cookie(CookieKind::Leaf, 0.33, -0.27, 0.11, 2.5),
+    cookie(CookieKind::SmallStar, 0.31, 0.33, 0.085, 0.5),
+    cookie(CookieKind::SmallStar, -0.17, 0.83, 0.085, 1.1),
 ];
 
 const TRAY: [f64; 3] = [0.23, 0.38, 0.44];
@@ -77,7 +77,7 @@ const CHERRY: [f64; 3] = [0.70, 0.06, 0.08];
 const APRICOT: [f64; 3] = [0.93, 0.46, 0.08];
 
 /// What lies at `p`.
-pub(super) fn surface(p: Vec2) -> Surface {
+pub(super) fn surface_at(p: Vec2) -> Surface {
     let mut here = tray(p);
     for cookie in &BATCH {
         let q = p - cookie.middle;
@@ -155,42 +155,42 @@ impl Surface {
 fn bake(cookie: &Cookie, q: Vec2, p: Vec2) -> Option<Surface> {
     let s = cookie.size;
     let baked = match cookie.kind {
-        Kind::ChocolateChip => {
+        CookieKind::ChocolateChip => {
             let d = circle(q, s) + 0.02 * layered_noise(q * 6.0, 2, 75);
             chips(dough(d, 0.12, 0.72, BROWN, p), q, s, CHIP)
         }
-        Kind::DarkChocolate => {
+        CookieKind::DarkChocolate => {
             let d = circle(q, s) + 0.02 * layered_noise(q * 6.0, 2, 76);
             chips(dough(d, 0.13, 0.70, COCOA, p), q, s, ICING)
         }
-        Kind::Star => {
+        CookieKind::Star => {
             let d = star(q, 6, s, 0.60 * s) - 0.012;
             dough(d, 0.07, 0.60, BUTTER, p).sugared(p, if d < -0.03 { 0.4 } else { 0.0 })
         }
-        Kind::SmallStar => {
+        CookieKind::SmallStar => {
             let d = star(q, 5, s, 0.50 * s) - 0.010;
             let iced = d + 0.016;
             dough(d, 0.04, 0.42, BROWN, p).topped(iced, 0.08, ICING)
         }
-        Kind::JamHeart => {
+        CookieKind::JamHeart => {
             let d = scalloped(q, s, 16);
             let filling = heart(q - vec2(0.0, 0.01), 0.52 * s);
             filled(dough(d, 0.06, 0.66, BUTTER, p), filling, CHERRY, q)
         }
-        Kind::JamFlower => {
+        CookieKind::JamFlower => {
             let d = scalloped(q, s, 8);
             let filling = circle(q, 0.42 * s);
             filled(dough(d, 0.06, 0.64, BUTTER, p), filling, APRICOT, q)
         }
-        Kind::Ring => {
+        CookieKind::Ring => {
             let across = (q.length() - 0.63 * s).abs() - 0.37 * s;
             let wave = 0.018 * (q.y.atan2(q.x) * 7.0).sin();
             let icing = (q.length() - 0.63 * s).abs() - 0.27 * s + wave;
             let ring = dough(across, 0.085, 0.86, BROWN, p).topped(icing, 0.06, [0.92, 0.55, 0.62]);
             sprinkled(ring, q, icing)
         }
-        Kind::Gingerbread => return gingerbread(q * (1.0 / s), s, p),
-        Kind::Pinwheel => {
+        CookieKind::Gingerbread => return gingerbread(q * (1.0 / s), s, p),
+        CookieKind::Pinwheel => {
             let d = circle(q, s);
             let turn = q.y.atan2(q.x) / TAU;
             let spiral = (q.length() / (0.24 * s) - turn).rem_euclid(1.0);
@@ -201,7 +201,7 @@ fn bake(cookie: &Cookie, q: Vec2, p: Vec2) -> Option<Surface> {
             wheel.height *= groove;
             wheel
         }
-        Kind::Leaf => {
+        CookieKind::Leaf => {
             let d = vesica(q, s, 0.42 * s);
             let rib = segment(q, vec2(-0.8 * s, 0.0), vec2(0.8 * s, 0.0));
             let slant = (q.x - 1.4 * q.y.abs()).rem_euclid(0.042) - 0.021;
@@ -329,7 +329,7 @@ mod tests {
         for j in 0..300 {
             for i in 0..300 {
                 let p = vec2(f64::from(i) / 150.0 - 1.0, f64::from(j) / 150.0 - 1.0);
-                let Surface { height, albedo, .. } = surface(p);
+                let Surface { height, albedo, .. } = surface_at(p);
                 assert!((0.0..=1.05).contains(&height), "height {height} at {p:?}");
                 assert!(
                     albedo.iter().all(|a| (0.0..1.2).contains(a)),

@@ -8,9 +8,9 @@
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 use super::glass::Glass;
-use crate::simulate::plane::{Vec2, smoothstep, vec2};
+use crate::simulate::coordinates::{Vec2, smoothstep, vec2};
+use crate::simulate::gradient_noise::{cell_hash, noise};
 use crate::simulate::shapes::{circle, fold, segment, smooth_union, star, vesica};
-use crate::simulate::texture::{cell_hash, noise};
 
 /// Half the width of the bars between lights that are cut from stone, of the leads that hold large
 /// parts together, and of the fine ones.
@@ -22,7 +22,7 @@ const SOLDER: f64 = 0.005;
 
 /// What is at a point of the window.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Spot {
+pub(super) struct GlassPoint {
     /// Number of the piece; the same everywhere on it.
     pub piece: u32,
     /// Its glass.
@@ -33,7 +33,7 @@ pub(super) struct Spot {
     pub paint: f64,
 }
 
-impl Spot {
+impl GlassPoint {
     fn new(piece: u32, glass: Glass) -> Self {
         Self {
             piece,
@@ -102,7 +102,7 @@ const PEARLS: f64 = 0.914;
 const FRAME: f64 = 0.940;
 
 /// What is at `p`. Pieces are numbered by part, hundreds, and place in it.
-pub(super) fn spot(p: Vec2) -> Spot {
+pub(super) fn glass_at(p: Vec2) -> GlassPoint {
     // Drawn by hand.
     let p = p + vec2(noise(p * 6.0, 52).0, noise(p * 6.0, 53).0) * 0.005;
     let r = p.length();
@@ -125,14 +125,14 @@ pub(super) fn spot(p: Vec2) -> Spot {
 }
 
 /// Twelve flaming points about a rose.
-fn sun(p: Vec2) -> Spot {
+fn sun(p: Vec2) -> GlassPoint {
     let (k, q) = fold(p, 12, 0.0);
     let (gap, _) = fold(p, 12, PI / 12.0);
     let rays = star(vec2(p.y, -p.x), 12, 0.146, 0.082);
     let (petal, l) = fold(p, 6, PI / 6.0);
     let petals = vesica(l - vec2(0.046, 0.0), 0.026, 0.017);
     let glass = [Glass::Amber, Glass::Gold][(k % 2) as usize];
-    Spot::new(10 + gap, Glass::Cobalt)
+    GlassPoint::new(10 + gap, Glass::Cobalt)
         .inlay(rays, FINE, 30 + k, glass)
         .painted(0.5 * stroke(q.y, 0.0028) * smoothstep(0.0, 0.01, -rays))
         .inlay(circle(p, 0.080), FINE, 50, Glass::Ruby)
@@ -155,15 +155,15 @@ fn lancet(q: Vec2, half: f64, head: f64, foot: f64) -> f64 {
 }
 
 /// A round of glass in the pale ground between the heads of lancets; the pieces' numbers.
-fn eyelet(p: Vec2, radius: f64, [ground, round]: [u32; 2], glass: Glass) -> Spot {
+fn eyelet(p: Vec2, radius: f64, [ground, round]: [u32; 2], glass: Glass) -> GlassPoint {
     let ring = stroke(circle(p, 0.45 * radius), 0.003);
     let edge = circle(p, radius);
-    Spot::new(ground, Glass::Pale)
+    GlassPoint::new(ground, Glass::Pale)
         .inlay(edge, FINE, round, glass)
         .painted(if edge < 0.0 { 0.5 * ring } else { 0.0 })
 }
 
-fn first_lancets(p: Vec2) -> Spot {
+fn first_lancets(p: Vec2) -> GlassPoint {
     const HEAD: f64 = 0.428;
     let (gap, g) = fold(p, 12, PI / 12.0);
     let (k, q) = fold(p, 12, 0.0);
@@ -190,7 +190,7 @@ fn first_lancets(p: Vec2) -> Spot {
     } else {
         Glass::Pale
     };
-    let border = Spot::new(220 + 40 * k + 2 * (step as u32) + side, border)
+    let border = GlassPoint::new(220 + 40 * k + 2 * (step as u32) + side, border)
         .lead((q.x / 0.058 - (q.x / 0.058).round()) * 0.058, 0.7 * FINE)
         .lead(q.y, 0.7 * FINE);
     let field = light + 0.021;
@@ -232,7 +232,7 @@ fn first_lancets(p: Vec2) -> Spot {
         .within(light)
 }
 
-fn second_lancets(p: Vec2) -> Spot {
+fn second_lancets(p: Vec2) -> GlassPoint {
     const HEAD: f64 = 0.754;
     let (gap, g) = fold(p, 24, 0.0);
     let (k, q) = fold(p, 24, PI / 24.0);
@@ -251,7 +251,7 @@ fn second_lancets(p: Vec2) -> Spot {
     // Panels one above the other, barred by leads.
     let panel = (((q.x - 0.562) / 0.0600).floor().clamp(0.0, 2.0)) as u32;
     let level = 0.562 + 0.0600 * ((q.x - 0.562) / 0.0600).round().clamp(1.0, 2.0);
-    let foot = Spot::new(1230 + 4 * k + panel, ground)
+    let foot = GlassPoint::new(1230 + 4 * k + panel, ground)
         .lead(q.x - level, 0.8 * FINE)
         .painted(diaper(q, 0.0175));
     // A lozenge in each of the lower ones.
@@ -291,13 +291,13 @@ fn second_lancets(p: Vec2) -> Spot {
         .within(light)
 }
 
-fn pearls(p: Vec2, r: f64) -> Spot {
+fn pearls(p: Vec2, r: f64) -> GlassPoint {
     const MIDDLE: f64 = 0.5 * (PEARLS + SECOND) + 0.002;
     let (k, q) = fold(p, 36, 0.0);
     let (gap, g) = fold(p, 36, PI / 36.0);
     let glass = [Glass::Ruby, Glass::Cobalt][(gap % 2) as usize];
     let leaf = stroke(vesica(vec2(g.y, r - MIDDLE), 0.028, 0.008), 0.0028);
-    Spot::new(1500 + gap, glass)
+    GlassPoint::new(1500 + gap, glass)
         .painted(0.5 * leaf)
         .lead(q.y, 0.8 * FINE)
         .inlay(
@@ -308,7 +308,7 @@ fn pearls(p: Vec2, r: f64) -> Spot {
         )
 }
 
-fn corner(p: Vec2) -> Spot {
+fn corner(p: Vec2) -> GlassPoint {
     let place = u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0);
     let q = vec2(p.x.abs(), p.y.abs());
     let side = u32::from(q.x > q.y);
@@ -319,7 +319,7 @@ fn corner(p: Vec2) -> Spot {
     let c = q - vec2(0.7715, 0.7715);
     let small = h - vec2(0.537, 0.857);
     let great = circle(c, 0.158);
-    let ground = Spot::new(1860 + side_place, Glass::Cobalt)
+    let ground = GlassPoint::new(1860 + side_place, Glass::Cobalt)
         .lead(q.x - q.y, FINE)
         .lead(h.x, FINE);
     let stars = star(h - vec2(0.645, 0.917), 4, 0.017, 0.006);
@@ -331,7 +331,7 @@ fn corner(p: Vec2) -> Spot {
     let tail = h.x - 0.40;
     let jewel = h - vec2(0.345, 0.896);
     let ground = if tail < 0.0 {
-        Spot::new(1880 + side_place, Glass::Gold)
+        GlassPoint::new(1880 + side_place, Glass::Gold)
             .painted(foliage(vec2(h.x, h.y - 0.920), 0.036))
             .lead(h.x, FINE)
             .inlay(
@@ -381,10 +381,10 @@ fn corner(p: Vec2) -> Spot {
     if opening > 0.0 {
         // Between the foils.
         let (between, _) = fold(c, 4, PI / 4.0);
-        return Spot::new(1800 + 4 * place + between, Glass::Azure)
+        return GlassPoint::new(1800 + 4 * place + between, Glass::Azure)
             .within((2.0 * BOLD - opening).max(great + BOLD));
     }
-    Spot::new(1730 + number, Glass::Ruby)
+    GlassPoint::new(1730 + number, Glass::Ruby)
         .lead((l.y.abs() - l.x) * FRAC_1_SQRT_2, FINE)
         .painted(diaper(c, 0.018))
         .inlay(leaf, 0.8 * FINE, 1750 + number, Glass::Emerald)
@@ -403,7 +403,7 @@ fn corner(p: Vec2) -> Spot {
         .within(opening)
 }
 
-fn frame(p: Vec2) -> Spot {
+fn frame(p: Vec2) -> GlassPoint {
     const STONES: f64 = 12.0;
     let (along, side) = match (p.x.abs() > p.y.abs(), p.x > 0.0, p.y > 0.0) {
         (true, right, _) => (p.y, u32::from(right)),
@@ -411,7 +411,7 @@ fn frame(p: Vec2) -> Spot {
     };
     if along.abs() > FRAME {
         let place = u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0);
-        return Spot::new(700 + place, Glass::Ruby).lead(along.abs() - FRAME, FINE);
+        return GlassPoint::new(700 + place, Glass::Ruby).lead(along.abs() - FRAME, FINE);
     }
     // Long stones of two blues, short golden ones where they meet.
     let length = 2.0 * FRAME / STONES;
@@ -421,18 +421,18 @@ fn frame(p: Vec2) -> Spot {
     let from_joint = (t - t.round()) * length;
     if short < 0.0 {
         let dot = 0.55 * stroke(circle(vec2(from_joint, middle), 0.008), 0.003);
-        Spot::new(2000 + 20 * side + t.round() as u32, Glass::Gold).painted(dot)
+        GlassPoint::new(2000 + 20 * side + t.round() as u32, Glass::Gold).painted(dot)
     } else {
         let stone = (t.floor() as u32).min(STONES as u32 - 1);
         let glass = [Glass::Cobalt, Glass::Azure][(stone % 2) as usize];
         let centre = (t - t.floor() - 0.5) * length;
         let leaf = stroke(vesica(vec2(centre, middle), 0.045, 0.013), 0.0028);
-        Spot::new(710 + 20 * side + stone, glass).painted(0.5 * leaf)
+        GlassPoint::new(710 + 20 * side + stone, glass).painted(0.5 * leaf)
     }
     .lead(short, FINE)
 }
 
-fn quarries(p: Vec2) -> Spot {
+fn quarries(p: Vec2) -> GlassPoint {
     const SIDE: f64 = 0.2;
     let (a, b) = (
         (p.x + p.y) * FRAC_1_SQRT_2 / SIDE,
@@ -451,7 +451,7 @@ fn quarries(p: Vec2) -> Spot {
     let (u, v) = (a - i - 0.5, b - j - 0.5);
     let (_, q) = fold(vec2(u, v), 4, TAU / 8.0);
     let flower = stroke(vesica(q - vec2(0.16, 0.0), 0.11, 0.05), 0.012);
-    Spot::new(piece, glass)
+    GlassPoint::new(piece, glass)
         .painted(0.5 * flower)
         .lead(line(a), FINE)
         .lead(line(b), FINE)
@@ -467,9 +467,9 @@ mod tests {
         let step = 0.2 * FINE;
         for row in 0..160 {
             let y = -1.06 + f64::from(row) * 0.01327;
-            let mut before = spot(vec2(-1.2, y));
+            let mut before = glass_at(vec2(-1.2, y));
             for i in 1..(2.4 / step) as u32 {
-                let here = spot(vec2(-1.2 + f64::from(i) * step, y));
+                let here = glass_at(vec2(-1.2 + f64::from(i) * step, y));
                 if here.piece != before.piece {
                     let lead = here.clearance.min(before.clearance);
                     assert!(lead < 0.0, "{before:?} meets {here:?} at y = {y}");

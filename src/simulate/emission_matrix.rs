@@ -1,12 +1,12 @@
 //! Many lights at once: `y = pT` for every pattern while a tile's transport is at hand.
 
-use super::codes::{Codes, emission};
+use super::light_codes::{LightCodes, emission};
 use crate::transport::{CHANNELS, Extent, Geometry, TransportFunctions};
 
 /// The lights a scene is to be seen under, as emitted, laid out so that one element's emission
 /// under all lights is one run of memory: `[M, lights]`.
 #[derive(Clone, Debug)]
-pub struct Exposure {
+pub struct EmissionMatrix {
     light: Extent,
     columns: usize,
     emitted: Vec<f32>,
@@ -14,15 +14,15 @@ pub struct Exposure {
     channels: Vec<[usize; CHANNELS]>,
 }
 
-impl Exposure {
+impl EmissionMatrix {
     /// Lights for a plane of extent `light`; each must have its length.
-    pub fn new(light: Extent, lights: &[Codes]) -> Self {
+    pub fn new(light: Extent, lights: &[LightCodes]) -> Self {
         let mut channels = Vec::with_capacity(lights.len());
         let mut columns = 0;
         for codes in lights {
             match codes {
-                Codes::Grey(_) => channels.push([columns; CHANNELS]),
-                Codes::Rgb(_) => channels.push([columns, columns + 1, columns + 2]),
+                LightCodes::Grey(_) => channels.push([columns; CHANNELS]),
+                LightCodes::Rgb(_) => channels.push([columns, columns + 1, columns + 2]),
             }
             columns = channels.last().map_or(0, |c| c[CHANNELS - 1]) + 1;
         }
@@ -32,8 +32,8 @@ impl Exposure {
             for m in 0..light.area() {
                 let row = &mut emitted[m * columns..(m + 1) * columns];
                 match codes {
-                    Codes::Grey(grey) => row[channels[0]] = table[usize::from(grey[m])],
-                    Codes::Rgb(rgb) => {
+                    LightCodes::Grey(grey) => row[channels[0]] = table[usize::from(grey[m])],
+                    LightCodes::Rgb(rgb) => {
                         for (column, code) in channels.iter().zip(rgb[m]) {
                             row[*column] = table[usize::from(code)];
                         }
@@ -50,7 +50,7 @@ impl Exposure {
     }
 
     /// The tile's pixels under every light, `[lights][pixels]`, in units of the measurement.
-    pub fn expose(
+    pub fn pictures(
         &self,
         geometry: &Geometry,
         functions: &TransportFunctions,

@@ -1,7 +1,7 @@
 //! The surface sampled on a grid, so that rays can be marched over it quickly.
 
-use super::baking::surface;
-use crate::simulate::plane::{UnitPlane, Vec2, vec2};
+use super::tray::surface_at;
+use crate::simulate::coordinates::{UnitPlane, Vec2, vec2};
 use crate::transport::{CHANNELS, Extent, LightPx};
 
 /// Distance over which slopes for shading are taken, in unit coordinates: the same at every
@@ -10,7 +10,7 @@ const SLOPE_STEP: f64 = 0.008;
 
 /// Heights and colours on a grid over the light plane.
 #[derive(Debug)]
-pub(super) struct Relief {
+pub(super) struct SurfaceGrid {
     plane: UnitPlane,
     extent: Extent,
     /// Light elements from one sample to the next.
@@ -22,7 +22,7 @@ pub(super) struct Relief {
 
 /// The surface at one sample.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Spot {
+pub(super) struct SurfacePoint {
     /// Where, on the light plane.
     pub at: LightPx,
     /// Height, 1 for the tallest cookie.
@@ -35,7 +35,7 @@ pub(super) struct Spot {
     pub unit_slope: Vec2,
 }
 
-impl Relief {
+impl SurfaceGrid {
     /// Samples the surface at `extent` points, `pitch` light elements apart.
     pub fn new(light: Extent, extent: Extent, pitch: Vec2) -> Self {
         let plane = UnitPlane::new(light);
@@ -44,7 +44,7 @@ impl Relief {
         let mut glosses = Vec::with_capacity(extent.area());
         for j in 0..extent.height {
             for i in 0..extent.width {
-                let here = surface(plane.at(place(pitch, i, j)));
+                let here = surface_at(plane.at(place(pitch, i, j)));
                 heights.push(here.height as f32);
                 albedos.push(here.albedo.map(|a| a as f32));
                 glosses.push(here.gloss as f32);
@@ -66,12 +66,12 @@ impl Relief {
     }
 
     /// The surface at sample `(i, j)`.
-    pub fn spot(&self, i: u32, j: u32) -> Spot {
+    pub fn spot(&self, i: u32, j: u32) -> SurfacePoint {
         let at = place(self.pitch, i, j);
         let n = (j * self.extent.width + i) as usize;
         let p = self.plane.at(at);
-        let step = |d: Vec2| surface(p + d).height - surface(p - d).height;
-        Spot {
+        let step = |d: Vec2| surface_at(p + d).height - surface_at(p - d).height;
+        SurfacePoint {
             at,
             height: f64::from(self.heights[n]),
             albedo: self.albedos[n].map(f64::from),
@@ -93,7 +93,7 @@ impl Relief {
 
     /// Whether something stands in the way of the beam to `spot`. Beams travel by `tilt` (light
     /// elements) while they fall by 1.
-    pub fn shaded(&self, spot: &Spot, tilt: Vec2) -> bool {
+    pub fn shaded(&self, spot: &SurfacePoint, tilt: Vec2) -> bool {
         let to_sky = 1.0 - spot.height;
         let run = vec2(tilt.x / self.pitch.x, tilt.y / self.pitch.y);
         // One step a sample along the longer axis misses nothing the grid can show.
