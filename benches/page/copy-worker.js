@@ -1,4 +1,4 @@
-/** Copies its own memory: takes some where it is told how much, and copies it whenever it is told 0. */
+/** Worker that copies its own memory: a message above 0 allocates so many bytes, a message of 0 copies them. */
 
 const scope = /** @type {any} */ (globalThis);
 let from = new Uint8Array();

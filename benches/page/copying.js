@@ -1,4 +1,4 @@
-/** In the page: bytes that copying reads and writes a second, by so many workers at once. */
+/** Runs in the page. Measures memory bandwidth: bytes that `count` workers together read and write a second. */
 
 const BYTES = 1 << 28;
 const RUNS = 7;

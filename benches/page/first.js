@@ -1,10 +1,10 @@
 /**
- * How soon a photograph is there: node first.js PHOTOS REPORT.json, with the folder of the demo's photographs.
- * Over a line of 10 Mbit/s and 50 ms, with scripts and modules in the browser's cache, of which the server is
- * asked each time whether they are still the same. The photograph is not in it. Times are from the navigation,
- * and from `src` on a page that has relit a photograph before: to the first relit picture, which may be coarse,
- * and to the whole photograph. The peer is a PNG of one picture of it, by the same line: navigation to its
- * `load`.
+ * Measures the time to the first picture: node first.js PHOTOS REPORT.json, where PHOTOS is the demo's folder.
+ *
+ * The line has 10 Mbit/s and 50 ms latency. Scripts and modules are in the browser's cache and are revalidated; the
+ * photograph is not cached. Times run from the navigation, and from setting `src` on a page that has relit a
+ * photograph before, to the first relit picture, which may be coarse, and to the whole photograph. The peer is a PNG
+ * of one picture over the same line, from the navigation to its `load` event.
  */
 
 import { statSync, writeFileSync } from 'node:fs';
@@ -41,7 +41,7 @@ const server = await listen((request, response) => {
 const line = await slowLine(Number(new URL(server.url).port), LINE);
 const browser = await launchChromium();
 
-/** In the page: when there is a picture, and when all of it is there. */
+/** Runs in the page. Records the times of the first picture and of the whole photograph. */
 const watch = () => {
   const times = /** @type {any} */ ({
     began: document.readyState === 'loading' ? 0 : performance.now(),
@@ -66,12 +66,12 @@ const watch = () => {
   });
 };
 
-/** In the page. @param {() => void} watch @param {string} src */
+/** Runs in the page. Loads another photograph and returns its times. @param {() => void} watch @param {string} src */
 const begin = async (watch, src) => {
   const photo = /** @type {any} */ (document.querySelector('relightable-photo'));
   const began = performance.now();
   photo.src = src;
-  // Until it takes that up, it has the picture that it had.
+  // The element keeps its old picture until it starts to load.
   await Promise.resolve();
   watch();
   const { times } = /** @type {any} */ (globalThis);
@@ -87,7 +87,7 @@ const times = { navigation_first: [], navigation_whole: [], src_first: [], src_w
 
 try {
   const context = await browser.newContext();
-  // The first turn fills the caches.
+  // The first round fills the caches.
   for (let turn = 0; turn <= TURNS; turn += 1) {
     const page = await context.newPage();
     await page.addInitScript(watch);

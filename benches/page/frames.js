@@ -1,25 +1,25 @@
-/** In the page: an element on one back end, and how long its frames take. */
+/** Runs in the page. Shows an element on one backend and measures its frame times. */
 
 import { devices, drawCount, drawn, waitForScreen } from './hooks.js';
 
 /** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
 /** @typedef {'video' | 'torch' | 'exposure' | 'canvas'} KindName */
 
-/** Lights that frames take turns with. */
+/** Number of different lights that the frames alternate between. */
 const LIGHTS = 4;
 const FEWEST = 3;
-/** Even so few are not waited for longer than this many times as long. */
+/** Factor on a part's duration after which even too few frames are enough. */
 const LONGEST = 5;
 const MOST = 200;
-/** Frames that take longer would be drawn by less of the photograph, unless each is a motion of its own. */
+/** After slower frames the element would lower the quality, unless it rests between them. */
 const SLOW_MS = 30;
 const REST_MS = 120;
 const CANVAS = { width: 640, height: 360 };
-/** So large the element is on the page. */
+/** Width of the element on the page, in CSS pixels. */
 const SHOWN = '256px';
 
 /**
- * Puts an element into the page; settles once it shows its photograph, and rejects with its error.
+ * Adds an element to the page. Resolves when it shows its photograph, rejects with its error.
  *
  * @param {string} src
  * @param {string | null} backend
@@ -47,7 +47,7 @@ const noise = () => Math.random();
 
 /** @type {Record<KindName, (photo: RelightablePhoto) => (frame: number) => void>} */
 const KINDS = {
-  /** Every element of the light is new and coloured in each frame. */
+  /** Changes every light element, in colour, in each frame. */
   video(photo) {
     const { lightWidth: width, lightHeight: height } = /** @type {any} */ (photo.info);
     const films = Array.from({ length: LIGHTS }, () =>
@@ -60,7 +60,7 @@ const KINDS = {
       photo.lightChanged();
     };
   },
-  /** Another picture on a canvas in each frame. */
+  /** Draws another image to a source canvas in each frame. */
   canvas(photo) {
     const films = Array.from({ length: LIGHTS }, () => {
       const film = new OffscreenCanvas(CANVAS.width, CANVAS.height);
@@ -86,7 +86,7 @@ const KINDS = {
       photo.torch = { x: 0.3 + 0.04 * (frame % LIGHTS), y: 0.5 };
     };
   },
-  /** Under a light that stays: the last of those above. */
+  /** Changes the exposure under the last light of the kinds above. */
   exposure(photo) {
     return (frame) => {
       photo.exposure = 1 + 0.1 * (frame % LIGHTS);
@@ -95,9 +95,8 @@ const KINDS = {
 };
 
 /**
- * Waits until what was drawn is there. A WebGPU device says so. Of a canvas drawn in 2D, which may be a
- * graphics device's memory too, one pixel is read, and by another canvas: one that is read itself is
- * taken out of that memory by browsers.
+ * Waits until the picture is complete. A WebGPU device reports that. For other canvases, another canvas reads one
+ * pixel: browsers move a 2D canvas out of graphics memory when the page reads the canvas itself.
  *
  * @param {RelightablePhoto} photo
  */
@@ -122,8 +121,8 @@ function readPixel(canvas) {
 }
 
 /**
- * Draws frames of a kind one after the other, for so many seconds, and gives milliseconds from the change
- * until the element has drawn (`issued`), and until the picture is there too (`done`).
+ * Draws frames of a kind one after the other for some seconds. Returns milliseconds from each change until the element
+ * has drawn (`issued`) and until the picture is complete (`done`).
  *
  * @param {RelightablePhoto} photo
  * @param {KindName} name
@@ -138,7 +137,7 @@ export async function time(photo, name, seconds) {
   for (let i = 0; i < MOST; i += 1) {
     const passed = (performance.now() - start) / 1000;
     if (i >= FEWEST ? passed > seconds : passed > LONGEST * seconds) break;
-    // Another than before, the first too.
+    // Each frame differs from the one before, the first included.
     const { issued, done } = await frame(photo, change, i + 2);
     if (photo.detail !== 1)
       throw new Error(`a frame was drawn by ${photo.detail} of the components`);
@@ -166,7 +165,7 @@ async function frame(photo, change, i) {
 }
 
 /**
- * Draws so many frames, not waiting for the screen.
+ * Draws `count` frames without waiting for the screen.
  *
  * @param {RelightablePhoto} photo
  * @param {KindName} name
@@ -180,8 +179,8 @@ export async function draw(photo, name, count) {
 }
 
 /**
- * Milliseconds of a frame where several are drawn before they are waited for. About the same as one that
- * is waited for: nothing is left when the wait is over.
+ * Returns milliseconds a frame when several frames are drawn before one wait. If that is about the time of a frame with
+ * its own wait, waiting really waits.
  *
  * @param {RelightablePhoto} photo
  * @param {KindName} name
@@ -205,7 +204,7 @@ export async function timeTogether(photo, name, each) {
   return times;
 }
 
-/** Milliseconds of waiting for a picture that is there. @param {RelightablePhoto} photo */
+/** Returns milliseconds of a wait for a complete picture: the measurement's overhead. @param {RelightablePhoto} photo */
 export async function timeWaiting(photo) {
   const times = [];
   for (let i = 0; i < FEWEST; i += 1) {
@@ -217,7 +216,7 @@ export async function timeWaiting(photo) {
 }
 
 /**
- * Frames a second as the page shows them: one for each the screen asks for, where that is kept up with.
+ * Returns the frames a second that the page shows, at most one for each frame of the screen.
  *
  * @param {RelightablePhoto} photo
  * @param {KindName} name
@@ -235,7 +234,7 @@ export async function showFor(photo, name, seconds) {
   return frames / ((performance.now() - start) / 1000);
 }
 
-/** Frames that are drawn while nothing is asked for. @param {number} seconds */
+/** Counts frames that are drawn while nothing changes. @param {number} seconds */
 export async function unasked(seconds) {
   const before = drawCount();
   await new Promise((resolve) => setTimeout(resolve, 1000 * seconds));

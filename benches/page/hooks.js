@@ -1,6 +1,6 @@
 /**
- * Loaded before the element: tells when it has drawn, lets frames follow each other faster than the
- * screen, and counts what it holds. `?workers=N` makes a page believe that it has so many cores.
+ * Loaded before the element. Reports when the element has drawn, runs frames faster than the screen, and counts
+ * graphics devices and contexts. With `?workers=N` the page sees N cores.
  */
 
 /** @typedef {'webgpu' | 'webgl2' | 'cpu'} Backend */
@@ -10,15 +10,15 @@ if (workers) {
   Object.defineProperty(Navigator.prototype, 'hardwareConcurrency', { get: () => Number(workers) });
 }
 
-/** Graphics devices that were asked for; those that the browser let go are not there any more. */
+/** Live graphics devices. */
 export const devices = /** @type {Set<GPUDevice>} */ (new Set());
 const contexts = /** @type {Set<WeakRef<WebGL2RenderingContext>>} */ (new Set());
 
-/** Contexts that hold on to a device. */
+/** Number of WebGL2 contexts that are not lost. */
 export const liveContexts = () =>
   [...contexts].filter((context) => context.deref()?.isContextLost() === false).length;
 
-/** How often something was drawn, and who waits for that. */
+/** Number of drawn frames, and the callbacks that wait for the next. */
 let draws = 0;
 let waiting = /** @type {(() => void)[]} */ ([]);
 
@@ -31,11 +31,11 @@ function drew() {
   for (const tell of told) tell();
 }
 
-/** Settles once a picture is drawn: all of it, as what draws is not interrupted. */
+/** Resolves when a whole picture is drawn; drawing is never interrupted. */
 export const drawn = () => new Promise((resolve) => waiting.push(() => resolve(undefined)));
 
 /**
- * Calls `after` whenever a method has returned.
+ * Wraps a method so that `after` is called whenever it has returned.
  *
  * @param {any} type
  * @param {string} name
@@ -52,7 +52,7 @@ function watch(type, name, after) {
   };
 }
 
-/** Of the canvases that elements show; lights are read by others. @param {CanvasRenderingContext2D} context */
+/** Counts frames on canvases that elements show, not on those that read light images. @param {CanvasRenderingContext2D} context */
 const shown = ({ canvas }) => {
   if (canvas.getRootNode() instanceof ShadowRoot) drew();
 };
@@ -89,7 +89,7 @@ port1.onmessage = () => {
 const nextOnScreen = globalThis.requestAnimationFrame.bind(globalThis);
 let onScreen = true;
 
-/** Whether frames wait for the screen, as they always do in pages, or follow at once. @param {boolean} wait */
+/** Chooses whether frames wait for the screen, as in every page, or follow at once. @param {boolean} wait */
 export function waitForScreen(wait) {
   onScreen = wait;
 }

@@ -1,18 +1,18 @@
-/** A line of limited speed in front of a server: what all connections bring together, and how late. */
+/** A TCP proxy with limited bandwidth, shared by all connections, and latency. */
 
 import { once } from 'node:events';
 import { connect, createServer } from 'node:net';
 import { setTimeout as sleep } from 'node:timers/promises';
 
 /**
- * Every byte to the client passes here. A connection takes a way there and back before it carries anything.
+ * Forwards to a server on this machine. A new connection costs one round trip.
  *
  * @param {number} port of the server
- * @param {{ bytesPerSecond: number, latencyMs: number }} line latency of a way there and back
+ * @param {{ bytesPerSecond: number, latencyMs: number }} line latency of a round trip
  * @returns {Promise<{ origin: string, close: () => void }>}
  */
 export async function slowLine(port, { bytesPerSecond, latencyMs }) {
-  /** When the line is free. */
+  /** Time at which the line is free again. */
   let free = 0;
   const server = createServer((client) => {
     const upstream = connect(port, '127.0.0.1');
@@ -26,7 +26,7 @@ export async function slowLine(port, { bytesPerSecond, latencyMs }) {
     });
   });
   /**
-   * In order. What is on its way does not keep the next from setting out.
+   * Forwards bytes in order; latencies overlap.
    *
    * @param {import('node:net').Socket} from
    * @param {import('node:net').Socket} to
@@ -35,7 +35,7 @@ export async function slowLine(port, { bytesPerSecond, latencyMs }) {
   async function carry(from, to, way) {
     let last = sleep(latencyMs);
     from.on('data', (bytes) => {
-      // No more than a connection's window is under way.
+      // At most a connection's window of bytes is in flight.
       from.pause();
       const here = Promise.all([last, way(bytes.length)]);
       last = here.then(() => void (to.destroyed || to.write(bytes)));

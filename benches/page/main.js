@@ -1,32 +1,28 @@
 /**
- * Measures `<relightable-photo>` in Chromium: node main.js FOLDER, which has photographs and what is to be
- * known of them in photos.json. Prints tables and writes FOLDER/figures.json. A second argument names
- * parts to be measured alone: `frames`, `peers`, `memory`.
+ * Measures `<relightable-photo>` in Chromium: node main.js FOLDER, where FOLDER has photographs and their description in
+ * photos.json. Prints tables and writes FOLDER/figures.json. A second argument selects parts: `frames`, `peers`,
+ * `memory`.
  *
- * A frame begins where the page changes something (`lightChanged()`, `torch`, `exposure`), and ends when
- * the picture is there. Frames follow each other without waiting for the screen: the page's
- * `requestAnimationFrame` is replaced by one that calls at once. Of the lights, "video" has every element
- * new and coloured in each frame, given as numbers; "torch" moves in each frame; "exposure" changes under a
- * torch that stays; "canvas" is another picture of 640 by 360 pixels on a canvas in each frame, whose
- * reading counts. Everything else stays as a page has it.
+ * A frame begins with a change by the page (`lightChanged()`, `torch`, `exposure`) and ends when the picture is
+ * complete. Frames do not wait for the screen: the page's `requestAnimationFrame` is replaced. "video" sets new
+ * coloured values for every light element in each frame, "torch" moves the torch, "exposure" changes the exposure under a
+ * fixed torch, and "canvas" draws another 640 by 360 image to a source canvas, whose reading counts.
  *
- * That the picture is there is told for WebGPU by `onSubmittedWorkDone` of the element's device; for the
- * others by one pixel of the element's canvas, which is drawn into another canvas and read there. Each
- * wait is checked: frames that are drawn eight at a time and waited for once take about as long each as
- * those that are waited for one by one, on graphics devices far longer than issuing them ("waits", below).
- * For the CPU two times are told: `handed` is until `putImageData` has returned, when the element's work
- * is done, and `done` until the browser has the pixel for another canvas, into which goes its own copying
- * to graphics memory and back. The screen is not a part of any of these. "shown" is: frames a second with
- * the page's own `requestAnimationFrame`, which asks 60 times a second at most.
+ * For WebGPU, `onSubmittedWorkDone` reports the complete picture. For the other backends, another canvas reads one pixel of
+ * the element's canvas. Each wait is checked ("waits", below): eight frames with one wait must take about eight
+ * times as long as one frame with its own wait, and on graphics devices far longer than issuing them. The CPU backend has
+ * two times: `handed` until `putImageData` has returned, when the element's work is done, and `done` until
+ * the browser has the pixel in another canvas, which includes the browser's copies to graphics memory and back. The
+ * screen is part of neither. "shown" counts frames a second with the page's own `requestAnimationFrame`, at most 60.
  *
- * Pages on a machine without a graphics processor have WebGPU and WebGL2 from a program, SwiftShader, which
- * uses the same cores. Such figures are marked as software: they are nobody's graphics processor's.
+ * Without a GPU, WebGPU and WebGL2 run on SwiftShader, a software renderer on the same cores. Such figures are marked as
+ * software and say nothing about GPUs.
  *
- * Bytes of a frame are those of the codes, each read once, and of the picture written. They are held
- * against the bytes that two workers read and write a second with `TypedArray.set`, in the same run.
+ * The bytes of a frame are the coefficients' codes, read once, and the written picture. They are compared with the bytes that
+ * two workers read and write a second with `TypedArray.set`, in the same run.
  *
- * The peer is `peers.js`. Ours lights by any picture, the peer from one direction; what both have in common
- * is what they are for: another picture for another light. It draws straight into the canvas shown.
+ * `peers.js` is the peer: a shader that draws RTI into the visible canvas. Our element relights by any light image, the peer
+ * from one direction; both draw another picture for another light.
  */
 
 import { readFileSync, writeFileSync } from 'node:fs';
@@ -40,11 +36,11 @@ import { browserVersion, inPage, isSoftware, openPage, start } from './pages.js'
 /** @typedef {{ label: string, backend: Backend, workers?: number }} Way */
 /** @typedef {{ issued: number[], done: number[] }} Times */
 
-/** All is measured so often, one after the other: a machine is rarely busy that long. */
+/** Number of rounds over all measurements: other load on the machine rarely lasts that long. */
 const TURNS = 2;
 const SECONDS = 1;
 const SHOWN_SECONDS = 2;
-/** What single things are measured on. */
+/** The photograph for single measurements. */
 const SIDE = 512;
 const RANK = 16;
 const SMALL = 128;
@@ -66,11 +62,11 @@ const parts = new Set(only.split(','));
 const photos = JSON.parse(readFileSync(join(folder, 'photos.json'), 'utf8'));
 /** @type {Record<string, number>} */
 const figures = {};
-/** Milliseconds by what was measured. @type {Map<string, Times>} */
+/** Milliseconds by photograph, backend and kind of frame. @type {Map<string, Times>} */
 const times = new Map();
-/** What draws, by back end. @type {Map<string, string>} */
+/** The graphics adapter by backend. @type {Map<string, string>} */
 const adapters = new Map();
-/** Why something could not be measured. @type {Map<string, string>} */
+/** Reasons for missing measurements. @type {Map<string, string>} */
 const failures = new Map();
 
 /** @param {Photo} photo */
@@ -86,7 +82,7 @@ function photoOf(side, rank) {
 const software = (/** @type {string} */ label) => isSoftware(adapters.get(label) ?? '');
 const marked = (/** @type {string} */ label) => (software(label) ? `${label}, software` : label);
 
-/** A program needs minutes for such a frame. @param {Photo} photo @param {string} label */
+/** Software renderers need minutes for such a frame. @param {Photo} photo @param {string} label */
 const tooSlow = ({ side }, label) => side > SIDE && software(label);
 const LEFT_OUT = 'left out: a program needs minutes for a frame';
 
@@ -97,7 +93,7 @@ const fastest = (/** @type {number[]} */ values) => Math.min(...values);
 const cell = (value, digits = 2) => value.toFixed(digits).padStart(9);
 
 const began = performance.now();
-/** For who waits: this takes a while. @param {string} what */
+/** Reports progress. @param {string} what */
 const progress = (what) =>
   console.error(`${((performance.now() - began) / 1000).toFixed(0)} s: ${what}`);
 
@@ -107,7 +103,7 @@ function keep(key, { issued, done }) {
   times.set(key, { issued: [...all.issued, ...issued], done: [...all.done, ...done] });
 }
 
-/** Frames of a photograph, one way. @param {Photo} photo @param {Way} way */
+/** Measures the frames of a photograph on one backend. @param {Photo} photo @param {Way} way */
 async function measure(photo, { label, backend, workers }) {
   const page = await openPage(workers ? { workers } : {});
   const name = nameOf(photo);
@@ -205,7 +201,7 @@ function showFrames(copied) {
 /** @param {number[]} values */
 const short = (values) => `${median(values).toFixed(2)} ms, fastest ${fastest(values).toFixed(2)}`;
 
-/** Whether waiting for pictures does wait. */
+/** Checks that waiting for a picture really waits. */
 async function checkWaits() {
   console.log('\nWaits, video: medians in milliseconds of a frame\n');
   const texts = ['issued', 'done', 'of eight', 'the wait'];
@@ -232,7 +228,7 @@ async function checkWaits() {
   }
 }
 
-/** What elements do as pages have them: frames on the screen, none where nothing changes, the default. */
+/** Measures elements as pages use them: frames on the screen, no frames without a change, the default backend. */
 async function showOnScreen() {
   console.log(
     '\nShown, with the page asking for frames 60 times a second; unasked: frames in a second in',
@@ -266,7 +262,7 @@ async function showOnScreen() {
   }
 }
 
-/** Which back end elements take that are not told which. */
+/** Reports the backend that elements choose by default. */
 async function showDefault() {
   const page = await openPage({});
   const chosen = await inPage(

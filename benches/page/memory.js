@@ -1,4 +1,4 @@
-/** Memory that elements take, and what of it is left when they are gone. */
+/** Measures the memory of elements, and what remains after they are removed. */
 
 import { inPage, isSoftware, openPage } from './pages.js';
 
@@ -6,12 +6,12 @@ import { inPage, isSoftware, openPage } from './pages.js';
 /** @typedef {import('./hooks.js').Backend} Backend */
 
 const FRAMES = 10_000;
-/** On a device that is a program, which takes its time. */
+/** Software renderers are slow. */
 const FEWER_FRAMES = 1000;
 const CYCLES = 200;
 const MB = 1e6;
 
-/** Memory of the WebAssembly of the page and of those of its workers that relight. @param {Page} page */
+/** Sums the WebAssembly memory of the page and of its relighting workers. @param {Page} page */
 async function modules(page) {
   /** @param {readonly string[]} loaded */
   const bytes = async (loaded) => {
@@ -38,10 +38,10 @@ async function modules(page) {
   ]);
 }
 
-/** What a page holds once garbage is collected. @param {Page} page */
+/** Counts a page's memory and objects after garbage collection. @param {Page} page */
 async function holdings(page) {
   const session = await page.context().newCDPSession(page);
-  // Twice: what the first finds is let go by the second, where it is held by the browser's own objects.
+  // Twice: objects that the browser's own objects hold are released by the second collection.
   for (let i = 0; i < 2; i += 1) await session.send('HeapProfiler.collectGarbage');
   await page.waitForTimeout(200);
   await session.send('HeapProfiler.collectGarbage');
@@ -68,7 +68,7 @@ async function holdings(page) {
 /** @typedef {Awaited<ReturnType<typeof holdings>>} Holdings */
 
 /**
- * Prints what was held first and last, and gives what came on top.
+ * Prints the first and the last holdings and returns the growth.
  *
  * @param {string} name
  * @param {Holdings} first
@@ -86,8 +86,8 @@ function report(name, first, last) {
 const short = (/** @type {number} */ value) => String(Math.round(100 * value) / 100);
 
 /**
- * WebAssembly memory with a photograph on the CPU, by two workers, over the bytes it decodes to: when it is
- * shown, and after frames of each kind.
+ * Measures the WebAssembly memory of the CPU backend with two workers, relative to the photograph's decoded bytes: when the
+ * photograph is shown, and after frames of each kind.
  *
  * @param {string} src
  * @param {string} name
@@ -117,14 +117,14 @@ async function overDecoded(src, name) {
   return figures;
 }
 
-/** In the page. @param {import('./pages.js').Modules} modules @param {'torch' | 'video'} kind */
+/** Runs in the page. @param {import('./pages.js').Modules} modules @param {'torch' | 'video'} kind */
 async function drawSome({ frames }, kind) {
   const photo = document.querySelector('relightable-photo');
   if (photo) await frames.draw(photo, kind, 20);
 }
 
 /**
- * What comes on top in many frames of a torch.
+ * Measures the growth over many frames with a moving torch.
  *
  * @param {string} src
  * @param {Backend} backend
@@ -151,7 +151,7 @@ async function overFrames(src, backend) {
 }
 
 /**
- * What comes on top when elements are made and removed again and again. None is left at either time.
+ * Measures the growth over many elements that are added and removed. None exists at either measurement.
  *
  * @param {string} src
  * @param {Backend} backend
@@ -180,8 +180,8 @@ async function overCycles(src, backend) {
 }
 
 /**
- * @param {string} small address of a photograph for many frames
- * @param {readonly { name: string, src: string }[]} held those that memory is held against
+ * @param {string} small address of a small photograph, for many frames
+ * @param {readonly { name: string, src: string }[]} held photographs whose memory is compared with their decoded size
  */
 export async function memory(small, held) {
   console.log('\nMemory, after garbage is collected, first and last:\n');

@@ -1,4 +1,4 @@
-/** One Chromium and one server for all measurements. */
+/** One Chromium and one server, shared by all measurements. */
 
 import { readFile } from 'node:fs/promises';
 import { join } from 'node:path';
@@ -11,13 +11,13 @@ import { site } from '../../www/tools/site.js';
 const HTML = `<!doctype html><html lang="en"><title>Bench</title>
 <script type="module" src="/bench/hooks.js"></script>
 <script type="module" src="/relightable-photo/relightable-photo.js"></script>`;
-/** Pages so isolated are told the time to 5 microseconds. */
+/** Cross-origin isolated pages have a clock of 5 microseconds. */
 const ISOLATED = {
   'Cross-Origin-Opener-Policy': 'same-origin',
   'Cross-Origin-Embedder-Policy': 'require-corp',
 };
 
-/** Relighters note the memory of their modules, to which there is no other way. */
+/** Makes relighting workers record their modules' memory, which is otherwise out of reach. */
 const RELIGHTER = '/relightable-photo/relightable-photo-relighter.js';
 const NOTING = `
   const memories = (globalThis.memories = []);
@@ -37,10 +37,10 @@ let origin;
 let browser;
 
 /**
- * Serves a folder's photographs, and starts the browser.
+ * Serves a folder of photographs and starts the browser.
  *
  * @param {string} photos
- * @returns {Promise<() => Promise<void>>} ends both
+ * @returns {Promise<() => Promise<void>>} stops both
  */
 export async function start(photos) {
   const serveSite = site({ photos });
@@ -69,8 +69,7 @@ export async function start(photos) {
 export const browserVersion = () => browser.version();
 
 /**
- * A page of its own; whoever opens it closes its context. With `workers`, it believes to have so many
- * cores.
+ * Opens a page in a context of its own; the caller closes the context. With `workers`, the page sees so many cores.
  *
  * @param {{ workers?: number }} options
  */
@@ -83,11 +82,11 @@ export async function openPage({ workers }) {
   return page;
 }
 
-/** Whether a graphics device is a program that makes up for a missing one. @param {string} adapter */
+/** Tells whether an adapter is a software renderer. @param {string} adapter */
 export const isSoftware = (adapter) => /swiftshader|llvmpipe|basic render/i.test(adapter);
 
 /**
- * Runs a function in a page, with the modules of this folder that are for pages.
+ * Runs a function in a page and passes it this folder's modules for pages.
  *
  * @template A, R
  * @param {import('playwright-core').Page} page

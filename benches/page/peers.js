@@ -1,22 +1,22 @@
 /**
- * In the page: what viewers of RTI do for a frame, as PTM, HSH and PCA bases of nine functions have it.
- * Each pixel has nine coefficients for red, green and blue, held as 27 bytes in seven RGBA8 layers with a
- * scale and a bias each; the light is a direction, which gives nine weights; the picture is sRGB.
+ * Runs in the page. Draws a frame as RTI viewers do for PTM, HSH and PCA with nine basis functions: each pixel has nine
+ * coefficients for red, green and blue, stored as 27 bytes in seven RGBA8 layers with a scale and a bias each. The light's
+ * direction gives nine weights; the picture is sRGB.
  *
- * A stand-in, written from the maths. It leaves out what viewers do besides: pyramids of tiles, zooming,
- * interpolation between mipmaps, specular enhancement, normals. Nothing of that is done by ours either.
+ * This is written from the equations. It omits tile pyramids, zooming, mipmap interpolation, specular enhancement and
+ * normals, none of which our element draws in this benchmark either.
  */
 
 const FUNCTIONS = 9;
 const LAYERS = 7;
-/** One vector for each layer, and the weights, padded. */
+/** Number of vectors of the uniforms: one for each layer, and the padded weights. */
 const UNIFORMS = 4 * (LAYERS + LAYERS + 3);
 const FRAMES = 4;
 const FEWEST = 5;
 const MOST = 200;
 
 /**
- * Harmonics of a hemisphere for a direction, as HSH has them.
+ * Computes the hemispherical harmonics (HSH) of a direction.
  *
  * @param {number} x
  * @param {number} y
@@ -26,7 +26,7 @@ function weights(x, y) {
   return [1, y, 2 * z - 1, x, x * y, y * z, 6 * z * z - 6 * z + 1, x * z, x * x - y * y];
 }
 
-/** Scales, biases and the weights of a frame's direction. @param {number} frame */
+/** Computes scales, biases and the weights of a frame's direction. @param {number} frame */
 function uniforms(frame) {
   const values = new Float32Array(UNIFORMS);
   values.fill(0.1, 0, 4 * LAYERS);
@@ -36,7 +36,7 @@ function uniforms(frame) {
   return values;
 }
 
-/** Bytes of a layer, of no meaning. @param {number} side */
+/** Makes a layer of arbitrary bytes. @param {number} side */
 function layer(side) {
   const bytes = new Uint8Array(4 * side * side);
   for (let at = 0; at < bytes.length; at += 1 << 16) {
@@ -45,7 +45,7 @@ function layer(side) {
   return bytes;
 }
 
-/** Sum over functions, channel after channel: value 3 k + c is function k's for channel c. */
+/** Writes the sum over basis functions; value 3 k + c belongs to function k and channel c. */
 const sums = (/** @type {string} */ weight) =>
   [0, 1, 2]
     .map((c) =>
@@ -99,7 +99,7 @@ const WGSL = `
  * @typedef {object} Peer
  * @property {string} adapter
  * @property {(frame: number) => void} draw
- * @property {() => unknown} finished settles, or returns, once what was drawn is there
+ * @property {() => unknown} finished returns or resolves when the picture is complete
  */
 
 /** @param {HTMLCanvasElement} canvas @param {number} side @returns {Peer} */

@@ -1,4 +1,4 @@
-/** What is in the packed package, and what of it can be imported, where. */
+/** Tests the tarball's files and its imports in Node, TypeScript and browsers. */
 
 import assert from 'node:assert/strict';
 import { existsSync, readFileSync, statSync, symlinkSync, writeFileSync } from 'node:fs';
@@ -11,7 +11,7 @@ import { compare } from '../../www/tools/pictures.js';
 import { glassBytes, nativePicture } from '../browser/photos.js';
 import { manifestOf, packed, REPOSITORY, run, unpacked } from './packed.js';
 
-/** Scripts that find each other by their names. */
+/** Scripts with fixed names. */
 const SCRIPTS = [
   ...['', '-controls', '-words', '-worker', '-cpu', '-gpu', '-relighter', '-sources', '-tilt'].map(
     (part) => `relightable-photo${part}`,
@@ -30,7 +30,7 @@ const EXPECTED = [
   ...MODULES.flatMap((name) => [`dist/wasm/${name}.js`, `dist/wasm/${name}.d.ts`]),
   ...BUILDS.map((name) => `dist/wasm/${name}_bg.wasm`),
 ];
-/** What scripts share, and types of all modules: no tests, no fakes. */
+/** Files whose names vary: shared chunks, and types without those of tests. */
 const ALSO = [
   /^dist\/chunk-[A-Z0-9]{8}\.js(\.map)?$/,
   /^dist\/types\/(?!.*(test|fakes))[a-z0-9/-]+\.d\.ts$/,
@@ -47,7 +47,7 @@ const packageJson = JSON.parse(readFileSync(join(place, 'package.json'), 'utf8')
 /** @param {string} file */
 const at = (file) => pathToFileURL(join(place, file)).href;
 
-test('what is packed', () => {
+test('the tarball has exactly the expected files', () => {
   const paths = packed.files.map(({ path }) => path);
   const missing = EXPECTED.filter((path) => !paths.includes(path));
   const more = paths.filter(
@@ -61,7 +61,7 @@ test('what is packed', () => {
   }
 });
 
-test('licences of what is compiled in', () => {
+test('the licences of compiled crates are included', () => {
   const text = readFileSync(join(place, 'dist/THIRD-PARTY.md'), 'utf8');
   for (const crate of ['zstd-sys', 'serde', 'web-sys', 'wasm-bindgen']) {
     assert.match(text, new RegExp(`^- ${crate} \\d`, 'm'));
@@ -71,12 +71,15 @@ test('licences of what is compiled in', () => {
   assert.match(text, /Redistribution and use in source and binary forms/);
 });
 
-test('every name in exports leads somewhere, and can be imported on a server', () => {
+test('every export exists and can be imported in Node', () => {
   const names = Object.keys(packageJson.exports).filter((name) => !name.includes('*'));
   for (const [name, target] of Object.entries(packageJson.exports)) {
     const files = typeof target === 'string' ? [target] : Object.values(target);
     for (const file of files) {
-      assert.ok(existsSync(join(place, file.replace('/*', ''))), `${name} is to be ${file}`);
+      assert.ok(
+        existsSync(join(place, file.replace('/*', ''))),
+        `${name} names the missing file ${file}`,
+      );
     }
   }
   assert.ok(existsSync(join(place, packageJson.customElements)));
@@ -104,7 +107,7 @@ test('every name in exports leads somewhere, and can be imported on a server', (
     console.log('imported');
   `;
   writeFileSync(join(folder, 'server.mjs'), script);
-  // With warnings of any kind as errors.
+  // Every warning is an error.
   const options = [
     '--throw-deprecation',
     '--no-experimental-require-module',
@@ -113,7 +116,7 @@ test('every name in exports leads somewhere, and can be imported on a server', (
   assert.equal(run(folder, process.execPath, ...options, 'server.mjs'), 'imported\n');
 });
 
-test('importing the class defines nothing, and importing the package does', () => {
+test('importing the class defines no element, importing the package does', () => {
   const script = (/** @type {string} */ specifier) => `
     const defined = [];
     globalThis.HTMLElement = class {};
@@ -133,7 +136,7 @@ test('importing the class defines nothing, and importing the package does', () =
   }
 });
 
-test('hashes for integrity attributes', () => {
+test('integrity.json has the hash of every script and module', () => {
   /** @type {Record<string, string>} */
   const table = JSON.parse(readFileSync(join(place, 'dist/integrity.json'), 'utf8'));
   const loaded = packed.files
@@ -148,7 +151,7 @@ test('hashes for integrity attributes', () => {
   }
 });
 
-test('nothing in the scripts needs more than the policy allows', () => {
+test('scripts need nothing that the content security policy forbids', () => {
   for (const { path } of packed.files) {
     if (!/^dist\/.*\.js$/.test(path)) continue;
     const text = readFileSync(join(place, path), 'utf8');
@@ -160,7 +163,7 @@ test('nothing in the scripts needs more than the policy allows', () => {
   }
 });
 
-test('types, by every way to resolve them', () => {
+test('types resolve under every moduleResolution', () => {
   const uses = `
     import { type PhotoInfo, RelightablePhoto, type RelightablePhotoEventMap } from 'relightable-photo';
     import { defineRelightablePhoto, PhotoError } from 'relightable-photo/element';
@@ -193,7 +196,7 @@ test('types, by every way to resolve them', () => {
   `;
   writeFileSync(join(folder, 'uses.mts'), uses);
   writeFileSync(join(folder, 'core.mts'), core);
-  // From CommonJS too, where only types can be had without import().
+  // CommonJS can import types only, without import().
   writeFileSync(
     join(folder, 'uses.cts'),
     `export type Photo = import('relightable-photo', { with: { 'resolution-mode': 'import' } }).RelightablePhoto;`,
@@ -223,18 +226,18 @@ test('types, by every way to resolve them', () => {
     'uses.cts',
   ]);
   check('nodenext', { ...page, module: 'nodenext' }, ['uses.mts']);
-  // Without the DOM's.
+  // Without DOM types.
   check('node', { types: ['node'], lib: ['es2022'], module: 'nodenext' }, ['core.mts']);
 });
 
-test('the manifest tells all of the element', async () => {
+test('the manifest lists every attribute, event, member, property and part', async () => {
   const { RelightablePhoto } = await import(at('dist/element.js'));
   const element = manifestOf(place);
   const names = (/** @type {{ name: string }[]} */ entries) =>
     entries.map(({ name }) => name).sort();
   /** @type {string[]} */
   const attributes = RelightablePhoto.observedAttributes;
-  // Every element of a page has a language.
+  // `lang` is an attribute of every HTML element.
   const own = attributes.filter((name) => name !== 'lang');
   assert.deepEqual(names(element.attributes), own.sort());
   const map = readFileSync(join(place, 'dist/types/element/events.d.ts'), 'utf8');
@@ -254,7 +257,7 @@ test('the manifest tells all of the element', async () => {
     assert.ok(script.includes(name), `there is no part ${name}`);
 });
 
-test('the core, in Node', async (t) => {
+test('the core decodes and relights in Node', async (t) => {
   /** @type {typeof import('../../www/src/core.js')} */
   const core = await import(at('dist/core.js'));
   const { decode, relight } = core;
@@ -282,7 +285,7 @@ test('the core, in Node', async (t) => {
     await check(photo);
   });
   await t.test('from a file', async () => check(await decode(pathToFileURL(file))));
-  await t.test('from pieces, a stream, a Blob', async () => {
+  await t.test('from an iterable, a stream, a Blob', async () => {
     async function* pieces() {
       for (let i = 0; i < glassBytes.length; i += 10_000) yield glassBytes.subarray(i, i + 10_000);
     }
@@ -320,7 +323,7 @@ test('the core, in Node', async (t) => {
     assert.ok(0 < small && small < large && large < flood);
     photo.free();
   });
-  await t.test('what goes wrong has a code', async () => {
+  await t.test('failures have codes', async () => {
     const code = (/** @type {string} */ code) => (/** @type {unknown} */ error) =>
       error instanceof core.PhotoError && error.code === code;
     await assert.rejects(decode(Buffer.from('no photograph')), code('format-magic'));
@@ -341,8 +344,8 @@ test('the core, in Node', async (t) => {
   });
 });
 
-test('the core, by code that it is given', () => {
-  // In a process of its own, as modules start once; far from the files that would be found.
+test('the core uses provided WebAssembly', () => {
+  // In a process of its own, as modules start once; without Node's file access.
   const script = `
     import { readFileSync } from 'node:fs';
     import { decode, provideWasm, relight } from 'relightable-photo/core';

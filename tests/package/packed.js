@@ -16,7 +16,7 @@ import { join } from 'node:path';
 export const REPOSITORY = join(import.meta.dirname, '../..');
 const WORK = join(REPOSITORY, 'target/package');
 
-/** Without what packages would print or send. */
+/** Keeps tools from sending telemetry and printing colours. */
 const ENVIRONMENT = { ...process.env, NEXT_TELEMETRY_DISABLED: '1', CI: '1', NO_COLOR: '1' };
 
 /** @param {string} folder @param {string} program @param {string[]} args */
@@ -48,7 +48,7 @@ function pack() {
   return { ...packed, tarball: join(WORK, packed.filename) };
 }
 
-/** What `npm publish` would send. */
+/** The tarball that `npm publish` would send. */
 export const packed = pack();
 
 /**
@@ -102,7 +102,7 @@ export function project(name) {
 }
 
 /**
- * What the manifest of an installed package says of the element.
+ * Reads the element's declaration in the manifest of an installed package.
  *
  * @param {string} place
  * @returns {import('../../www/tools/manifest.js').Declaration}

@@ -1,4 +1,4 @@
-/** Loads a built page in a browser, under the policy that the element is made for. */
+/** Loads a built page in a browser under the documented content security policy. */
 
 import { after } from 'node:test';
 import sirv from 'sirv';
@@ -8,11 +8,11 @@ import { answer } from '../../www/tools/ranges.js';
 import { listen } from '../../www/tools/serve.js';
 import { glassBytes } from '../browser/photos.js';
 
-/** What the element is made for. @param {string} scripts that may run besides */
+/** The documented policy. @param {string} scripts further sources of scripts */
 const policy = (scripts) =>
   `default-src 'none'; script-src 'self' 'wasm-unsafe-eval'${scripts}; style-src 'self'; img-src 'self'; connect-src 'self'`;
 
-/** Machines that test may be busy with something else. */
+/** Generous, as test machines may be busy. */
 const PATIENCE_MS = 120_000;
 
 const browser = await launchChromium();
@@ -26,7 +26,7 @@ after(() => browser.close());
  * @property {Record<string, unknown>} state of the element, by its properties
  * @property {string[]} workers addresses
  * @property {string[]} requests addresses
- * @property {string[]} complaints of the page: what it logged as errors, threw, or was refused
+ * @property {string[]} complaints console errors, exceptions and policy violations of the page
  * @property {string} origin
  */
 
@@ -34,8 +34,8 @@ after(() => browser.close());
  * Serves folders of a built site, opens its first page and waits until the photograph is drawn.
  *
  * @param {{ at: string, folder: string }[]} mounts
- * @param {Record<string, string>} [attributes] to set then, and to wait for what they change to
- * @param {string} [scripts] sources that the policy has besides, for what a tool writes into pages
+ * @param {Record<string, string>} [attributes] set after that; the picture is awaited again
+ * @param {string} [scripts] further sources of scripts in the policy, for a tool's inline scripts
  * @returns {Promise<Visit>}
  */
 export async function visit(mounts, attributes = {}, scripts = '') {
@@ -111,7 +111,7 @@ export async function visit(mounts, attributes = {}, scripts = '') {
 }
 
 /**
- * Opens a page that sends pixels as its title: width, height and RGBA, parted by commas.
+ * Opens a page that reports pixels in its title: width, height and RGBA, separated by commas.
  *
  * @param {{ at: string, folder: string }[]} mounts
  */

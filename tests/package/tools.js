@@ -1,4 +1,4 @@
-/** The packed package in projects of others: built by their tools, and loaded in a browser. */
+/** Builds projects that use the packed package with common tools, and loads them in a browser. */
 
 import assert from 'node:assert/strict';
 import { createHash } from 'node:crypto';
@@ -12,11 +12,11 @@ import { draw, visit } from './page.js';
 
 const SCRIPT = 'relightable-photo.js';
 
-/** What the page's photograph looks like, whoever has built the page. */
+/** The expected picture, whatever tool built the page. */
 const expected = nativePicture('torch', 'cpu');
 
 /**
- * Holds a visit against what every page has to be.
+ * Checks what every page must fulfil.
  *
  * @param {import('./page.js').Visit} visit
  */
@@ -28,7 +28,7 @@ function check({ picture, state, workers, requests, complaints, origin }) {
   assert.ok(worst <= 1, `the picture differs by ${worst}/255 from that of ltm-export`);
   assert.ok(picture.data.some((value, i) => i % 4 !== 3 && value > 100));
   const others = [...requests, ...workers].filter((url) => new URL(url).origin !== origin);
-  assert.deepEqual(others, [], 'all is of the page’s own server');
+  assert.deepEqual(others, [], 'requests to other servers');
   assert.deepEqual(
     [...requests, ...workers].filter((url) => !/^https?:/.test(url)),
     [],
@@ -39,7 +39,7 @@ function check({ picture, state, workers, requests, complaints, origin }) {
 function checkWorkers({ state, workers }) {
   assert.equal(state['activeBackend'], 'cpu');
   assert.match(String(state['kernel']), /^simd128, \d workers?$/);
-  // One that decodes and one that relights.
+  // One worker decodes, another relights.
   assert.ok(workers.length >= 2, `workers: ${workers}`);
 }
 
@@ -56,7 +56,7 @@ async function checkSite(mounts, scripts) {
 
 test('a plain script', async () => {
   const { folder, place } = unpacked();
-  // With the hash that the package tells.
+  // The integrity attribute has the hash of integrity.json.
   const hash = JSON.parse(readFileSync(join(place, 'dist/integrity.json'), 'utf8'))[SCRIPT];
   const html = readFileSync(join(import.meta.dirname, 'plain/index.html'), 'utf8');
   writeFileSync(
@@ -98,22 +98,22 @@ test('webpack', async () => {
   await checkSite([{ at: '/', folder: join(folder, 'public') }]);
 });
 
-test('Next, which renders on the server first', async () => {
+test('Next, with server rendering', async () => {
   const folder = project('next');
   run(folder, 'npm', 'run', 'build');
   const html = readFileSync(join(folder, 'out/index.html'), 'utf8');
   assert.match(html, /<relightable-photo [^>]*src="\/photos\/glass\.ltm"/);
   assert.match(html, /<relightable-photo [^>]*white-balance="1 1 1"/);
-  // Next writes a script of its own into pages, which a policy has to name by its hash.
+  // Next writes an inline script, which the policy allows by its hash.
   const mounts = [{ at: '/', folder: join(folder, 'out') }];
   const { state } = await checkSite(mounts, hashesOfScripts(html));
-  // React has taken the page over.
+  // React has hydrated the page.
   assert.equal(state['output'], 'webgl2');
-  // The types without what Next's own lack.
+  // The types compile without skipLibCheck, which Next's own types need.
   run(folder, join(folder, 'node_modules/.bin/tsc'), '-p', 'types');
 });
 
-/** What a policy has to have for the scripts that are written into a page. @param {string} html */
+/** Returns the policy's hashes of a page's inline scripts. @param {string} html */
 function hashesOfScripts(html) {
   const scripts = [...html.matchAll(/<script>(.*?)<\/script>/gs)];
   const hashes = scripts.map(([, text = '']) => createHash('sha256').update(text).digest('base64'));
