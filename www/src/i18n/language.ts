@@ -1,19 +1,29 @@
-/** The language of a place in a page. */
+/** Chooses the language of an element. */
 
-import { type Language, languageOf } from './strings.js';
+import { LANGUAGES, type Language } from './strings.js';
 
-/** By the nearest `lang`, also beyond the shadow roots it is in; then by the browser's own. */
-export function languageAt(element: Element): Language {
+/** By the nearest `lang` attribute, also outside of shadow roots, and otherwise by the browser's language. */
+export function languageOf(element: Element): Language {
   const tags = [navigator.language];
-  let at: Element | null = element;
-  while (at) {
-    const named: Element | null = at.closest('[lang]');
-    if (named) {
-      tags.unshift(named.getAttribute('lang') ?? '');
+  let current: Element | null = element;
+  while (current) {
+    const labelled: Element | null = current.closest('[lang]');
+    if (labelled) {
+      tags.unshift(labelled.getAttribute('lang') ?? '');
       break;
     }
-    const root = at.getRootNode();
-    at = root instanceof ShadowRoot ? root.host : null;
+    const root = current.getRootNode();
+    current = root instanceof ShadowRoot ? root.host : null;
   }
-  return languageOf(tags);
+  return firstSupported(tags);
+}
+
+/** The first supported language of some BCP 47 tags; English if there is none. */
+export function firstSupported(tags: readonly string[]): Language {
+  for (const tag of tags) {
+    const primary = tag.trim().toLowerCase().split(/[-_]/, 1)[0];
+    const language = LANGUAGES.find((known) => known === primary);
+    if (language) return language;
+  }
+  return 'en';
 }

@@ -1,94 +1,51 @@
-/** What the element says to visitors. English is at hand; other languages are fetched where they are needed. */
+/**
+ * The texts that visitors see or hear. English is built in; the element fetches the script of another language when a
+ * page needs it, and shows English until then.
+ */
 
-/** English, and those that there are translations to, in their order there. */
-export const LANGUAGES = ['en', 'fr', 'de', 'it', 'es', 'ja', 'zh'] as const;
+import { ENGLISH, type StringKey, type Strings } from './en.js';
 
-export type Language = (typeof LANGUAGES)[number];
+export type { StringKey } from './en.js';
 
-export const ENGLISH = {
-  light: 'Light',
-  slider: '2D slider',
-  picture: 'Picture',
-  controls: 'Controls',
-  loading: 'Loading the picture',
-  loaded: 'The picture is ready.',
-  broken: 'The picture cannot be shown.',
-  flawed: 'Something here does not work as intended.',
-  details: 'Details',
-  flood: 'Flood',
-  torch: 'Torch',
-  checkerboard: 'Checkerboard',
-  stripes: 'Stripes',
-  spectrum: 'Spectrum',
-  fire: 'Fire',
-  projection: 'Projection',
-  play: 'Play',
-  pause: 'Pause',
-  zoomIn: 'Zoom in',
-  zoomOut: 'Zoom out',
-  reset: 'Reset',
-  tilt: 'Light by tilting',
-  fullscreen: 'Full screen',
-  leaveFullscreen: 'Leave full screen',
-  reveal: 'Light it yourself',
-  // Ctrl or ⌘ comes in the place of {0}.
-  wheelHint: '{0} + scroll to zoom',
-  touchHint: 'Use two fingers to zoom and move',
-  zoomed: 'Zoom {0}×',
-  // A place, near or far, and how far across and down.
-  lightAt: 'Light from {0}, {1}, {2}',
-  lightInMiddle: 'Light in the middle',
-  near: 'near',
-  far: 'far',
-  upperLeft: 'upper left',
-  above: 'above',
-  upperRight: 'upper right',
-  left: 'left',
-  right: 'right',
-  lowerLeft: 'lower left',
-  below: 'below',
-  lowerRight: 'lower right',
+/** Written out, because bundlers need literal addresses. */
+const FETCHERS = {
+  fr: () => import('./fr.js'),
+  de: () => import('./de.js'),
+  it: () => import('./it.js'),
+  es: () => import('./es.js'),
+  ja: () => import('./ja.js'),
+  zh: () => import('./zh.js'),
 } as const;
 
-/** The name of a text. */
-export type Word = keyof typeof ENGLISH;
+type FetchedLanguage = keyof typeof FETCHERS;
 
-type Translated = Readonly<Record<Word, readonly string[]>>;
+export type Language = 'en' | FetchedLanguage;
 
-let translated: Translated | null = null;
-let fetching: Promise<void> | null = null;
-let fetched = false;
+export const LANGUAGES = ['en', ...(Object.keys(FETCHERS) as FetchedLanguage[])] as const;
 
-/** Fetches translations, once a page. Settles when they are there, or cannot be had, which leaves English. */
-export function fetchTranslations(): Promise<void> {
-  fetching ??= import('./translations.js')
-    .then(({ TRANSLATIONS }) => {
-      translated = TRANSLATIONS;
-    })
-    .catch(() => {})
-    .then(() => {
-      fetched = true;
-    });
-  return fetching;
+const strings: Partial<Record<Language, Strings>> = { en: ENGLISH };
+const fetches: Partial<Record<Language, Promise<void>>> = {};
+
+/** Whether the texts of a language are yet to be fetched. */
+export function isPending(language: Language): language is FetchedLanguage {
+  return !strings[language];
 }
 
-/** Whether a language is to be fetched yet. */
-export function isMissing(language: Language): boolean {
-  return language !== 'en' && !fetched;
+/** Fetches the texts of a language once per page. A failed fetch leaves English. */
+export function fetchStrings(language: FetchedLanguage): Promise<void> {
+  fetches[language] ??= FETCHERS[language]().then(
+    (script) => {
+      strings[language] = script.default;
+    },
+    () => {
+      strings[language] = ENGLISH;
+    },
+  );
+  return fetches[language];
 }
 
-/** A text in a language, or in English until that is there, with what comes in the places of {0}, {1}… */
-export function say(word: Word, language: Language, ...values: readonly string[]): string {
-  const text = translated?.[word][LANGUAGES.indexOf(language) - 1] ?? ENGLISH[word];
+/** A text in a language, with `values` in place of its placeholders. */
+export function t(key: StringKey, language: Language, ...values: readonly string[]): string {
+  const text = (strings[language] ?? ENGLISH)[key];
   return text.replace(/\{(\d)\}/g, (_, index: string) => values[Number(index)] ?? '');
-}
-
-/** The first of some BCP 47 tags that there are texts in; English where there is none. */
-export function languageOf(tags: readonly string[]): Language {
-  for (const tag of tags) {
-    const primary = tag.trim().toLowerCase().split(/[-_]/, 1)[0];
-    const known = LANGUAGES.find((language) => language === primary);
-    if (known) return known;
-  }
-  return 'en';
 }

@@ -1,71 +1,65 @@
-/** What goes on from frame to frame: fire, the breathing light, what glides after a drag. Knows no clock. */
+/** Runs named animations in the browser's animation frames, and requests no frame while none runs. */
 
-/** Does what is due after so many seconds; `false` once it is at its end. */
-export type Step = (seconds: number) => boolean;
+/** Advances an animation by some seconds; `false` ends it. */
+export type AnimationStep = (seconds: number) => boolean;
 
-/** After a pause, as of a page that was not shown, things go on where they were. */
-const MOST_SECONDS = 0.1;
+/** After a pause, for example in a hidden page, animations continue where they were. */
+const MAX_STEP_SECONDS = 0.1;
 
-/** See the module. */
-export class Frames {
-  readonly #nextFrame: (callback: (ms: number) => void) => void;
-  readonly #steps = new Map<string, Step>();
-  #allowed = true;
-  #asked = false;
-  #last: number | null = null;
+export class AnimationLoop {
+  readonly #requestFrame: (callback: (ms: number) => void) => void;
+  readonly #steps = new Map<string, AnimationStep>();
+  #isEnabled = true;
+  #isRequested = false;
+  #lastMs: number | null = null;
 
-  /** `nextFrame` gives milliseconds since any moment. */
-  constructor(nextFrame: (callback: (ms: number) => void) => void) {
-    this.#nextFrame = nextFrame;
+  constructor(requestFrame: (callback: (ms: number) => void) => void) {
+    this.#requestFrame = requestFrame;
   }
 
-  /** Begins what has that name, or puts it in the place of what had it; `null` ends it. */
-  set(name: string, step: Step | null): void {
+  /** Starts or replaces the animation of that name; `null` ends it. */
+  set(name: string, step: AnimationStep | null): void {
     if (step) this.#steps.set(name, step);
     else this.#steps.delete(name);
-    this.#ask();
-  }
-
-  /** As `set`, where it is not under way already. */
-  keep(name: string, step: Step): void {
-    if (!this.#steps.has(name)) this.set(name, step);
+    this.#request();
   }
 
   has(name: string): boolean {
     return this.#steps.has(name);
   }
 
-  /** Whether anyone looks. While nobody does, all of it stands still. */
-  allow(allowed: boolean): void {
-    this.#allowed = allowed;
-    this.#ask();
+  /** Suspends or resumes all animations. */
+  set isEnabled(isEnabled: boolean) {
+    this.#isEnabled = isEnabled;
+    this.#request();
   }
 
   clear(): void {
     this.#steps.clear();
   }
 
-  get #runs(): boolean {
-    return this.#allowed && this.#steps.size > 0;
+  get #isRunning(): boolean {
+    return this.#isEnabled && this.#steps.size > 0;
   }
 
-  #ask(): void {
-    if (this.#asked || !this.#runs) return;
-    this.#asked = true;
-    this.#nextFrame((ms) => {
-      this.#asked = false;
-      if (!this.#runs) {
-        this.#last = null;
-        return;
-      }
-      const seconds = Math.min(MOST_SECONDS, Math.max(0, (ms - (this.#last ?? ms)) / 1000));
-      this.#last = ms;
+  #request(): void {
+    if (this.#isRequested || !this.#isRunning) return;
+    this.#isRequested = true;
+    this.#requestFrame((ms) => this.#runFrame(ms));
+  }
+
+  #runFrame(ms: number): void {
+    this.#isRequested = false;
+    if (this.#isRunning) {
+      const elapsed = (ms - (this.#lastMs ?? ms)) / 1000;
+      const seconds = Math.min(MAX_STEP_SECONDS, Math.max(0, elapsed));
+      this.#lastMs = ms;
       for (const [name, step] of [...this.#steps]) {
-        // It may have been replaced by another in its own step.
+        // A step may replace its own animation.
         if (!step(seconds) && this.#steps.get(name) === step) this.#steps.delete(name);
       }
-      if (!this.#runs) this.#last = null;
-      this.#ask();
-    });
+    }
+    if (!this.#isRunning) this.#lastMs = null;
+    this.#request();
   }
 }

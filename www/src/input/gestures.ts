@@ -1,170 +1,165 @@
 /**
- * What pointers on the picture mean: taking the light along, panning, pinching, tapping twice. Knows no
- * DOM: it is told of pointers, in pixels of the picture's box, and tells what is to be done.
+ * Recognises gestures on the picture: moving and throwing the light, panning, pinching, double taps. Input:
+ * pointer samples in pixels of the viewport. Output: calls of a `GestureListener`. Independent of the DOM.
  */
 
-import { speed, Track, type Velocity } from './inertia.js';
+import { speedOf, type Velocity, VelocityTracker } from './inertia.js';
 
-/** A pointer as it is now. */
-export interface Pointer {
+export interface PointerSample {
   readonly id: number;
   readonly kind: 'mouse' | 'touch' | 'pen';
+  /** Viewport pixels. */
   readonly x: number;
   readonly y: number;
-  /** Milliseconds since any moment. */
+  /** Milliseconds since any origin. */
   readonly time: number;
 }
 
-/** What the picture allows now. */
-export interface Allowed {
-  /** There is a light that moves. */
-  readonly light: boolean;
-  readonly zoom: boolean;
-  /** It is magnified. */
-  readonly zoomed: boolean;
+/** Which gestures the current state permits. */
+export interface GesturePermissions {
+  readonly movesLight: boolean;
+  readonly zooms: boolean;
+  /** The picture is magnified, so that panning has an effect. */
+  readonly isZoomed: boolean;
 }
 
-/** What is to be done. */
+/** All coordinates and distances are in viewport pixels. */
 export interface GestureListener {
-  /** The light is taken to a place. */
-  light(x: number, y: number): void;
-  /** It was meant otherwise: the light goes back to where it was. */
-  undoLight(): void;
-  /** It was let go, so fast. */
+  moveLight(x: number, y: number): void;
+  /** The gesture has become a pinch: the light returns to where it was before. */
+  restoreLight(): void;
+  /** The light was released in motion; the velocity is in pixels per second. */
   throwLight(velocity: Velocity): void;
   pan(dx: number, dy: number): void;
-  /** Magnified around a place. */
+  /** Magnify by `factor` around a point. */
   zoom(factor: number, x: number, y: number): void;
-  tapTwice(x: number, y: number): void;
+  doubleTap(x: number, y: number): void;
 }
 
-/** Two taps are one gesture within so many milliseconds, */
-const TWICE_MS = 320;
-/** and so many pixels; a finger that goes farther does not tap. */
-const TAP_PIXELS = 12;
-/** Pixels a second from which on a drag that is let go is thrown. */
-const THROWN = 120;
-/** A mouse that threw the light takes it up again once it has moved so far: hands are not still. */
-const TAKES_UP = 8;
+const DOUBLE_TAP_MS = 320;
+/** A pointer that moves farther than this does not tap. */
+const MAX_TAP_PIXELS = 12;
+/** Releasing a faster drag throws the light. Pixels per second. */
+const MIN_THROW_SPEED = 120;
+/** Hands tremble: after a throw, the mouse takes the light again only after this distance. */
+const MIN_HOVER_PIXELS = 8;
 
-interface Down {
+interface PressedPointer {
   x: number;
   y: number;
   readonly startX: number;
   readonly startY: number;
   readonly pans: boolean;
-  moved: boolean;
+  hasMoved: boolean;
 }
 
-/** See the module. */
-export class Gestures {
+export class GestureRecognizer {
   readonly #listener: GestureListener;
-  readonly #down = new Map<number, Down>();
-  #track = new Track();
-  /** Two fingers were down since the last time that none was: what is left of them does nothing. */
-  #pinched = false;
-  #tapped: { readonly x: number; readonly y: number; readonly time: number } | null = null;
-  #thrownAt: { readonly x: number; readonly y: number } | null = null;
+  readonly #pressed = new Map<number, PressedPointer>();
+  #velocity = new VelocityTracker();
+  /** Two fingers were down at once; ignore the remaining finger until all are up. */
+  #hasPinched = false;
+  #lastTap: { readonly x: number; readonly y: number; readonly time: number } | null = null;
+  #throwPoint: { readonly x: number; readonly y: number } | null = null;
 
   constructor(listener: GestureListener) {
     this.#listener = listener;
   }
 
-  /** Whether a pointer holds the picture. */
-  get holds(): boolean {
-    return this.#down.size > 0;
+  get isPressed(): boolean {
+    return this.#pressed.size > 0;
   }
 
-  /** `pan`: it was asked for, by a key or another button. */
-  down({ id, x, y, time }: Pointer, allowed: Allowed, pan = false): void {
-    this.#thrownAt = null;
-    const pans = pan || !allowed.light;
-    this.#down.set(id, { x, y, startX: x, startY: y, pans, moved: false });
-    if (this.#down.size === 1) {
-      this.#pinched = false;
-      this.#track = new Track();
+  /** `forcePan`: a modifier key or another button requests panning. */
+  down({ id, x, y, time }: PointerSample, allowed: GesturePermissions, forcePan = false): void {
+    this.#throwPoint = null;
+    const pans = forcePan || !allowed.movesLight;
+    this.#pressed.set(id, { x, y, startX: x, startY: y, pans, hasMoved: false });
+    if (this.#pressed.size === 1) {
+      this.#hasPinched = false;
+      this.#velocity = new VelocityTracker();
       if (pans) return;
-      this.#track.add(x, y, time);
-      this.#listener.light(x, y);
-    } else if (allowed.zoom && !this.#pinched) {
-      this.#pinched = true;
-      this.#tapped = null;
-      const first = this.#down.values().next().value;
-      if (!first?.pans) this.#listener.undoLight();
+      this.#velocity.add(x, y, time);
+      this.#listener.moveLight(x, y);
+    } else if (allowed.zooms && !this.#hasPinched) {
+      this.#hasPinched = true;
+      this.#lastTap = null;
+      const first = this.#pressed.values().next().value;
+      if (!first?.pans) this.#listener.restoreLight();
     }
   }
 
-  move({ id, kind, x, y, time }: Pointer, allowed: Allowed): void {
-    const down = this.#down.get(id);
-    if (!down) {
-      if (kind !== 'touch' && this.#down.size === 0) this.#hover(x, y, allowed);
+  move({ id, kind, x, y, time }: PointerSample, allowed: GesturePermissions): void {
+    const pointer = this.#pressed.get(id);
+    if (!pointer) {
+      if (kind !== 'touch' && !this.isPressed) this.#hover(x, y, allowed);
       return;
     }
-    const before = this.#span();
-    const [dx, dy] = [x - down.x, y - down.y];
-    down.x = x;
-    down.y = y;
-    down.moved ||= Math.hypot(x - down.startX, y - down.startY) > TAP_PIXELS;
-    if (this.#down.size > 1 && allowed.zoom) {
-      const after = this.#span();
+    const before = this.#pinchGeometry();
+    const [dx, dy] = [x - pointer.x, y - pointer.y];
+    pointer.x = x;
+    pointer.y = y;
+    pointer.hasMoved ||= Math.hypot(x - pointer.startX, y - pointer.startY) > MAX_TAP_PIXELS;
+    if (this.#pressed.size > 1 && allowed.zooms) {
+      const after = this.#pinchGeometry();
       this.#listener.pan(after.x - before.x, after.y - before.y);
-      if (before.width > 0 && after.width > 0) {
-        this.#listener.zoom(after.width / before.width, after.x, after.y);
+      if (before.distance > 0 && after.distance > 0) {
+        this.#listener.zoom(after.distance / before.distance, after.x, after.y);
       }
-    } else if (this.#pinched) {
-      // One of two fingers was lifted first.
-    } else if (down.pans) {
-      if (allowed.zoomed) this.#listener.pan(dx, dy);
-    } else if (allowed.light && id === this.#down.keys().next().value) {
-      this.#track.add(x, y, time);
-      this.#listener.light(x, y);
+    } else if (this.#hasPinched) {
+      // Ignore the remaining finger of a pinch.
+    } else if (pointer.pans) {
+      if (allowed.isZoomed) this.#listener.pan(dx, dy);
+    } else if (allowed.movesLight && id === this.#pressed.keys().next().value) {
+      this.#velocity.add(x, y, time);
+      this.#listener.moveLight(x, y);
     }
   }
 
-  up({ id, x, y, time }: Pointer, allowed: Allowed): void {
-    const down = this.#down.get(id);
-    if (!down) return;
-    this.#down.delete(id);
-    if (this.#down.size > 0 || this.#pinched) return;
-    if (!down.moved) {
+  up({ id, x, y, time }: PointerSample, allowed: GesturePermissions): void {
+    const pointer = this.#pressed.get(id);
+    if (!pointer) return;
+    this.#pressed.delete(id);
+    if (this.isPressed || this.#hasPinched) return;
+    if (!pointer.hasMoved) {
       this.#tap(x, y, time, allowed);
       return;
     }
-    this.#tapped = null;
-    const velocity = this.#track.velocity(time);
-    if (down.pans || !allowed.light || speed(velocity) < THROWN) return;
-    this.#thrownAt = { x, y };
+    this.#lastTap = null;
+    const velocity = this.#velocity.velocityAt(time);
+    if (pointer.pans || !allowed.movesLight || speedOf(velocity) < MIN_THROW_SPEED) return;
+    this.#throwPoint = { x, y };
     this.#listener.throwLight(velocity);
   }
 
-  /** The browser has taken it for something of its own. */
+  /** The browser uses the pointer for itself, for example for scrolling. */
   cancel(id: number): void {
-    this.#down.delete(id);
-    this.#tapped = null;
+    this.#pressed.delete(id);
+    this.#lastTap = null;
   }
 
-  #hover(x: number, y: number, { light }: Allowed): void {
-    if (!light) return;
-    const from = this.#thrownAt;
-    if (from && Math.hypot(x - from.x, y - from.y) < TAKES_UP) return;
-    this.#thrownAt = null;
-    this.#listener.light(x, y);
+  #hover(x: number, y: number, { movesLight }: GesturePermissions): void {
+    if (!movesLight) return;
+    const from = this.#throwPoint;
+    if (from && Math.hypot(x - from.x, y - from.y) < MIN_HOVER_PIXELS) return;
+    this.#throwPoint = null;
+    this.#listener.moveLight(x, y);
   }
 
-  #tap(x: number, y: number, time: number, allowed: Allowed): void {
-    const before = this.#tapped;
-    const twice =
-      before &&
-      time - before.time <= TWICE_MS &&
-      Math.hypot(x - before.x, y - before.y) <= 2 * TAP_PIXELS;
-    this.#tapped = twice ? null : { x, y, time };
-    if (twice && allowed.zoom) this.#listener.tapTwice(x, y);
+  #tap(x: number, y: number, time: number, { zooms }: GesturePermissions): void {
+    const last = this.#lastTap;
+    const isDouble =
+      last &&
+      time - last.time <= DOUBLE_TAP_MS &&
+      Math.hypot(x - last.x, y - last.y) <= 2 * MAX_TAP_PIXELS;
+    this.#lastTap = isDouble ? null : { x, y, time };
+    if (isDouble && zooms) this.#listener.doubleTap(x, y);
   }
 
-  /** Of the first two pointers: what lies between them, and how far that is. */
-  #span(): { x: number; y: number; width: number } {
-    const [a, b] = [...this.#down.values()];
-    if (!a || !b) return { x: a?.x ?? 0, y: a?.y ?? 0, width: 0 };
-    return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, width: Math.hypot(a.x - b.x, a.y - b.y) };
+  /** The midpoint and distance of the first two pointers. */
+  #pinchGeometry(): { x: number; y: number; distance: number } {
+    const [a, b] = [...this.#pressed.values()];
+    if (!a || !b) return { x: a?.x ?? 0, y: a?.y ?? 0, distance: 0 };
+    return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, distance: Math.hypot(a.x - b.x, a.y - b.y) };
   }
 }

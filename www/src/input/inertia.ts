@@ -1,32 +1,34 @@
-/** What goes on gliding when a drag is let go. Distances are in any unit, times in milliseconds. */
+/**
+ * The glide after a throw. The velocity decays exponentially, v(t) = v₀ e^(−t/τ), so a throw travels v₀τ in total.
+ * Distances are in any unit; sample times are in milliseconds.
+ */
 
+/** Units per second. */
 export interface Velocity {
-  /** Units a second. */
   readonly x: number;
   readonly y: number;
 }
 
-/** What counts is how fast it was at the end, not on the whole. */
-const REMEMBERED_MS = 100;
-/** Who has held still for so long has not thrown. */
-const HELD_MS = 60;
-/** In so many seconds a glide falls to a third of its speed. */
-const TIME_CONSTANT = 0.28;
+/** The velocity at release counts, not the average of the drag. */
+const SAMPLE_WINDOW_MS = 100;
+/** A pointer that rests this long before release does not throw. */
+const MAX_REST_MS = 60;
+/** τ: the velocity falls to 37 % in this time. */
+const DECAY_SECONDS = 0.28;
 
-/** The way of a pointer, of late. */
-export class Track {
+/** Estimates a pointer's velocity from its recent samples. */
+export class VelocityTracker {
   #samples: { readonly x: number; readonly y: number; readonly time: number }[] = [];
 
   add(x: number, y: number, time: number): void {
-    this.#samples = this.#samples.filter((sample) => time - sample.time <= REMEMBERED_MS);
+    this.#samples = this.#samples.filter((sample) => time - sample.time <= SAMPLE_WINDOW_MS);
     this.#samples.push({ x, y, time });
   }
 
-  /** How fast it moves at that time. */
-  velocity(time: number): Velocity {
+  velocityAt(time: number): Velocity {
     const first = this.#samples[0];
     const last = this.#samples.at(-1);
-    if (!first || !last || time - last.time > HELD_MS || last.time - first.time <= 0) {
+    if (!first || !last || time - last.time > MAX_REST_MS || last.time - first.time <= 0) {
       return { x: 0, y: 0 };
     }
     const seconds = (last.time - first.time) / 1000;
@@ -34,17 +36,16 @@ export class Track {
   }
 }
 
-/** Where a glide is after some seconds more, and how fast it still is. */
-export function glide(velocity: Velocity, seconds: number): { moved: Velocity; left: Velocity } {
-  const kept = Math.exp(-seconds / TIME_CONSTANT);
-  const way = TIME_CONSTANT * (1 - kept);
-  return {
-    moved: { x: velocity.x * way, y: velocity.y * way },
-    left: { x: velocity.x * kept, y: velocity.y * kept },
-  };
+/** The distance travelled in `seconds`, and the velocity afterwards. */
+export function glide(
+  { x, y }: Velocity,
+  seconds: number,
+): { moved: { x: number; y: number }; velocity: Velocity } {
+  const decay = Math.exp(-seconds / DECAY_SECONDS);
+  const travel = DECAY_SECONDS * (1 - decay);
+  return { moved: { x: x * travel, y: y * travel }, velocity: { x: x * decay, y: y * decay } };
 }
 
-/** Units a second. */
-export function speed({ x, y }: Velocity): number {
+export function speedOf({ x, y }: Velocity): number {
   return Math.hypot(x, y);
 }

@@ -1,256 +1,273 @@
-/** What a visitor does, by pointer, wheel, keyboard and tilt; and what happens while nobody does anything. */
+/** Turns input by pointer, wheel, keyboard and tilt into changes of the viewer's state, and runs its animations. */
 
 import { CENTRE, type PicturePoint } from '../shared/values.js';
-import type { LightItem } from '../state/lighting.js';
-import type { Exhibit } from '../state/viewer-state.js';
+import type { LightItem } from '../state/light-state.js';
+import type { ViewerState } from '../state/viewer-state.js';
 import {
+  FULL_VIEW,
   type PhotoView,
   pan,
   toggleZoom,
   toPicture,
-  WHOLE,
   ZOOM_STEP,
   zoomAt,
 } from '../state/viewport.js';
-import type { View } from '../ui/view.js';
-import { Frames } from './animation-loop.js';
-import type { Allowed } from './gestures.js';
+import type { ShadowDom } from '../ui/shadow-dom.js';
+import { AnimationLoop } from './animation-loop.js';
+import type { GesturePermissions } from './gestures.js';
+import { IdleTimer } from './idle-timer.js';
 import type { Velocity } from './inertia.js';
-import { type Focus, type KeyAction, keyAction } from './keys.js';
-import { Movement } from './light-animator.js';
-import { Pointing } from './pointer-input.js';
-import { Tilting } from './tilt-sensor.js';
-import { Idle } from './wander.js';
+import { type FocusTarget, type KeyAction, keyAction } from './keys.js';
+import { LightAnimator } from './light-animator.js';
+import { PointerInput } from './pointer-input.js';
+import { reducedMotion } from './reduced-motion.js';
+import { isTiltSupported, TiltSensor } from './tilt-sensor.js';
 
-/** What is told. */
-export interface VisitorListener {
-  /** Something is another from now on. */
+export interface InteractionListener {
+  /** The light, an animation or the focus has changed. */
   changed(): void;
-  /** The part that is shown is another. */
-  looked(): void;
-  /** A light was chosen by a key. */
-  lightChosen(item: LightItem): void;
-  /** Escape. */
-  leave(): void;
-  /** The page scrolls where somebody may have wanted to zoom. */
-  scrolled(by: 'wheel' | 'touch'): void;
-  /** Nobody is there any more. */
+  /** The visitor has zoomed or panned. */
+  viewChanged(): void;
+  /** A key has selected another light. */
+  lightSelected(item: LightItem): void;
+  /** The visitor pressed Escape. */
+  escaped(): void;
+  /** The page scrolled where the visitor may have wanted to zoom. */
+  zoomIgnored(by: 'wheel' | 'touch'): void;
+  /** The kiosk's time without input is over. */
   expired(): void;
-  /** Anything at all was done, by a key or otherwise. */
-  touched(byKey: boolean): void;
+  /** Any input, by keyboard or otherwise. */
+  active(byKeyboard: boolean): void;
 }
 
-/** See the module. */
-export class Visitor {
-  readonly #exhibit: Exhibit;
-  readonly #listener: VisitorListener;
-  readonly #view: View;
-  readonly #pointing: Pointing;
-  readonly #tilting: Tilting;
-  readonly #frames = new Frames(requestAnimationFrame.bind(globalThis));
-  readonly #movement: Movement;
-  readonly #idle: Idle;
-  /** Somebody has done something of late, or has the light's focus. */
-  #awake = false;
-  #focused = false;
-  /** Where the torch was before a drag. */
-  #torch: PicturePoint | null = null;
+export class InteractionController {
+  readonly #state: ViewerState;
+  readonly #listener: InteractionListener;
+  readonly #dom: ShadowDom;
+  readonly #pointer: PointerInput;
+  readonly #tilt: TiltSensor;
+  readonly #loop = new AnimationLoop(requestAnimationFrame.bind(globalThis));
+  readonly #animator: LightAnimator;
+  readonly #idle: IdleTimer;
+  /** There was input recently. */
+  #isActive = false;
+  /** The torch handle has the keyboard's focus: a light that a screen reader describes must not move. */
+  #isHandleFocused = false;
+  /** The torch's position before the last move of a drag. */
+  #torchBeforeMove: PicturePoint | null = null;
 
-  constructor(root: ShadowRoot, view: View, exhibit: Exhibit, listener: VisitorListener) {
-    this.#exhibit = exhibit;
+  constructor(
+    root: ShadowRoot,
+    dom: ShadowDom,
+    state: ViewerState,
+    listener: InteractionListener,
+  ) {
+    this.#state = state;
     this.#listener = listener;
-    this.#view = view;
-    this.#movement = new Movement(exhibit.lighting, this.#frames, () => listener.changed());
-    this.#idle = new Idle(later, {
+    this.#dom = dom;
+    this.#animator = new LightAnimator(state.light, this.#loop, () => listener.changed());
+    this.#idle = new IdleTimer(delay, {
       rested: () => {
-        this.#awake = false;
+        this.#isActive = false;
         listener.changed();
       },
       expired: () => listener.expired(),
     });
-    this.#tilting = new Tilting((point) => {
-      if (!exhibit.lighting.holdsTorch) return;
-      this.touch();
-      this.#shineAt(point);
+    this.#tilt = new TiltSensor((point) => {
+      if (!state.light.isTorch) return;
+      this.markActive();
+      this.#moveTorch(point);
     });
-    this.#pointing = new Pointing(view.stage, {
-      allowed: () => this.#allowed,
-      isCooperative: () => exhibit.asked.cooperative,
-      wheel: (factor, at) => this.#look(zoomAt(exhibit.view, factor, at, exhibit.asked.zoom)),
-      scrolled: (by) => listener.scrolled(by),
-      touched: () => this.touch(),
-      pressed: () => {
-        const { handle, stage } = view;
-        (handle.hidden ? stage : handle).focus({ preventScroll: true });
-      },
-      light: (x, y) => {
-        this.#torch = exhibit.lighting.torch;
-        this.#shineAt(toPicture(exhibit.view, this.#inBox(x, y)));
-      },
-      undoLight: () => {
-        exhibit.lighting.torch = this.#torch;
-        listener.changed();
-      },
-      throwLight: (velocity) => this.#throw(velocity),
-      pan: (dx, dy) => {
-        const moved = this.#inBox(dx, dy);
-        this.#look(pan(exhibit.view, moved.x, moved.y, exhibit.asked.zoom));
-      },
-      zoom: (factor, x, y) => {
-        this.#look(zoomAt(exhibit.view, factor, this.#inBox(x, y), exhibit.asked.zoom));
-      },
-      tapTwice: (x, y) => {
-        this.#look(toggleZoom(exhibit.view, this.#inBox(x, y), exhibit.asked.zoom));
-      },
-    });
-    root.addEventListener('keydown', (event) => this.#press(event as KeyboardEvent));
-    root.addEventListener('keyup', (event) => {
-      if ((event as KeyboardEvent).key === ' ') this.#pointing.pans = false;
-    });
-    // A light that is read out stays where it is. Pressing the picture focuses it as well.
-    const focus = () => {
-      this.#focused = view.handle.matches(':focus-visible');
-      this.#pointing.pans = false;
-      listener.changed();
-    };
-    view.handle.addEventListener('focus', focus);
-    view.handle.addEventListener('blur', focus);
+    this.#pointer = this.#listenToPointer(dom);
+    this.#listenToKeyboard(root);
   }
 
-  /** Begins and ends what moves by itself. */
-  update(plays: boolean): void {
-    const { lighting, shown, asked, curtain } = this.#exhibit;
-    this.#idle.kiosk = asked.kiosk;
-    this.#frames.allow(curtain.seen);
-    const free = !this.#awake && !this.#focused && !this.#tilting.on;
-    this.#movement.update({
-      fire: plays && shown && lighting.burns,
-      breath: plays && shown && asked.breathes && lighting.holdsTorch && free,
+  /** Starts and stops animations. */
+  update(isPlaying: boolean): void {
+    const { light, isPictureShown, options, reveal } = this.#state;
+    this.#idle.kioskSeconds = options.kioskSeconds;
+    this.#loop.isEnabled = reveal.isVisible;
+    const isInUse = this.#isActive || this.#isHandleFocused || this.#tilt.isActive;
+    const isAnimated = isPlaying && isPictureShown;
+    this.#animator.update({
+      fire: isAnimated && light.isFire,
+      wander: isAnimated && options.autoplayLight && light.isTorch && !isInUse,
     });
   }
 
-  /** Somebody does something. */
-  touch(byKey = false): void {
-    this.#awake = true;
-    this.#idle.touch();
-    this.#listener.touched(byKey);
+  /** Records an input. */
+  markActive(byKeyboard = false): void {
+    this.#isActive = true;
+    this.#idle.restart();
+    this.#listener.active(byKeyboard);
   }
 
-  get tilts(): boolean {
-    return this.#tilting.on;
+  /** Whether the torch follows the device's tilt; `null` if it cannot. */
+  get isTilting(): boolean | null {
+    return this.#state.light.isTorch && isTiltSupported() ? this.#tilt.isActive : null;
   }
 
-  async tilt(): Promise<boolean> {
-    const may = await this.#tilting.request();
+  async toggleTilt(): Promise<void> {
+    if (this.#tilt.isActive) this.reset();
+    else await this.requestTilt();
+  }
+
+  /** Resolves to whether permission was granted. */
+  async requestTilt(): Promise<boolean> {
+    const isGranted = await this.#tilt.request();
     this.#listener.changed();
-    return may;
+    return isGranted;
   }
 
-  /** Puts down all that a visitor holds. */
+  /** Ends tilting, gliding and wandering. */
   reset(): void {
-    this.#tilting.stop();
-    this.#movement.hold();
-    this.#awake = false;
+    this.#tilt.stop();
+    this.#animator.stopTorch();
+    this.#isActive = false;
   }
 
-  /** Magnifies around the middle. */
+  /** Magnifies around the centre by one step. */
   zoom(by: 1 | -1): void {
-    const { view, asked } = this.#exhibit;
-    this.#look(zoomAt(view, ZOOM_STEP ** by, CENTRE, asked.zoom));
+    const { view, options } = this.#state;
+    this.#setView(zoomAt(view, ZOOM_STEP ** by, CENTRE, options.maxZoom));
   }
 
   stop(): void {
     this.reset();
     this.#idle.stop();
-    this.#frames.clear();
+    this.#loop.clear();
   }
 
-  get #allowed(): Allowed {
-    const { lighting, asked, shown, view } = this.#exhibit;
+  #listenToPointer(dom: ShadowDom): PointerInput {
+    const state = this.#state;
+    const listener = this.#listener;
+    const pointer = new PointerInput(dom.viewport, {
+      permissions: () => this.#permissions,
+      isCooperative: () => state.options.cooperativeGestures,
+      wheelZoom: (factor, at) =>
+        this.#setView(zoomAt(state.view, factor, at, state.options.maxZoom)),
+      zoomIgnored: (by) => listener.zoomIgnored(by),
+      active: () => this.markActive(),
+      pressed: () => {
+        const { handle, viewport } = dom;
+        (handle.hidden ? viewport : handle).focus({ preventScroll: true });
+      },
+      moveLight: (x, y) => {
+        this.#torchBeforeMove = state.light.torch;
+        this.#moveTorch(toPicture(state.view, pointer.toUnits(x, y)));
+      },
+      restoreLight: () => {
+        state.light.torch = this.#torchBeforeMove;
+        listener.changed();
+      },
+      throwLight: ({ x, y }: Velocity) => {
+        if (reducedMotion().matches) return;
+        const { zoom } = state.view;
+        const velocity = pointer.toUnits(x, y);
+        this.#animator.throwTorch({ x: velocity.x / zoom, y: velocity.y / zoom });
+      },
+      pan: (dx, dy) => {
+        const moved = pointer.toUnits(dx, dy);
+        this.#setView(pan(state.view, moved.x, moved.y, state.options.maxZoom));
+      },
+      zoom: (factor, x, y) =>
+        this.#setView(zoomAt(state.view, factor, pointer.toUnits(x, y), state.options.maxZoom)),
+      doubleTap: (x, y) =>
+        this.#setView(toggleZoom(state.view, pointer.toUnits(x, y), state.options.maxZoom)),
+    });
+    return pointer;
+  }
+
+  #listenToKeyboard(root: ShadowRoot): void {
+    root.addEventListener('keydown', (event) => this.#keyDown(event as KeyboardEvent));
+    root.addEventListener('keyup', (event) => {
+      if ((event as KeyboardEvent).key === ' ') this.#pointer.isPanning = false;
+    });
+    const { handle } = this.#dom;
+    const focusChanged = () => {
+      // A press with a pointer focuses the handle without :focus-visible.
+      this.#isHandleFocused = handle.matches(':focus-visible');
+      this.#pointer.isPanning = false;
+      this.#listener.changed();
+    };
+    handle.addEventListener('focus', focusChanged);
+    handle.addEventListener('blur', focusChanged);
+  }
+
+  get #permissions(): GesturePermissions {
+    const { light, options, isPictureShown, view } = this.#state;
     return {
-      light: shown && lighting.holdsTorch,
-      zoom: shown && asked.zoom > 1,
-      zoomed: view.zoom > 1,
+      movesLight: isPictureShown && light.isTorch,
+      zooms: isPictureShown && options.maxZoom > 1,
+      isZoomed: view.zoom > 1,
     };
   }
 
-  #inBox(x: number, y: number): PicturePoint {
-    const { width, height } = this.#pointing.size;
-    return { x: x / Math.max(1, width), y: y / Math.max(1, height) };
-  }
-
-  #shineAt(point: PicturePoint): void {
-    this.#movement.hold();
-    this.#exhibit.lighting.torch = point;
+  #moveTorch(point: PicturePoint): void {
+    this.#animator.stopTorch();
+    this.#state.light.torch = point;
     this.#listener.changed();
   }
 
-  #throw({ x, y }: Velocity): void {
-    if (matchMedia('(prefers-reduced-motion: reduce)').matches) return;
-    const { zoom } = this.#exhibit.view;
-    const inBox = this.#inBox(x, y);
-    this.#movement.throw({ x: inBox.x / zoom, y: inBox.y / zoom });
+  /** Returns whether the view has changed. */
+  #setView(view: PhotoView): boolean {
+    const last = this.#state.view;
+    this.#state.view = view;
+    const hasChanged = this.#state.view !== last;
+    if (hasChanged) this.#listener.viewChanged();
+    return hasChanged;
   }
 
-  /** Gives whether that is something else than before. */
-  #look(view: PhotoView): boolean {
-    const before = this.#exhibit.view;
-    this.#exhibit.view = view;
-    const other = this.#exhibit.view !== before;
-    if (other) this.#listener.looked();
-    return other;
-  }
-
-  #press(event: KeyboardEvent): void {
-    const focus = this.#focusOf(event.target);
+  #keyDown(event: KeyboardEvent): void {
+    const focus = this.#focusTarget(event.target);
     if (!focus) return;
-    this.touch(true);
+    this.markActive(true);
     if (event.key === ' ' && focus !== 'controls') {
-      this.#pointing.pans = true;
+      this.#pointer.isPanning = true;
       event.preventDefault();
       return;
     }
     const action = keyAction(event, focus);
-    if (action && this.#do(action)) event.preventDefault();
+    if (action && this.#perform(action)) event.preventDefault();
   }
 
-  #focusOf(target: EventTarget | null): Focus | null {
-    if (target === this.#view.handle) return 'light';
-    if (target === this.#view.stage) return 'picture';
-    const inControls =
+  #focusTarget(target: EventTarget | null): FocusTarget | null {
+    if (target === this.#dom.handle) return 'light';
+    if (target === this.#dom.viewport) return 'picture';
+    const isControl =
       target instanceof Element && target.closest('[role=toolbar], [role=radiogroup]');
-    return inControls ? 'controls' : null;
+    return isControl ? 'controls' : null;
   }
 
-  /** Gives whether that was the element's business. */
-  #do(action: KeyAction): boolean {
-    const { lighting, view, asked } = this.#exhibit;
-    const at = lighting.torch ?? CENTRE;
+  /** Returns whether the key was used. */
+  #perform(action: KeyAction): boolean {
+    const { light, view, options } = this.#state;
+    const torch = light.torch ?? CENTRE;
     switch (action.kind) {
-      case 'move':
-        this.#shineAt({ x: at.x + action.dx, y: at.y + action.dy });
+      case 'move-light':
+        this.#moveTorch({ x: torch.x + action.dx, y: torch.y + action.dy });
         return true;
-      case 'jump':
-        this.#shineAt({ x: action.x, y: at.y });
+      case 'set-light-x':
+        this.#moveTorch({ x: action.x, y: torch.y });
         return true;
       case 'pan':
-        return this.#look(pan(view, action.dx, action.dy, asked.zoom));
+        return this.#setView(pan(view, action.dx, action.dy, options.maxZoom));
       case 'zoom':
-        if (asked.zoom > 1) this.zoom(action.by);
-        return asked.zoom > 1;
-      case 'whole':
-        return this.#look(WHOLE);
-      case 'light':
-        this.#listener.lightChosen(this.#exhibit.step(action.by));
+        if (options.maxZoom > 1) this.zoom(action.by);
+        return options.maxZoom > 1;
+      case 'reset-view':
+        return this.#setView(FULL_VIEW);
+      case 'select-light':
+        this.#listener.lightSelected(this.#state.selectNextLight(action.by));
         return true;
-      case 'leave':
-        this.#listener.leave();
+      case 'escape':
+        this.#listener.escaped();
         return false;
     }
   }
 }
 
-function later(ms: number, callback: () => void): () => void {
+function delay(ms: number, callback: () => void): () => void {
   const timer = setTimeout(callback, ms);
   return () => clearTimeout(timer);
 }

@@ -1,9 +1,10 @@
-/** What keys do while the element has the focus. */
+/** Maps key presses to actions. Independent of the DOM. */
 
-/** What of a keyboard event counts. */
-export interface Key {
+/** The fields of a `KeyboardEvent` that count. */
+export interface KeyPress {
+  /** The character or key name. */
   readonly key: string;
-  /** Where on the keyboard it is, whatever it writes. */
+  /** The physical key, independent of the keyboard's layout. */
   readonly code: string;
   readonly shiftKey: boolean;
   readonly ctrlKey: boolean;
@@ -11,81 +12,75 @@ export interface Key {
   readonly altKey: boolean;
 }
 
-/** What a key asks for. Distances are fractions: of the picture for the light, of the box for the view. */
+/** Distances are fractions of the picture for the light, and of the viewport for panning. */
 export type KeyAction =
-  | { readonly kind: 'move'; readonly dx: number; readonly dy: number }
-  | { readonly kind: 'jump'; readonly x: 0 | 1 }
+  | { readonly kind: 'move-light'; readonly dx: number; readonly dy: number }
+  | { readonly kind: 'set-light-x'; readonly x: 0 | 1 }
   | { readonly kind: 'pan'; readonly dx: number; readonly dy: number }
   | { readonly kind: 'zoom'; readonly by: 1 | -1 }
-  | { readonly kind: 'whole' }
-  | { readonly kind: 'light'; readonly by: 1 | -1 }
-  | { readonly kind: 'leave' };
+  | { readonly kind: 'reset-view' }
+  | { readonly kind: 'select-light'; readonly by: 1 | -1 }
+  | { readonly kind: 'escape' };
 
-/** What has the focus: the light, the picture where its light does not move, or one of the controls. */
-export type Focus = 'light' | 'picture' | 'controls';
+/** The focused part: the torch handle, the picture (if no light can be moved), or the controls. */
+export type FocusTarget = 'light' | 'picture' | 'controls';
 
-const STEP = 0.05;
-const FINE = 0.01;
-const LARGE = 0.2;
-const PAN = 0.15;
+const LIGHT_STEP = 0.05;
+const FINE_LIGHT_STEP = 0.01;
+const PAGE_LIGHT_STEP = 0.2;
+const PAN_STEP = 0.15;
 
-const ARROWS: Readonly<Record<string, readonly [number, number]>> = {
+type Direction = readonly [x: number, y: number];
+
+const ARROWS: Readonly<Record<string, Direction>> = {
   ArrowLeft: [-1, 0],
   ArrowRight: [1, 0],
   ArrowUp: [0, -1],
   ArrowDown: [0, 1],
 };
 
-/** By their place: they lie as arrows do on every keyboard. */
-const PAN_CODES: Readonly<Record<string, readonly [number, number]>> = {
+/** Physical keys, which form the same cross on every layout. */
+const PAN_CODES: Readonly<Record<string, Direction>> = {
   KeyA: [-1, 0],
   KeyD: [1, 0],
   KeyW: [0, -1],
   KeyS: [0, 1],
 };
 
-/** What a key does there; `null` where it is none of the element's. */
-export function keyAction(key: Key, focus: Focus): KeyAction | null {
-  if (key.metaKey || (key.ctrlKey && !key.altKey)) return null;
-  // Many keyboards write brackets with Alt, some with Ctrl too.
-  if (key.key === '[' || key.key === ']') return { kind: 'light', by: key.key === ']' ? 1 : -1 };
-  if (key.altKey) return null;
-  return anywhere(key) ?? (focus === 'controls' ? null : onPicture(key, focus));
+/** The action of a key press; `null` if it is not the element's. */
+export function keyAction(press: KeyPress, focus: FocusTarget): KeyAction | null {
+  const { key, metaKey, ctrlKey, altKey } = press;
+  if (metaKey || (ctrlKey && !altKey)) return null;
+  // Many layouts type brackets with Alt, some with Ctrl and Alt.
+  if (key === '[' || key === ']') return { kind: 'select-light', by: key === ']' ? 1 : -1 };
+  if (altKey) return null;
+  return zoomAction(key) ?? (focus === 'controls' ? null : pictureAction(press, focus));
 }
 
-function anywhere({ key }: Key): KeyAction | null {
-  switch (key) {
-    case '+':
-    case '=':
-      return { kind: 'zoom', by: 1 };
-    case '-':
-    case '_':
-      return { kind: 'zoom', by: -1 };
-    case '0':
-      return { kind: 'whole' };
-    default:
-      return null;
-  }
+function zoomAction(key: string): KeyAction | null {
+  if (key === '+' || key === '=') return { kind: 'zoom', by: 1 };
+  if (key === '-' || key === '_') return { kind: 'zoom', by: -1 };
+  return key === '0' ? { kind: 'reset-view' } : null;
 }
 
-function onPicture({ key, code, shiftKey }: Key, focus: Focus): KeyAction | null {
+function pictureAction({ key, code, shiftKey }: KeyPress, focus: FocusTarget): KeyAction | null {
   const arrow = ARROWS[key];
-  const pans = PAN_CODES[code] ?? (focus === 'picture' ? arrow : undefined);
-  // The view goes where the key points to, so what is seen goes the other way.
-  if (pans) return { kind: 'pan', dx: -PAN * pans[0], dy: -PAN * pans[1] };
-  if (key === 'Escape') return { kind: 'leave' };
+  const pan = PAN_CODES[code] ?? (focus === 'picture' ? arrow : undefined);
+  // The view moves in the key's direction, so the picture moves the other way.
+  if (pan) return { kind: 'pan', dx: -PAN_STEP * pan[0], dy: -PAN_STEP * pan[1] };
+  if (key === 'Escape') return { kind: 'escape' };
   if (focus === 'picture') return null;
-  const step = shiftKey ? FINE : STEP;
-  if (arrow) return { kind: 'move', dx: step * arrow[0], dy: step * arrow[1] };
+  const step = shiftKey ? FINE_LIGHT_STEP : LIGHT_STEP;
+  if (arrow) return { kind: 'move-light', dx: step * arrow[0], dy: step * arrow[1] };
   switch (key) {
     case 'PageUp':
-      return { kind: 'move', dx: 0, dy: -LARGE };
+      return { kind: 'move-light', dx: 0, dy: -PAGE_LIGHT_STEP };
     case 'PageDown':
-      return { kind: 'move', dx: 0, dy: LARGE };
+      return { kind: 'move-light', dx: 0, dy: PAGE_LIGHT_STEP };
     case 'Home':
-      return { kind: 'jump', x: 0 };
+      return { kind: 'set-light-x', x: 0 };
     case 'End':
-      return { kind: 'jump', x: 1 };
+      return { kind: 'set-light-x', x: 1 };
     default:
       return null;
   }

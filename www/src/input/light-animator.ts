@@ -1,74 +1,70 @@
-/** How light moves by itself: fire, the torch that wanders, the torch that was thrown. */
+/** Animates the light: the fire, the wandering torch, the thrown torch. */
 
 import { CENTRE } from '../shared/values.js';
-import type { Lighting } from '../state/lighting.js';
-import type { Frames } from './animation-loop.js';
-import { glide, speed, type Velocity } from './inertia.js';
-import { breathe } from './wander.js';
+import type { LightState } from '../state/light-state.js';
+import type { AnimationLoop } from './animation-loop.js';
+import { glide, speedOf, type Velocity } from './inertia.js';
+import { wander } from './wander.js';
 
-/** What moves on. */
-export interface Moves {
-  readonly fire: boolean;
-  readonly breath: boolean;
-}
+/** A glide ends below this speed, in pictures per second. */
+const MIN_GLIDE_SPEED = 0.02;
 
-/** Slower than so much of the picture a second, a glide has ended. */
-const STILL = 0.02;
-
-/** See the module. */
-export class Movement {
-  readonly #lighting: Pick<Lighting, 'burn' | 'torch' | 'holdsTorch'>;
-  readonly #frames: Frames;
+export class LightAnimator {
+  readonly #light: Pick<LightState, 'advanceFire' | 'torch' | 'isTorch'>;
+  readonly #loop: AnimationLoop;
   readonly #changed: () => void;
 
   constructor(
-    lighting: Pick<Lighting, 'burn' | 'torch' | 'holdsTorch'>,
-    frames: Frames,
+    light: Pick<LightState, 'advanceFire' | 'torch' | 'isTorch'>,
+    loop: AnimationLoop,
     changed: () => void,
   ) {
-    this.#lighting = lighting;
-    this.#frames = frames;
+    this.#light = light;
+    this.#loop = loop;
     this.#changed = changed;
   }
 
-  update({ fire, breath }: Moves): void {
-    if (fire) this.#frames.keep('fire', (seconds) => this.#burn(seconds));
-    else this.#frames.set('fire', null);
-    if (!breath) this.#frames.set('breath', null);
-    else if (!this.#frames.has('breath')) this.#breathe();
+  /** Starts and stops the continuous animations. */
+  update({ fire, wander }: { readonly fire: boolean; readonly wander: boolean }): void {
+    if (!fire) this.#loop.set('fire', null);
+    else if (!this.#loop.has('fire')) this.#startFire();
+    if (!wander) this.#loop.set('wander', null);
+    else if (!this.#loop.has('wander')) this.#startWandering();
   }
 
-  /** Lets the torch glide on from where it is; so much of the picture a second. */
-  throw(velocity: Velocity): void {
-    let left = velocity;
-    this.#frames.set('glide', (seconds) => {
-      if (!this.#lighting.holdsTorch) return false;
-      const next = glide(left, seconds);
-      left = next.left;
-      const { x, y } = this.#lighting.torch ?? CENTRE;
-      this.#lighting.torch = { x: x + next.moved.x, y: y + next.moved.y };
+  /** Lets the torch glide on; the velocity is in pictures per second. */
+  throwTorch(initial: Velocity): void {
+    let velocity = initial;
+    this.#loop.set('glide', (seconds) => {
+      if (!this.#light.isTorch) return false;
+      const next = glide(velocity, seconds);
+      velocity = next.velocity;
+      const { x, y } = this.#light.torch ?? CENTRE;
+      this.#light.torch = { x: x + next.moved.x, y: y + next.moved.y };
       this.#changed();
-      return speed(left) > STILL;
+      return speedOf(velocity) > MIN_GLIDE_SPEED;
     });
   }
 
-  /** Somebody holds the torch. */
-  hold(): void {
-    this.#frames.set('glide', null);
-    this.#frames.set('breath', null);
+  /** Stops the torch where it is. */
+  stopTorch(): void {
+    this.#loop.set('glide', null);
+    this.#loop.set('wander', null);
   }
 
-  #burn(seconds: number): boolean {
-    if (this.#lighting.burn(seconds)) this.#changed();
-    return true;
+  #startFire(): void {
+    this.#loop.set('fire', (seconds) => {
+      if (this.#light.advanceFire(seconds)) this.#changed();
+      return true;
+    });
   }
 
-  #breathe(): void {
-    const from = this.#lighting.torch ?? CENTRE;
-    let passed = 0;
-    this.#frames.set('breath', (seconds) => {
-      passed += seconds;
-      this.#lighting.torch = breathe(from, passed);
+  #startWandering(): void {
+    const start = this.#light.torch ?? CENTRE;
+    let elapsed = 0;
+    this.#loop.set('wander', (seconds) => {
+      elapsed += seconds;
+      this.#light.torch = wander(start, elapsed);
       this.#changed();
       return true;
     });

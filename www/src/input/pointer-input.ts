@@ -1,118 +1,121 @@
-/** Pointers and the wheel over the picture: the browser's events, told as gestures. */
+/** Feeds the browser's pointer and wheel events over the picture to the gesture recognizer. */
 
 import type { PicturePoint } from '../shared/values.js';
 import { wheelFactor } from '../state/viewport.js';
-import { type Allowed, type GestureListener, Gestures, type Pointer } from './gestures.js';
+import {
+  type GestureListener,
+  type GesturePermissions,
+  GestureRecognizer,
+  type PointerSample,
+} from './gestures.js';
 
-/** What is told besides gestures. */
-export interface PointingListener extends GestureListener {
-  /** What the picture allows now. */
-  allowed(): Allowed;
-  /** Magnifies at a place of the box, from 0 to 1. Gives whether there was anything to be done. */
-  wheel(factor: number, at: PicturePoint): boolean;
-  /** Whether the wheel is the page's unless a key is held. */
+export interface PointerInputListener extends GestureListener {
+  permissions(): GesturePermissions;
+  /** Magnify at a viewport point, 0 to 1. Returns whether the view has changed. */
+  wheelZoom(factor: number, at: PicturePoint): boolean;
+  /** Whether the page keeps the wheel unless a modifier key is held. */
   isCooperative(): boolean;
-  /** The page scrolls where somebody may have wanted to zoom. */
-  scrolled(by: 'wheel' | 'touch'): void;
-  /** Somebody does something. */
-  touched(): void;
-  /** The picture was pressed: the keyboard follows. */
+  /** The page scrolled where the visitor may have wanted to zoom. */
+  zoomIgnored(by: 'wheel' | 'touch'): void;
+  /** Any input. */
+  active(): void;
+  /** The picture was pressed and should take the keyboard's focus. */
   pressed(): void;
 }
 
-/** With a trackpad's pinch, which browsers tell as a wheel that turns little. */
-const PINCH = 4;
+/** Browsers report a trackpad's pinch as a wheel with small steps and `ctrlKey`. */
+const PINCH_WHEEL_GAIN = 4;
 
-/** See the module. */
-export class Pointing {
-  readonly #stage: HTMLElement;
-  readonly #listener: PointingListener;
-  readonly #gestures: Gestures;
-  /** The space key is held. */
-  pans = false;
+export class PointerInput {
+  readonly #viewport: HTMLElement;
+  readonly #listener: PointerInputListener;
+  readonly #gestures: GestureRecognizer;
+  /** The space key is held: drags pan. */
+  isPanning = false;
 
-  constructor(stage: HTMLElement, listener: PointingListener) {
-    this.#stage = stage;
+  constructor(viewport: HTMLElement, listener: PointerInputListener) {
+    this.#viewport = viewport;
     this.#listener = listener;
-    this.#gestures = new Gestures(listener);
-    stage.addEventListener('pointermove', (event) => this.#move(event));
-    stage.addEventListener('pointerdown', (event) => this.#down(event));
-    stage.addEventListener('pointerup', (event) => this.#up(event));
-    stage.addEventListener('pointercancel', (event) => {
+    this.#gestures = new GestureRecognizer(listener);
+    viewport.addEventListener('pointermove', (event) => this.#move(event));
+    viewport.addEventListener('pointerdown', (event) => this.#down(event));
+    viewport.addEventListener('pointerup', (event) => this.#up(event));
+    viewport.addEventListener('pointercancel', (event) => {
       this.#gestures.cancel(event.pointerId);
-      const { zoom } = listener.allowed();
-      if (zoom && event.pointerType === 'touch') listener.scrolled('touch');
+      const { zooms } = listener.permissions();
+      if (zooms && event.pointerType === 'touch') listener.zoomIgnored('touch');
     });
-    stage.addEventListener('mousedown', (event) => {
-      if (isButton(event) || !this.#takes) return;
-      // Neither a selection begins nor the middle button's scrolling, nor does the focus go elsewhere.
+    viewport.addEventListener('mousedown', (event) => {
+      if (isOnButton(event) || !this.#isInteractive) return;
+      // Prevents a text selection, the middle button's scrolling and a change of the focus.
       event.preventDefault();
       listener.pressed();
     });
-    // Two fingers are for the picture, also where one is for the page. Touch actions cannot say so.
-    const two = (event: TouchEvent) => {
-      if (event.touches.length > 1 && event.cancelable && listener.allowed().zoom)
+    // Two fingers zoom the picture even where one finger scrolls the page; touch-action cannot express this.
+    const preventPageZoom = (event: TouchEvent) => {
+      if (event.touches.length > 1 && event.cancelable && listener.permissions().zooms)
         event.preventDefault();
     };
-    stage.addEventListener('touchstart', two, { passive: false });
-    stage.addEventListener('touchmove', two, { passive: false });
-    stage.addEventListener('wheel', (event) => this.#wheel(event), { passive: false });
+    viewport.addEventListener('touchstart', preventPageZoom, { passive: false });
+    viewport.addEventListener('touchmove', preventPageZoom, { passive: false });
+    viewport.addEventListener('wheel', (event) => this.#wheel(event), { passive: false });
   }
 
-  /** In pixels. */
-  get size(): { readonly width: number; readonly height: number } {
-    return this.#stage.getBoundingClientRect();
+  /** From viewport pixels to viewport units, 0 to 1. */
+  toUnits(x: number, y: number): PicturePoint {
+    const { width, height } = this.#viewport.getBoundingClientRect();
+    return { x: x / Math.max(1, width), y: y / Math.max(1, height) };
   }
 
-  get #takes(): boolean {
-    const { light, zoom } = this.#listener.allowed();
-    return light || zoom;
+  get #isInteractive(): boolean {
+    const { movesLight, zooms } = this.#listener.permissions();
+    return movesLight || zooms;
   }
 
   #down(event: PointerEvent): void {
-    const middle = event.button === 1;
-    if (isButton(event) || !this.#takes || (event.button !== 0 && !middle)) return;
-    this.#listener.touched();
-    const pans = middle || event.shiftKey || this.pans;
-    this.#gestures.down(this.#pointer(event), this.#listener.allowed(), pans);
-    // A drag that leaves the picture keeps the torch at its edge. (A pointer that a script made up cannot
-    // be captured.)
-    if (event.isTrusted) this.#stage.setPointerCapture(event.pointerId);
+    const isMiddle = event.button === 1;
+    if (isOnButton(event) || !this.#isInteractive || (event.button !== 0 && !isMiddle)) return;
+    this.#listener.active();
+    const forcePan = isMiddle || event.shiftKey || this.isPanning;
+    this.#gestures.down(this.#sample(event), this.#listener.permissions(), forcePan);
+    // A drag that leaves the picture continues. Pointers of synthetic events cannot be captured.
+    if (event.isTrusted) this.#viewport.setPointerCapture(event.pointerId);
   }
 
   #move(event: PointerEvent): void {
-    if (isButton(event) || !this.#takes) return;
-    this.#listener.touched();
-    this.#gestures.move(this.#pointer(event), this.#listener.allowed());
+    if (isOnButton(event) || !this.#isInteractive) return;
+    this.#listener.active();
+    this.#gestures.move(this.#sample(event), this.#listener.permissions());
   }
 
   #up(event: PointerEvent): void {
-    this.#gestures.up(this.#pointer(event), this.#listener.allowed());
+    this.#gestures.up(this.#sample(event), this.#listener.permissions());
   }
 
   #wheel(event: WheelEvent): void {
-    if (!this.#listener.allowed().zoom) return;
-    const pinch = event.ctrlKey;
-    if (this.#listener.isCooperative() && !pinch && !event.metaKey) {
-      this.#listener.scrolled('wheel');
+    if (!this.#listener.permissions().zooms) return;
+    const isPinch = event.ctrlKey;
+    if (this.#listener.isCooperative() && !isPinch && !event.metaKey) {
+      this.#listener.zoomIgnored('wheel');
       return;
     }
-    const { left, top, width, height } = this.#stage.getBoundingClientRect();
-    const at = { x: (event.clientX - left) / width, y: (event.clientY - top) / height };
-    const factor = wheelFactor(pinch ? PINCH * event.deltaY : event.deltaY, event.deltaMode);
-    this.#listener.touched();
-    // At either end the page scrolls on: nobody is caught over a picture.
-    if (this.#listener.wheel(factor, at) || pinch) event.preventDefault();
+    const { left, top } = this.#viewport.getBoundingClientRect();
+    const at = this.toUnits(event.clientX - left, event.clientY - top);
+    const delta = isPinch ? PINCH_WHEEL_GAIN * event.deltaY : event.deltaY;
+    this.#listener.active();
+    // At the smallest and largest zoom the page scrolls on, so that the picture does not trap the wheel.
+    const hasZoomed = this.#listener.wheelZoom(wheelFactor(delta, event.deltaMode), at);
+    if (hasZoomed || isPinch) event.preventDefault();
   }
 
-  #pointer({ pointerId, pointerType, clientX, clientY, timeStamp }: PointerEvent): Pointer {
-    const { left, top } = this.#stage.getBoundingClientRect();
+  #sample({ pointerId, pointerType, clientX, clientY, timeStamp }: PointerEvent): PointerSample {
+    const { left, top } = this.#viewport.getBoundingClientRect();
     const kind = pointerType === 'touch' || pointerType === 'pen' ? pointerType : 'mouse';
     return { id: pointerId, kind, x: clientX - left, y: clientY - top, time: timeStamp };
   }
 }
 
-/** The poster's button is none of the picture's business. */
-function isButton({ target }: Event): boolean {
+/** The poster's button lies over the picture and handles its own events. */
+function isOnButton({ target }: Event): boolean {
   return target instanceof Element && target.closest('button') !== null;
 }

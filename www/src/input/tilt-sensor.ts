@@ -1,46 +1,47 @@
-/** A device's tilt, where there is such a thing and the visitor allows it. */
+/** Asks for permission to read the device's orientation, and moves the torch by it. */
 
 import type { PicturePoint } from '../shared/values.js';
 
-/** Some browsers ask the visitor. */
-type Asking = { requestPermission?: () => Promise<string> };
+/** Some browsers ask the visitor for permission. */
+type PermissionRequester = { requestPermission?: () => Promise<string> };
 
-/** Whether a device is likely to tell how it is held: one for the hand. */
-export function mayTilt(): boolean {
+/** Whether the device is likely to have an orientation sensor: handheld devices. */
+export function isTiltSupported(): boolean {
   return 'DeviceOrientationEvent' in globalThis && matchMedia('(pointer: coarse)').matches;
 }
 
-/** See the module. */
-export class Tilting {
-  readonly #tell: (point: PicturePoint) => void;
+export class TiltSensor {
+  readonly #moveTorch: (point: PicturePoint) => void;
   #listening: AbortController | null = null;
 
-  constructor(tell: (point: PicturePoint) => void) {
-    this.#tell = tell;
+  constructor(moveTorch: (point: PicturePoint) => void) {
+    this.#moveTorch = moveTorch;
   }
 
-  get on(): boolean {
+  get isActive(): boolean {
     return this.#listening !== null;
   }
 
-  /** Begins, from how the device is held now. Gives whether it may. */
+  /** Starts; the current orientation is neutral. Resolves to whether permission was granted. */
   async request(): Promise<boolean> {
-    const events = (globalThis as { DeviceOrientationEvent?: Asking }).DeviceOrientationEvent;
-    if (!events) return false;
+    const { DeviceOrientationEvent: type } = globalThis as {
+      DeviceOrientationEvent?: PermissionRequester;
+    };
+    if (!type) return false;
     try {
-      const answer = (await events.requestPermission?.()) ?? 'granted';
-      if (answer !== 'granted') return false;
+      const permission = (await type.requestPermission?.()) ?? 'granted';
+      if (permission !== 'granted') return false;
     } catch {
-      // Not asked by a press of the visitor's.
+      // The browser asks only after a press.
       return false;
     }
     this.stop();
     const listening = new AbortController();
     this.#listening = listening;
     try {
-      // A script of its own, and after the question: browsers let it be asked by a press only.
-      const { followTilt } = await import('./tilt.js');
-      followTilt(this.#tell, listening.signal);
+      // A separate script, fetched after the request, which browsers accept only directly after a press.
+      const { observeTilt } = await import('./tilt.js');
+      observeTilt(this.#moveTorch, listening.signal);
     } catch {
       if (this.#listening === listening) this.stop();
     }

@@ -1,54 +1,55 @@
-/** A device that is tilted, as light: where it is held to begin with, the light is in the middle. */
+/** Maps the device's orientation to the torch's position. The initial orientation is the centre of the picture. */
 
-import { clampToPicture, type PicturePoint } from '../shared/values.js';
+import { CENTRE, clampToPicture, type PicturePoint } from '../shared/values.js';
 
-/** How a device is held, in degrees, as `deviceorientation` tells it. */
-export interface Pose {
-  /** Front to back. */
+/** In degrees, as in a `deviceorientation` event. */
+export interface DeviceAngles {
+  /** Front to back, −180 to 180. */
   readonly beta: number;
-  /** Left to right. */
+  /** Left to right, −90 to 90. */
   readonly gamma: number;
 }
 
-/** So many degrees to a side take the light to the picture's edge. */
-const REACH = 25;
-/** Of what is new in each event: hands tremble. */
-const SHARE = 0.25;
+/** The tilt that moves the torch from the centre to the edge. */
+const EDGE_DEGREES = 25;
+/** Weight of a new event in the exponential average, which smooths the tremor of hands. */
+const SMOOTHING = 0.25;
 
-/** See the module. */
-export class Tilt {
-  #rest: Pose | null = null;
-  #at: PicturePoint = { x: 0.5, y: 0.5 };
+export class TiltTracker {
+  #neutral: DeviceAngles | null = null;
+  #position: PicturePoint = CENTRE;
 
-  /** Where the light is, with the screen turned by so many degrees. */
-  turn({ beta, gamma }: Pose, screenAngle: number): PicturePoint {
-    this.#rest ??= { beta, gamma };
-    const right = difference(gamma, this.#rest.gamma, 180);
-    const down = difference(beta, this.#rest.beta, 360);
+  /** The torch's position, for a screen that is rotated by `screenAngle` degrees. */
+  update({ beta, gamma }: DeviceAngles, screenAngle: number): PicturePoint {
+    this.#neutral ??= { beta, gamma };
+    const right = angleDifference(gamma, this.#neutral.gamma, 180);
+    const down = angleDifference(beta, this.#neutral.beta, 360);
     const angle = (screenAngle * Math.PI) / 180;
     const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
-    const x = 0.5 + (right * cos + down * sin) / (2 * REACH);
-    const y = 0.5 + (down * cos - right * sin) / (2 * REACH);
-    const { x: toX, y: toY } = clampToPicture({ x, y });
-    const from = this.#at;
-    this.#at = { x: from.x + SHARE * (toX - from.x), y: from.y + SHARE * (toY - from.y) };
-    return this.#at;
+    const target = clampToPicture({
+      x: 0.5 + (right * cos + down * sin) / (2 * EDGE_DEGREES),
+      y: 0.5 + (down * cos - right * sin) / (2 * EDGE_DEGREES),
+    });
+    const { x, y } = this.#position;
+    this.#position = { x: x + SMOOTHING * (target.x - x), y: y + SMOOTHING * (target.y - y) };
+    return this.#position;
   }
 }
 
-/** The short way round. */
-function difference(to: number, from: number, round: number): number {
-  const turned = (((to - from) % round) + round) % round;
-  return turned > round / 2 ? turned - round : turned;
+/** `a − b` the short way round, for angles with the given period. */
+function angleDifference(a: number, b: number, period: number): number {
+  const difference = (((a - b) % period) + period) % period;
+  return difference > period / 2 ? difference - period : difference;
 }
 
-/** Tells where the light is each time that the device is held in another way. */
-export function followTilt(tell: (point: PicturePoint) => void, signal: AbortSignal): void {
-  const tilt = new Tilt();
-  const turn = ({ beta, gamma }: DeviceOrientationEvent) => {
-    // Machines on a table have none.
+/** Calls back with the torch's position at each change of the device's orientation. */
+export function observeTilt(moveTorch: (point: PicturePoint) => void, signal: AbortSignal): void {
+  if (signal.aborted) return;
+  const tracker = new TiltTracker();
+  const update = ({ beta, gamma }: DeviceOrientationEvent) => {
+    // Devices without a sensor report null.
     if (beta === null || gamma === null) return;
-    tell(tilt.turn({ beta, gamma }, screen.orientation?.angle ?? 0));
+    moveTorch(tracker.update({ beta, gamma }, screen.orientation?.angle ?? 0));
   };
-  if (!signal.aborted) addEventListener('deviceorientation', turn, { signal });
+  addEventListener('deviceorientation', update, { signal });
 }

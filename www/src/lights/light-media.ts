@@ -1,7 +1,6 @@
 /** The image or video of the `light-src` attribute. */
 
-/** The request mode for files of other origins. */
-export type CrossOrigin = 'anonymous' | 'use-credentials' | null;
+import type { CrossOrigin } from '../shared/names.js';
 
 const VIDEO_EXTENSION = /\.(mp4|m4v|webm|ogv|mov)$/i;
 

@@ -15,6 +15,9 @@ export type Backend = 'webgpu' | 'webgl2' | 'cpu';
 /** The colour space of the canvas. */
 export type Gamut = 'srgb' | 'display-p3';
 
+/** The CORS mode of requests, as on `<img>`. */
+export type CrossOrigin = 'anonymous' | 'use-credentials' | null;
+
 /** How brightness above white is shown: `clip` cuts it off, `filmic` compresses it. */
 export type ToneCurve = 'clip' | 'filmic';
 

@@ -1,29 +1,43 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { parseExposure, parseLight } from '../shared/parse-settings.js';
-import { Attributes } from './attribute-reader.js';
+import { AttributeReader } from './attribute-reader.js';
 
-test('what is wrong leaves what was right, is told once, and takes nothing else along', () => {
-  const it = new Attributes();
-  const read = (light: string | null, exposure: string | null) => [
-    it.read('light', light, parseLight),
-    it.read('exposure', exposure, parseExposure),
-  ];
-  const told = () => it.takeFaults().map(({ message }) => /“(.*?)”/.exec(message)?.[1]);
+test('an invalid attribute keeps its last value, is reported once, and affects no other', () => {
+  const attributes: Record<string, string | null> = {};
+  const reader = new AttributeReader({
+    baseURI: 'https://a.org/',
+    getAttribute: (name) => attributes[name] ?? null,
+  });
+  const read = (light: string | null, exposure: string | null) => {
+    Object.assign(attributes, { light, exposure });
+    return [reader.read('light', parseLight), reader.read('exposure', parseExposure)];
+  };
+  const reported = () => reader.takeErrors().map(({ message }) => /“(.*?)”/.exec(message)?.[1]);
   assert.deepEqual(read('moon', '2'), ['flood', 2]);
-  assert.deepEqual(told(), ['moon']);
+  assert.deepEqual(reported(), ['moon']);
   assert.deepEqual(read('moon', 'much'), ['flood', 2]);
-  assert.deepEqual(told(), ['much']);
-  assert.match(it.message ?? '', /moon/);
+  assert.deepEqual(reported(), ['much']);
+  assert.match(reader.message ?? '', /moon/);
   assert.deepEqual(read('stripes', 'much'), ['stripes', 2]);
-  assert.deepEqual(told(), []);
-  assert.match(it.message ?? '', /much/);
+  assert.deepEqual(reported(), []);
+  assert.match(reader.message ?? '', /much/);
   assert.deepEqual(read('sun', '3'), ['stripes', 3]);
-  assert.deepEqual(told(), ['sun']);
-  assert.ok(it.isWrong('light') && !it.isWrong('exposure'));
+  assert.deepEqual(reported(), ['sun']);
+  assert.ok(reader.isInvalid('light') && !reader.isInvalid('exposure'));
   assert.deepEqual(read(null, null), ['flood', 1]);
-  assert.equal(it.message, null);
-  it.read('light', 'sun', parseLight);
-  it.clear();
-  assert.deepEqual([it.message, told()], [null, []]);
+  assert.equal(reader.message, null);
+  read('sun', null);
+  reader.clear();
+  assert.deepEqual([reader.message, reported()], [null, []]);
+});
+
+test('an unchanged attribute gives the same object, and an address follows its base', () => {
+  const source = { baseURI: 'https://a.org/', getAttribute: () => 'a b' };
+  const reader = new AttributeReader(source);
+  const split = (text: string | null) => text?.split(' ');
+  assert.equal(reader.read('list', split), reader.read('list', split));
+  assert.equal(reader.readAddress('src'), 'https://a.org/a%20b');
+  source.baseURI = 'https://b.org/';
+  assert.equal(reader.readAddress('src'), 'https://b.org/a%20b');
 });

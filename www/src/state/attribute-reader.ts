@@ -1,50 +1,81 @@
-/** Attributes that are right, and those that are wrong for a while: one of them takes nothing else along. */
+/**
+ * Reads and parses attributes. An invalid attribute keeps its last valid value (or its default); other attributes
+ * are unaffected. An attribute is parsed again only after a change, so equal values are the same object.
+ */
 
 import { type PhotoError, toPhotoError } from '../shared/errors.js';
+import { parseAddress } from './attribute-values.js';
 
-/** See the module. */
-export class Attributes {
-  readonly #right = new Map<string, unknown>();
-  readonly #faults = new Map<string, PhotoError>();
-  #untold: PhotoError[] = [];
+/** The part of an element from which attributes are read. */
+export interface AttributeSource {
+  readonly baseURI: string;
+  getAttribute(name: string): string | null;
+}
 
-  /**
-   * What `parse` makes of a value; where it throws, of the last one that was right, or of none, for which it
-   * does not throw.
-   */
-  read<T>(name: string, value: string | null, parse: (value: string | null) => T): T {
+/** An attribute's text and what the parser made of it. */
+interface ParsedAttribute {
+  readonly text: string | null;
+  /** The base address against which an address was resolved. */
+  readonly base: string;
+  readonly value: unknown;
+  readonly error: PhotoError | null;
+}
+
+export class AttributeReader {
+  readonly #source: AttributeSource;
+  readonly #attributes = new Map<string, ParsedAttribute>();
+  #newErrors: PhotoError[] = [];
+
+  constructor(source: AttributeSource) {
+    this.#source = source;
+  }
+
+  /** `parse(null)` must give the default. */
+  read<T>(name: string, parse: (text: string | null, name: string) => T, base = ''): T {
+    const text = this.#source.getAttribute(name);
+    const last = this.#attributes.get(name);
+    if (last?.text === text && last.base === base) return last.value as T;
+    let value: unknown;
+    let error: PhotoError | null = null;
     try {
-      const right = parse(value);
-      this.#right.set(name, right);
-      this.#faults.delete(name);
-      return right;
+      value = parse(text, name);
     } catch (thrown) {
-      const fault = toPhotoError(thrown);
-      if (this.#faults.get(name)?.message !== fault.message) this.#untold.push(fault);
-      this.#faults.set(name, fault);
-      return this.#right.has(name) ? (this.#right.get(name) as T) : parse(null);
+      error = toPhotoError(thrown);
+      value = last ? last.value : parse(null, name);
+      this.#newErrors.push(error);
     }
+    this.#attributes.set(name, { text, base, value, error });
+    return value as T;
   }
 
-  /** What is wrong with one that is. */
+  /** The absolute URL of an attribute; `null` if it is empty. */
+  readAddress(name: string): string | null {
+    const { baseURI } = this.#source;
+    return this.read(name, (text) => parseAddress(text, name, baseURI), baseURI);
+  }
+
+  has(name: string): boolean {
+    return this.#source.getAttribute(name) !== null;
+  }
+
+  isInvalid(name: string): boolean {
+    return Boolean(this.#attributes.get(name)?.error);
+  }
+
+  /** The message of the first invalid attribute. */
   get message(): string | null {
-    return this.#faults.values().next().value?.message ?? null;
+    for (const { error } of this.#attributes.values()) if (error) return error.message;
+    return null;
   }
 
-  /** Whether one is wrong. */
-  isWrong(name: string): boolean {
-    return this.#faults.has(name);
+  /** The errors since the last call. */
+  takeErrors(): readonly PhotoError[] {
+    return this.#newErrors.splice(0);
   }
 
-  /** What has gone wrong since this was last asked. */
-  takeFaults(): readonly PhotoError[] {
-    return this.#untold.splice(0);
-  }
-
-  /** Forgets all of it. */
+  /** Forgets all values and errors. */
   clear(): void {
-    this.#right.clear();
-    this.#faults.clear();
-    this.#untold = [];
+    this.#attributes.clear();
+    this.#newErrors = [];
   }
 }

@@ -4,7 +4,7 @@
  */
 
 import { PhotoError } from '../shared/errors.js';
-import { BACKENDS, type Backend } from '../shared/names.js';
+import { BACKENDS, type Backend, type CrossOrigin } from '../shared/names.js';
 import { parseName, parseNumber } from '../shared/parse-settings.js';
 
 const LOADINGS = ['auto', 'lazy', 'eager'] as const;
@@ -65,7 +65,7 @@ export function parseReveal(value: string | null): Reveal {
 }
 
 /** As on `<img>`: any unknown value means `anonymous`. */
-export function parseCrossOrigin(value: string | null): 'anonymous' | 'use-credentials' | null {
+export function parseCrossOrigin(value: string | null): CrossOrigin {
   if (value === null) return null;
   return value.trim().toLowerCase() === 'use-credentials' ? 'use-credentials' : 'anonymous';
 }

@@ -1,43 +1,41 @@
-/** When a light is another than was told last. A source is one once it has been drawn. */
+/**
+ * Detects when the light that the photograph is drawn with becomes another one, for the `lightchange` event. A
+ * source counts from its first drawn frame. While a source is active, only another source is a change.
+ */
 
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
 import type { LightName } from '../shared/names.js';
+import { reuse } from '../shared/reuse.js';
 import type { PicturePoint } from '../shared/values.js';
 
-/** What shines, as it is told. */
-export interface Shining {
-  /** The built-in light, or the one that a source stands in for. */
+export interface ActiveLight {
+  /** The built-in light, or the one that the source replaces. */
   readonly name: LightName;
-  /** `null` in the middle, and for other lights. */
+  /** The torch's position; `null` behind the centre, and for other lights. */
   readonly torch: PicturePoint | null;
   readonly source: LightSource | null;
 }
 
-/** See the module. */
-export class LightNews {
-  #told: Shining | null = null;
+export class LightChangeDetector {
+  #active: ActiveLight | null = null;
 
-  /** What is new, if anything is. */
-  asked({ name, torch, image }: LightSetting): Shining | null {
-    // The first light is what the page asks for, which is no news.
-    if (this.#told && image) return null;
-    return this.#tell({ name, torch: image ? null : torch, source: null });
+  /** A setting was requested. The new light, if it is another built-in light. */
+  requested({ name, torch, image }: LightSetting): ActiveLight | null {
+    if (this.#active && image) return null;
+    return this.#update({ name, torch: image ? null : torch, source: null });
   }
 
-  drawn(name: LightName, source: LightSource): Shining | null {
-    return this.#tell({ name, torch: null, source });
+  /** A frame was drawn with a source. The new light, if it is another source. */
+  drawn(name: LightName, source: LightSource): ActiveLight | null {
+    if (this.#active?.source === source) return null;
+    return this.#update({ name, torch: null, source });
   }
 
-  #tell(now: Shining): Shining | null {
-    const before = this.#told;
-    this.#told = now;
-    return before && !same(before, now) ? now : null;
+  #update(next: ActiveLight): ActiveLight | null {
+    const last = this.#active;
+    this.#active = reuse(last, next);
+    // The first light is the initial state, not a change.
+    return last && this.#active !== last ? next : null;
   }
-}
-
-/** Under a source, built-in lights do not shine. */
-function same(a: Shining, b: Shining): boolean {
-  if (a.source || b.source) return a.source === b.source;
-  return a.name === b.name && a.torch?.x === b.torch?.x && a.torch?.y === b.torch?.y;
 }

@@ -1,8 +1,7 @@
-/** All that a page asks for by attributes. */
+/** The element's options: the values of all its attributes. Immutable: a change makes a new object. */
 
-import type { Backend, Gamut, ToneCurve } from '../engine/types.js';
 import { type CssColorParser, type LightColor, parseLightColor } from '../lights/light-color.js';
-import type { LightName } from '../shared/names.js';
+import type { Backend, CrossOrigin, Gamut, LightName, ToneCurve } from '../shared/names.js';
 import {
   parseExposure,
   parseGamut,
@@ -10,11 +9,11 @@ import {
   parseTone,
   parseWhiteBalance,
 } from '../shared/parse-settings.js';
-import type { PicturePoint, RgbFactors } from '../shared/values.js';
-import type { Attributes } from './attribute-reader.js';
+import { reuse } from '../shared/reuse.js';
+import { CENTRE, type PicturePoint, type RgbFactors } from '../shared/values.js';
+import type { AttributeReader } from './attribute-reader.js';
 import {
   type Loading,
-  parseAddress,
   parseBackends,
   parseCoordinate,
   parseCrossOrigin,
@@ -26,94 +25,85 @@ import {
   type Reveal,
 } from './attribute-values.js';
 
-/** See the module. Addresses are absolute. */
-export interface Asked {
+/** Addresses are absolute; an absent address is `null`. */
+export interface ElementOptions {
   readonly src: string | null;
-  /** `null` where the page leaves the order to the element. */
+  /** In order of preference; `null` leaves the order to the element. */
   readonly backends: readonly Backend[] | null;
   readonly gamut: Gamut;
   readonly exposure: number;
   readonly whiteBalance: RgbFactors;
   readonly tone: ToneCurve;
-  readonly light: AskedLight;
+  readonly light: LightOptions;
   readonly poster: string | null;
   readonly loading: Loading;
   readonly reveal: Reveal;
   readonly controls: boolean;
-  /** The furthest magnification; 1 is none. */
-  readonly zoom: number;
-  readonly cooperative: boolean;
-  /** Whether the torch is to wander by itself. */
-  readonly breathes: boolean;
-  /** Seconds; 0 is never. */
-  readonly kiosk: number;
-  /** Folder of the WebAssembly modules, with a slash at its end; `null` for the one beside the script. */
-  readonly wasm: string | null;
-  readonly crossOrigin: 'anonymous' | 'use-credentials' | null;
+  /** The largest magnification; 1 disables zooming. */
+  readonly maxZoom: number;
+  readonly cooperativeGestures: boolean;
+  readonly autoplayLight: boolean;
+  /** 0 is never. */
+  readonly kioskSeconds: number;
+  /** Folder of the WebAssembly modules, ending in a slash; `null` for the one beside the script. */
+  readonly wasmUrl: string | null;
+  readonly crossOrigin: CrossOrigin;
 }
 
-/** The light to begin with. */
-export interface AskedLight {
+/** The light before a visitor or a script chooses another. */
+export interface LightOptions {
   readonly name: LightName;
-  /** A picture or film in its place. */
+  /** An image or video that replaces the built-in light. */
   readonly src: string | null;
-  /** Where a torch shines; `null` over the middle of the light. */
-  readonly place: PicturePoint | null;
-  /** Radius of a torch; `null` for the usual one. */
+  readonly crossOrigin: CrossOrigin;
+  /** The torch's position; `null` behind the centre of the picture. */
+  readonly torch: PicturePoint | null;
+  /** The torch's radius; `null` for the default. */
   readonly size: number | null;
   readonly color: LightColor | null;
 }
 
-/** What attributes are read from. */
-export interface AttributeSource {
-  readonly baseURI: string;
-  getAttribute(name: string): string | null;
+/** Reads all attributes. Objects whose fields are unchanged are taken from `last`. */
+export function readOptions(
+  reader: AttributeReader,
+  parseColor: CssColorParser,
+  last: ElementOptions | null,
+): ElementOptions {
+  const crossOrigin = reader.read('crossorigin', parseCrossOrigin);
+  const light = reuse(last?.light, {
+    name: reader.read('light', parseLight),
+    src: reader.readAddress('light-src'),
+    crossOrigin,
+    torch: readTorch(reader, last?.light.torch),
+    size: reader.read('light-size', parseTorchSize),
+    color: reader.read('light-color', (text) => parseLightColor(text, parseColor)),
+  });
+  return reuse(last, {
+    light,
+    backends: reader.read('backend', parseBackends),
+    exposure: reader.read('exposure', parseExposure),
+    whiteBalance: reader.read('white-balance', parseWhiteBalance),
+    tone: reader.read('tone', parseTone),
+    gamut: reader.read('gamut', parseGamut),
+    src: reader.readAddress('src'),
+    poster: reader.readAddress('poster'),
+    loading: reader.read('loading', parseLoading),
+    reveal: reader.read('reveal', parseReveal),
+    controls: reader.has('controls'),
+    maxZoom: reader.read('zoom', parseZoom),
+    cooperativeGestures: reader.has('cooperative-gestures'),
+    autoplayLight: reader.has('autoplay-light'),
+    kioskSeconds: reader.read('kiosk', parseKiosk),
+    wasmUrl: reader.readAddress('wasm-url')?.replace(/\/?$/, '/') ?? null,
+    crossOrigin,
+  });
 }
 
-/** Reads all of them. What is wrong is told by `attributes`. */
-export function readAsked(
-  element: AttributeSource,
-  attributes: Attributes,
-  readColor: CssColorParser,
-): Asked {
-  const read = <T>(name: string, parse: (value: string | null, name: string) => T): T =>
-    attributes.read(name, element.getAttribute(name), (value) => parse(value, name));
-  const address = (value: string | null, name: string) =>
-    parseAddress(value, name, element.baseURI);
-  const has = (name: string) => element.getAttribute(name) !== null;
-  const [x, y] = [read('light-x', parseCoordinate), read('light-y', parseCoordinate)];
-  return {
-    light: {
-      name: read('light', parseLight),
-      src: read('light-src', address),
-      place: x === null && y === null ? null : { x: x ?? 0.5, y: y ?? 0.5 },
-      size: read('light-size', parseTorchSize),
-      color: read('light-color', (value) => parseLightColor(value, readColor)),
-    },
-    backends: read('backend', parseBackends),
-    exposure: read('exposure', parseExposure),
-    whiteBalance: read('white-balance', parseWhiteBalance),
-    tone: read('tone', parseTone),
-    gamut: read('gamut', parseGamut),
-    src: read('src', address),
-    poster: read('poster', address),
-    loading: read('loading', parseLoading),
-    reveal: read('reveal', parseReveal),
-    controls: has('controls'),
-    zoom: read('zoom', parseZoom),
-    cooperative: has('cooperative-gestures'),
-    breathes: has('autoplay-light'),
-    kiosk: read('kiosk', parseKiosk),
-    wasm: read('wasm-url', folder(address)),
-    crossOrigin: parseCrossOrigin(element.getAttribute('crossorigin')),
-  };
-}
-
-type ParseAddress = (value: string | null, name: string) => string | null;
-
-function folder(address: ParseAddress): ParseAddress {
-  return (value, name) => {
-    const url = address(value, name);
-    return url === null || url.endsWith('/') ? url : `${url}/`;
-  };
+function readTorch(
+  reader: AttributeReader,
+  last: PicturePoint | null | undefined,
+): PicturePoint | null {
+  const x = reader.read('light-x', parseCoordinate);
+  const y = reader.read('light-y', parseCoordinate);
+  return x === null && y === null ? null : reuse(last, { x: x ?? CENTRE.x, y: y ?? CENTRE.y });
 }

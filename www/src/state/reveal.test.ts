@@ -1,35 +1,36 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { Loading, Reveal } from './attribute-values.js';
-import { Curtain } from './reveal.js';
+import { RevealState } from './reveal.js';
 
-const asked = (loading: Loading, reveal: Reveal = 'auto') => ({ loading, reveal });
+const options = (loading: Loading, reveal: Reveal = 'auto') => ({ loading, reveal });
 
-test('a photograph is fetched at once, or once it is near, or once it is seen', () => {
-  const it = new Curtain();
-  const may = () => (['eager', 'auto', 'lazy'] as const).map((way) => it.mayFetch(asked(way)));
-  assert.deepEqual(may(), [true, false, false]);
-  it.near = true;
-  assert.deepEqual(may(), [true, true, false]);
-  it.seen = true;
-  assert.deepEqual(may(), [true, true, true]);
+test('a photograph is fetched at once, near the viewport, or in the viewport', () => {
+  const state = new RevealState();
+  const mayFetch = () =>
+    (['eager', 'auto', 'lazy'] as const).map((loading) => state.mayFetch(options(loading)));
+  assert.deepEqual(mayFetch(), [true, false, false]);
+  state.isNear = true;
+  assert.deepEqual(mayFetch(), [true, true, false]);
+  state.isVisible = true;
+  assert.deepEqual(mayFetch(), [true, true, true]);
 });
 
-test('a poster gives way to the picture, or to a press and the picture', () => {
-  const it = new Curtain();
-  it.near = true;
-  const down = () =>
-    (['auto', 'interaction', 'manual'] as const).map((r) => it.isDown(asked('auto', r)));
-  assert.deepEqual(down(), [true, true, true]);
-  assert.equal(it.mayFetch(asked('auto', 'interaction')), false);
-  assert.equal(it.mayFetch(asked('eager', 'interaction')), true);
-  assert.equal(it.mayFetch(asked('auto', 'manual')), true);
-  assert.equal(it.awaitsPress(asked('auto', 'interaction')), true);
-  it.drawn = true;
-  assert.deepEqual(down(), [false, true, true]);
-  it.lifted = true;
-  assert.deepEqual(down(), [false, false, false]);
-  assert.equal(it.awaitsPress(asked('auto', 'interaction')), false);
-  it.drawn = false;
-  assert.deepEqual(down(), [true, true, true], 'another photograph');
+test('the poster gives way to the picture, after a press or a call where required', () => {
+  const state = new RevealState();
+  state.isNear = true;
+  const isShown = () =>
+    (['auto', 'interaction', 'manual'] as const).map((r) => state.isPosterShown(options('auto', r)));
+  assert.deepEqual(isShown(), [true, true, true]);
+  assert.equal(state.mayFetch(options('auto', 'interaction')), false);
+  assert.equal(state.mayFetch(options('eager', 'interaction')), true);
+  assert.equal(state.mayFetch(options('auto', 'manual')), true);
+  assert.equal(state.needsPress(options('auto', 'interaction')), true);
+  state.isDrawn = true;
+  assert.deepEqual(isShown(), [false, true, true]);
+  state.isDismissed = true;
+  assert.deepEqual(isShown(), [false, false, false]);
+  assert.equal(state.needsPress(options('auto', 'interaction')), false);
+  state.isDrawn = false;
+  assert.deepEqual(isShown(), [true, true, true], 'another photograph');
 });

@@ -1,36 +1,31 @@
-/** When a photograph is fetched, and when its poster gives way to it. */
+/** When a photograph is fetched, and when its poster gives way to the picture. */
 
-import type { Loading, Reveal } from './attribute-values.js';
+import type { ElementOptions } from './options.js';
 
-/** What a page asks of it. */
-export interface CurtainAsked {
-  readonly loading: Loading;
-  readonly reveal: Reveal;
-}
+type RevealOptions = Pick<ElementOptions, 'loading' | 'reveal'>;
 
-/** See the module. */
-export class Curtain {
-  /** Whether the element is within a screen of the visitor's, and whether it can be seen. */
-  near = false;
-  seen = false;
-  /** Whether there is a picture. */
-  drawn = false;
-  /** Somebody pressed the poster, or a script let it go. */
-  lifted = false;
+export class RevealState {
+  /** Within one screen of the viewport. */
+  isNear = false;
+  /** In the viewport. */
+  isVisible = false;
+  /** A picture of the photograph has been drawn. */
+  isDrawn = false;
+  /** A visitor pressed the poster, or a script called `dismissPoster()`. */
+  isDismissed = false;
 
-  mayFetch({ loading, reveal }: CurtainAsked): boolean {
+  mayFetch({ loading, reveal }: RevealOptions): boolean {
     if (loading === 'eager') return true;
-    if (reveal === 'interaction' && !this.lifted) return false;
-    return loading === 'lazy' ? this.seen : this.near;
+    if (reveal === 'interaction' && !this.isDismissed) return false;
+    return loading === 'lazy' ? this.isVisible : this.isNear;
   }
 
-  /** Whether the picture is hidden. */
-  isDown({ reveal }: CurtainAsked): boolean {
-    return !this.drawn || (reveal !== 'auto' && !this.lifted);
+  isPosterShown({ reveal }: Pick<RevealOptions, 'reveal'>): boolean {
+    return !this.isDrawn || (reveal !== 'auto' && !this.isDismissed);
   }
 
-  /** Whether somebody has to press the poster. */
-  awaitsPress({ reveal }: CurtainAsked): boolean {
-    return reveal === 'interaction' && !this.lifted;
+  /** Whether the poster waits for a press. */
+  needsPress({ reveal }: Pick<RevealOptions, 'reveal'>): boolean {
+    return reveal === 'interaction' && !this.isDismissed;
   }
 }

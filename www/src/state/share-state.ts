@@ -1,35 +1,37 @@
-/** Light and view as text, for addresses: `l=torch&x=0.312&y=0.64&z=2&vx=0.5&vy=0.41&e=1.2`. */
+/** Light and view as a query string, for links: `l=torch&x=0.312&y=0.64&z=2&vx=0.5&vy=0.41&e=1.2`. */
 
 import { PhotoError } from '../shared/errors.js';
 import { LIGHTS, type LightName } from '../shared/names.js';
 import { MAX_EXPOSURE } from '../shared/parse-settings.js';
-import type { PicturePoint } from '../shared/values.js';
+import { CENTRE, type PicturePoint } from '../shared/values.js';
 import { MAX_TORCH_SIZE } from './attribute-values.js';
-import { type PhotoView, WHOLE } from './viewport.js';
+import type { PhotoView } from './viewport.js';
 
-/** What a visitor may have changed; `null` is as the page has it. */
-export interface PhotoState {
+/** What a visitor may have changed; `null` stands for the page's own value. */
+export interface SharedState {
   readonly light: LightName | null;
   readonly torch: PicturePoint | null;
-  /** Radius of the torch, of the light plane's shorter side. */
+  /** The torch's radius in units of the light plane's shorter side. */
   readonly size: number | null;
-  /** Any CSS colour. */
+  /** A CSS colour. */
   readonly color: string | null;
   readonly exposure: number | null;
   readonly view: PhotoView;
 }
 
-/** That state in a few letters, all of which addresses may hold. */
-export function writeState({ light, torch, size, color, exposure, view }: PhotoState): string {
-  const words = new URLSearchParams();
+/** Beyond any `zoom` attribute; the view is clamped to that. */
+const MAX_SHARED_ZOOM = 1e4;
+
+export function formatState({ light, torch, size, color, exposure, view }: SharedState): string {
+  const params = new URLSearchParams();
   const put = (key: string, value: string | number | null | undefined) => {
-    if (value != null) words.set(key, String(value));
+    if (value != null) params.set(key, String(value));
   };
   put('l', light);
   put('x', torch?.x);
   put('y', torch?.y);
   put('s', size);
-  // An address has another use for #.
+  // An unescaped # would begin the fragment of an address.
   put('c', color?.replace(/^#/, ''));
   if (view.zoom > 1) {
     put('z', view.zoom);
@@ -37,44 +39,46 @@ export function writeState({ light, torch, size, color, exposure, view }: PhotoS
     put('vy', view.y);
   }
   put('e', exposure);
-  return words.toString();
+  return params.toString();
 }
 
-/** What such a text says, and what is wrong with it: that counts as left out. Other keys are passed over. */
-export function readState(text: string): { state: PhotoState; faults: readonly PhotoError[] } {
-  const words = new URLSearchParams(text.replace(/^[?#]/, ''));
-  const faults: PhotoError[] = [];
-  const wrong = (key: string, value: string, right: string): null => {
-    const message = `The state “${text}” has ${key}=${value}, where ${key} is ${right}.`;
-    faults.push(new PhotoError('state', message));
-    return null;
+/** Parses a state. An invalid value counts as absent and gives an error; unknown keys are ignored. */
+export function parseState(text: string): { state: SharedState; errors: readonly PhotoError[] } {
+  const params = new URLSearchParams(text.replace(/^[?#]/, ''));
+  const errors: PhotoError[] = [];
+  /** Reads a value; `parse` gives `null` if it is invalid. */
+  const read = <T>(key: string, expected: string, parse: (value: string) => T | null): T | null => {
+    const value = params.get(key);
+    const parsed = value === null ? null : parse(value);
+    if (value !== null && parsed === null) {
+      const message = `The state “${text}” has ${key}=${value}. Expected ${expected}.`;
+      errors.push(new PhotoError('state', message));
+    }
+    return parsed;
   };
-  const number = (key: string, least: number, most: number): number | null => {
-    const value = words.get(key);
-    if (value === null) return null;
-    const read = value.trim() === '' ? Number.NaN : Number(value);
-    if (read >= least && read <= most) return read;
-    return wrong(key, value, `a number from ${least} to ${most}`);
-  };
-  const name = words.get('l');
-  const light = LIGHTS.find((known) => known === name) ?? null;
-  if (name !== null && !light) wrong('l', name, `one of ${LIGHTS.join(', ')}`);
-  const hex = words.get('c');
-  const isColor = hex !== null && /^([0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})$/i.test(hex);
-  if (hex !== null && !isColor) wrong('c', hex, 'a colour in hexadecimal digits');
+  const number = (key: string, min: number, max: number) =>
+    read(key, `a number from ${min} to ${max}`, (value) => {
+      const parsed = value.trim() === '' ? Number.NaN : Number(value);
+      return parsed >= min && parsed <= max ? parsed : null;
+    });
+  const light = read('l', `one of ${LIGHTS.join(', ')}`, (value) => {
+    return LIGHTS.find((known) => known === value) ?? null;
+  });
+  const color = read('c', 'a colour in hexadecimal digits', (value) =>
+    /^([0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})$/i.test(value) ? `#${value}` : null,
+  );
   const [x, y] = [number('x', 0, 1), number('y', 0, 1)];
-  const zoom = number('z', 1, 1e4) ?? 1;
-  const [vx, vy] = [number('vx', 0, 1), number('vy', 0, 1)];
-  const torch = x === null && y === null ? null : { x: x ?? 0.5, y: y ?? 0.5 };
+  const zoom = number('z', 1, MAX_SHARED_ZOOM) ?? 1;
+  const [viewX, viewY] = [number('vx', 0, 1), number('vy', 0, 1)];
   return {
     state: {
       light,
-      torch,
+      torch: x === null && y === null ? null : { x: x ?? CENTRE.x, y: y ?? CENTRE.y },
       size: number('s', 1e-6, MAX_TORCH_SIZE),
-      color: isColor ? `#${hex}` : null,
+      color,
       exposure: number('e', 0, MAX_EXPOSURE),
-      view: { zoom, x: vx ?? WHOLE.x, y: vy ?? WHOLE.y },
+      view: { zoom, x: viewX ?? CENTRE.x, y: viewY ?? CENTRE.y },
     },
-    faults,
+    errors,
   };
 }

@@ -1,36 +1,39 @@
-/**
- * What visitors have before them: light, view, and whether things move by themselves. As the page asks for
- * it, until somebody chooses something else. Knows no DOM.
- */
+/** The viewer's state: light, view and animation, as the options request them until a visitor changes them. */
 
 import type { OutputSettings } from '../engine/output-settings.js';
 import { type CssColorParser, multiplyRgb, parseLightColor } from '../lights/light-color.js';
 import type { PhotoError } from '../shared/errors.js';
 import type { LightName } from '../shared/names.js';
 import { parseLight } from '../shared/parse-settings.js';
+import { reuse } from '../shared/reuse.js';
 import { CENTRE, clampToPicture } from '../shared/values.js';
 import { parseTorchSize } from './attribute-values.js';
-import { type LightChoice, type LightItem, Lighting, type LightingListener } from './lighting.js';
-import type { Asked } from './options.js';
-import { Curtain } from './reveal.js';
-import { readState, writeState } from './share-state.js';
-import { clampView, type PhotoView, sameView, WHOLE } from './viewport.js';
+import {
+  type LightItem,
+  type LightOverrides,
+  LightState,
+  type LightStateListener,
+} from './light-state.js';
+import type { ElementOptions } from './options.js';
+import { RevealState } from './reveal.js';
+import { formatState, parseState } from './share-state.js';
+import { clampView, FULL_VIEW, type PhotoView } from './viewport.js';
 
-/** What `setLight` takes of a light. What is left out stays. */
+/** A built-in light for `setLight`. Absent fields keep their values. */
 export interface LightPose {
   readonly name?: LightName;
-  /** Where a torch shines, 0 to 1 across the picture, */
+  /** The torch's position, 0 to 1 across the picture. */
   readonly x?: number;
-  /** and down. */
+  /** The torch's position, 0 to 1 down the picture. */
   readonly y?: number;
-  /** Radius of a torch, as a fraction of the light plane's shorter side. */
+  /** The torch's radius, as a fraction of the light plane's shorter side. */
   readonly size?: number;
-  /** Any CSS colour. */
+  /** Any CSS color. */
   readonly color?: string;
 }
 
-/** Attributes that take the place of what was chosen. */
-const OVERRULES: Readonly<Record<string, keyof LightChoice>> = {
+/** The override that a change of an attribute clears. */
+const OVERRIDE_OF_ATTRIBUTE: Readonly<Record<string, keyof LightOverrides>> = {
   light: 'name',
   'light-src': 'name',
   'light-x': 'torch',
@@ -39,131 +42,128 @@ const OVERRULES: Readonly<Record<string, keyof LightChoice>> = {
   'light-color': 'color',
 };
 
-/** See the module. */
-export class Exhibit {
-  readonly lighting: Lighting;
-  readonly curtain = new Curtain();
-  readonly #readColor: CssColorParser;
-  #asked: Asked;
-  #view = WHOLE;
+export class ViewerState {
+  readonly light: LightState;
+  readonly reveal = new RevealState();
+  readonly #parseCssColor: CssColorParser;
+  #options: ElementOptions;
+  #view = FULL_VIEW;
+  #output: OutputSettings | null = null;
   #exposure: number | null = null;
-  #paused: boolean | null = null;
+  /** Whether animations are paused; `null` until a visitor or a script decides. */
+  paused: boolean | null = null;
   /** Why there is no picture. */
-  fault: string | null = null;
+  errorMessage: string | null = null;
 
-  constructor(asked: Asked, listener: LightingListener, readColor: CssColorParser) {
-    this.#asked = asked;
-    this.lighting = new Lighting(listener);
-    this.#readColor = readColor;
+  constructor(options: ElementOptions, listener: LightStateListener, parse: CssColorParser) {
+    this.#options = options;
+    this.light = new LightState(listener);
+    this.#parseCssColor = parse;
   }
 
-  /** What the page asks for by attributes. */
-  get asked(): Asked {
-    return this.#asked;
+  get options(): ElementOptions {
+    return this.#options;
   }
-  set asked(asked: Asked) {
-    this.#asked = asked;
-    this.lighting.ask(asked.light, asked.crossOrigin);
+  set options(options: ElementOptions) {
+    this.#options = options;
+    this.light.setOptions(options.light);
     this.view = this.#view;
   }
 
-  /** An attribute was written: what was chosen in its place goes. */
-  overrule(attribute: string): void {
-    const key = OVERRULES[attribute];
-    if (key) this.lighting.choose({ [key]: null });
+  /** A change of an attribute takes precedence over an earlier override. */
+  clearOverride(attribute: string): void {
+    const key = OVERRIDE_OF_ATTRIBUTE[attribute];
+    if (key) this.light.override({ [key]: null });
   }
 
-  /** The part of the picture that is shown: no more of it, and no closer than allowed. */
+  /** The same object as last time, unless the view has changed. The setter clamps. */
   get view(): PhotoView {
     return this.#view;
   }
   set view(view: PhotoView) {
-    const next = clampView(view, this.#asked.zoom);
-    if (!sameView(next, this.#view)) this.#view = next;
+    this.#view = reuse(this.#view, clampView(view, this.#options.maxZoom));
   }
 
-  /** Whether what moves by itself stands still; `null` where nobody has said. */
-  get paused(): boolean | null {
-    return this.#paused;
-  }
-  set paused(paused: boolean | null) {
-    this.#paused = paused;
+  /** Whether visitors see the picture and can interact with it. */
+  get isPictureShown(): boolean {
+    return this.errorMessage === null && !this.reveal.isPosterShown(this.#options);
   }
 
-  /** Whether there is a picture to be seen and touched. */
-  get shown(): boolean {
-    return this.fault === null && !this.curtain.isDown(this.#asked);
-  }
-
+  /** The same object as last time, unless a field has changed. */
   get output(): OutputSettings {
-    const { exposure, whiteBalance, tone } = this.#asked;
-    const { color } = this.lighting;
-    return {
+    const { exposure, whiteBalance, tone } = this.#options;
+    const { color } = this.light;
+    const last = this.#output;
+    const factors = color ? multiplyRgb(whiteBalance, color.factors) : whiteBalance;
+    this.#output = reuse(last, {
       exposure: this.#exposure ?? exposure,
-      whiteBalance: color ? multiplyRgb(whiteBalance, color.factors) : whiteBalance,
+      whiteBalance: reuse(last?.whiteBalance, factors),
       tone,
-    };
+    });
+    return this.#output;
   }
 
-  /** Throws where there is no such light. */
-  pose({ name, x, y, size, color }: LightPose): void {
-    const from = this.lighting.torch ?? CENTRE;
-    const choice: { -readonly [K in keyof LightChoice]?: LightChoice[K] } = {};
-    if (name !== undefined) choice.name = parseLight(name);
+  /** @throws {TypeError | PhotoError} for an invalid field, before anything changes */
+  setLight({ name, x, y, size, color }: LightPose): void {
+    const overrides: { -readonly [K in keyof LightOverrides]?: LightOverrides[K] } = {};
+    if (name !== undefined) overrides.name = parseLight(name);
     if (x !== undefined || y !== undefined) {
-      const torch = { x: x ?? from.x, y: y ?? from.y };
+      const last = this.light.torch ?? CENTRE;
+      const torch = { x: x ?? last.x, y: y ?? last.y };
       if (!(Number.isFinite(torch.x) && Number.isFinite(torch.y))) {
         throw new TypeError('x and y must be finite numbers, from 0 to 1');
       }
-      choice.torch = clampToPicture(torch);
+      overrides.torch = clampToPicture(torch);
     }
-    if (size !== undefined) choice.size = parseTorchSize(String(size));
-    if (color !== undefined) choice.color = parseLightColor(color, this.#readColor);
-    this.lighting.choose(choice);
+    if (size !== undefined) overrides.size = parseTorchSize(String(size));
+    if (color !== undefined) overrides.color = parseLightColor(color, this.#parseCssColor);
+    this.light.override(overrides);
   }
 
-  /** The light so many farther in the list. */
-  step(by: number): LightItem {
-    const { items, item } = this.lighting;
+  /** Selects another item of the light menu, `by` items away. */
+  selectNextLight(by: 1 | -1): LightItem {
+    const { items, item } = this.light;
     const next = items.at((items.indexOf(item) + by) % items.length) ?? item;
-    this.lighting.item = next;
+    this.light.item = next;
     return next;
   }
 
-  /** As the page asks. */
+  /** Back to the options. */
   reset(): void {
-    this.lighting.reset();
-    this.#view = WHOLE;
+    this.light.reset();
+    this.#view = FULL_VIEW;
     this.#exposure = null;
-    this.#paused = null;
+    this.paused = null;
   }
 
-  get state(): string {
-    const { item, torch, size, color } = this.lighting;
+  /** The state as text, for links. */
+  get sharedState(): string {
+    const { item, torch, size, color } = this.light;
     const { exposure } = this.output;
-    return writeState({
+    const isTorch = item === 'torch';
+    return formatState({
       light: item === 'projection' ? null : item,
-      torch: item === 'torch' ? torch : null,
-      size: item === 'torch' ? size : null,
+      torch: isTorch ? torch : null,
+      size: isTorch ? size : null,
       color: color?.hex ?? null,
       exposure: exposure === 1 ? null : exposure,
       view: this.#view,
     });
   }
 
-  /** Takes a state. Gives what is wrong with it. */
-  take(text: string): readonly PhotoError[] {
-    const { state, faults } = readState(text);
+  /** Restores a shared state. Returns an error for each invalid value. */
+  restore(text: string): readonly PhotoError[] {
+    const { state, errors } = parseState(text);
     const { light: name, torch, size, color, exposure, view } = state;
     this.reset();
-    this.lighting.choose({
+    this.light.override({
       name,
       torch: torch && clampToPicture(torch),
       size,
-      color: parseLightColor(color, this.#readColor),
+      color: parseLightColor(color, this.#parseCssColor),
     });
     this.#exposure = exposure;
     this.view = view;
-    return faults;
+    return errors;
   }
 }

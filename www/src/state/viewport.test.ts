@@ -4,10 +4,10 @@ import {
   clampView,
   type PhotoView,
   pan,
-  toBox,
+  toViewport,
   toggleZoom,
   toPicture,
-  WHOLE,
+  FULL_VIEW,
   wheelFactor,
   zoomAt,
 } from './viewport.js';
@@ -18,17 +18,17 @@ function near(a: number, b: number): void {
   assert.ok(Math.abs(a - b) < 1e-3, `${a} and ${b}`);
 }
 
-test('what is seen at a place of the box is seen there', () => {
-  for (const at of [WHOLE, { x: 0, y: 1 }, { x: 0.3, y: 0.9 }]) {
-    const box = toBox(CLOSE, toPicture(CLOSE, at));
-    near(box.x, at.x);
-    near(box.y, at.y);
+test('toPicture and toViewport are inverse', () => {
+  for (const at of [FULL_VIEW, { x: 0, y: 1 }, { x: 0.3, y: 0.9 }]) {
+    const point = toViewport(CLOSE, toPicture(CLOSE, at));
+    near(point.x, at.x);
+    near(point.y, at.y);
   }
   assert.deepEqual(toPicture(CLOSE, { x: 0.5, y: 0.5 }), { x: 0.4, y: 0.6 });
-  assert.deepEqual(toPicture(WHOLE, { x: 0.2, y: 0.7 }), { x: 0.2, y: 0.7 });
+  assert.deepEqual(toPicture(FULL_VIEW, { x: 0.2, y: 0.7 }), { x: 0.2, y: 0.7 });
 });
 
-test('zooming holds what is under the pointer', () => {
+test('zooming keeps the point under the pointer fixed', () => {
   const at = { x: 0.7, y: 0.4 };
   const before = toPicture(CLOSE, at);
   const after = toPicture(zoomAt(CLOSE, 1.3, at, 8), at);
@@ -36,14 +36,14 @@ test('zooming holds what is under the pointer', () => {
   near(after.y, before.y);
 });
 
-test('no view shows what is beyond the picture, or is closer than allowed', () => {
-  assert.deepEqual(clampView({ zoom: 0.2, x: 0, y: 9 }, 8), WHOLE);
+test('a view stays inside the picture and within the maximum zoom', () => {
+  assert.deepEqual(clampView({ zoom: 0.2, x: 0, y: 9 }, 8), FULL_VIEW);
   assert.deepEqual(clampView({ zoom: 99, x: 0, y: 1 }, 8), { zoom: 8, x: 0.0625, y: 0.9375 });
   assert.deepEqual(pan({ zoom: 2, x: 0.5, y: 0.5 }, 9, -9, 8), { zoom: 2, x: 0.25, y: 0.75 });
-  assert.deepEqual(zoomAt(CLOSE, 0.01, { x: 0, y: 0 }, 8), WHOLE);
+  assert.deepEqual(zoomAt(CLOSE, 0.01, { x: 0, y: 0 }, 8), FULL_VIEW);
 });
 
-test('what is panned follows the pointer', () => {
+test('a panned picture follows the pointer', () => {
   const at = { x: 0.5, y: 0.5 };
   const before = toPicture(CLOSE, at);
   const after = toPicture(pan(CLOSE, 0.1, -0.1, 8), { x: 0.6, y: 0.4 });
@@ -51,16 +51,16 @@ test('what is panned follows the pointer', () => {
   near(after.y, before.y);
 });
 
-test('two taps go closer to what they hit, and back', () => {
+test('a double tap zooms in at its point, and out again', () => {
   const at = { x: 0.8, y: 0.5 };
-  const closer = toggleZoom(WHOLE, at, 8);
+  const closer = toggleZoom(FULL_VIEW, at, 8);
   assert.equal(closer.zoom, 2.5);
   near(toPicture(closer, at).x, 0.8);
-  assert.deepEqual(toggleZoom(closer, at, 8), WHOLE);
-  assert.equal(toggleZoom(WHOLE, at, 2).zoom, 2);
+  assert.deepEqual(toggleZoom(closer, at, 8), FULL_VIEW);
+  assert.equal(toggleZoom(FULL_VIEW, at, 2).zoom, 2);
 });
 
-test('a wheel goes as far by lines as by pixels, and never leaps', () => {
+test('a wheel zooms equally by lines and by pixels, with a limit for one event', () => {
   assert.equal(wheelFactor(-120, 0), wheelFactor(-3, 1));
   assert.equal(wheelFactor(1e6, 0), wheelFactor(1, 2));
   near(wheelFactor(-100, 0) * wheelFactor(100, 0), 1);

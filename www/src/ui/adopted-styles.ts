@@ -1,15 +1,15 @@
-/** Style sheets, one for all elements of a page. */
+/** Style sheets that all elements of a page share. */
 
 const sheets = new Map<string, CSSStyleSheet>();
 
-/** Styles what is in a shadow root. */
-export function adopt(root: ShadowRoot, style: string): void {
-  let sheet = sheets.get(style);
+/** Adds a style sheet to a shadow root. */
+export function adoptStyles(root: ShadowRoot, css: string): void {
+  let sheet = sheets.get(css);
   if (!sheet) {
     // A constructed sheet needs no 'unsafe-inline' in the page's content security policy.
     sheet = new CSSStyleSheet();
-    sheet.replaceSync(style);
-    sheets.set(style, sheet);
+    sheet.replaceSync(css);
+    sheets.set(css, sheet);
   }
   root.adoptedStyleSheets = [...root.adoptedStyleSheets, sheet];
 }

@@ -1,11 +1,9 @@
-/** An element on the whole screen. */
-
 export function isFullscreen(element: Element): boolean {
   return element.matches(':fullscreen');
 }
 
-/** Takes the whole screen, or leaves it. Refused where the page's own frame, or the visitor, does not allow it. */
+/** Does nothing where the browser, an enclosing frame or the visitor refuses. */
 export function toggleFullscreen(element: Element): void {
-  const done = isFullscreen(element) ? document.exitFullscreen() : element.requestFullscreen();
-  void done.catch(() => {});
+  const change = isFullscreen(element) ? document.exitFullscreen() : element.requestFullscreen();
+  void change.catch(() => {});
 }

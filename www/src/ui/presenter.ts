@@ -1,94 +1,108 @@
-/** Shows an exhibit, all of it but the picture itself, and tells of it in the language of the place. */
+/** Shows the viewer's state in the shadow DOM and the toolbar, and announces changes, in the page's language. */
 
-import { languageAt } from '../i18n/language.js';
-import { isMissing, type Language, say, type Word } from '../i18n/strings.js';
-import { mayTilt } from '../input/tilt-sensor.js';
+import { languageOf } from '../i18n/language.js';
+import { isPending, type Language, type StringKey, t } from '../i18n/strings.js';
 import { CENTRE } from '../shared/values.js';
-import type { LightItem } from '../state/lighting.js';
-import type { Exhibit } from '../state/viewer-state.js';
-import type { Controls } from './controls.js';
+import type { LightItem } from '../state/light-state.js';
+import type { ViewerState } from '../state/viewer-state.js';
 import { isFullscreen } from './fullscreen.js';
-import { lightWords } from './light-labels.js';
+import type { LazyToolbar } from './lazy-toolbar.js';
+import { describeLight } from './light-description.js';
+import type { ShadowDom } from './shadow-dom.js';
 import type { ToolbarState } from './toolbar.js';
-import type { View } from './view.js';
 
-/** See the module. */
 export class Presenter {
   readonly #host: Element;
-  readonly #view: View;
-  readonly #controls: Controls;
-  readonly #exhibit: Exhibit;
+  readonly #dom: ShadowDom;
+  readonly #toolbar: LazyToolbar;
+  readonly #state: ViewerState;
 
-  constructor(host: Element, view: View, controls: Controls, exhibit: Exhibit) {
+  constructor(host: Element, dom: ShadowDom, toolbar: LazyToolbar, state: ViewerState) {
     this.#host = host;
-    this.#view = view;
-    this.#controls = controls;
-    this.#exhibit = exhibit;
+    this.#dom = dom;
+    this.#toolbar = toolbar;
+    this.#state = state;
   }
 
   get language(): Language {
-    return languageAt(this.#host);
+    return languageOf(this.#host);
   }
 
-  present(paused: boolean, tilts: boolean): void {
-    const { asked, view, shown, curtain, lighting } = this.#exhibit;
+  /** `isTilting`: whether the torch follows the device's tilt; `null` if it cannot. */
+  update(isPaused: boolean, isTilting: boolean | null): void {
+    const { options, view, isPictureShown, reveal, light } = this.#state;
     const { language } = this;
-    const light = shown && lighting.holdsTorch;
-    const zooms = shown && asked.zoom > 1;
-    const zoomed = view.zoom > 1;
-    const at = lighting.torch ?? CENTRE;
-    this.#view.describe(this.#host.getAttribute('alt'), language);
-    const holds = zooms && !asked.cooperative && (light || zoomed);
-    const touch = holds ? 'hold' : light || zooms ? 'scroll' : 'page';
-    this.#view.arrange({ light, focusable: zooms && !light, zoomed, touch }, language);
-    this.#view.place(view, at, lightWords(at, language));
-    this.#view.poster(asked.poster, asked.crossOrigin, !shown, curtain.awaitsPress(asked));
-    this.#controls.update(asked.controls && shown ? this.#buttons(paused, tilts) : null);
+    const hasHandle = isPictureShown && light.isTorch;
+    const zooms = isPictureShown && options.maxZoom > 1;
+    const isZoomed = view.zoom > 1;
+    const capturesTouch = zooms && !options.cooperativeGestures && (hasHandle || isZoomed);
+    const torch = light.torch ?? CENTRE;
+    this.#dom.updateLabels(this.#host.getAttribute('alt'), language);
+    this.#dom.updateLayout(
+      {
+        hasHandle,
+        isFocusable: zooms && !hasHandle,
+        isZoomed,
+        touchAction: capturesTouch ? 'none' : hasHandle || zooms ? 'pan-y' : 'auto',
+      },
+      language,
+    );
+    this.#dom.updateView(view, torch, describeLight(torch, language));
+    this.#dom.updatePoster(
+      options.poster,
+      options.crossOrigin,
+      !isPictureShown,
+      reveal.needsPress(options),
+    );
+    const hasToolbar = options.controls && isPictureShown;
+    this.#toolbar.update(hasToolbar ? this.#toolbarState(isPaused, isTilting) : null);
   }
 
-  /** Shows what is wrong, if anything is. */
-  fault(message: string | null): void {
-    const fatal = this.#exhibit.fault !== null;
-    this.#view.fault(message === null ? null : { fatal, message }, this.language);
+  /** `null` hides the message. */
+  showError(details: string | null): void {
+    const isFatal = this.#state.errorMessage !== null;
+    this.#dom.showError(details === null ? null : { isFatal, details }, this.language);
   }
 
-  /** Says how to zoom, where the page scrolled instead. */
-  hint(by: 'wheel' | 'touch'): void {
+  /** Explains how to zoom, after the page scrolled instead. */
+  hintAtZoom(by: 'wheel' | 'touch'): void {
     const key = /mac|iphone|ipad/i.test(navigator.platform) ? '⌘' : 'Ctrl';
-    this.#view.hint(this.#say(by === 'wheel' ? 'wheelHint' : 'touchHint', key));
+    this.#dom.showHint(this.#t(by === 'wheel' ? 'wheelHint' : 'touchHint', key));
   }
 
-  tellLoaded(): void {
-    this.#view.tell(this.#say('loaded'));
+  announceLoaded(): void {
+    this.#dom.announce(this.#t('loaded'));
   }
 
-  tellZoom(): void {
-    const { zoom } = this.#exhibit.view;
+  announceZoom(): void {
+    const { zoom } = this.#state.view;
     const text = zoom.toLocaleString(this.language, { maximumFractionDigits: 1 });
-    this.#view.tell(this.#say('zoomed', text));
+    this.#dom.announce(this.#t('zoomed', text));
   }
 
-  tellLight(item: LightItem): void {
-    this.#view.tell(`${this.#say('light')}: ${this.#say(item)}`);
+  announceLight(item: LightItem): void {
+    this.#dom.announce(`${this.#t('light')}: ${this.#t(item)}`);
   }
 
-  #buttons(paused: boolean, tilts: boolean): ToolbarState {
-    const { asked, view, lighting } = this.#exhibit;
-    const { items, item, holdsTorch, canPlay } = lighting;
+  #toolbarState(isPaused: boolean, isTilting: boolean | null): ToolbarState {
+    const { options, view, light } = this.#state;
+    const isPlayable = light.isPlayable || (light.isTorch && options.autoplayLight);
     return {
-      // Another one once its words are there.
-      language: `${this.language} ${isMissing(this.language)}`,
-      say: (word) => this.#say(word),
-      items,
-      item,
-      plays: canPlay || (holdsTorch && asked.breathes) ? !paused : null,
-      zoom: asked.zoom > 1 ? { in: view.zoom < asked.zoom, out: view.zoom > 1 } : null,
-      tilts: holdsTorch && mayTilt() ? tilts : null,
-      fullscreen: document.fullscreenEnabled ? isFullscreen(this.#host) : null,
+      t: (key) => this.#t(key),
+      languageKey: `${this.language} ${isPending(this.language)}`,
+      items: light.items,
+      item: light.item,
+      isPlaying: isPlayable ? !isPaused : null,
+      zoom:
+        options.maxZoom > 1
+          ? { canZoomIn: view.zoom < options.maxZoom, canZoomOut: view.zoom > 1 }
+          : null,
+      isTilting,
+      isFullscreen: document.fullscreenEnabled ? isFullscreen(this.#host) : null,
     };
   }
 
-  #say(word: Word, ...values: readonly string[]): string {
-    return say(word, this.language, ...values);
+  #t(key: StringKey, ...values: readonly string[]): string {
+    return t(key, this.language, ...values);
   }
 }

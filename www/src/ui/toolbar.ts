@@ -1,46 +1,45 @@
 /**
- * The buttons: one stop of the tab key, left and right between them; and the list of lights. A file of its
- * own, for pages that ask for controls.
+ * The toolbar and the light menu. The toolbar is a single tab stop; the arrow keys move between its buttons. A
+ * separate script, which is fetched only for pages that use `controls`.
  */
 
-import type { Word } from '../i18n/strings.js';
-import type { LightItem } from '../state/lighting.js';
-import { make, put, write } from './dom.js';
-import { icon, LAMP, showIcon } from './icons.js';
-import STYLE from './toolbar.css';
+import type { StringKey } from '../i18n/strings.js';
+import type { LightItem } from '../state/light-state.js';
+import { createElement, updateAttribute, updateText } from './dom-helpers.js';
+import { createIcon, LIGHT_ICON, setIcon } from './icons.js';
+import TOOLBAR_CSS from './toolbar.css';
 
-/** What the buttons show. `null`: there is no such button. */
+/** The state that the buttons show; `null` hides a button. */
 export interface ToolbarState {
-  /** A text in the visitor's language, which it is called by as well. */
-  readonly say: (word: Word) => string;
-  readonly language: string;
+  /** A text in the visitor's language. */
+  readonly t: (key: StringKey) => string;
+  /** Changes whenever the texts do. */
+  readonly languageKey: string;
   readonly items: readonly LightItem[];
   readonly item: LightItem;
-  readonly plays: boolean | null;
-  /** Whether there is more or less to be had. */
-  readonly zoom: { readonly in: boolean; readonly out: boolean } | null;
-  readonly tilts: boolean | null;
-  readonly fullscreen: boolean | null;
+  readonly isPlaying: boolean | null;
+  readonly zoom: { readonly canZoomIn: boolean; readonly canZoomOut: boolean } | null;
+  readonly isTilting: boolean | null;
+  readonly isFullscreen: boolean | null;
 }
 
-/** What the buttons do. */
 export interface ToolbarActions {
-  choose(item: LightItem): void;
-  play(): void;
+  selectLight(item: LightItem): void;
+  togglePlaying(): void;
   zoom(by: 1 | -1): void;
   reset(): void;
-  tilt(): void;
-  fullscreen(): void;
+  toggleTilt(): void;
+  toggleFullscreen(): void;
 }
 
-const LENS = 'M10.5 4a6.5 6.5 0 1 0 0 13a6.5 6.5 0 1 0 0-13M15.3 15.3L20 20M8 10.5h5';
+const MAGNIFIER = 'M10.5 4a6.5 6.5 0 1 0 0 13a6.5 6.5 0 1 0 0-13M15.3 15.3L20 20M8 10.5h5';
 
 const ICONS = {
-  light: LAMP,
+  light: LIGHT_ICON,
   play: 'M8.5 5.5v13l10-6.5z',
   pause: 'M9 6v12M15 6v12',
-  zoomIn: `${LENS}M10.5 8v5`,
-  zoomOut: LENS,
+  zoomIn: `${MAGNIFIER}M10.5 8v5`,
+  zoomOut: MAGNIFIER,
   reset: 'M5 12a7 7 0 1 0 2-4.9L5 9M5 4.5V9h4.5',
   tilt:
     'M8.5 4.5h7a1 1 0 0 1 1 1v13a1 1 0 0 1-1 1h-7a1 1 0 0 1-1-1v-13a1 1 0 0 1 1-1z' +
@@ -51,38 +50,38 @@ const ICONS = {
 
 type IconName = keyof typeof ICONS;
 
-/** Who has moved no pointer for so long looks at the picture. */
-const REST_MS = 3000;
+/** The toolbar hides after this time without pointer movement. */
+const HIDE_MS = 3000;
 
-/** See the module. */
 export class Toolbar {
-  readonly style = STYLE;
+  readonly css = TOOLBAR_CSS;
   readonly bar: HTMLElement;
   readonly menu: HTMLElement;
   readonly #light: HTMLButtonElement;
-  readonly #lightName = make('span');
+  readonly #lightName = createElement('span');
   readonly #play: HTMLButtonElement;
   readonly #zoomOut: HTMLButtonElement;
   readonly #zoomIn: HTMLButtonElement;
   readonly #reset: HTMLButtonElement;
   readonly #tilt: HTMLButtonElement;
   readonly #fullscreen: HTMLButtonElement;
-  #shown = '';
-  #resting: ReturnType<typeof setTimeout> | undefined;
+  /** The items and the language of the current menu. */
+  #menuKey = '';
+  #hideTimer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(actions: ToolbarActions) {
-    this.#light = button('light', () => this.#open(this.menu.hidden === true));
+    this.#light = createButton('light', () => this.#setMenuOpen(this.menu.hidden === true));
     this.#light.append(this.#lightName);
-    put(this.#light, 'aria-controls', 'lights');
-    this.#play = button('play', () => actions.play());
-    this.#zoomOut = button('zoomOut', () => actions.zoom(-1));
-    this.#zoomIn = button('zoomIn', () => actions.zoom(1));
-    this.#reset = button('reset', () => actions.reset());
-    this.#tilt = button('tilt', () => actions.tilt());
-    this.#fullscreen = button('fullscreen', () => actions.fullscreen());
-    this.bar = make(
+    updateAttribute(this.#light, 'aria-controls', 'lights');
+    this.#play = createButton('play', () => actions.togglePlaying());
+    this.#zoomOut = createButton('zoomOut', () => actions.zoom(-1));
+    this.#zoomIn = createButton('zoomIn', () => actions.zoom(1));
+    this.#reset = createButton('reset', () => actions.reset());
+    this.#tilt = createButton('tilt', () => actions.toggleTilt());
+    this.#fullscreen = createButton('fullscreen', () => actions.toggleFullscreen());
+    this.bar = createElement(
       'div',
-      { name: 'toolbar', part: 'controls', attributes: { role: 'toolbar' } },
+      { className: 'toolbar', part: 'controls', attributes: { role: 'toolbar' } },
       this.#light,
       this.#play,
       this.#zoomOut,
@@ -91,125 +90,128 @@ export class Toolbar {
       this.#tilt,
       this.#fullscreen,
     );
-    this.menu = make('div', {
-      name: 'menu',
+    this.menu = createElement('div', {
+      className: 'menu',
       part: 'menu',
       attributes: { role: 'radiogroup', id: 'lights' },
     });
-    this.close();
-    this.bar.addEventListener('keydown', (event) => this.#rove(event));
-    this.bar.addEventListener('focusin', ({ target }) => this.#stopAt(target));
+    this.closeMenu();
+    this.bar.addEventListener('keydown', (event) => this.#moveFocus(event));
+    this.bar.addEventListener('focusin', ({ target }) => this.#setTabStop(target));
     this.menu.addEventListener('change', ({ target }) => {
-      if (target instanceof HTMLInputElement) actions.choose(target.value as LightItem);
+      if (target instanceof HTMLInputElement) actions.selectLight(target.value as LightItem);
     });
     this.menu.addEventListener('keydown', (event) => {
       if (event.key !== 'Escape') return;
       event.preventDefault();
-      this.close();
+      this.closeMenu();
       this.#light.focus();
     });
   }
 
-  update({ say, language, items, item, plays, zoom, tilts, fullscreen }: ToolbarState): void {
-    this.#list(items, language, say);
+  update(state: ToolbarState): void {
+    const { t, item, isPlaying, zoom, isTilting } = state;
+    this.#updateMenu(state);
     for (const input of this.menu.querySelectorAll('input')) input.checked = input.value === item;
-    put(this.bar, 'aria-label', say('controls'));
-    put(this.menu, 'aria-label', say('light'));
-    write(this.#lightName, say(item));
-    name(this.#light, `${say('light')}: ${say(item)}`);
-    show(this.#play, plays !== null, say(plays ? 'pause' : 'play'), plays ? 'pause' : 'play');
-    show(this.#zoomOut, zoom !== null, say('zoomOut'));
-    show(this.#zoomIn, zoom !== null, say('zoomIn'));
-    put(this.#zoomOut, 'aria-disabled', String(!zoom?.out));
-    put(this.#zoomIn, 'aria-disabled', String(!zoom?.in));
-    show(this.#reset, true, say('reset'));
-    show(this.#tilt, tilts !== null, say('tilt'));
-    put(this.#tilt, 'aria-pressed', String(tilts === true));
-    const screen = fullscreen ? 'leaveFullscreen' : 'fullscreen';
-    show(this.#fullscreen, fullscreen !== null, say(screen), screen);
-    // The one stop may have gone.
-    const stops = this.#buttons.filter((button) => button.tabIndex === 0);
-    if (stops.length !== 1) this.#stopAt(this.#light);
+    updateAttribute(this.bar, 'aria-label', t('controls'));
+    updateAttribute(this.menu, 'aria-label', t('light'));
+    updateText(this.#lightName, t(item));
+    setLabel(this.#light, `${t('light')}: ${t(item)}`);
+    const playKey = isPlaying ? 'pause' : 'play';
+    updateButton(this.#play, isPlaying !== null, t(playKey), playKey);
+    updateButton(this.#zoomOut, zoom !== null, t('zoomOut'));
+    updateButton(this.#zoomIn, zoom !== null, t('zoomIn'));
+    updateAttribute(this.#zoomOut, 'aria-disabled', String(!zoom?.canZoomOut));
+    updateAttribute(this.#zoomIn, 'aria-disabled', String(!zoom?.canZoomIn));
+    updateButton(this.#reset, true, t('reset'));
+    updateButton(this.#tilt, isTilting !== null, t('tilt'));
+    updateAttribute(this.#tilt, 'aria-pressed', String(isTilting === true));
+    const screenKey = state.isFullscreen ? 'leaveFullscreen' : 'fullscreen';
+    updateButton(this.#fullscreen, state.isFullscreen !== null, t(screenKey), screenKey);
+    // The button that was the tab stop may be hidden now.
+    const stops = this.#visibleButtons.filter((button) => button.tabIndex === 0);
+    if (stops.length !== 1) this.#setTabStop(this.#light);
   }
 
-  close(): void {
-    this.#open(false);
+  closeMenu(): void {
+    this.#setMenuOpen(false);
   }
 
-  /** Somebody moves a pointer over the picture: the buttons show, and go once it rests. */
-  wake(): void {
-    this.bar.classList.remove('resting');
-    clearTimeout(this.#resting);
-    this.#resting = setTimeout(() => {
-      if (this.menu.hidden) this.bar.classList.add('resting');
-    }, REST_MS);
+  /** Shows the toolbar: for good after a key press, otherwise for `HIDE_MS`. */
+  show(byKeyboard: boolean): void {
+    this.bar.classList.remove('idle');
+    clearTimeout(this.#hideTimer);
+    if (byKeyboard) return;
+    this.#hideTimer = setTimeout(() => {
+      if (this.menu.hidden) this.bar.classList.add('idle');
+    }, HIDE_MS);
   }
 
-  /** Somebody uses keys: the buttons stay. */
-  stay(): void {
-    clearTimeout(this.#resting);
-    this.bar.classList.remove('resting');
-  }
-
-  get #buttons(): HTMLButtonElement[] {
+  get #visibleButtons(): HTMLButtonElement[] {
     return [...this.bar.querySelectorAll('button')].filter((button) => !button.hidden);
   }
 
-  #open(open: boolean): void {
-    this.menu.hidden = !open;
-    put(this.#light, 'aria-expanded', String(open));
-    if (open) this.menu.querySelector<HTMLInputElement>('input:checked')?.focus();
+  #setMenuOpen(isOpen: boolean): void {
+    this.menu.hidden = !isOpen;
+    updateAttribute(this.#light, 'aria-expanded', String(isOpen));
+    if (isOpen) this.menu.querySelector<HTMLInputElement>('input:checked')?.focus();
   }
 
-  #list(items: readonly LightItem[], language: string, say: (word: Word) => string): void {
-    const shown = `${items} ${language}`;
-    if (shown === this.#shown) return;
-    this.#shown = shown;
+  #updateMenu({ items, languageKey, t }: ToolbarState): void {
+    const key = `${items} ${languageKey}`;
+    if (key === this.#menuKey) return;
+    this.#menuKey = key;
     const labels = items.map((item) => {
       const attributes = { type: 'radio', name: 'light', value: item };
-      return make('label', {}, make('input', { attributes }), make('span', {}, say(item)));
+      const input = createElement('input', { attributes });
+      return createElement('label', {}, input, createElement('span', {}, t(item)));
     });
     this.menu.replaceChildren(...labels);
   }
 
-  #stopAt(target: EventTarget | null): void {
-    for (const button of this.#buttons) button.tabIndex = button === target ? 0 : -1;
+  #setTabStop(target: EventTarget | null): void {
+    for (const button of this.#visibleButtons) button.tabIndex = button === target ? 0 : -1;
   }
 
-  #rove(event: KeyboardEvent): void {
-    const buttons = this.#buttons;
-    const at = buttons.indexOf(event.target as HTMLButtonElement);
-    const to = {
-      ArrowLeft: at - 1,
-      ArrowRight: at + 1,
+  #moveFocus(event: KeyboardEvent): void {
+    const buttons = this.#visibleButtons;
+    const current = buttons.indexOf(event.target as HTMLButtonElement);
+    const next = {
+      ArrowLeft: current - 1,
+      ArrowRight: current + 1,
       Home: 0,
       End: buttons.length - 1,
     }[event.key];
-    if (at < 0 || to === undefined) return;
+    if (current < 0 || next === undefined) return;
     event.preventDefault();
-    buttons[(to + buttons.length) % buttons.length]?.focus();
+    buttons[(next + buttons.length) % buttons.length]?.focus();
   }
 }
 
-function button(iconName: IconName, press: () => void): HTMLButtonElement {
-  const made = make(
+function createButton(iconName: IconName, onPress: () => void): HTMLButtonElement {
+  const button = createElement(
     'button',
     { part: 'button', attributes: { type: 'button' } },
-    icon(ICONS[iconName]),
+    createIcon(ICONS[iconName]),
   );
-  made.addEventListener('click', () => {
-    if (made.getAttribute('aria-disabled') !== 'true') press();
+  button.addEventListener('click', () => {
+    if (button.getAttribute('aria-disabled') !== 'true') onPress();
   });
-  return made;
+  return button;
 }
 
-function name(button: HTMLButtonElement, text: string): void {
-  put(button, 'aria-label', text);
-  put(button, 'title', text);
+function setLabel(button: HTMLButtonElement, label: string): void {
+  updateAttribute(button, 'aria-label', label);
+  updateAttribute(button, 'title', label);
 }
 
-function show(button: HTMLButtonElement, shown: boolean, text: string, iconName?: IconName): void {
-  button.hidden = !shown;
-  name(button, text);
-  if (iconName && button.firstElementChild) showIcon(button.firstElementChild, ICONS[iconName]);
+function updateButton(
+  button: HTMLButtonElement,
+  isVisible: boolean,
+  label: string,
+  iconName?: IconName,
+): void {
+  button.hidden = !isVisible;
+  setLabel(button, label);
+  if (iconName && button.firstElementChild) setIcon(button.firstElementChild, ICONS[iconName]);
 }

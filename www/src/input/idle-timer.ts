@@ -1,0 +1,58 @@
+/** Reports that a visitor has been inactive: first for the wandering torch, later for the kiosk mode. */
+
+/** Calls back once after `ms` milliseconds. The returned function cancels. */
+export type Delay = (ms: number, callback: () => void) => () => void;
+
+export interface IdleListener {
+  /** No input for `REST_MS`. */
+  rested(): void;
+  /** No input for the kiosk's time, once after each activity. */
+  expired(): void;
+}
+
+/** The torch wanders again after this time. */
+export const REST_MS = 8000;
+
+export class IdleTimer {
+  readonly #delay: Delay;
+  readonly #listener: IdleListener;
+  #kioskMs = 0;
+  #isActive = false;
+  #cancelRest = (): void => {};
+  #cancelKiosk = (): void => {};
+
+  constructor(delay: Delay, listener: IdleListener) {
+    this.#delay = delay;
+    this.#listener = listener;
+  }
+
+  /** 0 is never. */
+  set kioskSeconds(seconds: number) {
+    if (1000 * seconds === this.#kioskMs) return;
+    this.#kioskMs = 1000 * seconds;
+    if (this.#isActive) this.#startKiosk();
+  }
+
+  /** Restarts after an input. */
+  restart(): void {
+    this.#isActive = true;
+    this.#cancelRest();
+    this.#cancelRest = this.#delay(REST_MS, () => this.#listener.rested());
+    this.#startKiosk();
+  }
+
+  stop(): void {
+    this.#isActive = false;
+    this.#cancelRest();
+    this.#cancelKiosk();
+  }
+
+  #startKiosk(): void {
+    this.#cancelKiosk();
+    if (this.#kioskMs === 0) return;
+    this.#cancelKiosk = this.#delay(this.#kioskMs, () => {
+      this.#isActive = false;
+      this.#listener.expired();
+    });
+  }
+}

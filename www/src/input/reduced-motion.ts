@@ -1,0 +1,4 @@
+/** Whether the visitor's system asks for less motion. */
+export function reducedMotion(): MediaQueryList {
+  return matchMedia('(prefers-reduced-motion: reduce)');
+}

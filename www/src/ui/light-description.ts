@@ -1,0 +1,31 @@
+/** Describes the torch's position in words, for screen readers. */
+
+import { type Language, type StringKey, t } from '../i18n/strings.js';
+import type { PicturePoint } from '../shared/values.js';
+
+const DIRECTIONS: readonly (readonly StringKey[])[] = [
+  ['upperLeft', 'above', 'upperRight'],
+  ['left', 'lightInMiddle', 'right'],
+  ['lowerLeft', 'below', 'lowerRight'],
+];
+
+/** Half the side of the square around the centre that counts as the middle; of the picture. */
+const MIDDLE_DISTANCE = 1 / 8;
+/** The largest distance from the centre that counts as near; of the picture. */
+const NEAR_DISTANCE = 0.3;
+
+/** For example “Light from upper left, near, 35 % · 30 %”, which ends with the x and y coordinates. */
+export function describeLight({ x, y }: PicturePoint, language: Language): string {
+  const direction = DIRECTIONS[third(y)]?.[third(x)] ?? 'lightInMiddle';
+  const percent = (value: number) => `${Math.round(100 * value)} %`;
+  const position = `${percent(x)} · ${percent(y)}`;
+  if (direction === 'lightInMiddle') return `${t(direction, language)}, ${position}`;
+  const distance = t(Math.hypot(x - 0.5, y - 0.5) < NEAR_DISTANCE ? 'near' : 'far', language);
+  return t('lightAt', language, t(direction, language), distance, position);
+}
+
+/** 0, 1 or 2: before, in or after the middle. */
+function third(coordinate: number): number {
+  if (coordinate < 0.5 - MIDDLE_DISTANCE) return 0;
+  return coordinate > 0.5 + MIDDLE_DISTANCE ? 2 : 1;
+}

@@ -1,0 +1,254 @@
+/**
+ * The element's shadow DOM: the viewport with the picture, its poster and the torch handle, and below them the
+ * controls, a progress bar and a message. It keeps no state apart from the elements.
+ */
+
+import { type Language, t } from '../i18n/strings.js';
+import type { PicturePoint } from '../shared/values.js';
+import { type PhotoView, toViewport } from '../state/viewport.js';
+import { adoptStyles } from './adopted-styles.js';
+import { createElement, createSlot, updateAttribute, updateText } from './dom-helpers.js';
+import { createIcon, LIGHT_ICON } from './icons.js';
+import ELEMENT_CSS from './style.css';
+
+export interface ErrorMessage {
+  /** Whether there is no picture because of the error. */
+  readonly isFatal: boolean;
+  readonly details: string;
+}
+
+export interface LayoutState {
+  /** The torch handle is present. */
+  readonly hasHandle: boolean;
+  /** The viewport itself takes the focus, because there is no handle. */
+  readonly isFocusable: boolean;
+  readonly isZoomed: boolean;
+  /** The browser's own gestures for single fingers, as in CSS. */
+  readonly touchAction: 'auto' | 'pan-y' | 'none';
+}
+
+/** Beyond this zoom, pixels are drawn as squares. */
+const MIN_PIXELATED_ZOOM = 4;
+/** An announcement waits this long, so that a newer one can replace it. */
+const ANNOUNCE_DELAY_MS = 400;
+const HINT_MS = 1800;
+
+export class ShadowDom {
+  /** The box that shows the picture and receives pointer events. */
+  readonly viewport = createElement('div', { className: 'viewport' });
+  /** Represents the torch for keyboards and screen readers. */
+  readonly handle = createElement('div', {
+    className: 'handle',
+    part: 'torch-handle',
+    attributes: { role: 'slider', tabindex: '0', 'aria-valuemin': '0', 'aria-valuemax': '100' },
+  });
+  /** Dismisses the poster. */
+  readonly revealButton: HTMLButtonElement;
+  readonly #root: ShadowRoot;
+  readonly #picture = createElement('div', { className: 'picture', part: 'picture' });
+  readonly #poster: HTMLElement;
+  readonly #posterImage = createElement('img', { part: 'poster', attributes: { alt: '' } });
+  readonly #revealText = createElement('span');
+  readonly #hint = createElement('div', { className: 'hint', part: 'hint' });
+  readonly #controls = createSlot('controls');
+  readonly #progressBar = createElement('div', {
+    className: 'progress-bar',
+    attributes: { role: 'progressbar' },
+  });
+  readonly #progress: HTMLElement;
+  readonly #errorSummary = createElement('p');
+  readonly #detailsLabel = createElement('summary');
+  readonly #errorDetails = createElement('p');
+  readonly #message: HTMLElement;
+  readonly #footer: HTMLElement;
+  readonly #status = createElement('div', {
+    className: 'visually-hidden',
+    part: 'status',
+    attributes: { role: 'status' },
+  });
+  #canvas: HTMLCanvasElement | null = null;
+  #announceTimer: ReturnType<typeof setTimeout> | undefined;
+  #hintTimer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(root: ShadowRoot) {
+    this.#root = root;
+    adoptStyles(root, ELEMENT_CSS);
+    this.#poster = createElement(
+      'div',
+      { className: 'poster' },
+      createSlot('poster', this.#posterImage),
+    );
+    this.#posterImage.addEventListener('load', () => this.viewport.classList.add('has-poster'));
+    this.#posterImage.addEventListener('error', () => {
+      this.#posterImage.hidden = true;
+    });
+    this.revealButton = createElement(
+      'button',
+      { className: 'reveal', part: 'button', attributes: { type: 'button' } },
+      createElement('span', {}, createIcon(LIGHT_ICON), this.#revealText),
+    );
+    this.viewport.append(
+      this.#picture,
+      this.#poster,
+      this.handle,
+      this.revealButton,
+      this.#hint,
+    );
+    this.#progress = createElement(
+      'div',
+      { className: 'progress', part: 'progress' },
+      createSlot('progress', this.#progressBar),
+    );
+    const details = createElement('details', {}, this.#detailsLabel, this.#errorDetails);
+    this.#message = createElement(
+      'div',
+      { className: 'message', part: 'message', attributes: { role: 'alert' } },
+      createSlot('error', this.#errorSummary, details),
+    );
+    for (const part of [
+      this.#posterImage,
+      this.handle,
+      this.revealButton,
+      this.#hint,
+      this.#progress,
+      this.#message,
+    ])
+      part.hidden = true;
+    this.#footer = createElement(
+      'div',
+      { className: 'footer' },
+      createElement('div', { className: 'controls' }, this.#controls),
+      this.#progress,
+      this.#message,
+    );
+    root.append(this.viewport, this.#footer, this.#status);
+  }
+
+  /** Adds the built-in controls, which a page's own `controls` slot replaces. */
+  mountControls(controls: readonly HTMLElement[], css: string): void {
+    adoptStyles(this.#root, css);
+    this.#controls.append(...controls);
+  }
+
+  /** Labels everything for screen readers. An empty `alt` marks the picture as decorative. */
+  updateLabels(alt: string | null, language: Language): void {
+    updateAttribute(this.#picture, 'role', alt === '' ? 'presentation' : 'img');
+    updateAttribute(this.#picture, 'aria-label', alt || null);
+    const { handle, revealButton } = this;
+    for (const part of [handle, revealButton, this.#hint, this.#footer, this.#status]) {
+      part.lang = language;
+    }
+    updateAttribute(handle, 'aria-label', t('light', language));
+    updateAttribute(handle, 'aria-roledescription', t('slider', language));
+    updateAttribute(this.#progressBar, 'aria-label', t('loading', language));
+    updateText(this.#revealText, t('reveal', language));
+    updateText(this.#detailsLabel, t('details', language));
+  }
+
+  /** Updates the handle and the focus. When the handle disappears, its focus moves to the viewport. */
+  updateLayout(state: LayoutState, language: Language): void {
+    const { handle, viewport } = this;
+    const { hasHandle, isFocusable, isZoomed, touchAction } = state;
+    const focused = this.#root.activeElement;
+    const keepsFocus = !hasHandle && (focused === handle || focused === viewport);
+    handle.hidden = !hasHandle;
+    viewport.classList.toggle('has-handle', hasHandle);
+    viewport.classList.toggle('zoomed', isZoomed);
+    viewport.classList.toggle('touch-pan-y', touchAction === 'pan-y');
+    viewport.classList.toggle('touch-none', touchAction === 'none');
+    const hasRole = isFocusable || keepsFocus;
+    updateAttribute(viewport, 'tabindex', isFocusable ? '0' : keepsFocus ? '-1' : null);
+    updateAttribute(viewport, 'role', hasRole ? 'group' : null);
+    updateAttribute(viewport, 'aria-label', hasRole ? t('picture', language) : null);
+    if (keepsFocus && focused === handle) viewport.focus({ preventScroll: true });
+    if (hasHandle && focused === viewport) handle.focus({ preventScroll: true });
+  }
+
+  /** Replaces the canvas. */
+  showCanvas(canvas: HTMLCanvasElement): void {
+    canvas.setAttribute('part', 'canvas');
+    this.#canvas = canvas;
+    this.#picture.replaceChildren(canvas);
+    this.viewport.classList.add('has-picture');
+    this.viewport.style.setProperty('--ratio', String(canvas.width / canvas.height));
+  }
+
+  /** Removes the canvas, the progress bar and the message. */
+  clear(): void {
+    this.viewport.classList.remove('has-picture');
+    this.#canvas = null;
+    this.#picture.replaceChildren();
+    this.updateProgress(null);
+    this.showError(null, 'en');
+  }
+
+  /** Shows a part of the picture. The handle is at the torch's position, or at the nearest edge of the view. */
+  updateView(view: PhotoView, torch: PicturePoint, description: string): void {
+    if (this.#canvas) {
+      const { zoom, x, y } = view;
+      const shift = (centre: number) => `${100 * (0.5 - centre * zoom)}%`;
+      this.#canvas.style.transform =
+        zoom > 1 ? `translate(${shift(x)}, ${shift(y)}) scale(${zoom})` : '';
+      this.#canvas.classList.toggle('pixelated', zoom > MIN_PIXELATED_ZOOM);
+    }
+    const { x, y } = toViewport(view, torch);
+    const percent = (coordinate: number) => `${100 * Math.min(1, Math.max(0, coordinate))}%`;
+    this.handle.style.left = percent(x);
+    this.handle.style.top = percent(y);
+    updateAttribute(this.handle, 'aria-valuenow', String(Math.round(100 * torch.x)));
+    updateAttribute(this.handle, 'aria-valuetext', description);
+  }
+
+  /** `needsPress` shows the button that dismisses the poster. */
+  updatePoster(
+    src: string | null,
+    crossOrigin: string | null,
+    isShown: boolean,
+    needsPress: boolean,
+  ): void {
+    if (this.#posterImage.getAttribute('src') !== src) {
+      this.viewport.classList.remove('has-poster');
+      this.#posterImage.hidden = src === null;
+      updateAttribute(this.#posterImage, 'crossorigin', crossOrigin);
+      updateAttribute(this.#posterImage, 'src', src);
+    }
+    this.#poster.classList.toggle('hidden', !isShown);
+    this.revealButton.hidden = !needsPress;
+  }
+
+  /** The loaded fraction, 0 to 1, or `NaN` if unknown; `null` hides the progress bar. */
+  updateProgress(fraction: number | null): void {
+    this.#progress.hidden = fraction === null;
+    if (fraction === null) return;
+    const isKnown = Number.isFinite(fraction);
+    this.#progress.classList.toggle('indeterminate', !isKnown);
+    this.#progressBar.style.transform = isKnown ? `scaleX(${fraction})` : '';
+    const percent = isKnown ? String(Math.round(fraction * 100)) : null;
+    updateAttribute(this.#progressBar, 'aria-valuenow', percent);
+  }
+
+  /** Shows a message over the picture; `null` hides it. */
+  showError(error: ErrorMessage | null, language: Language): void {
+    if (error) {
+      updateText(this.#errorSummary, t(error.isFatal ? 'broken' : 'degraded', language));
+      updateText(this.#errorDetails, error.details);
+    }
+    this.#message.hidden = error === null;
+  }
+
+  /** Shows a hint over the picture for a moment. */
+  showHint(text: string): void {
+    updateText(this.#hint, text);
+    this.#hint.hidden = false;
+    clearTimeout(this.#hintTimer);
+    this.#hintTimer = setTimeout(() => {
+      this.#hint.hidden = true;
+    }, HINT_MS);
+  }
+
+  /** Has a screen reader read a text, unless another one follows at once. */
+  announce(text: string): void {
+    clearTimeout(this.#announceTimer);
+    this.#announceTimer = setTimeout(() => updateText(this.#status, text), ANNOUNCE_DELAY_MS);
+  }
+}
