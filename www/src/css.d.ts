@@ -1,4 +1,4 @@
-/** Style sheets come into bundles as their text, made small. */
+/** The bundler imports a style sheet as its minified text. */
 declare module '*.css' {
   const text: string;
   export default text;

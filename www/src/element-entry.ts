@@ -1,4 +1,4 @@
-/** The element's class and all that goes with it. Importing this has no side effects. */
+/** The element's class, its events and its types. Importing this module has no side effects. */
 
 export { defineRelightablePhoto, TAG } from './element/define.js';
 export type { BlobOptions, PhotoInfo } from './element/element.js';

@@ -1,4 +1,4 @@
-/** Importing this defines `<relightable-photo>`, in a browser; on a server it does nothing. */
+/** Importing this module defines `<relightable-photo>` in a browser. On a server it has no effect. */
 
 import { defineRelightablePhoto } from './element/define.js';
 

@@ -27,7 +27,9 @@ const APART = new Map([
   ['lights/light-sources', 'relightable-photo-sources'],
   ['input/tilt', 'relightable-photo-tilt'],
   ['ui/toolbar', 'relightable-photo-controls'],
-  ['i18n/translations', 'relightable-photo-words'],
+  ...['fr', 'de', 'it', 'es', 'ja', 'zh'].map(
+    (language) => /** @type {const} */ ([`i18n/${language}`, `relightable-photo-${language}`]),
+  ),
 ]);
 
 /** @type {import('esbuild').Plugin} */

@@ -1,11 +1,11 @@
-/** Makes `<relightable-photo>` known to the page. */
+/** Registers `<relightable-photo>` with the page. */
 
 import { RelightablePhoto } from './element.js';
 
 /** The element's name in HTML. */
 export const TAG = 'relightable-photo';
 
-/** Defines the element, where there are elements, unless it is defined: a page may come to load two copies. */
+/** Defines the element once, even if a page loads two copies of this script. Does nothing on a server. */
 export function defineRelightablePhoto(): void {
   if (globalThis.customElements && !customElements.get(TAG)) {
     customElements.define(TAG, RelightablePhoto);

@@ -1,39 +1,43 @@
-/** The element's events. All bubble and cross shadow boundaries; none can be cancelled. */
+/** The element's events. All of them bubble and cross shadow boundaries; none can be cancelled. */
 
-import type { Backend } from '../engine/types.js';
 import type { LightSource } from '../lights/light-source.js';
 import type { ErrorCode, PhotoError } from '../shared/errors.js';
-import type { LightName } from '../shared/names.js';
+import type { Backend, LightName } from '../shared/names.js';
 import type { PicturePoint } from '../shared/values.js';
 import type { PhotoView } from '../state/viewport.js';
 
-const TRAVELS: EventInit = { bubbles: true, composed: true };
+const EVENT_OPTIONS: EventInit = { bubbles: true, composed: true };
 
-/** What happened, and what is told of it. */
+/** An event with further fields. */
 class PhotoEvent extends Event {
-  constructor(type: string, told: object) {
-    super(type, TRAVELS);
-    Object.assign(this, told);
+  constructor(type: string, fields: object) {
+    super(type, EVENT_OPTIONS);
+    Object.assign(this, fields);
   }
 }
 
-/** `load`: the photograph is there and drawn. */
-export function loadEvent(): Event {
-  return new Event('load', TRAVELS);
+/** `load`: the whole photograph is drawn. */
+export function createLoadEvent(): Event {
+  return new Event('load', EVENT_OPTIONS);
 }
 
-/** `progress`: more of the file has come; `total` is 0 until known. */
-export function progressEvent(loaded: number, total: number): ProgressEvent {
-  return new ProgressEvent('progress', { ...TRAVELS, loaded, total, lengthComputable: total > 0 });
+/** `progress`: more of the file has arrived; `total` is 0 while unknown. */
+export function createProgressEvent(loaded: number, total: number): ProgressEvent {
+  return new ProgressEvent('progress', {
+    ...EVENT_OPTIONS,
+    loaded,
+    total,
+    lengthComputable: total > 0,
+  });
 }
 
-/** `error`: something failed; the same message stands inside the element. */
+/** `error`: something failed. The element shows the message as well. */
 export class PhotoErrorEvent extends PhotoEvent {
-  /** For programs. */
+  /** Identifies the error for programs. */
   declare readonly code: ErrorCode;
-  /** For people. */
+  /** Explains the error to people. */
   declare readonly message: string;
-  /** What was caught, where there was something. */
+  /** The underlying error, if any. */
   declare readonly cause: unknown;
 
   constructor({ code, message, cause }: PhotoError) {
@@ -41,13 +45,13 @@ export class PhotoErrorEvent extends PhotoEvent {
   }
 }
 
-/** `lightchange`: the light is another, or the torch has moved. Frames of one source do not tell. */
+/** `lightchange`: another light is active, or the torch has moved. New frames of a source are no change. */
 export class LightChangeEvent extends PhotoEvent {
-  /** The built-in light; where there is a source, the one that it stands in for. */
+  /** The built-in light, or the one that the source replaces. */
   declare readonly light: LightName;
-  /** Where a torch that was moved shines; `null` for one in the middle, and for other lights. */
+  /** The torch's position; `null` behind the centre, and for other lights. */
   declare readonly torch: PicturePoint | null;
-  /** What shines in the built-in light's place; `null` where that one does. */
+  /** The source that replaces the built-in light, if any. */
   declare readonly source: LightSource | null;
 
   constructor(light: LightName, torch: PicturePoint | null, source: LightSource | null) {
@@ -55,15 +59,12 @@ export class LightChangeEvent extends PhotoEvent {
   }
 }
 
-/** `backendchange`: a back end was taken up, the first one too. */
+/** `backendchange`: a backend is in use, the first one or another one. */
 export class BackendChangeEvent extends PhotoEvent {
   declare readonly backend: Backend;
-  /** The one it replaces, `null` for the first. */
+  /** The backend before it, `null` for the first. */
   declare readonly previous: Backend | null;
-  /**
-   * Why not the one before it or those preferred to it, and why it is slower than it could be; empty where
-   * there is nothing to say.
-   */
+  /** Why preferred backends are not in use, and why rendering is degraded; empty if neither applies. */
   declare readonly reason: string;
 
   constructor(backend: Backend, previous: Backend | null, reason: string) {
@@ -72,11 +73,11 @@ export class BackendChangeEvent extends PhotoEvent {
 }
 
 /**
- * `qualitychange`: what is shown is drawn by another share of the photograph than before. It is less than
- * 1 only while the picture moves faster than all of it can be drawn.
+ * `qualitychange`: the picture is drawn with another share of the photograph's components. The share is below 1
+ * only while the picture changes faster than it can be drawn in full.
  */
 export class QualityChangeEvent extends PhotoEvent {
-  /** 0 to 1, in full detail; the first picture is. */
+  /** 0 to 1; the first picture has 1. */
   declare readonly share: number;
 
   constructor(share: number) {
@@ -84,10 +85,10 @@ export class QualityChangeEvent extends PhotoEvent {
   }
 }
 
-/** `contextlost`: the back end that drew is gone; `backendchange` tells what takes its place. */
+/** `contextlost`: the backend in use was lost; `backendchange` reports its replacement. */
 export class ContextLostEvent extends PhotoEvent {
   declare readonly backend: Backend;
-  /** What the browser says of it. */
+  /** The browser's explanation. */
   declare readonly message: string;
 
   constructor(backend: Backend, message: string) {
@@ -95,11 +96,11 @@ export class ContextLostEvent extends PhotoEvent {
   }
 }
 
-/** `viewchange`: another part of the picture is shown. */
+/** `viewchange`: another part of the picture is visible. */
 export class ViewChangeEvent extends PhotoEvent {
-  /** Magnification; 1 shows all of the picture. */
+  /** Magnification; 1 shows the whole picture. */
   declare readonly zoom: number;
-  /** The point of the picture in the middle, from 0 to 1. */
+  /** The point of the picture at the centre of the element, 0 to 1. */
   declare readonly x: number;
   declare readonly y: number;
 

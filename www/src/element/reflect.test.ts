@@ -1,11 +1,11 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { Attributes } from '../state/attribute-reader.js';
-import { readAsked } from '../state/options.js';
+import { AttributeReader } from '../state/attribute-reader.js';
+import { type ElementOptions, readOptions } from '../state/options.js';
 import { ATTRIBUTES, PROPERTIES, type Reflected, reflect } from './reflect.js';
 
-/** What of an element properties need. */
-class Holder {
+/** The part of an element that the properties use. */
+class FakeElement {
   readonly baseURI = 'https://a.org/page/';
   readonly attributes = new Map<string, string>();
   getAttribute(name: string): string | null {
@@ -18,15 +18,15 @@ class Holder {
     this.attributes.delete(name);
   }
 }
-reflect(Holder.prototype);
+reflect(FakeElement.prototype);
 
-function holder(): Holder & Reflected {
-  return new Holder() as Holder & Reflected;
+function createElement(): FakeElement & Reflected {
+  return new FakeElement() as FakeElement & Reflected;
 }
 
-test('properties say what goes without saying', () => {
-  const it = holder();
-  assert.deepEqual(Object.fromEntries(PROPERTIES.map((name) => [name, it[name]])), {
+test('properties have defaults', () => {
+  const element = createElement();
+  assert.deepEqual(Object.fromEntries(PROPERTIES.map((name) => [name, element[name]])), {
     src: '',
     alt: '',
     light: 'flood',
@@ -54,45 +54,52 @@ test('properties say what goes without saying', () => {
   assert.equal(ATTRIBUTES.length, PROPERTIES.length);
 });
 
-test('properties are attributes', () => {
-  const it = holder();
-  Object.assign(it, { lightX: 0.25, controls: true, zoom: 4, crossOrigin: 'use-credentials' });
-  assert.deepEqual(Object.fromEntries(it.attributes), {
+test('properties write their attributes', () => {
+  const element = createElement();
+  Object.assign(element, { lightX: 0.25, controls: true, zoom: 4, crossOrigin: 'use-credentials' });
+  assert.deepEqual(Object.fromEntries(element.attributes), {
     'light-x': '0.25',
     controls: '',
     zoom: '4',
     crossorigin: 'use-credentials',
   });
-  assert.deepEqual([it.lightX, it.controls, it.zoom], [0.25, true, 4]);
-  Object.assign(it, { controls: false, crossOrigin: null });
-  assert.deepEqual([...it.attributes.keys()], ['light-x', 'zoom']);
-  it.setAttribute('zoom', '');
-  it.setAttribute('kiosk', '');
-  assert.deepEqual([it.zoom, it.kiosk], [8, 60]);
-  it.setAttribute('zoom', 'much');
-  it.setAttribute('loading', 'later');
-  assert.deepEqual([it.zoom, it.loading], [1, 'auto']);
+  assert.deepEqual([element.lightX, element.controls, element.zoom], [0.25, true, 4]);
+  Object.assign(element, { controls: false, crossOrigin: null });
+  assert.deepEqual([...element.attributes.keys()], ['light-x', 'zoom']);
+  element.setAttribute('zoom', '');
+  element.setAttribute('kiosk', '');
+  assert.deepEqual([element.zoom, element.kiosk], [8, 60]);
+  element.setAttribute('zoom', 'much');
+  element.setAttribute('loading', 'later');
+  assert.deepEqual([element.zoom, element.loading], [1, 'auto']);
 });
 
-test('attributes are read together, and what is wrong is told with its name', () => {
-  const it = holder();
-  const attributes = new Attributes();
-  const asked = () => readAsked(it, attributes, () => [255, 0, 0, 255]);
-  it.setAttribute('src', 'window.ltm');
-  it.setAttribute('light-x', '0.25');
-  it.setAttribute('light-color', 'red');
-  it.setAttribute('wasm-url', '../wasm');
-  it.setAttribute('crossorigin', '');
-  it.setAttribute('cooperative-gestures', '');
-  const { src, light, wasm, crossOrigin, cooperative, breathes } = asked();
+test('all options are read together, and errors name their attribute', () => {
+  const element = createElement();
+  const reader = new AttributeReader(element);
+  let options: ElementOptions | null = null;
+  const read = () => {
+    options = readOptions(reader, () => [255, 0, 0, 255], options);
+    return options;
+  };
+  element.setAttribute('src', 'window.ltm');
+  element.setAttribute('light-x', '0.25');
+  element.setAttribute('light-color', 'red');
+  element.setAttribute('wasm-url', '../wasm');
+  element.setAttribute('crossorigin', '');
+  element.setAttribute('cooperative-gestures', '');
+  const { src, light, wasmUrl, crossOrigin, cooperativeGestures, autoplayLight } = read();
   assert.equal(src, 'https://a.org/page/window.ltm');
-  assert.deepEqual(light.place, { x: 0.25, y: 0.5 });
+  assert.deepEqual(light.torch, { x: 0.25, y: 0.5 });
   assert.deepEqual(light.color?.factors, [1, 0, 0]);
-  assert.equal(wasm, 'https://a.org/wasm/');
-  assert.deepEqual([crossOrigin, cooperative, breathes], ['anonymous', true, false]);
-  it.setAttribute('light-x', 'left');
-  it.setAttribute('poster', 'http://[');
-  assert.deepEqual(asked().light.place, { x: 0.25, y: 0.5 }, 'as it was when it was right');
-  const told = attributes.takeFaults().map(({ message }) => message);
-  assert.match(told.join(' '), /light-x “left”.*“http:\/\/\[” in poster/);
+  assert.equal(wasmUrl, 'https://a.org/wasm/');
+  assert.deepEqual([crossOrigin, cooperativeGestures, autoplayLight], ['anonymous', true, false]);
+  assert.equal(read(), options, 'the same object without a change');
+  element.setAttribute('zoom', '3');
+  assert.equal(read().light, light, 'the same light after a change of the zoom');
+  element.setAttribute('light-x', 'left');
+  element.setAttribute('poster', 'http://[');
+  assert.deepEqual(read().light.torch, { x: 0.25, y: 0.5 }, 'the last valid value');
+  const messages = reader.takeErrors().map(({ message }) => message);
+  assert.match(messages.join(' '), /light-x “left”.*“http:\/\/\[” in poster/);
 });

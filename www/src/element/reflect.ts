@@ -1,6 +1,7 @@
-/** Attributes as typed properties: what the attribute says, or what goes without saying. */
+/** Reflects attributes as typed properties. An absent or invalid attribute gives the property's default. */
 
 import { parseExposure } from '../shared/parse-settings.js';
+import { CENTRE } from '../shared/values.js';
 import {
   DEFAULT_TORCH_SIZE,
   type Loading,
@@ -14,61 +15,61 @@ import {
   type Reveal,
 } from '../state/attribute-values.js';
 
-/** The properties. Numbers and names are those that go without saying where the attribute is wrong. */
+/** The properties that reflect attributes. */
 export interface Reflected {
   /** Address of the `.ltm` file. */
   src: string;
-  /** What the picture shows, in words. */
+  /** Description of the picture for visitors who cannot see it. */
   alt: string;
-  /** Name of the built-in light to begin with; `activeLight` is the one that shines. */
+  /** Name of the initial built-in light; `activeLight` is the current one. */
   light: string;
-  /** Address of a picture or film that is the light in place of the built-in one. */
+  /** Address of an image or video that replaces the built-in light. */
   lightSrc: string;
-  /** Any CSS colour, by which the light is tinted. */
+  /** CSS colour of the light. */
   lightColor: string;
   /** Radius of the torch, as a fraction of the light plane's shorter side. */
   lightSize: number;
-  /** Where the torch shines to begin with, 0 to 1 across the picture. */
+  /** Initial position of the torch, 0 to 1 across the picture. */
   lightX: number;
-  /** The same, 0 to 1 down the picture. */
+  /** Initial position of the torch, 0 to 1 down the picture. */
   lightY: number;
-  /** Factor on the light's brightness. */
+  /** Factor on the brightness. */
   exposure: number;
-  /** Factors on red, green and blue. */
+  /** Factors on red, green and blue, separated by spaces. */
   whiteBalance: string;
-  /** What becomes of brightness: `clip`, cut off at white, or `filmic`, rolled off before it. */
+  /** Tone curve: `clip` cuts brightness off at white, `filmic` compresses highlights. */
   tone: string;
-  /** Colours that the canvas is to show: `srgb` or `display-p3`. */
+  /** Colour space of the canvas: `srgb` or `display-p3`. */
   gamut: string;
-  /** Back ends to try, in order, parted by spaces. */
+  /** Backends to try, in order, separated by spaces. */
   backend: string;
-  /** Address of a picture that is shown until the photograph is drawn, and where it cannot be. */
+  /** Address of an image that is shown until the photograph is drawn, and if it cannot be drawn. */
   poster: string;
-  /** When the photograph is fetched: once it is near the screen, once it is in view, or at once. */
+  /** When the photograph is fetched: `auto` within one screen of the viewport, `lazy` in the viewport, `eager` at once. */
   loading: Loading;
-  /** When the poster gives way: once the photograph is drawn, once it is pressed, or by `dismissPoster`. */
+  /** When the poster gives way: `auto` when the photograph is drawn, `interaction` on a press, `manual` by `dismissPoster()`. */
   reveal: Reveal;
-  /** Whether there are buttons. */
+  /** Whether the toolbar is shown. */
   controls: boolean;
-  /** The furthest magnification; 1 is none. */
+  /** Largest magnification; 1 disables zooming. */
   zoom: number;
-  /** Whether the wheel and single fingers are left to the page. */
+  /** Whether the wheel and single fingers scroll the page. */
   cooperativeGestures: boolean;
-  /** Whether the torch wanders by itself while nobody moves it. */
+  /** Whether the torch wanders while there is no input. */
   autoplayLight: boolean;
-  /** Seconds without a visitor after which everything is as it was; 0 is never. */
+  /** Seconds without input before the element resets itself; 0 is never. */
   kiosk: number;
   /** Address of the folder of the WebAssembly modules; empty for the one beside the script. */
   wasmUrl: string;
-  /** How files of other origins are asked for, as on images. */
+  /** CORS mode of requests, as on images. */
   crossOrigin: 'anonymous' | 'use-credentials' | null;
 }
 
-/** How an attribute is a property. */
+/** Converts between an attribute and a property. */
 interface Reflection<T> {
   readonly attribute: string;
-  get(value: string | null): T;
-  /** `null` takes the attribute away. */
+  get(text: string | null): T;
+  /** `null` removes the attribute. */
   set(value: T): string | null;
 }
 
@@ -78,9 +79,9 @@ const REFLECTED: { readonly [P in keyof Reflected]: Reflection<Reflected[P]> } =
   light: text('light', 'flood'),
   lightSrc: text('light-src'),
   lightColor: text('light-color', 'white'),
-  lightSize: parsed('light-size', (value) => parseTorchSize(value) ?? DEFAULT_TORCH_SIZE),
-  lightX: parsed('light-x', (value) => parseCoordinate(value, 'light-x') ?? 0.5),
-  lightY: parsed('light-y', (value) => parseCoordinate(value, 'light-y') ?? 0.5),
+  lightSize: parsed('light-size', (text) => parseTorchSize(text) ?? DEFAULT_TORCH_SIZE),
+  lightX: parsed('light-x', (text) => parseCoordinate(text, 'light-x') ?? CENTRE.x),
+  lightY: parsed('light-y', (text) => parseCoordinate(text, 'light-y') ?? CENTRE.y),
   exposure: parsed('exposure', parseExposure),
   whiteBalance: text('white-balance', '1 1 1'),
   tone: text('tone', 'clip'),
@@ -98,18 +99,16 @@ const REFLECTED: { readonly [P in keyof Reflected]: Reflection<Reflected[P]> } =
   crossOrigin: { attribute: 'crossorigin', get: parseCrossOrigin, set: (value) => value },
 };
 
-/** What an element has to observe. */
+/** The names of the attributes, for `observedAttributes`. */
 export const ATTRIBUTES: readonly string[] = Object.values(REFLECTED).map(
   ({ attribute }) => attribute,
 );
 
-/** The properties' names. */
 export const PROPERTIES = Object.keys(REFLECTED) as readonly (keyof Reflected)[];
 
-/** Gives a class of elements the properties. */
+/** Defines the properties on the prototype of an element class. */
 export function reflect(prototype: object): void {
   for (const [property, reflection] of Object.entries(REFLECTED)) {
-    // Each of them takes what its own type is.
     const { attribute, get, set } = reflection as Reflection<unknown>;
     Object.defineProperty(prototype, property, {
       configurable: true,
@@ -118,28 +117,28 @@ export function reflect(prototype: object): void {
         return get(this.getAttribute(attribute));
       },
       set(this: Element, value: unknown) {
-        const written = set(value);
-        if (written === null) this.removeAttribute(attribute);
-        else this.setAttribute(attribute, written);
+        const text = set(value);
+        if (text === null) this.removeAttribute(attribute);
+        else this.setAttribute(attribute, text);
       },
     });
   }
 }
 
-function text(attribute: string, otherwise = ''): Reflection<string> {
-  return { attribute, get: (value) => value ?? otherwise, set: String };
+function text(attribute: string, defaultValue = ''): Reflection<string> {
+  return { attribute, get: (text) => text ?? defaultValue, set: String };
 }
 
 function flag(attribute: string): Reflection<boolean> {
-  return { attribute, get: (value) => value !== null, set: (value) => (value ? '' : null) };
+  return { attribute, get: (text) => text !== null, set: (value) => (value ? '' : null) };
 }
 
-function parsed<T>(attribute: string, parse: (value: string | null) => T): Reflection<T> {
+function parsed<T>(attribute: string, parse: (text: string | null) => T): Reflection<T> {
   return {
     attribute,
-    get: (value) => {
+    get: (text) => {
       try {
-        return parse(value);
+        return parse(text);
       } catch {
         return parse(null);
       }

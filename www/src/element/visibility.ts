@@ -1,44 +1,45 @@
-/** Which elements can be seen: on the page's screen or near it, and not hidden. */
+/** Observes whether elements are in the viewport or near it. All elements share two observers, which report together. */
 
-/**
- * How far around the screen counts: what comes into view is drawn just before it does, and may be fetched
- * once it is within a screen of it.
- */
-const MARGINS = { seen: '64px', near: '100%' } as const;
+import type { RevealState } from '../state/reveal.js';
 
-export type Sight = keyof typeof MARGINS;
+/** The fields of the reveal state that this module observes. */
+export type Visibility = keyof Pick<RevealState, 'isNear' | 'isVisible'>;
 
-type Tell = (sight: Sight, is: boolean) => void;
+type VisibilityCallback = (visibility: Visibility, isTrue: boolean) => void;
 
-const watched = new Map<Element, Tell>();
-let observers: readonly [Sight, IntersectionObserver][] | undefined;
+/** How far outside of the viewport counts: drawing begins shortly before an element becomes visible. */
+const ROOT_MARGINS: readonly (readonly [Visibility, string])[] = [
+  ['isVisible', '64px'],
+  ['isNear', '100%'],
+];
 
-/** Tells of either once soon, and then whenever it changes. Where browsers cannot tell, it is so at once. */
-export function watch(element: Element, tell: Tell): void {
-  if (watched.has(element)) return;
-  watched.set(element, tell);
+const callbacks = new Map<Element, VisibilityCallback>();
+let observers: readonly IntersectionObserver[] | undefined;
+
+/** Calls back soon for the first time, and then at each change. Without browser support, all elements are visible. */
+export function observeVisibility(element: Element, callback: VisibilityCallback): void {
+  if (callbacks.has(element)) return;
+  callbacks.set(element, callback);
   if (!globalThis.IntersectionObserver) {
-    for (const sight of ['near', 'seen'] as const) tell(sight, true);
+    for (const [visibility] of ROOT_MARGINS) callback(visibility, true);
     return;
   }
-  observers ??= Object.entries(MARGINS).map(([name, margin]) => [
-    name as Sight,
-    observer(name as Sight, margin),
-  ]);
-  for (const [, observer] of observers) observer.observe(element);
+  observers ??= ROOT_MARGINS.map(([visibility, rootMargin]) =>
+    createObserver(visibility, rootMargin),
+  );
+  for (const observer of observers) observer.observe(element);
 }
 
-export function unwatch(element: Element): void {
-  if (!watched.delete(element)) return;
-  for (const [, observer] of observers ?? []) observer.unobserve(element);
+export function unobserveVisibility(element: Element): void {
+  if (!callbacks.delete(element)) return;
+  for (const observer of observers ?? []) observer.unobserve(element);
 }
 
-/** One for all: elements that come into view together are told of together. */
-function observer(sight: Sight, rootMargin: string): IntersectionObserver {
+function createObserver(visibility: Visibility, rootMargin: string): IntersectionObserver {
   return new IntersectionObserver(
     (entries) => {
       for (const { target, isIntersecting } of entries)
-        watched.get(target)?.(sight, isIntersecting);
+        callbacks.get(target)?.(visibility, isIntersecting);
     },
     { rootMargin },
   );

@@ -17,8 +17,7 @@ const SAME_AS_ENGLISH = new Set([
 for (const language of LANGUAGES) if (isPending(language)) await fetchStrings(language);
 
 /** A text with its placeholders unchanged. */
-const template = (key: StringKey, language: Language) =>
-  t(key, language, '{0}', '{1}', '{2}');
+const template = (key: StringKey, language: Language) => t(key, language, '{0}', '{1}', '{2}');
 
 test('every text is translated into every language, with the same placeholders', () => {
   const placeholders = (text: string) => (text.match(/\{\d\}/g) ?? []).sort();

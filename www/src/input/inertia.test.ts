@@ -1,38 +1,38 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { glide, speed, Track, type Velocity } from './inertia.js';
+import { glide, speedOf, type Velocity, VelocityTracker } from './inertia.js';
 
-test('a drag is as fast as it was at its end', () => {
-  const track = new Track();
-  for (let time = 0; time <= 400; time += 10) track.add(time < 300 ? 0 : time - 300, 50, time);
-  const velocity = track.velocity(400);
+test('the velocity is that at the end of the drag', () => {
+  const tracker = new VelocityTracker();
+  for (let time = 0; time <= 400; time += 10) tracker.add(time < 300 ? 0 : time - 300, 50, time);
+  const velocity = tracker.velocityAt(400);
   assert.ok(Math.abs(velocity.x - 1000) < 1, String(velocity.x));
   assert.equal(velocity.y, 0);
 });
 
-test('who holds still before letting go throws nothing', () => {
-  const track = new Track();
-  track.add(0, 0, 0);
-  assert.equal(speed(track.velocity(0)), 0);
-  track.add(100, 0, 20);
-  assert.ok(speed(track.velocity(30)) > 0);
-  assert.equal(speed(track.velocity(200)), 0);
+test('a rest before the release gives no velocity', () => {
+  const tracker = new VelocityTracker();
+  tracker.add(0, 0, 0);
+  assert.equal(speedOf(tracker.velocityAt(0)), 0);
+  tracker.add(100, 0, 20);
+  assert.ok(speedOf(tracker.velocityAt(30)) > 0);
+  assert.equal(speedOf(tracker.velocityAt(200)), 0);
 });
 
-test('a glide slows down and goes as far in many steps as in few', () => {
-  const far = (steps: number): Velocity => {
-    let left: Velocity = { x: 2, y: -1 };
+test('a glide slows down, and its distance does not depend on the number of steps', () => {
+  const distance = (steps: number): Velocity => {
+    let velocity: Velocity = { x: 2, y: -1 };
     let [x, y] = [0, 0];
     for (let i = 0; i < steps; i += 1) {
-      const next = glide(left, 1 / steps);
+      const next = glide(velocity, 1 / steps);
       x += next.moved.x;
       y += next.moved.y;
-      assert.ok(speed(next.left) < speed(left));
-      left = next.left;
+      assert.ok(speedOf(next.velocity) < speedOf(velocity));
+      velocity = next.velocity;
     }
     return { x, y };
   };
-  const [few, many] = [far(2), far(120)];
+  const [few, many] = [distance(2), distance(120)];
   assert.ok(Math.abs(few.x - many.x) < 1e-9 && Math.abs(few.y - many.y) < 1e-9);
   assert.ok(many.x > 0.5 && many.x < 2 * 0.28);
 });

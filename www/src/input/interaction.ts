@@ -56,12 +56,7 @@ export class InteractionController {
   /** The torch's position before the last move of a drag. */
   #torchBeforeMove: PicturePoint | null = null;
 
-  constructor(
-    root: ShadowRoot,
-    dom: ShadowDom,
-    state: ViewerState,
-    listener: InteractionListener,
-  ) {
+  constructor(root: ShadowRoot, dom: ShadowDom, state: ViewerState, listener: InteractionListener) {
     this.#state = state;
     this.#listener = listener;
     this.#dom = dom;

@@ -9,7 +9,7 @@ const COLORS: Record<string, readonly number[]> = {
 };
 const read = (css: string) => COLORS[css] ?? null;
 
-test('a colour is its light, decoded from sRGB', () => {
+test('a colour is decoded from sRGB', () => {
   assert.equal(parseLightColor(null, read), null);
   assert.equal(parseLightColor(' ', read), null);
   assert.deepEqual(parseLightColor('white', read), { factors: [1, 1, 1], hex: '#ffffff' });
@@ -20,7 +20,7 @@ test('a colour is its light, decoded from sRGB', () => {
   assert.throws(() => parseLightColor('sunny', read), { code: 'attribute', message: /“sunny”/ });
 });
 
-test('what is transparent by half shines by half', () => {
+test('alpha scales the brightness', () => {
   const half = parseLightColor('#ff000080', read);
   assert.equal(half?.hex, '#ff000080');
   assert.ok(Math.abs((half?.factors[0] ?? 0) - 128 / 255) < 1e-9);

@@ -25,7 +25,7 @@ export function parseLightColor(value: string | null, parse: CssColorParser): Li
   if (!css) return null;
   const rgba = parse(css);
   if (!rgba) {
-    const message = `The light color “${css}” is not a CSS color. Use a color such as “orange” or “#ffc080”.`;
+    const message = `The light colour “${css}” is not a CSS colour. Use one such as “orange” or “#ffc080”.`;
     throw new PhotoError('attribute', message);
   }
   const [red = 0, green = 0, blue = 0, alpha = 255] = rgba;

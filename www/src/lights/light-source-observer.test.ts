@@ -3,8 +3,8 @@ import { type TestContext, test } from 'node:test';
 import { checkLightSource, type LightSource } from './light-source.js';
 import { LightSourceObserver } from './light-source-observer.js';
 
-/** Counts listeners, as an `EventTarget` does not. */
-class Target extends EventTarget {
+/** An `EventTarget` that counts its listeners. */
+class CountingTarget extends EventTarget {
   listeners = 0;
 
   override addEventListener(
@@ -19,19 +19,19 @@ class Target extends EventTarget {
     });
   }
 
-  happens(type: string): void {
+  fire(type: string): void {
     this.dispatchEvent(new Event(type));
   }
 }
 
-class FakeImage extends Target {
+class FakeImage extends CountingTarget {
   complete = false;
   currentSrc = 'a.png';
   naturalWidth = 0;
   decode = async () => {};
 }
 
-class FakeVideo extends Target {
+class FakeVideo extends CountingTarget {
   paused = false;
   ended = false;
   readyState = 0;
@@ -44,8 +44,8 @@ class FakeVideo extends Target {
   pause = () => {};
 }
 
-/** One that tells of its frames. */
-class TellingVideo extends FakeVideo {
+/** A video that reports its frames. */
+class FrameCallbackVideo extends FakeVideo {
   readonly waiting = new Map<number, () => void>();
   #last = 0;
 
@@ -70,11 +70,11 @@ class FakeStream {}
 
 const settle = () => new Promise((resolve) => setImmediate(resolve));
 
-/** What of the browser is used; the video of a stream is `streamed`. */
-function browser(t: TestContext) {
+/** Installs fakes of the browser's classes. `streamed` is the video that plays a stream. */
+function fakeBrowser(t: TestContext) {
   const animation = new Map<number, () => void>();
   let last = 0;
-  const streamed = new TellingVideo();
+  const streamed = new FrameCallbackVideo();
   const fakes = {
     HTMLImageElement: FakeImage,
     HTMLVideoElement: FakeVideo,
@@ -99,123 +99,123 @@ function browser(t: TestContext) {
   return { animation, frame, streamed };
 }
 
-function follow(source: unknown) {
+function observe(source: unknown) {
   const log: string[] = [];
-  const follower = new LightSourceObserver(source as LightSource, {
+  const observer = new LightSourceObserver(source as LightSource, {
     changed: () => log.push('changed'),
-    errorChanged: (fault) => log.push(fault ? fault.code : 'well'),
+    errorChanged: (fault) => log.push(fault ? fault.code : 'no error'),
   });
-  return { follower, happened: () => log.splice(0) };
+  return { observer, calls: () => log.splice(0) };
 }
 
-test('frames of a video are told, and none once it is stopped', (t) => {
-  browser(t);
-  const video = new TellingVideo();
-  const { follower, happened } = follow(video);
+test('frames of a video are reported until the observer stops', (t) => {
+  fakeBrowser(t);
+  const video = new FrameCallbackVideo();
+  const { observer, calls } = observe(video);
   assert.equal(video.waiting.size, 0);
-  follower.start();
-  follower.start();
-  video.happens('loadeddata');
+  observer.start();
+  observer.start();
+  video.fire('loadeddata');
   video.frame();
   video.frame();
-  video.happens('seeked');
-  assert.equal(happened().length, 4);
-  follower.stop();
+  video.fire('seeked');
+  assert.equal(calls().length, 4);
+  observer.stop();
   assert.equal(video.waiting.size + video.listeners, 0);
 });
 
-test('a video that does not tell of its frames is looked at while it plays', (t) => {
-  const { animation, frame } = browser(t);
+test('a video without frame callbacks is polled while it plays', (t) => {
+  const { animation, frame } = fakeBrowser(t);
   const video = new FakeVideo();
   video.paused = true;
-  const { follower, happened } = follow(video);
-  follower.start();
+  const { observer, calls } = observe(video);
+  observer.start();
   assert.equal(animation.size, 0);
   video.paused = false;
-  video.happens('playing');
-  video.happens('playing');
+  video.fire('playing');
+  video.fire('playing');
   frame();
   frame();
-  assert.equal(happened().length, 2);
+  assert.equal(calls().length, 2);
   video.paused = true;
   frame();
-  assert.equal(animation.size + happened().length, 0);
+  assert.equal(animation.size + calls().length, 0);
   video.paused = false;
-  video.happens('playing');
-  follower.stop();
+  video.fire('playing');
+  observer.stop();
   assert.equal(animation.size + video.listeners, 0);
 });
 
-test('what became of a source while nobody looked is told once somebody does', (t) => {
-  browser(t);
-  const video = new TellingVideo();
-  const { follower, happened } = follow(video);
-  follower.start();
-  follower.stop();
-  follower.start();
-  assert.deepEqual(happened(), []);
-  follower.stop();
+test('a change while stopped is reported at the next start', (t) => {
+  fakeBrowser(t);
+  const video = new FrameCallbackVideo();
+  const { observer, calls } = observe(video);
+  observer.start();
+  observer.stop();
+  observer.start();
+  assert.deepEqual(calls(), []);
+  observer.stop();
   video.currentTime = 1;
-  follower.start();
-  assert.deepEqual(happened(), ['changed']);
+  observer.start();
+  assert.deepEqual(calls(), ['changed']);
 });
 
-test('an image is told of when it has loaded, or cannot', async (t) => {
-  browser(t);
+test('loading an image is reported, and so is a failure', async (t) => {
+  fakeBrowser(t);
   const image = new FakeImage();
-  const { follower, happened } = follow(image);
-  follower.start();
-  assert.deepEqual(happened(), []);
-  image.happens('error');
-  assert.match(follower.error?.message ?? '', /a\.png/);
-  image.happens('error');
-  assert.deepEqual(happened(), ['light-source']);
-  image.happens('load');
+  const { observer, calls } = observe(image);
+  observer.start();
+  assert.deepEqual(calls(), []);
+  image.fire('error');
+  assert.match(observer.error?.message ?? '', /a\.png/);
+  image.fire('error');
+  assert.deepEqual(calls(), ['light-source']);
+  image.fire('load');
   await settle();
-  assert.deepEqual(happened(), ['well', 'changed']);
-  assert.equal(follower.error, null);
-  image.happens('load');
-  follower.stop();
+  assert.deepEqual(calls(), ['no error', 'changed']);
+  assert.equal(observer.error, null);
+  image.fire('load');
+  observer.stop();
   await settle();
-  assert.deepEqual(happened(), []);
+  assert.deepEqual(calls(), []);
   assert.equal(image.listeners, 0);
 });
 
-test('an image that could not be loaded before says so', (t) => {
-  browser(t);
-  const { follower, happened } = follow(Object.assign(new FakeImage(), { complete: true }));
-  follower.start();
-  assert.deepEqual(happened(), ['light-source']);
+test('an earlier failure of an image is reported at the start', (t) => {
+  fakeBrowser(t);
+  const { observer, calls } = observe(Object.assign(new FakeImage(), { complete: true }));
+  observer.start();
+  assert.deepEqual(calls(), ['light-source']);
 });
 
-test('a stream is played while somebody looks, and its tracks are left alone', async (t) => {
-  const { streamed } = browser(t);
+test('a stream plays while it is observed', async (t) => {
+  const { streamed } = fakeBrowser(t);
   const stream = new FakeStream();
-  const { follower, happened } = follow(stream);
-  assert.equal(follower.picture, streamed as unknown);
-  follower.start();
+  const { observer, calls } = observe(stream);
+  assert.equal(observer.picture, streamed as unknown);
+  observer.start();
   assert.equal(streamed.srcObject, stream);
   streamed.frame();
-  assert.deepEqual(happened(), ['changed']);
-  streamed.happens('ended');
-  assert.deepEqual(happened(), ['light-source'], 'a camera may be unplugged');
+  assert.deepEqual(calls(), ['changed']);
+  streamed.fire('ended');
+  assert.deepEqual(calls(), ['light-source'], 'a camera may be disconnected');
   streamed.frame();
-  assert.deepEqual(happened(), ['well', 'changed']);
-  follower.stop();
+  assert.deepEqual(calls(), ['no error', 'changed']);
+  observer.stop();
   assert.equal(streamed.srcObject, null);
   streamed.played = () => Promise.reject(new Error('not allowed'));
-  follower.start();
+  observer.start();
   await settle();
-  assert.deepEqual(happened(), ['light-source']);
-  follower.stop();
-  follower.start();
-  follower.stop();
+  assert.deepEqual(calls(), ['light-source']);
+  observer.stop();
+  observer.start();
+  observer.stop();
   await settle();
-  assert.deepEqual(happened(), [], 'it was stopped on purpose');
+  assert.deepEqual(calls(), [], 'the failure belongs to an earlier start');
 });
 
-test('what cannot be light is refused by name', (t) => {
-  browser(t);
+test('other values are rejected with the accepted classes', (t) => {
+  fakeBrowser(t);
   const linear = { data: new Float32Array(3), width: 1, height: 1 };
   for (const source of [new FakeImage(), new FakeStream(), linear]) {
     assert.equal(checkLightSource(source), source);

@@ -76,7 +76,10 @@ test('a source replaces the built-in lights until one of them is selected', asyn
   const light = createLight();
   assert.ok(light.isTorch && !light.items.includes('projection'));
   light.source = SOURCE;
-  assert.deepEqual([light.item, light.items[0], light.isTorch], ['projection', 'projection', false]);
+  assert.deepEqual(
+    [light.item, light.items[0], light.isTorch],
+    ['projection', 'projection', false],
+  );
   // The support is being fetched; the last light stays until then.
   assert.equal(light.setting.image, PENDING_IMAGE);
   await settle();

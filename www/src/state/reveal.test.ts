@@ -20,7 +20,9 @@ test('the poster gives way to the picture, after a press or a call where require
   const state = new RevealState();
   state.isNear = true;
   const isShown = () =>
-    (['auto', 'interaction', 'manual'] as const).map((r) => state.isPosterShown(options('auto', r)));
+    (['auto', 'interaction', 'manual'] as const).map((r) =>
+      state.isPosterShown(options('auto', r)),
+    );
   assert.deepEqual(isShown(), [true, true, true]);
   assert.equal(state.mayFetch(options('auto', 'interaction')), false);
   assert.equal(state.mayFetch(options('eager', 'interaction')), true);

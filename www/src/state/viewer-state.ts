@@ -28,7 +28,7 @@ export interface LightPose {
   readonly y?: number;
   /** The torch's radius, as a fraction of the light plane's shorter side. */
   readonly size?: number;
-  /** Any CSS color. */
+  /** Any CSS colour. */
   readonly color?: string;
 }
 

@@ -2,12 +2,12 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import {
   clampView,
+  FULL_VIEW,
   type PhotoView,
   pan,
-  toViewport,
   toggleZoom,
   toPicture,
-  FULL_VIEW,
+  toViewport,
   wheelFactor,
   zoomAt,
 } from './viewport.js';

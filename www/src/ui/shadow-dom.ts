@@ -87,13 +87,7 @@ export class ShadowDom {
       { className: 'reveal', part: 'button', attributes: { type: 'button' } },
       createElement('span', {}, createIcon(LIGHT_ICON), this.#revealText),
     );
-    this.viewport.append(
-      this.#picture,
-      this.#poster,
-      this.handle,
-      this.revealButton,
-      this.#hint,
-    );
+    this.viewport.append(this.#picture, this.#poster, this.handle, this.revealButton, this.#hint);
     this.#progress = createElement(
       'div',
       { className: 'progress', part: 'progress' },

@@ -1,0 +1,373 @@
+/**
+ * Connects the parts of an element. Attributes and input change the viewer's state; `update` then brings the session,
+ * the shadow DOM, the animations and the page's event listeners up to date with it. Changes within one script are
+ * collected and handled by one update.
+ */
+
+import { setModuleFolder } from '../engine/wasm-loader.js';
+import { fetchStrings, isPending } from '../i18n/strings.js';
+import { InteractionController } from '../input/interaction.js';
+import { reducedMotion } from '../input/reduced-motion.js';
+import { parseCssColor } from '../lights/light-color.js';
+import type { LightSetting } from '../lights/light-setting.js';
+import type { LightSource } from '../lights/light-source.js';
+import { PhotoSession, type SessionSettings } from '../player/photo-session.js';
+import { BROWSER_PORTS } from '../player/ports.js';
+import type { CanvasRenderer, FrameResult } from '../renderers/types.js';
+import type { PhotoError } from '../shared/errors.js';
+import { BACKENDS } from '../shared/names.js';
+import { reuse } from '../shared/reuse.js';
+import { AttributeReader } from '../state/attribute-reader.js';
+import { type ActiveLight, LightChangeDetector } from '../state/light-change.js';
+import { type ElementOptions, readOptions } from '../state/options.js';
+import { ViewerState } from '../state/viewer-state.js';
+import type { PhotoView } from '../state/viewport.js';
+import { isFullscreen, toggleFullscreen } from '../ui/fullscreen.js';
+import { LazyToolbar } from '../ui/lazy-toolbar.js';
+import { Presenter } from '../ui/presenter.js';
+import { ShadowDom } from '../ui/shadow-dom.js';
+import type { ToolbarActions } from '../ui/toolbar.js';
+import {
+  BackendChangeEvent,
+  ContextLostEvent,
+  createLoadEvent,
+  createProgressEvent,
+  LightChangeEvent,
+  PhotoErrorEvent,
+  QualityChangeEvent,
+  ViewChangeEvent,
+} from './events.js';
+import { observeVisibility, unobserveVisibility } from './visibility.js';
+
+export class PhotoController {
+  readonly state: ViewerState;
+  readonly session: PhotoSession<CanvasRenderer>;
+  readonly interaction: InteractionController;
+  readonly #host: HTMLElement;
+  readonly #reader: AttributeReader;
+  readonly #dom: ShadowDom;
+  readonly #toolbar: LazyToolbar;
+  readonly #presenter: Presenter;
+  readonly #lightChanges = new LightChangeDetector();
+  #reportedView: PhotoView;
+  /** The last settings of the session; `null` while it has none. */
+  #settings: SessionSettings | null = null;
+  #mustReload = false;
+  #isUpdateScheduled = false;
+  /** Ends the listeners that exist only while the element is in the document. */
+  #connection: AbortController | null = null;
+  /** Why the last frame was not drawn with the requested light. */
+  #lightError: PhotoError | null = null;
+
+  constructor(host: HTMLElement) {
+    const root = host.attachShadow({ mode: 'open' });
+    this.#host = host;
+    this.#reader = new AttributeReader(host);
+    this.#dom = new ShadowDom(root);
+    this.state = new ViewerState(
+      readOptions(this.#reader, parseCssColor, null),
+      {
+        changed: () => this.session.redraw(),
+        sourceSupportLoaded: () => this.schedule(),
+        errorChanged: (error) => this.#lightErrorChanged(error),
+      },
+      parseCssColor,
+    );
+    this.#reportedView = this.state.view;
+    this.#toolbar = this.#createToolbar();
+    this.#presenter = new Presenter(host, this.#dom, this.#toolbar, this.state);
+    this.session = this.#createSession();
+    this.interaction = this.#createInteraction(root);
+    this.#dom.revealButton.addEventListener('click', () => {
+      this.interaction.markActive();
+      this.dismissPoster();
+    });
+    host.addEventListener('fullscreenchange', () => this.schedule());
+  }
+
+  /** Updates once the current script has ended. */
+  schedule(): void {
+    if (this.#isUpdateScheduled) return;
+    this.#isUpdateScheduled = true;
+    queueMicrotask(() => {
+      if (this.#isUpdateScheduled) this.update();
+    });
+  }
+
+  /** Brings everything up to date with the attributes and the viewer's state. */
+  update(): void {
+    this.#isUpdateScheduled = false;
+    if (!this.#host.isConnected) {
+      this.#release();
+      return;
+    }
+    this.#connect();
+    const options = this.readOptions();
+    const { state, isPaused } = this;
+    const { language } = this.#presenter;
+    state.light.observe(state.reveal.isVisible, !isPaused);
+    if (isPending(language)) void fetchStrings(language).then(() => this.schedule());
+    this.#presenter.update(isPaused, this.interaction.isTilting);
+    this.#showError();
+    this.interaction.update(!isPaused);
+    for (const error of this.#reader.takeErrors()) this.reportError(error);
+    this.#updateSession(options);
+    this.#reportLight(this.#lightChanges.requested(state.light.setting));
+    if (state.view !== this.#reportedView) {
+      this.#reportedView = state.view;
+      this.#dispatch(new ViewChangeEvent(state.view));
+    }
+  }
+
+  /** Reads attributes that may have changed in the current script. */
+  readOptions(): ElementOptions {
+    const { state } = this;
+    state.options = readOptions(this.#reader, parseCssColor, state.options);
+    return state.options;
+  }
+
+  attributeChanged(name: string): void {
+    // As on <img>, setting the same address again reloads the file.
+    if (name === 'src') this.#mustReload = true;
+    this.state.clearOverride(name);
+    this.schedule();
+  }
+
+  get isPaused(): boolean {
+    return this.state.paused ?? reducedMotion().matches;
+  }
+  set isPaused(isPaused: boolean) {
+    this.state.paused = isPaused;
+    this.schedule();
+  }
+
+  setLightSource(source: LightSource | null): void {
+    this.state.light.source = source;
+    this.#lightError = null;
+    this.schedule();
+  }
+
+  dismissPoster(): void {
+    this.state.reveal.isDismissed = true;
+    this.schedule();
+  }
+
+  /** Returns light and view to the options. */
+  reset(): void {
+    this.interaction.reset();
+    this.state.reset();
+    this.schedule();
+  }
+
+  /** Draws the current state in full quality, after the fetch of the support for its light source. */
+  async renderNow(): Promise<CanvasRenderer> {
+    this.update();
+    const pending = this.state.light.pendingSource;
+    if (pending) {
+      await pending;
+      this.update();
+    }
+    return this.session.renderNow();
+  }
+
+  reportError(error: PhotoError): void {
+    this.#dispatch(new PhotoErrorEvent(error));
+  }
+
+  #createToolbar(): LazyToolbar {
+    const actions: ToolbarActions = {
+      selectLight: (item) => {
+        this.state.light.item = item;
+        this.interaction.markActive();
+        this.schedule();
+      },
+      togglePlaying: () => {
+        this.isPaused = !this.isPaused;
+      },
+      zoom: (by) => this.interaction.zoom(by),
+      reset: () => this.reset(),
+      toggleTilt: () => {
+        void this.interaction.toggleTilt();
+        this.schedule();
+      },
+      toggleFullscreen: () => toggleFullscreen(this.#host),
+    };
+    return new LazyToolbar(this.#dom, actions, {
+      loaded: () => this.schedule(),
+      failed: (error) => this.reportError(error),
+    });
+  }
+
+  #createSession(): PhotoSession<CanvasRenderer> {
+    return new PhotoSession<CanvasRenderer>(BROWSER_PORTS, {
+      loadStarted: () => {
+        this.#clearPicture();
+        this.#dom.updateProgress(Number.NaN);
+      },
+      progress: (loaded, total) => {
+        this.#dom.updateProgress(total > 0 ? Math.min(1, loaded / total) : Number.NaN);
+        this.#dispatch(createProgressEvent(loaded, total));
+      },
+      frameDrawn: (frame, light) => this.#frameDrawn(frame, light),
+      qualityChanged: (quality) => this.#dispatch(new QualityChangeEvent(quality)),
+      loaded: () => {
+        this.#dom.updateProgress(null);
+        this.#presenter.announceLoaded();
+        this.#dispatch(createLoadEvent());
+      },
+      rendererChanged: ({ canvas }) => {
+        this.#dom.showCanvas(canvas);
+        this.schedule();
+      },
+      backendChanged: (backend, previous, reason) =>
+        this.#dispatch(new BackendChangeEvent(backend, previous, reason)),
+      backendLost: (backend, message) => this.#dispatch(new ContextLostEvent(backend, message)),
+      failed: (error) => {
+        this.state.errorMessage = error.message;
+        this.#dom.updateProgress(null);
+        this.schedule();
+        this.#showError();
+        this.reportError(error);
+      },
+      recovered: () => {
+        this.state.errorMessage = null;
+        this.schedule();
+      },
+    });
+  }
+
+  #createInteraction(root: ShadowRoot): InteractionController {
+    const leaveFullscreen = () => {
+      const wasFullscreen = isFullscreen(this.#host);
+      if (wasFullscreen) toggleFullscreen(this.#host);
+      return wasFullscreen;
+    };
+    return new InteractionController(root, this.#dom, this.state, {
+      changed: () => this.schedule(),
+      viewChanged: () => {
+        this.#presenter.announceZoom();
+        this.schedule();
+      },
+      lightSelected: (item) => {
+        this.#presenter.announceLight(item);
+        this.schedule();
+      },
+      escaped: () => {
+        if (!leaveFullscreen()) (root.activeElement as HTMLElement | null)?.blur();
+      },
+      zoomIgnored: (by) => this.#presenter.hintAtZoom(by),
+      expired: () => {
+        this.reset();
+        this.#toolbar.closeMenu();
+        leaveFullscreen();
+      },
+      active: (byKeyboard) => this.#toolbar.show(byKeyboard),
+    });
+  }
+
+  #frameDrawn({ lightApplied, lightError }: FrameResult, drawn: LightSetting): void {
+    const { reveal, light } = this.state;
+    if (!reveal.isDrawn) this.schedule();
+    reveal.isDrawn = true;
+    const { setting, activeSource } = light;
+    if (lightApplied && activeSource && drawn.image === setting.image) {
+      this.#reportLight(this.#lightChanges.drawn(setting.name, activeSource));
+    }
+    // An error that persists is reported once, even if its numbers change with each frame.
+    if (lightError?.code === this.#lightError?.code) return;
+    this.#lightError = lightError;
+    this.#lightErrorChanged(lightError);
+  }
+
+  #connect(): void {
+    if (this.#connection) return;
+    this.#connection = new AbortController();
+    const { signal } = this.#connection;
+    reducedMotion().addEventListener('change', () => this.schedule(), { signal });
+    observeVisibility(this.#host, (visibility, isTrue) => {
+      this.state.reveal[visibility] = isTrue;
+      if (visibility === 'isVisible') this.session.setVisible(isTrue);
+      this.schedule();
+    });
+  }
+
+  /** Gives the session new settings, as soon as the photograph may be fetched. */
+  #updateSession(options: ElementOptions): void {
+    const { src, wasmUrl } = options;
+    const last = this.#settings;
+    // An invalid address neither reloads the last photograph nor reports a missing address.
+    const isInvalid = this.#reader.isInvalid('src');
+    if (src === null && isInvalid) return;
+    const reload = this.#mustReload && !isInvalid;
+    if (reload || src !== last?.src) {
+      if (src !== null && !this.state.reveal.mayFetch(options)) {
+        if (last && last.src !== src) this.#stopSession();
+        return;
+      }
+      this.#mustReload = false;
+    }
+    if (wasmUrl !== null) setModuleFolder(wasmUrl);
+    const settings = reuse<SessionSettings>(last, {
+      src,
+      credentials: options.crossOrigin === 'use-credentials' ? 'include' : 'same-origin',
+      renderOptions: reuse(last?.renderOptions, {
+        backends: options.backends ?? BACKENDS,
+        // Software renderers are used only on request: the CPU backend is faster.
+        software: options.backends !== null,
+        gamut: options.gamut,
+      }),
+      output: this.state.output,
+      light: this.state.light.setting,
+    });
+    if (settings === last && !reload) return;
+    this.#settings = settings;
+    this.session.set(settings, reload);
+  }
+
+  #reportLight(light: ActiveLight | null): void {
+    if (light) this.#dispatch(new LightChangeEvent(light.name, light.torch, light.source));
+  }
+
+  /** The photograph continues to load and to be drawn. */
+  #lightErrorChanged(error: PhotoError | null): void {
+    this.#showError();
+    if (error && this.#host.isConnected) this.reportError(error);
+  }
+
+  #showError(): void {
+    const message = this.#reader.message ?? this.state.errorMessage;
+    const lightMessage = this.state.light.error?.message ?? this.#lightError?.message;
+    this.#presenter.showError(message ?? lightMessage ?? null);
+  }
+
+  #clearPicture(): void {
+    this.state.reveal.isDrawn = false;
+    this.state.errorMessage = null;
+    this.#lightError = null;
+    this.#dom.clear();
+    this.#showError();
+  }
+
+  #stopSession(): void {
+    this.session.stop();
+    this.#settings = null;
+    this.#clearPicture();
+  }
+
+  /** The element has left the document. */
+  #release(): void {
+    unobserveVisibility(this.#host);
+    this.#connection?.abort();
+    this.#connection = null;
+    this.state.reveal.isNear = false;
+    this.state.reveal.isVisible = false;
+    this.interaction.stop();
+    this.state.light.observe(false, false);
+    this.#reader.clear();
+    this.#stopSession();
+  }
+
+  #dispatch(event: Event): void {
+    this.#host.dispatchEvent(event);
+  }
+}
