@@ -1,6 +1,6 @@
-/** Decoding and relighting without a page: for Node, workers and scripts of one's own. No DOM, no side effects. */
+/** Decodes and relights without the element: in Node, in workers and in pages. No DOM, no side effects. */
 
-export type { CorePhotograph as Photograph, DecodeOptions, PhotoFile } from './core/decode.js';
+export type { DecodeOptions, PhotoFile } from './core/decode.js';
 export { decode } from './core/decode.js';
 export type {
   CoreLight as Light,
@@ -10,6 +10,7 @@ export type {
   Torch,
 } from './core/relight.js';
 export { relight } from './core/relight.js';
+export type { CorePhotograph as Photograph } from './core/types.js';
 export type { WasmCode } from './core/wasm-code.js';
 export type { EngineErrorCode, ErrorCode, PageErrorCode } from './shared/errors.js';
 export { PhotoError } from './shared/errors.js';
@@ -19,13 +20,12 @@ export { LIGHTS } from './shared/names.js';
 import { provideCode, type WasmCode } from './core/wasm-code.js';
 import { CORE_MODULES } from './shared/names.js';
 
-/** A WebAssembly module, by name. */
+/** The name of a WebAssembly module. */
 export type ModuleName = (typeof CORE_MODULES)[number];
 
 /**
- * Has modules started from these bytes, or from these addresses, in place of the files
- * beside the script: for where those can be neither fetched nor read. To be called before the first
- * `decode`. Code with SIMD is for machines that have it.
+ * Sets the bytes or the addresses of WebAssembly modules, where the files beside the script can be neither
+ * fetched nor read. Call it before the first `decode`. Code with SIMD needs a machine with SIMD.
  */
 export function provideWasm(codes: Readonly<Partial<Record<ModuleName, WasmCode>>>): void {
   for (const [name, code] of Object.entries(codes)) {

@@ -1,17 +1,19 @@
-/** From a file, wherever it is, to a photograph in memory. */
+/** Decodes a file from any source on the calling thread. */
 
 import { loadDecoder } from '../engine/decoder-module.js';
 import { tooLong } from '../loading/http-errors.js';
 import { openPhoto } from '../loading/load.js';
-import { MainThreadDecoder, type PhotoDecoder } from '../photo/main-thread-decoder.js';
+import { MainThreadDecoder } from '../photo/main-thread-decoder.js';
+import type { PhotoDecoder } from '../photo/photo-decoder.js';
 import type { Photograph } from '../photo/photograph.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
 import { DecodedPhotograph } from './decoded-photo.js';
-import { coreCode, readFile } from './wasm-code.js';
+import type { CorePhotograph } from './types.js';
+import { fetchCoreWasm, readFile } from './wasm-code.js';
 
 /**
- * A `.ltm` file: its bytes, whole or as they come from its start on, or its address. That may be relative
- * where there is a page, and a `file:` URL in Node.
+ * A `.ltm` file: its bytes, a stream of its bytes, or its address. In a page, the address may be relative;
+ * in Node, it may be a `file:` URL.
  */
 export type PhotoFile =
   | string
@@ -24,68 +26,55 @@ export type PhotoFile =
 
 /** Options of `decode`. */
 export interface DecodeOptions {
-  /** Ends it; what was decoded till then is freed. */
+  /** Cancels decoding when it is aborted. */
   readonly signal?: AbortSignal;
-  /** Told how many bytes have been decoded, and how many there are: 0 until known. */
+  /** Gets the number of decoded bytes and that of the file, which is 0 until known. */
   readonly onProgress?: (loaded: number, total: number) => void;
 }
 
-/** A photograph in memory, until freed. */
-export interface CorePhotograph {
-  /** Picture, in pixels. */
-  readonly width: number;
-  readonly height: number;
-  /** Light plane, in elements. */
-  readonly lightWidth: number;
-  readonly lightHeight: number;
-  /** Memory its light transport takes, in bytes. */
-  readonly decodedBytes: number;
-  /** What the file says of itself. */
-  readonly metadata: unknown;
-  /** Gives its memory back. */
-  free(): void;
-}
-
 /**
- * Decodes a photograph, on this thread, in turns of some milliseconds. Rejects with a `PhotoError`, or with
- * the signal's reason once aborted.
+ * Decodes a photograph on this thread, and gives way to other tasks every few milliseconds. Rejects with a
+ * `PhotoError`, or with the signal's reason if it is aborted.
  */
 export async function decode(
   file: PhotoFile,
   { signal = new AbortController().signal, onProgress = () => {} }: DecodeOptions = {},
 ): Promise<CorePhotograph> {
   signal.throwIfAborted();
-  const decoder = async () =>
-    new MainThreadDecoder(await loadDecoder(coreCode), () => performance.now());
-  if (typeof file !== 'string' && !(file instanceof URL)) {
-    const taken = take(await decoder(), piecesOf(file), signal, onProgress);
-    return new DecodedPhotograph(await taken);
-  }
-  const url = addressOf(file);
-  const bytes = url.startsWith('file:') ? await bytesOf(url) : null;
-  if (bytes) return decode(bytes, { signal, onProgress });
-  const ports = { decoder, fetch: (...request: Parameters<typeof fetch>) => fetch(...request) };
   const now = () => performance.now();
-  const photograph = openPhoto(url, signal, onProgress, null, { ...ports, pause, now });
+  const createDecoder = async () => new MainThreadDecoder(await loadDecoder(fetchCoreWasm), now);
+  if (typeof file !== 'string' && !(file instanceof URL)) {
+    const photograph = decodePieces(await createDecoder(), piecesOf(file), signal, onProgress);
+    return new DecodedPhotograph(await photograph);
+  }
+  const url = absoluteUrl(file);
+  const bytes = url.startsWith('file:') ? await readFileOrThrow(url) : null;
+  if (bytes) return decode(bytes, { signal, onProgress });
+  const photograph = openPhoto(url, signal, onProgress, null, {
+    createDecoder,
+    fetch: (...request) => fetch(...request),
+    yieldToPage,
+    now,
+  });
   return new DecodedPhotograph(await photograph);
 }
 
-/** Decodes what comes, from its start on. */
-async function take(
+/** Decodes pieces of a file that come in order. */
+async function decodePieces(
   decoder: PhotoDecoder,
   pieces: Iterable<Uint8Array> | AsyncIterable<Uint8Array>,
   signal: AbortSignal,
   onProgress: (loaded: number, total: number) => void,
 ): Promise<Photograph> {
-  const turn = async () => {
-    await pause();
+  const yieldOrThrow = async () => {
+    await yieldToPage();
     signal.throwIfAborted();
   };
   try {
     let offset = 0;
     for await (const bytes of pieces) {
       signal.throwIfAborted();
-      await decoder.feed(offset, bytes, turn);
+      await decoder.feed(offset, bytes, yieldOrThrow);
       offset += bytes.byteLength;
       const { bytesFed, fileBytes } = decoder.state;
       if (fileBytes !== undefined && offset > fileBytes) {
@@ -110,8 +99,8 @@ function piecesOf(
   if (ArrayBuffer.isView(file)) {
     return [new Uint8Array(file.buffer, file.byteOffset, file.byteLength)];
   }
-  if (file instanceof Blob) return chunksOf(file.stream());
-  if ('getReader' in file) return chunksOf(file);
+  if (file instanceof Blob) return iterate(file.stream());
+  if ('getReader' in file) return iterate(file);
   if (file && Symbol.asyncIterator in file) return file;
   throw new TypeError(
     'decode takes an address, an ArrayBuffer, a view of one, a Blob, a ReadableStream or an ' +
@@ -119,8 +108,8 @@ function piecesOf(
   );
 }
 
-/** Not every browser can iterate over streams. */
-async function* chunksOf(stream: ReadableStream<Uint8Array>): AsyncGenerator<Uint8Array, void> {
+/** `ReadableStream` is not iterable in every browser. */
+async function* iterate(stream: ReadableStream<Uint8Array>): AsyncGenerator<Uint8Array, void> {
   const reader = stream.getReader();
   try {
     for (;;) {
@@ -133,19 +122,19 @@ async function* chunksOf(stream: ReadableStream<Uint8Array>): AsyncGenerator<Uin
   }
 }
 
-function addressOf(file: string | URL): string {
+function absoluteUrl(file: string | URL): string {
   try {
     return new URL(file, globalThis.location?.href).href;
   } catch (cause) {
     throw new PhotoError(
       'src-missing',
-      `“${file}” is not an address. Without a page it has to be a whole one, with https: or file:.`,
+      `“${file}” is not a URL. Outside of a page, use an absolute URL with https: or file:.`,
       cause,
     );
   }
 }
 
-async function bytesOf(url: string): Promise<Uint8Array | null> {
+async function readFileOrThrow(url: string): Promise<Uint8Array | null> {
   try {
     return await readFile(url);
   } catch (cause) {
@@ -153,7 +142,6 @@ async function bytesOf(url: string): Promise<Uint8Array | null> {
   }
 }
 
-/** Lets others have the thread. */
-function pause(): Promise<void> {
+function yieldToPage(): Promise<void> {
   return new Promise((resolve) => setTimeout(resolve));
 }

@@ -1,9 +1,8 @@
-/** What a photograph of the core is inside: apart from its face, whose types need no DOM. */
+/** The class behind `CorePhotograph`. */
 
-import type { Photograph, PhotoInfo } from '../photo/photograph.js';
-import type { CorePhotograph } from './decode.js';
+import type { Photograph } from '../photo/photograph.js';
+import type { CorePhotograph } from './types.js';
 
-/** See the module. */
 export class DecodedPhotograph implements CorePhotograph {
   readonly width: number;
   readonly height: number;
@@ -11,25 +10,23 @@ export class DecodedPhotograph implements CorePhotograph {
   readonly lightHeight: number;
   readonly decodedBytes: number;
   readonly metadata: unknown;
-  readonly photograph: Photograph;
-  /** Told before it is freed. */
+  /** Called before the photograph is freed. */
   onFree: (() => void) | null = null;
-  #freed = false;
+  #isFreed = false;
 
-  constructor(photograph: Photograph) {
-    const info: PhotoInfo = photograph.info;
-    this.width = info.width;
-    this.height = info.height;
-    this.lightWidth = info.lightWidth;
-    this.lightHeight = info.lightHeight;
-    this.decodedBytes = info.decodedBytes;
-    this.metadata = info.metadata;
-    this.photograph = photograph;
+  constructor(readonly photograph: Photograph) {
+    const { width, height, lightWidth, lightHeight, decodedBytes, metadata } = photograph.info;
+    this.width = width;
+    this.height = height;
+    this.lightWidth = lightWidth;
+    this.lightHeight = lightHeight;
+    this.decodedBytes = decodedBytes;
+    this.metadata = metadata;
   }
 
   free(): void {
-    if (this.#freed) return;
-    this.#freed = true;
+    if (this.#isFreed) return;
+    this.#isFreed = true;
     this.onFree?.();
     this.photograph.free();
   }

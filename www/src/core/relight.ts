@@ -1,4 +1,4 @@
-/** Pictures of a photograph under any light, by the CPU, on this thread. */
+/** Relights a photograph with the CPU on the calling thread. */
 
 import { loadCpu } from '../engine/cpu-module.js';
 import { makeDisplay } from '../engine/output-settings.js';
@@ -12,21 +12,21 @@ import {
   parseTone,
   parseWhiteBalance,
 } from '../shared/parse-settings.js';
-import type { CorePhotograph } from './decode.js';
 import { DecodedPhotograph } from './decoded-photo.js';
-import { coreCode } from './wasm-code.js';
+import type { CorePhotograph } from './types.js';
+import { fetchCoreWasm } from './wasm-code.js';
 
-/** A torch straight behind a point of the picture: 0, 0 is the top left corner and 1, 1 the bottom right. */
+/** A torch behind a point of the picture: (0, 0) is the top left corner and (1, 1) the bottom right corner. */
 export interface Torch {
   readonly x: number;
   readonly y: number;
-  /** Its radius, as a fraction of the light plane's shorter side. */
+  /** Its radius in units of the light plane's shorter side. */
   readonly size?: number;
 }
 
 /**
- * A picture of light, of any size, row by row: linear red, green and blue in a `Float32Array`, 0 dark and 1
- * full brightness, or sRGB as `ImageData` has it, with alpha, which is the share of a pixel that shines.
+ * A light image of any size, row by row: linear red, green and blue from 0 to 1 in a `Float32Array`, or sRGB
+ * codes with alpha as in `ImageData`. Alpha scales the pixel's light.
  */
 export interface PictureLight {
   readonly data: Float32Array | Uint8ClampedArray;
@@ -34,7 +34,7 @@ export interface PictureLight {
   readonly height: number;
 }
 
-/** What may shine on a photograph. */
+/** A light: the name of a built-in one, a torch or a light image. */
 export type CoreLight = LightName | Torch | PictureLight;
 
 /** Options of `relight`. */
@@ -43,15 +43,15 @@ export interface RelightOptions {
   readonly exposure?: number;
   /** Factors on red, green and blue. */
   readonly whiteBalance?: readonly [red: number, green: number, blue: number];
-  /** What becomes of brightness: `clip`, cut off at white, or `filmic`, rolled off before it. */
+  /** How brightness above white is shown: `clip` cuts it off, `filmic` compresses it. */
   readonly tone?: ToneCurve;
-  /** What the pixels are codes of. */
+  /** The colour space of the pixels. */
   readonly gamut?: Gamut;
-  /** The share of the photograph's components to draw by, the most important first: 0 to 1, which is all. */
+  /** The share of the components to use, the most important first: 0 to 1. */
   readonly detail?: number;
 }
 
-/** A picture in memory, as `ImageData` takes it. */
+/** A picture for `new ImageData`. */
 export interface Picture {
   readonly width: number;
   readonly height: number;
@@ -59,12 +59,12 @@ export interface Picture {
   readonly pixels: Uint8ClampedArray<ArrayBuffer>;
 }
 
-/** What relights each photograph, kept for the next picture. */
+/** The relighter of each photograph, for its next picture. */
 const relighters = new WeakMap<DecodedPhotograph, BandRelighter>();
 
 /**
- * Draws a photograph under a light. Rejects with a `PhotoError`: `attribute` for options, `light-…` for
- * lights that cannot be had.
+ * Relights a photograph. Rejects with a `PhotoError`: `attribute` for an invalid option, `light-…` for an
+ * invalid light.
  */
 export async function relight(
   photo: CorePhotograph,
@@ -72,7 +72,7 @@ export async function relight(
   options: RelightOptions = {},
 ): Promise<Picture> {
   if (!(photo instanceof DecodedPhotograph)) {
-    throw new TypeError('relight takes what decode has given');
+    throw new TypeError('relight takes a photograph from decode');
   }
   const { exposure = 1, whiteBalance = [1, 1, 1], tone, gamut, detail = 1 } = options;
   const output = {
@@ -80,22 +80,22 @@ export async function relight(
     whiteBalance: parseWhiteBalance(whiteBalance.join(' ')),
     tone: parseTone(tone ?? null),
   };
-  const shown = parseGamut(gamut ?? null);
+  const outputGamut = parseGamut(gamut ?? null);
   const { width, height } = photo;
   const pixels = new Uint8ClampedArray(4 * width * height);
-  const module = await loadCpu(coreCode);
+  const module = await loadCpu(fetchCoreWasm);
   try {
-    await photo.photograph.withModule(module, (inside) => {
-      const relighter = relighterOf(module, photo, inside);
-      const made = makeLight(module, inside, light);
-      const display = makeDisplay(module, output, shown);
+    await photo.photograph.withModule(module, (modulePhoto) => {
+      const relighter = relighterOf(module, photo, modulePhoto);
+      const lightInModule = createLight(module, modulePhoto, light);
+      const display = makeDisplay(module, output, outputGamut);
       try {
         const [first = 0, end = 0] = relighter.lightRows;
         const out = new Uint8Array(pixels.buffer);
-        relighter.relight(made.linearRgb(first, end), display, detail, out);
+        relighter.relight(lightInModule.linearRgb(first, end), display, detail, out);
       } finally {
         display.free();
-        made.free();
+        lightInModule.free();
       }
     });
   } catch (thrown) {
@@ -107,20 +107,20 @@ export async function relight(
 function relighterOf(
   module: CpuModule,
   photo: DecodedPhotograph,
-  inside: DrawnPhoto,
+  modulePhoto: DrawnPhoto,
 ): BandRelighter {
   const known = relighters.get(photo);
   if (known) return known;
-  const made = new module.BandRelighter(inside, 0, photo.height);
-  relighters.set(photo, made);
-  photo.onFree = () => made.free();
-  return made;
+  const relighter = new module.BandRelighter(modulePhoto, 0, photo.height);
+  relighters.set(photo, relighter);
+  photo.onFree = () => relighter.free();
+  return relighter;
 }
 
-function makeLight({ Light }: CpuModule, inside: DrawnPhoto, light: CoreLight): Light {
-  if (typeof light === 'string') return Light.builtin(inside, parseLight(light));
-  if ('x' in light) return Light.torch(inside, light.x, light.y, light.size);
+function createLight({ Light }: CpuModule, modulePhoto: DrawnPhoto, light: CoreLight): Light {
+  if (typeof light === 'string') return Light.builtin(modulePhoto, parseLight(light));
+  if ('x' in light) return Light.torch(modulePhoto, light.x, light.y, light.size);
   const { data, width, height } = light;
-  if (data instanceof Float32Array) return Light.fromLinear(inside, data, width, height);
-  return Light.fromSrgb(inside, data, width, height);
+  if (data instanceof Float32Array) return Light.fromLinear(modulePhoto, data, width, height);
+  return Light.fromSrgb(modulePhoto, data, width, height);
 }

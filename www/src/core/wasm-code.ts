@@ -1,12 +1,12 @@
-/** Where the core has the code of its modules from: what it was given, files in Node, or else the network. */
+/** Where the core gets its modules: from the caller, from files in Node, or from the network. */
 
-import { fetchCode, type Provide } from '../engine/wasm-loader.js';
+import { type FetchWasm, fetchWasm } from '../engine/wasm-loader.js';
 import type { ModuleName } from '../shared/names.js';
 
-/** The code of a module: its bytes, or where they are. */
+/** A module's bytes, or their address. */
 export type WasmCode = ArrayBuffer | ArrayBufferView<ArrayBuffer> | URL | string;
 
-/** What of Node is used: not an import, which bundlers for pages would have to resolve. */
+/** The part of Node that is used. An `import` would have to be resolved by bundlers for browsers. */
 interface NodeProcess {
   getBuiltinModule?(
     name: 'node:fs/promises',
@@ -15,22 +15,21 @@ interface NodeProcess {
 
 const provided = new Map<ModuleName, WasmCode>();
 
-/** Has a module started from this code, not from the file beside the script. One that runs stays. */
+/** Sets the code of a module that has not started yet. */
 export function provideCode(name: ModuleName, code: WasmCode): void {
   provided.set(name, code);
 }
 
-/** The code of a module that would be at an address. */
-export const coreCode: Provide = async (name, at) => {
-  const code = provided.get(name) ?? at;
+export const fetchCoreWasm: FetchWasm = async (name, url) => {
+  const code = provided.get(name) ?? url;
   if (typeof code !== 'string' && !(code instanceof URL)) return code;
-  return (await readFile(String(code))) ?? (await fetchCode(name, code));
+  return (await readFile(String(code))) ?? (await fetchWasm(name, code));
 };
 
-/** A file's bytes; `null` for other addresses, and where files cannot be read. */
-export async function readFile(address: string): Promise<Uint8Array<ArrayBuffer> | null> {
-  if (!address.startsWith('file:')) return null;
+/** A file's bytes; `null` if the URL is not a `file:` URL, or outside of Node. */
+export async function readFile(url: string): Promise<Uint8Array<ArrayBuffer> | null> {
+  if (!url.startsWith('file:')) return null;
   const { process } = globalThis as { process?: NodeProcess };
   const files = process?.getBuiltinModule?.('node:fs/promises');
-  return files ? new Uint8Array(await files.readFile(new URL(address))) : null;
+  return files ? new Uint8Array(await files.readFile(new URL(url))) : null;
 }

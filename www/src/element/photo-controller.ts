@@ -12,7 +12,7 @@ import { parseCssColor } from '../lights/light-color.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
 import { PhotoSession, type SessionSettings } from '../player/photo-session.js';
-import { BROWSER_PORTS } from '../player/ports.js';
+import { BROWSER_PORTS } from '../player/browser-ports.js';
 import type { CanvasRenderer, FrameResult } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
 import { BACKENDS } from '../shared/names.js';

@@ -1,10 +1,9 @@
-/** The module that decodes photographs. */
+/** Loads the decoder's module. */
 
 import type { DecoderModule } from './types.js';
-import { loader } from './wasm-loader.js';
+import { createLoader } from './wasm-loader.js';
 
-/** Loads it, once a page. */
-export const loadDecoder = loader<DecoderModule>('decoder', 'decodes photographs', {
+export const loadDecoder = createLoader<DecoderModule>('decoder', 'decodes photographs', {
   glue: () => import('./wasm/decoder.js'),
   simd: () => new URL('./wasm/decoder_bg.wasm', import.meta.url),
   scalar: () => new URL('./wasm/decoder_scalar_bg.wasm', import.meta.url),

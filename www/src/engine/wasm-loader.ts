@@ -1,29 +1,29 @@
-/** How WebAssembly modules are found and started, in pages, in workers and in Node. */
+/** Finds, fetches and starts WebAssembly modules in pages, in workers and in Node. */
 
+import { withPolicyErrors } from '../shared/content-security-policy.js';
 import { messageOf, PhotoError } from '../shared/errors.js';
 import type { ModuleName } from '../shared/names.js';
-import { allowed } from '../shared/policy.js';
 
-/** Bytes of WebAssembly, or the answer that brings them. */
-type Code = ArrayBuffer | ArrayBufferView<ArrayBuffer> | Response;
+/** The bytes of a module, or the response that brings them. */
+type WasmSource = ArrayBuffer | ArrayBufferView<ArrayBuffer> | Response;
 
-/** Gives the code of a module that is at an address. */
-export type Provide = (name: ModuleName, at: URL | string) => Promise<Code>;
+/** Gets the module with the given name, whose file is at `url`. */
+export type FetchWasm = (name: ModuleName, url: URL | string) => Promise<WasmSource>;
 
-export const fetchCode: Provide = (_, at) => fetch(at);
+export const fetchWasm: FetchWasm = (_, url) => fetch(url);
 
-/** Where a module is: written out for bundlers, which look for exactly such forms. */
+/** A module's files. Functions, because bundlers recognise only literal paths. */
 export interface WasmBuilds {
-  /** The script that wasm-bindgen makes, one for both builds. */
+  /** The script of wasm-bindgen, which all builds share. */
   readonly glue: () => Promise<unknown>;
   readonly simd: () => URL;
-  /** For machines without SIMD; left out where there is one build for all. */
+  /** The build for machines without SIMD; absent if one build runs everywhere. */
   readonly scalar?: () => URL;
 }
 
-/** What wasm-bindgen makes. */
+/** The exports of wasm-bindgen's script that start the module. */
 interface Glue {
-  default(options: { module_or_path: Code }): Promise<unknown>;
+  default(options: { module_or_path: WasmSource }): Promise<unknown>;
 }
 
 // The smallest module with a 128-bit operation: () => i8x16.splat(0), dropped.
@@ -32,70 +32,69 @@ const SIMD_PROBE = new Uint8Array([
   11,
 ]);
 
-/** Where modules are, if not beside this script: an address that ends in a slash. */
+/** The folder of the modules, with a slash at its end; `null` if they lie beside this script. */
 let folder: string | null = null;
 
-/** Has modules started from files in another folder from now on. Those that run stay. */
-export function setModuleFolder(address: string | null): void {
-  folder = address;
+/** Sets the folder of modules that are started from now on. */
+export function setModuleFolder(url: string | null): void {
+  folder = url;
 }
 
-/** That folder, for workers. */
 export function moduleFolder(): string | null {
   return folder;
 }
 
 /**
- * How a module is loaded, once a page; a load that failed is tried again at the next call. `what` says what
- * the module does.
+ * Makes the function that loads a module once per page. After a failure, the next call tries again.
+ * `task` is what the module does, for error messages: "decodes photographs".
  */
-export function loader<M>(
+export function createLoader<M>(
   name: ModuleName,
-  what: string,
+  task: string,
   builds: WasmBuilds,
-): (provide?: Provide) => Promise<M> {
+): (fetchModule?: FetchWasm) => Promise<M> {
   let loading: Promise<M> | undefined;
-  return (provide = fetchCode) => {
-    loading ??= allowed(() => start<M>(name, builds, provide), /^script-src/, mayNotRun).catch(
-      (cause: unknown) => {
-        loading = undefined;
-        if (cause instanceof PhotoError) throw cause;
-        throw new PhotoError(
-          'wasm-unavailable',
-          `The module that ${what} could not be started. The wasm folder has to lie beside the script, or ` +
-            'where wasm-url says, and a content security policy has to allow its address in connect-src. ' +
-            `The browser says: ${messageOf(cause)}`,
-          cause,
-        );
-      },
-    );
+  return (fetchModule = fetchWasm) => {
+    const start = () => startModule<M>(name, builds, fetchModule);
+    loading ??= withPolicyErrors(start, /^script-src/, wasmForbidden).catch((cause: unknown) => {
+      loading = undefined;
+      if (cause instanceof PhotoError) throw cause;
+      throw new PhotoError(
+        'wasm-unavailable',
+        `The module that ${task} could not be started. The wasm folder must lie beside the script or ` +
+          'where wasm-url says, and a content security policy must allow its address in connect-src. ' +
+          `The browser says: ${messageOf(cause)}`,
+        cause,
+      );
+    });
     return loading;
   };
 }
 
-function mayNotRun(_: string, cause: unknown): PhotoError {
+function wasmForbidden(_: string, cause: unknown): PhotoError {
   return new PhotoError(
     'csp-wasm',
-    "WebAssembly may not run here: the page's content security policy has to allow " +
-      "'wasm-unsafe-eval' in script-src.",
+    "The page's content security policy blocks WebAssembly: add 'wasm-unsafe-eval' to script-src.",
     cause,
   );
 }
 
-/** Starts a module, in the build that this machine can run. */
-async function start<M>(
+/** Starts the build that this machine can run. */
+async function startModule<M>(
   name: ModuleName,
   { glue, simd, scalar }: WasmBuilds,
-  provide: Provide,
+  fetchModule: FetchWasm,
 ): Promise<M> {
-  // A build with SIMD does not even load where SIMD is missing.
-  const old = scalar && !WebAssembly.validate(SIMD_PROBE) ? scalar : null;
-  const beside = old ?? simd;
-  const at = folder === null ? beside() : `${folder}${name}${old ? '_scalar' : ''}_bg.wasm`;
-  // Both at once: each is of no use without the other.
-  const bytes = provide(name, at);
-  bytes.catch(() => {});
+  // Without SIMD support, a SIMD build does not even compile.
+  const scalarBuild = scalar && !WebAssembly.validate(SIMD_PROBE) ? scalar : null;
+  const url =
+    folder === null
+      ? (scalarBuild ?? simd)()
+      : `${folder}${name}${scalarBuild ? '_scalar' : ''}_bg.wasm`;
+  // The module and its script load at the same time.
+  const source = fetchModule(name, url);
+  source.catch(() => {});
   const module = (await glue()) as Glue;
-  await module.default({ module_or_path: await bytes });
+  await module.default({ module_or_path: await source });
   return module as M;
 }

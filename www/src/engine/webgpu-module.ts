@@ -1,10 +1,9 @@
-/** The module that relights by WebGPU. */
+/** Loads the WebGPU backend's module. */
 
 import type { WebGpuModule } from './types.js';
-import { loader } from './wasm-loader.js';
+import { createLoader } from './wasm-loader.js';
 
-/** Loads it, once a page. */
-export const loadWebGpu = loader<WebGpuModule>('webgpu', 'relights by WebGPU', {
+export const loadWebGpu = createLoader<WebGpuModule>('webgpu', 'relights with WebGPU', {
   glue: () => import('./wasm/webgpu.js'),
   simd: () => new URL('./wasm/webgpu_bg.wasm', import.meta.url),
 });

@@ -1,31 +1,34 @@
 /**
- * Reading parts of a file over HTTP as they arrive. Transfers that break off go on where they ended;
- * a server that knows no ranges, or that a browser does not ask for them, is read from start to end
- * instead.
+ * Reads ranges of a file over HTTP. An interrupted transfer continues where it ended. If the server
+ * ignores ranges, or the browser does not request them, the file is read from start to end instead.
  */
 
 import type { ByteRange } from '../shared/byte-range.js';
 import { PhotoError } from '../shared/errors.js';
+import { withTimeout } from '../shared/promises.js';
 import * as errors from './http-errors.js';
-import { Passing } from './http-errors.js';
-import { differ, readHead, sizeOfUnsatisfied, type Version } from './response-head.js';
-import { type ChancePorts, pauseMs, sleep, within } from './retry.js';
+import { RetryableError } from './http-errors.js';
+import {
+  type FileVersion,
+  isOtherVersion,
+  readHead,
+  sizeFromUnsatisfiedRange,
+} from './response-head.js';
+import { type RetryPorts, retryPauseMs, sleep } from './retry.js';
 
-/** Bytes of the file and where in it they lie. */
+/** Bytes of the file that begin at `offset`. */
 export interface Piece {
   readonly offset: number;
   readonly bytes: Uint8Array;
 }
 
-/** What a source needs from the world around it, and how patient it is. */
-export interface SourcePorts extends ChancePorts {
+export interface SourcePorts extends RetryPorts {
   readonly fetch: typeof fetch;
   readonly sleep: (ms: number, signal: AbortSignal) => Promise<void>;
-  /** Longest silence before a transfer counts as broken off. Slow lines trickle; a line that is
-   * silent for this long has been lost without either end being told. */
+  /** Silence after which a transfer counts as interrupted, in milliseconds. */
   readonly stallMs: number;
-  /** How often to ask again for a range of which nothing comes. */
-  readonly retries: number;
+  /** How often a range is requested again without receiving anything. */
+  readonly maxRetries: number;
 }
 
 const DEFAULT_PORTS: Omit<SourcePorts, 'fetch'> = {
@@ -33,150 +36,153 @@ const DEFAULT_PORTS: Omit<SourcePorts, 'fetch'> = {
   random: Math.random,
   now: Date.now,
   stallMs: 30_000,
-  retries: 4,
+  maxRetries: 4,
 };
 
-/** A range on its way. */
+/** The progress of one range. */
 interface Transfer {
   readonly start: number;
-  /** Where the next piece begins. */
-  at: number;
+  /** The start of the next piece. */
+  position: number;
   end: number;
-  /** Whether a part is asked for, not the whole file. */
-  inParts: boolean;
+  /** Whether the range is requested, and not the whole file. */
+  usesRange: boolean;
 }
 
-/** A file behind an address. Meant for one `read` at a time. */
+/** A file at a URL. Only one `read` may run at a time. */
 export class HttpSource {
   readonly url: string;
   readonly #ports: SourcePorts;
   #size: number | undefined;
-  /** Whether more than the end of a transfer has told it. */
-  #sizeTold = true;
-  /** What the answers so far say of the file. */
-  #version: Version | undefined;
-  /** The one that is left, once the server has answered with the whole file. */
-  #whole: Transfer | undefined;
+  /** Whether a header has told the size, and not only the end of a transfer. */
+  #isSizeCertain = true;
+  #version: FileVersion | undefined;
+  /** The transfer of the whole file, once the server has sent it instead of a range. */
+  #wholeTransfer: Transfer | undefined;
 
   constructor(url: string, ports: Pick<SourcePorts, 'fetch'> & Partial<SourcePorts>) {
     this.url = url;
     this.#ports = { ...DEFAULT_PORTS, ...ports };
   }
 
-  /** Bytes of the whole file, once known. */
+  /** Size of the whole file in bytes, once known. */
   get size(): number | undefined {
     return this.#size;
   }
 
   /**
-   * Hands over the bytes of a range in pieces of any size as they arrive. From a server that knows no
-   * ranges that is the whole file, and further calls hand over nothing more. The range may reach beyond
-   * the file's end only as long as its size is not known. Throws a `PhotoError`, or the signal's reason
-   * once aborted.
+   * Yields the bytes of a range as they arrive. If the server ignores ranges, the first call yields the
+   * whole file and later calls nothing. The range may exceed the file only while its size is unknown.
+   * Throws a `PhotoError`, or the signal's reason if it is aborted.
    */
   async *read(range: ByteRange, signal: AbortSignal): AsyncGenerator<Piece, void> {
-    this.#refuse(range, range.end);
-    const transfer = this.#whole ?? { ...range, at: range.start, inParts: true };
+    this.#checkSize(range, range.end);
+    const transfer = this.#wholeTransfer ?? { ...range, position: range.start, usesRange: true };
     let failures = 0;
     for (;;) {
       signal.throwIfAborted();
       transfer.end = Math.min(transfer.end, this.#size ?? transfer.end);
-      const before = transfer.at;
-      if (before >= transfer.end) break;
+      const { position } = transfer;
+      if (position >= transfer.end) break;
       try {
         yield* this.#attempt(transfer, signal);
         failures = 0;
       } catch (thrown) {
-        if (!(thrown instanceof Passing)) throw thrown;
-        failures = transfer.at === before ? failures + 1 : 1;
-        if (failures > this.#ports.retries) throw thrown.after(failures);
-        // Browsers do not say why there is no answer. Some refuse what is compressed where a part was
-        // asked for, some have another origin's server asked whether it allows that.
-        const unheard = this.#version === undefined && thrown.code === 'http-network';
-        if (unheard) transfer.inParts = failures % 2 === 1;
-        const pause = this.#ports.sleep(pauseMs(thrown, failures, this.#ports), signal);
-        await within(pause, signal);
+        if (!(thrown instanceof RetryableError)) throw thrown;
+        failures = transfer.position === position ? failures + 1 : 1;
+        if (failures > this.#ports.maxRetries) throw thrown.afterAttempts(failures);
+        // A missing response has no reason: the range header may be the cause, which some browsers refuse
+        // for compressed files, and for which some ask another origin's server for permission first.
+        const hasNoResponse = this.#version === undefined && thrown.code === 'http-network';
+        if (hasNoResponse) transfer.usesRange = failures % 2 === 1;
+        const pause = this.#ports.sleep(retryPauseMs(thrown, failures, this.#ports), signal);
+        await withTimeout(pause, { signal });
       }
     }
-    this.#refuse(range, range.start + 1);
+    this.#checkSize(range, range.start + 1);
   }
 
-  /** Refuses a range that needs a file up to `end`, if the file turns out to be shorter. */
-  #refuse(range: ByteRange, end: number): void {
+  /** Throws if the file is known to end before `end`. */
+  #checkSize(range: ByteRange, end: number): void {
     const size = this.#size ?? end;
     if (size >= end) return;
-    // Where only the end of the transfer told the size, that end may have come too early.
-    if (!this.#sizeTold) throw errors.short(this.url, size, range.end);
+    if (!this.#isSizeCertain) throw errors.endedEarly(this.url, size, range.end);
     throw errors.tooShort(this.url, range, size);
   }
 
-  /** Hands over what one request brings, less what came before the last break. */
+  /** Sends one request and yields its bytes, without those received before an interruption. */
   async *#attempt(transfer: Transfer, signal: AbortSignal): AsyncGenerator<Piece, void> {
-    // What is under way ends with the attempt, however that ends.
+    // However the attempt ends, its request ends too.
     const stop = new AbortController();
-    const stopToo = () => stop.abort(signal.reason);
-    signal.addEventListener('abort', stopToo);
+    const forwardAbort = () => stop.abort(signal.reason);
+    signal.addEventListener('abort', forwardAbort);
     try {
       const response = await this.#request(transfer, stop.signal);
-      if (response.status === 416 && transfer.inParts) return this.#endBefore(transfer, response);
-      const asked = { start: transfer.at, end: transfer.end };
-      const head = readHead(this.url, response, transfer.inParts ? asked : 'whole');
-      this.#recognise(head.version, head.size);
-      if (head.whole && !this.#whole) {
-        this.#whole = transfer;
-        transfer.inParts = false;
-        transfer.at = 0;
+      if (response.status === 416 && transfer.usesRange) return this.#endBefore(transfer, response);
+      const requested = { start: transfer.position, end: transfer.end };
+      const head = readHead(this.url, response, transfer.usesRange ? requested : 'whole');
+      this.#checkVersion(head.version, head.size);
+      if (head.isWhole && !this.#wholeTransfer) {
+        this.#wholeTransfer = transfer;
+        transfer.usesRange = false;
+        transfer.position = 0;
         transfer.end = Number.POSITIVE_INFINITY;
       }
-      const end = head.to ?? this.#size;
-      let offset = head.from;
+      const end = head.end ?? this.#size;
+      let offset = head.start;
       const reader = response.body?.getReader();
       while (reader) {
-        const { done, value } = await this.#unlessSilent(reader.read(), stop.signal, (cause) =>
-          errors.short(this.url, offset, end, cause),
+        const { done, value } = await this.#untilStalled(reader.read(), stop.signal, (cause) =>
+          errors.endedEarly(this.url, offset, end, cause),
         );
         if (done) break;
-        const skip = transfer.at - offset;
+        const skip = transfer.position - offset;
         offset += value.byteLength;
         if (offset > (end ?? offset)) {
-          if (head.whole) throw errors.changed(this.url);
-          throw errors.otherPart(this.url, transfer, 'more of them');
+          if (head.isWhole) throw errors.changed(this.url);
+          throw errors.wrongRange(this.url, requested, 'more of them');
         }
         if (skip >= value.byteLength) continue;
-        const piece = { offset: transfer.at, bytes: value.subarray(skip) };
-        transfer.at = offset;
+        const piece = { offset: transfer.position, bytes: value.subarray(skip) };
+        transfer.position = offset;
         yield piece;
       }
-      if (offset < Math.max(end ?? 0, transfer.at)) throw errors.short(this.url, offset, end);
-      if (!this.#whole) return;
-      this.#sizeTold = this.#size !== undefined;
+      if (offset < Math.max(end ?? 0, transfer.position)) {
+        throw errors.endedEarly(this.url, offset, end);
+      }
+      if (!this.#wholeTransfer) return;
+      this.#isSizeCertain = this.#size !== undefined;
       this.#size = offset;
     } finally {
-      signal.removeEventListener('abort', stopToo);
+      signal.removeEventListener('abort', forwardAbort);
       stop.abort();
     }
   }
 
-  async #request({ inParts, at, end }: Transfer, signal: AbortSignal): Promise<Response> {
-    // The one header that other origins need not be asked to allow.
-    const init = { signal, ...(inParts && { headers: { Range: `bytes=${at}-${end - 1}` } }) };
-    const { fetch } = this.#ports; // Browsers' own does not want to be called as a method.
-    const answer = (async () => fetch(this.url, init))();
-    return await this.#unlessSilent(answer, signal, (cause) => errors.unreachable(this.url, cause));
+  async #request({ usesRange, position, end }: Transfer, signal: AbortSignal): Promise<Response> {
+    // Range is the only header here that needs no permission of another origin.
+    const headers = { Range: `bytes=${position}-${end - 1}` };
+    const { fetch } = this.#ports; // The browser's `fetch` cannot be called as a method.
+    const response = (async () => fetch(this.url, { signal, ...(usesRange && { headers }) }))();
+    return await this.#untilStalled(response, signal, (cause) =>
+      errors.unreachable(this.url, cause),
+    );
   }
 
-  /** Answers of status 416: the file ends before the range begins. */
-  #endBefore({ start, at, end }: Transfer, response: Response): void {
-    // Where all before has come, there it ends.
-    const size = sizeOfUnsatisfied(response) ?? (at > start ? at : undefined);
-    this.#recognise({}, size);
-    if (size === undefined || size > at) throw errors.refused(this.url, { start: at, end });
+  /** Handles status 416: the file ends before the requested range. */
+  #endBefore({ start, position, end }: Transfer, response: Response): void {
+    // If everything before this position has arrived, the file ends here.
+    const size = sizeFromUnsatisfiedRange(response) ?? (position > start ? position : undefined);
+    this.#checkVersion({}, size);
+    if (size === undefined || size > position) {
+      throw errors.rangeRefused(this.url, { start: position, end });
+    }
   }
 
-  /** Makes sure that an answer is of the same file as those before. */
-  #recognise(version: Version, size: number | undefined): void {
+  /** Throws if a response belongs to another version of the file than the ones before. */
+  #checkVersion(version: FileVersion, size: number | undefined): void {
     const known = this.#version ?? version;
-    if (differ(known, version) || (this.#size ?? size) !== (size ?? this.#size)) {
+    if (isOtherVersion(known, version) || (this.#size ?? size) !== (size ?? this.#size)) {
       throw errors.changed(this.url);
     }
     this.#version = {
@@ -186,17 +192,17 @@ export class HttpSource {
     this.#size ??= size;
   }
 
-  /** Waits for what a request under way brings next. */
-  #unlessSilent<T>(
+  /** Waits for the next data of a request. */
+  #untilStalled<T>(
     promise: Promise<T>,
     signal: AbortSignal,
-    failure: (cause: unknown) => Passing,
+    toError: (cause: unknown) => RetryableError,
   ): Promise<T> {
     const ms = this.#ports.stallMs;
-    const end = () => Promise.reject(errors.stalled(this.url, ms));
-    return within(promise, signal, { ms, end }).catch((cause: unknown) => {
+    const onTimeout = () => Promise.reject(errors.stalled(this.url, ms));
+    return withTimeout(promise, { signal, timeout: { ms, onTimeout } }).catch((cause: unknown) => {
       signal.throwIfAborted();
-      throw cause instanceof PhotoError ? cause : failure(cause);
+      throw cause instanceof PhotoError ? cause : toError(cause);
     });
   }
 }

@@ -8,7 +8,7 @@ import { answer } from '../../tools/ranges.js';
 import type { DecodedPhoto, Decoder } from '../engine/types.js';
 import { MainThreadDecoder } from '../photo/main-thread-decoder.js';
 import type { Photograph } from '../photo/photograph.js';
-import { photoOf } from '../renderers/cpu/worker-pool-fakes.js';
+import { fakePhoto } from '../photo/photograph-fakes.js';
 import { type LoadPorts, openPhoto } from './load.js';
 
 const never = new AbortController().signal;
@@ -66,12 +66,12 @@ class FakeDecoder implements Decoder {
   }
 
   preview(): DecodedPhoto | undefined {
-    return this.scansDone > 0 ? photoOf(1).photo : undefined;
+    return this.scansDone > 0 ? fakePhoto(1).photo : undefined;
   }
 
   finish(): DecodedPhoto {
     this.free();
-    return photoOf(1).photo;
+    return fakePhoto(1).photo;
   }
 
   free(): void {
@@ -128,9 +128,9 @@ function bytesOf(asked: Site['asked'], size: number): number {
 function portsOf(ports: Partial<LoadPorts> = {}): LoadPorts {
   let time = 0;
   return {
-    decoder: async () => new MainThreadDecoder({ Decoder: FakeDecoder }, () => time++),
+    createDecoder: async () => new MainThreadDecoder({ Decoder: FakeDecoder }, () => time++),
     fetch: (input, init) => fetch(input, init),
-    pause: () => Promise.resolve(),
+    yieldToPage: () => Promise.resolve(),
     now: () => 0,
     ...ports,
   };
@@ -274,7 +274,7 @@ test('a file short on the server is told from one short in transfer', async (t) 
   });
   await assert.rejects(opened(lengthless.url), {
     code: 'http-short',
-    message: /rose\.ltm arrived incomplete: .* at byte 300000, before byte 800000/,
+    message: /rose\.ltm is incomplete: .* at byte 300000, before byte 800000/,
   });
 });
 
@@ -283,7 +283,7 @@ test('a file that goes on after its end is format-invalid', async (t) => {
   const site = await serve(t, (request, response) => send(request, response, file));
   await assert.rejects(opened(site.url), {
     code: 'format-invalid',
-    message: /rose\.ltm goes on after its end at byte 800000: the server has 800010\./,
+    message: /rose\.ltm is too long: .* ends at byte 800000, but the server has 800010\./,
   });
   assert.equal(site.asked.length, 1);
 });
@@ -353,8 +353,8 @@ test('an abort between two pieces frees the decoder and ends the transfer', asyn
 test('an abort while the page has its turn is noticed', async (t) => {
   const site = await serve(t, (request, response) => send(request, response, fileOf()));
   const abort = new AbortController();
-  const pause = async () => abort.abort(new Error('another src'));
-  const ports = portsOf({ pause });
+  const yieldToPage = async () => abort.abort(new Error('another src'));
+  const ports = portsOf({ yieldToPage });
   await assert.rejects(
     openPhoto(site.url, abort.signal, () => {}, drop, ports),
     /another src/,
@@ -368,7 +368,7 @@ test('an abort while the module loads does not wait for it', async (t) => {
   const decoder = () => new Promise<never>(() => {});
   setTimeout(() => abort.abort(new Error('another src')), 20);
   await assert.rejects(
-    openPhoto(site.url, abort.signal, () => {}, drop, portsOf({ decoder })),
+    openPhoto(site.url, abort.signal, () => {}, drop, portsOf({ createDecoder: decoder })),
     /another src/,
   );
 });
@@ -379,14 +379,17 @@ test('a module that does not start ends the transfer too', async (t) => {
     while (site.closed.length === 0) await new Promise((resolve) => setTimeout(resolve));
     throw new Error('no wasm');
   };
-  await assert.rejects(opened(site.url, { decoder }), { code: 'internal', message: /no wasm/ });
+  await assert.rejects(opened(site.url, { createDecoder: decoder }), {
+    code: 'internal',
+    message: /no wasm/,
+  });
   await Promise.all(site.closed);
 });
 
 test('what the server says is told before the module is there', async (t) => {
   const site = await serve(t, (_, response) => response.writeHead(404).end());
   const decoder = () => new Promise<never>(() => {});
-  await assert.rejects(opened(site.url, { decoder }), { code: 'http-status' });
+  await assert.rejects(opened(site.url, { createDecoder: decoder }), { code: 'http-status' });
 });
 
 test('the page gets its turn, with what has been decoded by then', async (t) => {
@@ -394,11 +397,11 @@ test('the page gets its turn, with what has been decoded by then', async (t) => 
   const site = await serve(t, (request, response) => send(request, response, file));
   let loaded = 0;
   const turns: number[] = [];
-  const pause = async () => {
+  const yieldToPage = async () => {
     turns.push(loaded);
   };
   // Eight looks at the clock make a turn, and there is one after each slice.
-  await openPhoto(site.url, never, (bytes) => (loaded = bytes), drop, portsOf({ pause }));
+  await openPhoto(site.url, never, (bytes) => (loaded = bytes), drop, portsOf({ yieldToPage }));
   assert.ok(turns.length > 70, `${turns.length} turns`);
   const steps = turns.map((at, i) => at - (turns[i - 1] ?? 0));
   assert.ok(
@@ -413,7 +416,10 @@ test('a decoder that is never content ends in an error', async (t) => {
   }
   const site = await serve(t, (request, response) => send(request, response, fileOf()));
   const decoder = async () => new MainThreadDecoder({ Decoder: Glutton }, () => 0);
-  await assert.rejects(opened(site.url, { decoder }), { code: 'internal', message: /fed/ });
+  await assert.rejects(opened(site.url, { createDecoder: decoder }), {
+    code: 'internal',
+    message: /already has/,
+  });
   assert.equal(site.asked.length, 2);
 });
 
@@ -430,7 +436,7 @@ test('of several ranges that a decoder wants the first is asked for, then what i
   const file = fileOf();
   const site = await serve(t, (request, response) => send(request, response, file));
   const decoder = async () => new MainThreadDecoder({ Decoder: InThree }, () => 0);
-  await opened(site.url, { decoder });
+  await opened(site.url, { createDecoder: decoder });
   assert.deepEqual(site.asked, ['0-16383', '16384-49999', '50000-299999', '300000-799999']);
   assert.ok(FakeDecoder.fed.equals(file));
 });
@@ -440,7 +446,7 @@ test('coarser photographs come while the file does, each of twice as much, and n
   const site = await serve(t, (request, response) => send(request, response, file));
   let now = 0;
   const shares: number[] = [];
-  const keep = (preview: Photograph) => shares.push(preview.share);
+  const keep = (preview: Photograph) => shares.push(preview.completeness);
   const at = { now: () => now };
   await openPhoto(site.url, never, () => (now += 1000), keep, portsOf(at));
   assert.ok(shares.length >= 2 && shares.length <= 3, String(shares));

@@ -1,39 +1,36 @@
-/** From an address to a decoded photograph. */
+/** Loads a photograph: fetches a file and decodes it while it arrives. */
 
-import type { PhotoDecoder } from '../photo/main-thread-decoder.js';
+import type { PhotoDecoder } from '../photo/photo-decoder.js';
 import type { Photograph } from '../photo/photograph.js';
-import { sentence } from '../player/backends.js';
 import type { ByteRange } from '../shared/byte-range.js';
-import { hasCode, PhotoError, toPhotoError } from '../shared/errors.js';
+import { endSentence, hasCode, PhotoError, toPhotoError } from '../shared/errors.js';
+import { withTimeout } from '../shared/promises.js';
 import { HttpSource, type Piece } from './byte-source.js';
-import { nameOf, tooLong } from './http-errors.js';
-import { within } from './retry.js';
+import { fileName, tooLong } from './http-errors.js';
 
-/** Told how much of the file has been decoded; `total` is 0 until known. A file that is replaced
- * meanwhile counts anew. */
+/** Gets the number of decoded bytes and that of the file, which is 0 until known. */
 export type OnProgress = (loaded: number, total: number) => void;
 
-/** Given coarser photographs while the file comes, each to be freed by who takes it. */
+/** Gets a coarser photograph of the file so far, and must free it. */
 export type OnPreview = (photograph: Photograph) => void;
 
-/** What loading needs from the world around it. */
 export interface LoadPorts {
-  readonly decoder: () => Promise<PhotoDecoder>;
+  readonly createDecoder: () => Promise<PhotoDecoder>;
   readonly fetch: typeof fetch;
-  /** Milliseconds since any moment. */
+  /** Milliseconds, from any start. */
   readonly now: () => number;
-  /** Lets the page draw and take input. */
-  readonly pause: () => Promise<void>;
+  /** Lets the page draw and handle input. */
+  readonly yieldToPage: () => Promise<void>;
 }
 
-/** What decoders want first. Of most files the head is in it, and small ones are as a whole. */
-const FIRST: ByteRange = { start: 0, end: 1 << 14 };
-/** A coarser photograph is worth its trouble where more time than this has passed since the last. */
-const PREVIEW_MS = 400;
+/** The first request. It contains the index of most files, and small files as a whole. */
+const FIRST_RANGE: ByteRange = { start: 0, end: 1 << 14 };
+/** Minimum time between two previews. */
+const MIN_PREVIEW_INTERVAL_MS = 400;
 
 /**
- * Fetches and decodes a file while it arrives. One that is replaced meanwhile is begun anew, once.
- * Throws a `PhotoError`, or the signal's reason once aborted; what was decoded till then is freed.
+ * Loads a photograph. If the file is replaced during the transfer, it starts once more. Throws a
+ * `PhotoError`, or the signal's reason if it is aborted; nothing remains allocated then.
  */
 export async function openPhoto(
   url: string,
@@ -46,9 +43,9 @@ export async function openPhoto(
     return await open(url, signal, onProgress, onPreview, ports);
   } catch (thrown) {
     if (!hasCode(thrown, 'http-changed')) throw thrown;
-    // A cache may still have parts of the file that was.
-    const anew: typeof fetch = (input, init) => ports.fetch(input, { ...init, cache: 'reload' });
-    return await open(url, signal, onProgress, onPreview, { ...ports, fetch: anew });
+    // A cache may still have parts of the old file.
+    const reload: typeof fetch = (input, init) => ports.fetch(input, { ...init, cache: 'reload' });
+    return await open(url, signal, onProgress, onPreview, { ...ports, fetch: reload });
   }
 }
 
@@ -60,57 +57,60 @@ async function open(
   ports: LoadPorts,
 ): Promise<Photograph> {
   const stop = new AbortController();
-  const stopToo = () => stop.abort(signal.reason);
+  const forwardAbort = () => stop.abort(signal.reason);
   signal.throwIfAborted();
-  signal.addEventListener('abort', stopToo);
+  signal.addEventListener('abort', forwardAbort);
   try {
     const source = new HttpSource(url, { fetch: ports.fetch });
-    const opening = source.read(FIRST, stop.signal);
-    // The decoder gets ready while the server thinks.
-    const starting = ports.decoder();
+    const firstPieces = source.read(FIRST_RANGE, stop.signal);
+    // The decoder starts while the server answers.
+    const starting = ports.createDecoder();
     stop.signal.addEventListener('abort', () => {
-      // What a worker is at need not be waited for. One that nobody waits for is let go when it comes.
       starting.then((decoder) => decoder.free()).catch(() => {});
     });
-    const [decoder, first] = await Promise.all([within(starting, stop.signal), opening.next()]);
-    const pieces = piecesOf(first, opening, decoder, source, stop.signal);
+    const [decoder, first] = await Promise.all([
+      withTimeout(starting, { signal: stop.signal }),
+      firstPieces.next(),
+    ]);
+    const pieces = piecesFor(decoder, source, first, firstPieces, stop.signal);
     return await decode(decoder, pieces, signal, onProgress, onPreview, ports);
   } catch (thrown) {
     signal.throwIfAborted();
-    throw named(toPhotoError(thrown), url);
+    throw withFileName(toPhotoError(thrown), url);
   } finally {
-    signal.removeEventListener('abort', stopToo);
-    // Neither a transfer nor a decoder is left running.
+    signal.removeEventListener('abort', forwardAbort);
+    // Ends the transfer and frees the decoder.
     stop.abort();
   }
 }
 
-/** What a decoder says is wrong, of the file that it is wrong with. */
-function named(error: PhotoError, url: string): PhotoError {
+/** Adds the file's name to the decoder's errors. */
+function withFileName(error: PhotoError, url: string): PhotoError {
   const { code, message, cause } = error;
-  if (!code.startsWith('format-') || message.includes(nameOf(url))) return error;
-  return new PhotoError(code, sentence(`${nameOf(url)}: ${message}`), cause);
+  if (!code.startsWith('format-') || message.includes(fileName(url))) return error;
+  return new PhotoError(code, endSentence(`${fileName(url)}: ${message}`), cause);
 }
 
-/** All of a file that its decoder wants, after what was asked for without it. */
-async function* piecesOf(
-  first: IteratorResult<Piece, void>,
-  opening: AsyncIterable<Piece>,
+/** The pieces of the first request, and then those that the decoder asks for. */
+async function* piecesFor(
   decoder: PhotoDecoder,
   source: HttpSource,
+  first: IteratorResult<Piece, void>,
+  firstPieces: AsyncIterable<Piece>,
   signal: AbortSignal,
 ): AsyncGenerator<Piece, void> {
   if (!first.done) yield first.value;
-  yield* opening;
-  let fed = -1;
+  yield* firstPieces;
+  let lastBytesFed = -1;
   for (;;) {
     const { fileBytes: end, next, bytesFed } = decoder.state;
     const { size } = source;
     if (end !== undefined && size !== undefined && size > end) throw tooLong(source.url, end, size);
     if (!next) return;
-    // It would be asked for again and again.
-    if (bytesFed === fed) throw new Error('the decoder wants what it has been fed');
-    fed = bytesFed;
+    // Otherwise the loop would never end.
+    if (bytesFed === lastBytesFed)
+      throw new Error('the decoder asks for bytes that it already has');
+    lastBytesFed = bytesFed;
     yield* source.read(next, signal);
   }
 }
@@ -123,23 +123,23 @@ async function decode(
   onPreview: OnPreview | null,
   ports: LoadPorts,
 ): Promise<Photograph> {
-  let told = 0;
+  let reported = 0;
   const nextPreview = previewsOf(decoder, ports.now);
-  const tell = () => {
+  const reportProgress = () => {
     const { bytesFed, fileBytes } = decoder.state;
-    if (bytesFed > told) onProgress(bytesFed, fileBytes ?? 0);
-    told = bytesFed;
+    if (bytesFed > reported) onProgress(bytesFed, fileBytes ?? 0);
+    reported = bytesFed;
   };
-  const turn = async () => {
-    tell();
-    await ports.pause();
+  const yieldToPage = async () => {
+    reportProgress();
+    await ports.yieldToPage();
     signal.throwIfAborted();
   };
   for await (const { offset, bytes } of pieces) {
     signal.throwIfAborted();
-    await decoder.feed(offset, bytes, turn);
+    await decoder.feed(offset, bytes, yieldToPage);
     signal.throwIfAborted();
-    tell();
+    reportProgress();
     signal.throwIfAborted();
     const preview = onPreview ? await nextPreview() : null;
     if (signal.aborted) preview?.free();
@@ -153,27 +153,27 @@ async function decode(
 }
 
 /**
- * Makes coarser photographs of what has come: the first as soon as there is one. Each takes as long as
- * decoding what has come, so that the next is of twice as much, and none is made that the whole photograph
- * would soon take the place of.
+ * Makes previews: the first as soon as possible, and each further one when twice as many bytes have
+ * arrived. A preview takes as long as decoding the bytes so far, so that all of them together take as
+ * long as the photograph. None is made once the whole file is there.
  */
 function previewsOf(decoder: PhotoDecoder, now: () => number): () => Promise<Photograph | null> {
-  let scans = 0;
-  let bytes = 0;
-  let at = Number.NEGATIVE_INFINITY;
+  let lastScans = 0;
+  let lastBytes = 0;
+  let lastMs = Number.NEGATIVE_INFINITY;
   return async () => {
     const { scansDone, bytesFed, next } = decoder.state;
-    if (scansDone <= scans || bytesFed < 2 * bytes || !next) return null;
-    if (now() - at < PREVIEW_MS) return null;
-    scans = scansDone;
-    bytes = bytesFed;
+    if (scansDone <= lastScans || bytesFed < 2 * lastBytes || !next) return null;
+    if (now() - lastMs < MIN_PREVIEW_INTERVAL_MS) return null;
+    lastScans = scansDone;
+    lastBytes = bytesFed;
     const preview = await decoder.preview();
-    at = now();
+    lastMs = now();
     return preview;
   };
 }
 
-/** A `PhotoError` for an element without an address. */
+/** The error of an element without `src`. */
 export function missingSource(): PhotoError {
-  return new PhotoError('src-missing', 'There is no photograph to show: src is not set.');
+  return new PhotoError('src-missing', 'There is no photograph to show: set the src attribute.');
 }

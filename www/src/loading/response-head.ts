@@ -1,92 +1,98 @@
-/** What the head of a server's answer says of the file, with every way this can go wrong told apart. */
+/** Reads a response's status and headers, and recognises everything that can be wrong with them. */
 
 import type { ByteRange } from '../shared/byte-range.js';
-import { badStatus, compressed, otherPart, webPage } from './http-errors.js';
+import { badStatus, compressed, webPage, wrongRange } from './http-errors.js';
 
-/** The head of an answer that brings bytes of the file. */
-export interface Head {
-  /** Whether the whole file comes, whatever was asked for. */
-  readonly whole: boolean;
-  /** Where in the file the body begins. */
-  readonly from: number;
-  /** Where in the file the body ends, as far as can be told. */
-  readonly to: number | undefined;
-  /** Bytes of the whole file, as far as can be told. */
+/** What the headers say about the body. */
+export interface ResponseHead {
+  /** Whether the body is the whole file, whatever was requested. */
+  readonly isWhole: boolean;
+  /** The byte of the file at which the body begins. */
+  readonly start: number;
+  /** The byte of the file at which the body ends, if known. */
+  readonly end: number | undefined;
+  /** The size of the whole file, if known. */
   readonly size: number | undefined;
-  readonly version: Version;
+  readonly version: FileVersion;
 }
 
-/** What tells one version of a file from another. */
-export interface Version {
-  /** A strong one: the same bytes have the same tag, others have another. */
+/** Identifies the version of the file on the server. */
+export interface FileVersion {
+  /** A strong entity tag. */
   readonly etag?: string | undefined;
   readonly modified?: string | undefined;
 }
 
 /**
- * Reads the head of the answer to a request for a range, or for the whole file. Throws `http-status`,
- * `http-type`, `http-encoding` or `http-range` where the body is not what it should be.
+ * Reads the head of the response to a request for a range or for the whole file.
+ *
+ * @throws `http-status`, `http-type`, `http-encoding` or `http-range` if the body is not the requested data
  */
-export function readHead(url: string, response: Response, asked: ByteRange | 'whole'): Head {
+export function readHead(
+  url: string,
+  response: Response,
+  requested: ByteRange | 'whole',
+): ResponseHead {
   const { status } = response;
-  const whole = status === 200;
-  if (!whole && (status !== 206 || asked === 'whole')) throw badStatus(url, response);
+  const isWhole = status === 200;
+  if (!isWhole && (status !== 206 || requested === 'whole')) throw badStatus(url, response);
   const type = mediaType(response);
   if (type === 'text/html' || type === 'application/xhtml+xml') throw webPage(url, type);
   const version = { etag: strongTag(response), modified: header(response, 'last-modified') };
-  if (whole) {
-    const size = wholeBytes(response);
-    return { whole, from: 0, to: size, size, version };
+  if (isWhole) {
+    const size = wholeSize(response);
+    return { isWhole, start: 0, end: size, size, version };
   }
-  return { whole, ...readPart(url, response, asked as ByteRange), version };
+  return { isWhole, ...readContentRange(url, response, requested as ByteRange), version };
 }
 
-/** The size of the file as an answer of status 416 tells it. */
-export function sizeOfUnsatisfied(response: Response): number | undefined {
+/** The file's size as a response with status 416 gives it. */
+export function sizeFromUnsatisfiedRange(response: Response): number | undefined {
   const size = /^bytes \*\/(\d+)$/i.exec(header(response, 'content-range') ?? '')?.[1];
   return size === undefined ? undefined : Number(size);
 }
 
-/** Whether two answers cannot be of the same file. */
-export function differ(a: Version, b: Version): boolean {
+/** Whether two responses belong to different versions of the file for certain. */
+export function isOtherVersion(a: FileVersion, b: FileVersion): boolean {
   if (a.etag !== undefined && b.etag !== undefined) return a.etag !== b.etag;
   return a.modified !== undefined && b.modified !== undefined && a.modified !== b.modified;
 }
 
-function readPart(
+function readContentRange(
   url: string,
   response: Response,
-  { start, end }: ByteRange,
-): { from: number; to: number; size: number | undefined } {
-  const encoding = encodingOf(response);
+  requested: ByteRange,
+): { start: number; end: number; size: number | undefined } {
+  const encoding = contentEncoding(response);
   if (encoding !== undefined) throw compressed(url, encoding);
-  // Another origin's Content-Range is hidden unless the server exposes it; lengths are not.
-  const said = header(response, 'content-range');
+  // Browsers hide Content-Range of other origins unless the server exposes it, but not Content-Length.
+  const text = header(response, 'content-range');
   const length = contentLength(response);
-  const parts = /^bytes (\d+)-(\d+)\/(\d+|\*)$/i.exec(said ?? '');
-  const from = parts ? Number(parts[1]) : start;
-  const to = parts ? Number(parts[2]) + 1 : length ? start + length : end;
+  const parts = /^bytes (\d+)-(\d+)\/(\d+|\*)$/i.exec(text ?? '');
+  const start = parts ? Number(parts[1]) : requested.start;
+  const end = parts ? Number(parts[2]) + 1 : length ? start + length : requested.end;
   const size = parts && parts[3] !== '*' ? Number(parts[3]) : undefined;
-  const legible =
-    parts !== null || (said === undefined && !mediaType(response)?.startsWith('multipart/'));
-  if (!legible || from !== start || to <= from || to > end || to > (size ?? to)) {
-    throw otherPart(url, { start, end }, said ?? `${length ?? 'other'} bytes`);
+  const isReadable =
+    parts !== null || (text === undefined && !mediaType(response)?.startsWith('multipart/'));
+  const isRequested = start === requested.start && end > start && end <= requested.end;
+  if (!isReadable || !isRequested || end > (size ?? end)) {
+    throw wrongRange(url, requested, text ?? `${length ?? 'other'} bytes`);
   }
-  return { from, to, size };
+  return { start, end, size };
 }
 
-/** The length of a whole file's answer, where that is sure to be the file's. */
-function wholeBytes(response: Response): number | undefined {
-  // With Content-Encoding, Content-Length counts compressed bytes and the body comes decompressed. Of
-  // another origin's answer scripts may read the latter but not the former.
-  const sure = encodingOf(response) === undefined && response.type !== 'cors';
-  return sure ? contentLength(response) : undefined;
+/** The size of a file that is sent whole, if Content-Length is certain to be that size. */
+function wholeSize(response: Response): number | undefined {
+  // With Content-Encoding, Content-Length counts compressed bytes. Of other origins, scripts can read
+  // Content-Length but not Content-Encoding.
+  const isCertain = contentEncoding(response) === undefined && response.type !== 'cors';
+  return isCertain ? contentLength(response) : undefined;
 }
 
-/** The entity tag, unless it is a weak one or that of the compressed file. */
+/** The entity tag, unless it is weak or that of a compressed representation. */
 function strongTag(response: Response): string | undefined {
   const tag = header(response, 'etag');
-  return tag?.startsWith('W/') || encodingOf(response) !== undefined ? undefined : tag;
+  return tag?.startsWith('W/') || contentEncoding(response) !== undefined ? undefined : tag;
 }
 
 function contentLength(response: Response): number | undefined {
@@ -94,7 +100,7 @@ function contentLength(response: Response): number | undefined {
   return length !== undefined && /^\d+$/.test(length) ? Number(length) : undefined;
 }
 
-function encodingOf(response: Response): string | undefined {
+function contentEncoding(response: Response): string | undefined {
   const encoding = header(response, 'content-encoding');
   return encoding?.toLowerCase() === 'identity' ? undefined : encoding;
 }

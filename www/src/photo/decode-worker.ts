@@ -1,60 +1,47 @@
-/** The worker that decodes one photograph: what `WorkerDecoder` starts and talks to. */
+/** The script of the worker that decodes one photograph for a `WorkerDecoder`. */
 
 import { loadDecoder } from '../engine/decoder-module.js';
 import type { DecodedPhoto, Decoder } from '../engine/types.js';
-import { setModuleFolder } from '../engine/wasm-loader.js';
+import { serve } from '../engine/worker-server.js';
 import { toPhotoError } from '../shared/errors.js';
-import { started, workerScope } from '../shared/worker-scope.js';
-import { stateOf } from './main-thread-decoder.js';
-import { headOf } from './photograph.js';
-import type { Answer, Request } from './worker-decoder.js';
+import { decoderState } from './main-thread-decoder.js';
+import { describePhoto, type TileBytes } from './types.js';
+import type { DecodeResult, DecodeTask, TransferredPhoto } from './worker-decoder.js';
 
-const scope = workerScope<Request, Answer>();
-
-function fail(thrown: unknown): void {
-  const { code, message } = toPhotoError(thrown);
-  scope.postMessage({ kind: 'failed', code, message });
-}
-
-function answer(decoder: Decoder, request: Request): void {
-  if (request.kind === 'feed') {
-    decoder.feed(request.offset, request.bytes);
-    scope.postMessage({ kind: 'fed', state: stateOf(decoder) });
-    return;
-  }
-  const photo = request.kind === 'finish' ? decoder.finish() : decoder.preview();
-  if (photo) give(photo);
-  scope.postMessage({ kind: 'done' });
-}
-
-function give(photo: DecodedPhoto): void {
-  const head = headOf(photo);
-  scope.postMessage({ kind: 'head', head });
-  for (let index = 0; index < head.tiles; index += 1) {
-    const bytes = photo.takeTile(index) as Uint8Array<ArrayBuffer>;
-    scope.postMessage({ kind: 'tile', bytes }, [bytes.buffer]);
-  }
-  photo.free();
-}
-
-// Not awaited at the top level, which bundlers cannot put into the classic workers that they make.
-async function start(): Promise<void> {
+function answer(decoder: Decoder, task: DecodeTask): DecodeResult {
   try {
-    setModuleFolder((await started(workerScope())).modules);
-    const { Decoder } = await loadDecoder();
-    const decoder = new Decoder();
-    scope.onmessage = ({ data }) => {
-      try {
-        answer(decoder, data);
-      } catch (thrown) {
-        fail(thrown);
-      }
-    };
-    // Nothing is asked of it before this.
-    scope.postMessage({ kind: 'ready', state: stateOf(decoder) });
+    if (task.kind === 'feed') {
+      decoder.feed(task.offset, task.bytes);
+      return { state: decoderState(decoder) };
+    }
+    const photo = task.kind === 'finish' ? decoder.finish() : decoder.preview();
+    return { photo: photo ? takeOut(photo) : null };
   } catch (thrown) {
-    fail(thrown);
+    const { code, message } = toPhotoError(thrown);
+    return { error: { code, message } };
   }
 }
 
-void start();
+/** Moves a photograph out of the module's memory. */
+function takeOut(photo: DecodedPhoto): TransferredPhoto {
+  const descriptor = describePhoto(photo);
+  const tiles = Array.from(
+    { length: descriptor.tiles },
+    (_, index) => photo.takeTile(index) as TileBytes,
+  );
+  photo.free();
+  return { descriptor, tiles };
+}
+
+serve(async () => {
+  const { Decoder } = await loadDecoder();
+  const decoder = new Decoder();
+  return {
+    ready: decoderState(decoder),
+    handle: (task: DecodeTask) => {
+      const result = answer(decoder, task);
+      const tiles = 'photo' in result ? result.photo?.tiles : undefined;
+      return [result, tiles?.map(({ buffer }) => buffer) ?? []] as const;
+    },
+  };
+});

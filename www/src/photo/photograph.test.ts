@@ -3,58 +3,58 @@ import test from 'node:test';
 import type { DrawingModule } from '../engine/types.js';
 import { WorkerPool } from '../renderers/cpu/worker-pool.js';
 import {
-  crewOf,
   type FakeWorker,
-  light,
-  painted,
-  photoOf,
-  SHOWING,
+  FRAME,
+  fakePool,
   settle,
+  tileIndices,
 } from '../renderers/cpu/worker-pool-fakes.js';
-import { headOf, Photograph, type TileBytes } from './photograph.js';
+import { Photograph } from './photograph.js';
+import { fakeLight, fakePhoto } from './photograph-fakes.js';
+import { describePhoto, type TileBytes } from './types.js';
 
 const ALL = [0, 1, 2, 3];
 
-/** One of four tiles, as a worker gave them. */
-function received() {
-  const { photo, has, state, module } = photoOf(4);
+/** A photograph of four tiles from a worker. */
+function fromWorker() {
+  const { photo, tilesInModules, state, module } = fakePhoto(4);
   const tiles = ALL.map((index) => photo.takeTile(index) as TileBytes);
-  const head = headOf(photo);
+  const descriptor = describePhoto(photo);
   photo.free();
-  return { photograph: Photograph.received(head, tiles), has, state, module };
+  return { photograph: Photograph.fromTiles(descriptor, tiles), tilesInModules, state, module };
 }
 
-async function picture(photograph: Photograph, pool: WorkerPool): Promise<number[]> {
+async function relight(photograph: Photograph, pool: WorkerPool): Promise<number[]> {
   return photograph.withWorkers(pool, async (session) =>
-    painted(await session.relight(light, SHOWING)),
+    tileIndices(await session.relight(fakeLight, FRAME)),
   );
 }
 
-test('tiles go straight to the pool, and back into the page’s module when they are renderOptions there', async () => {
-  const { pool, alive } = crewOf(2);
-  const { photograph, has, module } = received();
-  assert.deepEqual(await picture(photograph, pool), ALL);
-  assert.equal(has.size, 0);
-  assert.equal(await photograph.withModule(module, () => has.size), 4);
-  assert.equal(await alive(), 0, 'workers without a photograph end');
-  assert.deepEqual(await picture(photograph, pool), ALL);
-  assert.equal(has.size, 0);
+test('tiles move to the workers, and to a module of the page when it needs them', async () => {
+  const { pool, countAlive } = fakePool(2);
+  const { photograph, tilesInModules, module } = fromWorker();
+  assert.deepEqual(await relight(photograph, pool), ALL);
+  assert.equal(tilesInModules.size, 0);
+  assert.equal(await photograph.withModule(module, () => tilesInModules.size), 4);
+  assert.equal(await countAlive(), 0, 'workers without a photograph end');
+  assert.deepEqual(await relight(photograph, pool), ALL);
+  assert.equal(tilesInModules.size, 0);
   assert.equal(photograph.info.decodedBytes, 4);
 });
 
-test('what is asked for is done in order, whatever takes long', async () => {
-  const { pool } = crewOf(2);
-  const { photo, has, module } = photoOf(4);
-  const photograph = Photograph.decoded(photo);
+test('uses of a photograph run in the order of the calls', async () => {
+  const { pool } = fakePool(2);
+  const { photo, tilesInModules, module } = fakePhoto(4);
+  const photograph = Photograph.fromModule(photo);
   const order: string[] = [];
   const note = (what: string) => () => {
-    order.push(`${what} ${has.size}`);
+    order.push(`${what} ${tilesInModules.size}`);
   };
   await Promise.all([
-    picture(photograph, pool).then(note('picture')),
+    relight(photograph, pool).then(note('picture')),
     photograph.withModule(module, note('page')),
-    picture(photograph, pool).then(note('picture')),
-    picture(photograph, pool).then(note('picture')),
+    relight(photograph, pool).then(note('picture')),
+    relight(photograph, pool).then(note('picture')),
     photograph.withModule(module, note('page')),
   ]);
   const steps = order.map((step) => step.split(' ')[0]);
@@ -65,123 +65,125 @@ test('what is asked for is done in order, whatever takes long', async () => {
   );
 });
 
-test('a failure of one use is not the next one’s', async () => {
-  const { photograph, has, module } = received();
+test('a failed use does not affect the next one', async () => {
+  const { photograph, tilesInModules, module } = fromWorker();
   const failing = photograph.withModule(module, () => Promise.reject(new Error('no adapter')));
-  const next = photograph.withModule(module, () => has.size);
+  const next = photograph.withModule(module, () => tilesInModules.size);
   await assert.rejects(failing, /no adapter/);
   assert.equal(await next, 4);
 });
 
-test('without workers all tiles stay', async () => {
-  const { photograph, has, module } = received();
+test('without workers the tiles stay', async () => {
+  const { photograph, tilesInModules, module } = fromWorker();
   const pool = new WorkerPool(() => null, 2);
-  await assert.rejects(picture(photograph, pool), { code: 'worker-unavailable' });
-  assert.equal(await photograph.withModule(module, () => has.size), 4);
+  await assert.rejects(relight(photograph, pool), { code: 'worker-unavailable' });
+  assert.equal(await photograph.withModule(module, () => tilesInModules.size), 4);
 });
 
-/** @param to does something while a worker stops */
-async function loses(
-  to: (photograph: Photograph, pool: WorkerPool, module: DrawingModule) => Promise<unknown>,
-  idle: boolean,
+/** A worker crashes before `use`, or during it. */
+async function crashDuring(
+  use: (photograph: Photograph, pool: WorkerPool, module: DrawingModule) => Promise<unknown>,
+  isIdle: boolean,
 ) {
-  const { pool, workers } = crewOf(2);
-  const { photograph, state, module } = received();
-  await picture(photograph, pool);
+  const { pool, workers } = fakePool(2);
+  const { photograph, state, module } = fromWorker();
+  await relight(photograph, pool);
   const worker = workers[1] as FakeWorker;
-  if (idle) worker.die();
-  else worker.slow = true;
-  const doing = assert.rejects(to(photograph, pool, module), {
+  if (isIdle) worker.crash();
+  else worker.isSlow = true;
+  const using = assert.rejects(use(photograph, pool, module), {
     code: 'photo-lost',
     message: /out of memory/,
   });
   await settle();
-  if (!idle) worker.die();
-  await doing;
-  // Never again as if it were whole.
+  if (!isIdle) worker.crash();
+  await using;
+  // The photograph stays unusable.
   await assert.rejects(
     photograph.withModule(module, () => {}),
     { code: 'photo-lost' },
   );
-  await assert.rejects(picture(photograph, pool), { code: 'photo-lost' });
+  await assert.rejects(relight(photograph, pool), { code: 'photo-lost' });
   await settle();
-  assert.ok(workers.every(({ ended }) => ended));
+  assert.ok(workers.every(({ hasEnded }) => hasEnded));
   photograph.free();
   await settle();
   assert.equal(state.alive, 0);
 }
 
-for (const idle of [true, false]) {
-  const when = idle ? 'before' : 'while';
-  test(`tiles lost ${when} it is relit make it useless`, () => loses(picture, idle));
-  test(`tiles lost ${when} they are given back make it useless`, () =>
-    loses((photograph, _, module) => photograph.withModule(module, () => {}), idle));
+for (const isIdle of [true, false]) {
+  const when = isIdle ? 'before' : 'during';
+  test(`a worker that crashes ${when} relighting loses the photograph`, () =>
+    crashDuring(relight, isIdle));
+  test(`a worker that crashes ${when} the return of tiles loses the photograph`, () =>
+    crashDuring((photograph, _, module) => photograph.withModule(module, () => {}), isIdle));
 }
 
-test('tiles lost on their way to a worker make it useless', async () => {
-  const { pool } = crewOf(1, (worker) => {
+test('a worker that crashes while it receives tiles loses the photograph', async () => {
+  const { pool } = fakePool(1, (worker) => {
     worker.start();
     const answer = worker.answer.bind(worker);
     worker.answer = (request) => {
-      if (request.task.kind !== 'put' || request.task.index !== 2) answer(request);
-      else setImmediate(() => worker.die());
+      const { task } = request.task;
+      if (task.kind !== 'put' || task.index !== 2) answer(request);
+      else setImmediate(() => worker.crash());
     };
   });
-  const { photograph, module } = received();
-  await assert.rejects(picture(photograph, pool), { code: 'photo-lost' });
+  const { photograph, module } = fromWorker();
+  await assert.rejects(relight(photograph, pool), { code: 'photo-lost' });
   await assert.rejects(
     photograph.withModule(module, () => {}),
     { code: 'photo-lost' },
   );
 });
 
-test('tiles that cannot be sent to a worker are not lost, nor where it stops afterwards', async () => {
-  const { pool, workers } = crewOf(1, (worker) => {
+test('tiles that cannot be sent are not lost, even if the worker crashes afterwards', async () => {
+  const { pool, workers } = fakePool(1, (worker) => {
     worker.start();
-    if (workers.length === 1) worker.refusal = new Error('no memory to send it');
+    if (workers.length === 1) worker.sendError = new Error('no memory to send it');
   });
-  const { photograph } = received();
-  await assert.rejects(picture(photograph, pool), /no memory/);
-  workers[0]?.die();
-  await assert.rejects(picture(photograph, pool), { code: 'worker-unavailable' });
-  assert.deepEqual(await picture(photograph, pool), ALL);
+  const { photograph } = fromWorker();
+  await assert.rejects(relight(photograph, pool), /no memory/);
+  workers[0]?.crash();
+  await assert.rejects(relight(photograph, pool), { code: 'worker-unavailable' });
+  assert.deepEqual(await relight(photograph, pool), ALL);
   assert.equal(workers.length, 2);
 });
 
-test('a worker that stops while another starts loses nothing', async () => {
-  const { pool, workers } = crewOf(2, () => {});
-  const { photograph, has, module } = received();
-  const frame = assert.rejects(picture(photograph, pool), { code: 'worker-unavailable' });
+test('a worker that crashes while another one starts loses no tiles', async () => {
+  const { pool, workers } = fakePool(2, () => {});
+  const { photograph, tilesInModules, module } = fromWorker();
+  const frame = assert.rejects(relight(photograph, pool), { code: 'worker-unavailable' });
   await settle();
   workers[0]?.start();
   await settle();
-  workers[0]?.die();
+  workers[0]?.crash();
   workers[1]?.start();
   await frame;
-  assert.equal(await photograph.withModule(module, () => has.size), 4);
+  assert.equal(await photograph.withModule(module, () => tilesInModules.size), 4);
 });
 
-test('a tile that the page’s module has no memory for is not lost', async () => {
-  const { pool } = crewOf(2);
-  const { photo, has, state, module } = photoOf(4);
-  const photograph = Photograph.decoded(photo);
-  await picture(photograph, pool);
-  state.refuses = true;
+test('a tile for which the module tilesInModules no memory is not lost', async () => {
+  const { pool } = fakePool(2);
+  const { photo, tilesInModules, state, module } = fakePhoto(4);
+  const photograph = Photograph.fromModule(photo);
+  await relight(photograph, pool);
+  state.isOutOfMemory = true;
   await assert.rejects(
     photograph.withModule(module, () => {}),
     { code: 'format-limit' },
   );
-  state.refuses = false;
-  assert.deepEqual(await picture(photograph, pool), ALL);
-  assert.equal(await photograph.withModule(module, () => has.size), 4);
+  state.isOutOfMemory = false;
+  assert.deepEqual(await relight(photograph, pool), ALL);
+  assert.equal(await photograph.withModule(module, () => tilesInModules.size), 4);
 });
 
-test('one that is freed keeps nobody waiting, and is freed once nobody reads it', async () => {
-  const { pool, workers, alive } = crewOf(2);
-  const { photograph, state, module } = received();
-  await picture(photograph, pool);
-  for (const worker of workers) worker.slow = true;
-  const frame = assert.rejects(picture(photograph, pool), { code: 'internal' });
+test('freeing a photograph rejects pending uses, and frees its memory after the one in progress', async () => {
+  const { pool, workers, countAlive } = fakePool(2);
+  const { photograph, state, module } = fromWorker();
+  await relight(photograph, pool);
+  for (const worker of workers) worker.isSlow = true;
+  const frame = assert.rejects(relight(photograph, pool), { code: 'internal' });
   const next = assert.rejects(
     photograph.withModule(module, () => {}),
     { code: 'internal' },
@@ -191,59 +193,59 @@ test('one that is freed keeps nobody waiting, and is freed once nobody reads it'
   await frame;
   await next;
   await settle();
-  assert.deepEqual([state.alive, await alive()], [0, 0]);
+  assert.deepEqual([state.alive, await countAlive()], [0, 0]);
 });
 
-test('one that is freed while workers start takes none', async () => {
-  const { pool, workers, alive } = crewOf(2, () => {});
-  const { photograph, state } = received();
-  const frame = assert.rejects(picture(photograph, pool), { code: 'internal' });
+test('a photograph that is freed while workers start sends them no tiles', async () => {
+  const { pool, workers, countAlive } = fakePool(2, () => {});
+  const { photograph, state } = fromWorker();
+  const frame = assert.rejects(relight(photograph, pool), { code: 'internal' });
   await settle();
-  assert.equal(await alive(), 2);
+  assert.equal(await countAlive(), 2);
   photograph.free();
   await settle();
   for (const worker of workers) worker.start();
   await frame;
   await settle();
-  assert.deepEqual([state.alive, await alive()], [0, 0]);
+  assert.deepEqual([state.alive, await countAlive()], [0, 0]);
   assert.ok(workers.every(({ log }) => !log.includes('put')));
 });
 
-test('tiles go from one module of the page to another, and who uses them is told before', async () => {
-  const { photo, has, state, module } = photoOf(4);
-  const photograph = Photograph.decoded(photo);
-  const told: string[] = [];
-  const leave = () => told.push(`${has.size} to leave`);
-  await photograph.withModule(module, () => {}, { leave });
-  assert.deepEqual([has.size, state.alive, told], [4, 1, []]);
+test('before tiles leave a module, its users are told', async () => {
+  const { photo, tilesInModules, state, module } = fakePhoto(4);
+  const photograph = Photograph.fromModule(photo);
+  const calls: string[] = [];
+  const onLeave = () => calls.push(`${tilesInModules.size} to leave`);
+  await photograph.withModule(module, () => {}, { onLeave });
+  assert.deepEqual([tilesInModules.size, state.alive, calls], [4, 1, []]);
   await photograph.withModule({ ...module }, () => {});
-  assert.deepEqual([has.size, state.alive, told], [4, 1, ['4 to leave']]);
-  const { pool } = crewOf(2);
-  assert.deepEqual(await picture(photograph, pool), ALL);
-  assert.deepEqual([has.size, state.alive, told], [0, 0, ['4 to leave']]);
+  assert.deepEqual([tilesInModules.size, state.alive, calls], [4, 1, ['4 to leave']]);
+  const { pool } = fakePool(2);
+  assert.deepEqual(await relight(photograph, pool), ALL);
+  assert.deepEqual([tilesInModules.size, state.alive, calls], [0, 0, ['4 to leave']]);
 });
 
-test('tiles that a module has no memory for stay where they were', async () => {
-  const { photo, has, state, module } = photoOf(4);
-  const photograph = Photograph.decoded(photo);
-  state.refuses = true;
+test('a module without memory leaves the tiles where they are', async () => {
+  const { photo, tilesInModules, state, module } = fakePhoto(4);
+  const photograph = Photograph.fromModule(photo);
+  state.isOutOfMemory = true;
   await assert.rejects(
     photograph.withModule(module, () => {}),
     { code: 'format-limit' },
   );
-  state.refuses = false;
-  assert.equal(await photograph.withModule({ ...module }, () => has.size), 4);
+  state.isOutOfMemory = false;
+  assert.equal(await photograph.withModule({ ...module }, () => tilesInModules.size), 4);
   assert.equal(state.alive, 1);
   photograph.free();
   await settle();
   assert.equal(state.alive, 0);
 });
 
-test('metadata that are no JSON object are format-invalid, and the photograph is freed', () => {
+test('metadata that is not a JSON object is format-invalid, and the photograph is freed', () => {
   for (const metadata of ['[]', '', '1', '{"a": }', 'null']) {
-    const { photo, state } = photoOf(1);
+    const { photo, state } = fakePhoto(1);
     const wrong = { ...photo, metadata };
-    assert.throws(() => Photograph.decoded(wrong), { code: 'format-invalid' });
+    assert.throws(() => Photograph.fromModule(wrong), { code: 'format-invalid' });
     assert.equal(state.alive, 0);
   }
 });

@@ -1,94 +1,68 @@
 /**
- * A photograph on the page, wherever its tiles are: as they came, in one of the page's modules, or with a
- * crew of workers. They move only when they have to, and what is done with them is done one thing after
- * the other.
+ * A decoded photograph. Its tiles exist once, because they take most of the memory: as bytes on the page,
+ * in the memory of one of the page's modules, or in workers. A renderer has them moved to where it draws.
+ * Uses of the tiles run one after another, in the order of the calls.
  */
 
 import type { DecodedPhoto, DrawingModule, DrawnPhoto, Freeable, Photo } from '../engine/types.js';
-import type { PoolSession, WorkerPool } from '../renderers/cpu/worker-pool.js';
-import { letGo, messageOf, PhotoError } from '../shared/errors.js';
-import { allEnded } from '../shared/promises.js';
+import { messageOf, PhotoError, photoReleased } from '../shared/errors.js';
+import { allSettledOrThrow } from '../shared/promises.js';
+import {
+  describePhoto,
+  type PhotoDescriptor,
+  type PhotoInfo,
+  type TileBytes,
+  type TileSession,
+  type TileWorkers,
+} from './types.js';
 
-/** Bytes of a tile that another module gave. */
-export type TileBytes = Uint8Array<ArrayBuffer>;
-
-/** What is known of a photograph. */
-export interface PhotoInfo {
-  /** Picture, in pixels. */
-  readonly width: number;
-  readonly height: number;
-  /** Light plane, in elements. */
-  readonly lightWidth: number;
-  readonly lightHeight: number;
-  /** Memory its light transport takes, in bytes. */
-  readonly decodedBytes: number;
-  /** What the file says of itself. */
-  readonly metadata: unknown;
-}
-
-/** All of a photograph but its tiles, as modules give and take it. */
-export interface Head extends Omit<PhotoInfo, 'metadata'> {
-  readonly metadata: string;
-  /** Number of tiles, which lie row by row. */
-  readonly tiles: number;
-  /** Pixels along a tile's side; those at the right and lower edges may be smaller. */
-  readonly tileSide: number;
-  readonly geometry: Float64Array;
-  readonly basis: Float32Array;
-}
-
-/** That of a photograph in the decoder's module. */
-export function headOf(photo: DecodedPhoto): Head {
-  const { width, height, lightWidth, lightHeight, decodedBytes, metadata, tiles, tileSide } = photo;
-  const [geometry, basis] = [photo.geometryParcel(), photo.basisParcel()];
-  const info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
-  return { ...info, tiles, tileSide, geometry, basis };
-}
-
-/** A module's memory with tiles in it. */
-interface Room {
-  /** `null` for the one that decoded them. */
+/** A module of the page with tiles in its memory. */
+interface TileStore {
+  /** `null` for the decoder's. */
   readonly module: DrawingModule | null;
   readonly photo: Photo;
-  /** Told before tiles leave. */
-  readonly users: Set<() => void>;
+  /** Called before tiles leave the module. */
+  readonly onLeave: Set<() => void>;
 }
 
-/** Where a tile is: in a module of the page, with the crew, on its way from or to it, or here. */
-type Place = Room | 'pool' | 'away' | TileBytes;
+/** 'in transit': sent to a worker, or requested from it. */
+type TileLocation = TileStore | 'workers' | 'in transit' | TileBytes;
 
-/** See the module. */
 export class Photograph implements Freeable {
   readonly info: PhotoInfo;
-  readonly head: Head;
-  /** How much of the file it is of, from 0 to 1, which is all. */
-  readonly share: number;
-  readonly #tiles: Place[];
-  /** Those in modules of the page: one, unless tiles were kept from moving. */
-  readonly #rooms = new Set<Room>();
-  #session: PoolSession | null = null;
-  /** Why it can no longer be used: tiles are gone, or it was freed. */
-  #over: PhotoError | null = null;
-  /** Settles when all that was asked for so far is done. */
-  #last: Promise<unknown> = Promise.resolve();
+  readonly descriptor: PhotoDescriptor;
+  /** The share of the file that this photograph was decoded from, 0 to 1. */
+  readonly completeness: number;
+  readonly #tiles: TileLocation[];
+  /** One, unless a move has failed halfway. */
+  readonly #stores = new Set<TileStore>();
+  #session: TileSession | null = null;
+  /** Why the photograph is unusable: tiles are lost, or it was freed. */
+  #fault: PhotoError | null = null;
+  /** Settles after the last use that was requested. */
+  #lastUse: Promise<unknown> = Promise.resolve();
 
-  private constructor(head: Head, tiles: Place[], share: number) {
-    const { width, height, lightWidth, lightHeight, decodedBytes } = head;
-    const metadata = readMetadata(head.metadata);
+  private constructor(descriptor: PhotoDescriptor, tiles: TileLocation[], completeness: number) {
+    const { width, height, lightWidth, lightHeight, decodedBytes } = descriptor;
+    const metadata = parseMetadata(descriptor.metadata);
     this.info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
-    this.head = head;
-    this.share = share;
+    this.descriptor = descriptor;
+    this.completeness = completeness;
     this.#tiles = tiles;
   }
 
-  /** One that a module of the page has decoded, which is freed with this. Throws `format-invalid`. */
-  static decoded(photo: DecodedPhoto, share = 1): Photograph {
-    const room: Room = { module: null, photo, users: new Set() };
+  /**
+   * A photograph in the memory of the page's decoder, which is freed with it or if this throws.
+   *
+   * @throws `format-invalid`
+   */
+  static fromModule(photo: DecodedPhoto, completeness = 1): Photograph {
+    const store: TileStore = { module: null, photo, onLeave: new Set() };
     try {
-      const head = headOf(photo);
-      const tiles = Array.from({ length: head.tiles }, () => room);
-      const photograph = new Photograph(head, tiles, share);
-      photograph.#rooms.add(room);
+      const descriptor = describePhoto(photo);
+      const tiles = Array.from({ length: descriptor.tiles }, () => store);
+      const photograph = new Photograph(descriptor, tiles, completeness);
+      photograph.#stores.add(store);
       return photograph;
     } catch (thrown) {
       photo.free();
@@ -96,194 +70,207 @@ export class Photograph implements Freeable {
     }
   }
 
-  /** One that was decoded elsewhere. Throws `format-invalid`. */
-  static received(head: Head, tiles: TileBytes[], share = 1): Photograph {
-    return new Photograph(head, tiles, share);
+  /**
+   * A photograph that a worker has decoded.
+   *
+   * @throws `format-invalid`
+   */
+  static fromTiles(descriptor: PhotoDescriptor, tiles: TileBytes[], completeness = 1): Photograph {
+    return new Photograph(descriptor, tiles, completeness);
   }
 
-  /** The photograph in a module, without tiles: what lights are made for. Freed by who asks. */
-  plane(module: DrawingModule): DrawnPhoto {
-    return module.Photo.receive(this.head.geometry, this.head.basis);
+  /** Whether this is the whole photograph and not a preview. */
+  get isComplete(): boolean {
+    return this.completeness === 1;
+  }
+
+  /** The photograph without tiles, which suffices for making lights. The caller frees it. */
+  createLightPlane(module: DrawingModule): DrawnPhoto {
+    return module.Photo.receive(this.descriptor.geometry, this.descriptor.basis);
   }
 
   /**
-   * Does something with all tiles in a module of the page, unless `signal` is aborted by then. `leave` is
-   * told before tiles leave it again; what it has made of `photo` is to be freed then.
+   * Moves all tiles to a module of the page and calls `use`, unless `signal` is aborted by then. `onLeave`
+   * is called before tiles leave the module again: free whatever `use` has made of the photograph.
    */
   withModule<T>(
     module: DrawingModule,
     use: (photo: DrawnPhoto) => T | Promise<T>,
-    { signal, leave }: { signal?: AbortSignal; leave?: () => void } = {},
+    { signal, onLeave }: { signal?: AbortSignal; onLeave?: () => void } = {},
   ): Promise<T> {
-    return this.#next(async () => {
+    return this.#enqueue(async () => {
       signal?.throwIfAborted();
-      const room = await this.#toPage(module);
-      const used = await use(room.photo);
-      if (leave) room.users.add(leave);
-      return used;
+      const store = await this.#moveToModule(module);
+      const result = await use(store.photo);
+      if (onLeave) store.onLeave.add(onLeave);
+      return result;
     });
   }
 
   /**
-   * Does something with all tiles with a crew, always the same one. Where the crew can have no workers,
-   * rejects with `worker-unavailable`, and the photograph is as it was.
+   * Moves all tiles to workers, always the same ones, and calls `use`. Rejects with `worker-unavailable`
+   * if there are no workers; the photograph is unchanged then.
    */
-  withWorkers<T>(pool: WorkerPool, use: (session: PoolSession) => T | Promise<T>): Promise<T> {
-    return this.#next(async () => use(await this.#toCrew(pool)));
+  withWorkers<S extends TileSession, T>(
+    workers: TileWorkers<S>,
+    use: (session: S) => T | Promise<T>,
+  ): Promise<T> {
+    return this.#enqueue(async () => use(await this.#moveToWorkers(workers)));
   }
 
   free(): void {
-    this.#over ??= letGo();
+    this.#fault ??= photoReleased();
     this.#session?.end();
-    // What is under way may read it still.
-    void this.#last.finally(() => {
-      this.#tiles.fill('away');
-      this.#sweep();
+    // The use in progress may still read tiles.
+    void this.#lastUse.finally(() => {
+      this.#tiles.fill('in transit');
+      this.#freeEmptyStores();
     });
   }
 
-  /** Does some work after all that was asked for before. Rejects with `photo-lost` once tiles are gone. */
-  #next<T>(work: () => Promise<T>): Promise<T> {
-    const done = this.#last.then(async () => {
-      if (this.#over) throw this.#over;
+  /** Runs a use after all earlier ones. Rejects with `photo-lost` once tiles are lost. */
+  #enqueue<T>(use: () => Promise<T>): Promise<T> {
+    const result = this.#lastUse.then(async () => {
+      if (this.#fault) throw this.#fault;
       try {
-        return await work();
+        return await use();
       } catch (thrown) {
-        throw this.#loss(thrown) ?? thrown;
+        throw this.#lossAfter(thrown) ?? thrown;
       }
     });
-    this.#last = done.catch(() => {});
-    return done;
+    this.#lastUse = result.catch(() => {});
+    return result;
   }
 
-  /** What to tell in the place of a failure after which tiles are missing. */
-  #loss(thrown: unknown): PhotoError | null {
-    const gone = this.#session?.failure;
-    if (!this.#tiles.includes('away') && !(gone && this.#tiles.includes('pool'))) {
-      // The next use has other workers.
-      if (gone) this.#leaveCrew();
+  /** The error to report if a failed use has lost tiles. */
+  #lossAfter(thrown: unknown): PhotoError | null {
+    const haveWorkersFailed = this.#session?.failure != null;
+    const isLost =
+      this.#tiles.includes('in transit') || (haveWorkersFailed && this.#tiles.includes('workers'));
+    if (!isLost) {
+      // The next use gets other workers.
+      if (haveWorkersFailed) this.#endSession();
       return null;
     }
-    this.#over ??= new PhotoError(
-      'photo-lost',
-      `${messageOf(thrown)} A part of the photograph went with it.`,
-      thrown,
-    );
+    const message = `${messageOf(thrown)} A part of the photograph was lost with it.`;
+    this.#fault ??= new PhotoError('photo-lost', message, thrown);
     this.#session?.end();
-    return this.#over;
+    return this.#fault;
   }
 
-  async #toPage(module: DrawingModule): Promise<Room & { readonly photo: DrawnPhoto }> {
+  async #moveToModule(module: DrawingModule): Promise<TileStore & { readonly photo: DrawnPhoto }> {
     const session = this.#session;
     if (session) {
-      await this.#each(session, async (index) => {
-        if (this.#tiles[index] !== 'pool') return;
-        this.#tiles[index] = 'away';
+      await forEachTile(session, async (index) => {
+        if (this.#tiles[index] !== 'workers') return;
+        this.#tiles[index] = 'in transit';
         this.#tiles[index] = await session.take(index);
       });
-      this.#leaveCrew();
+      this.#endSession();
     }
-    const [room, photo] = this.#roomIn(module);
-    this.#vacate(room);
-    // Tile by tile, so that few are in two memories.
+    const [store, photo] = this.#storeIn(module);
+    this.#announceLeave(store);
+    // Tile by tile, so that few are in memory twice.
     for (const index of this.#tiles.keys()) {
-      if (this.#tiles[index] === room) continue;
-      const bytes = this.#takeOut(index);
-      photo.putTile(index, bytes);
-      this.#tiles[index] = room;
+      if (this.#tiles[index] === store) continue;
+      photo.putTile(index, this.#toBytes(index));
+      this.#tiles[index] = store;
     }
-    this.#sweep();
-    return { ...room, photo };
+    this.#freeEmptyStores();
+    return { ...store, photo };
   }
 
-  #roomIn(module: DrawingModule): [Room, DrawnPhoto] {
-    for (const room of this.#rooms) {
-      if (room.module === module) return [room, room.photo as DrawnPhoto];
+  #storeIn(module: DrawingModule): [TileStore, DrawnPhoto] {
+    for (const store of this.#stores) {
+      if (store.module === module) return [store, store.photo as DrawnPhoto];
     }
-    const photo = this.plane(module);
-    const room = { module, photo, users: new Set<() => void>() };
-    this.#rooms.add(room);
-    return [room, photo];
+    const photo = this.createLightPlane(module);
+    const store = { module, photo, onLeave: new Set<() => void>() };
+    this.#stores.add(store);
+    return [store, photo];
   }
 
-  async #toCrew(pool: WorkerPool): Promise<PoolSession> {
-    this.#session ??= await pool.open(this.head);
-    const session = this.#session;
-    if (this.#over) {
+  async #moveToWorkers<S extends TileSession>(workers: TileWorkers<S>): Promise<S> {
+    this.#session ??= await workers.open(this.descriptor);
+    const session = this.#session as S;
+    if (this.#fault) {
       session.end();
-      throw this.#over;
+      throw this.#fault;
     }
-    this.#vacate();
-    await this.#each(session, async (index) => {
-      if (this.#tiles[index] === 'pool') return;
-      const bytes = this.#takeOut(index);
-      this.#tiles[index] = 'away';
+    this.#announceLeave();
+    await forEachTile(session, async (index) => {
+      if (this.#tiles[index] === 'workers') return;
+      const bytes = this.#toBytes(index);
+      this.#tiles[index] = 'in transit';
       try {
         await session.put(index, bytes);
-        this.#tiles[index] = 'pool';
+        this.#tiles[index] = 'workers';
       } catch (thrown) {
-        // What has left has no bytes here.
+        // A transferred buffer is empty; otherwise nothing was sent.
         if (bytes.byteLength > 0) this.#tiles[index] = bytes;
         throw thrown;
       }
     });
-    this.#sweep();
+    this.#freeEmptyStores();
     await session.plan();
     return session;
   }
 
-  /** A tile that is in a module of the page, or here; it is here then. */
-  #takeOut(index: number): TileBytes {
-    const place = this.#tiles[index] as Room | TileBytes;
-    if (place instanceof Uint8Array) return place;
-    const bytes = place.photo.takeTile(index) as TileBytes;
+  /** Takes a tile out of its module, if it is in one. */
+  #toBytes(index: number): TileBytes {
+    const location = this.#tiles[index] as TileStore | TileBytes;
+    if (location instanceof Uint8Array) return location;
+    const bytes = location.photo.takeTile(index) as TileBytes;
     this.#tiles[index] = bytes;
     return bytes;
   }
 
-  /** Tells those who use tiles in the page's modules that they leave, but for one of them. */
-  #vacate(but?: Room): void {
-    for (const room of this.#rooms) {
-      if (room === but) continue;
-      for (const leave of room.users) leave();
-      room.users.clear();
+  #announceLeave(except?: TileStore): void {
+    for (const store of this.#stores) {
+      if (store === except) continue;
+      for (const onLeave of store.onLeave) onLeave();
+      store.onLeave.clear();
     }
   }
 
-  /** Frees rooms that no tile is in. */
-  #sweep(): void {
-    for (const room of this.#rooms) {
-      if (this.#tiles.includes(room)) continue;
-      for (const leave of room.users) leave();
-      room.photo.free();
-      this.#rooms.delete(room);
+  #freeEmptyStores(): void {
+    for (const store of this.#stores) {
+      if (this.#tiles.includes(store)) continue;
+      for (const onLeave of store.onLeave) onLeave();
+      store.photo.free();
+      this.#stores.delete(store);
     }
   }
 
-  #leaveCrew(): void {
+  #endSession(): void {
     this.#session?.end();
     this.#session = null;
   }
-
-  /** Tile by tile, so that few are in two places, with all workers at once. */
-  async #each(session: PoolSession, move: (index: number) => Promise<void>): Promise<void> {
-    await allEnded(
-      session.tiles.map(async (tiles) => {
-        for (const index of tiles) await move(index);
-      }),
-    );
-  }
 }
 
-/** The metadata of a file. Throws `format-invalid`. */
-function readMetadata(json: string): unknown {
+/** Moves tile after tile, so that few are in memory twice, but with all workers at once. */
+async function forEachTile(
+  session: TileSession,
+  move: (index: number) => Promise<void>,
+): Promise<void> {
+  await allSettledOrThrow(
+    session.tiles.map(async (tiles) => {
+      for (const index of tiles) await move(index);
+    }),
+  );
+}
+
+function parseMetadata(json: string): unknown {
   try {
     const metadata: unknown = JSON.parse(json);
     if (typeof metadata === 'object' && metadata !== null && !Array.isArray(metadata)) {
       return metadata;
     }
   } catch {
-    // No JSON.
+    // Not JSON.
   }
-  throw new PhotoError('format-invalid', 'The metadata is invalid: it is no JSON object.');
+  throw new PhotoError(
+    'format-invalid',
+    "The file's metadata is not a JSON object. Export it again.",
+  );
 }

@@ -1,8 +1,16 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { DrawingModule } from '../engine/types.js';
-import type { DecoderState } from './main-thread-decoder.js';
-import { type Answer, type Request, WorkerDecoder, type WorkerLike } from './worker-decoder.js';
+import type { WorkerRequest, WorkerResponse } from '../shared/worker-client.js';
+import type { DecoderState } from './photo-decoder.js';
+import {
+  type DecodeResult,
+  type DecodeTask,
+  type DecodeWorker,
+  WorkerDecoder,
+} from './worker-decoder.js';
+
+const LIMITS = { intervalMs: 1, maxChecks: 3, maxStartChecks: 1000 };
 
 const stateAt = (bytesFed: number): DecoderState => ({
   bytesFed,
@@ -11,43 +19,44 @@ const stateAt = (bytesFed: number): DecoderState => ({
   next: undefined,
 });
 
-/** A worker that answers by a script. */
-class FakeWorker implements WorkerLike {
-  onmessage: WorkerLike['onmessage'] = null;
-  onerror: WorkerLike['onerror'] = null;
-  onmessageerror: WorkerLike['onmessageerror'] = null;
-  ended = false;
-  readonly asked: Request[] = [];
+type Response = WorkerResponse<DecoderState, DecodeResult>;
 
-  constructor(answers: (request: Request) => Answer[]) {
-    this.#answers = answers;
-  }
-  readonly #answers: (request: Request) => Answer[];
+/** A worker that answers by a function; it stays silent for `undefined`. */
+class FakeWorker implements DecodeWorker {
+  onmessage: DecodeWorker['onmessage'] = null;
+  onerror: DecodeWorker['onerror'] = null;
+  onmessageerror: DecodeWorker['onmessageerror'] = null;
+  hasEnded = false;
+  readonly #answer: (task: DecodeTask) => DecodeResult | undefined;
 
-  postMessage(request: Request): void {
-    assert.ok(!this.ended, 'nothing is asked of a worker that has ended');
-    this.asked.push(request);
-    for (const answer of this.#answers(request)) this.say(answer);
+  constructor(answer: (task: DecodeTask) => DecodeResult | undefined) {
+    this.#answer = answer;
   }
 
-  say(data: Answer): void {
+  postMessage({ id, task }: WorkerRequest<DecodeTask>): void {
+    assert.ok(!this.hasEnded, 'a worker that has ended gets no requests');
+    const result = this.#answer(task);
+    if (result) this.respond({ kind: 'done', id, result });
+  }
+
+  respond(data: Response): void {
     queueMicrotask(() => {
-      if (!this.ended) this.onmessage?.({ data } as MessageEvent<Answer>);
+      if (!this.hasEnded) this.onmessage?.({ data } as MessageEvent<Response>);
     });
   }
 
-  die(message: string): void {
+  crash(message: string): void {
     queueMicrotask(() => this.onerror?.({ message } as ErrorEvent));
   }
 
   terminate(): void {
-    this.ended = true;
+    this.hasEnded = true;
   }
 }
 
-const HEAD: Answer = {
-  kind: 'head',
-  head: {
+/** A photograph of two tiles with the given lengths. */
+function photoWith(...tileLengths: number[]): DecodeResult {
+  const descriptor = {
     width: 1,
     height: 2,
     lightWidth: 1,
@@ -58,29 +67,27 @@ const HEAD: Answer = {
     basis: new Float32Array(9),
     metadata: '{}',
     decodedBytes: 700,
-  },
-};
-const tile = (length: number): Answer => ({ kind: 'tile', bytes: new Uint8Array(length) });
+  };
+  return { photo: { descriptor, tiles: tileLengths.map((length) => new Uint8Array(length)) } };
+}
 
-async function started(answers: (request: Request) => Answer[]) {
-  const worker = new FakeWorker(answers);
-  const starting = WorkerDecoder.start(worker);
-  worker.say({ kind: 'ready', state: stateAt(0) });
+async function started(answer: (task: DecodeTask) => DecodeResult | undefined) {
+  const worker = new FakeWorker(answer);
+  const starting = WorkerDecoder.start(worker, LIMITS);
+  worker.respond({ kind: 'ready', ready: stateAt(0) });
   return { worker, decoder: await starting };
 }
 
-test('bytes go to the worker and a photograph comes of them, tile by tile', async () => {
-  const { worker, decoder } = await started((request) =>
-    request.kind === 'feed'
-      ? [{ kind: 'fed', state: stateAt(request.offset + request.bytes.length) }]
-      : [HEAD, tile(40), tile(50), { kind: 'done' }],
+test('the worker gets the bytes and sends the photograph', async () => {
+  const { worker, decoder } = await started((task) =>
+    task.kind === 'feed' ? { state: stateAt(task.offset + task.bytes.length) } : photoWith(40, 50),
   );
   assert.equal(decoder.state.bytesFed, 0);
   await decoder.feed(0, new Uint8Array(300));
   await decoder.feed(300, new Uint8Array(600));
   assert.deepEqual(decoder.state, stateAt(900));
   const photograph = await decoder.finish();
-  assert.ok(worker.ended);
+  assert.ok(worker.hasEnded);
   assert.equal(photograph.info.decodedBytes, 700);
   const sizes: [number, number][] = [];
   const module = {
@@ -98,75 +105,69 @@ test('bytes go to the worker and a photograph comes of them, tile by tile', asyn
   ]);
 });
 
-test('a coarser photograph comes of what is there by then, and the decoder goes on', async () => {
-  const { worker, decoder } = await started((request) =>
-    request.kind === 'feed'
-      ? [{ kind: 'fed', state: stateAt(300) }]
-      : request.kind === 'preview' && decoder.state.bytesFed > 0
-        ? [HEAD, tile(4), tile(5), { kind: 'done' }]
-        : [{ kind: 'done' }],
-  );
+test('a preview knows its completeness, and the decoder goes on', async () => {
+  const { worker, decoder } = await started((task) => {
+    if (task.kind === 'feed') return { state: stateAt(300) };
+    return decoder.state.bytesFed > 0 ? photoWith(4, 5) : { photo: null };
+  });
   assert.equal(await decoder.preview(), null);
   await decoder.feed(0, new Uint8Array(300));
   const preview = await decoder.preview();
-  assert.equal(preview?.share, 1 / 3);
-  assert.ok(!worker.ended);
+  assert.equal(preview?.completeness, 1 / 3);
+  assert.ok(!worker.hasEnded);
 });
 
-test('what is wrong with a file keeps its code', async () => {
-  const { decoder } = await started(() => [
-    { kind: 'failed', code: 'format-checksum', message: 'tile 3 is damaged' },
-  ]);
-  const wrong = { code: 'format-checksum', message: 'tile 3 is damaged' };
-  await assert.rejects(decoder.feed(0, new Uint8Array(1)), wrong);
-  // And of that nothing more can come.
-  await assert.rejects(decoder.finish(), wrong);
+test('an error of the file keeps its code', async () => {
+  const error = { code: 'format-checksum', message: 'tile 3 is damaged' };
+  const { decoder } = await started(() => ({ error }));
+  await assert.rejects(decoder.feed(0, new Uint8Array(1)), error);
+  await assert.rejects(decoder.finish(), error);
 });
 
-test('a worker that does not start is told, and ended', async () => {
+test('a worker that does not start rejects and is ended', async () => {
   for (const fail of [
-    (worker: FakeWorker) => worker.die('refused by a policy'),
-    (worker: FakeWorker) => worker.say({ kind: 'failed', code: 'wasm-unavailable', message: '' }),
+    (worker: FakeWorker) => worker.crash('blocked by a policy'),
+    (worker: FakeWorker) => worker.respond({ kind: 'failed', message: 'no module' }),
   ]) {
-    const worker = new FakeWorker(() => []);
+    const worker = new FakeWorker(() => undefined);
     const starting = WorkerDecoder.start(worker);
     fail(worker);
     await assert.rejects(starting, { name: 'PhotoError' });
-    assert.ok(worker.ended);
+    assert.ok(worker.hasEnded);
   }
 });
 
-test('a worker that dies at it is worker-unavailable', async () => {
-  const { worker, decoder } = await started(() => []);
+test('a worker that crashes is worker-unavailable', async () => {
+  const { worker, decoder } = await started(() => undefined);
   const feeding = decoder.feed(0, new Uint8Array(1));
-  worker.die('out of memory');
+  worker.crash('out of memory');
   await assert.rejects(feeding, { code: 'worker-unavailable', message: /out of memory/ });
 });
 
 test('a worker that falls silent is worker-unavailable', async () => {
-  const worker = new FakeWorker(() => []);
-  const starting = WorkerDecoder.start(worker, { lookMs: 1, looks: 3 });
-  worker.say({ kind: 'ready', state: stateAt(0) });
-  const decoder = await starting;
-  await assert.rejects(decoder.feed(0, new Uint8Array(1)), { code: 'worker-unavailable' });
+  const { decoder } = await started(() => undefined);
+  await assert.rejects(decoder.feed(0, new Uint8Array(1)), {
+    code: 'worker-unavailable',
+    message: /does not answer/,
+  });
 });
 
-test('a decoder that is freed keeps nobody waiting', async () => {
-  const { worker, decoder } = await started(() => []);
+test('freeing a decoder rejects its requests', async () => {
+  const { worker, decoder } = await started(() => undefined);
   const feeding = decoder.feed(0, new Uint8Array(1));
   decoder.free();
   await assert.rejects(feeding, { name: 'PhotoError' });
-  assert.ok(worker.ended);
+  assert.ok(worker.hasEnded);
 });
 
-test('a photograph that is not received whole is none', async () => {
-  for (const answers of [
-    [HEAD, tile(40), { kind: 'failed', code: 'internal', message: 'no memory' }],
-    [HEAD, tile(40), { kind: 'done' }],
-    [{ kind: 'done' }],
-  ] as Answer[][]) {
-    const { worker, decoder } = await started(() => answers);
+test('a photograph without all its tiles is an internal error', async () => {
+  for (const result of [
+    { error: { code: 'internal', message: 'no memory' } },
+    photoWith(40),
+    { photo: null },
+  ] as DecodeResult[]) {
+    const { worker, decoder } = await started(() => result);
     await assert.rejects(decoder.finish(), { code: 'internal' });
-    assert.ok(worker.ended);
+    assert.ok(worker.hasEnded);
   }
 });

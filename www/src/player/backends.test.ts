@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { Backend } from '../engine/types.js';
 import { PhotoError } from '../shared/errors.js';
-import { after, firstWorking, from } from './backends.js';
+import { backendsAfter, backendsFrom, firstWorking } from './backends.js';
 
 const always = () => {};
 
@@ -53,9 +53,9 @@ test('a search nobody waits for tries no further', async () => {
 });
 
 test('after a loss, those further down the order are left', () => {
-  assert.deepEqual(after(['webgpu', 'webgl2', 'cpu'], 'webgl2'), ['cpu']);
-  assert.deepEqual(after(['cpu'], 'cpu'), []);
-  assert.deepEqual(from(['webgpu', 'webgl2', 'cpu'], 'webgl2'), ['webgl2', 'cpu']);
+  assert.deepEqual(backendsAfter(['webgpu', 'webgl2', 'cpu'], 'webgl2'), ['cpu']);
+  assert.deepEqual(backendsAfter(['cpu'], 'cpu'), []);
+  assert.deepEqual(backendsFrom(['webgpu', 'webgl2', 'cpu'], 'webgl2'), ['webgl2', 'cpu']);
 });
 
 test('what no back end is allowed to do is told at once', async () => {

@@ -1,66 +1,62 @@
-/** Which back end draws: the first of an order that can. */
+/** The order in which backends are tried. */
 
 import type { Backend } from '../engine/types.js';
-import { messageOf, PhotoError, toPhotoError } from '../shared/errors.js';
+import { endSentence, messageOf, PhotoError, toPhotoError } from '../shared/errors.js';
 
-/** How people call the back ends. */
+/** The backends' names in messages. */
 export const BACKEND_TITLES: Readonly<Record<Backend, string>> = {
   webgpu: 'WebGPU',
   webgl2: 'WebGL2',
   cpu: 'CPU',
 };
 
-/** A back end that works, and why the ones before it do not. */
-export interface Chosen<T> {
+/** The first backend that works. */
+export interface WorkingBackend<T> {
   readonly backend: Backend;
   readonly value: T;
-  /** Empty where the first choice worked. */
+  /** Why those before it do not work; empty if it was the first. */
   readonly reason: string;
 }
 
 /**
- * Tries back ends in order. `attempt` is called for one after the other and never for two at once;
- * `abandoned` says between attempts whether the result is still wanted, and its throw ends the
- * search. Where none works, throws `backend-unavailable` with every reason.
+ * Calls `attempt` for one backend after another until one succeeds. After each failure it calls
+ * `checkCancelled`, which throws to end the search. Rejects with `backend-unavailable` and every reason
+ * if no backend works, or with `csp-wasm` at once, since that holds for all of them.
  */
 export async function firstWorking<T>(
-  order: readonly Backend[],
+  backends: readonly Backend[],
   attempt: (backend: Backend) => Promise<T>,
-  abandoned: () => void,
-): Promise<Chosen<T>> {
+  checkCancelled: () => void,
+): Promise<WorkingBackend<T>> {
   const failures: string[] = [];
-  let last: unknown;
-  for (const backend of order) {
+  let cause: unknown;
+  for (const backend of backends) {
     try {
       const value = await attempt(backend);
       return { backend, value, reason: failures.join(' ') };
     } catch (thrown) {
-      abandoned();
-      // Nor would any other be allowed to.
+      checkCancelled();
       if (toPhotoError(thrown).code === 'csp-wasm') throw thrown;
-      last = thrown;
-      failures.push(`${BACKEND_TITLES[backend]}: ${sentence(messageOf(thrown))}`);
+      cause = thrown;
+      failures.push(`${BACKEND_TITLES[backend]}: ${endSentence(messageOf(thrown))}`);
     }
   }
-  const remedy = order.includes('cpu') ? '' : ' The CPU might: leave the backend attribute out.';
+  const remedy = backends.includes('cpu')
+    ? ''
+    : ' Remove the backend attribute, so that the CPU is tried too.';
   throw new PhotoError(
     'backend-unavailable',
-    `This browser cannot draw the photograph. ${failures.join(' ')}${remedy}`,
-    last,
+    `No backend of this browser can draw the photograph. ${failures.join(' ')}${remedy}`,
+    cause,
   );
 }
 
-/** What is left to try when a back end does not come to draw. */
-export function after(order: readonly Backend[], failed: Backend): readonly Backend[] {
-  return order.slice(order.indexOf(failed) + 1);
+/** The backends left after one that cannot be used. */
+export function backendsAfter(backends: readonly Backend[], failed: Backend): readonly Backend[] {
+  return backends.slice(backends.indexOf(failed) + 1);
 }
 
-/** What is left to try when a back end was lost while drawing: that one first. */
-export function from(order: readonly Backend[], lost: Backend): readonly Backend[] {
-  return order.slice(order.indexOf(lost));
-}
-
-/** With an end to it. */
-export function sentence(text: string): string {
-  return /[.!?]$/.test(text) ? text : `${text}.`;
+/** The backends left after one that worked and was lost: the same one is tried again first. */
+export function backendsFrom(backends: readonly Backend[], lost: Backend): readonly Backend[] {
+  return backends.slice(backends.indexOf(lost));
 }

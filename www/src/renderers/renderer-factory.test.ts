@@ -2,26 +2,28 @@ import assert from 'node:assert/strict';
 import test, { type TestContext } from 'node:test';
 import type { Backend, CpuModule } from '../engine/types.js';
 import { Photograph } from '../photo/photograph.js';
-import { PhotoSession, type SessionSettings } from '../player/photo-session.js';
-import { exposed, PLAIN, wanting } from '../player/settings-fakes.js';
+import { fakePhoto } from '../photo/photograph-fakes.js';
+import { PhotoSession } from '../player/photo-session.js';
+import type { SessionSettings } from '../player/types.js';
 import { PhotoError } from '../shared/errors.js';
 import { cpuRenderers } from './cpu/cpu-renderer.js';
 import type { WorkerPool } from './cpu/worker-pool.js';
-import { crewOf, type FakeWorker, photoOf, settle } from './cpu/worker-pool-fakes.js';
+import { type FakeWorker, fakePool, settle } from './cpu/worker-pool-fakes.js';
 import type { Devices, LoadGraphics } from './gpu/devices.js';
 import { gpuRenderers } from './gpu/gpu-renderer.js';
-import { drawer } from './renderer-factory.js';
+import { rendererFactory } from './renderer-factory.js';
+import { PLAIN, withBackends, withExposure } from './settings-fakes.js';
 import type { CanvasRenderer } from './types.js';
 
 const SETTINGS: SessionSettings = {
   src: 'a.ltm',
   credentials: 'same-origin',
-  renderOptions: wanting(['cpu']),
+  renderOptions: withBackends(['cpu']),
   light: { name: 'flood', torch: null, image: null },
-  output: exposed(1),
+  output: withExposure(1),
 };
 
-/** Stands in for what of the document is used. */
+/** Replaces the document. */
 function fakeDocument(t: TestContext): void {
   const newCanvas = () => {
     const canvas = {
@@ -39,25 +41,25 @@ function fakeDocument(t: TestContext): void {
   });
 }
 
-/** Draws with one module for all, by a crew, and by devices. */
-const drawerOf = (module: unknown, pool: WorkerPool, devices: Devices) =>
-  drawer({
+/** A factory with one module for all backends. */
+const factoryFor = (module: unknown, pool: WorkerPool, devices: Devices) =>
+  rendererFactory({
     gpu: async () => gpuRenderers((async () => module) as unknown as LoadGraphics, devices),
     cpu: async () => cpuRenderers(pool),
     cpuModule: async () => module as CpuModule,
   });
 
-/** Devices, which note how many tiles modules have when one is set up. */
-function fakeDevices(has: ReadonlySet<number>) {
-  const setUps: string[] = [];
-  /** Devices that are had once `ask` has no objections. */
-  const devicesThat = (ask: (backend: Backend) => Promise<void>) => {
+/** Devices that log how many tiles are in modules when a renderer is created. */
+function fakeDevices(tilesInModules: ReadonlySet<number>) {
+  const created: string[] = [];
+  /** Devices that are available once `open` resolves. WebGL2 is a software renderer. */
+  const createDevices = (open: (backend: Backend) => Promise<void>) => {
     const lease = async (_: unknown, backend: Backend, software: boolean) => {
-      await ask(backend);
+      await open(backend);
       if (backend === 'webgl2' && !software)
-        throw new PhotoError('backend-unavailable', 'a program');
+        throw new PhotoError('backend-unavailable', 'a software renderer');
       const draw = async () => {
-        setUps.push(`${backend} of ${has.size}`);
+        created.push(`${backend} of ${tilesInModules.size}`);
         return { kernel: 'fake', gamut: 'srgb', render: () => {}, free: () => {} };
       };
       const release = () => released.push(backend);
@@ -66,22 +68,22 @@ function fakeDevices(has: ReadonlySet<number>) {
     return { lease } as unknown as Devices;
   };
   const released: Backend[] = [];
-  return { devicesThat, setUps, released };
+  return { createDevices, created, released };
 }
 
 /** A session of a photograph of four tiles, which two workers draw. */
-async function playing(t: TestContext, ask = async (_: Backend): Promise<void> => {}) {
+async function startSession(t: TestContext, open = async (_: Backend): Promise<void> => {}) {
   fakeDocument(t);
-  const { pool, workers, alive } = crewOf(2);
-  const { photo, has, module } = photoOf(4);
-  const { devicesThat, setUps, released } = fakeDevices(has);
+  const { pool, workers, countAlive } = fakePool(2);
+  const { photo, tilesInModules, module } = fakePhoto(4);
+  const { createDevices, created, released } = fakeDevices(tilesInModules);
   const frames: (() => void)[] = [];
   const changes: string[] = [];
   const session = new PhotoSession<CanvasRenderer>(
     {
-      open: async () => Photograph.decoded(photo),
+      open: async () => Photograph.fromModule(photo),
       prepare: () => {},
-      draw: drawerOf(module, pool, devicesThat(ask)).draw,
+      createRenderer: factoryFor(module, pool, createDevices(open)).createRenderer,
       nextFrame: (callback) => frames.push(callback),
       later: () => () => {},
       now: () => 0,
@@ -101,34 +103,35 @@ async function playing(t: TestContext, ask = async (_: Backend): Promise<void> =
   );
   session.set(SETTINGS);
   await settle();
-  assert.equal(has.size, 0);
-  return { session, workers, alive, has, setUps, released, frames, changes };
+  assert.equal(tilesInModules.size, 0);
+  return { session, workers, countAlive, tilesInModules, created, released, frames, changes };
 }
 
-test('frames that wait when the back end is switched are drawn by the new one, and move no tiles', async (t) => {
-  const { session, workers, alive, has, setUps, frames, changes } = await playing(t);
-  for (const worker of workers) worker.slow = true;
-  session.set({ ...SETTINGS, output: exposed(2) });
+test('frames that wait during a change of the backend are drawn by the new one, and move no tiles', async (t) => {
+  const { session, workers, countAlive, tilesInModules, created, frames, changes } =
+    await startSession(t);
+  for (const worker of workers) worker.isSlow = true;
+  session.set({ ...SETTINGS, output: withExposure(2) });
   frames.shift()?.();
   await settle();
   const waiting = session.renderNow();
-  session.set({ ...SETTINGS, renderOptions: wanting(['webgl2']) });
+  session.set({ ...SETTINGS, renderOptions: withBackends(['webgl2']) });
   const during = session.renderNow();
   await settle();
-  for (const worker of workers) worker.hurry();
+  for (const worker of workers) worker.catchUp();
   await settle();
   assert.deepEqual(changes, ['cpu', 'webgl2']);
   assert.equal(await waiting, session.renderer);
   assert.equal(await during, session.renderer);
   await settle();
-  assert.deepEqual([has.size, await alive()], [4, 0]);
-  assert.deepEqual(setUps, ['webgl2 of 4']);
+  assert.deepEqual([tilesInModules.size, await countAlive()], [4, 0]);
+  assert.deepEqual(created, ['webgl2 of 4']);
   assert.equal(workers.length, 2, 'none is started for a frame that nobody sees');
 });
 
-test('a picture of a photograph that is replaced in the middle of a frame is not-loaded', async (t) => {
-  const { session, workers } = await playing(t);
-  for (const worker of workers as FakeWorker[]) worker.slow = true;
+test('renderNow rejects with not-loaded if the photograph is replaced during a frame', async (t) => {
+  const { session, workers } = await startSession(t);
+  for (const worker of workers as FakeWorker[]) worker.isSlow = true;
   const asked = [session.renderNow(), session.renderNow()].map((picture) =>
     assert.rejects(picture, { code: 'not-loaded' }),
   );
@@ -137,31 +140,37 @@ test('a picture of a photograph that is replaced in the middle of a frame is not
   await Promise.all(asked);
 });
 
-test('a photograph that the page draws for want of workers says why', async (t) => {
+test("a renderer on the page's thread says why there are no workers", async (t) => {
   fakeDocument(t);
-  const { pool } = crewOf(2, (worker) => worker.die());
-  const { photo, has, module } = photoOf(4);
-  const { devicesThat } = fakeDevices(has);
-  const { draw } = drawerOf(
+  const { pool } = fakePool(2, (worker) => worker.crash());
+  const { photo, tilesInModules, module } = fakePhoto(4);
+  const { createDevices } = fakeDevices(tilesInModules);
+  const { createRenderer } = factoryFor(
     module,
     pool,
-    devicesThat(async () => {}),
+    createDevices(async () => {}),
   );
-  const photograph = Photograph.decoded(photo);
+  const photograph = Photograph.fromModule(photo);
   const { signal } = new AbortController();
   for (let time = 0; time < 2; time += 1) {
-    const renderer = await draw('cpu', photograph, wanting(['cpu']), () => {}, signal);
-    assert.equal(renderer.kernel, 'fake, in the page');
+    const renderer = await createRenderer(
+      'cpu',
+      photograph,
+      withBackends(['cpu']),
+      () => {},
+      signal,
+    );
+    assert.equal(renderer.kernel, 'fake, on the page');
     assert.match(renderer.warning ?? '', /without workers: .*out of memory/);
   }
 });
 
-/** Asks for back ends, and answers when the test does. */
-function asking() {
-  const asked: Backend[] = [];
+/** Opens devices when the test answers. */
+function openingDevices() {
+  const requested: Backend[] = [];
   let answer = (_: boolean): void => {};
-  const ask = (backend: Backend): Promise<void> => {
-    asked.push(backend);
+  const open = (backend: Backend): Promise<void> => {
+    requested.push(backend);
     return new Promise((resolve, reject) => {
       const missing = new PhotoError('backend-unavailable', 'there is none');
       answer = (yes) => (yes ? resolve() : reject(missing));
@@ -171,32 +180,32 @@ function asking() {
     answer(yes);
     await settle();
   };
-  return { ask, asked, answers };
+  return { open, requested, answers };
 }
 
-test('back ends that cannot be had leave tiles with the workers', async (t) => {
-  const { ask, asked, answers } = asking();
-  const { session, workers, has, changes } = await playing(t, ask);
-  session.set({ ...SETTINGS, renderOptions: wanting(['webgpu', 'webgl2', 'cpu']) });
+test('unavailable backends leave the tiles in the workers', async (t) => {
+  const { open, requested, answers } = openingDevices();
+  const { session, workers, tilesInModules, changes } = await startSession(t, open);
+  session.set({ ...SETTINGS, renderOptions: withBackends(['webgpu', 'webgl2', 'cpu']) });
   await settle();
   await answers(false);
   await answers(false);
   await session.renderNow();
-  assert.deepEqual(asked, ['webgpu', 'webgl2']);
-  assert.deepEqual([has.size, changes], [0, ['cpu']]);
+  assert.deepEqual(requested, ['webgpu', 'webgl2']);
+  assert.deepEqual([tilesInModules.size, changes], [0, ['cpu']]);
   assert.ok(workers.every(({ log }) => !log.includes('take')));
 });
 
-test('a device that is a program is passed over, unless back ends were named', async (t) => {
-  const { session, has, changes, setUps, released } = await playing(t);
-  const order = wanting(['webgl2', 'cpu']);
+test('a software renderer is skipped unless the page names backends', async (t) => {
+  const { session, tilesInModules, changes, created, released } = await startSession(t);
+  const order = withBackends(['webgl2', 'cpu']);
   session.set({ ...SETTINGS, renderOptions: { ...order, software: false } });
   await session.renderNow();
-  assert.deepEqual([has.size, changes, setUps], [0, ['cpu'], []]);
+  assert.deepEqual([tilesInModules.size, changes, created], [0, ['cpu'], []]);
   session.set({ ...SETTINGS, renderOptions: order });
   await session.renderNow();
-  assert.deepEqual([changes, setUps], [['cpu', 'webgl2'], ['webgl2 of 4']]);
-  // Nor does it stay once they are not named any more.
+  assert.deepEqual([changes, created], [['cpu', 'webgl2'], ['webgl2 of 4']]);
+  // It is replaced once the page names none any more.
   session.set({ ...SETTINGS, renderOptions: { ...order, software: false } });
   await session.renderNow();
   assert.deepEqual(changes, ['cpu', 'webgl2', 'cpu']);
@@ -204,83 +213,89 @@ test('a device that is a program is passed over, unless back ends were named', a
   assert.deepEqual(released, ['webgl2']);
 });
 
-test('back ends that do not answer keep nobody waiting who has given them up, and get nothing', async (t) => {
-  const { ask, asked, answers } = asking();
-  const { session, workers, setUps } = await playing(t, ask);
-  session.set({ ...SETTINGS, renderOptions: wanting(['webgpu']) });
+test('a backend that does not answer does not delay the next choice, and gets no tiles', async (t) => {
+  const { open, requested, answers } = openingDevices();
+  const { session, workers, created } = await startSession(t, open);
+  session.set({ ...SETTINGS, renderOptions: withBackends(['webgpu']) });
   await settle();
   session.set(SETTINGS);
   assert.equal((await session.renderNow()).kernel, 'fake, 2 workers');
   await answers(true);
-  assert.deepEqual([asked, setUps], [['webgpu'], []]);
+  assert.deepEqual([requested, created], [['webgpu'], []]);
   assert.ok(workers.every(({ log }) => !log.includes('take')));
 });
 
-test('a renderer that was freed draws nothing, and leaves tiles where they are', async (t) => {
+test('a freed renderer rejects and moves no tiles', async (t) => {
   fakeDocument(t);
-  const { pool, workers, alive } = crewOf(2);
-  const { photo, has, module } = photoOf(4);
-  const { devicesThat } = fakeDevices(has);
-  const photograph = Photograph.decoded(photo);
-  const renderer = await drawerOf(
+  const { pool, workers, countAlive } = fakePool(2);
+  const { photo, tilesInModules, module } = fakePhoto(4);
+  const { createDevices } = fakeDevices(tilesInModules);
+  const photograph = Photograph.fromModule(photo);
+  const renderer = await factoryFor(
     module,
     pool,
-    devicesThat(async () => {}),
-  ).draw('cpu', photograph, SETTINGS.renderOptions, () => {}, new AbortController().signal);
-  for (const worker of workers) worker.slow = true;
+    createDevices(async () => {}),
+  ).createRenderer(
+    'cpu',
+    photograph,
+    SETTINGS.renderOptions,
+    () => {},
+    new AbortController().signal,
+  );
+  for (const worker of workers) worker.isSlow = true;
   const frame = assert.rejects(Promise.resolve(renderer.render(SETTINGS.light, PLAIN, 1)), {
     code: 'internal',
   });
   await settle();
   renderer.free();
-  for (const worker of workers) worker.hurry();
+  for (const worker of workers) worker.catchUp();
   await frame;
   await photograph.withModule(module, () => {});
   await assert.rejects(Promise.resolve(renderer.render(SETTINGS.light, PLAIN, 1)), {
     code: 'internal',
   });
-  assert.deepEqual([has.size, await alive()], [4, 0]);
+  assert.deepEqual([tilesInModules.size, await countAlive()], [4, 0]);
 });
 
-/** A drawer on the CPU, whose module comes when the test says. */
-function preparing(t: TestContext) {
+/** A factory that warms up the CPU; its module loads when the test says. */
+function warmingUp(t: TestContext) {
   fakeDocument(t);
-  const { pool, workers, alive } = crewOf(4);
-  const { module } = photoOf(4);
-  let come = (_: CpuModule): void => {};
+  const { pool, workers, countAlive } = fakePool(4);
+  const { module } = fakePhoto(4);
+  let loaded = (_: CpuModule): void => {};
   let fail = (_: Error): void => {};
   const cpuModule = new Promise<CpuModule>((resolve, reject) => {
-    come = resolve;
+    loaded = resolve;
     fail = reject;
   });
-  const { prepare } = drawer({
+  const { prepare } = rendererFactory({
     gpu: () => Promise.reject(new PhotoError('backend-unavailable', 'none here')),
     cpu: async () => cpuRenderers(pool),
     cpuModule: () => cpuModule,
   });
-  const over = new AbortController();
-  const done = prepare({ ...wanting(['webgl2', 'cpu']), software: false }, over.signal);
-  return { come: () => come(module as unknown as CpuModule), fail, over, done, workers, alive };
+  const abort = new AbortController();
+  const done = prepare({ ...withBackends(['webgl2', 'cpu']), software: false }, abort.signal);
+  return { load: () => loaded(module), fail, abort, done, workers, countAlive };
 }
 
-test('workers get ready once their module is there, and go home unless there is work', async (t) => {
-  const { come, over, done, workers, alive } = preparing(t);
+test('workers start once their module is loaded, and end if there is no photograph', async (t) => {
+  const { load, abort, done, workers, countAlive } = warmingUp(t);
   await settle();
   assert.equal(workers.length, 0);
-  come();
+  load();
   await done;
   assert.equal(workers.length, 2);
-  over.abort();
+  abort.abort();
   await settle();
-  assert.equal(await alive(), 0);
+  assert.equal(await countAlive(), 0);
 });
 
-test('no worker gets ready for what is over by then, or has no module', async (t) => {
-  const first = preparing(t);
-  first.over.abort();
-  first.come();
+test('no worker starts after an abort, or without a module', async (t) => {
+  const first = warmingUp(t);
+  first.abort.abort();
+  first.load();
   await first.done;
-  const second = preparing(t);
+  const second = warmingUp(t);
   second.fail(new Error('offline'));
   await second.done;
   assert.equal(first.workers.length + second.workers.length, 0);

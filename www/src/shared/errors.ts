@@ -1,51 +1,51 @@
-/** Everything that can go wrong with a photograph, as codes that pages may rely on. */
+/** The errors that the package reports. Pages may rely on the codes, but not on the messages. */
 
-/** Codes this package's own TypeScript raises. */
+/** Codes of the package's TypeScript. */
 export type PageErrorCode =
-  /** An attribute has a value the element does not know. */
+  /** An attribute has an unknown or invalid value. */
   | 'attribute'
-  /** What `setState` was given has something in it that cannot be. */
+  /** The text passed to `setState` has an invalid value. */
   | 'state'
-  /** There is no `src`. */
+  /** `src` is not set. */
   | 'src-missing'
-  /** The server could not be reached, or its answer may not be read from this page. */
+  /** The server cannot be reached, or this page may not read its response. */
   | 'http-network'
-  /** The server answered, but not with the file: 404 and the like. */
+  /** The server answered with an error status, such as 404. */
   | 'http-status'
-  /** The server sent a web page in the file's place. */
+  /** The server sent a web page instead of the file. */
   | 'http-type'
-  /** The transfer ended before the whole file had come. */
+  /** The transfer ended before the end of the file. */
   | 'http-short'
-  /** Nothing came for a long time. */
+  /** No data arrived for 30 seconds. */
   | 'http-stalled'
-  /** The file was replaced on the server while it was read. */
+  /** The file on the server was replaced during the transfer. */
   | 'http-changed'
-  /** The server sends parts of the file compressed, which are not parts of the file. */
+  /** The server compresses partial responses, which makes them unreadable. */
   | 'http-encoding'
-  /** The server does not have, or did not send, the part of the file that was asked for. */
+  /** The server refused a range of the file, or sent another one. */
   | 'http-range'
-  /** The page's content security policy does not let the file be fetched. */
+  /** The page's content security policy blocks the request for the file. */
   | 'csp-connect'
-  /** The page's content security policy does not let WebAssembly run. */
+  /** The page's content security policy blocks WebAssembly. */
   | 'csp-wasm'
   /** A WebAssembly module could not be loaded. */
   | 'wasm-unavailable'
-  /** The script of the buttons beside the element's could not be loaded. */
+  /** The toolbar's script could not be loaded. */
   | 'controls-unavailable'
-  /** The worker that decodes a photograph stopped at it, for want of memory for one. */
+  /** The worker that decodes the photograph stopped, usually because memory ran out. */
   | 'worker-unavailable'
-  /** A worker that had a part of the photograph stopped. The photograph is fetched anew, a few times. */
+  /** A worker with a part of the photograph stopped. The photograph is fetched again, up to five times. */
   | 'photo-lost'
-  /** A picture that is to be light shows what this page may not read, from another origin. */
+  /** The light image contains data of another origin, which this page may not read. */
   | 'light-tainted'
-  /** What is to be light could not be loaded, played or read. */
+  /** The light image could not be loaded, played or read. */
   | 'light-source'
-  /** Something was asked of a photograph that is not loaded yet. */
+  /** A method was called before the photograph was loaded. */
   | 'not-loaded'
-  /** A fault in this software. */
+  /** A bug in this package. */
   | 'internal';
 
-/** Codes the WebAssembly module raises. */
+/** Codes of the WebAssembly modules. */
 export type EngineErrorCode =
   | 'format-magic'
   | 'format-text-mode'
@@ -63,7 +63,7 @@ export type EngineErrorCode =
 /** Any code; a newer WebAssembly module may add some. */
 export type ErrorCode = PageErrorCode | EngineErrorCode | (string & {});
 
-/** A failure with a code for programs and a message for people. */
+/** An error with a code for programs and a message for people. */
 export class PhotoError extends Error {
   readonly code: ErrorCode;
 
@@ -79,24 +79,34 @@ export function messageOf(thrown: unknown): string {
   return thrown instanceof Error ? thrown.message : String(thrown);
 }
 
-/** Whether that is what went wrong. Each script that is fetched apart has a `PhotoError` of its own. */
+/** Tests the code, not the class: each separately fetched script has a `PhotoError` class of its own. */
 export function hasCode(thrown: unknown, code: ErrorCode): boolean {
   return thrown instanceof Error && (thrown as { code?: unknown }).code === code;
 }
 
-/** What becomes of what is asked for a photograph that nobody wants any more. */
-export function letGo(): PhotoError {
-  return new PhotoError('internal', 'The photograph was let go.');
+/** The error of pending work for a photograph that is no longer needed. */
+export function photoReleased(): PhotoError {
+  return new PhotoError('internal', 'The photograph was released.');
 }
 
-/** Anything thrown as a `PhotoError`: those with a code keep it, others are faults of ours. */
+/** Anything thrown as a `PhotoError`. Errors without a code become `internal`. */
 export function toPhotoError(thrown: unknown): PhotoError {
   if (thrown instanceof PhotoError) return thrown;
   const code = thrown instanceof Error ? (thrown as { code?: unknown }).code : undefined;
   if (typeof code === 'string') {
-    // One of another script's brings its own cause.
     const { name, message, cause } = thrown as Error;
+    // The `PhotoError` of another script has the original cause.
     return new PhotoError(code, message, name === 'PhotoError' ? cause : thrown);
   }
-  return new PhotoError('internal', `Something went wrong inside: ${messageOf(thrown)}`, thrown);
+  return new PhotoError('internal', `An internal error occurred: ${messageOf(thrown)}`, thrown);
+}
+
+/** The text with a full stop, unless it ends in one already. */
+export function endSentence(text: string): string {
+  return /[.!?]$/.test(text) ? text : `${text}.`;
+}
+
+/** The sentences that are not empty, as one text. */
+export function joinSentences(sentences: readonly (string | undefined)[]): string {
+  return sentences.filter(Boolean).join(' ');
 }

@@ -1,6 +1,6 @@
 /**
- * Renderer on the CPU: by the page's crew of workers, or by the page where it can have none. A script of its own,
- * which has copies of what it shares with the element's.
+ * Creates renderers for the CPU: in the page's worker pool, or on the page's thread if there are no
+ * workers. It is a script of its own with copies of what it shares with the element's script.
  */
 
 import type { CpuModule, Gamut } from '../../engine/types.js';
@@ -13,38 +13,34 @@ import { WorkerRenderer } from './worker-renderer.js';
 
 export { WorkerPool } from './worker-pool.js';
 
-/** Sets drawing up on a canvas of its own. */
-export type DrawOnCpu = (
-  module: CpuModule,
-  photograph: Photograph,
-  gamut: Gamut,
-  signal: AbortSignal,
-) => Promise<CanvasRenderer>;
-
-/** What draws on the CPU. */
 export interface CpuRenderers {
-  readonly draw: DrawOnCpu;
-  /** Has what draws get ready, and stay so until what it gives is called. */
-  prepare(): () => void;
+  create(
+    module: CpuModule,
+    photograph: Photograph,
+    gamut: Gamut,
+    signal: AbortSignal,
+  ): Promise<CanvasRenderer>;
+  /** Starts workers. The returned function releases them. */
+  warmUp(): () => void;
 }
 
-/** Draws by a crew where it can have workers. */
 export function cpuRenderers(pool: WorkerPool): CpuRenderers {
-  // What the page has once drawn on the CPU it may be drawing still, which keeps tiles from workers; and
-  // why it did.
-  const withModule = new WeakMap<Photograph, string>();
-  const draw: DrawOnCpu = async (module, photograph, gamut, signal) => {
-    try {
-      if (!withModule.has(photograph)) {
-        return await WorkerRenderer.create(module, photograph, pool, gamut);
+  // Photographs that were drawn on the page's thread, and why. They stay there, because the page's
+  // renderer may still need the tiles.
+  const warnings = new WeakMap<Photograph, string>();
+  return {
+    async create(module, photograph, gamut, signal) {
+      if (!warnings.has(photograph)) {
+        try {
+          return await WorkerRenderer.create(module, photograph, pool, gamut);
+        } catch (thrown) {
+          if (!hasCode(thrown, 'worker-unavailable')) throw thrown;
+          warnings.set(photograph, `The page relights without workers: ${messageOf(thrown)}`);
+        }
       }
-    } catch (thrown) {
-      // Without workers the page does it.
-      if (!hasCode(thrown, 'worker-unavailable')) throw thrown;
-      withModule.set(photograph, `The page relights without workers: ${messageOf(thrown)}`);
-    }
-    const warning = withModule.get(photograph) ?? '';
-    return await MainThreadRenderer.create(module, photograph, gamut, warning, signal);
+      const warning = warnings.get(photograph) ?? '';
+      return await MainThreadRenderer.create(module, photograph, gamut, warning, signal);
+    },
+    warmUp: () => pool.warmUp(),
   };
-  return { draw, prepare: () => pool.gather() };
 }

@@ -1,30 +1,32 @@
-/** A canvas that the page draws on the CPU. Tiles may leave its module; they are back for the next picture. */
+/**
+ * Draws with the CPU on the page's thread. If another renderer moves the tiles away, the next frame moves
+ * them back.
+ */
 
 import type { OutputSettings } from '../../engine/output-settings.js';
-import type { CpuModule, Gamut } from '../../engine/types.js';
+import type { CpuModule, DrawnPhoto, Gamut } from '../../engine/types.js';
 import type { LightSetting } from '../../lights/light-setting.js';
 import type { Photograph } from '../../photo/photograph.js';
-import { letGo } from '../../shared/errors.js';
-import { WasmRenderer } from '../surface.js';
+import { photoReleased } from '../../shared/errors.js';
 import type { CanvasRenderer, FrameResult } from '../types.js';
+import { WasmRenderer } from '../wasm-renderer.js';
 
-/** See the module. */
 export class MainThreadRenderer implements CanvasRenderer {
-  readonly canvas: HTMLCanvasElement;
+  readonly canvas = document.createElement('canvas');
   readonly kernel: string;
-  readonly warning: string;
-  gamut: Gamut;
   readonly #module: CpuModule;
   readonly #photograph: Photograph;
-  /** None while tiles are elsewhere. */
+  /** `null` while the tiles are elsewhere. */
   #renderer: WasmRenderer | null = null;
-  #freed = false;
+  #isFreed = false;
 
-  private constructor(module: CpuModule, photograph: Photograph, gamut: Gamut, warning: string) {
-    this.canvas = document.createElement('canvas');
+  private constructor(
+    module: CpuModule,
+    photograph: Photograph,
+    public gamut: Gamut,
+    readonly warning: string,
+  ) {
     this.kernel = module.cpuKernel();
-    this.gamut = gamut;
-    this.warning = warning;
     this.#module = module;
     this.#photograph = photograph;
   }
@@ -44,27 +46,31 @@ export class MainThreadRenderer implements CanvasRenderer {
   render(
     setting: LightSetting,
     output: OutputSettings,
-    detail: number,
+    quality: number,
   ): FrameResult | Promise<FrameResult> {
-    if (this.#renderer) return this.#renderer.render(setting, output, detail);
-    return this.#begin().then((renderer) => renderer.render(setting, output, detail));
+    if (this.#renderer) return this.#renderer.render(setting, output, quality);
+    return this.#begin().then((renderer) => renderer.render(setting, output, quality));
   }
 
   free(): void {
-    this.#freed = true;
+    this.#isFreed = true;
     this.#stop();
   }
 
   #begin(signal?: AbortSignal): Promise<WasmRenderer> {
-    const use = (photo: Parameters<Parameters<Photograph['withModule']>[1]>[0]) => {
-      if (this.#freed) throw letGo();
+    const use = (photo: DrawnPhoto) => {
+      if (this.#isFreed) throw photoReleased();
       const relighter = new this.#module.Relighter(photo, this.canvas, this.gamut);
-      const plane = this.#photograph.plane(this.#module);
-      this.#renderer = new WasmRenderer(this.#module, plane, relighter, this.canvas);
+      const lightPlane = this.#photograph.createLightPlane(this.#module);
+      this.#renderer = new WasmRenderer(this.#module, lightPlane, relighter, this.canvas);
       return this.#renderer;
     };
-    const leave = () => this.#stop();
-    return this.#photograph.withModule(this.#module, use, signal ? { signal, leave } : { leave });
+    const onLeave = () => this.#stop();
+    return this.#photograph.withModule(
+      this.#module,
+      use,
+      signal ? { signal, onLeave } : { onLeave },
+    );
   }
 
   #stop(): void {

@@ -1,57 +1,53 @@
-/** What the page and a worker that relights say to each other: one answer to each request. */
+/** The tasks of a relighting worker and their results. */
 
 import type { OutputSettings } from '../../engine/output-settings.js';
 import type { Gamut } from '../../engine/types.js';
+import type { WorkerLike } from '../../shared/worker-client.js';
 
-/** How a picture is drawn. */
-export interface Showing {
+/** How a frame is drawn. */
+export interface FrameSettings {
   readonly output: OutputSettings;
-  /** Of the canvas. */
+  /** The canvas's gamut. */
   readonly gamut: Gamut;
   /** Share of the components, 0 to 1. */
-  readonly detail: number;
+  readonly quality: number;
 }
 
-/** What a worker is asked to do with rows of a photograph. */
-export type Task =
-  /** Make room for them; their tiles are to follow. */
-  | {
+/** Camera rows of a photograph, made of whole rows of tiles. */
+export interface RowRange {
+  readonly firstRow: number;
+  readonly rows: number;
+}
+
+/** What a worker does with the row range that it has of a photograph. */
+export type RowTask =
+  /** Allocates the row range. Its tiles follow. */
+  | ({
       readonly kind: 'open';
       readonly geometry: Float64Array;
       readonly basis: Float32Array;
-      readonly firstRow: number;
-      readonly rows: number;
-    }
-  /** Keep a tile. */
+    } & RowRange)
+  /** Stores a tile. */
   | { readonly kind: 'put'; readonly index: number; readonly bytes: Uint8Array<ArrayBuffer> }
-  /** Give a tile back. The answer has its bytes. */
+  /** Gives a tile back: the result is its bytes. */
   | { readonly kind: 'take'; readonly index: number }
-  /** Get ready to relight them. The answer tells which rows of the light they see: two `Uint32`. */
+  /** Prepares relighting. The result is two `Uint32`: the first light row needed, and the end of those rows. */
   | { readonly kind: 'plan' }
-  /** Relight them. The answer has their pixels, RGBA row by row, in the same memory. */
+  /** Relights. The result is `pixels`, filled with RGBA row by row. */
   | {
       readonly kind: 'relight';
-      /** Linear R, G and B of the rows that are seen; `null` for those of the last time. */
+      /** Linear R, G and B of the light rows needed; `null` for those of the last frame. */
       readonly light: Float32Array | null;
-      readonly showing: Showing;
+      readonly settings: FrameSettings;
       readonly pixels: ArrayBuffer;
     }
-  /** Let them go. */
   | { readonly kind: 'close' };
 
-/** A task. */
-export interface Request {
-  /** Of the request; its answer has the same. */
-  readonly number: number;
-  /** Of the photograph. */
+export interface RelightTask {
+  /** The photograph's number. */
   readonly photo: number;
-  readonly task: Task;
+  readonly task: RowTask;
 }
 
-/** What a worker says. */
-export type Answer =
-  /** It can be asked. `kernel` is what does the work. */
-  | { readonly kind: 'ready'; readonly kernel: string }
-  | { readonly kind: 'done'; readonly number: number; readonly bytes: ArrayBuffer }
-  /** The worker could not start, or do what it was asked; nobody knows what became of its tiles. */
-  | { readonly kind: 'broken'; readonly message: string };
+/** `Ready` is the kernel's name, `Result` the bytes that the task asks for. */
+export type RelightWorker = WorkerLike<RelightTask, string, ArrayBuffer>;

@@ -1,95 +1,75 @@
-/** A worker that relights rows of photographs: what a `WorkerClient` starts and talks to. */
+/** The script of a worker that relights row ranges of photographs for a `WorkerPool`. */
 
 import { loadCpu } from '../../engine/cpu-module.js';
 import { makeDisplay } from '../../engine/output-settings.js';
 import type { BandRelighter, CpuModule, DrawnPhoto } from '../../engine/types.js';
-import { setModuleFolder } from '../../engine/wasm-loader.js';
-import { messageOf } from '../../shared/errors.js';
-import { started, workerScope } from '../../shared/worker-scope.js';
-import type { Answer, Request, Task } from './protocol.js';
+import { serve } from '../../engine/worker-server.js';
+import type { RelightTask, RowRange, RowTask } from './protocol.js';
 
-/** Rows of a photograph. */
-interface Band {
+interface StoredRows extends RowRange {
   readonly photo: DrawnPhoto;
-  readonly firstRow: number;
-  readonly rows: number;
-  /** None while tiles come and go. */
+  /** `null` while tiles are moved. */
   relighter: BandRelighter | null;
 }
 
-const scope = workerScope<Request, Answer>();
-const bands = new Map<number, Band>();
-const NOTHING = new ArrayBuffer(0);
+const storedRows = new Map<number, StoredRows>();
+const NO_BYTES = new ArrayBuffer(0);
 
-function answer(module: CpuModule, photo: number, task: Task): ArrayBuffer {
+function handle(module: CpuModule, photo: number, task: RowTask): ArrayBuffer {
   if (task.kind === 'open') {
     const { geometry, basis, firstRow, rows } = task;
-    const room = module.Photo.receive(geometry, basis);
-    bands.set(photo, { photo: room, firstRow, rows, relighter: null });
-    return NOTHING;
+    const received = module.Photo.receive(geometry, basis);
+    storedRows.set(photo, { photo: received, firstRow, rows, relighter: null });
+    return NO_BYTES;
   }
-  const band = bands.get(photo);
-  if (!band) throw new Error('It was asked for what it does not have.');
+  const stored = storedRows.get(photo);
+  if (!stored) throw new Error(`It has no photograph with the number ${photo}.`);
   switch (task.kind) {
     case 'plan':
-      return Uint32Array.from(planned(module, band).lightRows).buffer;
+      return Uint32Array.from(relighterOf(module, stored).lightRows).buffer;
     case 'relight': {
-      const { light, showing, pixels } = task;
-      const display = makeDisplay(module, showing.output, showing.gamut);
+      const { light, settings, pixels } = task;
+      const display = makeDisplay(module, settings.output, settings.gamut);
       try {
         const out = new Uint8Array(pixels);
-        planned(module, band).relight(light, display, showing.detail, out);
+        relighterOf(module, stored).relight(light, display, settings.quality, out);
       } finally {
         display.free();
       }
       return pixels;
     }
     case 'put':
-      stop(band);
-      band.photo.putTile(task.index, task.bytes);
-      return NOTHING;
+      freeRelighter(stored);
+      stored.photo.putTile(task.index, task.bytes);
+      return NO_BYTES;
     case 'take':
-      stop(band);
-      return (band.photo.takeTile(task.index) as Uint8Array<ArrayBuffer>).buffer;
+      freeRelighter(stored);
+      return (stored.photo.takeTile(task.index) as Uint8Array<ArrayBuffer>).buffer;
     case 'close':
-      stop(band);
-      band.photo.free();
-      bands.delete(photo);
-      return NOTHING;
+      freeRelighter(stored);
+      stored.photo.free();
+      storedRows.delete(photo);
+      return NO_BYTES;
   }
 }
 
-function planned(module: CpuModule, band: Band): BandRelighter {
-  band.relighter ??= new module.BandRelighter(band.photo, band.firstRow, band.rows);
-  return band.relighter;
+function relighterOf(module: CpuModule, stored: StoredRows): BandRelighter {
+  stored.relighter ??= new module.BandRelighter(stored.photo, stored.firstRow, stored.rows);
+  return stored.relighter;
 }
 
-function stop(band: Band): void {
-  band.relighter?.free();
-  band.relighter = null;
+function freeRelighter(stored: StoredRows): void {
+  stored.relighter?.free();
+  stored.relighter = null;
 }
 
-function fail(thrown: unknown): void {
-  scope.postMessage({ kind: 'broken', message: messageOf(thrown) });
-}
-
-// Not awaited at the top level, which bundlers cannot put into the classic workers that they make.
-async function start(): Promise<void> {
-  try {
-    setModuleFolder((await started(workerScope())).modules);
-    const module = await loadCpu();
-    scope.onmessage = ({ data: { number, photo, task } }) => {
-      try {
-        const bytes = answer(module, photo, task);
-        scope.postMessage({ kind: 'done', number, bytes }, bytes.byteLength > 0 ? [bytes] : []);
-      } catch (thrown) {
-        fail(thrown);
-      }
-    };
-    scope.postMessage({ kind: 'ready', kernel: module.cpuKernel() });
-  } catch (thrown) {
-    fail(thrown);
-  }
-}
-
-void start();
+serve(async () => {
+  const module = await loadCpu();
+  return {
+    ready: module.cpuKernel(),
+    handle: ({ photo, task }: RelightTask) => {
+      const bytes = handle(module, photo, task);
+      return [bytes, bytes.byteLength > 0 ? [bytes] : []] as const;
+    },
+  };
+});

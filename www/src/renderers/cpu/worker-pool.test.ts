@@ -1,24 +1,23 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { DecodedPhoto } from '../../engine/types.js';
-import { headOf } from '../../photo/photograph.js';
+import { fakeLight, fakePhoto } from '../../photo/photograph-fakes.js';
+import { describePhoto } from '../../photo/types.js';
 import { WorkerPool } from './worker-pool.js';
 import {
-  crewOf,
   type FakeWorker,
-  IMPATIENT,
-  light,
-  painted,
-  photoOf,
-  SHOWING,
+  FRAME,
+  fakePool,
+  SHORT_LIMITS,
   settle,
+  tileIndices,
 } from './worker-pool-fakes.js';
 
 const SILENT = /does not answer/;
 
-/** A place with a crew for a photograph, and all its tiles there. */
-async function placed(pool: WorkerPool, photo: DecodedPhoto) {
-  const session = await pool.open(headOf(photo));
+/** A session of a photograph with all its tiles in the workers. */
+async function openWithTiles(pool: WorkerPool, photo: DecodedPhoto) {
+  const session = await pool.open(describePhoto(photo));
   for (const index of session.tiles.flat()) {
     await session.put(index, photo.takeTile(index) as Uint8Array<ArrayBuffer>);
   }
@@ -26,246 +25,249 @@ async function placed(pool: WorkerPool, photo: DecodedPhoto) {
   return session;
 }
 
-test('rows of tiles are shared out evenly, and together are the picture', async () => {
-  for (const [tiles, size, shares] of [
+test('rows of tiles are split evenly, and together they are the picture', async () => {
+  for (const [tileCount, size, tilesPerWorker] of [
     [16, 2, [8, 8]],
     [7, 3, [2, 3, 2]],
     [1, 4, [1]],
   ] as const) {
-    const { pool, workers, alive } = crewOf(size);
-    const { photo, has } = photoOf(tiles);
-    const session = await placed(pool, photo);
-    assert.equal(has.size, 0);
+    const { pool, workers, countAlive } = fakePool(size);
+    const { photo, tilesInModules } = fakePhoto(tileCount);
+    const session = await openWithTiles(pool, photo);
+    assert.equal(tilesInModules.size, 0);
     assert.deepEqual(
-      workers.map(({ held }) => [...held.values()][0]?.size),
-      shares,
+      workers.map(({ tiles }) => [...tiles.values()][0]?.size),
+      tilesPerWorker,
     );
-    const all = Array.from({ length: tiles }, (_, i) => i);
+    const all = Array.from({ length: tileCount }, (_, i) => i);
     for (let frame = 0; frame < 3; frame += 1) {
-      assert.deepEqual(painted(await session.relight(light, SHOWING)), all);
+      assert.deepEqual(tileIndices(await session.relight(fakeLight, FRAME)), all);
     }
     assert.equal((await session.take(0))[0], 0);
     session.end();
-    assert.equal(await alive(), 0);
+    assert.equal(await countAlive(), 0);
   }
 });
 
-test('the memory of a picture is used again', async () => {
-  const { pool, workers } = crewOf(2);
-  const session = await placed(pool, photoOf(4).photo);
-  const [first] = await session.relight(light, SHOWING);
+test('the memory of a picture is reused', async () => {
+  const { pool, workers } = fakePool(2);
+  const session = await openWithTiles(pool, fakePhoto(4).photo);
+  const [first] = await session.relight(fakeLight, FRAME);
   assert.equal(first?.pixels.byteLength, 8);
   const before = first.pixels;
-  await session.relight(light, SHOWING);
-  assert.equal(before.byteLength, 0, 'it went back to the worker');
+  await session.relight(fakeLight, FRAME);
+  assert.equal(before.byteLength, 0, 'it was transferred to the worker');
   assert.equal(workers[0]?.log.filter((kind) => kind === 'relight').length, 2);
 });
 
-test('a light is brought once, and again where tiles have come and gone', async () => {
-  const { pool, workers } = crewOf(2);
-  const { photo } = photoOf(4);
-  const session = await placed(pool, photo);
-  const brought: number[] = [];
+test('a light is sent once, and again after tiles were moved', async () => {
+  const { pool, workers } = fakePool(2);
+  const session = await openWithTiles(pool, fakePhoto(4).photo);
+  const sent: number[] = [];
   const counted = {
-    ...light,
+    ...fakeLight,
     linearRgb: (first: number, end: number) => {
-      brought.push(first);
-      return light.linearRgb(first, end);
+      sent.push(first);
+      return fakeLight.linearRgb(first, end);
     },
   };
-  for (let frame = 0; frame < 3; frame += 1) await session.relight(counted, SHOWING);
-  assert.equal(brought.length, 2, 'to each worker');
+  for (let frame = 0; frame < 3; frame += 1) await session.relight(counted, FRAME);
+  assert.equal(sent.length, 2, 'to each worker');
   assert.equal(workers[0]?.log.filter((kind) => kind === 'relight').length, 3);
   await session.put(0, await session.take(0));
   await session.plan();
-  await session.relight(counted, SHOWING);
-  await session.relight({ ...counted }, SHOWING);
-  assert.equal(brought.length, 6);
+  await session.relight(counted, FRAME);
+  await session.relight({ ...counted }, FRAME);
+  assert.equal(sent.length, 6);
 });
 
-test('photographs share the workers, which end with the last of them', async () => {
-  const { pool, workers, alive } = crewOf(2);
-  const [one, other] = await Promise.all([4, 6].map((tiles) => placed(pool, photoOf(tiles).photo)));
+test('photographs share the workers, which end with the last photograph', async () => {
+  const { pool, workers, countAlive } = fakePool(2);
+  const [one, other] = await Promise.all(
+    [4, 6].map((tileCount) => openWithTiles(pool, fakePhoto(tileCount).photo)),
+  );
   assert.ok(one && other);
   assert.equal(workers.length, 2);
-  // Both at once, of the same workers.
   const [four, six] = await Promise.all([
-    one.relight(light, SHOWING),
-    other.relight(light, SHOWING),
+    one.relight(fakeLight, FRAME),
+    other.relight(fakeLight, FRAME),
   ]);
-  assert.equal(painted(four).length, 4);
-  assert.equal(painted(six).length, 6);
+  assert.equal(tileIndices(four).length, 4);
+  assert.equal(tileIndices(six).length, 6);
   one.end();
   one.end();
   await settle();
-  assert.equal(await alive(), 2);
-  assert.ok(workers.every(({ held }) => held.size === 1));
+  assert.equal(await countAlive(), 2);
+  assert.ok(workers.every(({ tiles }) => tiles.size === 1));
   other.end();
-  assert.equal(await alive(), 0);
-  await placed(pool, photoOf(1).photo);
-  assert.equal(workers.length, 3, 'others are started');
+  assert.equal(await countAlive(), 0);
+  await openWithTiles(pool, fakePhoto(1).photo);
+  assert.equal(workers.length, 3, 'a new one is started');
 });
 
-test('small photographs go to the workers with the least to do', async () => {
-  const { pool, workers } = crewOf(2);
-  const shifts = [];
-  for (let i = 0; i < 4; i += 1) shifts.push(await placed(pool, photoOf(1).photo));
+test('a small photograph goes to the worker with the fewest photographs', async () => {
+  const { pool, workers } = fakePool(2);
+  const sessions = [];
+  for (let i = 0; i < 4; i += 1) sessions.push(await openWithTiles(pool, fakePhoto(1).photo));
   assert.deepEqual(
-    workers.map(({ held }) => held.size),
+    workers.map(({ tiles }) => tiles.size),
     [2, 2],
   );
-  shifts[0]?.end();
-  await placed(pool, photoOf(1).photo);
-  assert.equal(workers[0]?.held.size, 2);
+  sessions[0]?.end();
+  await openWithTiles(pool, fakePhoto(1).photo);
+  assert.equal(workers[0]?.tiles.size, 2);
 });
 
-test('workers that do not start leave the photograph alone, and are not tried again', async () => {
-  const refused = { pool: new WorkerPool(() => null, 2), workers: [], alive: () => 0 };
-  const missing = crewOf(2, (worker) => worker.die());
-  const broken = crewOf(2, (worker) => worker.say({ kind: 'broken', message: 'no module' }));
-  for (const { pool, workers, alive } of [refused, missing, broken]) {
-    const { photo, has } = photoOf(4);
-    await assert.rejects(pool.open(headOf(photo)), { code: 'worker-unavailable' });
-    assert.equal(has.size, 4);
-    assert.equal(await alive(), 0);
+test('workers that cannot start leave the photograph unchanged, and are not tried again', async () => {
+  const forbidden = { pool: new WorkerPool(() => null, 2), workers: [], countAlive: () => 0 };
+  const missing = fakePool(2, (worker) => worker.crash());
+  const broken = fakePool(2, (worker) => worker.respond({ kind: 'failed', message: 'no module' }));
+  for (const { pool, workers, countAlive } of [forbidden, missing, broken]) {
+    const { photo, tilesInModules } = fakePhoto(4);
+    await assert.rejects(pool.open(describePhoto(photo)), { code: 'worker-unavailable' });
+    assert.equal(tilesInModules.size, 4);
+    assert.equal(await countAlive(), 0);
     const started = workers.length;
-    await assert.rejects(pool.open(headOf(photo)), { code: 'worker-unavailable' });
+    await assert.rejects(pool.open(describePhoto(photo)), { code: 'worker-unavailable' });
     assert.equal(workers.length, started);
   }
 });
 
-test('workers that take long to start are waited for longer than for work', async () => {
-  const patience = { lookMs: 10, looks: 2, startLooks: 1000 };
-  const { pool } = crewOf(2, (worker) => setTimeout(() => worker.start(), 100), patience);
-  assert.equal((await pool.open(headOf(photoOf(4).photo))).size, 2);
+test('a start may take longer than a task', async () => {
+  const limits = { intervalMs: 10, maxChecks: 2, maxStartChecks: 1000 };
+  const { pool } = fakePool(2, (worker) => setTimeout(() => worker.start(), 100), limits);
+  assert.equal((await pool.open(describePhoto(fakePhoto(4).photo))).size, 2);
 });
 
-test('workers that do not start in time are tried again for the next photograph', async () => {
-  let starting = false;
-  const { pool, alive } = crewOf(2, (worker) => starting && worker.start(), IMPATIENT);
-  const { photo, has } = photoOf(4);
-  await assert.rejects(pool.open(headOf(photo)), {
+test('workers that start too slowly are tried again for the next photograph', async () => {
+  let isStarting = false;
+  const { pool, countAlive } = fakePool(2, (worker) => isStarting && worker.start(), SHORT_LIMITS);
+  const { photo, tilesInModules } = fakePhoto(4);
+  await assert.rejects(pool.open(describePhoto(photo)), {
     code: 'worker-unavailable',
-    message: /not answer/,
+    message: SILENT,
   });
-  assert.deepEqual([has.size, await alive()], [4, 0]);
-  starting = true;
-  await placed(pool, photo);
-  assert.equal(await alive(), 2);
+  assert.deepEqual([tilesInModules.size, await countAlive()], [4, 0]);
+  isStarting = true;
+  await openWithTiles(pool, photo);
+  assert.equal(await countAlive(), 2);
 });
 
-for (const [how, stop, why] of [
-  ['of which the browser tells', (worker: FakeWorker) => worker.die(), /out of memory/],
+for (const [how, stop, reason] of [
+  ['and the browser reports it', (worker: FakeWorker) => worker.crash(), /out of memory/],
   [
-    'that says so',
-    (worker: FakeWorker) => worker.say({ kind: 'broken', message: 'unreachable' }),
+    'and reports it itself',
+    (worker: FakeWorker) => worker.respond({ kind: 'failed', message: 'unreachable' }),
     /unreachable/,
   ],
   ['silently', (worker: FakeWorker) => worker.terminate(), SILENT],
 ] as const) {
-  test(`a worker that stops in the middle, ${how}, ends what it owes and no more`, async () => {
-    const { pool, workers } = crewOf(2, undefined, why === SILENT ? IMPATIENT : undefined);
+  test(`a worker that stops during a frame, ${how}, fails only its own photographs`, async () => {
+    const { pool, workers } = fakePool(2, undefined, reason === SILENT ? SHORT_LIMITS : undefined);
     const [whole, small] = [
-      await placed(pool, photoOf(4).photo),
-      await pool.open(headOf(photoOf(1).photo)),
+      await openWithTiles(pool, fakePhoto(4).photo),
+      await pool.open(describePhoto(fakePhoto(1).photo)),
     ];
-    for (const worker of workers) worker.slow = true;
+    for (const worker of workers) worker.isSlow = true;
     const frames = Promise.all([
-      assert.rejects(whole.relight(light, SHOWING), { code: 'worker-unavailable', message: why }),
+      assert.rejects(whole.relight(fakeLight, FRAME), {
+        code: 'worker-unavailable',
+        message: reason,
+      }),
       small.put(0, Uint8Array.of(0)),
     ]);
     stop(workers[1] as FakeWorker);
-    workers[0]?.hurry();
+    workers[0]?.catchUp();
     await frames;
-    assert.match(whole.failure?.message ?? '', why);
+    assert.match(whole.failure?.message ?? '', reason);
     assert.equal(small.failure, null);
     await assert.rejects(whole.take(3), { code: 'worker-unavailable' });
     await small.plan();
-    assert.deepEqual(painted(await small.relight(light, SHOWING)), [0]);
+    assert.deepEqual(tileIndices(await small.relight(fakeLight, FRAME)), [0]);
     whole.end();
-    // Another takes its place.
-    await placed(pool, photoOf(2).photo);
+    // A new worker takes its place.
+    await openWithTiles(pool, fakePhoto(2).photo);
     assert.equal(workers.length, 3);
   });
 }
 
-test('a slow worker that answers now and then is not given up', async () => {
-  const { pool, workers } = crewOf(1, undefined, { ...IMPATIENT, looks: 10 });
-  const session = await placed(pool, photoOf(1).photo);
+test('a slow worker that answers from time to time is kept', async () => {
+  const { pool, workers } = fakePool(1, undefined, { ...SHORT_LIMITS, maxChecks: 10 });
+  const session = await openWithTiles(pool, fakePhoto(1).photo);
   const worker = workers[0] as FakeWorker;
-  worker.slow = true;
+  worker.isSlow = true;
   const frames = Promise.all([
     session.plan(),
-    session.relight(light, SHOWING),
-    session.relight(light, SHOWING),
+    session.relight(fakeLight, FRAME),
+    session.relight(fakeLight, FRAME),
   ]);
   for (let i = 0; i < 4; i += 1) {
     await new Promise((resolve) => setTimeout(resolve, 25));
-    const request = worker.owed.shift();
+    const request = worker.unanswered.shift();
     if (request) worker.answer(request);
   }
   await frames;
-  // Nor one that owes nothing.
+  // So is an idle one.
   await new Promise((resolve) => setTimeout(resolve, 60));
   assert.equal(session.failure, null);
 });
 
-/** Has all workers stop, one after the other. */
-async function incident(pool: WorkerPool, alive: () => FakeWorker[], draw: boolean) {
-  const session = await placed(pool, photoOf(4).photo);
-  if (draw) await session.relight(light, SHOWING);
-  for (const worker of await alive()) {
-    worker.die();
+/** All workers stop, one after the other. */
+async function crashAll(pool: WorkerPool, workers: FakeWorker[], draw: boolean) {
+  const session = await openWithTiles(pool, fakePhoto(4).photo);
+  if (draw) await session.relight(fakeLight, FRAME);
+  for (const worker of workers.filter(({ hasEnded }) => !hasEnded)) {
+    worker.crash();
     await settle();
   }
   assert.ok(session.failure);
   session.end();
 }
 
-test('workers that stop again and again before they have drawn are done without', async () => {
-  const { pool, workers } = crewOf(4);
-  const alive = () => workers.filter(({ ended }) => !ended);
-  for (let i = 0; i < 3; i += 1) await incident(pool, alive, false);
-  await assert.rejects(pool.open(headOf(photoOf(4).photo)), { code: 'worker-unavailable' });
+test('after three failures without a frame, the pool starts no more workers', async () => {
+  const { pool, workers } = fakePool(4);
+  for (let i = 0; i < 3; i += 1) await crashAll(pool, workers, false);
+  await assert.rejects(pool.open(describePhoto(fakePhoto(4).photo)), {
+    code: 'worker-unavailable',
+  });
   assert.equal(workers.length, 12);
 });
 
-test('workers that stop now and then are replaced, however often', async () => {
-  const { pool, workers } = crewOf(4);
-  const alive = () => workers.filter(({ ended }) => !ended);
-  for (let i = 0; i < 5; i += 1) await incident(pool, alive, true);
-  assert.equal((await placed(pool, photoOf(4).photo)).size, 4);
+test('workers that have drawn a frame are replaced, however often they fail', async () => {
+  const { pool, workers } = fakePool(4);
+  for (let i = 0; i < 5; i += 1) await crashAll(pool, workers, true);
+  assert.equal((await openWithTiles(pool, fakePhoto(4).photo)).size, 4);
 });
 
-test('what cannot be sent fails, and nothing is owed for it', async () => {
-  const { pool, workers } = crewOf(1, undefined, IMPATIENT);
-  const session = await placed(pool, photoOf(1).photo);
+test('a request that cannot be sent rejects, and no answer is expected', async () => {
+  const { pool, workers } = fakePool(1, undefined, SHORT_LIMITS);
+  const session = await openWithTiles(pool, fakePhoto(1).photo);
   const bytes = Uint8Array.of(0);
-  const unsent = Object.assign(new Error('no memory to send it'), { name: 'DataCloneError' });
+  const sendError = Object.assign(new Error('no memory to send it'), { name: 'DataCloneError' });
   const worker = workers[0] as FakeWorker;
-  worker.refusal = unsent;
-  await assert.rejects(session.put(0, bytes), unsent);
+  worker.sendError = sendError;
+  await assert.rejects(session.put(0, bytes), sendError);
   assert.equal(bytes.byteLength, 1);
-  worker.refusal = null;
+  worker.sendError = null;
   await new Promise((resolve) => setTimeout(resolve, 100));
-  assert.equal(session.failure, null, 'it is not taken for silent');
+  assert.equal(session.failure, null, 'the worker does not count as silent');
   await session.plan();
 });
 
-test('a photograph that is let go keeps nobody waiting, and others are served', async () => {
-  const { pool, workers } = crewOf(1);
-  const [gone, stays] = [
-    await placed(pool, photoOf(2).photo),
-    await placed(pool, photoOf(3).photo),
+test('the end of a session rejects its requests, but not those of others', async () => {
+  const { pool, workers } = fakePool(1);
+  const [ended, other] = [
+    await openWithTiles(pool, fakePhoto(2).photo),
+    await openWithTiles(pool, fakePhoto(3).photo),
   ];
   const worker = workers[0] as FakeWorker;
-  worker.slow = true;
-  const frame = gone.relight(light, SHOWING);
-  const other = stays.relight(light, SHOWING);
-  gone.end();
+  worker.isSlow = true;
+  const frame = ended.relight(fakeLight, FRAME);
+  const otherFrame = other.relight(fakeLight, FRAME);
+  ended.end();
   await assert.rejects(frame, { code: 'internal' });
-  await assert.rejects(gone.take(0), { code: 'internal' });
-  worker.hurry();
-  assert.deepEqual(painted(await other), [0, 1, 2]);
-  assert.equal(worker.held.size, 1);
+  await assert.rejects(ended.take(0), { code: 'internal' });
+  worker.catchUp();
+  assert.deepEqual(tileIndices(await otherFrame), [0, 1, 2]);
+  assert.equal(worker.tiles.size, 1);
 });

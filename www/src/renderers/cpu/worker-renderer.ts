@@ -1,111 +1,105 @@
-/** A canvas that a crew of workers draws. */
+/** Draws with the CPU in the page's worker pool; the page copies the pixels to the canvas. */
 
 import type { OutputSettings } from '../../engine/output-settings.js';
 import type { CpuModule, DrawnPhoto, Gamut } from '../../engine/types.js';
 import { LightCache } from '../../lights/light-cache.js';
 import type { LightSetting } from '../../lights/light-setting.js';
 import type { Photograph } from '../../photo/photograph.js';
-import { hasCode, letGo, messageOf, PhotoError } from '../../shared/errors.js';
+import { hasCode, messageOf, PhotoError, photoReleased } from '../../shared/errors.js';
 import type { CanvasRenderer, FrameResult } from '../types.js';
-import type { PoolSession, WorkerPool } from './worker-pool.js';
+import type { RowPixels } from './pool-session.js';
+import type { WorkerPool } from './worker-pool.js';
 
-/** See the module. */
 export class WorkerRenderer implements CanvasRenderer {
   readonly canvas: HTMLCanvasElement;
-  readonly kernel: string;
-  readonly gamut: Gamut;
   readonly #lights: LightCache;
-  /** What lights are made for. */
-  readonly #plane: DrawnPhoto;
+  /** The photograph without tiles. */
+  readonly #lightPlane: DrawnPhoto;
   readonly #photograph: Photograph;
   readonly #pool: WorkerPool;
   readonly #context: CanvasRenderingContext2D;
-  #freed = false;
+  #isFreed = false;
 
   private constructor(
     module: CpuModule,
+    readonly kernel: string,
+    readonly gamut: Gamut,
     photograph: Photograph,
     pool: WorkerPool,
     context: CanvasRenderingContext2D,
-    kernel: string,
-    gamut: Gamut,
   ) {
     this.canvas = context.canvas;
-    this.kernel = kernel;
-    this.gamut = gamut;
-    this.#lights = new LightCache(module);
-    this.#plane = photograph.plane(module);
     this.#photograph = photograph;
     this.#pool = pool;
     this.#context = context;
+    this.#lights = new LightCache(module);
+    this.#lightPlane = photograph.createLightPlane(module);
   }
 
-  /** Rejects with `worker-unavailable` where there can be no workers; the photograph is whole then. */
+  /** Rejects with `worker-unavailable` if there are no workers; the photograph is unchanged then. */
   static async create(
     module: CpuModule,
     photograph: Photograph,
     pool: WorkerPool,
-    renderOptions: Gamut,
+    requestedGamut: Gamut,
   ): Promise<WorkerRenderer> {
     const canvas = document.createElement('canvas');
     canvas.width = photograph.info.width;
     canvas.height = photograph.info.height;
-    // In the page's memory, where the pixels come from: where there is no graphics processor, every
-    // frame would go to a program in the place of one and back.
+    // Keeps the canvas in the page's memory: a software renderer would copy every frame twice.
     const context = canvas.getContext('2d', {
-      colorSpace: renderOptions,
+      colorSpace: requestedGamut,
       willReadFrequently: true,
     });
     if (!context) {
-      throw new PhotoError('backend-unavailable', 'The canvas gives no 2D context.');
+      throw new PhotoError('backend-unavailable', 'The browser has no canvas with a 2D context.');
     }
-    const kernel = await photograph.withWorkers(pool, describe);
-    // Browsers that know no other gamut say nothing of it.
-    const gamut =
-      context.getContextAttributes?.().colorSpace === renderOptions ? renderOptions : 'srgb';
-    return new WorkerRenderer(module, photograph, pool, context, kernel, gamut);
+    const kernel = await photograph.withWorkers(pool, ({ kernel, size }) => {
+      return `${kernel}, ${size} ${size === 1 ? 'worker' : 'workers'}`;
+    });
+    // A browser without support for the gamut ignores it.
+    const { colorSpace } = context.getContextAttributes?.() ?? {};
+    const gamut = colorSpace === requestedGamut ? requestedGamut : 'srgb';
+    return new WorkerRenderer(module, kernel, gamut, photograph, pool, context);
   }
 
   async render(
     setting: LightSetting,
     output: OutputSettings,
-    detail: number,
+    quality: number,
   ): Promise<FrameResult> {
-    // Before its tiles are brought to the workers for nothing.
-    if (this.#freed) throw letGo();
+    this.#checkNotFreed();
     try {
       return await this.#photograph.withWorkers(this.#pool, async (session) => {
-        if (this.#freed) throw letGo();
-        const { light, lightApplied, lightError } = this.#lights.get(setting, this.#plane);
-        const rows = await session.relight(light, { output, gamut: this.gamut, detail });
-        const settings = { colorSpace: this.gamut };
-        if (this.#freed) throw letGo();
-        // All at once, and before their memory is used again.
-        for (const { first, count, pixels } of rows) {
-          const data = new Uint8ClampedArray(pixels);
-          this.#context.putImageData(
-            new ImageData(data, this.canvas.width, count, settings),
-            0,
-            first,
-          );
-        }
-        return { lightApplied, lightError };
+        this.#checkNotFreed();
+        const { light, ...result } = this.#lights.get(setting, this.#lightPlane);
+        const rows = await session.relight(light, { output, gamut: this.gamut, quality });
+        this.#checkNotFreed();
+        // All rows in one task, before the next frame reuses their memory.
+        for (const part of rows) this.#copyToCanvas(part);
+        return result;
       });
     } catch (thrown) {
       if (!hasCode(thrown, 'worker-unavailable')) throw thrown;
-      // Without workers this cannot draw, but a photograph that is fetched anew is drawn by the page.
+      // Once the photograph is fetched again, it is drawn on the page's thread.
       throw new PhotoError('photo-lost', messageOf(thrown), thrown);
     }
   }
 
   free(): void {
-    if (this.#freed) return;
-    this.#freed = true;
+    if (this.#isFreed) return;
+    this.#isFreed = true;
     this.#lights.free();
-    this.#plane.free();
+    this.#lightPlane.free();
   }
-}
 
-function describe({ kernel, size }: PoolSession): string {
-  return `${kernel}, ${size} ${size === 1 ? 'worker' : 'workers'}`;
+  #checkNotFreed(): void {
+    if (this.#isFreed) throw photoReleased();
+  }
+
+  #copyToCanvas({ firstRow, rows, pixels }: RowPixels): void {
+    const data = new Uint8ClampedArray(pixels);
+    const image = new ImageData(data, this.canvas.width, rows, { colorSpace: this.gamut });
+    this.#context.putImageData(image, 0, firstRow);
+  }
 }

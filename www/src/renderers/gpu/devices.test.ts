@@ -1,7 +1,8 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { Graphics } from '../../engine/types.js';
-import { Devices, type LoadGraphics, type Page } from './devices.js';
+import { Devices, type LoadGraphics } from './devices.js';
+import type { GraphicsPorts } from './graphics-ports.js';
 
 const settle = () => new Promise((resolve) => setImmediate(resolve));
 
@@ -43,12 +44,12 @@ function world() {
   const load = (async () => module) as unknown as LoadGraphics;
   let name: string | null = 'A real one';
   let asked = 0;
-  const page: Page = {
+  const ports: GraphicsPorts = {
     nameOf: async () => {
       asked += 1;
       return name;
     },
-    newCanvas: () => {
+    createCanvas: () => {
       let lose = (): void => {};
       canvases.push({ lose: () => lose() });
       const addEventListener = (_: string, listener: () => void) => {
@@ -59,7 +60,7 @@ function world() {
     now: () => now,
   };
   return {
-    devices: new Devices(page, 20),
+    devices: new Devices(ports, 20),
     load,
     /** Devices are called that from now on; `null`: there are none. */
     call: (other: string | null) => {
@@ -178,7 +179,7 @@ test('where there is no device, its module is not loaded, and the next asks agai
     const load = (() => assert.fail('it is of no use')) as unknown as LoadGraphics;
     await assert.rejects(w.devices.lease(load, backend, true, w.note('a')), {
       code: 'backend-unavailable',
-      message: /none to offer/,
+      message: /has no device/,
     });
     w.call('A real one');
     assert.ok(await w.devices.lease(w.load, backend, true, w.note('a')));
@@ -199,7 +200,7 @@ test('the module of a device that is a program is loaded only for who takes one'
     const refused = w.devices.lease(load, 'webgl2', false, w.note('a'));
     await assert.rejects(refused, {
       code: 'backend-unavailable',
-      message: /done by a program here/,
+      message: /software renderer/,
     });
     assert.ok(await w.devices.lease(w.load, 'webgl2', true, w.note('b')));
   }
@@ -210,8 +211,12 @@ test('the module of a device that is a program is loaded only for who takes one'
 
 test('a browser that never tells a name has no device', async () => {
   const w = world();
-  const page = { nameOf: () => new Promise<never>(() => {}), newCanvas: assert.fail, now: () => 0 };
-  const devices = new Devices(page, 20);
+  const ports = {
+    nameOf: () => new Promise<never>(() => {}),
+    createCanvas: assert.fail,
+    now: () => 0,
+  };
+  const devices = new Devices(ports, 20);
   await assert.rejects(devices.lease(w.load, 'webgpu', true, w.note('a')), {
     code: 'backend-unavailable',
     message: /does not answer within/,
@@ -227,12 +232,12 @@ test('a browser that answers late is asked again', async () => {
     }),
     Promise.resolve('A real one'),
   ];
-  const page = {
+  const ports = {
     nameOf: () => names.shift() ?? Promise.resolve(null),
-    newCanvas: assert.fail,
+    createCanvas: assert.fail,
     now: () => 0,
   };
-  const devices = new Devices(page, 20);
+  const devices = new Devices(ports, 20);
   const lease = () => devices.lease(w.load, 'webgpu', true, w.note('a'));
   await assert.rejects(lease(), /does not answer within/);
   answer('A real one');
@@ -246,8 +251,5 @@ test('what takes the place of a lost device is asked its name', async () => {
   w.call('google swiftshader');
   w.loses[0]?.('gone.');
   await settle();
-  await assert.rejects(
-    w.devices.lease(w.load, 'webgpu', false, w.note('a')),
-    /done by a program here/,
-  );
+  await assert.rejects(w.devices.lease(w.load, 'webgpu', false, w.note('a')), /software renderer/);
 });

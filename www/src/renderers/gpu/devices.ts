@@ -1,242 +1,177 @@
 /**
- * The graphics devices of a page: one of each kind, which all photographs share, and which goes with the
- * last of them. One that is lost is made anew for who asks next, unless it is lost again and again.
+ * The page's graphics devices: one per graphics backend, shared by all photographs and freed with the
+ * last of them. The next lease after a loss gets a new device, unless losses are frequent.
  */
 
-import type { Backend, Graphics, Modules } from '../../engine/types.js';
+import type { Graphics, Modules } from '../../engine/types.js';
 import { PhotoError } from '../../shared/errors.js';
+import { withTimeout } from '../../shared/promises.js';
+import type { DeviceHandle } from '../wasm-renderer.js';
+import { BROWSER_GRAPHICS, type GraphicsBackend, type GraphicsPorts } from './graphics-ports.js';
 
-/** A back end that is a graphics device. */
-export type GraphicsBackend = Exclude<Backend, 'cpu'>;
+export type { GraphicsBackend } from './graphics-ports.js';
 
-/** Gives the modules of devices. */
 export type LoadGraphics = <N extends GraphicsBackend>(name: N) => Promise<Modules[N]>;
 
-/** What of the page is used. */
-export interface Page {
-  /** What a device calls itself; `null` where there is none. A module that has none to drive is not loaded. */
-  nameOf(backend: GraphicsBackend): Promise<string | null>;
-  newCanvas(): HTMLCanvasElement;
-  now(): number;
-}
-
-/** A photograph's share of a device. */
-export interface Lease {
+/** A photograph's use of a device. Free what was drawn with it before `release`. */
+export interface Lease extends DeviceHandle {
   readonly graphics: Graphics;
-  /** Tells that the device does not work, where the browser did not. */
-  fail(reason: string): void;
-  /** Gives the share up; what was drawn by is to be freed before. */
-  release(): void;
 }
 
-/** A device, or one that is on its way. */
-interface Shared {
+/** A device that is open or being opened. */
+interface SharedDevice {
   readonly graphics: Promise<Graphics>;
-  /** Told when the device is lost. */
+  /** Called when the device is lost. */
   readonly holders: Set<(reason: string) => void>;
-  /** Whether it was lost or let go: what it says after that is nobody's concern. */
-  over: boolean;
+  /** Lost or freed: later events of the device are ignored. */
+  isClosed: boolean;
 }
 
-/** After so many losses with less than the time below between, a device is done without. */
-const MOST_LOSSES = 3;
-const FORGET_MS = 60_000;
-/** Where a device takes longer, none is to be expected: some browsers never answer. */
-const LONGEST_MS = 10_000;
+/** After this many losses, with less than `LOSS_MEMORY_MS` between two of them, leases are refused. */
+const MAX_LOSSES = 3;
+const LOSS_MEMORY_MS = 60_000;
+/** Some browsers never answer a request for WebGPU. */
+const MAX_ANSWER_MS = 10_000;
 
-/** Programs that make up for a missing graphics processor. */
-const PROGRAMS = /swiftshader|llvmpipe|lavapipe|softpipe|basic render|software/i;
+const SOFTWARE_RENDERERS = /swiftshader|llvmpipe|lavapipe|softpipe|basic render|software/i;
 
-/** See the module. */
 export class Devices {
-  readonly #page: Page;
-  readonly #longestMs: number;
-  readonly #shared = new Map<GraphicsBackend, Shared>();
-  /** What devices call themselves, once asked. */
+  readonly #ports: GraphicsPorts;
+  readonly #maxAnswerMs: number;
+  readonly #devices = new Map<GraphicsBackend, SharedDevice>();
+  /** The names of adapters, once requested. */
   readonly #names = new Map<GraphicsBackend, Promise<string | null>>();
-  /** Why WebGPU, which never answered, is not asked again. */
-  #mute: PhotoError | null = null;
-  readonly #losses = new Map<GraphicsBackend, { count: number; last: number }>();
+  /** Set while WebGPU leaves a request unanswered: no photograph waits for it again. */
+  #silence: PhotoError | null = null;
+  readonly #losses = new Map<GraphicsBackend, { count: number; lastMs: number }>();
 
-  constructor(page: Page = thisPage(), longestMs = LONGEST_MS) {
-    this.#page = page;
-    this.#longestMs = longestMs;
+  constructor(ports: GraphicsPorts = BROWSER_GRAPHICS, maxAnswerMs = MAX_ANSWER_MS) {
+    this.#ports = ports;
+    this.#maxAnswerMs = maxAnswerMs;
   }
 
   /**
-   * A share of a device, until it is released; `software`: also of one that is a program. `lost` is told at
-   * most once. Rejects with `backend-unavailable` where there is none to have, or has been too often.
+   * Leases the device of a backend; `software` allows a software renderer. `onLost` is called at most
+   * once. Rejects with `backend-unavailable`.
    */
   async lease(
     load: LoadGraphics,
     backend: GraphicsBackend,
     software: boolean,
-    lost: (reason: string) => void,
+    onLost: (reason: string) => void,
   ): Promise<Lease> {
-    if (backend === 'webgpu' && this.#mute) throw this.#mute;
-    this.#refuseFickle(backend);
+    if (backend === 'webgpu' && this.#silence) throw this.#silence;
+    this.#checkLosses(backend);
     const name = await this.#nameOf(backend);
-    if (name === null) throw unavailable('this browser has none to offer');
-    if (!software && PROGRAMS.test(name)) {
-      throw unavailable(`it is done by a program here (${name}), and the CPU is faster`);
+    if (name === null) throw unavailable('this browser has no device for it');
+    if (!software && SOFTWARE_RENDERERS.test(name)) {
+      throw unavailable(`its device is a software renderer (${name}), and the CPU is faster`);
     }
-    const shared = this.#shared.get(backend) ?? this.#open(load, backend);
-    // One function may hold several shares.
-    const holder = (reason: string): void => lost(reason);
-    shared.holders.add(holder);
+    const device = this.#devices.get(backend) ?? this.#open(load, backend);
+    // A new function for each lease, since a caller may pass the same one twice.
+    const holder = (reason: string): void => onLost(reason);
+    device.holders.add(holder);
     const release = (): void => {
-      shared.holders.delete(holder);
-      if (shared.holders.size === 0) this.#close(backend, shared);
+      device.holders.delete(holder);
+      if (device.holders.size === 0) this.#close(backend, device);
     };
     try {
-      const fail = (reason: string): void => this.#lose(backend, shared, reason);
-      return { graphics: await shared.graphics, fail, release };
+      const fail = (reason: string): void => this.#lose(backend, device, reason);
+      return { graphics: await device.graphics, fail, release };
     } catch (thrown) {
       release();
       throw thrown;
     }
   }
 
-  #refuseFickle(backend: GraphicsBackend): void {
+  #checkLosses(backend: GraphicsBackend): void {
     const losses = this.#losses.get(backend);
-    if (!losses || losses.count < MOST_LOSSES) return;
-    if (this.#page.now() - losses.last > FORGET_MS) {
-      this.#losses.delete(backend);
-      return;
-    }
-    throw unavailable(`it was lost ${losses.count} times within a short time`);
+    if (!losses || losses.count < MAX_LOSSES) return;
+    if (this.#ports.now() - losses.lastMs > LOSS_MEMORY_MS) this.#losses.delete(backend);
+    else throw unavailable(`it was lost ${losses.count} times within a short time`);
   }
 
-  #open(load: LoadGraphics, backend: GraphicsBackend): Shared {
-    const lose = (reason: string): void => this.#lose(backend, shared, reason);
-    const graphics = backend === 'webgpu' ? this.#webGpu(load) : this.#webGl2(load, lose);
-    const shared: Shared = { graphics, holders: new Set(), over: false };
-    this.#shared.set(backend, shared);
+  #open(load: LoadGraphics, backend: GraphicsBackend): SharedDevice {
+    const lose = (reason: string): void => this.#lose(backend, device, reason);
+    const graphics = backend === 'webgpu' ? this.#openWebGpu(load) : this.#openWebGl2(load, lose);
+    const device: SharedDevice = { graphics, holders: new Set(), isClosed: false };
+    this.#devices.set(backend, device);
     graphics.then(
-      (device) => {
-        void device.lost?.then(({ message }) => lose(message || 'the graphics device is gone.'));
+      ({ lost }) => {
+        void lost?.then(({ message }) => lose(message || 'the graphics device is gone.'));
       },
-      () => {}, // told to who asked
+      () => {}, // `lease` rejects with it
     );
-    return shared;
+    return device;
   }
 
   #nameOf(backend: GraphicsBackend): Promise<string | null> {
-    let name = this.#names.get(backend);
-    if (!name) {
-      name = this.#answered(this.#page.nameOf(backend), () => {});
-      this.#names.set(backend, name);
-      // One that there is none of may be there later: a driver starts anew.
-      const forget = () => this.#names.delete(backend);
-      name.then((known) => known ?? forget(), forget);
-    }
+    const known = this.#names.get(backend);
+    if (known) return known;
+    const name = this.#untilAnswered(this.#ports.nameOf(backend), () => {});
+    this.#names.set(backend, name);
+    // A device that is missing now may come back, with a restarted driver.
+    const forget = () => this.#names.delete(backend);
+    name.then((found) => found ?? forget(), forget);
     return name;
   }
 
-  async #webGpu(load: LoadGraphics): Promise<Graphics> {
+  async #openWebGpu(load: LoadGraphics): Promise<Graphics> {
     const { Graphics } = await load('webgpu');
-    return await this.#answered(Graphics.webgpu(), (device) => device.free());
+    return await this.#untilAnswered(Graphics.webgpu(), (device) => device.free());
   }
 
-  /** What is asked of WebGPU; `late` is given what comes when nobody waits for it any more. */
-  async #answered<T>(asked: Promise<T>, late: (answer: T) => void): Promise<T> {
-    let timer: ReturnType<typeof setTimeout> | undefined;
-    const tooLate = new Promise<never>((_, reject) => {
-      timer = setTimeout(() => {
-        const why = `it does not answer within ${this.#longestMs / 1000} seconds`;
-        // Else each photograph would wait as long.
-        this.#mute = unavailable(why);
-        reject(this.#mute);
-        asked.then(
-          (answer) => {
-            // A page that slept, say.
-            this.#mute = null;
-            late(answer);
-          },
-          () => {},
-        );
-      }, this.#longestMs);
-    });
-    try {
-      return await Promise.race([asked, tooLate]);
-    } finally {
-      clearTimeout(timer);
-    }
+  /** Waits for an answer of WebGPU; `onLate` gets one that comes after the time limit. */
+  #untilAnswered<T>(answer: Promise<T>, onLate: (answer: T) => void): Promise<T> {
+    const ms = this.#maxAnswerMs;
+    const onTimeout = () => {
+      this.#silence = unavailable(`it does not answer within ${ms / 1000} seconds`);
+      answer.then(
+        (late) => {
+          // The page may have slept, for example.
+          this.#silence = null;
+          onLate(late);
+        },
+        () => {},
+      );
+      return Promise.reject(this.#silence);
+    };
+    return withTimeout(answer, { timeout: { ms, onTimeout } });
   }
 
-  async #webGl2(load: LoadGraphics, lose: (reason: string) => void): Promise<Graphics> {
+  async #openWebGl2(load: LoadGraphics, lose: (reason: string) => void): Promise<Graphics> {
     const { Graphics } = await load('webgl2');
-    const canvas = this.#page.newCanvas();
+    const canvas = this.#ports.createCanvas();
     const graphics = Graphics.webgl2(canvas);
     canvas.addEventListener('webglcontextlost', () => lose('the browser took it away.'));
     return graphics;
   }
 
-  #lose(backend: GraphicsBackend, shared: Shared, reason: string): void {
-    if (shared.over) return;
-    const losses = this.#losses.get(backend) ?? { count: 0, last: 0 };
-    const now = this.#page.now();
-    const recent = now - losses.last <= FORGET_MS;
-    this.#losses.set(backend, { count: recent ? losses.count + 1 : 1, last: now });
-    // What comes in its place may be a program.
+  #lose(backend: GraphicsBackend, device: SharedDevice, reason: string): void {
+    if (device.isClosed) return;
+    const losses = this.#losses.get(backend) ?? { count: 0, lastMs: 0 };
+    const now = this.#ports.now();
+    const isRecent = now - losses.lastMs <= LOSS_MEMORY_MS;
+    this.#losses.set(backend, { count: isRecent ? losses.count + 1 : 1, lastMs: now });
+    // The next device may be a software renderer.
     this.#names.delete(backend);
-    const holders = [...shared.holders];
-    this.#close(backend, shared);
-    for (const lost of holders) lost(reason);
+    const holders = [...device.holders];
+    this.#close(backend, device);
+    for (const onLost of holders) onLost(reason);
   }
 
-  #close(backend: GraphicsBackend, shared: Shared): void {
-    if (shared.over) return;
-    shared.over = true;
-    if (this.#shared.get(backend) === shared) this.#shared.delete(backend);
-    shared.graphics.then(
-      (device) => device.free(),
+  #close(backend: GraphicsBackend, device: SharedDevice): void {
+    if (device.isClosed) return;
+    device.isClosed = true;
+    if (this.#devices.get(backend) === device) this.#devices.delete(backend);
+    device.graphics.then(
+      (graphics) => graphics.free(),
       () => {},
     );
   }
 }
 
-/** For errors of devices, whatever the module says of them. */
-export function unavailable(why: string, cause?: unknown): PhotoError {
-  return new PhotoError('backend-unavailable', why, cause);
-}
-
-/** What is used of WebGPU here, which types of browsers do not tell of yet. */
-interface Gpu {
-  requestAdapter(): Promise<{ readonly info?: AdapterInfo } | null>;
-}
-interface AdapterInfo {
-  readonly vendor?: string;
-  readonly architecture?: string;
-  readonly description?: string;
-  readonly isFallbackAdapter?: boolean;
-}
-
-async function webGpuName(): Promise<string | null> {
-  const adapter = await (navigator as { gpu?: Gpu }).gpu?.requestAdapter();
-  if (!adapter) return null;
-  const { vendor, architecture, description, isFallbackAdapter } = adapter.info ?? {};
-  return [vendor, architecture, description, isFallbackAdapter ? 'software' : ''].join(' ').trim();
-}
-
-function webGl2Name(): string | null {
-  const gl = document.createElement('canvas').getContext('webgl2');
-  if (!gl) return null;
-  let name: string | null = gl.getParameter(gl.RENDERER);
-  // Some browsers tell only who asks twice; others complain of that.
-  if (name?.startsWith('WebKit')) {
-    const info = gl.getExtension('WEBGL_debug_renderer_info');
-    if (info) name = gl.getParameter(info.UNMASKED_RENDERER_WEBGL);
-  }
-  // Browsers let pages have a few contexts only.
-  gl.getExtension('WEBGL_lose_context')?.loseContext();
-  return name;
-}
-
-function thisPage(): Page {
-  return {
-    nameOf: async (backend) => (backend === 'webgpu' ? webGpuName() : webGl2Name()),
-    newCanvas: () => document.createElement('canvas'),
-    now: () => performance.now(),
-  };
+/** The session puts the backend's name and a colon before the message. */
+function unavailable(message: string): PhotoError {
+  return new PhotoError('backend-unavailable', message);
 }

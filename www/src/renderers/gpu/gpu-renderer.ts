@@ -1,32 +1,32 @@
-/** Renderer by graphics devices. A script of its own, which has copies of what it shares with the element's. */
+/**
+ * Creates renderers for graphics devices. It is a script of its own with copies of what it shares with
+ * the element's script.
+ */
 
 import type { Photograph } from '../../photo/photograph.js';
-import { WasmRenderer } from '../surface.js';
 import type { CanvasRenderer, RenderOptions } from '../types.js';
+import { WasmRenderer } from '../wasm-renderer.js';
 import type { Devices, GraphicsBackend, LoadGraphics } from './devices.js';
 
 export { Devices } from './devices.js';
 
-/** What draws by graphics devices. */
 export interface GpuRenderers {
-  /** Sets drawing up on a canvas of its own. `lost` is told at most once. */
-  draw(
+  /** Calls `onLost` at most once. */
+  create(
     backend: GraphicsBackend,
     photograph: Photograph,
-    renderOptions: RenderOptions,
-    lost: (reason: string) => void,
+    options: RenderOptions,
+    onLost: (reason: string) => void,
     signal: AbortSignal,
   ): Promise<CanvasRenderer>;
-  /** Has a device get ready, and stay so until what it gives is called; `software`: also a program. */
-  prepare(backend: GraphicsBackend, software: boolean): Promise<() => void>;
+  /** Opens a device; `software` allows a software renderer. The returned function releases it. */
+  warmUp(backend: GraphicsBackend, software: boolean): Promise<() => void>;
 }
 
-/** Draws by devices, with the modules that `load` gives. */
 export function gpuRenderers(load: LoadGraphics, devices: Devices): GpuRenderers {
   return {
-    async draw(backend, photograph, { gamut, software }, lost, signal) {
-      const lease = await devices.lease(load, backend, software, lost);
-      const { graphics } = lease;
+    async create(backend, photograph, { gamut, software }, onLost, signal) {
+      const lease = await devices.lease(load, backend, software, onLost);
       try {
         signal.throwIfAborted();
         const module = await load(backend);
@@ -34,9 +34,9 @@ export function gpuRenderers(load: LoadGraphics, devices: Devices): GpuRenderers
           module,
           async (photo) => {
             const canvas = document.createElement('canvas');
-            const relighter = await graphics.draw(photo, canvas, gamut);
-            const plane = photograph.plane(module);
-            return new WasmRenderer(module, plane, relighter, canvas, { lease });
+            const relighter = await lease.graphics.draw(photo, canvas, gamut);
+            const lightPlane = photograph.createLightPlane(module);
+            return new WasmRenderer(module, lightPlane, relighter, canvas, lease);
           },
           { signal },
         );
@@ -45,7 +45,7 @@ export function gpuRenderers(load: LoadGraphics, devices: Devices): GpuRenderers
         throw thrown;
       }
     },
-    async prepare(backend, software) {
+    async warmUp(backend, software) {
       return (await devices.lease(load, backend, software, () => {})).release;
     },
   };

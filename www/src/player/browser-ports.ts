@@ -1,29 +1,28 @@
-/** What a player needs done, by the browser. */
+/** The browser's implementation of the session's ports, for all elements of the page. */
 
-import { forbidden } from '../loading/http-errors.js';
+import { forbiddenByPolicy } from '../loading/http-errors.js';
 import { openPhoto } from '../loading/load.js';
-import { newDecoder } from '../photo/decoders.js';
-import { draw, prepare } from '../renderers/renderer-factory.js';
+import { createDecoder } from '../photo/decoders.js';
+import { createRenderer, prepare } from '../renderers/renderer-factory.js';
 import type { CanvasRenderer } from '../renderers/types.js';
-import { allowed } from '../shared/policy.js';
-import type { SessionPorts } from './photo-session.js';
+import { withPolicyErrors } from '../shared/content-security-policy.js';
+import type { SessionPorts } from './types.js';
 
-/** For all elements of the page. */
 export const BROWSER_PORTS: SessionPorts<CanvasRenderer> = {
   open: (src, credentials, signal, onProgress, onPreview) =>
     openPhoto(src, signal, onProgress, onPreview, {
-      decoder: newDecoder,
+      createDecoder,
       fetch: (input, init) =>
-        allowed(
+        withPolicyErrors(
           () => fetch(input, { ...init, credentials }),
           /^connect-src/,
-          (directive, cause) => forbidden(src, directive, cause),
+          (directive, cause) => forbiddenByPolicy(src, directive, cause),
         ),
-      pause,
+      yieldToPage,
       now: () => performance.now(),
     }),
-  draw,
-  prepare: (renderOptions, over) => void prepare(renderOptions, over),
+  createRenderer,
+  prepare: (options, signal) => void prepare(options, signal),
   nextFrame: (callback) => requestAnimationFrame(callback),
   later: (ms, callback) => {
     const timer = setTimeout(callback, ms);
@@ -32,8 +31,7 @@ export const BROWSER_PORTS: SessionPorts<CanvasRenderer> = {
   now: () => performance.now(),
 };
 
-/** Gives the page its turn. */
-function pause(): Promise<void> {
+function yieldToPage(): Promise<void> {
   const { scheduler } = globalThis as { scheduler?: { yield?: () => Promise<void> } };
   return scheduler?.yield?.() ?? new Promise((resolve) => setTimeout(resolve));
 }

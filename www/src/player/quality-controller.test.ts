@@ -1,19 +1,19 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Quality } from './quality.js';
+import { QualityController } from './quality-controller.js';
 
 /** A motion: frames one after another, each taking what `cost` says of the share it is drawn by. */
-function motion(quality: Quality, start = 0) {
+function animate(controller: QualityController, start = 0) {
   let now = start;
   /** The share of each frame. */
   const shares: number[] = [];
   const frames = (count: number, cost: (share: number, frame: number) => number, gap = 0) => {
     for (let frame = 0; frame < count; frame += 1) {
-      const { detail } = quality;
-      const ended = now + cost(detail, frame);
-      shares.push(detail);
-      quality.drew(now, ended);
-      now = ended + gap;
+      const share = controller.quality;
+      const endMs = now + cost(share, frame);
+      shares.push(share);
+      controller.recordFrame(now, endMs);
+      now = endMs + gap;
     }
   };
   return { frames, shares, rest: (ms: number) => (now += ms) };
@@ -43,8 +43,8 @@ for (const [what, cost] of [
   ['at 30 Hz', 1000 / 30],
 ] as const) {
   test(`frames in time are drawn in full: ${what}`, () => {
-    const quality = new Quality();
-    const { frames, shares } = motion(quality);
+    const controller = new QualityController();
+    const { frames, shares } = animate(controller);
     frames(1000, (_, frame) => cost + 2 * noise(frame));
     assert.deepEqual(new Set(shares), new Set([1]));
   });
@@ -57,8 +57,8 @@ for (const [full, share] of [
   [1000, 1 / 4],
 ] as const) {
   test(`frames of ${full} ms are drawn by ${share} within a dozen`, () => {
-    const quality = new Quality();
-    const { frames, shares } = motion(quality);
+    const controller = new QualityController();
+    const { frames, shares } = animate(controller);
     frames(100, linear(full));
     assert.deepEqual(new Set(shares.slice(12)), new Set([share]));
     assert.equal(changes(shares), 1, 'at once');
@@ -66,17 +66,17 @@ for (const [full, share] of [
 }
 
 test('hiccups change nothing', () => {
-  const quality = new Quality();
-  const { frames, shares } = motion(quality);
+  const controller = new QualityController();
+  const { frames, shares } = animate(controller);
   frames(1000, (_, frame) => (frame % 7 < 3 ? 300 : 20));
   assert.deepEqual(new Set(shares), new Set([1]));
 });
 
 test('detail is back once there is time again, step by step', () => {
-  const quality = new Quality();
-  const { frames, shares } = motion(quality);
+  const controller = new QualityController();
+  const { frames, shares } = animate(controller);
   frames(20, linear(120));
-  assert.equal(quality.detail, 1 / 4);
+  assert.equal(controller.quality, 1 / 4);
   shares.length = 0;
   frames(100, linear(16));
   assert.deepEqual([...new Set(shares)], [1 / 4, 1 / 2, 1]);
@@ -84,28 +84,28 @@ test('detail is back once there is time again, step by step', () => {
 });
 
 test('detail is back also where a display shows frames no sooner', () => {
-  const quality = new Quality();
-  const { frames } = motion(quality);
+  const controller = new QualityController();
+  const { frames } = animate(controller);
   frames(20, shownAt(60, linear(120)));
-  assert.equal(quality.detail, 1 / 4);
+  assert.equal(controller.quality, 1 / 4);
   frames(100, shownAt(60, linear(16)));
-  assert.equal(quality.detail, 1);
+  assert.equal(controller.quality, 1);
 });
 
 test('detail is back in the end where it could not be expected to fit', () => {
-  const quality = new Quality();
-  const { frames } = motion(quality);
+  const controller = new QualityController();
+  const { frames } = animate(controller);
   frames(20, shownAt(30, linear(120)));
-  assert.equal(quality.detail, 1 / 4);
+  assert.equal(controller.quality, 1 / 4);
   frames(1500, shownAt(30, linear(30)));
-  assert.equal(quality.detail, 1);
+  assert.equal(controller.quality, 1);
 });
 
 for (const full of [42, 48, 60, 75, 85, 100, 130]) {
   test(`what lies between two steps does not go to and fro: ${full} ms`, () => {
     for (const hertz of [60, 144, 1e6]) {
-      const quality = new Quality();
-      const { frames, shares } = motion(quality);
+      const controller = new QualityController();
+      const { frames, shares } = animate(controller);
       const shown = shownAt(hertz, linear(full));
       frames(1000, (share, frame) => shown(share) * (1 + 0.1 * noise(frame)));
       // Down, and at most two tries of more.
@@ -117,8 +117,8 @@ for (const full of [42, 48, 60, 75, 85, 100, 130]) {
 }
 
 test('where more is expected to fit and does not, tries become rare', () => {
-  const quality = new Quality();
-  const { frames, shares } = motion(quality);
+  const controller = new QualityController();
+  const { frames, shares } = animate(controller);
   // Half of them take next to nothing: 60 Hz promises what full detail does not hold.
   frames(10_000, (share) => (share === 1 ? 60 : 1000 / 60));
   const tries = (changes(shares) - 1) / 2;
@@ -128,8 +128,8 @@ test('where more is expected to fit and does not, tries become rare', () => {
 
 test('a page that is slow by itself is left in full detail', () => {
   for (const cost of [45, 100]) {
-    const quality = new Quality();
-    const { frames, shares } = motion(quality);
+    const controller = new QualityController();
+    const { frames, shares } = animate(controller);
     frames(10_000, (_, frame) => cost + noise(frame));
     const less = shares.filter((share) => share < 1).length;
     assert.ok(less > 0 && less <= 5 * 7, `${less} frames in less detail`);
@@ -138,28 +138,28 @@ test('a page that is slow by itself is left in full detail', () => {
 });
 
 test('a page that is slow by itself is not taken for one that is slow ever after', () => {
-  const quality = new Quality();
-  const { frames } = motion(quality);
+  const controller = new QualityController();
+  const { frames } = animate(controller);
   frames(20, () => 60);
-  assert.equal(quality.detail, 1);
+  assert.equal(controller.quality, 1);
   frames(1100, linear(60));
-  assert.equal(quality.detail, 1 / 2);
+  assert.equal(controller.quality, 1 / 2);
 });
 
 test('a page that is slow by itself is found out, whatever happened when less was tried', () => {
-  const quality = new Quality();
-  const { frames } = motion(quality);
+  const controller = new QualityController();
+  const { frames } = animate(controller);
   // Something else kept it busy just before.
   frames(8, () => 250);
   frames(100, () => 100);
-  assert.equal(quality.detail, 1 / 4);
+  assert.equal(controller.quality, 1 / 4);
   frames(600, () => 100);
-  assert.equal(quality.detail, 1);
+  assert.equal(controller.quality, 1);
 });
 
 test('frames that are late even by the least are drawn by that', () => {
-  const quality = new Quality();
-  const { frames, shares } = motion(quality);
+  const controller = new QualityController();
+  const { frames, shares } = animate(controller);
   frames(3000, linear(400));
   const more = shares.slice(12).filter((share) => share > 1 / 4).length;
   assert.ok(more <= 2 * 7, `${more} frames in more detail`);
@@ -167,16 +167,16 @@ test('frames that are late even by the least are drawn by that', () => {
 
 test('the time between motions, and between frames of a slow film, is not a frame’s', () => {
   for (const gap of [30, 90, 150, 500]) {
-    const quality = new Quality();
-    const { frames, shares } = motion(quality);
+    const controller = new QualityController();
+    const { frames, shares } = animate(controller);
     frames(300, () => 1000 / 60, gap);
     assert.deepEqual(new Set(shares), new Set([1]), `gaps of ${gap} ms`);
   }
 });
 
 test('motions part at a pause, and the first frame of each does not count', () => {
-  const quality = new Quality();
-  const { frames, shares, rest } = motion(quality);
+  const controller = new QualityController();
+  const { frames, shares, rest } = animate(controller);
   for (let stroke = 0; stroke < 50; stroke += 1) {
     // A device that wakes up.
     frames(30, (_, frame) => (frame === 0 ? 200 : 16));
@@ -190,19 +190,19 @@ test('motions of one frame each tell nothing', () => {
     [99, 1 / 2],
     [101, 1],
   ] as const) {
-    const quality = new Quality();
-    motion(quality).frames(50, linear(60), gap);
-    assert.equal(quality.detail, share, `gaps of ${gap} ms`);
+    const controller = new QualityController();
+    animate(controller).frames(50, linear(60), gap);
+    assert.equal(controller.quality, share, `gaps of ${gap} ms`);
   }
 });
 
 test('what was learnt in short motions holds for the next', () => {
-  const quality = new Quality();
-  const { frames, shares, rest } = motion(quality);
+  const controller = new QualityController();
+  const { frames, shares, rest } = animate(controller);
   for (let stroke = 0; stroke < 10; stroke += 1) {
     frames(4, linear(150));
     rest(2000);
   }
-  assert.equal(quality.detail, 1 / 4);
+  assert.equal(controller.quality, 1 / 4);
   assert.equal(changes(shares), 1);
 });

@@ -1,17 +1,16 @@
-/** Settings that tests share. */
+/** Settings for tests. */
 
 import type { OutputSettings } from '../engine/output-settings.js';
 import type { Backend } from '../engine/types.js';
-import type { RenderOptions } from '../renderers/types.js';
+import type { RenderOptions } from './types.js';
 
-/** A photograph shown as taken. */
 export const PLAIN: OutputSettings = { exposure: 1, whiteBalance: [1, 1, 1], tone: 'clip' };
 
-export function exposed(exposure: number): OutputSettings {
+export function withExposure(exposure: number): OutputSettings {
   return { ...PLAIN, exposure };
 }
 
-/** Back ends that were named. */
-export function wanting(backends: readonly Backend[]): RenderOptions {
+/** The options of a page that names its backends. */
+export function withBackends(backends: readonly Backend[]): RenderOptions {
   return { backends, software: true, gamut: 'srgb' };
 }

@@ -1,0 +1,71 @@
+/** The worker's side of `shared/worker-client.ts`, and how the page starts a worker. */
+
+import { messageOf } from '../shared/errors.js';
+import type { WorkerRequest, WorkerResponse } from '../shared/worker-client.js';
+import { moduleFolder, setModuleFolder } from './wasm-loader.js';
+
+/** The first message to a worker. */
+interface StartMessage {
+  /** The folder of the WebAssembly modules; `null` if they lie beside the worker. */
+  readonly modules: string | null;
+}
+
+/** What a worker serves once it has started. */
+export interface Service<Task, Ready, Result> {
+  /** Sent to the page with the news that the worker has started. */
+  readonly ready: Ready;
+  /** Does one task; gives its result and the buffers to transfer with it. */
+  handle(task: Task): readonly [Result, Transferable[]];
+}
+
+/** The part of a worker's global scope that is used; the compiler knows only that of pages. */
+interface WorkerScope {
+  onmessage: ((event: MessageEvent) => void) | null;
+  postMessage(message: unknown, transfer?: Transferable[]): void;
+}
+
+/**
+ * Starts a worker; `null` if the page may not have it. `create` calls `new Worker` itself, with the
+ * address written out, because bundlers look for exactly that form.
+ */
+export function startWorker(create: () => Worker): Worker | null {
+  try {
+    const worker = create();
+    worker.postMessage({ modules: moduleFolder() } satisfies StartMessage);
+    return worker;
+  } catch {
+    return null;
+  }
+}
+
+/** Runs in a worker: sets a service up, and answers the page's requests with it. */
+export function serve<Task, Ready, Result>(
+  setUp: () => Promise<Service<Task, Ready, Result>>,
+): void {
+  const scope = globalThis as unknown as WorkerScope;
+  const send = (message: WorkerResponse<Ready, Result>, transfer: Transferable[] = []): void =>
+    scope.postMessage(message, transfer);
+  const fail = (thrown: unknown): void => send({ kind: 'failed', message: messageOf(thrown) });
+  const answer = (service: Service<Task, Ready, Result>, request: WorkerRequest<Task>): void => {
+    try {
+      const [result, transfer] = service.handle(request.task);
+      send({ kind: 'done', id: request.id, result }, transfer);
+    } catch (thrown) {
+      fail(thrown);
+    }
+  };
+  const start = async ({ modules }: StartMessage): Promise<void> => {
+    try {
+      setModuleFolder(modules);
+      const service = await setUp();
+      scope.onmessage = ({ data }) => answer(service, data);
+      send({ kind: 'ready', ready: service.ready });
+    } catch (thrown) {
+      fail(thrown);
+    }
+  };
+  scope.onmessage = ({ data }) => {
+    scope.onmessage = null;
+    void start(data);
+  };
+}

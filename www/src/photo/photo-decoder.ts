@@ -1,0 +1,36 @@
+/** The interface of the decoders. */
+
+import type { ByteRange } from '../shared/byte-range.js';
+import type { Photograph } from './photograph.js';
+
+/** The progress of a decoder. */
+export interface DecoderState {
+  /** Bytes of the file that were fed; repeated ones count once. */
+  readonly bytesFed: number;
+  readonly fileBytes: number | undefined;
+  /** Scans that are complete for every tile. */
+  readonly scansDone: number;
+  /** The range to feed next; `undefined` once the file is complete. */
+  readonly next: ByteRange | undefined;
+}
+
+/** Lets the page draw and handle input. Throws if the load was cancelled meanwhile. */
+export type YieldToPage = () => Promise<void>;
+
+/** Decodes one file, on the page's thread or in a worker. */
+export interface PhotoDecoder {
+  readonly state: DecoderState;
+  /** Feeds bytes of the file that begin at `offset`. Bytes of one range must come in order. */
+  feed(offset: number, bytes: Uint8Array, yieldToPage: YieldToPage): Promise<void>;
+  /** A coarser photograph from the bytes so far; `null` if they do not suffice. */
+  preview(): Promise<Photograph | null>;
+  /** The photograph. Ends the decoder, also if it rejects. */
+  finish(): Promise<Photograph>;
+  /** Ends the decoder without waiting for what it is doing. Does nothing if it has ended. */
+  free(): void;
+}
+
+/** The share of a file that was fed, 0 to 1. */
+export function completenessOf({ bytesFed, fileBytes }: DecoderState): number {
+  return fileBytes ? Math.min(1, bytesFed / fileBytes) : 0;
+}

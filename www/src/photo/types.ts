@@ -1,0 +1,64 @@
+/** The data of a photograph outside a WebAssembly module, and the workers that may hold its tiles. */
+
+import type { DecodedPhoto } from '../engine/types.js';
+import type { PhotoError } from '../shared/errors.js';
+
+/** A tile on its way between two modules. */
+export type TileBytes = Uint8Array<ArrayBuffer>;
+
+/** What the file's index says about a photograph. */
+export interface PhotoInfo {
+  /** The picture's width in pixels. */
+  readonly width: number;
+  /** The picture's height in pixels. */
+  readonly height: number;
+  /** The light plane's width in light elements. */
+  readonly lightWidth: number;
+  /** The light plane's height in light elements. */
+  readonly lightHeight: number;
+  /** Memory that the decoded light transport matrix takes, in bytes. */
+  readonly decodedBytes: number;
+  /** The file's metadata, a JSON object. */
+  readonly metadata: unknown;
+}
+
+/** A photograph without its tiles: what a module needs to create it. */
+export interface PhotoDescriptor extends Omit<PhotoInfo, 'metadata'> {
+  /** JSON text. */
+  readonly metadata: string;
+  /** Number of tiles, which are numbered row by row. */
+  readonly tiles: number;
+  /** Camera pixels along a tile's side; tiles at the right and lower edges may be smaller. */
+  readonly tileSide: number;
+  readonly geometry: Float64Array;
+  readonly basis: Float32Array;
+}
+
+/** The descriptor of a photograph in the decoder's module. */
+export function describePhoto(photo: DecodedPhoto): PhotoDescriptor {
+  const { width, height, lightWidth, lightHeight, decodedBytes, metadata, tiles, tileSide } = photo;
+  const [geometry, basis] = [photo.geometryParcel(), photo.basisParcel()];
+  const info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
+  return { ...info, tiles, tileSide, geometry, basis };
+}
+
+/** One photograph's tiles in workers. */
+export interface TileSession {
+  /** Why the tiles are lost; `null` while the workers are alive. */
+  readonly failure: PhotoError | null;
+  /** The indices of the tiles that each worker takes. */
+  readonly tiles: readonly (readonly number[])[];
+  /** Moves a tile to its worker. If that fails before it is sent, `bytes` are still there. */
+  put(index: number, bytes: TileBytes): Promise<void>;
+  /** Moves a tile back. */
+  take(index: number): Promise<TileBytes>;
+  /** Prepares relighting, once all tiles are there. */
+  plan(): Promise<void>;
+  end(): void;
+}
+
+/** Workers that keep tiles and relight them. */
+export interface TileWorkers<S extends TileSession> {
+  /** Rejects with `worker-unavailable`. */
+  open(photo: PhotoDescriptor): Promise<S>;
+}

@@ -1,0 +1,58 @@
+/** A backend in use for one photograph, and the photograph's reference count. */
+
+import type { Backend, Freeable } from '../engine/types.js';
+import type { Photograph } from '../photo/photograph.js';
+import type { Renderer, RenderOptions } from '../renderers/types.js';
+import type { Deferred } from '../shared/promises.js';
+import { QualityController } from './quality-controller.js';
+
+/** An object that is freed when its last user releases it. The creator is its first user. */
+export class RefCounted<T extends Freeable> {
+  readonly value: T;
+  #users = 1;
+
+  constructor(value: T) {
+    this.value = value;
+  }
+
+  retain(): this {
+    this.#users += 1;
+    return this;
+  }
+
+  release(): void {
+    this.#users -= 1;
+    if (this.#users === 0) this.value.free();
+  }
+}
+
+/** A renderer with its state. */
+export class ActiveBackend<R extends Renderer> {
+  readonly quality = new QualityController();
+  hasDrawn = false;
+  /** Why the backend stopped working; `null` while it works. */
+  lossReason: string | null = null;
+  /** Resolves when the frame in progress ends; `null` if there is none. */
+  frame: Deferred | null = null;
+  #isFreed = false;
+
+  constructor(
+    readonly backend: Backend,
+    readonly options: RenderOptions,
+    readonly renderer: R,
+    readonly photo: RefCounted<Photograph>,
+  ) {
+    photo.retain();
+  }
+
+  get isFreed(): boolean {
+    return this.#isFreed;
+  }
+
+  free(): void {
+    if (this.#isFreed) return;
+    this.#isFreed = true;
+    this.renderer.free();
+    this.photo.release();
+  }
+}

@@ -1,0 +1,242 @@
+/**
+ * Finds a backend for a photograph and replaces it when it is lost. There is at most one search at a
+ * time: a new one cancels the last, whose result is freed when it comes. The picture of the last backend
+ * stays until the new one has drawn a frame.
+ */
+
+import type { Backend } from '../engine/types.js';
+import type { Photograph } from '../photo/photograph.js';
+import type { Renderer, RenderOptions } from '../renderers/types.js';
+import { joinSentences, PhotoError, toPhotoError } from '../shared/errors.js';
+import { Deferred } from '../shared/promises.js';
+import { ActiveBackend, type RefCounted } from './active-backend.js';
+import { BACKEND_TITLES, backendsAfter, backendsFrom, firstWorking } from './backends.js';
+import type { SessionListener, SessionPorts } from './types.js';
+
+/** What a selector reports: to the page, and to the session that draws. */
+export interface SelectorEvents<R extends Renderer>
+  extends Pick<SessionListener<R>, 'backendChanged' | 'backendLost' | 'failed'> {
+  /** A search has ended with a backend that works. */
+  selected(): void;
+  /** The photograph lost tiles and must be fetched again. */
+  photoLost(reason: string): void;
+}
+
+/** A search, which ends also when it is cancelled. */
+class BackendSearch extends Deferred {
+  readonly #abort = new AbortController();
+
+  get signal(): AbortSignal {
+    return this.#abort.signal;
+  }
+
+  cancel(): void {
+    this.#abort.abort();
+    this.resolve();
+  }
+}
+
+export class BackendSelector<R extends Renderer> {
+  /** The options with which a lost backend is replaced. */
+  options: RenderOptions | null = null;
+  readonly #createRenderer: SessionPorts<R>['createRenderer'];
+  readonly #events: SelectorEvents<R>;
+  #active: ActiveBackend<R> | null = null;
+  /** On the screen until `#active` has drawn. */
+  #outgoing: ActiveBackend<R> | null = null;
+  #search: BackendSearch | null = null;
+  /** The photograph of the last search. */
+  #photo: RefCounted<Photograph> | null = null;
+
+  constructor(createRenderer: SessionPorts<R>['createRenderer'], events: SelectorEvents<R>) {
+    this.#createRenderer = createRenderer;
+    this.#events = events;
+  }
+
+  get active(): ActiveBackend<R> | null {
+    return this.#active;
+  }
+
+  /** Resolves when the search in progress ends; `null` if there is none. */
+  get search(): Promise<void> | null {
+    return this.#search?.promise ?? null;
+  }
+
+  /**
+   * Puts the first of `options.backends` that works in the place of the backend `previous`. `reason` says
+   * why that one is replaced; empty if only the options have changed.
+   */
+  async select(
+    photo: RefCounted<Photograph>,
+    options: RenderOptions,
+    previous: Backend | null,
+    reason: string,
+  ): Promise<void> {
+    this.#search?.cancel();
+    const search = new BackendSearch();
+    const { signal } = search;
+    this.#search = search;
+    this.#photo = photo;
+    // An attempt reads the photograph until it ends, even after the search was cancelled.
+    photo.retain();
+    try {
+      const working = await firstWorking(
+        options.backends,
+        (backend) => this.#attempt(backend, options, photo, signal),
+        () => signal.throwIfAborted(),
+      );
+      signal.throwIfAborted();
+      this.#search = null;
+      this.#use(working.value, options, previous, [reason, working.reason]);
+    } catch (thrown) {
+      if (signal.aborted) return;
+      this.#search = null;
+      // A preview needs no error: the search for the whole photograph reports the same.
+      if (!photo.value.isComplete) {
+        if (this.#active?.isFreed) this.#active = null;
+        return;
+      }
+      this.drop();
+      const { code, message } = toPhotoError(thrown);
+      this.#events.failed(new PhotoError(code, joinSentences([reason, message]), thrown));
+    } finally {
+      search.resolve();
+      photo.release();
+    }
+  }
+
+  /**
+   * A backend stopped working. It is set up again, or replaced by the next one if it never drew a frame.
+   * A search in progress goes on instead.
+   */
+  lose(lost: ActiveBackend<R>, reason: string): void {
+    const isReported = lost.lossReason !== null;
+    lost.lossReason ??= reason;
+    if (this.#active !== lost) return;
+    if (!isReported) this.#events.backendLost(lost.backend, reason);
+    if (!this.#search && this.options) this.#replace(lost, this.options, lost.backend, '');
+  }
+
+  /** The active backend has drawn its first frame. */
+  freeOutgoing(): void {
+    this.#outgoing?.free();
+    this.#outgoing = null;
+  }
+
+  /** Frees the backends, but not a search in progress. */
+  drop(): void {
+    this.#active?.free();
+    this.#active = null;
+    this.freeOutgoing();
+  }
+
+  /** Frees the backends and cancels the search. */
+  release(): void {
+    this.#search?.cancel();
+    this.#search = null;
+    this.drop();
+  }
+
+  #use(
+    found: ActiveBackend<R>,
+    options: RenderOptions,
+    previous: Backend | null,
+    reasons: readonly string[],
+  ): void {
+    const last = this.#active;
+    const isReplacement = reasons[0] !== '' || (last !== null && last.lossReason !== null);
+    if (found !== last) {
+      this.#active = found;
+      if (last?.hasDrawn && last.lossReason === null) this.#outgoing = last;
+      else last?.free();
+    }
+    const reason = joinSentences([...reasons, found.renderer.warning]);
+    if (found.lossReason !== null) {
+      this.#replace(found, options, previous, reason);
+      return;
+    }
+    // The same backend with another gamut is no change.
+    if (found !== last && (found.backend !== previous || isReplacement)) {
+      this.#events.backendChanged(found.backend, previous, reason);
+    }
+    this.#events.selected();
+  }
+
+  #replace(
+    { backend, hasDrawn, lossReason }: ActiveBackend<R>,
+    options: RenderOptions,
+    previous: Backend | null,
+    reasonBefore: string,
+  ): void {
+    const reason = joinSentences([
+      reasonBefore,
+      `${BACKEND_TITLES[backend]} was lost: ${lossReason}`,
+    ]);
+    const backends = (hasDrawn ? backendsFrom : backendsAfter)(options.backends, backend);
+    this.drop();
+    if (this.#photo && backends.length > 0) {
+      void this.select(this.#photo, { ...options, backends }, previous, reason);
+      return;
+    }
+    const message = `${reason} No other backend is left to try. Reload the page.`;
+    this.#events.failed(new PhotoError('backend-lost', message));
+  }
+
+  /** Sets a backend up, unless the active one already meets the options. */
+  async #attempt(
+    backend: Backend,
+    options: RenderOptions,
+    photo: RefCounted<Photograph>,
+    signal: AbortSignal,
+  ): Promise<ActiveBackend<R>> {
+    const active = this.#active;
+    if (active?.photo === photo && active.lossReason === null && meets(active, backend, options)) {
+      return active;
+    }
+    let created: ActiveBackend<R> | null = null;
+    let earlyLoss: string | null = null;
+    const onLost = (reason: string): void => {
+      if (created) this.lose(created, reason);
+      else earlyLoss ??= reason;
+    };
+    const renderer = await this.#createRenderer(
+      backend,
+      photo.value,
+      options,
+      onLost,
+      signal,
+    ).catch((thrown: unknown) => {
+      // The loss explains every other error.
+      if (earlyLoss !== null) throw lostInSetUp(earlyLoss, thrown);
+      const error = toPhotoError(thrown);
+      // No other backend could use this photograph either; fetching it again ends the search.
+      if (error.code === 'photo-lost' && !signal.aborted && photo.value.isComplete) {
+        this.#events.photoLost(error.message);
+      }
+      throw error;
+    });
+    if (signal.aborted || earlyLoss !== null) renderer.free();
+    signal.throwIfAborted();
+    if (earlyLoss !== null) throw lostInSetUp(earlyLoss);
+    created = new ActiveBackend(backend, options, renderer, photo);
+    return created;
+  }
+}
+
+function meets<R extends Renderer>(
+  active: ActiveBackend<R>,
+  backend: Backend,
+  { gamut, software }: RenderOptions,
+): boolean {
+  return (
+    active.backend === backend &&
+    active.options.gamut === gamut &&
+    // A device that was allowed to be a software renderer may be one.
+    (backend === 'cpu' || software || !active.options.software)
+  );
+}
+
+function lostInSetUp(reason: string, cause?: unknown): PhotoError {
+  const message = `it was lost while it was being set up: ${reason}`;
+  return new PhotoError('backend-lost', message, cause);
+}

@@ -1,0 +1,146 @@
+/**
+ * Chooses the quality of an animation's frames, so that they keep a rate of 30 a second. It learns only
+ * from the begin and end of frames; it has no clock.
+ *
+ * Every wait is counted in frames of animations, because other frames teach nothing.
+ */
+
+/** The shares of the components to choose from. Half of the components take at best half of the time. */
+const QUALITY_LEVELS = [1, 1 / 2, 1 / 4] as const;
+const MAX_LEVEL = QUALITY_LEVELS.length - 1;
+const FRAME_BUDGET_MS = 1000 / 30;
+/** Longer frames are slow. Above the budget, because a display of 30 Hz shows no frame sooner. */
+const SLOW_FRAME_MS = 1.2 * FRAME_BUDGET_MS;
+/**
+ * Quality rises if frames are expected to take at most this long. Two frames of a 60 Hz display must
+ * fit, because such a display shows no frame sooner.
+ */
+const MAX_EXPECTED_MS = 1.1 * FRAME_BUDGET_MS;
+/** Frames per decision, which uses their median: up to half of them may be outliers. */
+const WINDOW_FRAMES = 7;
+/** A frame that begins later than this after the last one belongs to another animation. */
+const MAX_GAP_MS = 100;
+
+/** Frames before a higher quality is tried; doubles after each failure. */
+const RAISE_DELAY_FRAMES = 30;
+const MAX_RAISE_DELAY_FRAMES = 64 * RAISE_DELAY_FRAMES;
+/** Factor on that delay if the higher quality is not expected to fit; what slowed it may be over. */
+const UNLIKELY_RAISE_FACTOR = 20;
+/** A raise that lasts this many frames was no failure. */
+const MIN_LASTING_FRAMES = 150;
+/** Frames before a lower quality is tried again after it did not help; doubles each time. */
+const DROP_DELAY_FRAMES = 1000;
+const MAX_DROP_DELAY_FRAMES = 64 * DROP_DELAY_FRAMES;
+/** The least that a lower quality must save, relative to a saving in proportion to the components. */
+const MIN_SAVING = 1 / 4;
+
+/** The level and the median frame time before the quality was lowered. */
+interface Drop {
+  readonly level: number;
+  readonly ms: number;
+}
+
+/** For one photograph on one backend: frame times of others say nothing about it. */
+export class QualityController {
+  /** Index of the current quality in `QUALITY_LEVELS`. */
+  #level = 0;
+  /** Durations of the last frames at this level. */
+  #durations: number[] = [];
+  #lastEndMs = Number.NEGATIVE_INFINITY;
+  #frames = 0;
+  #changedAtFrame = 0;
+  #raisedAtFrame = Number.NEGATIVE_INFINITY;
+  #raiseDelay = RAISE_DELAY_FRAMES;
+  /** The last drop, until its effect is known. */
+  #drop: Drop | null = null;
+  #noDropBeforeFrame = 0;
+  #dropDelay = DROP_DELAY_FRAMES;
+
+  /** The share of the components for the next frame of an animation. */
+  get quality(): number {
+    return qualityAt(this.#level);
+  }
+
+  /**
+   * Records a frame of an animation. `endMs` is when the next frame could have begun, whether or not one
+   * was due.
+   */
+  recordFrame(startMs: number, endMs: number): void {
+    const isContinued = startMs - this.#lastEndMs <= MAX_GAP_MS;
+    this.#lastEndMs = endMs;
+    // The first frame of an animation includes the device's wake-up.
+    if (!isContinued) return;
+    this.#frames += 1;
+    this.#durations.push(endMs - startMs);
+    if (this.#durations.length < WINDOW_FRAMES) return;
+    this.#decide(median(this.#durations));
+    if (this.#durations.length === WINDOW_FRAMES) this.#durations.shift();
+  }
+
+  #decide(ms: number): void {
+    const drop = this.#drop;
+    this.#drop = null;
+    if (drop && !this.#hasHelped(drop, ms)) this.#undoDrop();
+    else if (ms > SLOW_FRAME_MS && this.#canLower) this.#lower(ms);
+    else this.#raiseIfDue(ms);
+  }
+
+  get #canLower(): boolean {
+    return this.#level < MAX_LEVEL && this.#frames >= this.#noDropBeforeFrame;
+  }
+
+  /** A lower quality does not help if the page itself is slow, or its display. */
+  #hasHelped(drop: Drop, ms: number): boolean {
+    const idealSaving = 1 - this.quality / qualityAt(drop.level);
+    return ms <= drop.ms * (1 - MIN_SAVING * idealSaving);
+  }
+
+  /** If frames are slow anyway, they can as well have full quality. */
+  #undoDrop(): void {
+    this.#noDropBeforeFrame = this.#frames + this.#dropDelay;
+    this.#dropDelay = Math.min(2 * this.#dropDelay, MAX_DROP_DELAY_FRAMES);
+    this.#setLevel(0);
+  }
+
+  /** Goes to the first level that is expected to fit. */
+  #lower(ms: number): void {
+    const isFailedRaise = this.#frames - this.#raisedAtFrame < MIN_LASTING_FRAMES;
+    this.#raiseDelay = isFailedRaise
+      ? Math.min(2 * this.#raiseDelay, MAX_RAISE_DELAY_FRAMES)
+      : RAISE_DELAY_FRAMES;
+    this.#drop = { level: this.#level, ms };
+    let level = this.#level + 1;
+    while (level < MAX_LEVEL && this.#expectedMs(ms, level) > FRAME_BUDGET_MS) level += 1;
+    this.#setLevel(level);
+  }
+
+  /** Rarely, it also tries a level that is not expected to fit. */
+  #raiseIfDue(ms: number): void {
+    if (this.#level === 0) return;
+    const level = this.#level - 1;
+    const isLikely = this.#expectedMs(ms, level) <= MAX_EXPECTED_MS;
+    const delay = isLikely ? this.#raiseDelay : UNLIKELY_RAISE_FACTOR * this.#raiseDelay;
+    if (this.#frames - this.#changedAtFrame < delay) return;
+    this.#raisedAtFrame = this.#frames;
+    this.#setLevel(level);
+  }
+
+  /** The duration at another level, if it is proportional to the number of components. */
+  #expectedMs(ms: number, level: number): number {
+    return (ms * qualityAt(level)) / this.quality;
+  }
+
+  #setLevel(level: number): void {
+    this.#level = level;
+    this.#changedAtFrame = this.#frames;
+    this.#durations = [];
+  }
+}
+
+function qualityAt(level: number): number {
+  return QUALITY_LEVELS[level] as number;
+}
+
+function median(values: readonly number[]): number {
+  return [...values].sort((a, b) => a - b)[values.length >> 1] as number;
+}

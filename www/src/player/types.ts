@@ -1,0 +1,75 @@
+/** What a photo session needs from its surroundings, and what it reports to the element. */
+
+import type { OutputSettings } from '../engine/output-settings.js';
+import type { Backend } from '../engine/types.js';
+import type { LightSetting } from '../lights/light-setting.js';
+import type { OnPreview, OnProgress } from '../loading/load.js';
+import type { Photograph } from '../photo/photograph.js';
+import type { FrameResult, Renderer, RenderOptions } from '../renderers/types.js';
+import type { PhotoError } from '../shared/errors.js';
+
+/** Everything that the element's attributes and the visitor decide. */
+export interface SessionSettings {
+  /** Absolute address; `null` if there is none. */
+  readonly src: string | null;
+  readonly credentials: RequestCredentials;
+  readonly renderOptions: RenderOptions;
+  readonly light: LightSetting;
+  readonly output: OutputSettings;
+}
+
+/** The browser's clock and frames. */
+export interface FramePorts {
+  /** Calls back before the browser draws its next frame. */
+  nextFrame(callback: () => void): void;
+  /** Calls back once after `ms` milliseconds. The returned function cancels it. */
+  later(ms: number, callback: () => void): () => void;
+  /** Milliseconds, from any start. */
+  now(): number;
+}
+
+/** Loading and drawing; tests replace them. */
+export interface SessionPorts<R extends Renderer> extends FramePorts {
+  open(
+    src: string,
+    credentials: RequestCredentials,
+    signal: AbortSignal,
+    onProgress: OnProgress,
+    onPreview: OnPreview | null,
+  ): Promise<Photograph>;
+  /** Warms up the backend that will probably be used, until `signal` is aborted. */
+  prepare(options: RenderOptions, signal: AbortSignal): void;
+  /**
+   * Creates a renderer with a surface of its own. It may stop early once `signal` is aborted. Calls
+   * `onLost` at most once. Rejects with `backend-unavailable` or `photo-lost`.
+   */
+  createRenderer(
+    backend: Backend,
+    photo: Photograph,
+    options: RenderOptions,
+    onLost: (reason: string) => void,
+    signal: AbortSignal,
+  ): Promise<R>;
+}
+
+/** What a session reports. */
+export interface SessionListener<R extends Renderer> {
+  /** A load starts; the last photograph is gone. */
+  loadStarted(): void;
+  progress: OnProgress;
+  /** A new renderer has drawn its first frame: its surface replaces the last one. */
+  rendererChanged(renderer: R): void;
+  /** A frame was drawn; `light` is the light that was requested for it. */
+  frameDrawn(frame: FrameResult, light: LightSetting): void;
+  /** That frame has another quality than the last one. The first frame is compared with 1. */
+  qualityChanged(quality: number): void;
+  /** The whole photograph was drawn for the first time since it was fetched. */
+  loaded(): void;
+  /** Another backend is in use, or the same one again after a loss. */
+  backendChanged(backend: Backend, previous: Backend | null, reason: string): void;
+  /** The backend in use stopped working. */
+  backendLost(backend: Backend, reason: string): void;
+  failed(error: PhotoError): void;
+  /** A frame was drawn after a failure. */
+  recovered(): void;
+}

@@ -1,0 +1,161 @@
+/** A photograph in the worker pool: moves its tiles and relights it, one row range in each worker. */
+
+import type { Light } from '../../engine/types.js';
+import type { PhotoDescriptor, TileBytes, TileSession } from '../../photo/types.js';
+import { type PhotoError, photoReleased } from '../../shared/errors.js';
+import { allSettledOrThrow } from '../../shared/promises.js';
+import type { WorkerClient } from '../../shared/worker-client.js';
+import type { FrameSettings, RelightTask, RowRange, RowTask } from './protocol.js';
+import type { TileRowRange } from './row-ranges.js';
+
+type RelightClient = WorkerClient<RelightTask, string, ArrayBuffer>;
+
+/** Rows of a picture. */
+export interface RowPixels extends RowRange {
+  /** RGBA, row by row. */
+  readonly pixels: ArrayBuffer;
+}
+
+/** What a session reports to its pool. */
+interface PoolSessionEvents {
+  frameDrawn(): void;
+  ended(): void;
+}
+
+/** One worker's part of the photograph. */
+interface WorkerPart {
+  readonly client: RelightClient;
+  readonly range: TileRowRange;
+  /** The light rows that it needs. */
+  lightRows: readonly [first: number, end: number];
+  /** The light that it has; `null` if none. */
+  light: Light | null;
+  /** Memory for its pixels; `null` while the worker has it. */
+  pixels: ArrayBuffer | null;
+}
+
+export class PoolSession implements TileSession {
+  /** What the workers compute with: `simd128` or `scalar`. */
+  readonly kernel: string;
+  readonly #photo: number;
+  readonly #width: number;
+  readonly #parts: readonly WorkerPart[];
+  readonly #events: PoolSessionEvents;
+  /** Whether the workers know their light rows; false while tiles are moved. */
+  #isPlanned = false;
+  #hasEnded = false;
+
+  constructor(
+    photo: number,
+    { width, geometry, basis }: PhotoDescriptor,
+    clients: readonly RelightClient[],
+    ranges: readonly TileRowRange[],
+    kernel: string,
+    events: PoolSessionEvents,
+  ) {
+    this.kernel = kernel;
+    this.#photo = photo;
+    this.#width = width;
+    this.#events = events;
+    this.#parts = ranges.map((range, i) => {
+      const client = clients[i] as RelightClient;
+      return { client, range, lightRows: [0, 0], light: null, pixels: null };
+    });
+    for (const { client, range } of this.#parts) {
+      const { firstRow, rows } = range;
+      // If this fails, the next request fails too.
+      this.#request(client, { kind: 'open', geometry, basis, firstRow, rows }).catch(() => {});
+    }
+  }
+
+  /** The number of workers. */
+  get size(): number {
+    return this.#parts.length;
+  }
+
+  /** The failure of a worker, with which its tiles are lost. */
+  get failure(): PhotoError | null {
+    return this.#parts.find(({ client }) => client.failure)?.client.failure ?? null;
+  }
+
+  get tiles(): number[][] {
+    return this.#parts.map(({ range: { firstTile, endTile } }) =>
+      Array.from({ length: endTile - firstTile }, (_, i) => firstTile + i),
+    );
+  }
+
+  async put(index: number, bytes: TileBytes): Promise<void> {
+    this.#isPlanned = false;
+    await this.#request(this.#clientOf(index), { kind: 'put', index, bytes }, [bytes.buffer]);
+  }
+
+  async take(index: number): Promise<TileBytes> {
+    this.#isPlanned = false;
+    return new Uint8Array(await this.#request(this.#clientOf(index), { kind: 'take', index }));
+  }
+
+  async plan(): Promise<void> {
+    if (this.#isPlanned) return;
+    await allSettledOrThrow(
+      this.#parts.map(async (part) => {
+        part.light = null;
+        const rows = new Uint32Array(await this.#request(part.client, { kind: 'plan' }));
+        part.lightRows = [rows[0] ?? 0, rows[1] ?? 0];
+      }),
+    );
+    this.#isPlanned = true;
+  }
+
+  /**
+   * Relights the whole picture. Call it after `plan`, and again only after it has settled, which is when
+   * all workers are done; the next call reuses the memory of the pixels. `light` may be freed at once. The
+   * same object is not sent to the workers twice.
+   */
+  async relight(light: Light, settings: FrameSettings): Promise<RowPixels[]> {
+    const picture = await allSettledOrThrow(
+      this.#parts.map((part) => this.#relightPart(part, light, settings)),
+    );
+    this.#events.frameDrawn();
+    return picture;
+  }
+
+  async #relightPart(part: WorkerPart, light: Light, settings: FrameSettings): Promise<RowPixels> {
+    const { firstRow, rows } = part.range;
+    const [first, end] = part.lightRows;
+    const rgb =
+      light === part.light ? null : (light.linearRgb(first, end) as Float32Array<ArrayBuffer>);
+    const memory = part.pixels ?? new ArrayBuffer(4 * this.#width * rows);
+    part.pixels = null;
+    const task: RowTask = { kind: 'relight', light: rgb, settings, pixels: memory };
+    const pixels = await this.#request(part.client, task, rgb ? [rgb.buffer, memory] : [memory]);
+    part.pixels = pixels;
+    part.light = light;
+    return { firstRow, rows, pixels };
+  }
+
+  /** Releases the photograph in the workers and rejects pending requests. */
+  end(): void {
+    if (this.#hasEnded) return;
+    for (const { client } of this.#parts) {
+      client.abandon(this.#photo, photoReleased());
+      if (!client.failure) this.#request(client, { kind: 'close' }).catch(() => {});
+    }
+    this.#hasEnded = true;
+    this.#events.ended();
+  }
+
+  async #request(
+    client: RelightClient,
+    task: RowTask,
+    transfer: Transferable[] = [],
+  ): Promise<ArrayBuffer> {
+    // A worker fails if it is asked for a photograph that it has released.
+    if (this.#hasEnded) throw photoReleased();
+    return await client.request({ photo: this.#photo, task }, transfer, this.#photo);
+  }
+
+  #clientOf(tile: number): RelightClient {
+    const part = this.#parts.find(({ range }) => tile < range.endTile) as WorkerPart;
+    return part.client;
+  }
+}

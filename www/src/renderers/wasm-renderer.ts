@@ -1,0 +1,92 @@
+/** Draws on a canvas with a WebAssembly module on the page's thread: WebGPU, WebGL2 or the CPU. */
+
+import { makeDisplay, type OutputSettings } from '../engine/output-settings.js';
+import type { DrawingModule, DrawnPhoto, Gamut, Relighter } from '../engine/types.js';
+import type { ImageLight } from '../lights/image-light.js';
+import { LightCache } from '../lights/light-cache.js';
+import type { LightSetting } from '../lights/light-setting.js';
+import { toPhotoError } from '../shared/errors.js';
+import type { CanvasRenderer, FrameResult } from './types.js';
+
+/** The graphics device that a renderer shares with others. */
+export interface DeviceHandle {
+  /** Reports that the device does not work. */
+  fail(reason: string): void;
+  release(): void;
+}
+
+export class WasmRenderer implements CanvasRenderer {
+  readonly #module: DrawingModule;
+  readonly #lights: LightCache;
+  /** The photograph without tiles. */
+  readonly #lightPlane: DrawnPhoto;
+  readonly #relighter: Relighter;
+  readonly #device: DeviceHandle | null;
+  /** Whether the device's light is an uploaded image. */
+  #hasUploadedImage = false;
+
+  /** Frees `lightPlane` and `relighter`, and releases `device`, when it is freed. */
+  constructor(
+    module: DrawingModule,
+    lightPlane: DrawnPhoto,
+    relighter: Relighter,
+    readonly canvas: HTMLCanvasElement,
+    device: DeviceHandle | null = null,
+  ) {
+    this.#module = module;
+    this.#lights = new LightCache(module);
+    this.#lightPlane = lightPlane;
+    this.#relighter = relighter;
+    this.#device = device;
+  }
+
+  get kernel(): string {
+    return this.#relighter.kernel;
+  }
+
+  get gamut(): Gamut {
+    return this.#relighter.gamut;
+  }
+
+  render(setting: LightSetting, output: OutputSettings, quality: number): FrameResult {
+    const display = makeDisplay(this.#module, output, this.gamut);
+    try {
+      if (this.#upload(setting.image)) {
+        this.#hasUploadedImage = true;
+        this.#relighter.renderPicture(display, quality);
+        return { lightApplied: true, lightError: null };
+      }
+      const { light, lightApplied, lightError } = this.#lights.get(setting, this.#lightPlane);
+      // An image that is no longer readable keeps its last uploaded content.
+      this.#hasUploadedImage &&= !lightApplied;
+      if (this.#hasUploadedImage) this.#relighter.renderPicture(display, quality);
+      else this.#relighter.render(light, display, quality);
+      return { lightApplied, lightError };
+    } catch (thrown) {
+      const { code, message } = toPhotoError(thrown);
+      if (code === 'backend-lost') this.#device?.fail(message);
+      throw thrown;
+    } finally {
+      display.free();
+    }
+  }
+
+  /** Uploads an image directly to the device, if both support that: its pixels bypass the page's memory. */
+  #upload(image: ImageLight | null): boolean {
+    const source = image?.uploadable();
+    if (!source) return false;
+    try {
+      return this.#relighter.takePicture(source.image, source.width, source.height);
+    } catch {
+      // Reading its pixels, which follows, reports the error.
+      return false;
+    }
+  }
+
+  free(): void {
+    this.#relighter.free();
+    this.#device?.release();
+    this.#lights.free();
+    this.#lightPlane.free();
+  }
+}

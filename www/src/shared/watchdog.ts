@@ -1,0 +1,51 @@
+/** Detects that a worker does not answer any more: browsers do not report every worker that they end. */
+
+/** When a silent worker counts as dead. */
+export interface WatchdogLimits {
+  /** Time between two checks, in milliseconds. */
+  readonly intervalMs: number;
+  /**
+   * Checks without an answer after which a worker counts as dead. The watchdog counts checks and not
+   * time, because a page that sleeps checks no more often than its workers work.
+   */
+  readonly maxChecks: number;
+  /** The same for a worker that still starts, which includes a download and a compilation. */
+  readonly maxStartChecks: number;
+}
+
+/** Calls back if it is not reset for a number of checks. */
+export class Watchdog {
+  readonly #intervalMs: number;
+  readonly #onTimeout: () => void;
+  #timer: ReturnType<typeof setInterval> | undefined;
+  #checks = 0;
+  #maxChecks = 0;
+
+  constructor(intervalMs: number, onTimeout: () => void) {
+    this.#intervalMs = intervalMs;
+    this.#onTimeout = onTimeout;
+  }
+
+  /** Starts the count, or starts it again. */
+  reset(maxChecks: number): void {
+    this.#checks = 0;
+    this.#maxChecks = maxChecks;
+    this.#timer ??= setInterval(() => this.#check(), this.#intervalMs);
+  }
+
+  get isRunning(): boolean {
+    return this.#timer !== undefined;
+  }
+
+  stop(): void {
+    clearInterval(this.#timer);
+    this.#timer = undefined;
+  }
+
+  #check(): void {
+    this.#checks += 1;
+    if (this.#checks <= this.#maxChecks) return;
+    this.stop();
+    this.#onTimeout();
+  }
+}

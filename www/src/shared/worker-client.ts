@@ -1,0 +1,167 @@
+/**
+ * The page's side of one worker, which answers numbered requests. The decoder and the worker pool use
+ * it; `engine/worker-server.ts` is the worker's side.
+ */
+
+import { joinSentences, PhotoError } from './errors.js';
+import { Watchdog, type WatchdogLimits } from './watchdog.js';
+
+/** A message to the worker. */
+export interface WorkerRequest<Task> {
+  readonly id: number;
+  readonly task: Task;
+}
+
+/** A message from the worker. */
+export type WorkerResponse<Ready, Result> =
+  /** The worker has started. */
+  | { readonly kind: 'ready'; readonly ready: Ready }
+  | { readonly kind: 'done'; readonly id: number; readonly result: Result }
+  /** The worker could not start, or could not do a task: its state is undefined from now on. */
+  | { readonly kind: 'failed'; readonly message: string };
+
+/** The part of `Worker` that a client uses. */
+export type WorkerLike<Task, Ready, Result> = Pick<Worker, 'terminate'> & {
+  postMessage(message: WorkerRequest<Task>, transfer: Transferable[]): void;
+  onmessage: ((event: MessageEvent<WorkerResponse<Ready, Result>>) => void) | null;
+  onerror: ((event: ErrorEvent) => void) | null;
+  onmessageerror: ((event: MessageEvent) => void) | null;
+};
+
+/** What differs between the kinds of workers. */
+export interface WorkerClientOptions {
+  /** The worker's name in error messages: "decoding worker". */
+  readonly name: string;
+  readonly limits: WatchdogLimits;
+  /** What a visitor can do after the worker has stopped. */
+  readonly remedy?: string;
+  /** Called once if the worker fails before `terminate`; the pending requests reject afterwards. */
+  readonly onFailure?: () => void;
+}
+
+const START_REMEDY =
+  "its script must lie beside the element's, and a content security policy must allow it in worker-src.";
+
+interface PendingRequest<Result> {
+  readonly group: number;
+  readonly resolve: (result: Result) => void;
+  readonly reject: (error: PhotoError) => void;
+}
+
+/** Sends requests to a worker, and reports a worker that stops or falls silent. */
+export class WorkerClient<Task, Ready, Result> {
+  /** Settles when the worker has started, or cannot. */
+  readonly ready: Promise<Ready>;
+  readonly #worker: WorkerLike<Task, Ready, Result>;
+  readonly #options: WorkerClientOptions;
+  readonly #watchdog: Watchdog;
+  readonly #pending = new Map<number, PendingRequest<Result>>();
+  #rejectReady = (_: PhotoError): void => {};
+  #lastId = 0;
+  #hasStarted = false;
+  #isSilent = false;
+  #failure: PhotoError | null = null;
+
+  constructor(worker: WorkerLike<Task, Ready, Result>, options: WorkerClientOptions) {
+    const { intervalMs, maxStartChecks } = options.limits;
+    this.#worker = worker;
+    this.#options = options;
+    this.#watchdog = new Watchdog(intervalMs, () => {
+      this.#isSilent = true;
+      this.#fail('It does not answer.');
+    });
+    this.ready = new Promise((resolve, reject) => {
+      this.#rejectReady = reject;
+      worker.onmessage = ({ data }) => this.#receive(data, resolve);
+    });
+    this.ready.catch(() => {});
+    worker.onerror = (event) => {
+      event.preventDefault?.();
+      this.#fail(event.message ?? '');
+    };
+    worker.onmessageerror = () => this.#fail('The browser could not read its answer.');
+    this.#watchdog.reset(maxStartChecks);
+  }
+
+  get hasStarted(): boolean {
+    return this.#hasStarted;
+  }
+
+  /** Whether the watchdog gave the worker up, which another worker may not repeat. */
+  get isSilent(): boolean {
+    return this.#isSilent;
+  }
+
+  /** Why the worker is unusable; `null` while it works. */
+  get failure(): PhotoError | null {
+    return this.#failure;
+  }
+
+  /**
+   * Sends a task; the worker does tasks in order. `group` is for `abandon`. Rejects with
+   * `worker-unavailable` if the worker has failed, or fails before it answers. If the browser cannot
+   * send the message, it rejects with the browser's error, and nothing has been transferred.
+   */
+  request(task: Task, transfer: Transferable[] = [], group = 0): Promise<Result> {
+    return new Promise((resolve, reject) => {
+      if (this.#failure) {
+        reject(this.#failure);
+        return;
+      }
+      const id = this.#lastId + 1;
+      this.#worker.postMessage({ id, task }, transfer);
+      this.#lastId = id;
+      this.#pending.set(id, { group, resolve, reject });
+      if (!this.#watchdog.isRunning) this.#watchdog.reset(this.#options.limits.maxChecks);
+    });
+  }
+
+  /** Rejects the pending requests of a group; the worker still does them. */
+  abandon(group: number, reason: PhotoError): void {
+    for (const [id, pending] of this.#pending) {
+      if (pending.group !== group) continue;
+      this.#pending.delete(id);
+      pending.reject(reason);
+    }
+  }
+
+  /** Ends the worker and rejects everything that is pending. */
+  terminate(): void {
+    this.#fail('It was ended.', false);
+  }
+
+  #receive(response: WorkerResponse<Ready, Result>, resolveReady: (ready: Ready) => void): void {
+    if (response.kind === 'failed') {
+      this.#fail(response.message);
+      return;
+    }
+    if (response.kind === 'ready') {
+      this.#hasStarted = true;
+      resolveReady(response.ready);
+    } else {
+      const pending = this.#pending.get(response.id);
+      this.#pending.delete(response.id);
+      pending?.resolve(response.result);
+    }
+    if (this.#pending.size > 0) this.#watchdog.reset(this.#options.limits.maxChecks);
+    else this.#watchdog.stop();
+  }
+
+  #fail(reason: string, isReported = true): void {
+    if (this.#failure) return;
+    const { name, remedy, onFailure } = this.#options;
+    const sentences = this.#hasStarted
+      ? [`The ${name} stopped.`, reason, remedy]
+      : [`The ${name} did not start: ${START_REMEDY}`, reason];
+    const failure = new PhotoError('worker-unavailable', joinSentences(sentences));
+    this.#failure = failure;
+    this.#watchdog.stop();
+    this.#worker.onmessage = null;
+    this.#worker.terminate();
+    // Before the rejections, so that their handlers see the final state.
+    if (isReported) onFailure?.();
+    this.#rejectReady(failure);
+    for (const { reject } of this.#pending.values()) reject(failure);
+    this.#pending.clear();
+  }
+}
