@@ -14,7 +14,7 @@ import type { Backend } from '../engine/types.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import { missingSource, type OnPreview } from '../loading/load.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { FrameResult, Renderer, RenderOptions } from '../renderers/types.js';
+import type { FrameResult, Renderer } from '../renderers/types.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
 import { Deferred } from '../shared/promises.js';
 import { type ActiveBackend, RefCounted } from './active-backend.js';
@@ -94,7 +94,7 @@ export class PhotoSession<R extends Renderer> {
     return this.#selector.active?.hasDrawn ? this.#quality : null;
   }
 
-  /** Applies new settings. `reload` fetches the photograph again even if its address is the same. */
+  /** Applies new settings; what has changed is a new object. `reload` fetches the photograph again even if its address is the same. */
   set(settings: SessionSettings, reload = false): void {
     const previous = this.#settings;
     this.#settings = settings;
@@ -102,7 +102,7 @@ export class PhotoSession<R extends Renderer> {
     const isSameFile =
       previous?.src === settings.src && previous.credentials === settings.credentials;
     if (!previous || reload || !isSameFile) this.#start(settings.src);
-    else if (isSame(previous.renderOptions, settings.renderOptions)) this.#scheduler.invalidate();
+    else if (previous.renderOptions === settings.renderOptions) this.#scheduler.invalidate();
     else if (this.#photo) {
       void this.#selector.select(this.#photo, settings.renderOptions, this.backend, '');
     }
@@ -368,10 +368,4 @@ export class PhotoSession<R extends Renderer> {
 function notLoaded(cause?: unknown): PhotoError {
   const message = 'The photograph is not loaded yet: wait for its load event.';
   return new PhotoError('not-loaded', message, cause);
-}
-
-function isSame(a: RenderOptions, b: RenderOptions): boolean {
-  return (
-    a.backends.join() === b.backends.join() && a.software === b.software && a.gamut === b.gamut
-  );
 }
