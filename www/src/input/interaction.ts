@@ -123,8 +123,7 @@ export class InteractionController {
 
   /** Magnifies around the centre by one step. */
   zoom(by: 1 | -1): void {
-    const { view, options } = this.#state;
-    this.#setView(zoomAt(view, ZOOM_STEP ** by, CENTRE, options.maxZoom));
+    this.#zoomAt(ZOOM_STEP ** by, CENTRE);
   }
 
   stop(): void {
@@ -139,8 +138,7 @@ export class InteractionController {
     const pointer = new PointerInput(dom.viewport, {
       permissions: () => this.#permissions,
       isCooperative: () => state.options.cooperativeGestures,
-      wheelZoom: (factor, at) =>
-        this.#setView(zoomAt(state.view, factor, at, state.options.maxZoom)),
+      wheelZoom: (factor, at) => this.#zoomAt(factor, at),
       zoomIgnored: (by) => listener.zoomIgnored(by),
       active: () => this.markActive(),
       pressed: () => {
@@ -163,10 +161,9 @@ export class InteractionController {
       },
       pan: (dx, dy) => {
         const moved = pointer.toUnits(dx, dy);
-        this.#setView(pan(state.view, moved.x, moved.y, state.options.maxZoom));
+        this.#pan(moved.x, moved.y);
       },
-      zoom: (factor, x, y) =>
-        this.#setView(zoomAt(state.view, factor, pointer.toUnits(x, y), state.options.maxZoom)),
+      zoom: (factor, x, y) => this.#zoomAt(factor, pointer.toUnits(x, y)),
       doubleTap: (x, y) =>
         this.#setView(toggleZoom(state.view, pointer.toUnits(x, y), state.options.maxZoom)),
     });
@@ -204,6 +201,16 @@ export class InteractionController {
     this.#listener.changed();
   }
 
+  #zoomAt(factor: number, at: PicturePoint): boolean {
+    const { view, options } = this.#state;
+    return this.#setView(zoomAt(view, factor, at, options.maxZoom));
+  }
+
+  #pan(dx: number, dy: number): boolean {
+    const { view, options } = this.#state;
+    return this.#setView(pan(view, dx, dy, options.maxZoom));
+  }
+
   /** Returns whether the view has changed. */
   #setView(view: PhotoView): boolean {
     const last = this.#state.view;
@@ -236,17 +243,14 @@ export class InteractionController {
 
   /** Returns whether the key was used. */
   #perform(action: KeyAction): boolean {
-    const { light, view, options } = this.#state;
+    const { light, options } = this.#state;
     const torch = light.torch ?? CENTRE;
     switch (action.kind) {
       case 'move-light':
         this.#moveTorch({ x: torch.x + action.dx, y: torch.y + action.dy });
         return true;
-      case 'set-light-x':
-        this.#moveTorch({ x: action.x, y: torch.y });
-        return true;
       case 'pan':
-        return this.#setView(pan(view, action.dx, action.dy, options.maxZoom));
+        return this.#pan(action.dx, action.dy);
       case 'zoom':
         if (options.maxZoom > 1) this.zoom(action.by);
         return options.maxZoom > 1;

@@ -25,8 +25,8 @@ test('arrows move the light; Shift makes small steps, page keys large ones', () 
     dy: -0.01,
   });
   assert.deepEqual(keyAction(press('PageDown'), 'light'), { kind: 'move-light', dx: 0, dy: 0.2 });
-  assert.deepEqual(keyAction(press('Home'), 'light'), { kind: 'set-light-x', x: 0 });
-  assert.deepEqual(keyAction(press('End'), 'light'), { kind: 'set-light-x', x: 1 });
+  assert.deepEqual(keyAction(press('Home'), 'light'), { kind: 'move-light', dx: -1, dy: 0 });
+  assert.deepEqual(keyAction(press('End'), 'light'), { kind: 'move-light', dx: 1, dy: 0 });
   assert.deepEqual(keyAction(press('Escape'), 'light'), { kind: 'escape' });
 });
 

@@ -15,7 +15,6 @@ export interface KeyPress {
 /** Distances are fractions of the picture for the light, and of the viewport for panning. */
 export type KeyAction =
   | { readonly kind: 'move-light'; readonly dx: number; readonly dy: number }
-  | { readonly kind: 'set-light-x'; readonly x: 0 | 1 }
   | { readonly kind: 'pan'; readonly dx: number; readonly dy: number }
   | { readonly kind: 'zoom'; readonly by: 1 | -1 }
   | { readonly kind: 'reset-view' }
@@ -26,13 +25,13 @@ export type KeyAction =
 export type FocusTarget = 'light' | 'picture' | 'controls';
 
 const LIGHT_STEP = 0.05;
+/** With Shift. */
 const FINE_LIGHT_STEP = 0.01;
-const PAGE_LIGHT_STEP = 0.2;
 const PAN_STEP = 0.15;
 
-type Direction = readonly [x: number, y: number];
+type Vector = readonly [x: number, y: number];
 
-const ARROWS: Readonly<Record<string, Direction>> = {
+const ARROWS: Readonly<Record<string, Vector>> = {
   ArrowLeft: [-1, 0],
   ArrowRight: [1, 0],
   ArrowUp: [0, -1],
@@ -40,11 +39,19 @@ const ARROWS: Readonly<Record<string, Direction>> = {
 };
 
 /** Physical keys, which form the same cross on every layout. */
-const PAN_CODES: Readonly<Record<string, Direction>> = {
+const PAN_CODES: Readonly<Record<string, Vector>> = {
   KeyA: [-1, 0],
   KeyD: [1, 0],
   KeyW: [0, -1],
   KeyS: [0, 1],
+};
+
+/** Larger moves of the light; a whole picture reaches the edge. */
+const LIGHT_MOVES: Readonly<Record<string, Vector>> = {
+  PageUp: [0, -0.2],
+  PageDown: [0, 0.2],
+  Home: [-1, 0],
+  End: [1, 0],
 };
 
 /** The action of a key press; `null` if it is not the element's. */
@@ -64,24 +71,18 @@ function zoomAction(key: string): KeyAction | null {
 }
 
 function pictureAction({ key, code, shiftKey }: KeyPress, focus: FocusTarget): KeyAction | null {
-  const arrow = ARROWS[key];
-  const pan = PAN_CODES[code] ?? (focus === 'picture' ? arrow : undefined);
-  // The view moves in the key's direction, so the picture moves the other way.
-  if (pan) return { kind: 'pan', dx: -PAN_STEP * pan[0], dy: -PAN_STEP * pan[1] };
   if (key === 'Escape') return { kind: 'escape' };
-  if (focus === 'picture') return null;
-  const step = shiftKey ? FINE_LIGHT_STEP : LIGHT_STEP;
-  if (arrow) return { kind: 'move-light', dx: step * arrow[0], dy: step * arrow[1] };
-  switch (key) {
-    case 'PageUp':
-      return { kind: 'move-light', dx: 0, dy: -PAGE_LIGHT_STEP };
-    case 'PageDown':
-      return { kind: 'move-light', dx: 0, dy: PAGE_LIGHT_STEP };
-    case 'Home':
-      return { kind: 'set-light-x', x: 0 };
-    case 'End':
-      return { kind: 'set-light-x', x: 1 };
-    default:
-      return null;
-  }
+  const hasLight = focus === 'light';
+  const arrow = ARROWS[key];
+  // The view moves in the key's direction, so the picture moves the other way.
+  const pan = PAN_CODES[code] ?? (hasLight ? null : arrow);
+  if (pan) return move('pan', pan, -PAN_STEP);
+  if (!hasLight) return null;
+  if (arrow) return move('move-light', arrow, shiftKey ? FINE_LIGHT_STEP : LIGHT_STEP);
+  const vector = LIGHT_MOVES[key];
+  return vector ? move('move-light', vector, 1) : null;
+}
+
+function move(kind: 'move-light' | 'pan', [x, y]: Vector, step: number): KeyAction {
+  return { kind, dx: step * x, dy: step * y };
 }

@@ -110,3 +110,11 @@ export function endSentence(text: string): string {
 export function joinSentences(sentences: readonly (string | undefined)[]): string {
   return sentences.filter(Boolean).join(' ');
 }
+
+/** The error for a script that the element fetches on demand; `purpose` completes “The script for …”. */
+export function missingScript(code: ErrorCode, purpose: string, cause: unknown): PhotoError {
+  const message =
+    `The script for ${purpose} could not be loaded (${messageOf(cause)}). Serve it in the same folder as ` +
+    "the element's script.";
+  return new PhotoError(code, message, cause);
+}

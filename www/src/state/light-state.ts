@@ -11,7 +11,7 @@ import type { LightSetting } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
 import type { LightSourceListener, LightSourceObserver } from '../lights/light-source-observer.js';
 import type * as SourceSupport from '../lights/light-sources.js';
-import { messageOf, PhotoError } from '../shared/errors.js';
+import { missingScript, type PhotoError } from '../shared/errors.js';
 import { LIGHTS, type LightName } from '../shared/names.js';
 import { reuse } from '../shared/reuse.js';
 import { clampToPicture, type PicturePoint } from '../shared/values.js';
@@ -229,10 +229,7 @@ export class LightState {
     try {
       this.#support = await this.#fetchSupport();
     } catch (cause) {
-      const message =
-        `The script for images as light could not be loaded (${messageOf(cause)}). Serve it in the same ` +
-        "folder as the element's script.";
-      this.#fetchError = new PhotoError('light-source', message, cause);
+      this.#fetchError = missingScript('light-source', 'images as light', cause);
     }
     this.#fetching = null;
     if (!this.#fetchError) this.#listener.sourceSupportLoaded();

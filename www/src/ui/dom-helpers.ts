@@ -1,20 +1,11 @@
 /** Creates and updates elements without markup, which a content security policy may forbid. */
 
-interface CreateOptions {
-  readonly className?: string;
-  /** The name for `::part()`. */
-  readonly part?: string;
-  readonly attributes?: Readonly<Record<string, string>>;
-}
-
 export function createElement<K extends keyof HTMLElementTagNameMap>(
   tag: K,
-  { className = '', part = '', attributes = {} }: CreateOptions = {},
+  attributes: Readonly<Record<string, string>> = {},
   ...children: (Node | string)[]
 ): HTMLElementTagNameMap[K] {
   const element = document.createElement(tag);
-  if (className) element.className = className;
-  if (part) element.setAttribute('part', part);
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
   element.append(...children);
   return element;
@@ -22,7 +13,7 @@ export function createElement<K extends keyof HTMLElementTagNameMap>(
 
 /** A slot with fallback content. */
 export function createSlot(name: string, ...fallback: (Node | string)[]): HTMLSlotElement {
-  return createElement('slot', { attributes: { name } }, ...fallback);
+  return createElement('slot', { name }, ...fallback);
 }
 
 /** Sets an attribute if it differs; `null` removes it. */

@@ -1,6 +1,6 @@
 /** The toolbar's placeholder: fetches its script when the `controls` attribute is used for the first time. */
 
-import { PhotoError } from '../shared/errors.js';
+import { missingScript, type PhotoError } from '../shared/errors.js';
 import type { ShadowDom } from './shadow-dom.js';
 import type { Toolbar, ToolbarActions, ToolbarState } from './toolbar.js';
 
@@ -50,9 +50,7 @@ export class LazyToolbar {
       this.#dom.mountControls([toolbar.menu, toolbar.bar], toolbar.css);
       this.#listener.loaded();
     } catch (cause) {
-      const message =
-        "The controls could not be loaded. Serve their script in the same folder as the element's script.";
-      this.#listener.failed(new PhotoError('controls-unavailable', message, cause));
+      this.#listener.failed(missingScript('controls-unavailable', 'the controls', cause));
     }
   }
 }

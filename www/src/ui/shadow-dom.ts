@@ -35,25 +35,28 @@ const HINT_MS = 1800;
 
 export class ShadowDom {
   /** The box that shows the picture and receives pointer events. */
-  readonly viewport = createElement('div', { className: 'viewport' });
+  readonly viewport = createElement('div', { class: 'viewport' });
   /** Represents the torch for keyboards and screen readers. */
   readonly handle = createElement('div', {
-    className: 'handle',
+    class: 'handle',
     part: 'torch-handle',
-    attributes: { role: 'slider', tabindex: '0', 'aria-valuemin': '0', 'aria-valuemax': '100' },
+    role: 'slider',
+    tabindex: '0',
+    'aria-valuemin': '0',
+    'aria-valuemax': '100',
   });
   /** Dismisses the poster. */
   readonly revealButton: HTMLButtonElement;
   readonly #root: ShadowRoot;
-  readonly #picture = createElement('div', { className: 'picture', part: 'picture' });
+  readonly #picture = createElement('div', { class: 'picture', part: 'picture' });
   readonly #poster: HTMLElement;
-  readonly #posterImage = createElement('img', { part: 'poster', attributes: { alt: '' } });
+  readonly #posterImage = createElement('img', { part: 'poster', alt: '' });
   readonly #revealText = createElement('span');
-  readonly #hint = createElement('div', { className: 'hint', part: 'hint' });
+  readonly #hint = createElement('div', { class: 'hint', part: 'hint' });
   readonly #controls = createSlot('controls');
   readonly #progressBar = createElement('div', {
-    className: 'progress-bar',
-    attributes: { role: 'progressbar' },
+    class: 'progress-bar',
+    role: 'progressbar',
   });
   readonly #progress: HTMLElement;
   readonly #errorSummary = createElement('p');
@@ -62,9 +65,9 @@ export class ShadowDom {
   readonly #message: HTMLElement;
   readonly #footer: HTMLElement;
   readonly #status = createElement('div', {
-    className: 'visually-hidden',
+    class: 'visually-hidden',
     part: 'status',
-    attributes: { role: 'status' },
+    role: 'status',
   });
   #canvas: HTMLCanvasElement | null = null;
   #announceTimer: ReturnType<typeof setTimeout> | undefined;
@@ -75,7 +78,7 @@ export class ShadowDom {
     adoptStyles(root, ELEMENT_CSS);
     this.#poster = createElement(
       'div',
-      { className: 'poster' },
+      { class: 'poster' },
       createSlot('poster', this.#posterImage),
     );
     this.#posterImage.addEventListener('load', () => this.viewport.classList.add('has-poster'));
@@ -84,19 +87,19 @@ export class ShadowDom {
     });
     this.revealButton = createElement(
       'button',
-      { className: 'reveal', part: 'button', attributes: { type: 'button' } },
+      { class: 'reveal', part: 'button', type: 'button' },
       createElement('span', {}, createIcon(LIGHT_ICON), this.#revealText),
     );
     this.viewport.append(this.#picture, this.#poster, this.handle, this.revealButton, this.#hint);
     this.#progress = createElement(
       'div',
-      { className: 'progress', part: 'progress' },
+      { class: 'progress', part: 'progress' },
       createSlot('progress', this.#progressBar),
     );
     const details = createElement('details', {}, this.#detailsLabel, this.#errorDetails);
     this.#message = createElement(
       'div',
-      { className: 'message', part: 'message', attributes: { role: 'alert' } },
+      { class: 'message', part: 'message', role: 'alert' },
       createSlot('error', this.#errorSummary, details),
     );
     for (const part of [
@@ -110,8 +113,8 @@ export class ShadowDom {
       part.hidden = true;
     this.#footer = createElement(
       'div',
-      { className: 'footer' },
-      createElement('div', { className: 'controls' }, this.#controls),
+      { class: 'footer' },
+      createElement('div', { class: 'controls' }, this.#controls),
       this.#progress,
       this.#message,
     );
@@ -148,8 +151,7 @@ export class ShadowDom {
     handle.hidden = !hasHandle;
     viewport.classList.toggle('has-handle', hasHandle);
     viewport.classList.toggle('zoomed', isZoomed);
-    viewport.classList.toggle('touch-pan-y', touchAction === 'pan-y');
-    viewport.classList.toggle('touch-none', touchAction === 'none');
+    viewport.style.setProperty('--touch-action', touchAction);
     const hasRole = isFocusable || keepsFocus;
     updateAttribute(viewport, 'tabindex', isFocusable ? '0' : keepsFocus ? '-1' : null);
     updateAttribute(viewport, 'role', hasRole ? 'group' : null);

@@ -81,7 +81,7 @@ export class Toolbar {
     this.#fullscreen = createButton('fullscreen', () => actions.toggleFullscreen());
     this.bar = createElement(
       'div',
-      { className: 'toolbar', part: 'controls', attributes: { role: 'toolbar' } },
+      { class: 'toolbar', part: 'controls', role: 'toolbar' },
       this.#light,
       this.#play,
       this.#zoomOut,
@@ -91,9 +91,10 @@ export class Toolbar {
       this.#fullscreen,
     );
     this.menu = createElement('div', {
-      className: 'menu',
+      class: 'menu',
       part: 'menu',
-      attributes: { role: 'radiogroup', id: 'lights' },
+      role: 'radiogroup',
+      id: 'lights',
     });
     this.closeMenu();
     this.bar.addEventListener('keydown', (event) => this.#moveFocus(event));
@@ -162,8 +163,7 @@ export class Toolbar {
     if (key === this.#menuKey) return;
     this.#menuKey = key;
     const labels = items.map((item) => {
-      const attributes = { type: 'radio', name: 'light', value: item };
-      const input = createElement('input', { attributes });
+      const input = createElement('input', { type: 'radio', name: 'light', value: item });
       return createElement('label', {}, input, createElement('span', {}, t(item)));
     });
     this.menu.replaceChildren(...labels);
@@ -191,7 +191,7 @@ export class Toolbar {
 function createButton(iconName: IconName, onPress: () => void): HTMLButtonElement {
   const button = createElement(
     'button',
-    { part: 'button', attributes: { type: 'button' } },
+    { part: 'button', type: 'button' },
     createIcon(ICONS[iconName]),
   );
   button.addEventListener('click', () => {
