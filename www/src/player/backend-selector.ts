@@ -13,9 +13,10 @@ import { ActiveBackend, type RefCounted } from './active-backend.js';
 import { BACKEND_TITLES, backendsAfter, backendsFrom, firstWorking } from './backends.js';
 import type { SessionListener, SessionPorts } from './types.js';
 
-/** What a selector reports: to the page, and to the session that draws. */
-export interface SelectorEvents<R extends Renderer>
-  extends Pick<SessionListener<R>, 'backendChanged' | 'backendLost' | 'failed'> {
+/** What a selector reports to its session. */
+export interface SelectorEvents {
+  /** No backend works. */
+  failed(error: PhotoError): void;
   /** A search has ended with a backend that works. */
   selected(): void;
   /** The photograph lost tiles and must be fetched again. */
@@ -40,7 +41,8 @@ export class BackendSelector<R extends Renderer> {
   /** The options with which a lost backend is replaced. */
   options: RenderOptions | null = null;
   readonly #createRenderer: SessionPorts<R>['createRenderer'];
-  readonly #events: SelectorEvents<R>;
+  readonly #listener: SessionListener<R>;
+  readonly #events: SelectorEvents;
   #active: ActiveBackend<R> | null = null;
   /** On the screen until `#active` has drawn. */
   #outgoing: ActiveBackend<R> | null = null;
@@ -48,8 +50,13 @@ export class BackendSelector<R extends Renderer> {
   /** The photograph of the last search. */
   #photo: RefCounted<Photograph> | null = null;
 
-  constructor(createRenderer: SessionPorts<R>['createRenderer'], events: SelectorEvents<R>) {
+  constructor(
+    createRenderer: SessionPorts<R>['createRenderer'],
+    listener: SessionListener<R>,
+    events: SelectorEvents,
+  ) {
     this.#createRenderer = createRenderer;
+    this.#listener = listener;
     this.#events = events;
   }
 
@@ -113,7 +120,7 @@ export class BackendSelector<R extends Renderer> {
     const isReported = lost.lossReason !== null;
     lost.lossReason ??= reason;
     if (this.#active !== lost) return;
-    if (!isReported) this.#events.backendLost(lost.backend, reason);
+    if (!isReported) this.#listener.backendLost(lost.backend, reason);
     if (!this.#search && this.options) this.#replace(lost, this.options, lost.backend, '');
   }
 
@@ -157,7 +164,7 @@ export class BackendSelector<R extends Renderer> {
     }
     // The same backend with another gamut is no change.
     if (found !== last && (found.backend !== previous || isReplacement)) {
-      this.#events.backendChanged(found.backend, previous, reason);
+      this.#listener.backendChanged(found.backend, previous, reason);
     }
     this.#events.selected();
   }

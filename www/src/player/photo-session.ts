@@ -26,23 +26,19 @@ import type { SessionListener, SessionPorts, SessionSettings } from './types.js'
 /** How often a photograph that loses tiles is fetched again without a frame in between. */
 const MAX_REFETCHES = 5;
 
-/** The state of a load, as far as the page knows of it. */
+/** The state of a load, as far as the page knows it. */
 type SessionStatus =
-  | { readonly kind: 'idle' }
+  | 'idle'
   /** Until a frame of the whole photograph is drawn; previews are drawn before. */
-  | { readonly kind: 'loading' }
+  | 'loading'
   /** A frame of the whole photograph was drawn. */
-  | { readonly kind: 'loaded' }
-  | {
-      readonly kind: 'failed';
-      readonly wasLoaded: boolean;
-      /** The transfer failed: frames of a preview do not repair that. */
-      readonly isFinal: boolean;
-    };
+  | 'loaded'
+  | SessionFailure;
 
-const IDLE: SessionStatus = { kind: 'idle' };
-const LOADING: SessionStatus = { kind: 'loading' };
-const LOADED: SessionStatus = { kind: 'loaded' };
+interface SessionFailure {
+  /** The status after the next frame; `null` if a frame, of a preview, does not repair the failure. */
+  readonly recovered: SessionStatus | null;
+}
 
 export class PhotoSession<R extends Renderer> {
   readonly #ports: SessionPorts<R>;
@@ -50,7 +46,7 @@ export class PhotoSession<R extends Renderer> {
   readonly #selector: BackendSelector<R>;
   readonly #scheduler: FrameScheduler;
   #settings: SessionSettings | null = null;
-  #status: SessionStatus = IDLE;
+  #status: SessionStatus = 'idle';
   /** Aborted when the load and its photograph are released. */
   #load = new AbortController();
   #photo: RefCounted<Photograph> | null = null;
@@ -65,9 +61,7 @@ export class PhotoSession<R extends Renderer> {
   constructor(ports: SessionPorts<R>, listener: SessionListener<R>) {
     this.#ports = ports;
     this.#listener = listener;
-    this.#selector = new BackendSelector(ports.createRenderer, {
-      backendChanged: (...change) => listener.backendChanged(...change),
-      backendLost: (...loss) => listener.backendLost(...loss),
+    this.#selector = new BackendSelector(ports.createRenderer, listener, {
       failed: (error) => this.#fail(error),
       selected: () => this.#drawFrame(true),
       photoLost: (reason) => this.#refetch(reason),
@@ -149,7 +143,7 @@ export class PhotoSession<R extends Renderer> {
   #refetch(reason: string): void {
     const src = this.#settings?.src;
     const previous = this.backend;
-    const hasFailed = this.#status.kind === 'failed';
+    const hasFailed = typeof this.#status === 'object';
     this.#release(true);
     if (this.#refetches === MAX_REFETCHES) {
       const summary = `The photograph was fetched ${MAX_REFETCHES} more times without success. Reload the page.`;
@@ -157,7 +151,7 @@ export class PhotoSession<R extends Renderer> {
       return;
     }
     this.#refetches += 1;
-    if (hasFailed) this.#status = { kind: 'failed', wasLoaded: false, isFinal: false };
+    if (hasFailed) this.#status = { recovered: 'loading' };
     if (src) void this.#run(src, previous, reason);
   }
 
@@ -165,7 +159,7 @@ export class PhotoSession<R extends Renderer> {
   async #run(src: string, previous: Backend | null, reason: string): Promise<void> {
     const { signal } = this.#load;
     const preparation = new AbortController();
-    if (this.#status === IDLE) this.#status = LOADING;
+    if (this.#status === 'idle') this.#status = 'loading';
     if (this.#settings) this.#ports.prepare(this.#settings.renderOptions, preparation.signal);
     const onPreview: OnPreview = (preview) => {
       // The last preview must be drawn first.
@@ -329,26 +323,20 @@ export class PhotoSession<R extends Renderer> {
   }
 
   #recover(): void {
-    const status = this.#status;
-    const hasFailed = status.kind === 'failed';
-    if (hasFailed && !status.isFinal) {
-      this.#status = status.wasLoaded ? LOADED : LOADING;
+    if (typeof this.#status === 'object' && this.#status.recovered) {
+      this.#status = this.#status.recovered;
       this.#listener.recovered();
     }
-    if (this.#status === LOADING && this.photo?.isComplete) {
-      this.#status = LOADED;
+    if (this.#status === 'loading' && this.photo?.isComplete) {
+      this.#status = 'loaded';
       this.#listener.loaded();
     }
   }
 
   #fail(error: PhotoError, isFinal = false): void {
-    const { kind } = this.#status;
-    const last = this.#status.kind === 'failed' ? this.#status : null;
-    this.#status = {
-      kind: 'failed',
-      wasLoaded: last?.wasLoaded ?? kind === 'loaded',
-      isFinal: last?.isFinal || isFinal,
-    };
+    const status = this.#status;
+    const recovered = typeof status === 'object' ? status.recovered : status;
+    this.#status = { recovered: isFinal ? null : recovered };
     this.#listener.failed(error);
   }
 
@@ -361,7 +349,7 @@ export class PhotoSession<R extends Renderer> {
     this.#photo = null;
     this.#nextFrame = null;
     this.#isFullQualityRequested = false;
-    this.#status = IDLE;
+    this.#status = 'idle';
   }
 }
 

@@ -15,37 +15,29 @@ export interface WatchdogLimits {
 
 /** Calls back if it is not reset for a number of checks. */
 export class Watchdog {
-  readonly #intervalMs: number;
-  readonly #onTimeout: () => void;
   #timer: ReturnType<typeof setInterval> | undefined;
-  #checks = 0;
-  #maxChecks = 0;
+  #checksLeft = 0;
 
-  constructor(intervalMs: number, onTimeout: () => void) {
-    this.#intervalMs = intervalMs;
-    this.#onTimeout = onTimeout;
-  }
-
-  /** Starts the count, or starts it again. */
-  reset(maxChecks: number): void {
-    this.#checks = 0;
-    this.#maxChecks = maxChecks;
-    this.#timer ??= setInterval(() => this.#check(), this.#intervalMs);
-  }
+  constructor(
+    readonly intervalMs: number,
+    readonly onTimeout: () => void,
+  ) {}
 
   get isRunning(): boolean {
     return this.#timer !== undefined;
   }
 
+  /** Starts the count, or starts it again. */
+  reset(maxChecks: number): void {
+    this.#checksLeft = maxChecks;
+    this.#timer ??= setInterval(() => {
+      this.#checksLeft -= 1;
+      if (this.#checksLeft < 0) this.onTimeout();
+    }, this.intervalMs);
+  }
+
   stop(): void {
     clearInterval(this.#timer);
     this.#timer = undefined;
-  }
-
-  #check(): void {
-    this.#checks += 1;
-    if (this.#checks <= this.#maxChecks) return;
-    this.stop();
-    this.#onTimeout();
   }
 }

@@ -33,14 +33,11 @@ export interface WorkerClientOptions {
   /** The worker's name in error messages: "decoding worker". */
   readonly name: string;
   readonly limits: WatchdogLimits;
-  /** What a visitor can do after the worker has stopped. */
-  readonly remedy?: string;
+  /** What to do if the worker has stopped, or cannot start, for error messages. */
+  readonly remedy: string;
   /** Called once if the worker fails before `terminate`; the pending requests reject afterwards. */
   readonly onFailure?: () => void;
 }
-
-const START_REMEDY =
-  "its script must lie beside the element's, and a content security policy must allow it in worker-src.";
 
 interface PendingRequest<Result> {
   readonly group: number;
@@ -56,18 +53,20 @@ export class WorkerClient<Task, Ready, Result> {
   readonly #options: WorkerClientOptions;
   readonly #watchdog: Watchdog;
   readonly #pending = new Map<number, PendingRequest<Result>>();
+  /** Why the worker is unusable; `null` while it works. */
+  failure: PhotoError | null = null;
+  hasStarted = false;
+  /** Whether the watchdog gave the worker up, which another worker may not repeat. */
+  isSilent = false;
   #rejectReady = (_: PhotoError): void => {};
   #lastId = 0;
-  #hasStarted = false;
-  #isSilent = false;
-  #failure: PhotoError | null = null;
 
   constructor(worker: WorkerLike<Task, Ready, Result>, options: WorkerClientOptions) {
     const { intervalMs, maxStartChecks } = options.limits;
     this.#worker = worker;
     this.#options = options;
     this.#watchdog = new Watchdog(intervalMs, () => {
-      this.#isSilent = true;
+      this.isSilent = true;
       this.#fail('It does not answer.');
     });
     this.ready = new Promise((resolve, reject) => {
@@ -83,20 +82,6 @@ export class WorkerClient<Task, Ready, Result> {
     this.#watchdog.reset(maxStartChecks);
   }
 
-  get hasStarted(): boolean {
-    return this.#hasStarted;
-  }
-
-  /** Whether the watchdog gave the worker up, which another worker may not repeat. */
-  get isSilent(): boolean {
-    return this.#isSilent;
-  }
-
-  /** Why the worker is unusable; `null` while it works. */
-  get failure(): PhotoError | null {
-    return this.#failure;
-  }
-
   /**
    * Sends a task; the worker does tasks in order. `group` is for `abandon`. Rejects with
    * `worker-unavailable` if the worker has failed, or fails before it answers. If the browser cannot
@@ -104,8 +89,8 @@ export class WorkerClient<Task, Ready, Result> {
    */
   request(task: Task, transfer: Transferable[] = [], group = 0): Promise<Result> {
     return new Promise((resolve, reject) => {
-      if (this.#failure) {
-        reject(this.#failure);
+      if (this.failure) {
+        reject(this.failure);
         return;
       }
       const id = this.#lastId + 1;
@@ -136,7 +121,7 @@ export class WorkerClient<Task, Ready, Result> {
       return;
     }
     if (response.kind === 'ready') {
-      this.#hasStarted = true;
+      this.hasStarted = true;
       resolveReady(response.ready);
     } else {
       const pending = this.#pending.get(response.id);
@@ -148,13 +133,12 @@ export class WorkerClient<Task, Ready, Result> {
   }
 
   #fail(reason: string, isReported = true): void {
-    if (this.#failure) return;
+    if (this.failure) return;
     const { name, remedy, onFailure } = this.#options;
-    const sentences = this.#hasStarted
-      ? [`The ${name} stopped.`, reason, remedy]
-      : [`The ${name} did not start: ${START_REMEDY}`, reason];
-    const failure = new PhotoError('worker-unavailable', joinSentences(sentences));
-    this.#failure = failure;
+    const summary = `The ${name} ${this.hasStarted ? 'stopped' : 'did not start'}.`;
+    const message = joinSentences([summary, reason, remedy]);
+    const failure = new PhotoError('worker-unavailable', message);
+    this.failure = failure;
     this.#watchdog.stop();
     this.#worker.onmessage = null;
     this.#worker.terminate();

@@ -15,6 +15,8 @@ import { splitRows } from './row-ranges.js';
 const MAX_INCIDENTS = 3;
 /** The largest frames take two seconds on slow machines. The browser has the module in its cache. */
 const LIMITS: WatchdogLimits = { intervalMs: 1000, maxChecks: 10, maxStartChecks: 15 };
+const REMEDY =
+  "Its script must lie beside the element's, and a content security policy must allow it in worker-src.";
 /** Workers to warm up before the photograph's size is known. Most photographs need at least as many. */
 const WARM_WORKERS = 2;
 
@@ -102,6 +104,7 @@ export class WorkerPool implements TileWorkers<PoolSession> {
     const client = new WorkerClient<RelightTask, string, ArrayBuffer>(worker, {
       name: 'relighting worker',
       limits: this.#limits,
+      remedy: REMEDY,
       onFailure: () => this.#handleFailure(started),
     });
     const started: PoolWorker = { client, photos: 0 };
