@@ -34,7 +34,7 @@ export class ActiveBackend<R extends Renderer> {
   lossReason: string | null = null;
   /** Resolves when the frame in progress ends; `null` if there is none. */
   frame: Deferred | null = null;
-  #isFreed = false;
+  isFreed = false;
 
   constructor(
     readonly backend: Backend,
@@ -45,13 +45,9 @@ export class ActiveBackend<R extends Renderer> {
     photo.retain();
   }
 
-  get isFreed(): boolean {
-    return this.#isFreed;
-  }
-
   free(): void {
-    if (this.#isFreed) return;
-    this.#isFreed = true;
+    if (this.isFreed) return;
+    this.isFreed = true;
     this.renderer.free();
     this.photo.release();
   }

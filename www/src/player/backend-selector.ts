@@ -206,27 +206,27 @@ export class BackendSelector<R extends Renderer> {
       if (created) this.lose(created, reason);
       else earlyLoss ??= reason;
     };
-    const renderer = await this.#createRenderer(
-      backend,
-      photo.value,
-      options,
-      onLost,
-      signal,
-    ).catch((thrown: unknown) => {
+    try {
+      const renderer = await this.#createRenderer(backend, photo.value, options, onLost, signal);
+      if (!signal.aborted && earlyLoss === null) {
+        created = new ActiveBackend(backend, options, renderer, photo);
+        return created;
+      }
+      renderer.free();
+      throw signal.reason;
+    } catch (thrown) {
       // The loss explains every other error.
-      if (earlyLoss !== null) throw lostInSetUp(earlyLoss, thrown);
+      if (earlyLoss !== null) {
+        const message = `it was lost while it was being set up: ${earlyLoss}`;
+        throw new PhotoError('backend-lost', message, thrown);
+      }
       const error = toPhotoError(thrown);
       // No other backend could use this photograph either; fetching it again ends the search.
       if (error.code === 'photo-lost' && !signal.aborted && photo.value.isComplete) {
         this.#events.photoLost(error.message);
       }
       throw error;
-    });
-    if (signal.aborted || earlyLoss !== null) renderer.free();
-    signal.throwIfAborted();
-    if (earlyLoss !== null) throw lostInSetUp(earlyLoss);
-    created = new ActiveBackend(backend, options, renderer, photo);
-    return created;
+    }
   }
 }
 
@@ -241,9 +241,4 @@ function meets<R extends Renderer>(
     // A device that was allowed to be a software renderer may be one.
     (backend === 'cpu' || software || !active.options.software)
   );
-}
-
-function lostInSetUp(reason: string, cause?: unknown): PhotoError {
-  const message = `it was lost while it was being set up: ${reason}`;
-  return new PhotoError('backend-lost', message, cause);
 }
