@@ -1,9 +1,11 @@
 /** The WebAssembly modules: their surfaces. */
 
-import type { LivePicture } from '../lights/light-source.js';
 import type { Gamut, ModuleName, ToneCurve } from '../shared/names.js';
 
 export type { Backend, Gamut, ToneCurve } from '../shared/names.js';
+
+/** A picture that a graphics device can upload directly, and that may change at any time. */
+export type LivePicture = HTMLCanvasElement | OffscreenCanvas | ImageBitmap | HTMLVideoElement;
 
 /** Holds memory inside the module until freed. */
 export interface Freeable {

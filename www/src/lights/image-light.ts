@@ -1,7 +1,6 @@
 /** An image that is used as light in place of a built-in light, as renderers see it. */
 
-import type { DrawingModule, DrawnPhoto, Light } from '../engine/types.js';
-import type { LivePicture } from './light-source.js';
+import type { DrawingModule, DrawnPhoto, Light, LivePicture } from '../engine/types.js';
 
 /** An image that a graphics device can upload directly, and its size in pixels. */
 export interface UploadableImage {

@@ -1,5 +1,7 @@
 /** The light sources that a page may use in place of the built-in lights. */
 
+import type { LivePicture } from '../engine/types.js';
+
 /** A light image of any size in linear values. */
 export interface LinearLight {
   /** Linear red, green and blue, row by row: 0 is dark, 1 is full brightness. */
@@ -7,9 +9,6 @@ export interface LinearLight {
   readonly width: number;
   readonly height: number;
 }
-
-/** A picture that a graphics device can upload directly, and that may change at any time. */
-export type LivePicture = HTMLCanvasElement | OffscreenCanvas | ImageBitmap | HTMLVideoElement;
 
 /** A picture in one of the browser's classes, in sRGB. */
 export type BrowserPicture = HTMLImageElement | ImageData | LivePicture;
