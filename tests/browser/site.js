@@ -148,9 +148,9 @@ describe('the site', () => {
     await drawn(page);
     const paused = () => page.evaluate("document.getElementById('photo').paused");
     assert.equal(await paused(), true);
-    await page.getByRole('button', { name: 'Let the fire burn' }).click();
+    await page.getByRole('button', { name: 'Play the fire' }).click();
     assert.equal(await paused(), false);
-    await page.getByRole('button', { name: 'Hold the fire still' }).click();
+    await page.getByRole('button', { name: 'Pause the fire' }).click();
     assert.equal(await paused(), true);
   });
 
@@ -194,7 +194,7 @@ describe('the playground', () => {
     await page.reload();
     assert.equal(await html.innerText(), code);
     assert.equal(await page.locator('relightable-photo').getAttribute('light'), 'stripes');
-    await page.getByRole('button', { name: 'Everything as it was' }).click();
+    await page.getByRole('button', { name: 'Reset all' }).click();
     await html.getByText('light="torch"').waitFor();
     assert.equal(new URL(page.url()).search, '');
     await page.getByLabel('loading', { exact: true }).selectOption('eager');

@@ -5,7 +5,7 @@ import 'relightable-photo';
 
 export default function Window() {
   const [light, setLight] = useState('torch');
-  const [fault, setFault] = useState('');
+  const [error, setError] = useState('');
 
   return (
     <figure>
@@ -13,13 +13,13 @@ export default function Window() {
         src="/photos/stained-glass.ltm"
         alt="A rose window of stained glass, lit from behind."
         light={light}
-        onload={() => setFault('')}
-        onerror={(event) => setFault(event.code)}
+        onload={() => setError('')}
+        onerror={(event) => setError(event.code)}
       />
       <button type="button" onClick={() => setLight('fire')}>
-        Light a fire behind it
+        Light a fire behind the window
       </button>
-      {fault && <figcaption>What went wrong: {fault}</figcaption>}
+      {error && <figcaption>Error: {error}</figcaption>}
     </figure>
   );
 }

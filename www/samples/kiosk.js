@@ -1,13 +1,13 @@
-/** Nobody stands beside a kiosk: what cannot be shown is tried again after a minute. */
+/** Loads the photograph again one minute after an error, because nobody attends a kiosk. */
 
-const MINUTE = 60_000;
+const RETRY_MS = 60_000;
 
 const photo = document.querySelector('relightable-photo');
-let waiting = 0;
+let retryTimer = 0;
 photo.addEventListener('error', ({ code, message }) => {
   console.warn(code, message);
-  clearTimeout(waiting);
-  waiting = setTimeout(() => photo.setAttribute('src', photo.getAttribute('src')), MINUTE);
+  clearTimeout(retryTimer);
+  retryTimer = setTimeout(() => photo.setAttribute('src', photo.getAttribute('src')), RETRY_MS);
 });
-photo.addEventListener('load', () => clearTimeout(waiting));
+photo.addEventListener('load', () => clearTimeout(retryTimer));
 document.addEventListener('contextmenu', (event) => event.preventDefault());

@@ -12,7 +12,7 @@ add_filter( 'upload_mimes', function ( $types ) {
 	return $types;
 } );
 
-// The package's dist folder lies beside this file.
+// The package's dist folder is next to this file.
 add_action( 'init', function () {
 	wp_register_script_module(
 		'relightable-photo',
@@ -20,14 +20,14 @@ add_action( 'init', function () {
 	);
 } );
 
-add_shortcode( 'relightable_photo', function ( $given ) {
+add_shortcode( 'relightable_photo', function ( $attributes ) {
 	$names = array( 'src', 'alt', 'light', 'poster', 'zoom', 'kiosk' );
 	$html  = '<relightable-photo controls cooperative-gestures';
 	foreach ( $names as $name ) {
-		if ( isset( $given[ $name ] ) ) {
+		if ( isset( $attributes[ $name ] ) ) {
 			$value = in_array( $name, array( 'src', 'poster' ), true )
-				? esc_url( $given[ $name ] )
-				: esc_attr( $given[ $name ] );
+				? esc_url( $attributes[ $name ] )
+				: esc_attr( $attributes[ $name ] );
 			$html .= " $name=\"$value\"";
 		}
 	}

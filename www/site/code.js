@@ -1,4 +1,4 @@
-/** A button on each sample of code that copies it. */
+/** Adds a copy button to each code sample. */
 
 for (const figure of document.querySelectorAll('.code')) {
   const code = figure.querySelector('code');
@@ -6,15 +6,14 @@ for (const figure of document.querySelectorAll('.code')) {
   const button = document.createElement('button');
   button.type = 'button';
   button.className = 'button';
-  const name = code.dataset['sample'] ?? 'the code';
   button.textContent = 'Copy';
-  button.setAttribute('aria-label', `Copy ${name}`);
+  button.setAttribute('aria-label', `Copy ${code.dataset['sample'] ?? 'the code'}`);
   button.addEventListener('click', async () => {
     try {
       await navigator.clipboard.writeText(code.textContent ?? '');
       button.textContent = 'Copied';
     } catch {
-      // Browsers may forbid it: selected, the keyboard copies it.
+      // The browser may deny access to the clipboard. Select the text, so that the keyboard can copy it.
       getSelection()?.selectAllChildren(code);
       button.textContent = 'Selected';
     }

@@ -1,10 +1,11 @@
 /**
- * The gallery. What its first picture shows can be read from and set by its address: ?light=…&backend=…
+ * The gallery's first picture: its controls, and its state in the page's address, ?light=…&backend=…
  *
  * @typedef {import('../src/index.js').RelightablePhoto} RelightablePhoto
+ * @typedef {import('../src/index.js').LightSource} LightSource
  */
 
-const TITLES = /** @type {const} */ ({ webgpu: 'WebGPU', webgl2: 'WebGL2', cpu: 'CPU' });
+const BACKEND_NAMES = /** @type {const} */ ({ webgpu: 'WebGPU', webgl2: 'WebGL2', cpu: 'CPU' });
 
 const photo = /** @type {RelightablePhoto} */ (document.getElementById('photo'));
 const form = /** @type {HTMLFormElement} */ (document.getElementById('controls'));
@@ -19,167 +20,176 @@ const lights = /** @type {NodeListOf<HTMLInputElement>} */ (
   form.querySelectorAll('input[name="light"]')
 );
 
-/** Why the back end is not the first choice. */
-let reason = '';
-/** Puts away what the visitor has lit the picture by. */
-let putAway = () => {};
-/** Counts what the visitor has asked for: what comes late gives way to what was asked for later. */
-let wishes = 0;
+/** Why a preferred backend is not in use. */
+let backendReason = '';
+/** Releases the visitor's current image, video or camera. */
+let releaseSource = () => {};
+/** Increases with each choice of the visitor, so that a source that opens late does not replace a newer choice. */
+let choiceCount = 0;
 
-const asked = new URLSearchParams(location.search);
-const light = asked.get('light');
-for (const input of lights) if (input.value === light) input.checked = true;
-backend.value = asked.get('backend') ?? '';
+const params = new URLSearchParams(location.search);
+for (const input of lights) if (input.value === params.get('light')) input.checked = true;
+backend.value = params.get('backend') ?? '';
 if (backend.selectedIndex < 0) backend.value = '';
-apply();
+applyForm();
 
-// The menu belongs to the form but stands outside of it.
+// The backend menu belongs to the form but is outside of it, so listen on the document.
 document.addEventListener('change', ({ target }) => {
   if (target === file) return;
-  if (target !== backend) shine(null);
-  apply();
+  if (target !== backend) setSource(null);
+  applyForm();
   const state = new URLSearchParams({ light: photo.light });
   if (backend.value) state.set('backend', backend.value);
   history.replaceState(null, '', `?${state}`);
 });
 
 photo.addEventListener('backendchange', (event) => {
-  reason = event.reason;
-  tell();
+  backendReason = event.reason;
+  updateStatus();
 });
-photo.addEventListener('load', tell);
+photo.addEventListener('load', updateStatus);
 photo.addEventListener('error', ({ code }) => {
-  // The element shows the message itself, and goes on drawing by another light where only that is wrong.
+  // The element shows the message. After a light-… error it continues with the last light.
   if (!code.startsWith('light-')) status.textContent = 'Not drawn.';
 });
-if (photo.info) tell();
+if (photo.info) updateStatus();
 
 file.addEventListener('change', async () => {
   const chosen = file.files?.[0];
   if (!chosen) return;
-  wishes += 1;
-  const wish = wishes;
   try {
-    if (chosen.type.startsWith('video/')) {
-      await showFilm(chosen, wish);
-    } else {
-      const bitmap = await createImageBitmap(chosen);
-      if (wish === wishes) shine(bitmap, file, () => bitmap.close());
-      else bitmap.close();
-    }
+    await openSource(file, () =>
+      chosen.type.startsWith('video/') ? openVideo(chosen) : openImage(chosen),
+    );
   } catch {
     status.textContent = `This browser cannot show ${chosen.name}.`;
   }
-  // The same file may be chosen again.
+  // Allows the visitor to choose the same file again.
   file.value = '';
 });
 
-// Fire is still to begin with for who asks for less motion.
+// Under prefers-reduced-motion the fire is paused at first.
 play.addEventListener('click', () => {
   photo.paused = !photo.paused;
-  tellPlay();
+  updatePlayButton();
 });
-matchMedia('(prefers-reduced-motion: reduce)').addEventListener('change', tellPlay);
-// Not before: `paused` is the element's own word.
-customElements.whenDefined('relightable-photo').then(tellPlay);
+matchMedia('(prefers-reduced-motion: reduce)').addEventListener('change', updatePlayButton);
+// `paused` exists only once the element is defined.
+customElements.whenDefined('relightable-photo').then(updatePlayButton);
 
-const cameras = navigator.mediaDevices;
-/** @type {HTMLElement} */ (document.getElementById('with-camera')).hidden = !cameras;
+const { mediaDevices } = navigator;
+/** @type {HTMLElement} */ (document.getElementById('with-camera')).hidden = !mediaDevices;
 camera.addEventListener('click', async () => {
-  wishes += 1;
-  const wish = wishes;
   try {
-    const stream = await cameras.getUserMedia({ video: { width: 640 } });
-    const stop = () => {
-      for (const track of stream.getTracks()) track.stop();
-    };
-    if (wish === wishes) shine(stream, camera, stop);
-    else stop();
+    await openSource(camera, openCamera);
   } catch (error) {
     const name = error instanceof DOMException ? error.name : '';
     status.textContent =
       {
         NotAllowedError:
-          'The camera may not be used: allow it in the browser’s settings for this page.',
-        NotFoundError: 'There is no camera.',
-        NotReadableError: 'Another program has the camera: close that, and try again.',
-      }[name] ?? 'The camera could not be used.';
+          'The browser blocks the camera. Allow it for this page in the browser’s settings.',
+        NotFoundError: 'This device has no camera.',
+        NotReadableError: 'Another program uses the camera. Close it and try again.',
+      }[name] ?? 'The camera does not work.';
   }
 });
 
 /**
- * @param {File} chosen
- * @param {number} wish
+ * Opens a source, and lights the photograph with it unless the visitor has chosen another one meanwhile.
+ *
+ * @param {HTMLElement} control by which the visitor chose it
+ * @param {() => Promise<{ source: LightSource, release: () => void }>} open
  */
-async function showFilm(chosen, wish) {
-  const src = URL.createObjectURL(chosen);
-  const film = Object.assign(document.createElement('video'), {
+async function openSource(control, open) {
+  choiceCount += 1;
+  const choice = choiceCount;
+  const { source, release } = await open();
+  if (choice === choiceCount) setSource(source, control, release);
+  else release();
+}
+
+/** @param {File} image */
+async function openImage(image) {
+  const source = await createImageBitmap(image);
+  return { source, release: () => source.close() };
+}
+
+async function openCamera() {
+  const source = await mediaDevices.getUserMedia({ video: { width: 640 } });
+  const release = () => {
+    for (const track of source.getTracks()) track.stop();
+  };
+  return { source, release };
+}
+
+/** @param {File} video */
+async function openVideo(video) {
+  const src = URL.createObjectURL(video);
+  const source = Object.assign(document.createElement('video'), {
     src,
     muted: true,
     loop: true,
     playsInline: true,
   });
-  const stop = () => {
-    film.pause();
-    film.removeAttribute('src');
-    film.load();
+  const release = () => {
+    source.pause();
+    source.removeAttribute('src');
+    source.load();
     URL.revokeObjectURL(src);
   };
   try {
-    await film.play();
+    await source.play();
   } catch (error) {
-    stop();
+    release();
     throw error;
   }
-  if (wish === wishes) shine(film, file, stop);
-  else stop();
+  return { source, release };
 }
 
 /**
- * Lights the picture by something of the visitor's, or by the built-in lights again.
+ * Lights the photograph with a source of the visitor, or with the built-in lights (`null`).
  *
- * @param {import('../src/index.js').LightSource | null} source
- * @param {HTMLElement} [control] by which it was chosen
- * @param {() => void} [stop]
+ * @param {LightSource | null} source
+ * @param {HTMLElement} [control] by which the visitor chose it
+ * @param {() => void} [release]
  */
-function shine(source, control, stop = () => {}) {
-  wishes += 1;
+function setSource(source, control, release = () => {}) {
+  choiceCount += 1;
   photo.lightSource = source;
-  putAway();
-  putAway = stop;
-  file.nextElementSibling?.classList.toggle('lit', control === file);
+  releaseSource();
+  releaseSource = release;
+  file.nextElementSibling?.classList.toggle('active', control === file);
   camera.setAttribute('aria-pressed', String(control === camera));
   if (!source) return;
   for (const input of lights) input.checked = false;
-  hint.classList.add('off');
-  tellPlay();
-  tell();
+  hint.classList.add('hidden');
+  updatePlayButton();
+  updateStatus();
 }
 
-function apply() {
-  // None is while something of the visitor's shines.
-  const chosen = [...lights].find((input) => input.checked)?.value ?? photo.light;
-  if (photo.getAttribute('light') !== chosen) photo.setAttribute('light', chosen);
-  tellPlay();
-  // A hidden line is not read out either.
-  hint.classList.toggle('off', chosen !== 'torch' || photo.lightSource !== null);
+function applyForm() {
+  // No light is checked while a source of the visitor is in use.
+  const light = [...lights].find((input) => input.checked)?.value ?? photo.light;
+  if (photo.getAttribute('light') !== light) photo.setAttribute('light', light);
+  updatePlayButton();
+  hint.classList.toggle('hidden', light !== 'torch' || photo.lightSource !== null);
   if ((photo.getAttribute('backend') ?? '') === backend.value) return;
   if (backend.value) photo.setAttribute('backend', backend.value);
   else photo.removeAttribute('backend');
 }
 
-function tell() {
+function updateStatus() {
   const { info, activeBackend, kernel } = photo;
   if (!info || !activeBackend) return;
   const parts = [
-    `${TITLES[activeBackend]}${kernel ? ` (${kernel})` : ''}`,
+    `${BACKEND_NAMES[activeBackend]}${kernel ? ` (${kernel})` : ''}`,
     `${info.width} × ${info.height} pixels`,
-    `${info.lightWidth} × ${info.lightHeight} lights`,
+    `${info.lightWidth} × ${info.lightHeight} light elements`,
   ];
-  status.textContent = [parts.join(' · '), reason].filter(Boolean).join('. ');
+  status.textContent = [parts.join(' · '), backendReason].filter(Boolean).join('. ');
 }
 
-function tellPlay() {
+function updatePlayButton() {
   play.hidden = photo.light !== 'fire' || photo.lightSource != null || !photo.matches(':defined');
-  play.textContent = photo.paused ? 'Let the fire burn.' : 'Hold the fire still.';
+  play.textContent = photo.paused ? 'Play the fire' : 'Pause the fire';
 }

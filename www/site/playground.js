@@ -1,12 +1,12 @@
 /**
- * The playground: a form of all attributes, the element they make, its HTML and its events. What was
- * chosen is in the page's address.
+ * The playground: a form with all attributes, the resulting element, its HTML and its events. The page's address
+ * contains the settings.
  *
  * @typedef {import('../src/index.js').RelightablePhoto} RelightablePhoto
  */
 
-/** Of these only the beginning matters: the element is made anew when they change. */
-const AT_THE_START = ['loading', 'reveal', 'crossorigin', 'wasm-url'];
+/** These take effect only when the element starts, so a change creates another element. */
+const START_ATTRIBUTES = ['loading', 'reveal', 'crossorigin', 'wasm-url'];
 const EVENTS = [
   'load',
   'progress',
@@ -17,7 +17,7 @@ const EVENTS = [
   'qualitychange',
   'contextlost',
 ];
-const DETAILS = [
+const EVENT_FIELDS = [
   'code',
   'message',
   'loaded',
@@ -31,11 +31,11 @@ const DETAILS = [
   'reason',
   'share',
 ];
-/** Those before are of no use to anyone, and make the page slow. */
-const LOGGED = 200;
+/** More lines would make the page slow. */
+const MAX_LOG_LINES = 200;
 
 const form = /** @type {HTMLFormElement} */ (document.getElementById('attributes'));
-const stage = /** @type {HTMLElement} */ (document.getElementById('stage'));
+const preview = /** @type {HTMLElement} */ (document.getElementById('preview'));
 const html = /** @type {HTMLElement} */ (document.getElementById('html'));
 const log = /** @type {HTMLElement} */ (document.getElementById('log'));
 const copied = /** @type {HTMLElement} */ (document.getElementById('copied'));
@@ -46,23 +46,23 @@ const controls = /** @type {(HTMLInputElement | HTMLSelectElement)[]} */ (
 /** @type {RelightablePhoto | null} */
 let photo = null;
 
-const initial = chosen();
+const initial = settings();
 for (const [name, value] of new URLSearchParams(location.search)) {
   const control = controls.find((control) => control.name === name);
-  if (control) fill(control, value);
+  if (control) setControl(control, value);
 }
-make();
+createPhoto();
 
 form.addEventListener('change', ({ target }) => {
   const { name } = /** @type {HTMLInputElement} */ (target);
-  if (AT_THE_START.includes(name)) make();
-  else apply();
+  if (START_ATTRIBUTES.includes(name)) createPhoto();
+  else applyForm();
 });
 form.addEventListener('submit', (event) => event.preventDefault());
-// The event comes before what it tells of.
-form.addEventListener('reset', () => setTimeout(make));
+// The event fires before the form is reset.
+form.addEventListener('reset', () => setTimeout(createPhoto));
 document.getElementById('clear')?.addEventListener('click', () => log.replaceChildren());
-document.getElementById('take')?.addEventListener('click', () => {
+document.getElementById('read-state')?.addEventListener('click', () => {
   const state = /** @type {HTMLElement} */ (document.getElementById('state'));
   state.textContent = photo?.getState() ?? '';
 });
@@ -71,14 +71,14 @@ document.getElementById('copy')?.addEventListener('click', async () => {
     await navigator.clipboard.writeText(html.textContent ?? '');
     copied.textContent = 'Copied.';
   } catch {
-    // Browsers may forbid it: selected, the keyboard copies it.
+    // The browser may deny access to the clipboard. Select the text, so that the keyboard can copy it.
     getSelection()?.selectAllChildren(html);
     copied.textContent = 'Selected: copy it with your keyboard.';
   }
 });
 
-/** Fills in what an address says; a menu keeps its choice where there is none of that name. */
-function fill(
+/** Sets a control to a value of the address; a menu ignores unknown values. */
+function setControl(
   /** @type {HTMLInputElement | HTMLSelectElement} */ control,
   /** @type {string} */ value,
 ) {
@@ -92,17 +92,17 @@ function fill(
   }
 }
 
-/** What the form says now, by name. @returns {Record<string, string>} */
-function chosen() {
+/** The values of all controls, by name. @returns {Record<string, string>} */
+function settings() {
   return Object.fromEntries(
     controls.map((control) => {
-      const box = control instanceof HTMLInputElement && control.type === 'checkbox';
-      return [control.name, box ? (control.checked ? '1' : '0') : control.value.trim()];
+      const isCheckbox = control instanceof HTMLInputElement && control.type === 'checkbox';
+      return [control.name, isCheckbox ? (control.checked ? '1' : '0') : control.value.trim()];
     }),
   );
 }
 
-/** The attributes that come of it; empty ones are left out. @returns {[string, string][]} */
+/** The attributes, without empty ones. @returns {[string, string][]} */
 function attributes() {
   return controls.flatMap((control) => {
     if (control instanceof HTMLInputElement && control.type === 'checkbox') {
@@ -113,43 +113,45 @@ function attributes() {
   });
 }
 
-function make() {
+function createPhoto() {
   const next = document.createElement('relightable-photo');
-  for (const type of EVENTS) next.addEventListener(type, tell);
+  for (const type of EVENTS) next.addEventListener(type, logEvent);
   photo = next;
-  apply();
-  stage.replaceChildren(next);
+  applyForm();
+  preview.replaceChildren(next);
 }
 
-function apply() {
+function applyForm() {
   if (!photo) return;
-  const wanted = attributes();
+  const present = attributes();
   for (const control of controls) {
-    if (!wanted.some(([name]) => name === control.name)) photo.removeAttribute(control.name);
+    if (!present.some(([name]) => name === control.name)) photo.removeAttribute(control.name);
   }
-  for (const [name, value] of wanted) {
+  for (const [name, value] of present) {
     if (photo.getAttribute(name) !== value) photo.setAttribute(name, value);
   }
-  const lines = wanted.map(([name, value]) => (value ? `${name}="${quoted(value)}"` : name));
+  const lines = present.map(([name, value]) =>
+    value ? `${name}="${escapeAttribute(value)}"` : name,
+  );
   html.textContent = `<relightable-photo\n  ${lines.join('\n  ')}\n></relightable-photo>`;
-  const others = Object.entries(chosen()).filter(([name, value]) => value !== initial[name]);
-  const search = new URLSearchParams(others).toString();
+  const changed = Object.entries(settings()).filter(([name, value]) => value !== initial[name]);
+  const search = new URLSearchParams(changed).toString();
   history.replaceState(null, '', search ? `?${search}` : location.pathname);
 }
 
 /** @param {string} value */
-function quoted(value) {
+function escapeAttribute(value) {
   return value.replaceAll('&', '&amp;').replaceAll('"', '&quot;');
 }
 
 /** @param {Event} event */
-function tell(event) {
-  const details = DETAILS.filter((name) => name in event).map((name) => {
+function logEvent(event) {
+  const fields = EVENT_FIELDS.filter((name) => name in event).map((name) => {
     const value = /** @type {any} */ (event)[name];
     return `${name}: ${JSON.stringify(value, (_, v) => (typeof v === 'number' ? +v.toFixed(3) : v))}`;
   });
   const line = document.createElement('li');
-  line.textContent = [event.type, details.join(', ')].filter(Boolean).join('  ');
+  line.textContent = [event.type, fields.join(', ')].filter(Boolean).join('  ');
   log.prepend(line);
-  while (log.childElementCount > LOGGED) log.lastElementChild?.remove();
+  while (log.childElementCount > MAX_LOG_LINES) log.lastElementChild?.remove();
 }

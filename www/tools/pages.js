@@ -29,6 +29,11 @@ export function composePage(name) {
   const fields = {
     title: field(source, 'title'),
     description: field(source, 'description'),
+    styles: field(source, 'styles')
+      .split(' ')
+      .filter(Boolean)
+      .map((href) => `<link rel="stylesheet" href="${href}" />`)
+      .join('\n    '),
     scripts: field(source, 'scripts')
       .split(' ')
       .filter(Boolean)
