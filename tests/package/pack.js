@@ -13,9 +13,10 @@ import { manifestOf, packed, REPOSITORY, run, unpacked } from './packed.js';
 
 /** Scripts with fixed names. */
 const SCRIPTS = [
-  ...['', '-controls', '-words', '-worker', '-cpu', '-gpu', '-relighter', '-sources', '-tilt'].map(
+  ...['', '-controls', '-worker', '-cpu', '-gpu', '-relighter', '-sources', '-tilt'].map(
     (part) => `relightable-photo${part}`,
   ),
+  ...['fr', 'de', 'it', 'es', 'ja', 'zh'].map((language) => `relightable-photo-${language}`),
   ...['index', 'element', 'core'],
 ];
 const CORE_MODULES = ['decoder', 'cpu'];
