@@ -191,7 +191,11 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     let shots = choose_shots(&manifest.shots, args.patterns)?;
     if shots.len() < recover::MIN_PATTERNS {
         let manifest = folder.manifest_path().display().to_string();
-        return Err(RecoverError::TooFewPatterns(shots.len())).context(manifest);
+        return Err(RecoverError::TooFewPatterns {
+            count: shots.len(),
+            min: recover::MIN_PATTERNS,
+        })
+        .context(manifest);
     }
     let threads = rayon::current_num_threads();
     let plan = Plan::new(
@@ -269,8 +273,8 @@ fn recover(
     warn_of_saturation(saturated, &measurements);
     let failed = |error| match error {
         RecoverError::Cancelled(_) => interrupted(&checkpoint),
-        RecoverError::MismatchedPatterns(patterns) => {
-            astray(folder, patterns.iter().map(|&l| shots[l]))
+        RecoverError::MismatchedPatterns { pattern_indices } => {
+            astray(folder, pattern_indices.iter().map(|&l| shots[l]))
         }
         other => anyhow::Error::new(other).context(args.capture.display().to_string()),
     };

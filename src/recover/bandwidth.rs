@@ -1,357 +1,305 @@
-//! How wide the band is: what share of a pixel's light reaches it from how far off.
+//! Estimates how wide a window has to be to hold nearly all of the light that a pixel receives.
 //!
-//! What the rings of light elements around a pixel send it, as a share of all, is fitted to many pixels'
-//! measurements at once by plain least squares. What its own few elements send differs from pixel to
-//! pixel, and is left out: the equations are projected onto what does not depend on it. No sign is
-//! imposed, so that rings beyond the band come out near zero, on either side of it, rather than
-//! gathering noise.
+//! T is zero far from a pixel's correspondence (paper, section 3): it is a band, whose width depends on the
+//! object. The light elements around a pixel are divided into square rings. The flux of each ring, relative
+//! to the pixel's light, is taken to be the same for all pixels and estimated from many pixels at once by
+//! plain least squares. What the few elements in the middle send differs from pixel to pixel, so the
+//! equations are projected onto the complement of these elements' columns. No sign is imposed: the flux of
+//! rings beyond the band is then zero on average, and does not gather noise.
+//!
+//! The *tail fraction* of a window is the flux of all rings outside it. Its standard error is that of a
+//! jackknife over parts of the picture.
 
-use super::RecoverError;
-use super::holdout::numbers;
-use super::pooled::DEVIATION;
-use super::sampling::{
-    mean_variance, pixels_by_window, reaches_display, spread_squares, unsaturated,
-};
+use super::common_mode::CommonMode;
+use super::error::RecoverError;
+use super::holdout::pattern_ids;
+use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns};
+use super::pooled::PooledMeasurements;
+use super::sampling::{self, PixelsOfWindow};
 use crate::capture::{Measurements, distinct};
 use crate::executor::Executor;
-use crate::linalg::{self, add_scaled, dot, vectorise};
-use crate::transport::{CameraPx, Element, Geometry, Window};
+use crate::linalg::{self, add_scaled, vectorise};
+use crate::transport::{Element, Geometry, Window};
 
-/// Side of the window that the band is looked for in.
-const PROBE: u32 = 31;
-/// Side of the smallest window.
-const LEAST: u32 = 7;
-/// Side where nothing can be told.
-const USUAL: u32 = 15;
-/// Sides of what counts as a pixel's own elements; the largest whose number is at most three quarters
-/// of that of the patterns.
-const OWN: [u32; 4] = [7, 5, 3, 1];
-/// Largest share of a pixel's light left outside the window chosen.
-const LEAK: f64 = 0.01;
-/// Rings added: the mean function is narrower than the widest ones.
-const MARGIN: usize = 1;
-/// Squares of the picture looked at, and their side in pixels.
-const SQUARES: (usize, u32) = (1024, 4);
-/// Parts that the squares are divided into; fixed, so that sums do not depend on threads.
+/// Side of the widest window that is searched.
+const MAX_SIDE: u32 = 31;
+/// Side of the narrowest.
+const MIN_SIDE: u32 = 7;
+/// Side if the measurements do not determine it.
+const DEFAULT_SIDE: u32 = 15;
+/// Sides of the middle of the window, which differs from pixel to pixel. The largest one is used whose
+/// number of elements is at most three quarters of the number of patterns.
+const CENTRE_SIDES: [u32; 4] = [7, 5, 3, 1];
+/// Largest tail fraction of the chosen window.
+const MAX_TAIL_FRACTION: f64 = 0.01;
+/// Rings added to the window found: the mean function is narrower than the widest ones.
+const MARGIN_RINGS: usize = 1;
+/// Squares of the picture that are used, and their side in camera pixels.
+const MAX_SQUARES: usize = 1024;
+const SQUARE_SIDE: u32 = 4;
+/// Parts of the picture for the jackknife, one job each.
 const PARTS: usize = 8;
 
-/// A window to recover with.
+/// A window for the recovery, as estimated from measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindowEstimate {
-    /// The smallest window that holds nearly all of the band, as far as that is known.
+    /// The smallest window that holds nearly all light, as far as that is known.
     pub window: Window,
     /// What is known of the light from outside it.
     pub bandwidth: BandwidthEstimate,
 }
 
-/// How far the band reaches.
+/// How wide the band of T is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BandwidthEstimate {
-    /// Not much farther than the window.
+    /// Hardly wider than the window.
     Bounded {
         /// Estimated share of a pixel's light that comes from outside the window.
         tail_fraction: f64,
     },
-    /// As far as was looked, or farther.
+    /// At least as wide as the widest window that was searched.
     Unbounded,
-    /// Too few measurements to tell.
+    /// There are too few measurements to tell.
     Undetermined,
 }
 
 impl WindowEstimate {
-    /// The largest window an estimate may come to.
-    pub const MAX_WINDOW: Window = match Window::new(PROBE) {
+    /// The widest window that an estimate may come to.
+    pub const MAX_WINDOW: Window = match Window::new(MAX_SIDE) {
         Ok(window) => window,
-        Err(_) => panic!("the probing window is a window"),
+        Err(_) => panic!("the widest window is a window"),
     };
 
-    /// Estimates the band from what is at hand of `measurements`.
+    /// Estimates the window from the rows of `measurements` that are in memory.
+    ///
+    /// # Errors
+    /// If the geometry is out of range, if no pixel sees the light plane, and if the executor is cancelled.
     pub fn from_measurements(
         measurements: &Measurements,
         executor: &impl Executor,
     ) -> Result<Self, RecoverError> {
         let light = measurements.light;
-        let probe = PROBE.min((light.width.min(light.height) / 2).saturating_sub(1) | 1);
+        let max_side = MAX_SIDE.min((light.width.min(light.height) / 2).saturating_sub(1) | 1);
         let geometry = Geometry {
             camera: measurements.camera,
             light,
-            window: Window::new(probe)?,
+            window: Window::new(max_side)?,
             correspondence: measurements.correspondence,
             tile_side: Geometry::DEFAULT_TILE_SIDE,
         }
         .validate()?;
-        if !reaches_display(&geometry) {
+        if !sampling::sees_light_plane(&geometry) {
             return Err(RecoverError::CorrespondenceOffLightPlane);
         }
-        let patterns = distinct(&numbers(&measurements.patterns));
-        let rings = Rings::new(probe, patterns);
-        let mut squares = spread_squares(measurements, SQUARES.1, SQUARES.0);
-        // Each part a piece of the picture: what lies beside each other errs alike.
+        let rings = Rings::new(max_side, distinct(&pattern_ids(&measurements.patterns)));
+        let mut squares = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
+        // Errors of neighbouring squares are correlated: each part is a strip of the picture.
         squares.sort_by_key(|square| (square.y, square.x));
         executor.check_cancelled()?;
         let parts = executor.map(PARTS, |part| {
-            let mut sums = Sums::new(rings.sizes.len());
-            let share = |part: usize| part * squares.len() / PARTS;
-            for square in &squares[share(part)..share(part + 1)] {
-                for (origin, pixels) in pixels_by_window(&geometry, *square) {
+            let mut sums = NormalEquations::zeros(rings.sizes.len());
+            let start = |part: usize| part * squares.len() / PARTS;
+            for square in &squares[start(part)..start(part + 1)] {
+                for (origin, pixels) in sampling::pixels_by_window(&geometry, *square) {
                     vectorise(
                         #[inline(always)]
-                        || sums.add(measurements, &geometry, &rings, (origin, &pixels)),
+                        || rings.add_window(&mut sums, measurements, &geometry, (origin, &pixels)),
                     );
                 }
             }
             sums
         });
-        // From all parts but one, and from all.
-        let leaks = |but: usize| {
-            let mut total = Sums::new(rings.sizes.len());
-            let parts = parts.iter().enumerate().filter(|(part, _)| *part != but);
-            parts.for_each(|(_, part)| total.merge(part));
-            let flux = total.solve();
-            flux.map(|flux| rings.leaks(&flux, probe))
+        let tail_fractions_without = |left_out: usize| {
+            let mut total = NormalEquations::zeros(rings.sizes.len());
+            let used = parts
+                .iter()
+                .enumerate()
+                .filter(|(part, _)| *part != left_out);
+            used.for_each(|(_, part)| total.merge(part));
+            Some(rings.tail_fractions(&total.solve()?, max_side))
         };
-        let Some(all) = leaks(PARTS) else {
-            return unclear(probe); // or dark, which recovery says
+        let Some(tails) = tail_fractions_without(PARTS) else {
+            // Too few measurements, or dark photographs, which the recovery reports.
+            return undetermined(max_side);
         };
-        let without: Option<Vec<Vec<f64>>> = (0..PARTS).map(leaks).collect();
-        let errors = match without {
-            Some(without) => jackknife(&without, &all),
-            None => vec![f64::INFINITY; all.len()],
+        let without_part: Option<Vec<_>> = (0..PARTS).map(tail_fractions_without).collect();
+        let errors = match without_part {
+            Some(without_part) => jackknife_errors(&without_part, &tails),
+            None => vec![f64::INFINITY; tails.len()],
         };
-        band(&all, &errors, probe)
+        choose_window(&tails, &errors, max_side)
     }
 }
 
-/// Elements of the probing window by their distance from its middle.
+/// The division of the widest window into a centre and rings around it.
 struct Rings {
-    /// Side of what is a pixel's own.
-    own: u32,
-    /// Of each slot: its place among the pixel's own, or the ring it is in.
-    of: Vec<Place>,
-    /// Elements in each ring, from the inside out.
+    /// Side of the centre.
+    centre: u32,
+    /// What each slot belongs to.
+    regions: Vec<Region>,
+    /// Number of elements in each ring, from the inside out.
     sizes: Vec<f64>,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Place {
-    Own(usize),
+enum Region {
+    /// The centre's element of this index.
+    Centre(usize),
+    /// The ring of this index.
     Ring(usize),
 }
 
 impl Rings {
-    fn new(probe: u32, patterns: usize) -> Self {
-        let fits = |own: &u32| *own < probe && 4 * (own * own) as usize <= 3 * patterns;
-        let own = OWN.into_iter().find(fits).unwrap_or(1);
-        let half = probe / 2;
-        let distance = |s: u32| (s / probe).abs_diff(half).max((s % probe).abs_diff(half));
-        let mut sizes = vec![0.0; (half - own / 2) as usize];
+    fn new(side: u32, patterns: usize) -> Self {
+        let fits = |centre: &u32| *centre < side && 4 * (centre * centre) as usize <= 3 * patterns;
+        let centre = CENTRE_SIDES.into_iter().find(fits).unwrap_or(1);
+        let half = side / 2;
+        let distance = |s: u32| (s / side).abs_diff(half).max((s % side).abs_diff(half));
+        let mut sizes = vec![0.0; (half - centre / 2) as usize];
         let mut next = 0;
-        let place = |s: u32| match distance(s).checked_sub(own / 2 + 1) {
+        let region = |s: u32| match distance(s).checked_sub(centre / 2 + 1) {
             Some(ring) => {
                 sizes[ring as usize] += 1.0;
-                Place::Ring(ring as usize)
+                Region::Ring(ring as usize)
             }
             None => {
                 next += 1;
-                Place::Own(next - 1)
+                Region::Centre(next - 1)
             }
         };
-        let of = (0..probe * probe).map(place).collect();
-        Self { own, of, sizes }
+        Self {
+            centre,
+            regions: (0..side * side).map(region).collect(),
+            sizes,
+        }
     }
 
-    /// Light from outside the least window and the first rings, for every number of rings but all,
-    /// of the flux in each ring.
-    fn leaks(&self, flux: &[f64], probe: u32) -> Vec<f64> {
-        let rings = &flux[((LEAST.min(probe) - self.own) / 2) as usize..];
-        let mut outside = 0.0;
-        let leaks = rings.iter().rev().map(|ring| {
-            outside += ring;
-            outside
-        });
-        let mut leaks: Vec<f64> = leaks.collect();
-        leaks.reverse();
-        leaks
+    /// Adds the equations of one window's pixels, for the flux of each ring.
+    #[inline(always)]
+    fn add_window(
+        &self,
+        sums: &mut NormalEquations,
+        measurements: &Measurements,
+        geometry: &Geometry,
+        (origin, pixels): (Element, &PixelsOfWindow),
+    ) {
+        let elements = sampling::elements_of_window(geometry, origin);
+        let is_centre = |slot: usize| matches!(self.regions[slot], Region::Centre(_));
+        let centre_area = (self.centre * self.centre) as usize;
+        let centre_elements = elements.iter().filter(|&&(slot, _)| is_centre(slot));
+        if centre_elements.count() < centre_area {
+            return; // The pixel's brightness is unknown.
+        }
+        let all: Vec<usize> = (0..measurements.patterns.len()).collect();
+        let rings: Vec<usize> = (0..self.sizes.len()).collect();
+        for (plane, channels) in measurements.planes() {
+            let indices = sampling::unsaturated(measurements, &all, pixels, channels.clone());
+            let patterns = indices.len();
+            let mut centre = vec![0.0; centre_area * patterns];
+            let mut columns = vec![0.0; rings.len() * patterns];
+            for (i, &l) in indices.iter().enumerate() {
+                let pattern = measurements.patterns[l].plane(plane);
+                for &(slot, m) in &elements {
+                    let p = f64::from(pattern[m]);
+                    match self.regions[slot] {
+                        Region::Centre(k) => centre[k * patterns + i] += p,
+                        Region::Ring(r) => columns[r * patterns + i] += p / self.sizes[r],
+                    }
+                }
+            }
+            let weights = EquationWeights::uniform(patterns, CommonMode::EXCLUDED);
+            let centre = WeightedColumns::new(centre, weights.clone());
+            let mut columns = WeightedColumns::new(columns, weights);
+            let level = centre.means.iter().sum::<f64>() / centre_area as f64;
+            if level <= 0.0 || !project_out(&mut columns, &centre) {
+                continue;
+            }
+            let mut pooled =
+                PooledMeasurements::new(measurements, &indices, pixels, channels, level);
+            columns.weights.apply(&mut pooled.y);
+            sums.add(&columns, &rings, pooled.certainty, &pooled.y);
+        }
+    }
+
+    /// The tail fraction of each window from the narrowest to the last but one, of the flux of each ring.
+    fn tail_fractions(&self, flux: &[f64], max_side: u32) -> Vec<f64> {
+        let mut tails = flux[((MIN_SIDE.min(max_side) - self.centre) / 2) as usize..].to_vec();
+        for ring in (1..tails.len()).rev() {
+            tails[ring - 1] += tails[ring];
+        }
+        tails
     }
 }
 
-/// The band, where windows from the least on leave out `leaks`, give or take `errors`.
-fn band(leaks: &[f64], errors: &[f64], probe: u32) -> Result<WindowEstimate, RecoverError> {
-    let rings = leaks.len();
-    // One that is low by chance is not enough, and beyond the last there is none.
-    let low = |i: usize| match (leaks.get(i), errors.get(i)) {
-        (Some(leak), Some(error)) => leak.abs() <= LEAK && *error <= LEAK,
-        _ => true,
-    };
-    let held = (0..rings).find(|&i| low(i) && low(i + 1));
-    let side = |inside: usize| Window::new(LEAST.min(probe) + 2 * inside as u32);
-    if let Some(inside) = held.map(|held| held + MARGIN).filter(|&i| i < rings) {
-        return Ok(WindowEstimate {
-            window: side(inside)?,
-            bandwidth: BandwidthEstimate::Bounded {
-                tail_fraction: leaks[inside].max(0.0),
-            },
-        });
+/// Replaces `columns` by their projection onto the complement of `others`. Returns false if the others
+/// depend on each other linearly.
+#[inline(always)]
+fn project_out(columns: &mut WeightedColumns, others: &WeightedColumns) -> bool {
+    let mut gram = others.gram();
+    if linalg::cholesky(&mut gram, others.unknowns()).is_none() {
+        return false;
     }
-    // The last may be low: the band then ends where the looking does.
-    let mut but_last = leaks.iter().zip(errors).take(rings.saturating_sub(1));
-    match rings > 1 && but_last.all(|(leak, error)| *leak > LEAK + 2.0 * error) {
-        true => Ok(WindowEstimate {
-            window: side(rings)?,
-            bandwidth: BandwidthEstimate::Unbounded,
-        }),
-        false => unclear(probe),
+    for column in columns.columns.chunks_exact_mut(columns.weights.len()) {
+        let mut shares: Vec<f64> = others.right_hand_side(column).collect();
+        linalg::cholesky_solve(&gram, &mut shares);
+        for (share, other) in shares.iter().zip(others.iter()) {
+            add_scaled(column, -share, other);
+        }
     }
+    true
 }
 
-fn unclear(probe: u32) -> Result<WindowEstimate, RecoverError> {
-    Ok(WindowEstimate {
-        window: Window::new(USUAL.min(probe))?,
-        bandwidth: BandwidthEstimate::Undetermined,
-    })
-}
-
-/// Standard errors of `all`, from what they are `without` each part.
-fn jackknife(without: &[Vec<f64>], all: &[f64]) -> Vec<f64> {
-    let parts = without.len() as f64;
+/// Standard errors of the values `all`, given their values `without_part` each part.
+fn jackknife_errors(without_part: &[Vec<f64>], all: &[f64]) -> Vec<f64> {
+    let parts = without_part.len() as f64;
     let error = |(i, all): (usize, &f64)| {
-        let squares = without.iter().map(|leaks| (leaks[i] - all).powi(2));
+        let squares = without_part.iter().map(|values| (values[i] - all).powi(2));
         (squares.sum::<f64>() * (parts - 1.0) / parts).sqrt()
     };
     all.iter().enumerate().map(error).collect()
 }
 
-/// Normal equations of the rings' flux.
-struct Sums {
-    rings: usize,
-    /// `[ring, ring]`, upper triangle.
-    gram: Vec<f64>,
-    right: Vec<f64>,
-}
-
-impl Sums {
-    fn new(rings: usize) -> Self {
-        Self {
-            rings,
-            gram: vec![0.0; rings * rings],
-            right: vec![0.0; rings],
-        }
-    }
-
-    fn merge(&mut self, other: &Self) {
-        add_scaled(&mut self.gram, 1.0, &other.gram);
-        add_scaled(&mut self.right, 1.0, &other.right);
-    }
-
-    #[inline(always)]
-    fn add(
-        &mut self,
-        measurements: &Measurements,
-        geometry: &Geometry,
-        rings: &Rings,
-        (origin, pixels): (Element, &[(usize, CameraPx)]),
-    ) {
-        let (light, window) = (geometry.light, geometry.window);
-        let elements: Vec<(usize, Place)> = (0..window.area())
-            .filter_map(|slot| {
-                let m = window.element(origin, slot).index_in(light)?;
-                Some((m, rings.of[slot]))
-            })
-            .collect();
-        let own = |(_, place): &&(usize, Place)| matches!(place, Place::Own(_));
-        if elements.iter().filter(own).count() < (rings.own * rings.own) as usize {
-            return; // How bright it is cannot be told.
-        }
-        let all: Vec<usize> = (0..measurements.patterns.len()).collect();
-        for (plane, channels) in measurements.planes() {
-            let rows = unsaturated(measurements, &all, pixels, channels.clone());
-            let patterns = rows.len();
-            let mut own = vec![0.0; (rings.own * rings.own) as usize * patterns];
-            let mut columns = vec![0.0; self.rings * patterns];
-            for (i, &l) in rows.iter().enumerate() {
-                let pattern = measurements.patterns[l].plane(plane);
-                for &(m, place) in &elements {
-                    let p = f64::from(pattern[m]);
-                    match place {
-                        Place::Own(k) => own[k * patterns + i] += p,
-                        Place::Ring(r) => columns[r * patterns + i] += p / rings.sizes[r],
-                    }
-                }
-            }
-            let level = own.iter().sum::<f64>() / own.len() as f64;
-            if level <= 0.0 || !leave_out(&mut own, &mut columns, patterns) {
-                continue;
-            }
-            let mut seen = vec![0.0; patterns];
-            let mut energy = 0.0;
-            for &(_, pixel) in pixels {
-                for c in channels.clone() {
-                    let y = rows.iter().map(|&l| measurements.sample(l, pixel, c));
-                    let y: Vec<f64> = y.collect();
-                    let mean = y.iter().sum::<f64>() / patterns as f64;
-                    // Also false where some sample is saturated.
-                    if mean > 0.0 {
-                        let brightness = mean / level;
-                        let noise =
-                            mean_variance(measurements, &rows, c, mean) / brightness.powi(2);
-                        let weight = 1.0 / (DEVIATION.powi(2) + noise);
-                        energy += weight;
-                        add_scaled(&mut seen, weight / brightness, &y);
-                    }
-                }
-            }
-            for i in 0..self.rings {
-                let a = &columns[i * patterns..(i + 1) * patterns];
-                self.right[i] += dot(a, &seen);
-                for j in i..self.rings {
-                    let b = &columns[j * patterns..(j + 1) * patterns];
-                    self.gram[i * self.rings + j] += energy * dot(a, b);
-                }
-            }
-        }
-    }
-
-    /// Flux of each ring; `None` without light.
-    fn solve(mut self) -> Option<Vec<f64>> {
-        linalg::cholesky(&mut self.gram, self.rings)?;
-        linalg::cholesky_solve(&self.gram, &mut self.right);
-        Some(self.right)
-    }
-}
-
-/// Takes from `columns`, `[ring, pattern]`, their means and all that those of a pixel's own elements,
-/// `[element, pattern]`, can show. False where these are not independent.
-#[inline(always)]
-fn leave_out(own: &mut [f64], columns: &mut [f64], patterns: usize) -> bool {
-    for column in own
-        .chunks_exact_mut(patterns)
-        .chain(columns.chunks_exact_mut(patterns))
+/// Chooses the window by the tail fractions of windows from the narrowest on, and their standard errors.
+fn choose_window(
+    tails: &[f64],
+    errors: &[f64],
+    max_side: u32,
+) -> Result<WindowEstimate, RecoverError> {
+    let rings = tails.len();
+    let is_small = |i: usize| match (tails.get(i), errors.get(i)) {
+        (Some(tail), Some(error)) => tail.abs() <= MAX_TAIL_FRACTION && *error <= MAX_TAIL_FRACTION,
+        _ => true, // Nothing is known of light from beyond the last ring.
+    };
+    // A single small value may be due to chance.
+    let first = (0..rings).find(|&i| is_small(i) && is_small(i + 1));
+    let window = |rings: usize| Window::new(MIN_SIDE.min(max_side) + 2 * rings as u32);
+    if let Some(inside) = first
+        .map(|first| first + MARGIN_RINGS)
+        .filter(|&i| i < rings)
     {
-        let mean = column.iter().sum::<f64>() / patterns as f64;
-        column.iter_mut().for_each(|p| *p -= mean);
+        return Ok(WindowEstimate {
+            window: window(inside)?,
+            bandwidth: BandwidthEstimate::Bounded {
+                tail_fraction: tails[inside].max(0.0),
+            },
+        });
     }
-    let own: Vec<&[f64]> = own.chunks_exact(patterns).collect();
-    let k = own.len();
-    let mut gram = vec![0.0; k * k];
-    for i in 0..k {
-        for j in i..k {
-            gram[i * k + j] = dot(own[i], own[j]);
-        }
+    // The last ring may be dark: the band then ends with the widest window.
+    let mut but_last = tails.iter().zip(errors).take(rings.saturating_sub(1));
+    match rings > 1 && but_last.all(|(tail, error)| *tail > MAX_TAIL_FRACTION + 2.0 * error) {
+        true => Ok(WindowEstimate {
+            window: window(rings)?,
+            bandwidth: BandwidthEstimate::Unbounded,
+        }),
+        false => undetermined(max_side),
     }
-    if linalg::cholesky(&mut gram, k).is_none() {
-        return false;
-    }
-    let mut share = vec![0.0; k];
-    for column in columns.chunks_exact_mut(patterns) {
-        for (share, own) in share.iter_mut().zip(&own) {
-            *share = dot(own, column);
-        }
-        linalg::cholesky_solve(&gram, &mut share);
-        for (share, own) in share.iter().zip(&own) {
-            add_scaled(column, -share, own);
-        }
-    }
-    true
+}
+
+fn undetermined(max_side: u32) -> Result<WindowEstimate, RecoverError> {
+    Ok(WindowEstimate {
+        window: Window::new(DEFAULT_SIDE.min(max_side))?,
+        bandwidth: BandwidthEstimate::Undetermined,
+    })
 }
 
 #[cfg(test)]
@@ -359,44 +307,40 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_band_ends_where_rings_stay_dark() {
+    fn window_ends_where_tail_fractions_are_small() {
         let rings = Rings::new(15, 100);
         let flux = [0.06, 0.035, 0.004, 0.001]; // out to sides 9, 11, 13 and 15
-        let leaks = rings.leaks(&flux, 15);
+        let tails = rings.tail_fractions(&flux, 15);
         let close = |a: f64, b: f64| (a - b).abs() < 1e-12;
-        for (leak, expected) in leaks.iter().zip([0.1, 0.04, 0.005, 0.001]) {
-            assert!(close(*leak, expected), "{leaks:?}");
+        for (tail, expected) in tails.iter().zip([0.1, 0.04, 0.005, 0.001]) {
+            assert!(close(*tail, expected), "{tails:?}");
         }
-        let sure = [0.001; 4];
+        let errors = [0.001; 4];
         // A window of 11 leaves 0.5 %, and there is a ring of margin.
-        let found = band(&leaks, &sure, 15).unwrap();
-        assert_eq!(found.window.side(), 13);
-        assert!(
-            matches!(found.bandwidth, BandwidthEstimate::Bounded { tail_fraction } if close(tail_fraction, 0.001))
-        );
-        // Where rings never stay dark the band is as wide as was looked, if that is sure.
-        let far = [0.1, 0.06, 0.04, 0.02];
-        let beyond = band(&far, &sure, 15).unwrap();
-        assert_eq!(
-            (beyond.window.side(), beyond.bandwidth),
-            (15, BandwidthEstimate::Unbounded)
-        );
-        let edge = band(&[0.1, 0.06, 0.04, 0.002], &sure, 15).unwrap();
+        let bounded = choose_window(&tails, &errors, 15).unwrap();
+        assert_eq!(bounded.window.side(), 13);
+        assert!(matches!(
+            bounded.bandwidth,
+            BandwidthEstimate::Bounded { tail_fraction } if close(tail_fraction, 0.001)
+        ));
+        // Where no ring is dark, and that is certain, the band is as wide as the widest window.
+        let unbounded = choose_window(&[0.1, 0.06, 0.04, 0.02], &errors, 15).unwrap();
+        assert_eq!(unbounded.window.side(), 15);
+        assert_eq!(unbounded.bandwidth, BandwidthEstimate::Unbounded);
+        let edge = choose_window(&[0.1, 0.06, 0.04, 0.002], &errors, 15).unwrap();
         assert_eq!(edge.bandwidth, BandwidthEstimate::Unbounded);
-        let unclear = band(&[0.1; 12], &[0.06; 12], 31).unwrap();
-        assert_eq!(
-            (unclear.window.side(), unclear.bandwidth),
-            (15, BandwidthEstimate::Undetermined)
-        );
+        let uncertain = choose_window(&[0.1; 12], &[0.06; 12], 31).unwrap();
+        assert_eq!(uncertain.window.side(), 15);
+        assert_eq!(uncertain.bandwidth, BandwidthEstimate::Undetermined);
     }
 
     #[test]
-    fn rings_cover_the_window() {
-        for (probe, patterns, own) in [(3, 80, 1), (7, 80, 5), (9, 20, 3), (31, 80, 7)] {
-            let rings = Rings::new(probe, patterns);
-            assert_eq!(rings.own, own);
-            let elements = rings.sizes.iter().sum::<f64>() + f64::from(own * own);
-            assert_eq!(elements, f64::from(probe * probe));
+    fn centre_and_rings_cover_the_window() {
+        for (side, patterns, centre) in [(3, 80, 1), (7, 80, 5), (9, 20, 3), (31, 80, 7)] {
+            let rings = Rings::new(side, patterns);
+            assert_eq!(rings.centre, centre);
+            let elements = rings.sizes.iter().sum::<f64>() + f64::from(centre * centre);
+            assert_eq!(elements, f64::from(side * side));
             assert!(rings.sizes.iter().all(|&size| size >= 1.0));
         }
     }

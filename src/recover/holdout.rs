@@ -1,31 +1,36 @@
-//! Patterns held out, by which all is chosen that measurements themselves must tell.
+//! Divides the patterns into training patterns and held-out ones, by which everything is chosen that the
+//! measurements themselves have to tell.
 
-use super::MIN_PATTERNS;
+use super::sampling::MIN_PATTERNS;
 use crate::capture::{self, Measurements, Pattern};
 use crate::transport::CHANNELS;
 
-/// Every how many patterns one is held out.
-const EVERY: usize = 10;
+/// One in so many distinct patterns is held out.
+const HELD_OUT_EVERY: usize = 10;
 
-/// Patterns to learn from and patterns to choose by.
+/// A division of the patterns, by their indices in the measurements.
 #[derive(Clone, Debug)]
 pub(super) struct HoldoutSplit {
     /// All patterns.
     pub all: Vec<usize>,
     /// All but those held out.
     pub training: Vec<usize>,
-    /// Patterns held out; none where that would leave too few.
+    /// The patterns held out; none if that left fewer than [`MIN_PATTERNS`].
     pub held_out: Vec<usize>,
 }
 
 impl HoldoutSplit {
-    /// Holds out every tenth of the patterns that differ. Shots of one pattern, by several exposures,
-    /// stay together: what was learned from cannot tell what was learned well.
+    /// Holds out every tenth distinct pattern. Shots of one pattern at several exposures stay together: a
+    /// pattern that is in both parts would measure memory, not prediction.
     pub fn new(measurements: &Measurements) -> Self {
-        let all: Vec<usize> = (0..measurements.patterns.len()).collect();
-        let numbers = numbers(&measurements.patterns);
-        let (held_out, training): (Vec<usize>, Vec<usize>) =
-            all.iter().partition(|&&l| numbers[l] % EVERY == EVERY / 2);
+        Self::of_patterns(&measurements.patterns)
+    }
+
+    fn of_patterns(patterns: &[Pattern]) -> Self {
+        let all: Vec<usize> = (0..patterns.len()).collect();
+        let ids = pattern_ids(patterns);
+        let is_held_out = |l: &&usize| ids[**l] % HELD_OUT_EVERY == HELD_OUT_EVERY / 2;
+        let (held_out, training): (Vec<usize>, Vec<usize>) = all.iter().partition(is_held_out);
         match training.len() >= MIN_PATTERNS && !held_out.is_empty() {
             true => Self {
                 all,
@@ -41,8 +46,8 @@ impl HoldoutSplit {
     }
 }
 
-/// Numbers patterns in the order in which they come up; the same ones alike.
-pub(super) fn numbers(patterns: &[Pattern]) -> Vec<usize> {
+/// Ids of the patterns, from 0 in order of appearance; equal patterns have one id.
+pub(super) fn pattern_ids(patterns: &[Pattern]) -> Vec<usize> {
     let bits = |pattern: &Pattern| -> Vec<u32> {
         let planes = (0..CHANNELS).map(|c| pattern.plane(c));
         planes.flatten().map(|p| p.to_bits()).collect()
@@ -54,9 +59,12 @@ pub(super) fn numbers(patterns: &[Pattern]) -> Vec<usize> {
 mod tests {
     use super::*;
 
+    fn grey(p: f32) -> Pattern {
+        Pattern::Grey(vec![p, 0.5])
+    }
+
     #[test]
-    fn shots_of_one_pattern_have_one_number() {
-        let grey = |p: f32| Pattern::Grey(vec![p, 0.5]);
+    fn equal_patterns_have_one_id() {
         let rgb = |p: f32| Pattern::Rgb([(); CHANNELS].map(|()| vec![p, 0.5]));
         let patterns = [
             grey(0.1),
@@ -66,6 +74,44 @@ mod tests {
             grey(0.4),
             rgb(0.3),
         ];
-        assert_eq!(numbers(&patterns), [0, 0, 1, 0, 2, 1]);
+        assert_eq!(pattern_ids(&patterns), [0, 0, 1, 0, 2, 1]);
+    }
+
+    #[test]
+    fn every_tenth_distinct_pattern_is_held_out() {
+        let distinct: Vec<Pattern> = (0..25u8).map(|i| grey(f32::from(i))).collect();
+        let split = HoldoutSplit::of_patterns(&distinct);
+        assert_eq!(split.held_out, [5, 15]);
+        assert_eq!(split.training.len(), 23);
+        assert!(!split.training.contains(&5) && !split.training.contains(&15));
+        assert!(split.all.iter().copied().eq(0..25));
+    }
+
+    #[test]
+    fn exposures_of_a_pattern_stay_together() {
+        // Each pattern twice, once after the other.
+        let twice: Vec<Pattern> = (0..24u8).map(|i| grey(f32::from(i / 2))).collect();
+        let split = HoldoutSplit::of_patterns(&twice);
+        assert_eq!(split.held_out, [10, 11]);
+        let ids = pattern_ids(&twice);
+        for l in &split.training {
+            assert!(split.held_out.iter().all(|h| ids[*h] != ids[*l]));
+        }
+    }
+
+    #[test]
+    fn few_patterns_are_all_for_training() {
+        for count in [0u8, 4, 5] {
+            let patterns: Vec<Pattern> = (0..count).map(|i| grey(f32::from(i))).collect();
+            let split = HoldoutSplit::of_patterns(&patterns);
+            assert!(split.held_out.is_empty());
+            assert_eq!(
+                (split.training.len(), split.all.len()),
+                (patterns.len(), patterns.len())
+            );
+        }
+        // Six patterns are the fewest of which one can be held out.
+        let six: Vec<Pattern> = (0..6u8).map(|i| grey(f32::from(i))).collect();
+        assert_eq!(HoldoutSplit::of_patterns(&six).held_out, [5]);
     }
 }

@@ -1,160 +1,181 @@
-//! How good an answer is, and how much of it is lost on the way to a file, as far as patterns held out
-//! can tell.
+//! Hold-out validation: the SNR of a recovery, and what an encoder loses of it, estimated from patterns that
+//! the recovery did not use.
+//!
+//! The elements of patterns vary independently, with a variance var(p). Between patterns, measurements then
+//! vary by `var(p) ‖τ‖²`, and the residuals of functions τ̂ by `var(p) ‖τ − τ̂‖²`, each plus the noise, whose
+//! variance is known. With sums over sampled pixels and channels,
+//! `SNR = (Σ var y − Σ noise) / (Σ var residual − Σ noise)`.
 
-use super::RecoverError;
+use super::error::RecoverError;
 use super::holdout::HoldoutSplit;
-use super::pixelwise::predictions;
-use super::sampling::spread_squares;
+use super::{prediction, sampling};
 use crate::capture::{Measurements, Pattern};
 use crate::executor::Executor;
 use crate::transport::{
     Basis, CHANNELS, Decibels, Geometry, RecoveredTile, TileRect, TransportFunctions,
 };
 
-/// Squares looked at, and their side: that of a file's blocks.
-const SQUARES: (usize, u32) = (96, 8);
-/// Share of the noise below which what is missed cannot be told from it, as noise is known to a few
+/// Squares of the picture that are validated.
+const MAX_SQUARES: usize = 96;
+/// Their side in camera pixels: that of a file's blocks.
+const SQUARE_SIDE: u32 = 8;
+/// Fewest held-out patterns that have a variance.
+const MIN_HELD_OUT: usize = 2;
+/// Smallest error that the noise lets one tell, as a share of the noise: its variance is known to a few
 /// hundredths.
-const RESOLUTION: f64 = 0.1;
+const ERROR_RESOLUTION: f64 = 0.1;
 
-/// Some of the picture, recovered without the patterns held out, and what was seen under these.
-///
-/// Elements of patterns vary independently, so that measurements vary between patterns by
-/// `var(p) ‖τ‖²` and predictions are missed by `var(p) ‖τ − τ̂‖²`, plus noise of known variance.
+/// Squares of the picture, recovered from the training patterns, with their measurements under the held-out
+/// ones.
 #[derive(Clone, Debug)]
 pub struct HoldoutValidation {
     geometry: Geometry,
-    held: Vec<Pattern>,
-    squares: Vec<Square>,
-    /// Sums of variances between patterns, over pixels and channels: of measurements, less their
-    /// noise; and of the noise of those held out.
+    patterns: Vec<Pattern>,
+    squares: Vec<ValidationSquare>,
+    /// Variance of the measurements between patterns, less their noise.
     signal: f64,
+    /// Variance of the noise under the held-out patterns.
     noise: f64,
-    /// Of what the recovered functions miss.
-    missed: f64,
+    /// Variance of the residuals of the recovered functions between held-out patterns.
+    residual: f64,
 }
 
 #[derive(Clone, Debug)]
-struct Square {
+struct ValidationSquare {
     tile: RecoveredTile,
-    /// What was seen under the patterns held out, `[pixel, held, channel]`.
-    seen: Vec<f64>,
+    /// Under the held-out patterns, `[pixel, pattern, channel]`.
+    measurements: Vec<f64>,
 }
 
 impl HoldoutValidation {
-    /// Recovers squares by `training_tile`, which takes only the patterns to learn from. None where there
-    /// are too few patterns to hold any out.
+    /// Recovers squares of the picture by `recover_from_training`, which uses training patterns only.
+    /// Returns `None` if the split has too few held-out patterns.
+    ///
+    /// # Errors
+    /// If the executor is cancelled.
     pub(super) fn new(
         measurements: &Measurements,
         (geometry, basis): (&Geometry, Option<&Basis>),
         split: &HoldoutSplit,
         executor: &impl Executor,
-        training_tile: impl Fn(TileRect) -> RecoveredTile + Sync + Send,
+        recover_from_training: impl Fn(TileRect) -> RecoveredTile + Sync + Send,
     ) -> Result<Option<Self>, RecoverError> {
         executor.check_cancelled()?;
-        if split.held_out.len() < 2 {
+        if split.held_out.len() < MIN_HELD_OUT {
             return Ok(None);
         }
-        let rects = spread_squares(measurements, SQUARES.1, SQUARES.0);
-        let parts = executor.map(rects.len(), |i| {
-            let mut seen = Vec::new();
-            for pixel in rects[i].pixels() {
-                for &l in &split.held_out {
-                    seen.extend((0..CHANNELS).map(|c| measurements.sample(l, pixel, c)));
-                }
-            }
-            let tile = training_tile(rects[i]);
-            (
-                Square { tile, seen },
-                variances(measurements, split, rects[i]),
-            )
+        let rects = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
+        let results = executor.map(rects.len(), |i| {
+            let tile = recover_from_training(rects[i]);
+            let functions = tile.clone().functions(geometry, basis);
+            let square = ValidationSquare {
+                tile,
+                measurements: held_out_measurements(measurements, split, rects[i]),
+            };
+            let variances = variances(measurements, split, rects[i]);
+            (square, functions, variances)
         });
-        let mut rehearsal = Self {
+        let patterns = split.held_out.iter();
+        let mut validation = Self {
             geometry: *geometry,
-            held: split
-                .held_out
-                .iter()
+            patterns: patterns
                 .map(|&l| measurements.patterns[l].clone())
                 .collect(),
-            squares: Vec::with_capacity(parts.len()),
+            squares: Vec::with_capacity(rects.len()),
             signal: 0.0,
             noise: 0.0,
-            missed: 0.0,
+            residual: 0.0,
         };
-        for (square, (signal, noise)) in parts {
-            rehearsal.squares.push(square);
-            rehearsal.signal += signal;
-            rehearsal.noise += noise;
+        let mut recovered = Vec::with_capacity(rects.len());
+        for (square, functions, (signal, noise)) in results {
+            validation.squares.push(square);
+            validation.signal += signal;
+            validation.noise += noise;
+            recovered.push(functions);
         }
-        let functions = executor.map(rehearsal.squares.len(), |i| {
-            rehearsal.squares[i].tile.clone().functions(geometry, basis)
-        });
-        rehearsal.missed = rehearsal.missed(&functions);
-        Ok(Some(rehearsal))
+        validation.residual = validation.residual_variance(&recovered);
+        Ok(Some(validation))
     }
 
-    /// Whether measurements differ from pattern to pattern by more than their noise.
+    /// Whether measurements vary between patterns by more than their noise.
     pub fn has_signal(&self) -> bool {
         self.signal > 0.0
     }
 
-    /// About the SNR of the recovery.
+    /// Estimated SNR of the recovery; `None` without signal.
     pub fn snr(&self) -> Option<Decibels> {
-        let error = self.error(self.missed);
+        let error = self.error(self.residual);
         (error > 0.0 && self.signal > 0.0).then(|| Decibels(10.0 * (self.signal / error).log10()))
     }
 
-    /// The squares as they were recovered.
+    /// The recovered squares.
     pub fn tiles(&self) -> impl ExactSizeIterator<Item = &RecoveredTile> {
         self.squares.iter().map(|square| &square.tile)
     }
 
-    /// About how much SNR is lost where `functions` stand for the [squares](Self::tiles): less than
-    /// nothing where what was changed was noise.
+    /// Estimated loss of SNR if `functions` replace those of the [squares](Self::tiles). It is negative if
+    /// the replacement removes noise.
     pub fn loss(&self, functions: &[TransportFunctions]) -> Decibels {
-        let before = self.error(self.missed);
-        // What is added to both by noise that is not well known cancels.
-        let after = before + self.missed(functions) - self.missed;
+        let before = self.error(self.residual);
+        // An error in the variance of the noise is in both residuals and cancels.
+        let after = before + self.residual_variance(functions) - self.residual;
         Decibels(10.0 * (after.max(f64::MIN_POSITIVE) / before.max(f64::MIN_POSITIVE)).log10())
     }
 
-    fn error(&self, missed: f64) -> f64 {
-        (missed - self.noise).max(RESOLUTION * self.noise)
+    /// Error of functions by the variance of their residuals.
+    fn error(&self, residual: f64) -> f64 {
+        (residual - self.noise).max(ERROR_RESOLUTION * self.noise)
     }
 
-    /// Sum of the variances of what functions miss.
-    fn missed(&self, functions: &[TransportFunctions]) -> f64 {
+    /// Variance of the residuals of `functions` between held-out patterns, summed over pixels and channels.
+    fn residual_variance(&self, functions: &[TransportFunctions]) -> f64 {
         let squares = self.squares.iter().zip(functions);
-        squares
-            .map(|(square, functions)| {
-                let predicted = predictions(&self.geometry, &self.held, functions);
-                let misses = square.seen.iter().zip(&predicted).map(|(y, p)| y - p);
-                let misses: Vec<f64> = misses.collect();
-                let of_pixels = misses.chunks_exact(self.held.len() * CHANNELS);
-                let of_channels = of_pixels.flat_map(|misses| {
-                    (0..CHANNELS)
-                        .map(|c| variance(misses.iter().skip(c).step_by(CHANNELS).copied()))
-                });
-                of_channels.filter(|missed| missed.is_finite()).sum::<f64>()
-            })
-            .sum()
+        let of_squares = squares.map(|(square, functions)| {
+            let predictions = prediction::predictions(&self.geometry, &self.patterns, functions);
+            let residuals = square.measurements.iter().zip(&predictions);
+            let residuals: Vec<f64> = residuals.map(|(y, predicted)| y - predicted).collect();
+            let pixels = residuals.chunks_exact(self.patterns.len() * CHANNELS);
+            let variances = pixels.flat_map(|residuals| {
+                let of_channel = |c| residuals.iter().skip(c).step_by(CHANNELS).copied();
+                (0..CHANNELS).map(move |c| variance(of_channel(c)))
+            });
+            variances
+                .filter(|variance| variance.is_finite())
+                .sum::<f64>()
+        });
+        of_squares.sum()
     }
 }
 
-/// Variances between patterns, summed over pixels and channels that are nowhere saturated: of
-/// measurements less their noise, and of the noise of those held out.
+/// Measurements under the held-out patterns, `[pixel, pattern, channel]`.
+fn held_out_measurements(
+    measurements: &Measurements,
+    split: &HoldoutSplit,
+    rect: TileRect,
+) -> Vec<f64> {
+    let mut samples = Vec::new();
+    for pixel in rect.pixels() {
+        for &l in &split.held_out {
+            samples.extend((0..CHANNELS).map(|c| measurements.sample(l, pixel, c)));
+        }
+    }
+    samples
+}
+
+/// Variances between patterns, summed over the pixels and channels that are nowhere saturated: of the
+/// measurements less their noise, and of the noise under the held-out patterns.
 fn variances(measurements: &Measurements, split: &HoldoutSplit, rect: TileRect) -> (f64, f64) {
     let (mut signal, mut noise) = (0.0, 0.0);
     for pixel in rect.pixels() {
         for c in 0..CHANNELS {
             let sample = |l: &usize| measurements.sample(*l, pixel, c);
-            let noise_of = |l: &usize| measurements.variance(*l, c, sample(l));
-            let seen = variance(split.all.iter().map(sample));
-            if seen.is_finite() {
-                signal += seen - mean(split.all.iter().map(noise_of));
+            let noise_variance = |l: &usize| measurements.variance(*l, c, sample(l));
+            let total = variance(split.all.iter().map(sample));
+            if total.is_finite() {
+                signal += total - mean(split.all.iter().map(noise_variance));
             }
             if split.held_out.iter().all(|l| sample(l).is_finite()) {
-                noise += mean(split.held_out.iter().map(noise_of));
+                noise += mean(split.held_out.iter().map(noise_variance));
             }
         }
     }

@@ -13,15 +13,20 @@
 mod bandwidth;
 mod bpdn;
 mod common_mode;
+mod error;
 mod gram_cache;
 mod holdout;
 mod holdout_validation;
 mod learned;
+mod method;
+mod model_selection;
 mod nnls;
+mod normal_equations;
 mod passive_set;
 mod pattern_check;
 mod pixelwise;
 mod pooled;
+mod prediction;
 mod recovery;
 mod sampling;
 #[cfg(all(test, not(target_arch = "wasm32")))]
@@ -30,9 +35,9 @@ mod test_problems;
 pub use bandwidth::{BandwidthEstimate, WindowEstimate};
 pub use bpdn::{Constraint, Homotopy, InteriorPoint, Solution, SparsityBasis};
 pub use common_mode::CommonMode;
+pub use error::RecoverError;
 pub use holdout_validation::HoldoutValidation;
+pub use method::Method;
 pub use nnls::Nnls;
-pub use recovery::{Method, RecoverError, Recovery, Settings};
-
-/// Fewest patterns that recovery makes sense with.
-pub(crate) const MIN_PATTERNS: usize = 4;
+pub use recovery::{Recovery, Settings};
+pub use sampling::MIN_PATTERNS;

@@ -1,9 +1,11 @@
-//! Exact non-negative least squares from normal equations, by active sets.
+//! Non-negative least squares: `min ½xᵀGx − hᵀx` subject to `x ≥ 0`, with the Gram matrix `G = AᵀA` `[k, k]`
+//! and `h = Aᵀb` `[k]` (paper, section 3, case (a)).
 //!
-//! Lawson & Hanson's method on the Gram matrix (Bro & de Jong 1997), with the inverse on the passive
-//! set updated as elements enter and leave, several of them for each gradient. Every search starts
-//! from nothing: of the set of a neighbouring pixel or channel so much has to leave again that it is
-//! no quicker to start from, and what rounding its inverse has gathered comes along.
+//! An active-set method on the normal equations (Lawson and Hanson 1974; Bro and de Jong 1997): unknowns
+//! with a positive gradient `h − Gx` enter the passive set, several for each gradient computed, and unknowns
+//! that would become negative leave it. Each search starts from the empty set. The set of a neighbouring
+//! pixel or channel is no faster to start from, since most of it leaves again, and it brings the rounding
+//! errors of its inverse.
 
 use super::passive_set::PassiveSet;
 use crate::linalg::{LANES, padded_len, vectorise};
@@ -12,24 +14,26 @@ use crate::linalg::{LANES, padded_len, vectorise};
 #[derive(Debug)]
 pub struct Nnls<'a> {
     k: usize,
-    /// Elements allowed to be above zero; carries the right-hand side.
+    /// Unknowns that may be positive, with the least-squares solution for `h`.
     passive: PassiveSet<'a, 1>,
-    /// The passive elements' values now; the set itself knows where least squares puts them.
+    /// Feasible values of the members.
     x: Vec<f64>,
-    /// `h − Gx`.
+    /// `h − Gx`, `[k]`.
     gradient: Vec<f64>,
-    /// The gradient where elements may enter, −∞ elsewhere and up to a whole number of [`LANES`].
-    slopes: Vec<f64>,
+    /// The gradient of unknowns that may enter, −∞ for others, padded to a multiple of [`LANES`].
+    entering: Vec<f64>,
 }
 
-/// Largest gradient, as a share of the largest right-hand side entry, still taken as zero.
-const TOLERANCE: f64 = 1e-10;
-/// Several elements may enter for each time that the whole gradient is computed, which is much work:
-/// share of its gradient that one must have kept by then.
-const STILL_STEEP: f64 = 0.5;
+/// Largest gradient that counts as zero, relative to the largest entry of `h`.
+const GRADIENT_TOLERANCE: f64 = 1e-10;
+/// Share of its gradient that an unknown must have kept to enter after others: the gradient of all unknowns
+/// is expensive, and is computed once for several.
+const MIN_REMAINING_GRADIENT: f64 = 0.5;
+/// Iterations after which the search ends in any case, relative to k.
+const MAX_ITERATIONS_PER_UNKNOWN: usize = 10;
 
 impl<'a> Nnls<'a> {
-    /// A solver for `gram = AᵀA`, `[k, k]` row-major.
+    /// A solver for `gram = AᵀA`, `[k, k]`.
     ///
     /// # Panics
     /// If `gram` does not have `k²` entries.
@@ -39,21 +43,21 @@ impl<'a> Nnls<'a> {
             passive: PassiveSet::new(gram, k),
             x: Vec::with_capacity(k),
             gradient: vec![0.0; k],
-            slopes: vec![f64::NEG_INFINITY; padded_len(k)],
+            entering: vec![f64::NEG_INFINITY; padded_len(k)],
         }
     }
 
-    /// Minimises `½xᵀGx − hᵀx` subject to `x ≥ 0`, with `h = Aᵀb`, `[k]`. Returns `x`, `[k]`, which
-    /// is feasible always and optimal to rounding: it satisfies the Karush–Kuhn–Tucker conditions.
+    /// Returns the minimum of `½xᵀGx − hᵀx` subject to `x ≥ 0`, `[k]`. It is always feasible, and satisfies
+    /// the Karush–Kuhn–Tucker conditions to rounding.
     pub fn solve(&mut self, h: &[f64]) -> Vec<f64> {
         vectorise(
             #[inline(always)]
             || self.search(h),
         );
-        self.passive.spread(&self.x)
+        self.passive.scatter(&self.x)
     }
 
-    /// Elements above zero in the last solution: the degrees of freedom it spent.
+    /// Number of positive unknowns in the last solution: the degrees of freedom of the fit.
     pub fn degrees_of_freedom(&self) -> usize {
         self.passive.members().len()
     }
@@ -66,58 +70,58 @@ impl<'a> Nnls<'a> {
         if top == 0.0 {
             return;
         }
-        let least = TOLERANCE * top;
-        // An element that was refused, or that left at once, must not be picked again before
-        // something else has changed, or rounding could make the search go round in circles.
+        let min_gradient = GRADIENT_TOLERANCE * top;
+        // An unknown that was refused, or that left at once, must not be tried again before the set has
+        // changed: with rounding errors the search could cycle.
         let mut refused = Vec::new();
         let mut rebuilt = false;
-        for _ in 0..10 * self.k {
-            if self.descent(h) > least {
-                // Rounding has gathered in the solution: least squares on the same set once more.
+        for _ in 0..MAX_ITERATIONS_PER_UNKNOWN * self.k {
+            if self.update_gradient(h) > min_gradient {
+                // The solution has rounding errors.
                 self.passive.refine(0, &self.gradient);
-                self.descend();
-                if self.descent(h) > least && !rebuilt {
+                self.move_to_solution();
+                if self.update_gradient(h) > min_gradient && !rebuilt {
                     rebuilt = true;
                     self.rebuild(h);
-                    self.descent(h);
+                    self.update_gradient(h);
                 }
             }
             let mut found = false;
-            for (j, steep) in self.steepest(&refused) {
-                if steep <= least {
+            for (j, gradient) in self.largest_gradients(&refused) {
+                if gradient <= min_gradient {
                     break;
                 }
-                // Those that entered before have changed this one's gradient.
-                let offer = self.passive.offer(j, [h[j]]);
-                if offer.left[0] < STILL_STEEP * steep {
+                // Unknowns that entered since have changed the gradient of this one.
+                let candidate = self.passive.evaluate(j, [h[j]]);
+                if candidate.residual[0] < MIN_REMAINING_GRADIENT * gradient {
                     continue;
                 }
                 found = true;
-                if !self.passive.accept(offer) {
+                if !self.passive.insert(candidate) {
                     refused.push(j);
                     continue;
                 }
                 self.x.push(0.0);
-                self.descend();
+                self.move_to_solution();
                 match self.passive.contains(j) {
                     true => refused.clear(),
                     false => refused.push(j),
                 }
             }
             if !found {
-                self.polish();
+                self.refine_solution();
                 break;
             }
         }
     }
 
-    /// Moves from feasible `x` to the least-squares solution on the passive set, elements that would
-    /// turn negative leaving on the way.
+    /// Moves x, which is feasible, to the least-squares solution on the passive set. Members that would
+    /// become negative leave the set.
     #[inline(always)]
-    fn descend(&mut self) {
+    fn move_to_solution(&mut self) {
         loop {
             let solution = self.passive.solution(0);
-            // The largest step along x -> z that stays feasible.
+            // The largest feasible step from x to the solution z.
             let mut step = 1.0f64;
             let mut blocked = usize::MAX;
             for (i, (&x, &z)) in self.x.iter().zip(solution).enumerate() {
@@ -135,83 +139,83 @@ impl<'a> Nnls<'a> {
             for (x, z) in self.x.iter_mut().zip(solution) {
                 *x += step * (z - *x);
             }
-            // Whoever reached zero leaves; the one that stopped the step does, rounding or not. From
-            // the back, as those that leave are replaced by the last.
+            // Members that reach zero leave, the blocking one in any case. In descending order: the last
+            // member replaces a removed one.
             for i in (0..self.x.len()).rev() {
                 if i == blocked || (self.passive.solution(0)[i] <= 0.0 && self.x[i] <= 0.0) {
                     self.x.swap_remove(i);
-                    self.passive.leave(i);
+                    self.passive.remove(i);
                 }
             }
         }
     }
 
-    /// Takes out of the solution what rounding has left of its gradient: next to nothing in `x`, but
-    /// where measurements can be met exactly all of the residual.
+    /// Removes the rounding error of the solution: next to nothing in `x`, but all of the residual if the
+    /// measurements can be met exactly.
     #[inline(always)]
-    fn polish(&mut self) {
+    fn refine_solution(&mut self) {
         self.passive.refine(0, &self.gradient);
         if self.passive.solution(0).iter().all(|&z| z > 0.0) {
             self.x.copy_from_slice(self.passive.solution(0));
         }
     }
 
-    /// Lets the passive elements enter once more, one by one, into an empty set: what many updates
-    /// have done to the inverse is gone.
+    /// Inserts the members into an empty set, one by one, which removes the rounding errors of many updates
+    /// from the inverse.
     #[inline(always)]
     fn rebuild(&mut self, h: &[f64]) {
         let members = self.passive.members().to_vec();
         let x = std::mem::take(&mut self.x);
         self.passive.clear();
         for (&j, x) in members.iter().zip(x) {
-            if self.passive.enter(j, [h[j]]) {
+            if self.passive.evaluate_and_insert(j, [h[j]]) {
                 self.x.push(x);
             }
         }
-        self.descend();
+        self.move_to_solution();
     }
 
-    /// Computes the gradient; returns how far from zero it is on the passive set, where it should be.
+    /// Computes the gradient. Returns its largest magnitude on the passive set, where it should be zero.
     #[inline(always)]
-    fn descent(&mut self, h: &[f64]) -> f64 {
-        // The sign is turned twice, so that rows are only ever added.
+    fn update_gradient(&mut self, h: &[f64]) -> f64 {
+        // −(Gx − h): rows are only ever added.
         for (g, h) in self.gradient.iter_mut().zip(h) {
             *g = -h;
         }
         self.passive.add_product(&mut self.gradient, &self.x);
         self.gradient.iter_mut().for_each(|g| *g = -*g);
-        let on_set = self
-            .passive
-            .members()
-            .iter()
-            .map(|&j| self.gradient[j].abs());
-        on_set.fold(0.0, f64::max)
+        let members = self.passive.members().iter();
+        members.fold(0.0, |max, &j| f64::max(max, self.gradient[j].abs()))
     }
 
-    /// Elements outside the passive set whose growth lowers the residual steeply, with their gradient,
-    /// the steepest of all first: of every [`LANES`]-th element one.
+    /// Unknowns outside the passive set with large gradients, and these gradients, in descending order. In
+    /// each class of indices modulo [`LANES`], the unknown with the largest gradient.
     #[inline(always)]
-    fn steepest(&mut self, refused: &[usize]) -> [(usize, f64); LANES] {
-        self.slopes[..self.k].copy_from_slice(&self.gradient);
+    fn largest_gradients(&mut self, refused: &[usize]) -> [(usize, f64); LANES] {
+        self.entering[..self.k].copy_from_slice(&self.gradient);
         for &j in self.passive.members().iter().chain(refused) {
-            self.slopes[j] = f64::NEG_INFINITY;
+            self.entering[j] = f64::NEG_INFINITY;
         }
-        // Numbers instead of indices: comparing and choosing then takes a register of either.
+        // Indices as floating-point numbers: a comparison then selects gradients and indices alike.
         let mut best = [f64::NEG_INFINITY; LANES];
-        let mut at = [0.0; LANES];
-        let mut number = 0.0;
-        for slopes in self.slopes.as_chunks::<LANES>().0 {
+        let mut best_index = [0.0; LANES];
+        let mut index = 0.0;
+        for gradients in self.entering.as_chunks::<LANES>().0 {
             for lane in 0..LANES {
-                let better = slopes[lane] > best[lane];
-                best[lane] = if better { slopes[lane] } else { best[lane] };
-                at[lane] = if better { number } else { at[lane] };
+                let is_better = gradients[lane] > best[lane];
+                best[lane] = if is_better {
+                    gradients[lane]
+                } else {
+                    best[lane]
+                };
+                best_index[lane] = if is_better { index } else { best_index[lane] };
             }
-            number += 1.0;
+            index += 1.0;
         }
-        let mut steepest =
-            std::array::from_fn(|lane| (at[lane] as usize * LANES + lane, best[lane]));
-        steepest.sort_unstable_by(|a: &(usize, f64), b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        steepest
+        let mut largest =
+            std::array::from_fn(|lane| (best_index[lane] as usize * LANES + lane, best[lane]));
+        largest.sort_unstable_by(|a: &(usize, f64), b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        largest
     }
 }
 
@@ -222,14 +226,13 @@ mod tests {
     use super::super::test_problems::Problem;
     use super::*;
 
-    /// The least squared residual that any non-negative x reaches, by trying every set of elements
-    /// above zero: slow, and nothing like an active-set search.
-    fn least_by_enumeration(problem: &Problem, y: &[f64]) -> f64 {
+    /// The smallest squared residual of all non-negative x, by least squares on every subset of unknowns.
+    fn smallest_residual_by_enumeration(problem: &Problem, y: &[f64]) -> f64 {
         let mut least = Problem::energy(y);
         for set in 1usize..1 << problem.k {
             let members: Vec<usize> = (0..problem.k).filter(|j| set >> j & 1 == 1).collect();
             let Some(z) = least_squares(problem, &members, y) else {
-                continue; // dependent columns: smaller sets reach as far
+                continue; // dependent columns: a smaller subset has the same residual
             };
             if z.iter().all(|&z| z >= 0.0) {
                 let mut x = vec![0.0; problem.k];
@@ -240,7 +243,7 @@ mod tests {
         least
     }
 
-    /// Least squares on some columns by Gram–Schmidt: `None` if they depend on each other.
+    /// Least squares on some columns, by Gram–Schmidt; `None` if they are linearly dependent.
     fn least_squares(problem: &Problem, members: &[usize], y: &[f64]) -> Option<Vec<f64>> {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (n, mut rest) = (members.len(), y.to_vec());
@@ -282,10 +285,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(200))]
 
-        /// Wide and tall problems, several right-hand sides through one solver: no
-        /// negative entries, no ascent directions, no gradient where an entry is above zero.
+        /// Wide and tall problems, several right-hand sides with one solver.
         #[test]
-        fn answers_satisfy_kkt(
+        fn solutions_satisfy_the_kkt_conditions(
             k in 1usize..60, rows in 1usize..40, seed in any::<u64>(), offset in 0.0f64..2.0,
         ) {
             let problem = Problem::random(k, rows, seed, offset);
@@ -304,7 +306,7 @@ mod tests {
         }
 
         #[test]
-        fn nothing_is_nearer(
+        fn no_feasible_point_has_a_smaller_residual(
             k in 1usize..8, rows in 1usize..12, seed in any::<u64>(), offset in 0.0f64..2.0,
         ) {
             let problem = Problem::random(k, rows, seed, offset);
@@ -313,14 +315,14 @@ mod tests {
             for y in &problem.measurements {
                 let x = solver.solve(&problem.right_hand_side(y));
                 let ours = problem.residual(&x, y).powi(2);
-                let least = least_by_enumeration(&problem, y);
+                let least = smallest_residual_by_enumeration(&problem, y);
                 prop_assert!((ours - least).abs() < 1e-8 * Problem::energy(y), "{ours} {least}");
             }
         }
     }
 
     #[test]
-    fn a_non_negative_solution_is_found_exactly() {
+    fn exact_non_negative_solution_is_found() {
         let truth = [0.0, 2.0, 0.0, 0.5, 1.0];
         let mut problem = Problem::random(5, 8, 3, 0.5);
         let seen = |row: &[f64]| row.iter().zip(&truth).map(|(a, t)| a * t).sum();
@@ -333,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_measured_gives_nothing() {
+    fn zero_measurements_have_the_zero_solution() {
         assert_eq!(Nnls::new(&[2.0], 1).solve(&[0.0]), [0.0]);
         assert_eq!(Nnls::new(&[], 0).solve(&[]), [0.0; 0]);
         assert_eq!(Nnls::new(&[0.0], 1).solve(&[1.0]), [0.0]);

@@ -1,51 +1,56 @@
-//! The elements that an active-set solver lets above zero, with their equations kept solved.
+//! The passive set of an active-set solver: the unknowns that are free to vary (Lawson and Hanson 1974).
+//!
+//! For a passive set P of n unknowns, the set keeps the inverse `H = G[P, P]⁻¹` of a part of the Gram matrix
+//! and the solutions `H b[P]` of N right-hand sides, and updates all of them by rank-one terms, at n²
+//! products, when an unknown is inserted or removed. No step has to wait for the one before, unlike
+//! substitution through a triangular factor; [`PassiveSet::refine`] removes the rounding errors that the
+//! updates leave.
+//!
+//! Sets are small and of every size. A loop that ended with the set would spend most of its time on the
+//! remainder after the last full vector register, so all vectors are padded with zeros to a multiple of
+//! [`LANES`].
 
 use crate::linalg::{LANES, add_scaled_padded, add_scaled_rows, dot_padded, padded_len};
 
-/// As many numbers as fill whole registers.
+/// The values of one vector register, or of a few.
 type Block = [f64; LANES];
 
-/// A pivot below this share of its diagonal means that the element's column depends linearly on the
-/// passive ones, to the precision of the Gram matrix: letting it in would not lower the residual.
-const DEPENDENT: f64 = 1e-9;
-/// Members there is room for at first; sets rarely grow beyond the number of patterns.
-const ROOM: usize = 96;
-/// Rows of the inverse that are multiplied together.
-const ROWS: usize = 4;
+/// Smallest pivot, relative to its diagonal entry, of an unknown whose column is linearly independent of the
+/// passive ones, to the precision of the Gram matrix. Another unknown would not lower the residual.
+const MIN_PIVOT_RATIO: f64 = 1e-9;
+/// Members that a new set has memory for. Sets rarely grow beyond the number of patterns.
+const INITIAL_CAPACITY: usize = 96;
+/// Rows of the inverse that one pass multiplies.
+const ROWS_PER_PASS: usize = 4;
 
-/// A passive set `P` with the inverse `H = G[P, P]⁻¹` and the solutions `H b[P]` of `N` right-hand
-/// sides, all updated as elements enter and leave, at `n²` products each. No step waits for the one
-/// before, as in substitution through a triangular factor; what rounding the updates gather is taken
-/// out by [`PassiveSet::refine`].
-///
-/// Sets are small and of every size, so that vectors which ended where the set does would spend most
-/// time on what is left over of them after the last full register. All have zeros up to a full one.
+/// A passive set with the inverse of its Gram matrix and the solutions of `N` right-hand sides.
 #[derive(Debug)]
 pub(super) struct PassiveSet<'a, const N: usize> {
-    /// `[k, k]`, row-major, symmetric.
+    /// `G`, `[k, k]`, symmetric.
     gram: &'a [f64],
-    /// Elements in the order of all vectors over the set.
+    /// The unknowns in the set, in the order of all vectors over it.
     members: Vec<usize>,
+    /// `[k]`.
     is_member: Vec<bool>,
-    /// `H`, `[stride, stride]`, zero beyond the members' rows and columns, in panels of [`LANES`]
-    /// columns: the part of a vector that goes with a panel stays in registers.
+    /// `H`, `[stride, stride]`, zero beyond the members' rows and columns, in panels of [`LANES`] columns:
+    /// the part of a vector that belongs to a panel stays in registers.
     inverse: Vec<Block>,
-    /// A multiple of [`LANES`], and the length of the vectors below, which are zero beyond the
-    /// members.
+    /// Length of the vectors below, a multiple of [`LANES`]. They are zero beyond the members.
     stride: usize,
     solutions: [Vec<f64>; N],
+    /// A vector over the set, and its product with H.
     column: Vec<f64>,
     product: Vec<f64>,
 }
 
 impl<'a, const N: usize> PassiveSet<'a, N> {
-    /// An empty set out of the `k` elements of `gram`, `[k, k]` row-major.
+    /// An empty set of the unknowns of `gram`, `[k, k]`.
     ///
     /// # Panics
     /// If `gram` does not have `k²` entries.
     pub fn new(gram: &'a [f64], k: usize) -> Self {
         assert_eq!(gram.len(), k * k, "the Gram matrix is square");
-        let stride = padded_len(k.min(ROOM));
+        let stride = padded_len(k.min(INITIAL_CAPACITY));
         Self {
             gram,
             members: Vec::with_capacity(stride),
@@ -58,7 +63,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         }
     }
 
-    /// The elements in the set, in the order of all vectors over it.
+    /// The unknowns in the set, in the order of all vectors over it.
     #[inline(always)]
     pub fn members(&self) -> &[usize] {
         &self.members
@@ -69,21 +74,21 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         self.is_member[j]
     }
 
-    /// An element's row of the Gram matrix.
+    /// An unknown's row of the Gram matrix.
     #[inline(always)]
     pub fn row(&self, j: usize) -> &'a [f64] {
         let k = self.is_member.len();
         &self.gram[j * k..(j + 1) * k]
     }
 
-    /// `y += Gx` for an x that is zero outside the set.
+    /// Computes `y += Gx`, `[k]`, for the values `x` of the members.
     #[inline(always)]
     pub fn add_product(&self, y: &mut [f64], x: &[f64]) {
         add_scaled_rows(y, self.gram, &self.members, x);
     }
 
-    /// Values of the members as a vector of all elements, `[k]`.
-    pub fn spread(&self, values: &[f64]) -> Vec<f64> {
+    /// Expands the values of the members to all unknowns, `[k]`, zero outside the set.
+    pub fn scatter(&self, values: &[f64]) -> Vec<f64> {
         let mut all = vec![0.0; self.is_member.len()];
         for (&j, &value) in self.members.iter().zip(values) {
             all[j] = value;
@@ -91,10 +96,10 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         all
     }
 
-    /// Takes all elements out.
+    /// Removes all members.
     #[inline(always)]
     pub fn clear(&mut self) {
-        let width = self.width();
+        let width = self.padded_len();
         for panel in panels(&mut self.inverse, self.stride, width) {
             panel.fill([0.0; LANES]);
         }
@@ -106,9 +111,9 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         }
     }
 
-    /// Length of vectors over the set with the zeros that fill the last register.
+    /// Padded length of vectors over the set.
     #[inline(always)]
-    fn width(&self) -> usize {
+    fn padded_len(&self) -> usize {
         padded_len(self.members.len())
     }
 
@@ -120,19 +125,19 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
 
     /// Replaces right-hand side `which` by `b`, `[k]`.
     #[inline(always)]
-    pub fn carry(&mut self, which: usize, b: &[f64]) {
+    pub fn set_rhs(&mut self, which: usize, b: &[f64]) {
         self.gather(b);
-        self.multiply();
-        let width = self.width();
+        self.multiply_by_inverse();
+        let width = self.padded_len();
         self.solutions[which][..width].copy_from_slice(&self.product[..width]);
     }
 
-    /// Corrects the solution of right-hand side `which` by what is left of it, `b − Gz`, `[k]`.
+    /// Corrects the solution z of right-hand side `which` by its residual `b − Gz`, `[k]`.
     #[inline(always)]
-    pub fn refine(&mut self, which: usize, left: &[f64]) {
-        self.gather(left);
-        self.multiply();
-        let width = self.width();
+    pub fn refine(&mut self, which: usize, residual: &[f64]) {
+        self.gather(residual);
+        self.multiply_by_inverse();
+        let width = self.padded_len();
         add_scaled_padded(
             &mut self.solutions[which][..width],
             1.0,
@@ -140,28 +145,28 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         );
     }
 
-    /// `column = b[P]`.
+    /// Sets `column = b[P]`.
     #[inline(always)]
     fn gather(&mut self, b: &[f64]) {
         let n = self.members.len();
-        let width = self.width();
+        let width = self.padded_len();
         for (c, &j) in self.column.iter_mut().zip(&self.members) {
             *c = b[j];
         }
         self.column[n..width].fill(0.0);
     }
 
-    /// `product = H column`.
+    /// Sets `product = H · column`.
     #[inline(always)]
-    fn multiply(&mut self) {
-        let width = self.width();
-        // H is symmetric: its columns are its rows, and sums along rows need no reduction.
-        let factors = self.column[..width].as_chunks::<ROWS>().0;
+    fn multiply_by_inverse(&mut self) {
+        let width = self.padded_len();
+        // H is symmetric: its rows are its columns, so the sums need no reduction across a register.
+        let factors = self.column[..width].as_chunks::<ROWS_PER_PASS>().0;
         let product = self.product.as_chunks_mut::<LANES>().0;
         let inverse = self.inverse.chunks_exact(self.stride.max(1));
         for (p, panel) in product[..width / LANES].iter_mut().zip(inverse) {
             let mut sum = [0.0; LANES];
-            for ([a, b, c, d], f) in panel.as_chunks::<ROWS>().0.iter().zip(factors) {
+            for ([a, b, c, d], f) in panel.as_chunks::<ROWS_PER_PASS>().0.iter().zip(factors) {
                 for i in 0..LANES {
                     sum[i] += (f[0] * a[i] + f[1] * b[i]) + (f[2] * c[i] + f[3] * d[i]);
                 }
@@ -170,71 +175,71 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         }
     }
 
-    /// Looks at element `j` with its entries `b` of the right-hand sides.
+    /// Evaluates unknown `j`, with its entries `b` of the right-hand sides, as a candidate for the set.
     #[inline(always)]
-    pub fn offer(&mut self, j: usize, b: [f64; N]) -> Offer<N> {
+    pub fn evaluate(&mut self, j: usize, b: [f64; N]) -> Candidate<N> {
         let row = self.row(j);
         self.gather(row);
-        let column = &self.column[..self.width()];
-        let mut left = b;
-        for (left, z) in left.iter_mut().zip(&self.solutions) {
-            *left -= dot_padded(column, &z[..column.len()]);
+        let column = &self.column[..self.padded_len()];
+        let mut residual = b;
+        for (residual, z) in residual.iter_mut().zip(&self.solutions) {
+            *residual -= dot_padded(column, &z[..column.len()]);
         }
-        Offer {
+        Candidate {
             j,
             diagonal: row[j],
-            left,
+            residual,
         }
     }
 
-    /// Adds element `j` with its entries of the right-hand sides, unless its column depends linearly
-    /// on the set's.
+    /// Inserts unknown `j`, with its entries `b` of the right-hand sides. Returns false if its column depends
+    /// linearly on those of the set.
     #[inline(always)]
-    pub fn enter(&mut self, j: usize, b: [f64; N]) -> bool {
-        let offer = self.offer(j, b);
-        self.accept(offer)
+    pub fn evaluate_and_insert(&mut self, j: usize, b: [f64; N]) -> bool {
+        let candidate = self.evaluate(j, b);
+        self.insert(candidate)
     }
 
-    /// Adds the element offered last, on the same terms.
+    /// Inserts the candidate that was evaluated last. Returns false if its column depends linearly on those
+    /// of the set.
     #[inline(always)]
-    pub fn accept(&mut self, offer: Offer<N>) -> bool {
-        self.multiply();
-        let (n, before) = (self.members.len(), self.width());
-        let known = dot_padded(&self.column[..before], &self.product[..before]);
-        let pivot = offer.diagonal - known;
-        // NaN is refused as well.
-        if pivot.is_nan() || pivot <= DEPENDENT * offer.diagonal {
+    pub fn insert(&mut self, candidate: Candidate<N>) -> bool {
+        self.multiply_by_inverse();
+        let (n, before) = (self.members.len(), self.padded_len());
+        let explained = dot_padded(&self.column[..before], &self.product[..before]);
+        let pivot = candidate.diagonal - explained;
+        if pivot.is_nan() || pivot <= MIN_PIVOT_RATIO * candidate.diagonal {
             return false;
         }
         if n == self.stride {
-            self.widen();
+            self.grow();
         }
         let inverse = 1.0 / pivot;
-        for (z, left) in self.solutions.iter_mut().zip(offer.left) {
-            let step = left * inverse;
+        for (z, residual) in self.solutions.iter_mut().zip(candidate.residual) {
+            let step = residual * inverse;
             add_scaled_padded(&mut z[..before], -step, &self.product[..before]);
             z[n] = step;
         }
-        // With −1 as the new element's entry, one outer product updates all of the inverse.
-        self.members.push(offer.j);
-        self.is_member[offer.j] = true;
-        let width = self.width();
+        // With −1 as the new member's entry, one outer product updates all of the inverse.
+        self.members.push(candidate.j);
+        self.is_member[candidate.j] = true;
+        let width = self.padded_len();
         self.product[before..width].fill(0.0);
         self.product[n] = -1.0;
-        self.add_outer(inverse);
+        self.add_outer_product(inverse);
         true
     }
 
-    /// `H += factor · product productᵀ`.
+    /// Computes `H += factor · product productᵀ`.
     #[inline(always)]
-    fn add_outer(&mut self, factor: f64) {
-        let width = self.width();
+    fn add_outer_product(&mut self, factor: f64) {
+        let width = self.padded_len();
         let product = &self.product[..width];
         let blocks = product.as_chunks::<LANES>().0;
-        let factors = product.as_chunks::<ROWS>().0;
+        let factors = product.as_chunks::<ROWS_PER_PASS>().0;
         for (panel, block) in panels(&mut self.inverse, self.stride, width).zip(blocks) {
             let block = block.map(|v| v * factor);
-            let rows = panel.as_chunks_mut::<ROWS>().0.iter_mut();
+            let rows = panel.as_chunks_mut::<ROWS_PER_PASS>().0.iter_mut();
             for (rows, factors) in rows.zip(factors) {
                 let mut sums = *rows;
                 for (sum, v) in sums.iter_mut().zip(factors) {
@@ -247,11 +252,11 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         }
     }
 
-    /// Takes out the `i`-th member; the last one moves to its place.
+    /// Removes the member at position `i`; the last member moves there.
     #[inline(always)]
-    pub fn leave(&mut self, i: usize) {
-        let (last, width) = (self.members.len() - 1, self.width());
-        // The inverse's column that goes.
+    pub fn remove(&mut self, i: usize) {
+        let (last, width) = (self.members.len() - 1, self.padded_len());
+        // The column of H that is removed.
         let (panel, lane) = (i / LANES * self.stride, i % LANES);
         for (p, row) in self.product[..width].iter_mut().zip(&self.inverse[panel..]) {
             *p = row[lane];
@@ -263,15 +268,15 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
             z[i] = z[last];
             z[last] = 0.0;
         }
-        self.add_outer(-inverse);
+        self.add_outer_product(-inverse);
         self.move_last_to(i);
         self.is_member[self.members.swap_remove(i)] = false;
     }
 
-    /// Puts the last row and column of the inverse in the place of the `i`-th and zeros in theirs.
+    /// Moves the last row and column of H to position `i`, and fills them with zeros.
     #[inline(always)]
     fn move_last_to(&mut self, i: usize) {
-        let (last, width, stride) = (self.members.len() - 1, self.width(), self.stride);
+        let (last, width, stride) = (self.members.len() - 1, self.padded_len(), self.stride);
         for panel in panels(&mut self.inverse, stride, width) {
             panel[i] = panel[last];
             panel[last] = [0.0; LANES];
@@ -285,9 +290,9 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         }
     }
 
-    /// Makes room for twice as many members.
+    /// Doubles the number of members that the set has memory for.
     #[cold]
-    fn widen(&mut self) {
+    fn grow(&mut self) {
         let (old, new) = (
             self.stride,
             padded_len((2 * self.stride).min(self.is_member.len())),
@@ -307,17 +312,17 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     }
 }
 
-/// An element that may enter a set of `N` right-hand sides.
+/// An unknown that may be inserted.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Offer<const N: usize> {
+pub(super) struct Candidate<const N: usize> {
     j: usize,
     /// `G[j, j]`.
     diagonal: f64,
-    /// What the set's solutions leave of its entries of the right-hand sides.
-    pub left: [f64; N],
+    /// Its entries of the residuals of the right-hand sides: the negative gradient of least squares.
+    pub residual: [f64; N],
 }
 
-/// The panels of the first `width` columns of a matrix as [`PassiveSet`] keeps it, `width` rows each.
+/// The panels of the first `width` columns of `H`, `width` rows each.
 #[inline(always)]
 fn panels(
     inverse: &mut [Block],
@@ -336,41 +341,41 @@ mod tests {
     use crate::linalg::add_scaled;
 
     #[test]
-    fn solutions_follow_the_set() {
+    fn insertions_and_removals_keep_the_solution() {
         let k = 150;
         let problem = Problem::random(k, 200, 5, 0.5);
         let gram = problem.gram();
         let b = problem.right_hand_side(&problem.measurements[0]);
         let mut set = PassiveSet::<1>::new(&gram, k);
         for j in 0..k {
-            assert!(set.enter(j, [b[j]]));
+            assert!(set.evaluate_and_insert(j, [b[j]]));
             if j % 3 == 2 {
-                set.leave(j / 3 % set.members().len());
+                set.remove(j / 3 % set.members().len());
             }
         }
-        assert!(set.members().len() > ROOM);
+        assert!(set.members().len() > INITIAL_CAPACITY);
         let solution = set.solution(0).to_vec();
-        let left = |z: &[f64]| {
-            let mut left = b.clone();
+        let residual = |z: &[f64]| {
+            let mut residual = b.clone();
             for (&m, z) in set.members().iter().zip(z) {
-                add_scaled(&mut left, -z, &gram[m * k..(m + 1) * k]);
+                add_scaled(&mut residual, -z, &gram[m * k..(m + 1) * k]);
             }
-            left
+            residual
         };
         for &m in set.members() {
-            assert!(left(&solution)[m].abs() < 1e-7);
+            assert!(residual(&solution)[m].abs() < 1e-7);
         }
-        let left = left(&solution);
-        set.refine(0, &left);
-        set.carry(0, &b);
+        let residual = residual(&solution);
+        set.refine(0, &residual);
+        set.set_rhs(0, &b);
         for (z, again) in solution.iter().zip(set.solution(0)) {
             assert!((z - again).abs() < 1e-7);
         }
         set.clear();
         assert!(set.members().is_empty() && !set.contains(0));
-        // A column that is another one's double does not enter.
-        let twin = [1.0, 2.0, 2.0, 4.0];
-        let mut set = PassiveSet::<1>::new(&twin, 2);
-        assert!(set.enter(0, [1.0]) && !set.enter(1, [2.0]));
+        // A column that is a multiple of another one is refused.
+        let dependent = [1.0, 2.0, 2.0, 4.0];
+        let mut set = PassiveSet::<1>::new(&dependent, 2);
+        assert!(set.evaluate_and_insert(0, [1.0]) && !set.evaluate_and_insert(1, [2.0]));
     }
 }

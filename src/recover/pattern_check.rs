@@ -1,31 +1,36 @@
-//! Whether photographs show the patterns they are listed with.
+//! Checks that each photograph shows the pattern that it is listed with.
 //!
-//! What the mean light transport function makes of a pattern is, on average, what is photographed
-//! under it: the slope of the one against the other is the same for all, however coarse or fine the
-//! pattern (one, if the window holds all light). Under another pattern's photograph it is zero. How far
-//! it may be off by chance is told by how much squares of the picture differ (clusters, as in Liang &
-//! Zeger 1986); what is too noisy to tell is let pass.
+//! The mean light transport function predicts, on average, what a photograph measures: the regression slope
+//! of measurements on predictions is the same for all patterns, coarse or fine (1 if the window holds all
+//! light). For a photograph of another pattern it is 0. The standard error of a slope comes from how much it
+//! differs between squares of the picture (clusters, as in Liang and Zeger 1986). A photograph fails only if
+//! its slope is too small with certainty.
 
-use super::RecoverError;
+use super::error::RecoverError;
 use super::holdout::HoldoutSplit;
-use super::sampling::pixels_by_window;
+use super::sampling::{self, PixelsOfWindow};
 use crate::capture::Measurements;
 use crate::executor::Executor;
-use crate::transport::{CameraPx, Element, Geometry, TileRect};
+use crate::transport::{Element, Geometry, TileRect};
 
-/// Share of the others' slope that a photograph of its pattern surely has.
-const RIGHT: f64 = 0.4;
-/// Standard errors that make sure.
-const SURE: f64 = 3.0;
-/// Standard errors by which the slope of all patterns must be above zero: where it is not, there is
-/// nothing to be recovered.
-const SEEN: f64 = 2.0;
-/// Fewest squares, and fewest patterns held out, that tell anything.
-const FEWEST_SQUARES: usize = 32;
-const FEWEST_HELD: usize = 2;
+/// Smallest slope of a photograph that matches its pattern, relative to [`REFERENCE_PERCENTILE`].
+const MIN_SLOPE_RATIO: f64 = 0.4;
+/// Percentile of the slopes that stands for photographs that match; it holds unless nine in ten do not.
+const REFERENCE_PERCENTILE: usize = 90;
+/// Standard errors by which a photograph's slope must be too small.
+const MISMATCH_ERRORS: f64 = 3.0;
+/// Standard errors by which the common slope of the held-out patterns must be above zero.
+const CORRELATION_ERRORS: f64 = 2.0;
+/// Fewest squares, and fewest held-out patterns, that give a standard error.
+const MIN_SQUARES: usize = 32;
+const MIN_HELD_OUT: usize = 2;
 
-/// Looks at `squares` of the picture. An error where patterns do not tell what their photographs
-/// show: [`RecoverError::MismatchedPatterns`] if those of some, [`RecoverError::UncorrelatedPatterns`] if of all.
+/// Checks the photographs on `squares` of the picture; `mean_function` is `[slot]`.
+///
+/// # Errors
+/// [`RecoverError::MismatchedPatterns`] if some photographs do not match their patterns, and
+/// [`RecoverError::UncorrelatedPatterns`] if most do not, or if the held-out patterns together predict
+/// nothing.
 pub(super) fn check_patterns(
     measurements: &Measurements,
     geometry: &Geometry,
@@ -34,130 +39,135 @@ pub(super) fn check_patterns(
     squares: &[TileRect],
     executor: &impl Executor,
 ) -> Result<(), RecoverError> {
-    if squares.len() < FEWEST_SQUARES {
+    if squares.len() < MIN_SQUARES {
         return Ok(());
     }
-    let by_square = executor.map(squares.len(), |i| {
-        let mut products = vec![Products::default(); split.all.len()];
-        for (origin, pixels) in pixels_by_window(geometry, squares[i]) {
-            let seen = (origin, &pixels[..]);
-            add(
-                &mut products,
+    let moments = executor.map(squares.len(), |i| {
+        let mut moments = vec![Moments::default(); split.all.len()];
+        for (origin, pixels) in sampling::pixels_by_window(geometry, squares[i]) {
+            let window = (origin, &pixels[..]);
+            add_window(
+                &mut moments,
                 measurements,
                 geometry,
                 split,
                 mean_function,
-                seen,
+                window,
             );
         }
-        products
+        moments
     });
     let slopes: Vec<Option<Slope>> = (0..split.all.len())
-        .map(|l| Slope::of(&by_square, &[l]))
+        .map(|l| Slope::fit(&moments, &[l]))
         .collect();
-    // That of patterns that are right, unless more than nine in ten are wrong.
     let mut values: Vec<f64> = slopes.iter().flatten().map(|slope| slope.value).collect();
     values.sort_by(f64::total_cmp);
-    let usual = values.get(values.len() * 9 / 10).copied().unwrap_or(0.0);
-    let wrong = |&l: &usize| slopes[l].is_some_and(|slope| slope.is_below(RIGHT * usual));
-    let astray: Vec<usize> = (0..split.all.len()).filter(wrong).collect();
-    // What is held out and not known to be wrong: that alone may be all that is wrong.
-    let held: Vec<usize> = split
-        .held_out
-        .iter()
-        .copied()
-        .filter(|l| !astray.contains(l))
-        .collect();
-    let unrelated = split.held_out.len() >= FEWEST_HELD
-        && Slope::of(&by_square, &held).is_some_and(Slope::is_nothing);
-    if unrelated || 2 * astray.len() > split.all.len() {
+    let reference = values.get(values.len() * REFERENCE_PERCENTILE / 100);
+    let min_slope = MIN_SLOPE_RATIO * reference.copied().unwrap_or(0.0);
+    let is_mismatched = |&l: &usize| slopes[l].is_some_and(|slope| slope.is_below(min_slope));
+    let mismatched: Vec<usize> = (0..split.all.len()).filter(is_mismatched).collect();
+    let held_out = split.held_out.iter().copied();
+    let held_out: Vec<usize> = held_out.filter(|l| !mismatched.contains(l)).collect();
+    let is_uncorrelated = split.held_out.len() >= MIN_HELD_OUT
+        && Slope::fit(&moments, &held_out).is_some_and(Slope::may_be_zero);
+    if is_uncorrelated || 2 * mismatched.len() > split.all.len() {
         return Err(RecoverError::UncorrelatedPatterns);
     }
-    match astray.is_empty() {
+    match mismatched.is_empty() {
         true => Ok(()),
-        false => Err(RecoverError::MismatchedPatterns(astray)),
+        false => Err(RecoverError::MismatchedPatterns {
+            pattern_indices: mismatched,
+        }),
     }
 }
 
-/// Inner products, over pixels, of what the mean function shows of a pattern that differs from what it
-/// shows on average, with itself and with the same of what was photographed.
+/// Sums over pixels, both centred over the patterns: of squared predictions, and of predictions times
+/// measurements.
 #[derive(Clone, Copy, Debug, Default)]
-struct Products {
-    shown: f64,
-    both: f64,
+struct Moments {
+    prediction: f64,
+    cross: f64,
 }
 
-/// What is photographed for one of what is shown.
+/// A regression slope of measurements on predictions.
 #[derive(Clone, Copy, Debug)]
 struct Slope {
     value: f64,
-    error: f64,
+    standard_error: f64,
 }
 
 impl Slope {
-    /// Of `patterns` together, from `[square][pattern]`; `None` where nothing is shown.
-    fn of(by_square: &[Vec<Products>], patterns: &[usize]) -> Option<Self> {
-        let squares: Vec<Products> = by_square
-            .iter()
-            .map(|square| {
-                let products = patterns.iter().map(|&l| square[l]);
-                products.fold(Products::default(), |a, b| Products {
-                    shown: a.shown + b.shown,
-                    both: a.both + b.both,
-                })
+    /// The common slope of `patterns`, from moments `[square][pattern]`; `None` if the predictions do not
+    /// vary.
+    fn fit(moments: &[Vec<Moments>], patterns: &[usize]) -> Option<Self> {
+        let squares = moments.iter().map(|square| {
+            let of_patterns = patterns.iter().map(|&l| square[l]);
+            of_patterns.fold(Moments::default(), |a, b| Moments {
+                prediction: a.prediction + b.prediction,
+                cross: a.cross + b.cross,
             })
-            .collect();
-        let shown: f64 = squares.iter().map(|p| p.shown).sum();
-        let value = squares.iter().map(|p| p.both).sum::<f64>() / shown;
-        let off = squares.iter().map(|p| (p.both - value * p.shown).powi(2));
-        let error = off.sum::<f64>().sqrt() / shown;
-        (value.is_finite() && error.is_finite()).then_some(Self { value, error })
+        });
+        let squares: Vec<Moments> = squares.collect();
+        let prediction: f64 = squares.iter().map(|m| m.prediction).sum();
+        let value = squares.iter().map(|m| m.cross).sum::<f64>() / prediction;
+        let residuals = squares
+            .iter()
+            .map(|m| (m.cross - value * m.prediction).powi(2));
+        let standard_error = residuals.sum::<f64>().sqrt() / prediction;
+        (value.is_finite() && standard_error.is_finite()).then_some(Self {
+            value,
+            standard_error,
+        })
     }
 
     fn is_below(self, value: f64) -> bool {
-        self.value + SURE * self.error < value
+        self.value + MISMATCH_ERRORS * self.standard_error < value
     }
 
-    fn is_nothing(self) -> bool {
-        self.value < SEEN * self.error
+    fn may_be_zero(self) -> bool {
+        self.value < CORRELATION_ERRORS * self.standard_error
     }
 }
 
-/// Adds one window's pixels to `products`, `[pattern]`.
-fn add(
-    products: &mut [Products],
+/// Adds one window's pixels to the moments, `[pattern]`.
+fn add_window(
+    moments: &mut [Moments],
     measurements: &Measurements,
     geometry: &Geometry,
     split: &HoldoutSplit,
     mean_function: &[f64],
-    (origin, pixels): (Element, &[(usize, CameraPx)]),
+    (origin, pixels): (Element, &PixelsOfWindow),
 ) {
+    let elements = sampling::elements_of_window(geometry, origin);
     for (plane, channels) in measurements.planes() {
-        let shown = |&l: &usize| {
+        let predict = |&l: &usize| {
             let pattern = measurements.patterns[l].plane(plane);
-            let slots = mean_function.iter().enumerate().filter_map(|(slot, m)| {
-                let element = geometry.window.element(origin, slot);
-                Some(m * f64::from(pattern[element.index_in(geometry.light)?]))
-            });
-            slots.sum::<f64>()
+            let terms = elements.iter();
+            let terms = terms.map(|&(slot, m)| mean_function[slot] * f64::from(pattern[m]));
+            terms.sum::<f64>()
         };
-        let shown: Vec<f64> = split.all.iter().map(shown).collect();
+        let predictions: Vec<f64> = split.all.iter().map(predict).collect();
         let pixels = pixels.iter().map(|&(_, pixel)| pixel);
         for (pixel, c) in pixels.flat_map(|pixel| channels.clone().map(move |c| (pixel, c))) {
             let sample = |l: usize| measurements.sample(l, pixel, c);
             let known = split.training.iter().filter(|&&l| sample(l).is_finite());
-            let [level, light, count] = known.fold([0.0; 3], |[level, light, count], &l| {
-                [level + shown[l], light + sample(l), count + 1.0]
-            });
-            if !(level > 0.0 && light > 0.0) {
+            let [predicted, measured, count] =
+                known.fold([0.0; 3], |[predicted, measured, count], &l| {
+                    [
+                        predicted + predictions[l],
+                        measured + sample(l),
+                        count + 1.0,
+                    ]
+                });
+            if !(predicted > 0.0 && measured > 0.0) {
                 continue;
             }
-            for (l, products) in products.iter_mut().enumerate() {
-                let seen = sample(l) - light / count;
-                if seen.is_finite() {
-                    let shown = light / level * (shown[l] - level / count);
-                    products.shown += shown * shown;
-                    products.both += shown * seen;
+            for (l, moments) in moments.iter_mut().enumerate() {
+                let deviation = sample(l) - measured / count;
+                if deviation.is_finite() {
+                    let prediction = measured / predicted * (predictions[l] - predicted / count);
+                    moments.prediction += prediction * prediction;
+                    moments.cross += prediction * deviation;
                 }
             }
         }
@@ -168,21 +178,22 @@ fn add(
 mod tests {
     use super::*;
 
-    fn squares(pairs: &[(f64, f64)]) -> Vec<Vec<Products>> {
-        let square = |&(shown, both): &(f64, f64)| vec![Products { shown, both }];
-        pairs.iter().map(square).collect()
+    fn slope(squares: &[(f64, f64)]) -> Option<Slope> {
+        let moments = squares
+            .iter()
+            .map(|&(prediction, cross)| vec![Moments { prediction, cross }]);
+        Slope::fit(&moments.collect::<Vec<_>>(), &[0])
     }
 
     #[test]
-    fn slopes_are_judged_by_how_sure_they_are() {
-        let slope = |pairs: &[(f64, f64)]| Slope::of(&squares(pairs), &[0]);
-        let right = slope(&[(1.0, 0.9), (2.0, 2.1), (1.0, 1.1)]).unwrap();
-        assert!((right.value - 1.025).abs() < 1e-9 && right.error < 0.1);
-        assert!(!right.is_below(0.5) && !right.is_nothing());
-        let wrong = slope(&[(1.0, 0.1), (2.0, -0.1), (1.0, 0.05)]).unwrap();
-        assert!(wrong.is_below(0.5) && wrong.is_nothing());
+    fn slopes_are_tested_against_their_standard_errors() {
+        let matched = slope(&[(1.0, 0.9), (2.0, 2.1), (1.0, 1.1)]).unwrap();
+        assert!((matched.value - 1.025).abs() < 1e-9 && matched.standard_error < 0.1);
+        assert!(!matched.is_below(0.5) && !matched.may_be_zero());
+        let mismatched = slope(&[(1.0, 0.1), (2.0, -0.1), (1.0, 0.05)]).unwrap();
+        assert!(mismatched.is_below(0.5) && mismatched.may_be_zero());
         let noisy = slope(&[(1.0, 3.0), (2.0, -4.0), (1.0, 1.5)]).unwrap();
-        assert!(!noisy.is_below(0.5) && noisy.is_nothing());
+        assert!(!noisy.is_below(0.5) && noisy.may_be_zero());
         assert!(slope(&[(0.0, 0.0), (0.0, 0.0)]).is_none());
     }
 }

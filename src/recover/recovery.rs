@@ -1,165 +1,31 @@
-//! Recovery of a whole transport, tile by tile, by any of the methods.
+//! Recovery of a light transport matrix, tile by tile, by any of the methods.
 
 use std::fmt::Write;
 
-use serde::Serialize;
-use thiserror::Error;
-
+use super::common_mode::CommonMode;
+use super::error::RecoverError;
 use super::holdout::HoldoutSplit;
 use super::holdout_validation::HoldoutValidation;
 use super::learned::LearnedRecovery;
+use super::method::Method;
 use super::pixelwise::PixelwiseRecovery;
 use super::pooled;
-use super::{CommonMode, MIN_PATTERNS, SparsityBasis};
+use super::sampling::MIN_PATTERNS;
 use crate::capture::Measurements;
-use crate::executor::{Cancelled, Executor};
-use crate::transport::{Basis, Geometry, GeometryError, RecoveredTile, TileRect, Window};
+use crate::executor::Executor;
+use crate::transport::{Basis, Geometry, RecoveredTile, TileRect, Window};
 
-/// How light transport functions are recovered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(into = "&'static str")]
-pub enum Method {
-    /// A Gaussian prior learned from the measurements themselves, and the posterior under it; blended
-    /// with least squares in tiles where a blend predicts patterns held out better.
-    Learned,
-    /// Non-negative least squares, each pixel and channel on its own (paper, section 3, case (a)).
-    Nnls,
-    /// Basis pursuit denoising: of all functions that explain a pixel's measurements to within noise
-    /// the sparsest in this basis (paper, section 3, case (b)).
-    Bpdn(SparsityBasis),
-}
-
-impl From<Method> for &'static str {
-    fn from(method: Method) -> Self {
-        method.name()
-    }
-}
-
-impl Method {
-    /// Every method there is.
-    pub const ALL: &[Self] = &[
-        Self::Learned,
-        Self::Nnls,
-        Self::Bpdn(SparsityBasis::Identity),
-        Self::Bpdn(SparsityBasis::Dct),
-        Self::Bpdn(SparsityBasis::Haar),
-    ];
-
-    /// About the most memory that preparing a recovery takes beside the measurements, in bytes.
-    pub fn preparation_bytes(self, window: Window) -> usize {
-        let own = match self {
-            Self::Learned => LearnedRecovery::preparation_bytes(window),
-            Self::Nnls | Self::Bpdn(_) => 0,
-        };
-        own.max(pooled::bytes(window))
-    }
-
-    /// About the most memory that recovering one tile takes beside the measurements and the tile's
-    /// functions, in bytes.
-    pub fn tile_bytes(self, window: Window, patterns: usize) -> usize {
-        let direct = PixelwiseRecovery::tile_bytes(window, patterns);
-        match self {
-            // Tiles may be blended with least squares.
-            Self::Learned => direct.max(LearnedRecovery::tile_bytes(window)),
-            Self::Nnls | Self::Bpdn(_) => direct,
-        }
-    }
-
-    /// The most components that tiles may be combined from.
-    pub fn max_rank(self, window: Window) -> usize {
-        match self {
-            Self::Learned => LearnedRecovery::max_rank(window),
-            Self::Nnls | Self::Bpdn(_) => 0,
-        }
-    }
-
-    /// The most camera pixels around a tile whose measurements may go into it.
-    pub fn max_halo(self) -> u32 {
-        match self {
-            Self::Learned => LearnedRecovery::MAX_HALO,
-            Self::Nnls | Self::Bpdn(_) => 0,
-        }
-    }
-
-    /// The basis of [`Bpdn`](Self::Bpdn).
-    pub fn basis(self) -> Option<SparsityBasis> {
-        match self {
-            Self::Bpdn(basis) => Some(basis),
-            Self::Learned | Self::Nnls => None,
-        }
-    }
-
-    /// The name by which options, reports and files call it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Learned => "learned",
-            Self::Nnls => "nnls",
-            Self::Bpdn(_) => "bpdn",
-        }
-    }
-}
-
-/// What is asked of a recovery.
+/// The options of a recovery.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// How.
+    /// How light transport functions are recovered.
     pub method: Method,
-    /// What a camera pixel may see.
+    /// The light elements around a pixel's correspondence that may light it.
     pub window: Window,
 }
 
-/// Why a recovery cannot start.
-#[derive(Debug, Error)]
-pub enum RecoverError {
-    /// Too few patterns.
-    #[error(
-        "{0} patterns are too few; recovery needs at least {MIN_PATTERNS}, and about 80 to be good"
-    )]
-    TooFewPatterns(usize),
-    /// The window does not fit.
-    #[error(transparent)]
-    Geometry(#[from] GeometryError),
-    /// The correspondence misses the display.
-    #[error(
-        "no camera pixel looks at the light plane; check \"correspondence\" and \"light\" in the capture's manifest"
-    )]
-    CorrespondenceOffLightPlane,
-    /// Nothing in the photographs stands out of their noise.
-    #[error(
-        "the photographs show no light from the display; check \"camera.black\", the exposure, and that photographs are listed with the patterns they show"
-    )]
-    NoSignal,
-    /// Patterns do not tell what photographs show.
-    #[error(
-        "what the photographs show does not follow from the patterns; check that each is listed with the pattern it shows, \"correspondence\" in the capture's manifest, and the exposure"
-    )]
-    UncorrelatedPatterns,
-    /// Some patterns do not tell what their photographs show, as others do: which, among the
-    /// measurements'.
-    #[error("what the photographs of {} of the patterns show is not of them", .0.len())]
-    MismatchedPatterns(Vec<usize>),
-    /// No pixel looked at can be learned from.
-    #[error(
-        "too many pixels are saturated in too many photographs; photograph with less exposure, or add shots with less (\"exposure\" in capture.json)"
-    )]
-    Overexposed,
-    /// The caller cancelled the recovery.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-}
-
-/// The crc32c of what is written.
-struct Checksum(u32);
-
-impl Write for Checksum {
-    fn write_str(&mut self, text: &str) -> std::fmt::Result {
-        self.0 = crc32c::crc32c_append(self.0, text.as_bytes());
-        Ok(())
-    }
-}
-
-/// A recovery ready to run: what has been learned or chosen from the measurements as a whole, by
-/// which tiles can then be recovered one by one, in any order.
+/// A recovery that is ready to run. All that depends on the measurements as a whole has been learned or
+/// chosen; tiles can then be recovered one by one, in any order.
 #[derive(Debug)]
 pub struct Recovery {
     geometry: Geometry,
@@ -170,13 +36,17 @@ pub struct Recovery {
 #[derive(Debug)]
 enum Solver {
     Learned(Box<LearnedRecovery>),
-    Direct(PixelwiseRecovery),
+    Pixelwise(PixelwiseRecovery),
 }
 
 impl Recovery {
-    /// Learns and chooses from `measurements` whatever the method asks for. They may hold strips of
-    /// the picture instead of all of it, and are then looked at where tiles are
-    /// [covered](Measurements::covers).
+    /// Learns and chooses from `measurements` what the method needs. They may hold strips of the picture
+    /// instead of all of it; only [covered](Measurements::covers) tiles are then used.
+    ///
+    /// # Errors
+    /// If there are too few patterns, if the geometry is out of range or no pixel sees the light plane, if
+    /// the photographs are dark, overexposed or do not match their patterns, and if the executor is
+    /// cancelled.
     pub fn prepare(
         measurements: &Measurements,
         settings: Settings,
@@ -191,9 +61,13 @@ impl Recovery {
         }
         .validate()?;
         if measurements.patterns.len() < MIN_PATTERNS {
-            return Err(RecoverError::TooFewPatterns(measurements.patterns.len()));
+            return Err(RecoverError::TooFewPatterns {
+                count: measurements.patterns.len(),
+                min: MIN_PATTERNS,
+            });
         }
         let split = HoldoutSplit::new(measurements);
+        // Also checks that the photographs match their patterns, for every method.
         let mean = pooled::mean_function(measurements, &geometry, &split, executor)?;
         let solver = match settings.method {
             Method::Learned => {
@@ -201,13 +75,13 @@ impl Recovery {
                     LearnedRecovery::new(measurements, geometry, split.clone(), &mean, executor)?;
                 Solver::Learned(Box::new(learned))
             }
-            Method::Nnls => Solver::Direct(PixelwiseRecovery::least_squares(
+            Method::Nnls => Solver::Pixelwise(PixelwiseRecovery::least_squares(
                 measurements,
                 geometry,
                 &split,
                 executor,
             )?),
-            Method::Bpdn(basis) => Solver::Direct(PixelwiseRecovery::denoising(
+            Method::Bpdn(basis) => Solver::Pixelwise(PixelwiseRecovery::denoising(
                 measurements,
                 geometry,
                 basis,
@@ -220,68 +94,81 @@ impl Recovery {
             solver,
             holdout_validation: None,
         };
-        let training_tile = |rect: TileRect| match &recovery.solver {
+        let recover_from_training = |rect: TileRect| match &recovery.solver {
             Solver::Learned(learned) => learned.training_tile(measurements, rect),
-            Solver::Direct(direct) => {
-                RecoveredTile::Direct(direct.tile_from(measurements, &split.training, rect))
+            Solver::Pixelwise(solver) => {
+                RecoveredTile::Direct(solver.tile_from(measurements, &split.training, rect))
             }
         };
-        let setting = (&geometry, recovery.basis());
-        recovery.holdout_validation =
-            HoldoutValidation::new(measurements, setting, &split, executor, training_tile)?;
+        recovery.holdout_validation = HoldoutValidation::new(
+            measurements,
+            (&geometry, recovery.basis()),
+            &split,
+            executor,
+            recover_from_training,
+        )?;
         Ok(recovery)
     }
 
-    /// Grids, band and tiling of the answer.
+    /// Grids, window and tiling of the result.
     pub fn geometry(&self) -> &Geometry {
         &self.geometry
     }
 
-    /// Tells one preparation from another: tiles are of one file only if these are equal.
+    /// A checksum of the preparation. Tiles belong in one file only if it is equal.
     pub fn fingerprint(&self) -> u32 {
-        // All of it as text, in which numbers are exact.
-        let mut sum = Checksum(0);
-        let written = write!(sum, "{:?} {:?}", self.geometry, self.solver);
-        debug_assert!(written.is_ok(), "a checksum takes everything");
-        sum.0
+        // Over the `Debug` output, which writes numbers exactly.
+        let mut checksum = Crc32c(0);
+        let written = write!(checksum, "{:?} {:?}", self.geometry, self.solver);
+        debug_assert!(written.is_ok(), "a checksum accepts any text");
+        checksum.0
     }
 
-    /// The functions that factored tiles are combined from, if there are such tiles.
+    /// The basis functions that factored tiles share, if there are such tiles.
     pub fn basis(&self) -> Option<&Basis> {
         match &self.solver {
             Solver::Learned(learned) => Some(learned.basis()),
-            Solver::Direct(_) => None,
+            Solver::Pixelwise(_) => None,
         }
     }
 
-    /// Weight that least squares or denoising gives the patterns' common mode, where either goes into
-    /// the answer.
+    /// The weight of the patterns' common mode in least squares or denoising, if tiles depend on either.
     pub fn common_mode(&self) -> Option<CommonMode> {
         match &self.solver {
             Solver::Learned(learned) => learned.common_mode(),
-            Solver::Direct(direct) => Some(direct.common_mode()),
+            Solver::Pixelwise(solver) => Some(solver.common_mode),
         }
     }
 
-    /// How well it does on patterns held out; none where there are too few to hold any out.
+    /// The validation on held-out patterns; `None` if there are too few patterns to hold any out.
     pub fn holdout_validation(&self) -> Option<&HoldoutValidation> {
         self.holdout_validation.as_ref()
     }
 
-    /// Camera pixels around a tile whose measurements go into it.
+    /// Distance from a tile, in camera pixels, of the measurements that the tile depends on.
     pub fn halo(&self) -> u32 {
         match &self.solver {
             Solver::Learned(learned) => learned.halo(),
-            Solver::Direct(_) => 0,
+            Solver::Pixelwise(_) => 0,
         }
     }
 
-    /// Recovers one tile. `measurements` are those the recovery was prepared from, or other rows of
-    /// the same: they cover the tile and [`halo`](Self::halo) rows around it, as far as there are any.
+    /// Recovers one tile. `measurements` are those that the recovery was prepared from, or other rows of
+    /// the same capture: they cover the tile and [`halo`](Self::halo) rows around it, within the picture.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
         match &self.solver {
             Solver::Learned(learned) => learned.tile(measurements, rect),
-            Solver::Direct(direct) => RecoveredTile::Direct(direct.tile(measurements, rect)),
+            Solver::Pixelwise(solver) => RecoveredTile::Direct(solver.tile(measurements, rect)),
         }
+    }
+}
+
+/// CRC-32C of the text that is written.
+struct Crc32c(u32);
+
+impl Write for Crc32c {
+    fn write_str(&mut self, text: &str) -> std::fmt::Result {
+        self.0 = crc32c::crc32c_append(self.0, text.as_bytes());
+        Ok(())
     }
 }

@@ -1,54 +1,63 @@
-//! Which pixels and measurements are looked at.
+//! Selects the pixels, patterns and light elements that an estimate uses.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::MIN_PATTERNS;
 use crate::capture::Measurements;
 use crate::transport::{CameraPx, Element, Extent, Geometry, TileRect};
 
-/// Squares of `side` pixels spread evenly over the picture, none over another, at most `most`: all
-/// there are room for where the picture is small. Only such whose measurements are at hand.
-pub(super) fn spread_squares(measurements: &Measurements, side: u32, most: usize) -> Vec<TileRect> {
-    let camera = measurements.camera;
-    squares(camera, side, most, |square| measurements.covers(square))
+/// Fewest patterns that recovery makes sense with.
+pub const MIN_PATTERNS: usize = 4;
+
+/// Pixels that share a window, each with its position in a region, row by row.
+pub(super) type PixelsOfWindow = [(usize, CameraPx)];
+
+/// Squares of `side²` pixels spread evenly over the picture, without overlap, at most `max_count`. Only
+/// squares whose measurements are in memory.
+pub(super) fn spread_squares(
+    measurements: &Measurements,
+    side: u32,
+    max_count: usize,
+) -> Vec<TileRect> {
+    let is_covered = |square| measurements.covers(square);
+    spread_over(measurements.camera, side, max_count, is_covered)
 }
 
-fn squares(
+fn spread_over(
     camera: Extent,
     side: u32,
-    most: usize,
-    at_hand: impl Fn(TileRect) -> bool,
+    max_count: usize,
+    is_covered: impl Fn(TileRect) -> bool,
 ) -> Vec<TileRect> {
     let extent = Extent {
         width: side.min(camera.width),
         height: side.min(camera.height),
     };
-    let square = |x: u32, y: u32| TileRect {
-        x: x * extent.width,
-        y: y * extent.height,
+    let square = |column: u32, row: u32| TileRect {
+        x: column * extent.width,
+        y: row * extent.height,
         extent,
     };
-    let across = camera.width / extent.width;
+    let columns = camera.width / extent.width;
     let rows: Vec<u32> = (0..camera.height / extent.height)
-        .filter(|&y| at_hand(square(0, y)))
+        .filter(|&row| is_covered(square(0, row)))
         .collect();
-    if across as usize * rows.len() <= most {
-        let row = |&y: &u32| (0..across).map(move |x| square(x, y));
-        return rows.iter().flat_map(row).collect();
+    if columns as usize * rows.len() <= max_count {
+        let squares = |&row: &u32| (0..columns).map(move |column| square(column, row));
+        return rows.iter().flat_map(squares).collect();
     }
-    let mut squares: Vec<TileRect> = Vec::with_capacity(most);
-    // Roberts's R2 sequence: even, and in step with no pattern of the picture.
-    for i in 1..=64 * most {
-        let at =
+    let mut squares: Vec<TileRect> = Vec::with_capacity(max_count);
+    // Roberts's R2 sequence: even, and in step with no periodic structure of the picture.
+    for i in 1..=64 * max_count {
+        let position =
             |step: f64, cells: usize| ((0.5 + step * i as f64).fract() * cells as f64) as usize;
         let square = square(
-            at(0.754_877_666_246_69, across as usize) as u32,
-            rows[at(0.569_840_290_998_05, rows.len())],
+            position(0.754_877_666_246_69, columns as usize) as u32,
+            rows[position(0.569_840_290_998_05, rows.len())],
         );
         if !squares.contains(&square) {
             squares.push(square);
-            if squares.len() == most {
+            if squares.len() == max_count {
                 break;
             }
         }
@@ -56,7 +65,7 @@ fn squares(
     squares
 }
 
-/// All pixels of a region by their common window: (number in the region, pixel).
+/// The pixels of a region, grouped by the origin of their window.
 pub(super) fn pixels_by_window(
     geometry: &Geometry,
     rect: TileRect,
@@ -69,71 +78,78 @@ pub(super) fn pixels_by_window(
     windows
 }
 
-/// Whether any window reaches the display.
-pub(super) fn reaches_display(geometry: &Geometry) -> bool {
-    let mut pixels = geometry.tiles().flat_map(TileRect::pixels);
-    pixels.any(|pixel| geometry.reaches_display(geometry.window_origin(pixel)))
+/// The slots of a window that lie on the light plane, each with its light element's index.
+pub(super) fn elements_of_window(geometry: &Geometry, origin: Element) -> Vec<(usize, usize)> {
+    let slots = 0..geometry.window.area();
+    let element = |slot| {
+        let element = geometry.window.element(origin, slot);
+        Some((slot, element.index_in(geometry.light)?))
+    };
+    slots.filter_map(element).collect()
 }
 
-/// Those of the patterns `rows` under which no channel of no pixel is saturated; all of them where
-/// those are too few, for pixels that are not.
+/// Whether any pixel's window reaches the light plane.
+pub(super) fn sees_light_plane(geometry: &Geometry) -> bool {
+    let mut pixels = geometry.tiles().flat_map(TileRect::pixels);
+    pixels.any(|pixel| {
+        let origin = geometry.window_origin(pixel);
+        !geometry.clip_window(origin).is_empty()
+    })
+}
+
+/// The patterns of `pattern_indices` under which none of the pixels and channels is saturated; all of them
+/// if those are fewer than [`MIN_PATTERNS`].
 pub(super) fn unsaturated(
     measurements: &Measurements,
-    rows: &[usize],
-    pixels: &[(usize, CameraPx)],
+    pattern_indices: &[usize],
+    pixels: &PixelsOfWindow,
     channels: Range<usize>,
 ) -> Vec<usize> {
-    let seen = |&l: &usize| {
+    let is_usable = |&l: &usize| {
         let mut pixels = pixels.iter();
         pixels.all(|&(_, pixel)| {
             let mut channels = channels.clone();
             channels.all(|c| measurements.sample(l, pixel, c).is_finite())
         })
     };
-    let usable: Vec<usize> = rows.iter().copied().filter(seen).collect();
+    let usable: Vec<usize> = pattern_indices.iter().copied().filter(is_usable).collect();
     match usable.len() >= MIN_PATTERNS {
         true => usable,
-        false => rows.to_vec(),
+        false => pattern_indices.to_vec(),
     }
 }
 
-/// Mean variance of measurements that are `y` on average, over the patterns `rows`, whose exposures
-/// may differ.
-pub(super) fn mean_variance(measurements: &Measurements, rows: &[usize], c: usize, y: f64) -> f64 {
-    let variances = rows.iter().map(|&l| measurements.variance(l, c, y));
-    variances.sum::<f64>() / rows.len().max(1) as f64
+/// Mean, over the patterns, of the variance of a measurement `y`. Patterns may differ in exposure.
+pub(super) fn mean_variance(
+    measurements: &Measurements,
+    pattern_indices: &[usize],
+    c: usize,
+    y: f64,
+) -> f64 {
+    let variances = pattern_indices
+        .iter()
+        .map(|&l| measurements.variance(l, c, y));
+    variances.sum::<f64>() / pattern_indices.len().max(1) as f64
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn extent(width: u32, height: u32) -> Extent {
+        Extent { width, height }
+    }
+
     #[test]
-    fn squares_are_spread_and_apart() {
-        let camera = Extent {
-            width: 128,
-            height: 96,
-        };
-        let chosen = squares(camera, 16, 24, |_| true);
-        assert_eq!(chosen.len(), 24);
-        for (i, a) in chosen.iter().enumerate() {
+    fn squares_are_spread_without_overlap() {
+        let squares = spread_over(extent(128, 96), 16, 24, |_| true);
+        assert_eq!(squares.len(), 24);
+        for (i, a) in squares.iter().enumerate() {
             assert!(a.x + 16 <= 128 && a.y + 16 <= 96);
-            for b in &chosen[..i] {
+            for b in &squares[..i] {
                 assert!(a.x.abs_diff(b.x) >= 16 || a.y.abs_diff(b.y) >= 16);
             }
         }
-        assert_eq!(
-            squares(
-                Extent {
-                    width: 3,
-                    height: 5
-                },
-                16,
-                24,
-                |_| true
-            )
-            .len(),
-            1
-        );
+        assert_eq!(spread_over(extent(3, 5), 16, 24, |_| true).len(), 1);
     }
 }

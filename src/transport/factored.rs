@@ -65,7 +65,7 @@ impl FactoredTile {
                     (0..CHANNELS).for_each(|c| tau[c] += sums[c][s]);
                 }
             }
-            geometry.darken_off_display(geometry.window_origin(pixel), tau);
+            geometry.zero_off_light_plane(geometry.window_origin(pixel), tau);
         }
     }
 }

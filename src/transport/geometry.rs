@@ -1,5 +1,7 @@
 //! Where camera pixels, light elements, windows and tiles lie.
 
+use std::ops::Range;
+
 use thiserror::Error;
 
 /// Largest side of a camera or light grid; bounds every later product well inside `u64`.
@@ -250,26 +252,21 @@ impl Geometry {
         self.window.origin(self.correspondence.at(pixel))
     }
 
-    /// Whether any of the window that starts at `origin` lies on the display.
-    pub(crate) fn reaches_display(&self, origin: Element) -> bool {
-        let side = i64::from(self.window.side());
-        let reaches =
-            |at: i32, length: u32| i64::from(at) + side > 0 && i64::from(at) < i64::from(length);
-        reaches(origin.u, self.light.width) && reaches(origin.v, self.light.height)
+    /// The part of the window that starts at `origin` which lies on the light plane.
+    pub(crate) fn clip_window(&self, origin: Element) -> ClippedRect {
+        let side = self.window.side();
+        let size = Extent {
+            width: side,
+            height: side,
+        };
+        ClippedRect::new(origin, size, self.light)
     }
 
-    /// Zeroes the values of elements off the display, for the window that starts at `origin`.
-    pub(crate) fn darken_off_display<T: Copy + Default>(&self, origin: Element, values: &mut [T]) {
+    /// Zeroes the slots off the light plane, for the window that starts at `origin`.
+    pub(crate) fn zero_off_light_plane<T: Copy + Default>(&self, origin: Element, slots: &mut [T]) {
+        let ClippedRect { columns, rows, .. } = self.clip_window(origin);
         let side = self.window.side() as usize;
-        // Window columns or rows that lie on the display, from one up to another.
-        let on_display = |origin: i32, length: u32| {
-            let clamp = |at: i64| at.clamp(0, side as i64) as usize;
-            let start = clamp(-i64::from(origin));
-            start..clamp(i64::from(length) - i64::from(origin)).max(start)
-        };
-        let columns = on_display(origin.u, self.light.width);
-        let rows = on_display(origin.v, self.light.height);
-        for (v, row) in values.chunks_exact_mut(side).enumerate() {
+        for (v, row) in slots.chunks_exact_mut(side).enumerate() {
             if rows.contains(&v) {
                 row[..columns.start].fill(T::default());
                 row[columns.end..].fill(T::default());
@@ -277,6 +274,54 @@ impl Geometry {
                 row.fill(T::default());
             }
         }
+    }
+}
+
+/// The part of a rectangle of light elements that lies on the light plane.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct ClippedRect {
+    /// The rectangle's first element, which may lie off the light plane.
+    origin: Element,
+    /// Columns on the light plane, counted from the rectangle's first.
+    pub columns: Range<usize>,
+    /// Rows on the light plane, counted from the rectangle's first.
+    pub rows: Range<usize>,
+}
+
+impl ClippedRect {
+    /// Clips the rectangle of this size that starts at `origin`.
+    pub fn new(origin: Element, size: Extent, light: Extent) -> Self {
+        let clip = |origin: i32, size: u32, light: u32| {
+            let clamp = |at: i64| at.clamp(0, i64::from(size)) as usize;
+            let start = clamp(-i64::from(origin));
+            start..clamp(i64::from(light) - i64::from(origin)).max(start)
+        };
+        Self {
+            origin,
+            columns: clip(origin.u, size.width, light.width),
+            rows: clip(origin.v, size.height, light.height),
+        }
+    }
+
+    /// Whether nothing of the rectangle lies on the light plane.
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty() || self.rows.is_empty()
+    }
+
+    /// Number of elements on the light plane.
+    pub fn area(&self) -> usize {
+        self.columns.len() * self.rows.len()
+    }
+
+    /// Column and row, on the light plane, of the first element on it.
+    pub fn first(&self) -> [usize; 2] {
+        let first = |origin: i32, range: &Range<usize>| {
+            (i64::from(origin) + range.start as i64).max(0) as usize
+        };
+        [
+            first(self.origin.u, &self.columns),
+            first(self.origin.v, &self.rows),
+        ]
     }
 }
 
@@ -300,4 +345,38 @@ pub enum GeometryError {
     /// Infinite or NaN coefficient.
     #[error("the correspondence has a coefficient that is not a finite number")]
     Correspondence,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_are_clipped_to_the_light_plane() {
+        let light = Extent {
+            width: 6,
+            height: 4,
+        };
+        let size = Extent {
+            width: 5,
+            height: 5,
+        };
+        let clip = |u, v| ClippedRect::new(Element { v, u }, size, light);
+        let corner = clip(-2, -1);
+        assert_eq!((corner.columns.clone(), corner.rows.clone()), (2..5, 1..5));
+        assert_eq!((corner.first(), corner.area()), ([0, 0], 12));
+        let edge = clip(3, 1);
+        assert_eq!((edge.columns.clone(), edge.rows.clone()), (0..3, 0..3));
+        assert_eq!(edge.first(), [3, 1]);
+        for (u, v) in [
+            (-5, 0),
+            (6, 0),
+            (0, -5),
+            (0, 4),
+            (i32::MIN, 0),
+            (0, i32::MAX),
+        ] {
+            assert!(clip(u, v).is_empty(), "{u} {v}");
+        }
+    }
 }

@@ -17,6 +17,7 @@ mod tile;
 
 pub use factored::{BandTile, Basis, FactoredTile, RecoveredTile};
 pub use functions::TransportFunctions;
+pub(crate) use geometry::ClippedRect;
 pub use geometry::{
     CameraPx, Correspondence, Element, Extent, Geometry, GeometryError, LightPx, MAX_SIDE,
     MAX_WINDOW, TileRect, Window,

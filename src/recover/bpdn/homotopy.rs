@@ -67,7 +67,7 @@ impl<'a> Homotopy<'a> {
             #[inline(always)]
             || self.follow_path(h, energy, epsilon * epsilon),
         );
-        self.passive.spread(&self.x)
+        self.passive.scatter(&self.x)
     }
 
     /// Follows the path to where ‖y − Ax‖² = `max_squared_residual`.
@@ -102,7 +102,7 @@ impl<'a> Homotopy<'a> {
                 PathEvent::End => break,
                 PathEvent::Remove(i) => {
                     self.x.swap_remove(i);
-                    self.passive.leave(i);
+                    self.passive.remove(i);
                     self.dependent.fill(false);
                 }
                 PathEvent::Insert(j) => self.insert(j),
@@ -117,7 +117,7 @@ impl<'a> Homotopy<'a> {
     /// Adds an element to P unless its column depends linearly on those there.
     #[inline(always)]
     fn insert(&mut self, j: usize) {
-        match self.passive.enter(j, [0.0, 1.0]) {
+        match self.passive.evaluate_and_insert(j, [0.0, 1.0]) {
             true => self.x.push(0.0),
             false => self.dependent[j] = true,
         }
@@ -170,7 +170,7 @@ impl<'a> Homotopy<'a> {
             }
             self.passive.add_product(&mut self.correlation, &self.x);
             self.correlation.iter_mut().for_each(|c| *c = -*c);
-            self.passive.carry(ROUNDING_ERROR, &self.correlation);
+            self.passive.set_rhs(ROUNDING_ERROR, &self.correlation);
             add_scaled(&mut self.x, 1.0, self.passive.solution(ROUNDING_ERROR));
         }
         self.x.iter_mut().for_each(|x| *x = x.max(0.0));

@@ -76,42 +76,33 @@ impl LearnedBasis {
         origin: Element,
         plane: usize,
     ) -> PatternResponses {
-        let (window, light) = (geometry.window, geometry.light);
-        let side = window.side() as usize;
-        let width = light.width as usize;
-        // The part of the window inside the light plane.
-        let clip = |at: i32, length: u32| {
-            let (at, length) = (i64::from(at), i64::from(length));
-            let first = (-at).clamp(0, side as i64);
-            let end = (length - at).clamp(first, side as i64);
-            (first as usize..end as usize, at)
-        };
-        let (columns, u) = clip(origin.u, light.width);
-        let (lines, v) = clip(origin.v, light.height);
+        let side = geometry.window.side() as usize;
+        let width = geometry.light.width as usize;
+        let clipped = geometry.clip_window(origin);
+        let (columns, rows, [u, v]) = (&clipped.columns, &clipped.rows, clipped.first());
         let mut responses = vec![0.0; measurements.patterns.len() * self.stride];
-        let mut emission = vec![0.0f32; lines.len() * columns.len()];
+        let mut emission = vec![0.0f32; clipped.area()];
         let mut functions = Vec::with_capacity(emission.len() * self.stride);
-        for line in lines.clone() {
-            let first = (line * side + columns.start) * self.stride;
+        for row in rows.clone() {
+            let first = (row * side + columns.start) * self.stride;
             functions
                 .extend_from_slice(&self.interleaved[first..first + columns.len() * self.stride]);
         }
-        let rows = responses.chunks_exact_mut(self.stride);
-        for (pattern, row) in measurements.patterns.iter().zip(rows) {
+        let of_patterns = responses.chunks_exact_mut(self.stride);
+        for (pattern, responses) in measurements.patterns.iter().zip(of_patterns) {
             let pattern = pattern.plane(plane);
-            let emission_lines = emission.chunks_exact_mut(columns.len().max(1));
-            for (line, emission) in lines.clone().zip(emission_lines) {
-                let first =
-                    (v + line as i64) as usize * width + (u + columns.start as i64) as usize;
+            let emission_rows = emission.chunks_exact_mut(columns.len().max(1));
+            for (row, emission) in emission_rows.enumerate() {
+                let first = (v + row) * width + u;
                 emission.copy_from_slice(&pattern[first..first + columns.len()]);
             }
             vectorise(
                 #[inline(always)]
-                || multiply(&emission, &functions, row),
+                || multiply(&emission, &functions, responses),
             );
         }
         PatternResponses {
-            has_full_window: columns.len() == side && lines.len() == side,
+            has_full_window: clipped.area() == side * side,
             responses,
             stride: self.stride,
             rank: self.rank(),

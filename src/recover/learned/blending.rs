@@ -11,7 +11,8 @@ use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::recover::RecoverError;
 use crate::recover::holdout::HoldoutSplit;
-use crate::recover::pixelwise::{PixelwiseRecovery, held_out_residuals};
+use crate::recover::pixelwise::PixelwiseRecovery;
+use crate::recover::prediction;
 use crate::transport::{CHANNELS, Extent, TileRect, TransportFunctions};
 
 /// Smallest share of a tile's squared held-out residual that blending must save: a blended tile is
@@ -45,7 +46,7 @@ impl ResidualProducts {
         [learned, nnls]: [&TransportFunctions; 2],
     ) -> Self {
         let [learned, nnls] = [learned, nnls].map(|functions| {
-            held_out_residuals(&model.geometry, measurements, &split.held_out, functions)
+            prediction::residuals(&model.geometry, measurements, &split.held_out, functions)
         });
         let mut products = Self::default();
         for (a, b) in learned.into_iter().zip(nnls) {

@@ -5,8 +5,8 @@
 //! `[r]`. Inference needs only BᵀB, `[r, r]`, Bᵀy, `[r]`, ‖y‖² and the noise variance. Observations with
 //! the same window and the same unsaturated patterns share BᵀB.
 //!
-//! Each pattern has a weight, and columns are centred over the patterns; the equation of the patterns'
-//! common mode is added again with weight [`MEAN_WEIGHT`].
+//! B and y are weighted by the patterns' exposures, and the patterns' common mode by
+//! [`CommonMode::POOLED`].
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -14,8 +14,9 @@ use std::ops::Range;
 use super::basis::{LearnedBasis, PatternResponses};
 use crate::capture::Measurements;
 use crate::linalg::{dot, vectorise};
-use crate::recover::MIN_PATTERNS;
-use crate::recover::pooled::MEAN_WEIGHT;
+use crate::recover::common_mode::CommonMode;
+use crate::recover::normal_equations::{EquationWeights, WeightedColumns};
+use crate::recover::sampling::MIN_PATTERNS;
 use crate::recover::sampling::pixels_by_window;
 use crate::transport::{CHANNELS, CameraPx, Extent, Geometry, TileRect};
 
@@ -178,7 +179,7 @@ impl RegionEquations {
         channels: Range<usize>,
     ) {
         let measurements = window.measurements;
-        let mut shared: Vec<CentredResponses<'_>> = Vec::new();
+        let mut shared: Vec<WeightedResponses<'_>> = Vec::new();
         for &(p, pixel) in pixels {
             for c in channels.clone() {
                 let usable = usable_patterns(measurements, window.pattern_indices, pixel, c);
@@ -192,8 +193,8 @@ impl RegionEquations {
                 let y: Vec<f64> = y.collect();
                 let known = shared.iter().position(|s| s.pattern_indices == usable);
                 let known = known.unwrap_or_else(|| {
-                    let centred = CentredResponses::new(window, usable, self.gram_matrices.len());
-                    self.gram_matrices.push(centred.gram_matrix());
+                    let centred = WeightedResponses::new(window, usable, self.gram_matrices.len());
+                    self.gram_matrices.push(centred.columns.gram());
                     shared.push(centred);
                     shared.len() - 1
                 });
@@ -268,23 +269,19 @@ struct WindowData<'a> {
     weights: &'a [f64],
 }
 
-/// Responses to one set of L patterns, centred over the patterns and weighted.
-struct CentredResponses<'a> {
+/// The equations of one window and one set of L patterns.
+struct WeightedResponses<'a> {
     window: WindowData<'a>,
     pattern_indices: Vec<usize>,
-    /// `[L]`, and the sum of their squares.
-    weights: Vec<f64>,
-    total_weight: f64,
-    /// B, `[r, L]`: the responses of one basis function are contiguous.
-    columns: Vec<f64>,
-    /// Mean response of each basis function, `[r]`, and of the mean function.
-    means: Vec<f64>,
+    /// B.
+    columns: WeightedColumns,
+    /// Mean response of the mean function.
     mean_function: f64,
     /// Index of BᵀB.
     gram: usize,
 }
 
-impl<'a> CentredResponses<'a> {
+impl<'a> WeightedResponses<'a> {
     #[inline(always)]
     fn new(window: &WindowData<'a>, pattern_indices: Vec<usize>, gram: usize) -> Self {
         let (rank, count) = (window.responses.rank, pattern_indices.len());
@@ -294,52 +291,17 @@ impl<'a> CentredResponses<'a> {
                 columns[k * count + i] = f64::from(b);
             }
         }
-        let weights: Vec<f64> = pattern_indices.iter().map(|&l| window.weights[l]).collect();
-        let total_weight = weights.iter().map(|w| w * w).sum::<f64>();
-        let mut means = Vec::with_capacity(rank);
-        for column in columns.chunks_exact_mut(count.max(1)) {
-            let products = column.iter().zip(&weights).map(|(b, w)| w * w * b);
-            let mean = products.sum::<f64>() / total_weight;
-            let column = column.iter_mut().zip(&weights);
-            column.for_each(|(b, w)| *b = w * (*b - mean));
-            means.push(mean);
-        }
-        let products = pattern_indices.iter().zip(&weights);
+        let weights = pattern_indices.iter().map(|&l| window.weights[l]).collect();
+        let weights = EquationWeights::new(weights, CommonMode::POOLED);
+        let products = pattern_indices.iter().zip(&weights.patterns);
         let products = products.map(|(&l, w)| w * w * window.responses.mean(l));
-        let mean_function = products.sum::<f64>() / total_weight;
         Self {
             window: *window,
+            mean_function: products.sum::<f64>() / weights.energy,
+            columns: WeightedColumns::new(columns, weights),
             pattern_indices,
-            weights,
-            total_weight,
-            columns,
-            means,
-            mean_function,
             gram,
         }
-    }
-
-    /// Squared weight of the common mode's equation.
-    fn common_mode_weight(&self) -> f64 {
-        self.total_weight * MEAN_WEIGHT * MEAN_WEIGHT
-    }
-
-    /// BᵀB, `[r, r]`.
-    #[inline(always)]
-    fn gram_matrix(&self) -> Vec<f64> {
-        let (rank, count) = (self.means.len(), self.pattern_indices.len());
-        let (weight, mean) = (self.common_mode_weight(), &self.means);
-        let mut gram = vec![0.0; rank * rank];
-        for i in 0..rank {
-            let a = &self.columns[i * count..(i + 1) * count];
-            for j in i..rank {
-                let b = &self.columns[j * count..(j + 1) * count];
-                let value = dot(a, b) + weight * mean[i] * mean[j];
-                gram[i * rank + j] = value;
-                gram[j * rank + i] = value;
-            }
-        }
-        gram
     }
 
     /// The observation of measurements `y`, `[L]`; writes Bᵀy to `right_hand_side`, `[r]`.
@@ -350,19 +312,18 @@ impl<'a> CentredResponses<'a> {
         y: &[f64],
         right_hand_side: &mut [f64],
     ) -> Observation {
-        let (weights, count) = (&self.weights, y.len());
         let measurements = self.window.measurements;
-        let weighted: Vec<f64> = y.iter().zip(weights).map(|(y, w)| w * y).collect();
-        let mean = dot(&weighted, weights) / self.total_weight;
-        let weight = self.common_mode_weight();
-        // Centred columns are orthogonal to the weights, so y need not be centred.
-        for (k, column) in self.columns.chunks_exact(count).enumerate() {
-            right_hand_side[k] = dot(column, &weighted) + weight * self.means[k] * mean;
-        }
-        let samples = || self.pattern_indices.iter().zip(weights).zip(y);
-        let variances = samples().map(|((&l, w), &y)| w * w * measurements.variance(l, c, y));
-        let deviations = samples().map(|((_, w), y)| (w * (y - mean)).powi(2));
-        let deviation = deviations.sum::<f64>();
+        let weights = &self.columns.weights;
+        let samples = self.pattern_indices.iter().zip(&weights.patterns).zip(y);
+        let variances = samples.map(|((&l, w), &y)| w * w * measurements.variance(l, c, y));
+        let variance = variances.sum::<f64>() / y.len() as f64;
+        let mut weighted_y = y.to_vec();
+        let mean = weights.apply(&mut weighted_y);
+        let products = self.columns.right_hand_side(&weighted_y);
+        right_hand_side
+            .iter_mut()
+            .zip(products)
+            .for_each(|(right, product)| *right = product);
         let scale = match self.mean_function > 0.0 {
             true => mean / self.mean_function,
             false => 0.0,
@@ -370,9 +331,9 @@ impl<'a> CentredResponses<'a> {
         Observation {
             gram: self.gram,
             scale: scale.max(0.0),
-            variance: (variances.sum::<f64>() / count as f64).max(MIN_VARIANCE),
-            power: deviation + weight * mean * mean,
-            count,
+            variance: variance.max(MIN_VARIANCE),
+            power: dot(&weighted_y, &weighted_y),
+            count: y.len(),
             phase: phase(self.window.geometry, pixel),
             has_full_window: self.window.responses.has_full_window,
         }

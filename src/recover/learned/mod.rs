@@ -119,7 +119,7 @@ impl LearnedRecovery {
 
     /// Weight of the patterns' common mode in the least squares that tiles are blended with.
     pub fn common_mode(&self) -> Option<CommonMode> {
-        self.nnls.as_ref().map(PixelwiseRecovery::common_mode)
+        self.nnls.as_ref().map(|nnls| nnls.common_mode)
     }
 
     /// The largest [`halo`](Self::halo), in camera pixels.

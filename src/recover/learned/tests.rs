@@ -344,7 +344,7 @@ fn photographs_of_other_patterns_are_an_error() {
     measurements.pictures.swap(4, 20);
     let error = learn(&measurements, &SequentialExecutor).unwrap_err();
     assert!(
-        matches!(&error, RecoverError::MismatchedPatterns(l) if l == &[4, 20]),
+        matches!(&error, RecoverError::MismatchedPatterns { pattern_indices } if pattern_indices == &[4, 20]),
         "{error}"
     );
     // Sensor noise only.

@@ -63,7 +63,7 @@ pub fn bounds(geometry: &Geometry) -> Bounds {
     for rect in geometry.tiles() {
         for pixel in rect.pixels() {
             let origin = geometry.window_origin(pixel);
-            if !geometry.reaches_display(origin) {
+            if geometry.clip_window(origin).is_empty() {
                 continue;
             }
             let Element { u, v } = origin;
@@ -167,7 +167,7 @@ fn for_each_pixel(transport: &Transport, mut each: impl FnMut(usize, usize, Came
         }
         for (p, pixel) in tile.rect().pixels().enumerate() {
             let origin = geometry.window_origin(pixel);
-            if geometry.reaches_display(origin) {
+            if !geometry.clip_window(origin).is_empty() {
                 each(i, p, pixel, origin);
             }
         }

@@ -1,0 +1,93 @@
+//! The recovery methods, and upper bounds on what each needs.
+
+use serde::Serialize;
+
+use super::bpdn::SparsityBasis;
+use super::learned::LearnedRecovery;
+use super::pixelwise::PixelwiseRecovery;
+use super::pooled;
+use crate::transport::Window;
+
+/// How light transport functions are recovered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(into = "&'static str")]
+pub enum Method {
+    /// Posterior mean under a Gaussian prior that is learned from the measurements; blended with least
+    /// squares in tiles where the blend predicts held-out patterns better.
+    Learned,
+    /// Non-negative least squares, each pixel and channel by itself (paper, section 3, case (a)).
+    Nnls,
+    /// Basis pursuit denoising: of all functions that explain a pixel's measurements to within the noise,
+    /// the sparsest one in this basis (paper, section 3, case (b)).
+    Bpdn(SparsityBasis),
+}
+
+impl From<Method> for &'static str {
+    fn from(method: Method) -> Self {
+        method.name()
+    }
+}
+
+impl Method {
+    /// All methods.
+    pub const ALL: &[Self] = &[
+        Self::Learned,
+        Self::Nnls,
+        Self::Bpdn(SparsityBasis::Identity),
+        Self::Bpdn(SparsityBasis::Dct),
+        Self::Bpdn(SparsityBasis::Haar),
+    ];
+
+    /// Upper bound on the memory that preparing a recovery takes beside the measurements, in bytes.
+    pub fn preparation_bytes(self, window: Window) -> usize {
+        let own = match self {
+            Self::Learned => LearnedRecovery::preparation_bytes(window),
+            Self::Nnls | Self::Bpdn(_) => 0,
+        };
+        own.max(pooled::max_bytes(window))
+    }
+
+    /// Upper bound on the memory that recovering a tile takes beside the measurements and the tile's
+    /// functions, in bytes.
+    pub fn tile_bytes(self, window: Window, patterns: usize) -> usize {
+        let pixelwise = PixelwiseRecovery::max_tile_bytes(window, patterns);
+        match self {
+            // Tiles may be blended with least squares.
+            Self::Learned => pixelwise.max(LearnedRecovery::tile_bytes(window)),
+            Self::Nnls | Self::Bpdn(_) => pixelwise,
+        }
+    }
+
+    /// Largest rank of the basis that factored tiles share.
+    pub fn max_rank(self, window: Window) -> usize {
+        match self {
+            Self::Learned => LearnedRecovery::max_rank(window),
+            Self::Nnls | Self::Bpdn(_) => 0,
+        }
+    }
+
+    /// Largest distance from a tile, in camera pixels, of measurements that the tile depends on.
+    pub fn max_halo(self) -> u32 {
+        match self {
+            Self::Learned => LearnedRecovery::MAX_HALO,
+            Self::Nnls | Self::Bpdn(_) => 0,
+        }
+    }
+
+    /// The basis of [`Bpdn`](Self::Bpdn).
+    pub fn basis(self) -> Option<SparsityBasis> {
+        match self {
+            Self::Bpdn(basis) => Some(basis),
+            Self::Learned | Self::Nnls => None,
+        }
+    }
+
+    /// The method's name in options, reports and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Learned => "learned",
+            Self::Nnls => "nnls",
+            Self::Bpdn(_) => "bpdn",
+        }
+    }
+}
