@@ -24,7 +24,6 @@ import { type ElementOptions, readOptions } from '../state/options.js';
 import { ViewerState } from '../state/viewer-state.js';
 import type { PhotoView } from '../state/viewport.js';
 import { isFullscreen, toggleFullscreen } from '../ui/fullscreen.js';
-import { LazyToolbar } from '../ui/lazy-toolbar.js';
 import { Presenter } from '../ui/presenter.js';
 import { ShadowDom } from '../ui/shadow-dom.js';
 import type { ToolbarActions } from '../ui/toolbar.js';
@@ -47,7 +46,6 @@ export class PhotoController {
   readonly #host: HTMLElement;
   readonly #reader: AttributeReader;
   readonly #dom: ShadowDom;
-  readonly #toolbar: LazyToolbar;
   readonly #presenter: Presenter;
   readonly #lightChanges = new LightChangeDetector();
   #reportedView: PhotoView;
@@ -75,8 +73,7 @@ export class PhotoController {
       parseCssColor,
     );
     this.#reportedView = this.state.view;
-    this.#toolbar = this.#createToolbar();
-    this.#presenter = new Presenter(host, this.#dom, this.#toolbar, this.state);
+    this.#presenter = this.#createPresenter();
     this.session = this.#createSession();
     this.interaction = this.#createInteraction(root);
     this.#dom.revealButton.addEventListener('click', () => {
@@ -175,26 +172,24 @@ export class PhotoController {
     this.#dispatch(new PhotoErrorEvent(error));
   }
 
-  #createToolbar(): LazyToolbar {
+  #createPresenter(): Presenter {
     const actions: ToolbarActions = {
       selectLight: (item) => {
         this.state.light.item = item;
         this.interaction.markActive();
         this.schedule();
       },
-      togglePlaying: () => {
+      play: () => {
         this.isPaused = !this.isPaused;
       },
-      zoom: (by) => this.interaction.zoom(by),
+      zoomOut: () => this.interaction.zoom(-1),
+      zoomIn: () => this.interaction.zoom(1),
       reset: () => this.reset(),
-      toggleTilt: () => {
-        void this.interaction.toggleTilt();
-        this.schedule();
-      },
-      toggleFullscreen: () => toggleFullscreen(this.#host),
+      tilt: () => this.interaction.toggleTilt(),
+      fullscreen: () => toggleFullscreen(this.#host),
     };
-    return new LazyToolbar(this.#dom, actions, {
-      loaded: () => this.schedule(),
+    return new Presenter(this.#host, this.#dom, this.state, actions, {
+      toolbarLoaded: () => this.schedule(),
       failed: (error) => this.reportError(error),
     });
   }
@@ -259,10 +254,10 @@ export class PhotoController {
       zoomIgnored: (by) => this.#presenter.hintAtZoom(by),
       expired: () => {
         this.reset();
-        this.#toolbar.closeMenu();
+        this.#presenter.closeMenu();
         leaveFullscreen();
       },
-      active: (byKeyboard) => this.#toolbar.show(byKeyboard),
+      active: (byKeyboard) => this.#presenter.showToolbar(byKeyboard),
     });
   }
 

@@ -1,17 +1,12 @@
 /** Reflects attributes as typed properties. An absent or invalid attribute gives the property's default. */
 
-import { parseExposure } from '../shared/parse-settings.js';
 import { CENTRE } from '../shared/values.js';
 import {
   DEFAULT_TORCH_SIZE,
   type Loading,
-  parseCoordinate,
-  parseCrossOrigin,
-  parseKiosk,
-  parseLoading,
-  parseReveal,
-  parseTorchSize,
-  parseZoom,
+  type PARSERS,
+  type ParsedValue,
+  parserOf,
   type Reveal,
 } from '../state/attribute-values.js';
 
@@ -79,24 +74,24 @@ const REFLECTED: { readonly [P in keyof Reflected]: Reflection<Reflected[P]> } =
   light: text('light', 'flood'),
   lightSrc: text('light-src'),
   lightColor: text('light-color', 'white'),
-  lightSize: parsed('light-size', (text) => parseTorchSize(text) ?? DEFAULT_TORCH_SIZE),
-  lightX: parsed('light-x', (text) => parseCoordinate(text, 'light-x') ?? CENTRE.x),
-  lightY: parsed('light-y', (text) => parseCoordinate(text, 'light-y') ?? CENTRE.y),
-  exposure: parsed('exposure', parseExposure),
+  lightSize: number('light-size', DEFAULT_TORCH_SIZE),
+  lightX: number('light-x', CENTRE.x),
+  lightY: number('light-y', CENTRE.y),
+  exposure: number('exposure'),
   whiteBalance: text('white-balance', '1 1 1'),
   tone: text('tone', 'clip'),
   gamut: text('gamut', 'srgb'),
   backend: text('backend', 'webgpu webgl2 cpu'),
   poster: text('poster'),
-  loading: parsed('loading', parseLoading),
-  reveal: parsed('reveal', parseReveal),
+  loading: parsed('loading'),
+  reveal: parsed('reveal'),
   controls: flag('controls'),
-  zoom: parsed('zoom', parseZoom),
+  zoom: number('zoom'),
   cooperativeGestures: flag('cooperative-gestures'),
   autoplayLight: flag('autoplay-light'),
-  kiosk: parsed('kiosk', parseKiosk),
+  kiosk: number('kiosk'),
   wasmUrl: text('wasm-url'),
-  crossOrigin: { attribute: 'crossorigin', get: parseCrossOrigin, set: (value) => value },
+  crossOrigin: { ...parsed('crossorigin'), set: (value) => value },
 };
 
 /** The names of the attributes, for `observedAttributes`. */
@@ -133,16 +128,22 @@ function flag(attribute: string): Reflection<boolean> {
   return { attribute, get: (text) => text !== null, set: (value) => (value ? '' : null) };
 }
 
-function parsed<T>(attribute: string, parse: (text: string | null) => T): Reflection<T> {
-  return {
-    attribute,
-    get: (text) => {
-      try {
-        return parse(text);
-      } catch {
-        return parse(null);
-      }
-    },
-    set: String,
+function parsed<K extends keyof typeof PARSERS>(attribute: K): Reflection<ParsedValue<K>> {
+  const parse = parserOf(attribute);
+  const get = (text: string | null) => {
+    try {
+      return parse(text);
+    } catch {
+      return parse(null);
+    }
   };
+  return { attribute, get, set: String };
+}
+
+function number(
+  attribute: 'light-size' | 'light-x' | 'light-y' | 'exposure' | 'zoom' | 'kiosk',
+  defaultValue = 0,
+): Reflection<number> {
+  const { get, set } = parsed(attribute);
+  return { attribute, get: (text) => get(text) ?? defaultValue, set };
 }

@@ -102,9 +102,13 @@ export class InteractionController {
     return this.#state.light.isTorch && isTiltSupported() ? this.#tilt.isActive : null;
   }
 
-  async toggleTilt(): Promise<void> {
-    if (this.#tilt.isActive) this.reset();
-    else await this.requestTilt();
+  toggleTilt(): void {
+    if (!this.#tilt.isActive) {
+      void this.requestTilt();
+      return;
+    }
+    this.reset();
+    this.#listener.changed();
   }
 
   /** Resolves to whether permission was granted. */

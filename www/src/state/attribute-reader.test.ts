@@ -1,6 +1,5 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { parseExposure, parseLight } from '../shared/parse-settings.js';
 import { AttributeReader } from './attribute-reader.js';
 
 test('an invalid attribute keeps its last value, is reported once, and affects no other', () => {
@@ -11,7 +10,7 @@ test('an invalid attribute keeps its last value, is reported once, and affects n
   });
   const read = (light: string | null, exposure: string | null) => {
     Object.assign(attributes, { light, exposure });
-    return [reader.read('light', parseLight), reader.read('exposure', parseExposure)];
+    return [reader.read('light'), reader.read('exposure')];
   };
   const reported = () => reader.takeErrors().map(({ message }) => /“(.*?)”/.exec(message)?.[1]);
   assert.deepEqual(read('moon', '2'), ['flood', 2]);
@@ -36,7 +35,7 @@ test('an unchanged attribute gives the same object, and an address follows its b
   const source = { baseURI: 'https://a.org/', getAttribute: () => 'a b' };
   const reader = new AttributeReader(source);
   const split = (text: string | null) => text?.split(' ');
-  assert.equal(reader.read('list', split), reader.read('list', split));
+  assert.equal(reader.parse('list', split), reader.parse('list', split));
   assert.equal(reader.readAddress('src'), 'https://a.org/a%20b');
   source.baseURI = 'https://b.org/';
   assert.equal(reader.readAddress('src'), 'https://b.org/a%20b');

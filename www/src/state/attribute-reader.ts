@@ -4,7 +4,7 @@
  */
 
 import { type PhotoError, toPhotoError } from '../shared/errors.js';
-import { parseAddress } from './attribute-values.js';
+import { type PARSERS, type ParsedValue, parseAddress, parserOf } from './attribute-values.js';
 
 /** The part of an element from which attributes are read. */
 export interface AttributeSource {
@@ -30,18 +30,23 @@ export class AttributeReader {
     this.#source = source;
   }
 
-  /** `parse(null)` must give the default. */
-  read<T>(name: string, parse: (text: string | null, name: string) => T, base = ''): T {
+  /** The parsed value of one of the attributes in `PARSERS`. */
+  read<K extends keyof typeof PARSERS>(name: K): ParsedValue<K> {
+    return this.parse(name, parserOf(name));
+  }
+
+  /** Parses any attribute. `parse(null)` must give the default. */
+  parse<T>(name: string, parse: (text: string | null) => T, base = ''): T {
     const text = this.#source.getAttribute(name);
     const last = this.#attributes.get(name);
     if (last?.text === text && last.base === base) return last.value as T;
     let value: unknown;
     let error: PhotoError | null = null;
     try {
-      value = parse(text, name);
+      value = parse(text);
     } catch (thrown) {
       error = toPhotoError(thrown);
-      value = last ? last.value : parse(null, name);
+      value = last ? last.value : parse(null);
       this.#newErrors.push(error);
     }
     this.#attributes.set(name, { text, base, value, error });
@@ -51,7 +56,7 @@ export class AttributeReader {
   /** The absolute URL of an attribute; `null` if it is empty. */
   readAddress(name: string): string | null {
     const { baseURI } = this.#source;
-    return this.read(name, (text) => parseAddress(text, name, baseURI), baseURI);
+    return this.parse(name, (text) => parseAddress(text, name, baseURI), baseURI);
   }
 
   has(name: string): boolean {

@@ -1,11 +1,19 @@
 /**
- * Parsers of the attributes that only the element has. `null` is an absent attribute. Each parser throws a
- * `PhotoError` with the code `attribute` whose message names the accepted values.
+ * Parsers of all attributes that are not plain text. `null` is an absent attribute. A parser throws a `PhotoError` with
+ * the code `attribute`, whose message names the accepted values.
  */
 
 import { PhotoError } from '../shared/errors.js';
 import { BACKENDS, type Backend, type CrossOrigin } from '../shared/names.js';
-import { parseName, parseNumber } from '../shared/parse-settings.js';
+import {
+  parseExposure,
+  parseGamut,
+  parseLight,
+  parseName,
+  parseNumber,
+  parseTone,
+  parseWhiteBalance,
+} from '../shared/parse-settings.js';
 
 const LOADINGS = ['auto', 'lazy', 'eager'] as const;
 const REVEALS = ['auto', 'interaction', 'manual'] as const;
@@ -26,53 +34,65 @@ export type Loading = (typeof LOADINGS)[number];
 /** When the poster gives way to the picture: when it is drawn, on a press, or by `dismissPoster()`. */
 export type Reveal = (typeof REVEALS)[number];
 
-/** Backends in order of preference; `null` leaves the order to the element. */
-export function parseBackends(value: string | null): readonly Backend[] | null {
-  const names = value?.split(/[\s,]+/).filter(Boolean) ?? [];
-  if (names.length === 0) return null;
-  return [...new Set(names.map((name) => parseName(name, BACKENDS, 'backend')))];
+type Text = string | null;
+
+/** By attribute. Absent coordinates, sizes, backends and addresses are `null`. */
+export const PARSERS = {
+  light: parseLight,
+  exposure: parseExposure,
+  'white-balance': parseWhiteBalance,
+  tone: parseTone,
+  gamut: parseGamut,
+  /** The torch's radius in units of the light plane's shorter side. */
+  'light-size': (text: Text) =>
+    parseNumber(
+      text,
+      'light size',
+      1e-6,
+      MAX_TORCH_SIZE,
+      'it is a fraction of the light’s shorter side',
+    ),
+  'light-x': (text: Text) => parseCoordinate(text, 'light-x'),
+  'light-y': (text: Text) => parseCoordinate(text, 'light-y'),
+  /** In order of preference. */
+  backend: (text: Text): readonly Backend[] | null => {
+    const names = text?.split(/[\s,]+/).filter(Boolean) ?? [];
+    if (names.length === 0) return null;
+    return [...new Set(names.map((name) => parseName(name, BACKENDS, 'backend')))];
+  },
+  /** The largest magnification; 1 disables zooming. */
+  zoom: (text: Text) =>
+    text?.trim() === ''
+      ? EMPTY_ZOOM
+      : (parseNumber(text, 'zoom', 1, MAX_ZOOM, '1 disables zooming') ?? 1),
+  /** Seconds without input before the element resets itself; 0 is never. */
+  kiosk: (text: Text) =>
+    text?.trim() === ''
+      ? EMPTY_KIOSK_SECONDS
+      : (parseNumber(text, 'kiosk', 0, MAX_KIOSK_SECONDS, 'it is in seconds, 0 is never') ?? 0),
+  loading: (text: Text) => parseName(text, LOADINGS, 'loading mode'),
+  reveal: (text: Text) => parseName(text, REVEALS, 'reveal mode'),
+  /** As on `<img>`: any unknown value means `anonymous`. */
+  crossorigin: (text: Text): CrossOrigin => {
+    if (text === null) return null;
+    return text.trim().toLowerCase() === 'use-credentials' ? 'use-credentials' : 'anonymous';
+  },
+} as const;
+
+export type ParsedValue<K extends keyof typeof PARSERS> = ReturnType<(typeof PARSERS)[K]>;
+
+/** The parser of an attribute, typed by the attribute's name. */
+export function parserOf<K extends keyof typeof PARSERS>(name: K): (text: Text) => ParsedValue<K> {
+  return PARSERS[name] as (text: Text) => ParsedValue<K>;
 }
 
-/** The torch's radius in units of the light plane's shorter side; `null` for the default. */
-export function parseTorchSize(value: string | null): number | null {
-  const hint = 'it is a fraction of the light’s shorter side';
-  return parseNumber(value, 'light size', 1e-6, MAX_TORCH_SIZE, hint);
-}
-
-/** A coordinate on the picture, for the attribute `name`; `null` for the default. */
-export function parseCoordinate(value: string | null, name: string): number | null {
-  return parseNumber(value, name, 0, 1, '0 is the picture’s left or upper edge');
-}
-
-/** The largest magnification; 1 disables zooming. */
-export function parseZoom(value: string | null): number {
-  if (value?.trim() === '') return EMPTY_ZOOM;
-  return parseNumber(value, 'zoom', 1, MAX_ZOOM, '1 disables zooming') ?? 1;
-}
-
-/** Seconds without input before the element resets itself; 0 is never. */
-export function parseKiosk(value: string | null): number {
-  if (value?.trim() === '') return EMPTY_KIOSK_SECONDS;
-  return parseNumber(value, 'kiosk', 0, MAX_KIOSK_SECONDS, 'it is in seconds, 0 is never') ?? 0;
-}
-
-export function parseLoading(value: string | null): Loading {
-  return parseName(value, LOADINGS, 'loading mode');
-}
-
-export function parseReveal(value: string | null): Reveal {
-  return parseName(value, REVEALS, 'reveal mode');
-}
-
-/** As on `<img>`: any unknown value means `anonymous`. */
-export function parseCrossOrigin(value: string | null): CrossOrigin {
-  if (value === null) return null;
-  return value.trim().toLowerCase() === 'use-credentials' ? 'use-credentials' : 'anonymous';
+function parseCoordinate(text: Text, name: string): number | null {
+  return parseNumber(text, name, 0, 1, '0 is the picture’s left or upper edge');
 }
 
 /** An absolute URL, resolved against `base`; `null` for an empty value. */
-export function parseAddress(value: string | null, name: string, base: string): string | null {
-  const address = value?.trim();
+export function parseAddress(text: Text, name: string, base: string): string | null {
+  const address = text?.trim();
   if (!address) return null;
   try {
     return new URL(address, base).href;

@@ -2,28 +2,10 @@
 
 import { type CssColorParser, type LightColor, parseLightColor } from '../lights/light-color.js';
 import type { Backend, CrossOrigin, Gamut, LightName, ToneCurve } from '../shared/names.js';
-import {
-  parseExposure,
-  parseGamut,
-  parseLight,
-  parseTone,
-  parseWhiteBalance,
-} from '../shared/parse-settings.js';
 import { reuse } from '../shared/reuse.js';
 import { CENTRE, type PicturePoint, type RgbFactors } from '../shared/values.js';
 import type { AttributeReader } from './attribute-reader.js';
-import {
-  type Loading,
-  parseBackends,
-  parseCoordinate,
-  parseCrossOrigin,
-  parseKiosk,
-  parseLoading,
-  parseReveal,
-  parseTorchSize,
-  parseZoom,
-  type Reveal,
-} from './attribute-values.js';
+import type { Loading, Reveal } from './attribute-values.js';
 
 /** Addresses are absolute; an absent address is `null`. */
 export interface ElementOptions {
@@ -69,41 +51,34 @@ export function readOptions(
   parseColor: CssColorParser,
   last: ElementOptions | null,
 ): ElementOptions {
-  const crossOrigin = reader.read('crossorigin', parseCrossOrigin);
+  const crossOrigin = reader.read('crossorigin');
+  const [x, y] = [reader.read('light-x'), reader.read('light-y')];
+  const point = { x: x ?? CENTRE.x, y: y ?? CENTRE.y };
   const light = reuse(last?.light, {
-    name: reader.read('light', parseLight),
+    name: reader.read('light'),
     src: reader.readAddress('light-src'),
     crossOrigin,
-    torch: readTorch(reader, last?.light.torch),
-    size: reader.read('light-size', parseTorchSize),
-    color: reader.read('light-color', (text) => parseLightColor(text, parseColor)),
+    torch: x === null && y === null ? null : reuse(last?.light.torch, point),
+    size: reader.read('light-size'),
+    color: reader.parse('light-color', (text) => parseLightColor(text, parseColor)),
   });
   return reuse(last, {
     light,
-    backends: reader.read('backend', parseBackends),
-    exposure: reader.read('exposure', parseExposure),
-    whiteBalance: reader.read('white-balance', parseWhiteBalance),
-    tone: reader.read('tone', parseTone),
-    gamut: reader.read('gamut', parseGamut),
+    backends: reader.read('backend'),
+    exposure: reader.read('exposure'),
+    whiteBalance: reader.read('white-balance'),
+    tone: reader.read('tone'),
+    gamut: reader.read('gamut'),
     src: reader.readAddress('src'),
     poster: reader.readAddress('poster'),
-    loading: reader.read('loading', parseLoading),
-    reveal: reader.read('reveal', parseReveal),
+    loading: reader.read('loading'),
+    reveal: reader.read('reveal'),
     controls: reader.has('controls'),
-    maxZoom: reader.read('zoom', parseZoom),
+    maxZoom: reader.read('zoom'),
     cooperativeGestures: reader.has('cooperative-gestures'),
     autoplayLight: reader.has('autoplay-light'),
-    kioskSeconds: reader.read('kiosk', parseKiosk),
+    kioskSeconds: reader.read('kiosk'),
     wasmUrl: reader.readAddress('wasm-url')?.replace(/\/?$/, '/') ?? null,
     crossOrigin,
   });
-}
-
-function readTorch(
-  reader: AttributeReader,
-  last: PicturePoint | null | undefined,
-): PicturePoint | null {
-  const x = reader.read('light-x', parseCoordinate);
-  const y = reader.read('light-y', parseCoordinate);
-  return x === null && y === null ? null : reuse(last, { x: x ?? CENTRE.x, y: y ?? CENTRE.y });
 }

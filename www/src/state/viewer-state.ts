@@ -4,10 +4,9 @@ import type { OutputSettings } from '../engine/output-settings.js';
 import { type CssColorParser, multiplyRgb, parseLightColor } from '../lights/light-color.js';
 import type { PhotoError } from '../shared/errors.js';
 import type { LightName } from '../shared/names.js';
-import { parseLight } from '../shared/parse-settings.js';
 import { reuse } from '../shared/reuse.js';
 import { CENTRE, clampToPicture } from '../shared/values.js';
-import { parseTorchSize } from './attribute-values.js';
+import { PARSERS } from './attribute-values.js';
 import {
   type LightItem,
   type LightOverrides,
@@ -106,7 +105,7 @@ export class ViewerState {
   /** @throws {TypeError | PhotoError} for an invalid field, before anything changes */
   setLight({ name, x, y, size, color }: LightPose): void {
     const overrides: { -readonly [K in keyof LightOverrides]?: LightOverrides[K] } = {};
-    if (name !== undefined) overrides.name = parseLight(name);
+    if (name !== undefined) overrides.name = PARSERS.light(name);
     if (x !== undefined || y !== undefined) {
       const last = this.light.torch ?? CENTRE;
       const torch = { x: x ?? last.x, y: y ?? last.y };
@@ -115,7 +114,7 @@ export class ViewerState {
       }
       overrides.torch = clampToPicture(torch);
     }
-    if (size !== undefined) overrides.size = parseTorchSize(String(size));
+    if (size !== undefined) overrides.size = PARSERS['light-size'](String(size));
     if (color !== undefined) overrides.color = parseLightColor(color, this.#parseCssColor);
     this.light.override(overrides);
   }

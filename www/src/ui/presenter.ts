@@ -2,26 +2,42 @@
 
 import { languageOf } from '../i18n/language.js';
 import { isPending, type Language, type StringKey, t } from '../i18n/strings.js';
+import { missingScript, type PhotoError } from '../shared/errors.js';
 import { CENTRE } from '../shared/values.js';
 import type { LightItem } from '../state/light-state.js';
 import type { ViewerState } from '../state/viewer-state.js';
 import { isFullscreen } from './fullscreen.js';
-import type { LazyToolbar } from './lazy-toolbar.js';
 import { describeLight } from './light-description.js';
 import type { ShadowDom } from './shadow-dom.js';
-import type { ToolbarState } from './toolbar.js';
+import type { Toolbar, ToolbarActions, ToolbarState } from './toolbar.js';
+
+export interface PresenterListener {
+  /** The toolbar has been loaded: call `update`. */
+  toolbarLoaded(): void;
+  failed(error: PhotoError): void;
+}
 
 export class Presenter {
   readonly #host: Element;
   readonly #dom: ShadowDom;
-  readonly #toolbar: LazyToolbar;
   readonly #state: ViewerState;
+  readonly #actions: ToolbarActions;
+  readonly #listener: PresenterListener;
+  #toolbar: Toolbar | null = null;
+  #isToolbarRequested = false;
 
-  constructor(host: Element, dom: ShadowDom, toolbar: LazyToolbar, state: ViewerState) {
+  constructor(
+    host: Element,
+    dom: ShadowDom,
+    state: ViewerState,
+    actions: ToolbarActions,
+    listener: PresenterListener,
+  ) {
     this.#host = host;
     this.#dom = dom;
-    this.#toolbar = toolbar;
     this.#state = state;
+    this.#actions = actions;
+    this.#listener = listener;
   }
 
   get language(): Language {
@@ -54,8 +70,17 @@ export class Presenter {
       !isPictureShown,
       reveal.needsPress(options),
     );
-    const hasToolbar = options.controls && isPictureShown;
-    this.#toolbar.update(hasToolbar ? this.#toolbarState(isPaused, isTilting) : null);
+    if (options.controls && isPictureShown) this.#updateToolbar(isPaused, isTilting);
+    else this.#hideToolbar();
+  }
+
+  /** Shows the toolbar after an input: for good after a key press, otherwise for some seconds. */
+  showToolbar(byKeyboard: boolean): void {
+    this.#toolbar?.show(byKeyboard);
+  }
+
+  closeMenu(): void {
+    this.#toolbar?.closeMenu();
   }
 
   /** `null` hides the message. */
@@ -82,6 +107,35 @@ export class Presenter {
 
   announceLight(item: LightItem): void {
     this.#dom.announce(`${this.#t('light')}: ${this.#t(item)}`);
+  }
+
+  #hideToolbar(): void {
+    if (!this.#toolbar) return;
+    this.#toolbar.bar.hidden = true;
+    this.#toolbar.closeMenu();
+  }
+
+  #updateToolbar(isPaused: boolean, isTilting: boolean | null): void {
+    if (!this.#toolbar) {
+      if (!this.#isToolbarRequested) void this.#fetchToolbar();
+      return;
+    }
+    this.#toolbar.bar.hidden = false;
+    this.#toolbar.update(this.#toolbarState(isPaused, isTilting));
+  }
+
+  /** The toolbar is a separate script, fetched when the `controls` attribute is used for the first time. */
+  async #fetchToolbar(): Promise<void> {
+    this.#isToolbarRequested = true;
+    try {
+      const { Toolbar } = await import('./toolbar.js');
+      const toolbar = new Toolbar(this.#actions);
+      this.#toolbar = toolbar;
+      this.#dom.mountControls([toolbar.menu, toolbar.bar], toolbar.css);
+      this.#listener.toolbarLoaded();
+    } catch (cause) {
+      this.#listener.failed(missingScript('controls-unavailable', 'the controls', cause));
+    }
   }
 
   #toolbarState(isPaused: boolean, isTilting: boolean | null): ToolbarState {

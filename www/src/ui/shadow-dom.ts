@@ -34,8 +34,6 @@ const ANNOUNCE_DELAY_MS = 400;
 const HINT_MS = 1800;
 
 export class ShadowDom {
-  /** The box that shows the picture and receives pointer events. */
-  readonly viewport = createElement('div', { class: 'viewport' });
   /** Represents the torch for keyboards and screen readers. */
   readonly handle = createElement('div', {
     class: 'handle',
@@ -44,31 +42,65 @@ export class ShadowDom {
     tabindex: '0',
     'aria-valuemin': '0',
     'aria-valuemax': '100',
+    hidden: '',
   });
-  /** Dismisses the poster. */
-  readonly revealButton: HTMLButtonElement;
-  readonly #root: ShadowRoot;
-  readonly #picture = createElement('div', { class: 'picture', part: 'picture' });
-  readonly #poster: HTMLElement;
-  readonly #posterImage = createElement('img', { part: 'poster', alt: '' });
   readonly #revealText = createElement('span');
-  readonly #hint = createElement('div', { class: 'hint', part: 'hint' });
+  /** Dismisses the poster. */
+  readonly revealButton = createElement(
+    'button',
+    { class: 'reveal', part: 'button', type: 'button', hidden: '' },
+    createElement('span', {}, createIcon(LIGHT_ICON), this.#revealText),
+  );
+  readonly #picture = createElement('div', { class: 'picture', part: 'picture' });
+  readonly #posterImage = createElement('img', { part: 'poster', alt: '', hidden: '' });
+  readonly #poster = createElement(
+    'div',
+    { class: 'poster' },
+    createSlot('poster', this.#posterImage),
+  );
+  readonly #hint = createElement('div', { class: 'hint', part: 'hint', hidden: '' });
+  /** The box that shows the picture and receives pointer events. */
+  readonly viewport = createElement(
+    'div',
+    { class: 'viewport' },
+    this.#picture,
+    this.#poster,
+    this.handle,
+    this.revealButton,
+    this.#hint,
+  );
   readonly #controls = createSlot('controls');
-  readonly #progressBar = createElement('div', {
-    class: 'progress-bar',
-    role: 'progressbar',
-  });
-  readonly #progress: HTMLElement;
+  readonly #progressBar = createElement('div', { class: 'progress-bar', role: 'progressbar' });
+  readonly #progress = createElement(
+    'div',
+    { class: 'progress', part: 'progress', hidden: '' },
+    createSlot('progress', this.#progressBar),
+  );
   readonly #errorSummary = createElement('p');
   readonly #detailsLabel = createElement('summary');
   readonly #errorDetails = createElement('p');
-  readonly #message: HTMLElement;
-  readonly #footer: HTMLElement;
+  readonly #message = createElement(
+    'div',
+    { class: 'message', part: 'message', role: 'alert', hidden: '' },
+    createSlot(
+      'error',
+      this.#errorSummary,
+      createElement('details', {}, this.#detailsLabel, this.#errorDetails),
+    ),
+  );
+  readonly #footer = createElement(
+    'div',
+    { class: 'footer' },
+    createElement('div', { class: 'controls' }, this.#controls),
+    this.#progress,
+    this.#message,
+  );
   readonly #status = createElement('div', {
     class: 'visually-hidden',
     part: 'status',
     role: 'status',
   });
+  readonly #root: ShadowRoot;
   #canvas: HTMLCanvasElement | null = null;
   #announceTimer: ReturnType<typeof setTimeout> | undefined;
   #hintTimer: ReturnType<typeof setTimeout> | undefined;
@@ -76,48 +108,10 @@ export class ShadowDom {
   constructor(root: ShadowRoot) {
     this.#root = root;
     adoptStyles(root, ELEMENT_CSS);
-    this.#poster = createElement(
-      'div',
-      { class: 'poster' },
-      createSlot('poster', this.#posterImage),
-    );
     this.#posterImage.addEventListener('load', () => this.viewport.classList.add('has-poster'));
     this.#posterImage.addEventListener('error', () => {
       this.#posterImage.hidden = true;
     });
-    this.revealButton = createElement(
-      'button',
-      { class: 'reveal', part: 'button', type: 'button' },
-      createElement('span', {}, createIcon(LIGHT_ICON), this.#revealText),
-    );
-    this.viewport.append(this.#picture, this.#poster, this.handle, this.revealButton, this.#hint);
-    this.#progress = createElement(
-      'div',
-      { class: 'progress', part: 'progress' },
-      createSlot('progress', this.#progressBar),
-    );
-    const details = createElement('details', {}, this.#detailsLabel, this.#errorDetails);
-    this.#message = createElement(
-      'div',
-      { class: 'message', part: 'message', role: 'alert' },
-      createSlot('error', this.#errorSummary, details),
-    );
-    for (const part of [
-      this.#posterImage,
-      this.handle,
-      this.revealButton,
-      this.#hint,
-      this.#progress,
-      this.#message,
-    ])
-      part.hidden = true;
-    this.#footer = createElement(
-      'div',
-      { class: 'footer' },
-      createElement('div', { class: 'controls' }, this.#controls),
-      this.#progress,
-      this.#message,
-    );
     root.append(this.viewport, this.#footer, this.#status);
   }
 

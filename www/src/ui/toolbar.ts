@@ -23,14 +23,14 @@ export interface ToolbarState {
   readonly isFullscreen: boolean | null;
 }
 
-export interface ToolbarActions {
-  selectLight(item: LightItem): void;
-  togglePlaying(): void;
-  zoom(by: 1 | -1): void;
-  reset(): void;
-  toggleTilt(): void;
-  toggleFullscreen(): void;
+type ActionName = 'play' | 'zoomOut' | 'zoomIn' | 'reset' | 'tilt' | 'fullscreen';
+
+/** The actions of the buttons and the menu. */
+export interface ToolbarActions extends Readonly<Record<ActionName, () => void>> {
+  readonly selectLight: (item: LightItem) => void;
 }
+
+type ButtonName = 'light' | ActionName;
 
 const MAGNIFIER = 'M10.5 4a6.5 6.5 0 1 0 0 13a6.5 6.5 0 1 0 0-13M15.3 15.3L20 20M8 10.5h5';
 
@@ -57,38 +57,28 @@ export class Toolbar {
   readonly css = TOOLBAR_CSS;
   readonly bar: HTMLElement;
   readonly menu: HTMLElement;
-  readonly #light: HTMLButtonElement;
+  readonly #buttons: Readonly<Record<ButtonName, HTMLButtonElement>>;
   readonly #lightName = createElement('span');
-  readonly #play: HTMLButtonElement;
-  readonly #zoomOut: HTMLButtonElement;
-  readonly #zoomIn: HTMLButtonElement;
-  readonly #reset: HTMLButtonElement;
-  readonly #tilt: HTMLButtonElement;
-  readonly #fullscreen: HTMLButtonElement;
   /** The items and the language of the current menu. */
   #menuKey = '';
   #hideTimer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(actions: ToolbarActions) {
-    this.#light = createButton('light', () => this.#setMenuOpen(this.menu.hidden === true));
-    this.#light.append(this.#lightName);
-    updateAttribute(this.#light, 'aria-controls', 'lights');
-    this.#play = createButton('play', () => actions.togglePlaying());
-    this.#zoomOut = createButton('zoomOut', () => actions.zoom(-1));
-    this.#zoomIn = createButton('zoomIn', () => actions.zoom(1));
-    this.#reset = createButton('reset', () => actions.reset());
-    this.#tilt = createButton('tilt', () => actions.toggleTilt());
-    this.#fullscreen = createButton('fullscreen', () => actions.toggleFullscreen());
+    this.#buttons = {
+      light: createButton('light', () => this.#setMenuOpen(this.menu.hidden === true)),
+      play: createButton('play', actions.play),
+      zoomOut: createButton('zoomOut', actions.zoomOut),
+      zoomIn: createButton('zoomIn', actions.zoomIn),
+      reset: createButton('reset', actions.reset),
+      tilt: createButton('tilt', actions.tilt),
+      fullscreen: createButton('fullscreen', actions.fullscreen),
+    };
+    this.#buttons.light.append(this.#lightName);
+    updateAttribute(this.#buttons.light, 'aria-controls', 'lights');
     this.bar = createElement(
       'div',
       { class: 'toolbar', part: 'controls', role: 'toolbar' },
-      this.#light,
-      this.#play,
-      this.#zoomOut,
-      this.#zoomIn,
-      this.#reset,
-      this.#tilt,
-      this.#fullscreen,
+      ...Object.values(this.#buttons),
     );
     this.menu = createElement('div', {
       class: 'menu',
@@ -106,32 +96,37 @@ export class Toolbar {
       if (event.key !== 'Escape') return;
       event.preventDefault();
       this.closeMenu();
-      this.#light.focus();
+      this.#buttons.light.focus();
     });
   }
 
   update(state: ToolbarState): void {
-    const { t, item, isPlaying, zoom, isTilting } = state;
+    const { t, item, isPlaying, zoom, isTilting, isFullscreen } = state;
+    const { light, zoomOut, zoomIn, tilt } = this.#buttons;
+    const show = (name: ButtonName, isVisible: boolean, icon: IconName = name) => {
+      const button = this.#buttons[name];
+      button.hidden = !isVisible;
+      setLabel(button, t(icon));
+      if (button.firstElementChild) setIcon(button.firstElementChild, ICONS[icon]);
+    };
     this.#updateMenu(state);
     for (const input of this.menu.querySelectorAll('input')) input.checked = input.value === item;
     updateAttribute(this.bar, 'aria-label', t('controls'));
     updateAttribute(this.menu, 'aria-label', t('light'));
     updateText(this.#lightName, t(item));
-    setLabel(this.#light, `${t('light')}: ${t(item)}`);
-    const playKey = isPlaying ? 'pause' : 'play';
-    updateButton(this.#play, isPlaying !== null, t(playKey), playKey);
-    updateButton(this.#zoomOut, zoom !== null, t('zoomOut'));
-    updateButton(this.#zoomIn, zoom !== null, t('zoomIn'));
-    updateAttribute(this.#zoomOut, 'aria-disabled', String(!zoom?.canZoomOut));
-    updateAttribute(this.#zoomIn, 'aria-disabled', String(!zoom?.canZoomIn));
-    updateButton(this.#reset, true, t('reset'));
-    updateButton(this.#tilt, isTilting !== null, t('tilt'));
-    updateAttribute(this.#tilt, 'aria-pressed', String(isTilting === true));
-    const screenKey = state.isFullscreen ? 'leaveFullscreen' : 'fullscreen';
-    updateButton(this.#fullscreen, state.isFullscreen !== null, t(screenKey), screenKey);
+    setLabel(light, `${t('light')}: ${t(item)}`);
+    show('play', isPlaying !== null, isPlaying ? 'pause' : 'play');
+    show('zoomOut', zoom !== null);
+    show('zoomIn', zoom !== null);
+    updateAttribute(zoomOut, 'aria-disabled', String(!zoom?.canZoomOut));
+    updateAttribute(zoomIn, 'aria-disabled', String(!zoom?.canZoomIn));
+    show('reset', true);
+    show('tilt', isTilting !== null);
+    updateAttribute(tilt, 'aria-pressed', String(isTilting === true));
+    show('fullscreen', isFullscreen !== null, isFullscreen ? 'leaveFullscreen' : 'fullscreen');
     // The button that was the tab stop may be hidden now.
     const stops = this.#visibleButtons.filter((button) => button.tabIndex === 0);
-    if (stops.length !== 1) this.#setTabStop(this.#light);
+    if (stops.length !== 1) this.#setTabStop(light);
   }
 
   closeMenu(): void {
@@ -149,12 +144,12 @@ export class Toolbar {
   }
 
   get #visibleButtons(): HTMLButtonElement[] {
-    return [...this.bar.querySelectorAll('button')].filter((button) => !button.hidden);
+    return Object.values(this.#buttons).filter((button) => !button.hidden);
   }
 
   #setMenuOpen(isOpen: boolean): void {
     this.menu.hidden = !isOpen;
-    updateAttribute(this.#light, 'aria-expanded', String(isOpen));
+    updateAttribute(this.#buttons.light, 'aria-expanded', String(isOpen));
     if (isOpen) this.menu.querySelector<HTMLInputElement>('input:checked')?.focus();
   }
 
@@ -203,15 +198,4 @@ function createButton(iconName: IconName, onPress: () => void): HTMLButtonElemen
 function setLabel(button: HTMLButtonElement, label: string): void {
   updateAttribute(button, 'aria-label', label);
   updateAttribute(button, 'title', label);
-}
-
-function updateButton(
-  button: HTMLButtonElement,
-  isVisible: boolean,
-  label: string,
-  iconName?: IconName,
-): void {
-  button.hidden = !isVisible;
-  setLabel(button, label);
-  if (iconName && button.firstElementChild) setIcon(button.firstElementChild, ICONS[iconName]);
 }
