@@ -18,7 +18,7 @@ use crate::capture::{
     Shot,
 };
 use crate::simulate::{
-    self, Camera, DISPLAY_GAMMA, EmissionMatrix, GrayCodePattern, LightCodes, RandomStream,
+    self, Camera, EmissionMatrix, GrayCodePattern, LightCodes, MONITOR_GAMMA, RandomStream,
     SceneKind, SimulatedScene, TruthLight,
 };
 use crate::transport::{CHANNELS, Extent, TileRect, TransportFunctions};
@@ -168,7 +168,7 @@ impl Plan {
                 light: LightSpec {
                     width: args.light.width,
                     height: args.light.height,
-                    gamma: Some(DISPLAY_GAMMA),
+                    gamma: Some(MONITOR_GAMMA),
                     response: None,
                 },
                 camera: CameraSpec {

@@ -1,4 +1,4 @@
-//! The camera: light to electrons to codes.
+//! The camera: from measurements to electrons with noise, to 16-bit codes.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -9,23 +9,23 @@ use crate::transport::CHANNELS;
 /// A camera with linear 16-bit codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Code without light.
+    /// Code of the measurement 0.
     pub black: f64,
-    /// Code at full scale, where the measurement is 1.
+    /// Code of the measurement 1.
     pub white: f64,
-    /// Electrons at full scale.
+    /// Electrons of the measurement 1.
     pub electrons: f64,
     /// Standard deviation of the read noise, in electrons.
     pub read_noise: f64,
 }
 
-/// Which of a capture's independent random sequences to draw from. The same seed and stream yield
-/// the same numbers, whatever else is drawn and in whatever order.
+/// One of a capture's independent random sequences. A seed and a stream determine its numbers, whatever
+/// other streams are used and in whatever order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RandomStream {
-    /// The elements of pattern number `.0`.
+    /// The elements of the pattern with this index.
     Pattern(u32),
-    /// The noise of photograph number `.0`.
+    /// The noise of the photograph with this index.
     Photograph(u32),
 }
 
@@ -42,7 +42,11 @@ impl RandomStream {
 }
 
 impl Camera {
-    /// Takes the photograph of `picture`, in units of the measurement, as codes.
+    /// Photographs `picture`, in units of the measurement, with shot noise (Poisson) and read noise (Gaussian).
+    /// Returns codes; too much light saturates.
+    ///
+    /// # Errors
+    /// [`NormalError`] if the read noise is negative or not finite.
     pub fn photograph(
         &self,
         picture: &[[f32; CHANNELS]],
@@ -52,9 +56,9 @@ impl Camera {
         let code_per_electron = (self.white - self.black) / self.electrons;
         let mut code = |measurement: f32| {
             let mean = f64::from(measurement) * self.electrons;
-            // `new` refuses a mean of zero, for which no electron ever arrives.
-            let caught = Poisson::new(mean).map_or(0.0, |p| p.sample(noise));
-            let electrons = caught + read.sample(noise);
+            // `new` refuses a mean of zero, with which no electron arrives.
+            let photoelectrons = Poisson::new(mean).map_or(0.0, |p| p.sample(noise));
+            let electrons = photoelectrons + read.sample(noise);
             (self.black + electrons * code_per_electron).round() as u16 // `as` saturates
         };
         Ok(picture.iter().map(|pixel| pixel.map(&mut code)).collect())

@@ -1,4 +1,4 @@
-//! Where the scenes are drawn: plane vectors and resolution-free coordinates.
+//! Vectors of the plane, and unit coordinates, which do not depend on the resolution.
 
 use std::ops::{Add, Mul, Sub};
 
@@ -24,13 +24,13 @@ impl Vec2 {
         self.x * other.x + self.y * other.y
     }
 
-    /// Turned by `angle`, from x towards y.
+    /// Rotated by `angle` radians from x towards y.
     pub fn rotated(self, angle: f64) -> Self {
         let (s, c) = angle.sin_cos();
         vec2(c * self.x - s * self.y, s * self.x + c * self.y)
     }
 
-    /// The mirror image with x >= 0.
+    /// Reflected such that x >= 0.
     pub fn mirrored(self) -> Self {
         vec2(self.x.abs(), self.y)
     }
@@ -57,11 +57,11 @@ impl Mul<f64> for Vec2 {
     }
 }
 
-/// Unit coordinates of a light plane: origin in the middle, ±1 at the ends of the shorter side, y
+/// Unit coordinates of a light plane: the origin in its centre, ±1 at the ends of its shorter side, y
 /// downwards.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct UnitPlane {
-    middle: Vec2,
+    centre: Vec2,
     half: f64,
 }
 
@@ -69,24 +69,24 @@ impl UnitPlane {
     pub fn new(light: Extent) -> Self {
         let (w, h) = (f64::from(light.width), f64::from(light.height));
         Self {
-            middle: vec2(w / 2.0, h / 2.0),
+            centre: vec2(w / 2.0, h / 2.0),
             half: w.min(h) / 2.0,
         }
     }
 
-    /// Unit coordinates of a position given in light elements.
+    /// The unit coordinates of a position in light elements.
     pub fn at(&self, p: LightPx) -> Vec2 {
-        (vec2(p.u, p.v) - self.middle) * (1.0 / self.half)
+        (vec2(p.u, p.v) - self.centre) * (1.0 / self.half)
     }
 }
 
-/// 0 below `from`, 1 above `to`, smooth between.
+/// 0 below `from`, 1 above `to`, a cubic between.
 pub(super) fn smoothstep(from: f64, to: f64, x: f64) -> f64 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// `a` at `t` = 0, `b` at 1.
+/// Linear interpolation: `a` at `t` = 0, `b` at 1.
 pub(super) fn mix(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }

@@ -1,21 +1,21 @@
-//! Many lights at once: `y = pT` for every pattern while a tile's transport is at hand.
+//! y = pT under many lights at once, while a tile's transport is in memory.
 
 use super::light_codes::{LightCodes, emission};
 use crate::transport::{CHANNELS, Extent, Geometry, TransportFunctions};
 
-/// The lights a scene is to be seen under, as emitted, laid out so that one element's emission
-/// under all lights is one run of memory: `[M, lights]`.
+/// Emissions under many lights, `[M, columns]`: one column for each grey light, three for each RGB light. The
+/// emissions of one element are contiguous, so that the sums over elements are vector operations.
 #[derive(Clone, Debug)]
 pub struct EmissionMatrix {
     light: Extent,
     columns: usize,
-    emitted: Vec<f32>,
-    /// The column of each light that feeds each camera channel.
+    emissions: Vec<f32>,
+    /// The column of each light and camera channel.
     channels: Vec<[usize; CHANNELS]>,
 }
 
 impl EmissionMatrix {
-    /// Lights for a plane of extent `light`; each must have its length.
+    /// The emissions of `lights`, each of `light.area()` elements.
     pub fn new(light: Extent, lights: &[LightCodes]) -> Self {
         let mut channels = Vec::with_capacity(lights.len());
         let mut columns = 0;
@@ -27,10 +27,10 @@ impl EmissionMatrix {
             columns = channels.last().map_or(0, |c| c[CHANNELS - 1]) + 1;
         }
         let table: [f32; 256] = std::array::from_fn(|code| emission(code as u8) as f32);
-        let mut emitted = vec![0.0; light.area() * columns];
+        let mut emissions = vec![0.0; light.area() * columns];
         for (codes, channels) in lights.iter().zip(&channels) {
             for m in 0..light.area() {
-                let row = &mut emitted[m * columns..(m + 1) * columns];
+                let row = &mut emissions[m * columns..(m + 1) * columns];
                 match codes {
                     LightCodes::Grey(grey) => row[channels[0]] = table[usize::from(grey[m])],
                     LightCodes::Rgb(rgb) => {
@@ -44,12 +44,12 @@ impl EmissionMatrix {
         Self {
             light,
             columns,
-            emitted,
+            emissions,
             channels,
         }
     }
 
-    /// The tile's pixels under every light, `[lights][pixels]`, in units of the measurement.
+    /// A tile's pictures under every light, `[light][pixel]`, in units of the measurement.
     pub fn pictures(
         &self,
         geometry: &Geometry,
@@ -68,9 +68,9 @@ impl EmissionMatrix {
                 }
                 let element = geometry.window.element(origin, s);
                 if let Some(m) = element.index_in(self.light) {
-                    let emitted = &self.emitted[m * self.columns..(m + 1) * self.columns];
+                    let emissions = &self.emissions[m * self.columns..(m + 1) * self.columns];
                     for (sums, tau) in sums.chunks_exact_mut(self.columns).zip(tau) {
-                        for (sum, e) in sums.iter_mut().zip(emitted) {
+                        for (sum, e) in sums.iter_mut().zip(emissions) {
                             *sum += tau * e;
                         }
                     }

@@ -1,8 +1,8 @@
-//! Reproducible irregularity: hashes and gradient noise (Perlin 2002).
+//! Reproducible randomness: hashes of integers, and gradient noise (Perlin 2002).
 
 use super::coordinates::{Vec2, mix, vec2};
 
-/// A well mixed number from a lattice point and a seed.
+/// A hash of a lattice point and a seed.
 fn hash(x: i32, y: i32, seed: u32) -> u32 {
     let mut h = seed ^ 0x9e37_79b9;
     for k in [x as u32, y as u32] {
@@ -13,17 +13,17 @@ fn hash(x: i32, y: i32, seed: u32) -> u32 {
     h
 }
 
-/// A number in 0..1 that belongs to `key` and `seed`.
+/// A hash of `key` and `seed` in 0..1.
 pub(super) fn unit_hash(key: u32, seed: u32) -> f64 {
     f64::from(hash(key as i32, 0, seed)) / 4_294_967_296.0
 }
 
-/// A number in 0..1 that belongs to a lattice cell.
+/// A hash of a lattice cell and `seed` in 0..1.
 pub(super) fn cell_hash(x: i32, y: i32, seed: u32) -> f64 {
     f64::from(hash(x, y, seed)) / 4_294_967_296.0
 }
 
-/// Gradient noise of unit grain and its slope. The value lies within ±0.71, mostly within ±0.4.
+/// Gradient noise on the unit lattice, and its gradient. Values are within ±0.71, mostly within ±0.4.
 pub(super) fn noise(p: Vec2, seed: u32) -> (f64, Vec2) {
     let (x0, y0) = (p.x.floor(), p.y.floor());
     let (fx, fy) = (p.x - x0, p.y - y0);
@@ -49,7 +49,7 @@ pub(super) fn noise(p: Vec2, seed: u32) -> (f64, Vec2) {
     (mix(top, bottom, sy), slope)
 }
 
-/// `octaves` layers of noise, each twice as fine and half as strong.
+/// The sum of `octaves` layers of noise, each with twice the frequency and half the amplitude of the last.
 pub(super) fn layered_noise(p: Vec2, octaves: u32, seed: u32) -> f64 {
     (0..octaves)
         .map(|o| {
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slope_is_the_derivative() {
+    fn slope_is_the_gradient() {
         let h = 1e-5;
         for i in 0..50 {
             let p = vec2(f64::from(i) * 0.37 - 9.0, f64::from(i) * 0.73 - 20.0);

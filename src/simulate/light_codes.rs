@@ -1,56 +1,59 @@
-//! What the display is told to show: patterns and Gray code.
+//! The 8-bit codes that the monitor shows: random patterns and Gray code.
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal, NormalError, StandardUniform};
 
 use crate::transport::Extent;
 
-/// Emitted light is `(code / 255)^DISPLAY_GAMMA`.
-pub const DISPLAY_GAMMA: f64 = 2.2;
+/// The monitor emits `(code / 255)^MONITOR_GAMMA`.
+pub const MONITOR_GAMMA: f64 = 2.2;
 
-/// Light emitted for a code, 1 at full brightness.
+/// The emission of a code, 0 to 1.
 pub fn emission(code: u8) -> f64 {
-    (f64::from(code) / 255.0).powf(DISPLAY_GAMMA)
+    (f64::from(code) / 255.0).powf(MONITOR_GAMMA)
 }
 
-/// The code whose emission is nearest to `emitted`, which may leave 0..=1.
-pub(super) fn code_for(emitted: f64) -> u8 {
-    (emitted.clamp(0.0, 1.0).powf(1.0 / DISPLAY_GAMMA) * 255.0).round() as u8
+/// The code with the emission nearest to `emission`, which is clamped to 0..=1.
+pub(super) fn code_for(emission: f64) -> u8 {
+    (emission.clamp(0.0, 1.0).powf(1.0 / MONITOR_GAMMA) * 255.0).round() as u8
 }
 
-/// 8-bit codes of every light element, row by row.
+/// A code for each light element, row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LightCodes {
-    /// One code for all three primaries.
+    /// The same code for all three primaries.
     Grey(Vec<u8>),
     /// Red, green, blue.
     Rgb(Vec<[u8; 3]>),
 }
 
 impl LightCodes {
-    /// The same code everywhere.
+    /// The same grey code for all elements.
     pub fn uniform(light: Extent, code: u8) -> Self {
         Self::Grey(vec![code; light.area()])
     }
 }
 
-/// Random patterns to photograph.
+/// A distribution of random patterns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ensemble {
-    /// Emitted light drawn from N(0.5, 0.17²), clipped to 0..=1.
+    /// Emissions from N(0.5, 0.17²), clipped to 0..=1.
     Gaussian,
-    /// Each element on or off with equal chance.
+    /// Each element on or off with equal probability.
     Bernoulli,
 }
 
 impl Ensemble {
-    /// A pattern, drawn from `stream`.
+    /// A random pattern from the numbers of `stream`.
+    ///
+    /// # Errors
+    /// Never: the distribution's parameters are constants. [`NormalError`] is its constructor's type.
     pub fn draw(self, light: Extent, stream: &mut ChaCha8Rng) -> Result<LightCodes, NormalError> {
         let codes = match self {
             Self::Gaussian => {
-                // At 0.17 the clipping takes 0.3 % of the elements.
-                let emitted = Normal::new(0.5, 0.17)?;
-                let code = |_| code_for(emitted.sample(stream));
+                // 0.3 % of the elements are clipped.
+                let emissions = Normal::new(0.5, 0.17)?;
+                let code = |_| code_for(emissions.sample(stream));
                 (0..light.area()).map(code).collect()
             }
             Self::Bernoulli => {
@@ -65,20 +68,20 @@ impl Ensemble {
     }
 }
 
-/// One picture of the Gray code that tells every column (or row) from the others.
+/// One pattern of the Gray code of all columns or of all rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GrayCodePattern {
-    /// Whether it numbers columns (`x`) or rows (`y`).
+    /// Whether it codes columns (axis x) or rows (axis y).
     pub columns: bool,
-    /// Bit of the Gray code, 0 the least significant.
+    /// Index of the bit, 0 for the least significant.
     pub bit: u32,
     /// Whether dark and bright are exchanged.
     pub inverted: bool,
 }
 
 impl GrayCodePattern {
-    /// All pictures a light plane needs: columns then rows, most significant bit first, each
-    /// followed by its inverse.
+    /// All patterns of a light plane: columns, then rows, most significant bit first, each followed by its
+    /// inverse.
     pub fn all(light: Extent) -> Vec<Self> {
         let axis = |columns, side: u32| {
             let bits = u32::BITS - (side - 1).leading_zeros();
@@ -95,12 +98,12 @@ impl GrayCodePattern {
             .collect()
     }
 
-    /// `x` or `y`.
+    /// The name of the axis in the capture's manifest.
     pub fn axis(self) -> &'static str {
         if self.columns { "x" } else { "y" }
     }
 
-    /// What to show.
+    /// The codes of the pattern.
     pub fn codes(self, light: Extent) -> LightCodes {
         let mut codes = Vec::with_capacity(light.area());
         for v in 0..light.height {
@@ -124,12 +127,12 @@ mod tests {
             width: 20,
             height: 3,
         };
-        let pictures: Vec<_> = GrayCodePattern::all(light)
+        let patterns: Vec<_> = GrayCodePattern::all(light)
             .into_iter()
             .filter(|g| g.columns && !g.inverted)
             .collect();
         assert_eq!(
-            pictures.iter().map(|g| g.bit).collect::<Vec<_>>(),
+            patterns.iter().map(|g| g.bit).collect::<Vec<_>>(),
             [4, 3, 2, 1, 0]
         );
         let column = |u: usize| -> Vec<u8> {
@@ -137,7 +140,7 @@ mod tests {
                 LightCodes::Grey(c) => c[u],
                 LightCodes::Rgb(_) => unreachable!(),
             };
-            pictures.iter().map(code).collect()
+            patterns.iter().map(code).collect()
         };
         for u in 1..20 {
             let changed = column(u - 1)

@@ -1,12 +1,12 @@
-//! Built-in scenes whose transport is known, and the camera that photographs them.
+//! Built-in scenes with known light transport, and a camera that photographs them.
 //!
-//! A [`SimulatedScene`] is a picture drawn by formula, in coordinates that do not depend on any resolution,
-//! together with the physics that turns each camera pixel into a light transport function. Lengths
-//! that make the band (scattering widths, refraction, parallax) are given in light elements: with
-//! more elements the same picture stands closer to the display, and the same window holds it.
+//! A [`SimulatedScene`] computes the light transport function τ, `[S]` in units of the measurement, of any
+//! camera pixel: a procedural picture in resolution-independent coordinates ([`coordinates`]) and the physics
+//! of light in it. The lengths that determine the band (scattering widths, refraction, parallax) are in
+//! light elements, so that one window holds the band at every resolution.
 //!
-//! Pure computation: no threads, no files, no clock. Whoever has them calls [`SimulatedScene::tile`] for
-//! many tiles at once, [`EmissionMatrix`] to see them under many lights and [`Camera`] for the noise.
+//! [`EmissionMatrix`] computes y = pT under many lights, [`Camera`] adds noise. This module uses no threads,
+//! files or clock; callers compute [`SimulatedScene::tile`] in parallel.
 
 mod camera;
 mod cookies;
@@ -20,7 +20,7 @@ mod truth_lights;
 
 pub use camera::{Camera, RandomStream};
 pub use emission_matrix::EmissionMatrix;
-pub use light_codes::{DISPLAY_GAMMA, Ensemble, GrayCodePattern, LightCodes, emission};
+pub use light_codes::{Ensemble, GrayCodePattern, LightCodes, MONITOR_GAMMA, emission};
 pub use truth_lights::TruthLight;
 
 use crate::transport::{
@@ -28,17 +28,16 @@ use crate::transport::{
     TransportFunctions, Window,
 };
 
-/// Side of the window that holds every built-in scene's band, in light elements. Scattering and
-/// parallax below are chosen to fit it.
+/// Side of the window that holds every built-in scene's band, in light elements.
 pub const WINDOW_SIDE: u32 = 15;
 
-/// A scene of known transport.
+/// A scene with known light transport.
 pub trait SimulatedScene: Sync {
-    /// Grids, band and correspondence.
+    /// Camera and light plane, window and correspondence.
     fn geometry(&self) -> &Geometry;
 
-    /// Writes the light transport function of one pixel, `[S]`, over zeros. Elements off the
-    /// display have none.
+    /// Writes the light transport function of one pixel, `[S]`, to `tau`, which holds zeros. Elements
+    /// outside the light plane stay zero.
     fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]);
 
     /// The light transport functions of the pixels in `rect`.
@@ -55,14 +54,17 @@ pub trait SimulatedScene: Sync {
 /// The built-in scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SceneKind {
-    /// A rose window: coloured glass between lead cames, lit from behind.
+    /// A rose window of coloured glass and lead, lit from behind.
     StainedGlass,
-    /// Cookies on a tray under a tilted projector.
+    /// Cookies on a tray, lit by a projector at an angle.
     Cookies,
 }
 
 impl SceneKind {
-    /// The scene seen by `camera` under a light plane of `light` elements.
+    /// The scene, seen by a camera of `camera` pixels under a light plane of `light` elements.
+    ///
+    /// # Errors
+    /// [`GeometryError`] for extents of zero, too large, or smaller than the window.
     pub fn build(
         self,
         camera: Extent,
@@ -87,8 +89,8 @@ impl SceneKind {
         })
     }
 
-    /// The ensemble that suits the scene: the paper lit glass with Gaussian patterns; sparse
-    /// transport profits most from the higher contrast of binary ones.
+    /// The default ensemble: Gaussian for glass, as in the paper; Bernoulli for cookies, as its higher
+    /// contrast helps sparse transport.
     pub fn ensemble(self) -> Ensemble {
         match self {
             Self::StainedGlass => Ensemble::Gaussian,

@@ -1,4 +1,4 @@
-//! Signed distances to the shapes both scenes are made of: negative inside.
+//! Signed distances to the outlines of shapes, in unit coordinates: negative inside.
 
 use std::f64::consts::TAU;
 
@@ -15,9 +15,9 @@ pub(super) fn segment(p: Vec2, a: Vec2, b: Vec2) -> f64 {
     (pa - ba * t).length()
 }
 
-/// The lens between two circles: pointed at `(±half_length, 0)`, `half_width` at the middle.
+/// The intersection of two discs: tips at `(±half_length, 0)`, `half_width` at x = 0.
 pub(super) fn vesica(p: Vec2, half_length: f64, half_width: f64) -> f64 {
-    // Each arc is a circle through the tips whose centre lies beyond the other side.
+    // Each arc is a circle through both tips with its centre on the other side of the x axis.
     let offset = (half_length * half_length - half_width * half_width) / (2.0 * half_width);
     let radius = half_width + offset;
     circle(vec2(p.x, p.y.abs() + offset), radius)
@@ -36,7 +36,7 @@ pub(super) fn star(p: Vec2, points: u32, outer: f64, inner: f64) -> f64 {
 
 /// A heart 2 wide and 1.8 high for `size` = 1, its point towards +y (after Inigo Quilez).
 pub(super) fn heart(p: Vec2, size: f64) -> f64 {
-    // He draws it upright with its point at the origin and 1.2 wide.
+    // His heart has its point at the origin, points to -y and is 1.2 wide.
     let scale = 0.6 / size;
     let q = vec2(p.x.abs() * scale, 0.55 - p.y * scale);
     let d = if q.x + q.y > 1.0 {
@@ -50,14 +50,14 @@ pub(super) fn heart(p: Vec2, size: f64) -> f64 {
     d / scale
 }
 
-/// Both shapes, with a fillet of about `k` where they meet.
+/// The union of two shapes, with a fillet of about `k` where they meet.
 pub(super) fn smooth_union(a: f64, b: f64, k: f64) -> f64 {
     let h = (k - (a - b).abs()).max(0.0) / k;
     a.min(b) - h * h * k / 4.0
 }
 
-/// Folds the plane `n` times around the origin. Gives the number of the sector and the point as
-/// seen from it: x outwards along the sector's middle, y across. Sector 0 lies at angle `phase`.
+/// Maps the plane to one of `n` equal sectors around the origin. Returns the sector's index and the point
+/// rotated to it: x radial along the sector's axis, y tangential. The axis of sector 0 is at angle `phase`.
 pub(super) fn fold(p: Vec2, n: u32, phase: f64) -> (u32, Vec2) {
     let step = TAU / f64::from(n);
     let k = ((p.y.atan2(p.x) - phase) / step).round();
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn folding_keeps_the_radius_and_finds_the_sector() {
+    fn fold_keeps_the_radius_and_returns_the_sector() {
         for k in 0..12 {
             let angle = TAU * f64::from(k) / 12.0 + 0.1;
             let (index, q) = fold(vec2(0.7, 0.0).rotated(angle), 12, 0.0);

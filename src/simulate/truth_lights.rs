@@ -1,11 +1,12 @@
-//! The lights of `truth/`: what recovery never sees and is judged by.
+//! The lights of a simulated capture's `truth/` folder, under which relit pictures are evaluated. Recovery
+//! never uses them.
 
 use super::coordinates::{Vec2, mix3, smoothstep, vec2};
 use super::gradient_noise::layered_noise;
 use super::light_codes::{LightCodes, code_for};
 use crate::transport::Extent;
 
-/// A light for `truth/light_NAME.png`.
+/// The light in `truth/light_NAME.png`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TruthLight {
     /// All elements at full brightness.
@@ -14,14 +15,14 @@ pub enum TruthLight {
     Checker,
     /// Vertical black and white stripes, sixteen periods across.
     Stripes,
-    /// Four colours in the corners, blending.
+    /// A gradient between four coloured corners.
     Colour,
     /// A flame.
     Fire,
 }
 
 impl TruthLight {
-    /// All of them.
+    /// All lights.
     pub const ALL: [Self; 5] = [
         Self::Flood,
         Self::Checker,
@@ -30,7 +31,7 @@ impl TruthLight {
         Self::Fire,
     ];
 
-    /// The `NAME` in its files' names.
+    /// NAME in `light_NAME.png` and `relit_NAME.png`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Flood => "flood",
@@ -41,7 +42,7 @@ impl TruthLight {
         }
     }
 
-    /// The light on a plane of the given extent, always as RGB.
+    /// The codes of the light, always RGB.
     pub fn codes(self, light: Extent) -> LightCodes {
         let shorter = light.width.min(light.height);
         let white = |on: bool| [if on { 255 } else { 0 }; 3];
@@ -66,24 +67,24 @@ impl TruthLight {
     }
 }
 
-/// Linear RGB blended between four corners.
+/// Linear RGB, bilinear between four corners.
 fn corners(x: f64, y: f64) -> [f64; 3] {
     let top = mix3([0.02, 0.0, 1.0], [1.0, 0.0, 0.08], x);
     let bottom = mix3([0.0, 1.0, 1.0], [1.0, 0.9, 0.0], x);
     mix3(top, bottom, y)
 }
 
-/// A flame on the unit square: emission of a glowing gas that cools as it rises and frays.
+/// The linear RGB of a flame on the unit square: glowing gas that cools as it rises.
 fn flame(p: Vec2) -> [f64; 3] {
     let height = 1.0 - p.y;
-    // The gas sways the more the higher it is.
+    // The horizontal displacement grows with the height.
     let sway = layered_noise(vec2(p.x * 1.5, p.y * 2.2 + 3.0), 3, 11) * 0.9 * height;
     let x = p.x - 0.5 + sway;
     let width = 0.36 * (1.0 - height).max(0.0).powf(0.7) * smoothstep(-0.25, 0.22, height);
     let body = 1.0 - (x.abs() / width.max(1e-3)).powi(2);
     let tongues = layered_noise(vec2(p.x * 6.0, p.y * 3.5 + 8.0), 4, 23);
     let heat = (body + 1.3 * tongues * (0.4 + height)).clamp(0.0, 1.0);
-    // Black body colours: red first, then yellow, white at the core only.
+    // Approximate black body colours: red, then yellow, and white in the core.
     let glow = |from: f64, to: f64| smoothstep(from, to, heat);
     let halo = 0.06 * (-8.0 * (x * x + (height - 0.35).powi(2))).exp();
     [
@@ -98,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_light_uses_the_display_and_none_is_another() {
+    fn lights_are_bright_and_different() {
         let light = Extent {
             width: 64,
             height: 48,

@@ -347,15 +347,15 @@ mod tests {
         }
     }
 
-    /// Smooth coefficients, `[pixel, channel, 2]`, but for pixels unlike their neighbours.
+    /// Smooth coefficients, `[pixel, channel, 2]`, but for outliers in the first channel.
     fn coefficients(rect: TileRect) -> Vec<f64> {
         let pixels = rect.pixels().flat_map(|pixel| {
             let (x, y) = (f64::from(pixel.x), f64::from(pixel.y));
             (0..CHANNELS).flat_map(move |c| {
                 let phase = 0.4 * c as f64;
                 let smooth = [(0.17 * x + phase).sin(), (0.13 * y - 0.1 * x + phase).cos()];
-                match OUTLIERS.contains(&(pixel.x, pixel.y)) {
-                    true => smooth.map(|z| z + 3.0),
+                match c == 0 && OUTLIERS.contains(&(pixel.x, pixel.y)) {
+                    true => smooth.map(|z| z - 2.0 * z.signum()),
                     false => smooth,
                 }
             })
@@ -390,7 +390,7 @@ mod tests {
         {
             let factor = prior.noise_factor;
             let q = learned.infer(&means[0], factor, location, &mut mean, &mut solver);
-            match OUTLIERS.contains(&(pixel.x, pixel.y)) {
+            match location.channel == 0 && OUTLIERS.contains(&(pixel.x, pixel.y)) {
                 true => outliers.push(q),
                 false => {
                     smooth.push(q);

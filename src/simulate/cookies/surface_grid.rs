@@ -1,14 +1,14 @@
-//! The surface sampled on a grid, so that rays can be marched over it quickly.
+//! The surface of the tray and the cookies, sampled on a grid for fast ray marching.
 
 use super::tray::surface_at;
 use crate::simulate::coordinates::{UnitPlane, Vec2, vec2};
 use crate::transport::{CHANNELS, Extent, LightPx};
 
-/// Distance over which slopes for shading are taken, in unit coordinates: the same at every
-/// resolution, so that the picture is.
+/// Distance of the finite differences for shading, in unit coordinates: the same at every resolution, so that
+/// the picture does not depend on it.
 const SLOPE_STEP: f64 = 0.008;
 
-/// Heights and colours on a grid over the light plane.
+/// Heights and colours at grid points over the light plane.
 #[derive(Debug)]
 pub(super) struct SurfaceGrid {
     plane: UnitPlane,
@@ -23,15 +23,15 @@ pub(super) struct SurfaceGrid {
 /// The surface at one sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SurfacePoint {
-    /// Where, on the light plane.
+    /// Position on the light plane.
     pub at: LightPx,
-    /// Height, 1 for the tallest cookie.
+    /// Height; the tallest cookie has 1.
     pub height: f64,
     /// Diffuse albedo.
     pub albedo: [f64; CHANNELS],
     /// Strength of the highlight.
     pub gloss: f64,
-    /// Slope of the height per unit coordinate.
+    /// Gradient of the height, by unit coordinates.
     pub unit_slope: Vec2,
 }
 
@@ -44,10 +44,10 @@ impl SurfaceGrid {
         let mut glosses = Vec::with_capacity(extent.area());
         for j in 0..extent.height {
             for i in 0..extent.width {
-                let here = surface_at(plane.at(place(pitch, i, j)));
-                heights.push(here.height as f32);
-                albedos.push(here.albedo.map(|a| a as f32));
-                glosses.push(here.gloss as f32);
+                let surface = surface_at(plane.at(sample_position(pitch, i, j)));
+                heights.push(surface.height as f32);
+                albedos.push(surface.albedo.map(|a| a as f32));
+                glosses.push(surface.gloss as f32);
             }
         }
         Self {
@@ -66,8 +66,8 @@ impl SurfaceGrid {
     }
 
     /// The surface at sample `(i, j)`.
-    pub fn spot(&self, i: u32, j: u32) -> SurfacePoint {
-        let at = place(self.pitch, i, j);
+    pub fn point(&self, i: u32, j: u32) -> SurfacePoint {
+        let at = sample_position(self.pitch, i, j);
         let n = (j * self.extent.width + i) as usize;
         let p = self.plane.at(at);
         let step = |d: Vec2| surface_at(p + d).height - surface_at(p - d).height;
@@ -81,32 +81,34 @@ impl SurfaceGrid {
         }
     }
 
-    /// Slope of the height per light element around sample `(i, j)`.
+    /// Gradient of the height, by light elements, at sample `(i, j)`.
     pub fn slope(&self, i: u32, j: u32) -> Vec2 {
         let (i, j) = (i as i32, j as i32);
-        let across = |di, dj| self.height_at(i + di, j + dj) - self.height_at(i - di, j - dj);
+        let difference = |di, dj| self.height_at(i + di, j + dj) - self.height_at(i - di, j - dj);
         vec2(
-            across(1, 0) * 0.5 / self.pitch.x,
-            across(0, 1) * 0.5 / self.pitch.y,
+            difference(1, 0) * 0.5 / self.pitch.x,
+            difference(0, 1) * 0.5 / self.pitch.y,
         )
     }
 
-    /// Whether something stands in the way of the beam to `spot`. Beams travel by `tilt` (light
-    /// elements) while they fall by 1.
-    pub fn shaded(&self, spot: &SurfacePoint, tilt: Vec2) -> bool {
-        let to_sky = 1.0 - spot.height;
-        let run = vec2(tilt.x / self.pitch.x, tilt.y / self.pitch.y);
-        // One step a sample along the longer axis misses nothing the grid can show.
-        let steps = (to_sky * run.x.abs().max(run.y.abs())).ceil().max(1.0);
+    /// Whether the surface blocks the beam to `point`. A beam moves by `tilt` light elements while it descends
+    /// by 1.
+    pub fn is_shaded(&self, point: &SurfacePoint, tilt: Vec2) -> bool {
+        let max_rise = 1.0 - point.height;
+        let tilt_samples = vec2(tilt.x / self.pitch.x, tilt.y / self.pitch.y);
+        // One step for each sample along the longer axis.
+        let steps = (max_rise * tilt_samples.x.abs().max(tilt_samples.y.abs()))
+            .ceil()
+            .max(1.0);
         let start = vec2(
-            spot.at.u / self.pitch.x - 0.5,
-            spot.at.v / self.pitch.y - 0.5,
+            point.at.u / self.pitch.x - 0.5,
+            point.at.v / self.pitch.y - 0.5,
         );
-        // A surface must not shade itself where interpolation is a little higher than it.
+        // Against self-shadowing where the interpolated height exceeds the sample.
         const BIAS: f64 = 0.004;
         (1..=steps as u32).any(|k| {
-            let rise = to_sky * f64::from(k) / steps;
-            self.interpolated(start - run * rise) > spot.height + rise + BIAS
+            let rise = max_rise * f64::from(k) / steps;
+            self.interpolated(start - tilt_samples * rise) > point.height + rise + BIAS
         })
     }
 
@@ -116,7 +118,7 @@ impl SurfaceGrid {
         f64::from(self.heights[(j * self.extent.width + i) as usize])
     }
 
-    /// Height at a position given in samples, bilinear.
+    /// Height at a position in samples, by bilinear interpolation.
     fn interpolated(&self, p: Vec2) -> f64 {
         let (i, j) = (p.x.floor(), p.y.floor());
         let (fx, fy) = (p.x - i, p.y - j);
@@ -128,7 +130,8 @@ impl SurfaceGrid {
     }
 }
 
-fn place(pitch: Vec2, i: u32, j: u32) -> LightPx {
+/// The position of sample `(i, j)` on the light plane.
+fn sample_position(pitch: Vec2, i: u32, j: u32) -> LightPx {
     LightPx {
         u: (f64::from(i) + 0.5) * pitch.x,
         v: (f64::from(j) + 0.5) * pitch.y,

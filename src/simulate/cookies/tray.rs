@@ -1,4 +1,4 @@
-//! The tray and what lies on it: height and colour at every point, in unit coordinates.
+//! The tray and the cookies: height, colour and gloss of the surface as a function of unit coordinates.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,14 +7,14 @@ use crate::simulate::gradient_noise::{cell_hash, layered_noise};
 use crate::simulate::shapes::{circle, fold, heart, segment, smooth_union, star, vesica};
 use crate::transport::CHANNELS;
 
-/// What the camera and the projector meet at a point.
+/// The surface at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Surface {
-    /// Height over the tray, 0 to 1: the tallest cookie's.
+    /// Height over the tray; the tallest cookie has about 1.
     pub height: f64,
     /// Diffuse albedo, RGB.
     pub albedo: [f64; CHANNELS],
-    /// Strength of the highlight, 0 where matt.
+    /// Strength of the highlight; 0 for a matt surface.
     pub gloss: f64,
 }
 
@@ -32,24 +32,24 @@ enum CookieKind {
     Leaf,
 }
 
-/// One cookie: what, where, how large and turned by how much.
+/// One cookie, rotated by `angle` radians.
 struct Cookie {
     kind: CookieKind,
     middle: Vec2,
     size: f64,
-    turn: f64,
+    angle: f64,
 }
 
-const fn cookie(kind: CookieKind, x: f64, y: f64, size: f64, turn: f64) -> Cookie {
+const fn cookie(kind: CookieKind, x: f64, y: f64, size: f64, angle: f64) -> Cookie {
     Cookie {
         kind,
         middle: vec2(x, y),
         size,
-        turn,
+        angle,
     }
 }
 
-const BATCH: [Cookie; 13] = [
+const COOKIES: [Cookie; 13] = [
     cookie(CookieKind::ChocolateChip, -0.56, -0.57, 0.31, 0.0),
     cookie(CookieKind::Star, 0.08, -0.62, 0.30, 0.2),
     cookie(CookieKind::JamHeart, 0.62, -0.60, 0.29, -0.25),
@@ -76,23 +76,23 @@ const ICING: [f64; 3] = [0.93, 0.91, 0.88];
 const CHERRY: [f64; 3] = [0.70, 0.06, 0.08];
 const APRICOT: [f64; 3] = [0.93, 0.46, 0.08];
 
-/// What lies at `p`.
+/// The surface at `p`.
 pub(super) fn surface_at(p: Vec2) -> Surface {
-    let mut here = tray(p);
-    for cookie in &BATCH {
+    let mut surface = tray(p);
+    for cookie in &COOKIES {
         let q = p - cookie.middle;
-        // 1.25 covers the bulge of every outline over its nominal size.
+        // No outline exceeds 1.25 times the nominal size.
         if q.length() < 1.25 * cookie.size
-            && let Some(baked) = bake(cookie, q.rotated(-cookie.turn), p)
-            && baked.height > here.height
+            && let Some(cookie) = cookie_surface(cookie, q.rotated(-cookie.angle), p)
+            && cookie.height > surface.height
         {
-            here = baked;
+            surface = cookie;
         }
     }
-    here
+    surface
 }
 
-/// An enamelled tray with a raised rim; beyond it, its rim goes on.
+/// An enamelled tray with a raised rim, which extends beyond the unit square.
 fn tray(p: Vec2) -> Surface {
     let edge = p.x.abs().max(p.y.abs());
     let rim = smoothstep(0.93, 0.975, edge);
@@ -108,13 +108,13 @@ fn tray(p: Vec2) -> Surface {
     }
 }
 
-/// The rounded edge of dough: 0 at the outline, 1 from `bevel` inwards.
+/// The profile of a rounded edge: 0 at the outline, 1 at the distance `bevel` inside.
 fn rounded(d: f64, bevel: f64) -> f64 {
     let t = (-d / bevel).clamp(0.0, 1.0);
     (1.0 - (1.0 - t) * (1.0 - t)).sqrt()
 }
 
-/// Dough of outline `d`: darker where thin edges baked longer, grainy all over.
+/// Dough with an outline at signed distance `d`: grainy, and darker at its thin edge.
 fn dough(d: f64, bevel: f64, height: f64, colour: [f64; 3], p: Vec2) -> Surface {
     let grain = layered_noise(p * 16.0, 3, 73);
     let crust = 1.0 - 0.35 * (1.0 - smoothstep(0.0, 0.05, -d));
@@ -126,19 +126,19 @@ fn dough(d: f64, bevel: f64, height: f64, colour: [f64; 3], p: Vec2) -> Surface 
 }
 
 impl Surface {
-    /// Lays something of outline `d` and thickness `thick` on top.
-    fn topped(self, d: f64, thick: f64, colour: [f64; 3]) -> Self {
+    /// Adds a topping with an outline at signed distance `d`.
+    fn topped(self, d: f64, thickness: f64, colour: [f64; 3]) -> Self {
         if d >= 0.0 {
             return self;
         }
         Self {
-            height: self.height + thick * rounded(d, 0.02),
+            height: self.height + thickness * rounded(d, 0.02),
             albedo: mix3(self.albedo, colour, smoothstep(0.0, 0.004, -d)),
             gloss: 0.12,
         }
     }
 
-    /// Grains of sugar.
+    /// Adds grains of sugar in the share `share` of the cells of a grid.
     fn sugared(self, p: Vec2, share: f64) -> Self {
         const GRAIN: f64 = 0.016;
         let (i, j) = ((p.x / GRAIN).floor(), (p.y / GRAIN).floor());
@@ -151,10 +151,10 @@ impl Surface {
     }
 }
 
-/// The cookie at `q`, in its own frame; `p` is the same point on the tray. `None` beside it.
-fn bake(cookie: &Cookie, q: Vec2, p: Vec2) -> Option<Surface> {
+/// The cookie at `q`, in its own coordinates; `p` is the same point on the tray. `None` beside the cookie.
+fn cookie_surface(cookie: &Cookie, q: Vec2, p: Vec2) -> Option<Surface> {
     let s = cookie.size;
-    let baked = match cookie.kind {
+    let surface = match cookie.kind {
         CookieKind::ChocolateChip => {
             let d = circle(q, s) + 0.02 * layered_noise(q * 6.0, 2, 75);
             chips(dough(d, 0.12, 0.72, BROWN, p), q, s, CHIP)
@@ -183,17 +183,17 @@ fn bake(cookie: &Cookie, q: Vec2, p: Vec2) -> Option<Surface> {
             filled(dough(d, 0.06, 0.64, BUTTER, p), filling, APRICOT, q)
         }
         CookieKind::Ring => {
-            let across = (q.length() - 0.63 * s).abs() - 0.37 * s;
+            let d = (q.length() - 0.63 * s).abs() - 0.37 * s;
             let wave = 0.018 * (q.y.atan2(q.x) * 7.0).sin();
             let icing = (q.length() - 0.63 * s).abs() - 0.27 * s + wave;
-            let ring = dough(across, 0.085, 0.86, BROWN, p).topped(icing, 0.06, [0.92, 0.55, 0.62]);
+            let ring = dough(d, 0.085, 0.86, BROWN, p).topped(icing, 0.06, [0.92, 0.55, 0.62]);
             sprinkled(ring, q, icing)
         }
         CookieKind::Gingerbread => return gingerbread(q * (1.0 / s), s, p),
         CookieKind::Pinwheel => {
             let d = circle(q, s);
-            let turn = q.y.atan2(q.x) / TAU;
-            let spiral = (q.length() / (0.24 * s) - turn).rem_euclid(1.0);
+            let angle = q.y.atan2(q.x) / TAU;
+            let spiral = (q.length() / (0.24 * s) - angle).rem_euclid(1.0);
             let dark = smoothstep(0.02, 0.10, spiral) * (1.0 - smoothstep(0.48, 0.56, spiral));
             let groove = 1.0 - 0.12 * (1.0 - (spiral * TAU * 2.0).cos()) / 2.0;
             let colour = mix3(BUTTER, COCOA.map(|a| a * 1.35), dark);
@@ -211,10 +211,10 @@ fn bake(cookie: &Cookie, q: Vec2, p: Vec2) -> Option<Surface> {
             leaf
         }
     };
-    (baked.height > 0.0).then_some(baked)
+    (surface.height > 0.0).then_some(surface)
 }
 
-/// A circle with a wavy outline.
+/// Signed distance to a disc with a scalloped outline.
 fn scalloped(q: Vec2, size: f64, lobes: u32) -> f64 {
     let (_, l) = fold(q, lobes, 0.0);
     let lobe = size * (PI / f64::from(lobes)).sin() * 1.05;
@@ -225,7 +225,7 @@ fn scalloped(q: Vec2, size: f64, lobes: u32) -> f64 {
     )
 }
 
-/// Sinks a window of outline `d` into the dough and fills it with jam.
+/// Replaces the dough inside the outline at signed distance `d` by jam.
 fn filled(dough: Surface, d: f64, jam: [f64; 3], q: Vec2) -> Surface {
     let inside = smoothstep(-0.006, 0.006, -d);
     let level = 0.34 + 0.05 * layered_noise(q * 9.0, 2, 77);
@@ -237,7 +237,7 @@ fn filled(dough: Surface, d: f64, jam: [f64; 3], q: Vec2) -> Surface {
     }
 }
 
-/// Chips strewn over a round cookie, one to a jittered cell of a grid.
+/// Adds chips to a round cookie, at most one in each cell of a jittered grid.
 fn chips(dough: Surface, q: Vec2, size: f64, colour: [f64; 3]) -> Surface {
     const CELL: f64 = 0.112;
     let (i0, j0) = ((q.x / CELL).floor() as i32, (q.y / CELL).floor() as i32);
@@ -265,7 +265,7 @@ fn chips(dough: Surface, q: Vec2, size: f64, colour: [f64; 3]) -> Surface {
     topped
 }
 
-/// Coloured sprinkles on icing.
+/// Adds coloured sprinkles to icing with an outline at signed distance `icing`.
 fn sprinkled(iced: Surface, q: Vec2, icing: f64) -> Surface {
     const CELL: f64 = 0.046;
     const COLOURS: [[f64; 3]; 4] = [
@@ -324,7 +324,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn heights_and_albedos_stay_in_range() {
+    fn heights_and_albedos_are_in_range() {
         let mut highest = 0.0f64;
         for j in 0..300 {
             for i in 0..300 {

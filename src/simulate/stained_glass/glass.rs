@@ -1,9 +1,9 @@
-//! The glasses a window is made of.
+//! The kinds of glass in the window, and their optical properties.
 
 use crate::simulate::coordinates::{Vec2, smoothstep, vec2};
 use crate::simulate::gradient_noise::{cell_hash, layered_noise, unit_hash};
 
-/// A sheet of glass, as a glazier would pick it.
+/// A kind of glass sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Glass {
     Cobalt,
@@ -20,28 +20,28 @@ pub(super) enum Glass {
     Opal,
 }
 
-/// What a sheet does to light.
+/// Optical properties of a sheet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Optics {
-    /// Transmittance of the sheet's usual thickness, RGB.
+    /// Transmittance at the nominal thickness, RGB.
     pub transmittance: [f64; 3],
-    /// Share of the light that goes straight through.
+    /// Share of the light that is not scattered.
     pub ballistic: f64,
-    /// Width (standard deviation) of the ballistic peak that fine roughness leaves, in elements.
+    /// Standard deviation of the ballistic peak, from fine roughness, in elements.
     pub peak: f64,
     /// Root mean square displacement by the rough faces, in elements.
     pub ripple: f64,
-    /// Size of the ripples, in unit coordinates.
+    /// Length scale of the rough faces, in unit coordinates.
     pub grain: f64,
-    /// Width of the scattering tail's wide part for green, in elements.
+    /// Standard deviation of the tail's wide part for green, in elements.
     pub tail: f64,
-    /// How unevenly colour lies in the sheet.
+    /// Relative variation of the thickness in streaks.
     pub streaks: f64,
 }
 
 impl Glass {
-    /// The sheet's optics. Roughness and scattering follow what such glasses are sold as: antique
-    /// glass is clear and wavy, cathedral glass strongly hammered, opalescent glass milky.
+    /// The sheet's optical properties. Roughness and scattering are those of glass types on the market: antique
+    /// glass is clear and wavy, hammered glass rough, opalescent glass milky.
     pub fn optics(self) -> Optics {
         let sheet =
             |transmittance, [ballistic, peak, ripple, grain, tail, streaks]: [f64; 6]| Optics {
@@ -75,14 +75,14 @@ impl Glass {
     }
 }
 
-/// Transmittance of piece number `piece` at `p`: Beer and Lambert's law through a sheet whose
-/// thickness and colour vary from piece to piece and, in streaks, over each; less the bubbles' dark rims.
+/// Transmittance of piece `piece` at `p`: the Beer–Lambert law for a sheet whose thickness and colour vary
+/// between pieces and, in streaks, within each; minus the dark rims of bubbles.
 pub(super) fn transmittance(optics: &Optics, piece: u32, p: Vec2) -> [f64; 3] {
     let jitter = 0.76 + 0.42 * unit_hash(piece, 31);
-    // No two melts have quite the same colour.
+    // The colour varies between pieces.
     let warm = 0.16 * (unit_hash(piece, 35) - 0.5);
     let melt = [1.0 - warm, 1.0, 1.0 + warm];
-    // Streaks run the way the sheet was drawn, another way in each piece.
+    // Streaks run along the direction in which the sheet was drawn, which differs between pieces.
     let along = p.rotated(unit_hash(piece, 32) * std::f64::consts::TAU);
     let along = along + vec2(17.0, 29.0) * unit_hash(piece, 33);
     let streak = layered_noise(vec2(along.x * 3.0, along.y * 14.0), 3, 34);
@@ -91,7 +91,7 @@ pub(super) fn transmittance(optics: &Optics, piece: u32, p: Vec2) -> [f64; 3] {
     std::array::from_fn(|c| optics.transmittance[c].powf(thickness * melt[c]) * clear)
 }
 
-/// 0 in plain glass to 1 on the rim of a bubble.
+/// 0 in plain glass, up to 1 on the rim of a bubble.
 fn bubble_rim(p: Vec2) -> f64 {
     const CELL: f64 = 0.07;
     let (i, j) = ((p.x / CELL).floor(), (p.y / CELL).floor());
@@ -104,7 +104,7 @@ fn bubble_rim(p: Vec2) -> f64 {
         (i + 0.3 + 0.4 * random(43)) * CELL,
         (j + 0.3 + 0.4 * random(44)) * CELL,
     );
-    // Bubbles are drawn long with the sheet.
+    // Bubbles are elongated along the drawing direction.
     let q = p - centre;
     let distance = vec2(q.x / 1.6, q.y).length() / radius;
     smoothstep(0.35, 0.85, distance) * (1.0 - smoothstep(0.95, 1.25, distance))

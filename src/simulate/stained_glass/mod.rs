@@ -1,10 +1,15 @@
-//! Stained glass lit from behind by a display.
+//! A stained-glass window, lit from behind by a monitor.
 //!
-//! A camera pixel looks through one spot of the pane. Part of the light it sees comes straight
-//! through, from where the refracting rough faces let it look: the ballistic peak. The rest is
-//! scattered in the glass and comes from all around: the tail, a sum of two Gaussians, wider for
-//! red. Both are integrated over the light elements' areas and attenuated by the glass's colour.
-//! Lead stops light on the camera's side, and shades the elements behind it.
+//! τ of a camera pixel, which looks through one point of the window, is
+//!
+//! ```text
+//! τ_m = attenuation · visible_m · (b · G_peak(m) + (1 − b) · (0.45 G_narrow(m) + 0.55 G_wide(m)))
+//! ```
+//!
+//! with Gaussians G, integrated over light element m: the ballistic peak, displaced by refraction at the
+//! rough faces, and a scattering tail, wider for red. b is the ballistic share. The attenuation is the
+//! transmittance of glass, paint and lead over the pixel's area; visible_m is the share of element m that
+//! lead does not hide.
 
 mod glass;
 mod rose;
@@ -17,43 +22,43 @@ use super::coordinates::{UnitPlane, Vec2, mix, smoothstep, vec2};
 use super::gradient_noise::{noise, unit_hash};
 use crate::transport::{CHANNELS, CameraPx, Element, Geometry, LightPx};
 
-/// Samples along each side of a pixel or element when its coverage by lead is counted.
+/// Samples along each side of a pixel or element, for averages over its area.
 const SAMPLES_PER_SIDE: u32 = 4;
-/// What lead lets through to the camera: a trace of stray light.
+/// Transmittance of lead: a little stray light.
 const LEAD_TRANSMITTANCE: [f64; CHANNELS] = [0.0030, 0.0029, 0.0027];
-/// Light that still gets around the lead from an element wholly behind it: the pane stands a little
-/// off the display.
+/// Visible share of an element that lead hides completely: the window is at a distance from the monitor, so
+/// that light passes around the lead.
 const BEHIND_LEAD_SHARE: f64 = 0.50;
-/// Share of the light that the two faces do not reflect.
+/// Share of the light that the two faces of the glass do not reflect.
 const FACE_TRANSMITTANCE: f64 = 0.97;
-/// Furthest the ballistic peak moves, in elements: with its width it stays inside the window.
+/// Largest displacement of the ballistic peak, in elements: the peak stays inside the window.
 const MAX_DISPLACEMENT: f64 = 4.0;
-/// Width of the tail in each channel, relative to green: scattering grows with wavelength here
-/// because the blue light that would go furthest is absorbed.
+/// Width of the tail in each channel, relative to green: wider for red, because the glass absorbs the blue
+/// light that travels far.
 const RELATIVE_TAIL_WIDTH: [f64; CHANNELS] = [1.14, 1.0, 0.88];
 
-/// The scene.
+/// The stained-glass scene.
 #[derive(Debug)]
 pub(super) struct StainedGlass {
     geometry: Geometry,
     plane: UnitPlane,
-    /// Light elements from one camera pixel to the next, along u and v.
+    /// Distance between camera pixels along u and v, in light elements.
     pitch: Vec2,
-    /// Share of each light element that no lead hides, `[M]`.
-    clear: Vec<f32>,
+    /// Visible share of each light element, `[M]`.
+    visible: Vec<f32>,
 }
 
 impl StainedGlass {
     pub fn new(geometry: Geometry) -> Self {
         let plane = UnitPlane::new(geometry.light);
-        let mut clear = Vec::with_capacity(geometry.light.area());
+        let mut visible = Vec::with_capacity(geometry.light.area());
         for v in 0..geometry.light.height {
             for u in 0..geometry.light.width {
                 let corner = vec2(f64::from(u), f64::from(v));
                 let hidden = mean_over(corner, vec2(1.0, 1.0), |p| {
                     f64::from(u8::from(glass_at(plane.at(p)).clearance < 0.0))
                 });
-                clear.push(mix(1.0, BEHIND_LEAD_SHARE, hidden) as f32);
+                visible.push(mix(1.0, BEHIND_LEAD_SHARE, hidden) as f32);
             }
         }
         let affine = geometry.correspondence.affine;
@@ -61,38 +66,38 @@ impl StainedGlass {
             geometry,
             plane,
             pitch: vec2(affine[0][0], affine[1][1]),
-            clear,
+            visible,
         }
     }
 
-    /// What the pane lets through over a pixel's area, on the camera's side.
+    /// The mean transmittance over a pixel's area.
     fn attenuation(&self, centre: Vec2) -> [f64; CHANNELS] {
         let mut sum = [0.0; CHANNELS];
         let corner = centre - self.pitch * 0.5;
         for_each_sample(corner, self.pitch, |p| {
             let p = self.plane.at(p);
-            let seen = transmitted(&glass_at(p), p);
+            let point = transmittance_at(&glass_at(p), p);
             for c in 0..CHANNELS {
-                sum[c] += seen[c];
+                sum[c] += point[c];
             }
         });
         sum.map(|s| s / f64::from(SAMPLES_PER_SIDE * SAMPLES_PER_SIDE))
     }
 
-    /// Where refraction moves the view of the point `centre` (light elements), in elements.
+    /// Displacement by refraction at the point `centre`; both in light elements.
     fn displacement(&self, optics: &Optics, piece: u32, centre: Vec2) -> Vec2 {
         let p = self.plane.at(LightPx {
             u: centre.x,
             v: centre.y,
         });
-        // Each piece is cut from another part of the sheet.
+        // Each piece is another part of the sheet.
         let offset = vec2(unit_hash(piece, 61), unit_hash(piece, 62)) * 90.0;
-        // The slope of unit gradient noise has a root mean square of about 0.9 along each axis.
+        // The gradient of the noise has a root mean square of about 0.9 along each axis.
         let faces = noise(p * (1.0 / optics.grain) + offset, 63).1;
-        // The sheet is not equally rough all over, and the whole pane is a little warped.
-        let uneven = 1.0 + 0.9 * noise(p * 2.3, 64).0;
+        // The roughness varies over the sheet, and the whole window is slightly warped.
+        let roughness = 1.0 + 0.9 * noise(p * 2.3, 64).0;
         let warp = noise(p * 1.7, 65).1;
-        let d = faces * (optics.ripple * uneven / 0.9) + warp * 0.35;
+        let d = faces * (optics.ripple * roughness / 0.9) + warp * 0.35;
         let length = d.length();
         if length > MAX_DISPLACEMENT {
             d * (MAX_DISPLACEMENT / length)
@@ -112,14 +117,14 @@ impl SimulatedScene for StainedGlass {
         let centre = vec2(at.u, at.v);
         let GlassPoint { piece, glass, .. } = glass_at(self.plane.at(at));
         let optics = glass.optics();
-        let seen = self.displacement(&optics, piece, centre);
-        // How the footprint of a pixel is stretched by the slope of the displacement.
-        let ahead = |d: Vec2| self.displacement(&optics, piece, centre + d) - seen;
-        let right = ahead(vec2(self.pitch.x, 0.0)) + vec2(self.pitch.x, 0.0);
-        let down = ahead(vec2(0.0, self.pitch.y)) + vec2(0.0, self.pitch.y);
-        // A box has a twelfth of its square as variance. Past a point glass just blurs.
-        let width = |across: f64, along: f64| {
-            let footprint = (across * across + along * along) / 12.0;
+        let displacement = self.displacement(&optics, piece, centre);
+        // The gradient of the displacement stretches the pixel's footprint.
+        let difference = |d: Vec2| self.displacement(&optics, piece, centre + d) - displacement;
+        let right = difference(vec2(self.pitch.x, 0.0)) + vec2(self.pitch.x, 0.0);
+        let down = difference(vec2(0.0, self.pitch.y)) + vec2(0.0, self.pitch.y);
+        // A box has the variance side² / 12. The footprint's effect is limited.
+        let width = |dx: f64, dy: f64| {
+            let footprint = (dx * dx + dy * dy) / 12.0;
             (optics.peak * optics.peak + footprint.min(0.6)).sqrt()
         };
         let peak = vec2(width(right.x, down.x), width(right.y, down.y));
@@ -128,18 +133,18 @@ impl SimulatedScene for StainedGlass {
         let side = self.geometry.window.side() as usize;
         let from_origin = centre - vec2(f64::from(origin.u), f64::from(origin.v));
         let attenuation = self.attenuation(centre);
-        // The tail has forgotten half of the way it was refracted.
-        let middle = from_origin + seen * 0.5;
-        let thick = 0.85 + 0.3 * unit_hash(piece, 66);
-        let ballistic = SeparableGaussian::new(side, from_origin + seen, peak);
+        // Scattering halves the displacement.
+        let tail_centre = from_origin + displacement * 0.5;
+        let thickness = 0.85 + 0.3 * unit_hash(piece, 66);
+        let ballistic = SeparableGaussian::new(side, from_origin + displacement, peak);
         for c in 0..CHANNELS {
-            let wide = optics.tail * RELATIVE_TAIL_WIDTH[c] * thick.sqrt();
-            let narrow = SeparableGaussian::new(side, middle, vec2(0.5, 0.5) * wide);
-            let wide = SeparableGaussian::new(side, middle, vec2(1.0, 1.0) * wide);
-            let straight = optics.ballistic.powf(thick);
-            let scattered = 1.0 - straight;
+            let wide = optics.tail * RELATIVE_TAIL_WIDTH[c] * thickness.sqrt();
+            let narrow = SeparableGaussian::new(side, tail_centre, vec2(0.5, 0.5) * wide);
+            let wide = SeparableGaussian::new(side, tail_centre, vec2(1.0, 1.0) * wide);
+            let ballistic_share = optics.ballistic.powf(thickness);
+            let scattered = 1.0 - ballistic_share;
             let parts = [
-                (straight, &ballistic),
+                (ballistic_share, &ballistic),
                 (0.45 * scattered, &narrow),
                 (0.55 * scattered, &wide),
             ];
@@ -156,26 +161,26 @@ impl SimulatedScene for StainedGlass {
                     .iter()
                     .map(|(w, b)| w * b.along_u[i] * b.along_v[j])
                     .sum();
-                tau[c] = (share * attenuation[c]) as f32 * self.clear[m];
+                tau[c] = (share * attenuation[c]) as f32 * self.visible[m];
             }
         }
     }
 }
 
-/// What the pane lets through at one point.
-fn transmitted(spot: &GlassPoint, p: Vec2) -> [f64; CHANNELS] {
-    if spot.clearance < 0.0 {
+/// The transmittance at one point.
+fn transmittance_at(point: &GlassPoint, p: Vec2) -> [f64; CHANNELS] {
+    if point.clearance < 0.0 {
         return LEAD_TRANSMITTANCE;
     }
-    // Painters shade pieces towards the lead: it rounds them, and hides where the putty is.
-    let shade = mix(0.72, 1.0, smoothstep(0.0, 0.013, spot.clearance));
-    // The brown stops blue most.
-    let paint = [0.78, 0.86, 0.92].map(|stopped| 1.0 - stopped * spot.paint);
-    let glass = transmittance(&spot.glass.optics(), spot.piece, p);
+    // Shading paint along the lead.
+    let shade = mix(0.72, 1.0, smoothstep(0.0, 0.013, point.clearance));
+    // Brown paint absorbs blue most.
+    let paint = [0.78, 0.86, 0.92].map(|absorbed| 1.0 - absorbed * point.paint);
+    let glass = transmittance(&point.glass.optics(), point.piece, p);
     std::array::from_fn(|c| glass[c] * paint[c] * shade * FACE_TRANSMITTANCE)
 }
 
-/// A Gaussian of unit weight, separated and integrated over each element of a window.
+/// A Gaussian of integral 1, separated by axis and integrated over each element of a window.
 struct SeparableGaussian {
     along_u: Vec<f64>,
     along_v: Vec<f64>,
@@ -186,10 +191,10 @@ impl SeparableGaussian {
     fn new(side: usize, centre: Vec2, width: Vec2) -> Self {
         let axis = |centre: f64, width: f64| {
             let scale = std::f64::consts::FRAC_1_SQRT_2 / width;
-            let below = |edge: usize| 0.5 * libm::erf((edge as f64 - centre) * scale);
-            let mut last = below(0);
+            let cumulative = |edge: usize| 0.5 * libm::erf((edge as f64 - centre) * scale);
+            let mut last = cumulative(0);
             let mut share = |m: usize| {
-                let next = below(m + 1);
+                let next = cumulative(m + 1);
                 next - std::mem::replace(&mut last, next)
             };
             (0..side).map(&mut share).collect()
@@ -201,7 +206,7 @@ impl SeparableGaussian {
     }
 }
 
-/// Calls `f` at the centres of the cells of a grid over the box at `corner` of extent `size`.
+/// Calls `f` at the cell centres of a grid over the box from `corner` of extent `size`.
 fn for_each_sample(corner: Vec2, size: Vec2, mut f: impl FnMut(LightPx)) {
     let at = |i: u32| (f64::from(i) + 0.5) / f64::from(SAMPLES_PER_SIDE);
     for j in 0..SAMPLES_PER_SIDE {
@@ -227,9 +232,9 @@ mod tests {
     use crate::transport::Extent;
 
     #[test]
-    fn a_blob_has_unit_weight_at_its_place() {
-        let blob = SeparableGaussian::new(15, vec2(6.3, 8.9), vec2(0.6, 1.4));
-        for (axis, centre) in [(&blob.along_u, 6.3), (&blob.along_v, 8.9)] {
+    fn gaussian_has_unit_weight_and_its_centre() {
+        let gaussian = SeparableGaussian::new(15, vec2(6.3, 8.9), vec2(0.6, 1.4));
+        for (axis, centre) in [(&gaussian.along_u, 6.3), (&gaussian.along_v, 8.9)] {
             let weight: f64 = axis.iter().sum();
             let mean: f64 = axis
                 .iter()
@@ -241,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn lead_is_near_black_and_glass_is_not() {
+    fn lead_is_nearly_black_and_glass_is_not() {
         let side = |n| Extent {
             width: n,
             height: n,
@@ -256,7 +261,7 @@ mod tests {
             for (pixel, tau) in rect.pixels().zip(functions.tau.chunks_exact(area)) {
                 let flood: f32 = tau.iter().flatten().sum::<f32>() / 3.0;
                 let clearance = glass_at(plane.at(geometry.correspondence.at(pixel))).clearance;
-                if covered(&plane, geometry, pixel) {
+                if is_covered(&plane, geometry, pixel) {
                     lead += 1;
                     assert!(flood < 0.004, "lead at {pixel:?} sends {flood}");
                 } else if clearance > 0.01 {
@@ -268,7 +273,8 @@ mod tests {
         assert!(lead > 50 && glass > 1000, "{lead} {glass}");
     }
 
-    fn covered(plane: &UnitPlane, geometry: &Geometry, pixel: CameraPx) -> bool {
+    /// Whether lead covers all of a pixel.
+    fn is_covered(plane: &UnitPlane, geometry: &Geometry, pixel: CameraPx) -> bool {
         let at = geometry.correspondence.at(pixel);
         let affine = geometry.correspondence.affine;
         let pitch = vec2(affine[0][0], affine[1][1]);

@@ -1,9 +1,8 @@
-//! The cartoon of the window: which piece of glass lies where, and where the lead and the stone.
+//! The design of the rose window: glass, lead, stone and paint as a function of unit coordinates.
 //!
-//! A rose in Gothic tracery. From the middle outwards: a sun, twelve lancets with roundels in their
-//! heads, twenty-four narrower ones, eyelets wherever heads leave room, a ring of pearls; then
-//! quatrefoils in the corners of the square and its frame. A picture that is not square shows
-//! diamond quarries beside it. Unit coordinates throughout.
+//! A rose in Gothic tracery. From the centre outwards: a sun, twelve lancets with roundels in their heads,
+//! twenty-four narrower lancets, eyelets between the heads, a ring of pearls; then quatrefoils in the corners
+//! of the square, and its frame. A picture that is not square shows diamond quarries beside the square.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
@@ -12,24 +11,23 @@ use crate::simulate::coordinates::{Vec2, smoothstep, vec2};
 use crate::simulate::gradient_noise::{cell_hash, noise};
 use crate::simulate::shapes::{circle, fold, segment, smooth_union, star, vesica};
 
-/// Half the width of the bars between lights that are cut from stone, of the leads that hold large
-/// parts together, and of the fine ones.
-const STONE: f64 = 0.0076;
-const BOLD: f64 = 0.0060;
-const FINE: f64 = 0.0039;
-/// How far solder spreads where leads meet.
-const SOLDER: f64 = 0.005;
+/// Half the width of stone bars, of leads between large parts, and of fine leads.
+const STONE_HALF_WIDTH: f64 = 0.0076;
+const BOLD_HALF_WIDTH: f64 = 0.0060;
+const FINE_HALF_WIDTH: f64 = 0.0039;
+/// Radius of the solder where leads meet.
+const SOLDER_RADIUS: f64 = 0.005;
 
-/// What is at a point of the window.
+/// The window at one point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GlassPoint {
-    /// Number of the piece; the same everywhere on it.
+    /// Identifier of the piece of glass.
     pub piece: u32,
-    /// Its glass.
+    /// The kind of glass.
     pub glass: Glass,
-    /// Distance to the nearest lead's edge; negative within the lead.
+    /// Signed distance to the nearest edge of lead; negative within lead.
     pub clearance: f64,
-    /// Density of the painter's brown, 0 to 1.
+    /// Density of brown paint, 0 to 1.
     pub paint: f64,
 }
 
@@ -43,14 +41,14 @@ impl GlassPoint {
         }
     }
 
-    /// A lead along the line from which the point is `distance` away, soldered to those before it.
+    /// Adds a lead along a line at `distance`, soldered to the other leads.
     fn lead(mut self, distance: f64, half_width: f64) -> Self {
         let edge = distance.abs() - half_width;
-        self.clearance = smooth_union(self.clearance, edge, SOLDER);
+        self.clearance = smooth_union(self.clearance, edge, SOLDER_RADIUS);
         self
     }
 
-    /// Cuts a shape out, of signed distance `d`, and leads `piece` into it.
+    /// Inserts `piece` into the shape with signed distance `d`, with a lead around it.
     fn inlay(mut self, d: f64, half_width: f64, piece: u32, glass: Glass) -> Self {
         if d < 0.0 {
             self = Self::new(piece, glass);
@@ -58,25 +56,25 @@ impl GlassPoint {
         self.lead(d, half_width)
     }
 
-    /// Walls everything in but an opening of signed distance `d`.
+    /// Covers everything outside an opening with signed distance `d`.
     fn within(mut self, d: f64) -> Self {
         self.clearance = self.clearance.min(-d);
         self
     }
 
-    /// Paints with the given density.
+    /// Adds paint of the given density.
     fn painted(mut self, density: f64) -> Self {
         self.paint = self.paint.max(density.clamp(0.0, 1.0));
         self
     }
 }
 
-/// Density of a painted line that is `distance` away.
+/// Density of a painted line at `distance`.
 fn stroke(distance: f64, half_width: f64) -> f64 {
     1.0 - smoothstep(0.5 * half_width, 1.5 * half_width, distance.abs())
 }
 
-/// A diaper of lozenges with a dot in each, as painters lay it under figures.
+/// Density of a painted diaper: lozenges with a dot in each.
 fn diaper(p: Vec2, side: f64) -> f64 {
     let (a, b) = ((p.x + p.y) / side, (p.x - p.y) / side);
     let (a, b) = (a - a.round(), b - b.round());
@@ -85,7 +83,7 @@ fn diaper(p: Vec2, side: f64) -> f64 {
     0.34 * line.max(dot)
 }
 
-/// Leaves in pairs along a stem on the x axis, seen from its root.
+/// Density of painted leaves, in pairs along a stem on the x axis.
 fn foliage(p: Vec2, spacing: f64) -> f64 {
     let place = (p.x / spacing).round() * spacing;
     let q = vec2(p.x - place, p.y.abs()).rotated(-0.85);
@@ -93,38 +91,44 @@ fn foliage(p: Vec2, spacing: f64) -> f64 {
     0.55 * stroke(p.y, 0.0026).max(stroke(leaf, 0.0024))
 }
 
-/// Radii of the circles between the parts: the sun's, that of the first lancets, of the second ones,
-/// the ring of pearls' and the whole rose's. Half the side of the frame's inside.
-const SUN: f64 = 0.160;
-const FIRST: f64 = 0.545;
-const SECOND: f64 = 0.868;
-const PEARLS: f64 = 0.914;
-const FRAME: f64 = 0.940;
+/// Outer radii of the sun, of the first and the second ring of lancets and of the ring of pearls; half the
+/// side of the square inside the frame.
+const SUN_RADIUS: f64 = 0.160;
+const FIRST_LANCETS_RADIUS: f64 = 0.545;
+const SECOND_LANCETS_RADIUS: f64 = 0.868;
+const PEARLS_RADIUS: f64 = 0.914;
+const FRAME_HALF_SIDE: f64 = 0.940;
 
-/// What is at `p`. Pieces are numbered by part, hundreds, and place in it.
+/// The window at `p`. The identifier of a piece is its part in hundreds plus its index there.
 pub(super) fn glass_at(p: Vec2) -> GlassPoint {
-    // Drawn by hand.
+    // Irregular, as if drawn by hand.
     let p = p + vec2(noise(p * 6.0, 52).0, noise(p * 6.0, 53).0) * 0.005;
     let r = p.length();
     let square = p.x.abs().max(p.y.abs());
     if square > 1.0 {
-        quarries(p).lead(square - 1.0, BOLD)
-    } else if square > FRAME {
-        frame(p).lead(square - FRAME, BOLD).lead(square - 1.0, BOLD)
-    } else if r > PEARLS {
-        corner(p).lead(r - PEARLS, BOLD).lead(square - FRAME, BOLD)
-    } else if r > SECOND {
-        pearls(p, r).lead(r - PEARLS, BOLD).lead(r - SECOND, STONE)
-    } else if r > FIRST {
-        second_lancets(p).within(r - SECOND + STONE)
-    } else if r > SUN {
+        quarries(p).lead(square - 1.0, BOLD_HALF_WIDTH)
+    } else if square > FRAME_HALF_SIDE {
+        frame(p)
+            .lead(square - FRAME_HALF_SIDE, BOLD_HALF_WIDTH)
+            .lead(square - 1.0, BOLD_HALF_WIDTH)
+    } else if r > PEARLS_RADIUS {
+        corner(p)
+            .lead(r - PEARLS_RADIUS, BOLD_HALF_WIDTH)
+            .lead(square - FRAME_HALF_SIDE, BOLD_HALF_WIDTH)
+    } else if r > SECOND_LANCETS_RADIUS {
+        pearls(p, r)
+            .lead(r - PEARLS_RADIUS, BOLD_HALF_WIDTH)
+            .lead(r - SECOND_LANCETS_RADIUS, STONE_HALF_WIDTH)
+    } else if r > FIRST_LANCETS_RADIUS {
+        second_lancets(p).within(r - SECOND_LANCETS_RADIUS + STONE_HALF_WIDTH)
+    } else if r > SUN_RADIUS {
         first_lancets(p)
     } else {
-        sun(p).lead(r - SUN, STONE)
+        sun(p).lead(r - SUN_RADIUS, STONE_HALF_WIDTH)
     }
 }
 
-/// Twelve flaming points about a rose.
+/// A star with twelve points around six petals.
 fn sun(p: Vec2) -> GlassPoint {
     let (k, q) = fold(p, 12, 0.0);
     let (gap, _) = fold(p, 12, PI / 12.0);
@@ -133,33 +137,33 @@ fn sun(p: Vec2) -> GlassPoint {
     let petals = vesica(l - vec2(0.046, 0.0), 0.026, 0.017);
     let glass = [Glass::Amber, Glass::Gold][(k % 2) as usize];
     GlassPoint::new(10 + gap, Glass::Cobalt)
-        .inlay(rays, FINE, 30 + k, glass)
+        .inlay(rays, FINE_HALF_WIDTH, 30 + k, glass)
         .painted(0.5 * stroke(q.y, 0.0028) * smoothstep(0.0, 0.01, -rays))
-        .inlay(circle(p, 0.080), FINE, 50, Glass::Ruby)
-        .inlay(petals, 0.7 * FINE, 60 + petal, Glass::Opal)
+        .inlay(circle(p, 0.080), FINE_HALF_WIDTH, 50, Glass::Ruby)
+        .inlay(petals, 0.7 * FINE_HALF_WIDTH, 60 + petal, Glass::Opal)
         .painted(0.5 * stroke(l.y, 0.002) * smoothstep(0.0, 0.006, -petals))
-        .inlay(circle(p, 0.022), 0.8 * FINE, 51, Glass::Gold)
+        .inlay(circle(p, 0.022), 0.8 * FINE_HALF_WIDTH, 51, Glass::Gold)
 }
 
-/// The opening of a lancet whose sides point to the middle of the rose, `half` an angle from its
-/// axis, and whose head is round about `(head, 0)`: signed distance. Stone is left on its sides.
-fn lancet(q: Vec2, half: f64, head: f64, foot: f64) -> f64 {
-    let (s, c) = half.sin_cos();
+/// Signed distance to the opening of a lancet between stone bars. Its sides are radial, at the angle
+/// `half_angle` from its axis; its head is a circle around `(head, 0)`.
+fn lancet(q: Vec2, half_angle: f64, head: f64, foot: f64) -> f64 {
+    let (s, c) = half_angle.sin_cos();
     let y = q.y.abs();
     let d = if q.x * c + y * s > head * c {
-        circle(q - vec2(head, 0.0), head * s - STONE)
+        circle(q - vec2(head, 0.0), head * s - STONE_HALF_WIDTH)
     } else {
-        y * c - q.x * s + STONE
+        y * c - q.x * s + STONE_HALF_WIDTH
     };
-    d.max(foot + STONE - q.length())
+    d.max(foot + STONE_HALF_WIDTH - q.length())
 }
 
-/// A round of glass in the pale ground between the heads of lancets; the pieces' numbers.
-fn eyelet(p: Vec2, radius: f64, [ground, round]: [u32; 2], glass: Glass) -> GlassPoint {
+/// A disc of glass, piece `disc`, in the pale ground between the heads of lancets, piece `ground`.
+fn eyelet(p: Vec2, radius: f64, [ground, disc]: [u32; 2], glass: Glass) -> GlassPoint {
     let ring = stroke(circle(p, 0.45 * radius), 0.003);
     let edge = circle(p, radius);
     GlassPoint::new(ground, Glass::Pale)
-        .inlay(edge, FINE, round, glass)
+        .inlay(edge, FINE_HALF_WIDTH, disc, glass)
         .painted(if edge < 0.0 { 0.5 * ring } else { 0.0 })
 }
 
@@ -167,13 +171,13 @@ fn first_lancets(p: Vec2) -> GlassPoint {
     const HEAD: f64 = 0.428;
     let (gap, g) = fold(p, 12, PI / 12.0);
     let (k, q) = fold(p, 12, 0.0);
-    let light = lancet(q, PI / 12.0, HEAD, SUN);
+    let light = lancet(q, PI / 12.0, HEAD, SUN_RADIUS);
     if light > 0.0 {
         let eye = g - vec2(0.505, 0.0);
         let glass = [Glass::Amber, Glass::Ruby][(gap % 2) as usize];
         return eyelet(eye, 0.024, [200 + gap, 212 + gap], glass)
-            .within(2.0 * STONE - light)
-            .lead(p.length() - FIRST, STONE);
+            .within(2.0 * STONE_HALF_WIDTH - light)
+            .lead(p.length() - FIRST_LANCETS_RADIUS, STONE_HALF_WIDTH);
     }
     let even = k % 2 == 0;
     let (ground, edge) = if even {
@@ -182,7 +186,7 @@ fn first_lancets(p: Vec2) -> GlassPoint {
         (Glass::Ruby, Glass::Cobalt)
     };
     let c = q - vec2(HEAD, 0.0);
-    // A narrow border all round, cut where its colour changes.
+    // A narrow border of alternating colours.
     let step = (q.x / 0.058).floor();
     let side = u32::from(q.y > 0.0);
     let border = if step.rem_euclid(2.0) < 1.0 {
@@ -191,17 +195,23 @@ fn first_lancets(p: Vec2) -> GlassPoint {
         Glass::Pale
     };
     let border = GlassPoint::new(220 + 40 * k + 2 * (step as u32) + side, border)
-        .lead((q.x / 0.058 - (q.x / 0.058).round()) * 0.058, 0.7 * FINE)
-        .lead(q.y, 0.7 * FINE);
+        .lead(
+            (q.x / 0.058 - (q.x / 0.058).round()) * 0.058,
+            0.7 * FINE_HALF_WIDTH,
+        )
+        .lead(q.y, 0.7 * FINE_HALF_WIDTH);
     let field = light + 0.021;
-    let mut spot = border.inlay(field, FINE, 800 + k, ground);
+    let mut spot = border.inlay(field, FINE_HALF_WIDTH, 800 + k, ground);
     if field < 0.0 {
         spot = spot.painted(diaper(q, 0.020));
-        // A stem of leaves climbs to the roundel.
+        // A stem of leaves below the roundel.
         let stem = vesica(q - vec2(0.290, 0.0), 0.080, 0.030);
         let leaves = [Glass::Emerald, Glass::Moss][usize::from(even)];
-        spot = spot.lead(segment(q, vec2(0.2, 0.0), vec2(0.35, 0.0)), 0.6 * FINE);
-        spot = spot.inlay(stem, 0.9 * FINE, 820 + k, leaves);
+        spot = spot.lead(
+            segment(q, vec2(0.2, 0.0), vec2(0.35, 0.0)),
+            0.6 * FINE_HALF_WIDTH,
+        );
+        spot = spot.inlay(stem, 0.9 * FINE_HALF_WIDTH, 820 + k, leaves);
         if stem < 0.0 {
             spot = spot.painted(foliage(q - vec2(0.22, 0.0), 0.026));
         }
@@ -212,11 +222,11 @@ fn first_lancets(p: Vec2) -> GlassPoint {
     } else {
         (Glass::Azure, Glass::Amber)
     };
-    spot = spot.inlay(medallion, 0.8 * BOLD, 840 + k, rim);
+    spot = spot.inlay(medallion, 0.8 * BOLD_HALF_WIDTH, 840 + k, rim);
     if medallion > 0.0 {
         return spot.within(light);
     }
-    // Six petals, or a star with eight points, about a heart.
+    // Six petals, or a star with eight points.
     let (petal, l) = fold(c, 6, 0.0);
     let (figure, piece, heart) = if even {
         let petals = vesica(l - vec2(0.037, 0.0), 0.026, 0.0185);
@@ -226,9 +236,9 @@ fn first_lancets(p: Vec2) -> GlassPoint {
         (tips, 880 + k, Glass::Ruby)
     };
     spot.painted(0.45 * stroke(circle(c, 0.056), 0.0022))
-        .inlay(figure, 0.7 * FINE, piece, flower)
+        .inlay(figure, 0.7 * FINE_HALF_WIDTH, piece, flower)
         .painted(0.45 * stroke(l.y, 0.002) * smoothstep(0.0, 0.005, -figure))
-        .inlay(circle(c, 0.0155), 0.6 * FINE, 860 + k, heart)
+        .inlay(circle(c, 0.0155), 0.6 * FINE_HALF_WIDTH, 860 + k, heart)
         .within(light)
 }
 
@@ -236,11 +246,12 @@ fn second_lancets(p: Vec2) -> GlassPoint {
     const HEAD: f64 = 0.754;
     let (gap, g) = fold(p, 24, 0.0);
     let (k, q) = fold(p, 24, PI / 24.0);
-    let light = lancet(q, PI / 24.0, HEAD, FIRST);
+    let light = lancet(q, PI / 24.0, HEAD, FIRST_LANCETS_RADIUS);
     if light > 0.0 {
         let eye = g - vec2(0.830, 0.0);
         let glass = [Glass::Ruby, Glass::Cobalt, Glass::Emerald][(gap % 3) as usize];
-        return eyelet(eye, 0.020, [1200 + gap, 1600 + gap], glass).within(2.0 * STONE - light);
+        return eyelet(eye, 0.020, [1200 + gap, 1600 + gap], glass)
+            .within(2.0 * STONE_HALF_WIDTH - light);
     }
     let (ground, bar) = [
         (Glass::Cobalt, Glass::Ruby),
@@ -248,19 +259,19 @@ fn second_lancets(p: Vec2) -> GlassPoint {
         (Glass::Cobalt, Glass::Emerald),
         (Glass::Azure, Glass::Violet),
     ][(k % 4) as usize];
-    // Panels one above the other, barred by leads.
+    // Three panels along the radius, with leads between them.
     let panel = (((q.x - 0.562) / 0.0600).floor().clamp(0.0, 2.0)) as u32;
     let level = 0.562 + 0.0600 * ((q.x - 0.562) / 0.0600).round().clamp(1.0, 2.0);
     let foot = GlassPoint::new(1230 + 4 * k + panel, ground)
-        .lead(q.x - level, 0.8 * FINE)
+        .lead(q.x - level, 0.8 * FINE_HALF_WIDTH)
         .painted(diaper(q, 0.0175));
-    // A lozenge in each of the lower ones.
+    // A lozenge in each of the two inner panels.
     let middle = 0.562 + 0.0600 * (f64::from(panel.min(1)) + 0.5);
     let l = q - vec2(middle, 0.0);
     let lozenge = (l.x.abs() + 0.62 * l.y.abs() - 0.0280) * 0.81;
     let spot = if panel < 2 {
         let glass = if panel == 0 { bar } else { Glass::Pale };
-        foot.inlay(lozenge, 0.8 * FINE, 1340 + 2 * k + panel, glass)
+        foot.inlay(lozenge, 0.8 * FINE_HALF_WIDTH, 1340 + 2 * k + panel, glass)
             .painted(if lozenge < 0.0 {
                 0.55 * stroke(circle(l, 0.007), 0.0026)
             } else {
@@ -271,7 +282,7 @@ fn second_lancets(p: Vec2) -> GlassPoint {
     };
     let c = q - vec2(HEAD, 0.0);
     let medallion = circle(c, 0.068);
-    let spot = spot.inlay(medallion, 0.8 * BOLD, 1400 + k, bar);
+    let spot = spot.inlay(medallion, 0.8 * BOLD_HALF_WIDTH, 1400 + k, bar);
     if medallion > 0.0 {
         return spot.within(light);
     }
@@ -281,28 +292,28 @@ fn second_lancets(p: Vec2) -> GlassPoint {
     let glass = [Glass::Opal, Glass::Gold, Glass::Rose, Glass::Pale][(k % 4) as usize];
     let heart = [Glass::Cobalt, Glass::Ruby][(k % 2) as usize];
     spot.painted(0.45 * stroke(rays.y, 0.0022))
-        .inlay(figure, 0.8 * FINE, 1430 + k, glass)
+        .inlay(figure, 0.8 * FINE_HALF_WIDTH, 1430 + k, glass)
         .painted(if figure < 0.0 {
             0.5 * stroke(circle(l - vec2(0.035, 0.0), 0.011), 0.0022)
         } else {
             0.0
         })
-        .inlay(circle(c, 0.0155), 0.6 * FINE, 1460 + k, heart)
+        .inlay(circle(c, 0.0155), 0.6 * FINE_HALF_WIDTH, 1460 + k, heart)
         .within(light)
 }
 
 fn pearls(p: Vec2, r: f64) -> GlassPoint {
-    const MIDDLE: f64 = 0.5 * (PEARLS + SECOND) + 0.002;
+    const MIDDLE: f64 = 0.5 * (PEARLS_RADIUS + SECOND_LANCETS_RADIUS) + 0.002;
     let (k, q) = fold(p, 36, 0.0);
     let (gap, g) = fold(p, 36, PI / 36.0);
     let glass = [Glass::Ruby, Glass::Cobalt][(gap % 2) as usize];
     let leaf = stroke(vesica(vec2(g.y, r - MIDDLE), 0.028, 0.008), 0.0028);
     GlassPoint::new(1500 + gap, glass)
         .painted(0.5 * leaf)
-        .lead(q.y, 0.8 * FINE)
+        .lead(q.y, 0.8 * FINE_HALF_WIDTH)
         .inlay(
             circle(q - vec2(MIDDLE, 0.0), 0.0185),
-            0.7 * FINE,
+            0.7 * FINE_HALF_WIDTH,
             1540 + k,
             Glass::Opal,
         )
@@ -313,30 +324,32 @@ fn corner(p: Vec2) -> GlassPoint {
     let q = vec2(p.x.abs(), p.y.abs());
     let side = u32::from(q.x > q.y);
     let side_place = 2 * place + side;
-    // From here on in one half of the corner.
+    // Coordinates in one half of the corner.
     let h = vec2(q.x.min(q.y), q.x.max(q.y));
-    // The circles that touch the rose and the frame: a great one, and one on each side of it.
+    // A great circle that touches the rose and the frame, and a small one on each side of it.
     let c = q - vec2(0.7715, 0.7715);
     let small = h - vec2(0.537, 0.857);
     let great = circle(c, 0.158);
     let ground = GlassPoint::new(1860 + side_place, Glass::Cobalt)
-        .lead(q.x - q.y, FINE)
-        .lead(h.x, FINE);
+        .lead(q.x - q.y, FINE_HALF_WIDTH)
+        .lead(h.x, FINE_HALF_WIDTH);
     let stars = star(h - vec2(0.645, 0.917), 4, 0.017, 0.006);
-    let ground =
-        ground
-            .painted(diaper(q, 0.024))
-            .inlay(stars, 0.6 * FINE, 1870 + side_place, Glass::Pale);
-    // Between the small circle and the axis, a tail of foliage with a jewel at its root.
+    let ground = ground.painted(diaper(q, 0.024)).inlay(
+        stars,
+        0.6 * FINE_HALF_WIDTH,
+        1870 + side_place,
+        Glass::Pale,
+    );
+    // Foliage between the small circle and the axis, with a jewel.
     let tail = h.x - 0.40;
     let jewel = h - vec2(0.345, 0.896);
     let ground = if tail < 0.0 {
         GlassPoint::new(1880 + side_place, Glass::Gold)
             .painted(foliage(vec2(h.x, h.y - 0.920), 0.036))
-            .lead(h.x, FINE)
+            .lead(h.x, FINE_HALF_WIDTH)
             .inlay(
                 circle(jewel, 0.029),
-                0.8 * FINE,
+                0.8 * FINE_HALF_WIDTH,
                 1890 + side_place,
                 Glass::Ruby,
             )
@@ -344,37 +357,37 @@ fn corner(p: Vec2) -> GlassPoint {
     } else {
         ground
     }
-    .lead(tail, FINE);
+    .lead(tail, FINE_HALF_WIDTH);
 
     let rim = circle(small, 0.068);
     let (petal, l) = fold(small, 5, 0.3);
     let petals = circle(l - vec2(0.038, 0.0), 0.0225);
-    let ground = ground.inlay(rim, BOLD, 1640 + side_place, Glass::Violet);
+    let ground = ground.inlay(rim, BOLD_HALF_WIDTH, 1640 + side_place, Glass::Violet);
     let ground = if rim < 0.0 {
         ground
             .inlay(
                 petals,
-                0.7 * FINE,
+                0.7 * FINE_HALF_WIDTH,
                 1660 + 5 * side_place + petal,
                 Glass::Opal,
             )
             .painted(0.5 * stroke(l.y, 0.002) * smoothstep(0.0, 0.008, -petals))
             .inlay(
                 circle(small, 0.017),
-                0.7 * FINE,
+                0.7 * FINE_HALF_WIDTH,
                 1710 + side_place,
                 Glass::Gold,
             )
     } else {
         ground
     };
-    if great > BOLD {
-        return ground.lead(great, BOLD);
+    if great > BOLD_HALF_WIDTH {
+        return ground.lead(great, BOLD_HALF_WIDTH);
     }
-    // A quatrefoil cut from stone, a leaf in each foil.
+    // A quatrefoil in stone, with a leaf in each foil.
     let (foil, l) = fold(c, 4, 0.0);
     let opening = circle(l - vec2(0.074, 0.0), 0.072)
-        .max(great + 2.0 * BOLD)
+        .max(great + 2.0 * BOLD_HALF_WIDTH)
         .min(circle(c, 0.056));
     let leaf = vesica(l - vec2(0.092, 0.0), 0.046, 0.025);
     let number = 4 * place + foil;
@@ -382,21 +395,26 @@ fn corner(p: Vec2) -> GlassPoint {
         // Between the foils.
         let (between, _) = fold(c, 4, PI / 4.0);
         return GlassPoint::new(1800 + 4 * place + between, Glass::Azure)
-            .within((2.0 * BOLD - opening).max(great + BOLD));
+            .within((2.0 * BOLD_HALF_WIDTH - opening).max(great + BOLD_HALF_WIDTH));
     }
     GlassPoint::new(1730 + number, Glass::Ruby)
-        .lead((l.y.abs() - l.x) * FRAC_1_SQRT_2, FINE)
+        .lead((l.y.abs() - l.x) * FRAC_1_SQRT_2, FINE_HALF_WIDTH)
         .painted(diaper(c, 0.018))
-        .inlay(leaf, 0.8 * FINE, 1750 + number, Glass::Emerald)
+        .inlay(leaf, 0.8 * FINE_HALF_WIDTH, 1750 + number, Glass::Emerald)
         .painted(if leaf < 0.0 {
             foliage(l - vec2(0.05, 0.0), 0.018)
         } else {
             0.0
         })
-        .inlay(circle(c, 0.050), 0.8 * BOLD, 1770 + place, Glass::Cobalt)
+        .inlay(
+            circle(c, 0.050),
+            0.8 * BOLD_HALF_WIDTH,
+            1770 + place,
+            Glass::Cobalt,
+        )
         .inlay(
             star(c, 8, 0.040, 0.022),
-            0.6 * FINE,
+            0.6 * FINE_HALF_WIDTH,
             1780 + place,
             Glass::Gold,
         )
@@ -409,15 +427,16 @@ fn frame(p: Vec2) -> GlassPoint {
         (true, right, _) => (p.y, u32::from(right)),
         (false, _, below) => (p.x, 2 + u32::from(below)),
     };
-    if along.abs() > FRAME {
+    if along.abs() > FRAME_HALF_SIDE {
         let place = u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0);
-        return GlassPoint::new(700 + place, Glass::Ruby).lead(along.abs() - FRAME, FINE);
+        return GlassPoint::new(700 + place, Glass::Ruby)
+            .lead(along.abs() - FRAME_HALF_SIDE, FINE_HALF_WIDTH);
     }
-    // Long stones of two blues, short golden ones where they meet.
-    let length = 2.0 * FRAME / STONES;
-    let t = (along + FRAME) / length;
+    // Long stones in two blues, with short golden ones between them.
+    let length = 2.0 * FRAME_HALF_SIDE / STONES;
+    let t = (along + FRAME_HALF_SIDE) / length;
     let short = ((t - t.round()) * length).abs() - 0.030;
-    let middle = p.x.abs().max(p.y.abs()) - 0.5 * (1.0 + FRAME);
+    let middle = p.x.abs().max(p.y.abs()) - 0.5 * (1.0 + FRAME_HALF_SIDE);
     let from_joint = (t - t.round()) * length;
     if short < 0.0 {
         let dot = 0.55 * stroke(circle(vec2(from_joint, middle), 0.008), 0.003);
@@ -429,7 +448,7 @@ fn frame(p: Vec2) -> GlassPoint {
         let leaf = stroke(vesica(vec2(centre, middle), 0.045, 0.013), 0.0028);
         GlassPoint::new(710 + 20 * side + stone, glass).painted(0.5 * leaf)
     }
-    .lead(short, FINE)
+    .lead(short, FINE_HALF_WIDTH)
 }
 
 fn quarries(p: Vec2) -> GlassPoint {
@@ -453,8 +472,8 @@ fn quarries(p: Vec2) -> GlassPoint {
     let flower = stroke(vesica(q - vec2(0.16, 0.0), 0.11, 0.05), 0.012);
     GlassPoint::new(piece, glass)
         .painted(0.5 * flower)
-        .lead(line(a), FINE)
-        .lead(line(b), FINE)
+        .lead(line(a), FINE_HALF_WIDTH)
+        .lead(line(b), FINE_HALF_WIDTH)
 }
 
 #[cfg(test)]
@@ -462,9 +481,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn different_pieces_never_touch_without_lead_between() {
-        // Walk the window in steps much shorter than a lead is wide.
-        let step = 0.2 * FINE;
+    fn lead_separates_different_pieces() {
+        // Steps are much shorter than the width of a lead.
+        let step = 0.2 * FINE_HALF_WIDTH;
         for row in 0..160 {
             let y = -1.06 + f64::from(row) * 0.01327;
             let mut before = glass_at(vec2(-1.2, y));
