@@ -13,7 +13,7 @@ use crate::capture::{CaptureFolder, Measurements, Noise, Rows};
 use crate::relight::Light;
 use crate::simulate::{SceneKind, WINDOW_SIDE};
 use crate::study::{
-    self, CaptureTruth, Known, Photographer, RelitLight, SNR_PATTERNS, SceneTruth, Section,
+    self, CaptureTruth, KnownTransport, RelitLight, SNR_PATTERNS, SceneCamera, SceneTruth, Section,
 };
 use crate::transport::Extent;
 
@@ -33,9 +33,9 @@ const ELECTRONS: f64 = 40_000.0;
 const SEED: u64 = 2014;
 
 const INTRODUCTION: &str = "# Results\n\n\
-    SNR is 20 log10(‖T‖ / ‖T − T̂‖) over the whole matrix, Frobenius norms; what lies outside the \
-    window counts as error. L is the number of patterns, M that of light elements, N that of camera \
-    pixels. Figures are numbered as in the paper (Thanikachalam et al. 2014). \
+    SNR is 20 log10(‖T‖ / ‖T − T̂‖) over the whole matrix, with Frobenius norms; elements outside the \
+    window count as error. L is the number of patterns, M the number of light elements, N the number of \
+    camera pixels. Figures are numbered as in the paper (Thanikachalam et al. 2014). \
     `ltm-export study` writes this page.\n";
 
 /// Measure recovery where the transport is known: the paper's figures, its comparison, many scenes
@@ -135,7 +135,7 @@ fn study_one(
     subject: &Path,
     name: &str,
     pixels: usize,
-    progress: study::Progress,
+    progress: study::ProgressCallback,
 ) -> Result<Vec<Section>> {
     if !is_part(subject) {
         return study_capture(subject, name, pixels, progress)
@@ -151,13 +151,13 @@ fn study_one(
         .into_iter()
         .map(|(kind, name)| {
             let scene = kind.build(square(COMPARISON_CAMERA), square(COMPARISON_LIGHT))?;
-            let photographer = Photographer {
+            let scene_camera = SceneCamera {
                 scene: scene.as_ref(),
                 electrons: ELECTRONS,
                 seed: SEED,
             };
             let section =
-                study::comparison(name, photographer, kind.ensemble(), &AllCores, progress)?;
+                study::comparison(name, scene_camera, kind.ensemble(), &AllCores, progress)?;
             Ok(section)
         })
         .collect::<Result<_>>()?,
@@ -177,12 +177,12 @@ fn study_scene(
     kind: SceneKind,
     name: &str,
     pixels: usize,
-    progress: study::Progress,
+    progress: study::ProgressCallback,
 ) -> Result<Vec<Section>> {
     let light = square(PAPER_LIGHT);
     let scene = kind.build(square(PAPER_CAMERA), light)?;
     let known = SceneTruth(scene.as_ref());
-    let photographer = Photographer {
+    let scene_camera = SceneCamera {
         scene: scene.as_ref(),
         electrons: ELECTRONS,
         seed: SEED,
@@ -191,7 +191,7 @@ fn study_scene(
     progress(&format!(
         "{name}: photographing under {most} patterns, window {WINDOW_SIDE}"
     ));
-    let measurements = photographer.measure(kind.ensemble(), most, &AllCores)?;
+    let measurements = scene_camera.measure(kind.ensemble(), most, &AllCores)?;
     let lights = study::built_in_lights(light);
     figures(name, &known, measurements, lights, pixels, progress)
 }
@@ -201,7 +201,7 @@ fn study_capture(
     path: &Path,
     name: &str,
     pixels: usize,
-    progress: study::Progress,
+    progress: study::ProgressCallback,
 ) -> Result<Vec<Section>> {
     let folder = CaptureFolder::open(path)?;
     let truth = folder
@@ -242,11 +242,11 @@ fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
 
 fn figures(
     name: &str,
-    known: &impl Known,
+    known: &impl KnownTransport,
     measurements: Measurements,
     lights: Vec<RelitLight>,
     pixels: usize,
-    progress: study::Progress,
+    progress: study::ProgressCallback,
 ) -> Result<Vec<Section>> {
     let mut sections = vec![study::sparsity(name, known, &AllCores, progress)?];
     let relit_from = study::first_shots(&measurements, RELIT_PATTERNS);

@@ -1,32 +1,35 @@
-//! One method on one set of measurements, held against the truth.
+//! The SNR and the time of one method on one set of measurements, against the known transport.
 
 use std::time::Instant;
 
-use super::known::{Known, error_of};
-use super::methods::judged;
-use super::{StudyError, blocks};
+use super::known_transport::{KnownTransport, transport_error};
+use super::methods::sample_for;
+use super::{StudyError, pixel_sampling};
 use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::recover::{Method, Recovery, Settings};
 use crate::transport::{Decibels, TransportError};
 
-/// How well a method did, and what it cost.
+/// SNR and time of a method.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Accuracy {
-    /// SNR of the whole matrix; `None` where there is no error at all.
+    /// SNR of the whole matrix; `None` if the error is zero.
     pub snr: Option<Decibels>,
-    /// Standard error of `snr` from judging a sample of pixels, in dB; 0 where all were judged.
+    /// Standard error of `snr` in dB, because only a sample of pixels was recovered; 0 if all were.
     pub standard_error: f64,
-    /// Camera pixels judged.
+    /// Number of recovered camera pixels.
     pub pixels: usize,
-    /// Wall clock of recovering all pixels, scaled up from those judged.
+    /// Wall-clock time of recovering all pixels, extrapolated from the sample.
     pub seconds: f64,
 }
 
-/// Recovers and judges about `pixels` pixels, or more or fewer of them as the method is faster or
-/// slower ([`judged`]).
-pub(super) fn judge(
-    known: &impl Known,
+/// Recovers a sample of about `pixels` pixels, scaled by the method's speed ([`sample_for`]), and compares it
+/// with the known transport.
+///
+/// # Errors
+/// Those of [`Recovery::prepare`].
+pub(super) fn measure_accuracy(
+    known: &impl KnownTransport,
     measurements: &Measurements,
     method: Method,
     pixels: usize,
@@ -40,18 +43,18 @@ pub(super) fn judge(
     let recovery = Recovery::prepare(measurements, settings, executor)?;
     let prepared = start.elapsed().as_secs_f64();
     let geometry = *recovery.geometry();
-    let rects = judged(method, &geometry, pixels);
+    let rects = sample_for(method, &geometry, pixels);
     let functions = executor.map(rects.len(), |i| {
         let tile = recovery.tile(measurements, rects[i]);
         tile.functions(&geometry, recovery.basis())
     });
     let recovered = start.elapsed().as_secs_f64();
     let errors = executor.map(functions.len(), |i| {
-        error_of(known, &geometry, &functions[i])
+        transport_error(known, &geometry, &functions[i])
     });
-    let pixels = blocks::pixels(&rects);
+    let pixels = pixel_sampling::count_pixels(&rects);
     let all = geometry.camera.area();
-    let (snr, standard_error) = pooled(&errors, pixels as f64 / all as f64);
+    let (snr, standard_error) = pooled_snr(&errors, pixels as f64 / all as f64);
     let per_pixel = (recovered - prepared) / pixels as f64;
     Ok(Accuracy {
         snr,
@@ -61,9 +64,9 @@ pub(super) fn judge(
     })
 }
 
-/// SNR over all `parts`, and its standard error if they are a random `share` of what there is: that
-/// of a ratio of two sums (Cochran 1977, section 6.4), as decibels.
-pub(super) fn pooled(parts: &[TransportError], share: f64) -> (Option<Decibels>, f64) {
+/// SNR over all `parts`, and its standard error in dB if they are a random sample that covers a `share` of the
+/// picture: that of a ratio of two sums (Cochran 1977, section 6.4).
+pub(super) fn pooled_snr(parts: &[TransportError], share: f64) -> (Option<Decibels>, f64) {
     let mut sum = TransportError::default();
     parts.iter().for_each(|&part| sum.merge(part));
     let n = parts.len() as f64;
@@ -89,12 +92,12 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_of_equal_parts_leaves_no_doubt_and_one_of_unequal_parts_does() {
-        let (snr, doubt) = pooled(&[part(1.0, 0.9); 5], 0.1);
+    fn standard_error_is_zero_for_equal_parts_or_complete_samples() {
+        let (snr, standard_error) = pooled_snr(&[part(1.0, 0.9); 5], 0.1);
         assert!((snr.unwrap().0 - 20.0).abs() < 1e-9);
-        assert!(doubt < 1e-9);
+        assert!(standard_error < 1e-9);
         let unequal = [part(1.0, 0.9), part(1.0, 0.99)];
-        assert!(pooled(&unequal, 0.1).1 > 1.0);
-        assert_eq!(pooled(&unequal, 1.0).1, 0.0, "all were judged");
+        assert!(pooled_snr(&unequal, 0.1).1 > 1.0);
+        assert_eq!(pooled_snr(&unequal, 1.0).1, 0.0, "all were judged");
     }
 }

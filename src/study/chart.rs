@@ -1,4 +1,4 @@
-//! Line charts as SVG.
+//! Line charts with a logarithmic horizontal axis, as SVG.
 
 use std::fmt::Display;
 use std::ops::Range;
@@ -9,11 +9,11 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::StudyError;
 
-/// Size in pixels.
-const SIZE: (u32, u32) = (960, 500);
-/// Room at the right for the names of lines, which there hide nothing.
-const LEGEND: u32 = 210;
-/// Colours that people with any colour vision tell apart (Okabe & Ito 2008).
+/// Width and height.
+const SIZE_PX: (u32, u32) = (960, 500);
+/// Width of the legend, to the right of the plot.
+const LEGEND_WIDTH_PX: u32 = 210;
+/// Colours that are distinct with every kind of colour vision (Okabe & Ito 2008).
 const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -29,17 +29,17 @@ const FONT: &str = "Helvetica, Arial, sans-serif";
 /// One line.
 pub(super) struct Series {
     pub name: String,
-    /// By rising x; every x is above zero.
+    /// By ascending x; every x is positive.
     pub points: Vec<(f64, f64)>,
-    /// Whether the points themselves are shown.
-    pub marked: bool,
+    /// Whether points have markers.
+    pub has_markers: bool,
 }
 
-/// A second reading of the horizontal axis, along the top: `x · factor`.
+/// A second horizontal axis at the top, with the values `x · factor`.
 pub(super) struct TopAxis {
     pub label: &'static str,
     pub factor: f64,
-    /// Where ticks stand, as read at the top.
+    /// Values of the ticks.
     pub ticks: Vec<f64>,
 }
 
@@ -51,18 +51,21 @@ pub(super) struct Chart<'a> {
     pub x_ticks: Vec<f64>,
     pub top: Option<TopAxis>,
     pub y: Range<f64>,
-    /// A level to compare with, and its name.
-    pub level: Option<(f64, &'a str)>,
+    /// A reference value on the y axis, and its name.
+    pub reference: Option<(f64, &'a str)>,
     pub series: Vec<Series>,
 }
 
 impl Chart<'_> {
-    /// Draws it.
+    /// Draws the chart as SVG.
+    ///
+    /// # Errors
+    /// [`StudyError::Chart`] if the drawing library fails.
     pub fn svg(&self) -> Result<String, StudyError> {
         let mut svg = String::new();
-        let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        self.draw(&area).map_err(failed)?;
-        area.present().map_err(failed)?;
+        let area = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
+        self.draw(&area).map_err(chart_error)?;
+        area.present().map_err(chart_error)?;
         drop(area);
         Ok(svg)
     }
@@ -78,7 +81,7 @@ impl Chart<'_> {
         let mut builder = ChartBuilder::on(&area);
         builder
             .margin(12)
-            .margin_right(LEGEND)
+            .margin_right(LEGEND_WIDTH_PX)
             .x_label_area_size(52)
             .y_label_area_size(64);
         if self.top.is_some() {
@@ -113,8 +116,8 @@ impl Chart<'_> {
             .axis_style(RGBColor(90, 90, 90))
             .x_desc(self.x_label)
             .y_desc(self.y_label)
-            .x_label_formatter(&|x| number(*x))
-            .y_label_formatter(&|y| number(*y))
+            .x_label_formatter(&|x| format_number(*x))
+            .y_label_formatter(&|y| format_number(*y))
             .label_style(label)
             .axis_desc_style((FONT, 16))
             .draw()
@@ -124,17 +127,17 @@ impl Chart<'_> {
                 .configure_secondary_axes()
                 .x_labels(top.ticks.len())
                 .x_desc(top.label)
-                .x_label_formatter(&|x| number(*x))
+                .x_label_formatter(&|x| format_number(*x))
                 .label_style(label)
                 .axis_desc_style((FONT, 16))
                 .axis_style(RGBColor(90, 90, 90))
                 .draw()
                 .map_err(boxed)?;
         }
-        let left = (area.dim_in_pixel().0 - LEGEND + 16) as i32;
-        if let Some((level, name)) = self.level {
+        let left = (area.dim_in_pixel().0 - LEGEND_WIDTH_PX + 16) as i32;
+        if let Some((value, name)) = self.reference {
             let grey = RGBColor(120, 120, 120);
-            let ends = [(x.start, level), (x.end, level)];
+            let ends = [(x.start, value), (x.end, value)];
             chart
                 .draw_series(DashedLineSeries::new(ends, 6, 5, grey.stroke_width(1)))
                 .map_err(boxed)?;
@@ -143,13 +146,13 @@ impl Chart<'_> {
                 let dash = PathElement::new([(x, y), (x + 8, y)], grey.stroke_width(1));
                 area.draw(&dash).map_err(boxed)?;
             }
-            area.draw(&beside(name, left, y)).map_err(boxed)?;
+            area.draw(&legend_label(name, left, y)).map_err(boxed)?;
         }
         for (i, series) in self.series.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
             let line = LineSeries::new(series.points.iter().copied(), colour.stroke_width(2));
             chart.draw_series(line).map_err(boxed)?;
-            if series.marked {
+            if series.has_markers {
                 let points = series.points.iter();
                 chart
                     .draw_series(points.map(|&p| Circle::new(p, 4, colour.filled())))
@@ -158,32 +161,33 @@ impl Chart<'_> {
             let y = 72 + 24 * i as i32;
             let line = PathElement::new([(left, y), (left + 22, y)], colour.stroke_width(3));
             area.draw(&line).map_err(boxed)?;
-            area.draw(&beside(&series.name, left, y)).map_err(boxed)?;
+            area.draw(&legend_label(&series.name, left, y))
+                .map_err(boxed)?;
         }
         Ok(())
     }
 
-    /// From the first point to the last of any line, and a little room.
+    /// From the smallest x to the largest, with a margin.
     fn x_range(&self) -> Range<f64> {
         let xs = || self.series.iter().flat_map(|s| &s.points).map(|p| p.0);
-        let (least, most) = (xs().fold(f64::MAX, f64::min), xs().fold(0.0, f64::max));
-        match least < most {
-            true => least / 1.08..most * 1.08,
-            false => 0.5 * most.max(1.0)..2.0 * most.max(1.0),
+        let (min, max) = (xs().fold(f64::MAX, f64::min), xs().fold(0.0, f64::max));
+        match min < max {
+            true => min / 1.08..max * 1.08,
+            false => 0.5 * max.max(1.0)..2.0 * max.max(1.0),
         }
     }
 }
 
-/// A name in the legend, beside the piece of its line that begins at `left`.
-fn beside(name: &str, left: i32, y: i32) -> Text<'static, (i32, i32), String> {
+/// A name in the legend, to the right of its line, which begins at `left`.
+fn legend_label(name: &str, left: i32, y: i32) -> Text<'static, (i32, i32), String> {
     let style = TextStyle::from((FONT, 14).into_font());
     let style = style.pos(Pos::new(HPos::Left, VPos::Center));
     Text::new(name.to_owned(), (left + 30, y), style)
 }
 
-/// A range of levels that holds `values` and ends on round numbers.
-pub(super) fn level_range(values: impl Iterator<Item = f64>, least_top: f64) -> Range<f64> {
-    let (mut low, mut high) = (0.0f64, least_top);
+/// A range that contains zero, `min_top` and `values`, and ends on multiples of 5.
+pub(super) fn axis_range(values: impl Iterator<Item = f64>, min_top: f64) -> Range<f64> {
+    let (mut low, mut high) = (0.0f64, min_top);
     for value in values {
         (low, high) = (low.min(value), high.max(value));
     }
@@ -191,8 +195,8 @@ pub(super) fn level_range(values: impl Iterator<Item = f64>, least_top: f64) -> 
     (low / step).floor() * step..(high / step).ceil() * step
 }
 
-/// Up to three significant digits, without zeros that say nothing.
-fn number(x: f64) -> String {
+/// A number with up to three significant digits, without trailing zeros.
+fn format_number(x: f64) -> String {
     if x == 0.0 {
         return "0".to_owned();
     }
@@ -208,7 +212,7 @@ fn boxed<E: std::error::Error + 'static>(error: E) -> Box<dyn std::error::Error>
     Box::new(error)
 }
 
-fn failed(error: impl Display) -> StudyError {
+fn chart_error(error: impl Display) -> StudyError {
     StudyError::Chart(error.to_string())
 }
 
@@ -217,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_short() {
+    fn numbers_have_three_significant_digits() {
         for (x, text) in [
             (0.0, "0"),
             (0.00122, "0.00122"),
@@ -226,12 +230,12 @@ mod tests {
             (320.0, "320"),
             (-5.0, "-5"),
         ] {
-            assert_eq!(number(x), text);
+            assert_eq!(format_number(x), text);
         }
     }
 
     #[test]
-    fn a_chart_shows_its_labels_and_lines() {
+    fn a_chart_has_labels_and_markers() {
         let chart = Chart {
             title: "Title",
             x_label: "across",
@@ -242,12 +246,12 @@ mod tests {
                 factor: 2.0,
                 ticks: vec![2.0, 20.0],
             }),
-            y: level_range([-3.0, 31.0].into_iter(), 25.0),
-            level: Some((25.0, "25 dB")),
+            y: axis_range([-3.0, 31.0].into_iter(), 25.0),
+            reference: Some((25.0, "25 dB")),
             series: vec![Series {
                 name: "nnls".to_owned(),
                 points: vec![(1.0, -3.0), (10.0, 31.0)],
-                marked: true,
+                has_markers: true,
             }],
         };
         assert_eq!(chart.y, -5.0..35.0);

@@ -1,145 +1,149 @@
-//! The paper's comparison, at a size where every way to acquire a transport can be run: photographs
-//! and time needed for 25 dB.
+//! Comparison of acquisition methods (paper, section 1): the photographs and the time that each needs for an SNR
+//! of 25 dB, on a scene so small that all of them are feasible.
 
 use std::time::Instant;
 
-use super::accuracy::{judge, pooled};
-use super::brute_force;
-use super::chart::{Chart, Series, TopAxis, level_range};
-use super::dense::Dense;
-use super::known::SceneTruth;
-use super::methods::{self, METHODS};
-use super::nystrom::{Nystrom, Samples};
-use super::photograph::first_shots;
-use super::report::{Section, Table, cell, seconds};
-use super::{Photographer, Picture, Progress, StudyError, blocks, unwindowed};
-use crate::capture::Measurements;
+use super::accuracy::{measure_accuracy, pooled_snr};
+use super::chart::{Chart, Series, TopAxis, axis_range};
+use super::dense_transport::DenseTransport;
+use super::known_transport::SceneTruth;
+use super::methods;
+use super::nystrom::{Nystrom, NystromSamples};
+use super::scene_camera::first_shots;
+use super::section::{Section, Table, seconds_cell, snr_cell};
+use super::{ProgressCallback, SceneCamera, StudyError, pixel_sampling, scanning, unwindowed};
+use crate::capture::{Measurements, Picture};
 use crate::executor::Executor;
+use crate::recover::Method;
 use crate::simulate::{Ensemble, LightCodes};
 use crate::transport::{CHANNELS, Decibels, Extent, TransportError};
 
-/// Numbers of photographs that curves have points at, rising.
-const PHOTOGRAPHS: [usize; 8] = [10, 20, 40, 80, 160, 320, 640, 1024];
-/// Most patterns that methods with patterns are given.
-const MOST_PATTERNS: usize = 640;
-/// Of those, the numbers that slow methods are given.
-const SLOW_PATTERNS: [usize; 4] = [20, 80, 160, 320];
-/// Pixels that stand for all where every element is an unknown.
+/// Numbers of photographs at the points of curves, ascending.
+const PHOTOGRAPH_COUNTS: [usize; 8] = [10, 20, 40, 80, 160, 320, 640, 1024];
+/// Largest number of patterns for the methods that use patterns.
+const MAX_PATTERNS: usize = 640;
+/// Numbers of patterns for slow methods.
+const SLOW_PATTERN_COUNTS: [usize; 4] = [20, 80, 160, 320];
+/// Sample size of recovery without a window.
 const UNWINDOWED_PIXELS: usize = 96;
-/// The level to reach, in dB.
-const LEVEL: f64 = 25.0;
-/// Photographs of the first scanned element, row and dark frame: no two share their noise.
-const ROW_NOISE: u32 = 1 << 20;
+/// The SNR to reach.
+const TARGET_SNR_DB: f64 = 25.0;
+/// Index of the first photograph of a row, so that its noise differs from that of all other photographs.
+const FIRST_ROW_PHOTOGRAPH: u32 = 1 << 20;
 
-/// One way to acquire a transport.
-struct Curve {
+/// The SNR of one acquisition method by the number of photographs.
+struct MethodCurve {
     name: String,
-    points: Vec<Point>,
+    points: Vec<ComparisonPoint>,
 }
 
-struct Point {
+struct ComparisonPoint {
     photographs: usize,
     snr: Option<Decibels>,
     seconds: f64,
 }
 
-/// Holds the ways to acquire a transport against each other on one scene, named `name`.
+/// Compares the acquisition methods on one scene, named `name`.
+///
+/// # Errors
+/// Those of photographing and recovering the scene, and [`StudyError`] if a chart or a table cannot be written.
 pub fn comparison(
     name: &str,
-    photographer: Photographer,
+    scene_camera: SceneCamera,
     ensemble: Ensemble,
     executor: &impl Executor,
-    progress: Progress,
+    progress: ProgressCallback,
 ) -> Result<Section, StudyError> {
-    let known = SceneTruth(photographer.scene);
+    let known = SceneTruth(scene_camera.scene);
     let (camera, light) = {
-        let geometry = photographer.scene.geometry();
+        let geometry = scene_camera.scene.geometry();
         (geometry.camera, geometry.light)
     };
-    let truth = Dense::new(&known, executor);
+    let truth = DenseTransport::new(&known, executor);
     let elements = light.area();
-    let counts = |most: usize| PHOTOGRAPHS.into_iter().filter(move |&k| k <= most);
-    let tell = |curve: &Curve| {
+    let counts = |max: usize| PHOTOGRAPH_COUNTS.into_iter().filter(move |&k| k <= max);
+    let report = |curve: &MethodCurve| {
         if let Some(last) = curve.points.last() {
             progress(&format!(
                 "comparison, {name}: {}: {} dB from {}",
                 curve.name,
-                cell(last.snr),
+                snr_cell(last.snr),
                 last.photographs
             ));
         }
     };
 
-    let scans = photographer.photographs(&single_elements(light), executor)?;
+    let scans = scene_camera.photographs(&single_elements(light), executor)?;
     let start = Instant::now();
-    let scanned = brute_force::scan(&truth, &scans);
-    let taken = start.elapsed().as_secs_f64();
-    let mut curves = vec![Curve {
+    let scanned = scanning::snr_by_scans(&truth, &scans);
+    let seconds = start.elapsed().as_secs_f64();
+    let mut curves = vec![MethodCurve {
         name: "scanning".to_owned(),
         points: scanned
             .into_iter()
             .enumerate()
-            .map(|(i, snr)| Point {
+            .map(|(i, snr)| ComparisonPoint {
                 photographs: i + 1,
                 snr,
-                seconds: taken,
+                seconds,
             })
             .collect(),
     }];
-    tell(&curves[0]);
+    report(&curves[0]);
 
-    let mut nystrom = Curve {
+    let mut nystrom = MethodCurve {
         name: "kernel Nyström".to_owned(),
         points: Vec::new(),
     };
     for photographs in counts(2 * elements.min(camera.area())) {
-        let (snr, seconds) = low_rank(&truth, &photographer, &scans, photographs, executor)?;
-        nystrom.points.push(Point {
+        let (snr, seconds) = run_nystrom(&truth, &scene_camera, &scans, photographs, executor)?;
+        nystrom.points.push(ComparisonPoint {
             photographs,
             snr,
             seconds,
         });
     }
-    tell(&nystrom);
+    report(&nystrom);
     curves.push(nystrom);
     drop(scans);
 
-    let measurements = photographer.measure(ensemble, MOST_PATTERNS, executor)?;
-    let mut whole = Curve {
+    let measurements = scene_camera.measure(ensemble, MAX_PATTERNS, executor)?;
+    let mut no_window = MethodCurve {
         name: "no window, nnls".to_owned(),
         points: Vec::new(),
     };
-    for l in counts(MOST_PATTERNS) {
+    for l in counts(MAX_PATTERNS) {
         let measurements = first_shots(&measurements, l);
         let (errors, seconds) =
             unwindowed::recover(&truth, &measurements, UNWINDOWED_PIXELS, executor);
         let share = errors.len() as f64 / truth.pixels() as f64;
-        whole.points.push(Point {
+        no_window.points.push(ComparisonPoint {
             photographs: l,
-            snr: pooled(&errors, share).0,
+            snr: pooled_snr(&errors, share).0,
             seconds,
         });
     }
-    tell(&whole);
-    curves.push(whole);
+    report(&no_window);
+    curves.push(no_window);
 
-    for &method in METHODS {
-        let mut curve = Curve {
+    for &method in Method::ALL {
+        let mut curve = MethodCurve {
             name: format!("window, {}", methods::name(method)),
             points: Vec::new(),
         };
-        // Every point of a slow method would take longer than all else here together.
-        let wanted = |l: &usize| !methods::slow(method) || SLOW_PATTERNS.contains(l);
-        for l in counts(MOST_PATTERNS).filter(wanted) {
+        // All points of a slow method would take longer than everything else here.
+        let is_measured = |l: &usize| !methods::is_slow(method) || SLOW_PATTERN_COUNTS.contains(l);
+        for l in counts(MAX_PATTERNS).filter(is_measured) {
             let measurements = first_shots(&measurements, l);
-            let accuracy = judge(&known, &measurements, method, camera.area(), executor)?;
-            curve.points.push(Point {
+            let accuracy =
+                measure_accuracy(&known, &measurements, method, camera.area(), executor)?;
+            curve.points.push(ComparisonPoint {
                 photographs: l,
                 snr: accuracy.snr,
                 seconds: accuracy.seconds,
             });
         }
-        tell(&curve);
+        report(&curve);
         curves.push(curve);
     }
     section(name, camera, elements, &measurements, &curves)
@@ -150,18 +154,19 @@ fn section(
     camera: Extent,
     elements: usize,
     measurements: &Measurements,
-    curves: &[Curve],
+    curves: &[MethodCurve],
 ) -> Result<Section, StudyError> {
-    let mut section = Section::new(&format!("Photographs for {LEVEL} dB, {name}"));
-    section.paragraph(&format!(
-        "Camera {camera}, light {}, the same camera and noise for all. Scanning lights one element \
-         a photograph, and what it has not scanned counts as dark; one element gives little light, \
-         so that noise bounds what it reaches. Kernel Nyström photographs as \
-         many rows of T as columns and keeps them as they are; rows need a projector at the camera's place and a camera at \
-         the light's, which the other methods do without, and count as photographs all the same. \
-         Without a window every light element is an unknown of every pixel; that is judged on {UNWINDOWED_PIXELS} pixels drawn at \
-         random, its time scaled to all. Photographs for {LEVEL} dB are read off the curve, straight \
-         between its points. Time is for computing alone.",
+    let mut section = Section::new(&format!("Photographs for {TARGET_SNR_DB} dB, {name}"));
+    section.add_paragraph(&format!(
+        "Camera {camera}, light plane {}, the same camera and noise for all methods. Scanning photographs \
+         one light element at a time; the elements not yet scanned count as dark. One element gives \
+         little light, so that noise limits the SNR. Kernel Nyström photographs as many rows of T as \
+         columns. Rows need a second projector at the camera's position and a second camera at the \
+         light's, which the other methods do not need; each row counts as one photograph. Without a \
+         window every light element is an unknown of every pixel; this method is evaluated on \
+         {UNWINDOWED_PIXELS} random pixels, and its time is extrapolated to all pixels. The number of \
+         photographs for {TARGET_SNR_DB} dB is interpolated between the points of the curve. Times are \
+         computing times without the photographing.",
         measurements.light,
     ));
     let mut data = Table::new(&["method", "photographs", "snr_db", "seconds"]);
@@ -175,36 +180,36 @@ fn section(
     ]);
     for curve in curves {
         for point in &curve.points {
-            data.row([
+            data.add_row([
                 curve.name.clone(),
                 point.photographs.to_string(),
-                cell(point.snr),
-                seconds(point.seconds),
+                snr_cell(point.snr),
+                seconds_cell(point.seconds),
             ]);
         }
-        let needed = photographs_for(LEVEL, &curve.points);
-        let most = curve.points.last().map_or(0, |p| p.photographs);
+        let needed = photographs_for(TARGET_SNR_DB, &curve.points);
+        let max = curve.points.last().map_or(0, |p| p.photographs);
         let at_80 = curve.points.iter().find(|p| p.photographs == 80);
         let best = curve
             .points
             .iter()
-            .max_by(|a, b| level(a).total_cmp(&level(b)));
-        // Time at the level, or at the best where it is not reached.
+            .max_by(|a, b| snr_db(a).total_cmp(&snr_db(b)));
+        // The time at the target SNR, or at the best SNR if the target is not reached.
         let timed = match needed {
             Some(needed) => curve.points.iter().find(|p| p.photographs >= needed),
             None => best,
         };
-        table.row([
+        table.add_row([
             curve.name.clone(),
-            needed.map_or(format!("more than {most}"), |k| k.to_string()),
+            needed.map_or(format!("more than {max}"), |k| k.to_string()),
             needed.map_or(String::new(), |k| {
                 format!("{:.1} %", 100.0 * k as f64 / elements as f64)
             }),
-            cell(at_80.and_then(|p| p.snr)),
+            snr_cell(at_80.and_then(|p| p.snr)),
             best.map_or(String::new(), |p| {
-                format!("{} ({})", cell(p.snr), p.photographs)
+                format!("{} ({})", snr_cell(p.snr), p.photographs)
             }),
-            timed.map_or(String::new(), |p| seconds(p.seconds)),
+            timed.map_or(String::new(), |p| seconds_cell(p.seconds)),
         ]);
     }
     let series: Vec<_> = curves
@@ -214,13 +219,13 @@ fn section(
             points: curve
                 .points
                 .iter()
-                .filter(|p| p.photographs >= PHOTOGRAPHS[0])
+                .filter(|p| p.photographs >= PHOTOGRAPH_COUNTS[0])
                 .filter_map(|p| Some((p.photographs as f64, p.snr?.0)))
                 .collect(),
-            marked: curve.points.len() <= PHOTOGRAPHS.len(),
+            has_markers: curve.points.len() <= PHOTOGRAPH_COUNTS.len(),
         })
         .collect();
-    let ticks: Vec<f64> = PHOTOGRAPHS.map(|k| k as f64).into();
+    let ticks: Vec<f64> = PHOTOGRAPH_COUNTS.map(|k| k as f64).into();
     let levels = series.iter().flat_map(|s| &s.points).map(|p| p.1);
     let chart = Chart {
         title: &format!("{name}, N = {}, M = {elements}", camera.area()),
@@ -232,21 +237,21 @@ fn section(
             ticks: ticks.iter().map(|k| k / elements as f64).collect(),
         }),
         x_ticks: ticks,
-        y: level_range(levels, 35.0),
-        level: Some((LEVEL, "25 dB")),
+        y: axis_range(levels, 35.0),
+        reference: Some((TARGET_SNR_DB, "25 dB")),
         series,
     };
-    section.picture(
+    section.add_picture(
         &format!("comparison-{name}"),
         &format!("SNR of the transport of {name} against photographs, by way of acquisition"),
         chart.svg()?,
     );
-    section.paragraph(&table.markdown());
-    section.data(&format!("comparison-{name}"), &data)?;
+    section.add_paragraph(&table.markdown());
+    section.add_csv(&format!("comparison-{name}"), &data)?;
     Ok(section)
 }
 
-/// Every element alone at full brightness.
+/// The codes of each light element alone at full brightness.
 fn single_elements(light: Extent) -> Vec<LightCodes> {
     let single = |m: usize| {
         let mut codes = vec![0; light.area()];
@@ -256,22 +261,22 @@ fn single_elements(light: Extent) -> Vec<LightCodes> {
     (0..light.area()).map(single).collect()
 }
 
-/// Kernel Nyström from half as many columns and rows as `photographs`, drawn at random: its SNR, and
-/// the seconds it takes once they are photographed.
-fn low_rank(
-    truth: &Dense,
-    photographer: &Photographer,
+/// Kernel Nyström from random columns and rows, half of `photographs` each: its SNR and its computing time in
+/// seconds.
+fn run_nystrom(
+    truth: &DenseTransport,
+    scene_camera: &SceneCamera,
     scans: &[Picture],
     photographs: usize,
     executor: &impl Executor,
 ) -> Result<(Option<Decibels>, f64), StudyError> {
-    let elements = blocks::draw(truth.elements, photographs / 2);
-    let pixels = blocks::draw(truth.pixels(), photographs - photographs / 2);
+    let elements = pixel_sampling::random_indices(truth.elements, photographs / 2);
+    let pixels = pixel_sampling::random_indices(truth.pixels(), photographs - photographs / 2);
     let black = vec![[0.0; CHANNELS]; truth.elements];
-    let dark = photographer.noisy(&black, ROW_NOISE)?;
+    let dark = scene_camera.add_noise(&black, FIRST_ROW_PHOTOGRAPH)?;
     let rows = executor.map(pixels.len(), |i| {
         let row = truth.pixel(pixels[i]).to_vec();
-        photographer.noisy(&row, ROW_NOISE + 1 + pixels[i] as u32)
+        scene_camera.add_noise(&row, FIRST_ROW_PHOTOGRAPH + 1 + pixels[i] as u32)
     });
     let rows = rows.into_iter().collect::<Result<Vec<_>, _>>()?;
     let start = Instant::now();
@@ -284,7 +289,7 @@ fn low_rank(
             less_dark.map(|(y, dark)| f64::from(y[c] - dark[c]))
         });
         let nystrom = Nystrom::new(
-            &Samples {
+            &NystromSamples {
                 columns: columns.collect(),
                 rows: sampled.collect(),
                 elements: elements.clone(),
@@ -295,7 +300,7 @@ fn low_rank(
         );
         let errors = executor.map(truth.pixels(), |n| {
             let mut estimate = nystrom.pixel(n);
-            // What was photographed is better known than what is predicted from it.
+            // Photographed columns and rows replace their predictions.
             for &m in &elements {
                 estimate[m] = f64::from(scans[m][n][c].max(0.0));
             }
@@ -314,23 +319,23 @@ fn low_rank(
             part.merge(error);
         }
     }
-    Ok((pooled(&parts, 1.0).0, start.elapsed().as_secs_f64()))
+    Ok((pooled_snr(&parts, 1.0).0, start.elapsed().as_secs_f64()))
 }
 
-/// A level to sort by.
-fn level(point: &Point) -> f64 {
+/// The SNR in dB, infinite without error.
+fn snr_db(point: &ComparisonPoint) -> f64 {
     point.snr.map_or(f64::INFINITY, |snr| snr.0)
 }
 
-/// Fewest photographs that reach `wanted` for good, straight between points in the logarithm of
-/// their number.
-fn photographs_for(wanted: f64, points: &[Point]) -> Option<usize> {
-    let reached = points.iter().rposition(|p| level(p) < wanted);
+/// The number of photographs from which on the SNR is at least `target` dB, interpolated linearly in the
+/// logarithm of the number; `None` if the curve ends below.
+fn photographs_for(target: f64, points: &[ComparisonPoint]) -> Option<usize> {
+    let reached = points.iter().rposition(|p| snr_db(p) < target);
     let (below, above) = match reached {
         None => return points.first().map(|p| p.photographs),
         Some(i) => (&points[i], points.get(i + 1)?),
     };
-    let share = (wanted - level(below)) / (level(above) - level(below));
+    let share = (target - snr_db(below)) / (snr_db(above) - snr_db(below));
     let (a, b) = (below.photographs as f64, above.photographs as f64);
     Some((a * (b / a).powf(share) - 1e-9).ceil() as usize)
 }
@@ -341,8 +346,8 @@ mod tests {
     use crate::executor::SequentialExecutor;
     use crate::simulate::SceneKind;
 
-    fn point(photographs: usize, db: f64) -> Point {
-        Point {
+    fn point(photographs: usize, db: f64) -> ComparisonPoint {
+        ComparisonPoint {
             photographs,
             snr: Some(Decibels(db)),
             seconds: 0.0,
@@ -350,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn photographs_needed_lie_between_points() {
+    fn photographs_for_interpolates_between_points() {
         let curve = [point(10, 5.0), point(40, 25.0), point(160, 35.0)];
         assert_eq!(photographs_for(25.0, &curve), Some(40));
         assert_eq!(photographs_for(30.0, &curve), Some(80));
@@ -359,20 +364,20 @@ mod tests {
     }
 
     #[test]
-    fn every_way_is_tried_on_a_tiny_scene() {
+    fn comparison_runs_every_method_on_a_tiny_scene() {
         let side = |side| Extent {
             width: side,
             height: side,
         };
         let scene = SceneKind::Cookies.build(side(8), side(4)).unwrap();
-        let photographer = Photographer {
+        let scene_camera = SceneCamera {
             scene: scene.as_ref(),
             electrons: 1e6,
             seed: 3,
         };
         let section = comparison(
             "tiny",
-            photographer,
+            scene_camera,
             Ensemble::Bernoulli,
             &SequentialExecutor,
             &|_| {},

@@ -1,27 +1,18 @@
-//! The methods under study.
+//! Names and sample sizes of the recovery methods in the study.
 
-use super::blocks;
+use super::pixel_sampling;
 use crate::recover::{Method, SparsityBasis};
 use crate::transport::{Geometry, TileRect};
 
-/// Every method, in the order of tables and legends.
-pub(super) const METHODS: &[Method] = &[
-    Method::Learned,
-    Method::Nnls,
-    Method::Bpdn(SparsityBasis::Identity),
-    Method::Bpdn(SparsityBasis::Dct),
-    Method::Bpdn(SparsityBasis::Haar),
-];
+/// The default method of `ltm-export recover`.
+pub(super) const DEFAULT_METHOD: Method = Method::Learned;
 
-/// The method that `recover` uses unless told otherwise.
-pub(super) const DEFAULT: Method = Method::Learned;
+/// Factor on the sample size of fast methods.
+const FAST_FACTOR: usize = 4;
+/// Divisor of the sample size of slow methods.
+const SLOW_DIVISOR: usize = 8;
 
-/// How many times as many pixels are judged of methods that take a fraction of the time.
-const MORE_OF_FAST: usize = 4;
-/// How many times fewer pixels are judged of methods that take longer.
-const FEWER_OF_SLOW: usize = 8;
-
-/// The name by which tables and legends call a method; no two have the same.
+/// The unique name of a method in tables and legends.
 pub(super) fn name(method: Method) -> &'static str {
     match method {
         Method::Bpdn(SparsityBasis::Identity) => "bpdn-identity",
@@ -31,21 +22,25 @@ pub(super) fn name(method: Method) -> &'static str {
     }
 }
 
-/// Whether `method` takes longer than others.
-pub(super) fn slow(method: Method) -> bool {
+/// Whether `method` takes much longer than the others.
+pub(super) fn is_slow(method: Method) -> bool {
     matches!(
         method,
         Method::Bpdn(SparsityBasis::Dct | SparsityBasis::Haar)
     )
 }
 
-/// The pixels that stand for all when `method` is judged on a sample of `pixels`. What is decided
-/// tile by tile is judged by whole tiles.
-pub(super) fn judged(method: Method, geometry: &Geometry, pixels: usize) -> Vec<TileRect> {
+/// The sample of pixels for `method`, from the nominal sample size `pixels`. Learned recovery decides tile by
+/// tile whether to blend, so that its sample consists of whole tiles.
+pub(super) fn sample_for(method: Method, geometry: &Geometry, pixels: usize) -> Vec<TileRect> {
     match method {
-        Method::Learned => blocks::tiles(geometry, pixels.saturating_mul(MORE_OF_FAST)),
-        _ if slow(method) => blocks::sample(geometry.camera, pixels / FEWER_OF_SLOW),
-        _ => blocks::sample(geometry.camera, pixels),
+        Method::Learned => {
+            pixel_sampling::random_tiles(geometry, pixels.saturating_mul(FAST_FACTOR))
+        }
+        _ if is_slow(method) => {
+            pixel_sampling::random_blocks(geometry.camera, pixels / SLOW_DIVISOR)
+        }
+        _ => pixel_sampling::random_blocks(geometry.camera, pixels),
     }
 }
 
@@ -56,9 +51,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn methods_have_names_of_their_own_and_the_default_is_one_of_them() {
-        let names: BTreeSet<_> = METHODS.iter().map(|&method| name(method)).collect();
-        assert_eq!(names.len(), METHODS.len());
-        assert!(METHODS.contains(&DEFAULT));
+    fn method_names_are_unique() {
+        let names: BTreeSet<_> = Method::ALL.iter().map(|&method| name(method)).collect();
+        assert_eq!(names.len(), Method::ALL.len());
+        assert!(Method::ALL.contains(&DEFAULT_METHOD));
     }
 }

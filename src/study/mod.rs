@@ -1,67 +1,64 @@
-//! How well recovery does where the transport is known: the figures of the paper (Thanikachalam et
-//! al. 2014), its comparison with other ways to acquire a transport, and a table of scenes.
+//! Evaluation of recovery on known light transport: the figures of the paper (Thanikachalam et al. 2014), its
+//! comparison with other acquisition methods, and a table of scenes.
 //!
-//! Each part takes what is known and photographed and yields a [`Section`]: text, tables and
-//! pictures in memory. Whoever has files writes them.
+//! Each part takes a [`KnownTransport`] and measurements of it and returns a [`Section`]: text, tables and
+//! pictures in memory. The caller writes them to files.
 
 mod accuracy;
-mod blocks;
-mod brute_force;
 mod chart;
 mod comparison;
-mod dense;
-mod known;
+mod dense_transport;
+mod known_transport;
 mod methods;
 mod nystrom;
-mod photograph;
-mod relit;
-mod report;
+mod picture_sheet;
+mod pixel_sampling;
+mod relit_pictures;
+mod scanning;
+mod scene_camera;
 mod scenes;
-mod sheet;
+mod section;
 mod snr_curves;
 mod sparsity;
 mod unwindowed;
 
 pub use comparison::comparison;
-pub use known::{CaptureTruth, Known, SceneTruth};
-pub use nystrom::{Nystrom, Samples};
-pub use photograph::{Photographer, first_shots};
-pub use relit::{RelitLight, built_in_lights, relit_pictures};
-pub use report::{Section, Table};
+pub use known_transport::{CaptureTruth, KnownTransport, SceneTruth};
+pub use nystrom::{Nystrom, NystromSamples};
+pub use relit_pictures::{RelitLight, built_in_lights, relit_pictures};
+pub use scene_camera::{SceneCamera, first_shots};
 pub use scenes::scenes_table;
+pub use section::{Section, Table};
 pub use snr_curves::{SNR_PATTERNS, snr_curves};
 pub use sparsity::{SparsityProfile, sparsity};
 
 use thiserror::Error;
 
 use crate::recover::RecoverError;
-use crate::transport::{CHANNELS, GeometryError};
+use crate::transport::GeometryError;
 
-/// Linear RGB of every camera pixel, row by row, in units of the measurement.
-type Picture = Vec<[f32; CHANNELS]>;
+/// Receives a line of text when a part of the study advances.
+pub type ProgressCallback<'a> = &'a (dyn Fn(&str) + Sync);
 
-/// What the study tells while it is at work.
-pub type Progress<'a> = &'a (dyn Fn(&str) + Sync);
-
-/// Why a part of the study cannot be done.
+/// Why a part of the study fails.
 #[derive(Debug, Error)]
 pub enum StudyError {
-    /// A method refused the measurements.
+    /// A method cannot recover the transport from the measurements.
     #[error(transparent)]
     Recover(#[from] RecoverError),
-    /// A scene does not fit.
+    /// The geometry of a scene is invalid.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
-    /// A distribution has impossible parameters.
-    #[error("the camera's noise cannot be drawn")]
+    /// A random distribution has invalid parameters.
+    #[error("the simulated camera has invalid noise parameters")]
     Noise(#[from] rand_distr::NormalError),
-    /// A chart cannot be drawn.
+    /// Drawing a chart failed.
     #[error("a chart cannot be drawn: {0}")]
     Chart(String),
-    /// A picture cannot be encoded.
+    /// Encoding a picture failed.
     #[error("a picture cannot be encoded")]
     Picture(#[from] image::ImageError),
-    /// A table cannot be written.
+    /// Writing a table as CSV failed.
     #[error("a table cannot be written as CSV")]
     Table(#[from] csv::Error),
 }

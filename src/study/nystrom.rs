@@ -1,36 +1,39 @@
-//! Low rank: the kernel Nyström method (Wang, Dong, Tong, Lin & Guo 2009).
+//! Low-rank acquisition: the kernel Nyström method (Wang, Dong, Tong, Lin & Guo 2009).
 //!
-//! Some columns of T are photographed by lighting one element each, and some rows by lighting the
-//! scene from the camera's side and looking from the light's, which takes a second projector and
-//! camera that a usual rig does not have. With `A` where the two cross, `T ≈ f⁻¹(f(C) f(A)⁺ f(R))`:
-//! the kernel `f(x) = x^γ`, taken element by element, flattens the light so that fewer rows and
-//! columns carry more of it.
+//! ```text
+//! T ≈ f⁻¹(f(R)ᵀ f(A)⁺ᵀ f(C)),   f(x) = x^γ element by element
+//! ```
+//!
+//! with C the columns of photographs of single elements, R the rows photographed in the other direction, and
+//! A where both cross. Rows need a second projector at the camera's position and a second camera at the
+//! light's. The kernel f compresses the range of values, so that a lower rank suffices.
 
 use crate::executor::Executor;
+use crate::linalg::{add_scaled, cholesky, cholesky_solve, transpose};
 
 /// Exponents γ to choose from.
 const EXPONENTS: [f64; 5] = [1.0, 0.7, 0.5, 0.35, 0.25];
-/// Ridges to choose from, as shares of the mean of the Gram matrix's diagonal.
+/// Ridges to choose from, relative to the mean of the Gram matrix's diagonal.
 const RIDGES: [f64; 5] = [1e-10, 1e-6, 1e-3, 1e-1, 1e1];
-/// One row in so many is held out while exponent and ridge are chosen.
-const HOLD_OUT_EVERY: usize = 5;
+/// Every so many rows, one is held out to choose exponent and ridge.
+const HOLDOUT_INTERVAL: usize = 5;
 
-/// Rows and columns of one channel's T, as photographed.
+/// Photographed rows and columns of one channel of T.
 #[derive(Clone, Debug)]
-pub struct Samples {
-    /// Light elements sampled.
+pub struct NystromSamples {
+    /// Indices of the photographed light elements.
     pub elements: Vec<usize>,
-    /// What every pixel sees of each: `[N, r]`.
+    /// Their measurements, `[N, r]`.
     pub columns: Vec<f64>,
-    /// Camera pixels sampled.
+    /// Indices of the photographed camera pixels.
     pub pixels: Vec<usize>,
-    /// What each of them sees of every light element: `[c, M]`.
+    /// Their measurements of every light element, `[pixel, M]`.
     pub rows: Vec<f64>,
-    /// Light elements, `M`.
+    /// Number of light elements, M.
     pub light: usize,
 }
 
-/// A transport of low rank under a kernel.
+/// A transport with low rank under a kernel.
 #[derive(Clone, Debug)]
 pub struct Nystrom {
     exponent: f64,
@@ -43,18 +46,18 @@ pub struct Nystrom {
 }
 
 impl Nystrom {
-    /// Chooses exponent and ridge by how well held-out rows are predicted, then uses all rows.
-    pub fn new(samples: &Samples, executor: &impl Executor) -> Self {
+    /// Chooses the exponent and the ridge with the smallest error on held-out rows, then fits all rows.
+    pub fn new(samples: &NystromSamples, executor: &impl Executor) -> Self {
         let candidates: Vec<(f64, f64)> = EXPONENTS
             .iter()
             .flat_map(|&exponent| RIDGES.map(|ridge| (exponent, ridge)))
             .collect();
-        let (held, kept): (Vec<usize>, Vec<usize>) =
-            (0..samples.pixels.len()).partition(|i| i % HOLD_OUT_EVERY == HOLD_OUT_EVERY - 1);
+        let (held_out, training): (Vec<usize>, Vec<usize>) =
+            (0..samples.pixels.len()).partition(|i| i % HOLDOUT_INTERVAL == HOLDOUT_INTERVAL - 1);
         let errors = executor.map(candidates.len(), |i| {
             let (exponent, ridge) = candidates[i];
-            let fit = Self::fit(samples, &kept, exponent, ridge);
-            let rows = held.iter().map(|&h| {
+            let fit = Self::fit(samples, &training, exponent, ridge);
+            let rows = held_out.iter().map(|&h| {
                 let estimate = fit.pixel(samples.pixels[h]);
                 let row = &samples.rows[h * samples.light..(h + 1) * samples.light];
                 let squares = row.iter().zip(estimate).map(|(t, e)| (t - e).powi(2));
@@ -68,19 +71,19 @@ impl Nystrom {
         Self::fit(samples, &all, exponent, ridge)
     }
 
-    /// From the rows numbered `rows`.
-    fn fit(samples: &Samples, rows: &[usize], exponent: f64, ridge: f64) -> Self {
+    /// Fits the rows `row_indices`.
+    fn fit(samples: &NystromSamples, row_indices: &[usize], exponent: f64, ridge: f64) -> Self {
         let (rank, light) = (samples.elements.len(), samples.light);
         let kernel = |x: f64| x.max(0.0).powf(exponent);
         // Normal equations of f(A)·X = f(R).
         let mut gram = vec![0.0; rank * rank];
         let mut mixing = vec![0.0; rank * light];
-        for &i in rows {
+        for &i in row_indices {
             let row: Vec<f64> = samples.rows[i * light..(i + 1) * light]
                 .iter()
                 .map(|&t| kernel(t))
                 .collect();
-            // Of a crossing there are two photographs; that of the column also multiplies later.
+            // Elements of A are photographed twice. The column's photograph is also the one in f(C).
             let n = samples.pixels[i];
             let crossing: Vec<f64> = samples.columns[n * rank..(n + 1) * rank]
                 .iter()
@@ -95,10 +98,7 @@ impl Nystrom {
             }
         }
         let mean = (0..rank).map(|i| gram[i * rank + i]).sum::<f64>() / rank as f64;
-        for i in 0..rank {
-            gram[i * rank + i] += (ridge * mean).max(f64::MIN_POSITIVE);
-        }
-        solve_in_place(&mut gram, &mut mixing, rank, light);
+        let mixing = solve_with_ridge(&gram, &mixing, rank, ridge * mean);
         Self {
             exponent,
             columns: samples.columns.iter().map(|&t| kernel(t)).collect(),
@@ -108,7 +108,7 @@ impl Nystrom {
         }
     }
 
-    /// What pixel `n` sees of every light element, `[M]`.
+    /// The column of pixel `n`, `[M]`.
     pub fn pixel(&self, n: usize) -> Vec<f64> {
         let mut row = vec![0.0; self.light];
         let columns = &self.columns[n * self.rank..(n + 1) * self.rank];
@@ -122,63 +122,23 @@ impl Nystrom {
     }
 }
 
-/// `sum += factor · values`.
-fn add_scaled(sum: &mut [f64], factor: f64, values: &[f64]) {
-    for (sum, value) in sum.iter_mut().zip(values) {
-        *sum += factor * value;
+/// Solves `(matrix + ridge · I) x = right` for `right`, `[k, width]`. The ridge grows until the matrix,
+/// `[k, k]`, is positive definite.
+fn solve_with_ridge(matrix: &[f64], right: &[f64], k: usize, ridge: f64) -> Vec<f64> {
+    let mut ridge = ridge.max(f64::MIN_POSITIVE);
+    let factor = loop {
+        let mut factor = matrix.to_vec();
+        (0..k).for_each(|i| factor[i * k + i] += ridge);
+        if cholesky(&mut factor, k).is_some() || !ridge.is_finite() {
+            break factor;
+        }
+        ridge *= 10.0;
+    };
+    let mut columns = transpose(right, right.len() / k.max(1));
+    for column in columns.chunks_exact_mut(k.max(1)) {
+        cholesky_solve(&factor, column);
     }
-}
-
-/// Replaces `right`, `[k, width]`, by the solution of `matrix · x = right`, through the Cholesky
-/// factor of `matrix`, `[k, k]`, symmetric and positive definite, which it overwrites. A pivot lost
-/// to rounding drops its unknown.
-fn solve_in_place(matrix: &mut [f64], right: &mut [f64], k: usize, width: usize) {
-    let mut dropped = vec![false; k];
-    for i in 0..k {
-        let whole = matrix[i * k + i];
-        for j in 0..=i {
-            let (above, row) = matrix.split_at(i * k);
-            let other = if j < i {
-                &above[j * k..j * k + j]
-            } else {
-                &row[..i]
-            };
-            let dot: f64 = row.iter().zip(other).map(|(a, b)| a * b).sum();
-            let left = row[j] - dot;
-            matrix[i * k + j] = match i == j {
-                true if left > 1e-14 * whole => left.sqrt(),
-                true => {
-                    dropped[i] = true;
-                    1.0
-                }
-                false if dropped[j] => 0.0,
-                false => left / matrix[j * k + j],
-            };
-        }
-    }
-    for i in 0..k {
-        let (above, row) = right.split_at_mut(i * width);
-        let row = &mut row[..width];
-        if dropped[i] {
-            row.fill(0.0);
-            continue;
-        }
-        for j in 0..i {
-            add_scaled(row, -matrix[i * k + j], &above[j * width..(j + 1) * width]);
-        }
-        row.iter_mut().for_each(|x| *x /= matrix[i * k + i]);
-    }
-    for i in (0..k).rev() {
-        let (row, below) = right[i * width..].split_at_mut(width);
-        if dropped[i] {
-            continue;
-        }
-        for j in i + 1..k {
-            let x = &below[(j - i - 1) * width..(j - i) * width];
-            add_scaled(row, -matrix[j * k + i], x);
-        }
-        row.iter_mut().for_each(|x| *x /= matrix[i * k + i]);
-    }
+    transpose(&columns, k)
 }
 
 #[cfg(test)]
@@ -187,7 +147,7 @@ mod tests {
     use crate::executor::SequentialExecutor;
 
     #[test]
-    fn a_matrix_of_low_rank_comes_back() {
+    fn a_low_rank_matrix_is_reproduced() {
         let (pixels, light, rank) = (40, 30, 3);
         let factor =
             |i: usize, k: usize| 0.2 + ((i * 37 + k * 101 + i * k * 13) % 29) as f64 / 29.0;
@@ -196,7 +156,7 @@ mod tests {
         };
         let elements: Vec<usize> = (0..6).map(|i| i * 5).collect();
         let sampled: Vec<usize> = (0..10).map(|i| i * 4).collect();
-        let samples = Samples {
+        let samples = NystromSamples {
             columns: (0..pixels)
                 .flat_map(|n| elements.iter().map(move |&m| element(n, m)))
                 .collect(),
@@ -217,19 +177,5 @@ mod tests {
             }
         }
         assert!(error < 1e-8 * signal, "{}", error / signal);
-    }
-
-    #[test]
-    fn cholesky_solves() {
-        let mut matrix = vec![4.0, 2.0, 0.4, 2.0, 5.0, 1.0, 0.4, 1.0, 3.0];
-        let mut right = vec![1.0, 0.0, 2.0, 1.0, 3.0, -1.0];
-        let (a, b) = (matrix.clone(), right.clone());
-        solve_in_place(&mut matrix, &mut right, 3, 2);
-        for i in 0..3 {
-            for w in 0..2 {
-                let back: f64 = (0..3).map(|j| a[i * 3 + j] * right[j * 2 + w]).sum();
-                assert!((back - b[i * 2 + w]).abs() < 1e-12);
-            }
-        }
     }
 }

@@ -1,16 +1,17 @@
-//! Every method on scenes that nothing was tuned on, and how far the default falls short.
+//! A table of all methods on scenes that no parameter was chosen on, and the default method's shortfall.
 
-use super::accuracy::judge;
-use super::known::SceneTruth;
-use super::methods::{self, DEFAULT, METHODS};
-use super::report::{Section, Table, cell};
-use super::{Photographer, Progress, StudyError};
+use super::accuracy::measure_accuracy;
+use super::known_transport::SceneTruth;
+use super::methods::{self, DEFAULT_METHOD};
+use super::section::{Section, Table, snr_cell};
+use super::{ProgressCallback, SceneCamera, StudyError};
 use crate::executor::Executor;
+use crate::recover::Method;
 use crate::simulate::{Ensemble, SceneKind};
 use crate::transport::Extent;
 
-/// What is photographed, and how.
-struct Setting {
+/// One row of the table.
+struct SceneSetting {
     kind: SceneKind,
     camera: u32,
     light: u32,
@@ -27,8 +28,8 @@ const fn setting(
     patterns: usize,
     electrons: f64,
     seed: u64,
-) -> Setting {
-    Setting {
+) -> SceneSetting {
+    SceneSetting {
         kind,
         camera,
         light,
@@ -42,9 +43,9 @@ const fn setting(
 use Ensemble::{Bernoulli, Gaussian};
 use SceneKind::{Cookies, StainedGlass};
 
-/// Both scenes, both ensembles, few photographs and many, dim and bright, one, two and three camera
-/// pixels a light element, a seed each.
-const SETTINGS: [Setting; 14] = [
+/// Both scenes, both ensembles, few and many photographs, little and much light, one to three camera pixels
+/// for each light element, and a seed for each.
+const SETTINGS: [SceneSetting; 14] = [
     setting(StainedGlass, [128, 64], Gaussian, 80, 4e4, 101),
     setting(StainedGlass, [128, 64], Bernoulli, 80, 4e4, 102),
     setting(StainedGlass, [128, 64], Bernoulli, 40, 2e5, 103),
@@ -61,14 +62,17 @@ const SETTINGS: [Setting; 14] = [
     setting(Cookies, [144, 48], Gaussian, 60, 1e5, 114),
 ];
 
-/// How far the default may fall short of the best other method, in dB.
-const ALLOWED: f64 = 0.3;
+/// Largest accepted shortfall of the default method against the best other one.
+const MAX_SHORTFALL_DB: f64 = 0.3;
 
-/// The table of scenes. Methods that recover each pixel on its own are judged on about `pixels`.
+/// The table of scenes, with samples of about `pixels` pixels for each method.
+///
+/// # Errors
+/// Those of photographing and recovering a scene.
 pub fn scenes_table(
     pixels: usize,
     executor: &impl Executor,
-    progress: Progress,
+    progress: ProgressCallback,
 ) -> Result<Section, StudyError> {
     let mut header = vec![
         "scene",
@@ -79,7 +83,7 @@ pub fn scenes_table(
         "electrons",
         "seed",
     ];
-    header.extend(METHODS.iter().map(|&m| methods::name(m)));
+    header.extend(Method::ALL.iter().map(|&m| methods::name(m)));
     header.extend(["default", "shortfall"]);
     let mut table = Table::new(&header);
     let mut worst = f64::NEG_INFINITY;
@@ -91,16 +95,16 @@ pub fn scenes_table(
         let scene = setting
             .kind
             .build(square(setting.camera), square(setting.light))?;
-        let photographer = Photographer {
+        let scene_camera = SceneCamera {
             scene: scene.as_ref(),
             electrons: setting.electrons,
             seed: setting.seed,
         };
-        let measurements = photographer.measure(setting.ensemble, setting.patterns, executor)?;
+        let measurements = scene_camera.measure(setting.ensemble, setting.patterns, executor)?;
         let mut levels = Vec::new();
-        for &method in METHODS {
+        for &method in Method::ALL {
             let known = SceneTruth(scene.as_ref());
-            levels.push(judge(&known, &measurements, method, pixels, executor)?.snr);
+            levels.push(measure_accuracy(&known, &measurements, method, pixels, executor)?.snr);
         }
         let mut row = vec![
             scene_name(setting.kind).to_owned(),
@@ -115,38 +119,40 @@ pub fn scenes_table(
             setting.electrons.to_string(),
             setting.seed.to_string(),
         ];
-        row.extend(levels.iter().map(|&snr| cell(snr)));
+        row.extend(levels.iter().map(|&snr| snr_cell(snr)));
         progress(&format!("scenes: {}", row.join(", ")));
-        let of = |default: bool| {
-            let levels = METHODS.iter().zip(&levels);
-            let chosen = levels.filter(|(method, _)| (**method == DEFAULT) == default);
+        let best_snr = |is_default: bool| {
+            let levels = Method::ALL.iter().zip(&levels);
+            let chosen = levels.filter(|(method, _)| (**method == DEFAULT_METHOD) == is_default);
             chosen
                 .filter_map(|(_, snr)| Some((*snr)?.0))
                 .reduce(f64::max)
         };
-        let shortfall = of(false).zip(of(true)).map(|(other, ours)| other - ours);
+        let shortfall = best_snr(false)
+            .zip(best_snr(true))
+            .map(|(other, default)| other - default);
         worst = worst.max(shortfall.unwrap_or(worst));
-        row.push(methods::name(DEFAULT).to_owned());
+        row.push(methods::name(DEFAULT_METHOD).to_owned());
         row.push(shortfall.map_or(String::new(), |db| format!("{db:.2}")));
-        table.row(row);
+        table.add_row(row);
     }
     let mut section = Section::new("Scenes");
-    section.paragraph(
-        "SNR of T in dB by each method, and by how many dB the default falls short of the best \
-         other one (less than nothing: it is ahead). No parameter of any method was chosen on these \
+    section.add_paragraph(
+        "SNR of T in dB by method, and the shortfall of the default method against the best other one \
+         in dB (negative if the default is the best). No parameter of any method was chosen on these \
          scenes, seeds or settings.",
     );
-    section.paragraph(&table.markdown());
+    section.add_paragraph(&table.markdown());
     if worst.is_finite() {
-        section.paragraph(&format!(
-            "The default's largest shortfall is {worst:.2} dB; {ALLOWED} dB are allowed."
+        section.add_paragraph(&format!(
+            "The default's largest shortfall is {worst:.2} dB; at most {MAX_SHORTFALL_DB} dB is accepted."
         ));
     }
-    section.data("scenes", &table)?;
+    section.add_csv("scenes", &table)?;
     Ok(section)
 }
 
-/// The name by which commands call a scene.
+/// The name of a scene on the command line.
 fn scene_name(kind: SceneKind) -> &'static str {
     match kind {
         StainedGlass => "stained-glass",

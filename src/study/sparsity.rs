@@ -1,31 +1,31 @@
-//! The structure of a transport (paper, figure 2): how few elements hold its energy, where they lie
-//! in the matrix, and what one light transport function looks like.
+//! The structure of a light transport matrix (paper, figure 2): how few elements hold its energy (the sparsity
+//! profile), where they are in the matrix, and one light transport function.
 
 use super::chart::{Chart, Series};
-use super::known::Known;
-use super::report::{Section, Table};
-use super::sheet::{Captioned, Panel, Sheet};
-use super::{Progress, StudyError};
+use super::known_transport::KnownTransport;
+use super::picture_sheet::{CaptionedPanel, Panel, PictureSheet};
+use super::section::{Section, Table};
+use super::{ProgressCallback, StudyError};
 use crate::executor::Executor;
 use crate::transport::{CHANNELS, CameraPx, Extent, Geometry};
 
-/// Low mantissa bits that do not count: elements within 1/64 of each other are one class.
-const DROPPED_BITS: u32 = 17;
-const CLASSES: usize = 1 << (31 - DROPPED_BITS);
+/// Ignored low bits of the mantissa: elements within 1/64 of each other are in one class.
+const IGNORED_BITS: u32 = 17;
+const CLASSES: usize = 1 << (31 - IGNORED_BITS);
 /// Points of a profile's curve.
-const POINTS: usize = 120;
-/// Shares of the energy that the table tells of.
-const SHARES: [f64; 4] = [0.5, 0.9, 0.99, 0.999];
-/// Side of the picture of the whole matrix, in cells.
-const PICTURE: u32 = 512;
-/// Side of the zoom, in pixels and elements.
-const ZOOM: u32 = 96;
+const CURVE_POINTS: usize = 120;
+/// Shares of the energy in the table.
+const ENERGY_SHARES: [f64; 4] = [0.5, 0.9, 0.99, 0.999];
+/// Side of the overview of the whole matrix, in cells.
+const OVERVIEW_SIDE: u32 = 512;
+/// Side of the zoomed part, in camera pixels and light elements.
+const ZOOM_SIDE: u32 = 96;
 
-/// How the energy (the sum of squares) of many elements is spread over them: a histogram of their
-/// magnitudes, fine enough that shares are exact to about a percent of an element's energy.
+/// A histogram of the magnitudes of many elements, from which follow the shares of energy (sum of squares) that
+/// the largest elements hold. Classes are so narrow that shares are exact to about 1 % of one element's energy.
 #[derive(Clone, Debug)]
 pub struct SparsityProfile {
-    /// By class of magnitude, rising.
+    /// By class of magnitude, ascending.
     counts: Vec<u64>,
     energies: Vec<f64>,
     zeros: u64,
@@ -48,13 +48,13 @@ impl SparsityProfile {
             self.zeros += 1;
             return;
         }
-        // The bits of a float, its sign aside, rise with its magnitude.
-        let class = (element.abs().to_bits() >> DROPPED_BITS) as usize;
+        // The bits of a positive float ascend with its value.
+        let class = (element.abs().to_bits() >> IGNORED_BITS) as usize;
         self.counts[class] += 1;
         self.energies[class] += f64::from(element).powi(2);
     }
 
-    /// Joins what was gathered elsewhere.
+    /// Adds the elements of another profile.
     pub fn merge(&mut self, other: &Self) {
         for class in 0..CLASSES {
             self.counts[class] += other.counts[class];
@@ -63,43 +63,42 @@ impl SparsityProfile {
         self.zeros += other.zeros;
     }
 
-    /// Elements added, zeros included.
+    /// Number of elements, zeros included.
     pub fn len(&self) -> u64 {
         self.zeros + self.counts.iter().sum::<u64>()
     }
 
-    /// Whether nothing was added.
+    /// Whether there are no elements.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Share of the energy that the `k` largest elements hold, 0 to 1.
+    /// The share of the energy in the `k` largest elements, 0 to 1.
     pub fn share_of_largest(&self, k: f64) -> f64 {
         let total: f64 = self.energies.iter().sum();
-        let (mut left, mut held) = (k, 0.0);
+        let (mut remaining, mut held) = (k, 0.0);
         for (count, energy) in self.largest_first() {
-            let taken = (left / count).min(1.0);
-            held += taken * energy;
-            left -= count;
-            if left <= 0.0 {
+            held += (remaining / count).min(1.0) * energy;
+            remaining -= count;
+            if remaining <= 0.0 {
                 break;
             }
         }
         if total > 0.0 { held / total } else { 0.0 }
     }
 
-    /// How many of the largest elements hold `share` of the energy.
-    pub fn largest_holding(&self, share: f64) -> f64 {
+    /// The number of largest elements that hold `share` of the energy.
+    pub fn count_for_share(&self, share: f64) -> f64 {
         let mut missing = share * self.energies.iter().sum::<f64>();
-        let mut taken = 0.0;
+        let mut counted = 0.0;
         for (count, energy) in self.largest_first() {
             if energy >= missing {
-                return taken + count * missing / energy;
+                return counted + count * missing / energy;
             }
             missing -= energy;
-            taken += count;
+            counted += count;
         }
-        taken
+        counted
     }
 
     fn largest_first(&self) -> impl Iterator<Item = (f64, f64)> {
@@ -110,12 +109,15 @@ impl SparsityProfile {
     }
 }
 
-/// Figure 2.
+/// The section of figure 2.
+///
+/// # Errors
+/// [`StudyError`] if a chart, a picture or a table cannot be written.
 pub fn sparsity(
     name: &str,
-    known: &impl Known,
+    known: &impl KnownTransport,
     executor: &impl Executor,
-    progress: Progress,
+    progress: ProgressCallback,
 ) -> Result<Section, StudyError> {
     progress(&format!("{name}: structure of the transport"));
     let geometry = known.geometry();
@@ -123,7 +125,7 @@ pub fn sparsity(
         survey_row(known, y as u32)
     });
     let mut whole = SparsityProfile::default();
-    let mut overview = vec![0.0f32; (PICTURE * PICTURE) as usize];
+    let mut overview = vec![0.0f32; (OVERVIEW_SIDE * OVERVIEW_SIDE) as usize];
     let mut energies = Vec::with_capacity(geometry.camera.area());
     for row in rows {
         whole.merge(&row.profile);
@@ -135,12 +137,12 @@ pub fn sparsity(
     let pixel = median_pixel(geometry.camera, &energies);
     let mut tau = vec![[0.0; CHANNELS]; geometry.window.area()];
     known.transport_function(pixel, &mut tau);
-    let mut one = SparsityProfile::default();
-    tau.as_flattened().iter().for_each(|&t| one.add(t));
+    let mut example = SparsityProfile::default();
+    tau.as_flattened().iter().for_each(|&t| example.add(t));
 
     let mut section = Section::new(&format!("Figure 2: structure of the transport, {name}"));
     let side = geometry.window.side();
-    section.paragraph(&format!(
+    section.add_paragraph(&format!(
         "Camera {}, light {}, window {side}x{side}: {} of the matrix's {:.1e} elements lie in the \
          band ({:.2} %).",
         geometry.camera,
@@ -149,21 +151,21 @@ pub fn sparsity(
         geometry.camera.area() as f64 * geometry.light.area() as f64,
         100.0 * geometry.window.area() as f64 / geometry.light.area() as f64,
     ));
-    profile_chart(name, geometry, &whole, &one, &mut section)?;
-    let sheet = Sheet {
+    profile_chart(name, geometry, &whole, &example, &mut section)?;
+    let sheet = PictureSheet {
         columns: vec![String::new(); 3],
         rows: vec![(
             String::new(),
             vec![
-                Captioned {
-                    panel: grey(extent(PICTURE, PICTURE), &overview),
+                CaptionedPanel {
+                    panel: grey_panel(extent(OVERVIEW_SIDE, OVERVIEW_SIDE), &overview),
                     caption: vec![
-                        "T, whole: pixels across, light elements".to_owned(),
-                        "down, brightest element of each cell".to_owned(),
+                        "T: pixels horizontally, light elements".to_owned(),
+                        "vertically, maximum of each cell".to_owned(),
                     ],
                 },
-                zoom(known),
-                Captioned {
+                zoomed_part(known),
+                CaptionedPanel {
                     panel: function_panel(side, &tau),
                     caption: vec![
                         format!(
@@ -175,9 +177,9 @@ pub fn sparsity(
                 },
             ],
         )],
-        side: 300,
+        side_px: 300,
     };
-    section.picture(
+    section.add_picture(
         &format!("{name}-figure2-band"),
         &format!(
             "The band of the transport of {name}, a zoom into it, and one light transport function"
@@ -187,23 +189,23 @@ pub fn sparsity(
     Ok(section)
 }
 
-/// What one row of camera pixels adds to the survey.
-struct Row {
+/// The statistics of one row of camera pixels.
+struct RowSurvey {
     profile: SparsityProfile,
-    /// Cells of the overview and their brightest elements.
+    /// Cells of the overview and their largest elements.
     overview: Vec<(usize, f32)>,
     energies: Vec<f32>,
 }
 
-fn survey_row(known: &impl Known, y: u32) -> Row {
+fn survey_row(known: &impl KnownTransport, y: u32) -> RowSurvey {
     let geometry = known.geometry();
-    let mut row = Row {
+    let mut row = RowSurvey {
         profile: SparsityProfile::default(),
         overview: Vec::new(),
         energies: Vec::new(),
     };
     let mut tau = vec![[0.0; CHANNELS]; geometry.window.area()];
-    let scale = |i: usize, of: usize| i * PICTURE as usize / of;
+    let scale = |i: usize, of: usize| i * OVERVIEW_SIDE as usize / of;
     let mut cells = std::collections::BTreeMap::new();
     for x in 0..geometry.camera.width {
         let pixel = CameraPx { x, y };
@@ -215,9 +217,9 @@ fn survey_row(known: &impl Known, y: u32) -> Row {
             tau.iter().for_each(|&t| row.profile.add(t));
             energy += tau.iter().map(|t| t * t).sum::<f32>();
             if let Some(m) = geometry.window.element(origin, s).index_in(geometry.light) {
-                let cell = scale(m, geometry.light.area()) * PICTURE as usize + column;
-                let brightest = cells.entry(cell).or_insert(0.0f32);
-                *brightest = brightest.max(mean(*tau));
+                let cell = scale(m, geometry.light.area()) * OVERVIEW_SIDE as usize + column;
+                let maximum = cells.entry(cell).or_insert(0.0f32);
+                *maximum = maximum.max(mean(*tau));
             }
         }
         row.energies.push(energy);
@@ -230,49 +232,49 @@ fn profile_chart(
     name: &str,
     geometry: &Geometry,
     whole: &SparsityProfile,
-    one: &SparsityProfile,
+    example: &SparsityProfile,
     section: &mut Section,
 ) -> Result<(), StudyError> {
     let functions = (geometry.camera.area() * CHANNELS) as f64;
     let area = geometry.window.area() as f64;
     let curve = |profile: &SparsityProfile, functions: f64| -> Vec<(f64, f64)> {
-        let least: f64 = 0.1;
-        (0..=POINTS)
-            .map(|i| least * (area / least).powf(i as f64 / POINTS as f64))
+        let first: f64 = 0.1;
+        (0..=CURVE_POINTS)
+            .map(|i| first * (area / first).powf(i as f64 / CURVE_POINTS as f64))
             .map(|k| (k, 100.0 * profile.share_of_largest(k * functions)))
             .collect()
     };
     let series = [
         ("all of T", whole, functions),
-        ("the one function below", one, CHANNELS as f64),
+        ("the function below", example, CHANNELS as f64),
     ]
     .map(|(name, profile, functions)| Series {
         name: name.to_owned(),
         points: curve(profile, functions),
-        marked: false,
+        has_markers: false,
     });
     let mut data = Table::new(&[
         "largest_elements_per_function",
         "energy_percent_whole",
         "energy_percent_one",
     ]);
-    for (whole, one) in series[0].points.iter().zip(&series[1].points) {
-        data.row([
+    for (whole, example) in series[0].points.iter().zip(&series[1].points) {
+        data.add_row([
             format!("{:.4}", whole.0),
             format!("{:.3}", whole.1),
-            format!("{:.3}", one.1),
+            format!("{:.3}", example.1),
         ]);
     }
     let mut table = Table::new(&[
         "energy",
-        "elements a function, all of T",
-        "the one function",
+        "elements per function, all of T",
+        "the function below",
     ]);
-    for share in SHARES {
-        table.row([
+    for share in ENERGY_SHARES {
+        table.add_row([
             format!("{} %", 100.0 * share),
-            format!("{:.1}", whole.largest_holding(share) / functions),
-            format!("{:.1}", one.largest_holding(share) / CHANNELS as f64),
+            format!("{:.1}", whole.count_for_share(share) / functions),
+            format!("{:.1}", example.count_for_share(share) / CHANNELS as f64),
         ]);
     }
     let chart = Chart {
@@ -285,26 +287,26 @@ fn profile_chart(
             .collect(),
         top: None,
         y: 0.0..100.0,
-        level: None,
+        reference: None,
         series: series.into(),
     };
-    section.picture(
+    section.add_picture(
         &format!("{name}-figure2-profile"),
         &format!("Share of the energy of {name} held by its largest elements"),
         chart.svg()?,
     );
-    section.data(&format!("{name}-figure2"), &data)?;
-    section.paragraph(&table.markdown());
+    section.add_csv(&format!("{name}-figure2"), &data)?;
+    section.add_paragraph(&table.markdown());
     Ok(())
 }
 
-/// A small square of T: consecutive pixels of the middle row, and consecutive elements of the
-/// display row behind them.
-fn zoom(known: &impl Known) -> Captioned {
+/// A small part of T: consecutive pixels of the camera's middle row, and consecutive elements of the row of
+/// the light plane behind them.
+fn zoomed_part(known: &impl KnownTransport) -> CaptionedPanel {
     let geometry = known.geometry();
     let half = (geometry.window.side() / 2) as i32;
-    let width = geometry.camera.width.min(ZOOM);
-    let height = geometry.light.width.min(ZOOM);
+    let width = geometry.camera.width.min(ZOOM_SIDE);
+    let height = geometry.light.width.min(ZOOM_SIDE);
     let (left, y) = (
         (geometry.camera.width - width) / 2,
         geometry.camera.height / 2,
@@ -314,8 +316,8 @@ fn zoom(known: &impl Known) -> Captioned {
         y,
     });
     let row = middle.v + half;
-    let last_first = (geometry.light.width - height) as i32;
-    let first = (middle.u + half - height as i32 / 2).clamp(0, last_first);
+    let max_first = (geometry.light.width - height) as i32;
+    let first = (middle.u + half - height as i32 / 2).clamp(0, max_first);
     let mut values = vec![0.0f32; (width * height) as usize];
     let mut tau = vec![[0.0; CHANNELS]; geometry.window.area()];
     for i in 0..width {
@@ -324,23 +326,23 @@ fn zoom(known: &impl Known) -> Captioned {
         known.transport_function(pixel, &mut tau);
         for (s, tau) in tau.iter().enumerate() {
             let element = geometry.window.element(origin, s);
-            let down = element.u - first;
-            if element.v == row && (0..height as i32).contains(&down) {
-                values[(down as u32 * width + i) as usize] = mean(*tau);
+            let line = element.u - first;
+            if element.v == row && (0..height as i32).contains(&line) {
+                values[(line as u32 * width + i) as usize] = mean(*tau);
             }
         }
     }
-    Captioned {
-        panel: grey(extent(width, height), &values),
+    CaptionedPanel {
+        panel: grey_panel(extent(width, height), &values),
         caption: vec![
-            format!("Zoom: {width} pixels of row {y} across,"),
-            format!("{height} elements of row {row} down"),
+            format!("Detail: {width} pixels of row {y},"),
+            format!("{height} light elements of row {row}"),
         ],
     }
 }
 
-/// The pixel whose function has the median energy, of those in the middle of the picture, whose
-/// windows no border cuts.
+/// The pixel whose function has the median energy, among those in the centre of the picture, whose windows are
+/// inside the light plane.
 fn median_pixel(camera: Extent, energies: &[f32]) -> CameraPx {
     let middle = |side: u32| side / 4..(3 * side).div_ceil(4);
     let mut pixels: Vec<CameraPx> = middle(camera.height)
@@ -351,7 +353,7 @@ fn median_pixel(camera: Extent, energies: &[f32]) -> CameraPx {
     pixels[pixels.len() / 2]
 }
 
-/// One function in colour, its brightest value white.
+/// One function in colour, scaled to its maximum.
 fn function_panel(side: u32, tau: &[[f32; CHANNELS]]) -> Panel {
     let peak = tau.as_flattened().iter().fold(0.0f32, |a, &b| a.max(b));
     let scale = if peak > 0.0 {
@@ -361,13 +363,13 @@ fn function_panel(side: u32, tau: &[[f32; CHANNELS]]) -> Panel {
     };
     let linear = tau.iter().map(|t| t.map(|t| f64::from(t) * scale));
     Panel {
-        data: true,
+        is_data: true,
         ..Panel::photograph(extent(side, side), linear)
     }
 }
 
-/// Elements in grey on black, over three decades of brightness.
-fn grey(extent: Extent, values: &[f32]) -> Panel {
+/// Elements in grey, on a logarithmic scale over three decades.
+fn grey_panel(extent: Extent, values: &[f32]) -> Panel {
     let peak = values.iter().fold(0.0f32, |a, &b| a.max(b));
     let code = |v: f32| {
         let decades = (v / peak.max(f32::MIN_POSITIVE)).log10();
@@ -376,7 +378,7 @@ fn grey(extent: Extent, values: &[f32]) -> Panel {
     Panel {
         extent,
         rgb: values.iter().flat_map(|&v| [code(v); 3]).collect(),
-        data: true,
+        is_data: true,
     }
 }
 
@@ -393,9 +395,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_largest_elements_hold_what_they_hold() {
+    fn profile_returns_shares_and_counts() {
         let mut profile = SparsityProfile::default();
-        // Energies 16, 4, 1, 1 and nothing.
+        // Energies 16, 4, 1, 1 and 0.
         for element in [2.0, -4.0, 1.0, 0.0, 1.0] {
             profile.add(element);
         }
@@ -409,7 +411,7 @@ mod tests {
         ] {
             assert!((profile.share_of_largest(k) - energy / 22.0).abs() < 1e-12);
             if energy > 0.0 {
-                assert!((profile.largest_holding(energy / 22.0) - k).abs() < 1e-9);
+                assert!((profile.count_for_share(energy / 22.0) - k).abs() < 1e-9);
             }
         }
         assert_eq!(profile.share_of_largest(4.0), 1.0);
@@ -417,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn profiles_join() {
+    fn merged_profiles_equal_one_profile() {
         let (mut a, mut b, mut both) =
             <(SparsityProfile, SparsityProfile, SparsityProfile)>::default();
         for i in 0..50 {

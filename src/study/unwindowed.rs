@@ -1,37 +1,39 @@
-//! Compressive sensing out of the box: every light element is an unknown of every pixel.
+//! Recovery without a window: every light element is an unknown of every pixel (out-of-the-box compressive
+//! sensing in the paper's terms).
 
 use std::time::Instant;
 
-use super::blocks;
-use super::dense::Dense;
+use super::dense_transport::DenseTransport;
+use super::pixel_sampling;
 use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::recover::Nnls;
 use crate::transport::TransportError;
 
-/// Recovers about `pixels` pixels drawn at random, each on its own, by non-negative least squares
-/// over all M elements. Returns each one's error, and the seconds that all pixels would take. With
-/// `φ = I` and `τ ≥ 0` the ℓ1 norm of the paper's case (b) is the light the pixel sees in all, which the
-/// measurements already fix but for their noise; least squares stands for both.
+/// Recovers `pixels` random pixels, each by non-negative least squares over all M elements. Returns the error
+/// of each pixel, and the extrapolated time for all pixels in seconds.
 ///
-/// Patterns must be grey and no sample saturated.
+/// Least squares represents the paper's case (b) with φ = I as well: for τ ≥ 0 the ℓ1 norm is the pixel's
+/// total light, which the measurements determine up to their noise.
+///
+/// Patterns must be grey, and no sample may be saturated.
 pub(super) fn recover(
-    truth: &Dense,
+    truth: &DenseTransport,
     measurements: &Measurements,
     pixels: usize,
     executor: &impl Executor,
 ) -> (Vec<TransportError>, f64) {
     let start = Instant::now();
     let gram = gram(measurements, executor);
-    let once = start.elapsed().as_secs_f64();
-    let drawn = blocks::draw(truth.pixels(), pixels);
+    let shared = start.elapsed().as_secs_f64();
+    let indices = pixel_sampling::random_indices(truth.pixels(), pixels);
     let start = Instant::now();
-    let functions = executor.map(drawn.len(), |i| {
+    let functions = executor.map(indices.len(), |i| {
         let mut solver = Nnls::new(&gram, truth.elements);
-        [0, 1, 2].map(|c| solver.solve(&right_hand_side(measurements, drawn[i], c)))
+        [0, 1, 2].map(|c| solver.solve(&right_hand_side(measurements, indices[i], c)))
     });
-    let each = start.elapsed().as_secs_f64() / drawn.len() as f64;
-    let errors = functions.iter().zip(drawn).map(|(function, n)| {
+    let each = start.elapsed().as_secs_f64() / indices.len() as f64;
+    let errors = functions.iter().zip(indices).map(|(function, n)| {
         let mut error = TransportError::default();
         for (c, tau) in function.iter().enumerate() {
             for (truth, &tau) in truth.pixel(n).iter().zip(tau) {
@@ -40,7 +42,7 @@ pub(super) fn recover(
         }
         error
     });
-    (errors.collect(), once + each * truth.pixels() as f64)
+    (errors.collect(), shared + each * truth.pixels() as f64)
 }
 
 /// `PᵀP`, `[M, M]`.
@@ -50,9 +52,9 @@ fn gram(measurements: &Measurements, executor: &impl Executor) -> Vec<f64> {
         let mut row = vec![0.0; elements];
         for pattern in &measurements.patterns {
             let plane = pattern.plane(0);
-            let here = f64::from(plane[i]);
+            let emission = f64::from(plane[i]);
             for (sum, &emitted) in row.iter_mut().zip(plane) {
-                *sum += here * f64::from(emitted);
+                *sum += emission * f64::from(emitted);
             }
         }
         row
@@ -83,8 +85,8 @@ mod tests {
     use crate::transport::{CHANNELS, Correspondence, Extent};
 
     #[test]
-    fn a_sparse_function_is_found_among_all_elements() {
-        // 16 elements, 10 patterns, two of them seen.
+    fn a_sparse_function_is_recovered_from_all_elements() {
+        // 16 elements, 10 patterns, two elements with transport.
         let mut tau = vec![[0.0f32; CHANNELS]; 16];
         tau[3] = [0.5, 0.2, 0.1];
         tau[11] = [0.0, 0.3, 0.4];
@@ -120,7 +122,7 @@ mod tests {
             },
             patterns: patterns.into_iter().map(Pattern::Grey).collect(),
         };
-        let truth = Dense { elements: 16, tau };
+        let truth = DenseTransport { elements: 16, tau };
         let (errors, _) = recover(&truth, &measurements, 1, &SequentialExecutor);
         assert!(errors[0].snr().is_none_or(|snr| snr.0 > 60.0), "{errors:?}");
     }

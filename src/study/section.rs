@@ -1,19 +1,19 @@
-//! What a part of the study yields: text, tables and pictures, in memory.
+//! A section of the study's report: text, tables and pictures, in memory.
 
 use super::StudyError;
 use crate::transport::Decibels;
 
-/// One part of the study.
+/// A section of the report.
 #[derive(Debug, Default)]
 pub struct Section {
-    /// Markdown; names pictures by their paths in `files`.
+    /// Markdown text. Its links are the paths in `files`.
     pub markdown: String,
-    /// Path (with forward slashes) and content of every file.
+    /// Path, with forward slashes, and content of every file.
     pub files: Vec<(String, Vec<u8>)>,
 }
 
 impl Section {
-    /// A section that begins with a heading of the second level.
+    /// A section with a heading of the second level.
     pub(super) fn new(heading: &str) -> Self {
         Self {
             markdown: format!("## {heading}\n"),
@@ -22,25 +22,28 @@ impl Section {
     }
 
     /// Adds a paragraph.
-    pub(super) fn paragraph(&mut self, text: &str) {
+    pub(super) fn add_paragraph(&mut self, text: &str) {
         self.markdown += &format!("\n{}\n", text.trim_end());
     }
 
-    /// Adds a picture and shows it.
-    pub(super) fn picture(&mut self, name: &str, alt: &str, svg: String) {
+    /// Adds an SVG file and a paragraph that shows it.
+    pub(super) fn add_picture(&mut self, name: &str, alt: &str, svg: String) {
         let path = format!("images/{name}.svg");
-        self.paragraph(&format!("![{alt}]({path})"));
+        self.add_paragraph(&format!("![{alt}]({path})"));
         self.files.push((path, svg.into_bytes()));
     }
 
-    /// Adds a table's CSV.
-    pub(super) fn data(&mut self, name: &str, table: &Table) -> Result<(), StudyError> {
+    /// Adds a table as a CSV file.
+    ///
+    /// # Errors
+    /// Those of [`Table::csv`].
+    pub(super) fn add_csv(&mut self, name: &str, table: &Table) -> Result<(), StudyError> {
         self.files.push((format!("{name}.csv"), table.csv()?));
         Ok(())
     }
 }
 
-/// A table, for people and for programs.
+/// A table of text, written as Markdown or CSV.
 #[derive(Clone, Debug)]
 pub struct Table {
     header: Vec<&'static str>,
@@ -57,11 +60,14 @@ impl Table {
     }
 
     /// Adds a row, one cell for each column.
-    pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+    pub fn add_row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.rows.push(cells.into_iter().collect());
     }
 
-    /// As CSV, the header first. Refuses rows that are longer or shorter than it.
+    /// The table as CSV, the header first.
+    ///
+    /// # Errors
+    /// [`StudyError::Table`] if a row has more or fewer cells than the header.
     pub fn csv(&self) -> Result<Vec<u8>, StudyError> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(&self.header)?;
@@ -73,19 +79,20 @@ impl Table {
             .map_err(|e| csv::Error::from(e.into_error()))?)
     }
 
-    /// As a Markdown table.
+    /// The table as Markdown. Columns of numbers are right-aligned.
     pub fn markdown(&self) -> String {
         let line = |cells: &mut dyn Iterator<Item = &str>| {
             let cells: Vec<_> = cells.collect();
             format!("| {} |\n", cells.join(" | "))
         };
         let mut text = line(&mut self.header.iter().copied());
-        let numeric = |i: usize| {
+        let is_numeric = |i: usize| {
             self.rows
                 .iter()
                 .all(|row| row.get(i).is_some_and(|cell| is_number(cell)))
         };
-        text += &line(&mut (0..self.header.len()).map(|i| if numeric(i) { "--:" } else { "---" }));
+        text +=
+            &line(&mut (0..self.header.len()).map(|i| if is_numeric(i) { "--:" } else { "---" }));
         for row in &self.rows {
             text += &line(&mut row.iter().map(String::as_str));
         }
@@ -93,18 +100,18 @@ impl Table {
     }
 }
 
-/// Whether a cell is a number, or empty where one might be, and so goes to the right.
+/// Whether a cell is a number, a percentage or empty.
 fn is_number(cell: &str) -> bool {
     cell.is_empty() || cell.trim_end_matches(" %").parse::<f64>().is_ok()
 }
 
-/// A level as a cell: two decimals, or nothing where there is none.
-pub(super) fn cell(level: Option<Decibels>) -> String {
+/// An SNR as a cell with two decimals, empty for `None`.
+pub(super) fn snr_cell(level: Option<Decibels>) -> String {
     level.map_or(String::new(), |level| format!("{:.2}", level.0))
 }
 
-/// A duration as a cell.
-pub(super) fn seconds(seconds: f64) -> String {
+/// A duration in seconds as a cell.
+pub(super) fn seconds_cell(seconds: f64) -> String {
     let decimals = usize::from(seconds < 10.0) + usize::from(seconds < 1.0);
     format!("{seconds:.decimals$}")
 }
@@ -116,7 +123,7 @@ mod tests {
     #[test]
     fn a_table_has_one_cell_for_each_column() {
         let mut table = Table::new(&["scene", "snr_db"]);
-        table.row(["a, b".to_owned(), cell(Some(Decibels(25.0)))]);
+        table.add_row(["a, b".to_owned(), snr_cell(Some(Decibels(25.0)))]);
         assert_eq!(
             String::from_utf8(table.csv().unwrap()).unwrap(),
             "scene,snr_db\n\"a, b\",25.00\n"
@@ -125,7 +132,7 @@ mod tests {
             table.markdown(),
             "| scene | snr_db |\n| --- | --: |\n| a, b | 25.00 |\n"
         );
-        table.row(["one".to_owned()]);
+        table.add_row(["one".to_owned()]);
         assert!(table.csv().is_err());
     }
 }

@@ -1,28 +1,28 @@
-//! Photographs of a scene in memory.
+//! Simulated photographs of a scene, in memory.
 
-use super::{Picture, StudyError};
-use crate::capture::{Measurements, Noise, Pattern, Rows};
+use super::StudyError;
+use crate::capture::{Measurements, Noise, Pattern, Picture, Rows};
 use crate::executor::Executor;
 use crate::simulate::{
     Camera, EmissionMatrix, Ensemble, LightCodes, RandomStream, SimulatedScene, emission,
 };
 use crate::transport::CHANNELS;
 
-/// Photographs whose noise is drawn at once, while those before and after it are without.
-const BATCH: usize = 16;
+/// Photographs that noise is added to at once; bounds the memory for copies.
+const NOISE_BATCH: usize = 16;
 
-/// A camera before a scene, with the noise of one session.
+/// A simulated camera in front of a scene.
 #[derive(Clone, Copy)]
-pub struct Photographer<'a> {
-    /// What is photographed.
+pub struct SceneCamera<'a> {
+    /// The scene.
     pub scene: &'a dyn SimulatedScene,
-    /// Electrons at full scale.
+    /// Electrons of the measurement 1.
     pub electrons: f64,
     /// Seed of patterns and noise.
     pub seed: u64,
 }
 
-impl Photographer<'_> {
+impl SceneCamera<'_> {
     /// The camera of `ltm-export simulate`.
     pub(super) fn camera(&self) -> Camera {
         Camera {
@@ -33,7 +33,10 @@ impl Photographer<'_> {
         }
     }
 
-    /// Photographs the scene under `count` patterns.
+    /// Photographs the scene under `count` random patterns.
+    ///
+    /// # Errors
+    /// [`StudyError::Noise`] if `electrons` is not a valid noise parameter.
     pub fn measure(
         &self,
         ensemble: Ensemble,
@@ -56,7 +59,7 @@ impl Photographer<'_> {
             camera: geometry.camera,
             light: geometry.light,
             correspondence: geometry.correspondence,
-            patterns: codes.iter().map(emitted).collect(),
+            patterns: codes.iter().map(emitted_pattern).collect(),
             full_scale: vec![1.0; count],
             rows: Rows::all(geometry.camera.height),
             pictures,
@@ -66,14 +69,14 @@ impl Photographer<'_> {
         Ok(measurements)
     }
 
-    /// What the camera sees in the dark.
+    /// A photograph without light.
     fn dark(&self) -> Result<Picture, StudyError> {
         let black = vec![[0.0; CHANNELS]; self.scene.geometry().camera.area()];
-        self.noisy(&black, 0)
+        self.add_noise(&black, 0)
     }
 
-    /// One photograph for each light, in units of the measurement, less a dark photograph; NaN
-    /// where saturated.
+    /// One photograph for each light, in units of the measurement, minus a dark photograph; saturated samples
+    /// are NaN.
     pub(super) fn photographs(
         &self,
         lights: &[LightCodes],
@@ -82,9 +85,9 @@ impl Photographer<'_> {
         let mut pictures = self.pictures(lights, executor);
         let dark = self.dark()?;
         let mut done = 0;
-        for batch in pictures.chunks_mut(BATCH) {
+        for batch in pictures.chunks_mut(NOISE_BATCH) {
             let noisy = executor.map(batch.len(), |i| {
-                self.noisy(&batch[i], (1 + done + i) as u32)
+                self.add_noise(&batch[i], (1 + done + i) as u32)
             });
             done += batch.len();
             for (picture, noisy) in batch.iter_mut().zip(noisy) {
@@ -97,10 +100,10 @@ impl Photographer<'_> {
         Ok(pictures)
     }
 
-    /// Photograph number `number` of `picture`, with noise.
-    pub(super) fn noisy(&self, picture: &Picture, number: u32) -> Result<Picture, StudyError> {
+    /// A photograph of `picture` with the noise of the photograph number `index`.
+    pub(super) fn add_noise(&self, picture: &Picture, index: u32) -> Result<Picture, StudyError> {
         let camera = self.camera();
-        let mut noise = RandomStream::Photograph(number).start(self.seed);
+        let mut noise = RandomStream::Photograph(index).start(self.seed);
         let codes = camera.photograph(picture, &mut noise)?;
         let linear = |code: u16| match f64::from(code) >= camera.white {
             true => f32::NAN,
@@ -109,21 +112,21 @@ impl Photographer<'_> {
         Ok(codes.into_iter().map(|codes| codes.map(linear)).collect())
     }
 
-    /// The scene under each light, without noise.
+    /// The pictures of the scene under each light, without noise.
     fn pictures(&self, lights: &[LightCodes], executor: &impl Executor) -> Vec<Picture> {
         let geometry = self.scene.geometry();
         let emissions = EmissionMatrix::new(geometry.light, lights);
         let mut pictures = vec![vec![[0.0; CHANNELS]; geometry.camera.area()]; lights.len()];
-        let across = geometry.tile_grid().width as usize;
+        let tiles_per_row = geometry.tile_grid().width as usize;
         let tiles: Vec<_> = geometry.tiles().collect();
-        // A row of tiles at a time bounds the memory.
-        for row in tiles.chunks(across) {
-            let seen = executor.map(row.len(), |i| {
+        // One row of tiles at a time, to bound the memory.
+        for row in tiles.chunks(tiles_per_row) {
+            let tiles = executor.map(row.len(), |i| {
                 emissions.pictures(geometry, &self.scene.tile(row[i]))
             });
-            for (rect, seen) in row.iter().zip(seen) {
-                for (picture, seen) in pictures.iter_mut().zip(seen) {
-                    for (pixel, y) in rect.pixels().zip(seen) {
+            for (rect, tile) in row.iter().zip(tiles) {
+                for (picture, tile) in pictures.iter_mut().zip(tile) {
+                    for (pixel, y) in rect.pixels().zip(tile) {
                         picture[geometry.camera.index(pixel)] = y;
                     }
                 }
@@ -133,7 +136,8 @@ impl Photographer<'_> {
     }
 }
 
-fn emitted(codes: &LightCodes) -> Pattern {
+/// The pattern that the monitor emits for `codes`.
+fn emitted_pattern(codes: &LightCodes) -> Pattern {
     let linear = |code: &u8| emission(*code) as f32;
     match codes {
         LightCodes::Grey(codes) => Pattern::Grey(codes.iter().map(linear).collect()),
@@ -143,7 +147,7 @@ fn emitted(codes: &LightCodes) -> Pattern {
     }
 }
 
-/// The first `count` shots of `measurements`, as if no others had been taken.
+/// The first `count` shots of `measurements`, with a noise model estimated from them alone.
 pub fn first_shots(measurements: &Measurements, count: usize) -> Measurements {
     let count = count.min(measurements.patterns.len());
     let mut first = Measurements {

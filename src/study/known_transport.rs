@@ -1,4 +1,4 @@
-//! Transport that is known: from a scene's formula, or from a capture's `truth/`.
+//! Known light transport, from a simulated scene or from a capture's `truth/` folder.
 
 use crate::capture::Truth;
 use crate::relight::Light;
@@ -8,12 +8,12 @@ use crate::transport::{
     TransportFunctions,
 };
 
-/// A transport of which every light transport function can be had.
-pub trait Known: Sync {
-    /// Grids, correspondence, and the window that holds the band.
+/// A light transport matrix whose columns are known.
+pub trait KnownTransport: Sync {
+    /// Camera and light plane, correspondence, and the window that holds the band.
     fn geometry(&self) -> &Geometry;
 
-    /// First element of a pixel's window.
+    /// Origin of a pixel's window.
     fn origin(&self, pixel: CameraPx) -> Element {
         self.geometry().window_origin(pixel)
     }
@@ -22,11 +22,11 @@ pub trait Known: Sync {
     fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]);
 }
 
-/// A built-in scene.
+/// The transport of a simulated scene.
 #[derive(Clone, Copy)]
 pub struct SceneTruth<'a>(pub &'a dyn SimulatedScene);
 
-impl Known for SceneTruth<'_> {
+impl KnownTransport for SceneTruth<'_> {
     fn geometry(&self) -> &Geometry {
         self.0.geometry()
     }
@@ -37,7 +37,7 @@ impl Known for SceneTruth<'_> {
     }
 }
 
-/// What a capture folder's `truth/` says.
+/// The transport in a capture's `truth/` folder.
 #[derive(Debug)]
 pub struct CaptureTruth {
     truth: Truth,
@@ -45,7 +45,10 @@ pub struct CaptureTruth {
 }
 
 impl CaptureTruth {
-    /// `truth` of a capture with this `correspondence`, by which its pixels will be recovered.
+    /// The transport of a capture whose pixels are recovered with `correspondence`.
+    ///
+    /// # Errors
+    /// [`GeometryError`] if the extents and the window do not fit together.
     pub fn new(truth: Truth, correspondence: Correspondence) -> Result<Self, GeometryError> {
         let geometry = Geometry {
             camera: truth.camera(),
@@ -59,7 +62,7 @@ impl CaptureTruth {
     }
 }
 
-impl Known for CaptureTruth {
+impl KnownTransport for CaptureTruth {
     fn geometry(&self) -> &Geometry {
         &self.geometry
     }
@@ -76,33 +79,32 @@ impl Known for CaptureTruth {
     }
 }
 
-/// Error of recovered functions, which lie on the windows of `geometry`, over every element that
-/// either transport has.
-pub(super) fn error_of(
-    known: &impl Known,
+/// Error of recovered functions, whose windows are those of `geometry`, over the elements of both windows.
+pub(super) fn transport_error(
+    known: &impl KnownTransport,
     geometry: &Geometry,
     functions: &TransportFunctions,
 ) -> TransportError {
-    let (ours, theirs) = (geometry.window, known.geometry().window);
+    let (window, known_window) = (geometry.window, known.geometry().window);
     let mut sum = TransportError::default();
-    let mut truth = vec![[0.0; CHANNELS]; theirs.area()];
-    let recovered = functions.tau.chunks_exact(ours.area());
+    let mut truth = vec![[0.0; CHANNELS]; known_window.area()];
+    let recovered = functions.tau.chunks_exact(window.area());
     for (pixel, estimate) in functions.rect.pixels().zip(recovered) {
-        let (our_origin, their_origin) = (geometry.window_origin(pixel), known.origin(pixel));
+        let (origin, known_origin) = (geometry.window_origin(pixel), known.origin(pixel));
         known.transport_function(pixel, &mut truth);
         for (s, truth) in truth.iter().enumerate() {
-            let here = ours.slot(our_origin, theirs.element(their_origin, s));
-            let estimate = here.map_or([0.0; CHANNELS], |s| estimate[s]);
+            let slot = window.slot(origin, known_window.element(known_origin, s));
+            let estimate = slot.map_or([0.0; CHANNELS], |s| estimate[s]);
             for c in 0..CHANNELS {
                 sum.add(f64::from(truth[c]), f64::from(estimate[c]));
             }
         }
-        if (ours, our_origin) == (theirs, their_origin) {
+        if (window, origin) == (known_window, known_origin) {
             continue;
         }
         for (s, estimate) in estimate.iter().enumerate() {
-            if theirs
-                .slot(their_origin, ours.element(our_origin, s))
+            if known_window
+                .slot(known_origin, window.element(origin, s))
                 .is_none()
             {
                 estimate.iter().for_each(|&e| sum.add(0.0, f64::from(e)));
@@ -112,19 +114,23 @@ pub(super) fn error_of(
     sum
 }
 
-/// The pixels of `rect` under `light`, from the known transport, row by row.
-pub(super) fn expose(known: &impl Known, rect: TileRect, light: &Light) -> Vec<[f64; CHANNELS]> {
+/// The picture of `rect` under `light` from the known transport, row by row.
+pub(super) fn known_picture(
+    known: &impl KnownTransport,
+    rect: TileRect,
+    light: &Light,
+) -> Vec<[f64; CHANNELS]> {
     let geometry = known.geometry();
     let mut tau = vec![[0.0; CHANNELS]; geometry.window.area()];
-    let lit = rect.pixels().map(|pixel| {
+    let picture = rect.pixels().map(|pixel| {
         known.transport_function(pixel, &mut tau);
-        pixel_under(geometry, known.origin(pixel), &tau, light)
+        relight_pixel(geometry, known.origin(pixel), &tau, light)
     });
-    lit.collect()
+    picture.collect()
 }
 
-/// `y = pτ` for one pixel.
-pub(super) fn pixel_under(
+/// y = pτ of one pixel.
+pub(super) fn relight_pixel(
     geometry: &Geometry,
     origin: Element,
     tau: &[[f32; CHANNELS]],

@@ -1,4 +1,4 @@
-//! Sheets of labelled pictures as SVG.
+//! Labelled pictures in rows and columns, as SVG.
 
 use std::fmt::Write;
 
@@ -13,29 +13,32 @@ use crate::relight::tone;
 use crate::transport::{CHANNELS, Extent};
 
 const JPEG_QUALITY: u8 = 85;
-/// Room for a line of text, in pixels.
-const LINE: u32 = 22;
-const GAP: u32 = 8;
+/// Height of a line of text, and the gap between pictures.
+const LINE_HEIGHT_PX: u32 = 22;
+const GAP_PX: u32 = 8;
 
 /// An 8-bit sRGB picture.
 pub(super) struct Panel {
     pub extent: Extent,
     pub rgb: Vec<u8>,
-    /// Whether its pixels are data, to be shown as squares, or a photograph.
-    pub data: bool,
+    /// Whether its pixels are data, shown as exact squares, or those of a photograph.
+    pub is_data: bool,
 }
 
 impl Panel {
-    /// A photograph from linear light, encoded as sRGB.
+    /// A photograph from linear RGB, encoded as sRGB.
     pub fn photograph(extent: Extent, linear: impl Iterator<Item = [f64; CHANNELS]>) -> Self {
         Self {
             extent,
             rgb: linear.flat_map(|rgb| rgb.map(tone::srgb8)).collect(),
-            data: false,
+            is_data: false,
         }
     }
 
-    /// PNG.
+    /// The panel as PNG.
+    ///
+    /// # Errors
+    /// [`StudyError::Picture`] if the encoder fails.
     pub fn png(&self) -> Result<Vec<u8>, StudyError> {
         let mut bytes = Vec::new();
         PngEncoder::new(&mut bytes).write_image(
@@ -47,9 +50,9 @@ impl Panel {
         Ok(bytes)
     }
 
-    /// For SVG: exact where pixels are data, small where they are a photograph's.
+    /// A data URL: PNG for data, JPEG for a photograph.
     fn data_url(&self) -> Result<String, StudyError> {
-        let (kind, bytes) = match self.data {
+        let (kind, bytes) = match self.is_data {
             true => ("png", self.png()?),
             false => {
                 let mut bytes = Vec::new();
@@ -69,81 +72,84 @@ impl Panel {
     }
 }
 
-/// A picture and the lines under it.
-pub(super) struct Captioned {
+/// A panel with lines of text below it.
+pub(super) struct CaptionedPanel {
     pub panel: Panel,
     pub caption: Vec<String>,
 }
 
-/// Rows of pictures, each row named at its left, each column at its top; either name may be empty.
-pub(super) struct Sheet {
+/// Rows of panels, with names on the left of rows and above columns; names may be empty.
+pub(super) struct PictureSheet {
     pub columns: Vec<String>,
-    pub rows: Vec<(String, Vec<Captioned>)>,
-    /// Width and height at which every picture is shown; taller ones are fitted in.
-    pub side: u32,
+    pub rows: Vec<(String, Vec<CaptionedPanel>)>,
+    /// Width and height of every panel; panels that are not square are fitted in.
+    pub side_px: u32,
 }
 
-impl Sheet {
-    /// Draws it.
+impl PictureSheet {
+    /// The sheet as SVG.
+    ///
+    /// # Errors
+    /// [`StudyError::Picture`] if encoding a panel fails.
     pub fn svg(&self) -> Result<String, StudyError> {
-        let rows_named = self.rows.iter().any(|(name, _)| !name.is_empty());
-        let columns_named = self.columns.iter().any(|name| !name.is_empty());
+        let has_row_names = self.rows.iter().any(|(name, _)| !name.is_empty());
+        let has_column_names = self.columns.iter().any(|name| !name.is_empty());
         let (left, top) = (
-            u32::from(rows_named) * LINE,
-            u32::from(columns_named) * LINE,
+            u32::from(has_row_names) * LINE_HEIGHT_PX,
+            u32::from(has_column_names) * LINE_HEIGHT_PX,
         );
-        let lines = |row: &[Captioned]| {
+        let lines = |row: &[CaptionedPanel]| {
             let lines = row.iter().map(|p| p.caption.len() as u32).max();
             lines.unwrap_or(0)
         };
         let heights: Vec<u32> = self
             .rows
             .iter()
-            .map(|(_, row)| self.side + lines(row) * LINE + GAP)
+            .map(|(_, row)| self.side_px + lines(row) * LINE_HEIGHT_PX + GAP_PX)
             .collect();
-        let width = left + GAP + self.columns.len() as u32 * (self.side + GAP);
-        let height = top + GAP + heights.iter().sum::<u32>();
+        let width = left + GAP_PX + self.columns.len() as u32 * (self.side_px + GAP_PX);
+        let height = top + GAP_PX + heights.iter().sum::<u32>();
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
              viewBox=\"0 0 {width} {height}\" font-family=\"Helvetica, Arial, sans-serif\" \
              font-size=\"14\" fill=\"#1e1e1e\" text-anchor=\"middle\">\n\
              <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
         );
-        let column_x = |i: usize| left + GAP + i as u32 * (self.side + GAP);
+        let column_x = |i: usize| left + GAP_PX + i as u32 * (self.side_px + GAP_PX);
         for (i, name) in self.columns.iter().enumerate() {
-            // Without names there is no line above for them.
+            // Without column names there is no line for them at the top.
             if !name.is_empty() {
-                text(&mut svg, column_x(i) + self.side / 2, top - 4, name);
+                text(&mut svg, column_x(i) + self.side_px / 2, top - 4, name);
             }
         }
-        let mut y = top + GAP / 2;
+        let mut y = top + GAP_PX / 2;
         for ((name, row), height) in self.rows.iter().zip(&heights) {
             if !name.is_empty() {
-                let (x, middle) = (LINE - 6, y + self.side / 2);
-                let turn = format!("<g transform=\"rotate(-90 {x} {middle})\">");
-                svg += &turn;
+                let (x, middle) = (LINE_HEIGHT_PX - 6, y + self.side_px / 2);
+                let group = format!("<g transform=\"rotate(-90 {x} {middle})\">");
+                svg += &group;
                 text(&mut svg, x, middle, name);
                 svg += "</g>\n";
             }
-            for (i, Captioned { panel, caption }) in row.iter().enumerate() {
+            for (i, CaptionedPanel { panel, caption }) in row.iter().enumerate() {
                 let x = column_x(i);
-                let style = if panel.data { "pixelated" } else { "auto" };
+                let style = if panel.is_data { "pixelated" } else { "auto" };
                 let _ = writeln!(
                     svg,
                     "<image x=\"{x}\" y=\"{y}\" width=\"{0}\" height=\"{0}\" \
                      style=\"image-rendering:{style}\" href=\"{1}\"/>",
-                    self.side,
+                    self.side_px,
                     panel.data_url()?
                 );
                 let _ = writeln!(
                     svg,
                     "<rect x=\"{x}\" y=\"{y}\" width=\"{0}\" height=\"{0}\" fill=\"none\" \
                      stroke=\"#c8c8c8\"/>",
-                    self.side
+                    self.side_px
                 );
                 for (i, line) in caption.iter().enumerate() {
-                    let below = y + self.side + LINE * (i as u32 + 1) - 5;
-                    text(&mut svg, x + self.side / 2, below, line);
+                    let below = y + self.side_px + LINE_HEIGHT_PX * (i as u32 + 1) - 5;
+                    text(&mut svg, x + self.side_px / 2, below, line);
                 }
             }
             y += height;
@@ -167,27 +173,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sheet_holds_every_picture_and_every_word() {
-        let panel = |data| Panel {
+    fn a_sheet_contains_panels_names_and_captions() {
+        let panel = |is_data| Panel {
             extent: Extent {
                 width: 2,
                 height: 2,
             },
             rgb: vec![200; 12],
-            data,
+            is_data,
         };
-        let sheet = Sheet {
+        let sheet = PictureSheet {
             columns: vec!["flood".to_owned(), "a < b".to_owned()],
             rows: vec![(
                 "true".to_owned(),
                 [true, false]
-                    .map(|data| Captioned {
-                        panel: panel(data),
+                    .map(|is_data| CaptionedPanel {
+                        panel: panel(is_data),
                         caption: vec!["50 dB".to_owned()],
                     })
                     .into(),
             )],
-            side: 100,
+            side_px: 100,
         };
         let svg = sheet.svg().unwrap();
         for word in [
