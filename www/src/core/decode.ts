@@ -1,6 +1,6 @@
 /** Decodes a file from any source on the calling thread. */
 
-import { loadDecoder } from '../engine/decoder-module.js';
+import { loadDecoder } from '../engine/modules.js';
 import { tooLong } from '../loading/http-errors.js';
 import { openPhoto } from '../loading/load.js';
 import { MainThreadDecoder } from '../photo/main-thread-decoder.js';
@@ -50,12 +50,16 @@ export async function decode(
   const url = absoluteUrl(file);
   const bytes = url.startsWith('file:') ? await readFileOrThrow(url) : null;
   if (bytes) return decode(bytes, { signal, onProgress });
-  const photograph = openPhoto(url, signal, onProgress, null, {
-    createDecoder,
-    fetch: (...request) => fetch(...request),
-    yieldToPage,
-    now,
-  });
+  const photograph = openPhoto(
+    url,
+    { signal, onProgress, onPreview: null },
+    {
+      createDecoder,
+      fetch: (...request) => fetch(...request),
+      yieldToPage,
+      now,
+    },
+  );
   return new DecodedPhotograph(await photograph);
 }
 

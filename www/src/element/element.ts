@@ -1,9 +1,9 @@
 /** `<relightable-photo>`: the public interface. The class delegates to `PhotoController`. */
 
 import { checkLightSource, isLightSource, type LightSource } from '../lights/light-source.js';
-import type { PhotoInfo } from '../photo/types.js';
 import { encodeCanvas, resampleCanvas } from '../renderers/canvas-export.js';
 import type { Backend, Gamut, LightName } from '../shared/names.js';
+import type { PhotoInfo } from '../shared/photo-info.js';
 import type { PicturePoint } from '../shared/values.js';
 import type { LightPose } from '../state/viewer-state.js';
 import type { PhotoView } from '../state/viewport.js';
@@ -14,7 +14,7 @@ import { ATTRIBUTES, PROPERTIES, type Reflected, reflect } from './reflect.js';
 // Servers have no HTMLElement, but importing this module must work there.
 const Base = globalThis.HTMLElement ?? (class {} as unknown as typeof HTMLElement);
 
-export type { PhotoInfo } from '../photo/types.js';
+export type { PhotoInfo } from '../shared/photo-info.js';
 
 /** Options of `toBlob`. */
 export interface BlobOptions {

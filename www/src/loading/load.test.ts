@@ -146,7 +146,11 @@ async function opened(
 ): Promise<{ told: [number, number][]; photo: Photograph }> {
   const told: [number, number][] = [];
   try {
-    const photo = await openPhoto(url, never, (...p) => told.push(p), drop, portsOf(ports));
+    const photo = await openPhoto(
+      url,
+      { signal: never, onProgress: (...p) => told.push(p), onPreview: drop },
+      portsOf(ports),
+    );
     return { told, photo };
   } finally {
     assert.equal(FakeDecoder.alive, 0);
@@ -341,11 +345,17 @@ test('an abort between two pieces frees the decoder and ends the transfer', asyn
     const stop = (loaded: number) => {
       if (loaded > FIRST_BYTES) abort.abort(new Error('another src'));
     };
-    await assert.rejects(openPhoto(site.url, abort.signal, stop, drop, portsOf()), /another src/);
+    await assert.rejects(
+      openPhoto(site.url, { signal: abort.signal, onProgress: stop, onPreview: drop }, portsOf()),
+      /another src/,
+    );
     assert.equal(FakeDecoder.alive, 0);
     assert.equal(getEventListeners(abort.signal, 'abort').length, 0);
     await Promise.all(site.closed);
-    await assert.rejects(openPhoto(site.url, abort.signal, stop, drop, portsOf()), /another src/);
+    await assert.rejects(
+      openPhoto(site.url, { signal: abort.signal, onProgress: stop, onPreview: drop }, portsOf()),
+      /another src/,
+    );
     assert.equal(site.asked.length, ranges ? 2 : 1, 'nothing is asked for any more');
   }
 });
@@ -356,7 +366,7 @@ test('an abort while the page has its turn is noticed', async (t) => {
   const yieldToPage = async () => abort.abort(new Error('another src'));
   const ports = portsOf({ yieldToPage });
   await assert.rejects(
-    openPhoto(site.url, abort.signal, () => {}, drop, ports),
+    openPhoto(site.url, { signal: abort.signal, onProgress: () => {}, onPreview: drop }, ports),
     /another src/,
   );
   assert.equal(FakeDecoder.alive, 0);
@@ -368,7 +378,11 @@ test('an abort while the module loads does not wait for it', async (t) => {
   const decoder = () => new Promise<never>(() => {});
   setTimeout(() => abort.abort(new Error('another src')), 20);
   await assert.rejects(
-    openPhoto(site.url, abort.signal, () => {}, drop, portsOf({ createDecoder: decoder })),
+    openPhoto(
+      site.url,
+      { signal: abort.signal, onProgress: () => {}, onPreview: drop },
+      portsOf({ createDecoder: decoder }),
+    ),
     /another src/,
   );
 });
@@ -401,7 +415,11 @@ test('the page gets its turn, with what has been decoded by then', async (t) => 
     turns.push(loaded);
   };
   // Eight looks at the clock make a turn, and there is one after each slice.
-  await openPhoto(site.url, never, (bytes) => (loaded = bytes), drop, portsOf({ yieldToPage }));
+  await openPhoto(
+    site.url,
+    { signal: never, onProgress: (bytes) => (loaded = bytes), onPreview: drop },
+    portsOf({ yieldToPage }),
+  );
   assert.ok(turns.length > 70, `${turns.length} turns`);
   const steps = turns.map((at, i) => at - (turns[i - 1] ?? 0));
   assert.ok(
@@ -448,11 +466,15 @@ test('coarser photographs come while the file does, each of twice as much, and n
   const shares: number[] = [];
   const keep = (preview: Photograph) => shares.push(preview.completeness);
   const at = { now: () => now };
-  await openPhoto(site.url, never, () => (now += 1000), keep, portsOf(at));
+  await openPhoto(
+    site.url,
+    { signal: never, onProgress: () => (now += 1000), onPreview: keep },
+    portsOf(at),
+  );
   assert.ok(shares.length >= 2 && shares.length <= 3, String(shares));
   assert.ok((shares[0] ?? 0) >= 0.125 && (shares[0] ?? 1) < 0.25, String(shares));
   assert.ok(shares.every((share, i) => i === 0 || share >= 2 * (shares[i - 1] ?? 1)));
   shares.length = 0;
-  await openPhoto(site.url, never, () => {}, keep, portsOf(at));
+  await openPhoto(site.url, { signal: never, onProgress: () => {}, onPreview: keep }, portsOf(at));
   assert.equal(shares.length, 1, 'no time has passed');
 });

@@ -8,11 +8,13 @@ import { withTimeout } from '../shared/promises.js';
 import { HttpSource, type Piece } from './byte-source.js';
 import { fileName, tooLong } from './http-errors.js';
 
-/** Gets the number of decoded bytes and that of the file, which is 0 until known. */
-export type OnProgress = (loaded: number, total: number) => void;
-
-/** Gets a coarser photograph of the file so far, and must free it. */
-export type OnPreview = (photograph: Photograph) => void;
+export interface LoadOptions {
+  readonly signal: AbortSignal;
+  /** Gets the number of decoded bytes and that of the file, which is 0 until known. */
+  readonly onProgress: (loaded: number, total: number) => void;
+  /** Gets coarser photographs of the file so far, and must free them; `null` if none are needed. */
+  readonly onPreview: ((photograph: Photograph) => void) | null;
+}
 
 export interface LoadPorts {
   readonly createDecoder: () => Promise<PhotoDecoder>;
@@ -34,28 +36,21 @@ const MIN_PREVIEW_INTERVAL_MS = 400;
  */
 export async function openPhoto(
   url: string,
-  signal: AbortSignal,
-  onProgress: OnProgress,
-  onPreview: OnPreview | null,
+  options: LoadOptions,
   ports: LoadPorts,
 ): Promise<Photograph> {
   try {
-    return await open(url, signal, onProgress, onPreview, ports);
+    return await open(url, options, ports);
   } catch (thrown) {
     if (!hasCode(thrown, 'http-changed')) throw thrown;
     // A cache may still have parts of the old file.
     const reload: typeof fetch = (input, init) => ports.fetch(input, { ...init, cache: 'reload' });
-    return await open(url, signal, onProgress, onPreview, { ...ports, fetch: reload });
+    return await open(url, options, { ...ports, fetch: reload });
   }
 }
 
-async function open(
-  url: string,
-  signal: AbortSignal,
-  onProgress: OnProgress,
-  onPreview: OnPreview | null,
-  ports: LoadPorts,
-): Promise<Photograph> {
+async function open(url: string, options: LoadOptions, ports: LoadPorts): Promise<Photograph> {
+  const { signal } = options;
   const stop = new AbortController();
   const forwardAbort = () => stop.abort(signal.reason);
   signal.throwIfAborted();
@@ -73,7 +68,7 @@ async function open(
       firstPieces.next(),
     ]);
     const pieces = piecesFor(decoder, source, first, firstPieces, stop.signal);
-    return await decode(decoder, pieces, signal, onProgress, onPreview, ports);
+    return await decode(decoder, pieces, options, ports);
   } catch (thrown) {
     signal.throwIfAborted();
     throw withFileName(toPhotoError(thrown), url);
@@ -118,9 +113,7 @@ async function* piecesFor(
 async function decode(
   decoder: PhotoDecoder,
   pieces: AsyncIterable<Piece>,
-  signal: AbortSignal,
-  onProgress: OnProgress,
-  onPreview: OnPreview | null,
+  { signal, onProgress, onPreview }: LoadOptions,
   ports: LoadPorts,
 ): Promise<Photograph> {
   let reported = 0;

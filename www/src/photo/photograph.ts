@@ -6,11 +6,11 @@
 
 import type { DecodedPhoto, DrawingModule, DrawnPhoto, Freeable, Photo } from '../engine/types.js';
 import { messageOf, PhotoError, photoReleased } from '../shared/errors.js';
+import type { PhotoInfo } from '../shared/photo-info.js';
 import { allSettledOrThrow } from '../shared/promises.js';
 import {
   describePhoto,
   type PhotoDescriptor,
-  type PhotoInfo,
   type TileBytes,
   type TileSession,
   type TileWorkers,

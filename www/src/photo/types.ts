@@ -2,25 +2,10 @@
 
 import type { DecodedPhoto } from '../engine/types.js';
 import type { PhotoError } from '../shared/errors.js';
+import type { PhotoInfo } from '../shared/photo-info.js';
 
 /** A tile on its way between two modules. */
 export type TileBytes = Uint8Array<ArrayBuffer>;
-
-/** What the file's index says about a photograph. */
-export interface PhotoInfo {
-  /** The picture's width in pixels. */
-  readonly width: number;
-  /** The picture's height in pixels. */
-  readonly height: number;
-  /** The light plane's width in light elements. */
-  readonly lightWidth: number;
-  /** The light plane's height in light elements. */
-  readonly lightHeight: number;
-  /** Memory that the decoded light transport matrix takes, in bytes. */
-  readonly decodedBytes: number;
-  /** The file's metadata, a JSON object. */
-  readonly metadata: unknown;
-}
 
 /** A photograph without its tiles: what a module needs to create it. */
 export interface PhotoDescriptor extends Omit<PhotoInfo, 'metadata'> {

@@ -6,12 +6,12 @@
 
 import type { Backend } from '../engine/types.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { Renderer, RenderOptions } from '../renderers/types.js';
+import type { CreateRenderer, Renderer, RenderOptions } from '../renderers/types.js';
 import { joinSentences, PhotoError, toPhotoError } from '../shared/errors.js';
 import { Deferred } from '../shared/promises.js';
 import { ActiveBackend, type RefCounted } from './active-backend.js';
 import { BACKEND_TITLES, backendsAfter, backendsFrom, firstWorking } from './backends.js';
-import type { SessionListener, SessionPorts } from './types.js';
+import type { SessionListener } from './types.js';
 
 /** What a selector reports to its session. */
 export interface SelectorEvents {
@@ -40,7 +40,7 @@ class BackendSearch extends Deferred {
 export class BackendSelector<R extends Renderer> {
   /** The options with which a lost backend is replaced. */
   options: RenderOptions | null = null;
-  readonly #createRenderer: SessionPorts<R>['createRenderer'];
+  readonly #createRenderer: CreateRenderer<R>;
   readonly #listener: SessionListener<R>;
   readonly #events: SelectorEvents;
   #active: ActiveBackend<R> | null = null;
@@ -51,7 +51,7 @@ export class BackendSelector<R extends Renderer> {
   #photo: RefCounted<Photograph> | null = null;
 
   constructor(
-    createRenderer: SessionPorts<R>['createRenderer'],
+    createRenderer: CreateRenderer<R>,
     listener: SessionListener<R>,
     events: SelectorEvents,
   ) {

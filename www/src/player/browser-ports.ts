@@ -9,8 +9,8 @@ import { withPolicyErrors } from '../shared/content-security-policy.js';
 import type { SessionPorts } from './types.js';
 
 export const BROWSER_PORTS: SessionPorts<CanvasRenderer> = {
-  open: (src, credentials, signal, onProgress, onPreview) =>
-    openPhoto(src, signal, onProgress, onPreview, {
+  open: (src, credentials, options) =>
+    openPhoto(src, options, {
       createDecoder,
       fetch: (input, init) =>
         withPolicyErrors(

@@ -12,7 +12,7 @@
 
 import type { Backend } from '../engine/types.js';
 import type { LightSetting } from '../lights/light-setting.js';
-import { missingSource, type OnPreview } from '../loading/load.js';
+import { missingSource } from '../loading/load.js';
 import type { Photograph } from '../photo/photograph.js';
 import type { FrameResult, Renderer } from '../renderers/types.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
@@ -161,22 +161,20 @@ export class PhotoSession<R extends Renderer> {
     const preparation = new AbortController();
     if (this.#status === 'idle') this.#status = 'loading';
     if (this.#settings) this.#ports.prepare(this.#settings.renderOptions, preparation.signal);
-    const onPreview: OnPreview = (preview) => {
+    const onPreview = (preview: Photograph): void => {
       // The last preview must be drawn first.
       if (signal.aborted || this.#selector.search) preview.free();
       else void this.#use(preview, previous, reason);
     };
     try {
-      const photo = await this.#ports.open(
-        src,
-        this.#settings?.credentials ?? 'same-origin',
+      const photo = await this.#ports.open(src, this.#settings?.credentials ?? 'same-origin', {
         signal,
-        (loaded, total) => {
+        onProgress: (loaded, total) => {
           if (!signal.aborted) this.#listener.progress(loaded, total);
         },
         // After a loss, the picture on the screen is finer than a preview.
-        this.#scheduler.hasPicture ? null : onPreview,
-      );
+        onPreview: this.#scheduler.hasPicture ? null : onPreview,
+      });
       // The backend that the preview's search finds is used for the photograph as well.
       while (this.#selector.search && !signal.aborted) await this.#selector.search;
       if (signal.aborted) photo.free();

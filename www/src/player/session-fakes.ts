@@ -61,7 +61,7 @@ export function fakeSession() {
   let slowFrames: SlowFrame[] | null = null;
   const session = new PhotoSession<Renderer>(
     {
-      open: (src, _credentials, signal, _, onPreview) =>
+      open: (src, _credentials, { signal, onPreview }) =>
         new Promise((resolve, reject) => {
           const onAbort = () => log.push(`abort ${src}`);
           signal.addEventListener('abort', onAbort);

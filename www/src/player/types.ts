@@ -3,9 +3,9 @@
 import type { OutputSettings } from '../engine/output-settings.js';
 import type { Backend } from '../engine/types.js';
 import type { LightSetting } from '../lights/light-setting.js';
-import type { OnPreview, OnProgress } from '../loading/load.js';
+import type { LoadOptions } from '../loading/load.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { FrameResult, Renderer, RenderOptions } from '../renderers/types.js';
+import type { CreateRenderer, FrameResult, Renderer, RenderOptions } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
 
 /** Everything that the element's attributes and the visitor decide. */
@@ -30,33 +30,17 @@ export interface FramePorts {
 
 /** Loading and drawing; tests replace them. */
 export interface SessionPorts<R extends Renderer> extends FramePorts {
-  open(
-    src: string,
-    credentials: RequestCredentials,
-    signal: AbortSignal,
-    onProgress: OnProgress,
-    onPreview: OnPreview | null,
-  ): Promise<Photograph>;
+  open(src: string, credentials: RequestCredentials, options: LoadOptions): Promise<Photograph>;
   /** Warms up the backend that will probably be used, until `signal` is aborted. */
   prepare(options: RenderOptions, signal: AbortSignal): void;
-  /**
-   * Creates a renderer with a surface of its own. It may stop early once `signal` is aborted. Calls
-   * `onLost` at most once. Rejects with `backend-unavailable` or `photo-lost`.
-   */
-  createRenderer(
-    backend: Backend,
-    photo: Photograph,
-    options: RenderOptions,
-    onLost: (reason: string) => void,
-    signal: AbortSignal,
-  ): Promise<R>;
+  readonly createRenderer: CreateRenderer<R>;
 }
 
 /** What a session reports. */
 export interface SessionListener<R extends Renderer> {
   /** A load starts; the last photograph is gone. */
   loadStarted(): void;
-  progress: OnProgress;
+  progress: LoadOptions['onProgress'];
   /** A new renderer has drawn its first frame: its surface replaces the last one. */
   rendererChanged(renderer: R): void;
   /** A frame was drawn; `light` is the light that was requested for it. */

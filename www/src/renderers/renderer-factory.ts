@@ -3,16 +3,13 @@
  * which are fetched when they are needed.
  */
 
-import { loadCpu } from '../engine/cpu-module.js';
+import { loadCpu, loadWebGl2, loadWebGpu } from '../engine/modules.js';
 import type { Backend, CpuModule, Modules } from '../engine/types.js';
-import { loadWebGl2 } from '../engine/webgl2-module.js';
-import { loadWebGpu } from '../engine/webgpu-module.js';
 import { startWorker } from '../engine/worker-server.js';
-import type { Photograph } from '../photo/photograph.js';
 import { messageOf, PhotoError } from '../shared/errors.js';
 import type { CpuRenderers } from './cpu/cpu-renderer.js';
 import type { GpuRenderers } from './gpu/gpu-renderer.js';
-import type { CanvasRenderer, RenderOptions } from './types.js';
+import type { CanvasRenderer, CreateRenderer, RenderOptions } from './types.js';
 
 /** More workers would wait for memory and for each other. */
 const MAX_WORKERS = 4;
@@ -20,21 +17,8 @@ const MAX_WORKERS = 4;
 const IDLE_DELAY_MS = 1000;
 
 export interface RendererFactory {
-  /**
-   * Creates a renderer with a canvas of its own, because a canvas cannot change from one graphics API to
-   * another. If the backend is unavailable, the tiles stay where they are.
-   */
-  createRenderer(
-    backend: Backend,
-    photograph: Photograph,
-    options: RenderOptions,
-    onLost: (reason: string) => void,
-    signal: AbortSignal,
-  ): Promise<CanvasRenderer>;
-  /**
-   * Warms up the first backend that works until `signal` is aborted. Errors are left to
-   * `createRenderer`.
-   */
+  readonly createRenderer: CreateRenderer<CanvasRenderer>;
+  /** Warms up the first backend that works until `signal` is aborted. Errors are left to `createRenderer`. */
   prepare(options: RenderOptions, signal: AbortSignal): Promise<void>;
 }
 

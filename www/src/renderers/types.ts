@@ -3,6 +3,7 @@
 import type { OutputSettings } from '../engine/output-settings.js';
 import type { Backend, Freeable, Gamut } from '../engine/types.js';
 import type { LightSetting } from '../lights/light-setting.js';
+import type { Photograph } from '../photo/photograph.js';
 import type { PhotoError } from '../shared/errors.js';
 
 /** Which backends may draw, and in which colours. */
@@ -35,6 +36,19 @@ export interface Renderer extends Freeable {
     quality: number,
   ): FrameResult | Promise<FrameResult>;
 }
+
+/**
+ * Creates a renderer with a surface of its own, because a canvas cannot change from one graphics API to another.
+ * It may stop early once `signal` is aborted. Calls `onLost` at most once. Rejects with `backend-unavailable`,
+ * in which case the tiles stay where they are, or with `photo-lost`.
+ */
+export type CreateRenderer<R extends Renderer> = (
+  backend: Backend,
+  photo: Photograph,
+  options: RenderOptions,
+  onLost: (reason: string) => void,
+  signal: AbortSignal,
+) => Promise<R>;
 
 /** A renderer whose surface is a canvas element. */
 export interface CanvasRenderer extends Renderer {

@@ -13,23 +13,19 @@ import { WorkerRenderer } from './worker-renderer.js';
 
 export { WorkerPool } from './worker-pool.js';
 
-export interface CpuRenderers {
-  create(
-    module: CpuModule,
-    photograph: Photograph,
-    gamut: Gamut,
-    signal: AbortSignal,
-  ): Promise<CanvasRenderer>;
-  /** Starts workers. The returned function releases them. */
-  warmUp(): () => void;
-}
+export type CpuRenderers = ReturnType<typeof cpuRenderers>;
 
-export function cpuRenderers(pool: WorkerPool): CpuRenderers {
+export function cpuRenderers(pool: WorkerPool) {
   // Photographs that were drawn on the page's thread, and why. They stay there, because the page's
   // renderer may still need the tiles.
   const warnings = new WeakMap<Photograph, string>();
   return {
-    async create(module, photograph, gamut, signal) {
+    async create(
+      module: CpuModule,
+      photograph: Photograph,
+      gamut: Gamut,
+      signal: AbortSignal,
+    ): Promise<CanvasRenderer> {
       if (!warnings.has(photograph)) {
         try {
           return await WorkerRenderer.create(module, photograph, pool, gamut);
@@ -41,6 +37,7 @@ export function cpuRenderers(pool: WorkerPool): CpuRenderers {
       const warning = warnings.get(photograph) ?? '';
       return await MainThreadRenderer.create(module, photograph, gamut, warning, signal);
     },
+    /** Starts workers. The returned function releases them. */
     warmUp: () => pool.warmUp(),
   };
 }

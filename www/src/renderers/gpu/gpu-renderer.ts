@@ -10,22 +10,17 @@ import type { Devices, GraphicsBackend, LoadGraphics } from './devices.js';
 
 export { Devices } from './devices.js';
 
-export interface GpuRenderers {
-  /** Calls `onLost` at most once. */
-  create(
-    backend: GraphicsBackend,
-    photograph: Photograph,
-    options: RenderOptions,
-    onLost: (reason: string) => void,
-    signal: AbortSignal,
-  ): Promise<CanvasRenderer>;
-  /** Opens a device; `software` allows a software renderer. The returned function releases it. */
-  warmUp(backend: GraphicsBackend, software: boolean): Promise<() => void>;
-}
+export type GpuRenderers = ReturnType<typeof gpuRenderers>;
 
-export function gpuRenderers(load: LoadGraphics, devices: Devices): GpuRenderers {
+export function gpuRenderers(load: LoadGraphics, devices: Devices) {
   return {
-    async create(backend, photograph, { gamut, software }, onLost, signal) {
+    async create(
+      backend: GraphicsBackend,
+      photograph: Photograph,
+      { gamut, software }: RenderOptions,
+      onLost: (reason: string) => void,
+      signal: AbortSignal,
+    ): Promise<CanvasRenderer> {
       const lease = await devices.lease(load, backend, software, onLost);
       try {
         signal.throwIfAborted();
@@ -45,7 +40,8 @@ export function gpuRenderers(load: LoadGraphics, devices: Devices): GpuRenderers
         throw thrown;
       }
     },
-    async warmUp(backend, software) {
+    /** Opens a device. The returned function releases it. */
+    async warmUp(backend: GraphicsBackend, software: boolean): Promise<() => void> {
       return (await devices.lease(load, backend, software, () => {})).release;
     },
   };
