@@ -1,6 +1,6 @@
 /** Decodes a file from any source on the calling thread. */
 
-import { loadDecoder } from '../engine/modules.js';
+import { loadDecoder } from '../engine/core-modules.js';
 import { tooLong } from '../loading/http-errors.js';
 import { openPhoto } from '../loading/load.js';
 import { MainThreadDecoder } from '../photo/main-thread-decoder.js';

@@ -1,6 +1,6 @@
 /** Relights a photograph with the CPU on the calling thread. */
 
-import { loadCpu } from '../engine/modules.js';
+import { loadCpu } from '../engine/core-modules.js';
 import { makeDisplay } from '../engine/output-settings.js';
 import type { BandRelighter, CpuModule, DrawnPhoto, Light } from '../engine/types.js';
 import { toPhotoError } from '../shared/errors.js';

@@ -1,24 +1,23 @@
 import assert from 'node:assert/strict';
-import { getEventListeners, once } from 'node:events';
-import { createServer, type IncomingMessage, type ServerResponse } from 'node:http';
-import type { AddressInfo } from 'node:net';
-import test, { type TestContext } from 'node:test';
+import { getEventListeners } from 'node:events';
+import type { IncomingMessage, ServerResponse } from 'node:http';
+import test from 'node:test';
 import { gzipSync } from 'node:zlib';
 import { answer } from '../../tools/ranges.js';
 import type { DecodedPhoto, Decoder } from '../engine/types.js';
 import { MainThreadDecoder } from '../photo/main-thread-decoder.js';
 import type { Photograph } from '../photo/photograph.js';
 import { fakePhoto } from '../photo/photograph-fakes.js';
+import { never, serve, type TestServer } from './http-fakes.js';
 import { type LoadPorts, openPhoto } from './load.js';
 
-const never = new AbortController().signal;
 const FIRST_BYTES = 16_384;
-/** What the demo's photograph takes. */
+/** The size of the demo's photograph. */
 const FILE_BYTES = 800_000;
-/** Where a file must not have a 255. */
-const TENDER = 20_000;
+/** The fake decoder rejects a file with the value 255 here. */
+const CHECKED_BYTE = 20_000;
 
-/** A file for `FakeDecoder`, in which no place looks like the next. */
+/** A file for `FakeDecoder`, whose bytes differ from place to place. */
 function fileOf(size = FILE_BYTES, headBytes = 1000): Buffer {
   const file = Buffer.alloc(
     size,
@@ -29,7 +28,7 @@ function fileOf(size = FILE_BYTES, headBytes = 1000): Buffer {
   return file;
 }
 
-/** Counts those alive; the bytes that the last one was fed stay. */
+/** Counts its living instances, and keeps the bytes of the last one. */
 class FakeDecoder implements Decoder {
   static alive = 0;
   static fed = Buffer.alloc(0);
@@ -55,12 +54,12 @@ class FakeDecoder implements Decoder {
     this.#bytes.set(bytes, offset);
     this.bytesFed = Math.max(this.bytesFed, offset + bytes.byteLength);
     FakeDecoder.fed = this.#bytes.subarray(0, this.bytesFed);
-    if (FakeDecoder.fed[TENDER] === 255) {
+    if (FakeDecoder.fed[CHECKED_BYTE] === 255) {
       throw Object.assign(new Error('tile 3 is damaged'), { code: 'format-checksum' });
     }
   }
 
-  /** One at each 100 kB. */
+  /** One scan per 100 kB. */
   get scansDone(): number {
     return Math.floor(this.bytesFed / 100_000);
   }
@@ -79,52 +78,23 @@ class FakeDecoder implements Decoder {
   }
 }
 
-interface Site {
-  readonly url: string;
-  /** What has been asked for, in order. */
-  readonly asked: (string | undefined)[];
-  /** Answers that have been ended, by either side. */
-  readonly closed: Promise<unknown>[];
-}
-
-/** A server of its own for a test. `count` is 1 with the first request. */
-async function serve(
-  t: TestContext,
-  handler: (request: IncomingMessage, response: ServerResponse, count: number) => unknown,
-): Promise<Site> {
-  const asked: (string | undefined)[] = [];
-  const closed: Promise<unknown>[] = [];
-  const server = createServer((request, response) => {
-    closed.push(once(response, 'close'));
-    handler(request, response, asked.push(request.headers.range?.replace('bytes=', '')));
-  });
-  server.listen(0, '127.0.0.1');
-  await once(server, 'listening');
-  t.after(() => {
-    server.close();
-    server.closeAllConnections();
-  });
-  const { port } = server.address() as AddressInfo;
-  return { url: `http://127.0.0.1:${port}/rose.ltm`, asked, closed };
-}
-
-/** Answers as servers do that know ranges. */
+/** Answers as a server with ranges. */
 function send(request: IncomingMessage, response: ServerResponse, file: Buffer, etag = '"a"') {
   const read = (start: number, end: number) => [file.subarray(start, end)];
   const content = { size: file.length, type: 'application/vnd.ltm', etag, read };
   answer(request, response, content).catch(() => {});
 }
 
-/** Bytes that requests ask for, those beyond the file's end left out. */
-function bytesOf(asked: Site['asked'], size: number): number {
-  const lengths = asked.map((range) => {
+/** The number of requested bytes, without those beyond the file's end. */
+function countBytes(ranges: TestServer['ranges'], size: number): number {
+  const lengths = ranges.map((range) => {
     const [first = 0, last = size - 1] = range?.split('-').map(Number) ?? [];
     return Math.min(last + 1, size) - first;
   });
   return lengths.reduce((sum, length) => sum + length, 0);
 }
 
-/** A world in which every look at the clock takes a millisecond. */
+/** Ports whose clock advances by a millisecond with each call. */
 function portsOf(ports: Partial<LoadPorts> = {}): LoadPorts {
   let time = 0;
   return {
@@ -136,160 +106,160 @@ function portsOf(ports: Partial<LoadPorts> = {}): LoadPorts {
   };
 }
 
-/** For who does not care for coarser ones. */
+/** Ignores previews. */
 const drop = (preview: Photograph) => preview.free();
 
-/** Opens a photograph and makes sure that nothing of that is left. */
-async function opened(
+/** Loads a photograph, and checks that no decoder and no listener is left. */
+async function load(
   url: string,
   ports: Partial<LoadPorts> = {},
-): Promise<{ told: [number, number][]; photo: Photograph }> {
-  const told: [number, number][] = [];
+): Promise<{ progress: [number, number][]; photo: Photograph }> {
+  const progress: [number, number][] = [];
   try {
     const photo = await openPhoto(
       url,
-      { signal: never, onProgress: (...p) => told.push(p), onPreview: drop },
+      { signal: never, onProgress: (...p) => progress.push(p), onPreview: drop },
       portsOf(ports),
     );
-    return { told, photo };
+    return { progress, photo };
   } finally {
     assert.equal(FakeDecoder.alive, 0);
     assert.equal(getEventListeners(never, 'abort').length, 0);
   }
 }
 
-test('a file opens with two requests, of which no byte is for nothing', async (t) => {
+test('a file takes two requests, without unused bytes', async (t) => {
   const file = fileOf();
-  const site = await serve(t, (request, response) => send(request, response, file));
-  const { told } = await opened(site.url);
-  assert.deepEqual(site.asked, ['0-16383', '16384-799999']);
-  const ratio = bytesOf(site.asked, file.length) / file.length;
-  assert.ok(ratio <= 1.05, `${ratio} bytes asked for each that is needed`);
+  const server = await serve(t, (request, response) => send(request, response, file));
+  const { progress } = await load(server.url);
+  assert.deepEqual(server.ranges, ['0-16383', '16384-799999']);
+  const ratio = countBytes(server.ranges, file.length) / file.length;
+  assert.ok(ratio <= 1.05, `${ratio} requested bytes for each byte of the file`);
   assert.ok(FakeDecoder.fed.equals(file));
-  const sizes = told.map(([loaded]) => loaded);
+  const sizes = progress.map(([loaded]) => loaded);
   assert.deepEqual(
     sizes,
     [...new Set(sizes)].sort((a, b) => a - b),
   );
-  assert.ok(told.every(([, total]) => total === FILE_BYTES));
+  assert.ok(progress.every(([, total]) => total === FILE_BYTES));
   assert.equal(sizes.at(-1), FILE_BYTES);
 });
 
-test('a small file opens with one request', async (t) => {
+test('a small file takes one request', async (t) => {
   const file = fileOf(5000);
-  const site = await serve(t, (request, response) => send(request, response, file));
-  await opened(site.url);
-  assert.deepEqual(site.asked, ['0-16383']);
+  const server = await serve(t, (request, response) => send(request, response, file));
+  await load(server.url);
+  assert.deepEqual(server.ranges, ['0-16383']);
   assert.ok(FakeDecoder.fed.equals(file));
 });
 
-test('a long head is asked for first', async (t) => {
+test('a long index is requested first', async (t) => {
   const file = fileOf(FILE_BYTES, 50_000);
-  const site = await serve(t, (request, response) => send(request, response, file));
-  await opened(site.url);
-  assert.deepEqual(site.asked, ['0-16383', '16384-49999', '50000-799999']);
+  const server = await serve(t, (request, response) => send(request, response, file));
+  await load(server.url);
+  assert.deepEqual(server.ranges, ['0-16383', '16384-49999', '50000-799999']);
   assert.ok(FakeDecoder.fed.equals(file));
 });
 
-test('a large file is not cut up', async (t) => {
+test('a large file is not split into many requests', async (t) => {
   const file = fileOf(9_000_000);
-  const site = await serve(t, (request, response) => send(request, response, file));
-  await opened(site.url);
-  assert.equal(site.asked.length, 2);
+  const server = await serve(t, (request, response) => send(request, response, file));
+  await load(server.url);
+  assert.equal(server.ranges.length, 2);
   assert.equal(FakeDecoder.fed.length, file.length);
 });
 
-test('a server that knows no ranges is asked once', async (t) => {
+test('a server without ranges gets one request', async (t) => {
   const file = fileOf();
-  const site = await serve(t, (_, response) => response.end(file));
-  const { told } = await opened(site.url);
-  assert.deepEqual(site.asked, ['0-16383']);
+  const server = await serve(t, (_, response) => response.end(file));
+  const { progress } = await load(server.url);
+  assert.deepEqual(server.ranges, ['0-16383']);
   assert.ok(FakeDecoder.fed.equals(file));
-  assert.deepEqual(told.at(-1), [FILE_BYTES, FILE_BYTES]);
+  assert.deepEqual(progress.at(-1), [FILE_BYTES, FILE_BYTES]);
 });
 
-test('a server that knows ranges no longer is asked once more', async (t) => {
+test('a server that stops supporting ranges gets one more request', async (t) => {
   const file = fileOf();
-  const site = await serve(t, (request, response, count) =>
+  const server = await serve(t, (request, response, count) =>
     count === 1 ? send(request, response, file) : response.end(file),
   );
-  await opened(site.url);
-  assert.equal(site.asked.length, 2);
+  await load(server.url);
+  assert.equal(server.ranges.length, 2);
   assert.ok(FakeDecoder.fed.equals(file));
 });
 
-test('whatever length the server tells, the file’s own is the total', async (t) => {
+test('the total is the file’s own size, not the server’s', async (t) => {
   const file = fileOf();
   for (const level of [0, 9]) {
     const zipped = gzipSync(file, { level });
-    const site = await serve(t, (_, response) => {
+    const server = await serve(t, (_, response) => {
       response.writeHead(200, { 'content-encoding': 'gzip', 'content-length': zipped.length });
       response.end(zipped);
     });
-    const { told } = await opened(site.url);
-    assert.ok(told.every(([, total]) => total === FILE_BYTES));
-    assert.deepEqual(told.at(-1), [FILE_BYTES, FILE_BYTES]);
+    const { progress } = await load(server.url);
+    assert.ok(progress.every(([, total]) => total === FILE_BYTES));
+    assert.deepEqual(progress.at(-1), [FILE_BYTES, FILE_BYTES]);
   }
 });
 
-test('a transfer that breaks off goes on where it ended', async (t) => {
+test('an interrupted transfer continues where it ended', async (t) => {
   const file = fileOf();
-  const site = await serve(t, (request, response, count) => {
+  const server = await serve(t, (request, response, count) => {
     if (count !== 2) return send(request, response, file);
     response.writeHead(206, { 'content-range': 'bytes 16384-799999/800000', etag: '"a"' });
     response.write(file.subarray(FIRST_BYTES, 100_000), () => response.socket?.destroySoon());
     return undefined;
   });
-  await opened(site.url);
-  assert.deepEqual(site.asked, ['0-16383', '16384-799999', '100000-799999']);
+  await load(server.url);
+  assert.deepEqual(server.ranges, ['0-16383', '16384-799999', '100000-799999']);
   assert.ok(FakeDecoder.fed.equals(file));
 });
 
-test('a damaged file keeps the decoder’s code and ends the transfer', async (t) => {
+test('a damaged file has the decoder’s code and ends the transfer', async (t) => {
   const file = fileOf(8_000_000);
-  file[TENDER] = 255;
+  file[CHECKED_BYTE] = 255;
   for (const ranges of [true, false]) {
-    const site = await serve(t, (request, response) =>
+    const server = await serve(t, (request, response) =>
       ranges ? send(request, response, file) : response.end(file),
     );
-    await assert.rejects(opened(site.url), {
+    await assert.rejects(load(server.url), {
       name: 'PhotoError',
       code: 'format-checksum',
       message: 'rose.ltm: tile 3 is damaged.',
     });
-    await Promise.all(site.closed);
+    await Promise.all(server.closed);
   }
 });
 
-test('a file short on the server is told from one short in transfer', async (t) => {
+test('a short file differs from a short transfer', async (t) => {
   const short = fileOf().subarray(0, 300_000);
   const parts = await serve(t, (request, response) => send(request, response, short));
-  await assert.rejects(opened(parts.url), {
+  await assert.rejects(load(parts.url), {
     code: 'format-truncated',
     message: /rose\.ltm is too short: bytes 16384 to 799999 are needed, .* has only 300000\./,
   });
-  assert.equal(parts.asked.length, 1, 'the rest is of no use');
+  assert.equal(parts.ranges.length, 1, 'the rest is of no use');
   const whole = await serve(t, (_, response) => {
     response.writeHead(200, { 'content-length': short.length }).end(short);
   });
-  await assert.rejects(opened(whole.url), { code: 'format-truncated', message: /only 300000/ });
+  await assert.rejects(load(whole.url), { code: 'format-truncated', message: /only 300000/ });
   const lengthless = await serve(t, (_, response) => {
     response.writeHead(200, { 'transfer-encoding': 'chunked' }).end(short);
   });
-  await assert.rejects(opened(lengthless.url), {
+  await assert.rejects(load(lengthless.url), {
     code: 'http-short',
     message: /rose\.ltm is incomplete: .* at byte 300000, before byte 800000/,
   });
 });
 
-test('a file that goes on after its end is format-invalid', async (t) => {
+test('a file with data after its end is format-invalid', async (t) => {
   const file = Buffer.concat([fileOf(), Buffer.alloc(10)]);
-  const site = await serve(t, (request, response) => send(request, response, file));
-  await assert.rejects(opened(site.url), {
+  const server = await serve(t, (request, response) => send(request, response, file));
+  await assert.rejects(load(server.url), {
     code: 'format-invalid',
     message: /rose\.ltm is too long: .* ends at byte 800000, but the server has 800010\./,
   });
-  assert.equal(site.asked.length, 1);
+  assert.equal(server.ranges.length, 1);
 });
 
 test('an empty file is format-truncated', async (t) => {
@@ -298,47 +268,47 @@ test('an empty file is format-truncated', async (t) => {
     response.writeHead(200, { 'content-length': 0 }).end();
   });
   for (const { url } of [parts, whole]) {
-    await assert.rejects(opened(url), {
+    await assert.rejects(load(url), {
       code: 'format-truncated',
       message: /rose\.ltm is too short: .* the server has only 0\./,
     });
   }
 });
 
-test('a file that is replaced meanwhile is begun anew, past any cache', async (t) => {
+test('a file that is replaced is loaded once more, without the cache', async (t) => {
   const [before, after] = [fileOf(), fileOf(700_000)];
-  const site = await serve(t, (request, response, count) =>
+  const server = await serve(t, (request, response, count) =>
     count === 1 ? send(request, response, before) : send(request, response, after, '"b"'),
   );
   const caches: (RequestCache | undefined)[] = [];
-  const { told } = await opened(site.url, {
+  const { progress } = await load(server.url, {
     fetch: (input, init) => {
       caches.push(init?.cache);
       return fetch(input, init);
     },
   });
-  assert.deepEqual(site.asked, ['0-16383', '16384-799999', '0-16383', '16384-699999']);
+  assert.deepEqual(server.ranges, ['0-16383', '16384-799999', '0-16383', '16384-699999']);
   assert.deepEqual(caches, [undefined, undefined, 'reload', 'reload']);
   assert.ok(FakeDecoder.fed.equals(after));
-  assert.deepEqual(told.at(-1), [700_000, 700_000]);
+  assert.deepEqual(progress.at(-1), [700_000, 700_000]);
 });
 
-test('a file that is replaced again and again is http-changed', async (t) => {
-  const site = await serve(t, (request, response, count) =>
+test('a file that is replaced repeatedly is http-changed', async (t) => {
+  const server = await serve(t, (request, response, count) =>
     send(request, response, fileOf(), `"${count}"`),
   );
-  await assert.rejects(opened(site.url), {
+  await assert.rejects(load(server.url), {
     name: 'PhotoError',
     code: 'http-changed',
     message: /rose\.ltm was replaced on the server/,
   });
-  assert.equal(site.asked.length, 4);
+  assert.equal(server.ranges.length, 4);
 });
 
 test('an abort between two pieces frees the decoder and ends the transfer', async (t) => {
   const file = fileOf(8_000_000);
   for (const ranges of [true, false]) {
-    const site = await serve(t, (request, response) =>
+    const server = await serve(t, (request, response) =>
       ranges ? send(request, response, file) : response.end(file),
     );
     const abort = new AbortController();
@@ -346,40 +316,40 @@ test('an abort between two pieces frees the decoder and ends the transfer', asyn
       if (loaded > FIRST_BYTES) abort.abort(new Error('another src'));
     };
     await assert.rejects(
-      openPhoto(site.url, { signal: abort.signal, onProgress: stop, onPreview: drop }, portsOf()),
+      openPhoto(server.url, { signal: abort.signal, onProgress: stop, onPreview: drop }, portsOf()),
       /another src/,
     );
     assert.equal(FakeDecoder.alive, 0);
     assert.equal(getEventListeners(abort.signal, 'abort').length, 0);
-    await Promise.all(site.closed);
+    await Promise.all(server.closed);
     await assert.rejects(
-      openPhoto(site.url, { signal: abort.signal, onProgress: stop, onPreview: drop }, portsOf()),
+      openPhoto(server.url, { signal: abort.signal, onProgress: stop, onPreview: drop }, portsOf()),
       /another src/,
     );
-    assert.equal(site.asked.length, ranges ? 2 : 1, 'nothing is asked for any more');
+    assert.equal(server.ranges.length, ranges ? 2 : 1, 'nothing more is requested');
   }
 });
 
-test('an abort while the page has its turn is noticed', async (t) => {
-  const site = await serve(t, (request, response) => send(request, response, fileOf()));
+test('an abort while the page runs is noticed', async (t) => {
+  const server = await serve(t, (request, response) => send(request, response, fileOf()));
   const abort = new AbortController();
   const yieldToPage = async () => abort.abort(new Error('another src'));
   const ports = portsOf({ yieldToPage });
   await assert.rejects(
-    openPhoto(site.url, { signal: abort.signal, onProgress: () => {}, onPreview: drop }, ports),
+    openPhoto(server.url, { signal: abort.signal, onProgress: () => {}, onPreview: drop }, ports),
     /another src/,
   );
   assert.equal(FakeDecoder.alive, 0);
 });
 
 test('an abort while the module loads does not wait for it', async (t) => {
-  const site = await serve(t, (request, response) => send(request, response, fileOf()));
+  const server = await serve(t, (request, response) => send(request, response, fileOf()));
   const abort = new AbortController();
   const decoder = () => new Promise<never>(() => {});
   setTimeout(() => abort.abort(new Error('another src')), 20);
   await assert.rejects(
     openPhoto(
-      site.url,
+      server.url,
       { signal: abort.signal, onProgress: () => {}, onPreview: drop },
       portsOf({ createDecoder: decoder }),
     ),
@@ -387,28 +357,28 @@ test('an abort while the module loads does not wait for it', async (t) => {
   );
 });
 
-test('a module that does not start ends the transfer too', async (t) => {
-  const site = await serve(t, (_, response) => response.write('…'));
+test('a module that does not start ends the transfer', async (t) => {
+  const server = await serve(t, (_, response) => response.write('…'));
   const decoder = async () => {
-    while (site.closed.length === 0) await new Promise((resolve) => setTimeout(resolve));
+    while (server.closed.length === 0) await new Promise((resolve) => setTimeout(resolve));
     throw new Error('no wasm');
   };
-  await assert.rejects(opened(site.url, { createDecoder: decoder }), {
+  await assert.rejects(load(server.url, { createDecoder: decoder }), {
     code: 'internal',
     message: /no wasm/,
   });
-  await Promise.all(site.closed);
+  await Promise.all(server.closed);
 });
 
-test('what the server says is told before the module is there', async (t) => {
-  const site = await serve(t, (_, response) => response.writeHead(404).end());
+test('a server error is reported before the module is loaded', async (t) => {
+  const server = await serve(t, (_, response) => response.writeHead(404).end());
   const decoder = () => new Promise<never>(() => {});
-  await assert.rejects(opened(site.url, { createDecoder: decoder }), { code: 'http-status' });
+  await assert.rejects(load(server.url, { createDecoder: decoder }), { code: 'http-status' });
 });
 
-test('the page gets its turn, with what has been decoded by then', async (t) => {
+test('decoding yields to the page, after reporting its progress', async (t) => {
   const file = fileOf();
-  const site = await serve(t, (request, response) => send(request, response, file));
+  const server = await serve(t, (request, response) => send(request, response, file));
   let loaded = 0;
   const turns: number[] = [];
   const yieldToPage = async () => {
@@ -416,7 +386,7 @@ test('the page gets its turn, with what has been decoded by then', async (t) => 
   };
   // Eight looks at the clock make a turn, and there is one after each slice.
   await openPhoto(
-    site.url,
+    server.url,
     { signal: never, onProgress: (bytes) => (loaded = bytes), onPreview: drop },
     portsOf({ yieldToPage }),
   );
@@ -428,20 +398,20 @@ test('the page gets its turn, with what has been decoded by then', async (t) => 
   );
 });
 
-test('a decoder that is never content ends in an error', async (t) => {
+test('a decoder that asks for the same bytes again is an error', async (t) => {
   class Glutton extends FakeDecoder {
     override wants = () => Float64Array.of(0, 100);
   }
-  const site = await serve(t, (request, response) => send(request, response, fileOf()));
+  const server = await serve(t, (request, response) => send(request, response, fileOf()));
   const decoder = async () => new MainThreadDecoder({ Decoder: Glutton }, () => 0);
-  await assert.rejects(opened(site.url, { createDecoder: decoder }), {
+  await assert.rejects(load(server.url, { createDecoder: decoder }), {
     code: 'internal',
     message: /already has/,
   });
-  assert.equal(site.asked.length, 2);
+  assert.equal(server.ranges.length, 2);
 });
 
-test('of several ranges that a decoder wants the first is asked for, then what it wants by then', async (t) => {
+test('the decoder’s first range is requested, and then the next one at that time', async (t) => {
   class InThree extends FakeDecoder {
     override wants(): Float64Array {
       const { bytesFed: at } = this;
@@ -452,22 +422,22 @@ test('of several ranges that a decoder wants the first is asked for, then what i
     }
   }
   const file = fileOf();
-  const site = await serve(t, (request, response) => send(request, response, file));
+  const server = await serve(t, (request, response) => send(request, response, file));
   const decoder = async () => new MainThreadDecoder({ Decoder: InThree }, () => 0);
-  await opened(site.url, { createDecoder: decoder });
-  assert.deepEqual(site.asked, ['0-16383', '16384-49999', '50000-299999', '300000-799999']);
+  await load(server.url, { createDecoder: decoder });
+  assert.deepEqual(server.ranges, ['0-16383', '16384-49999', '50000-299999', '300000-799999']);
   assert.ok(FakeDecoder.fed.equals(file));
 });
 
-test('coarser photographs come while the file does, each of twice as much, and not one after the other', async (t) => {
+test('previews come while the file loads, each of twice as many bytes, and not too often', async (t) => {
   const file = fileOf();
-  const site = await serve(t, (request, response) => send(request, response, file));
+  const server = await serve(t, (request, response) => send(request, response, file));
   let now = 0;
   const shares: number[] = [];
   const keep = (preview: Photograph) => shares.push(preview.completeness);
   const at = { now: () => now };
   await openPhoto(
-    site.url,
+    server.url,
     { signal: never, onProgress: () => (now += 1000), onPreview: keep },
     portsOf(at),
   );
@@ -475,6 +445,10 @@ test('coarser photographs come while the file does, each of twice as much, and n
   assert.ok((shares[0] ?? 0) >= 0.125 && (shares[0] ?? 1) < 0.25, String(shares));
   assert.ok(shares.every((share, i) => i === 0 || share >= 2 * (shares[i - 1] ?? 1)));
   shares.length = 0;
-  await openPhoto(site.url, { signal: never, onProgress: () => {}, onPreview: keep }, portsOf(at));
+  await openPhoto(
+    server.url,
+    { signal: never, onProgress: () => {}, onPreview: keep },
+    portsOf(at),
+  );
   assert.equal(shares.length, 1, 'no time has passed');
 });

@@ -1,6 +1,6 @@
 /** The script of the worker that decodes one photograph for a `WorkerDecoder`. */
 
-import { loadDecoder } from '../engine/modules.js';
+import { loadDecoder } from '../engine/core-modules.js';
 import type { DecodedPhoto, Decoder } from '../engine/types.js';
 import { serve } from '../engine/worker-server.js';
 import { toPhotoError } from '../shared/errors.js';

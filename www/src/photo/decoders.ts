@@ -1,6 +1,6 @@
 /** Chooses the thread that decodes: a worker's if the page may have one, otherwise the page's. */
 
-import { loadDecoder } from '../engine/modules.js';
+import { loadDecoder } from '../engine/core-modules.js';
 import { startWorker } from '../engine/worker-server.js';
 import { MainThreadDecoder } from './main-thread-decoder.js';
 import type { PhotoDecoder } from './photo-decoder.js';

@@ -4,31 +4,39 @@ import type { Backend } from '../engine/types.js';
 import { PhotoError } from '../shared/errors.js';
 import { backendsAfter, backendsFrom, firstWorking } from './backends.js';
 
-const always = () => {};
+const neverCancelled = () => {};
 
-test('the first choice is taken without a reason', async () => {
-  const chosen = await firstWorking(['webgl2', 'cpu'], async (backend) => `on ${backend}`, always);
-  assert.deepEqual(chosen, { backend: 'webgl2', value: 'on webgl2', reason: '' });
+test('the first backend that works has no reason', async () => {
+  const working = await firstWorking(
+    ['webgl2', 'cpu'],
+    async (backend) => `on ${backend}`,
+    neverCancelled,
+  );
+  assert.deepEqual(working, { backend: 'webgl2', value: 'on webgl2', reason: '' });
 });
 
-test('each failure leads to the next and is told', async () => {
+test('each failure leads to the next backend, and is a reason', async () => {
   const tried: Backend[] = [];
-  const chosen = await firstWorking(
+  const working = await firstWorking(
     ['webgpu', 'webgl2', 'cpu'],
     async (backend) => {
       tried.push(backend);
       if (backend !== 'cpu') throw new Error(`no ${backend} here`);
       return backend;
     },
-    always,
+    neverCancelled,
   );
   assert.deepEqual(tried, ['webgpu', 'webgl2', 'cpu']);
-  assert.equal(chosen.reason, 'WebGPU: no webgpu here. WebGL2: no webgl2 here.');
+  assert.equal(working.reason, 'WebGPU: no webgpu here. WebGL2: no webgl2 here.');
 });
 
-test('none working is backend-unavailable, with every reason', async () => {
+test('if none works, the error has every reason', async () => {
   await assert.rejects(
-    firstWorking(['webgpu', 'webgl2'], (backend) => Promise.reject(new Error(backend)), always),
+    firstWorking(
+      ['webgpu', 'webgl2'],
+      (backend) => Promise.reject(new Error(backend)),
+      neverCancelled,
+    ),
     {
       code: 'backend-unavailable',
       message: /WebGPU: webgpu\. WebGL2: webgl2\./,
@@ -36,7 +44,7 @@ test('none working is backend-unavailable, with every reason', async () => {
   );
 });
 
-test('a search nobody waits for tries no further', async () => {
+test('a cancelled search tries no further', async () => {
   const tried: Backend[] = [];
   const search = firstWorking(
     ['webgpu', 'cpu'],
@@ -45,27 +53,27 @@ test('a search nobody waits for tries no further', async () => {
       return Promise.reject(new Error('no'));
     },
     () => {
-      throw new Error('abandoned');
+      throw new Error('cancelled');
     },
   );
-  await assert.rejects(search, /abandoned/);
+  await assert.rejects(search, /cancelled/);
   assert.deepEqual(tried, ['webgpu']);
 });
 
-test('after a loss, those further down the order are left', () => {
+test('after a failure the next backends are left, after a loss also the same one', () => {
   assert.deepEqual(backendsAfter(['webgpu', 'webgl2', 'cpu'], 'webgl2'), ['cpu']);
   assert.deepEqual(backendsAfter(['cpu'], 'cpu'), []);
   assert.deepEqual(backendsFrom(['webgpu', 'webgl2', 'cpu'], 'webgl2'), ['webgl2', 'cpu']);
 });
 
-test('what no back end is allowed to do is told at once', async () => {
+test('csp-wasm ends the search at once', async () => {
   const tried: Backend[] = [];
-  const refused = new PhotoError('csp-wasm', 'WebAssembly may not run here.');
+  const forbidden = new PhotoError('csp-wasm', 'WebAssembly may not run here.');
   const search = firstWorking(
     ['webgpu', 'cpu'],
     (backend) => {
       tried.push(backend);
-      return Promise.reject(refused);
+      return Promise.reject(forbidden);
     },
     () => {},
   );

@@ -2,10 +2,10 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { QualityController } from './quality-controller.js';
 
-/** A motion: frames one after another, each taking what `cost` says of the share it is drawn by. */
+/** An animation: each frame takes `cost(quality)` milliseconds. */
 function animate(controller: QualityController, start = 0) {
   let now = start;
-  /** The share of each frame. */
+  /** The quality of each frame. */
   const shares: number[] = [];
   const frames = (count: number, cost: (share: number, frame: number) => number, gap = 0) => {
     for (let frame = 0; frame < count; frame += 1) {
@@ -19,18 +19,18 @@ function animate(controller: QualityController, start = 0) {
   return { frames, shares, rest: (ms: number) => (now += ms) };
 }
 
-/** How often the share changed. */
+/** How often the quality changed. */
 function changes(shares: readonly number[]): number {
   return shares.filter((share, i) => i > 0 && share !== shares[i - 1]).length;
 }
 
-/** A display that shows a frame at its next refresh, however soon it was done. */
+/** A display shows a frame at its next refresh, however early it is done. */
 function shownAt(hertz: number, cost: (share: number) => number) {
   const period = 1000 / hertz;
   return (share: number) => period * Math.ceil(cost(share) / period - 1e-9);
 }
 
-/** So that no limit is met by chance; the same each time. */
+/** Deterministic, from -0.5 to 0.5. */
 function noise(frame: number): number {
   return ((frame * 7919) % 13) / 13 - 0.5;
 }
@@ -42,7 +42,7 @@ for (const [what, cost] of [
   ['at 60 Hz', 1000 / 60],
   ['at 30 Hz', 1000 / 30],
 ] as const) {
-  test(`frames in time are drawn in full: ${what}`, () => {
+  test(`fast frames have full quality: ${what}`, () => {
     const controller = new QualityController();
     const { frames, shares } = animate(controller);
     frames(1000, (_, frame) => cost + 2 * noise(frame));
@@ -56,7 +56,7 @@ for (const [full, share] of [
   [100, 1 / 4],
   [1000, 1 / 4],
 ] as const) {
-  test(`frames of ${full} ms are drawn by ${share} within a dozen`, () => {
+  test(`frames of ${full} ms have the quality ${share} after a dozen`, () => {
     const controller = new QualityController();
     const { frames, shares } = animate(controller);
     frames(100, linear(full));
@@ -65,14 +65,14 @@ for (const [full, share] of [
   });
 }
 
-test('hiccups change nothing', () => {
+test('outliers change nothing', () => {
   const controller = new QualityController();
   const { frames, shares } = animate(controller);
   frames(1000, (_, frame) => (frame % 7 < 3 ? 300 : 20));
   assert.deepEqual(new Set(shares), new Set([1]));
 });
 
-test('detail is back once there is time again, step by step', () => {
+test('quality rises step by step once frames are fast', () => {
   const controller = new QualityController();
   const { frames, shares } = animate(controller);
   frames(20, linear(120));
@@ -83,7 +83,7 @@ test('detail is back once there is time again, step by step', () => {
   assert.equal(changes(shares), 2);
 });
 
-test('detail is back also where a display shows frames no sooner', () => {
+test('quality rises even if the display limits the frame rate', () => {
   const controller = new QualityController();
   const { frames } = animate(controller);
   frames(20, shownAt(60, linear(120)));
@@ -92,7 +92,7 @@ test('detail is back also where a display shows frames no sooner', () => {
   assert.equal(controller.quality, 1);
 });
 
-test('detail is back in the end where it could not be expected to fit', () => {
+test('quality rises in the end even if it is not expected to fit', () => {
   const controller = new QualityController();
   const { frames } = animate(controller);
   frames(20, shownAt(30, linear(120)));
@@ -102,13 +102,13 @@ test('detail is back in the end where it could not be expected to fit', () => {
 });
 
 for (const full of [42, 48, 60, 75, 85, 100, 130]) {
-  test(`what lies between two steps does not go to and fro: ${full} ms`, () => {
+  test(`quality does not oscillate between two levels: ${full} ms`, () => {
     for (const hertz of [60, 144, 1e6]) {
       const controller = new QualityController();
       const { frames, shares } = animate(controller);
       const shown = shownAt(hertz, linear(full));
       frames(1000, (share, frame) => shown(share) * (1 + 0.1 * noise(frame)));
-      // Down, and at most two tries of more.
+      // One drop and at most two attempts to raise.
       assert.ok(changes(shares) <= 5, `${changes(shares)} changes at ${hertz} Hz`);
       const slow = shares.filter((share) => shown(share) > 40).length;
       assert.ok(slow <= 8 + 2 * 7, `${slow} slow frames at ${hertz} Hz`);
@@ -116,28 +116,28 @@ for (const full of [42, 48, 60, 75, 85, 100, 130]) {
   });
 }
 
-test('where more is expected to fit and does not, tries become rare', () => {
+test('attempts that fail against expectation become rare', () => {
   const controller = new QualityController();
   const { frames, shares } = animate(controller);
-  // Half of them take next to nothing: 60 Hz promises what full detail does not hold.
+  // Half of the components take next to nothing, so that full quality is expected to fit at 60 Hz.
   frames(10_000, (share) => (share === 1 ? 60 : 1000 / 60));
   const tries = (changes(shares) - 1) / 2;
   assert.ok(tries > 3 && tries <= 10, `${tries} tries`);
   assert.ok(changes(shares.slice(5000)) <= 6, 'one in 1920 frames');
 });
 
-test('a page that is slow by itself is left in full detail', () => {
+test('if the page itself is slow, quality stays full', () => {
   for (const cost of [45, 100]) {
     const controller = new QualityController();
     const { frames, shares } = animate(controller);
     frames(10_000, (_, frame) => cost + noise(frame));
     const less = shares.filter((share) => share < 1).length;
-    assert.ok(less > 0 && less <= 5 * 7, `${less} frames in less detail`);
-    assert.deepEqual(new Set(shares.slice(20, 1000)), new Set([1]), 'and for long');
+    assert.ok(less > 0 && less <= 5 * 7, `${less} frames of less quality`);
+    assert.deepEqual(new Set(shares.slice(20, 1000)), new Set([1]), 'for long');
   }
 });
 
-test('a page that is slow by itself is not taken for one that is slow ever after', () => {
+test('a lower quality is tried again later on a slow page', () => {
   const controller = new QualityController();
   const { frames } = animate(controller);
   frames(20, () => 60);
@@ -146,10 +146,10 @@ test('a page that is slow by itself is not taken for one that is slow ever after
   assert.equal(controller.quality, 1 / 2);
 });
 
-test('a page that is slow by itself is found out, whatever happened when less was tried', () => {
+test('a slow page is recognised even if the first drop seemed to help', () => {
   const controller = new QualityController();
   const { frames } = animate(controller);
-  // Something else kept it busy just before.
+  // Something else kept the page busy just before.
   frames(8, () => 250);
   frames(100, () => 100);
   assert.equal(controller.quality, 1 / 4);
@@ -157,15 +157,15 @@ test('a page that is slow by itself is found out, whatever happened when less wa
   assert.equal(controller.quality, 1);
 });
 
-test('frames that are late even by the least are drawn by that', () => {
+test('if the lowest quality is too slow, it is used all the same', () => {
   const controller = new QualityController();
   const { frames, shares } = animate(controller);
   frames(3000, linear(400));
   const more = shares.slice(12).filter((share) => share > 1 / 4).length;
-  assert.ok(more <= 2 * 7, `${more} frames in more detail`);
+  assert.ok(more <= 2 * 7, `${more} frames of more quality`);
 });
 
-test('the time between motions, and between frames of a slow film, is not a frame’s', () => {
+test('pauses between frames do not count', () => {
   for (const gap of [30, 90, 150, 500]) {
     const controller = new QualityController();
     const { frames, shares } = animate(controller);
@@ -174,18 +174,18 @@ test('the time between motions, and between frames of a slow film, is not a fram
   }
 });
 
-test('motions part at a pause, and the first frame of each does not count', () => {
+test('the first frame after a pause does not count', () => {
   const controller = new QualityController();
   const { frames, shares, rest } = animate(controller);
   for (let stroke = 0; stroke < 50; stroke += 1) {
-    // A device that wakes up.
+    // The device wakes up.
     frames(30, (_, frame) => (frame === 0 ? 200 : 16));
     rest(120);
   }
   assert.deepEqual(new Set(shares), new Set([1]));
 });
 
-test('motions of one frame each tell nothing', () => {
+test('animations of one frame change nothing', () => {
   for (const [gap, share] of [
     [99, 1 / 2],
     [101, 1],
@@ -196,7 +196,7 @@ test('motions of one frame each tell nothing', () => {
   }
 });
 
-test('what was learnt in short motions holds for the next', () => {
+test('short animations add up', () => {
   const controller = new QualityController();
   const { frames, shares, rest } = animate(controller);
   for (let stroke = 0; stroke < 10; stroke += 1) {

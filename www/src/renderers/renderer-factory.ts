@@ -3,7 +3,8 @@
  * which are fetched when they are needed.
  */
 
-import { loadCpu, loadWebGl2, loadWebGpu } from '../engine/modules.js';
+import { loadCpu } from '../engine/core-modules.js';
+import { loadWebGl2, loadWebGpu } from '../engine/graphics-modules.js';
 import type { Backend, CpuModule, Modules } from '../engine/types.js';
 import { startWorker } from '../engine/worker-server.js';
 import { messageOf, PhotoError } from '../shared/errors.js';

@@ -1,6 +1,6 @@
 /** The script of a worker that relights row ranges of photographs for a `WorkerPool`. */
 
-import { loadCpu } from '../../engine/modules.js';
+import { loadCpu } from '../../engine/core-modules.js';
 import { makeDisplay } from '../../engine/output-settings.js';
 import type { BandRelighter, CpuModule, DrawnPhoto } from '../../engine/types.js';
 import { serve } from '../../engine/worker-server.js';

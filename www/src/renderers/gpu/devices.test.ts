@@ -6,13 +6,13 @@ import type { GraphicsPorts } from './graphics-ports.js';
 
 const settle = () => new Promise((resolve) => setImmediate(resolve));
 
-/** A page whose devices the test loses, and a module that notes what becomes of them. */
-function world() {
+/** Devices that the test loses, and a log of what happens to them. */
+function fakeDevices() {
   const log: string[] = [];
-  const loses: ((message: string) => void)[] = [];
+  const losses: ((message: string) => void)[] = [];
   const canvases: { lose(): void }[] = [];
   let now = 0;
-  let missing: Error | null = null;
+  let openError: Error | null = null;
   let silent = false;
   let unanswered = 0;
   const device = (name: string, lost: Graphics['lost']): Graphics => ({
@@ -24,29 +24,29 @@ function world() {
   const module = {
     Graphics: {
       webgpu: async () => {
-        if (missing) throw missing;
+        if (openError) throw openError;
         if (silent) {
           unanswered += 1;
           return new Promise<never>(() => {});
         }
-        const number = loses.length;
+        const number = losses.length;
         const lost = new Promise<{ message: string }>((resolve) => {
-          loses.push((message) => resolve({ message }));
+          losses.push((message) => resolve({ message }));
         });
         return device(`webgpu ${number}`, lost);
       },
       webgl2: () => {
-        if (missing) throw missing;
+        if (openError) throw openError;
         return device(`webgl2 ${canvases.length - 1}`, undefined);
       },
     },
   };
   const load = (async () => module) as unknown as LoadGraphics;
-  let name: string | null = 'A real one';
-  let asked = 0;
+  let name: string | null = 'A real device';
+  let nameRequests = 0;
   const ports: GraphicsPorts = {
     nameOf: async () => {
-      asked += 1;
+      nameRequests += 1;
       return name;
     },
     createCanvas: () => {
@@ -62,21 +62,21 @@ function world() {
   return {
     devices: new Devices(ports, 20),
     load,
-    /** Devices are called that from now on; `null`: there are none. */
-    call: (other: string | null) => {
+    /** Sets the name of the adapter; `null` if there is none. */
+    setName: (other: string | null) => {
       name = other;
     },
-    asked: () => asked,
-    loses,
+    nameRequests: () => nameRequests,
+    losses,
     canvases,
     unanswered: () => unanswered,
-    happened: () => log.splice(0),
-    note: (name: string) => (reason: string) => log.push(`${name}: ${reason}`),
+    takeLog: () => log.splice(0),
+    onLost: (name: string) => (reason: string) => log.push(`${name}: ${reason}`),
     pass: (ms: number) => {
       now += ms;
     },
-    miss: (error: Error | null) => {
-      missing = error;
+    setError: (error: Error | null) => {
+      openError = error;
     },
     fallSilent: () => {
       silent = true;
@@ -85,152 +85,155 @@ function world() {
 }
 
 for (const backend of ['webgpu', 'webgl2'] as const) {
-  test(`all who ask for ${backend} at once share one device, which goes with the last`, async () => {
-    const w = world();
+  test(`simultaneous leases of ${backend} share a device, which is freed with the last`, async () => {
+    const f = fakeDevices();
     const leases = await Promise.all(
-      ['a', 'b', 'c'].map((name) => w.devices.lease(w.load, backend, true, w.note(name))),
+      ['a', 'b', 'c'].map((name) => f.devices.lease(f.load, backend, true, f.onLost(name))),
     );
     assert.equal(new Set(leases.map(({ graphics }) => graphics)).size, 1);
     for (const { release } of leases.slice(1)) release();
     await settle();
-    assert.deepEqual(w.happened(), []);
+    assert.deepEqual(f.takeLog(), []);
     leases[0]?.release();
     leases[0]?.release();
     await settle();
-    assert.deepEqual(w.happened(), [`free ${backend} 0`]);
-    // What it says when it is let go is no loss.
-    w.loses[0]?.('destroyed');
-    w.canvases[0]?.lose();
+    assert.deepEqual(f.takeLog(), [`free ${backend} 0`]);
+    // The loss of a device that was freed is ignored.
+    f.losses[0]?.('destroyed');
+    f.canvases[0]?.lose();
     await settle();
-    assert.deepEqual(w.happened(), []);
-    const next = await w.devices.lease(w.load, backend, true, w.note('d'));
+    assert.deepEqual(f.takeLog(), []);
+    const next = await f.devices.lease(f.load, backend, true, f.onLost('d'));
     assert.equal(next.graphics.kernel, `${backend} 1`);
   });
 
-  test(`all who share ${backend} are told once that it was lost, and the next gets another`, async () => {
-    const w = world();
+  test(`all leases of ${backend} report a loss once, and the next gets a new device`, async () => {
+    const f = fakeDevices();
     const lose = (i: number) =>
-      backend === 'webgpu' ? w.loses[i]?.('gone.') : w.canvases[i]?.lose();
+      backend === 'webgpu' ? f.losses[i]?.('gone.') : f.canvases[i]?.lose();
     const leases = await Promise.all(
-      ['a', 'b'].map((name) => w.devices.lease(w.load, backend, true, w.note(name))),
+      ['a', 'b'].map((name) => f.devices.lease(f.load, backend, true, f.onLost(name))),
     );
     lose(0);
     lose(0);
     await settle();
     leases[0]?.fail('a draw failed');
     const reason = backend === 'webgpu' ? 'gone.' : 'the browser took it away.';
-    assert.deepEqual(w.happened().sort(), [`a: ${reason}`, `b: ${reason}`, `free ${backend} 0`]);
-    const next = await w.devices.lease(w.load, backend, true, w.note('c'));
+    assert.deepEqual(f.takeLog().sort(), [`a: ${reason}`, `b: ${reason}`, `free ${backend} 0`]);
+    const next = await f.devices.lease(f.load, backend, true, f.onLost('c'));
     for (const { release } of leases) release();
     await settle();
-    assert.deepEqual(w.happened(), [], 'the one that was lost takes nothing of the next along');
+    assert.deepEqual(f.takeLog(), [], 'the lost device does not affect the next');
     next.fail('a draw failed');
     await settle();
-    assert.deepEqual(w.happened(), ['c: a draw failed', `free ${backend} 1`]);
+    assert.deepEqual(f.takeLog(), ['c: a draw failed', `free ${backend} 1`]);
   });
 }
 
-test('a device that is lost again and again is refused for a while', async () => {
-  const w = world();
+test('a device that is lost repeatedly is refused for a minute', async () => {
+  const f = fakeDevices();
   for (let i = 0; i < 3; i += 1) {
-    await w.devices.lease(w.load, 'webgpu', true, w.note('a'));
-    w.loses[i]?.('gone.');
+    await f.devices.lease(f.load, 'webgpu', true, f.onLost('a'));
+    f.losses[i]?.('gone.');
     await settle();
-    w.pass(10_000);
+    f.pass(10_000);
   }
   const refused = { code: 'backend-unavailable', message: /lost 3 times/ };
-  await assert.rejects(w.devices.lease(w.load, 'webgpu', true, w.note('a')), refused);
-  assert.ok(await w.devices.lease(w.load, 'webgl2', true, w.note('a')), 'another is had');
-  w.pass(60_000);
+  await assert.rejects(f.devices.lease(f.load, 'webgpu', true, f.onLost('a')), refused);
+  assert.ok(
+    await f.devices.lease(f.load, 'webgl2', true, f.onLost('a')),
+    'the other backend is available',
+  );
+  f.pass(60_000);
   for (let i = 3; i < 8; i += 1) {
-    await w.devices.lease(w.load, 'webgpu', true, w.note('a'));
-    w.loses[i]?.('gone.');
+    await f.devices.lease(f.load, 'webgpu', true, f.onLost('a'));
+    f.losses[i]?.('gone.');
     await settle();
-    w.pass(70_000);
+    f.pass(70_000);
   }
 });
 
-test('a device that cannot be had is asked for again by the next', async () => {
+test('a device that failed to open is opened again by the next lease', async () => {
   for (const backend of ['webgpu', 'webgl2'] as const) {
-    const w = world();
-    w.miss(new Error('none here'));
-    await assert.rejects(w.devices.lease(w.load, backend, true, w.note('a')), /none here/);
-    w.miss(null);
-    assert.ok(await w.devices.lease(w.load, backend, true, w.note('a')));
+    const f = fakeDevices();
+    f.setError(new Error('none here'));
+    await assert.rejects(f.devices.lease(f.load, backend, true, f.onLost('a')), /none here/);
+    f.setError(null);
+    assert.ok(await f.devices.lease(f.load, backend, true, f.onLost('a')));
   }
 });
 
-test('a browser that never answers has no device', async () => {
-  const w = world();
-  w.fallSilent();
-  const asked = w.devices.lease(w.load, 'webgpu', true, w.note('a'));
+test('a browser that does not answer has no device', async () => {
+  const f = fakeDevices();
+  f.fallSilent();
+  const asked = f.devices.lease(f.load, 'webgpu', true, f.onLost('a'));
   const message = /does not answer within/;
   await assert.rejects(asked, { code: 'backend-unavailable', message });
-  // Nor does anyone wait for it again.
-  const again = w.devices.lease(w.load, 'webgpu', true, w.note('b'));
+  // The next lease does not wait.
+  const again = f.devices.lease(f.load, 'webgpu', true, f.onLost('b'));
   await assert.rejects(again, { code: 'backend-unavailable', message });
-  assert.equal(w.unanswered(), 1);
+  assert.equal(f.unanswered(), 1);
 });
 
-test('where there is no device, its module is not loaded, and the next asks again', async () => {
+test('without a device its module is not loaded, and the next lease asks again', async () => {
   for (const backend of ['webgpu', 'webgl2'] as const) {
-    const w = world();
-    w.call(null);
-    const load = (() => assert.fail('it is of no use')) as unknown as LoadGraphics;
-    await assert.rejects(w.devices.lease(load, backend, true, w.note('a')), {
+    const f = fakeDevices();
+    f.setName(null);
+    const load = (() => assert.fail('it is not needed')) as unknown as LoadGraphics;
+    await assert.rejects(f.devices.lease(load, backend, true, f.onLost('a')), {
       code: 'backend-unavailable',
       message: /has no device/,
     });
-    w.call('A real one');
-    assert.ok(await w.devices.lease(w.load, backend, true, w.note('a')));
-    await w.devices.lease(w.load, backend, true, w.note('b'));
-    assert.equal(w.asked(), 2, 'once there is one, it is known');
+    f.setName('A real device');
+    assert.ok(await f.devices.lease(f.load, backend, true, f.onLost('a')));
+    await f.devices.lease(f.load, backend, true, f.onLost('b'));
+    assert.equal(f.nameRequests(), 2, 'a name is kept');
   }
 });
 
-test('the module of a device that is a program is loaded only for who takes one', async () => {
+test('the module of a software renderer is loaded only on request', async () => {
   for (const name of [
     'google swiftshader',
     'ANGLE (Mesa, llvmpipe (LLVM 19.1))',
     'Microsoft Basic Render Driver',
   ]) {
-    const w = world();
-    w.call(name);
-    const load = (() => assert.fail('it is of no use')) as unknown as LoadGraphics;
-    const refused = w.devices.lease(load, 'webgl2', false, w.note('a'));
+    const f = fakeDevices();
+    f.setName(name);
+    const load = (() => assert.fail('it is not needed')) as unknown as LoadGraphics;
+    const refused = f.devices.lease(load, 'webgl2', false, f.onLost('a'));
     await assert.rejects(refused, {
       code: 'backend-unavailable',
       message: /software renderer/,
     });
-    assert.ok(await w.devices.lease(w.load, 'webgl2', true, w.note('b')));
+    assert.ok(await f.devices.lease(f.load, 'webgl2', true, f.onLost('b')));
   }
-  const w = world();
-  w.call('nvidia lovelace');
-  assert.ok(await w.devices.lease(w.load, 'webgpu', false, w.note('a')));
+  const f = fakeDevices();
+  f.setName('nvidia lovelace');
+  assert.ok(await f.devices.lease(f.load, 'webgpu', false, f.onLost('a')));
 });
 
-test('a browser that never tells a name has no device', async () => {
-  const w = world();
+test('a browser that does not give a name has no device', async () => {
+  const f = fakeDevices();
   const ports = {
     nameOf: () => new Promise<never>(() => {}),
     createCanvas: assert.fail,
     now: () => 0,
   };
   const devices = new Devices(ports, 20);
-  await assert.rejects(devices.lease(w.load, 'webgpu', true, w.note('a')), {
+  await assert.rejects(devices.lease(f.load, 'webgpu', true, f.onLost('a')), {
     code: 'backend-unavailable',
     message: /does not answer within/,
   });
 });
 
 test('a browser that answers late is asked again', async () => {
-  const w = world();
+  const f = fakeDevices();
   let answer = (_: string): void => {};
   const names = [
     new Promise<string>((resolve) => {
       answer = resolve;
     }),
-    Promise.resolve('A real one'),
+    Promise.resolve('A real device'),
   ];
   const ports = {
     nameOf: () => names.shift() ?? Promise.resolve(null),
@@ -238,18 +241,21 @@ test('a browser that answers late is asked again', async () => {
     now: () => 0,
   };
   const devices = new Devices(ports, 20);
-  const lease = () => devices.lease(w.load, 'webgpu', true, w.note('a'));
+  const lease = () => devices.lease(f.load, 'webgpu', true, f.onLost('a'));
   await assert.rejects(lease(), /does not answer within/);
-  answer('A real one');
+  answer('A real device');
   await settle();
   assert.ok(await lease());
 });
 
-test('what takes the place of a lost device is asked its name', async () => {
-  const w = world();
-  await w.devices.lease(w.load, 'webgpu', false, w.note('a'));
-  w.call('google swiftshader');
-  w.loses[0]?.('gone.');
+test('the name is asked again after a loss', async () => {
+  const f = fakeDevices();
+  await f.devices.lease(f.load, 'webgpu', false, f.onLost('a'));
+  f.setName('google swiftshader');
+  f.losses[0]?.('gone.');
   await settle();
-  await assert.rejects(w.devices.lease(w.load, 'webgpu', false, w.note('a')), /software renderer/);
+  await assert.rejects(
+    f.devices.lease(f.load, 'webgpu', false, f.onLost('a')),
+    /software renderer/,
+  );
 });
