@@ -152,7 +152,7 @@ export class Photograph implements Freeable {
       if (haveWorkersFailed) this.#endSession();
       return null;
     }
-    const message = `${messageOf(thrown)} A part of the photograph was lost with it.`;
+    const message = `${messageOf(thrown)} A part of the photograph went with it.`;
     this.#fault ??= new PhotoError('photo-lost', message, thrown);
     this.#session?.end();
     return this.#fault;

@@ -46,7 +46,7 @@ export async function firstWorking<T>(
     : ' Remove the backend attribute, so that the CPU is tried too.';
   throw new PhotoError(
     'backend-unavailable',
-    `No backend of this browser can draw the photograph. ${failures.join(' ')}${remedy}`,
+    `This browser cannot draw the photograph. ${failures.join(' ')}${remedy}`,
     cause,
   );
 }
