@@ -12,12 +12,12 @@ import type {
   DecodedPhoto,
   Decoder,
   Display,
-  DrawingModule,
-  DrawnPhoto,
   Gamut,
   Graphics,
   Light,
+  ReceivedPhoto,
   Relighter,
+  RelightModule,
 } from '../../www/src/engine/types.js';
 
 // Its classes are nominal, so functions of one cannot be assigned to functions of the other; what
@@ -29,7 +29,7 @@ type _Constructor = Extends<[number?], ConstructorParameters<typeof Decoders.Dec
 type _Finish = Extends<ReturnType<Decoders.Decoder['finish']>, DecodedPhoto>;
 type _Preview = Extends<ReturnType<Decoders.Decoder['preview']>, DecodedPhoto | undefined>;
 
-type _CpuReceive = Extends<ReturnType<typeof Cpu.Photo.receive>, DrawnPhoto>;
+type _CpuReceive = Extends<ReturnType<typeof Cpu.Photo.receive>, ReceivedPhoto>;
 type _CpuParcels = Extends<[Float64Array, Float32Array], Parameters<typeof Cpu.Photo.receive>>;
 type _CpuLight = Extends<ReturnType<typeof Cpu.Light.builtin>, Light>;
 type _CpuBuiltin = Extends<[Cpu.Photo, string], Parameters<typeof Cpu.Light.builtin>>;
@@ -44,14 +44,14 @@ type _CpuSrgb = Extends<
 >;
 type _CpuDisplay = Extends<Cpu.Display, Display>;
 type _CpuDisplayOf = Extends<
-  ConstructorParameters<DrawingModule['Display']>,
+  ConstructorParameters<RelightModule['Display']>,
   ConstructorParameters<typeof Cpu.Display>
 >;
 type _CpuRelighter = Extends<Cpu.Relighter, Omit<Relighter, 'render' | 'renderPicture'>>;
 type _CpuRender = Extends<[Cpu.Light, Cpu.Display, number], Parameters<Cpu.Relighter['render']>>;
 type _CpuRenderPicture = Extends<[Cpu.Display, number], Parameters<Cpu.Relighter['renderPicture']>>;
 
-type _WebGl2Receive = Extends<ReturnType<typeof WebGl2.Photo.receive>, DrawnPhoto>;
+type _WebGl2Receive = Extends<ReturnType<typeof WebGl2.Photo.receive>, ReceivedPhoto>;
 type _WebGl2Parcels = Extends<
   [Float64Array, Float32Array],
   Parameters<typeof WebGl2.Photo.receive>
@@ -72,7 +72,7 @@ type _WebGl2Srgb = Extends<
 >;
 type _WebGl2Display = Extends<WebGl2.Display, Display>;
 type _WebGl2DisplayOf = Extends<
-  ConstructorParameters<DrawingModule['Display']>,
+  ConstructorParameters<RelightModule['Display']>,
   ConstructorParameters<typeof WebGl2.Display>
 >;
 type _WebGl2Relighter = Extends<WebGl2.Relighter, Omit<Relighter, 'render' | 'renderPicture'>>;
@@ -85,7 +85,7 @@ type _WebGl2RenderPicture = Extends<
   Parameters<WebGl2.Relighter['renderPicture']>
 >;
 
-type _WebGpuReceive = Extends<ReturnType<typeof WebGpu.Photo.receive>, DrawnPhoto>;
+type _WebGpuReceive = Extends<ReturnType<typeof WebGpu.Photo.receive>, ReceivedPhoto>;
 type _WebGpuParcels = Extends<
   [Float64Array, Float32Array],
   Parameters<typeof WebGpu.Photo.receive>
@@ -106,7 +106,7 @@ type _WebGpuSrgb = Extends<
 >;
 type _WebGpuDisplay = Extends<WebGpu.Display, Display>;
 type _WebGpuDisplayOf = Extends<
-  ConstructorParameters<DrawingModule['Display']>,
+  ConstructorParameters<RelightModule['Display']>,
   ConstructorParameters<typeof WebGpu.Display>
 >;
 type _WebGpuRelighter = Extends<WebGpu.Relighter, Omit<Relighter, 'render' | 'renderPicture'>>;

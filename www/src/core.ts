@@ -24,8 +24,8 @@ import { CORE_MODULES } from './shared/names.js';
 export type ModuleName = (typeof CORE_MODULES)[number];
 
 /**
- * Sets the bytes or the addresses of WebAssembly modules, where the files beside the script can be neither
- * fetched nor read. Call it before the first `decode`. Code with SIMD needs a machine with SIMD.
+ * Sets the bytes or the addresses of WebAssembly modules, where the files beside the script can be neither fetched nor
+ * read. Call it before the first `decode`. Code with SIMD needs a machine with SIMD.
  */
 export function provideWasm(codes: Readonly<Partial<Record<ModuleName, WasmCode>>>): void {
   for (const [name, code] of Object.entries(codes)) {

@@ -12,8 +12,8 @@ import type { CorePhotograph } from './types.js';
 import { fetchCoreWasm, readFile } from './wasm-code.js';
 
 /**
- * A `.ltm` file: its bytes, a stream of its bytes, or its address. In a page, the address may be relative;
- * in Node, it may be a `file:` URL.
+ * A `.ltm` file: its bytes, a stream of its bytes, or its address. In a page, the address may be relative; in Node, it
+ * may be a `file:` URL.
  */
 export type PhotoFile =
   | string

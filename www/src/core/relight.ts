@@ -2,7 +2,7 @@
 
 import { loadCpu } from '../engine/core-modules.js';
 import { makeDisplay } from '../engine/output-settings.js';
-import type { BandRelighter, CpuModule, DrawnPhoto, Light } from '../engine/types.js';
+import type { BandRelighter, CpuModule, Light, ReceivedPhoto } from '../engine/types.js';
 import { toPhotoError } from '../shared/errors.js';
 import type { Gamut, LightName, ToneCurve } from '../shared/names.js';
 import {
@@ -25,8 +25,8 @@ export interface Torch {
 }
 
 /**
- * A light image of any size, row by row: linear red, green and blue from 0 to 1 in a `Float32Array`, or sRGB
- * codes with alpha as in `ImageData`. Alpha scales the pixel's light.
+ * A light image of any size, row by row: linear red, green and blue from 0 to 1 in a `Float32Array`, or sRGB codes with
+ * alpha as in `ImageData`. Alpha scales the pixel's light.
  */
 export interface PictureLight {
   readonly data: Float32Array | Uint8ClampedArray;
@@ -63,8 +63,8 @@ export interface Picture {
 const relighters = new WeakMap<DecodedPhotograph, BandRelighter>();
 
 /**
- * Relights a photograph. Rejects with a `PhotoError`: `attribute` for an invalid option, `light-…` for an
- * invalid light.
+ * Relights a photograph. Rejects with a `PhotoError`: `attribute` for an invalid option, `light-…` for an invalid
+ * light.
  */
 export async function relight(
   photo: CorePhotograph,
@@ -107,7 +107,7 @@ export async function relight(
 function relighterOf(
   module: CpuModule,
   photo: DecodedPhotograph,
-  modulePhoto: DrawnPhoto,
+  modulePhoto: ReceivedPhoto,
 ): BandRelighter {
   const known = relighters.get(photo);
   if (known) return known;
@@ -117,7 +117,7 @@ function relighterOf(
   return relighter;
 }
 
-function createLight({ Light }: CpuModule, modulePhoto: DrawnPhoto, light: CoreLight): Light {
+function createLight({ Light }: CpuModule, modulePhoto: ReceivedPhoto, light: CoreLight): Light {
   if (typeof light === 'string') return Light.builtin(modulePhoto, parseLight(light));
   if ('x' in light) return Light.torch(modulePhoto, light.x, light.y, light.size);
   const { data, width, height } = light;

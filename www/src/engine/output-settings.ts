@@ -1,7 +1,7 @@
 /** The output transform's settings: how a linear picture becomes codes on the canvas. */
 
 import type { RgbFactors } from '../shared/values.js';
-import type { Display, DrawingModule, Gamut, ToneCurve } from './types.js';
+import type { Display, Gamut, RelightModule, ToneCurve } from './types.js';
 
 /** Immutable: a change makes a new object. */
 export interface OutputSettings {
@@ -13,7 +13,7 @@ export interface OutputSettings {
 
 /** The output transform in a WebAssembly module, for a canvas of the given gamut. */
 export function makeDisplay(
-  { Display }: Pick<DrawingModule, 'Display'>,
+  { Display }: Pick<RelightModule, 'Display'>,
   { exposure, whiteBalance, tone }: OutputSettings,
   gamut: Gamut,
 ): Display {

@@ -1,4 +1,7 @@
-/** The WebAssembly modules: their surfaces. */
+/**
+ * The exports of the WebAssembly modules. Each module has a memory of its own; photographs move between modules as a
+ * descriptor and tiles. `tests/browser/engine-contract.ts` compares these types with those of wasm-bindgen.
+ */
 
 import type { Gamut, ModuleName, ToneCurve } from '../shared/names.js';
 
@@ -7,154 +10,146 @@ export type { Backend, Gamut, ToneCurve } from '../shared/names.js';
 /** A picture that a graphics device can upload directly, and that may change at any time. */
 export type LivePicture = HTMLCanvasElement | OffscreenCanvas | ImageBitmap | HTMLVideoElement;
 
-/** Holds memory inside the module until freed. */
+/** An object in a module's memory, until it is freed. */
 export interface Freeable {
   free(): void;
 }
 
-/** A photograph in the memory of a module, or as many of its tiles as are there. */
-export interface Photo extends Freeable {
-  /** A tile for another module; it is dark here afterwards. Not while a CPU is at the photograph. */
+/** A photograph in a module's memory, with some or all of its tiles. */
+export interface ModulePhoto extends Freeable {
+  /** Moves a tile out; it is dark here afterwards. Not allowed while a CPU relighter uses the photograph. */
   takeTile(index: number): Uint8Array;
 }
 
-/** One that was decoded. */
-export interface DecodedPhoto extends Photo {
+/** A photograph in the decoder's memory. */
+export interface DecodedPhoto extends ModulePhoto {
   readonly width: number;
   readonly height: number;
   readonly lightWidth: number;
   readonly lightHeight: number;
-  /** Text that should be a JSON object. */
+  /** JSON text, which is not validated. */
   readonly metadata: string;
   readonly decodedBytes: number;
-  /** Number of tiles, which lie row by row. */
+  /** Number of tiles, which are numbered row by row. */
   readonly tiles: number;
-  /** Pixels along a tile's side; those at the right and lower edges may be smaller. */
+  /** Camera pixels along a tile's side; tiles at the right and lower edges may be smaller. */
   readonly tileSide: number;
-  /** What `Photo.receive` of another module takes. */
+  /** The arguments of `Photo.receive`. */
   geometryParcel(): Float64Array;
   basisParcel(): Float32Array;
 }
 
-/** One that another module decoded, to be drawn. */
-export interface DrawnPhoto extends Photo {
-  /** Takes a tile that `takeTile` gave. Not while a CPU is at the photograph. */
+/** A photograph that another module has decoded. */
+export interface ReceivedPhoto extends ModulePhoto {
+  /** Moves a tile of `takeTile` in. Not allowed while a CPU relighter uses the photograph. */
   putTile(index: number, bytes: Uint8Array): void;
 }
 
-/** What every element of the light plane emits. */
+/** The emission of the light elements. */
 export interface Light extends Freeable {
-  /** Linear R, G and B of the rows from `first` up to `end`, row by row. */
+  /** Linear R, G and B of the rows from `first` to before `end`, row by row. */
   linearRgb(first: number, end: number): Float32Array;
 }
 
-/** Says which bytes of a file it wants, and takes them as they come. */
+/** Decodes one file while it arrives. */
 export interface Decoder extends Freeable {
-  /** Where ranges begin and end, in turns, the most important first; empty once all has come. */
+  /** Start and end of each range that is needed, the most important first; empty once the file is complete. */
   wants(): Float64Array;
-  /** Takes the file's bytes from `offset` on; those of a range in order. */
+  /** Feeds bytes of the file that begin at `offset`. Bytes of one range must come in order. */
   feed(offset: number, bytes: Uint8Array): void;
-  /** Each byte counted once. */
+  /** Bytes that were fed; repeated ones count once. */
   readonly bytesFed: number;
   readonly fileBytes: number | undefined;
-  /** Scans that are there for every tile. */
+  /** Scans that are complete for every tile. */
   readonly scansDone: number;
-  /**
-   * A coarser photograph of what has come of every tile; none before the first scan is there, and once all
-   * is.
-   */
+  /** A coarser photograph; `undefined` before the first scan is complete, and once the file is. */
   preview(): DecodedPhoto | undefined;
-  /** Ends the decoder, whether it succeeds or throws. */
+  /** The photograph. Ends the decoder, also if it throws. */
   finish(): DecodedPhoto;
 }
 
-/** How a picture is shown. */
+/** An output transform. */
 export interface Display extends Freeable {}
 
 /** A graphics device, which photographs share. */
 export interface Graphics extends Freeable {
   readonly kernel: string;
-  /** Settles when a WebGPU device goes away; the canvas of a WebGL2 context tells itself. */
+  /** Settles when a WebGPU device is lost; `undefined` for WebGL2, whose canvas fires an event. */
   readonly lost: Promise<{ readonly message: string }> | undefined;
-  /** Brings a photograph to the device, to be drawn into a canvas of its own. */
-  draw(photo: DrawnPhoto, canvas: HTMLCanvasElement, gamut: Gamut): Relighter | Promise<Relighter>;
+  /** Uploads a photograph and draws it on a canvas, which it uses alone. */
+  draw(
+    photo: ReceivedPhoto,
+    canvas: HTMLCanvasElement,
+    gamut: Gamut,
+  ): Relighter | Promise<Relighter>;
 }
 
-/** One photograph, on one canvas. */
+/** Draws one photograph on one canvas. `quality` is the share of the components, 0 to 1. */
 export interface Relighter extends Freeable {
   readonly kernel: string;
-  /** What the canvas shows. */
+  /** The canvas's gamut. */
   readonly gamut: Gamut;
-  /** By a share of the components, from 0 to 1, which is all. */
-  render(light: Light, display: Display, detail: number): void;
+  render(light: Light, display: Display, quality: number): void;
   /**
-   * Takes a picture of so many pixels as the light of `renderPicture`; `false` where this back end cannot.
-   * Throws what the browser does; the last light stays.
+   * Uploads a picture as the light of `renderPicture`; `false` if the backend cannot. Throws the browser's error, and
+   * keeps the last light then.
    */
   takePicture(picture: LivePicture, width: number, height: number): boolean;
-  /** As `render`, under the picture that was taken last. */
-  renderPicture(display: Display, detail: number): void;
+  /** As `render`, with the uploaded picture. */
+  renderPicture(display: Display, quality: number): void;
 }
 
-/** The CPU at work on some rows of a picture, without a canvas. */
+/** Relights rows of a picture with the CPU, without a canvas. */
 export interface BandRelighter extends Freeable {
-  /** The first row of the light that is seen, and the first after it that is not. */
+  /** The first light row that is needed, and the end of those rows. */
   readonly lightRows: Uint32Array;
-  /**
-   * Takes linear R, G and B of those rows, or the last ones again, and a share of the components, and
-   * writes RGBA into `out`, row by row.
-   */
-  relight(light: Float32Array | null, display: Display, detail: number, out: Uint8Array): void;
+  /** `light` has linear R, G and B of those rows; `null` reuses the last one. Writes RGBA into `out`, row by row. */
+  relight(light: Float32Array | null, display: Display, quality: number, out: Uint8Array): void;
 }
 
-/** The module that decodes. */
 export interface DecoderModule {
   Decoder: { new (maxDecodedBytes?: number): Decoder };
 }
 
-/** What every module that draws has. */
-export interface DrawingModule {
+/** What the modules of all backends export. */
+export interface RelightModule {
   Photo: {
-    /** A photograph that another module decoded, without its tiles as yet. */
-    receive(geometry: Float64Array, basis: Float32Array): DrawnPhoto;
+    /** Creates a photograph without tiles. */
+    receive(geometry: Float64Array, basis: Float32Array): ReceivedPhoto;
   };
-  /** A photograph without tiles will do for those. */
+  /** The photograph may be one without tiles. */
   Light: {
-    builtin(photo: DrawnPhoto, name: string): Light;
-    torch(photo: DrawnPhoto, x: number, y: number, size?: number): Light;
-    /** A fire that has burnt for so many seconds. */
-    fire(photo: DrawnPhoto, seconds: number): Light;
-    /** A picture of any size, in linear RGB, row by row. */
-    fromLinear(photo: DrawnPhoto, values: Float32Array, width: number, height: number): Light;
-    /** A picture of any size, in sRGB: RGBA, row by row, colours apart from alpha. */
-    fromSrgb(photo: DrawnPhoto, rgba: Uint8ClampedArray, width: number, height: number): Light;
+    builtin(photo: ReceivedPhoto, name: string): Light;
+    torch(photo: ReceivedPhoto, x: number, y: number, size?: number): Light;
+    fire(photo: ReceivedPhoto, seconds: number): Light;
+    /** From linear RGB of a picture of any size, row by row. */
+    fromLinear(photo: ReceivedPhoto, values: Float32Array, width: number, height: number): Light;
+    /** From sRGB codes with straight alpha of a picture of any size: RGBA, row by row. */
+    fromSrgb(photo: ReceivedPhoto, rgba: Uint8ClampedArray, width: number, height: number): Light;
   };
   Display: {
     new (exposure: number, balance: Float64Array, curve: ToneCurve, gamut: Gamut): Display;
   };
 }
 
-/** The module that draws on the CPU. */
-export interface CpuModule extends DrawingModule {
-  /** What relights: `simd128` or `scalar`. */
+export interface CpuModule extends RelightModule {
+  /** `simd128` or `scalar`. */
   cpuKernel(): string;
-  BandRelighter: { new (photo: DrawnPhoto, firstRow: number, rows: number): BandRelighter };
-  /** One that draws on this thread. */
-  Relighter: { new (photo: DrawnPhoto, canvas: HTMLCanvasElement, gamut: Gamut): Relighter };
+  BandRelighter: { new (photo: ReceivedPhoto, firstRow: number, rows: number): BandRelighter };
+  /** Draws on the calling thread. */
+  Relighter: { new (photo: ReceivedPhoto, canvas: HTMLCanvasElement, gamut: Gamut): Relighter };
 }
 
-/** The module that draws by WebGPU. */
-export interface WebGpuModule extends DrawingModule {
+export interface WebGpuModule extends RelightModule {
   Graphics: { webgpu(): Promise<Graphics> };
 }
 
-/** The module that draws by WebGL2. */
-export interface WebGl2Module extends DrawingModule {
-  /** On a canvas for it alone. */
+export interface WebGl2Module extends RelightModule {
+  /** The device uses the canvas alone. */
   Graphics: { webgl2(canvas: HTMLCanvasElement): Graphics };
 }
 
-/** All modules by name. Each has a memory of its own. */
+/** All modules by name. */
 export interface Modules extends Record<ModuleName, unknown> {
   decoder: DecoderModule;
   cpu: CpuModule;

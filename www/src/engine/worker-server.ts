@@ -25,8 +25,8 @@ interface WorkerScope {
 }
 
 /**
- * Starts a worker; `null` if the page may not have it. `create` calls `new Worker` itself, with the
- * address written out, because bundlers look for exactly that form.
+ * Starts a worker; `null` if the page may not have it. `create` calls `new Worker` itself, with the address written
+ * out, because bundlers look for exactly that form.
  */
 export function startWorker(create: () => Worker): Worker | null {
   try {

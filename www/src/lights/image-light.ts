@@ -1,6 +1,6 @@
 /** An image that is used as light in place of a built-in light, as renderers see it. */
 
-import type { DrawingModule, DrawnPhoto, Light, LivePicture } from '../engine/types.js';
+import type { Light, LivePicture, ReceivedPhoto, RelightModule } from '../engine/types.js';
 
 /** An image that a graphics device can upload directly, and its size in pixels. */
 export interface UploadableImage {
@@ -18,7 +18,7 @@ export interface ImageLight {
    *
    * @throws `light-tainted`, `light-size`, `light-value` or `light-source`
    */
-  createLight(module: Pick<DrawingModule, 'Light'>, photo: DrawnPhoto): Light | null;
+  createLight(module: Pick<RelightModule, 'Light'>, photo: ReceivedPhoto): Light | null;
 }
 
 /** An image that is not loaded yet. */

@@ -1,13 +1,13 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { DrawingModule, DrawnPhoto, Light } from '../engine/types.js';
+import type { Light, ReceivedPhoto, RelightModule } from '../engine/types.js';
 import { PhotoError } from '../shared/errors.js';
 import { toImageLight } from './image-pixels.js';
 import { LightCache } from './light-cache.js';
 import type { LightSetting } from './light-setting.js';
 import type { LightPicture, LinearLight } from './light-source.js';
 
-const PHOTO = {} as DrawnPhoto;
+const PHOTO = {} as ReceivedPhoto;
 const GOOD: LinearLight = { data: new Float32Array(3), width: 1, height: 1 };
 const BAD: LinearLight = { data: new Float32Array(1), width: 1, height: 1 };
 
@@ -26,17 +26,17 @@ function createCache() {
   };
   const module = {
     Light: {
-      builtin: (_: DrawnPhoto, name: string) => light(name),
-      torch: (_: DrawnPhoto, x: number, y: number, size?: number) =>
+      builtin: (_: ReceivedPhoto, name: string) => light(name),
+      torch: (_: ReceivedPhoto, x: number, y: number, size?: number) =>
         light(`torch ${x} ${y} ${size}`),
-      fire: (_: DrawnPhoto, seconds: number) => light(`fire ${seconds}`),
-      fromLinear: (_: DrawnPhoto, values: Float32Array) => {
+      fire: (_: ReceivedPhoto, seconds: number) => light(`fire ${seconds}`),
+      fromLinear: (_: ReceivedPhoto, values: Float32Array) => {
         if (values.length !== 3) throw new PhotoError('light-size', 'three values');
         return light('linear');
       },
     },
   };
-  const cache = new LightCache(module as unknown as Pick<DrawingModule, 'Light'>);
+  const cache = new LightCache(module as unknown as Pick<RelightModule, 'Light'>);
   return { cache, live };
 }
 

@@ -1,6 +1,6 @@
 /** Keeps the last light that was made in a WebAssembly module, for as long as its setting is unchanged. */
 
-import type { DrawingModule, DrawnPhoto, Freeable, Light } from '../engine/types.js';
+import type { Freeable, Light, ReceivedPhoto, RelightModule } from '../engine/types.js';
 import { type PhotoError, toPhotoError } from '../shared/errors.js';
 import { createBuiltinLight, type LightSetting } from './light-setting.js';
 
@@ -14,12 +14,12 @@ export interface LightResult {
 }
 
 export class LightCache implements Freeable {
-  readonly #module: Pick<DrawingModule, 'Light'>;
+  readonly #module: Pick<RelightModule, 'Light'>;
   #light: Light | null = null;
   /** The setting of `#light`; `null` for an image, whose content may change. */
   #setting: LightSetting | null = null;
 
-  constructor(module: Pick<DrawingModule, 'Light'>) {
+  constructor(module: Pick<RelightModule, 'Light'>) {
     this.#module = module;
   }
 
@@ -27,7 +27,7 @@ export class LightCache implements Freeable {
    * The light of a setting. While its image cannot be read, the last light substitutes for it, or, if there is
    * none, the built-in light.
    */
-  get(setting: LightSetting, photo: DrawnPhoto): LightResult {
+  get(setting: LightSetting, photo: ReceivedPhoto): LightResult {
     let lightApplied = true;
     let lightError: PhotoError | null = null;
     if (setting.image) {

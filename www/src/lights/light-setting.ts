@@ -1,6 +1,6 @@
 /** The light of one frame. Immutable: a change makes a new object. */
 
-import type { DrawingModule, DrawnPhoto, Light } from '../engine/types.js';
+import type { Light, ReceivedPhoto, RelightModule } from '../engine/types.js';
 import type { LightName } from '../shared/names.js';
 import { CENTRE, type PicturePoint } from '../shared/values.js';
 import type { ImageLight } from './image-light.js';
@@ -20,8 +20,8 @@ export interface LightSetting {
 
 /** Makes the built-in light of a setting. */
 export function createBuiltinLight(
-  { Light }: Pick<DrawingModule, 'Light'>,
-  photo: DrawnPhoto,
+  { Light }: Pick<RelightModule, 'Light'>,
+  photo: ReceivedPhoto,
   { name, torch, size, seconds = 0 }: LightSetting,
 ): Light {
   if (name === 'fire') return Light.fire(photo, seconds);

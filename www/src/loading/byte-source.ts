@@ -1,6 +1,6 @@
 /**
- * Reads ranges of a file over HTTP. An interrupted transfer continues where it ended. If the server
- * ignores ranges, or the browser does not request them, the file is read from start to end instead.
+ * Reads ranges of a file over HTTP. An interrupted transfer continues where it ended. If the server ignores ranges, or
+ * the browser does not request them, the file is read from start to end instead.
  */
 
 import type { ByteRange } from '../shared/byte-range.js';
@@ -71,9 +71,9 @@ export class HttpSource {
   }
 
   /**
-   * Yields the bytes of a range as they arrive. If the server ignores ranges, the first call yields the
-   * whole file and later calls nothing. The range may exceed the file only while its size is unknown.
-   * Throws a `PhotoError`, or the signal's reason if it is aborted.
+   * Yields the bytes of a range as they arrive. If the server ignores ranges, the first call yields the whole file and
+   * later calls nothing. The range may exceed the file only while its size is unknown. Throws a `PhotoError`, or the
+   * signal's reason if it is aborted.
    */
   async *read(range: ByteRange, signal: AbortSignal): AsyncGenerator<Piece, void> {
     this.#checkSize(range, range.end);
@@ -91,8 +91,8 @@ export class HttpSource {
         if (!(thrown instanceof RetryableError)) throw thrown;
         failures = transfer.position === position ? failures + 1 : 1;
         if (failures > this.#ports.maxRetries) throw thrown.afterAttempts(failures);
-        // A missing response has no reason: the range header may be the cause, which some browsers refuse
-        // for compressed files, and for which some ask another origin's server for permission first.
+        // A missing response has no reason: the range header may be the cause, which some browsers refuse for
+        // compressed files, and for which some ask another origin's server for permission first.
         const hasNoResponse = this.#version === undefined && thrown.code === 'http-network';
         if (hasNoResponse) transfer.usesRange = failures % 2 === 1;
         const pause = this.#ports.sleep(retryPauseMs(thrown, failures, this.#ports), signal);

@@ -146,9 +146,9 @@ async function decode(
 }
 
 /**
- * Makes previews: the first as soon as possible, and each further one when twice as many bytes have
- * arrived. A preview takes as long as decoding the bytes so far, so that all of them together take as
- * long as the photograph. None is made once the whole file is there.
+ * Makes previews: the first as soon as possible, and each further one when twice as many bytes have arrived. A preview
+ * takes as long as decoding the bytes so far, so that all of them together take as long as the photograph. None is made
+ * once the whole file is there.
  */
 function previewsOf(decoder: PhotoDecoder, now: () => number): () => Promise<Photograph | null> {
   let lastScans = 0;

@@ -83,8 +83,8 @@ function readContentRange(
 
 /** The size of a file that is sent whole, if Content-Length is certain to be that size. */
 function wholeSize(response: Response): number | undefined {
-  // With Content-Encoding, Content-Length counts compressed bytes. Of other origins, scripts can read
-  // Content-Length but not Content-Encoding.
+  // With Content-Encoding, Content-Length counts compressed bytes. Of other origins, scripts can read Content-Length
+  // but not Content-Encoding.
   const isCertain = contentEncoding(response) === undefined && response.type !== 'cors';
   return isCertain ? contentLength(response) : undefined;
 }

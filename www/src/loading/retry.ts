@@ -16,8 +16,8 @@ export interface RetryPorts {
 }
 
 /**
- * Exponential backoff with jitter: the pause after the nth failure in a row. The jitter keeps the pages
- * that an outage has cut off from returning at the same moment.
+ * Exponential backoff with jitter: the pause after the nth failure in a row. The jitter keeps the pages that an outage
+ * has cut off from returning at the same moment.
  */
 export function retryPauseMs(error: RetryableError, failures: number, ports: RetryPorts): number {
   const backoff = Math.min(MAX_PAUSE_MS, FIRST_PAUSE_MS * 2 ** (failures - 1));

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { DrawingModule } from '../engine/types.js';
+import type { RelightModule } from '../engine/types.js';
 import { WorkerPool } from '../renderers/cpu/worker-pool.js';
 import {
   type FakeWorker,
@@ -82,7 +82,7 @@ test('without workers the tiles stay', async () => {
 
 /** A worker crashes before `use`, or during it. */
 async function crashDuring(
-  use: (photograph: Photograph, pool: WorkerPool, module: DrawingModule) => Promise<unknown>,
+  use: (photograph: Photograph, pool: WorkerPool, module: RelightModule) => Promise<unknown>,
   isIdle: boolean,
 ) {
   const { pool, workers } = fakePool(2);

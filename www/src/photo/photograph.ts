@@ -1,10 +1,16 @@
 /**
- * A decoded photograph. Its tiles exist once, because they take most of the memory: as bytes on the page,
- * in the memory of one of the page's modules, or in workers. A renderer has them moved to where it draws.
- * Uses of the tiles run one after another, in the order of the calls.
+ * A decoded photograph. Its tiles exist once, because they take most of the memory: as bytes on the page, in the memory
+ * of one of the page's modules, or in workers. A renderer has them moved to where it draws. Uses of the tiles run one
+ * after another, in the order of the calls.
  */
 
-import type { DecodedPhoto, DrawingModule, DrawnPhoto, Freeable, Photo } from '../engine/types.js';
+import type {
+  DecodedPhoto,
+  Freeable,
+  ModulePhoto,
+  ReceivedPhoto,
+  RelightModule,
+} from '../engine/types.js';
 import { messageOf, PhotoError, photoReleased } from '../shared/errors.js';
 import type { PhotoInfo } from '../shared/photo-info.js';
 import { allSettledOrThrow } from '../shared/promises.js';
@@ -19,8 +25,8 @@ import {
 /** A module of the page with tiles in its memory. */
 interface TileStore {
   /** `null` for the decoder's. */
-  readonly module: DrawingModule | null;
-  readonly photo: Photo;
+  readonly module: RelightModule | null;
+  readonly photo: ModulePhoto;
   /** Called before tiles leave the module. */
   readonly onLeave: Set<() => void>;
 }
@@ -85,17 +91,17 @@ export class Photograph implements Freeable {
   }
 
   /** The photograph without tiles, which suffices for making lights. The caller frees it. */
-  createLightPlane(module: DrawingModule): DrawnPhoto {
+  createLightPlane(module: RelightModule): ReceivedPhoto {
     return module.Photo.receive(this.descriptor.geometry, this.descriptor.basis);
   }
 
   /**
-   * Moves all tiles to a module of the page and calls `use`, unless `signal` is aborted by then. `onLeave`
-   * is called before tiles leave the module again: free whatever `use` has made of the photograph.
+   * Moves all tiles to a module of the page and calls `use`, unless `signal` is aborted by then. `onLeave` is called
+   * before tiles leave the module again: free whatever `use` has made of the photograph.
    */
   withModule<T>(
-    module: DrawingModule,
-    use: (photo: DrawnPhoto) => T | Promise<T>,
+    module: RelightModule,
+    use: (photo: ReceivedPhoto) => T | Promise<T>,
     { signal, onLeave }: { signal?: AbortSignal; onLeave?: () => void } = {},
   ): Promise<T> {
     return this.#enqueue(async () => {
@@ -108,8 +114,8 @@ export class Photograph implements Freeable {
   }
 
   /**
-   * Moves all tiles to workers, always the same ones, and calls `use`. Rejects with `worker-unavailable`
-   * if there are no workers; the photograph is unchanged then.
+   * Moves all tiles to workers, always the same ones, and calls `use`. Rejects with `worker-unavailable` if there are
+   * no workers; the photograph is unchanged then.
    */
   withWorkers<S extends TileSession, T>(
     workers: TileWorkers<S>,
@@ -158,7 +164,9 @@ export class Photograph implements Freeable {
     return this.#fault;
   }
 
-  async #moveToModule(module: DrawingModule): Promise<TileStore & { readonly photo: DrawnPhoto }> {
+  async #moveToModule(
+    module: RelightModule,
+  ): Promise<TileStore & { readonly photo: ReceivedPhoto }> {
     const session = this.#session;
     if (session) {
       await forEachTile(session, async (index) => {
@@ -180,9 +188,9 @@ export class Photograph implements Freeable {
     return { ...store, photo };
   }
 
-  #storeIn(module: DrawingModule): [TileStore, DrawnPhoto] {
+  #storeIn(module: RelightModule): [TileStore, ReceivedPhoto] {
     for (const store of this.#stores) {
-      if (store.module === module) return [store, store.photo as DrawnPhoto];
+      if (store.module === module) return [store, store.photo as ReceivedPhoto];
     }
     const photo = this.createLightPlane(module);
     const store = { module, photo, onLeave: new Set<() => void>() };

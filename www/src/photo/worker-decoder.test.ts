@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { DrawingModule } from '../engine/types.js';
+import type { RelightModule } from '../engine/types.js';
 import type { WorkerRequest, WorkerResponse } from '../shared/worker-client.js';
 import type { DecoderState } from './photo-decoder.js';
 import {
@@ -97,7 +97,7 @@ test('the worker gets the bytes and sends the photograph', async () => {
         free() {},
       }),
     },
-  } as unknown as DrawingModule;
+  } as unknown as RelightModule;
   await photograph.withModule(module, () => {});
   assert.deepEqual(sizes, [
     [0, 40],

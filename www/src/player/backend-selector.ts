@@ -1,7 +1,7 @@
 /**
- * Finds a backend for a photograph and replaces it when it is lost. There is at most one search at a
- * time: a new one cancels the last, whose result is freed when it comes. The picture of the last backend
- * stays until the new one has drawn a frame.
+ * Finds a backend for a photograph and replaces it when it is lost. There is at most one search at a time: a new one
+ * cancels the last, whose result is freed when it comes. The picture of the last backend stays until the new one has
+ * drawn a frame.
  */
 
 import type { Backend } from '../engine/types.js';
@@ -70,8 +70,8 @@ export class BackendSelector<R extends Renderer> {
   }
 
   /**
-   * Puts the first of `options.backends` that works in the place of the backend `previous`. `reason` says
-   * why that one is replaced; empty if only the options have changed.
+   * Puts the first of `options.backends` that works in the place of the backend `previous`. `reason` says why that one
+   * is replaced; empty if only the options have changed.
    */
   async select(
     photo: RefCounted<Photograph>,
@@ -113,8 +113,8 @@ export class BackendSelector<R extends Renderer> {
   }
 
   /**
-   * A backend stopped working. It is set up again, or replaced by the next one if it never drew a frame.
-   * A search in progress goes on instead.
+   * A backend stopped working. It is set up again, or replaced by the next one if it never drew a frame. A search in
+   * progress goes on instead.
    */
   lose(lost: ActiveBackend<R>, reason: string): void {
     const isReported = lost.lossReason !== null;

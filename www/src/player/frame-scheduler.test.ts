@@ -6,8 +6,8 @@ import { PhotoError } from '../shared/errors.js';
 import { type FakeSession, fakeSession, loadedSession, SETTINGS, settle } from './session-fakes.js';
 
 /**
- * Frames of an animation. Each is drawn at once, but the browser's next frame follows after `ms`, or after
- * a share of that if the frame has reduced quality.
+ * Frames of an animation. Each is drawn at once, but the browser's next frame follows after `ms`, or after a share of
+ * that if the frame has reduced quality.
  */
 async function animate(f: FakeSession, count: number, ms: number): Promise<void> {
   for (let frame = 0; frame < count; frame += 1) {

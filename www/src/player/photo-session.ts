@@ -108,8 +108,8 @@ export class PhotoSession<R extends Renderer> {
   }
 
   /**
-   * Whether the picture can be seen. If not, changes are not drawn; but the first picture is, the first
-   * of another backend, and those that `renderNow` requests.
+   * Whether the picture can be seen. If not, changes are not drawn; but the first picture is, the first of another
+   * backend, and those that `renderNow` requests.
    */
   setVisible(isVisible: boolean): void {
     this.#scheduler.setVisible(isVisible);
@@ -122,9 +122,9 @@ export class PhotoSession<R extends Renderer> {
   }
 
   /**
-   * Draws the current settings in full quality and gives the renderer. It waits for a frame or a backend
-   * search in progress; all requests made meanwhile get the same frame. Rejects with `not-loaded` if
-   * there is no photograph, and with the error of a frame that fails.
+   * Draws the current settings in full quality and gives the renderer. It waits for a frame or a backend search in
+   * progress; all requests made meanwhile get the same frame. Rejects with `not-loaded` if there is no photograph, and
+   * with the error of a frame that fails.
    */
   renderNow(): Promise<R> {
     this.#isFullQualityRequested = true;
@@ -223,8 +223,8 @@ export class PhotoSession<R extends Renderer> {
   }
 
   /**
-   * The search or the frame that the next frame waits for. A frame during a search would take back tiles
-   * that the new backend needs.
+   * The search or the frame that the next frame waits for. A frame during a search would take back tiles that the new
+   * backend needs.
    */
   get #inProgress(): Promise<void> | undefined {
     return this.#selector.search ?? this.#selector.active?.frame?.promise;

@@ -1,6 +1,6 @@
 /**
- * Chooses the quality of an animation's frames, so that they keep a rate of 30 a second. It learns only
- * from the begin and end of frames; it has no clock.
+ * Chooses the quality of an animation's frames, so that they keep a rate of 30 a second. It learns only from the begin
+ * and end of frames; it has no clock.
  *
  * Every wait is counted in frames of animations, because other frames teach nothing.
  */
@@ -12,8 +12,8 @@ const FRAME_BUDGET_MS = 1000 / 30;
 /** Longer frames are slow. Above the budget, because a display of 30 Hz shows no frame sooner. */
 const SLOW_FRAME_MS = 1.2 * FRAME_BUDGET_MS;
 /**
- * Quality rises if frames are expected to take at most this long. Two frames of a 60 Hz display must
- * fit, because such a display shows no frame sooner.
+ * Quality rises if frames are expected to take at most this long. Two frames of a 60 Hz display must fit, because such
+ * a display shows no frame sooner.
  */
 const MAX_EXPECTED_MS = 1.1 * FRAME_BUDGET_MS;
 /** Frames per decision, which uses their median: up to half of them may be outliers. */
@@ -61,10 +61,7 @@ export class QualityController {
     return qualityAt(this.#level);
   }
 
-  /**
-   * Records a frame of an animation. `endMs` is when the next frame could have begun, whether or not one
-   * was due.
-   */
+  /** Records a frame of an animation. `endMs` is when the next frame could have begun, whether or not one was due. */
   recordFrame(startMs: number, endMs: number): void {
     const isContinued = startMs - this.#lastEndMs <= MAX_GAP_MS;
     this.#lastEndMs = endMs;

@@ -1,6 +1,6 @@
 /**
- * Creates renderers for a backend. The code of the graphics backends and of the CPU are separate scripts,
- * which are fetched when they are needed.
+ * Creates renderers for a backend. The code of the graphics backends and of the CPU are separate scripts, which are
+ * fetched when they are needed.
  */
 
 import { loadCpu } from '../engine/core-modules.js';

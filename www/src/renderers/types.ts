@@ -38,9 +38,9 @@ export interface Renderer extends Freeable {
 }
 
 /**
- * Creates a renderer with a surface of its own, because a canvas cannot change from one graphics API to another.
- * It may stop early once `signal` is aborted. Calls `onLost` at most once. Rejects with `backend-unavailable`,
- * in which case the tiles stay where they are, or with `photo-lost`.
+ * Creates a renderer with a surface of its own, because a canvas cannot change from one graphics API to another. It may
+ * stop early once `signal` is aborted. Calls `onLost` at most once. Rejects with `backend-unavailable`, in which case
+ * the tiles stay where they are, or with `photo-lost`.
  */
 export type CreateRenderer<R extends Renderer> = (
   backend: Backend,

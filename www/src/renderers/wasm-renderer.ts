@@ -1,7 +1,7 @@
 /** Draws on a canvas with a WebAssembly module on the page's thread: WebGPU, WebGL2 or the CPU. */
 
 import { makeDisplay, type OutputSettings } from '../engine/output-settings.js';
-import type { DrawingModule, DrawnPhoto, Gamut, Relighter } from '../engine/types.js';
+import type { Gamut, ReceivedPhoto, Relighter, RelightModule } from '../engine/types.js';
 import type { ImageLight } from '../lights/image-light.js';
 import { LightCache } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
@@ -16,10 +16,10 @@ export interface DeviceHandle {
 }
 
 export class WasmRenderer implements CanvasRenderer {
-  readonly #module: DrawingModule;
+  readonly #module: RelightModule;
   readonly #lights: LightCache;
   /** The photograph without tiles. */
-  readonly #lightPlane: DrawnPhoto;
+  readonly #lightPlane: ReceivedPhoto;
   readonly #relighter: Relighter;
   readonly #device: DeviceHandle | null;
   /** Whether the device's light is an uploaded image. */
@@ -27,8 +27,8 @@ export class WasmRenderer implements CanvasRenderer {
 
   /** Frees `lightPlane` and `relighter`, and releases `device`, when it is freed. */
   constructor(
-    module: DrawingModule,
-    lightPlane: DrawnPhoto,
+    module: RelightModule,
+    lightPlane: ReceivedPhoto,
     relighter: Relighter,
     readonly canvas: HTMLCanvasElement,
     device: DeviceHandle | null = null,

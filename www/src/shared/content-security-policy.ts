@@ -1,6 +1,6 @@
 /**
- * Recognises failures that are due to the page's content security policy. Such a failure looks like any
- * other, but the browser also fires a `securitypolicyviolation` event shortly before or after it.
+ * Recognises failures that are due to the page's content security policy. Such a failure looks like any other, but the
+ * browser also fires a `securitypolicyviolation` event shortly before or after it.
  */
 
 import { PhotoError } from './errors.js';
@@ -12,8 +12,8 @@ const MAX_EVENT_DELAY_MS = 50;
 type ViolationTarget = Partial<Pick<EventTarget, 'addEventListener' | 'removeEventListener'>>;
 
 /**
- * Does some work. If it fails, and a directive that matches `directive` was violated meanwhile, rejects
- * with `toError(violated directive, cause)` instead.
+ * Does some work. If it fails, and a directive that matches `directive` was violated meanwhile, rejects with
+ * `toError(violated directive, cause)` instead.
  */
 export async function withPolicyErrors<T>(
   work: () => Promise<T>,

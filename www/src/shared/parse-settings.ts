@@ -1,7 +1,7 @@
 /**
- * Parsers of the settings that the element's attributes and the core's options have in common. `null` or an
- * empty text gives the default. Each parser throws a `PhotoError` with the code `attribute` whose message names
- * the accepted values.
+ * Parsers of the settings that the element's attributes and the core's options have in common. `null` or an empty text
+ * gives the default. Each parser throws a `PhotoError` with the code `attribute` whose message names the accepted
+ * values.
  */
 
 import { PhotoError } from './errors.js';

@@ -1,6 +1,6 @@
 /**
- * Change detection by reference. Immutable settings objects pass through `reuse`, so that an object is new only if
- * one of its fields has changed. Consumers then compare references instead of fields.
+ * Change detection by reference. Immutable settings objects pass through `reuse`, so that an object is new only if one
+ * of its fields has changed. Consumers then compare references instead of fields.
  */
 
 /** `previous` if each of its fields is identical to that of `next`; otherwise `next`. */

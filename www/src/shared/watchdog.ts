@@ -5,8 +5,8 @@ export interface WatchdogLimits {
   /** Time between two checks, in milliseconds. */
   readonly intervalMs: number;
   /**
-   * Checks without an answer after which a worker counts as dead. The watchdog counts checks and not
-   * time, because a page that sleeps checks no more often than its workers work.
+   * Checks without an answer after which a worker counts as dead. The watchdog counts checks and not time, because a
+   * page that sleeps checks no more often than its workers work.
    */
   readonly maxChecks: number;
   /** The same for a worker that still starts, which includes a download and a compilation. */

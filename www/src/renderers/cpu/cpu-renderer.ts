@@ -1,6 +1,6 @@
 /**
- * Creates renderers for the CPU: in the page's worker pool, or on the page's thread if there are no
- * workers. It is a script of its own with copies of what it shares with the element's script.
+ * Creates renderers for the CPU: in the page's worker pool, or on the page's thread if there are no workers. It is a
+ * script of its own with copies of what it shares with the element's script.
  */
 
 import type { CpuModule, Gamut } from '../../engine/types.js';
@@ -16,8 +16,8 @@ export { WorkerPool } from './worker-pool.js';
 export type CpuRenderers = ReturnType<typeof cpuRenderers>;
 
 export function cpuRenderers(pool: WorkerPool) {
-  // Photographs that were drawn on the page's thread, and why. They stay there, because the page's
-  // renderer may still need the tiles.
+  // Photographs that were drawn on the page's thread, and why. They stay there, because the page's renderer may still
+  // need the tiles.
   const warnings = new WeakMap<Photograph, string>();
   return {
     async create(

@@ -1,10 +1,9 @@
 /**
- * Draws with the CPU on the page's thread. If another renderer moves the tiles away, the next frame moves
- * them back.
+ * Draws with the CPU on the page's thread. If another renderer moves the tiles away, the next frame moves them back.
  */
 
 import type { OutputSettings } from '../../engine/output-settings.js';
-import type { CpuModule, DrawnPhoto, Gamut } from '../../engine/types.js';
+import type { CpuModule, Gamut, ReceivedPhoto } from '../../engine/types.js';
 import type { LightSetting } from '../../lights/light-setting.js';
 import type { Photograph } from '../../photo/photograph.js';
 import { photoReleased } from '../../shared/errors.js';
@@ -58,7 +57,7 @@ export class MainThreadRenderer implements CanvasRenderer {
   }
 
   #begin(signal?: AbortSignal): Promise<WasmRenderer> {
-    const use = (photo: DrawnPhoto) => {
+    const use = (photo: ReceivedPhoto) => {
       if (this.#isFreed) throw photoReleased();
       const relighter = new this.#module.Relighter(photo, this.canvas, this.gamut);
       const lightPlane = this.#photograph.createLightPlane(this.#module);

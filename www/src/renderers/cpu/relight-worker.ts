@@ -2,12 +2,12 @@
 
 import { loadCpu } from '../../engine/core-modules.js';
 import { makeDisplay } from '../../engine/output-settings.js';
-import type { BandRelighter, CpuModule, DrawnPhoto } from '../../engine/types.js';
+import type { BandRelighter, CpuModule, ReceivedPhoto } from '../../engine/types.js';
 import { serve } from '../../engine/worker-server.js';
 import type { RelightTask, RowRange, RowTask } from './protocol.js';
 
 interface StoredRows extends RowRange {
-  readonly photo: DrawnPhoto;
+  readonly photo: ReceivedPhoto;
   /** `null` while tiles are moved. */
   relighter: BandRelighter | null;
 }

@@ -1,6 +1,6 @@
 /**
- * The page's workers that relight with the CPU; all photographs share them. Each worker has a row range
- * of a photograph, with the only copy of its tiles.
+ * The page's workers that relight with the CPU; all photographs share them. Each worker has a row range of a
+ * photograph, with the only copy of its tiles.
  */
 
 import type { PhotoDescriptor, TileWorkers } from '../../photo/types.js';

@@ -1,7 +1,7 @@
 /** Draws with the CPU in the page's worker pool; the page copies the pixels to the canvas. */
 
 import type { OutputSettings } from '../../engine/output-settings.js';
-import type { CpuModule, DrawnPhoto, Gamut } from '../../engine/types.js';
+import type { CpuModule, Gamut, ReceivedPhoto } from '../../engine/types.js';
 import { LightCache } from '../../lights/light-cache.js';
 import type { LightSetting } from '../../lights/light-setting.js';
 import type { Photograph } from '../../photo/photograph.js';
@@ -14,7 +14,7 @@ export class WorkerRenderer implements CanvasRenderer {
   readonly canvas: HTMLCanvasElement;
   readonly #lights: LightCache;
   /** The photograph without tiles. */
-  readonly #lightPlane: DrawnPhoto;
+  readonly #lightPlane: ReceivedPhoto;
   readonly #photograph: Photograph;
   readonly #pool: WorkerPool;
   readonly #context: CanvasRenderingContext2D;

@@ -1,6 +1,6 @@
 /**
- * The page's graphics devices: one per graphics backend, shared by all photographs and freed with the
- * last of them. The next lease after a loss gets a new device, unless losses are frequent.
+ * The page's graphics devices: one per graphics backend, shared by all photographs and freed with the last of them. The
+ * next lease after a loss gets a new device, unless losses are frequent.
  */
 
 import type { Graphics, Modules } from '../../engine/types.js';
@@ -51,8 +51,8 @@ export class Devices {
   }
 
   /**
-   * Leases the device of a backend; `software` allows a software renderer. `onLost` is called at most
-   * once. Rejects with `backend-unavailable`.
+   * Leases the device of a backend; `software` allows a software renderer. `onLost` is called at most once. Rejects
+   * with `backend-unavailable`.
    */
   async lease(
     load: LoadGraphics,

@@ -1,6 +1,6 @@
 /**
- * Creates renderers for graphics devices. It is a script of its own with copies of what it shares with
- * the element's script.
+ * Creates renderers for graphics devices. It is a script of its own with copies of what it shares with the element's
+ * script.
  */
 
 import type { Photograph } from '../../photo/photograph.js';
