@@ -1,17 +1,13 @@
-/** What tests that run in every browser ask of one. Playwright's pages are such pages as they are. */
+/** A page in any browser, as the tests that run in every browser use it. Playwright's pages have this interface. */
 
-import type { TestContext } from 'node:test';
-import type { Keyboard, Locator, Mouse, Page } from 'playwright-core';
+import type { Keyboard, Locator, Mouse, Page } from '@playwright/test';
 
-/** A page, in any browser. Functions that are evaluated see nothing of what is around them. */
+/** Functions that are evaluated in the page cannot use variables of the test. */
 export interface AnyPage extends Pick<Page, 'evaluate' | 'waitForFunction'> {
   readonly mouse: Pick<Mouse, 'move' | 'down' | 'up'>;
   readonly keyboard: Pick<Keyboard, 'press'>;
   locator(selector: string): Pick<Locator, 'screenshot'>;
 }
 
-/** A browser with which tests run. */
-export interface AnyBrowser {
-  /** Opens a page that closes when the test ends, and fails the test where it complains of anything. */
-  open(test: TestContext, path: string): Promise<AnyPage>;
-}
+/** Opens a page of the test server. The test fails when the page reports an error. */
+export type OpenAnyPage = (path: string) => Promise<AnyPage>;

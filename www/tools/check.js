@@ -1,6 +1,6 @@
 /**
- * Loads the demo page in a headless browser and holds every light it shows against the native
- * program: node www/tools/check.js PHOTO.ltm. Exits with 1 if anything is off.
+ * Compares every light that the demo page draws in Chromium with ltm-export: node www/tools/check.js PHOTO.ltm
+ * Exits with 1 when a picture differs or the page reports an error.
  */
 
 import { execFileSync } from 'node:child_process';
@@ -12,8 +12,8 @@ import { compare, decodePng } from './pictures.js';
 import { listen } from './serve.js';
 import { site } from './site.js';
 
-/** Largest difference of a code that rounding explains. */
-const TOLERANCE = 1;
+/** Rounding may change a code, out of 255, by 1. */
+const MAX_DIFFERENCE = 1;
 const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum', 'fire'];
 
 const photo = resolve(process.argv[2] ?? 'target/demo/photos/stained-glass.ltm');
@@ -22,55 +22,57 @@ const scratch = mkdtempSync(join(tmpdir(), 'relightable-photo-'));
 const server = await listen(site({ photos: dirname(photo) }), 0);
 const browser = await launchChromium();
 try {
-  const wrong = await check();
-  for (const complaint of wrong) console.error(`check: ${complaint}`);
-  if (wrong.length === 0) {
-    console.log(`check: the page draws every light as ltm-export does, to ${TOLERANCE}/255`);
+  const faults = await check();
+  for (const fault of faults) console.error(`check: ${fault}`);
+  if (faults.length === 0) {
+    console.log(
+      `check: the page agrees with ltm-export under every light, to ${MAX_DIFFERENCE}/255`,
+    );
   }
-  process.exitCode = wrong.length > 0 ? 1 : 0;
+  process.exitCode = faults.length > 0 ? 1 : 0;
 } finally {
   await browser.close();
   await server.close();
   rmSync(scratch, { recursive: true });
 }
 
-/** @returns {Promise<string[]>} what is wrong */
+/** @returns {Promise<string[]>} descriptions of the faults */
 async function check() {
   /** @type {string[]} */
-  const wrong = [];
-  // Fire stands still at its first moment.
+  const faults = [];
+  // Under reduced motion, fire rests at its first frame, as in ltm-export.
   const page = await browser.newPage({ reducedMotion: 'reduce' });
-  page.on('pageerror', (error) => wrong.push(`the page threw ${error}`));
+  page.on('pageerror', (error) => faults.push(`the page threw ${error}`));
   page.on('console', (message) => {
-    if (message.type() === 'error') wrong.push(`the page complained: ${message.text()}`);
+    if (message.type() === 'error') faults.push(`the page logged an error: ${message.text()}`);
   });
   await page.goto(server.url);
-  // Either the whole picture or the reason why there is none.
+  // Either the whole photograph is drawn, or an error is shown.
   await page.waitForFunction(() => {
     const element = document.querySelector('relightable-photo');
     const alert = element?.shadowRoot?.querySelector('[role=alert]');
     return element?.detail === 1 || alert?.checkVisibility();
   });
   const alert = page.locator('relightable-photo').first().getByRole('alert');
-  if (await alert.isVisible()) return [...wrong, await alert.innerText()];
+  if (await alert.isVisible()) return [...faults, await alert.innerText()];
   const backend = await page.evaluate(() => {
     const { activeBackend, kernel } = /** @type {any} */ (
       document.querySelector('relightable-photo')
     );
     return `${activeBackend} (${kernel})`;
   });
-  console.log(`back end: ${backend}`);
+  console.log(`backend: ${backend}`);
   for (const light of LIGHTS) {
-    const { worst, psnr } = compare(await drawn(page, light), native(light));
+    const { worst, psnr } = compare(await pagePicture(page, light), nativePicture(light));
     console.log(`${light.padEnd(12)} PSNR ${psnr.toFixed(2)} dB, worst difference ${worst}/255`);
-    if (!(worst <= TOLERANCE))
-      wrong.push(`${light} differs by ${worst}/255 from ltm-export relight`);
+    if (!(worst <= MAX_DIFFERENCE))
+      faults.push(`${light} differs by ${worst}/255 from ltm-export relight`);
   }
-  return wrong;
+  return faults;
 }
 
 /** @param {import('playwright-core').Page} page @param {string} light */
-async function drawn(page, light) {
+async function pagePicture(page, light) {
   const url = await page.evaluate(async (light) => {
     const element = /** @type {import('../src/index.js').RelightablePhoto} */ (
       document.querySelector('relightable-photo')
@@ -86,7 +88,7 @@ async function drawn(page, light) {
 }
 
 /** @param {string} light */
-function native(light) {
+function nativePicture(light) {
   const out = join(scratch, `${light}.png`);
   execFileSync(program, ['relight', photo, '--light', light, '-o', out], {
     stdio: ['ignore', 'ignore', 'inherit'],

@@ -1,11 +1,10 @@
-/** The system's Chromium, without a screen and with its GPU done in software. */
+/** Starts the system's Chromium headless, with software renderers for WebGPU and WebGL2. */
 
 import { chromium } from 'playwright-core';
 
 /**
- * SwiftShader computes WebGPU and WebGL2 on machines without a GPU, and the same on all others. With
- * Vulkan by SwiftShader too, WebGPU can put its frames on the screen; without, Chromium loses the
- * device at the first one.
+ * SwiftShader renders WebGPU and WebGL2, so that machines with and without a GPU produce the same pictures. Vulkan runs
+ * on SwiftShader as well: otherwise Chromium loses the WebGPU device when it presents the first frame.
  */
 const ARGUMENTS = [
   '--no-sandbox',
@@ -18,10 +17,21 @@ const ARGUMENTS = [
   '--ignore-gpu-blocklist',
 ];
 
+/**
+ * Launch options of Playwright.
+ *
+ * @param {string[]} args more of Chromium's arguments
+ * @returns {{ executablePath: string, args: string[] }}
+ */
+export function chromiumOptions(...args) {
+  const executablePath = process.env['CHROMIUM'];
+  if (!executablePath) {
+    throw new Error('CHROMIUM does not name a browser: run ". pkg-scripts/env.sh" first');
+  }
+  return { executablePath, args: [...ARGUMENTS, ...args] };
+}
+
 /** @returns {Promise<import('playwright-core').Browser>} */
 export function launchChromium() {
-  const executablePath = process.env['CHROMIUM'];
-  if (!executablePath)
-    throw new Error('CHROMIUM does not name a browser: source pkg-scripts/env.sh');
-  return chromium.launch({ executablePath, args: ARGUMENTS });
+  return chromium.launch(chromiumOptions());
 }

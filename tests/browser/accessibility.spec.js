@@ -1,0 +1,223 @@
+/** Accessibility: axe-core in each state, roles and focus, languages, sizes of the controls. */
+
+import { join } from 'node:path';
+import { expect, test } from './fixtures.js';
+import { alertOf, boxOf, mountPhoto, waitForEvents, waitForLoad } from './page-helpers.js';
+import { SCREENSHOTS } from './test-photos.js';
+
+/** @typedef {import('@playwright/test').Page} Page */
+/** @typedef {import('./fixtures.js').OpenPage} OpenPage */
+
+const GLASS = {
+  src: '/photos/stained-glass.ltm',
+  alt: 'A window',
+  light: 'torch',
+  backend: 'cpu',
+  controls: '',
+  zoom: '',
+};
+
+/**
+ * Opens a page with one element, under the site's policy.
+ *
+ * @param {OpenPage} openPage
+ * @param {Record<string, string>} [attributes]
+ * @param {import('./fixtures.js').PageOptions & { lang?: string }} [options] `lang` is the page's language
+ */
+async function open(openPage, attributes = {}, { lang = 'en', ...options } = {}) {
+  const page = await openPage(`/strict?lang=${lang}`, options);
+  await mountPhoto(page, { ...GLASS, ...attributes });
+  await page.evaluate("photo.style.width = 'min(480px, 100%)'");
+  return page;
+}
+
+/** The rules of axe-core that a page violates, with the HTML of the elements. @param {Page} page */
+async function axeViolations(page) {
+  const results = await page.evaluate('axe.run()');
+  return results.violations.map(
+    (/** @type {any} */ { id, nodes }) =>
+      `${id}: ${nodes.map((/** @type {any} */ node) => node.html).join(' ')}`,
+  );
+}
+
+/** Functions that bring an element into a state. @type {Record<string, (openPage: OpenPage) => Promise<Page>>} */
+const STATES = {
+  async loading(openPage) {
+    const page = await open(openPage, { src: '/faults/slow' });
+    await page.getByRole('progressbar').waitFor();
+    return page;
+  },
+  async 'waiting for an interaction'(openPage) {
+    const page = await open(openPage, { reveal: 'interaction', poster: '/half.png' });
+    await page.getByRole('button', { name: 'Light it yourself' }).waitFor();
+    return page;
+  },
+  async 'lit by a torch'(openPage) {
+    const page = await open(openPage, { 'autoplay-light': '' });
+    await waitForLoad(page);
+    await page.getByRole('toolbar').waitFor();
+    return page;
+  },
+  async 'with the menu of lights'(openPage) {
+    const page = await open(openPage);
+    await waitForLoad(page);
+    await page.getByRole('button', { name: 'Light: Torch' }).click();
+    await page.getByRole('radiogroup', { name: 'Light' }).waitFor();
+    return page;
+  },
+  async 'lit by stripes'(openPage) {
+    const page = await open(openPage, { light: 'stripes' });
+    await waitForLoad(page);
+    return page;
+  },
+  async 'without controls'(openPage) {
+    const page = await open(openPage, { light: 'flood' });
+    await page.evaluate("photo.removeAttribute('controls'), photo.removeAttribute('zoom')");
+    await waitForLoad(page);
+    return page;
+  },
+  async 'zoomed in'(openPage) {
+    const page = await open(openPage);
+    await waitForLoad(page);
+    await page.evaluate('photo.view = { zoom: 5, x: 0.5, y: 0.5 }');
+    await waitForEvents(page, 'viewchange');
+    return page;
+  },
+  async 'in full screen'(openPage) {
+    const page = await open(openPage);
+    await waitForLoad(page);
+    await page.getByRole('button', { name: 'Full screen' }).click();
+    await page.waitForFunction('document.fullscreenElement === photo');
+    return page;
+  },
+  async 'with an error'(openPage) {
+    const page = await open(openPage, { src: '/photos/absent.ltm', poster: '/half.png' });
+    await alertOf(page).waitFor();
+    await page.locator('relightable-photo summary').click();
+    return page;
+  },
+};
+
+test.describe('axe finds no violation on a page with a photograph', () => {
+  for (const [state, enter] of Object.entries(STATES)) {
+    test(state, async ({ openPage }) => {
+      const page = await enter(openPage);
+      expect(await axeViolations(page)).toStrictEqual([]);
+      await page.screenshot({
+        path: join(SCREENSHOTS, `element-${state.replaceAll(' ', '-')}.png`),
+      });
+    });
+  }
+});
+
+test.describe('the picture', () => {
+  test('is an image with a name, and has a slider under the torch', async ({ openPage }) => {
+    const page = await open(openPage);
+    await waitForLoad(page);
+    await page.getByRole('img', { name: 'A window' }).waitFor();
+    const slider = page.getByRole('slider', { name: 'Light' });
+    await slider.waitFor({ state: 'attached' });
+    expect(await slider.getAttribute('aria-roledescription')).toBe('2D slider');
+    await page
+      .getByRole('status')
+      .getByText('The picture is ready.')
+      .waitFor({ state: 'attached' });
+    await page.evaluate("photo.light = 'flood'");
+    await slider.waitFor({ state: 'detached' });
+    expect(await page.locator('relightable-photo').ariaSnapshot()).not.toMatch(/slider|arrow/);
+  });
+
+  test('has a focus ring, also in forced colours', async ({ openPage }) => {
+    const page = await open(openPage);
+    await waitForLoad(page);
+    await page.keyboard.press('Tab');
+    const ring = page.getByRole('slider');
+    const width = await ring.evaluate((element) => getComputedStyle(element).borderTopWidth);
+    expect(width).toBe('3px');
+    await page.emulateMedia({ forcedColors: 'active' });
+    const [shown, system] = await ring.evaluate((element) => {
+      const probe = document.createElement('i');
+      probe.style.color = 'Highlight';
+      element.append(probe);
+      return [getComputedStyle(element).borderTopColor, getComputedStyle(probe).color];
+    });
+    expect(shown).toBe(system);
+  });
+});
+
+test.describe('texts', () => {
+  for (const [lang, light, zoom] of /** @type {const} */ ([
+    ['fr', 'Lumière: Torche', 'Agrandir'],
+    ['de-CH', 'Licht: Taschenlampe', 'Vergrößern'],
+    ['it', 'Luce: Torcia', 'Ingrandisci'],
+    ['es', 'Luz: Linterna', 'Ampliar'],
+    ['ja', '光: 懐中電灯', '拡大'],
+    ['zh-Hans', '光: 手电筒', '放大'],
+  ])) {
+    test(`are in the page’s language: ${lang}`, async ({ openPage }) => {
+      const page = await open(openPage, {}, { lang });
+      await waitForLoad(page);
+      await page.getByRole('button', { name: light, exact: true }).waitFor();
+      await page.getByRole('button', { name: zoom, exact: true }).waitFor();
+      expect(await axeViolations(page)).toStrictEqual([]);
+    });
+  }
+
+  test('are in the language of the nearest ancestor, or of the browser', async ({ openPage }) => {
+    const page = await open(openPage, {}, { lang: 'pt', locale: 'es-MX' });
+    await waitForLoad(page);
+    await page.getByRole('button', { name: 'Ampliar' }).waitFor();
+    await page.evaluate("photo.lang = 'de'");
+    await page.getByRole('button', { name: 'Vergrößern' }).waitFor();
+    await page.evaluate(() => {
+      const { photo } = /** @type {any} */ (globalThis);
+      photo.removeAttribute('lang');
+      const host = document.createElement('section');
+      host.lang = 'fr';
+      host.attachShadow({ mode: 'open' }).append(photo);
+      document.body.append(host);
+    });
+    await page.getByRole('button', { name: 'Agrandir' }).waitFor();
+  });
+});
+
+test.describe('controls', () => {
+  for (const width of [320, 390, 1440]) {
+    test(`are at least 44 pixels wide and high, within a page of ${width} pixels`, async ({
+      openPage,
+    }) => {
+      const page = await open(
+        openPage,
+        { 'autoplay-light': '' },
+        { viewport: { width, height: 800 } },
+      );
+      await waitForLoad(page);
+      await page.getByRole('button', { name: 'Light: Torch' }).click();
+      const frame = await boxOf(page.locator('relightable-photo'));
+      const targets = [...(await page.getByRole('button').all())];
+      for (const radio of await page.getByRole('radio').all()) targets.push(radio.locator('..'));
+      expect(targets.length, String(targets.length)).toBeGreaterThanOrEqual(12);
+      for (const target of targets) {
+        const box = await boxOf(target);
+        expect(box.width, JSON.stringify(box)).toBeGreaterThanOrEqual(44);
+        expect(box.height, JSON.stringify(box)).toBeGreaterThanOrEqual(44);
+        expect(box.x).toBeGreaterThanOrEqual(frame.x);
+        expect(box.x + box.width).toBeLessThanOrEqual(frame.x + frame.width + 0.5);
+      }
+    });
+  }
+
+  test('grow when text is twice as large', async ({ openPage }) => {
+    const page = await open(openPage, {}, { viewport: { width: 390, height: 800 } });
+    await waitForLoad(page);
+    await page.evaluate("document.documentElement.style.fontSize = '32px'");
+    await page.getByRole('button', { name: 'Light: Torch' }).click();
+    const label = page.getByRole('radiogroup').getByText('Checkerboard');
+    const box = await boxOf(label);
+    const frame = await boxOf(page.locator('relightable-photo'));
+    expect(box.height).toBeGreaterThanOrEqual(32);
+    expect(box.x + box.width).toBeLessThanOrEqual(frame.x + frame.width);
+    expect(await axeViolations(page)).toStrictEqual([]);
+    await page.screenshot({ path: join(SCREENSHOTS, 'element-large-text.png') });
+  });
+});

@@ -1,0 +1,155 @@
+/** The gallery page and its first picture. */
+
+import { join } from 'node:path';
+import { brightest, encodePng } from '../../www/tools/pictures.js';
+import { expect, test } from './fixtures.js';
+import { boxOf, dominantColour, screenPicture } from './page-helpers.js';
+import { SCREENSHOTS } from './test-photos.js';
+
+/** @param {import('@playwright/test').Page} page */
+async function waitUntilDrawn(page) {
+  await page.waitForFunction(() => document.querySelector('relightable-photo')?.activeBackend);
+  await page.locator('#photo canvas').waitFor();
+  // The progress bar disappears when the whole photograph has loaded.
+  await page.locator('#photo').getByRole('progressbar').waitFor({ state: 'hidden' });
+}
+
+/** Centre and mean of the brightness on the screen. @param {import('@playwright/test').Page} page */
+async function brightnessOf(page) {
+  return brightest(await screenPicture(page, '#photo'));
+}
+
+test.describe('the gallery', () => {
+  for (const [backend, title] of [
+    ['webgpu', 'WebGPU'],
+    ['webgl2', 'WebGL2'],
+    ['cpu', 'CPU'],
+  ]) {
+    test(`draws on ${backend}, and its torch follows the pointer`, async ({ openPage }) => {
+      const page = await openPage(`/?light=torch&backend=${backend}`);
+      await waitUntilDrawn(page);
+      await page.getByRole('status').getByText(`${title} (`).waitFor();
+      const box = await boxOf(page.locator('#photo'));
+      await page.mouse.move(box.x + 0.25 * box.width, box.y + 0.5 * box.height);
+      const left = await brightnessOf(page);
+      await page.mouse.move(box.x + 0.75 * box.width, box.y + 0.5 * box.height);
+      const right = await brightnessOf(page);
+      expect(right.x - left.x, `from ${left.x} to ${right.x}`).toBeGreaterThan(0.3);
+    });
+  }
+
+  test('has a radio button for each light, for pointer and keyboard', async ({ openPage }) => {
+    const page = await openPage('/');
+    await waitUntilDrawn(page);
+    const light = () => page.evaluate("document.getElementById('photo').light");
+    expect(await light()).toBe('fire');
+    for (const name of ['Torch', 'Flood', 'Checkerboard', 'Spectrum', 'Stripes']) {
+      await page.getByRole('radio', { name }).check();
+      expect(await light()).toBe(name.toLowerCase());
+    }
+    await page.keyboard.press('ArrowRight');
+    expect(await light()).toBe('checkerboard');
+    expect(page.url()).toMatch(/light=checkerboard/);
+  });
+
+  test('uses the visitor’s image as the light, until another light is chosen', async ({
+    openPage,
+  }) => {
+    const page = await openPage('/?light=flood');
+    await waitUntilDrawn(page);
+    const before = await brightnessOf(page);
+    // White on the left, black on the right.
+    const data = Uint8Array.from({ length: 40 }, (_, i) => (i % 4 === 3 || i < 20 ? 255 : 0));
+    const buffer = encodePng({ width: 10, height: 1, data });
+    const file = { name: 'half.png', mimeType: 'image/png', buffer };
+    await page.getByLabel('a picture or film').setInputFiles(file);
+    await page.waitForFunction(() => document.querySelector('relightable-photo')?.lightSource);
+    expect(await page.getByRole('radio', { checked: true }).count()).toBe(0);
+    const half = await brightnessOf(page);
+    expect(half.x, `${before.x} to ${half.x}`).toBeLessThan(before.x - 0.1);
+    await page.screenshot({ path: join(SCREENSHOTS, 'page-own-light.png'), fullPage: true });
+    await page.getByRole('radio', { name: 'Flood' }).check();
+    expect((await brightnessOf(page)).x).toBeGreaterThan(half.x + 0.1);
+    const odd = { name: 'odd.png', mimeType: 'image/png', buffer: Buffer.from('nothing') };
+    await page.getByLabel('a picture or film').setInputFiles(odd);
+    await page.getByRole('status').getByText('cannot show odd.png').waitFor();
+  });
+
+  test('uses the visitor’s video as the light', async ({ openPage }) => {
+    const page = await openPage('/?light=flood');
+    await waitUntilDrawn(page);
+    const film = join(import.meta.dirname, '../fixtures/red-then-blue.webm');
+    await page.getByLabel('a picture or film').setInputFiles(film);
+    await page.waitForFunction(
+      () => document.querySelector('relightable-photo')?.lightSource instanceof HTMLVideoElement,
+    );
+    const colour = async () => dominantColour(await screenPicture(page, '#photo'));
+    await expect.poll(colour).toBe('red');
+    await expect.poll(colour).toBe('blue');
+  });
+
+  test('uses the camera as the light, and stops it afterwards', async ({ openPage }) => {
+    const page = await openPage('/', {
+      before: () => {
+        const canvas = document.createElement('canvas');
+        const stream = canvas.captureStream();
+        Object.assign(globalThis, { stream });
+        navigator.mediaDevices.getUserMedia = async () => stream;
+      },
+    });
+    await waitUntilDrawn(page);
+    await page.getByRole('button', { name: 'your camera' }).click();
+    await page.waitForFunction(() => document.querySelector('relightable-photo')?.lightSource);
+    const state = () => page.evaluate('stream.getVideoTracks()[0].readyState');
+    expect(await state()).toBe('live');
+    await page.getByRole('radio', { name: 'Stripes' }).check();
+    expect(await state()).toBe('ended');
+    expect(await page.evaluate("document.getElementById('photo').lightSource")).toBeNull();
+  });
+
+  test('has a menu that changes the backend', async ({ openPage }) => {
+    const page = await openPage('/');
+    await waitUntilDrawn(page);
+    await page.getByLabel('Drawn by').selectOption('CPU');
+    await page
+      .getByRole('status')
+      .getByText(/CPU \(simd128, \d workers?\)/)
+      .waitFor();
+    expect(page.url()).toMatch(/backend=cpu/);
+  });
+
+  for (const width of [390, 820, 1440]) {
+    for (const colorScheme of /** @type {const} */ (['light', 'dark'])) {
+      test(`does not scroll sideways at ${width} pixels, ${colorScheme}`, async ({ openPage }) => {
+        const viewport = { width, height: width < 500 ? 844 : 900 };
+        const page = await openPage('/?light=torch', { viewport, colorScheme });
+        await waitUntilDrawn(page);
+        const overflow = await page.evaluate(
+          'document.documentElement.scrollWidth - document.documentElement.clientWidth',
+        );
+        expect(overflow).toBe(0);
+        await page.screenshot({
+          path: join(SCREENSHOTS, `page-${width}-${colorScheme}.png`),
+          fullPage: true,
+        });
+      });
+    }
+  }
+
+  test('has its own brightness under each light', async ({ openPage }) => {
+    const page = await openPage('/');
+    await waitUntilDrawn(page);
+    const means = [];
+    for (const name of ['Flood', 'Torch', 'Spectrum']) {
+      await page.getByRole('radio', { name }).check();
+      means.push((await brightnessOf(page)).mean);
+      await page
+        .locator('.hero .frame')
+        .screenshot({ path: join(SCREENSHOTS, `${name.toLowerCase()}.png`) });
+    }
+    const [flood = 0, torch = 0, spectrum = 0] = means;
+    expect(flood, String(means)).toBeGreaterThan(spectrum);
+    expect(spectrum, String(means)).toBeGreaterThan(torch);
+    expect(torch, String(means)).toBeGreaterThan(2);
+  });
+});

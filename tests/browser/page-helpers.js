@@ -1,0 +1,206 @@
+/** What tests do with a page: put an element into it, wait for its events, read its picture. */
+
+import { decodePng } from '../../www/tools/pictures.js';
+
+/** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
+/** @typedef {import('@playwright/test').Page} Page */
+/** @typedef {import('./any-browser.js').AnyPage} AnyPage */
+/** @typedef {{ type: string } & Record<string, unknown>} PhotoEvent an event of the element, as data */
+
+/**
+ * Puts an element with these attributes into a page. The page's globals are then `photo`, the element, and
+ * `photoEvents`, all its events as data.
+ *
+ * @param {AnyPage} page
+ * @param {Record<string, string>} attributes
+ */
+export async function mountPhoto(page, attributes) {
+  await page.evaluate(async (attributes) => {
+    await customElements.whenDefined('relightable-photo');
+    const photo = document.createElement('relightable-photo');
+    /** @type {PhotoEvent[]} */
+    const photoEvents = [];
+    const changes = ['lightchange', 'viewchange', 'backendchange', 'contextlost', 'qualitychange'];
+    for (const type of ['load', 'progress', 'error', ...changes]) {
+      // The document receives them only if they bubble.
+      document.addEventListener(type, (event) => {
+        const fields = ['code', 'message', 'backend', 'previous', 'reason', 'light', 'torch'];
+        const data = [...fields, 'loaded', 'total', 'share', 'zoom', 'x', 'y']
+          .filter((field) => field in event)
+          .map((field) => [field, /** @type {any} */ (event)[field]]);
+        photoEvents.push({ type, ...Object.fromEntries(data) });
+      });
+    }
+    Object.assign(globalThis, { photo, photoEvents });
+    for (const [name, value] of Object.entries(attributes)) photo.setAttribute(name, value);
+    photo.style.width = '64px';
+    (document.querySelector('main') ?? document.body).append(photo);
+  }, attributes);
+}
+
+/**
+ * Waits for an event of a type and returns all events since the element was mounted.
+ *
+ * @param {AnyPage} page
+ * @param {string} type
+ * @param {number} [count] how many events of the type to wait for
+ * @returns {Promise<PhotoEvent[]>}
+ */
+export async function waitForEvents(page, type, count = 1) {
+  await page.waitForFunction(
+    ([type, count]) => {
+      const { photoEvents } = /** @type {any} */ (globalThis);
+      return photoEvents.filter((/** @type {PhotoEvent} */ e) => e.type === type).length >= count;
+    },
+    /** @type {const} */ ([type, count]),
+  );
+  return page.evaluate('photoEvents');
+}
+
+/**
+ * Waits for `load` and returns all events since the element was mounted.
+ *
+ * @param {AnyPage} page
+ * @throws if an `error` event comes first
+ */
+export async function waitForLoad(page) {
+  await page.waitForFunction(() => {
+    const { photoEvents } = /** @type {any} */ (globalThis);
+    return photoEvents.some((/** @type {PhotoEvent} */ { type }) => /^(load|error)$/.test(type));
+  });
+  /** @type {PhotoEvent[]} */
+  const photoEvents = await page.evaluate('photoEvents');
+  const error = photoEvents.find((event) => event.type === 'error');
+  if (error) throw new Error(`${error['code']}: ${error['message']}`);
+  return photoEvents;
+}
+
+/**
+ * Counts the events of a type since the element was mounted.
+ *
+ * @param {AnyPage} page
+ * @param {string} type
+ */
+export async function countEvents(page, type) {
+  /** @type {PhotoEvent[]} */
+  const events = await page.evaluate('photoEvents');
+  return events.filter((event) => event.type === type).length;
+}
+
+/**
+ * Sets attributes of the page's first element, and returns its picture in full quality.
+ *
+ * @param {AnyPage} page
+ * @param {Record<string, string>} [attributes]
+ * @param {{ x: number, y: number } | null} [torch]
+ */
+export async function capturePicture(page, attributes = {}, torch) {
+  const url = await page.evaluate(
+    async ({ attributes, torch }) => {
+      const photo = /** @type {RelightablePhoto} */ (document.querySelector('relightable-photo'));
+      for (const [name, value] of Object.entries(attributes)) photo.setAttribute(name, value);
+      if (torch !== undefined) photo.torch = torch;
+      const blob = await photo.toBlob();
+      const reader = new FileReader();
+      reader.readAsDataURL(blob);
+      await new Promise((resolve) => reader.addEventListener('load', resolve));
+      return String(reader.result);
+    },
+    { attributes, torch },
+  );
+  return decodeDataUrl(url);
+}
+
+/** @param {string} url of a PNG file */
+export function decodeDataUrl(url) {
+  return decodePng(Buffer.from(url.slice(url.indexOf(',') + 1), 'base64'));
+}
+
+/**
+ * The element's pixels on the screen.
+ *
+ * @param {AnyPage} page
+ * @param {string} [selector]
+ */
+export async function screenPicture(page, selector = 'relightable-photo') {
+  // To hide the caret, Playwright would set inline styles, which strict policies refuse.
+  return decodePng(await page.locator(selector).screenshot({ caret: 'initial' }));
+}
+
+/**
+ * Waits for frames. A test that counts frames proves that nothing happens meanwhile, however slow the machine is.
+ *
+ * @param {AnyPage} page
+ * @param {number} [count]
+ */
+export async function waitForFrames(page, count = 12) {
+  await page.evaluate(async (count) => {
+    for (let i = 0; i < count; i += 1) await new Promise(requestAnimationFrame);
+  }, count);
+}
+
+/** The element's error message. @param {Page} page */
+export function alertOf(page) {
+  return page.getByRole('alert');
+}
+
+/**
+ * Opens the details of the element's error message, which begins with one short sentence.
+ *
+ * @param {Page} page
+ */
+export async function openAlertDetails(page) {
+  await alertOf(page)
+    .getByText(/cannot be shown|not work as intended/)
+    .waitFor({ state: 'visible' });
+  const details = page.locator('relightable-photo details');
+  await details.evaluate((element) => element.setAttribute('open', ''));
+  return alertOf(page);
+}
+
+/** Removes WebGPU and WebGL2 from a page. For `before` of `openPage`. */
+export function removeGraphics() {
+  Object.defineProperty(Navigator.prototype, 'gpu', { get: () => undefined });
+  const { getContext } = HTMLCanvasElement.prototype;
+  HTMLCanvasElement.prototype.getContext = /** @type {any} */ (
+    /** @this {HTMLCanvasElement} @param {string} kind @param {any[]} rest */
+    function (kind, ...rest) {
+      return kind === 'webgl2' ? null : Reflect.apply(getContext, this, [kind, ...rest]);
+    }
+  );
+}
+
+/** The place of an element that is displayed. @param {import('@playwright/test').Locator} locator */
+export async function boxOf(locator) {
+  const box = await locator.boundingBox();
+  if (!box) throw new Error(`${locator} is not displayed`);
+  return box;
+}
+
+/**
+ * Makes a function that converts picture coordinates, from 0 to 1, to a point on the page.
+ *
+ * @param {Page} page
+ */
+export async function pointOf(page) {
+  const { x: left, y: top, width, height } = await boxOf(page.locator('relightable-photo'));
+  return (/** @type {number} */ x, /** @type {number} */ y) => ({
+    x: left + x * width,
+    y: top + y * height,
+  });
+}
+
+/**
+ * Which of red and blue dominates a picture.
+ *
+ * @param {import('../../www/tools/pictures.js').Picture} picture
+ * @returns {'red' | 'blue' | 'neither'}
+ */
+export function dominantColour({ data }) {
+  let [red, blue] = [0, 0];
+  for (let at = 0; at < data.length; at += 4) {
+    red += data[at] ?? 0;
+    blue += data[at + 2] ?? 0;
+  }
+  return red > 2 * blue ? 'red' : blue > 2 * red ? 'blue' : 'neither';
+}

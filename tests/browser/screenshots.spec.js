@@ -1,0 +1,146 @@
+/**
+ * Pictures of the element in each state, compared with tests/fixtures/visual. After an intended change, write new
+ * pictures and look at them:
+ *
+ *     playwright test -c tests/browser screenshots --update-snapshots
+ *
+ * The photograph is drawn on the CPU. Texts have a font of the site, so that the fonts of a machine do not matter.
+ */
+
+import { expect, test } from './fixtures.js';
+import { alertOf, mountPhoto, waitForFrames, waitForLoad } from './page-helpers.js';
+import { LIGHTS } from './test-photos.js';
+
+/** @typedef {import('@playwright/test').Page} Page */
+
+/**
+ * @typedef {object} State
+ * @property {Record<string, string>} [attributes]
+ * @property {number} [width] of the element, in pixels
+ * @property {(page: Page) => Promise<unknown>} [enter] brings the element into the state
+ * @property {import('./fixtures.js').PageOptions} [options]
+ */
+
+const GLASS = { src: '/photos/glass.ltm', backend: 'cpu', alt: 'A window', light: 'torch' };
+const CONTROLS = { ...GLASS, controls: '', zoom: '' };
+const POSTER = { ...GLASS, poster: '/half.png', reveal: 'interaction' };
+const FAILING = { ...GLASS, src: '/photos/absent.ltm' };
+const CONTROLS_WIDTH_PX = 400;
+const FONT =
+  '@font-face { font-family: Screenshots; src: url(/fonts/source-serif-4.woff2) } ' +
+  'relightable-photo { font-family: Screenshots }';
+
+/**
+ * Colour threshold of pixelmatch: 0.03 is a difference of 8/255 in brightness. A picture may have 0.2 % of pixels
+ * above it, where edges are smoothed differently.
+ */
+const TOLERANCE = { threshold: 0.03, maxDiffPixelRatio: 0.002 };
+
+/** @param {Page} page */
+const waitForToolbar = async (page) => {
+  await waitForLoad(page);
+  await page.getByRole('toolbar').waitFor();
+};
+/** @param {Page} page */
+const waitForAlert = (page) => alertOf(page).waitFor();
+/** @param {Page} page */
+const waitForPoster = async (page) => {
+  await page.getByRole('button', { name: 'Light it yourself' }).waitFor();
+  await page.waitForFunction("photo.shadowRoot.querySelector('[part=poster]').naturalWidth > 0");
+};
+/** @param {Page} page */
+const focusLight = async (page) => {
+  await waitForLoad(page);
+  await page.keyboard.press('Tab');
+  await expect(page.getByRole('slider')).toBeFocused();
+};
+/** @param {Page} page */
+const focusToolbar = async (page) => {
+  await waitForToolbar(page);
+  await page.keyboard.press('Tab');
+  await page.keyboard.press('Tab');
+  await expect(page.getByRole('button', { name: 'Light: Torch' })).toBeFocused();
+};
+
+/** @type {Record<string, State>} */
+const STATES = {
+  ...Object.fromEntries(
+    LIGHTS.map((light) => [`light-${light}`, { attributes: { ...GLASS, light } }]),
+  ),
+  'torch-moved': {
+    enter: async (page) => {
+      await waitForLoad(page);
+      await page.evaluate('void (photo.torch = { x: 0.2, y: 0.8 })');
+    },
+  },
+  exposed: { attributes: { ...GLASS, light: 'flood', exposure: '0.5' } },
+  toolbar: { attributes: CONTROLS, width: CONTROLS_WIDTH_PX, enter: waitForToolbar },
+  'toolbar-menu': {
+    attributes: CONTROLS,
+    width: CONTROLS_WIDTH_PX,
+    enter: async (page) => {
+      await waitForToolbar(page);
+      await page.getByRole('button', { name: 'Light: Torch' }).click();
+      await page.getByRole('radiogroup', { name: 'Light' }).waitFor();
+    },
+  },
+  'toolbar-focus': { attributes: CONTROLS, width: CONTROLS_WIDTH_PX, enter: focusToolbar },
+  'toolbar-dark': {
+    attributes: CONTROLS,
+    width: CONTROLS_WIDTH_PX,
+    enter: waitForToolbar,
+    options: { colorScheme: 'dark' },
+  },
+  'toolbar-forced-colors': {
+    attributes: CONTROLS,
+    width: CONTROLS_WIDTH_PX,
+    enter: focusToolbar,
+    options: { forcedColors: 'active' },
+  },
+  'light-focus': { enter: focusLight },
+  'light-focus-forced-colors': { enter: focusLight, options: { forcedColors: 'active' } },
+  poster: { attributes: POSTER, width: CONTROLS_WIDTH_PX, enter: waitForPoster },
+  'poster-dark': {
+    attributes: POSTER,
+    width: CONTROLS_WIDTH_PX,
+    enter: waitForPoster,
+    options: { colorScheme: 'dark' },
+  },
+  'poster-forced-colors': {
+    attributes: POSTER,
+    width: CONTROLS_WIDTH_PX,
+    enter: waitForPoster,
+    options: { forcedColors: 'active' },
+  },
+  error: { attributes: FAILING, width: CONTROLS_WIDTH_PX, enter: waitForAlert },
+  'error-dark': {
+    attributes: FAILING,
+    width: CONTROLS_WIDTH_PX,
+    enter: waitForAlert,
+    options: { colorScheme: 'dark' },
+  },
+  'error-forced-colors': {
+    attributes: FAILING,
+    width: CONTROLS_WIDTH_PX,
+    enter: waitForAlert,
+    options: { forcedColors: 'active' },
+  },
+};
+
+test.describe('the element looks as before:', () => {
+  for (const [name, state] of Object.entries(STATES)) {
+    test(name, async ({ openPage }) => {
+      const { attributes = GLASS, width = 128, enter = waitForLoad, options } = state;
+      const page = await openPage('/plain', { reducedMotion: 'reduce', ...options });
+      await mountPhoto(page, attributes);
+      await page.evaluate(`void (photo.style.width = '${width}px')`);
+      await page.addStyleTag({ content: FONT });
+      await enter(page);
+      await page.evaluate('document.fonts.ready.then(() => {})');
+      // Frames in less than full quality are replaced before `toBlob` resolves.
+      await page.evaluate('photo.toBlob().then(() => {}, () => {})');
+      await waitForFrames(page, 2);
+      await expect(page.locator('relightable-photo')).toHaveScreenshot(`${name}.png`, TOLERANCE);
+    });
+  }
+});

@@ -1,0 +1,335 @@
+/** The site's pages: accessibility, links, widths, no scripts; the playground; the samples; the exported folder. */
+
+import { execFileSync } from 'node:child_process';
+import { existsSync, readFileSync, rmSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { join } from 'node:path';
+import { transform } from 'esbuild';
+import { composePage, PAGES } from '../../www/tools/pages.js';
+import { expect, test } from './fixtures.js';
+import { FOLDER, SCREENSHOTS } from './test-photos.js';
+
+/** @typedef {import('@playwright/test').Page} Page */
+
+const repository = join(import.meta.dirname, '../..');
+const samples = join(repository, 'www/samples');
+const require = createRequire(import.meta.url);
+const axe = readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8');
+
+/** @param {string} name */
+const sample = (name) => readFileSync(join(samples, name), 'utf8');
+
+/** Scrolls to each photograph and waits until it is drawn. @param {Page} page */
+async function waitUntilDrawn(page) {
+  for (const photo of await page.locator('relightable-photo').all()) {
+    await photo.scrollIntoViewIfNeeded();
+    await photo.locator('canvas').waitFor();
+  }
+  await page.evaluate('scrollTo(0, 0)');
+}
+
+/** The addresses in a page's attributes. @param {Page} page @returns {Promise<string[]>} */
+function references(page) {
+  return page.evaluate(() =>
+    [...document.querySelectorAll('[href], [src], [data-manifest]')].flatMap((element) => {
+      const names = ['href', 'src', 'data-manifest'];
+      return names.flatMap((name) => {
+        const value = element.getAttribute(name);
+        return value ? [new URL(value, document.baseURI).href] : [];
+      });
+    }),
+  );
+}
+
+test.describe('the site', () => {
+  for (const name of PAGES) {
+    for (const colorScheme of /** @type {const} */ (['light', 'dark'])) {
+      for (const width of [390, 1440]) {
+        test(`axe finds no violation on ${name}: ${colorScheme}, ${width} pixels`, async ({
+          openPage,
+        }) => {
+          const viewport = { width, height: 900 };
+          const page = await openPage(`/${name}`, {
+            viewport,
+            colorScheme,
+            reducedMotion: 'reduce',
+          });
+          await waitUntilDrawn(page);
+          await page.evaluate(axe);
+          const { violations } = await page.evaluate('axe.run()');
+          const found = violations.map(
+            (/** @type {any} */ { id, nodes }) =>
+              `${id}: ${nodes.map((/** @type {any} */ node) => node.html).join(' ')}`,
+          );
+          expect(found).toStrictEqual([]);
+        });
+      }
+    }
+
+    test(`${name} requests nothing from other hosts and logs no errors`, async ({
+      openPage,
+      server,
+    }) => {
+      const page = await openPage(`/${name}`);
+      /** @type {string[]} */
+      const faults = [];
+      page.on('console', (message) => {
+        if (message.type() === 'error') faults.push(message.text());
+      });
+      page.on('request', (request) => {
+        if (new URL(request.url()).origin !== server.origin) faults.push(request.url());
+      });
+      page.on('response', (response) => {
+        if (response.status() >= 400) faults.push(`${response.status()} ${response.url()}`);
+      });
+      await page.reload();
+      await waitUntilDrawn(page);
+      expect(faults).toStrictEqual([]);
+    });
+
+    test(`${name} has no broken link`, async ({ openPage, server }) => {
+      const page = await openPage(`/${name}`);
+      const inside = (await references(page)).filter((address) =>
+        address.startsWith(server.origin),
+      );
+      expect(inside.length).toBeGreaterThan(8);
+      for (const address of new Set(inside)) {
+        const response = await fetch(address);
+        expect(response.status, address).toBe(200);
+        const { hash } = new URL(address);
+        const text = await response.text();
+        if (hash)
+          expect(text, `no element has the id of ${address}`).toContain(`id="${hash.slice(1)}"`);
+      }
+    });
+
+    for (const width of [320, 390, 820, 1440]) {
+      test(`${name} does not scroll sideways at ${width} pixels`, async ({ openPage }) => {
+        const page = await openPage(`/${name}`, { viewport: { width, height: 900 } });
+        const overflow = await page.evaluate(
+          'document.documentElement.scrollWidth - document.documentElement.clientWidth',
+        );
+        expect(overflow).toBe(0);
+        const path = join(SCREENSHOTS, `site-${name.replace('.html', '')}-${width}.png`);
+        await page.screenshot({ path, fullPage: true });
+      });
+    }
+
+    test(`${name} is readable without scripts`, async ({ openPage }) => {
+      const page = await openPage(`/${name}`, { javaScriptEnabled: false });
+      expect(await page.getByRole('heading', { level: 1 }).isVisible()).toBeTruthy();
+      const text = await page.getByRole('main').innerText();
+      expect(text.length, `${text.length} characters`).toBeGreaterThan(500);
+      for (const picture of await page.locator('relightable-photo noscript img').all()) {
+        await picture.scrollIntoViewIfNeeded();
+        expect(await picture.isVisible()).toBeTruthy();
+      }
+    });
+  }
+
+  test('has a title, a description and a menu entry for each page', async ({ openPage }) => {
+    const page = await openPage('/');
+    const found = { titles: new Set(), descriptions: new Set() };
+    for (const name of PAGES) {
+      await page.goto(`/${name}`);
+      found.titles.add(await page.title());
+      found.descriptions.add(await page.locator('meta[name=description]').getAttribute('content'));
+      expect(await page.locator('html').getAttribute('lang')).toBe('en');
+      expect(await page.locator('nav [aria-current=page]').getAttribute('href')).toBe(name);
+    }
+    expect(found.titles.size).toBe(PAGES.length);
+    expect(found.descriptions.size).toBe(PAGES.length);
+    for (const text of [...found.titles, ...found.descriptions]) expect(text).toMatch(/\S{3}/);
+  });
+
+  test('begins with a skip link', async ({ openPage }) => {
+    const page = await openPage('/how-it-works.html');
+    await page.keyboard.press('Tab');
+    await page.keyboard.press('Enter');
+    expect(await page.evaluate('document.activeElement.id')).toBe('main');
+  });
+
+  test('pauses the fire under reduced motion, until the visitor starts it', async ({
+    openPage,
+  }) => {
+    const page = await openPage('/', { reducedMotion: 'reduce' });
+    await waitUntilDrawn(page);
+    const paused = () => page.evaluate("document.getElementById('photo').paused");
+    expect(await paused()).toBe(true);
+    await page.getByRole('button', { name: 'Play the fire' }).click();
+    expect(await paused()).toBe(false);
+    await page.getByRole('button', { name: 'Pause the fire' }).click();
+    expect(await paused()).toBe(true);
+  });
+
+  test('documents every error code', () => {
+    const codes = readFileSync(join(repository, 'www/src/shared/errors.ts'), 'utf8').matchAll(
+      /^ +\| '([a-z-]+)'/gm,
+    );
+    const page = composePage('troubleshooting.html');
+    const documented = [...page.matchAll(/<tr id="([a-z-]+)">/g)].map(([, code]) => code).sort();
+    expect(documented.length).toBeGreaterThanOrEqual(25);
+    expect([...codes].map(([, code]) => code).sort()).toStrictEqual(documented);
+  });
+});
+
+test.describe('the playground', () => {
+  test('has a control for every attribute', async ({ openPage }) => {
+    const page = await openPage('/playground.html');
+    /** @type {string[]} */
+    const attributes = await page.evaluate(async () => {
+      const element = await customElements.whenDefined('relightable-photo');
+      return [.../** @type {any} */ (element).observedAttributes];
+    });
+    for (const name of attributes) {
+      if (name === 'lang') continue;
+      expect(await page.getByLabel(name, { exact: true }).count(), name).toBe(1);
+    }
+  });
+
+  test('shows the chosen attributes, their HTML and the events, and keeps them in the address', async ({
+    openPage,
+  }) => {
+    const page = await openPage('/playground.html');
+    await waitUntilDrawn(page);
+    await page.getByLabel('light', { exact: true }).selectOption('stripes');
+    await page.getByLabel('alt', { exact: true }).fill('A "window" & more');
+    await page.getByLabel('controls', { exact: true }).uncheck();
+    const html = page.locator('#html');
+    await html.getByText('light="stripes"').waitFor();
+    const code = await html.innerText();
+    expect(code).toMatch(/alt="A &quot;window&quot; &amp; more"/);
+    expect(code).not.toMatch(/controls/);
+    await page.locator('#log').getByText('lightchange').first().waitFor();
+    await page.reload();
+    expect(await html.innerText()).toBe(code);
+    expect(await page.locator('relightable-photo').getAttribute('light')).toBe('stripes');
+    await page.getByRole('button', { name: 'Reset all' }).click();
+    await html.getByText('light="torch"').waitFor();
+    expect(new URL(page.url()).search).toBe('');
+    await page.getByLabel('loading', { exact: true }).selectOption('eager');
+    await waitUntilDrawn(page);
+    expect(await page.locator('relightable-photo').getAttribute('loading')).toBe('eager');
+  });
+});
+
+test.describe('the samples', () => {
+  test('are shown unchanged', async ({ openPage }) => {
+    const page = await openPage('/integration.html');
+    const shown = await page.locator('[data-sample]').all();
+    expect(shown.length).toBeGreaterThanOrEqual(12);
+    for (const code of shown) {
+      const name = (await code.getAttribute('data-sample')) ?? '';
+      expect(await code.textContent(), name).toBe(sample(name).trimEnd());
+    }
+  });
+
+  for (const name of ['plain.html', 'iiif.html', 'kiosk.html']) {
+    test(`${name} shows its photograph`, async ({ openPage }) => {
+      const page = await openPage(`/samples/${name}`);
+      await waitUntilDrawn(page);
+      expect(await page.getByRole('img').first().getAttribute('aria-label')).toBeTruthy();
+      expect(await page.getByRole('alert').count()).toBe(0);
+    });
+  }
+
+  test('the manifest follows IIIF Presentation 3', async ({ server }) => {
+    const address = `${server.origin}/samples/manifest.json`;
+    const manifest = await (await fetch(address)).json();
+    expect(manifest['@context']).toBe('http://iiif.io/api/presentation/3/context.json');
+    expect([manifest.id, manifest.type]).toStrictEqual([address, 'Manifest']);
+    const ids = new Set();
+    /** @param {any} thing @param {string} type */
+    const checkResource = (thing, type) => {
+      expect(thing.type).toBe(type);
+      expect(URL.canParse(thing.id), thing.id).toBeTruthy();
+      expect(thing.id.startsWith(server.origin), thing.id).toBeTruthy();
+      expect(ids.has(thing.id), `${thing.id} is unique`).toBeFalsy();
+      ids.add(thing.id);
+      for (const text of [thing.label, thing.summary].filter(Boolean)) {
+        for (const value of Object.values(text)) expect(Array.isArray(value)).toBeTruthy();
+      }
+    };
+    checkResource(manifest, 'Manifest');
+    expect(manifest.label, 'manifests must have a label').toBeTruthy();
+    for (const canvas of manifest.items) {
+      checkResource(canvas, 'Canvas');
+      expect(canvas.width).toBeGreaterThan(0);
+      expect(canvas.height).toBeGreaterThan(0);
+      for (const [pages, motivation] of [
+        [canvas.items, 'painting'],
+        [canvas.annotations, 'supplementing'],
+      ]) {
+        for (const page of pages) {
+          checkResource(page, 'AnnotationPage');
+          for (const annotation of page.items) {
+            checkResource(annotation, 'Annotation');
+            expect(annotation.motivation).toBe(motivation);
+            expect(annotation.target).toBe(canvas.id);
+            checkResource(annotation.body, motivation === 'painting' ? 'Image' : 'Dataset');
+            const response = await fetch(annotation.body.id);
+            expect(response.headers.get('content-type')).toBe(annotation.body.format);
+            await response.body?.cancel();
+          }
+        }
+      }
+    }
+  });
+
+  for (const name of ['Window.jsx', 'vite.config.js', 'iiif.js', 'kiosk.js']) {
+    test(`${name} is JavaScript`, async () => {
+      await transform(sample(name), {
+        loader: name.endsWith('x') ? 'jsx' : 'js',
+        target: 'es2022',
+      });
+    });
+  }
+
+  test('Window.vue has a valid script and template', async ({ openPage }) => {
+    const [, script = '', template = ''] =
+      /^<script setup>\n(.*)<\/script>\n\n<template>\n(.*)<\/template>\n$/s.exec(
+        sample('Window.vue'),
+      ) ?? [];
+    await transform(script, { target: 'es2022' });
+    const page = await openPage('/blank');
+    // An XML parser reports elements that are not closed. Vue's attribute names are not valid in XML.
+    const xml = template.replace(/ [@:](?=[a-z])/g, ' v-').replaceAll('v-else', 'v-else=""');
+    const fault = await page.evaluate(
+      (xml) =>
+        new DOMParser().parseFromString(xml, 'application/xml').querySelector('parsererror')
+          ?.textContent,
+      xml,
+    );
+    expect(fault).toBeUndefined();
+  });
+
+  test('the plugin for WordPress is PHP', () => {
+    const { Engine } = require('php-parser');
+    const parser = new Engine({ parser: { version: '7.4' } });
+    expect(parser.parseCode(sample('relightable-photo.php'), 'plugin.php').kind).toBe('program');
+    expect(() => parser.parseCode('<?php add_filter( ', 'plugin.php')).toThrow();
+  });
+});
+
+test('the exported site contains every file that it refers to', async () => {
+  const out = join(repository, 'target/browser-tests/site');
+  const exporter = join(repository, 'www/tools/export.js');
+  execFileSync(process.execPath, [exporter, FOLDER, out, 'https://glass.example/photo/']);
+  const manifest = readFileSync(join(out, 'samples/manifest.json'), 'utf8');
+  expect(manifest).toMatch(/"https:\/\/glass\.example\/photo\/photos\/stained-glass\.ltm"/);
+  expect(manifest).not.toMatch(/museum\.example/);
+  for (const name of PAGES) {
+    const html = readFileSync(join(out, name), 'utf8');
+    for (const [, address = ''] of html.matchAll(/<[^>]* (?:href|src)="([^"#]+)[^"]*"/g)) {
+      if (/^https:/.test(address)) continue;
+      expect(address, 'addresses are relative').not.toMatch(/^\//);
+      expect(existsSync(join(out, address)), `${name} refers to ${address}`).toBeTruthy();
+    }
+  }
+  for (const [, address = ''] of readFileSync(join(out, 'site/site.css'), 'utf8').matchAll(
+    /url\("([^"]+)"\)/g,
+  )) {
+    expect(existsSync(join(out, 'site', address)), address).toBeTruthy();
+  }
+  rmSync(out, { recursive: true });
+});

@@ -1,0 +1,108 @@
+/** The torch follows the pointer, a finger and the arrow keys. */
+
+import { brightest } from '../../www/tools/pictures.js';
+import { expect, test } from './fixtures.js';
+import { capturePicture, pointOf, waitForEvents } from './page-helpers.js';
+
+const TORCH = { src: '/photos/glass.ltm', alt: 'A window', light: 'torch' };
+
+/** @param {import('@playwright/test').Page} page */
+async function enlarge(page) {
+  await page.evaluate("photo.style.width = '320px'");
+  return pointOf(page);
+}
+
+test.describe('the torch', () => {
+  for (const backend of ['webgpu', 'webgl2', 'cpu']) {
+    test(`follows the pointer on ${backend}`, async ({ openPhoto }) => {
+      const page = await openPhoto({ ...TORCH, backend });
+      const at = await enlarge(page);
+      for (const [x, y] of /** @type {const} */ ([
+        [0.25, 0.3],
+        [0.75, 0.3],
+        [0.75, 0.7],
+        [0.25, 0.7],
+      ])) {
+        const point = at(x, y);
+        await page.mouse.move(point.x, point.y);
+        const light = brightest(await capturePicture(page));
+        // The glass is coloured, so its centre of brightness is only near the torch.
+        expect(Math.abs(light.x - x), `${light.x} for a torch at ${x}`).toBeLessThan(0.12);
+        expect(Math.abs(light.y - y), `${light.y} for a torch at ${y}`).toBeLessThan(0.12);
+      }
+    });
+  }
+
+  test('reports its position in lightchange', async ({ openPhoto }) => {
+    const page = await openPhoto({ ...TORCH, backend: 'cpu' });
+    const at = await enlarge(page);
+    const point = at(0.25, 0.75);
+    await page.mouse.move(point.x, point.y);
+    const photoEvents = await waitForEvents(page, 'lightchange');
+    expect(photoEvents.at(-1)).toStrictEqual({
+      type: 'lightchange',
+      light: 'torch',
+      torch: { x: 0.25, y: 0.75 },
+    });
+  });
+
+  test('stays at the edge of the picture when a drag leaves it', async ({ openPhoto }) => {
+    const page = await openPhoto({ ...TORCH, backend: 'cpu' });
+    const at = await enlarge(page);
+    const [from, to] = [at(0.5, 0.5), at(1.4, 0.5)];
+    await page.mouse.move(from.x, from.y);
+    await page.mouse.down();
+    await page.mouse.move(to.x, to.y);
+    await page.mouse.up();
+    expect(await page.evaluate('photo.torch')).toStrictEqual({ x: 1, y: 0.5 });
+  });
+
+  test('moves to where a finger taps', async ({ openPhoto }) => {
+    const page = await openPhoto({ ...TORCH, backend: 'cpu' }, { hasTouch: true });
+    const at = await enlarge(page);
+    const point = at(0.2, 0.6);
+    await page.touchscreen.tap(point.x, point.y);
+    expect(await page.evaluate('photo.torch')).toStrictEqual({ x: 0.2, y: 0.6 });
+  });
+
+  test('leaves vertical scrolling to the page', async ({ openPhoto }) => {
+    const page = await openPhoto({ ...TORCH, backend: 'cpu' });
+    const touch = () =>
+      page
+        .getByRole('img', { name: 'A window' })
+        .evaluate((element) => getComputedStyle(element).touchAction);
+    expect(await touch()).toBe('pan-y');
+    await page.evaluate("photo.light = 'flood'");
+    expect(await touch()).toBe('auto');
+  });
+
+  test('moves with the arrow keys when focused', async ({ openPhoto }) => {
+    const page = await openPhoto({ ...TORCH, backend: 'cpu' });
+    const before = brightest(await capturePicture(page));
+    await page.keyboard.press('Tab');
+    for (let i = 0; i < 5; i += 1) await page.keyboard.press('ArrowLeft');
+    await page.keyboard.press('ArrowUp');
+    const torch = await page.evaluate('photo.torch');
+    expect(Math.abs(torch.x - 0.25)).toBeLessThan(1e-9);
+    expect(Math.abs(torch.y - 0.45)).toBeLessThan(1e-9);
+    const after = brightest(await capturePicture(page));
+    expect(after.x, `${before.x} to ${after.x}`).toBeLessThan(before.x - 0.15);
+  });
+
+  test('accepts spaces around the light’s name', async ({ openPhoto }) => {
+    const page = await openPhoto({ ...TORCH, light: ' torch ', backend: 'cpu' });
+    await page.keyboard.press('Tab');
+    await page.keyboard.press('ArrowLeft');
+    expect(await page.evaluate('photo.torch')).toStrictEqual({ x: 0.45, y: 0.5 });
+  });
+
+  test('does not move under other lights', async ({ openPhoto }) => {
+    const page = await openPhoto({ ...TORCH, light: 'flood', backend: 'cpu' });
+    const at = await enlarge(page);
+    const point = at(0.25, 0.25);
+    await page.mouse.move(point.x, point.y);
+    await page.keyboard.press('Tab');
+    await page.keyboard.press('ArrowLeft');
+    expect(await page.evaluate('photo.torch')).toBeNull();
+  });
+});
