@@ -88,7 +88,7 @@ test.describe('the fallback', () => {
     const [change] = backendChanges(await waitForLoad(page));
     expect(change?.['backend']).toBe('cpu');
     expect(String(change?.['reason'])).toMatch(
-      /WebGPU: it is done by a program.*WebGL2: it is done by a program/,
+      /WebGPU: its device is a software renderer.*WebGL2: its device is a software renderer/,
     );
     await expectSpectrum(page);
   });

@@ -94,6 +94,7 @@ test.describe('an element', () => {
 
   for (const backend of ['webgpu', 'webgl2', 'cpu']) {
     test(`that is removed releases its memory on ${backend}`, async ({ openPhoto }) => {
+      test.slow();
       const page = await openPhoto({ src: '/photos/glass.ltm', backend });
       const growth = await page.evaluate(async (backend) => {
         const { photo } = /** @type {any} */ (globalThis);
@@ -127,6 +128,7 @@ test.describe('an element', () => {
   test('that is added and removed 200 times leaves no nodes, listeners, workers or memory', async ({
     openPage,
   }) => {
+    test.slow();
     const page = await openPage('/plain');
     const session = await page.context().newCDPSession(page);
     const usage = async () => {

@@ -39,10 +39,11 @@ const slowDownWorkers = () => {
   globalThis.Worker = class extends Worker {
     /** @override @param {any} message @param {any} transfer */
     postMessage(message, transfer) {
-      if (message.task?.kind !== 'relight') return super.postMessage(message, transfer);
-      const { detail } = message.task.showing;
-      relit.push(detail);
-      const ms = /** @type {any} */ (globalThis).slow * detail;
+      const task = message.task?.task;
+      if (task?.kind !== 'relight') return super.postMessage(message, transfer);
+      const { quality } = task.settings;
+      relit.push(quality);
+      const ms = /** @type {any} */ (globalThis).slow * quality;
       const send = () => super.postMessage(message, transfer);
       if (now === null) {
         setTimeout(send, ms);

@@ -26,7 +26,7 @@ async function expectSpectrum(page) {
 const waitForPoolEnd = (page) => expect.poll(() => poolOf(page).length).toBe(0);
 
 /** A message that no client sends: the worker fails. */
-const INVALID_MESSAGE = "{ number: 0, photo: -1, task: { kind: 'plan' } }";
+const INVALID_MESSAGE = "{ id: 0, task: { photo: -1, task: { kind: 'plan' } } }";
 
 /**
  * For `before` of `openPage`: `relighters` has the page's relighting workers. While `failing` is true, each worker
@@ -45,8 +45,8 @@ const recordWorkers = () => {
     /** @override @param {any} message @param {any} transfer */
     postMessage(message, transfer) {
       const { failing } = /** @type {any} */ (globalThis);
-      if (failing && message.task?.kind === 'relight') {
-        super.postMessage({ number: 0, photo: -1, task: { kind: 'plan' } });
+      if (failing && message.task?.task?.kind === 'relight') {
+        super.postMessage({ id: 0, task: { photo: -1, task: { kind: 'plan' } } });
       }
       super.postMessage(message, transfer);
     }
@@ -313,6 +313,7 @@ test.describe('the worker pool', () => {
   }
 
   test('does not grow over two thousand frames', async ({ openPage }) => {
+    test.slow();
     const page = await openPage('/plain');
     await recordMemory(page);
     const session = await page.context().newCDPSession(page);

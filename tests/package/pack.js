@@ -8,8 +8,11 @@ import { test } from 'node:test';
 import { pathToFileURL } from 'node:url';
 import { integrityOf } from '../../www/tools/integrity.js';
 import { compare } from '../../www/tools/pictures.js';
-import { glassBytes, nativePicture } from '../browser/photos.js';
+import { makeTestPhotos, nativePicture, glassBytes as readGlass } from '../browser/test-photos.js';
 import { manifestOf, packed, REPOSITORY, run, unpacked } from './packed.js';
+
+makeTestPhotos();
+const glassBytes = readGlass();
 
 /** Scripts with fixed names. */
 const SCRIPTS = [
@@ -266,7 +269,7 @@ test('the core decodes and relights in Node', async (t) => {
   const check = async (photo) => {
     for (const light of /** @type {const} */ (['flood', 'torch', 'fire'])) {
       const { width, height, pixels } = await relight(photo, light, { exposure: 2 });
-      const native = nativePicture(light, 'cpu', 2);
+      const native = nativePicture(light, { backend: 'cpu', exposure: 2 });
       const { worst } = compare({ width, height, data: new Uint8Array(pixels.buffer) }, native);
       assert.ok(worst <= 1, `${light} differs by ${worst}/255 from ltm-export`);
     }

@@ -6,7 +6,7 @@ import { launchChromium } from '../../www/tools/chromium.js';
 import { decodePng } from '../../www/tools/pictures.js';
 import { answer } from '../../www/tools/ranges.js';
 import { listen } from '../../www/tools/serve.js';
-import { glassBytes } from '../browser/photos.js';
+import { glassBytes } from '../browser/test-photos.js';
 
 /** The documented policy. @param {string} scripts further sources of scripts */
 const policy = (scripts) =>
@@ -152,9 +152,9 @@ function serve(mounts, policy) {
     }
     if (url === '/photos/glass.ltm') {
       const read = (/** @type {number} */ start, /** @type {number} */ end) => [
-        glassBytes.subarray(start, end),
+        glassBytes().subarray(start, end),
       ];
-      const content = { size: glassBytes.length, type: 'application/vnd.ltm', etag: '"a"', read };
+      const content = { size: glassBytes().length, type: 'application/vnd.ltm', etag: '"a"', read };
       answer(request, response, content).catch(() => {});
       return;
     }

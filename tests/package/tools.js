@@ -6,14 +6,15 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { compare } from '../../www/tools/pictures.js';
-import { nativePicture } from '../browser/photos.js';
+import { makeTestPhotos, nativePicture } from '../browser/test-photos.js';
 import { manifestOf, project, run, unpacked } from './packed.js';
 import { draw, visit } from './page.js';
 
 const SCRIPT = 'relightable-photo.js';
 
 /** The expected picture, whatever tool built the page. */
-const expected = nativePicture('torch', 'cpu');
+makeTestPhotos();
+const expected = nativePicture('torch', { backend: 'cpu' });
 
 /**
  * Checks what every page must fulfil.
