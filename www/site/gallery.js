@@ -191,5 +191,5 @@ function updateStatus() {
 
 function updatePlayButton() {
   play.hidden = photo.light !== 'fire' || photo.lightSource != null || !photo.matches(':defined');
-  play.textContent = photo.paused ? 'Play the fire' : 'Pause the fire';
+  play.textContent = photo.paused ? 'Play the fire.' : 'Pause the fire.';
 }

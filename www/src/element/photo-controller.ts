@@ -8,7 +8,6 @@ import { setModuleFolder } from '../engine/wasm-loader.js';
 import { fetchStrings, isPending } from '../i18n/strings.js';
 import { InteractionController } from '../input/interaction.js';
 import { reducedMotion } from '../input/reduced-motion.js';
-import { parseCssColor } from '../lights/light-color.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
 import { BROWSER_PORTS } from '../player/browser-ports.js';
@@ -23,7 +22,7 @@ import { type ActiveLight, LightChangeDetector } from '../state/light-change.js'
 import { type ElementOptions, readOptions } from '../state/options.js';
 import { ViewerState } from '../state/viewer-state.js';
 import type { PhotoView } from '../state/viewport.js';
-import { isFullscreen, toggleFullscreen } from '../ui/fullscreen.js';
+import { toggleFullscreen } from '../ui/fullscreen.js';
 import { Presenter } from '../ui/presenter.js';
 import { ShadowDom } from '../ui/shadow-dom.js';
 import type { ToolbarActions } from '../ui/toolbar.js';
@@ -59,23 +58,21 @@ export class PhotoController {
   #lightError: PhotoError | null = null;
 
   constructor(host: HTMLElement) {
-    const root = host.attachShadow({ mode: 'open' });
     this.#host = host;
     this.#reader = new AttributeReader(host);
-    this.#dom = new ShadowDom(root);
-    this.state = new ViewerState(
-      readOptions(this.#reader, parseCssColor, null),
-      {
-        changed: () => this.session.redraw(),
-        sourceSupportLoaded: () => this.schedule(),
-        errorChanged: (error) => this.#lightErrorChanged(error),
-      },
-      parseCssColor,
-    );
+    this.#dom = new ShadowDom(host);
+    this.state = new ViewerState(readOptions(this.#reader, null), {
+      changed: () => this.session.redraw(),
+      sourceSupportLoaded: () => this.schedule(),
+      errorChanged: (error) => this.#lightErrorChanged(error),
+    });
     this.#reportedView = this.state.view;
     this.#presenter = this.#createPresenter();
     this.session = this.#createSession();
-    this.interaction = this.#createInteraction(root);
+    this.interaction = new InteractionController(this.state, this.#dom, this.#presenter, {
+      changed: () => this.schedule(),
+      expired: () => this.reset(),
+    });
     this.#dom.revealButton.addEventListener('click', () => {
       this.interaction.markActive();
       this.dismissPoster();
@@ -120,7 +117,7 @@ export class PhotoController {
   /** Reads attributes that may have changed in the current script. */
   readOptions(): ElementOptions {
     const { state } = this;
-    state.options = readOptions(this.#reader, parseCssColor, state.options);
+    state.options = readOptions(this.#reader, state.options);
     return state.options;
   }
 
@@ -229,35 +226,6 @@ export class PhotoController {
         this.state.errorMessage = null;
         this.schedule();
       },
-    });
-  }
-
-  #createInteraction(root: ShadowRoot): InteractionController {
-    const leaveFullscreen = () => {
-      const wasFullscreen = isFullscreen(this.#host);
-      if (wasFullscreen) toggleFullscreen(this.#host);
-      return wasFullscreen;
-    };
-    return new InteractionController(root, this.#dom, this.state, {
-      changed: () => this.schedule(),
-      viewChanged: () => {
-        this.#presenter.announceZoom();
-        this.schedule();
-      },
-      lightSelected: (item) => {
-        this.#presenter.announceLight(item);
-        this.schedule();
-      },
-      escaped: () => {
-        if (!leaveFullscreen()) (root.activeElement as HTMLElement | null)?.blur();
-      },
-      zoomIgnored: (by) => this.#presenter.hintAtZoom(by),
-      expired: () => {
-        this.reset();
-        this.#presenter.closeMenu();
-        leaveFullscreen();
-      },
-      active: (byKeyboard) => this.#presenter.showToolbar(byKeyboard),
     });
   }
 

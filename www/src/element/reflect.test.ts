@@ -79,7 +79,7 @@ test('all options are read together, and errors name their attribute', () => {
   const reader = new AttributeReader(element);
   let options: ElementOptions | null = null;
   const read = () => {
-    options = readOptions(reader, () => [255, 0, 0, 255], options);
+    options = readOptions(reader, options, () => [255, 0, 0, 255]);
     return options;
   };
   element.setAttribute('src', 'window.ltm');

@@ -1,7 +1,6 @@
 /** Turns input by pointer, wheel, keyboard and tilt into changes of the viewer's state, and runs its animations. */
 
 import { CENTRE, type PicturePoint } from '../shared/values.js';
-import type { LightItem } from '../state/light-state.js';
 import type { ViewerState } from '../state/viewer-state.js';
 import {
   FULL_VIEW,
@@ -12,6 +11,7 @@ import {
   ZOOM_STEP,
   zoomAt,
 } from '../state/viewport.js';
+import type { Presenter } from '../ui/presenter.js';
 import type { ShadowDom } from '../ui/shadow-dom.js';
 import { AnimationLoop } from './animation-loop.js';
 import type { GesturePermissions } from './gestures.js';
@@ -24,26 +24,17 @@ import { reducedMotion } from './reduced-motion.js';
 import { isTiltSupported, TiltSensor } from './tilt-sensor.js';
 
 export interface InteractionListener {
-  /** The light, an animation or the focus has changed. */
+  /** The light, the view, an animation or the focus has changed. */
   changed(): void;
-  /** The visitor has zoomed or panned. */
-  viewChanged(): void;
-  /** A key has selected another light. */
-  lightSelected(item: LightItem): void;
-  /** The visitor pressed Escape. */
-  escaped(): void;
-  /** The page scrolled where the visitor may have wanted to zoom. */
-  zoomIgnored(by: 'wheel' | 'touch'): void;
   /** The kiosk's time without input is over. */
   expired(): void;
-  /** Any input, by keyboard or otherwise. */
-  active(byKeyboard: boolean): void;
 }
 
 export class InteractionController {
   readonly #state: ViewerState;
-  readonly #listener: InteractionListener;
   readonly #dom: ShadowDom;
+  readonly #presenter: Presenter;
+  readonly #listener: InteractionListener;
   readonly #pointer: PointerInput;
   readonly #tilt: TiltSensor;
   readonly #loop = new AnimationLoop(requestAnimationFrame.bind(globalThis));
@@ -56,25 +47,35 @@ export class InteractionController {
   /** The torch's position before the last move of a drag. */
   #torchBeforeMove: PicturePoint | null = null;
 
-  constructor(root: ShadowRoot, dom: ShadowDom, state: ViewerState, listener: InteractionListener) {
+  constructor(
+    state: ViewerState,
+    dom: ShadowDom,
+    presenter: Presenter,
+    listener: InteractionListener,
+  ) {
     this.#state = state;
-    this.#listener = listener;
     this.#dom = dom;
+    this.#presenter = presenter;
+    this.#listener = listener;
     this.#animator = new LightAnimator(state.light, this.#loop, () => listener.changed());
     this.#idle = new IdleTimer(delay, {
       rested: () => {
         this.#isActive = false;
         listener.changed();
       },
-      expired: () => listener.expired(),
+      expired: () => {
+        listener.expired();
+        presenter.closeMenu();
+        presenter.leaveFullscreen();
+      },
     });
     this.#tilt = new TiltSensor((point) => {
       if (!state.light.isTorch) return;
       this.markActive();
       this.#moveTorch(point);
     });
-    this.#pointer = this.#listenToPointer(dom);
-    this.#listenToKeyboard(root);
+    this.#pointer = this.#listenToPointer();
+    this.#listenToKeyboard();
   }
 
   /** Starts and stops animations. */
@@ -94,7 +95,7 @@ export class InteractionController {
   markActive(byKeyboard = false): void {
     this.#isActive = true;
     this.#idle.restart();
-    this.#listener.active(byKeyboard);
+    this.#presenter.showToolbar(byKeyboard);
   }
 
   /** Whether the torch follows the device's tilt; `null` if it cannot. */
@@ -136,26 +137,23 @@ export class InteractionController {
     this.#loop.clear();
   }
 
-  #listenToPointer(dom: ShadowDom): PointerInput {
+  #listenToPointer(): PointerInput {
     const state = this.#state;
-    const listener = this.#listener;
-    const pointer = new PointerInput(dom.viewport, {
+    const { handle, viewport } = this.#dom;
+    const pointer = new PointerInput(viewport, {
       permissions: () => this.#permissions,
       isCooperative: () => state.options.cooperativeGestures,
       wheelZoom: (factor, at) => this.#zoomAt(factor, at),
-      zoomIgnored: (by) => listener.zoomIgnored(by),
+      zoomIgnored: (by) => this.#presenter.hintAtZoom(by),
       active: () => this.markActive(),
-      pressed: () => {
-        const { handle, viewport } = dom;
-        (handle.hidden ? viewport : handle).focus({ preventScroll: true });
-      },
+      pressed: () => (handle.hidden ? viewport : handle).focus({ preventScroll: true }),
       moveLight: (x, y) => {
         this.#torchBeforeMove = state.light.torch;
         this.#moveTorch(toPicture(state.view, pointer.toUnits(x, y)));
       },
       restoreLight: () => {
         state.light.torch = this.#torchBeforeMove;
-        listener.changed();
+        this.#listener.changed();
       },
       throwLight: ({ x, y }: Velocity) => {
         if (reducedMotion().matches) return;
@@ -174,12 +172,12 @@ export class InteractionController {
     return pointer;
   }
 
-  #listenToKeyboard(root: ShadowRoot): void {
+  #listenToKeyboard(): void {
+    const { root, handle } = this.#dom;
     root.addEventListener('keydown', (event) => this.#keyDown(event as KeyboardEvent));
     root.addEventListener('keyup', (event) => {
       if ((event as KeyboardEvent).key === ' ') this.#pointer.isPanning = false;
     });
-    const { handle } = this.#dom;
     const focusChanged = () => {
       // A press with a pointer focuses the handle without :focus-visible.
       this.#isHandleFocused = handle.matches(':focus-visible');
@@ -220,7 +218,10 @@ export class InteractionController {
     const last = this.#state.view;
     this.#state.view = view;
     const hasChanged = this.#state.view !== last;
-    if (hasChanged) this.#listener.viewChanged();
+    if (hasChanged) {
+      this.#presenter.announceZoom();
+      this.#listener.changed();
+    }
     return hasChanged;
   }
 
@@ -261,10 +262,11 @@ export class InteractionController {
       case 'reset-view':
         return this.#setView(FULL_VIEW);
       case 'select-light':
-        this.#listener.lightSelected(this.#state.selectNextLight(action.by));
+        this.#presenter.announceLight(this.#state.selectNextLight(action.by));
+        this.#listener.changed();
         return true;
       case 'escape':
-        this.#listener.escaped();
+        if (!this.#presenter.leaveFullscreen()) this.#dom.blur();
         return false;
     }
   }

@@ -20,7 +20,10 @@ export type CssColorParser = (css: string) => readonly number[] | null;
  *
  * @throws `attribute` for an invalid colour
  */
-export function parseLightColor(value: string | null, parse: CssColorParser): LightColor | null {
+export function parseLightColor(
+  value: string | null,
+  parse: CssColorParser = parseCssColor,
+): LightColor | null {
   const css = value?.trim();
   if (!css) return null;
   const rgba = parse(css);
@@ -52,7 +55,7 @@ let context: CanvasRenderingContext2D | null = null;
 const parsed = new Map<string, readonly number[] | null>();
 
 /** Parses with a canvas of one pixel, which supports every colour syntax of the browser. */
-export const parseCssColor: CssColorParser = (css) => {
+const parseCssColor: CssColorParser = (css) => {
   const cached = parsed.get(css);
   if (cached !== undefined) return cached;
   context ??= document.createElement('canvas').getContext('2d', { willReadFrequently: true });

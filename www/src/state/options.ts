@@ -48,8 +48,8 @@ export interface LightOptions {
 /** Reads all attributes. Objects whose fields are unchanged are taken from `last`. */
 export function readOptions(
   reader: AttributeReader,
-  parseColor: CssColorParser,
   last: ElementOptions | null,
+  parseColor?: CssColorParser,
 ): ElementOptions {
   const crossOrigin = reader.read('crossorigin');
   const [x, y] = [reader.read('light-x'), reader.read('light-y')];

@@ -1,7 +1,7 @@
 /** The viewer's state: light, view and animation, as the options request them until a visitor changes them. */
 
 import type { OutputSettings } from '../engine/output-settings.js';
-import { type CssColorParser, multiplyRgb, parseLightColor } from '../lights/light-color.js';
+import { multiplyRgb, parseLightColor } from '../lights/light-color.js';
 import type { PhotoError } from '../shared/errors.js';
 import type { LightName } from '../shared/names.js';
 import { reuse } from '../shared/reuse.js';
@@ -44,7 +44,6 @@ const OVERRIDE_OF_ATTRIBUTE: Readonly<Record<string, keyof LightOverrides>> = {
 export class ViewerState {
   readonly light: LightState;
   readonly reveal = new RevealState();
-  readonly #parseCssColor: CssColorParser;
   #options: ElementOptions;
   #view = FULL_VIEW;
   #output: OutputSettings | null = null;
@@ -54,10 +53,9 @@ export class ViewerState {
   /** Why there is no picture. */
   errorMessage: string | null = null;
 
-  constructor(options: ElementOptions, listener: LightStateListener, parse: CssColorParser) {
+  constructor(options: ElementOptions, listener: LightStateListener) {
     this.#options = options;
     this.light = new LightState(listener);
-    this.#parseCssColor = parse;
   }
 
   get options(): ElementOptions {
@@ -115,7 +113,7 @@ export class ViewerState {
       overrides.torch = clampToPicture(torch);
     }
     if (size !== undefined) overrides.size = PARSERS['light-size'](String(size));
-    if (color !== undefined) overrides.color = parseLightColor(color, this.#parseCssColor);
+    if (color !== undefined) overrides.color = parseLightColor(color);
     this.light.override(overrides);
   }
 
@@ -159,7 +157,7 @@ export class ViewerState {
       name,
       torch: torch && clampToPicture(torch),
       size,
-      color: parseLightColor(color, this.#parseCssColor),
+      color: parseLightColor(color),
     });
     this.#exposure = exposure;
     this.view = view;

@@ -6,7 +6,7 @@ import { missingScript, type PhotoError } from '../shared/errors.js';
 import { CENTRE } from '../shared/values.js';
 import type { LightItem } from '../state/light-state.js';
 import type { ViewerState } from '../state/viewer-state.js';
-import { isFullscreen } from './fullscreen.js';
+import { isFullscreen, toggleFullscreen } from './fullscreen.js';
 import { describeLight } from './light-description.js';
 import type { ShadowDom } from './shadow-dom.js';
 import type { Toolbar, ToolbarActions, ToolbarState } from './toolbar.js';
@@ -81,6 +81,13 @@ export class Presenter {
 
   closeMenu(): void {
     this.#toolbar?.closeMenu();
+  }
+
+  /** Returns whether the element was in full screen. */
+  leaveFullscreen(): boolean {
+    const wasFullscreen = isFullscreen(this.#host);
+    if (wasFullscreen) toggleFullscreen(this.#host);
+    return wasFullscreen;
   }
 
   /** `null` hides the message. */

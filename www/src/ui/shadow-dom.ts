@@ -34,6 +34,7 @@ const ANNOUNCE_DELAY_MS = 400;
 const HINT_MS = 1800;
 
 export class ShadowDom {
+  readonly root: ShadowRoot;
   /** Represents the torch for keyboards and screen readers. */
   readonly handle = createElement('div', {
     class: 'handle',
@@ -100,24 +101,23 @@ export class ShadowDom {
     part: 'status',
     role: 'status',
   });
-  readonly #root: ShadowRoot;
   #canvas: HTMLCanvasElement | null = null;
   #announceTimer: ReturnType<typeof setTimeout> | undefined;
   #hintTimer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(root: ShadowRoot) {
-    this.#root = root;
-    adoptStyles(root, ELEMENT_CSS);
+  constructor(host: Element) {
+    this.root = host.attachShadow({ mode: 'open' });
+    adoptStyles(this.root, ELEMENT_CSS);
     this.#posterImage.addEventListener('load', () => this.viewport.classList.add('has-poster'));
     this.#posterImage.addEventListener('error', () => {
       this.#posterImage.hidden = true;
     });
-    root.append(this.viewport, this.#footer, this.#status);
+    this.root.append(this.viewport, this.#footer, this.#status);
   }
 
   /** Adds the built-in controls, which a page's own `controls` slot replaces. */
   mountControls(controls: readonly HTMLElement[], css: string): void {
-    adoptStyles(this.#root, css);
+    adoptStyles(this.root, css);
     this.#controls.append(...controls);
   }
 
@@ -140,7 +140,7 @@ export class ShadowDom {
   updateLayout(state: LayoutState, language: Language): void {
     const { handle, viewport } = this;
     const { hasHandle, isFocusable, isZoomed, touchAction } = state;
-    const focused = this.#root.activeElement;
+    const focused = this.root.activeElement;
     const keepsFocus = !hasHandle && (focused === handle || focused === viewport);
     handle.hidden = !hasHandle;
     viewport.classList.toggle('has-handle', hasHandle);
@@ -234,6 +234,11 @@ export class ShadowDom {
     this.#hintTimer = setTimeout(() => {
       this.#hint.hidden = true;
     }, HINT_MS);
+  }
+
+  /** Removes the focus from inside the element. */
+  blur(): void {
+    (this.root.activeElement as HTMLElement | null)?.blur();
   }
 
   /** Has a screen reader read a text, unless another one follows at once. */
