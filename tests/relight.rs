@@ -1,4 +1,4 @@
-//! The CPU path gives the picture that the paper's equation gives in double precision.
+//! Pictures of the CPU backend are those of the double precision reference, to within one code.
 #![cfg(not(target_arch = "wasm32"))]
 
 mod common;
@@ -6,15 +6,16 @@ mod common;
 use std::ops::Range;
 use std::sync::Arc;
 
-use common::relit::{self, Kind};
+use common::relit::{self, TileContents};
 use common::tiled;
 use proptest::prelude::*;
 use relightable_photo::executor::SequentialExecutor;
-use relightable_photo::relight::{Display, Light, TorchPose, cpu, reference};
+use relightable_photo::relight::cpu::{CpuRelighter, LightRows};
+use relightable_photo::relight::{Light, OutputTransform, TorchPose, reference};
 use relightable_photo::transport::{Geometry, LightPx, MAX_WINDOW, Tile};
 
-/// Grids, windows and tiles of all shapes, with correspondences that turn, mirror and shift the
-/// picture until windows hang over the display's edges, or miss it.
+/// Grids, windows and tiles of all shapes, with correspondences that rotate, mirror and shift the picture until windows
+/// hang over the light plane's edges, or miss it.
 fn geometries() -> impl Strategy<Value = Geometry> {
     let sides = |most: u32| [1..=most, 1..=most];
     let window = prop_oneof![Just(1), Just(3), Just(15), Just(17), Just(MAX_WINDOW)];
@@ -33,30 +34,34 @@ proptest! {
         seed: u64,
         exposure in 0.0..8.0f32,
     ) {
-        let kind = [Kind::Direct, Kind::Factored, Kind::Mixed][seed as usize % 3];
-        let transport = Arc::new(relit::asymmetric_transport(geometry, kind, seed));
-        // One for all lights: what is left of the last must not show.
-        let mut relighter = cpu::Relighter::new(transport.clone());
+        let contents = [TileContents::Direct, TileContents::Factored, TileContents::Mixed][seed as usize % 3];
+        let transport = Arc::new(relit::asymmetric_transport(geometry, contents, seed));
+        // One relighter for all lights: the last light must leave nothing behind.
+        let mut relighter = CpuRelighter::new(transport.clone());
         for (name, light) in relit::lights(geometry.light) {
             relighter.relight(&light, &SequentialExecutor);
-            let display = relit::displays(exposure)[seed as usize / 3 % 4];
-            let got = relighter.picture(&display, &SequentialExecutor);
-            let want = reference::picture(&transport, &light, &display);
+            let output = relit::output_transforms(exposure)[seed as usize / 3 % 4];
+            let got = relighter.picture(&output, &SequentialExecutor);
+            let want = reference::picture(&transport, &light, &output);
             relit::assert_within_one_code(&got, &want, name);
         }
     }
 }
 
 #[test]
-fn a_window_off_the_display_sees_nothing() {
+fn windows_off_the_light_plane_are_dark() {
     for shift in [1e300, -1e300, 5e9, -2_147_483_648.0, 2_147_483_647.0] {
         let affine = [[0.5, 0.0, shift], [0.0, 0.5, 0.0]];
         let geometry = tiled([9, 8], [8, 8], 17, 8, affine);
-        let transport = Arc::new(relit::asymmetric_transport(geometry, Kind::Mixed, 1));
-        let mut relighter = cpu::Relighter::new(transport);
+        let transport = Arc::new(relit::asymmetric_transport(
+            geometry,
+            TileContents::Mixed,
+            1,
+        ));
+        let mut relighter = CpuRelighter::new(transport);
         for (name, light) in relit::lights(geometry.light) {
             relighter.relight(&light, &SequentialExecutor);
-            let picture = relighter.picture(&Display::srgb(1.0), &SequentialExecutor);
+            let picture = relighter.picture(&OutputTransform::srgb(1.0), &SequentialExecutor);
             assert!(
                 picture.pixels.iter().all(|p| *p == [0, 0, 0, 255]),
                 "{name}, {shift}"
@@ -66,7 +71,7 @@ fn a_window_off_the_display_sees_nothing() {
 }
 
 #[test]
-fn a_light_that_moves_leaves_nothing_behind() {
+fn a_moving_light_leaves_nothing_behind() {
     let geometry = tiled(
         [90, 70],
         [140, 110],
@@ -74,8 +79,12 @@ fn a_light_that_moves_leaves_nothing_behind() {
         32,
         [[1.5, 0.02, 1.0], [0.0, 1.5, -2.0]],
     );
-    let transport = Arc::new(relit::asymmetric_transport(geometry, Kind::Mixed, 3));
-    let mut moved = cpu::Relighter::new(transport.clone());
+    let transport = Arc::new(relit::asymmetric_transport(
+        geometry,
+        TileContents::Mixed,
+        3,
+    ));
+    let mut moved = CpuRelighter::new(transport.clone());
     for step in 0..6 {
         let centre = LightPx {
             u: 20.0 * f64::from(step),
@@ -87,14 +96,14 @@ fn a_light_that_moves_leaves_nothing_behind() {
         };
         let mut elements = Vec::new();
         for [r, g, b, _] in Light::torch(geometry.light, pose).elements() {
-            // Dark where it hardly shines, so that most of the light stays as it is.
+            // Dim elements are made dark, so that most of the light does not change.
             elements.extend([r, g, b].map(|c| if *c < 1e-3 { 0.0 } else { *c }));
         }
         let light = Light::from_linear_rgb(geometry.light, &elements).unwrap();
         moved.relight(&light, &SequentialExecutor);
-        let mut anew = cpu::Relighter::new(transport.clone());
-        anew.relight(&light, &SequentialExecutor);
-        assert_eq!(moved.linear(), anew.linear(), "step {step}");
+        let mut fresh = CpuRelighter::new(transport.clone());
+        fresh.relight(&light, &SequentialExecutor);
+        assert_eq!(moved.linear(), fresh.linear(), "step {step}");
     }
 }
 
@@ -102,9 +111,9 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
     #[test]
-    fn tiles_shared_out_give_the_same_picture_to_the_bit(geometry in geometries(), seed: u64) {
-        let kind = [Kind::Direct, Kind::Factored, Kind::Mixed][seed as usize % 3];
-        let transport = relit::asymmetric_transport(geometry, kind, seed);
+    fn row_ranges_give_the_same_picture_to_the_bit(geometry in geometries(), seed: u64) {
+        let contents = [TileContents::Direct, TileContents::Factored, TileContents::Mixed][seed as usize % 3];
+        let transport = relit::asymmetric_transport(geometry, contents, seed);
         let extent = geometry.camera;
         let middle = (geometry.tile_grid().height / 2 * geometry.tile_side).min(extent.height);
         let mut parts = [0..middle, middle..extent.height].map(|rows| {
@@ -114,30 +123,30 @@ proptest! {
                     *tile = Tile::dark(tile.rect());
                 }
             }
-            (cpu::Relighter::new(Arc::new(part)), rows)
+            (CpuRelighter::new(Arc::new(part)), rows)
         });
-        let mut whole = cpu::Relighter::new(Arc::new(transport));
-        let display = relit::displays(1.0)[seed as usize / 3 % 4];
+        let mut whole = CpuRelighter::new(Arc::new(transport));
+        let output = relit::output_transforms(1.0)[seed as usize / 3 % 4];
         for (name, light) in relit::lights(geometry.light) {
             whole.relight(&light, &SequentialExecutor);
-            let mut shared = Vec::new();
+            let mut joined = Vec::new();
             for (relighter, rows) in &mut parts {
-                let seen = RowsSeen { light: &light, rows: relighter.light_rows() };
-                relighter.relight_rows(seen, &SequentialExecutor);
+                let needed = NeededRows { light: &light, rows: relighter.light_rows() };
+                relighter.relight_rows(needed, &SequentialExecutor);
                 let mut out = vec![[0; 4]; rows.len() * extent.width as usize];
-                relighter.show(&display, rows.clone(), &mut out, &SequentialExecutor);
-                shared.append(&mut out);
+                relighter.encode_rows(&output, rows.clone(), &mut out, &SequentialExecutor);
+                joined.append(&mut out);
                 let [start, end] = [rows.start, rows.end].map(|row| (row * extent.width) as usize);
                 let (part, whole) = (relighter.linear(), whole.linear());
                 prop_assert!(part.pixels[start..end] == whole.pixels[start..end], "{name}");
             }
-            prop_assert!(whole.picture(&display, &SequentialExecutor).pixels == shared, "{name}");
+            prop_assert!(whole.picture(&output, &SequentialExecutor).pixels == joined, "{name}");
         }
     }
 }
 
 #[test]
-fn less_detail_is_the_first_components_and_goes_as_it_came() {
+fn lower_quality_is_the_first_components_and_can_be_undone() {
     let geometry = tiled(
         [70, 50],
         [35, 25],
@@ -145,47 +154,51 @@ fn less_detail_is_the_first_components_and_goes_as_it_came() {
         32,
         [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
     );
-    let transport = Arc::new(relit::asymmetric_transport(geometry, Kind::Mixed, 5));
-    let mut relighter = cpu::Relighter::new(transport.clone());
+    let transport = Arc::new(relit::asymmetric_transport(
+        geometry,
+        TileContents::Mixed,
+        5,
+    ));
+    let mut relighter = CpuRelighter::new(transport.clone());
     for (name, light) in relit::lights(geometry.light) {
-        relighter.set_detail(1.0);
+        relighter.set_quality(1.0);
         relighter.relight(&light, &SequentialExecutor);
         let whole = relighter.linear();
-        // One quad of three, then two.
-        for (share, quads) in [(0.0, 1), (0.3, 1), (0.34, 2)] {
-            let display = Display::srgb(1.0);
-            relighter.set_detail(share);
+        // One of three quads, then two.
+        for (quality, quads) in [(0.0, 1), (0.3, 1), (0.34, 2)] {
+            let output = OutputTransform::srgb(1.0);
+            relighter.set_quality(quality);
             relighter.relight(&light, &SequentialExecutor);
-            let want = reference::picture(&relit::first_quads(&transport, quads), &light, &display);
+            let want = reference::picture(&relit::first_quads(&transport, quads), &light, &output);
             relit::assert_within_one_code(
-                &relighter.picture(&display, &SequentialExecutor),
+                &relighter.picture(&output, &SequentialExecutor),
                 &want,
                 name,
             );
-            // The same under the light that is there.
-            let less = relighter.linear();
-            relighter.set_detail(1.0);
+            // The same with the light left as it is.
+            let coarse = relighter.linear();
+            relighter.set_quality(1.0);
             relighter.update(&SequentialExecutor);
             assert_eq!(relighter.linear(), whole, "{name}");
             relighter.update(&SequentialExecutor);
             assert_eq!(relighter.linear(), whole, "{name}");
-            relighter.set_detail(share);
+            relighter.set_quality(quality);
             relighter.update(&SequentialExecutor);
-            assert_eq!(relighter.linear(), less, "{name}");
+            assert_eq!(relighter.linear(), coarse, "{name}");
         }
-        relighter.set_detail(1.0);
+        relighter.set_quality(1.0);
         relighter.relight(&light, &SequentialExecutor);
         assert_eq!(relighter.linear(), whole, "{name}");
     }
 }
 
-/// A light of which no other rows may be asked for.
-struct RowsSeen<'a> {
+/// A light that fails if any other row is read.
+struct NeededRows<'a> {
     light: &'a Light,
     rows: Range<u32>,
 }
 
-impl cpu::LightRows for RowsSeen<'_> {
+impl LightRows for NeededRows<'_> {
     fn row(&mut self, v: u32) -> &[[f32; 4]] {
         assert_eq!(v, self.rows.start);
         self.rows.start += 1;

@@ -1,5 +1,5 @@
-//! The GLSL for WebGL2 is what naga makes of the WGSL. `UPDATE_SHADERS=1 cargo test --test shaders`
-//! rewrites it after a change of the WGSL or of naga.
+//! The GLSL for WebGL2 is translated by naga from the WGSL. After a change of the WGSL or of naga,
+//! `UPDATE_SHADERS=1 cargo test --test shaders` writes it again.
 #![cfg(not(target_arch = "wasm32"))]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -8,6 +8,35 @@ use std::path::Path;
 use naga::back::glsl;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{ShaderStage, proc::BoundsCheckPolicies};
+
+/// Each GLSL file, its entry point, and the WGSL files it is translated from: those it needs and no others, so that the
+/// translation has no unused parts.
+const SHADERS: [(&str, &str, ShaderStage, &[&str]); 4] = [
+    (
+        "fullscreen.vert.glsl",
+        "fullscreen",
+        ShaderStage::Vertex,
+        &["fullscreen.wgsl"],
+    ),
+    (
+        "correlate.frag.glsl",
+        "correlate",
+        ShaderStage::Fragment,
+        &["frame.wgsl", "basis.wgsl", "correlate_fragment.wgsl"],
+    ),
+    (
+        "downsample.frag.glsl",
+        "downsample",
+        ShaderStage::Fragment,
+        &["downsample.wgsl"],
+    ),
+    (
+        "relight.frag.glsl",
+        "relight",
+        ShaderStage::Fragment,
+        &["fullscreen.wgsl", "frame.wgsl", "relight.wgsl"],
+    ),
+];
 
 /// Translates one entry point to GLSL ES 3.00.
 fn translate(wgsl: &str, entry_point: &str, shader_stage: ShaderStage) -> String {
@@ -21,8 +50,8 @@ fn translate(wgsl: &str, entry_point: &str, shader_stage: ShaderStage) -> String
             version: 300,
             is_webgl: true,
         },
-        // Not ADJUST_COORDINATE_SPACE: it turns the picture upside down for off-screen targets,
-        // and a canvas has y up in clip space under both interfaces.
+        // Without ADJUST_COORDINATE_SPACE, which flips pictures in off-screen targets. A canvas has y up in clip space
+        // in both interfaces.
         writer_flags: glsl::WriterFlags::empty(),
         ..Default::default()
     };
@@ -42,13 +71,13 @@ fn translate(wgsl: &str, entry_point: &str, shader_stage: ShaderStage) -> String
     )
     .and_then(|mut writer| writer.write())
     .expect("naga translates the shader");
-    // The version has to stay the first line. Indentation would only make the module larger.
+    // The version must stay the first line. Indentation would only make the WebAssembly module larger.
     let mut lines = glsl
         .lines()
         .map(str::trim_start)
         .filter(|line| !line.is_empty());
     let version = lines.next().unwrap_or_default();
-    let note = "// naga made this of relight.wgsl: change that one.";
+    let note = "// Translated from WGSL by tests/shaders.rs; do not edit.";
     let lines = [version, note].into_iter().chain(lines);
     lines.flat_map(|line| [line, "\n"]).collect()
 }
@@ -56,14 +85,9 @@ fn translate(wgsl: &str, entry_point: &str, shader_stage: ShaderStage) -> String
 #[test]
 fn checked_in_glsl_is_translated_from_the_wgsl() {
     let shaders = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/relight/shaders");
-    let wgsl = std::fs::read_to_string(shaders.join("relight.wgsl")).unwrap();
-    for (name, entry_point, stage) in [
-        ("relight.vert.glsl", "cover", ShaderStage::Vertex),
-        ("see.frag.glsl", "see", ShaderStage::Fragment),
-        ("across.frag.glsl", "across", ShaderStage::Fragment),
-        ("down.frag.glsl", "down", ShaderStage::Fragment),
-        ("relight.frag.glsl", "relight", ShaderStage::Fragment),
-    ] {
+    for (name, entry_point, stage, sources) in SHADERS {
+        let read = |source: &&str| std::fs::read_to_string(shaders.join(source)).unwrap();
+        let wgsl: String = sources.iter().map(read).collect();
         let expected = translate(&wgsl, entry_point, stage);
         let path = shaders.join(name);
         if std::env::var_os("UPDATE_SHADERS").is_some() {
@@ -72,8 +96,7 @@ fn checked_in_glsl_is_translated_from_the_wgsl() {
         let found = std::fs::read_to_string(&path).unwrap_or_default();
         assert!(
             found == expected,
-            "{name} is not what naga makes of relight.wgsl; UPDATE_SHADERS=1 cargo test --test \
-             shaders rewrites it"
+            "{name} is out of date; UPDATE_SHADERS=1 cargo test --test shaders writes it again"
         );
     }
 }

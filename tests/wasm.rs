@@ -1,22 +1,23 @@
-//! The JavaScript surface in a real browser: a file is decoded, and each back end draws it into a
-//! canvas, which is read back and compared with the double precision reference.
+//! The WebAssembly surface in a browser: files are decoded, each backend draws into a canvas, and the canvas is compared
+//! with the double precision reference.
 //!
-//! Runs under wasm-bindgen-test-runner with ChromeDriver. The flags in webdriver.json give WebGL2
-//! and WebGPU on machines without a GPU, by SwiftShader; without the two about Vulkan, Chromium
-//! has a WebGPU device but no canvas for it.
+//! Runs under wasm-bindgen-test-runner with ChromeDriver. The flags in webdriver.json enable WebGL2 and WebGPU on machines
+//! without a GPU, by SwiftShader; without the two flags for Vulkan, WebGPU cannot draw into canvases.
 #![cfg(target_arch = "wasm32")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod common;
 
-use common::relit::{self, Kind};
+use common::relit::{self, TileContents};
 use common::{band_tile, tiled};
 use js_sys::{Float32Array, Object, Reflect, Uint8ClampedArray};
 use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{EncodedFile, Limits, Metadata, Quality, Reader, Source};
 use relightable_photo::relight::{self, BuiltinLight, Rgba8Picture, reference};
 use relightable_photo::transport::{Extent, Geometry, Tile, Transport};
-use relightable_photo::web::{CodedError, Decoder, Display, Graphics, Light, Photo, Relighter};
+use relightable_photo::web::{
+    CodedError, Decoder, GraphicsDevice, Light, OutputTransform, Photo, Relighter,
+};
 use wasm_bindgen::convert::TryFromJsValue;
 use wasm_bindgen::{JsCast, JsValue};
 use wasm_bindgen_futures::JsFuture;
@@ -27,9 +28,8 @@ wasm_bindgen_test_configure!(run_in_browser);
 
 const BACKENDS: [&str; 3] = ["cpu", "webgl2", "webgpu"];
 
-/// Sizes that no tile divides, windows smaller and larger than the display, correspondences that
-/// turn and shift so that windows hang over every edge, more codes than one texture layer holds,
-/// windows that miss the display.
+/// Extents that no tile divides, windows smaller and larger than the light plane, correspondences that rotate and shift so
+/// that windows hang over every edge, more codes than a texture layer holds, windows that miss the light plane.
 fn geometries() -> [Geometry; 6] {
     [
         tiled(
@@ -60,8 +60,7 @@ fn geometries() -> [Geometry; 6] {
             32,
             [[0.0, 0.7, -6.2], [-0.7, 0.0, 38.1]],
         ),
-        // The second texture layer begins at the middle element of pixel (16, 92)'s window, its
-        // brightest by far.
+        // The second texture layer begins in the middle of pixel (16, 92)'s window, where it is brightest.
         tiled(
             [152, 140],
             [64, 64],
@@ -76,12 +75,11 @@ fn geometries() -> [Geometry; 6] {
 /// The transport of one of the [`geometries`].
 fn transport(i: usize) -> Transport {
     let geometry = geometries()[i];
-    use Kind::{Direct, Factored, Mixed};
-    let kind = [Mixed, Factored, Direct, Factored, Direct, Mixed][i];
-    let mut transport = relit::asymmetric_transport(geometry, kind, i as u64);
+    use TileContents::{Direct, Factored, Mixed};
+    let contents = [Mixed, Factored, Direct, Factored, Direct, Mixed][i];
+    let mut transport = relit::asymmetric_transport(geometry, contents, i as u64);
     if geometry.camera.area() > 10_000 {
-        // Dark tiles spare a minute of compression. A column of them stays lit from the first
-        // texture layer to the last.
+        // Dark tiles save a minute of compression. One column of tiles stays lit, from the first texture layer to the last.
         let across = geometry.tile_grid().width as usize;
         for (i, tile) in transport.tiles.iter_mut().enumerate() {
             if i % across > 0 {
@@ -92,8 +90,8 @@ fn transport(i: usize) -> Transport {
     transport
 }
 
-/// Lets the browser, and the driver of this test, have their turn.
-async fn pause() {
+/// Lets the browser and the test's driver run.
+async fn next_task() {
     let later = js_sys::Promise::new(&mut |resolve, _| {
         let window = web_sys::window().unwrap();
         window
@@ -135,8 +133,8 @@ fn photo(transport: &Transport) -> Photo {
     decode(&file(transport, &Metadata::default()), 1 << 16).unwrap()
 }
 
-/// The transport as it comes out of its file: half-precision floats have less to say than codes.
-fn filed(transport: &Transport) -> Transport {
+/// The transport after encoding and decoding, which rounds it to half precision.
+fn round_trip(transport: &Transport) -> Transport {
     let mut reader = Reader::new(Limits::default());
     reader
         .feed(0, &file(transport, &Metadata::default()))
@@ -155,85 +153,90 @@ fn new_canvas() -> HtmlCanvasElement {
     canvas.unchecked_into()
 }
 
-/// A photograph that is drawn, and what it is drawn by.
-struct Drawn {
+/// A relighter, with the device that it needs.
+struct DeviceRelighter {
     relighter: Relighter,
-    _graphics: Option<Graphics>,
+    _device: Option<GraphicsDevice>,
 }
 
-impl Drawn {
+impl DeviceRelighter {
     fn render(&mut self, light: &Light, exposure: f64) -> Result<(), CodedError> {
-        self.render_by(light, exposure, 1.0)
+        self.render_in_quality(light, exposure, 1.0)
     }
 
-    fn render_by(&mut self, light: &Light, exposure: f64, detail: f64) -> Result<(), CodedError> {
-        let display = Display::new(exposure, &[1.0; 3], "clip", "srgb")?;
-        self.relighter.render(light, &display, detail)
+    fn render_in_quality(
+        &mut self,
+        light: &Light,
+        exposure: f64,
+        quality: f64,
+    ) -> Result<(), CodedError> {
+        let output = OutputTransform::new(exposure, &[1.0; 3], "clip", "srgb")?;
+        self.relighter.render(light, &output, quality)
     }
 }
 
-async fn graphics(backend: &str) -> Option<Graphics> {
+async fn open_device(backend: &str) -> Option<GraphicsDevice> {
     match backend {
         "webgpu" => {
-            let graphics = JsFuture::from(Graphics::webgpu()).await.unwrap();
-            Some(Graphics::try_from_js_value(graphics).expect("a Graphics"))
+            let device = JsFuture::from(GraphicsDevice::webgpu()).await.unwrap();
+            Some(GraphicsDevice::try_from_js_value(device).expect("a GraphicsDevice"))
         }
-        "webgl2" => Some(Graphics::webgl2(new_canvas()).unwrap()),
+        "webgl2" => Some(GraphicsDevice::webgl2(new_canvas()).unwrap()),
         _ => None,
     }
 }
 
-async fn draw(
-    graphics: &Graphics,
+async fn relighter_on(
+    device: &GraphicsDevice,
     photo: &Photo,
     canvas: &HtmlCanvasElement,
     gamut: &str,
 ) -> Result<Relighter, JsValue> {
-    let drawn = graphics.draw(photo, canvas.clone(), gamut.into());
-    let drawn = JsFuture::from(drawn).await?;
-    Ok(Relighter::try_from_js_value(drawn).expect("a Relighter"))
+    let relighter = device.draw(photo, canvas.clone(), gamut.into());
+    let relighter = JsFuture::from(relighter).await?;
+    Ok(Relighter::try_from_js_value(relighter).expect("a Relighter"))
 }
 
-async fn relighter(
+async fn open_relighter(
     backend: &str,
     photo: &Photo,
     canvas: &HtmlCanvasElement,
-) -> Result<Drawn, JsValue> {
-    let graphics = graphics(backend).await;
-    let relighter = match &graphics {
-        Some(graphics) => draw(graphics, photo, canvas, "srgb").await?,
+) -> Result<DeviceRelighter, JsValue> {
+    let device = open_device(backend).await;
+    let relighter = match &device {
+        Some(device) => relighter_on(device, photo, canvas, "srgb").await?,
         None => Relighter::new(photo, canvas.clone(), "srgb")?,
     };
-    Ok(Drawn {
+    Ok(DeviceRelighter {
         relighter,
-        _graphics: graphics,
+        _device: device,
     })
 }
 
-/// What pages show: dithered.
-fn shown(exposure: f64) -> relight::Display {
-    let plain = relight::Display::srgb(exposure as f32);
-    relight::Display {
+/// The output transform of pages, with dither.
+fn page_output(exposure: f64) -> relight::OutputTransform {
+    let plain = relight::OutputTransform::srgb(exposure as f32);
+    relight::OutputTransform {
         dither: true,
         ..plain
     }
 }
 
-/// The canvas as a page gets it by `drawImage`, in the task that rendered it.
+/// The canvas as `drawImage` copies it, in the task that rendered it.
 fn read_back(canvas: &HtmlCanvasElement) -> Rgba8Picture {
     read_back_in(canvas, "srgb")
 }
 
-/// The same, as a colour space has it.
-fn read_back_in(canvas: &HtmlCanvasElement, space: &str) -> Rgba8Picture {
+/// The same in a colour space.
+fn read_back_in(canvas: &HtmlCanvasElement, color_space: &str) -> Rgba8Picture {
     let copy = new_canvas();
     let settings = Object::new();
-    Reflect::set(&settings, &"colorSpace".into(), &space.into()).unwrap();
+    Reflect::set(&settings, &"colorSpace".into(), &color_space.into()).unwrap();
     copy.set_width(canvas.width());
     copy.set_height(canvas.height());
     let context = copy.get_context_with_context_options("2d", &settings);
     let context: CanvasRenderingContext2d = context.unwrap().unwrap().unchecked_into();
-    // Transparency would show as red.
+    // Transparent pixels become red.
     context.set_fill_style_str("red");
     let (width, height) = (canvas.width(), canvas.height());
     context.fill_rect(0.0, 0.0, f64::from(width), f64::from(height));
@@ -253,7 +256,7 @@ fn read_back_in(canvas: &HtmlCanvasElement, space: &str) -> Rgba8Picture {
 fn code_of(thrown: &JsValue) -> String {
     assert!(thrown.is_instance_of::<js_sys::Error>(), "{thrown:?}");
     let message = thrown.unchecked_ref::<js_sys::Error>().message();
-    assert!(message.length() > 10, "a message that helps: {message}");
+    assert!(message.length() > 10, "the message is too short: {message}");
     let code = Reflect::get(thrown, &"code".into()).unwrap();
     code.as_string().expect("a code")
 }
@@ -265,10 +268,10 @@ fn coded<T>(result: Result<T, CodedError>) -> String {
 
 async fn assert_backend_draws_the_reference(backend: &str) {
     for (i, geometry) in geometries().into_iter().enumerate() {
-        let transport = filed(&transport(i));
+        let transport = round_trip(&transport(i));
         let photo = photo(&transport);
         let canvas = new_canvas();
-        let mut relighter = relighter(backend, &photo, &canvas).await.unwrap();
+        let mut relighter = open_relighter(backend, &photo, &canvas).await.unwrap();
         assert_eq!(relighter.relighter.backend(), backend);
         for (j, (name, light)) in relit::lights(geometry.light).into_iter().enumerate() {
             let values: Vec<f32> = light
@@ -281,13 +284,13 @@ async fn assert_backend_draws_the_reference(backend: &str) {
             let web_light = Light::from_linear(&photo, &values, width, height).unwrap();
             let exposure = [1.0, 0.4, 2.5][j % 3];
             relighter.render(&web_light, exposure).unwrap();
-            let want = reference::picture(&transport, &light, &shown(exposure));
-            let what = format!(
+            let want = reference::picture(&transport, &light, &page_output(exposure));
+            let context = format!(
                 "{backend} ({}), geometry {i}, {name}",
                 relighter.relighter.kernel()
             );
-            relit::assert_within_one_code(&read_back(&canvas), &want, &what);
-            pause().await;
+            relit::assert_within_one_code(&read_back(&canvas), &want, &context);
+            next_task().await;
         }
         canvas.remove();
     }
@@ -309,28 +312,27 @@ async fn webgpu_draws_the_reference() {
 }
 
 #[wasm_bindgen_test]
-async fn less_detail_is_the_first_components_whatever_came_before() {
-    let transport = filed(&transport(0));
+async fn lower_quality_is_the_first_components_whatever_came_before() {
+    let transport = round_trip(&transport(0));
     let quads = transport.basis.rank().div_ceil(4);
     assert!(quads > 1);
     for backend in BACKENDS {
         let photo = photo(&transport);
         let canvas = new_canvas();
-        let mut relighter = relighter(backend, &photo, &canvas).await.unwrap();
+        let mut relighter = open_relighter(backend, &photo, &canvas).await.unwrap();
         for name in ["flood", "spectrum"] {
             let light = Light::builtin(&photo, name).unwrap();
-            let seen = BuiltinLight::from_name(name)
+            let native_light = BuiltinLight::from_name(name)
                 .unwrap()
                 .render(transport.geometry.light);
-            // Of one light, then of the same in full, and in less again.
             for used in [1, quads, 1] {
-                let detail = used as f64 / quads as f64;
-                relighter.render_by(&light, 1.0, detail).unwrap();
-                let of = relit::first_quads(&transport, used);
-                let want = reference::picture(&of, &seen, &shown(1.0));
-                let what = format!("{backend}, {name}, {used} of {quads}");
-                relit::assert_within_one_code(&read_back(&canvas), &want, &what);
-                pause().await;
+                let quality = used as f64 / quads as f64;
+                relighter.render_in_quality(&light, 1.0, quality).unwrap();
+                let coarse = relit::first_quads(&transport, used);
+                let want = reference::picture(&coarse, &native_light, &page_output(1.0));
+                let context = format!("{backend}, {name}, {used} of {quads}");
+                relit::assert_within_one_code(&read_back(&canvas), &want, &context);
+                next_task().await;
             }
         }
         canvas.remove();
@@ -338,11 +340,11 @@ async fn less_detail_is_the_first_components_whatever_came_before() {
 }
 
 #[wasm_bindgen_test]
-async fn built_in_lights_reach_the_canvas_by_name() {
+async fn built_in_lights_are_drawn_by_name() {
     let transport = transport(0);
     let photo = photo(&transport);
     let canvas = new_canvas();
-    let mut relighter = relighter("cpu", &photo, &canvas).await.unwrap();
+    let mut relighter = open_relighter("cpu", &photo, &canvas).await.unwrap();
     for (name, light) in relit::lights(transport.geometry.light) {
         match Light::builtin(&photo, name) {
             Ok(built_in) => relighter.render(&built_in, 1.0).unwrap(),
@@ -353,32 +355,39 @@ async fn built_in_lights_reach_the_canvas_by_name() {
                 continue;
             }
         }
-        let want = reference::picture(&transport, &light, &shown(1.0));
+        let want = reference::picture(&transport, &light, &page_output(1.0));
         relit::assert_within_one_code(&read_back(&canvas), &want, name);
     }
 }
 
 #[wasm_bindgen_test]
-async fn the_torch_stands_behind_the_point_of_the_picture_under_the_pointer() {
-    // A quarter turn: picture (x, y) lies before light (y, 1 - x).
+async fn the_torch_is_behind_its_point_of_the_picture() {
+    // Rotated by 90°: picture (x, y) lies in front of light (y, 1 - x).
     let affine = [[0.0, 0.5, 0.0], [-0.5, 0.0, 16.0]];
     let geometry = tiled([32, 32], [16, 16], 3, 8, affine);
-    let photo = photo(&relit::asymmetric_transport(geometry, Kind::Factored, 4));
+    let photo = photo(&relit::asymmetric_transport(
+        geometry,
+        TileContents::Factored,
+        4,
+    ));
     let canvas = new_canvas();
-    let mut relighter = relighter("cpu", &photo, &canvas).await.unwrap();
+    let mut relighter = open_relighter("cpu", &photo, &canvas).await.unwrap();
     for (x, y) in [(0.25, 0.75), (0.5, 0.5), (0.8, 0.2)] {
         let torch = Light::torch(&photo, x, y, Some(0.1)).unwrap();
         relighter.render(&torch, 1.0).unwrap();
         let picture = read_back(&canvas);
-        let (mut at, mut all) = ([0.0; 2], 0.0);
+        let (mut centroid, mut total) = ([0.0; 2], 0.0);
         for (i, [r, ..]) in picture.pixels.iter().enumerate() {
             let weight = f64::from(*r).powi(4);
-            at[0] += weight * ((i % 32) as f64 + 0.5) / 32.0;
-            at[1] += weight * ((i / 32) as f64 + 0.5) / 32.0;
-            all += weight;
+            centroid[0] += weight * ((i % 32) as f64 + 0.5) / 32.0;
+            centroid[1] += weight * ((i / 32) as f64 + 0.5) / 32.0;
+            total += weight;
         }
-        let off = (at[0] / all - x).hypot(at[1] / all - y);
-        assert!(off < 0.05, "torch at ({x}, {y}) shows {off} off");
+        let error = (centroid[0] / total - x).hypot(centroid[1] / total - y);
+        assert!(
+            error < 0.05,
+            "the torch at ({x}, {y}) is drawn {error} away"
+        );
     }
     for (x, y, size) in [
         (f64::NAN, 0.5, 0.1),
@@ -416,10 +425,10 @@ fn a_file_decodes_in_pieces_of_any_size() {
 }
 
 #[wasm_bindgen_test]
-async fn a_photo_goes_to_another_module_tile_by_tile() {
-    let transport = filed(&transport(0));
+async fn a_photo_is_transferred_to_another_module_tile_by_tile() {
+    let transport = round_trip(&transport(0));
     let mut sent = photo(&transport);
-    let (geometry, basis) = (sent.geometry_parcel(), sent.basis_parcel());
+    let (geometry, basis) = (sent.pack_geometry(), sent.pack_basis());
     let mut received = Photo::receive(&geometry, &basis).unwrap();
     assert_eq!(
         (received.tiles(), received.decoded_bytes()),
@@ -435,13 +444,13 @@ async fn a_photo_goes_to_another_module_tile_by_tile() {
     }
     assert_eq!(received.decoded_bytes(), bytes);
     let canvas = new_canvas();
-    let mut relighter = relighter("cpu", &received, &canvas).await.unwrap();
+    let mut relighter = open_relighter("cpu", &received, &canvas).await.unwrap();
     let light = Light::builtin(&received, "spectrum").unwrap();
     relighter.render(&light, 1.0).unwrap();
     let (_, light) = relit::lights(transport.geometry.light).swap_remove(4);
-    let want = reference::picture(&transport, &light, &shown(1.0));
+    let want = reference::picture(&transport, &light, &page_output(1.0));
     relit::assert_within_one_code(&read_back(&canvas), &want, "received");
-    // A photograph in use stays, and what was not sent is not taken.
+    // A photograph in use and corrupt tiles are refused.
     assert_eq!(coded(received.put_tile(0, &tiles[0])), "internal");
     assert_eq!(coded(sent.put_tile(99, &tiles[0])), "internal");
     tiles[1].pop();
@@ -451,8 +460,8 @@ async fn a_photo_goes_to_another_module_tile_by_tile() {
 }
 
 #[wasm_bindgen_test]
-fn a_decoder_wants_every_byte_once() {
-    let transport = relit::asymmetric_transport(geometries()[0], Kind::Direct, 0);
+fn a_decoder_asks_for_each_byte_once() {
+    let transport = relit::asymmetric_transport(geometries()[0], TileContents::Direct, 0);
     let bytes = file(&transport, &Metadata::default());
     let mut decoder = Decoder::new(None);
     let mut asked = Vec::new();
@@ -476,15 +485,15 @@ fn a_decoder_wants_every_byte_once() {
     assert_eq!(asked, [(0.0, first), (first, size)]);
     assert_eq!(decoder.bytes_fed(), size);
     assert!(decoder.scans_done() > 0);
-    assert!(decoder.preview().unwrap().is_none(), "all is there");
-    // What has come may come again.
+    assert!(decoder.preview().unwrap().is_none(), "the file is complete");
+    // Bytes may arrive twice.
     decoder.feed(100.0, &bytes[100..20_000]).unwrap();
     assert_eq!(decoder.bytes_fed(), size);
     decoder.finish().unwrap();
 }
 
 #[wasm_bindgen_test]
-fn every_bad_file_has_its_code() {
+fn each_kind_of_invalid_file_has_its_code() {
     let good = file(&transport(0), &Metadata::default());
     let damaged = |at: usize, to: u8| {
         let mut bytes = good.clone();
@@ -518,7 +527,7 @@ fn every_bad_file_has_its_code() {
 }
 
 #[wasm_bindgen_test]
-async fn lights_and_exposures_that_cannot_be_are_refused() {
+async fn invalid_lights_and_exposures_are_refused() {
     let [one, other] = [0, 1].map(|i| photo(&transport(i)));
     let linear = |values: &[f32], width, height| {
         Light::from_linear(&one, &Float32Array::from(values), width, height)
@@ -531,7 +540,7 @@ async fn lights_and_exposures_that_cannot_be_are_refused() {
     assert_eq!(coded(srgb(&[255; 4], u32::MAX)), "light-size");
     assert!(srgb(&[255; 8], 2).is_ok());
     for backend in BACKENDS {
-        let mut relighter = relighter(backend, &one, &new_canvas()).await.unwrap();
+        let mut relighter = open_relighter(backend, &one, &new_canvas()).await.unwrap();
         let foreign = Light::builtin(&other, "flood").unwrap();
         assert_eq!(coded(relighter.render(&foreign, 1.0)), "light-size");
         let own = Light::builtin(&one, "flood").unwrap();
@@ -549,24 +558,27 @@ async fn a_canvas_in_use_is_refused() {
         let canvas = new_canvas();
         let taken: Option<Object> = canvas.get_context(used_for).unwrap();
         assert!(taken.is_some());
-        let thrown = relighter(backend, &photo, &canvas).await.err().unwrap();
+        let thrown = open_relighter(backend, &photo, &canvas)
+            .await
+            .err()
+            .unwrap();
         assert_eq!(code_of(&thrown), "backend-unavailable");
     }
 }
 
 #[wasm_bindgen_test]
-async fn a_photo_may_go_and_another_take_its_place() {
+async fn a_photo_can_be_freed_and_replaced() {
     for backend in BACKENDS {
         for transport in [0, 2].map(transport) {
-            // A canvas serves one relighter only.
+            // Each relighter needs a new canvas.
             let canvas = new_canvas();
             let photo = photo(&transport);
             let light = Light::builtin(&photo, "spectrum").unwrap();
-            let mut relighter = relighter(backend, &photo, &canvas).await.unwrap();
+            let mut relighter = open_relighter(backend, &photo, &canvas).await.unwrap();
             drop(photo);
             relighter.render(&light, 1.0).unwrap();
             let (_, light) = relit::lights(transport.geometry.light).swap_remove(4);
-            let want = reference::picture(&transport, &light, &shown(1.0));
+            let want = reference::picture(&transport, &light, &page_output(1.0));
             relit::assert_within_one_code(&read_back(&canvas), &want, backend);
         }
     }
@@ -577,12 +589,12 @@ async fn a_lost_webgl2_context_is_reported() {
     let photo = photo(&transport(0));
     let light = Light::builtin(&photo, "flood").unwrap();
     let hidden = new_canvas();
-    let graphics = Graphics::webgl2(hidden.clone()).unwrap();
-    let display = Display::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
-    let mut relighter = draw(&graphics, &photo, &new_canvas(), "srgb")
+    let device = GraphicsDevice::webgl2(hidden.clone()).unwrap();
+    let output = OutputTransform::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
+    let mut relighter = relighter_on(&device, &photo, &new_canvas(), "srgb")
         .await
         .unwrap();
-    relighter.render(&light, &display, 1.0).unwrap();
+    relighter.render(&light, &output, 1.0).unwrap();
     let gl = hidden.get_context("webgl2").unwrap().unwrap();
     let gl: web_sys::WebGl2RenderingContext = gl.unchecked_into();
     let extension = gl.get_extension("WEBGL_lose_context").unwrap().unwrap();
@@ -590,68 +602,70 @@ async fn a_lost_webgl2_context_is_reported() {
     let lose: js_sys::Function = lose.unchecked_into();
     lose.call0(&extension).unwrap();
     assert_eq!(
-        coded(relighter.render(&light, &display, 1.0)),
+        coded(relighter.render(&light, &output, 1.0)),
         "backend-lost"
     );
 }
 
 #[wasm_bindgen_test]
-async fn photographs_take_turns_on_one_device() {
+async fn photographs_share_one_device() {
     for backend in ["webgl2", "webgpu"] {
-        let graphics = graphics(backend).await.unwrap();
-        let display = Display::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
-        let mut drawn = Vec::new();
+        let device = open_device(backend).await.unwrap();
+        let output = OutputTransform::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
+        let mut relighters = Vec::new();
         for i in [0, 1, 2, 0] {
-            let transport = filed(&transport(i));
+            let transport = round_trip(&transport(i));
             let (photo, canvas) = (photo(&transport), new_canvas());
-            let relighter = draw(&graphics, &photo, &canvas, "srgb").await.unwrap();
-            drawn.push((relighter, photo, canvas, transport));
+            let relighter = relighter_on(&device, &photo, &canvas, "srgb")
+                .await
+                .unwrap();
+            relighters.push((relighter, photo, canvas, transport));
         }
-        for turn in 0..3 {
-            for (i, (relighter, photo, canvas, transport)) in drawn.iter_mut().enumerate() {
+        for round in 0..3 {
+            for (i, (relighter, photo, canvas, transport)) in relighters.iter_mut().enumerate() {
                 let (name, light) =
-                    relit::lights(transport.geometry.light).swap_remove((i + turn) % 6);
+                    relit::lights(transport.geometry.light).swap_remove((i + round) % 6);
                 let web_light = Light::builtin(photo, name).unwrap();
-                relighter.render(&web_light, &display, 1.0).unwrap();
-                let want = reference::picture(transport, &light, &shown(1.0));
-                let what = format!("{backend}, photo {i}, turn {turn}, {name}");
-                relit::assert_within_one_code(&read_back(canvas), &want, &what);
+                relighter.render(&web_light, &output, 1.0).unwrap();
+                let want = reference::picture(transport, &light, &page_output(1.0));
+                let context = format!("{backend}, photo {i}, round {round}, {name}");
+                relit::assert_within_one_code(&read_back(canvas), &want, &context);
             }
-            // One that goes leaves the others alone.
-            drawn.remove(0);
+            // Dropping one must not affect the others.
+            relighters.remove(0);
         }
     }
 }
 
 #[wasm_bindgen_test]
-async fn displays_of_all_kinds_show_what_the_reference_shows() {
-    let transport = filed(&transport(0));
+async fn all_output_transforms_match_the_reference() {
+    let transport = round_trip(&transport(0));
     let photo = photo(&transport);
     let (name, light) = relit::lights(transport.geometry.light).swap_remove(4);
     let web_light = Light::builtin(&photo, name).unwrap();
     let balance = [1.3, 1.0, 0.6];
     for backend in BACKENDS {
-        let graphics = graphics(backend).await;
+        let device = open_device(backend).await;
         for gamut in [relight::Gamut::Srgb, relight::Gamut::DisplayP3] {
             let (canvas, space) = (new_canvas(), gamut.color_space());
-            let mut relighter = match &graphics {
-                Some(graphics) => draw(graphics, &photo, &canvas, space).await.unwrap(),
+            let mut relighter = match &device {
+                Some(device) => relighter_on(device, &photo, &canvas, space).await.unwrap(),
                 None => Relighter::new(&photo, canvas.clone(), space).unwrap(),
             };
             assert_eq!(relighter.gamut(), space);
             let curves = [relight::ToneCurve::Clip, relight::ToneCurve::Filmic];
             for (name, curve) in ["clip", "filmic"].into_iter().zip(curves) {
-                let display = Display::new(1.5, &balance, name, space).unwrap();
-                relighter.render(&web_light, &display, 1.0).unwrap();
-                let shown = relight::Display {
+                let output = OutputTransform::new(1.5, &balance, name, space).unwrap();
+                relighter.render(&web_light, &output, 1.0).unwrap();
+                let reference_output = relight::OutputTransform {
                     gains: balance.map(|factor| (1.5 * factor) as f32),
                     gamut,
                     curve,
                     dither: true,
                 };
-                let want = reference::picture(&transport, &light, &shown);
-                let what = format!("{backend}, {space}, {name}");
-                relit::assert_within_one_code(&read_back_in(&canvas, space), &want, &what);
+                let want = reference::picture(&transport, &light, &reference_output);
+                let context = format!("{backend}, {space}, {name}");
+                relit::assert_within_one_code(&read_back_in(&canvas, space), &want, &context);
             }
         }
     }

@@ -12,7 +12,8 @@ use serde::Serialize;
 use super::process::AllCores;
 use super::{files, report};
 use crate::capture::{CaptureFolder, DarkFrame, Pattern, Photo, Picture, Rows, Truth};
-use crate::relight::{BuiltinLight, Light, cpu};
+use crate::relight::cpu::CpuRelighter;
+use crate::relight::{BuiltinLight, Light};
 use crate::transport::{CHANNELS, Decibels, Geometry, Transport, TransportError};
 
 /// Hold a file against a capture's known transport, relit pictures and unused photographs
@@ -80,7 +81,7 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
         read_scans: file.scans,
         scans: file.head.scans.len(),
     };
-    let mut relighter = cpu::Relighter::new(Arc::new(file.transport));
+    let mut relighter = CpuRelighter::new(Arc::new(file.transport));
     if let Some(truth) = folder.truth()? {
         report.snr_db = against_truth(relighter.transport(), &truth).snr();
         for name in truth.lights()? {
@@ -171,7 +172,7 @@ fn against_truth(transport: &Transport, truth: &Truth) -> TransportError {
 
 /// 10 log10(1 / mean squared error) over all pixels and channels.
 fn relit_psnr(
-    relighter: &mut cpu::Relighter,
+    relighter: &mut CpuRelighter,
     light: &Light,
     truth: &[[f64; CHANNELS]],
 ) -> Option<Decibels> {
@@ -186,7 +187,7 @@ fn relit_psnr(
 
 /// Error of predicted against photographed pictures, by channel.
 fn against_shots(
-    relighter: &mut cpu::Relighter,
+    relighter: &mut CpuRelighter,
     folder: &CaptureFolder,
     dark: &DarkFrame,
     shots: &[usize],
@@ -201,7 +202,7 @@ fn against_shots(
 
 /// SNR of the predicted against the flood photograph, if there is one.
 fn against_flood(
-    relighter: &mut cpu::Relighter,
+    relighter: &mut CpuRelighter,
     folder: &CaptureFolder,
     dark: &DarkFrame,
 ) -> Result<Option<Decibels>> {
@@ -224,7 +225,7 @@ fn together(errors: &[TransportError; CHANNELS]) -> TransportError {
 /// Adds what is predicted under `light` against what was photographed, saturated samples left out.
 fn add_photo(
     errors: &mut [TransportError; CHANNELS],
-    relighter: &mut cpu::Relighter,
+    relighter: &mut CpuRelighter,
     light: &Light,
     mut photo: Photo,
 ) -> Result<()> {

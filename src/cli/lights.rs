@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use image::ImageReader;
 
-use crate::relight::{BuiltinLight, Light, area_resample, tone};
+use crate::relight::{BuiltinLight, Light, area_resample, srgb};
 use crate::transport::Extent;
 
 /// The light that `--light` asks for: a built-in one by name, else an image file, taken as sRGB.
@@ -31,7 +31,7 @@ pub fn named(light: &str, plane: Extent) -> Result<Light> {
     let linear: Vec<f32> = picture
         .into_raw()
         .into_iter()
-        .map(|code| tone::srgb_decode(f64::from(code)) as f32)
+        .map(|code| srgb::srgb_decode(f64::from(code)) as f32)
         .collect();
     Ok(Light::from_linear_rgb(
         plane,

@@ -9,7 +9,8 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use super::process::AllCores;
 use super::{Usage, files, lights};
-use crate::relight::{Display, Light, TorchPose, cpu, reference};
+use crate::relight::cpu::CpuRelighter;
+use crate::relight::{Light, OutputTransform, TorchPose, reference};
 
 /// Relight an object and write the picture as an 8-bit sRGB PNG
 #[derive(Debug, Args)]
@@ -90,14 +91,14 @@ pub fn run(args: &RelightArgs) -> Result<()> {
         (None, Some(seconds)) => Light::fire(geometry.light, seconds),
         (None, None) => lights::named(&args.light, geometry.light)?,
     };
-    let display = Display::srgb(args.exposure);
+    let transform = OutputTransform::srgb(args.exposure);
     let picture = match args.backend {
         Backend::Cpu => {
-            let mut relighter = cpu::Relighter::new(Arc::new(file.transport));
+            let mut relighter = CpuRelighter::new(Arc::new(file.transport));
             relighter.relight(&light, &AllCores);
-            relighter.picture(&display, &AllCores)
+            relighter.picture(&transform, &AllCores)
         }
-        Backend::Reference => reference::picture(&file.transport, &light, &display),
+        Backend::Reference => reference::picture(&file.transport, &light, &transform),
     };
     let rgb: Vec<u8> = picture
         .pixels

@@ -1,131 +1,137 @@
-//! What is asked of a back end, whichever it is.
+//! Backends: what draws a photograph into a canvas, and the errors they share.
 
 use thiserror::Error;
 
 use super::texture_layout::LayoutError;
-use super::{Display, Gamut, Light, Tint};
+use super::{Gamut, Light, LightChroma, OutputTransform};
 #[cfg(target_arch = "wasm32")]
 use crate::transport::Extent;
 
-/// What is drawn.
+/// One frame to draw.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
-    /// The light; `None` for the picture that was taken last.
+    /// The light; `None` for the last light image.
     pub light: Option<&'a Light>,
-    /// How it is shown.
-    pub display: Display,
-    /// The share of the components that is used, 0 to 1.
-    pub detail: f32,
+    /// From linear light to codes.
+    pub output: OutputTransform,
+    /// The share of the components in use, 0 to 1.
+    pub quality: f32,
 }
 
-/// The light that a device has.
+/// What a graphics device holds of the last light.
 #[derive(Clone, Debug, Default)]
-pub struct Lit {
-    /// `None` for a picture, whose colours nobody has looked at.
-    light: Option<(Light, Tint)>,
-    /// The detail in which it is seen, if it is already.
-    seen: Option<f32>,
+pub struct LightCache {
+    /// The uploaded light; `None` for a light image, whose elements only the device has.
+    light: Option<(Light, LightChroma)>,
+    /// The quality of the basis response, once it is computed.
+    response_quality: Option<f32>,
 }
 
-impl Lit {
-    /// One that was just given.
-    pub fn of(light: &Light) -> Self {
+impl LightCache {
+    /// A light that was just uploaded.
+    pub fn new(light: &Light) -> Self {
         Self {
-            light: Some((light.clone(), light.tint())),
-            seen: None,
+            light: Some((light.clone(), light.chroma())),
+            response_quality: None,
         }
     }
 
-    /// Whether it is that one.
-    pub fn is(&self, light: &Light) -> bool {
+    /// Whether the device holds this light.
+    pub fn has(&self, light: &Light) -> bool {
         self.light.as_ref().is_some_and(|(own, _)| own == light)
     }
 
-    /// What its channels have in common.
-    pub fn tint(&self) -> Tint {
-        self.light.as_ref().map_or(Tint::Many, |(_, tint)| *tint)
+    /// The ratio between the light's channels.
+    pub fn chroma(&self) -> LightChroma {
+        self.light
+            .as_ref()
+            .map_or(LightChroma::Varying, |(_, chroma)| *chroma)
     }
 
-    /// Whether it is yet to be seen in that detail, as it is afterwards.
-    pub fn look(&mut self, detail: f32) -> bool {
-        self.seen.replace(detail) != Some(detail)
+    /// Sets the quality of the basis response. Returns whether the response has to be computed again.
+    pub fn set_quality(&mut self, quality: f32) -> bool {
+        self.response_quality.replace(quality) != Some(quality)
     }
 }
 
-/// One way of drawing a relit photograph into a canvas.
+/// Draws one relit photograph into one canvas.
 pub trait Backend {
-    /// The name by which attributes call it.
+    /// The backend's name in attributes.
     fn name(&self) -> &'static str;
 
-    /// What does the work: an instruction set, or the graphics device.
+    /// The graphics device, or the instruction set of the CPU.
     fn kernel(&self) -> String;
 
-    /// What its canvas shows.
+    /// The gamut of the canvas.
     fn gamut(&self) -> Gamut;
 
-    /// Takes a picture that the browser has as the light of frames without one; `false` where the
-    /// device cannot.
+    /// Uploads a picture of the browser's as the light of frames without one. Returns `false` if the backend
+    /// cannot.
     ///
     /// # Errors
-    /// What the browser throws, as for pictures of another origin. The last light stays.
+    /// What the browser throws, for instance for pictures of another origin. The last light stays.
     #[cfg(target_arch = "wasm32")]
-    fn take_picture(
+    fn set_light_image(
         &mut self,
-        _: &wasm_bindgen::JsValue,
-        _: Extent,
+        _image: &wasm_bindgen::JsValue,
+        _extent: Extent,
     ) -> Result<bool, wasm_bindgen::JsValue> {
         Ok(false)
     }
 
-    /// Draws the whole picture before it returns.
+    /// Draws a frame before it returns.
+    ///
+    /// # Errors
+    /// [`BackendError::Lost`] once the device no longer works.
     fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError>;
 }
 
-/// Why a back end does not draw.
+/// Why a backend does not draw.
 #[derive(Debug, Error)]
 pub enum BackendError {
-    /// The browser does not have the interface, or has it switched off.
-    #[error("this browser has no {0} to offer")]
+    /// The browser lacks the interface, or it is switched off.
+    #[error("this browser does not offer {0}")]
     Missing(&'static str),
     /// The canvas gives no context.
     #[error(
-        "the canvas gives no {api} context ({reason}), nor would one that another interface has used"
+        "the canvas gives no {api} context: {reason}. A canvas that already has a context of another kind never gives \
+         one; use a new canvas"
     )]
     Canvas {
         /// The interface.
         api: &'static str,
-        /// The browser's word for it.
+        /// The browser's reason.
         reason: String,
     },
-    /// The browser has the interface but no device behind it.
+    /// The interface finds no device.
     #[error("{api} finds no usable graphics device: {reason}")]
     Device {
         /// The interface.
         api: &'static str,
-        /// The browser's word for it.
+        /// The browser's reason.
         reason: String,
     },
-    /// The device is too small for the photograph.
+    /// The photograph exceeds the device's limits.
     #[error("{0}")]
     Layout(#[from] LayoutError),
-    /// The driver refuses a shader.
-    #[error("the graphics driver refuses the {stage}: {log}")]
+    /// The driver rejects a shader.
+    #[error("the graphics driver rejects the {stage}: {log}")]
     Shader {
         /// Vertex shader, fragment shader or program.
         stage: &'static str,
-        /// The driver's word for it.
+        /// The driver's log.
         log: String,
     },
-    /// The device refuses textures or buffers.
-    #[error("the graphics device does not take the photograph: {0}")]
+    /// The device rejects textures or buffers.
+    #[error("the graphics device cannot hold the photograph: {0}")]
     Upload(String),
-    /// The device went away after it had been working.
+    /// The device was lost after it had been working.
     #[error("the graphics device was lost: {0}")]
     Lost(String),
 }
 
 impl BackendError {
-    /// Whether the back end had been working before.
+    /// Whether the backend worked before.
     pub fn is_loss(&self) -> bool {
         matches!(self, Self::Lost(_))
     }

@@ -1,4 +1,4 @@
-//! Canvases that pictures are copied into.
+//! Opens the 2D context of a canvas that pictures are copied into.
 
 use js_sys::{Function, Object, Reflect};
 use wasm_bindgen::{JsCast, JsValue};
@@ -8,22 +8,26 @@ use super::Gamut;
 use super::backend::BackendError;
 use crate::transport::Extent;
 
-/// Where a canvas keeps its pixels.
+/// Where a canvas stores its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Keep {
-    /// Where the browser likes, which is the graphics memory.
-    Anywhere,
-    /// In the page's memory, where pixels come from that a CPU has made: where there is no graphics
-    /// processor, every frame would go to a program in the place of one and back.
-    InMemory,
+pub enum CanvasStorage {
+    /// The browser decides, usually for graphics memory.
+    Default,
+    /// Main memory, for pixels that come from the CPU: otherwise a software renderer, if there is no GPU, would
+    /// copy every frame twice.
+    MainMemory,
 }
 
-/// A canvas's 2D context, of a picture's size and, where the browser can, of a gamut.
+/// Resizes a canvas and opens its 2D context. Returns the context and its gamut: the one asked for, if the browser
+/// supports it, or sRGB.
+///
+/// # Errors
+/// [`BackendError::Canvas`] if the canvas gives no 2D context.
 pub fn open_2d(
     canvas: &HtmlCanvasElement,
     extent: Extent,
     gamut: Gamut,
-    keep: Keep,
+    storage: CanvasStorage,
 ) -> Result<(CanvasRenderingContext2d, Gamut), BackendError> {
     let error = |reason: &str| BackendError::Canvas {
         api: "2D",
@@ -36,18 +40,21 @@ pub fn open_2d(
     let set = |name: &str, value| Reflect::set(&settings, &name.into(), &value).map_err(thrown);
     set("colorSpace", JsValue::from(gamut.color_space()))?;
     set("alpha", JsValue::from(false))?;
-    set("willReadFrequently", JsValue::from(keep == Keep::InMemory))?;
+    set(
+        "willReadFrequently",
+        JsValue::from(storage == CanvasStorage::MainMemory),
+    )?;
     let context = canvas
         .get_context_with_context_options("2d", &settings)
         .map_err(thrown)?
         .and_then(|context| context.dyn_into::<CanvasRenderingContext2d>().ok())
         .ok_or_else(|| error("getContext returned null"))?;
-    // Browsers that know no other gamut say nothing of it.
+    // Browsers without other gamuts ignore the setting, and report none.
     let attributes = Reflect::get(&context, &"getContextAttributes".into())
-        .and_then(|ask| ask.dyn_into::<Function>()?.call0(&context))
+        .and_then(|method| method.dyn_into::<Function>()?.call0(&context))
         .and_then(|attributes| Reflect::get(&attributes, &"colorSpace".into()));
-    let given = attributes.ok().and_then(|space| space.as_string());
-    let gamut = match given.as_deref() == Some(gamut.color_space()) {
+    let actual = attributes.ok().and_then(|space| space.as_string());
+    let gamut = match actual.as_deref() == Some(gamut.color_space()) {
         true => gamut,
         false => Gamut::Srgb,
     };

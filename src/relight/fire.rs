@@ -1,78 +1,79 @@
-//! A fire that burns along the lower edge of the light plane.
+//! The built-in light `fire`: flames along the lower edge of the light plane.
 //!
-//! Heat is turbulence that rises, faster the hotter, over a bed of embers whose draught comes and
-//! goes from place to place; its colour is that of a glowing body. Everything follows from the time
-//! alone, by hashes of lattice points. Lengths are in heights of the plane, upwards.
+//! Heat at a point is a falling ramp plus layers of gradient noise that rise at their own speeds ([`FlameNoise`]);
+//! the ramp's height varies along the edge ([`FlameColumn`]). A colour map turns heat into emission, and sparks are
+//! added on top. Everything is a function of time, through hashes of lattice points, so a fire can be drawn at any
+//! moment. Lengths are in heights of the light plane, `y` upwards.
 
 use super::math;
 use crate::transport::Extent;
 
-/// Most rows in which heat is computed; between them it is interpolated.
-const ROWS: u32 = 112;
-/// How long it has burnt when it is first looked at, in seconds: a moment with a fine flame.
-const FIRST_LOOK: f64 = 500.4;
-/// Sparks that fly at once over a square plane.
-const SPARKS: f64 = 14.0;
+/// Rows at which heat is computed, at most; it is interpolated between them.
+const MAX_HEAT_ROWS: u32 = 112;
+/// Age of the fire at time 0, in seconds: a moment with a well-shaped flame.
+const START_SECONDS: f64 = 500.4;
+/// Sparks in the air over a square light plane.
+const SPARK_COUNT: f64 = 14.0;
 
-/// Linear emission of every light element, row by row, `seconds` after the fire was first looked at.
-/// Times that are not finite are taken as none.
-pub(super) fn burning(extent: Extent, seconds: f64) -> Vec<[f32; 4]> {
-    let seconds = FIRST_LOOK + if seconds.is_finite() { seconds } else { 0.0 };
-    let air = Air::at(seconds);
+/// Linear emission of every light element, row by row, at a time in seconds. A time that is not finite counts as 0.
+pub(super) fn fire_emission(extent: Extent, seconds: f64) -> Vec<[f32; 4]> {
+    let seconds = START_SECONDS + if seconds.is_finite() { seconds } else { 0.0 };
+    let noise = FlameNoise::at(seconds);
     let size = extent.height as f32;
-    // Nodes stand on the centres of every so many elements, the last ones on the edge or beyond it.
-    let pitch = extent.height.div_ceil(ROWS).max(1);
+    // Heat is computed at the centres of every `pitch`th element; the last nodes may lie beyond the edge.
+    let pitch = extent.height.div_ceil(MAX_HEAT_ROWS).max(1);
     let nodes = |length: u32| (0..=length.saturating_sub(1).div_ceil(pitch)).map(|i| i * pitch);
-    let columns: Vec<(f32, Embers)> = nodes(extent.width)
+    let columns: Vec<(f32, FlameColumn)> = nodes(extent.width)
         .map(|u| {
             let x = (u as f32 + 0.5) / size;
-            (x, Embers::at(&air, x, extent.width as f32 / size))
+            (x, FlameColumn::at(&noise, x, extent.width as f32 / size))
         })
         .collect();
     let row = |v: u32| -> Vec<f32> {
         let y = 1.0 - (v as f32 + 0.5) / size;
-        columns.iter().map(|(x, e)| air.heat(*x, y, e)).collect()
+        let heat = |(x, column): &(f32, FlameColumn)| noise.heat(*x, y, column);
+        columns.iter().map(heat).collect()
     };
     let mut elements = Vec::with_capacity(extent.area());
-    let mut between = vec![0.0; columns.len()];
+    let mut nodes = vec![0.0; columns.len()];
     let (mut above, mut below) = (row(0), row(pitch));
     for v in 0..extent.height {
         if v > 0 && v % pitch == 0 {
             above = std::mem::replace(&mut below, row(v + pitch));
         }
         let t = (v % pitch) as f32 / pitch as f32;
-        for ((between, above), below) in between.iter_mut().zip(&above).zip(&below) {
-            *between = above + (below - above) * t;
+        for ((node, above), below) in nodes.iter_mut().zip(&above).zip(&below) {
+            *node = above + (below - above) * t;
         }
         for u in 0..extent.width {
-            let (node, part) = ((u / pitch) as usize, (u % pitch) as f32 / pitch as f32);
-            let left = between[node];
-            let right = between.get(node + 1).copied().unwrap_or(left);
-            elements.push(glow(left + (right - left) * part));
+            let (i, part) = ((u / pitch) as usize, (u % pitch) as f32 / pitch as f32);
+            let left = nodes[i];
+            let right = nodes.get(i + 1).copied().unwrap_or(left);
+            elements.push(heat_colour(left + (right - left) * part));
         }
     }
-    sparks(extent, seconds, &mut elements);
+    add_sparks(extent, seconds, &mut elements);
     elements
 }
 
-/// The colour of a glowing body: red first, then yellow, white at the hottest only.
-fn glow(heat: f32) -> [f32; 4] {
+/// The emission at a heat of 0 to 1: dark, red, yellow, and white at the hottest.
+fn heat_colour(heat: f32) -> [f32; 4] {
     let h2 = heat * heat;
     let h4 = h2 * h2;
     let red = h2 * (1.6 - 0.6 * h2);
     [red, h4 * (1.05 - 0.33 * h2), 0.32 * h4 * h4, 0.0]
 }
 
-/// Adds what flies up from the fire.
-fn sparks(extent: Extent, seconds: f64, elements: &mut [[f32; 4]]) {
+/// Adds the sparks: Gaussian spots that rise, sway and fade.
+fn add_sparks(extent: Extent, seconds: f64, elements: &mut [[f32; 4]]) {
     let size = f64::from(extent.height);
     let width = f64::from(extent.width);
-    // Never smaller than what elements can show without flicker.
+    // Smaller spots would flicker as they pass from element to element.
     let radius = (0.0055 * size).max(0.7);
-    let count = (SPARKS * width / size).clamp(1.0, 64.0) as u32;
+    let count = (SPARK_COUNT * width / size).clamp(1.0, 64.0) as u32;
     for k in 0..count {
         let unit = |n: u32, seed: u32| f64::from(hash(k, n, seed)) / f64::from(u32::MAX);
-        // Each comes again, elsewhere, after a time of its own.
+        // Each spark has its own lifetime, and starts again elsewhere.
         let life = 1.7 + 1.6 * unit(0, 90);
         let lives = seconds / life + unit(0, 91);
         let (number, age) = (lives.floor(), lives - lives.floor());
@@ -80,14 +81,14 @@ fn sparks(extent: Extent, seconds: f64, elements: &mut [[f32; 4]]) {
         let sway = math::sin(age * (2.0 + 3.0 * unit(n, 92)) + 6.0 * unit(n, 93));
         let u = width * (0.08 + 0.84 * unit(n, 94)) + size * 0.05 * sway;
         let v = size * (0.92 - (0.35 + 0.55 * unit(n, 95)) * age);
-        // It glows up and cools.
+        // It lights up quickly and fades.
         let power = (8.0 * age).min(1.0) * (1.0 - age).powi(2) * (0.4 + 0.5 * unit(n, 96));
-        let near = |centre: f64, length: u32| {
+        let reach = |centre: f64, length: u32| {
             let first = (centre - 3.0 * radius).max(0.0) as u32;
             first..((centre + 3.0 * radius).max(0.0) as u32).min(length)
         };
-        for j in near(v, extent.height) {
-            for i in near(u, extent.width) {
+        for j in reach(v, extent.height) {
+            for i in reach(u, extent.width) {
                 let (du, dv) = (f64::from(i) + 0.5 - u, f64::from(j) + 0.5 - v);
                 let spot = (power * (-(du * du + dv * dv) / (2.0 * radius * radius)).exp()) as f32;
                 let element = &mut elements[j as usize * extent.width as usize + i as usize];
@@ -99,19 +100,26 @@ fn sparks(extent: Extent, seconds: f64, elements: &mut [[f32; 4]]) {
     }
 }
 
-/// Turbulent air at one moment: each layer of noise has risen by its own speed.
-struct Air {
-    gust: Layer,
-    draught: Layer,
-    sway: Layer,
-    curl: Layer,
-    tongues: [Layer; 3],
+/// The layers of noise at one moment.
+struct FlameNoise {
+    /// Height of all flames.
+    gust: NoiseLayer,
+    /// Height of each flame.
+    draught: NoiseLayer,
+    /// Horizontal shift.
+    sway: NoiseLayer,
+    /// Finer shift, both ways.
+    curl: NoiseLayer,
+    /// The flames, from coarse to fine.
+    tongues: [NoiseLayer; 3],
 }
 
-impl Air {
+impl FlameNoise {
     fn at(seconds: f64) -> Self {
-        // Grains a height across and up, heights a second: slender at the root, finer is faster.
-        let layer = |seed, across, up, speed| Layer::new(seed, across, up, speed * seconds);
+        // Lattice cells per height along x and y, and speed in heights a second: finer noise is faster.
+        let layer = |seed, x_scale, y_scale, speed| {
+            NoiseLayer::new(seed, x_scale, y_scale, speed * seconds)
+        };
         Self {
             gust: layer(1, 0.9, 1.0, 0.8),
             draught: layer(2, 3.1, 1.0, 0.75),
@@ -125,14 +133,14 @@ impl Air {
         }
     }
 
-    /// 0 in cold air to 1 where the gas is hottest, `y` above the embers.
-    fn heat(&self, x: f32, y: f32, embers: &Embers) -> f32 {
-        // Above the tips of the flames nothing can glow.
-        let up = y / embers.reach;
-        if up > 1.45 {
+    /// The heat at a point, 0 to 1.
+    fn heat(&self, x: f32, y: f32, column: &FlameColumn) -> f32 {
+        // The sum below cannot be positive above this.
+        let height = y / column.flame_height;
+        if height > 1.45 {
             return 0.0;
         }
-        // Flames hold on to the embers and lean freely above them.
+        // The noise shifts flames more the higher they are; their roots stay.
         let free = y.min(0.9);
         let curl = self.curl.noise(x, y);
         let x = x + free * (0.34 * self.sway.noise(x, y) + 0.10 * curl);
@@ -140,64 +148,64 @@ impl Air {
         let [large, middle, small] = &self.tongues;
         let large = large.noise(x, y);
         let turbulence = large + 0.52 * middle.noise(x, y) + 0.26 * small.noise(x, y);
-        let body = 0.98 - 1.18 * up;
-        (body + turbulence * (0.75 + 0.85 * up.min(1.0)) - embers.cold).clamp(0.0, 1.0)
+        let body = 0.98 - 1.18 * height;
+        (body + turbulence * (0.75 + 0.85 * height.min(1.0)) - column.heat_loss).clamp(0.0, 1.0)
     }
 }
 
-/// What burns below a place.
-struct Embers {
-    /// Height that flames have on the average.
-    reach: f32,
-    /// Heat lost towards the sides.
-    cold: f32,
+/// What depends on the position along the edge alone.
+struct FlameColumn {
+    /// Mean height of the flames.
+    flame_height: f32,
+    /// Heat lost towards the ends of the edge.
+    heat_loss: f32,
 }
 
-impl Embers {
-    fn at(air: &Air, x: f32, width: f32) -> Self {
-        let gust = 1.0 + 0.15 * air.gust.noise(x, 0.0);
-        let aside = (2.0 * x / width - 1.0).abs();
+impl FlameColumn {
+    fn at(noise: &FlameNoise, x: f32, width: f32) -> Self {
+        let gust = 1.0 + 0.15 * noise.gust.noise(x, 0.0);
+        let offset = (2.0 * x / width - 1.0).abs();
         Self {
-            reach: (0.64 + 0.42 * air.draught.noise(x, 0.0)).max(0.2) * gust,
-            cold: 0.38 * aside * aside * aside * aside,
+            flame_height: (0.64 + 0.42 * noise.draught.noise(x, 0.0)).max(0.2) * gust,
+            heat_loss: 0.38 * offset * offset * offset * offset,
         }
     }
 }
 
-/// Gradient noise (Perlin 2002) of its own grain that has risen for a while.
-struct Layer {
+/// Gradient noise (K. Perlin, "Improving noise", 2002) that has risen by some distance.
+struct NoiseLayer {
     seed: u32,
-    across: f32,
-    up: f32,
-    /// Lattice rows that have passed, and the part of the next.
-    rows: u32,
-    part: f32,
+    /// Lattice cells per height.
+    x_scale: f32,
+    y_scale: f32,
+    /// The distance in lattice cells: whole cells modulo 2³², and the fraction.
+    risen_cells: u32,
+    risen_part: f32,
 }
 
-impl Layer {
-    /// `across` and `up`: lattice cells a height. `risen`: heights.
-    fn new(seed: u32, across: f32, up: f32, risen: f64) -> Self {
-        // In double precision, so that it moves smoothly after days as well.
-        let cells = risen * f64::from(up);
+impl NoiseLayer {
+    fn new(seed: u32, x_scale: f32, y_scale: f32, risen: f64) -> Self {
+        // In double precision, so that it still moves smoothly after days.
+        let cells = risen * f64::from(y_scale);
         let whole = cells.floor();
         Self {
             seed: seed.wrapping_mul(0x9e37_79b9),
-            across,
-            up,
-            rows: whole.rem_euclid(4_294_967_296.0) as u32,
-            part: (cells - whole) as f32,
+            x_scale,
+            y_scale,
+            risen_cells: whole.rem_euclid(4_294_967_296.0) as u32,
+            risen_part: (cells - whole) as f32,
         }
     }
 
-    /// Mostly within ±0.5, never outside ±1. Once: in each of its places it is 2 kB for browsers to load.
+    /// Mostly within ±0.5, always within ±1. Not inlined: each copy adds 2 kB to a module.
     #[inline(never)]
     fn noise(&self, x: f32, y: f32) -> f32 {
-        let (x, y) = (x * self.across, y * self.up - self.part);
-        // Rounding down is a call on some processors.
+        let (x, y) = (x * self.x_scale, y * self.y_scale - self.risen_part);
+        // `floor` is a call where SSE4.1 is missing.
         let cell = |t: f32| t as i32 - i32::from(t < 0.0);
         let (i, j) = (cell(x), cell(y));
         let (x, y) = (x - i as f32, y - j as f32);
-        let (i, j) = (i as u32, (j as u32).wrapping_sub(self.rows));
+        let (i, j) = (i as u32, (j as u32).wrapping_sub(self.risen_cells));
         let corner = |right: u32, above: u32| {
             let h = hash(i.wrapping_add(right), j.wrapping_add(above), self.seed);
             let (a, b) = (h as u16 as i16, (h >> 16) as u16 as i16);
@@ -212,7 +220,7 @@ impl Layer {
     }
 }
 
-/// A well mixed number (finaliser of MurmurHash3).
+/// A hash of a lattice point (the finaliser of MurmurHash3).
 fn hash(i: u32, j: u32, seed: u32) -> u32 {
     let mut h = i.wrapping_mul(0x85eb_ca6b) ^ j.wrapping_mul(0xc2b2_ae35) ^ seed;
     h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
@@ -226,9 +234,9 @@ mod tests {
 
     const FRAME: f64 = 1.0 / 60.0;
 
-    fn burning_at(seconds: f64) -> Vec<[f32; 4]> {
+    fn emission_at(seconds: f64) -> Vec<[f32; 4]> {
         let side = 64;
-        burning(
+        fire_emission(
             Extent {
                 width: side,
                 height: side,
@@ -243,10 +251,10 @@ mod tests {
     }
 
     #[test]
-    fn it_moves_smoothly_and_never_jumps() {
+    fn the_fire_moves_smoothly() {
         for i in 0..100 {
             let seconds = f64::from(i) * 0.61;
-            let (now, next) = (burning_at(seconds), burning_at(seconds + FRAME));
+            let (now, next) = (emission_at(seconds), emission_at(seconds + FRAME));
             let pairs = now.as_flattened().iter().zip(next.as_flattened());
             let largest = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(largest < 0.35, "{largest} at {seconds} s");
@@ -256,8 +264,8 @@ mod tests {
     }
 
     #[test]
-    fn no_moment_of_a_minute_comes_again() {
-        let moments: Vec<_> = (0..240).map(|i| burning_at(f64::from(i) * 0.25)).collect();
+    fn moments_of_a_minute_do_not_repeat() {
+        let moments: Vec<_> = (0..240).map(|i| emission_at(f64::from(i) * 0.25)).collect();
         for (i, moment) in moments.iter().enumerate() {
             for earlier in &moments[..i] {
                 assert!(mean_change(moment, earlier) > 0.03);
@@ -266,9 +274,9 @@ mod tests {
     }
 
     #[test]
-    fn it_flickers_but_neither_dies_nor_flares() {
+    fn the_total_light_stays_within_bounds() {
         let light = |i: u32| -> f32 {
-            let elements = burning_at(f64::from(i) * 0.25);
+            let elements = emission_at(f64::from(i) * 0.25);
             elements.as_flattened().iter().sum()
         };
         let totals: Vec<f32> = (0..240).map(light).collect();
@@ -279,28 +287,28 @@ mod tests {
     }
 
     #[test]
-    fn planes_of_any_size_burn_at_any_time() {
+    fn emission_is_within_bounds_for_any_extent_and_time() {
         for [width, height] in [[1, 1], [3, 200], [200, 3], [1, 256], [129, 130], [2, 257]] {
             for seconds in [0.0, -7.25, 1e9, 1e300, f64::NAN, f64::INFINITY] {
                 let extent = Extent { width, height };
-                let elements = burning(extent, seconds);
+                let elements = fire_emission(extent, seconds);
                 assert_eq!(elements.len(), extent.area());
                 for value in elements.as_flattened() {
                     assert!((0.0..=1.0).contains(value), "{value} on {extent}");
                 }
-                assert_eq!(burning(extent, seconds), elements);
+                assert_eq!(fire_emission(extent, seconds), elements);
             }
         }
     }
 
     #[test]
-    fn a_finer_plane_shows_the_same_fire() {
+    fn a_finer_light_plane_shows_the_same_fire() {
         let [coarse, fine] = [60, 240].map(|side| {
             let extent = Extent {
                 width: side,
                 height: side,
             };
-            burning(extent, 3.0)
+            fire_emission(extent, 3.0)
         });
         for v in 0..60 {
             for u in 0..60 {

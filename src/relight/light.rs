@@ -1,33 +1,32 @@
-//! Lights: what each element of the light plane emits.
+//! Lights: the vector `p` in `y = pT`, one linear RGB emission for each element of the light plane.
 
 use thiserror::Error;
 
-use super::resample::AreaMeans;
-use super::{Tint, fire, math};
+use super::resample::AreaResampler;
+use super::{LightChroma, fire, math};
 use crate::transport::{Extent, Geometry, LightPx};
 
-/// Linear emission of every light element, 0 dark to 1 full brightness: R, G, B and an unused
-/// fourth, row by row.
+/// The linear emission of every light element, 0 to 1 at full brightness.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
     extent: Extent,
     elements: Vec<[f32; 4]>,
 }
 
-/// Where a torch shines and how wide.
+/// Position and size of a torch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorchPose {
-    /// Centre of the spot, on the light plane.
+    /// Centre of the spot on the light plane.
     pub centre: LightPx,
-    /// Distance, in light elements, at which the spot has fallen to 1/√e.
+    /// Standard deviation of the spot, in light elements.
     pub radius: f64,
 }
 
 impl TorchPose {
-    /// A torch's usual radius, as a fraction of the light plane's shorter side.
-    pub const RADIUS: f64 = 1.0 / 7.0;
+    /// The default radius, as a fraction of the light plane's shorter side.
+    pub const DEFAULT_RADIUS: f64 = 1.0 / 7.0;
 
-    /// A torch of the usual radius over the middle of the light plane.
+    /// The default torch, in the middle of the light plane.
     pub fn central(light: Extent) -> Self {
         let (w, h) = (f64::from(light.width), f64::from(light.height));
         Self {
@@ -35,12 +34,11 @@ impl TorchPose {
                 u: w / 2.0,
                 v: h / 2.0,
             },
-            radius: w.min(h) * Self::RADIUS,
+            radius: w.min(h) * Self::DEFAULT_RADIUS,
         }
     }
 
-    /// A torch of the usual radius straight behind a point of the picture, given as fractions of
-    /// its width and height.
+    /// The default torch straight behind a point of the picture, given as fractions of its width and height.
     pub fn behind(geometry: &Geometry, x: f64, y: f64) -> Self {
         let Extent { width, height } = geometry.camera;
         Self {
@@ -52,25 +50,25 @@ impl TorchPose {
     }
 }
 
-/// The lights every relightable photograph comes with.
+/// The built-in lights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BuiltinLight {
     /// All elements at full brightness.
     Flood,
-    /// A round warm spot.
+    /// A warm Gaussian spot.
     Torch,
     /// Black and white squares, eight along the shorter side.
     Checkerboard,
     /// Vertical black and white stripes, eight periods across.
     Stripes,
-    /// The rainbow from left to right.
+    /// A rainbow from left to right.
     Spectrum,
-    /// One moment of a fire that burns along the lower edge: the first of [`Light::fire`].
+    /// Flames along the lower edge: [`Light::fire`] at time 0.
     Fire,
 }
 
 impl BuiltinLight {
-    /// All of them, in the order menus show them.
+    /// All built-in lights, in the order of menus.
     pub const ALL: [Self; 6] = [
         Self::Flood,
         Self::Torch,
@@ -80,7 +78,7 @@ impl BuiltinLight {
         Self::Fire,
     ];
 
-    /// The name by which attributes and commands call it.
+    /// The name in attributes and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Flood => "flood",
@@ -92,12 +90,12 @@ impl BuiltinLight {
         }
     }
 
-    /// The light of that name.
+    /// The built-in light of that name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|l| l.name() == name)
     }
 
-    /// This light on a plane of the given extent; a torch stands in the middle.
+    /// The light on a light plane of that extent.
     pub fn render(self, extent: Extent) -> Light {
         let (w, h) = (f64::from(extent.width), f64::from(extent.height));
         let white = |on: bool| if on { [1.0; 3] } else { [0.0; 3] };
@@ -105,9 +103,9 @@ impl BuiltinLight {
             Self::Flood => Light::from_fn(extent, |_| [1.0; 3]),
             Self::Torch => Light::torch(extent, TorchPose::central(extent)),
             Self::Checkerboard => {
-                let square = (w.min(h) / 8.0).max(1.0);
+                let cell = (w.min(h) / 8.0).max(1.0);
                 Light::from_fn(extent, |p| {
-                    let (i, j) = ((p.u / square) as u32, (p.v / square) as u32);
+                    let (i, j) = ((p.u / cell) as u32, (p.v / cell) as u32);
                     white((i + j).is_multiple_of(2))
                 })
             }
@@ -121,29 +119,29 @@ impl BuiltinLight {
     }
 }
 
-/// A light that does not fit the photograph.
+/// Values that are no light for this photograph.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum LightError {
-    /// Wrong number of values.
-    #[error("the light has {got} values; a light of {extent} elements needs {need}")]
-    Length {
+    /// The number of values does not match the extent.
+    #[error("the light has {got} values; {extent} elements need {need}")]
+    WrongLength {
         /// Values given.
         got: usize,
         /// Values needed.
         need: usize,
-        /// The light.
+        /// The extent.
         extent: Extent,
     },
-    /// A picture of no pixels.
-    #[error("the light is a picture of {0} pixels; it needs one at least each way")]
-    Empty(Extent),
-    /// Lights cannot be negative, infinite or NaN.
+    /// A light image without pixels.
+    #[error("the light image has {0} pixels; width and height must be at least 1")]
+    EmptyImage(Extent),
+    /// A value is negative, infinite or NaN.
     #[error("the light has a value that is negative or not a finite number, at element {0}")]
-    Value(usize),
+    InvalidValue(usize),
 }
 
 impl Light {
-    /// Builds a light from the emission at each element's centre. Values must be finite and >= 0.
+    /// A light from the emission at each element's centre, which must be finite and not negative.
     fn from_fn(extent: Extent, mut emission: impl FnMut(LightPx) -> [f32; 3]) -> Self {
         let mut elements = Vec::with_capacity(extent.area());
         for v in 0..extent.height {
@@ -159,10 +157,13 @@ impl Light {
     }
 
     /// A light from linear RGB values, `[height, width, 3]`.
+    ///
+    /// # Errors
+    /// [`LightError::WrongLength`] or [`LightError::InvalidValue`].
     pub fn from_linear_rgb(extent: Extent, values: &[f32]) -> Result<Self, LightError> {
         let need = extent.area() * 3;
         if values.len() != need {
-            return Err(LightError::Length {
+            return Err(LightError::WrongLength {
                 got: values.len(),
                 need,
                 extent,
@@ -172,21 +173,24 @@ impl Light {
         Ok(Self::from_checked(extent, values))
     }
 
-    /// A light from a picture of any size, of which `read` gives linear RGB values row by row: each
-    /// element emits the mean of what it covers.
+    /// A light from a light image of any extent, resampled by area. `read_row` fills each row in turn with linear RGB
+    /// values.
+    ///
+    /// # Errors
+    /// [`LightError::EmptyImage`] or [`LightError::InvalidValue`].
     pub fn from_linear_rows(
         extent: Extent,
-        picture: Extent,
-        mut read: impl FnMut(usize, &mut [f32]),
+        image: Extent,
+        mut read_row: impl FnMut(usize, &mut [f32]),
     ) -> Result<Self, LightError> {
-        check_picture(picture)?;
-        let mut row = vec![0.0; 3 * picture.width as usize];
+        check_extent(image)?;
+        let mut row = vec![0.0; 3 * image.width as usize];
         let mut read_checked = |y: usize, row: &mut [f32]| {
-            read(y, row);
-            check_values(row, y * picture.width as usize)
+            read_row(y, row);
+            check_values(row, y * image.width as usize)
         };
-        // Of the light's own size, as a page that animates it has it, elements are what they cover.
-        if picture == extent {
+        // Nothing to resample; usual where a page animates its own light.
+        if image == extent {
             let mut elements = Vec::with_capacity(extent.area());
             for y in 0..extent.height as usize {
                 read_checked(y, &mut row)?;
@@ -194,30 +198,32 @@ impl Light {
             }
             return Ok(Self { extent, elements });
         }
-        let mut means = AreaMeans::new(picture, extent);
-        for y in 0..picture.height as usize {
+        let mut resampler = AreaResampler::new(image, extent);
+        for y in 0..image.height as usize {
             read_checked(y, &mut row)?;
-            means.add_linear(&row);
+            resampler.add_linear_row(&row);
         }
-        Ok(Self::from_checked(extent, &means.finish()))
+        Ok(Self::from_checked(extent, &resampler.finish()))
     }
 
-    /// A light from a picture of any size, of which `read` gives sRGB codes and alpha row by row: each
-    /// element emits the mean of what it covers. Colours are not multiplied by alpha, which is the
-    /// share of a pixel that shines.
+    /// A light from a light image of any extent, resampled by area. `read_row` fills each row in turn with sRGB codes
+    /// and straight alpha; a pixel emits its alpha's share of its colour.
+    ///
+    /// # Errors
+    /// [`LightError::EmptyImage`].
     pub fn from_srgb_rows(
         extent: Extent,
-        picture: Extent,
-        mut read: impl FnMut(usize, &mut [u8]),
+        image: Extent,
+        mut read_row: impl FnMut(usize, &mut [u8]),
     ) -> Result<Self, LightError> {
-        check_picture(picture)?;
-        let mut means = AreaMeans::new(picture, extent);
-        let mut row = vec![0; 4 * picture.width as usize];
-        for y in 0..picture.height as usize {
-            read(y, &mut row);
-            means.add_srgb(&row);
+        check_extent(image)?;
+        let mut resampler = AreaResampler::new(image, extent);
+        let mut row = vec![0; 4 * image.width as usize];
+        for y in 0..image.height as usize {
+            read_row(y, &mut row);
+            resampler.add_srgb_row(&row);
         }
-        Ok(Self::from_checked(extent, &means.finish()))
+        Ok(Self::from_checked(extent, &resampler.finish()))
     }
 
     fn from_checked(extent: Extent, values: &[f32]) -> Self {
@@ -232,60 +238,60 @@ impl Light {
     pub fn torch(extent: Extent, pose: TorchPose) -> Self {
         const WARM_WHITE: [f64; 3] = [1.0, 0.93, 0.80];
         let scale = 0.5 / (pose.radius * pose.radius).max(1e-6);
-        // A Gaussian is one across times one down: few exponentials for many elements.
+        // Separable: one exponential for each column and row, not for each element.
         let profile = |length: u32, centre: f64| -> Vec<f64> {
             let offsets = (0..length).map(|i| f64::from(i) + 0.5 - centre);
             offsets.map(|d| (-d * d * scale).exp()).collect()
         };
-        let across = profile(extent.width, pose.centre.u);
-        let down = profile(extent.height, pose.centre.v);
+        let columns = profile(extent.width, pose.centre.u);
+        let rows = profile(extent.height, pose.centre.v);
         Self::from_fn(extent, |p| {
-            let spot = across[p.u as usize] * down[p.v as usize];
+            let spot = columns[p.u as usize] * rows[p.v as usize];
             WARM_WHITE.map(|c| (c * spot) as f32)
         })
     }
 
-    /// A fire that burns along the lower edge, `seconds` after it was first looked at: always the
-    /// same at the same time, and never twice the same. Times that are not finite are taken as none.
+    /// Flames along the lower edge, as a function of time in seconds; it does not repeat. A time that is not finite
+    /// counts as 0.
     pub fn fire(extent: Extent, seconds: f64) -> Self {
         Self {
             extent,
-            elements: fire::burning(extent, seconds),
+            elements: fire::fire_emission(extent, seconds),
         }
     }
 
-    /// What its channels have in common.
-    pub fn tint(&self) -> Tint {
-        Tint::of(std::iter::once(&self.elements[..]))
+    /// The ratio between the channels.
+    pub fn chroma(&self) -> LightChroma {
+        LightChroma::of_rows(std::iter::once(&self.elements[..]))
     }
 
-    /// Light plane.
+    /// Extent of the light plane.
     pub fn extent(&self) -> Extent {
         self.extent
     }
 
-    /// Emission of each element, row by row.
+    /// Emission of each element, row by row: R, G, B and an unused fourth value.
     pub fn elements(&self) -> &[[f32; 4]] {
         &self.elements
     }
 }
 
-fn check_picture(picture: Extent) -> Result<(), LightError> {
-    if picture.width == 0 || picture.height == 0 {
-        return Err(LightError::Empty(picture));
+fn check_extent(image: Extent) -> Result<(), LightError> {
+    if image.width == 0 || image.height == 0 {
+        return Err(LightError::EmptyImage(image));
     }
     Ok(())
 }
 
-/// Values of elements from the one of number `first` on.
+/// Checks the values of the elements from number `first` on.
 fn check_values(values: &[f32], first: usize) -> Result<(), LightError> {
     match values.iter().position(|v| !v.is_finite() || *v < 0.0) {
-        Some(bad) => Err(LightError::Value(first + bad / 3)),
+        Some(bad) => Err(LightError::InvalidValue(first + bad / 3)),
         None => Ok(()),
     }
 }
 
-/// A rainbow over 0..=1, red to violet, as linear RGB: three overlapping cosine lobes.
+/// A rainbow over 0..=1, red to violet, in linear RGB: a cosine lobe for each channel.
 fn rainbow(x: f64) -> [f32; 3] {
     let lobe = |centre: f64| {
         let d = ((x - centre).abs() / 0.36).min(1.0);
@@ -318,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn torch_peaks_where_it_points() {
+    fn the_torch_peaks_at_its_centre() {
         let centre = LightPx { u: 4.5, v: 9.5 };
         let light = Light::torch(
             PLANE,
@@ -337,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn fire_burns_below_glows_red_and_moves() {
+    fn fire_is_brightest_below_and_red_and_moves() {
         let fire = Light::fire(PLANE, 0.0);
         let row = |v: usize| -> f32 { fire.elements[v * 32..][..32].iter().map(|e| e[0]).sum() };
         assert!(
@@ -354,10 +360,10 @@ mod tests {
     }
 
     #[test]
-    fn a_light_of_the_wrong_size_or_with_nan_is_refused() {
+    fn wrong_lengths_and_invalid_values_are_errors() {
         assert!(matches!(
             Light::from_linear_rgb(PLANE, &[0.0; 5]),
-            Err(LightError::Length {
+            Err(LightError::WrongLength {
                 got: 5,
                 need: 1536,
                 ..
@@ -367,15 +373,15 @@ mod tests {
         values[7] = f32::NAN;
         assert_eq!(
             Light::from_linear_rgb(PLANE, &values),
-            Err(LightError::Value(2))
+            Err(LightError::InvalidValue(2))
         );
     }
 
     #[test]
-    fn a_picture_is_a_light_whatever_its_size() {
+    fn light_images_of_any_extent_become_lights() {
         let extent = |width, height| Extent { width, height };
-        let linear = |picture: Extent, values: &[f32]| {
-            Light::from_linear_rows(PLANE, picture, |y, row| {
+        let linear = |image: Extent, values: &[f32]| {
+            Light::from_linear_rows(PLANE, image, |y, row| {
                 row.copy_from_slice(&values[y * row.len()..][..row.len()]);
             })
         };
@@ -386,11 +392,17 @@ mod tests {
         );
         let flood = BuiltinLight::Flood.render(PLANE);
         assert_eq!(linear(extent(1, 1), &[1.0; 3]), Ok(flood.clone()));
-        let white = |picture| Light::from_srgb_rows(PLANE, picture, |_, row| row.fill(255));
+        let white = |image| Light::from_srgb_rows(PLANE, image, |_, row| row.fill(255));
         assert_eq!(white(extent(70, 3)), Ok(flood));
-        assert_eq!(white(extent(0, 2)), Err(LightError::Empty(extent(0, 2))));
+        assert_eq!(
+            white(extent(0, 2)),
+            Err(LightError::EmptyImage(extent(0, 2)))
+        );
         let mut values = vec![1.0; 12];
         values[10] = -1.0;
-        assert_eq!(linear(extent(2, 2), &values), Err(LightError::Value(3)));
+        assert_eq!(
+            linear(extent(2, 2), &values),
+            Err(LightError::InvalidValue(3))
+        );
     }
 }

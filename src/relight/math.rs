@@ -1,4 +1,5 @@
-//! Functions in double precision that browsers have anyway: else each module would bring its own.
+//! Elementary functions in double precision. In WebAssembly they are the browser's own, which keeps them out of the
+//! modules.
 
 #[cfg(target_arch = "wasm32")]
 pub use js_sys::Math::{cos, pow, sin};

@@ -1,38 +1,41 @@
-//! From a transport and a light to a picture: `y = pT` on the CPU, WebGPU and WebGL2.
+//! Relighting: the picture `y = pT` under a light `p`, on the CPU, by WebGPU and by WebGL2.
 //!
-//! Every back end computes the same thing from the same bytes: the light seen through each function
-//! of the basis from each window's place; for each camera pixel and channel Σ of that times its
-//! coefficients, and Σ over its window of `code · step · light` for what it has by element; then what
-//! a display makes of it ([`display`]).
-//! [`reference`] does it in double precision and is what the others are tested against. The GPU
-//! back ends share one WGSL source, `shaders/relight.wgsl`.
+//! All backends compute the same two steps from the same codes:
+//!
+//! 1. the basis response `C_k(o) = Σ_s v_k(s) p(o + s)`: the light correlated with each basis function at every
+//!    window origin `o`; it depends on the light alone;
+//! 2. for each camera pixel `n` and channel, `y_n = Σ_k c_nk C_k(o_n) + Σ_s τ_n(s) p(o_n + s)` from its coefficients
+//!    and its directly stored function, then the output transform ([`output_transform`]).
+//!
+//! [`reference`] computes the same in double precision; the backends are tested against it. Both GPU backends share
+//! the WGSL in `shaders/`.
 
 pub mod backend;
 #[cfg(target_arch = "wasm32")]
 pub mod canvas2d;
 pub mod cpu;
-pub mod display;
 mod fire;
 mod light;
+mod light_chroma;
 mod math;
+pub mod output_transform;
 mod picture;
 pub mod reference;
 mod resample;
+pub mod srgb;
 pub mod texture_layout;
-mod tint;
-pub mod tone;
 #[cfg(target_arch = "wasm32")]
 pub mod webgl2;
 #[cfg(any(target_arch = "wasm32", feature = "gpu"))]
 pub mod webgpu;
 
-pub use display::{Display, Gamut, ToneCurve};
 pub use light::{BuiltinLight, Light, LightError, TorchPose};
+pub use light_chroma::LightChroma;
+pub use output_transform::{Gamut, OutputTransform, ToneCurve};
 pub use picture::{LinearPicture, Rgba8Picture};
 pub use resample::area_resample;
-pub use tint::Tint;
 
-/// A share, 0 to 1, of a number of things of which there is always one.
-fn detailed(all: usize, share: f32) -> usize {
-    ((all as f32 * share).ceil() as usize).clamp(all.min(1), all)
+/// How many of `total` things a quality of 0 to 1 uses: at least one, if there is one.
+fn used_count(total: usize, quality: f32) -> usize {
+    ((total as f32 * quality).ceil() as usize).clamp(total.min(1), total)
 }

@@ -1,8 +1,8 @@
-//! Pictures, before and after the display transform.
+//! Pictures of the camera grid, before and after the output transform.
 
 use crate::transport::Extent;
 
-/// Linear light at each camera pixel, in units of the measurement: R, G, B and an unused fourth.
+/// The picture in linear light, in units of the measurement: R, G, B and an unused fourth value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearPicture {
     /// Camera grid.
@@ -11,7 +11,7 @@ pub struct LinearPicture {
     pub pixels: Vec<[f32; 4]>,
 }
 
-/// An opaque 8-bit sRGB picture, ready for a canvas or a PNG file.
+/// An opaque 8-bit picture, ready for a canvas or a PNG file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rgba8Picture {
     /// Camera grid.
@@ -21,7 +21,7 @@ pub struct Rgba8Picture {
 }
 
 impl LinearPicture {
-    /// An all-dark picture.
+    /// A black picture.
     pub fn black(extent: Extent) -> Self {
         Self {
             extent,
@@ -31,7 +31,7 @@ impl LinearPicture {
 }
 
 impl Rgba8Picture {
-    /// An all-dark picture.
+    /// A black picture.
     pub fn black(extent: Extent) -> Self {
         Self {
             extent,

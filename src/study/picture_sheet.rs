@@ -9,7 +9,7 @@ use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
 use super::StudyError;
-use crate::relight::tone;
+use crate::relight::srgb;
 use crate::transport::{CHANNELS, Extent};
 
 const JPEG_QUALITY: u8 = 85;
@@ -30,7 +30,7 @@ impl Panel {
     pub fn photograph(extent: Extent, linear: impl Iterator<Item = [f64; CHANNELS]>) -> Self {
         Self {
             extent,
-            rgb: linear.flat_map(|rgb| rgb.map(tone::srgb8)).collect(),
+            rgb: linear.flat_map(|rgb| rgb.map(srgb::srgb8)).collect(),
             is_data: false,
         }
     }

@@ -1,29 +1,27 @@
-//! Decoding a file as its bytes come.
+//! Decodes a file while its bytes arrive.
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{CodedError, Photo};
 use crate::format::{Interest, Limits, Reader};
 
-/// Says which bytes of an `.ltm` file are of use, takes them in pieces of any size and makes a
-/// [`Photo`] of them.
+/// Names the byte ranges of an `.ltm` file that it needs, takes them in pieces of any size, and makes a [`Photo`].
 #[wasm_bindgen]
 pub struct Decoder(Reader);
 
 #[wasm_bindgen]
 impl Decoder {
-    /// A decoder of a file that may decode to `maxDecodedBytes` bytes; 2 GiB if left out.
+    /// A decoder with a limit on the decoded bytes; the default is 2 GiB.
     #[wasm_bindgen(constructor)]
     pub fn new(#[wasm_bindgen(js_name = maxDecodedBytes)] max_decoded_bytes: Option<f64>) -> Self {
         let limits = max_decoded_bytes.map_or_else(Limits::default, |bytes| Limits {
-            decoded_bytes: bytes as u64, // saturates; NaN is 0
+            decoded_bytes: bytes as u64, // saturates; 0 for NaN
         });
         Self(Reader::new(limits))
     }
 
-    /// Byte ranges that have not come yet, the most important first: where the first begins, where
-    /// it ends, where the second begins. The first may reach beyond the end of a small file. Empty
-    /// once all has come.
+    /// The missing byte ranges, the most important first: start and end of the first, then of the second, and so on. The
+    /// first may end beyond a small file. Empty once the file is complete.
     pub fn wants(&self) -> Vec<f64> {
         let ranges = self.0.wants(&Interest::default());
         let bounds = ranges
@@ -32,32 +30,38 @@ impl Decoder {
         bounds.map(|bound| bound as f64).collect()
     }
 
-    /// Takes the file's bytes from `offset` on. Those of one range have to come in order; what has
-    /// come before is passed over.
+    /// Takes the file's bytes from `offset` on. The bytes of one range must come in order; bytes that came before are
+    /// skipped.
+    ///
+    /// # Errors
+    /// A code that begins with `format-`.
     pub fn feed(&mut self, offset: f64, bytes: &[u8]) -> Result<(), CodedError> {
         Ok(self.0.feed(offset as u64, bytes)?)
     }
 
-    /// Bytes that have come, each counted once.
+    /// Bytes taken, each counted once.
     #[wasm_bindgen(getter, js_name = bytesFed)]
     pub fn bytes_fed(&self) -> f64 {
         self.0.progress().bytes as f64
     }
 
-    /// Bytes the file has, once its header has been read.
+    /// Size of the file, once its header is read.
     #[wasm_bindgen(getter, js_name = fileBytes)]
     pub fn file_bytes(&self) -> Option<f64> {
         self.0.progress().file_bytes.map(|bytes| bytes as f64)
     }
 
-    /// Scans that are there for every tile.
+    /// Scans that are complete for every tile.
     #[wasm_bindgen(getter, js_name = scansDone)]
     pub fn scans_done(&self) -> usize {
         self.0.progress().scans
     }
 
-    /// A coarser photograph of what has come of every tile; none before the first scan is there, and once
-    /// all is.
+    /// A coarser photograph from the scans that are complete. `None` before the first scan, and once the file is
+    /// complete.
+    ///
+    /// # Errors
+    /// A code that begins with `format-`.
     pub fn preview(&self) -> Result<Option<Photo>, CodedError> {
         let (Some(transport), Some(head)) = (self.0.preview()?, self.0.head()) else {
             return Ok(None);
@@ -65,7 +69,10 @@ impl Decoder {
         Ok(Some(Photo::new(transport, &head.metadata)))
     }
 
-    /// The photograph, once nothing is wanted any more.
+    /// The photograph, once the file is complete.
+    ///
+    /// # Errors
+    /// A code that begins with `format-`: `format-truncated` if the file is not complete.
     pub fn finish(self) -> Result<Photo, CodedError> {
         let (transport, metadata) = self.0.finish()?;
         Ok(Photo::new(transport, &metadata))

@@ -1,4 +1,4 @@
-//! Errors as JavaScript programs like them: with a code to decide by and a message to show.
+//! Errors for JavaScript: a code for programs and a message for people.
 
 use wasm_bindgen::JsValue;
 
@@ -6,7 +6,7 @@ use crate::format::FormatError;
 use crate::relight::LightError;
 use crate::relight::backend::BackendError;
 
-/// Becomes a JavaScript `Error` with an extra property `code`.
+/// An error that becomes a JavaScript `Error` with a property `code`.
 #[derive(Debug)]
 pub struct CodedError {
     code: &'static str,
@@ -21,12 +21,12 @@ impl CodedError {
         }
     }
 
-    /// What kind of failure it is, in kebab case.
+    /// The kind of failure, in kebab case.
     pub fn code(&self) -> &'static str {
         self.code
     }
 
-    /// What went wrong and what to do about it, in English.
+    /// The cause and the remedy, in English.
     pub fn message(&self) -> &str {
         &self.message
     }
@@ -35,7 +35,7 @@ impl CodedError {
 impl From<CodedError> for JsValue {
     fn from(error: CodedError) -> Self {
         let thrown = js_sys::Error::new(&error.message);
-        // Fails only for objects that are frozen or no objects.
+        // Fails for frozen objects only.
         let _ = js_sys::Reflect::set(&thrown, &"code".into(), &error.code.into());
         thrown.into()
     }
@@ -59,8 +59,8 @@ impl From<FormatError> for CodedError {
 impl From<LightError> for CodedError {
     fn from(error: LightError) -> Self {
         let code = match error {
-            LightError::Length { .. } | LightError::Empty(_) => "light-size",
-            LightError::Value(_) => "light-value",
+            LightError::WrongLength { .. } | LightError::EmptyImage(_) => "light-size",
+            LightError::InvalidValue(_) => "light-value",
         };
         Self::new(code, error.to_string())
     }

@@ -1,35 +1,35 @@
-//! What JavaScript sees: a thin face on [`format`](crate::format) and [`relight`](crate::relight).
+//! The WebAssembly surface: thin wrappers of [`format`](crate::format) and [`relight`](crate::relight) for JavaScript.
 //!
-//! Each feature is a module of its own that browsers load when they need it: the decoder, and what relights
-//! on the CPU, by WebGL2 and by WebGPU. A photograph goes from one to another as parcels, as each has a memory
-//! of its own. Every failure is thrown as a JavaScript `Error` with a `code` (see [`CodedError`]).
+//! Each feature is a module that browsers load when they need it: the decoder, and the backends CPU, WebGL2 and WebGPU.
+//! Each module has its own memory, so a photograph is decoded in one and transferred to others ([`transfer`]). Every
+//! failure is thrown as a JavaScript `Error` with a `code` ([`CodedError`]).
 
-#[cfg(feature = "cpu")]
-mod band_relighter;
 #[cfg(feature = "cpu")]
 mod canvas2d;
 #[cfg(feature = "decoder")]
 mod decoder;
 mod error;
 #[cfg(any(feature = "webgl2", feature = "webgpu"))]
-mod graphics;
-mod parcel;
+mod graphics_device;
 mod photo;
-/// What every module that draws has.
+#[cfg(feature = "cpu")]
+mod row_range_relighter;
+mod transfer;
+/// What every module with a backend has.
 #[cfg(feature = "drawing")]
 mod drawing {
-    pub mod display;
     pub mod light;
+    pub mod output_transform;
     pub mod relighter;
 }
 
-#[cfg(feature = "cpu")]
-pub use band_relighter::{BandRelighter, cpu_kernel};
 #[cfg(feature = "decoder")]
 pub use decoder::Decoder;
 #[cfg(feature = "drawing")]
-pub use drawing::{display::Display, light::Light, relighter::Relighter};
+pub use drawing::{light::Light, output_transform::OutputTransform, relighter::Relighter};
 pub use error::CodedError;
 #[cfg(any(feature = "webgl2", feature = "webgpu"))]
-pub use graphics::Graphics;
+pub use graphics_device::GraphicsDevice;
 pub use photo::Photo;
+#[cfg(feature = "cpu")]
+pub use row_range_relighter::{RowRangeRelighter, cpu_kernel};

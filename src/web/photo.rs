@@ -1,13 +1,13 @@
-//! A photograph in one module's memory.
+//! A photograph in the memory of one module.
 
 use std::sync::Arc;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::{CodedError, parcel};
+use super::{CodedError, transfer};
 use crate::transport::{Geometry, Tile, Transport};
 
-/// A relightable photograph, or as many of its tiles as this module has.
+/// A photograph, with all or some of its tiles.
 #[wasm_bindgen]
 pub struct Photo {
     transport: Arc<Transport>,
@@ -16,7 +16,7 @@ pub struct Photo {
 }
 
 impl Photo {
-    /// For what relights it.
+    /// The transport, shared with a relighter.
     #[cfg(feature = "drawing")]
     pub(super) fn transport(&self) -> Arc<Transport> {
         self.transport.clone()
@@ -26,32 +26,41 @@ impl Photo {
         &self.transport.geometry
     }
 
-    fn unshared(&mut self) -> Result<&mut Transport, CodedError> {
-        Arc::get_mut(&mut self.transport)
-            .ok_or_else(|| CodedError::new("internal", "tiles of a photograph in use stay"))
+    fn transport_mut(&mut self) -> Result<&mut Transport, CodedError> {
+        Arc::get_mut(&mut self.transport).ok_or_else(|| {
+            CodedError::new(
+                "internal",
+                "a photograph in use by the CPU backend cannot give or take tiles",
+            )
+        })
     }
 }
 
 #[wasm_bindgen]
 impl Photo {
-    /// A tile, for a photograph in another module; it is dark afterwards. Not while a CPU is at the
-    /// photograph.
+    /// Takes a tile out, for the same photograph in another module; the tile is dark afterwards.
+    ///
+    /// # Errors
+    /// Code `internal` if there is no such tile, or the CPU backend uses the photograph.
     #[wasm_bindgen(js_name = takeTile)]
     pub fn take_tile(&mut self, index: usize) -> Result<Vec<u8>, CodedError> {
-        let tiles = &mut self.unshared()?.tiles;
-        let tile = tiles.get_mut(index).ok_or_else(parcel::wrong)?;
+        let tiles = &mut self.transport_mut()?.tiles;
+        let tile = tiles.get_mut(index).ok_or_else(transfer::corrupt)?;
         let dark = Tile::dark(tile.rect());
-        Ok(parcel::pack_tile(&std::mem::replace(tile, dark)))
+        Ok(transfer::pack_tile(&std::mem::replace(tile, dark)))
     }
 }
 
-/// Those that are drawn.
+/// The receiving side.
 #[cfg(feature = "drawing")]
 #[wasm_bindgen]
 impl Photo {
-    /// What a photograph that was decoded by another module has besides tiles: all dark as yet.
+    /// A photograph of another module, from its geometry and basis. All tiles are dark.
+    ///
+    /// # Errors
+    /// Code `internal` if the values are not those of `packGeometry` and `packBasis`.
     pub fn receive(geometry: &[f64], basis: &[f32]) -> Result<Photo, CodedError> {
-        let transport = parcel::unpack(geometry, basis)?;
+        let transport = transfer::unpack_transport(geometry, basis)?;
         Ok(Self {
             transport: Arc::new(transport),
             #[cfg(feature = "decoder")]
@@ -59,19 +68,26 @@ impl Photo {
         })
     }
 
-    /// Takes a tile that [`takeTile`](Self::take_tile) gave. Not while a CPU is at the photograph.
+    /// Puts in a tile of [`takeTile`](Self::take_tile).
+    ///
+    /// # Errors
+    /// Code `internal` if the bytes are not those of this tile, or the CPU backend uses the photograph; `format-limit`
+    /// if there is no memory.
     #[wasm_bindgen(js_name = putTile)]
     pub fn put_tile(&mut self, index: usize, bytes: &[u8]) -> Result<(), CodedError> {
-        let transport = self.unshared()?;
+        let transport = self.transport_mut()?;
         let rank = transport.basis.rank();
         let area = transport.geometry.window.area();
-        let tile = transport.tiles.get_mut(index).ok_or_else(parcel::wrong)?;
-        *tile = parcel::unpack_tile(bytes, tile.rect(), rank, area)?;
+        let tile = transport
+            .tiles
+            .get_mut(index)
+            .ok_or_else(transfer::corrupt)?;
+        *tile = transfer::unpack_tile(bytes, tile.rect(), rank, area)?;
         Ok(())
     }
 }
 
-/// Those that were decoded.
+/// The sending side.
 #[cfg(feature = "decoder")]
 impl Photo {
     pub(super) fn new(transport: Transport, metadata: &crate::format::MetadataJson) -> Self {
@@ -109,26 +125,26 @@ impl Photo {
         self.geometry().light.height
     }
 
-    /// Number of tiles, which lie row by row.
+    /// Number of tiles, counted row by row.
     #[wasm_bindgen(getter)]
     pub fn tiles(&self) -> usize {
         self.transport.tiles.len()
     }
 
-    /// Pixels along a tile's side; those at the right and lower edges may be smaller.
+    /// Pixels along a tile's side; tiles at the right and lower edges may be smaller.
     #[wasm_bindgen(getter, js_name = tileSide)]
     pub fn tile_side(&self) -> u32 {
         self.geometry().tile_side
     }
 
-    /// Bytes the photograph takes in memory.
+    /// Bytes of the tiles in memory.
     #[wasm_bindgen(getter, js_name = decodedBytes)]
     pub fn decoded_bytes(&self) -> f64 {
         let codes: usize = self.transport.tiles.iter().map(Tile::bytes).sum();
         codes as f64
     }
 
-    /// What the file says about where it came from: text that should be a JSON object.
+    /// The file's metadata: text, normally a JSON object.
     #[wasm_bindgen(getter)]
     pub fn metadata(&self) -> String {
         self.metadata.clone()
@@ -136,13 +152,13 @@ impl Photo {
 
     /// Grids, window and correspondence, for `Photo.receive` of another module.
     #[wasm_bindgen(js_name = geometryParcel)]
-    pub fn geometry_parcel(&self) -> Vec<f64> {
-        parcel::pack_geometry(self.geometry())
+    pub fn pack_geometry(&self) -> Vec<f64> {
+        transfer::pack_geometry(self.geometry())
     }
 
     /// The basis, for `Photo.receive` of another module.
     #[wasm_bindgen(js_name = basisParcel)]
-    pub fn basis_parcel(&self) -> Vec<f32> {
+    pub fn pack_basis(&self) -> Vec<f32> {
         self.transport.basis.kernels.concat()
     }
 }

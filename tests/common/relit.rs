@@ -1,25 +1,27 @@
-//! What tests of relighting share: transports, lights, and the standard that pictures are held to.
+//! Transports, lights and output transforms for tests of relighting, and the tolerance of pictures.
 
-use relightable_photo::relight::{BuiltinLight, Display, Gamut, Light, Rgba8Picture, ToneCurve};
+use relightable_photo::relight::{
+    BuiltinLight, Gamut, Light, OutputTransform, Rgba8Picture, ToneCurve,
+};
 use relightable_photo::transport::{BandTile, Basis, Extent, Geometry, Tile, Transport};
 
 use super::Noise;
 
-/// What tiles of a transport hold.
+/// What the tiles of a transport contain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Functions element by element.
+pub enum TileContents {
+    /// Functions slot by slot.
     Direct,
-    /// Coefficients over nine functions.
+    /// Coefficients of nine basis functions.
     Factored,
-    /// Either, both, or nothing.
+    /// Tiles of either, both and neither.
     Mixed,
 }
 
-/// Light transport functions with a peak in the window's middle and a rough tail, brighter to the
-/// right and below, so that a mirrored or shifted picture cannot pass for the right one. They are
-/// not zero off the display, so that whatever is wrongly seen there shows.
-pub fn asymmetric_transport(geometry: Geometry, kind: Kind, seed: u64) -> Transport {
+/// Light transport functions with a peak in the window's middle and a noisy tail, brighter to the right and below, so that
+/// a mirrored or shifted picture is recognised. They are not zero off the light plane, so that a backend that reads there
+/// is recognised too.
+pub fn asymmetric_transport(geometry: Geometry, contents: TileContents, seed: u64) -> Transport {
     const RANK: usize = 9;
     let mut noise = Noise(seed);
     let (side, area) = (geometry.window.side() as i32, geometry.window.area());
@@ -35,10 +37,10 @@ pub fn asymmetric_transport(geometry: Geometry, kind: Kind, seed: u64) -> Transp
     };
     let mut noise = Noise(!seed);
     let tiles = geometry.tiles().enumerate().map(|(i, rect)| {
-        let [direct, factored] = match kind {
-            Kind::Direct => [true, false],
-            Kind::Factored => [false, true],
-            Kind::Mixed => [i % 3 < 2, i % 4 > 0],
+        let [direct, factored] = match contents {
+            TileContents::Direct => [true, false],
+            TileContents::Factored => [false, true],
+            TileContents::Mixed => [i % 3 < 2, i % 4 > 0],
         };
         let mut tile = BandTile::dark(rect);
         for pixel in rect.pixels() {
@@ -51,7 +53,7 @@ pub fn asymmetric_transport(geometry: Geometry, kind: Kind, seed: u64) -> Transp
                     .extend(functions.iter().map(|tau| gain.map(|g| g * tau)));
             }
             if factored {
-                // Some are negative, in each pixel others.
+                // Some are negative, different ones in each pixel.
                 let coefficients = (0..RANK).map(|k| {
                     let size = (noise.next() as f32 - 0.3) / (1.0 + k as f32).sqrt();
                     gain.map(|g| g * size)
@@ -68,7 +70,7 @@ pub fn asymmetric_transport(geometry: Geometry, kind: Kind, seed: u64) -> Transp
     }
 }
 
-/// All built-in lights, and one brighter than any of them with a colour of its own at each element.
+/// All built-in lights; `random`, brighter, with varying chroma; and `corner`, with uniform chroma.
 pub fn lights(extent: Extent) -> Vec<(&'static str, Light)> {
     let mut lights: Vec<_> = BuiltinLight::ALL
         .map(|light| (light.name(), light.render(extent)))
@@ -79,7 +81,6 @@ pub fn lights(extent: Extent) -> Vec<(&'static str, Light)> {
         .collect();
     let random = Light::from_linear_rgb(extent, &values).unwrap();
     lights.push(("random", random));
-    // One that fills a corner only, of one colour.
     let corner = (0..extent.area()).flat_map(|i| {
         let (u, v) = (i as u32 % extent.width, i as u32 / extent.width);
         let lit = u < extent.width.div_ceil(3) && v < extent.height.div_ceil(3);
@@ -90,24 +91,24 @@ pub fn lights(extent: Extent) -> Vec<(&'static str, Light)> {
     lights
 }
 
-/// Displays of all kinds, the first of which adds nothing to the exposure.
-pub fn displays(exposure: f32) -> [Display; 4] {
-    let plain = Display::srgb(exposure);
+/// Output transforms that together use all features; the first has an exposure only.
+pub fn output_transforms(exposure: f32) -> [OutputTransform; 4] {
+    let plain = OutputTransform::srgb(exposure);
     let gains = [1.3, 1.0, 0.6].map(|gain| gain * exposure);
     let (gamut, curve) = (Gamut::DisplayP3, ToneCurve::Filmic);
     [
         plain,
-        Display {
+        OutputTransform {
             gains,
             dither: true,
             ..plain
         },
-        Display {
+        OutputTransform {
             gains: [4.0 * exposure; 3],
             curve,
             ..plain
         },
-        Display {
+        OutputTransform {
             gains,
             gamut,
             curve,
@@ -116,7 +117,7 @@ pub fn displays(exposure: f32) -> [Display; 4] {
     ]
 }
 
-/// A transport with the first of its components only, four a quad.
+/// The transport with its first quads of components only.
 pub fn first_quads(transport: &Transport, quads: usize) -> Transport {
     let mut transport = transport.clone();
     let all = transport.basis.rank().div_ceil(4);
@@ -133,15 +134,15 @@ pub fn first_quads(transport: &Transport, quads: usize) -> Transport {
     transport
 }
 
-/// Fails unless every channel of every pixel is within one code of the reference.
-pub fn assert_within_one_code(got: &Rgba8Picture, reference: &Rgba8Picture, what: &str) {
-    assert_eq!(got.extent, reference.extent, "{what}");
+/// Panics unless every channel of every pixel is within one code of the reference.
+pub fn assert_within_one_code(got: &Rgba8Picture, reference: &Rgba8Picture, context: &str) {
+    assert_eq!(got.extent, reference.extent, "{context}");
     let width = reference.extent.width as usize;
     for (i, (got, want)) in got.pixels.iter().zip(&reference.pixels).enumerate() {
-        let off = (0..4).map(|c| got[c].abs_diff(want[c])).max();
+        let difference = (0..4).map(|c| got[c].abs_diff(want[c])).max();
         assert!(
-            off <= Some(1) && got[3] == 255,
-            "{what}: pixel ({}, {}) is {got:?}, not {want:?}",
+            difference <= Some(1) && got[3] == 255,
+            "{context}: pixel ({}, {}) is {got:?}, not {want:?}",
             i % width,
             i / width
         );

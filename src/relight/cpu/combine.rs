@@ -1,229 +1,242 @@
-//! Pixels from what their windows see: `y_n = Σ_k c_nk C_k(o_n)`.
+//! Factored pixels from the basis response: `y_n = Σ_k c_nk C_k(o_n)`, in each channel.
 
-use super::lanes::{MOST_PIXELS, Pixels, Single, Vector};
-use crate::relight::Tint;
+use super::simd::{MAX_PIXELS, Scalar, Simd};
+use crate::relight::LightChroma;
 use crate::transport::{CHANNELS, CoefficientTile, QUAD, TexelCode};
 
-/// A square of the light, seen through the basis.
+/// The basis response of a light block, `C`.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen<'a> {
-    /// `[origin, channel, quad]`; one channel where the light has one tint.
+pub struct BlockResponse<'a> {
+    /// `[origin, channel, quad]`; one channel where the light has a uniform chroma.
     pub texels: &'a [[f32; QUAD]],
-    /// Texels of an origin and channel: those of a tile, or only the first of them.
+    /// Quads of components of each origin and channel: the tiles' first ones.
     pub quads: usize,
-    /// What the channels have in common.
-    pub tint: Tint,
+    /// The ratio between the light's channels.
+    pub chroma: LightChroma,
 }
 
-/// Writes pixels of a tile from `first` on, of which `places` has the origins' numbers.
+/// Writes the pixels of a tile from number `first` on. `offsets` has the origin of each, as an index in the block.
 #[inline(always)]
-pub fn combine<V: Vector>(
+pub fn combine<S: Simd>(
+    simd: S,
     tile: &CoefficientTile,
     first: usize,
-    places: &[u16],
-    seen: Seen<'_>,
+    offsets: &[u16],
+    response: BlockResponse<'_>,
     out: &mut [[f32; CHANNELS]],
 ) {
-    match seen.tint {
-        Tint::One(_, factors) => {
+    match response.chroma {
+        LightChroma::Uniform { factors, .. } => {
             let mut gain = tile.step;
             for c in 0..CHANNELS {
                 gain[c] *= factors[c];
             }
-            each::<V, 1>(tile, first, places, seen, gain, out);
+            combine_span::<S, 1>(simd, tile, first, offsets, response, gain, out);
         }
-        Tint::Many => each::<V, CHANNELS>(tile, first, places, seen, tile.step, out),
+        LightChroma::Varying => {
+            combine_span::<S, CHANNELS>(simd, tile, first, offsets, response, tile.step, out);
+        }
     }
 }
 
 #[inline(always)]
-fn each<V: Vector, const SEEN: usize>(
+fn combine_span<S: Simd, const LIGHT_CHANNELS: usize>(
+    simd: S,
     tile: &CoefficientTile,
     first: usize,
-    places: &[u16],
-    Seen { texels, quads, .. }: Seen<'_>,
+    offsets: &[u16],
+    BlockResponse { texels, quads, .. }: BlockResponse<'_>,
     gain: [f32; CHANNELS],
     out: &mut [[f32; CHANNELS]],
 ) {
-    // What pixels read, checked once and not for each.
-    let pixels = places.len();
-    assert_eq!(out.len(), pixels, "as many pixels as places");
-    let Some(most) = places.iter().copied().max() else {
+    // Bounds are checked once for all pixels, not in the inner loop.
+    let pixels = offsets.len();
+    assert_eq!(out.len(), pixels, "as many pixels as offsets");
+    let Some(largest) = offsets.iter().copied().max() else {
         return;
     };
-    assert!((usize::from(most) + 1) * SEEN * quads <= texels.len());
-    let plane = CoefficientTile::plane(tile.rect);
-    let channel = tile.codes.len() / CHANNELS;
-    let last = (CHANNELS - 1) * channel + quads.saturating_sub(1) * plane + first + pixels;
-    assert!(last <= tile.codes.len());
-    let row = Row {
+    assert!((usize::from(largest) + 1) * LIGHT_CHANNELS * quads <= texels.len());
+    let quad_stride = CoefficientTile::plane(tile.rect);
+    let channel_stride = tile.codes.len() / CHANNELS;
+    let last_quad = (CHANNELS - 1) * channel_stride + quads.saturating_sub(1) * quad_stride;
+    assert!(last_quad + first + pixels <= tile.codes.len());
+    let span = SpanPointers {
         texels: texels.as_ptr(),
         quads,
-        places,
+        offsets,
         codes: tile.codes[first..].as_ptr(),
-        plane,
-        channel,
+        quad_stride,
+        channel_stride,
         gain,
         out: out.as_mut_ptr(),
     };
-    let at_once = V::Pixels::COUNT;
     let mut done = 0;
-    // SAFETY: there is a place for each of the pixels and all are seen, and a code, as was asserted.
+    // SAFETY: all offsets lie within the response and all pixels within the tile, as was just asserted.
     unsafe {
-        while done + at_once <= pixels {
-            row.combine::<V::Pixels, SEEN>(done);
-            done += at_once;
+        while done + S::PIXELS <= pixels {
+            span.combine::<S, LIGHT_CHANNELS>(simd, done);
+            done += S::PIXELS;
         }
-        if done < pixels && pixels >= at_once {
-            // The last, some of them once more.
-            row.combine::<V::Pixels, SEEN>(pixels - at_once);
+        if done < pixels && pixels >= S::PIXELS {
+            // The last vector overlaps the one before: some pixels are computed twice.
+            span.combine::<S, LIGHT_CHANNELS>(simd, pixels - S::PIXELS);
             done = pixels;
         }
         while done < pixels {
-            row.combine::<Single, SEEN>(done);
+            span.combine::<Scalar, LIGHT_CHANNELS>(Scalar, done);
             done += 1;
         }
     }
 }
 
-/// Pixels side by side.
-struct Row<'a> {
+/// What the inner loop reads and writes for pixels side by side.
+struct SpanPointers<'a> {
     /// `[origin, channel, quad]`.
     texels: *const [f32; QUAD],
     quads: usize,
-    /// Of each pixel.
-    places: &'a [u16],
-    /// Of each pixel, `[channel, quad, pixel]`.
+    /// Each pixel's origin.
+    offsets: &'a [u16],
+    /// `[channel, quad, pixel]`.
     codes: *const TexelCode,
-    /// From one quad to the next.
-    plane: usize,
-    /// From one channel to the next.
-    channel: usize,
+    quad_stride: usize,
+    channel_stride: usize,
     gain: [f32; CHANNELS],
-    /// Of each pixel.
     out: *mut [f32; CHANNELS],
 }
 
-impl Row<'_> {
-    /// As many pixels as are worked on at once, from `first` on.
+impl SpanPointers<'_> {
+    /// Combines `S::PIXELS` pixels from number `first` of the span on.
     ///
     /// # Safety
-    /// There are so many of them, and texels of `SEEN` channels at their places.
+    /// The span has so many pixels, codes for each, and texels of `LIGHT_CHANNELS` channels at their origins.
     #[inline(always)]
-    unsafe fn combine<P: Pixels, const SEEN: usize>(&self, first: usize) {
-        const { assert!(P::COUNT <= MOST_PIXELS) };
-        // Loops and no closures, which would not be compiled for the vectors' registers.
-        let mut seen = [[self.texels; MOST_PIXELS]; SEEN];
-        for p in 0..P::COUNT {
-            // SAFETY: as above.
+    unsafe fn combine<S: Simd, const LIGHT_CHANNELS: usize>(&self, simd: S, first: usize) {
+        const { assert!(S::PIXELS <= MAX_PIXELS) };
+        // Loops, no closures: the compiler would not use the instruction set for these.
+        let mut origins = [[self.texels; MAX_PIXELS]; LIGHT_CHANNELS];
+        for p in 0..S::PIXELS {
+            // SAFETY: the caller vouches for the offset and its texels.
             unsafe {
-                let place = usize::from(*self.places.get_unchecked(first + p));
-                let texels = self.texels.add(place * SEEN * self.quads);
-                for (c, seen) in seen.iter_mut().enumerate() {
-                    seen[p] = texels.add(c * self.quads);
+                let offset = usize::from(*self.offsets.get_unchecked(first + p));
+                let texels = self.texels.add(offset * LIGHT_CHANNELS * self.quads);
+                for (c, origins) in origins.iter_mut().enumerate() {
+                    origins[p] = texels.add(c * self.quads);
                 }
             }
         }
-        let mut sums = [P::zero(); CHANNELS];
+        let mut sums = [simd.zero_quads(); CHANNELS];
         for q in 0..self.quads {
-            let mut texels = [P::zero(); SEEN];
-            for c in 0..SEEN {
-                let mut at = seen[c];
-                for at in &mut at {
-                    // Of pixels that are not asked for it is not read.
-                    *at = at.wrapping_add(q);
+            let mut responses = [simd.zero_quads(); LIGHT_CHANNELS];
+            for c in 0..LIGHT_CHANNELS {
+                let mut texels = origins[c];
+                for texel in &mut texels {
+                    // Pointers past `S::PIXELS` are not read.
+                    *texel = texel.wrapping_add(q);
                 }
-                // SAFETY: as above.
-                texels[c] = unsafe { P::load(at) };
+                // SAFETY: the caller vouches for the texels.
+                responses[c] = unsafe { simd.load_quads(texels) };
             }
             for (c, sum) in sums.iter_mut().enumerate() {
-                let seen = texels[if SEEN == 1 { 0 } else { c }];
-                // SAFETY: as above.
+                let response = responses[if LIGHT_CHANNELS == 1 { 0 } else { c }];
+                // SAFETY: the caller vouches for the codes.
                 *sum = unsafe {
-                    let codes = self.codes.add(c * self.channel + q * self.plane + first);
-                    sum.plus_products(codes, seen)
+                    let at = c * self.channel_stride + q * self.quad_stride + first;
+                    simd.add_products(*sum, self.codes.add(at), response)
                 };
             }
         }
-        // SAFETY: as above.
-        unsafe { P::store_sums(sums, self.gain, self.out.add(first)) };
+        // SAFETY: the caller vouches for the pixels.
+        unsafe { simd.store_sums(sums, self.gain, self.out.add(first)) };
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::relight::cpu::lanes::{Kind, Work};
+    use crate::relight::cpu::simd::{SimdKernel, SimdLevel};
     use crate::transport::{Extent, TileRect};
 
-    struct Combine<'a> {
+    struct CombineKernel<'a> {
         tile: &'a CoefficientTile,
         first: usize,
-        places: &'a [u16],
-        seen: Seen<'a>,
+        offsets: &'a [u16],
+        response: BlockResponse<'a>,
         out: &'a mut [[f32; CHANNELS]],
     }
 
-    impl Work for Combine<'_> {
+    impl SimdKernel for CombineKernel<'_> {
         #[inline(always)]
-        fn run<V: Vector>(self) {
-            combine::<V>(self.tile, self.first, self.places, self.seen, self.out);
+        fn run<S: Simd>(self, simd: S) {
+            combine(
+                simd,
+                self.tile,
+                self.first,
+                self.offsets,
+                self.response,
+                self.out,
+            );
         }
     }
 
     #[test]
-    fn pixels_are_their_sums_and_the_same_bits_by_all_kinds_of_vectors() {
+    fn pixels_match_the_sums_and_all_simd_levels_agree_to_the_bit() {
         let extent = Extent {
             width: 9,
             height: 3,
         };
         let rect = TileRect { x: 0, y: 0, extent };
-        let number = |i: usize| ((i * 7919) % 1009) as f32 / 504.0 - 1.0;
-        for (rank, tint) in [
-            (1usize, Tint::Many),
-            (9, Tint::Many),
-            (16, Tint::One(1, [0.5, 1.0, 0.25])),
+        let test_value = |i: usize| ((i * 7919) % 1009) as f32 / 504.0 - 1.0;
+        for (rank, chroma) in [
+            (1usize, LightChroma::Varying),
+            (9, LightChroma::Varying),
+            (
+                16,
+                LightChroma::Uniform {
+                    base: 1,
+                    factors: [0.5, 1.0, 0.25],
+                },
+            ),
         ] {
             let quads = rank.div_ceil(QUAD);
             let values: Vec<_> = (0..27 * rank)
-                .map(|i| [0, 1, 2].map(|c| number(3 * i + c)))
+                .map(|i| [0, 1, 2].map(|c| test_value(3 * i + c)))
                 .collect();
             let tile = CoefficientTile::quantise(rect, &values, rank);
             let texels: Vec<_> = (0..20 * 3 * quads)
-                .map(|i| [0, 1, 2, 3].map(|l| number(4 * i + l + 5)))
+                .map(|i| [0, 1, 2, 3].map(|l| test_value(4 * i + l + 5)))
                 .collect();
             for used in 1..=quads {
                 for (first, count) in [(0, 27), (3, 8), (26, 1), (5, 0), (1, 13), (0, 2), (4, 3)] {
-                    let places: Vec<u16> = (0..count).map(|i| (i * 5 / 2 % 20) as u16).collect();
-                    let seen = Seen {
-                        texels: &texels[..20 * used * tint.channels().len()],
+                    let offsets: Vec<u16> = (0..count).map(|i| (i * 5 / 2 % 20) as u16).collect();
+                    let response = BlockResponse {
+                        texels: &texels[..20 * used * chroma.channels().len()],
                         quads: used,
-                        tint,
+                        chroma,
                     };
-                    let combined = |kind: Kind| {
-                        // With others on either side, which are not to be touched.
+                    let combine_by = |level: SimdLevel| {
+                        // The pixels on either side must stay as they are.
                         let mut out = vec![[7.0; CHANNELS]; count + 2];
-                        kind.run(Combine {
+                        level.run(CombineKernel {
                             tile: &tile,
                             first,
-                            places: &places,
-                            seen,
+                            offsets: &offsets,
+                            response,
                             out: &mut out[1..=count],
                         });
                         assert_eq!([out[0], out[count + 1]], [[7.0; CHANNELS]; 2]);
                         out[1..=count].to_vec()
                     };
-                    let plain = combined(Kind::Plain);
-                    for kind in Kind::all() {
-                        assert_eq!(plain, combined(kind), "{kind:?}");
+                    let scalar = combine_by(SimdLevel::Scalar(Scalar));
+                    for level in SimdLevel::available() {
+                        assert_eq!(scalar, combine_by(level), "{level:?}");
                     }
-                    for (i, got) in plain.iter().enumerate() {
+                    for (i, got) in scalar.iter().enumerate() {
                         for c in 0..CHANNELS {
-                            let (channels, of_channel, gain) = match tint {
-                                Tint::One(_, factors) => (1, 0, factors[c]),
-                                Tint::Many => (3, c, 1.0),
+                            let (channels, channel, gain) = match chroma {
+                                LightChroma::Uniform { factors, .. } => (1, 0, factors[c]),
+                                LightChroma::Varying => (3, c, 1.0),
                             };
-                            let at = (usize::from(places[i]) * channels + of_channel) * used;
+                            let at = (usize::from(offsets[i]) * channels + channel) * used;
                             let products = (0..rank.min(QUAD * used)).map(|k| {
                                 let coefficient = tile.coefficient(rank, first + i, k)[c];
                                 f64::from(coefficient * texels[at + k / QUAD][k % QUAD])

@@ -1,339 +1,195 @@
-//! The light seen through every function of the basis from every place: `C_k(o) = Σ_s v_k(s) p(o+s)`
-//! for window origins `o`. A factored pixel is `Σ_k c_nk C_k(o_n)`: all that depends on the light is
-//! in `C`, and pixels that look at the same place share it.
+//! The basis response of a light block: `C_k(o) = Σ_s v_k(s) p(o + s)` for each window origin `o` of the block, each
+//! basis function `v_k` and each channel of the light `p`.
 //!
-//! Through the Fourier transform, square by square: some 60 operations a value where a window of 15
-//! takes 450.
+//! A factored pixel is `Σ_k c_nk C_k(o_n)`: everything that depends on the light is in `C`, and pixels with the same
+//! window origin share it. `C` is computed by Fourier transforms: `F⁻¹(V̄_k · F)`, with `V_k` the basis function's
+//! spectrum, which is computed once, and `F` the light's ([`LightSpectrum`]). That takes some 60 operations a value,
+//! where the sum over a window of side 15 takes 450.
 
-use super::fft::{Between, Complex, Fft, Kept, Packed};
-use super::lanes::{LANES, Plain, Vector};
-use super::squares::even_reach;
-use crate::transport::{Basis, CHANNELS, QUAD, Window};
+use super::block_size::{even_block_side, fft_side};
+use super::fft::{Complex, ComplexLine, Fft, FftScratch};
+use super::light_spectrum::LightSpectrum;
+use super::simd::{LANES, Scalar, Simd};
+use crate::transport::{Basis, QUAD, Window};
 
-/// Sides of transforms to choose from; the largest holds a window of 63 and as much again.
-const SIDES: [usize; 4] = [32, 64, 128, 256];
-/// Bytes for spectra of the basis and what is seen of a square, which ought to be in a cache.
-const MOST_MEMORY: u64 = 16 << 20;
-/// Functions in one transform: one in each real part, one in each imaginary part.
-const TOGETHER: usize = 2 * LANES;
+/// Basis functions in one transform: one in the real part and one in the imaginary part of each lane.
+const GROUP: usize = 2 * LANES;
 
-/// Correlates squares of a light with the functions of a basis.
+/// Correlates light blocks with the functions of a basis.
 #[derive(Debug)]
 pub struct Correlator {
     fft: Fft,
-    /// Origins along a square's side.
-    reach: usize,
-    /// Elements along the side of what a square sees; not more than the transforms'.
-    sees: usize,
+    /// Window origins along a block's side.
+    block_side: usize,
+    /// Light elements along the side of a block's footprint, `block_side + w - 1`.
+    footprint: usize,
     quads: usize,
-    /// Of the functions, mirrored; `[group, u, v]`.
-    spectra: Vec<Packed>,
+    /// Spectra of the mirrored basis functions: `[group, u, v]`.
+    spectra: Vec<ComplexLine>,
 }
 
-/// Memory that correlating takes for a while.
+/// Memory for one correlation.
 #[derive(Debug)]
-pub struct Workspace {
-    between: Between,
-    /// One channel of the light, `[v, u]`; dark beyond what a square sees.
-    plane: Vec<[f32; LANES]>,
-    /// Of some columns of it; `[v]`.
-    columns: Kept,
-    /// Of it along `v` alone: `[block of v, u]`, of the first half of `v`.
-    half: Vec<Packed>,
-    /// Of it: `[u, part, v]`.
-    spectrum: Vec<f32>,
-    /// `[u, v]`, of `v` as many as a square has.
-    lines: Vec<Packed>,
-    /// `C`; `[origin, channel, quad]`.
-    seen: Vec<Line>,
+pub struct CorrelationScratch {
+    fft: FftScratch,
+    light: LightSpectrum,
+    /// The product of the spectra, transformed back along `v`: `[u, v]`, `v` within the block.
+    columns: Vec<ComplexLine>,
+    /// `C`: `[origin, channel, quad]`.
+    response: Vec<CacheLine>,
 }
 
-/// Texels, where a cache's line begins.
+/// Texels, aligned to a cache line.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(64))]
-struct Line([f32; 16]);
+struct CacheLine([f32; 16]);
 
 impl Correlator {
-    /// For window origins that span `across` times `down`.
-    pub fn new(basis: &Basis, window: Window, across: usize, down: usize) -> Self {
-        let side = window.side() as usize;
-        let n = side_for(basis.rank(), side, across, down);
-        let reach = even_reach(n + 1 - side, [across, down]);
+    /// For window origins that span `columns × rows`.
+    pub fn new(basis: &Basis, window: Window, columns: usize, rows: usize) -> Self {
+        let window = window.side() as usize;
+        let n = fft_side(basis.rank(), window, columns, rows);
+        let block_side = even_block_side(n + 1 - window, [columns, rows]);
         let mut correlator = Self {
             fft: Fft::new(n),
-            reach,
-            sees: reach + side - 1,
+            block_side,
+            footprint: block_side + window - 1,
             quads: basis.rank().div_ceil(QUAD),
             spectra: Vec::new(),
         };
-        for functions in basis.kernels.chunks(TOGETHER) {
-            correlator.add_spectrum(functions, side);
+        for functions in basis.kernels.chunks(GROUP) {
+            correlator.add_spectrum(functions, window);
         }
         correlator
     }
 
-    fn add_spectrum(&mut self, functions: &[Vec<f32>], side: usize) {
+    fn add_spectrum(&mut self, functions: &[Vec<f32>], window: usize) {
         let n = self.fft.side();
-        // The light's spectrum is twice what it is.
+        // 1/n² of the inverse transform; ½, as the light's spectrum comes doubled.
         let scale = 0.5 / (n * n) as f32;
-        let mut square = vec![Packed::default(); n * n];
+        let mut mirrored = vec![ComplexLine::default(); n * n];
         for (k, function) in functions.iter().enumerate() {
             for (s, value) in function.iter().enumerate() {
-                // Mirrored: what a transform multiplies is a convolution.
-                let (u, v) = ((n - s % side) % n, (n - s / side) % n);
-                let Packed { re, im } = &mut square[v * n + u];
+                // A product of spectra is a convolution; mirroring makes it a correlation.
+                let (u, v) = ((n - s % window) % n, (n - s / window) % n);
+                let ComplexLine { re, im } = &mut mirrored[v * n + u];
                 let part = if k < LANES { re } else { im };
                 part[k % LANES] = value * scale;
             }
         }
-        let mut between = Between::new(n);
-        for row in square.chunks_exact_mut(n) {
-            let given = row.to_vec();
-
+        let mut scratch = FftScratch::new(n);
+        for row in mirrored.chunks_exact_mut(n) {
+            let values = row.to_vec();
             self.fft.transform(
-                &mut between,
-                #[inline(always)]
-                |u| Complex::load(|_| &given[u]),
-                #[inline(always)]
-                |u: usize, value: Complex<Plain>| value.store(0, &mut row[u]),
+                Scalar,
+                &mut scratch,
+                |u| Complex::load(Scalar, |_| &values[u]),
+                |u, value| value.store(Scalar, 0, &mut row[u]),
             );
         }
         for u in 0..n {
             let start = self.spectra.len();
-            self.spectra.resize(start + n, Packed::default());
-
+            self.spectra.resize(start + n, ComplexLine::default());
             self.fft.transform(
-                &mut between,
-                #[inline(always)]
-                |v| Complex::load(|_| &square[v * n + u]),
-                #[inline(always)]
-                |v: usize, value: Complex<Plain>| value.store(0, &mut self.spectra[start + v]),
+                Scalar,
+                &mut scratch,
+                |v| Complex::load(Scalar, |_| &mirrored[v * n + u]),
+                |v, value| value.store(Scalar, 0, &mut self.spectra[start + v]),
             );
         }
     }
 
-    /// Origins along the side of a square that is correlated at once.
-    pub fn reach(&self) -> usize {
-        self.reach
+    /// Window origins along a block's side.
+    pub fn block_side(&self) -> usize {
+        self.block_side
     }
 
-    /// Texels of four components, of one origin and channel.
+    /// Texels of four components that an origin and channel have.
     pub fn quads(&self) -> usize {
         self.quads
     }
 
-    /// What [`correlate`](Self::correlate) needs.
-    pub fn workspace(&self) -> Workspace {
+    /// Memory for [`correlate`](Self::correlate).
+    pub fn scratch(&self) -> CorrelationScratch {
         let n = self.fft.side();
-        Workspace {
-            between: Between::new(n),
-            plane: vec![[0.0; LANES]; n * n / LANES],
-            columns: Kept::new(n),
-            half: vec![Packed::default(); blocks(n) * n],
-            spectrum: vec![0.0; 2 * n * n],
-            lines: vec![Packed::default(); n * self.reach],
-            seen: Vec::new(),
+        CorrelationScratch {
+            fft: FftScratch::new(n),
+            light: LightSpectrum::new(n),
+            columns: vec![ComplexLine::default(); n * self.block_side],
+            response: Vec::new(),
         }
     }
 
-    /// `C` of a square, as `[origin, channel, quad]`, of the first `quads` of components and these
-    /// `channels` of what `row` yields of the light: elements of the row of that number, as many as a
-    /// square sees.
+    /// `C` of a block, `[origin, channel, quad]`, for these channels of the light and the first `quads` quads of
+    /// components. `row(v)` has the footprint's elements of row `v`.
     #[inline(always)]
-    pub fn correlate<'a, 'w, V: Vector>(
+    pub fn correlate<'a, 's, S: Simd>(
         &self,
+        simd: S,
         row: impl Fn(usize) -> &'a [[f32; 4]],
         channels: &[usize],
         quads: usize,
-        work: &'w mut Workspace,
-    ) -> &'w [[f32; QUAD]] {
+        scratch: &'s mut CorrelationScratch,
+    ) -> &'s [[f32; QUAD]] {
         let n = self.fft.side();
-        let texels = self.reach * self.reach * channels.len() * quads;
-        let lines = (texels * size_of::<[f32; QUAD]>()).div_ceil(size_of::<Line>());
-        if work.seen.len() < lines {
-            work.seen.resize(lines, Line::default());
+        let texels = self.block_side * self.block_side * channels.len() * quads;
+        let lines = (texels * size_of::<[f32; QUAD]>()).div_ceil(size_of::<CacheLine>());
+        if scratch.response.len() < lines {
+            scratch.response.resize(lines, CacheLine::default());
         }
         for (i, channel) in channels.iter().enumerate() {
-            self.separate(&row, *channel, &mut work.plane);
-            self.along_v::<V>(work);
-            self.along_u::<V>(work);
+            let CorrelationScratch { fft, light, .. } = scratch;
+            light.compute(simd, &self.fft, fft, &row, self.footprint, *channel);
             let groups = self.spectra.chunks_exact(n * n);
-            for (group, spectra) in groups.take(quads.div_ceil(TOGETHER / QUAD)).enumerate() {
-                self.invert::<V>(spectra, work);
-                self.collect::<V>(group, quads, (i, channels.len()), work);
+            for (group, spectra) in groups.take(quads.div_ceil(GROUP / QUAD)).enumerate() {
+                self.invert_along_v(simd, spectra, scratch);
+                self.invert_along_u(simd, group, quads, (i, channels.len()), scratch);
             }
         }
-        &bytemuck::cast_slice(&work.seen)[..texels]
+        &bytemuck::cast_slice(&scratch.response)[..texels]
     }
 
-    /// Takes one channel of the light. All is dark beyond what the square sees.
+    /// Multiplies the spectra and transforms the product back along `v`.
     #[inline(always)]
-    fn separate<'a>(
+    fn invert_along_v<S: Simd>(
         &self,
-        row: impl Fn(usize) -> &'a [[f32; 4]],
-        channel: usize,
-        plane: &mut [[f32; LANES]],
+        simd: S,
+        spectra: &[ComplexLine],
+        scratch: &mut CorrelationScratch,
     ) {
-        let plane = plane.as_flattened_mut();
-        for (v, out) in plane
-            .chunks_exact_mut(self.fft.side())
-            .take(self.sees)
-            .enumerate()
-        {
-            let elements = &row(v)[..self.sees];
-            for (out, element) in out.iter_mut().zip(elements) {
-                *out = element[channel];
-            }
-        }
-    }
-
-    /// Transforms that along `v`. Columns are real, so that two share a transform: of `f = a + ib`,
-    /// `a` has the spectrum `(f(v) + f̄(-v)) / 2` and `b` has `(f(v) - f̄(-v)) / 2i`. They are left as
-    /// twice that, and for `v` up to the middle, which tells the others.
-    #[inline(always)]
-    fn along_v<V: Vector>(&self, work: &mut Workspace) {
         let n = self.fft.side();
-        let blocks_a_row = n / LANES;
-        let columns = work.columns.of::<V>();
-        let plane = &work.plane;
-        // What the square does not see stays dark.
-        for first in (0..self.sees.div_ceil(LANES)).step_by(2 * V::LINES) {
+        for first in (0..n).step_by(S::LINES) {
+            let functions = &spectra[first * n..][..S::LINES * n];
+            let light = &scratch.light.columns_from(first)[..2 * S::LINES * n];
+            let columns =
+                &mut scratch.columns[first * self.block_side..][..S::LINES * self.block_side];
             self.fft.transform(
-                &mut work.between,
+                simd,
+                &mut scratch.fft,
                 #[inline(always)]
                 |v: usize| {
-                    let blocks = &plane[v * blocks_a_row + first..][..2 * V::LINES];
-                    Complex {
-                        re: V::load(
-                            #[inline(always)]
-                            |line| &blocks[2 * line],
-                        ),
-                        im: V::load(
-                            #[inline(always)]
-                            |line| &blocks[2 * line + 1],
-                        ),
-                    }
-                },
-                #[inline(always)]
-                |v: usize, value: Complex<V>| value.keep(&mut columns[v]),
-            );
-            for v in 0..=n / 2 {
-                let (f, g) = (
-                    Complex::<V>::kept(&columns[v]),
-                    Complex::kept(&columns[(n - v) % n]),
-                );
-                let both = [
-                    Complex {
-                        re: f.re.plus(g.re),
-                        im: f.im.minus(g.im),
-                    },
-                    Complex {
-                        re: f.im.plus(g.im),
-                        im: g.re.minus(f.re),
-                    },
-                ];
-                for line in 0..V::LINES {
-                    for (part, value) in both.into_iter().enumerate() {
-                        let mut packed = Packed::default();
-                        value.store(line, &mut packed);
-                        let u = (first + 2 * line + part) * LANES;
-                        let to = &mut work.half[v / LANES * n + u..][..LANES];
-                        for lane in 0..LANES {
-                            to[lane].re[v % LANES] = packed.re[lane];
-                            to[lane].im[v % LANES] = packed.im[lane];
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    /// Transforms what that left along `u`. What is beyond the middle is the conjugate of what is as
-    /// far before it.
-    #[inline(always)]
-    fn along_u<V: Vector>(&self, work: &mut Workspace) {
-        let n = self.fft.side();
-        let (half, spectrum) = (&work.half, &mut work.spectrum);
-        let last = blocks(n) - 1;
-        for first in (0..=last).step_by(V::LINES) {
-            self.fft.transform(
-                &mut work.between,
-                #[inline(always)]
-                |u: usize| {
-                    Complex::load(
-                        #[inline(always)]
-                        |line| &half[(first + line).min(last) * n + u],
-                    )
-                },
-                #[inline(always)]
-                |u: usize, value: Complex<V>| {
-                    for line in 0..V::LINES {
-                        let v = (first + line).min(last) * LANES;
-                        let (re, im) = spectrum[2 * u * n..][..2 * n].split_at_mut(n);
-                        if let (Some(re), Some(im)) =
-                            (re[v..].first_chunk_mut(), im[v..].first_chunk_mut())
-                        {
-                            value.re.store(line, re);
-                            value.im.store(line, im);
-                        }
-                    }
-                },
-            );
-        }
-        for u in 0..=n / 2 {
-            let (to_here, after) = spectrum.split_at_mut(2 * (u + 1) * n);
-            let here = to_here[2 * u * n..].chunks_exact_mut(n);
-            let opposite = (n - u) % n;
-            if opposite > u {
-                let there = &mut after[2 * (opposite - u - 1) * n..][..2 * n];
-                for ((here, there), sign) in here.zip(there.chunks_exact_mut(n)).zip([1.0, -1.0]) {
-                    let (here, beyond_here) = here.split_at_mut(n / 2 + 1);
-                    let (there, beyond_there) = there.split_at_mut(n / 2 + 1);
-                    mirror(here, sign, beyond_there);
-                    mirror(there, sign, beyond_here);
-                }
-            } else {
-                for (here, sign) in here.zip([1.0, -1.0]) {
-                    let (here, beyond) = here.split_at_mut(n / 2 + 1);
-                    mirror(here, sign, beyond);
-                }
-            }
-        }
-    }
-
-    /// The product of the spectra, transformed back along `v`.
-    #[inline(always)]
-    fn invert<V: Vector>(&self, spectra: &[Packed], work: &mut Workspace) {
-        let n = self.fft.side();
-        for first in (0..n).step_by(V::LINES) {
-            let functions = &spectra[first * n..][..V::LINES * n];
-            let light = &work.spectrum[2 * first * n..][..2 * V::LINES * n];
-            let lines = &mut work.lines[first * self.reach..][..V::LINES * self.reach];
-            self.fft.transform(
-                &mut work.between,
-                #[inline(always)]
-                |v: usize| {
-                    let functions = Complex::<V>::load(
+                    let functions = Complex::load(
+                        simd,
                         #[inline(always)]
                         |line| &functions[line * n + v],
                     );
                     let light = Complex {
-                        re: V::splat_lines(
+                        re: simd.splat_lines(
                             #[inline(always)]
                             |line| light[2 * line * n + v],
                         ),
-                        im: V::splat_lines(
+                        im: simd.splat_lines(
                             #[inline(always)]
                             |line| light[2 * line * n + n + v],
                         ),
                     };
-                    functions.times(light).exchanged()
+                    (functions * light).swapped()
                 },
                 #[inline(always)]
-                |v: usize, value: Complex<V>| {
-                    if v < self.reach {
-                        for line in 0..V::LINES {
-                            value.store(line, &mut lines[line * self.reach + v]);
+                |v: usize, value: Complex<S::Vector>| {
+                    if v < self.block_side {
+                        for line in 0..S::LINES {
+                            value.store(simd, line, &mut columns[line * self.block_side + v]);
                         }
                     }
                 },
@@ -341,49 +197,53 @@ impl Correlator {
         }
     }
 
-    /// The same along `u`, and where it belongs.
+    /// Transforms back along `u`, and writes the group's texels of one of `channels` channels.
     #[inline(always)]
-    fn collect<V: Vector>(
+    fn invert_along_u<S: Simd>(
         &self,
+        simd: S,
         group: usize,
         quads: usize,
         (channel, channels): (usize, usize),
-        work: &mut Workspace,
+        scratch: &mut CorrelationScratch,
     ) {
-        let begin = group * TOGETHER / QUAD;
-        let each = channels * quads;
-        let at = channel * quads + begin;
-        let quads = (quads - begin).min(TOGETHER / QUAD);
-        let seen: &mut [[f32; QUAD]] = bytemuck::cast_slice_mut(&mut work.seen);
-        let lines = &work.lines;
-        for first in (0..self.reach).step_by(V::LINES) {
+        let first_quad = group * GROUP / QUAD;
+        let texels_an_origin = channels * quads;
+        let offset = channel * quads + first_quad;
+        let quads = (quads - first_quad).min(GROUP / QUAD);
+        let response: &mut [[f32; QUAD]] = bytemuck::cast_slice_mut(&mut scratch.response);
+        let columns = &scratch.columns;
+        let last = self.block_side - 1;
+        for first in (0..self.block_side).step_by(S::LINES) {
             self.fft.transform(
-                &mut work.between,
+                simd,
+                &mut scratch.fft,
                 #[inline(always)]
                 |u: usize| {
                     Complex::load(
+                        simd,
                         #[inline(always)]
-                        |line| &lines[u * self.reach + (first + line).min(self.reach - 1)],
+                        |line| &columns[u * self.block_side + (first + line).min(last)],
                     )
                 },
                 #[inline(always)]
-                |u: usize, value: Complex<V>| {
-                    if u >= self.reach {
+                |u: usize, value: Complex<S::Vector>| {
+                    if u >= self.block_side {
                         return;
                     }
-                    let value = value.exchanged();
-                    for line in 0..V::LINES {
-                        let v = (first + line).min(self.reach - 1);
-                        let out = &mut seen[(v * self.reach + u) * each + at..][..quads];
+                    let value = value.swapped();
+                    for line in 0..S::LINES {
+                        let origin = (first + line).min(last) * self.block_side + u;
+                        let out = &mut response[origin * texels_an_origin + offset..][..quads];
                         if let ([re, im], []) = out.as_flattened_mut().as_chunks_mut() {
-                            value.re.store(line, re);
-                            value.im.store(line, im);
+                            simd.store(value.re, line, re);
+                            simd.store(value.im, line, im);
                             continue;
                         }
-                        let mut packed = Packed::default();
-                        value.store(line, &mut packed);
-                        let re = packed.re.as_chunks().0;
-                        let im = packed.im.as_chunks().0;
+                        let mut stored = ComplexLine::default();
+                        value.store(simd, line, &mut stored);
+                        let re = stored.re.as_chunks().0;
+                        let im = stored.im.as_chunks().0;
                         for (out, texel) in out.iter_mut().zip(re.iter().chain(im)) {
                             *out = *texel;
                         }
@@ -394,84 +254,35 @@ impl Correlator {
     }
 }
 
-/// What is beyond the middle of a line of a spectrum, from the first half of its opposite.
-#[inline(always)]
-fn mirror(opposite: &[f32], sign: f32, beyond: &mut [f32]) {
-    let middle = opposite.len() - 1;
-    for (value, opposite) in beyond.iter_mut().zip(opposite[1..middle].iter().rev()) {
-        *value = sign * opposite;
-    }
-}
-
-/// Blocks of lanes that the first half of a spectrum takes, its middle included.
-fn blocks(n: usize) -> usize {
-    (n / 2 + 1).div_ceil(LANES)
-}
-
-/// The side of transforms that takes the least work, of those that take no more memory than they
-/// may, or of the smallest there can be.
-fn side_for(rank: usize, window: usize, across: usize, down: usize) -> usize {
-    let reach = |n: usize| (n + 1).saturating_sub(window) as u64;
-    let memory = |n: usize| {
-        let values = (n * n) as u64 + CHANNELS as u64 * reach(n).pow(2);
-        values * rank as u64 * size_of::<f32>() as u64
-    };
-    let work = |n: usize| {
-        let squares = (across as u64).div_ceil(reach(n)) * (down as u64).div_ceil(reach(n));
-        squares.saturating_mul((n * n) as u64 * u64::from(n.ilog2()))
-    };
-    let mut possible = SIDES.into_iter().filter(|n| reach(*n) > 0);
-    let smallest = possible.next().unwrap_or(SIDES[SIDES.len() - 1]);
-    let larger = possible.filter(|n| memory(*n) <= MOST_MEMORY);
-    larger.fold(
-        smallest,
-        |best, n| if work(n) < work(best) { n } else { best },
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::relight::cpu::lanes::{Kind, Work};
+    use crate::relight::cpu::simd::{SimdKernel, SimdLevel};
+    use crate::transport::CHANNELS;
 
-    /// All channels of a square, through all functions.
-    struct Correlate<'a> {
+    /// Correlates all channels of a block.
+    struct CorrelateKernel<'a> {
         correlator: &'a Correlator,
         quads: usize,
         light: &'a [[f32; 4]],
-        seen: &'a mut Vec<[f32; QUAD]>,
+        response: &'a mut Vec<[f32; QUAD]>,
     }
 
-    impl Work for Correlate<'_> {
+    impl SimdKernel for CorrelateKernel<'_> {
         #[inline(always)]
-        fn run<V: Vector>(self) {
-            let row = |v: usize| &self.light[v * self.correlator.sees..];
-            let (channels, mut work) = ([0, 1, 2], self.correlator.workspace());
-            let seen = self
-                .correlator
-                .correlate::<V>(row, &channels, self.quads, &mut work);
-            *self.seen = seen.to_vec();
+        fn run<S: Simd>(self, simd: S) {
+            let row = |v: usize| &self.light[v * self.correlator.footprint..];
+            let mut scratch = self.correlator.scratch();
+            let response =
+                self.correlator
+                    .correlate(simd, row, &[0, 1, 2], self.quads, &mut scratch);
+            *self.response = response.to_vec();
         }
     }
 
     #[test]
-    fn sides_take_little_work_and_memory() {
-        assert_eq!(side_for(16, 15, 270, 270), 64);
-        assert_eq!(side_for(16, 15, 12, 12), 32);
-        // Of 64, squares of two origins each would take 2^32 operations.
-        assert_eq!(side_for(9, 63, 838, 836), 256);
-        for rank in [1, 1024] {
-            for window in (1..=63).step_by(2) {
-                let n = side_for(rank, window, 32_768 + window, 32_768 + window);
-                assert!(n >= window);
-                assert!(rank == 1 || n <= 64, "{window}: {n}");
-            }
-        }
-    }
-
-    #[test]
-    fn correlations_are_the_sums_they_stand_for() {
-        let number = |i: usize| ((i * 7919) % 1009) as f32 / 504.0 - 1.0;
+    fn correlations_match_the_sums() {
+        let test_value = |i: usize| ((i * 7919) % 1009) as f32 / 504.0 - 1.0;
         for (side, rank, span) in [
             (15, 16, 200),
             (1, 1, 20),
@@ -485,54 +296,61 @@ mod tests {
                 kernels: (0..rank)
                     .map(|k| {
                         (0..area)
-                            .map(|s| number(k * area + s) / side as f32)
+                            .map(|s| test_value(k * area + s) / side as f32)
                             .collect()
                     })
                     .collect(),
             };
             let window = Window::new(side as u32).unwrap();
             let correlator = Correlator::new(&basis, window, span, span);
-            let (reach, quads) = (correlator.reach(), correlator.quads());
-            let n = reach + side - 1;
+            let (block_side, quads) = (correlator.block_side(), correlator.quads());
+            let n = correlator.footprint;
             // One row is dark.
             let element = |i: usize| match i / n {
                 5 => [0.0; 4],
-                _ => std::array::from_fn(|c| number(4 * i + c).abs()),
+                _ => std::array::from_fn(|c| test_value(4 * i + c).abs()),
             };
             let light: Vec<[f32; 4]> = (0..n * n).map(element).collect();
-            let correlated = |kind: Kind, quads: usize| {
-                let mut seen = Vec::new();
-                kind.run(Correlate {
+            let correlate = |level: SimdLevel, quads: usize| {
+                let mut response = Vec::new();
+                level.run(CorrelateKernel {
                     correlator: &correlator,
                     quads,
                     light: &light,
-                    seen: &mut seen,
+                    response: &mut response,
                 });
-                seen
+                response
             };
-            let out = correlated(Kind::Plain, quads);
-            // The first of them are the same without the others.
+            let out = correlate(SimdLevel::Scalar(Scalar), quads);
+            // The first quads do not depend on the others.
             let fewer = quads.div_ceil(2);
             let first: Vec<_> = out
                 .chunks(quads)
                 .flat_map(|all| all[..fewer].to_vec())
                 .collect();
-            for kind in Kind::all() {
-                assert!(out == correlated(kind, quads), "{kind:?}");
-                assert!(first == correlated(kind, fewer), "{kind:?}");
+            for level in SimdLevel::available() {
+                assert!(out == correlate(level, quads), "{level:?}");
+                assert!(first == correlate(level, fewer), "{level:?}");
             }
-            for o in [0, 1, reach - 1, reach * reach / 2, reach * reach - 1] {
+            for o in [
+                0,
+                1,
+                block_side - 1,
+                block_side * block_side / 2,
+                block_side * block_side - 1,
+            ] {
                 for c in 0..CHANNELS {
                     for k in 0..rank {
                         let want: f64 = (0..area)
                             .map(|s| {
-                                let at = (o / reach + s / side) * n + o % reach + s % side;
+                                let at =
+                                    (o / block_side + s / side) * n + o % block_side + s % side;
                                 f64::from(basis.kernels[k][s]) * f64::from(light[at][c])
                             })
                             .sum();
                         let got = out[(o * CHANNELS + c) * quads + k / QUAD][k % QUAD];
-                        let off = (f64::from(got) - want).abs();
-                        assert!(off < 1e-5, "window {side}, origin {o}, {c}, {k}: {off}");
+                        let error = (f64::from(got) - want).abs();
+                        assert!(error < 1e-5, "window {side}, origin {o}, {c}, {k}: {error}");
                     }
                 }
             }

@@ -1,33 +1,26 @@
-//! Elements that a tile has besides its coefficients, or in their place.
+//! Direct pixels: `y_n = Σ_s τ_n(s) p(o_n + s)` over the window, in each channel.
 
-use crate::transport::{CHANNELS, DirectTile, TexelCode};
+use crate::transport::{CHANNELS, DirectTile};
 
-/// Σ over its window of `τ · light` of pixel `p` of a tile; `seen` is the light from the window's
-/// first element on, `stride` elements from row to row.
+/// The sum for pixel number `p` of a tile, slot by slot. `light` begins with the window's first element and has
+/// `stride` elements from row to row.
 #[inline(always)]
-pub fn sum(
+pub fn windowed_sum(
     tile: &DirectTile,
     p: usize,
-    seen: &[[f32; 4]],
-    side: usize,
+    light: &[[f32; 4]],
+    window: usize,
     stride: usize,
 ) -> [f32; CHANNELS] {
-    let codes = &tile.codes[p * side * side..(p + 1) * side * side];
-    let sum = accumulate(codes, seen, side, stride);
-    std::array::from_fn(|c| sum[c] * tile.step[c])
-}
-
-/// Σ of `code · light`, per channel, in row order.
-#[inline(always)]
-fn accumulate(codes: &[TexelCode], seen: &[[f32; 4]], side: usize, stride: usize) -> [f32; 4] {
+    let codes = &tile.codes[p * window * window..(p + 1) * window * window];
     let mut sum = [0.0f32; 4];
-    for (row, codes) in codes.chunks_exact(side).enumerate() {
-        let lights = &seen[row * stride..row * stride + side];
-        for (code, light) in codes.iter().zip(lights) {
+    for (row, codes) in codes.chunks_exact(window).enumerate() {
+        let elements = &light[row * stride..row * stride + window];
+        for (code, element) in codes.iter().zip(elements) {
             for c in 0..4 {
-                sum[c] += f32::from(code[c]) * light[c];
+                sum[c] += f32::from(code[c]) * element[c];
             }
         }
     }
-    sum
+    std::array::from_fn(|c| sum[c] * tile.step[c])
 }

@@ -1,27 +1,29 @@
-//! Discrete Fourier transforms of squares, several at once: one in each lane of a vector's lines.
+//! Forward discrete Fourier transforms `X(k) = Σ_i x(i) e^{-2πi·ik/n}` of `n` values, one transform in each lane
+//! of a vector.
 //!
-//! Stockham's algorithm in passes of radix four, and one of radix two where the side asks for it.
-//! Only the forward transform is there: the inverse is the same with real and imaginary parts
-//! exchanged, before and after.
+//! Stockham's algorithm: passes of radix four, and a last one of radix two where `n` is not a power of four. It
+//! needs no bit reversal, and lanes never mix. The inverse transform is the forward one with real and imaginary
+//! parts swapped before and after ([`Complex::swapped`]), times `1/n`.
 
 use std::f64::consts::TAU;
+use std::ops::{Add, Mul, Sub};
 
-use super::lanes::{LANES, MOST_LINES, Vector};
+use super::simd::{LANES, MAX_LINES, Simd, Vector};
 use crate::relight::math;
 
-/// One complex number of each transform of a line, as it lies in memory.
+/// A line of complex values in memory: one of each of [`LANES`] transforms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-#[cfg_attr(not(target_arch = "wasm32"), repr(align(64)))] // a cache's line, which is as many
+#[cfg_attr(not(target_arch = "wasm32"), repr(align(64)))] // its size, and a cache line's
 #[cfg_attr(target_arch = "wasm32", repr(align(32)))]
-pub struct Packed {
+pub struct ComplexLine {
     /// Real parts.
     pub re: [f32; LANES],
     /// Imaginary parts.
     pub im: [f32; LANES],
 }
 
-/// One complex number of each transform, as it is worked on.
+/// A vector of complex values.
 #[derive(Clone, Copy, Debug)]
 pub struct Complex<V> {
     /// Real parts.
@@ -31,83 +33,56 @@ pub struct Complex<V> {
 }
 
 impl<V: Vector> Complex<V> {
-    /// Loads lines.
+    /// Reads each line from memory.
     #[inline(always)]
-    pub fn load<'a>(line: impl Fn(usize) -> &'a Packed) -> Self {
+    pub fn load<'a, S: Simd<Vector = V>>(simd: S, line: impl Fn(usize) -> &'a ComplexLine) -> Self {
         Self {
-            re: V::load(
+            re: simd.load(
                 #[inline(always)]
                 |i| &line(i).re,
             ),
-            im: V::load(
+            im: simd.load(
                 #[inline(always)]
                 |i| &line(i).im,
             ),
         }
     }
 
-    /// Stores a line.
+    /// Writes line number `line` to memory.
     #[inline(always)]
-    pub fn store(self, line: usize, to: &mut Packed) {
-        self.re.store(line, &mut to.re);
-        self.im.store(line, &mut to.im);
+    pub fn store<S: Simd<Vector = V>>(self, simd: S, line: usize, to: &mut ComplexLine) {
+        simd.store(self.re, line, &mut to.re);
+        simd.store(self.im, line, &mut to.im);
     }
 
-    /// What was kept.
+    /// Reads a spilled vector.
     #[inline(always)]
-    pub fn kept([re, im]: &[V::Kept; 2]) -> Self {
+    pub fn unspill<S: Simd<Vector = V>>(simd: S, [re, im]: &[S::Spilled; 2]) -> Self {
         Self {
-            re: V::kept(re),
-            im: V::kept(im),
+            re: simd.unspill(re),
+            im: simd.unspill(im),
         }
     }
 
-    /// To be kept.
+    /// Spills the vector.
     #[inline(always)]
-    pub fn keep(self, [re, im]: &mut [V::Kept; 2]) {
-        self.re.keep(re);
-        self.im.keep(im);
+    pub fn spill<S: Simd<Vector = V>>(self, simd: S, [re, im]: &mut [S::Spilled; 2]) {
+        simd.spill(self.re, re);
+        simd.spill(self.im, im);
     }
 
-    /// The sum.
+    /// The same complex value in each lane.
     #[inline(always)]
-    pub fn plus(self, other: Self) -> Self {
+    pub fn splat<S: Simd<Vector = V>>(simd: S, [re, im]: [f32; 2]) -> Self {
         Self {
-            re: self.re.plus(other.re),
-            im: self.im.plus(other.im),
+            re: simd.splat(re),
+            im: simd.splat(im),
         }
     }
 
-    /// The difference.
+    /// Real and imaginary parts swapped.
     #[inline(always)]
-    pub fn minus(self, other: Self) -> Self {
-        Self {
-            re: self.re.minus(other.re),
-            im: self.im.minus(other.im),
-        }
-    }
-
-    /// The product.
-    #[inline(always)]
-    pub fn times(self, Self { re, im }: Self) -> Self {
-        Self {
-            re: self.re.times(re).minus(self.im.times(im)),
-            im: self.re.times(im).plus(self.im.times(re)),
-        }
-    }
-
-    /// The same complex number in each lane.
-    #[inline(always)]
-    pub fn splat([re, im]: [f32; 2]) -> Self {
-        Self {
-            re: V::splat(re),
-            im: V::splat(im),
-        }
-    }
-
-    /// Real and imaginary parts exchanged.
-    #[inline(always)]
-    pub fn exchanged(self) -> Self {
+    pub fn swapped(self) -> Self {
         Self {
             re: self.im,
             im: self.re,
@@ -115,52 +90,88 @@ impl<V: Vector> Complex<V> {
     }
 }
 
-/// Transforms of `side` numbers, a power of two of at least 16.
+impl<V: Vector> Add for Complex<V> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self {
+            re: self.re + other.re,
+            im: self.im + other.im,
+        }
+    }
+}
+
+impl<V: Vector> Sub for Complex<V> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self {
+            re: self.re - other.re,
+            im: self.im - other.im,
+        }
+    }
+}
+
+impl<V: Vector> Mul for Complex<V> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, Self { re, im }: Self) -> Self {
+        Self {
+            re: self.re * re - self.im * im,
+            im: self.re * im + self.im * re,
+        }
+    }
+}
+
+/// Transforms of `side` values, a power of two of at least 16.
 #[derive(Clone, Debug)]
 pub struct Fft {
     side: usize,
-    /// `e^{-2πip/n}`, its square and cube, for each `p` below `n/4` of each pass of radix four; `n`
-    /// is the side, then a quarter of it, and so on.
+    /// Powers 1, 2 and 3 of `e^{-2πip/n}` for each `p` below `n/4`, pass by pass; `n` is the side in the first
+    /// pass and a quarter of the last `n` in each further one.
     twiddles: Vec<[[f32; 2]; 3]>,
 }
 
-/// Numbers that are kept, of vectors of any kind.
+/// Memory for spilled complex vectors of any instruction set.
 #[derive(Debug)]
-pub struct Kept(Vec<Packed>);
+pub struct SpillBuffer(Vec<ComplexLine>);
 
-impl Kept {
-    /// For so many complex numbers.
+impl SpillBuffer {
+    /// Room for `count` complex vectors.
     pub fn new(count: usize) -> Self {
-        Self(vec![Packed::default(); count * MOST_LINES])
+        Self(vec![ComplexLine::default(); count * MAX_LINES])
     }
 
-    /// As vectors of one kind have them; not fewer than were asked for.
+    /// The memory as spilled vectors of one instruction set: at least as many as asked for.
     #[inline(always)]
-    pub fn of<V: Vector>(&mut self) -> &mut [[V::Kept; 2]] {
-        const { assert!(V::LINES <= MOST_LINES) };
+    pub fn vectors<S: Simd>(&mut self) -> &mut [[S::Spilled; 2]] {
+        const { assert!(S::LINES <= MAX_LINES) };
         bytemuck::cast_slice_mut(&mut self.0)
     }
 }
 
-/// Numbers between the passes.
+/// Values between two passes.
 #[derive(Debug)]
-pub struct Between {
-    now: Kept,
-    next: Kept,
+pub struct FftScratch {
+    current: SpillBuffer,
+    next: SpillBuffer,
 }
 
-impl Between {
-    /// For transforms of `side` numbers.
+impl FftScratch {
+    /// For transforms of `side` values.
     pub fn new(side: usize) -> Self {
         Self {
-            now: Kept::new(side),
-            next: Kept::new(side),
+            current: SpillBuffer::new(side),
+            next: SpillBuffer::new(side),
         }
     }
 }
 
 impl Fft {
-    /// Prepares transforms of `side` numbers, which is to be a power of two of at least 16.
+    /// Plans transforms of `side` values, a power of two of at least 16.
     pub fn new(side: usize) -> Self {
         let mut twiddles = Vec::new();
         let mut n = side;
@@ -177,134 +188,140 @@ impl Fft {
         Self { side, twiddles }
     }
 
-    /// Numbers that one transform takes.
+    /// Values that a transform takes.
     pub fn side(&self) -> usize {
         self.side
     }
 
-    /// Transforms the numbers that `take` has, and `put`s what becomes of them, each once, in any order.
+    /// Transforms the values `load(0)` to `load(side - 1)`. Calls `store` once with each `k` and `X(k)`, in any
+    /// order.
     #[inline(always)]
-    pub fn transform<V: Vector>(
+    pub fn transform<S: Simd>(
         &self,
-        between: &mut Between,
-        take: impl Fn(usize) -> Complex<V>,
-        mut put: impl FnMut(usize, Complex<V>),
+        simd: S,
+        scratch: &mut FftScratch,
+        load: impl Fn(usize) -> Complex<S::Vector>,
+        mut store: impl FnMut(usize, Complex<S::Vector>),
     ) {
-        let (mut now, mut next) = (between.now.of::<V>(), between.next.of::<V>());
+        let mut current = scratch.current.vectors::<S>();
+        let mut next = scratch.next.vectors::<S>();
         let quarter = self.side / 4;
         let (first, mut twiddles) = self.twiddles.split_at(quarter);
-        let (out, _) = now[..self.side].as_chunks_mut::<4>();
+        let (out, _) = current[..self.side].as_chunks_mut::<4>();
         for (p, (out, twiddles)) in out.iter_mut().zip(first).enumerate() {
-            let from = [
-                take(p),
-                take(p + quarter),
-                take(p + 2 * quarter),
-                take(p + 3 * quarter),
+            let values = [
+                load(p),
+                load(p + quarter),
+                load(p + 2 * quarter),
+                load(p + 3 * quarter),
             ];
             let [w, x, y, z] = out;
-            turned(butterfly(from), twiddles, [w, x, y, z]);
+            spill_twiddled(simd, butterfly(values), twiddles, [w, x, y, z]);
         }
         let (mut n, mut stride) = (quarter, 4);
         while n > 4 {
-            let (here, later) = twiddles.split_at(n / 4);
-            pass::<V>(&now[..self.side], &mut next[..self.side], here, stride);
-            std::mem::swap(&mut now, &mut next);
-            twiddles = later;
+            let (pass_twiddles, rest) = twiddles.split_at(n / 4);
+            let (from, to) = (&current[..self.side], &mut next[..self.side]);
+            radix_four_pass(simd, from, to, pass_twiddles, stride);
+            std::mem::swap(&mut current, &mut next);
+            twiddles = rest;
             n /= 4;
             stride *= 4;
         }
-        // The last takes no turns.
+        // All twiddles of the last pass are 1.
         if n == 4 {
-            let [a, b, c, d] = parts(&now[..self.side]);
+            let [a, b, c, d] = quarters(&current[..self.side]);
             for q in 0..stride {
-                let [a, b, c, d] = butterfly(four::<V>([&a[q], &b[q], &c[q], &d[q]]));
-                put(q, a);
-                put(q + stride, b);
-                put(q + 2 * stride, c);
-                put(q + 3 * stride, d);
+                let [a, b, c, d] = butterfly(unspill_four(simd, [&a[q], &b[q], &c[q], &d[q]]));
+                store(q, a);
+                store(q + stride, b);
+                store(q + 2 * stride, c);
+                store(q + 3 * stride, d);
             }
         } else {
-            let (low, high) = now[..self.side].split_at(stride);
+            let (low, high) = current[..self.side].split_at(stride);
             for (q, (low, high)) in low.iter().zip(high).enumerate() {
-                let (low, high) = (Complex::<V>::kept(low), Complex::kept(high));
-                put(q, low.plus(high));
-                put(q + stride, low.minus(high));
+                let (low, high) = (Complex::unspill(simd, low), Complex::unspill(simd, high));
+                store(q, low + high);
+                store(q + stride, low - high);
             }
         }
     }
 }
 
-/// Four numbers transformed.
+/// The transform of four values.
 #[inline(always)]
 fn butterfly<V: Vector>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
-    let (sum, difference) = (a.plus(c), a.minus(c));
-    let (other, apart) = (b.plus(d), b.minus(d));
+    let (even_sum, even_difference) = (a + c, a - c);
+    let (odd_sum, odd_difference) = (b + d, b - d);
     [
-        sum.plus(other),
-        // Less, and more, the imaginary unit times what is apart.
+        even_sum + odd_sum,
+        // even_difference - i · odd_difference
         Complex {
-            re: difference.re.plus(apart.im),
-            im: difference.im.minus(apart.re),
+            re: even_difference.re + odd_difference.im,
+            im: even_difference.im - odd_difference.re,
         },
-        sum.minus(other),
+        even_sum - odd_sum,
+        // even_difference + i · odd_difference
         Complex {
-            re: difference.re.minus(apart.im),
-            im: difference.im.plus(apart.re),
+            re: even_difference.re - odd_difference.im,
+            im: even_difference.im + odd_difference.re,
         },
     ]
 }
 
-/// Four numbers that were kept.
 #[inline(always)]
-fn four<V: Vector>([a, b, c, d]: [&[V::Kept; 2]; 4]) -> [Complex<V>; 4] {
+fn unspill_four<S: Simd>(simd: S, [a, b, c, d]: [&[S::Spilled; 2]; 4]) -> [Complex<S::Vector>; 4] {
     [
-        Complex::kept(a),
-        Complex::kept(b),
-        Complex::kept(c),
-        Complex::kept(d),
+        Complex::unspill(simd, a),
+        Complex::unspill(simd, b),
+        Complex::unspill(simd, c),
+        Complex::unspill(simd, d),
     ]
 }
 
-/// Keeps four numbers, turned.
+/// Spills four values, times 1 and the three twiddles.
 #[inline(always)]
-fn turned<V: Vector>(
-    [a, b, c, d]: [Complex<V>; 4],
+fn spill_twiddled<S: Simd>(
+    simd: S,
+    [a, b, c, d]: [Complex<S::Vector>; 4],
     [one, two, three]: &[[f32; 2]; 3],
-    [w, x, y, z]: [&mut [V::Kept; 2]; 4],
+    [w, x, y, z]: [&mut [S::Spilled; 2]; 4],
 ) {
-    a.keep(w);
-    b.times(Complex::splat(*one)).keep(x);
-    c.times(Complex::splat(*two)).keep(y);
-    d.times(Complex::splat(*three)).keep(z);
+    a.spill(simd, w);
+    (b * Complex::splat(simd, *one)).spill(simd, x);
+    (c * Complex::splat(simd, *two)).spill(simd, y);
+    (d * Complex::splat(simd, *three)).spill(simd, z);
 }
 
-/// Four equal parts.
 #[inline(always)]
-fn parts<T>(values: &[T]) -> [&[T]; 4] {
+fn quarters<T>(values: &[T]) -> [&[T]; 4] {
     let (low, high) = values.split_at(values.len() / 2);
     let ((a, b), (c, d)) = (low.split_at(low.len() / 2), high.split_at(high.len() / 2));
     [a, b, c, d]
 }
 
-/// A pass between the first and the last, `stride` transforms interleaved.
+/// A pass between the first and the last, of `stride` interleaved transforms.
 #[inline(always)]
-fn pass<V: Vector>(
-    from: &[[V::Kept; 2]],
-    to: &mut [[V::Kept; 2]],
+fn radix_four_pass<S: Simd>(
+    simd: S,
+    from: &[[S::Spilled; 2]],
+    to: &mut [[S::Spilled; 2]],
     twiddles: &[[[f32; 2]; 3]],
     stride: usize,
 ) {
-    let [a, b, c, d] = parts(from).map(|part| part.chunks_exact(stride));
-    let each = a.zip(b).zip(c.zip(d)).zip(to.chunks_exact_mut(4 * stride));
-    for ((((a, b), (c, d)), to), twiddles) in each.zip(twiddles) {
+    let [a, b, c, d] = quarters(from).map(|part| part.chunks_exact(stride));
+    let groups = a.zip(b).zip(c.zip(d)).zip(to.chunks_exact_mut(4 * stride));
+    for ((((a, b), (c, d)), to), twiddles) in groups.zip(twiddles) {
         let (low, high) = to.split_at_mut(2 * stride);
         let ((w, x), (y, z)) = (low.split_at_mut(stride), high.split_at_mut(stride));
         let (b, c, d) = (&b[..a.len()], &c[..a.len()], &d[..a.len()]);
         let (w, x) = (&mut w[..a.len()], &mut x[..a.len()]);
         let (y, z) = (&mut y[..a.len()], &mut z[..a.len()]);
         for q in 0..a.len() {
-            let out = butterfly(four::<V>([&a[q], &b[q], &c[q], &d[q]]));
-            turned(out, twiddles, [&mut w[q], &mut x[q], &mut y[q], &mut z[q]]);
+            let out = butterfly(unspill_four(simd, [&a[q], &b[q], &c[q], &d[q]]));
+            let to = [&mut w[q], &mut x[q], &mut y[q], &mut z[q]];
+            spill_twiddled(simd, out, twiddles, to);
         }
     }
 }
@@ -312,78 +329,78 @@ fn pass<V: Vector>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::relight::cpu::lanes::{Kind, Work};
+    use crate::relight::cpu::simd::{Scalar, SimdKernel, SimdLevel};
 
-    /// Transforms two lines, by whatever vectors there are.
-    struct Transform<'a> {
+    /// Transforms two lines.
+    struct TransformKernel<'a> {
         fft: &'a Fft,
-        given: &'a [[Packed; 2]],
-        spectrum: &'a mut [[Option<Packed>; 2]],
+        values: &'a [[ComplexLine; 2]],
+        spectrum: &'a mut [[Option<ComplexLine>; 2]],
     }
 
-    impl Work for Transform<'_> {
+    impl SimdKernel for TransformKernel<'_> {
         #[inline(always)]
-        fn run<V: Vector>(self) {
-            let between = &mut Between::new(self.given.len());
-            for first in (0..2).step_by(V::LINES) {
-                let put = |k: usize, value: Complex<V>| {
-                    for line in 0..V::LINES {
-                        let mut packed = Packed::default();
-                        value.store(line, &mut packed);
-                        assert!(self.spectrum[k][first + line].replace(packed).is_none());
+        fn run<S: Simd>(self, simd: S) {
+            let scratch = &mut FftScratch::new(self.values.len());
+            for first in (0..2).step_by(S::LINES) {
+                let store = |k: usize, value: Complex<S::Vector>| {
+                    for line in 0..S::LINES {
+                        let mut stored = ComplexLine::default();
+                        value.store(simd, line, &mut stored);
+                        assert!(self.spectrum[k][first + line].replace(stored).is_none());
                     }
                 };
-                let take = |i: usize| Complex::load(|line| &self.given[i][first + line]);
-                self.fft.transform(between, take, put);
+                let load = |i: usize| Complex::load(simd, |line| &self.values[i][first + line]);
+                self.fft.transform(simd, scratch, load, store);
             }
         }
     }
 
-    fn number(i: usize, lane: usize) -> f32 {
+    fn test_value(i: usize, lane: usize) -> f32 {
         ((i * 7919 + lane * 104_729) % 1009) as f32 / 504.0 - 1.0
     }
 
     #[test]
-    fn transforms_are_what_they_are_defined_to_be() {
+    fn transforms_match_the_definition() {
         for side in [16, 32, 64, 128, 256] {
             let fft = Fft::new(side);
-            let given: Vec<[Packed; 2]> = (0..side)
+            let values: Vec<[ComplexLine; 2]> = (0..side)
                 .map(|i| {
-                    [0, 1].map(|line| Packed {
-                        re: std::array::from_fn(|lane| number(i + 77 * line, lane)),
-                        im: std::array::from_fn(|lane| number(i + 500 + 77 * line, lane)),
+                    [0, 1].map(|line| ComplexLine {
+                        re: std::array::from_fn(|lane| test_value(i + 77 * line, lane)),
+                        im: std::array::from_fn(|lane| test_value(i + 500 + 77 * line, lane)),
                     })
                 })
                 .collect();
-            let transformed = |kind: Kind| {
+            let transform = |level: SimdLevel| {
                 let mut spectrum = vec![[None; 2]; side];
-                kind.run(Transform {
+                level.run(TransformKernel {
                     fft: &fft,
-                    given: &given,
+                    values: &values,
                     spectrum: &mut spectrum,
                 });
                 spectrum
             };
-            let spectrum = transformed(Kind::Plain);
-            for kind in Kind::all() {
-                assert_eq!(transformed(kind), spectrum, "{kind:?}");
+            let spectrum = transform(SimdLevel::Scalar(Scalar));
+            for level in SimdLevel::available() {
+                assert_eq!(transform(level), spectrum, "{level:?}");
             }
             for line in 0..2 {
                 for k in 0..side {
                     for lane in 0..LANES {
                         let (mut re, mut im) = (0.0f64, 0.0);
-                        for (i, value) in given.iter().enumerate() {
+                        for (i, value) in values.iter().enumerate() {
                             let angle = -TAU * (i * k % side) as f64 / side as f64;
                             let value = [value[line].re[lane], value[line].im[lane]].map(f64::from);
                             re += value[0] * angle.cos() - value[1] * angle.sin();
                             im += value[0] * angle.sin() + value[1] * angle.cos();
                         }
                         let got = spectrum[k][line].unwrap();
-                        let off =
+                        let error =
                             (f64::from(got.re[lane]) - re).hypot(f64::from(got.im[lane]) - im);
                         assert!(
-                            off < 1e-5 * (side as f64).sqrt(),
-                            "{side}, {k}, {lane}: {off}"
+                            error < 1e-5 * (side as f64).sqrt(),
+                            "{side}, {k}, {lane}: {error}"
                         );
                     }
                 }

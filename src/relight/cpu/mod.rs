@@ -1,34 +1,37 @@
-//! Relighting on the CPU: square by square of the light plane, and of the squares only those in
-//! which the light has changed.
+//! Relighting on the CPU: the picture `y = pT` in linear light, single precision.
 //!
-//! A square's light is correlated with the basis ([`correlation`]), and the pixels that look at the
-//! square are combined from that while it is in the cache ([`combine`]). Elements that a tile has
-//! besides are summed one by one ([`direct`]).
+//! Pixels are grouped by *light block* ([`light_blocks`]), a square of window origins. Where the light under a
+//! block has changed, the block's basis response is computed ([`correlation`]) and combined with the pixels'
+//! coefficients while it is in the cache ([`combine`]); the functions of direct tiles are summed slot by slot
+//! ([`direct`]). Other blocks keep their pixels. Blocks are independent, so threads share them.
 //!
-//! Single precision: what is seen of a square is exact to about a millionth of its brightest element.
+//! A basis response is exact to about a millionth of the block's brightest element.
 
+mod block_size;
 mod combine;
 mod correlation;
 mod direct;
 mod fft;
-mod lanes;
-mod padded;
-mod squares;
+mod light_blocks;
+mod light_spectrum;
+mod padded_light;
+mod simd;
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
-use super::display::Encoder;
-use super::{Display, Light, LinearPicture, Rgba8Picture, Tint, detailed};
+use super::output_transform::OutputEncoder;
+use super::{Light, LightChroma, LinearPicture, OutputTransform, Rgba8Picture, used_count};
 use crate::executor::Executor;
 use crate::transport::{CHANNELS, Tile, Transport};
-use correlation::{Correlator, Workspace};
-use lanes::{Vector, Work, widest};
-pub use padded::LightRows;
-use padded::PaddedLight;
-use squares::{Run, Square, Squares};
+use combine::{BlockResponse, combine};
+use correlation::{CorrelationScratch, Correlator};
+use light_blocks::{DIRECT_BLOCK_SIDE, LightBlock, LightBlocks, OriginBounds, PixelSpan};
+pub use padded_light::LightRows;
+use padded_light::PaddedLight;
+use simd::{Simd, SimdKernel, SimdLevel};
 
-/// The kernel this build uses.
+/// The instructions that this build relights by.
 pub const KERNEL: &str = if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
     "simd128"
 } else if cfg!(target_arch = "wasm32") {
@@ -37,266 +40,286 @@ pub const KERNEL: &str = if cfg!(all(target_arch = "wasm32", target_feature = "s
     "native"
 };
 
-/// One photograph, ready to be relit.
+/// Rows of the picture that are encoded at once.
+pub const STRIP_ROWS: usize = 64;
+
+/// A transport and its picture under the last light.
 #[derive(Debug)]
-pub struct Relighter {
+pub struct CpuRelighter {
     transport: Arc<Transport>,
-    /// None where no tile has coefficients.
+    /// `None` where no tile is factored.
     correlator: Option<Correlator>,
-    squares: Squares,
+    blocks: LightBlocks,
+    /// Elements along the side of a block's footprint.
+    footprint: usize,
     light: PaddedLight,
-    /// Of each square's pixels; in a lock of its own for threads to share the squares out.
+    /// The picture, block by block; locked one by one, as threads share the blocks.
     linear: Vec<RwLock<Vec<[f32; CHANNELS]>>>,
-    /// Of components, in fours, those that are used.
+    /// Quads of components in use.
     quads: usize,
-    /// Whether all has to be done anew, whatever of the light has changed.
-    stale: bool,
-    /// Of threads that are not at work, kept from frame to frame.
-    spare: Mutex<Vec<Workspace>>,
+    /// Whether all blocks are out of date, whatever has changed in the light.
+    is_stale: bool,
+    /// Memory of threads that are idle, kept from frame to frame.
+    scratch_pool: Mutex<Vec<CorrelationScratch>>,
 }
 
-impl Relighter {
-    /// Plans the work. All is dark until the first light.
+impl CpuRelighter {
+    /// Prepares a transport. The picture is dark until the first light.
     pub fn new(transport: Arc<Transport>) -> Self {
         let geometry = &transport.geometry;
-        let bounds = squares::bounds(geometry);
-        let factored = transport
-            .tiles
-            .iter()
-            .any(|tile| !tile.coefficients.is_dark());
-        let (across, down) = (bounds.columns.len(), bounds.rows.len());
+        let window = geometry.window.side() as usize;
+        let bounds = OriginBounds::new(geometry);
+        let is_factored = transport.tiles.iter().any(is_factored);
+        let (columns, rows) = (bounds.columns.len(), bounds.rows.len());
         let correlator =
-            factored.then(|| Correlator::new(&transport.basis, geometry.window, across, down));
-        let reach = correlator
+            is_factored.then(|| Correlator::new(&transport.basis, geometry.window, columns, rows));
+        let side = correlator
             .as_ref()
-            .map_or(squares::DIRECT_REACH, Correlator::reach);
-        let squares = Squares::new(&transport, &bounds, reach);
-        let light = PaddedLight::new(
-            geometry.light,
-            squares.origin,
-            squares.seen(geometry.window.side() as usize),
-        );
-        let dark = |square: &Square| RwLock::new(vec![[0.0; CHANNELS]; square.places.len()]);
+            .map_or(DIRECT_BLOCK_SIDE, Correlator::block_side);
+        let blocks = LightBlocks::new(&transport, &bounds, side);
+        let light = PaddedLight::new(geometry.light, blocks.origin, blocks.footprint(window));
+        let dark = |block: &LightBlock| RwLock::new(vec![[0.0; CHANNELS]; block.offsets.len()]);
         Self {
-            linear: squares.all.iter().map(dark).collect(),
+            linear: blocks.blocks.iter().map(dark).collect(),
             quads: correlator.as_ref().map_or(0, Correlator::quads),
-            stale: false,
+            is_stale: false,
+            footprint: side + window - 1,
             correlator,
-            squares,
-            spare: Mutex::default(),
+            blocks,
+            scratch_pool: Mutex::default(),
             light,
             transport,
         }
     }
 
-    /// What is relit.
+    /// The transport.
     pub fn transport(&self) -> &Transport {
         &self.transport
     }
 
-    /// Uses the first of the components only, a share of them of 0 to 1, from the next light or
-    /// [`update`](Self::update) on. They come in fours, of which there is always one.
-    pub fn set_detail(&mut self, share: f32) {
+    /// Sets the share of the components in use, 0 to 1, rounded up to quads; at least one quad is used. Takes
+    /// effect with the next light or [`update`](Self::update).
+    pub fn set_quality(&mut self, quality: f32) {
         let all = self.correlator.as_ref().map_or(0, Correlator::quads);
-        let quads = detailed(all, share);
-        self.stale |= quads != self.quads;
+        let quads = used_count(all, quality);
+        self.is_stale |= quads != self.quads;
         self.quads = quads;
     }
 
-    /// Takes a light in the place of the last one; does only what its changes ask for.
+    /// Relights under a light. Blocks whose light has not changed keep their pixels.
     ///
     /// # Panics
     /// If the light's extent is not the transport's.
     pub fn relight(&mut self, light: &Light, executor: &impl Executor) {
         let extent = self.transport.geometry.light;
-        assert_eq!(light.extent(), extent, "a light of another extent");
+        assert_eq!(light.extent(), extent, "extent of the light");
         self.relight_rows(light, executor);
     }
 
-    /// Rows of the light that any pixel sees.
+    /// Rows of the light plane that any window covers.
     pub fn light_rows(&self) -> Range<u32> {
-        self.light.rows_seen()
+        self.light.light_rows()
     }
 
-    /// [`relight`](Self::relight) by each of the [`light_rows`](Self::light_rows), asked for from the
-    /// first on.
+    /// [`relight`](Self::relight) under a light that is read row by row: each of the
+    /// [`light_rows`](Self::light_rows) once, from the first on.
     ///
     /// # Panics
-    /// If a row has another width.
+    /// If a row has another width than the light plane.
     pub fn relight_rows(&mut self, light: impl LightRows, executor: &impl Executor) {
-        self.light.put(light);
+        self.light.update(light);
         self.update(executor);
     }
 
-    /// Does what [`set_detail`](Self::set_detail) asks for under the light that is there.
+    /// Relights the blocks that are out of date, under the last light.
     pub fn update(&mut self, executor: &impl Executor) {
-        let side = self.squares.reach + self.transport.geometry.window.side() as usize - 1;
-        let stale: Vec<usize> = (0..self.squares.all.len())
+        let stale: Vec<usize> = (0..self.blocks.blocks.len())
             .filter(|&i| {
-                let [u, v] = self.squares.all[i].at;
-                self.stale || self.light.changed(u..u + side, v..v + side)
+                let [u, v] = self.blocks.blocks[i].at;
+                let (columns, rows) = (u..u + self.footprint, v..v + self.footprint);
+                self.is_stale || self.light.has_changed(columns, rows)
             })
             .collect();
         let this = &*self;
+        let level = SimdLevel::widest();
         executor.map(stale.len(), |i| {
-            let mut work = lock(&this.spare).pop();
-            widest(SquareWork {
+            let mut scratch = lock(&this.scratch_pool).pop();
+            level.run(BlockKernel {
                 relighter: this,
-                square: stale[i],
-                work: &mut work,
+                block: stale[i],
+                scratch: &mut scratch,
             });
-            lock(&this.spare).extend(work);
+            lock(&this.scratch_pool).extend(scratch);
         });
-        self.stale = false;
-        self.light.settle();
+        self.is_stale = false;
+        self.light.clear_changes();
     }
 
     #[inline(always)]
-    fn relight_square<V: Vector>(&self, i: usize, work: &mut Option<Workspace>) {
-        let square = &self.squares.all[i];
-        let mut linear = self.linear[i]
+    fn relight_block<S: Simd>(
+        &self,
+        simd: S,
+        index: usize,
+        scratch: &mut Option<CorrelationScratch>,
+    ) {
+        let block = &self.blocks.blocks[index];
+        let mut linear = self.linear[index]
             .write()
             .unwrap_or_else(PoisonError::into_inner);
-        let [u, v] = square.at;
-        let side = self.squares.reach + self.transport.geometry.window.side() as usize - 1;
-        let rows = (v..v + side).map(|v| &self.light.row(u, v)[..side]);
-        let tint = Tint::of(rows);
-        let is_factored = |run: &Run| !self.tile(run).coefficients.is_dark();
-        if tint.is_dark() {
+        let [u, v] = block.at;
+        let row = |r: usize| &self.light.elements_from(u, v + r)[..self.footprint];
+        let chroma = LightChroma::of_rows((0..self.footprint).map(row));
+        if chroma.is_dark() {
             linear.fill([0.0; CHANNELS]);
             return;
         }
-        for run in square.runs.iter().filter(|run| !is_factored(run)) {
-            linear[run.begin..run.begin + run.length].fill([0.0; CHANNELS]);
-        }
-        if let Some(correlator) = &self.correlator
-            && square.runs.iter().any(is_factored)
-        {
-            let work = work.get_or_insert_with(|| correlator.workspace());
-            let quads = self.quads;
-            let row = |r: usize| &self.light.row(u, v + r)[..side];
-            let texels = correlator.correlate::<V>(row, tint.channels(), quads, work);
-            let from = combine::Seen {
-                texels,
-                quads,
-                tint,
-            };
-            for run in square.runs.iter().filter(|run| is_factored(run)) {
-                let tile = &self.tile(run).coefficients;
-                let places = &square.places[run.begin..run.begin + run.length];
-                let linear = &mut linear[run.begin..run.begin + run.length];
-                combine::combine::<V>(tile, run.first, places, from, linear);
+        let mut has_factored = false;
+        for span in &block.spans {
+            match is_factored(self.tile(span)) {
+                true => has_factored = true,
+                false => linear[span.range()].fill([0.0; CHANNELS]),
             }
         }
+        if let Some(correlator) = &self.correlator
+            && has_factored
+        {
+            let scratch = scratch.get_or_insert_with(|| correlator.scratch());
+            let quads = self.quads;
+            let texels = correlator.correlate(simd, row, chroma.channels(), quads, scratch);
+            let response = BlockResponse {
+                texels,
+                quads,
+                chroma,
+            };
+            for span in &block.spans {
+                let tile = self.tile(span);
+                if is_factored(tile) {
+                    let offsets = &block.offsets[span.range()];
+                    let out = &mut linear[span.range()];
+                    combine(simd, &tile.coefficients, span.first, offsets, response, out);
+                }
+            }
+        }
+        self.add_direct(block, &mut linear);
+    }
+
+    #[inline(always)]
+    fn add_direct(&self, block: &LightBlock, linear: &mut [[f32; CHANNELS]]) {
+        let [u, v] = block.at;
         let window = self.transport.geometry.window.side() as usize;
-        for run in &square.runs {
-            let tile = &self.tile(run).functions;
+        for span in &block.spans {
+            let tile = &self.tile(span).functions;
             if tile.is_dark() {
                 continue;
             }
-            for at in 0..run.length {
-                let place = usize::from(square.places[run.begin + at]);
-                let (column, row) = (place % self.squares.reach, place / self.squares.reach);
-                let seen = self.light.elements_from(u + column, v + row);
-                let sum = direct::sum(tile, run.first + at, seen, window, self.light.stride());
-                let y = &mut linear[run.begin + at];
+            for i in 0..span.length {
+                let offset = usize::from(block.offsets[span.begin + i]);
+                let (column, row) = (offset % self.blocks.side, offset / self.blocks.side);
+                let light = self.light.elements_from(u + column, v + row);
+                let stride = self.light.stride();
+                let sum = direct::windowed_sum(tile, span.first + i, light, window, stride);
+                let y = &mut linear[span.begin + i];
                 (0..CHANNELS).for_each(|c| y[c] += sum[c]);
             }
         }
     }
 
-    fn tile(&self, run: &Run) -> &Tile {
-        &self.transport.tiles[run.tile]
+    fn tile(&self, span: &PixelSpan) -> &Tile {
+        &self.transport.tiles[span.tile]
     }
 
-    /// The picture, in units of the measurement.
+    /// The picture in linear light, in units of the measurement.
     pub fn linear(&self) -> LinearPicture {
-        let mut picture = LinearPicture::black(self.transport.geometry.camera);
         let camera = self.transport.geometry.camera;
-        self.for_each_run(0..camera.height, |run, linear| {
-            let at = camera.index(run.pixel);
-            for (y, &[r, g, b]) in picture.pixels[at..at + run.length].iter_mut().zip(linear) {
+        let mut picture = LinearPicture::black(camera);
+        self.for_each_span(0..camera.height, |span, linear| {
+            let first = camera.index(span.pixel);
+            let pixels = &mut picture.pixels[first..first + span.length];
+            for (y, &[r, g, b]) in pixels.iter_mut().zip(linear) {
                 *y = [r, g, b, 0.0];
             }
         });
         picture
     }
 
-    /// The picture as a display shows it.
-    pub fn picture(&self, display: &Display, executor: &impl Executor) -> Rgba8Picture {
+    /// The picture after an output transform.
+    pub fn picture(&self, output: &OutputTransform, executor: &impl Executor) -> Rgba8Picture {
         let mut picture = Rgba8Picture::black(self.transport.geometry.camera);
-        self.show(
-            display,
-            0..picture.extent.height,
-            &mut picture.pixels,
-            executor,
-        );
+        let rows = 0..picture.extent.height;
+        self.encode_rows(output, rows, &mut picture.pixels, executor);
         picture
     }
 
-    /// These rows of the picture, as a display shows them.
+    /// Writes rows of the picture after an output transform.
     ///
     /// # Panics
-    /// If `out` has not as many pixels.
-    pub fn show(
+    /// If `out` is not as large as the rows.
+    pub fn encode_rows(
         &self,
-        display: &Display,
+        output: &OutputTransform,
         rows: Range<u32>,
         out: &mut [[u8; 4]],
         executor: &impl Executor,
     ) {
         let width = self.transport.geometry.camera.width as usize;
-        assert_eq!(out.len(), rows.len() * width, "pixels of other rows");
-        let encoder = Encoder::new(display);
-        // A lock for each, as threads share them out.
-        let bands: Vec<_> = out
-            .chunks_mut((BAND_ROWS * width).max(1))
+        assert_eq!(out.len(), rows.len() * width, "pixels of the rows");
+        let encoder = OutputEncoder::new(output);
+        // Locked one by one, as threads share them.
+        let strips: Vec<_> = out
+            .chunks_mut((STRIP_ROWS * width).max(1))
             .map(Mutex::new)
             .collect();
-        executor.map(bands.len(), |i| {
-            let first = rows.start + (i * BAND_ROWS) as u32;
-            self.show_band(&encoder, first, &mut lock(&bands[i]));
+        executor.map(strips.len(), |i| {
+            let first = rows.start + (i * STRIP_ROWS) as u32;
+            self.encode_strip(&encoder, first, &mut lock(&strips[i]));
         });
     }
 
-    fn show_band(&self, encoder: &Encoder, first: u32, out: &mut [[u8; 4]]) {
+    fn encode_strip(&self, encoder: &OutputEncoder, first: u32, out: &mut [[u8; 4]]) {
         let width = self.transport.geometry.camera.width as usize;
         let end = first + (out.len() / width) as u32;
         out.fill([0, 0, 0, 255]);
-        self.for_each_run(first..end, |run, linear| {
-            let at = (run.pixel.y - first) as usize * width + run.pixel.x as usize;
-            encoder.encode(linear, run.pixel, &mut out[at..at + run.length]);
+        self.for_each_span(first..end, |span, linear| {
+            let at = (span.pixel.y - first) as usize * width + span.pixel.x as usize;
+            encoder.encode(linear, span.pixel, &mut out[at..at + span.length]);
         });
     }
 
-    fn for_each_run(&self, rows: Range<u32>, mut each: impl FnMut(&Run, &[[f32; CHANNELS]])) {
-        for (square, linear) in self.squares.all.iter().zip(&self.linear) {
+    fn for_each_span(
+        &self,
+        rows: Range<u32>,
+        mut visit: impl FnMut(&PixelSpan, &[[f32; CHANNELS]]),
+    ) {
+        for (block, linear) in self.blocks.blocks.iter().zip(&self.linear) {
             let linear = linear.read().unwrap_or_else(PoisonError::into_inner);
-            for run in square.runs.iter().filter(|run| rows.contains(&run.pixel.y)) {
-                each(run, &linear[run.begin..run.begin + run.length]);
+            for span in &block.spans {
+                if rows.contains(&span.pixel.y) {
+                    visit(span, &linear[span.range()]);
+                }
             }
         }
     }
 }
 
-/// Rows that are encoded at a time.
-pub const BAND_ROWS: usize = 64;
-
-/// A square to relight.
-struct SquareWork<'a> {
-    relighter: &'a Relighter,
-    square: usize,
-    work: &'a mut Option<Workspace>,
+/// Relights one block.
+struct BlockKernel<'a> {
+    relighter: &'a CpuRelighter,
+    block: usize,
+    scratch: &'a mut Option<CorrelationScratch>,
 }
 
-impl Work for SquareWork<'_> {
+impl SimdKernel for BlockKernel<'_> {
     #[inline(always)]
-    fn run<V: Vector>(self) {
-        self.relighter.relight_square::<V>(self.square, self.work);
+    fn run<S: Simd>(self, simd: S) {
+        self.relighter.relight_block(simd, self.block, self.scratch);
     }
 }
 
-/// What is written whole, whatever became of another thread.
+fn is_factored(tile: &Tile) -> bool {
+    !tile.coefficients.is_dark()
+}
+
+/// Locks whatever a panic on another thread has left: everything behind these locks is written before it is read.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,8 +1,12 @@
-//! Relighting by WebGL2, through web-sys.
+//! Relighting by WebGL2.
+//!
+//! All photographs of a page share one context, on a hidden canvas; each frame is copied from there into the
+//! photograph's own canvas.
 
 mod context;
-mod pictures;
-mod scene;
+mod downsampler;
+mod photo_renderer;
+mod resources;
 
 use std::rc::Rc;
 
@@ -13,65 +17,79 @@ pub use context::Context;
 
 use super::Gamut;
 use super::backend::{Backend, BackendError, Frame};
-use super::canvas2d::{Keep, open_2d};
+use super::canvas2d::{CanvasStorage, open_2d};
 use crate::transport::{Extent, Transport};
-use scene::Scene;
+use photo_renderer::PhotoRenderer;
 
-/// A photograph on a canvas, drawn in a context that others use too.
+/// Draws one photograph into one canvas.
 #[derive(Debug)]
-pub struct WebGl2 {
-    scene: Scene,
-    out: CanvasRenderingContext2d,
+pub struct WebGl2Backend {
+    renderer: PhotoRenderer,
+    /// The canvas's 2D context.
+    canvas: CanvasRenderingContext2d,
     gamut: Gamut,
 }
 
-impl WebGl2 {
+impl WebGl2Backend {
     /// Uploads a transport.
+    ///
+    /// # Errors
+    /// [`BackendError`] if the device cannot hold the transport or the canvas gives no context.
     pub fn new(
         context: Rc<Context>,
         transport: &Transport,
         canvas: &HtmlCanvasElement,
         gamut: Gamut,
     ) -> Result<Self, BackendError> {
-        let scene = Scene::new(context, transport)?;
-        let gamut = match scene.context.shows(gamut) {
+        let renderer = PhotoRenderer::new(context, transport)?;
+        let gamut = match renderer.context.has_gamut(gamut) {
             true => gamut,
             false => Gamut::Srgb,
         };
-        let (out, gamut) = open_2d(canvas, scene.extent(), gamut, Keep::Anywhere)?;
-        scene.context.aim(scene.extent(), gamut)?;
-        Ok(Self { scene, out, gamut })
+        let extent = renderer.extent();
+        let (canvas, gamut) = open_2d(canvas, extent, gamut, CanvasStorage::Default)?;
+        renderer.context.set_target(extent, gamut)?;
+        Ok(Self {
+            renderer,
+            canvas,
+            gamut,
+        })
     }
 }
 
-impl Backend for WebGl2 {
+impl Backend for WebGl2Backend {
     fn name(&self) -> &'static str {
         "webgl2"
     }
 
     fn kernel(&self) -> String {
-        self.scene.context.kernel().into()
+        self.renderer.context.kernel().into()
     }
 
     fn gamut(&self) -> Gamut {
         self.gamut
     }
 
-    fn take_picture(&mut self, picture: &JsValue, extent: Extent) -> Result<bool, JsValue> {
-        self.scene.take_picture(picture, extent)
+    fn set_light_image(&mut self, image: &JsValue, extent: Extent) -> Result<bool, JsValue> {
+        self.renderer.set_light_image(image, extent)
     }
 
     fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
-        let context = self.scene.context.clone();
-        let (extent, gamut) = (self.scene.extent(), self.gamut);
-        self.scene.draw(frame, || context.aim(extent, gamut))?;
-        let Extent { width, height } = extent;
+        self.renderer.draw(frame, self.gamut)?;
+        let Extent { width, height } = self.renderer.extent();
         let [width, height] = [width, height].map(f64::from);
-        let canvas = &context.canvas;
-        self.out
+        self.canvas
             .draw_image_with_html_canvas_element_and_sw_and_sh_and_dx_and_dy_and_dw_and_dh(
-                canvas, 0.0, 0.0, width, height, 0.0, 0.0, width, height,
+                &self.renderer.context.canvas,
+                0.0,
+                0.0,
+                width,
+                height,
+                0.0,
+                0.0,
+                width,
+                height,
             )
-            .map_err(|e| BackendError::Lost(format!("its picture could not be copied: {e:?}")))
+            .map_err(|e| BackendError::Lost(format!("the browser cannot copy the picture: {e:?}")))
     }
 }

@@ -1,92 +1,97 @@
-//! Drawing into a page's canvases.
+//! The WebGPU backend of a page: draws into canvases.
 
 use std::rc::Rc;
 
 use js_sys::Promise;
 use wasm_bindgen::JsValue;
 
+use super::api::{API, CanvasContext};
 use super::device::Device;
-use super::gpu::{API, Canvas};
-use super::scene::Scene;
+use super::photo_renderer::PhotoRenderer;
 use crate::relight::Gamut;
 use crate::relight::backend::{Backend, BackendError, Frame};
 use crate::transport::{Extent, Transport};
 
 impl Device {
-    /// A device that draws into canvases.
+    /// A device for canvases.
+    ///
+    /// # Errors
+    /// [`BackendError::Missing`] or [`BackendError::Device`] if the browser gives no device.
     pub async fn for_canvases() -> Result<Self, BackendError> {
-        Self::of(Canvas::preferred_format()).await
+        Self::open(CanvasContext::preferred_format()).await
     }
 
-    /// Settles, with an object that has a `message`, when the device goes away.
+    /// A promise of an object with a `message`, which settles when the device is lost.
     pub fn lost(&self) -> Promise {
         self.gpu.lost()
     }
 }
 
-/// A photograph on a canvas.
+/// Draws one photograph into one canvas.
 #[derive(Debug)]
-pub struct WebGpu {
-    scene: Scene,
-    canvas: Canvas,
+pub struct WebGpuBackend {
+    renderer: PhotoRenderer,
+    canvas: CanvasContext,
     gamut: Gamut,
 }
 
-impl WebGpu {
-    /// Uploads a transport. The canvas is touched last, so that after most failures another back
-    /// end can still have it.
+impl WebGpuBackend {
+    /// Uploads a transport. The canvas is used last, so that most failures leave it to another backend.
+    ///
+    /// # Errors
+    /// [`BackendError`] if the device cannot hold the transport or the canvas gives no context.
     pub async fn new(
         device: Rc<Device>,
         transport: &Transport,
         canvas: &web_sys::HtmlCanvasElement,
         gamut: Gamut,
     ) -> Result<Self, BackendError> {
-        let scene = Scene::new(device.clone(), transport).await?;
-        let refused = |reason| BackendError::Canvas { api: API, reason };
-        let configured = device.attempt(|| {
+        let renderer = PhotoRenderer::new(device.clone(), transport).await?;
+        let canvas_error = |reason| BackendError::Canvas { api: API, reason };
+        let configured = device.try_upload(|| {
             let camera = transport.geometry.camera;
             canvas.set_width(camera.width);
             canvas.set_height(camera.height);
-            let canvas = Canvas::of(canvas).map_err(refused)?;
-            // Whether the browser takes it shows at the first picture.
-            let show = |gamut| {
+            let canvas = CanvasContext::open(canvas).map_err(canvas_error)?;
+            // An unsupported gamut may fail at the first view only.
+            let try_gamut = |gamut| {
                 canvas.configure(&device.gpu, device.format, gamut)?;
                 canvas.view().map(|_| gamut)
             };
-            let shown = show(gamut).or_else(|_| show(Gamut::Srgb));
-            shown.map(|gamut| (canvas, gamut)).map_err(refused)
+            let gamut = try_gamut(gamut).or_else(|_| try_gamut(Gamut::Srgb));
+            gamut.map(|gamut| (canvas, gamut)).map_err(canvas_error)
         });
         let (canvas, gamut) = configured.await??;
         Ok(Self {
-            scene,
+            renderer,
             canvas,
             gamut,
         })
     }
 }
 
-impl Backend for WebGpu {
+impl Backend for WebGpuBackend {
     fn name(&self) -> &'static str {
         "webgpu"
     }
 
     fn kernel(&self) -> String {
-        self.scene.device().kernel().into()
+        self.renderer.device().kernel().into()
     }
 
     fn gamut(&self) -> Gamut {
         self.gamut
     }
 
-    fn take_picture(&mut self, picture: &JsValue, extent: Extent) -> Result<bool, JsValue> {
-        self.scene.take_picture(picture, extent)
+    fn set_light_image(&mut self, image: &JsValue, extent: Extent) -> Result<bool, JsValue> {
+        self.renderer.set_light_image(image, extent)
     }
 
     fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
-        self.scene.device().check()?;
-        let lost = |reason| BackendError::Lost(format!("its canvas gives no picture: {reason}"));
+        self.renderer.device().check()?;
+        let lost = |reason| BackendError::Lost(format!("the canvas gives no texture: {reason}"));
         let view = self.canvas.view().map_err(lost)?;
-        self.scene.draw(frame, &view);
+        self.renderer.draw(frame, &view);
         Ok(())
     }
 }
@@ -94,7 +99,7 @@ impl Backend for WebGpu {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::relight::{BuiltinLight, Display};
+    use crate::relight::{BuiltinLight, OutputTransform};
     use crate::transport::{Basis, Correspondence, Geometry, Tile, Window};
     use wasm_bindgen::JsCast;
     use wasm_bindgen_futures::JsFuture;
@@ -123,17 +128,17 @@ mod tests {
         let document = web_sys::window().unwrap().document().unwrap();
         let canvas = document.create_element("canvas").unwrap().unchecked_into();
         let device = Rc::new(Device::for_canvases().await.unwrap());
-        let webgpu = WebGpu::new(device.clone(), &transport, &canvas, Gamut::Srgb).await;
+        let webgpu = WebGpuBackend::new(device.clone(), &transport, &canvas, Gamut::Srgb).await;
         let mut webgpu = webgpu.unwrap();
         let frame = Frame {
             light: Some(&BuiltinLight::Flood.render(extent)),
-            display: Display::srgb(1.0),
-            detail: 1.0,
+            output: OutputTransform::srgb(1.0),
+            quality: 1.0,
         };
         webgpu.render(&frame).unwrap();
         let lost = device.lost();
         device.destroy();
-        // The browser tells in a task of its own.
+        // The browser reports the loss in another task.
         JsFuture::from(lost).await.unwrap();
         let error = webgpu.render(&frame).unwrap_err();
         assert!(error.is_loss(), "{error}");

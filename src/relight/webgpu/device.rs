@@ -1,6 +1,6 @@
-//! The graphics device, and the programs that run on it.
+//! A graphics device with the pipelines that run on it.
 
-use super::gpu::{API, ComputePipeline, Gpu, RenderPipeline, TextureFormat};
+use super::api::{API, ComputePipeline, DeviceQueue, RenderPipeline, TextureFormat};
 use super::shader::SHADER;
 use crate::relight::backend::BackendError;
 use crate::relight::texture_layout::TextureLimits;
@@ -8,23 +8,22 @@ use crate::relight::texture_layout::TextureLimits;
 /// A device that any number of photographs share.
 #[derive(Debug)]
 pub struct Device {
-    pub(super) gpu: Gpu,
-    /// Of what is drawn last.
+    pub(super) gpu: DeviceQueue,
+    /// Format of the pictures.
     pub(super) format: TextureFormat,
     pub(super) pipelines: Pipelines,
     pub(super) limits: TextureLimits,
     kernel: String,
     #[cfg(not(target_arch = "wasm32"))]
-    software: bool,
+    is_software: bool,
 }
 
 impl Device {
-    /// The device that the system prefers, to draw into targets of a format.
-    pub(super) async fn of(format: TextureFormat) -> Result<Self, BackendError> {
-        let (gpu, adapter) = Gpu::open().await?;
-        let pipelines = gpu.attempt(|| Pipelines::new(&gpu, format)).await;
+    /// The system's preferred device, for pictures of a format.
+    pub(super) async fn open(format: TextureFormat) -> Result<Self, BackendError> {
+        let (gpu, adapter) = DeviceQueue::open().await?;
+        let pipelines = gpu.catch_errors(|| Pipelines::new(&gpu, format)).await;
         let pipelines = pipelines.map_err(|reason| {
-            // Who asks again gets another.
             gpu.destroy();
             BackendError::Device { api: API, reason }
         })?;
@@ -34,7 +33,7 @@ impl Device {
         };
         Ok(Self {
             #[cfg(not(target_arch = "wasm32"))]
-            software: adapter.fallback,
+            is_software: adapter.is_software,
             kernel: kernel.into(),
             gpu,
             format,
@@ -43,23 +42,23 @@ impl Device {
         })
     }
 
-    /// The adapter, by name.
+    /// The adapter's name.
     pub fn kernel(&self) -> &str {
         &self.kernel
     }
 
-    /// Whether it is a program that makes up for a missing graphics processor. Pages ask browsers themselves.
+    /// Whether it is a software renderer. In browsers, pages find out themselves.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn is_software(&self) -> bool {
-        self.software
+        self.is_software
     }
 
-    /// Frees all that is on the device, whoever holds it still.
+    /// Frees everything on the device, also for photographs that still use it.
     pub fn destroy(&self) {
         self.gpu.destroy();
     }
 
-    /// Fails once the device no longer works.
+    /// Fails once the device is lost.
     pub(super) fn check(&self) -> Result<(), BackendError> {
         match self.gpu.loss.reason() {
             Some(reason) => Err(BackendError::Lost(reason.into())),
@@ -67,33 +66,32 @@ impl Device {
         }
     }
 
-    /// Runs `work`, and fails where the device refuses any of it.
-    pub(super) async fn attempt<T>(&self, work: impl FnOnce() -> T) -> Result<T, BackendError> {
-        let done = self.gpu.attempt(work).await;
+    /// Runs `work`. Fails if the device rejects any of its calls.
+    pub(super) async fn try_upload<T>(&self, work: impl FnOnce() -> T) -> Result<T, BackendError> {
+        let done = self.gpu.catch_errors(work).await;
         done.map_err(BackendError::Upload)
     }
 }
 
 #[derive(Debug)]
 pub(super) struct Pipelines {
-    pub see: ComputePipeline,
+    pub correlate: ComputePipeline,
     pub relight: RenderPipeline,
-    /// A picture to the light's columns, then to its rows.
     #[cfg(target_arch = "wasm32")]
-    pub shrink: [RenderPipeline; 2],
+    pub downsample: RenderPipeline,
 }
 
 impl Pipelines {
-    fn new(gpu: &Gpu, format: TextureFormat) -> Self {
-        let module = gpu.module(SHADER);
-        let covered =
-            |entry_point, format| gpu.render_pipeline(&module, "cover", entry_point, format);
+    fn new(gpu: &DeviceQueue, format: TextureFormat) -> Self {
+        let module = gpu.create_shader_module(SHADER);
+        let fullscreen = |entry_point, format| {
+            gpu.create_render_pipeline(&module, "fullscreen", entry_point, format)
+        };
         Self {
-            see: gpu.compute_pipeline(&module, "see_together"),
-            relight: covered("relight", format),
+            correlate: gpu.create_compute_pipeline(&module, "correlate_group"),
+            relight: fullscreen("relight", format),
             #[cfg(target_arch = "wasm32")]
-            shrink: ["across", "down"]
-                .map(|entry_point| covered(entry_point, TextureFormat::Rgba32Float)),
+            downsample: fullscreen("downsample", TextureFormat::Rgba32Float),
         }
     }
 }

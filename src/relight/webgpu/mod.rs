@@ -1,19 +1,22 @@
-//! Relighting by WebGPU: the browser's, and the system's own graphics devices.
+//! Relighting by WebGPU: in browsers, and natively on the system's graphics devices.
+//!
+//! `api` is the part of WebGPU that is used, with one implementation for browsers and one over wgpu; everything else is
+//! shared.
 
+mod api;
 #[cfg(target_arch = "wasm32")]
 mod canvas;
 mod device;
-mod gpu;
+#[cfg(target_arch = "wasm32")]
+mod downsampler;
 #[cfg(not(target_arch = "wasm32"))]
 mod offscreen;
-#[cfg(target_arch = "wasm32")]
-mod pictures;
-mod scene;
+mod photo_renderer;
+mod photo_textures;
 mod shader;
-mod textures;
 
 #[cfg(target_arch = "wasm32")]
-pub use canvas::WebGpu;
+pub use canvas::WebGpuBackend;
 pub use device::Device;
 #[cfg(not(target_arch = "wasm32"))]
-pub use offscreen::Offscreen;
+pub use offscreen::OffscreenRenderer;

@@ -1,37 +1,44 @@
-//! Drawing into memory, by a device of the system's own.
+//! Draws into a texture, on a device of the system, for tests and benchmarks.
 
 use std::rc::Rc;
 use std::time::Instant;
 
+use super::api::{API, DeviceQueue, Texture, TextureDescriptor, TextureFormat, usage};
 use super::device::Device;
-use super::gpu::{API, Gpu, Texture, TextureDescriptor, TextureFormat, usage};
-use super::scene::Scene;
+use super::photo_renderer::PhotoRenderer;
 use crate::relight::Rgba8Picture;
 use crate::relight::backend::{BackendError, Frame};
 use crate::transport::{Extent, Transport};
 
 impl Device {
-    /// A device that draws into memory.
+    /// A device for textures.
+    ///
+    /// # Errors
+    /// [`BackendError::Device`] if the system has none.
     pub async fn offscreen() -> Result<Self, BackendError> {
-        Self::of(TextureFormat::Rgba8Unorm).await
+        Self::open(TextureFormat::Rgba8Unorm).await
     }
 
-    /// Waits until all that was asked for is done.
+    /// Waits until all submitted work is done.
+    ///
+    /// # Errors
+    /// [`BackendError::Lost`] if the device is lost.
     pub fn wait(&self) -> Result<(), BackendError> {
         let done = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
         done.map_err(|e| BackendError::Lost(e.to_string()))?;
         self.check()
     }
-}
 
-impl Device {
-    /// Seconds that copying so many bytes within its memory takes, which is what benchmarks hold
-    /// relighting against: of the fastest of a few runs.
+    /// Seconds to copy so many bytes within the device's memory, in the fastest of five runs: what benchmarks compare
+    /// relighting with.
+    ///
+    /// # Errors
+    /// [`BackendError::Lost`] if the device is lost.
     pub fn copy_seconds(&self, bytes: u64) -> Result<f64, BackendError> {
         const COPIES: u32 = 8;
         let buffer = || {
             self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("copying"),
+                label: Some("copy"),
                 size: bytes,
                 usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
@@ -53,21 +60,24 @@ impl Device {
     }
 }
 
-/// A photograph and a picture of it, in a device's memory.
+/// Draws one photograph into a texture.
 #[derive(Debug)]
-pub struct Offscreen {
-    scene: Scene,
+pub struct OffscreenRenderer {
+    renderer: PhotoRenderer,
     extent: Extent,
     picture: Texture,
 }
 
-impl Offscreen {
+impl OffscreenRenderer {
     /// Uploads a transport.
+    ///
+    /// # Errors
+    /// [`BackendError::Layout`] or [`BackendError::Upload`] if the device cannot hold it.
     pub async fn new(device: Rc<Device>, transport: &Transport) -> Result<Self, BackendError> {
-        let scene = Scene::new(device.clone(), transport).await?;
+        let renderer = PhotoRenderer::new(device.clone(), transport).await?;
         let extent = transport.geometry.camera;
-        let picture = device.attempt(|| {
-            device.gpu.texture(&TextureDescriptor {
+        let picture = device.try_upload(|| {
+            device.gpu.create_texture(&TextureDescriptor {
                 label: "picture",
                 extent,
                 layers: None,
@@ -77,25 +87,31 @@ impl Offscreen {
         });
         let picture = picture.await?;
         Ok(Self {
-            scene,
+            renderer,
             extent,
             picture,
         })
     }
 
-    /// Asks for a picture; [`Device::wait`] tells when it is drawn.
+    /// Submits a frame. [`Device::wait`] waits until it is drawn.
+    ///
+    /// # Errors
+    /// [`BackendError::Lost`] if the device is lost.
     pub fn draw(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
-        self.scene.device().check()?;
-        self.scene.draw(frame, &self.picture.view);
+        self.renderer.device().check()?;
+        self.renderer.draw(frame, &self.picture.view);
         Ok(())
     }
 
-    /// The picture that was drawn last.
+    /// Reads the last picture.
+    ///
+    /// # Errors
+    /// [`BackendError::Lost`] or [`BackendError::Device`] if it cannot be read.
     pub fn read(&self) -> Result<Rgba8Picture, BackendError> {
-        let Gpu { device, queue, .. } = &self.scene.device().gpu;
+        let DeviceQueue { device, queue, .. } = &self.renderer.device().gpu;
         let picture = &self.picture.texture;
         let Extent { width, height } = self.extent;
-        // Rows begin where copies may.
+        // Copies need aligned rows.
         let stride = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("picture"),
@@ -117,18 +133,18 @@ impl Offscreen {
             picture.size(),
         );
         queue.submit([encoder.finish()]);
-        let refused = |reason: String| BackendError::Device { api: API, reason };
-        let (tell, told) = std::sync::mpsc::channel();
+        let device_error = |reason: String| BackendError::Device { api: API, reason };
+        let (sender, receiver) = std::sync::mpsc::channel();
         buffer
             .slice(..)
             .map_async(wgpu::MapMode::Read, move |result| {
-                let _ = tell.send(result);
+                let _ = sender.send(result);
             });
-        self.scene.device().wait()?;
-        let mapped = told.recv().map_err(|e| refused(e.to_string()))?;
-        mapped.map_err(|e| refused(e.to_string()))?;
+        self.renderer.device().wait()?;
+        let mapped = receiver.recv().map_err(|e| device_error(e.to_string()))?;
+        mapped.map_err(|e| device_error(e.to_string()))?;
         let bytes = buffer.slice(..).get_mapped_range();
-        let bytes = bytes.map_err(|e| refused(e.to_string()))?;
+        let bytes = bytes.map_err(|e| device_error(e.to_string()))?;
         let rows = bytes.chunks_exact(stride as usize);
         let pixels = rows.flat_map(|row| row[..4 * width as usize].as_chunks().0);
         Ok(Rgba8Picture {

@@ -1,27 +1,30 @@
-//! The shaders' source, as it goes with the program: without comments and indentation.
+//! The WGSL of all pipelines in one module, as compiled in: without comments and indentation.
 
-/// The first file is WebGL2's source as well.
 const SOURCE: &str = concat!(
+    include_str!("../shaders/fullscreen.wgsl"),
+    include_str!("../shaders/frame.wgsl"),
+    include_str!("../shaders/basis.wgsl"),
+    include_str!("../shaders/correlate.wgsl"),
+    include_str!("../shaders/downsample.wgsl"),
     include_str!("../shaders/relight.wgsl"),
-    include_str!("../shaders/see.wgsl")
 );
-const LENGTH: usize = bare(SOURCE.as_bytes(), &mut [0; SOURCE.len()]);
-const BARE: [u8; LENGTH] = {
+const LENGTH: usize = strip_comments(SOURCE.as_bytes(), &mut [0; SOURCE.len()]);
+const STRIPPED: [u8; LENGTH] = {
     let mut text = [0; LENGTH];
-    bare(SOURCE.as_bytes(), &mut text);
+    strip_comments(SOURCE.as_bytes(), &mut text);
     text
 };
 
-/// The module of all shaders, in WGSL.
-pub(super) const SHADER: &str = match std::str::from_utf8(&BARE) {
+/// The shader module's WGSL.
+pub(super) const SHADER: &str = match std::str::from_utf8(&STRIPPED) {
     Ok(text) => text,
-    Err(_) => panic!("whole characters are left out or none of them"),
+    Err(_) => panic!("comments are removed as whole characters"),
 };
 
-/// Copies `source` but for comments, indentation and empty lines; how many bytes that are.
-const fn bare(source: &[u8], text: &mut [u8]) -> usize {
+/// Copies `source` without comments, indentation and empty lines. Returns the number of bytes copied.
+const fn strip_comments(source: &[u8], text: &mut [u8]) -> usize {
     let (mut from, mut to) = (0, 0);
-    let mut line_begins = true;
+    let mut is_line_start = true;
     while from < source.len() {
         let byte = source[from];
         if byte == b'/' && from + 1 < source.len() && source[from + 1] == b'/' {
@@ -30,10 +33,10 @@ const fn bare(source: &[u8], text: &mut [u8]) -> usize {
             }
             continue;
         }
-        if !(line_begins && (byte == b' ' || byte == b'\n')) {
+        if !(is_line_start && (byte == b' ' || byte == b'\n')) {
             text[to] = byte;
             to += 1;
-            line_begins = byte == b'\n';
+            is_line_start = byte == b'\n';
         }
         from += 1;
     }
@@ -45,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_comments_and_indentation_are_left_out() {
+    fn only_comments_and_indentation_are_removed() {
         let code = |line: &str| {
             line.split("//")
                 .next()

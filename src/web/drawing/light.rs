@@ -1,4 +1,4 @@
-//! Lights made for a photograph.
+//! Lights for a photograph of this module.
 
 use js_sys::{Float32Array, Uint8ClampedArray};
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -7,7 +7,7 @@ use crate::relight::{self, BuiltinLight, LightError, TorchPose};
 use crate::transport::{CHANNELS, Extent};
 use crate::web::{CodedError, Photo};
 
-/// What each element of a photograph's light plane emits.
+/// The emission of each element of a photograph's light plane.
 #[wasm_bindgen]
 pub struct Light(relight::Light);
 
@@ -20,29 +20,38 @@ impl Light {
 #[wasm_bindgen]
 impl Light {
     /// The built-in light of that name.
+    ///
+    /// # Errors
+    /// Code `light-name` for other names.
     pub fn builtin(photo: &Photo, name: &str) -> Result<Light, CodedError> {
         let light = BuiltinLight::from_name(name).ok_or_else(|| {
             let names = BuiltinLight::ALL.map(BuiltinLight::name).join(", ");
             CodedError::new(
                 "light-name",
-                format!("there is no built-in light '{name}'; there are {names}"),
+                format!("unknown built-in light '{name}'; use one of {names}"),
             )
         })?;
         Ok(Self(light.render(photo.geometry().light)))
     }
 
-    /// A torch straight behind the point (`x`, `y`) of the picture, which may lie outside it: 0..1
-    /// from left to right and from top to bottom. `size` is its radius as a fraction of the light
-    /// plane's shorter side.
+    /// A torch straight behind a point of the picture, or outside it: `x` and `y` are 0 to 1 from left to right and from
+    /// top to bottom. `size` is the radius as a fraction of the light plane's shorter side.
+    ///
+    /// # Errors
+    /// Code `light-value` for values that are out of range.
     pub fn torch(photo: &Photo, x: f64, y: f64, size: Option<f64>) -> Result<Light, CodedError> {
-        let size = size.unwrap_or(TorchPose::RADIUS);
-        // Any larger, and squares of distances could overflow.
-        const FAR: f64 = 1e6;
-        if !(x.abs() <= FAR && y.abs() <= FAR && size > 0.0 && size <= FAR) {
-            // Without them: printing such numbers takes more of the module than torches do.
+        let size = size.unwrap_or(TorchPose::DEFAULT_RADIUS);
+        // Squares of larger distances could overflow.
+        const MAX_DISTANCE: f64 = 1e6;
+        if !(x.abs() <= MAX_DISTANCE
+            && y.abs() <= MAX_DISTANCE
+            && size > 0.0
+            && size <= MAX_DISTANCE)
+        {
+            // Without the values: code that prints floats would add more to the module than the torch.
             return Err(CodedError::new(
                 "light-value",
-                "such a torch cannot be: positions are fractions of the picture, and the size a \
+                "the torch is out of range: its position must be in fractions of the picture, and its size a \
                  positive fraction of the light plane",
             ));
         }
@@ -55,20 +64,24 @@ impl Light {
         Ok(Self(relight::Light::torch(geometry.light, pose)))
     }
 
-    /// A fire that burns along the lower edge, `seconds` after it was first looked at: always the
-    /// same at the same time. The built-in light `fire` is its first moment.
+    /// Flames along the lower edge at a time in seconds. The built-in light `fire` is time 0.
+    ///
+    /// # Errors
+    /// Code `light-value` for a time that is not finite.
     pub fn fire(photo: &Photo, seconds: f64) -> Result<Light, CodedError> {
         if !seconds.is_finite() {
             return Err(CodedError::new(
                 "light-value",
-                "the time of a fire must be a finite number of seconds",
+                "the time of the fire must be a finite number of seconds",
             ));
         }
         Ok(Self(relight::Light::fire(photo.geometry().light, seconds)))
     }
 
-    /// A picture as light: linear RGB values, 0 dark to 1 full brightness, row by row. Each element
-    /// of the light emits the mean of what it covers.
+    /// A light image in linear RGB, 0 to 1 at full brightness, row by row. It is resampled by area.
+    ///
+    /// # Errors
+    /// Code `light-size` for another number of values, `light-value` for negative or infinite values.
     #[wasm_bindgen(js_name = fromLinear)]
     pub fn from_linear(
         photo: &Photo,
@@ -76,16 +89,19 @@ impl Light {
         width: u32,
         height: u32,
     ) -> Result<Light, CodedError> {
-        let picture = picture(values.length(), 3, width, height)?;
-        let light = relight::Light::from_linear_rows(photo.geometry().light, picture, |y, row| {
+        let image = image_extent(values.length(), 3, width, height)?;
+        let light = relight::Light::from_linear_rows(photo.geometry().light, image, |y, row| {
             let (first, end) = (y * row.len(), (y + 1) * row.len());
             values.subarray(first as u32, end as u32).copy_to(row);
         })?;
         Ok(Self(light))
     }
 
-    /// A picture in sRGB as light: RGBA, row by row, colours not multiplied by alpha, which is the
-    /// share of a pixel that shines. Each element of the light emits the mean of what it covers.
+    /// A light image in sRGB with straight alpha, RGBA, row by row. A pixel emits its alpha's share of its colour. The
+    /// image is resampled by area.
+    ///
+    /// # Errors
+    /// Code `light-size` for another number of values.
     #[wasm_bindgen(js_name = fromSrgb)]
     pub fn from_srgb(
         photo: &Photo,
@@ -93,15 +109,15 @@ impl Light {
         width: u32,
         height: u32,
     ) -> Result<Light, CodedError> {
-        let picture = picture(rgba.length(), 4, width, height)?;
-        let light = relight::Light::from_srgb_rows(photo.geometry().light, picture, |y, row| {
+        let image = image_extent(rgba.length(), 4, width, height)?;
+        let light = relight::Light::from_srgb_rows(photo.geometry().light, image, |y, row| {
             let (first, end) = (y * row.len(), (y + 1) * row.len());
             rgba.subarray(first as u32, end as u32).copy_to(row);
         })?;
         Ok(Self(light))
     }
 
-    /// Linear RGB values of the rows from `first` up to `end`, row by row.
+    /// Linear RGB of the rows from `first` up to `end`, row by row.
     #[wasm_bindgen(js_name = linearRgb)]
     pub fn linear_rgb(&self, first: usize, end: usize) -> Float32Array {
         let Extent { width, height } = self.0.extent();
@@ -109,7 +125,7 @@ impl Light {
         let first = first.min(end);
         let length = CHANNELS * width;
         let values = Float32Array::new_with_length((length * (end - first)) as u32);
-        // Row by row: this memory never shrinks.
+        // Row by row: the module's memory never shrinks.
         let mut row = vec![[0.0; CHANNELS]; width];
         let elements = &self.0.elements()[first * width..end * width];
         for (i, elements) in elements.chunks_exact(width.max(1)).enumerate() {
@@ -117,20 +133,19 @@ impl Light {
                 *value = [*r, *g, *b];
             }
             let (start, end) = (i * length, (i + 1) * length);
-            let place = values.subarray(start as u32, end as u32);
-            place.copy_from(row.as_flattened());
+            let target = values.subarray(start as u32, end as u32);
+            target.copy_from(row.as_flattened());
         }
         values
     }
 }
 
-/// The size of a picture that a script gave, which stays where it is but for a row at a time: this
-/// memory never shrinks.
-fn picture(length: u32, channels: u64, width: u32, height: u32) -> Result<Extent, LightError> {
+/// The extent of a light image with that many values.
+fn image_extent(length: u32, channels: u64, width: u32, height: u32) -> Result<Extent, LightError> {
     let extent = Extent { width, height };
     let need = (u64::from(width) * u64::from(height)).saturating_mul(channels);
     if u64::from(length) != need {
-        return Err(LightError::Length {
+        return Err(LightError::WrongLength {
             got: length as usize,
             need: usize::try_from(need).unwrap_or(usize::MAX),
             extent,

@@ -1,0 +1,180 @@
+//! Light blocks: squares of window origins, each with the camera pixels whose windows begin there.
+//!
+//! A block is what is correlated at once, and what is relit again when the light under it has changed. Its
+//! *footprint* is the light that the windows of its origins cover.
+
+use std::ops::Range;
+
+use crate::transport::{CameraPx, Element, Extent, Geometry, Transport};
+
+/// The side of blocks where no tile is factored.
+pub const DIRECT_BLOCK_SIDE: usize = 64;
+
+/// The smallest rectangle of window origins that holds those of all pixels with a window on the light plane.
+#[derive(Clone, Debug, Default)]
+pub struct OriginBounds {
+    /// Along u.
+    pub columns: Range<i32>,
+    /// Along v.
+    pub rows: Range<i32>,
+}
+
+impl OriginBounds {
+    /// Of all pixels, those of dark tiles too: where blocks lie decides how sums are rounded, and workers that
+    /// each have a part of the tiles must agree to the bit.
+    pub fn new(geometry: &Geometry) -> Self {
+        let mut bounds: Option<Self> = None;
+        for rect in geometry.tiles() {
+            for pixel in rect.pixels() {
+                let origin = geometry.window_origin(pixel);
+                if geometry.clip_window(origin).is_empty() {
+                    continue;
+                }
+                let Element { u, v } = origin;
+                let known = bounds.get_or_insert(Self {
+                    columns: u..u + 1,
+                    rows: v..v + 1,
+                });
+                known.columns = known.columns.start.min(u)..known.columns.end.max(u + 1);
+                known.rows = known.rows.start.min(v)..known.rows.end.max(v + 1);
+            }
+        }
+        bounds.unwrap_or_default()
+    }
+}
+
+/// Pixels side by side, of one tile and one block.
+#[derive(Clone, Debug)]
+pub struct PixelSpan {
+    /// Index of the tile.
+    pub tile: usize,
+    /// Index of the first pixel in the tile.
+    pub first: usize,
+    /// The first pixel.
+    pub pixel: CameraPx,
+    /// Index of the first pixel in the block.
+    pub begin: usize,
+    /// Number of pixels.
+    pub length: usize,
+}
+
+impl PixelSpan {
+    /// Indices of the pixels in the block.
+    pub fn range(&self) -> Range<usize> {
+        self.begin..self.begin + self.length
+    }
+}
+
+/// A square of window origins, and the pixels that have them.
+#[derive(Clone, Debug, Default)]
+pub struct LightBlock {
+    /// Column and row of its first origin, from [`LightBlocks::origin`].
+    pub at: [usize; 2],
+    /// Its pixels.
+    pub spans: Vec<PixelSpan>,
+    /// For each pixel the index of its window origin in the block, row by row.
+    pub offsets: Vec<u16>,
+}
+
+/// The light blocks of all pixels that can be lit.
+#[derive(Clone, Debug)]
+pub struct LightBlocks {
+    /// The first origin of the first block.
+    pub origin: Element,
+    /// Origins along a block's side, at most 256.
+    pub side: usize,
+    /// Origins along u and along v, from the first to the last block.
+    extent: [usize; 2],
+    /// Blocks with at least one pixel.
+    pub blocks: Vec<LightBlock>,
+}
+
+impl LightBlocks {
+    /// Assigns the pixels to blocks of `side × side` origins.
+    pub fn new(transport: &Transport, bounds: &OriginBounds, side: usize) -> Self {
+        let grid = [bounds.columns.len(), bounds.rows.len()].map(|span| span.div_ceil(side));
+        // Centred, so that a half of the photograph has half of the blocks.
+        let first = |origins: &Range<i32>, blocks: usize| {
+            origins.start - ((blocks * side - origins.len()) / 2) as i32
+        };
+        let grid_origin = Element {
+            u: first(&bounds.columns, grid[0]),
+            v: first(&bounds.rows, grid[1]),
+        };
+        let mut blocks = vec![LightBlock::default(); grid[0] * grid[1]];
+        for_each_pixel(transport, |tile, p, pixel, Element { u, v }| {
+            let (u, v) = ((u - grid_origin.u) as usize, (v - grid_origin.v) as usize);
+            let block = &mut blocks[v / side * grid[0] + u / side];
+            block.at = [u / side * side, v / side * side];
+            block.add(tile, p, pixel, v % side * side + u % side);
+        });
+        blocks.retain(|block| !block.offsets.is_empty());
+        // The part of the grid that still has blocks.
+        let used = |axis: usize| {
+            let first = blocks.iter().map(|block| block.at[axis]);
+            let end = first.clone().max().map_or(0, |last| last + side);
+            first.min().unwrap_or(0)..end
+        };
+        let (columns, rows) = (used(0), used(1));
+        for block in &mut blocks {
+            block.at = [block.at[0] - columns.start, block.at[1] - rows.start];
+            block.spans.shrink_to_fit();
+            block.offsets.shrink_to_fit();
+        }
+        Self {
+            origin: Element {
+                u: grid_origin.u + columns.start as i32,
+                v: grid_origin.v + rows.start as i32,
+            },
+            side,
+            extent: [columns.len(), rows.len()],
+            blocks,
+        }
+    }
+
+    /// Extent of the footprints of all blocks together, for windows of side `window`.
+    pub fn footprint(&self, window: usize) -> Extent {
+        let [width, height] = self.extent.map(|origins| (origins + window - 1) as u32);
+        Extent { width, height }
+    }
+}
+
+impl LightBlock {
+    /// Adds pixel number `p` of a tile: to the last span if it continues that.
+    fn add(&mut self, tile: usize, p: usize, pixel: CameraPx, offset: usize) {
+        let begin = self.offsets.len();
+        self.offsets.push(offset as u16); // a side is at most 256
+        match self.spans.last_mut() {
+            Some(span)
+                if span.tile == tile
+                    && span.first + span.length == p
+                    && span.pixel.y == pixel.y =>
+            {
+                span.length += 1;
+            }
+            _ => self.spans.push(PixelSpan {
+                tile,
+                first: p,
+                pixel,
+                begin,
+                length: 1,
+            }),
+        }
+    }
+}
+
+/// Calls `visit` with tile index, pixel index, pixel and window origin for each pixel that can be lit.
+fn for_each_pixel(transport: &Transport, mut visit: impl FnMut(usize, usize, CameraPx, Element)) {
+    let geometry = &transport.geometry;
+    for (i, tile) in transport.tiles.iter().enumerate() {
+        if tile.is_dark() {
+            continue;
+        }
+        for (p, pixel) in tile.rect().pixels().enumerate() {
+            let origin = geometry.window_origin(pixel);
+            if !geometry.clip_window(origin).is_empty() {
+                visit(i, p, pixel, origin);
+            }
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The target's baseline: arrays, which the compiler vectorises as far as it can.
+
+use std::ops::{Add, Mul, Sub};
+
+use super::{LANES, MAX_PIXELS, Simd};
+use crate::transport::{CHANNELS, QUAD, TexelCode};
+
+/// The token of the baseline, which every CPU has.
+#[derive(Clone, Copy, Debug)]
+pub struct Scalar;
+
+/// One line.
+#[derive(Clone, Copy, Debug)]
+pub struct ScalarVector([f32; LANES]);
+
+impl ScalarVector {
+    #[inline(always)]
+    fn zip(self, other: Self, operation: impl Fn(f32, f32) -> f32) -> Self {
+        let mut out = [0.0; LANES];
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = operation(self.0[i], other.0[i]);
+        }
+        Self(out)
+    }
+}
+
+impl Add for ScalarVector {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+}
+
+impl Sub for ScalarVector {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+}
+
+impl Mul for ScalarVector {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+}
+
+impl Simd for Scalar {
+    const LINES: usize = 1;
+    type Vector = ScalarVector;
+    type Spilled = [f32; LANES];
+    const PIXELS: usize = 1;
+    type Quads = [f32; QUAD];
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> ScalarVector {
+        ScalarVector([value; LANES])
+    }
+
+    #[inline(always)]
+    fn unspill(self, values: &[f32; LANES]) -> ScalarVector {
+        ScalarVector(*values)
+    }
+
+    #[inline(always)]
+    fn spill(self, vector: ScalarVector, to: &mut [f32; LANES]) {
+        *to = vector.0;
+    }
+
+    #[inline(always)]
+    fn zero_quads(self) -> [f32; QUAD] {
+        [0.0; QUAD]
+    }
+
+    #[inline(always)]
+    unsafe fn load_quads(self, from: [*const [f32; QUAD]; MAX_PIXELS]) -> [f32; QUAD] {
+        // SAFETY: the caller vouches for one pointer.
+        unsafe { *from[0] }
+    }
+
+    #[inline(always)]
+    unsafe fn add_products(
+        self,
+        mut sums: [f32; QUAD],
+        codes: *const TexelCode,
+        factors: [f32; QUAD],
+    ) -> [f32; QUAD] {
+        // SAFETY: the caller vouches for one texel.
+        let codes = unsafe { *codes };
+        for lane in 0..QUAD {
+            sums[lane] += f32::from(codes[lane]) * factors[lane];
+        }
+        sums
+    }
+
+    #[inline(always)]
+    unsafe fn store_sums(
+        self,
+        channels: [[f32; QUAD]; CHANNELS],
+        gain: [f32; CHANNELS],
+        to: *mut [f32; CHANNELS],
+    ) {
+        let mut sums = [0.0; CHANNELS];
+        for c in 0..CHANNELS {
+            let [first, second, third, fourth] = channels[c];
+            sums[c] = ((first + third) + (second + fourth)) * gain[c];
+        }
+        // SAFETY: the caller vouches for room for one pixel.
+        unsafe { *to = sums };
+    }
+}

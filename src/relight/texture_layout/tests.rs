@@ -1,0 +1,223 @@
+//! Textures checked texel by texel against the rules that the shaders read them by.
+
+use super::*;
+use crate::relight::LightChroma;
+use crate::transport::{Basis, CameraPx, CoefficientTile, Correspondence, Tile, Window};
+
+const WEBGL2_MINIMUM: TextureLimits = TextureLimits {
+    max_side: 2048,
+    max_layers: 256,
+};
+
+fn geometry(camera: (u32, u32), window: u32) -> Geometry {
+    Geometry {
+        camera: Extent {
+            width: camera.0,
+            height: camera.1,
+        },
+        light: Extent {
+            width: 20,
+            height: 10,
+        },
+        window: Window::new(window).unwrap(),
+        correspondence: Correspondence {
+            affine: [[0.12, 0.0, -0.75], [0.0, 0.06, 1.0]],
+        },
+        tile_side: 16,
+    }
+}
+
+/// Codes that name their pixel and slot, or their pixel, channel and quad. Every third tile has no functions, every
+/// fourth no coefficients.
+fn transport(geometry: Geometry, rank: usize) -> Transport {
+    let area = geometry.window.area();
+    let tiles = geometry.tiles().enumerate().map(|(i, rect)| {
+        let mut tile = Tile::dark(rect);
+        tile.functions.step = [1.0, 2.0, rect.x as f32];
+        if i % 3 != 2 {
+            let codes = rect
+                .pixels()
+                .flat_map(|p| (0..area).map(move |s| [p.x as i16, p.y as i16, s as i16, 0]));
+            tile.functions.codes = codes.collect();
+        }
+        if i % 4 != 3 && rank > 0 {
+            let plane = CoefficientTile::plane(rect);
+            let mut codes = vec![[0; 4]; CoefficientTile::texels(rect, rank)];
+            for (i, codes) in codes.chunks_exact_mut(plane).enumerate() {
+                for (p, code) in rect.pixels().zip(codes) {
+                    *code = [p.x as i16, p.y as i16, i as i16, 7];
+                }
+            }
+            tile.coefficients.codes = codes;
+        }
+        tile
+    });
+    Transport {
+        geometry,
+        basis: Basis {
+            kernels: vec![vec![1.0; area]; rank],
+        },
+        tiles: tiles.collect(),
+    }
+}
+
+#[test]
+fn each_code_is_where_the_shader_reads_it() {
+    // 150 * 141 * 225 texels fill more than one layer.
+    for (camera, window) in [((150, 141), 15), ((37, 23), 3), ((8, 1), 1)] {
+        let geometry = geometry(camera, window);
+        let transport = transport(geometry, 0);
+        let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
+        let ArrayExtent { extent, layers } = layout.codes();
+        let mut texture = Vec::new();
+        layout
+            .for_each_code_region(&transport, |region| {
+                let [column, row, layer] = region.origin;
+                let before = layer as usize * extent.area();
+                assert_eq!(texture.len(), before + (row * extent.width) as usize);
+                assert_eq!((column, region.extent.width), (0, extent.width));
+                assert_eq!(region.texels.len(), region.extent.area());
+                texture.extend_from_slice(region.texels);
+                Ok::<_, ()>(())
+            })
+            .unwrap();
+        assert_eq!(texture.len(), extent.area() * layers as usize);
+        let origins = layout.origin_texels();
+        let tiles = layout.tile_texels(&transport);
+        let steps = layout.step_texels(&transport);
+        for y in 0..camera.1 {
+            for x in 0..camera.0 {
+                let [u, v] = origins[(y * camera.0 + x) as usize].map(i32::from);
+                let origin = geometry.window_origin(CameraPx { x, y });
+                assert_eq!((u, v), (origin.u, origin.v));
+                let tile = (y / 16 * camera.0.div_ceil(16) + x / 16) as usize;
+                assert_eq!(steps[tiles.len() + tile][2], (x / 16 * 16) as f32);
+                let [first, left, top, width] = tiles[tile];
+                if transport.tiles[tile].functions.is_dark() {
+                    assert_eq!(first, -1);
+                    continue;
+                }
+                let pixel = (y as i32 - top) * width + (x as i32 - left);
+                let first = first + pixel * geometry.window.area() as i32;
+                for s in 0..geometry.window.area() {
+                    let code = texture[first as usize + s];
+                    assert_eq!(code, [x as i16, y as i16, s as i16, 0]);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn each_coefficient_is_where_the_shader_reads_it() {
+    let geometry = geometry((37, 23), 3);
+    for rank in [1, 4, 9, 16] {
+        let transport = transport(geometry, rank);
+        let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
+        let (quads, pairs) = (rank.div_ceil(4) as u32, rank.div_ceil(8) as u32);
+        assert_eq!(layout.quad_pairs(), pairs);
+        let ArrayExtent { extent, layers } = layout.coefficients();
+        assert_eq!((extent, layers), (geometry.camera, 3 * quads));
+        let mut found = 0;
+        let Ok(()) = layout.for_each_coefficient_region(&transport, |region| {
+            let (channel, quad) = (region.origin[2] / quads, region.origin[2] % quads);
+            assert!(channel < 3 && region.texels.len() == region.extent.area());
+            for (i, texel) in region.texels.iter().enumerate() {
+                let (x, y) = (
+                    i as u32 % region.extent.width,
+                    i as u32 / region.extent.width,
+                );
+                let at = [(region.origin[0] + x) as i16, (region.origin[1] + y) as i16];
+                assert_eq!(*texel, [at[0], at[1], (channel * quads + quad) as i16, 7]);
+                found += 1;
+            }
+            Ok::<_, std::convert::Infallible>(())
+        });
+        let tiles = transport
+            .tiles
+            .iter()
+            .filter(|tile| !tile.coefficients.is_dark());
+        let pixels: usize = tiles.map(|tile| tile.rect().extent.area()).sum();
+        assert_eq!(found, pixels * 3 * quads as usize);
+        let layers = layout.basis_response().layers;
+        let passes = layout.correlation_passes(LightChroma::Varying, 1.0);
+        let filled: Vec<_> = passes.iter().map(|pass| pass.layer).collect();
+        assert!(filled.iter().copied().eq((0..layers).step_by(2)));
+        let uniform = LightChroma::Uniform {
+            base: 1,
+            factors: [0.5, 1.0, 0.25],
+        };
+        let one = layout.correlation_passes(uniform, 1.0);
+        assert!(one.iter().all(|pass| pass.channel == 1) && one[0].layer == 0);
+        assert_eq!(one.len(), pairs as usize);
+        let less = layout.correlation_passes(LightChroma::Varying, 0.5);
+        let used = rank.div_ceil(4).div_ceil(2).div_ceil(2); // half the quads, in pairs
+        assert_eq!(less.len(), 3 * used);
+        let first: Vec<_> = passes.iter().filter(|pass| pass.pair < used).collect();
+        assert!(less.iter().eq(first));
+    }
+}
+
+#[test]
+fn origins_far_off_the_light_plane_are_clamped() {
+    for (shift, expected) in [(1e300, [20, 10]), (-1e300, [-15, -15])] {
+        let mut geometry = geometry((8, 8), 15);
+        geometry.correspondence.affine = [[0.0, 0.0, shift]; 2];
+        let transport = transport(geometry, 0);
+        let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
+        for [u, v] in layout.origin_texels() {
+            assert_eq!([u, v], expected);
+        }
+    }
+}
+
+#[test]
+fn photographs_beyond_the_limits_are_errors() {
+    let error = |camera, window, rank, limits| {
+        let transport = transport(geometry(camera, window), rank);
+        TextureLayout::new(&transport, limits).unwrap_err()
+    };
+    assert!(matches!(
+        error((2049, 8), 1, 0, WEBGL2_MINIMUM),
+        LayoutError::GridTooLarge {
+            grid: "camera grid",
+            limit: 2048,
+            ..
+        }
+    ));
+    let small = TextureLimits {
+        max_side: 64,
+        max_layers: 2,
+    };
+    assert_eq!(
+        error((64, 64), 3, 0, small),
+        LayoutError::TooManyCodes {
+            need: 11 * 256 * 9,
+            limit: 2 * 64 * 64,
+        }
+    );
+    assert_eq!(
+        error((8, 8), 1, 1, small),
+        LayoutError::TooManyLayers { need: 6, limit: 2 }
+    );
+    let mut wide = transport(geometry((8, 8), 1), 64);
+    wide.geometry.light = Extent {
+        width: 1500,
+        height: 1500,
+    };
+    let response = TextureLayout::new(&wide, WEBGL2_MINIMUM).unwrap_err();
+    assert!(
+        matches!(response, LayoutError::ResponseTooLarge { need, .. } if need == 1502 * 1502 * 48 * 16)
+    );
+    let window = error((8, 8), 25, 1, WEBGL2_MINIMUM);
+    assert_eq!(
+        window,
+        LayoutError::WindowTooLarge {
+            side: 25,
+            limit: 512
+        }
+    );
+    let large = transport(geometry((512, 512), 15), 0);
+    let fits = TextureLayout::new(&large, WEBGL2_MINIMUM).unwrap();
+    assert!(fits.codes().layers <= 256);
+}

@@ -1,0 +1,130 @@
+//! The CPU backend in a worker: takes tiles and a light, and gives pixels of a row range.
+
+use std::ops::Range;
+
+use js_sys::{Float32Array, Uint8Array};
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use super::{CodedError, OutputTransform, Photo};
+use crate::executor::SequentialExecutor;
+use crate::relight::cpu::{self, CpuRelighter, STRIP_ROWS};
+use crate::transport::CHANNELS;
+
+/// Relights a row range of a photograph. Only its tiles are needed.
+#[wasm_bindgen(js_name = BandRelighter)]
+pub struct RowRangeRelighter {
+    relighter: CpuRelighter,
+    rows: Range<u32>,
+}
+
+#[wasm_bindgen(js_class = BandRelighter)]
+impl RowRangeRelighter {
+    /// For `rows` rows of the picture from `first` on. The photograph cannot give or take tiles until this is freed.
+    ///
+    /// # Errors
+    /// Code `internal` if the rows lie outside the picture.
+    #[wasm_bindgen(constructor)]
+    pub fn new(photo: &Photo, first: u32, rows: u32) -> Result<Self, CodedError> {
+        let height = photo.geometry().camera.height;
+        let end = first.checked_add(rows).filter(|end| *end <= height);
+        let end = end
+            .ok_or_else(|| CodedError::new("internal", "the row range lies outside the picture"))?;
+        Ok(Self {
+            relighter: CpuRelighter::new(photo.transport()),
+            rows: first..end,
+        })
+    }
+
+    /// The rows of the light that are needed: the first, and one past the last.
+    #[wasm_bindgen(getter, js_name = lightRows)]
+    pub fn light_rows(&self) -> Vec<u32> {
+        let Range { start, end } = self.relighter.light_rows();
+        vec![start, end]
+    }
+
+    /// Writes the row range under a light into `out`: RGBA, row by row. `light` has linear RGB of the
+    /// [`lightRows`](Self::light_rows); without it, the last light stays. `quality` is the share of the components in use,
+    /// 0 to 1. Both arrays are copied in strips: the module's memory never shrinks.
+    ///
+    /// # Errors
+    /// Code `internal` if an array has another length.
+    pub fn relight(
+        &mut self,
+        light: Option<Float32Array>,
+        output: &OutputTransform,
+        quality: f64,
+        out: &Uint8Array,
+    ) -> Result<(), CodedError> {
+        let geometry = self.relighter.transport().geometry;
+        let width = geometry.camera.width;
+        if u64::from(out.length()) != 4 * self.rows.len() as u64 * u64::from(width) {
+            return Err(CodedError::new(
+                "internal",
+                "the output has not the row range's length",
+            ));
+        }
+        self.relighter.set_quality(quality as f32);
+        match light {
+            Some(values) => {
+                let light_rows = self.relighter.light_rows();
+                let width = geometry.light.width as usize;
+                if values.length() as usize != CHANNELS * width * light_rows.len() {
+                    return Err(CodedError::new(
+                        "internal",
+                        "the light has not the length of its rows",
+                    ));
+                }
+                let rows = LinearRgbRows {
+                    values,
+                    first: light_rows.start,
+                    rgb: vec![[0.0; CHANNELS]; width],
+                    row: vec![[0.0; 4]; width],
+                };
+                self.relighter.relight_rows(rows, &SequentialExecutor);
+            }
+            None => self.relighter.update(&SequentialExecutor),
+        }
+        let output = output.inner();
+        let mut strip = vec![[0; 4]; STRIP_ROWS.min(self.rows.len()) * width as usize];
+        for first in self.rows.clone().step_by(STRIP_ROWS) {
+            let rows = first..self.rows.end.min(first + STRIP_ROWS as u32);
+            let pixels = &mut strip[..rows.len() * width as usize];
+            self.relighter
+                .encode_rows(&output, rows.clone(), pixels, &SequentialExecutor);
+            let [start, end] =
+                [rows.start, rows.end].map(|row| 4 * (row - self.rows.start) * width);
+            out.subarray(start, end).copy_from(pixels.as_flattened());
+        }
+        Ok(())
+    }
+}
+
+/// Rows of a light in a JavaScript array.
+struct LinearRgbRows {
+    /// Linear RGB.
+    values: Float32Array,
+    /// The first row.
+    first: u32,
+    /// One row in this memory.
+    rgb: Vec<[f32; CHANNELS]>,
+    row: Vec<[f32; 4]>,
+}
+
+impl cpu::LightRows for LinearRgbRows {
+    fn row(&mut self, v: u32) -> &[[f32; 4]] {
+        let values = self.rgb.as_flattened_mut();
+        let length = values.len() as u32;
+        let start = (v - self.first) * length;
+        self.values.subarray(start, start + length).copy_to(values);
+        for (element, [r, g, b]) in self.row.iter_mut().zip(&self.rgb) {
+            *element = [*r, *g, *b, 0.0];
+        }
+        &self.row
+    }
+}
+
+/// The instructions that the CPU backend uses: `simd128` or `scalar`.
+#[wasm_bindgen(js_name = cpuKernel)]
+pub fn cpu_kernel() -> String {
+    cpu::KERNEL.into()
+}
