@@ -1,7 +1,6 @@
-//! `pkg-scripts/bench page`: how fast `<relightable-photo>` relights in a browser, by each back end, and
-//! how much memory it takes. This program makes the photographs; `page/main.js`, which says how all of it
-//! is measured, runs the browser.
-#![allow(clippy::unwrap_used, clippy::expect_used)] // a bench that cannot go on should stop
+//! `pkg-scripts/bench page`: the frame times of `<relightable-photo>` in a browser by each backend, and its memory. This
+//! program makes the photographs; `page/main.js` runs the browser and describes the measurements.
+#![allow(clippy::unwrap_used, clippy::expect_used)] // a failed benchmark stops
 
 mod figures;
 mod made_up;
@@ -22,7 +21,7 @@ fn main() {
     fs::create_dir_all(&folder).unwrap();
     let photos: Vec<Value> = SIDES
         .iter()
-        .flat_map(|side| RANKS.map(|rank| photograph(&folder, *side, rank)))
+        .flat_map(|side| RANKS.map(|rank| write_photograph(&folder, *side, rank)))
         .collect();
     fs::write(folder.join("photos.json"), json!(photos).to_string()).unwrap();
     let Ok(node) = std::env::var("BENCH_NODE") else {
@@ -37,27 +36,27 @@ fn main() {
     figures::report("page", &measured);
 }
 
-/// A photograph, written where it is not there as this program writes it, and what is to be known of it.
-fn photograph(folder: &Path, side: u32, rank: usize) -> Value {
+/// Writes a photograph unless its file is up to date. Returns its name, size and bytes.
+fn write_photograph(folder: &Path, side: u32, rank: usize) -> Value {
     let name = format!("{side}-r{rank}.ltm");
     let path = folder.join(&name);
-    if !is_of_this_program(&path) {
-        // Under another name until it is whole.
+    if !is_up_to_date(&path) {
+        // Under another name until it is complete.
         let part = path.with_extension("part");
-        write(&part, side, rank);
+        write_file(&part, side, rank);
         fs::rename(part, path).unwrap();
     }
     json!({"name": name, "side": side, "rank": rank, "frame_bytes": made_up::bytes(side, rank)})
 }
 
-/// Whether a file is there that is no older than what would write it.
-fn is_of_this_program(path: &Path) -> bool {
+/// Whether a file exists and is not older than this program.
+fn is_up_to_date(path: &Path) -> bool {
     let changed = |path: &Path| fs::metadata(path)?.modified();
     let program = std::env::current_exe().and_then(|program| changed(&program));
     matches!((changed(path), program), (Ok(file), Ok(program)) if file >= program)
 }
 
-fn write(path: &Path, side: u32, rank: usize) {
+fn write_file(path: &Path, side: u32, rank: usize) {
     let geometry = made_up::geometry(side);
     let basis = made_up::basis(&geometry, rank);
     let source = Source {
@@ -67,7 +66,7 @@ fn write(path: &Path, side: u32, rank: usize) {
         metadata: Metadata::default(),
         extensions: Vec::new(),
     };
-    // Anything coarser might leave components out.
+    // A lower quality might drop components.
     let encoded = EncodedFile::new(source, Quality::Lossless, &Cores).unwrap();
     let kept = usize::from(encoded.head().header.rank);
     assert_eq!(kept, rank, "components of the file");

@@ -5,18 +5,18 @@ use std::time::Instant;
 
 use pollster::block_on;
 use relightable_photo::relight::backend::Frame;
-use relightable_photo::relight::webgpu::{Device, Offscreen};
-use relightable_photo::relight::{Display, Light};
+use relightable_photo::relight::webgpu::{Device, OffscreenRenderer};
+use relightable_photo::relight::{Light, OutputTransform};
 
-use super::film::{self, Kind};
+use super::animated_photo::{self, LightSequence};
 use super::{Figures, RANKS, made_up};
 
 const SIDES: [u32; 2] = [512, 2048];
-/// Copied to measure the memory's speed.
-const COPIED: u64 = 256 << 20;
+/// Bytes copied to measure the memory's bandwidth.
+const COPY_BYTES: u64 = 256 << 20;
 
-/// Milliseconds of a frame, of the fastest of a few runs of many: whole frames under a video, and the last
-/// pass alone, which is all that another exposure asks for.
+/// Milliseconds of a frame, in the fastest of five runs of many frames: under a video, and of the last pass alone, which
+/// is all that a change of exposure needs.
 pub fn frames(figures: &mut Figures) {
     let device = match block_on(Device::offscreen()) {
         Ok(device) => Rc::new(device),
@@ -25,16 +25,16 @@ pub fn frames(figures: &mut Figures) {
             return;
         }
     };
-    let of = match device.is_software() {
+    let label = match device.is_software() {
         true => "software",
         false => "gpu",
     };
-    println!("\n{} ({of})", device.kernel());
+    println!("\n{} ({label})", device.kernel());
     if device.is_software() {
-        println!("A program in the place of a graphics processor: these are no figures of one.");
+        println!("A software renderer: these are no figures of a GPU.");
     }
-    let copied = 2.0 * COPIED as f64 / device.copy_seconds(COPIED).unwrap();
-    figures.insert(format!("{of}_copy_bandwidth_gb_s"), copied / 1e9);
+    let copied = 2.0 * COPY_BYTES as f64 / device.copy_seconds(COPY_BYTES).unwrap();
+    figures.insert(format!("{label}_copy_bandwidth_gb_s"), copied / 1e9);
     println!("copies {:.1} GB/s, read and written\n", copied / 1e9);
     println!(
         "{:20} {:>10} {:>10} {:>12}",
@@ -42,17 +42,17 @@ pub fn frames(figures: &mut Figures) {
     );
     for side in SIDES {
         for rank in RANKS {
-            let transport = film::transport(side, rank);
-            let photo = block_on(Offscreen::new(device.clone(), &transport));
+            let transport = animated_photo::transport(side, rank);
+            let photo = block_on(OffscreenRenderer::new(device.clone(), &transport));
             let Ok(mut photo) = photo.inspect_err(|error| println!("{side}² rank {rank}: {error}"))
             else {
                 continue;
             };
-            let lights = Kind::Video.lights(transport.geometry.light);
-            let video = time(&device, |i| {
+            let lights = LightSequence::Video.lights(transport.geometry.light);
+            let video = frame_ms(&device, |i| {
                 draw(&mut photo, &lights[i % lights.len()], 1.0);
             });
-            let last = time(&device, |i| {
+            let last = frame_ms(&device, |i| {
                 draw(&mut photo, &lights[0], 1.0 + (i % 100) as f32 / 100.0);
             });
             let fraction = made_up::bytes(side, rank) as f64 / (last / 1e3) / copied;
@@ -61,7 +61,7 @@ pub fn frames(figures: &mut Figures) {
                 format!("{side}² rank {rank}"),
                 100.0 * fraction
             );
-            let key = |what: &str| format!("{of}_{side}_r{rank}_{what}");
+            let key = |what: &str| format!("{label}_{side}_r{rank}_{what}");
             figures.insert(key("video_ms"), video);
             figures.insert(key("last_pass_ms"), last);
             figures.insert(key("last_pass_copy_fraction"), fraction);
@@ -69,19 +69,19 @@ pub fn frames(figures: &mut Figures) {
     }
 }
 
-fn draw(photo: &mut Offscreen, light: &Light, exposure: f32) {
+fn draw(photo: &mut OffscreenRenderer, light: &Light, exposure: f32) {
     let frame = Frame {
         light: Some(light),
-        display: Display::srgb(exposure),
-        detail: 1.0,
+        output: OutputTransform::srgb(exposure),
+        quality: 1.0,
     };
     photo.draw(&frame).unwrap();
 }
 
-/// Of one of many that follow each other, as the device has them in turn.
-fn time(device: &Device, mut draw: impl FnMut(usize)) -> f64 {
+/// Milliseconds of one of many consecutive frames.
+fn frame_ms(device: &Device, mut draw: impl FnMut(usize)) -> f64 {
     let mut best = f64::INFINITY;
-    // Counted on from run to run: where one is of a single frame, that is another all the same.
+    // Counted on from run to run, so that even runs of a single frame draw different ones.
     let mut next = 0..;
     let mut run = |frames: usize| {
         let start = Instant::now();
@@ -89,7 +89,7 @@ fn time(device: &Device, mut draw: impl FnMut(usize)) -> f64 {
         device.wait().unwrap();
         start.elapsed().as_secs_f64() * 1e3 / frames as f64
     };
-    // So many that a run takes a tenth of a second.
+    // As many as fit a tenth of a second.
     let frames = (100.0 / run(1).min(run(2))).clamp(1.0, 300.0) as usize;
     for _ in 0..5 {
         best = best.min(run(frames));

@@ -1,29 +1,34 @@
-//! Photographs to relight, lights that change, and the time that a frame takes.
+//! Photographs to relight, sequences of lights, and the time of a frame.
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
 use relightable_photo::executor::{Executor, SequentialExecutor};
-use relightable_photo::relight::{Display, Light, Rgba8Picture, TorchPose, cpu};
+use relightable_photo::relight::cpu::CpuRelighter;
+use relightable_photo::relight::{Light, OutputTransform, Rgba8Picture, TorchPose};
 use relightable_photo::transport::{Extent, LightPx, Tile, Transport};
 
 use crate::made_up::{self, Cores, noise, square};
 
-/// Lights that frames take turns with.
-const LIGHTS: usize = 4;
+/// Lights of a sequence, which repeats.
+const SEQUENCE_LIGHTS: usize = 4;
 
 /// How the light changes from frame to frame.
 #[derive(Clone, Copy)]
-pub enum Kind {
+pub enum LightSequence {
     Video,
     Torch,
     Static,
 }
 
-pub const KINDS: [Kind; 3] = [Kind::Video, Kind::Torch, Kind::Static];
+pub const LIGHT_SEQUENCES: [LightSequence; 3] = [
+    LightSequence::Video,
+    LightSequence::Torch,
+    LightSequence::Static,
+];
 
-impl Kind {
+impl LightSequence {
     pub fn name(self) -> &'static str {
         match self {
             Self::Video => "video",
@@ -34,8 +39,8 @@ impl Kind {
 
     pub fn lights(self, extent: Extent) -> Vec<Light> {
         match self {
-            Self::Video => (0..LIGHTS).map(|i| video(extent, i)).collect(),
-            Self::Torch => (0..LIGHTS).map(|i| torch(extent, i)).collect(),
+            Self::Video => (0..SEQUENCE_LIGHTS).map(|i| video(extent, i)).collect(),
+            Self::Torch => (0..SEQUENCE_LIGHTS).map(|i| torch(extent, i)).collect(),
             Self::Static => vec![video(extent, 0)],
         }
     }
@@ -43,80 +48,81 @@ impl Kind {
 
 /// Milliseconds of a frame.
 #[derive(Clone, Copy)]
-pub struct Time {
-    /// Until there is a picture in linear light.
+pub struct FrameTime {
+    /// Up to the picture in linear light.
     pub linear: f64,
-    /// Tone mapping too.
-    pub whole: f64,
+    /// With the output transform.
+    pub total: f64,
 }
 
-impl Time {
-    pub const NEVER: Self = Self {
+impl FrameTime {
+    pub const INFINITE: Self = Self {
         linear: f64::INFINITY,
-        whole: f64::INFINITY,
+        total: f64::INFINITY,
     };
 
     pub fn min(self, other: Self) -> Self {
         Self {
             linear: self.linear.min(other.linear),
-            whole: self.whole.min(other.whole),
+            total: self.total.min(other.total),
         }
     }
 }
 
-/// A photograph under lights that follow each other.
-pub struct Film {
-    pub relighter: cpu::Relighter,
+/// A photograph under a sequence of lights.
+pub struct AnimatedPhoto {
+    pub relighter: CpuRelighter,
     pub lights: Vec<Light>,
-    shown: usize,
+    /// Frames drawn since the light sequence began.
+    frame: usize,
     picture: Rgba8Picture,
 }
 
-impl Film {
+impl AnimatedPhoto {
     pub fn new(side: u32, rank: usize) -> Self {
         Self {
-            relighter: cpu::Relighter::new(Arc::new(transport(side, rank))),
+            relighter: CpuRelighter::new(Arc::new(transport(side, rank))),
             lights: Vec::new(),
-            shown: 0,
+            frame: 0,
             picture: Rgba8Picture::black(square(side)),
         }
     }
 
     /// Takes other lights, and shows the first.
-    pub fn load(&mut self, kind: Kind) {
-        self.lights = kind.lights(self.relighter.transport().geometry.light);
-        self.shown = 0;
-        self.show(&Cores);
+    pub fn load(&mut self, sequence: LightSequence) {
+        self.lights = sequence.lights(self.relighter.transport().geometry.light);
+        self.frame = 0;
+        self.render_frame(&Cores);
     }
 
-    fn show(&mut self, executor: &impl Executor) -> Time {
-        let light = &self.lights[self.shown % self.lights.len()];
-        self.shown += 1;
+    fn render_frame(&mut self, executor: &impl Executor) -> FrameTime {
+        let light = &self.lights[self.frame % self.lights.len()];
+        self.frame += 1;
         let start = Instant::now();
         self.relighter.relight(light, executor);
         let linear = start.elapsed();
         let rows = 0..self.picture.extent.height;
         let pixels = &mut self.picture.pixels;
         self.relighter
-            .show(&Display::srgb(1.0), rows, pixels, executor);
-        let [linear, whole] = [linear, start.elapsed()].map(|time| time.as_secs_f64() * 1e3);
-        Time { linear, whole }
+            .encode_rows(&OutputTransform::srgb(1.0), rows, pixels, executor);
+        let [linear, total] = [linear, start.elapsed()].map(|time| time.as_secs_f64() * 1e3);
+        FrameTime { linear, total }
     }
 
-    /// The fastest frames on one thread and on all cores, in so many seconds.
-    pub fn fastest(&mut self, seconds: f64) -> [Time; 2] {
-        let (start, mut best, mut frames) = (Instant::now(), [Time::NEVER; 2], 0);
+    /// The fastest frames on one thread and on all cores, measured for so many seconds.
+    pub fn fastest(&mut self, seconds: f64) -> [FrameTime; 2] {
+        let (start, mut best, mut frames) = (Instant::now(), [FrameTime::INFINITE; 2], 0);
         while frames < 5 || frames < 200 && start.elapsed().as_secs_f64() < seconds {
-            best[0] = best[0].min(self.show(&SequentialExecutor));
-            best[1] = best[1].min(self.show(&Cores));
+            best[0] = best[0].min(self.render_frame(&SequentialExecutor));
+            best[1] = best[1].min(self.render_frame(&Cores));
             frames += 1;
         }
         best
     }
 }
 
-/// Seconds of the fastest of a few runs.
-pub fn fastest(runs: usize, mut work: impl FnMut()) -> f64 {
+/// Seconds of the fastest run.
+pub fn fastest_seconds(runs: usize, mut work: impl FnMut()) -> f64 {
     let times = (0..runs).map(|_| {
         let start = Instant::now();
         work();
