@@ -1,4 +1,4 @@
-//! Backends: what draws a photograph into a canvas, and the errors they share.
+//! Backends, which draw a relit photograph into a canvas: their common interface, errors, and cache of the last light.
 
 use thiserror::Error;
 

@@ -1,7 +1,7 @@
 //! Light blocks: squares of window origins, each with the camera pixels whose windows begin there.
 //!
-//! A block is what is correlated at once, and what is relit again when the light under it has changed. Its
-//! *footprint* is the light that the windows of its origins cover.
+//! A block is correlated at once, and relit when the light under it has changed. Its *footprint* is the square of light
+//! elements that the windows of its origins cover: `side + w - 1` elements along each side.
 
 use std::ops::Range;
 

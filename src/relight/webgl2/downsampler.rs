@@ -30,6 +30,9 @@ struct DownsamplePass {
 
 impl Downsampler {
     /// From light images of that extent to the light's texture.
+    ///
+    /// # Errors
+    /// [`BackendError::Device`] if the context is lost.
     pub fn new(
         gl: &Gl,
         extent: Extent,

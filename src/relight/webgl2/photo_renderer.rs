@@ -50,6 +50,9 @@ struct PhotoResources {
 
 impl PhotoRenderer {
     /// Uploads a transport. A failure leaves nothing in the context.
+    ///
+    /// # Errors
+    /// [`BackendError`] if the device cannot hold the transport.
     pub fn new(context: Rc<Context>, transport: &Transport) -> Result<Self, BackendError> {
         let layout = TextureLayout::new(transport, context.limits)?;
         context.clear_errors();
@@ -77,6 +80,9 @@ impl PhotoRenderer {
     }
 
     /// Draws a frame into the context's canvas.
+    ///
+    /// # Errors
+    /// [`BackendError::Lost`] once the context is lost.
     pub fn draw(&mut self, frame: &Frame<'_>, gamut: Gamut) -> Result<(), BackendError> {
         let Frame {
             light,

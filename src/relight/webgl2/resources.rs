@@ -54,6 +54,9 @@ pub(super) struct Texture {
 
 impl Texture {
     /// Creates a texture, an array if it has `layers`, and binds it to a unit.
+    ///
+    /// # Errors
+    /// [`BackendError::Device`] if the context is lost.
     pub fn new(
         gl: &Gl,
         unit: u32,
@@ -100,6 +103,9 @@ impl Texture {
     }
 
     /// Writes all texels of a 2D texture.
+    ///
+    /// # Errors
+    /// [`BackendError::Upload`] if the browser rejects it.
     pub fn write(
         &self,
         format: TexelFormat,
@@ -122,7 +128,10 @@ impl Texture {
             .map_err(upload_error)
     }
 
-    /// Writes a rectangle of one layer, from that column, row and layer on.
+    /// Writes a rectangle of one layer of a bound array, from that column, row and layer on.
+    ///
+    /// # Errors
+    /// [`BackendError::Upload`] if the browser rejects it.
     pub fn write_layer(
         &self,
         format: TexelFormat,
@@ -163,6 +172,9 @@ pub(super) struct Framebuffer {
 
 impl Framebuffer {
     /// Draws into a 2D texture.
+    ///
+    /// # Errors
+    /// [`BackendError::Device`] if the context is lost.
     pub fn of_texture(gl: &Gl, texture: &Texture) -> Result<Self, BackendError> {
         let created = Self::new(gl)?;
         let (target, attachment) = (Gl::FRAMEBUFFER, Gl::COLOR_ATTACHMENT0);
@@ -178,6 +190,9 @@ impl Framebuffer {
     }
 
     /// Draws into two layers of a texture array.
+    ///
+    /// # Errors
+    /// [`BackendError::Upload`] if the device cannot draw into it, [`BackendError::Device`] if the context is lost.
     pub fn of_two_layers(gl: &Gl, array: &Texture, first: u32) -> Result<Self, BackendError> {
         let created = Self::new(gl)?;
         let targets = [Gl::COLOR_ATTACHMENT0, Gl::COLOR_ATTACHMENT1];
@@ -226,6 +241,9 @@ pub(super) struct UniformBuffer {
 
 impl UniformBuffer {
     /// Creates a buffer with these bytes.
+    ///
+    /// # Errors
+    /// [`BackendError::Device`] if the context is lost.
     pub fn new(gl: &Gl, bytes: &[u8]) -> Result<Self, BackendError> {
         let created = Self {
             gl: gl.clone(),

@@ -73,7 +73,7 @@ pub trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = 
 
 impl<V: Copy + Add<Output = V> + Sub<Output = V> + Mul<Output = V>> Vector for V {}
 
-/// The proof that the CPU has an instruction set, and what it computes with.
+/// A token: proves that the CPU has an instruction set, and gives access to its operations.
 ///
 /// The methods for single lines are written once, here; an instruction set with wider vectors overrides them.
 pub trait Simd: Copy {

@@ -94,7 +94,7 @@ impl DeviceQueue {
         Ok((gpu, adapter))
     }
 
-    /// Frees everything on the device, also what is still in use.
+    /// Frees everything on the device, also resources in use.
     pub fn destroy(&self) {
         self.device.destroy();
     }
