@@ -1,94 +1,65 @@
 #version 300 es
-// naga made this of relight.wgsl: change that one.
+// Translated from WGSL by tests/shaders.rs; do not edit.
 precision highp float;
 precision highp int;
-struct Params {
-vec4 display[3];
-vec4 tint;
-int window;
-int tile_side;
-int quads;
-int channel_quads;
-int seen_quads;
-int filmic;
-int dither;
-int unused;
-};
-struct Basis {
-vec4 quads[1024];
-};
-struct Channel {
-vec4 share;
-};
-struct Shrink {
-ivec4 to;
-};
-struct Covering {
-vec4 clip;
-vec2 picture;
-};
-struct Pair {
-vec4 first;
-vec4 second;
+struct DownsampleUniforms {
+ivec2 axis;
+int size;
 };
 uniform highp sampler2D _group_0_binding_10_fs;
-layout(std140) uniform Shrink_block_0Fragment { Shrink _group_0_binding_11_fs; };
+layout(std140) uniform DownsampleUniforms_block_0Fragment { DownsampleUniforms _group_0_binding_11_fs; };
 layout(location = 0) out vec4 _fs2p_location0;
-ivec2 covered(int i, int count) {
-int _e12 = _group_0_binding_11_fs.to.x;
-return (ivec2((i * count), (((i + 1) * count) - 1)) / ivec2(_e12));
-}
-float share(int i_1, int j, int count_1) {
-int _e7 = _group_0_binding_11_fs.to.x;
-int begin = max((i_1 * count_1), (j * _e7));
-int _e18 = _group_0_binding_11_fs.to.x;
-int end = min(((i_1 + 1) * count_1), ((j + 1) * _e18));
-return (float((end - begin)) / float(count_1));
+int along(ivec2 axis, ivec2 value) {
+return ((axis.x * value.x) + (axis.y * value.y));
 }
 vec3 srgb_decode(vec3 code) {
 vec3 curve = pow(((code + vec3(0.055)) / vec3(1.055)), vec3(2.4));
 return mix(curve, (code / vec3(12.92)), lessThanEqual(code, vec3(0.04045)));
 }
-vec3 hable(vec3 x_1) {
-vec3 above = ((x_1 * ((0.15 * x_1) + vec3(0.05))) + vec3(0.004));
-vec3 below = ((x_1 * ((0.15 * x_1) + vec3(0.5))) + vec3(0.06));
-return ((above / below) - vec3(0.06666667));
-}
-int bayer(ivec2 at_4) {
-ivec2 n = ivec2((at_4.x ^ at_4.y), at_4.y);
-ivec2 bits = ((((n & ivec2(1)) << uvec2(4u)) | ((n & ivec2(2)) << uvec2(1u))) | ((n & ivec2(4)) >> uvec2(2u)));
-return ((bits.x << 1u) | bits.y);
-}
 void main() {
-vec4 at_1 = gl_FragCoord;
+vec4 position = gl_FragCoord;
 vec3 sum = vec3(0.0);
-int x = 0;
-int count_2 = int(uvec2(textureSize(_group_0_binding_10_fs, 0).xy).x);
-ivec2 _e7 = covered(int(at_1.x), count_2);
-x = _e7.x;
+int i = 0;
+ivec2 axis_1 = _group_0_binding_11_fs.axis;
+int size = _group_0_binding_11_fs.size;
+ivec2 pixel = ivec2(position.xy);
+ivec2 across = (pixel * (ivec2(1) - axis_1));
+int _e16 = along(axis_1, ivec2(uvec2(textureSize(_group_0_binding_10_fs, 0).xy)));
+int _e17 = along(axis_1, pixel);
+int cell_begin = (_e17 * _e16);
+int cell_end = (cell_begin + _e16);
+int last = ((cell_end - 1) / size);
+i = (cell_begin / size);
 bool loop_init = true;
 while(true) {
 if (!loop_init) {
-int _e35 = x;
-x = (_e35 + 1);
+int _e63 = i;
+i = (_e63 + 1);
 }
 loop_init = false;
-int _e13 = x;
-if ((_e13 <= _e7.y)) {
+int _e28 = i;
+if ((_e28 <= last)) {
 } else {
 break;
 }
 {
-int _e17 = x;
-vec4 code_1 = texelFetch(_group_0_binding_10_fs, ivec2(_e17, int(at_1.y)), 0);
-vec3 _e23 = sum;
-int _e26 = x;
-float _e27 = share(int(at_1.x), _e26, count_2);
-vec3 _e31 = srgb_decode(code_1.xyz);
-sum = (_e23 + ((_e27 * code_1.w) * _e31));
+int _e31 = i;
+vec4 texel = texelFetch(_group_0_binding_10_fs, (across + (axis_1 * _e31)), 0);
+int _e36 = i;
+int _e41 = i;
+int overlap = (min(cell_end, ((_e36 + 1) * size)) - max(cell_begin, (_e41 * size)));
+float weight = (float(overlap) / float(_e16));
+if ((axis_1.x > 0)) {
+vec3 _e51 = sum;
+vec3 _e55 = srgb_decode(texel.xyz);
+sum = (_e51 + ((weight * texel.w) * _e55));
+} else {
+vec3 _e58 = sum;
+sum = (_e58 + (weight * texel.xyz));
 }
 }
-vec3 _e37 = sum;
-_fs2p_location0 = vec4(_e37, 0.0);
+}
+vec3 _e65 = sum;
+_fs2p_location0 = vec4(_e65, 0.0);
 return;
 }
