@@ -1,10 +1,10 @@
 /**
- * Bundles www/src into dist, and writes the types to dist/types:
+ * Bundles www/src into dist:
  *
- * - relightable-photo.js, the element in one file, for script tags; its toolbar and its translations, which it
- *   fetches where they are asked for; and its workers;
- * - index.js, element.js and core.js, which share chunks, for bundlers and import maps;
- * - custom-elements.json, and the types of the element in JSX.
+ * - relightable-photo.js: the element in one file, for script tags, with its workers and the scripts that it loads
+ *   on demand;
+ * - index.js, element.js and core.js, which share chunks: for bundlers and import maps;
+ * - types/, custom-elements.json, and the types of the element in JSX.
  */
 
 import { execFileSync } from 'node:child_process';
@@ -20,8 +20,8 @@ const repository = join(import.meta.dirname, '..', '..');
 const sources = join(repository, 'www/src');
 const dist = join(repository, 'dist');
 
-/** What is fetched only where it is asked for lies beside the element, under names of its own. */
-const APART = new Map([
+/** The scripts that the element loads on demand, by their sources. */
+const LAZY_SCRIPTS = new Map([
   ['renderers/cpu/cpu-renderer', 'relightable-photo-cpu'],
   ['renderers/gpu/gpu-renderer', 'relightable-photo-gpu'],
   ['lights/light-sources', 'relightable-photo-sources'],
@@ -33,13 +33,13 @@ const APART = new Map([
 ]);
 
 /** @type {import('esbuild').Plugin} */
-const apart = {
-  name: 'apart',
+const lazyScripts = {
+  name: 'lazy-scripts',
   setup({ onResolve }) {
     onResolve({ filter: /^\.\.?\// }, ({ kind, path, resolveDir }) => {
       if (kind !== 'dynamic-import') return undefined;
       const source = relative(sources, join(resolveDir, path)).replace(/\.js$/, '');
-      const file = APART.get(source);
+      const file = LAZY_SCRIPTS.get(source);
       return file === undefined ? undefined : { path: `./${file}.js`, external: true };
     });
   },
@@ -53,7 +53,7 @@ const options = {
   format: 'esm',
   target: 'es2022',
   minify: true,
-  // Modules are UTF-8 wherever they come from.
+  // Browsers read modules as UTF-8 whatever the server says.
   charset: 'utf8',
   plugins: [styles],
   sourcemap: 'linked',
@@ -61,16 +61,16 @@ const options = {
   logLevel: 'warning',
 };
 
-/** The modules' own scripts stay files: who needs one module does not load those of the others. */
+/** The scripts of wasm-bindgen stay separate files, so that a page loads only those of the modules that it uses. */
 const external = ['./wasm/*'];
 
 /**
- * A worker has its module's script in it: it needs no other, and bundlers make classic workers of it, which
- * cannot load modules.
+ * Includes the scripts of wasm-bindgen in the workers: bundlers may turn these into classic workers, which cannot
+ * import modules.
  *
  * @type {import('esbuild').Plugin}
  */
-const glueInside = {
+const inlineGlue = {
   name: 'glue',
   setup({ onResolve }) {
     onResolve({ filter: /^\.\/wasm\// }, ({ path }) => ({ path: join(dist, path) }));
@@ -84,15 +84,17 @@ await Promise.all([
   build({
     ...options,
     external,
-    plugins: [styles, apart],
+    plugins: [styles, lazyScripts],
     entryPoints: {
       'relightable-photo': 'www/src/index.ts',
-      ...Object.fromEntries([...APART].map(([source, file]) => [file, `www/src/${source}.ts`])),
+      ...Object.fromEntries(
+        [...LAZY_SCRIPTS].map(([source, file]) => [file, `www/src/${source}.ts`]),
+      ),
     },
   }),
   build({
     ...options,
-    plugins: [glueInside],
+    plugins: [inlineGlue],
     entryPoints: {
       'relightable-photo-worker': 'www/src/photo/decode-worker.ts',
       'relightable-photo-relighter': 'www/src/renderers/cpu/relight-worker.ts',
@@ -102,7 +104,7 @@ await Promise.all([
     ...options,
     external,
     splitting: true,
-    // Beside the rest: addresses in them are relative.
+    // In the same folder, because chunks contain relative addresses.
     chunkNames: 'chunk-[hash]',
     entryPoints: {
       index: 'www/src/index.ts',
@@ -111,7 +113,7 @@ await Promise.all([
     },
   }),
 ]);
-// For imports that a compiler does not drop.
+// Modules with types only: some compilers keep their imports.
 for (const name of ['react.js', 'jsx.js']) writeFileSync(join(dist, name), 'export {};\n');
 
 rmSync(join(dist, 'types'), { recursive: true, force: true });

@@ -1,7 +1,7 @@
 /**
- * Writes the site as a folder for any host of static files: node www/tools/export.js PHOTOS OUT [ADDRESS].
- * ADDRESS is where it will be. Only the sample of a IIIF manifest needs it, in which addresses have to be
- * whole: without it they are relative, which this site's own page can read.
+ * Writes the site as a folder of static files: node www/tools/export.js PHOTOS OUT [ADDRESS]
+ * ADDRESS is the URL of the site. Only the sample of a IIIF manifest needs it, whose URLs should be absolute; without
+ * it they are relative, which the site's own page can read.
  */
 
 import { cpSync, mkdirSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
@@ -13,7 +13,7 @@ const repository = join(import.meta.dirname, '..', '..');
 const [photos, out, address] = process.argv.slice(2);
 if (!photos || !out || (address !== undefined && !URL.canParse(address))) {
   console.error(
-    'export: takes the folder of photographs, where to write, and the address it will have',
+    'export: usage: node www/tools/export.js PHOTOS OUT [ADDRESS], where ADDRESS is the URL of the site',
   );
   process.exit(2);
 }
@@ -24,7 +24,7 @@ for (const page of PAGES) writeFileSync(join(out, page), composePage(page));
 for (const [at, folder] of Object.entries(FOLDERS)) {
   cpSync(join(repository, folder), join(out, at), {
     recursive: true,
-    // For debugging and for TypeScript.
+    // Source maps and types are for development.
     filter: (path) => !path.endsWith('.map') && !path.endsWith(join('dist', 'types')),
   });
 }
@@ -39,4 +39,4 @@ for (const name of readdirSync(photos)) {
 }
 const base = address === undefined ? '../' : new URL('.', address).href;
 writeFileSync(join(out, MANIFEST), manifestAt(base));
-console.log(`${resolve(out)} holds the site: upload all of it.`);
+console.log(`${resolve(out)} contains the site: upload all of it.`);

@@ -8,15 +8,15 @@ import { pathToFileURL } from 'node:url';
 const dist = join(import.meta.dirname, '..', '..', 'dist');
 const FILE = 'integrity.json';
 
-/** What browsers load. */
+/** The files that browsers load. */
 const LOADED = /\.(js|wasm)$/;
 
-/** @param {Uint8Array} bytes as browsers want it in `integrity` */
+/** The value of an `integrity` attribute. @param {Uint8Array} bytes */
 export function integrityOf(bytes) {
   return `sha384-${createHash('sha384').update(bytes).digest('base64')}`;
 }
 
-/** Writes dist/integrity.json: each file that browsers load, with its hash. */
+/** Writes dist/integrity.json, which maps each file that browsers load to its hash. */
 export function writeIntegrity() {
   const names = [
     ...readdirSync(dist),

@@ -10,21 +10,21 @@ import { pathToFileURL } from 'node:url';
 // @ts-expect-error: it comes without types
 import { create } from '@custom-elements-manifest/analyzer/src/create.js';
 
-/** The analyser's own compiler: later ones have no such interface. */
+/** The analyser's own version of TypeScript: newer ones lack this API. */
 const ts = createRequire(import.meta.resolve('@custom-elements-manifest/analyzer/cli.js'))(
   'typescript',
 );
 
 const repository = join(import.meta.dirname, '..', '..');
 
-/** Where the package has the class, and where it is defined. */
+/** The module that exports the class, and the one that defines the element. */
 const CLASS_MODULE = 'dist/element.js';
 const DEFINING_MODULE = 'dist/index.js';
 const CLASS = 'RelightablePhoto';
 const SOURCES = ['www/src/element/element.ts', 'www/src/element/events.ts'];
-/** The interface that has the properties which are attributes. */
+/** The interface with the properties that reflect attributes. */
 const REFLECTED = { file: 'www/src/element/reflect.ts', name: 'Reflected' };
-/** Observed, and every element's. */
+/** Observed attributes that every element has. */
 const GLOBAL = ['lang'];
 
 /**
@@ -91,7 +91,7 @@ function parse(file) {
   return ts.createSourceFile(file, text, ts.ScriptTarget.ES2022, true);
 }
 
-/** Properties that the class has from elsewhere. @returns {Member[]} */
+/** The reflected properties. @returns {Member[]} */
 function reflected() {
   const source = parse(REFLECTED.file);
   const found = source.statements.find(
@@ -108,7 +108,7 @@ function reflected() {
 }
 
 /**
- * Leaves of a class what others may use, and joins attributes to their properties.
+ * Removes the private members of a class, and connects attributes with their properties.
  *
  * @param {Declaration} element
  * @param {readonly string[]} observed
@@ -119,7 +119,7 @@ function tidy(element, observed) {
     ({ name, privacy, static: ofClass }) =>
       privacy !== 'private' && !name.startsWith('#') && !ofClass && !callbacks.test(name),
   );
-  // The analyser guesses at others from calls of dispatchEvent.
+  // Events without a description are the analyser's guesses from calls of dispatchEvent.
   element.events = element.events.filter(({ description }) => description);
   element.superclass = { name: 'HTMLElement', package: 'global:' };
   element.attributes = observed.map((name) => {
@@ -152,7 +152,7 @@ function jsxAttributes({ attributes, events, members }) {
     '/** Made from custom-elements.json. */\n\n',
     `import type { ${[...own].sort().join(', ')} } from './element/events.js';\n`,
     `import type { ${CLASS} } from './element/element.js';\n\n`,
-    '/** Attributes by their names in HTML, properties that are none of them, and handlers of events. */\n',
+    '/** Attributes by their names in HTML, properties without an attribute, and event handlers. */\n',
     'export interface RelightablePhotoAttributes {\n',
     ...attributes.map(({ name, type, description = '' }) =>
       line(description, /-/.test(name) ? `'${name}'` : name, jsxType(type?.text ?? 'string')),
@@ -165,7 +165,7 @@ function jsxAttributes({ attributes, events, members }) {
   ].join('');
 }
 
-/** What may be written in JSX for an attribute whose property has this type. @param {string} type */
+/** The type of an attribute in JSX whose property has this type. @param {string} type */
 function jsxType(type) {
   if (type === 'boolean') return 'boolean';
   return type === 'number' ? 'number | string' : 'string';

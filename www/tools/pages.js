@@ -1,6 +1,6 @@
 /**
- * The site's pages, put together from what is their own, in www/pages, and the layout they share. Samples
- * of code stand in files of their own, so that what a page shows is what is tested.
+ * Composes the site's pages from www/pages and their common layout. The code samples are files of their own, so that
+ * the tests run exactly what a page shows.
  */
 
 import { readFileSync } from 'node:fs';
@@ -47,9 +47,9 @@ export function composePage(name) {
 }
 
 /**
- * The sample of a IIIF manifest, in which addresses have to be whole, as it is where the site is.
+ * The sample of a IIIF manifest with the URLs of the site.
  *
- * @param {string} base where the site is, with a slash at its end
+ * @param {string} base URL of the site, with a slash at its end
  */
 export function manifestAt(base) {
   return read('samples/manifest.json').replaceAll('https://museum.example/', base);
@@ -66,7 +66,7 @@ function sample(file) {
   return `<figure class="code"><figcaption>${file}</figcaption><pre tabindex="0" role="region" aria-label="${file}"><code data-sample="${file}">${code}</code></pre></figure>`;
 }
 
-/** @param {string} source @param {string} name of a comment at the beginning */
+/** @param {string} source @param {string} name of one of the comments at the beginning */
 function field(source, name) {
   return new RegExp(`^<!-- ${name}: (.*) -->$`, 'm').exec(source)?.[1] ?? '';
 }

@@ -1,4 +1,4 @@
-/** Comparing pictures, pixel by pixel. */
+/** Reads, writes and compares pictures. */
 
 import { PNG } from 'pngjs';
 
@@ -27,9 +27,7 @@ export function encodePng({ width, height, data }) {
  *   signal-to-noise ratio over R, G and B in dB, `Infinity` for equal pictures
  */
 export function compare(a, b) {
-  if (a.width !== b.width || a.height !== b.height) {
-    throw new Error(`a picture of ${a.width}x${a.height} and one of ${b.width}x${b.height}`);
-  }
+  checkSameSize(a, b);
   let worst = 0;
   let squares = 0;
   for (let i = 0; i < a.data.length; i += 1) {
@@ -42,7 +40,7 @@ export function compare(a, b) {
 }
 
 /**
- * Centre of brightness, from 0 to 1 across and down.
+ * Centre of brightness, from 0 to 1 in x and y, and mean code.
  *
  * @param {Picture} picture
  */
@@ -58,25 +56,30 @@ export function brightest({ width, height, data }) {
 }
 
 /**
- * Counts the pixels of which a code differs by more than `tolerance`.
+ * Counts the pixels with a code that differs by more than `tolerance`.
  *
  * @param {Picture} a
  * @param {Picture} b of the same size
  * @param {number} tolerance out of 255
- * @returns {{ count: number, difference: Picture }} the picture is white there, black elsewhere
+ * @returns {{ count: number, difference: Picture }} `difference` is white at those pixels and black elsewhere
  */
 export function differing(a, b, tolerance) {
-  if (a.width !== b.width || a.height !== b.height) {
-    throw new Error(`a picture of ${a.width}x${a.height} and one of ${b.width}x${b.height}`);
-  }
+  checkSameSize(a, b);
   const data = new Uint8Array(a.data.length);
   let count = 0;
   for (let at = 0; at < data.length; at += 4) {
-    const off = [0, 1, 2, 3].some(
+    const differs = [0, 1, 2, 3].some(
       (c) => Math.abs((a.data[at + c] ?? 0) - (b.data[at + c] ?? 0)) > tolerance,
     );
-    if (off) count += 1;
-    data.set([off ? 255 : 0, off ? 255 : 0, off ? 255 : 0, 255], at);
+    if (differs) count += 1;
+    data.set(differs ? [255, 255, 255, 255] : [0, 0, 0, 255], at);
   }
   return { count, difference: { width: a.width, height: a.height, data } };
+}
+
+/** @param {Picture} a @param {Picture} b */
+function checkSameSize(a, b) {
+  if (a.width === b.width && a.height === b.height) return;
+  const sizes = [a, b].map(({ width, height }) => `${width}x${height}`).join(' and ');
+  throw new Error(`the pictures differ in size: ${sizes}`);
 }

@@ -1,4 +1,4 @@
-/** Answers for files of which parts are asked for, as RFC 9110 has them (sections 13 and 14). */
+/** Answers range requests and conditional requests (RFC 9110, sections 13 and 14). */
 
 import { pipeline } from 'node:stream/promises';
 
@@ -6,19 +6,19 @@ import { pipeline } from 'node:stream/promises';
  * @typedef {object} Content
  * @property {number} size in bytes
  * @property {string} type MIME type
- * @property {string} etag a strong one, with its quotes: the same for the same bytes only
+ * @property {string} etag a strong entity tag with its quotes: equal only for equal bytes
  * @property {(start: number, end: number) => AsyncIterable<Uint8Array> | Iterable<Uint8Array>} read
- *   gives the bytes from `start` to before `end`
+ *   reads the bytes from `start` to before `end`
  */
 
 /**
- * Answers a GET or HEAD request for a file: with all of it, with the part that is asked for, or with
- * the word that what the client has is still right. Headers set before go along.
+ * Answers a GET or HEAD request for a file with the whole file (200), a range (206), or the news that the client's
+ * copy is up to date (304). Headers that were set before are sent too.
  *
  * @param {import('node:http').IncomingMessage} request
  * @param {import('node:http').ServerResponse} response
  * @param {Content} content
- * @returns {Promise<void>} settles when the answer is out, and rejects where it cannot be given whole
+ * @returns {Promise<void>} resolves when the response is sent, and rejects if it is interrupted
  */
 export async function answer(request, response, { size, type, etag, read }) {
   const { headers, method } = request;
@@ -28,7 +28,7 @@ export async function answer(request, response, { size, type, etag, read }) {
     response.writeHead(304).end();
     return;
   }
-  // Dates tell whole seconds only: too few to be sure that two parts are of the same file.
+  // If-Range with a date is ignored: whole seconds are too coarse to identify a version.
   const ifRange = headers['if-range'];
   const partly = method === 'GET' && (ifRange === undefined || ifRange === etag);
   const range = partly ? rangeOf(headers.range, size) : undefined;
@@ -47,9 +47,8 @@ export async function answer(request, response, { size, type, etag, read }) {
 }
 
 /**
- * The part of a file that a Range header asks for, half open and empty where the file has none of
- * it. Undefined where all of the file is the answer: where the header is missing or makes no sense,
- * and where it asks for several parts at once.
+ * The range that a Range header requests, without the byte at `end`; empty if it lies beyond the file. `undefined` if
+ * the whole file is the answer: the header is missing or invalid, or requests several ranges.
  *
  * @param {string | undefined} header
  * @param {number} size
@@ -57,7 +56,7 @@ export async function answer(request, response, { size, type, etag, read }) {
  */
 function rangeOf(header, size) {
   const [, first = '', last = ''] = /^bytes=(\d*)-(\d*)$/i.exec(header ?? '') ?? [];
-  // The last so many bytes.
+  // A suffix: the last bytes of the file.
   if (first === '')
     return last === '' ? undefined : { start: Math.max(0, size - +last), end: size };
   if (last !== '' && +last < +first) return undefined;
@@ -65,7 +64,7 @@ function rangeOf(header, size) {
 }
 
 /**
- * Whether an If-None-Match header has a tag in its list.
+ * Whether an If-None-Match header contains a tag.
  *
  * @param {string | undefined} header
  * @param {string} etag

@@ -8,7 +8,7 @@ import { site } from './site.js';
 const HOST = '127.0.0.1';
 
 /**
- * Listens on a port of this machine alone, the next free one where it is taken.
+ * Listens on a port of the loopback interface, or on the next free one.
  *
  * @param {import('node:http').RequestListener} handler
  * @param {number} port 0 for any
@@ -46,7 +46,7 @@ if (import.meta.url === pathToFileURL(process.argv[1] ?? '').href) {
   const photos = resolve(process.argv[2] ?? 'target/demo/photos');
   const port = Number(process.env['PORT'] ?? 8080);
   if (!Number.isInteger(port) || port < 0 || port > 65535) {
-    console.error(`serve: PORT is ${process.env['PORT']}; it must be a number from 0 to 65535`);
+    console.error(`serve: PORT is ${process.env['PORT']}, but must be a number from 0 to 65535`);
     process.exit(2);
   }
   const { url } = await listen(site({ photos }), port);

@@ -1,4 +1,4 @@
-/** The site as a request handler: its pages, the built element, the photographs. */
+/** A request handler for the site: its pages, the built element and the photographs. */
 
 import { readFileSync } from 'node:fs';
 import { open } from 'node:fs/promises';
@@ -12,7 +12,7 @@ import { answer } from './ranges.js';
 
 const repository = join(import.meta.dirname, '..', '..');
 
-/** Folders of the site, by where they are. What is not in them is nobody's to fetch. */
+/** The folders that are served, by their paths on the site. */
 export const FOLDERS = {
   '/relightable-photo/': 'dist',
   '/site/': 'www/site',
@@ -20,19 +20,19 @@ export const FOLDERS = {
   '/results/': 'docs/images/results',
 };
 
-/** Files that come with packages. */
+/** The files of npm packages that are served. */
 export const FILES = {
   '/fonts/source-serif-4.woff2': font('source-serif-4-latin-wght-normal.woff2'),
   '/fonts/source-serif-4-italic.woff2': font('source-serif-4-latin-wght-italic.woff2'),
 };
 
-/** Made for where the site is. */
+/** The sample of a IIIF manifest, which contains the address of the site. */
 export const MANIFEST = '/samples/manifest.json';
 
 /**
- * What the element is made to live under: no other hosts, no inline code or style, no eval, no
- * `blob:` or `data:`. WebAssembly has to be allowed by name. Fonts, and films that visitors choose, are the
- * pages' own affair.
+ * The strictest policy under which the element works: no other hosts, no inline code or style, no `eval`, and neither
+ * `blob:` nor `data:` URLs. WebAssembly needs a permission of its own. The pages themselves need fonts, and `blob:` for
+ * videos that visitors choose.
  */
 export const CONTENT_SECURITY_POLICY =
   "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self'; font-src 'self'; connect-src 'self'; media-src 'self' blob:";
@@ -46,7 +46,7 @@ const PHOTO_TYPES = { '.ltm': 'application/vnd.ltm', '.png': 'image/png' };
  */
 export function site({ photos }) {
   const options = {
-    // Files are looked up at each request: they may be rebuilt under a running server.
+    // Looks files up at each request, because they may be rebuilt meanwhile.
     dev: true,
     etag: true,
     /** @param {Response} response */
@@ -103,7 +103,7 @@ function font(name) {
 }
 
 /**
- * Serves the photographs of a folder, in parts where parts are asked for.
+ * Serves the photographs of a folder, with range requests.
  *
  * @param {string} folder
  * @returns {(request: Request, response: Response, missing: () => void) => void}
@@ -113,7 +113,7 @@ function photographs(folder) {
   return (request, response, missing) => {
     const path = photographAt(root, request.url ?? '/');
     if (!path) return missing();
-    // A transfer that the client ends, or that fails, has nobody to tell.
+    // A failed transfer ends the connection; there is no other way to report it.
     send(path, request, response, missing).catch(() => response.destroy());
   };
 }
@@ -127,11 +127,11 @@ function photographs(folder) {
 async function send(path, request, response, missing) {
   const file = await open(path).catch(() => undefined);
   if (!file) return missing();
-  // What is open stays the same file when another takes its place.
+  // An open file stays the same even if it is replaced.
   try {
     const stats = await file.stat({ bigint: true });
     if (!stats.isFile()) return missing();
-    // Compressed on their way, parts would be no parts of the file.
+    // A proxy that compresses a range would make it unreadable.
     response.setHeader('Cache-Control', 'no-cache, no-transform');
     response.setHeader('Last-Modified', stats.mtime.toUTCString());
     await answer(request, response, {
@@ -146,7 +146,7 @@ async function send(path, request, response, missing) {
 }
 
 /**
- * The photograph that a request is for; none where it leads out of the folder or to anything else.
+ * The path of a requested photograph; `undefined` for anything outside of the folder and for other types of files.
  *
  * @param {string} root ends in a separator
  * @param {string} url
@@ -156,6 +156,6 @@ function photographAt(root, url) {
     const path = join(root, decodeURIComponent(url.split('?', 1)[0] ?? ''));
     return path.startsWith(root) && extname(path) in PHOTO_TYPES ? path : undefined;
   } catch {
-    return undefined; // no text in UTF-8
+    return undefined; // not UTF-8
   }
 }

@@ -1,6 +1,6 @@
 /**
- * Weighs what browsers load, compressed by Brotli as servers send it, and exits with 1 where it is more than it
- * may be: node www/tools/size.js [REPORT.json]
+ * Prints the sizes of the files that browsers load, compressed with Brotli, and exits with 1 if a limit is exceeded:
+ * node www/tools/size.js [REPORT.json]
  */
 
 import { existsSync, readFileSync, writeFileSync } from 'node:fs';
@@ -10,7 +10,7 @@ import { brotliCompressSync, constants } from 'node:zlib';
 
 const dist = join(import.meta.dirname, '..', '..', 'dist');
 
-/** What each module takes: its code in one of its builds, and the scripts that go with it. */
+/** The files of each module: its builds, of which a browser loads one, and its scripts. */
 const MODULES = {
   decoder: {
     builds: ['wasm/decoder_bg.wasm', 'wasm/decoder_scalar_bg.wasm'],
@@ -28,8 +28,8 @@ const MODULES = {
 };
 const ELEMENT = 'relightable-photo.js';
 
-/** Most kilobytes, of 1000 bytes. */
-const LIMITS = {
+/** Maximum sizes in kilobytes of 1000 bytes. */
+const LIMITS_KB = {
   js_brotli_kb: 25,
   first_picture_wasm_brotli_kb: 110,
   all_wasm_brotli_kb: 180,
@@ -37,12 +37,12 @@ const LIMITS = {
 const TITLES = {
   js_brotli_kb: 'the element',
   first_picture_wasm_brotli_kb:
-    'WebAssembly for a first picture: the decoder and the largest back end',
-  all_wasm_brotli_kb: 'all WebAssembly that a browser can need',
+    'WebAssembly for a first picture: the decoder and the largest backend',
+  all_wasm_brotli_kb: 'all WebAssembly modules',
 };
 
 /** @param {string} name of a file in dist @returns {number} kilobytes */
-function weigh(name) {
+function compressedKb(name) {
   const params = { [constants.BROTLI_PARAM_QUALITY]: constants.BROTLI_MAX_QUALITY };
   return brotliCompressSync(readFileSync(join(dist, name)), { params }).length / 1000;
 }
@@ -53,37 +53,36 @@ const files = [
 ];
 const missing = files.filter((name) => !existsSync(join(dist, name)));
 if (missing.length > 0) {
-  console.error(`size: not in dist: ${missing.join(', ')}. Run pkg-scripts/build first.`);
+  console.error(`size: dist lacks ${missing.join(', ')}. Run pkg-scripts/build first.`);
   process.exit(1);
 }
-const weights = Object.fromEntries(files.map((name) => [name, weigh(name)]));
+const sizes = Object.fromEntries(files.map((name) => [name, compressedKb(name)]));
 /** @param {string} name */
-const weightOf = (name) => weights[name] ?? 0;
+const sizeOf = (name) => sizes[name] ?? 0;
 /** @param {readonly number[]} kb */
 const sum = (kb) => kb.reduce((all, one) => all + one, 0);
 const modules = Object.values(MODULES).map(({ builds, scripts }) => ({
-  // A browser loads one build.
-  wasm: Math.max(...builds.map(weightOf)),
-  scripts: sum(scripts.map(weightOf)),
+  wasm: Math.max(...builds.map(sizeOf)),
+  scripts: sum(scripts.map(sizeOf)),
 }));
 const [decoder = 0, ...backends] = modules.map(({ wasm }) => wasm);
 const figures = {
-  js_brotli_kb: weightOf(ELEMENT),
+  js_brotli_kb: sizeOf(ELEMENT),
   first_picture_wasm_brotli_kb: decoder + Math.max(...backends),
   all_wasm_brotli_kb: sum(modules.map(({ wasm }) => wasm)),
 };
 
-for (const [name, kb] of Object.entries(weights))
+for (const [name, kb] of Object.entries(sizes))
   console.log(`${kb.toFixed(1).padStart(7)} kB  ${name}`);
 console.log();
-for (const key of /** @type {(keyof typeof LIMITS)[]} */ (Object.keys(LIMITS))) {
-  const [kb, limit] = [figures[key], LIMITS[key]];
-  const verdict = kb > limit ? 'TOO MUCH' : 'ok';
+for (const key of /** @type {(keyof typeof LIMITS_KB)[]} */ (Object.keys(LIMITS_KB))) {
+  const [kb, limit] = [figures[key], LIMITS_KB[key]];
+  const verdict = kb > limit ? 'TOO LARGE' : 'ok';
   console.log(`${kb.toFixed(1).padStart(7)} kB of ${limit} kB  ${TITLES[key]}: ${verdict}`);
   if (kb > limit) process.exitCode = 1;
 }
 const scripts = sum(modules.map(({ scripts }) => scripts));
-console.log(`${scripts.toFixed(1).padStart(7)} kB  scripts that go with all of these modules`);
+console.log(`${scripts.toFixed(1).padStart(7)} kB  scripts of all modules`);
 
 const [, , report] = process.argv;
 if (report) {

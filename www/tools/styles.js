@@ -1,4 +1,4 @@
-/** Has bundles take style sheets as text, made small. */
+/** Lets TypeScript import style sheets as minified text. */
 
 import { readFile } from 'node:fs/promises';
 import { transform } from 'esbuild';

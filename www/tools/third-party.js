@@ -1,6 +1,6 @@
 /**
- * Writes dist/THIRD-PARTY.md: what is compiled into the WebAssembly modules, with its licences. Needs the crates'
- * sources, which are there once the modules are built: node www/tools/third-party.js
+ * Writes dist/THIRD-PARTY.md, the crates in the WebAssembly modules with their licences: node www/tools/third-party.js
+ * It needs the crates' sources, which cargo has downloaded once the modules are built.
  */
 
 import { execFileSync } from 'node:child_process';
@@ -18,7 +18,7 @@ function cargo(...args) {
 
 /** @typedef {{ name: string, version: string, license: string | null, license_file: string | null, manifest_path: string, source: string | null }} Crate */
 
-/** Crates whose code is in the modules: not those that only run while they are built. */
+/** The crates whose code is in the modules, without build tools and procedural macros. */
 function compiledIn() {
   const tree = cargo('tree', '--target', TARGET, '-e', 'normal,no-proc-macro', '--prefix', 'none');
   const names = new Set(tree.split('\n').map((line) => line.split(' ').slice(0, 2).join(' ')));
@@ -32,7 +32,7 @@ function compiledIn() {
 }
 
 /**
- * The texts of a crate's licence: of several to choose from, MIT's where that is one of them.
+ * The texts of a crate's licence; only MIT's if the crate may be used under MIT.
  *
  * @param {Crate} crate
  */
@@ -43,7 +43,7 @@ function licencesOf({ name, license, manifest_path }) {
   const chosen = (/\bMIT\b/.test(license ?? '') && mit.length > 0 ? mit : files).map((file) =>
     join(folder, file),
   );
-  // The C code that comes with a crate has a licence of its own.
+  // C code inside a crate has its own licence.
   for (const inner of readdirSync(folder)) {
     const text = join(folder, inner, 'LICENSE');
     if (existsSync(text) && statSync(text).isFile()) chosen.push(text);
@@ -58,7 +58,7 @@ function licencesOf({ name, license, manifest_path }) {
 const titleOf = ({ name, version, license }) => `${name} ${version} (${license ?? 'see below'})`;
 
 const crates = compiledIn();
-/** Crates by the text that they share. @type {Map<string, string[]>} */
+/** The crates with each licence text. @type {Map<string, string[]>} */
 const byText = new Map();
 /** @type {string[]} */
 const without = [];
@@ -73,12 +73,12 @@ const sections = [...byText].map(
 );
 const rest =
   without.length > 0
-    ? ['Without a text of their own:\n\n', ...without.map((title) => `- ${title}\n`)]
+    ? ['Crates without a licence text:\n\n', ...without.map((title) => `- ${title}\n`)]
     : [];
 writeFileSync(
   join(repository, 'dist/THIRD-PARTY.md'),
   [
-    '# What is compiled into the WebAssembly modules\n\n',
+    '# Third-party code in the WebAssembly modules\n\n',
     "Besides Rust's standard library (MIT OR Apache-2.0, https://www.rust-lang.org/policies/licenses):\n\n",
     sections.join('\n'),
     ...(rest.length > 0 ? ['\n', ...rest] : []),

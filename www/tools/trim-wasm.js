@@ -1,13 +1,13 @@
 /**
- * Takes from a module what nobody outside calls: zstd's stand-ins for C's library are for its C code alone, but
- * cargo exports them, and with them sorting in five kinds: node www/tools/trim-wasm.js FILE.wasm
+ * Removes exports that nothing calls: the replacements of C's library for zstd, which cargo exports although only
+ * zstd's C code uses them, and which keep five sorting algorithms alive: node www/tools/trim-wasm.js FILE.wasm
  */
 
 import { readFileSync, writeFileSync } from 'node:fs';
 import binaryen from 'binaryen';
 
 const file = process.argv[2] ?? '';
-binaryen.setDebugInfo(true); // names, which the optimiser strips
+binaryen.setDebugInfo(true); // keeps the names; the optimiser removes them later
 const module = binaryen.readBinary(readFileSync(file));
 for (let index = module.getNumExports() - 1; index >= 0; index -= 1) {
   const { name } = binaryen.getExportInfo(module.getExportByIndex(index));

@@ -1,4 +1,4 @@
-/** Compiles the tests beside the sources in www/src and runs them in Node. */
+/** Compiles the tests in www/src and runs them in Node. */
 
 import { spawnSync } from 'node:child_process';
 import { readdirSync, rmSync } from 'node:fs';
