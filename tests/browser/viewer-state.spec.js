@@ -47,7 +47,7 @@ test.describe('the state', () => {
     const photoEvents = await waitForEvents(page, 'error');
     const error = photoEvents.find(({ type }) => type === 'error');
     expect(error?.['code']).toBe('state');
-    expect(String(error?.['message'])).toMatch(/y=9, where y is a number from 0 to 1/);
+    expect(String(error?.['message'])).toMatch(/y=9\. Expected a number from 0 to 1/);
     expect(await page.evaluate('photo.torch')).toStrictEqual({ x: 0.25, y: 0.5 });
   });
 });

@@ -22,7 +22,6 @@ import { type ActiveLight, LightChangeDetector } from '../state/light-change.js'
 import { type ElementOptions, readOptions } from '../state/options.js';
 import { ViewerState } from '../state/viewer-state.js';
 import type { PhotoView } from '../state/viewport.js';
-import { toggleFullscreen } from '../ui/fullscreen.js';
 import { Presenter } from '../ui/presenter.js';
 import { ShadowDom } from '../ui/shadow-dom.js';
 import type { ToolbarActions } from '../ui/toolbar.js';
@@ -183,7 +182,7 @@ export class PhotoController {
       zoomIn: () => this.interaction.zoom(1),
       reset: () => this.reset(),
       tilt: () => this.interaction.toggleTilt(),
-      fullscreen: () => toggleFullscreen(this.#host),
+      fullscreen: () => this.#presenter.toggleFullscreen(),
     };
     return new Presenter(this.#host, this.#dom, this.state, actions, {
       toolbarLoaded: () => this.schedule(),

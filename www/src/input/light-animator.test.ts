@@ -62,7 +62,7 @@ test('a thrown torch glides to rest on the picture, unless it is stopped', () =>
   assert.deepEqual(light.torch, { x: 1, y: 1 });
 });
 
-test('a torch wanders until it is told to stop', () => {
+test('a torch wanders until it is stopped', () => {
   const { light, animator, frame } = createAnimator({ name: 'torch' });
   animator.update({ fire: false, wander: true });
   for (let i = 0; i < 100; i += 1) frame(33);

@@ -103,7 +103,7 @@ function observe(source: unknown) {
   const log: string[] = [];
   const observer = new LightSourceObserver(source as LightSource, {
     changed: () => log.push('changed'),
-    errorChanged: (fault) => log.push(fault ? fault.code : 'no error'),
+    errorChanged: (error) => log.push(error ? error.code : 'no error'),
   });
   return { observer, calls: () => log.splice(0) };
 }

@@ -6,7 +6,6 @@ import { missingScript, type PhotoError } from '../shared/errors.js';
 import { CENTRE } from '../shared/values.js';
 import type { LightItem } from '../state/light-state.js';
 import type { ViewerState } from '../state/viewer-state.js';
-import { isFullscreen, toggleFullscreen } from './fullscreen.js';
 import { describeLight } from './light-description.js';
 import type { ShadowDom } from './shadow-dom.js';
 import type { Toolbar, ToolbarActions, ToolbarState } from './toolbar.js';
@@ -83,10 +82,21 @@ export class Presenter {
     this.#toolbar?.closeMenu();
   }
 
+  get #isFullscreen(): boolean {
+    return this.#host.matches(':fullscreen');
+  }
+
+  /** Does nothing where the browser, an enclosing frame or the visitor refuses. */
+  toggleFullscreen(): void {
+    const isLeaving = this.#isFullscreen;
+    const change = isLeaving ? document.exitFullscreen() : this.#host.requestFullscreen();
+    void change.catch(() => {});
+  }
+
   /** Returns whether the element was in full screen. */
   leaveFullscreen(): boolean {
-    const wasFullscreen = isFullscreen(this.#host);
-    if (wasFullscreen) toggleFullscreen(this.#host);
+    const wasFullscreen = this.#isFullscreen;
+    if (wasFullscreen) this.toggleFullscreen();
     return wasFullscreen;
   }
 
@@ -159,7 +169,7 @@ export class Presenter {
           ? { canZoomIn: view.zoom < options.maxZoom, canZoomOut: view.zoom > 1 }
           : null,
       isTilting,
-      isFullscreen: document.fullscreenEnabled ? isFullscreen(this.#host) : null,
+      isFullscreen: document.fullscreenEnabled ? this.#isFullscreen : null,
     };
   }
 
