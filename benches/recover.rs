@@ -1,24 +1,19 @@
-//! `pkg-scripts/bench recover`: recovery against scipy and scikit-learn on the same measurements in
-//! the same run, against problem size and cores, and at the paper's scale.
+//! `pkg-scripts/bench recover`: the time of recovery against scipy and scikit-learn on the same measurements, against
+//! problem size and threads, and at the paper's scale.
 //!
-//! How the comparison is made fair. Ours is the time of whole tiles by the library's own way in
-//! ([`Recovery::tile`]) on one thread, divided by pixels and channels: gathering patterns, Gram
-//! matrices, right-hand sides and everything else is in it. A peer's time is its solver's call
-//! alone, on the same equations as ready arrays, one right-hand side after the other, on one thread;
-//! Gram matrices that it can use are given to it and not counted. Our own solvers' calls alone, on
-//! what the peers get, are shown as well.
+//! Our time is that of whole tiles by [`Recovery::tile`] on one thread, divided by pixels and channels; it includes
+//! patterns, Gram matrices and right-hand sides. A peer's time is that of its solver alone, on one thread, for the same
+//! equations as ready arrays, one right-hand side after the other; Gram matrices that it can use are not counted. The
+//! time of our own solvers alone, on the same arrays, is shown as well.
 //!
-//! - Non-negative least squares: `scipy.optimize.nnls`. Objective: `‖y − Ax‖`, where residuals below
-//!   1e-10 `‖y‖`, of measurements that can be met exactly, count as that.
-//! - Basis pursuit denoising, φ = I: scikit-learn has no constrained form. Lasso's minimiser at the λ
-//!   at which its residual is ε is the constrained problem's, so peers are given that λ, which they
-//!   would have to search for: `Lasso(positive=True)` at it, and `lars_path` and `lars_path_gram`
-//!   down to it. Objective: `½‖y − Ax‖² + λ‖x‖₁`, in which all can be compared. The ratio is against
-//!   the fastest of the three.
+//! - Non-negative least squares: `scipy.optimize.nnls`. The objective is `‖y − Ax‖`, but at least 1e-10 `‖y‖`: below that
+//!   both meet the measurements exactly.
+//! - Basis pursuit denoising with φ = I: scikit-learn has no constrained form. The constrained minimiser is Lasso's at
+//!   the λ whose residual is ε, so peers are given that λ, for which they would have to search: `Lasso(positive=True)`,
+//!   `lars_path` and `lars_path_gram`. The objective is `½‖y − Ax‖² + λ‖x‖₁`, and the time ratio is that to the fastest.
 //!
-//! Objectives are those of the solvers' own answers in double precision to the same equations, and
-//! are shown as the worst ratio of ours to the peer's, right-hand side by right-hand side: above
-//! one, the peer was better.
+//! Objectives are computed from the solvers' double-precision solutions. The largest ratio of ours to the peer's over
+//! all right-hand sides is shown: above 1, the peer's solution is better.
 
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a bench that cannot go on should stop
 
@@ -48,14 +43,13 @@ use figures::Figures;
 const WINDOW: u32 = 15;
 const PATTERNS: usize = 80;
 const SEED: u64 = 7;
-/// Tiles timed, and windows of them that peers get.
+/// Tiles that are timed, and windows of these that the peers solve.
 const TILES: usize = 4;
 const PEER_WINDOWS: usize = 12;
-/// ε² of the problems that peers of denoising get, beyond what least squares leaves: this share of
-/// the measurements' energy.
-const DENOISE: f64 = 1e-5;
-/// Camera pixels a side of the sample that transforms are timed on, which take long.
-const SMALL: u32 = 8;
+/// ε² of the denoising problems, above the squared residual of least squares, as a share of the measurements' energy.
+const EXCESS_RESIDUAL: f64 = 1e-5;
+/// Side, in camera pixels, of the sample on which the slow transforms are timed.
+const TRANSFORM_SAMPLE_SIDE: u32 = 8;
 
 fn main() {
     // `cargo bench` passes flags for a harness this bench does not have.
@@ -152,7 +146,7 @@ fn tile(recovery: &Recovery, measurements: &Measurements, rect: TileRect) -> Tra
         .functions(recovery.geometry(), recovery.basis())
 }
 
-/// Seconds of the fastest of a few runs: whatever else the machine does only adds to it.
+/// Seconds of the fastest run: anything else that the machine does only adds time.
 fn fastest(runs: usize, mut work: impl FnMut()) -> f64 {
     let times = (0..runs).map(|_| {
         let start = Instant::now();
@@ -179,7 +173,7 @@ fn snr(recovered: &[TransportFunctions], truth: &[TransportFunctions]) -> f64 {
     error.snr().map_or(f64::NAN, |snr| snr.0)
 }
 
-/// Tiles from the middle of the picture: their windows are on the display whole.
+/// Tiles from the middle of the picture, whose windows lie inside the light plane.
 fn inner_tiles(recovery: &Recovery) -> Vec<usize> {
     let grid = recovery.geometry().tile_grid();
     let across = grid.width as usize;
@@ -189,7 +183,7 @@ fn inner_tiles(recovery: &Recovery) -> Vec<usize> {
     (0..grid.area()).filter(|&i| inner(i)).take(TILES).collect()
 }
 
-/// Every method on the same tiles, each followed by its peers.
+/// Times every method on the same tiles, and its peers.
 fn against_peers(folder: &Path, figures: &mut Figures) {
     let (measurements, truth) = photograph(square(128));
     println!(
@@ -216,7 +210,10 @@ fn against_peers(folder: &Path, figures: &mut Figures) {
         let whole = tiles.iter().map(|&i| recovery.geometry().tile(i));
         let rects: Vec<_> = match transform {
             false => whole.collect(),
-            true => whole.take(1).map(|rect| middle(rect, SMALL)).collect(),
+            true => whole
+                .take(1)
+                .map(|rect| middle(rect, TRANSFORM_SAMPLE_SIDE))
+                .collect(),
         };
         let mut recovered = Vec::new();
         let seconds = fastest(if transform { 1 } else { 3 }, || {
@@ -236,7 +233,7 @@ fn against_peers(folder: &Path, figures: &mut Figures) {
         figures.insert(format!("{name}_us"), ours * 1e6);
         figures.insert(format!("{name}_snr_db"), snr);
         if method == Method::Nnls {
-            equations = Equations::spread(&measurements, &recovery, &truth);
+            equations = WindowEquations::of_windows(&measurements, &recovery, &truth);
         }
         match method {
             Method::Nnls => compare(folder, "nnls", "nnls_vs_scipy", ours, &equations, figures),
@@ -257,14 +254,14 @@ fn middle(rect: TileRect, side: u32) -> TileRect {
     }
 }
 
-/// Holds our solver's answers to `equations` against the peers', and its time and that of whole
-/// tiles, `ours`, against theirs.
+/// Compares our solver's solutions of `equations` with the peers', and its time and that of whole tiles, `ours`, with
+/// theirs.
 fn compare(
     folder: &Path,
     name: &str,
     key: &str,
     ours: f64,
-    equations: &[Equations],
+    equations: &[WindowEquations],
     figures: &mut Figures,
 ) {
     let mut solutions = Vec::new();
@@ -274,7 +271,7 @@ fn compare(
     let sides: usize = equations.iter().map(|e| e.sides.len()).sum();
     let alone = seconds / sides as f64;
     write_problems(folder, equations, &solutions);
-    let mut answer = peers(folder, name);
+    let mut answer = run_peers(folder, name);
     let answers = answer.as_object_mut().unwrap();
     let same = answers.remove("this").unwrap();
     println!(
@@ -306,20 +303,20 @@ fn compare(
 }
 
 /// The weighted equations of a window, with the right-hand sides of its four pixels.
-struct Equations {
+struct WindowEquations {
     /// `Aᵀ`, `[S, L]`.
     columns: Vec<Vec<f64>>,
     /// `AᵀA`, `[S, S]`.
     gram: Vec<f64>,
-    sides: Vec<Side>,
+    sides: Vec<RightHandSide>,
 }
 
-struct Side {
+struct RightHandSide {
     y: Vec<f64>,
     /// `Aᵀy`.
     h: Vec<f64>,
-    /// Squared residual that denoising may leave.
-    most: f64,
+    /// ε².
+    max_residual: f64,
     truth: Vec<f64>,
 }
 
@@ -327,14 +324,14 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-impl Equations {
-    /// Those of a spread of windows.
-    fn spread(
+impl WindowEquations {
+    /// The equations of windows spread over the tiles.
+    fn of_windows(
         measurements: &Measurements,
         recovery: &Recovery,
         truth: &[TransportFunctions],
     ) -> Vec<Self> {
-        let common_mode = recovery.common_mode().expect("this method chooses it");
+        let common_mode = recovery.common_mode().expect("least squares chooses it");
         let weigh = |mut values: Vec<f64>| {
             let mean = values.iter().sum::<f64>() / values.len() as f64;
             let less = (1.0 - common_mode.weight()) * mean;
@@ -366,7 +363,7 @@ impl Equations {
         let origin = geometry.window_origin(first);
         let column = |slot| {
             let element = geometry.window.element(origin, slot);
-            let m = (element.index_in(geometry.light)).expect("inside the display");
+            let m = (element.index_in(geometry.light)).expect("inside the light plane");
             let emissions = measurements.patterns.iter().map(|p| p.plane(0)[m]);
             weigh(emissions.map(f64::from).collect())
         };
@@ -397,20 +394,20 @@ impl Equations {
 
     fn add(&mut self, y: Vec<f64>, truth: Vec<f64>) {
         let h: Vec<f64> = self.columns.iter().map(|a| dot(a, &y)).collect();
-        let mut left = y.clone();
+        let mut residual = y.clone();
         let x = Nnls::new(&self.gram, h.len()).solve(&h);
         for (a, x) in self.columns.iter().zip(x) {
-            left.iter_mut().zip(a).for_each(|(left, a)| *left -= a * x);
+            residual.iter_mut().zip(a).for_each(|(r, a)| *r -= a * x);
         }
-        self.sides.push(Side {
-            most: dot(&left, &left) + DENOISE * dot(&y, &y),
+        self.sides.push(RightHandSide {
+            max_residual: dot(&residual, &residual) + EXCESS_RESIDUAL * dot(&y, &y),
             h,
             y,
             truth,
         });
     }
 
-    /// The answers to all right-hand sides.
+    /// Our solutions for all right-hand sides.
     fn solve(&self, problem: &str) -> Vec<Vec<f64>> {
         let k = self.columns.len();
         match problem {
@@ -422,16 +419,16 @@ impl Equations {
                 let mut solver = Homotopy::new(&self.gram, k);
                 let sides = self.sides.iter();
                 sides
-                    .map(|s| solver.solve(&s.h, dot(&s.y, &s.y), s.most.sqrt()))
+                    .map(|s| solver.solve(&s.h, dot(&s.y, &s.y), s.max_residual.sqrt()))
                     .collect()
             }
         }
     }
 }
 
-/// Writes equations and our answers as raw little-endian f64: for each window A `[L, S]`, then for
-/// each of its right-hand sides y `[L]`, our x `[S]` and the true one `[S]`.
-fn write_problems(folder: &Path, equations: &[Equations], solutions: &[Vec<Vec<f64>>]) {
+/// Writes equations and our solutions as little-endian f64: for each window A `[L, S]`, then for each of its right-hand
+/// sides y `[L]`, our x `[S]` and the true one `[S]`.
+fn write_problems(folder: &Path, equations: &[WindowEquations], solutions: &[Vec<Vec<f64>>]) {
     let mut bytes = Vec::new();
     let mut write = |value: &f64| bytes.extend(value.to_le_bytes());
     for (window, solutions) in equations.iter().zip(solutions) {
@@ -449,9 +446,9 @@ fn write_problems(folder: &Path, equations: &[Equations], solutions: &[Vec<Vec<f
     fs::write(folder.join("problems.f64"), bytes).unwrap();
 }
 
-/// What the peers make of the problems written, by name: seconds, worst ratio of objectives and SNR;
-/// and our answers' SNR.
-fn peers(folder: &Path, problem: &str) -> Value {
+/// Runs the peers on the problems written. Returns seconds, largest ratio of objectives and SNR by name, and the SNR of
+/// our solutions.
+fn run_peers(folder: &Path, problem: &str) -> Value {
     let python =
         std::env::var("BENCH_PYTHON").expect("BENCH_PYTHON: run pkg-scripts/bench recover");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/recover_peers.py");
@@ -464,20 +461,20 @@ fn peers(folder: &Path, problem: &str) -> Value {
         .stderr(Stdio::inherit())
         .output()
         .unwrap();
-    assert!(output.status.success(), "the peers failed");
+    assert!(output.status.success(), "a peer failed");
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Camera pixels a side of the pictures that time is held against.
+/// Sides of the pictures, in camera pixels.
 const SIDES: [u32; 3] = [128, 192, 256];
 
-/// Threads of a pool.
-struct Pool(rayon::ThreadPool);
+/// Runs jobs on the threads of a pool.
+struct PoolExecutor(rayon::ThreadPool);
 
-impl Executor for Pool {
-    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+impl Executor for PoolExecutor {
+    fn map<T: Send>(&self, count: usize, job: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         self.0
-            .install(|| (0..count).into_par_iter().map(work).collect())
+            .install(|| (0..count).into_par_iter().map(job).collect())
     }
 }
 
@@ -498,7 +495,7 @@ fn against_size(figures: &mut Figures) {
                 continue;
             }
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-            let pool = Pool(pool.build().unwrap());
+            let pool = PoolExecutor(pool.build().unwrap());
             let geometry = recovery.geometry();
             let seconds = fastest(2, || {
                 pool.map(geometry.tile_grid().area(), |i| {
@@ -515,8 +512,7 @@ fn against_size(figures: &mut Figures) {
             per_pixel.insert((side, threads), us);
         }
     }
-    // 1 where time is linear in the number of pixels; borders, whose windows are smaller, make it
-    // a little more.
+    // 1 if time is linear in the number of pixels; a little more, as windows at the border are smaller.
     let [small, .., large] = SIDES;
     figures.insert(
         "nnls_us_a_pixel_largest_to_smallest".to_owned(),
@@ -528,7 +524,7 @@ fn against_size(figures: &mut Figures) {
     }
 }
 
-/// The paper's size by the command line's default method, files and all.
+/// Recovers a capture of the paper's size by the command line's default method, files included.
 fn paper_scale(folder: &Path, figures: &mut Figures) {
     let ltm_export = || Command::new(env!("CARGO_BIN_EXE_ltm-export"));
     let capture = folder.join("paper-scale");

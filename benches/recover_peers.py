@@ -1,9 +1,9 @@
-"""Times peers on the problems that benches/recover.rs writes, and holds our answers against theirs.
+"""Times scipy and scikit-learn on the problems that benches/recover.rs writes, and compares our solutions with theirs.
 
 python recover_peers.py nnls|bpdn PROBLEMS.f64 L S RIGHT_HAND_SIDES
 
-Prints {peer: {"seconds": a right-hand side, "objective": worst ratio of ours to the peer's, "snr"}},
-and the SNR of our answers as those of "this".
+Prints {peer: {"seconds": per right-hand side, "objective": largest ratio of ours to the peer's, "snr"}}, and the SNR of
+our solutions under "this".
 """
 
 import json
@@ -17,7 +17,7 @@ RUNS = 3
 
 
 def read(path, patterns, elements, sides):
-    """Yields A [L, S], Y [sides, L], our X [sides, S] and the true one of each window."""
+    """Yields A [L, S], Y [sides, L], our X [sides, S] and the true X of each window."""
     data = np.fromfile(path, "<f8")
     per_window = patterns * elements + sides * (patterns + 2 * elements)
     for window in data.reshape(-1, per_window):
@@ -28,18 +28,18 @@ def read(path, patterns, elements, sides):
 
 
 def fastest(solve, problems):
-    """Seconds a problem in the fastest of some runs, and the last run's answers."""
+    """Returns the seconds per problem of the fastest run, and the last run's solutions."""
     best = np.inf
     for _ in range(RUNS):
         start = time.perf_counter()
-        answers = [solve(*problem) for problem in problems]
+        solutions = [solve(*problem) for problem in problems]
         best = min(best, time.perf_counter() - start)
-    return best / len(problems), answers
+    return best / len(problems), solutions
 
 
-def snr(answers, truths):
-    answers, truths = np.array(answers), np.array(truths)
-    return 10 * np.log10(np.sum(truths**2) / np.sum((answers - truths) ** 2))
+def snr(solutions, truths):
+    solutions, truths = np.array(solutions), np.array(truths)
+    return 10 * np.log10(np.sum(truths**2) / np.sum((solutions - truths) ** 2))
 
 
 def nnls(windows):
@@ -51,7 +51,7 @@ def nnls(windows):
     seconds, theirs = fastest(lambda a, y: scipy.optimize.nnls(a, y)[0], problems)
     ratios = []
     for (a, y), x, peer in zip(problems, ours, theirs):
-        # Where both meet the measurements exactly, what is left is rounding.
+        # If both meet the measurements exactly, the residuals are rounding errors.
         least = 1e-10 * np.linalg.norm(y)
         here, there = (max(np.linalg.norm(y - a @ z), least) for z in (x, peer))
         ratios.append(here / there)
@@ -70,7 +70,7 @@ def bpdn(windows):
         fortran = np.asfortranarray(a)
         for y, x, truth in zip(ys, xs, ts):
             h = a.T @ y
-            # Black pixels have no λ.
+            # A black pixel has no λ.
             if x.max() > 0:
                 strength = (a.T @ (y - a @ x))[x > 0].mean()
                 problems.append((fortran, y, gram, h, strength / len(y)))
@@ -107,7 +107,7 @@ def bpdn(windows):
 
 def main():
     problem, path, *sizes = sys.argv[1:]
-    warnings.simplefilter("ignore")  # a peer that stops early shows in the objective
+    warnings.simplefilter("ignore")  # the objective shows a peer that stops early
     windows = list(read(path, *map(int, sizes)))
     print(json.dumps({"nnls": nnls, "bpdn": bpdn}[problem](windows)))
 

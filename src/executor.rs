@@ -1,7 +1,7 @@
 //! Runs independent jobs, on one thread or on many, until the caller cancels.
 //!
-//! No algorithm of this library starts a thread. It divides its work into independent jobs and gives these
-//! to an [`Executor`]: the command line's uses all cores, a browser's the thread that calls.
+//! No algorithm of this library starts a thread. It divides its work into independent jobs and gives these to an
+//! [`Executor`]: the command line's uses all cores, a browser's the thread that calls.
 
 use thiserror::Error;
 

@@ -1,4 +1,4 @@
-//! What the benchmarks report: figures by name, on standard output and beside the build.
+//! Reports of benchmarks: figures by name, on standard output and in a JSON file in the target folder.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,7 +9,7 @@ use serde_json::json;
 /// Figures by name.
 pub type Figures = BTreeMap<String, f64>;
 
-/// Where benchmarks keep what they make.
+/// The folder for the files of benchmarks.
 pub fn folder() -> PathBuf {
     let program = Path::new(env!("CARGO_BIN_EXE_ltm-export"));
     let folder = program.ancestors().nth(2).unwrap().join("bench");
@@ -17,7 +17,7 @@ pub fn folder() -> PathBuf {
     folder
 }
 
-/// Prints the figures, and writes them with the machine's name to `name.json` in the [`folder`].
+/// Prints the figures, and writes them with the name of the machine to `name.json` in the [`folder`].
 pub fn report(name: &str, figures: &Figures) {
     println!();
     for (key, value) in figures {

@@ -1,5 +1,5 @@
-//! Cholesky factorisation `A = UᵀU` of a symmetric positive definite `[n, n]` matrix, and what follows
-//! from it: solutions, determinant, inverse (Golub and Van Loan, *Matrix Computations*, section 4.2).
+//! Cholesky factorisation `A = UᵀU` of a symmetric positive definite `[n, n]` matrix, and what follows from it:
+//! solutions, determinant, inverse (Golub and Van Loan, *Matrix Computations*, section 4.2).
 //!
 //! `A` and `U` are read and written in the upper triangle only; the lower one may hold anything.
 
@@ -8,8 +8,8 @@ use super::vector::{add_scaled, dot};
 /// Rows eliminated together: each row below is then loaded and stored a quarter as often.
 const BLOCK: usize = 4;
 
-/// Replaces `A` by `U`. Returns the logarithm of A's determinant, or `None` if A is not positive definite
-/// to working precision.
+/// Replaces `A` by `U`. Returns the logarithm of A's determinant, or `None` if A is not positive definite to working
+/// precision.
 #[inline(always)]
 pub(crate) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
     let mut log_det = 0.0;

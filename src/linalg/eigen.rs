@@ -1,13 +1,13 @@
-//! Eigenvalues and eigenvectors of a symmetric matrix, by cyclic Jacobi rotations (Golub and Van Loan,
-//! *Matrix Computations*, section 8.5): slower than by tridiagonal form, but short and exact to rounding.
+//! Eigenvalues and eigenvectors of a symmetric matrix, by cyclic Jacobi rotations (Golub and Van Loan, *Matrix
+//! Computations*, section 8.5): slower than by tridiagonal form, but short and exact to rounding.
 
 /// Sweeps over all off-diagonal entries. The method converges quadratically, after about six.
 const MAX_SWEEPS: usize = 30;
 /// Squared off-diagonal entries at which the matrix counts as diagonal, relative to all squared entries.
 const CONVERGED_ENERGY: f64 = 1e-24;
 
-/// Returns the eigenvalues of the symmetric `[n, n]` matrix `a`, largest first, and the eigenvectors as the
-/// rows of an `[n, n]` matrix.
+/// Returns the eigenvalues of the symmetric `[n, n]` matrix `a`, largest first, and the eigenvectors as the rows of an
+/// `[n, n]` matrix.
 pub(crate) fn symmetric_eigen(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut vectors = vec![0.0; n * n];
     for i in 0..n {

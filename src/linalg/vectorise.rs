@@ -2,8 +2,8 @@
 
 /// Runs `work`, compiled for AVX2 where the machine has it.
 ///
-/// `work` must be `#[inline(always)]`, and so must all that it calls: only inlined code is compiled for the
-/// wider instructions. FMA stays off, so results have the same bits on every machine.
+/// `work` must be `#[inline(always)]`, and so must all that it calls: only inlined code is compiled for the wider
+/// instructions. FMA stays off, so results have the same bits on every machine.
 #[inline(always)]
 pub(crate) fn vectorise<R>(work: impl FnOnce() -> R) -> R {
     #[cfg(target_arch = "x86_64")]

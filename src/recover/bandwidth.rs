@@ -1,14 +1,14 @@
 //! Estimates how wide a window has to be to hold nearly all of the light that a pixel receives.
 //!
-//! T is zero far from a pixel's correspondence (paper, section 3): it is a band, whose width depends on the
-//! object. The light elements around a pixel are divided into square rings. The flux of each ring, relative
-//! to the pixel's light, is taken to be the same for all pixels and estimated from many pixels at once by
-//! plain least squares. What the few elements in the middle send differs from pixel to pixel, so the
-//! equations are projected onto the complement of these elements' columns. No sign is imposed: the flux of
-//! rings beyond the band is then zero on average, and does not gather noise.
+//! T is zero far from a pixel's correspondence (paper, section 3): it is a band, whose width depends on the object. The
+//! light elements around a pixel are divided into square rings. The flux of each ring, relative to the pixel's light,
+//! is taken to be the same for all pixels and estimated from many pixels at once by plain least squares. What the few
+//! elements in the middle send differs from pixel to pixel, so the equations are projected onto the complement of these
+//! elements' columns. No sign is imposed: the flux of rings beyond the band is then zero on average, and does not
+//! gather noise.
 //!
-//! The *tail fraction* of a window is the flux of all rings outside it. Its standard error is that of a
-//! jackknife over parts of the picture.
+//! The *tail fraction* of a window is the flux of all rings outside it. Its standard error is that of a jackknife over
+//! parts of the picture.
 
 use super::common_mode::CommonMode;
 use super::error::RecoverError;
@@ -27,8 +27,8 @@ const MAX_SIDE: u32 = 31;
 const MIN_SIDE: u32 = 7;
 /// Side if the measurements do not determine it.
 const DEFAULT_SIDE: u32 = 15;
-/// Sides of the middle of the window, which differs from pixel to pixel. The largest one is used whose
-/// number of elements is at most three quarters of the number of patterns.
+/// Sides of the middle of the window, which differs from pixel to pixel. The largest one is used whose number of
+/// elements is at most three quarters of the number of patterns.
 const CENTRE_SIDES: [u32; 4] = [7, 5, 3, 1];
 /// Largest tail fraction of the chosen window.
 const MAX_TAIL_FRACTION: f64 = 0.01;
@@ -231,8 +231,8 @@ impl Rings {
     }
 }
 
-/// Replaces `columns` by their projection onto the complement of `others`. Returns false if the others
-/// depend on each other linearly.
+/// Replaces `columns` by their projection onto the complement of `others`. Returns false if the others depend on each
+/// other linearly.
 #[inline(always)]
 fn project_out(columns: &mut WeightedColumns, others: &WeightedColumns) -> bool {
     let mut gram = others.gram();

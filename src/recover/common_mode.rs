@@ -2,11 +2,11 @@
 
 /// Factor ω on the residual of the equation `mean(y) = mean(P̂)τ`, means over the patterns.
 ///
-/// Patterns are non-negative, so their equations share one large direction, the mean over all patterns.
-/// With it split off, `‖y − P̂τ‖² = ‖y_c − P̂_c τ‖² + L (ȳ − p̄τ)²`, where `y_c` and `P̂_c` are centred over
-/// the L patterns. Only noise disturbs the centred equations. Every constant offset disturbs the mean as
-/// well, and averaging does not lower it: light from beyond the window, the dark frame's own noise, a black
-/// level that drifts. The second term is therefore weighted by ω².
+/// Patterns are non-negative, so their equations share one large direction, the mean over all patterns. With it split
+/// off, `‖y − P̂τ‖² = ‖y_c − P̂_c τ‖² + L (ȳ − p̄τ)²`, where `y_c` and `P̂_c` are centred over the L patterns. Only
+/// noise disturbs the centred equations. Every constant offset disturbs the mean as well, and averaging does not lower
+/// it: light from beyond the window, the dark frame's own noise, a black level that drifts. The second term is
+/// therefore weighted by ω².
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[serde(transparent)]
 pub struct CommonMode(f64);

@@ -1,10 +1,9 @@
-//! The equations of every window in a region of the light plane, made from correlations that the windows
-//! share.
+//! The equations of every window in a region of the light plane, made from correlations that the windows share.
 //!
-//! Pixels whose correspondence falls in the same light element have one window, and so one Gram matrix.
-//! Neighbouring windows overlap: the entry for two light elements m and m + δ is the same in each window
-//! that holds both. The [`GramCache`] computes it once, and a window's matrix is then copied from a table
-//! instead of multiplied out, at L products an entry.
+//! Pixels whose correspondence falls in the same light element have one window, and so one Gram matrix. Neighbouring
+//! windows overlap: the entry for two light elements m and m + δ is the same in each window that holds both. The
+//! [`GramCache`] computes it once, and a window's matrix is then copied from a table instead of multiplied out, at L
+//! products an entry.
 
 use super::common_mode::CommonMode;
 use super::normal_equations::{EquationWeights, WeightedColumns};
@@ -29,8 +28,8 @@ pub(super) struct GramCache {
     weights: Vec<f64>,
     /// Emissions times the pattern's weight, `[element, L]`.
     emissions: Vec<f64>,
-    /// Inner products of an element's emissions and those of its neighbours, as `[element, δv, δu]` with
-    /// δ from −(w − 1) to w − 1. Empty if the region has too few windows to share them.
+    /// Inner products of an element's emissions and those of its neighbours, as `[element, δv, δu]` with δ from −(w −
+    /// 1) to w − 1. Empty if the region has too few windows to share them.
     correlations: Vec<f64>,
 }
 
@@ -62,8 +61,7 @@ impl WindowEquations {
 }
 
 impl GramCache {
-    /// Upper bound on the memory of a cache for `side²` window origins and the equations of one window, in
-    /// bytes.
+    /// Upper bound on the memory of a cache for `side²` window origins and the equations of one window, in bytes.
     pub fn max_bytes(window: Window, side: usize, patterns: usize) -> usize {
         let region = (side + window.side() as usize - 1).pow(2);
         let table = region * offsets(window).pow(2) * size_of::<f64>();
@@ -72,8 +70,8 @@ impl GramCache {
         table + emissions + window.area().pow(2) * size_of::<f64>()
     }
 
-    /// A cache for `windows` windows, whose origins lie between `first` and `last`. The equations are those
-    /// of the patterns `pattern_indices`, in the colour of `channel`; `weights` has those of all patterns.
+    /// A cache for `windows` windows, whose origins lie between `first` and `last`. The equations are those of the
+    /// patterns `pattern_indices`, in the colour of `channel`; `weights` has those of all patterns.
     pub fn new(
         (patterns, weights): (&[Pattern], &[f64]),
         pattern_indices: &[usize],
@@ -110,8 +108,8 @@ impl GramCache {
             emissions,
             correlations: Vec::new(),
         };
-        // The table takes an inner product for each pair of elements that any window could hold; a window's
-        // own Gram matrix takes one for each pair that it does hold.
+        // The table takes an inner product for each pair of elements that any window could hold; a window's own Gram
+        // matrix takes one for each pair that it does hold.
         let entries = region.area() * offsets(window).pow(2);
         if entries * size_of::<f64>() <= MAX_TABLE_BYTES && entries < windows * window.area().pow(2)
         {
@@ -153,8 +151,8 @@ impl GramCache {
         table
     }
 
-    /// The equations of the window that starts at `origin`, without the patterns at the positions
-    /// `excluded` of the cache's.
+    /// The equations of the window that starts at `origin`, without the patterns at the positions `excluded` of the
+    /// cache's.
     pub fn equations(
         &self,
         origin: Element,
@@ -276,8 +274,8 @@ mod tests {
             .collect()
     }
 
-    /// Equations from the table are those multiplied out, for windows inside and across the border, with
-    /// all patterns and without some.
+    /// Equations from the table are those multiplied out, for windows inside and across the border, with all patterns
+    /// and without some.
     #[test]
     fn table_agrees_with_products() {
         let window = Window::new(3).unwrap();

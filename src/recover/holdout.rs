@@ -1,5 +1,5 @@
-//! Divides the patterns into training patterns and held-out ones, by which everything is chosen that the
-//! measurements themselves have to tell.
+//! Divides the patterns into training patterns and held-out ones, by which everything is chosen that the measurements
+//! themselves have to tell.
 
 use super::sampling::MIN_PATTERNS;
 use crate::capture::{self, Measurements, Pattern};
@@ -20,8 +20,8 @@ pub(super) struct HoldoutSplit {
 }
 
 impl HoldoutSplit {
-    /// Holds out every tenth distinct pattern. Shots of one pattern at several exposures stay together: a
-    /// pattern that is in both parts would measure memory, not prediction.
+    /// Holds out every tenth distinct pattern. Shots of one pattern at several exposures stay together: a pattern that
+    /// is in both parts would measure memory, not prediction.
     pub fn new(measurements: &Measurements) -> Self {
         Self::of_patterns(&measurements.patterns)
     }

@@ -1,10 +1,9 @@
-//! Hold-out validation: the SNR of a recovery, and what an encoder loses of it, estimated from patterns that
-//! the recovery did not use.
+//! Hold-out validation: the SNR of a recovery, and what an encoder loses of it, estimated from patterns that the
+//! recovery did not use.
 //!
-//! The elements of patterns vary independently, with a variance var(p). Between patterns, measurements then
-//! vary by `var(p) ‖τ‖²`, and the residuals of functions τ̂ by `var(p) ‖τ − τ̂‖²`, each plus the noise, whose
-//! variance is known. With sums over sampled pixels and channels,
-//! `SNR = (Σ var y − Σ noise) / (Σ var residual − Σ noise)`.
+//! The elements of patterns vary independently, with a variance var(p). Between patterns, measurements then vary by
+//! `var(p) ‖τ‖²`, and the residuals of functions τ̂ by `var(p) ‖τ − τ̂‖²`, each plus the noise, whose variance is
+//! known. With sums over sampled pixels and channels, `SNR = (Σ var y − Σ noise) / (Σ var residual − Σ noise)`.
 
 use super::error::RecoverError;
 use super::holdout::HoldoutSplit;
@@ -21,12 +20,10 @@ const MAX_SQUARES: usize = 96;
 const SQUARE_SIDE: u32 = 8;
 /// Fewest held-out patterns that have a variance.
 const MIN_HELD_OUT: usize = 2;
-/// Smallest error that the noise lets one tell, as a share of the noise: its variance is known to a few
-/// hundredths.
+/// Smallest error that the noise lets one tell, as a share of the noise: its variance is known to a few hundredths.
 const ERROR_RESOLUTION: f64 = 0.1;
 
-/// Squares of the picture, recovered from the training patterns, with their measurements under the held-out
-/// ones.
+/// Squares of the picture, recovered from the training patterns, with their measurements under the held-out ones.
 #[derive(Clone, Debug)]
 pub struct HoldoutValidation {
     geometry: Geometry,
@@ -48,8 +45,8 @@ struct ValidationSquare {
 }
 
 impl HoldoutValidation {
-    /// Recovers squares of the picture by `recover_from_training`, which uses training patterns only.
-    /// Returns `None` if the split has too few held-out patterns.
+    /// Recovers squares of the picture by `recover_from_training`, which uses training patterns only. Returns `None` if
+    /// the split has too few held-out patterns.
     ///
     /// # Errors
     /// If the executor is cancelled.
@@ -113,8 +110,8 @@ impl HoldoutValidation {
         self.squares.iter().map(|square| &square.tile)
     }
 
-    /// Estimated loss of SNR if `functions` replace those of the [squares](Self::tiles). It is negative if
-    /// the replacement removes noise.
+    /// Estimated loss of SNR if `functions` replace those of the [squares](Self::tiles). It is negative if the
+    /// replacement removes noise.
     pub fn loss(&self, functions: &[TransportFunctions]) -> Decibels {
         let before = self.error(self.residual);
         // An error in the variance of the noise is in both residuals and cancels.
@@ -162,8 +159,8 @@ fn held_out_measurements(
     samples
 }
 
-/// Variances between patterns, summed over the pixels and channels that are nowhere saturated: of the
-/// measurements less their noise, and of the noise under the held-out patterns.
+/// Variances between patterns, summed over the pixels and channels that are nowhere saturated: of the measurements less
+/// their noise, and of the noise under the held-out patterns.
 fn variances(measurements: &Measurements, split: &HoldoutSplit, rect: TileRect) -> (f64, f64) {
     let (mut signal, mut noise) = (0.0, 0.0);
     for pixel in rect.pixels() {
@@ -192,4 +189,90 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 fn variance(values: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
     let (count, mean) = (values.len() as f64, mean(values.clone()));
     values.map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0)
+}
+
+#[cfg(all(test, not(target_arch = "wasm32")))]
+mod tests {
+    use super::super::test_problems::SyntheticCapture;
+    use super::*;
+    use crate::executor::SequentialExecutor;
+
+    /// Validates functions that are the true ones times `factor`.
+    fn validate(capture: &SyntheticCapture, factor: f64) -> Option<HoldoutValidation> {
+        let functions = capture.functions(factor);
+        let split = HoldoutSplit::new(&capture.measurements);
+        let recover = |rect| RecoveredTile::Direct(cropped(&functions, rect));
+        let geometry = (&capture.geometry, None);
+        HoldoutValidation::new(
+            &capture.measurements,
+            geometry,
+            &split,
+            &SequentialExecutor,
+            recover,
+        )
+        .unwrap()
+    }
+
+    fn cropped(functions: &TransportFunctions, rect: TileRect) -> TransportFunctions {
+        let (area, extent) = (
+            functions.tau.len() / functions.rect.extent.area(),
+            functions.rect.extent,
+        );
+        let mut crop = TransportFunctions::zeros(rect, area);
+        for (pixel, tau) in rect.pixels().zip(crop.tau.chunks_exact_mut(area)) {
+            let n = extent.index(pixel);
+            tau.copy_from_slice(&functions.tau[n * area..(n + 1) * area]);
+        }
+        crop
+    }
+
+    #[test]
+    fn snr_is_that_of_the_recovered_functions() {
+        let mut capture = SyntheticCapture::new(60);
+        for (factor, expected) in [(1.1, 20.0), (0.9, 20.0), (1.01, 40.0)] {
+            let validation = validate(&capture, factor).unwrap();
+            assert!(validation.has_signal());
+            let snr = validation.snr().unwrap().0;
+            assert!((snr - expected).abs() < 1.0, "{snr} dB, not {expected}");
+        }
+        // Residuals that the noise explains are no error beyond the noise's resolution.
+        capture.measurements.noise.floor = [1e-3; CHANNELS];
+        let validation = validate(&capture, 1.01).unwrap();
+        assert_eq!(
+            validation.error(validation.residual),
+            ERROR_RESOLUTION * validation.noise
+        );
+    }
+
+    #[test]
+    fn loss_compares_replacements_with_the_recovered_functions() {
+        let capture = SyntheticCapture::new(60);
+        let validation = validate(&capture, 1.05).unwrap();
+        let loss = |factor| {
+            let functions = capture.functions(factor);
+            let squares = validation.tiles().map(|tile| match tile {
+                RecoveredTile::Direct(tile) => cropped(&functions, tile.rect),
+                RecoveredTile::Factored(_) => unreachable!("all tiles are direct"),
+            });
+            validation.loss(&squares.collect::<Vec<_>>()).0
+        };
+        assert!(loss(1.05).abs() < 1e-9);
+        // Twice the error is 6 dB, half of it −6 dB.
+        assert!((loss(1.1) - 6.02).abs() < 0.01, "{}", loss(1.1));
+        assert!((loss(1.025) + 6.02).abs() < 0.01, "{}", loss(1.025));
+    }
+
+    #[test]
+    fn constant_photographs_have_no_signal_and_few_patterns_no_validation() {
+        let mut capture = SyntheticCapture::new(60);
+        capture.measurements.noise.floor = [1e-6; CHANNELS];
+        capture
+            .measurements
+            .pictures
+            .iter_mut()
+            .for_each(|picture| picture.fill([0.2; CHANNELS]));
+        let validation = validate(&capture, 1.0).unwrap();
+        assert!(!validation.has_signal() && validation.snr().is_none());
+        assert!(validate(&SyntheticCapture::new(15), 1.0).is_none());
+    }
 }

@@ -12,13 +12,13 @@ use crate::transport::Window;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(into = "&'static str")]
 pub enum Method {
-    /// Posterior mean under a Gaussian prior that is learned from the measurements; blended with least
-    /// squares in tiles where the blend predicts held-out patterns better.
+    /// Posterior mean under a Gaussian prior that is learned from the measurements; blended with least squares in tiles
+    /// where the blend predicts held-out patterns better.
     Learned,
     /// Non-negative least squares, each pixel and channel by itself (paper, section 3, case (a)).
     Nnls,
-    /// Basis pursuit denoising: of all functions that explain a pixel's measurements to within the noise,
-    /// the sparsest one in this basis (paper, section 3, case (b)).
+    /// Basis pursuit denoising: of all functions that explain a pixel's measurements to within the noise, the sparsest
+    /// one in this basis (paper, section 3, case (b)).
     Bpdn(SparsityBasis),
 }
 
@@ -47,8 +47,8 @@ impl Method {
         own.max(pooled::max_bytes(window))
     }
 
-    /// Upper bound on the memory that recovering a tile takes beside the measurements and the tile's
-    /// functions, in bytes.
+    /// Upper bound on the memory that recovering a tile takes beside the measurements and the tile's functions, in
+    /// bytes.
     pub fn tile_bytes(self, window: Window, patterns: usize) -> usize {
         let pixelwise = PixelwiseRecovery::max_tile_bytes(window, patterns);
         match self {

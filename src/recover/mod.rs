@@ -1,14 +1,17 @@
-//! From measurements to light transport functions.
+//! Recovery: from linear measurements to light transport functions.
 //!
-//! By default a prior learned from all pixels' measurements says what each function is likely to be
-//! ([`learned`]). The paper's own methods treat every pixel by itself: for each camera pixel and channel, over its window and subject to `τ ≥ 0`: minimise `‖y − P̂τ‖₂`
-//! (paper, section 3, case (a); [`Nnls`]), or `‖φᵀτ‖₁` subject to `‖y − P̂τ‖₂ ≤ ε` (case (b);
-//! [`Homotopy`] and [`InteriorPoint`]). What makes it affordable is that all pixels and channels
-//! whose correspondence falls in the same light element share one window and so one set of normal
-//! equations, and that windows share the patterns' correlations ([`design`]); what makes it accurate
-//! is how the patterns' common mode is weighted ([`CommonMode`]).
+//! For each camera pixel and channel, y `[L]` measures `P̂τ`: `P̂` `[L, S]` are the L patterns on the S light elements
+//! of the pixel's window, and τ `[S]` is its light transport function. L is smaller than S, so something has to be
+//! known of τ beforehand. [`Method::Learned`], the default, learns a Gaussian prior from the measurements of all
+//! pixels. The paper's methods treat each pixel by itself (section 3): non-negative least squares ([`Nnls`], case (a)),
+//! and basis pursuit denoising ([`Homotopy`] and [`InteriorPoint`], case (b)).
 //!
-//! [`Recovery`] is pure and works tile by tile: whoever has threads runs tiles on them.
+//! Pixels and channels with one window share their normal equations, and windows share the patterns' correlations: that
+//! makes recovery fast. The weight of the patterns' common mode ([`CommonMode`]) makes it accurate. Whatever the
+//! measurements themselves can tell is chosen on held-out patterns, which also estimate the SNR
+//! ([`HoldoutValidation`]).
+//!
+//! [`Recovery`] has no threads and no files: an [`Executor`](crate::executor::Executor) runs its jobs.
 
 mod bandwidth;
 mod bpdn;

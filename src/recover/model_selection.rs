@@ -1,8 +1,8 @@
-//! Chooses the parameters of [`PixelwiseRecovery`]: those by which the training patterns predict the
-//! held-out ones with the highest SNR.
+//! Chooses the parameters of [`PixelwiseRecovery`]: those by which the training patterns predict the held-out ones with
+//! the highest SNR.
 //!
-//! Chosen are the weight ω of the common mode and, for denoising, the share of the noise that the tolerance
-//! ε allows. Each candidate recovers a sample of windows, spread over the picture.
+//! Chosen are the weight ω of the common mode and, for denoising, the share of the noise that the tolerance ε allows.
+//! Each candidate recovers a sample of windows, spread over the picture.
 
 use std::collections::BTreeMap;
 
@@ -18,8 +18,7 @@ use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::transport::{CHANNELS, CameraPx, Decibels, Element, Geometry, TransportError};
 
-/// Size of a sample: enough to tell candidates apart by hundredths of a decibel, and few enough to take
-/// seconds.
+/// Size of a sample: enough to tell candidates apart by hundredths of a decibel, and few enough to take seconds.
 #[derive(Clone, Copy, Debug)]
 struct SampleSize {
     max_windows: usize,
@@ -172,8 +171,7 @@ impl<'a> WindowSample<'a> {
         error
     }
 
-    /// The noise of the measurements, by the residuals of least squares and the degrees of freedom that it
-    /// leaves.
+    /// The noise of the measurements, by the residuals of least squares and the degrees of freedom that it leaves.
     fn fit_noise(&self, common_mode: CommonMode, executor: &impl Executor) -> Tolerance {
         let measurements = self.measurements;
         let all: Vec<usize> = (0..measurements.patterns.len()).collect();

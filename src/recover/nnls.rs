@@ -1,11 +1,10 @@
-//! Non-negative least squares: `min ½xᵀGx − hᵀx` subject to `x ≥ 0`, with the Gram matrix `G = AᵀA` `[k, k]`
-//! and `h = Aᵀb` `[k]` (paper, section 3, case (a)).
+//! Non-negative least squares: `min ½xᵀGx − hᵀx` subject to `x ≥ 0`, with the Gram matrix `G = AᵀA` `[k, k]` and
+//! `h = Aᵀb` `[k]` (paper, section 3, case (a)).
 //!
-//! An active-set method on the normal equations (Lawson and Hanson 1974; Bro and de Jong 1997): unknowns
-//! with a positive gradient `h − Gx` enter the passive set, several for each gradient computed, and unknowns
-//! that would become negative leave it. Each search starts from the empty set. The set of a neighbouring
-//! pixel or channel is no faster to start from, since most of it leaves again, and it brings the rounding
-//! errors of its inverse.
+//! An active-set method on the normal equations (Lawson and Hanson 1974; Bro and de Jong 1997): unknowns with a
+//! positive gradient `h − Gx` enter the passive set, several for each gradient computed, and unknowns that would become
+//! negative leave it. Each search starts from the empty set. The set of a neighbouring pixel or channel is no faster to
+//! start from, since most of it leaves again, and it brings the rounding errors of its inverse.
 
 use super::passive_set::PassiveSet;
 use crate::linalg::{LANES, padded_len, vectorise};
@@ -26,8 +25,8 @@ pub struct Nnls<'a> {
 
 /// Largest gradient that counts as zero, relative to the largest entry of `h`.
 const GRADIENT_TOLERANCE: f64 = 1e-10;
-/// Share of its gradient that an unknown must have kept to enter after others: the gradient of all unknowns
-/// is expensive, and is computed once for several.
+/// Share of its gradient that an unknown must have kept to enter after others: the gradient of all unknowns is
+/// expensive, and is computed once for several.
 const MIN_REMAINING_GRADIENT: f64 = 0.5;
 /// Iterations after which the search ends in any case, relative to k.
 const MAX_ITERATIONS_PER_UNKNOWN: usize = 10;
@@ -47,8 +46,8 @@ impl<'a> Nnls<'a> {
         }
     }
 
-    /// Returns the minimum of `½xᵀGx − hᵀx` subject to `x ≥ 0`, `[k]`. It is always feasible, and satisfies
-    /// the Karush–Kuhn–Tucker conditions to rounding.
+    /// Returns the minimum of `½xᵀGx − hᵀx` subject to `x ≥ 0`, `[k]`. It is always feasible, and satisfies the
+    /// Karush–Kuhn–Tucker conditions to rounding.
     pub fn solve(&mut self, h: &[f64]) -> Vec<f64> {
         vectorise(
             #[inline(always)]
@@ -71,8 +70,8 @@ impl<'a> Nnls<'a> {
             return;
         }
         let min_gradient = GRADIENT_TOLERANCE * top;
-        // An unknown that was refused, or that left at once, must not be tried again before the set has
-        // changed: with rounding errors the search could cycle.
+        // An unknown that was refused, or that left at once, must not be tried again before the set has changed: with
+        // rounding errors the search could cycle.
         let mut refused = Vec::new();
         let mut rebuilt = false;
         for _ in 0..MAX_ITERATIONS_PER_UNKNOWN * self.k {
@@ -115,8 +114,8 @@ impl<'a> Nnls<'a> {
         }
     }
 
-    /// Moves x, which is feasible, to the least-squares solution on the passive set. Members that would
-    /// become negative leave the set.
+    /// Moves x, which is feasible, to the least-squares solution on the passive set. Members that would become negative
+    /// leave the set.
     #[inline(always)]
     fn move_to_solution(&mut self) {
         loop {
@@ -139,8 +138,8 @@ impl<'a> Nnls<'a> {
             for (x, z) in self.x.iter_mut().zip(solution) {
                 *x += step * (z - *x);
             }
-            // Members that reach zero leave, the blocking one in any case. In descending order: the last
-            // member replaces a removed one.
+            // Members that reach zero leave, the blocking one in any case. In descending order: the last member
+            // replaces a removed one.
             for i in (0..self.x.len()).rev() {
                 if i == blocked || (self.passive.solution(0)[i] <= 0.0 && self.x[i] <= 0.0) {
                     self.x.swap_remove(i);
@@ -150,8 +149,8 @@ impl<'a> Nnls<'a> {
         }
     }
 
-    /// Removes the rounding error of the solution: next to nothing in `x`, but all of the residual if the
-    /// measurements can be met exactly.
+    /// Removes the rounding error of the solution: next to nothing in `x`, but all of the residual if the measurements
+    /// can be met exactly.
     #[inline(always)]
     fn refine_solution(&mut self) {
         self.passive.refine(0, &self.gradient);
@@ -160,8 +159,8 @@ impl<'a> Nnls<'a> {
         }
     }
 
-    /// Inserts the members into an empty set, one by one, which removes the rounding errors of many updates
-    /// from the inverse.
+    /// Inserts the members into an empty set, one by one, which removes the rounding errors of many updates from the
+    /// inverse.
     #[inline(always)]
     fn rebuild(&mut self, h: &[f64]) {
         let members = self.passive.members().to_vec();
@@ -188,8 +187,8 @@ impl<'a> Nnls<'a> {
         members.fold(0.0, |max, &j| f64::max(max, self.gradient[j].abs()))
     }
 
-    /// Unknowns outside the passive set with large gradients, and these gradients, in descending order. In
-    /// each class of indices modulo [`LANES`], the unknown with the largest gradient.
+    /// Unknowns outside the passive set with large gradients, and these gradients, in descending order. In each class
+    /// of indices modulo [`LANES`], the unknown with the largest gradient.
     #[inline(always)]
     fn largest_gradients(&mut self, refused: &[usize]) -> [(usize, f64); LANES] {
         self.entering[..self.k].copy_from_slice(&self.gradient);

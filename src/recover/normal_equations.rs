@@ -1,10 +1,9 @@
 //! The normal equations `(WA)ᵀ(WA) x = (WA)ᵀWy` of least squares over patterns.
 //!
-//! `A` `[L, k]` has a row for each of L patterns and a column for each of k unknowns, and `y` `[L]` holds
-//! the measurements of one pixel and channel. The weights are
-//! `W = (I − (1 − ω) wwᵀ/‖w‖²) diag(w)`: `w` `[L]` weights the patterns, and ω their [`CommonMode`]. W is
-//! applied to the columns of A and to y once, so that Gram matrix, right-hand side and residual are plain
-//! inner products.
+//! `A` `[L, k]` has a row for each of L patterns and a column for each of k unknowns, and `y` `[L]` holds the
+//! measurements of one pixel and channel. The weights are `W = (I − (1 − ω) wwᵀ/‖w‖²) diag(w)`: `w` `[L]` weights the
+//! patterns, and ω their [`CommonMode`]. W is applied to the columns of A and to y once, so that Gram matrix,
+//! right-hand side and residual are plain inner products.
 
 use super::common_mode::CommonMode;
 use crate::linalg::{self, add_scaled, dot};
@@ -153,8 +152,7 @@ impl NormalEquations {
         }
     }
 
-    /// Adds `factor · (WA)ᵀ(WA)` and `(WA)ᵀ Wy`. Column i of A belongs to unknown `unknowns[i]`; these
-    /// rise.
+    /// Adds `factor · (WA)ᵀ(WA)` and `(WA)ᵀ Wy`. Column i of A belongs to unknown `unknowns[i]`; these rise.
     #[inline(always)]
     pub fn add(
         &mut self,

@@ -1,22 +1,20 @@
 //! The passive set of an active-set solver: the unknowns that are free to vary (Lawson and Hanson 1974).
 //!
-//! For a passive set P of n unknowns, the set keeps the inverse `H = G[P, P]⁻¹` of a part of the Gram matrix
-//! and the solutions `H b[P]` of N right-hand sides, and updates all of them by rank-one terms, at n²
-//! products, when an unknown is inserted or removed. No step has to wait for the one before, unlike
-//! substitution through a triangular factor; [`PassiveSet::refine`] removes the rounding errors that the
-//! updates leave.
+//! For a passive set P of n unknowns, the set keeps the inverse `H = G[P, P]⁻¹` of a part of the Gram matrix and the
+//! solutions `H b[P]` of N right-hand sides, and updates all of them by rank-one terms, at n² products, when an unknown
+//! is inserted or removed. No step has to wait for the one before, unlike substitution through a triangular factor;
+//! [`PassiveSet::refine`] removes the rounding errors that the updates leave.
 //!
-//! Sets are small and of every size. A loop that ended with the set would spend most of its time on the
-//! remainder after the last full vector register, so all vectors are padded with zeros to a multiple of
-//! [`LANES`].
+//! Sets are small and of every size. A loop that ended with the set would spend most of its time on the remainder after
+//! the last full vector register, so all vectors are padded with zeros to a multiple of [`LANES`].
 
 use crate::linalg::{LANES, add_scaled_padded, add_scaled_rows, dot_padded, padded_len};
 
 /// The values of one vector register, or of a few.
 type Block = [f64; LANES];
 
-/// Smallest pivot, relative to its diagonal entry, of an unknown whose column is linearly independent of the
-/// passive ones, to the precision of the Gram matrix. Another unknown would not lower the residual.
+/// Smallest pivot, relative to its diagonal entry, of an unknown whose column is linearly independent of the passive
+/// ones, to the precision of the Gram matrix. Another unknown would not lower the residual.
 const MIN_PIVOT_RATIO: f64 = 1e-9;
 /// Members that a new set has memory for. Sets rarely grow beyond the number of patterns.
 const INITIAL_CAPACITY: usize = 96;
@@ -32,8 +30,8 @@ pub(super) struct PassiveSet<'a, const N: usize> {
     members: Vec<usize>,
     /// `[k]`.
     is_member: Vec<bool>,
-    /// `H`, `[stride, stride]`, zero beyond the members' rows and columns, in panels of [`LANES`] columns:
-    /// the part of a vector that belongs to a panel stays in registers.
+    /// `H`, `[stride, stride]`, zero beyond the members' rows and columns, in panels of [`LANES`] columns: the part of
+    /// a vector that belongs to a panel stays in registers.
     inverse: Vec<Block>,
     /// Length of the vectors below, a multiple of [`LANES`]. They are zero beyond the members.
     stride: usize,
@@ -192,16 +190,15 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         }
     }
 
-    /// Inserts unknown `j`, with its entries `b` of the right-hand sides. Returns false if its column depends
-    /// linearly on those of the set.
+    /// Inserts unknown `j`, with its entries `b` of the right-hand sides. Returns false if its column depends linearly
+    /// on those of the set.
     #[inline(always)]
     pub fn evaluate_and_insert(&mut self, j: usize, b: [f64; N]) -> bool {
         let candidate = self.evaluate(j, b);
         self.insert(candidate)
     }
 
-    /// Inserts the candidate that was evaluated last. Returns false if its column depends linearly on those
-    /// of the set.
+    /// Inserts the candidate that was evaluated last. Returns false if its column depends linearly on those of the set.
     #[inline(always)]
     pub fn insert(&mut self, candidate: Candidate<N>) -> bool {
         self.multiply_by_inverse();

@@ -1,10 +1,10 @@
 //! Checks that each photograph shows the pattern that it is listed with.
 //!
-//! The mean light transport function predicts, on average, what a photograph measures: the regression slope
-//! of measurements on predictions is the same for all patterns, coarse or fine (1 if the window holds all
-//! light). For a photograph of another pattern it is 0. The standard error of a slope comes from how much it
-//! differs between squares of the picture (clusters, as in Liang and Zeger 1986). A photograph fails only if
-//! its slope is too small with certainty.
+//! The mean light transport function predicts, on average, what a photograph measures: the regression slope of
+//! measurements on predictions is the same for all patterns, coarse or fine (1 if the window holds all light). For a
+//! photograph of another pattern it is 0. The standard error of a slope comes from how much it differs between squares
+//! of the picture (clusters, as in Liang and Zeger 1986). A photograph fails only if its slope is too small with
+//! certainty.
 
 use super::error::RecoverError;
 use super::holdout::HoldoutSplit;
@@ -29,8 +29,7 @@ const MIN_HELD_OUT: usize = 2;
 ///
 /// # Errors
 /// [`RecoverError::MismatchedPatterns`] if some photographs do not match their patterns, and
-/// [`RecoverError::UncorrelatedPatterns`] if most do not, or if the held-out patterns together predict
-/// nothing.
+/// [`RecoverError::UncorrelatedPatterns`] if most do not, or if the held-out patterns together predict nothing.
 pub(super) fn check_patterns(
     measurements: &Measurements,
     geometry: &Geometry,
@@ -81,8 +80,7 @@ pub(super) fn check_patterns(
     }
 }
 
-/// Sums over pixels, both centred over the patterns: of squared predictions, and of predictions times
-/// measurements.
+/// Sums over pixels, both centred over the patterns: of squared predictions, and of predictions times measurements.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moments {
     prediction: f64,
@@ -97,8 +95,7 @@ struct Slope {
 }
 
 impl Slope {
-    /// The common slope of `patterns`, from moments `[square][pattern]`; `None` if the predictions do not
-    /// vary.
+    /// The common slope of `patterns`, from moments `[square][pattern]`; `None` if the predictions do not vary.
     fn fit(moments: &[Vec<Moments>], patterns: &[usize]) -> Option<Self> {
         let squares = moments.iter().map(|square| {
             let of_patterns = patterns.iter().map(|&l| square[l]);

@@ -1,9 +1,9 @@
 //! The paper's recovery: each camera pixel and channel by itself (section 3).
 //!
-//! Case (a) is non-negative least squares, `min ‖W(y − P̂τ)‖` over `τ ≥ 0`; case (b) is basis pursuit
-//! denoising, `min ‖φᵀτ‖₁` subject to `‖W(y − P̂τ)‖ ≤ ε`, `τ ≥ 0`. `P̂` `[L, k]` are the patterns on the k
-//! elements of the pixel's window. All pixels and channels of a window share their equations
-//! ([`super::gram_cache`]), except those with saturated measurements, which drop out.
+//! Case (a) is non-negative least squares, `min ‖W(y − P̂τ)‖` over `τ ≥ 0`; case (b) is basis pursuit denoising,
+//! `min ‖φᵀτ‖₁` subject to `‖W(y − P̂τ)‖ ≤ ε`, `τ ≥ 0`. `P̂` `[L, k]` are the patterns on the k elements of the pixel's
+//! window. All pixels and channels of a window share their equations ([`super::gram_cache`]), except those with
+//! saturated measurements, which drop out.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -16,8 +16,8 @@ use super::sampling::{self, MIN_PATTERNS, PixelsOfWindow};
 use crate::capture::Measurements;
 use crate::transport::{CameraPx, Element, Geometry, TileRect, TransportFunctions, Window};
 
-/// Side, in light elements, of the squares of window origins that share a [`GramCache`]: a default tile has
-/// one, at two camera pixels an element.
+/// Side, in light elements, of the squares of window origins that share a [`GramCache`]: a default tile has one, at two
+/// camera pixels an element.
 const CACHE_SIDE: i32 = 16;
 
 /// Largest squared residual above ε², as a share of the measurements' energy, of a valid homotopy path.
@@ -40,8 +40,8 @@ pub(super) struct PixelwiseRecovery {
     pub problem: PixelProblem,
 }
 
-/// Receives the solution of a pixel and channel: the window's origin, the pixel's position in the region,
-/// the channel, the window's slots on the light plane, and the light transport function on these.
+/// Receives the solution of a pixel and channel: the window's origin, the pixel's position in the region, the channel,
+/// the window's slots on the light plane, and the light transport function on these.
 type Solutions<'a> = dyn FnMut(Element, usize, usize, &[usize], &[f64]) + 'a;
 
 /// The measurements of a pixel and channel, one for each pattern of its equations.
@@ -186,8 +186,8 @@ impl PixelwiseRecovery {
                     let energy: f64 = y.iter().map(|y| y * y).sum();
                     let h = equations.right_hand_side(&y);
                     let mut x = homotopy.solve(&h, energy, epsilon);
-                    // With no more patterns than elements on the path its equations may be singular to
-                    // rounding, and the path leads elsewhere.
+                    // With no more patterns than elements on the path its equations may be singular to rounding, and
+                    // the path leads elsewhere.
                     let residual = equations.columns.squared_residual(&y, &x);
                     let max_residual = epsilon * epsilon + MAX_EXCESS_RESIDUAL * energy;
                     if residual.is_nan() || residual > max_residual {

@@ -1,10 +1,9 @@
 //! The mean light transport function of the picture, from the measurements of many pixels together.
 //!
 //! With every pixel and channel n scaled by its brightness `f_n`, one function h is taken for all:
-//! `min_h Σ_n q_n ‖W(y_n / f_n − P̂_n h)‖²`, `h ≥ 0`, where `P̂_n` are the patterns on the pixel's window and
-//! `q_n` is the certainty of the pixel. Brightness and function are found in turn: given h,
-//! `f_n = ȳ_n / p̄_n h`. That no pixel sees exactly h hardly matters: [`super::pattern_check`] and the learned
-//! prior start from it.
+//! `min_h Σ_n q_n ‖W(y_n / f_n − P̂_n h)‖²`, `h ≥ 0`, where `P̂_n` are the patterns on the pixel's window and `q_n` is
+//! the certainty of the pixel. Brightness and function are found in turn: given h, `f_n = ȳ_n / p̄_n h`. That no pixel
+//! sees exactly h hardly matters: [`super::pattern_check`] and the learned prior start from it.
 
 use std::ops::Range;
 
@@ -20,13 +19,13 @@ use crate::executor::Executor;
 use crate::linalg::{add_scaled, vectorise};
 use crate::transport::{CHANNELS, Element, Geometry, TileRect, Window};
 
-/// Rounds of brightness and function. A brightness that is a few per cent off, as it is while the function
-/// is unknown, shows as light from far off.
+/// Rounds of brightness and function. A brightness that is a few per cent off, as it is while the function is unknown,
+/// shows as light from far off.
 const ROUNDS: usize = 3;
 /// Jobs that the sums are divided into. Fixed, so that rounding does not depend on the number of threads.
 const JOBS: usize = 8;
-/// Standard deviation of a pixel's measurements from those that the mean function predicts, relative to its
-/// brightness; what limits a pixel's certainty where noise is low.
+/// Standard deviation of a pixel's measurements from those that the mean function predicts, relative to its brightness;
+/// what limits a pixel's certainty where noise is low.
 const MODEL_DEVIATION: f64 = 0.1;
 
 /// Squares of the picture that are used, and their side in camera pixels.
@@ -45,12 +44,12 @@ pub(super) fn sample_squares(measurements: &Measurements) -> Vec<TileRect> {
     sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES)
 }
 
-/// Returns the mean light transport function, `[slot]`, non-negative and of sum 1, after a check that the
-/// photographs show their patterns.
+/// Returns the mean light transport function, `[slot]`, non-negative and of sum 1, after a check that the photographs
+/// show their patterns.
 ///
 /// # Errors
-/// If no pixel sees the light plane, if the photographs are dark or overexposed, if they do not match their
-/// patterns, and if the executor is cancelled.
+/// If no pixel sees the light plane, if the photographs are dark or overexposed, if they do not match their patterns,
+/// and if the executor is cancelled.
 pub(super) fn mean_function(
     measurements: &Measurements,
     geometry: &Geometry,
@@ -99,8 +98,8 @@ fn fit_round(
         let mut pixels = square.pixels();
         pixels.all(|pixel| is_whole(geometry.window_origin(pixel)))
     });
-    // Windows across the border say little of the elements off the light plane: they are left out if there
-    // are enough others.
+    // Windows across the border say little of the elements off the light plane: they are left out if there are enough
+    // others.
     let only_whole = 4 * whole_squares.count() >= squares.len();
     let jobs = executor.map(JOBS, |job| {
         let mut sums = NormalEquations::zeros(area);
@@ -177,8 +176,8 @@ pub(super) struct PooledMeasurements {
 }
 
 impl PooledMeasurements {
-    /// Sums over the channels of the pixels that are nowhere saturated. `level` is the mean over the
-    /// patterns that a pixel of brightness 1 measures.
+    /// Sums over the channels of the pixels that are nowhere saturated. `level` is the mean over the patterns that a
+    /// pixel of brightness 1 measures.
     #[inline(always)]
     pub fn new(
         measurements: &Measurements,
@@ -226,5 +225,78 @@ fn dark_or_overexposed(measurements: &Measurements, squares: &[TileRect]) -> Rec
     match 2 * saturated > all {
         true => RecoverError::Overexposed,
         false => RecoverError::NoSignal,
+    }
+}
+
+#[cfg(all(test, not(target_arch = "wasm32")))]
+mod tests {
+    use super::super::test_problems::SyntheticCapture;
+    use super::*;
+    use crate::executor::SequentialExecutor;
+
+    fn fit(capture: &SyntheticCapture) -> Result<Vec<f64>, RecoverError> {
+        let split = HoldoutSplit::new(&capture.measurements);
+        mean_function(
+            &capture.measurements,
+            &capture.geometry,
+            &split,
+            &SequentialExecutor,
+        )
+    }
+
+    #[test]
+    fn function_that_all_pixels_share_is_found() {
+        let capture = SyntheticCapture::new(60);
+        let mean = fit(&capture).unwrap();
+        assert!((mean.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        for (found, expected) in mean.iter().zip(&capture.function) {
+            assert!((found - expected).abs() < 1e-4, "{mean:?}");
+        }
+    }
+
+    #[test]
+    fn certainty_is_the_inverse_variance_of_pixels_scaled_to_brightness_one() {
+        let mut capture = SyntheticCapture::new(8);
+        capture.measurements.noise.floor = [4e-4; CHANNELS];
+        let pixels: Vec<_> =
+            sampling::pixels_by_window(&capture.geometry, capture.functions(1.0).rect)
+                .remove(&Element { u: 3, v: 3 })
+                .unwrap();
+        let (all, level) = ((0..8).collect::<Vec<_>>(), 0.5);
+        let pooled =
+            PooledMeasurements::new(&capture.measurements, &all, &pixels[..1], 1..2, level);
+        let y: Vec<f64> = all
+            .iter()
+            .map(|&l| capture.measurements.sample(l, pixels[0].1, 1))
+            .collect();
+        let brightness = y.iter().sum::<f64>() / 8.0 / level;
+        let variance = MODEL_DEVIATION.powi(2) + 4e-4 / brightness.powi(2);
+        assert!((pooled.certainty * variance - 1.0).abs() < 1e-9);
+        for (pooled, y) in pooled.y.iter().zip(y) {
+            assert!((pooled * variance * brightness - y).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn dark_saturated_and_swapped_photographs_are_refused() {
+        let mut capture = SyntheticCapture::new(60);
+        capture.measurements.pictures.swap(3, 8);
+        let error = fit(&capture).unwrap_err();
+        let RecoverError::MismatchedPatterns { pattern_indices } = error else {
+            panic!("{error}");
+        };
+        assert_eq!(pattern_indices, [3, 8]);
+        capture
+            .measurements
+            .pictures
+            .iter_mut()
+            .for_each(|picture| picture.fill([0.0; CHANNELS]));
+        assert!(matches!(fit(&capture), Err(RecoverError::NoSignal)));
+        capture
+            .measurements
+            .pictures
+            .iter_mut()
+            .for_each(|picture| picture.fill([f32::NAN; CHANNELS]));
+        assert!(matches!(fit(&capture), Err(RecoverError::Overexposed)));
     }
 }

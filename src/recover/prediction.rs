@@ -33,8 +33,8 @@ pub(super) fn predictions<'a>(
     predictions
 }
 
-/// Measurements less predictions under the patterns `pattern_indices`, `[pixel, pattern, channel]`; NaN
-/// where a measurement is saturated.
+/// Measurements less predictions under the patterns `pattern_indices`, `[pixel, pattern, channel]`; NaN where a
+/// measurement is saturated.
 pub(super) fn residuals(
     geometry: &Geometry,
     measurements: &Measurements,

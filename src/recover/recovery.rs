@@ -24,8 +24,8 @@ pub struct Settings {
     pub window: Window,
 }
 
-/// A recovery that is ready to run. All that depends on the measurements as a whole has been learned or
-/// chosen; tiles can then be recovered one by one, in any order.
+/// A recovery that is ready to run. All that depends on the measurements as a whole has been learned or chosen; tiles
+/// can then be recovered one by one, in any order.
 #[derive(Debug)]
 pub struct Recovery {
     geometry: Geometry,
@@ -40,13 +40,12 @@ enum Solver {
 }
 
 impl Recovery {
-    /// Learns and chooses from `measurements` what the method needs. They may hold strips of the picture
-    /// instead of all of it; only [covered](Measurements::covers) tiles are then used.
+    /// Learns and chooses from `measurements` what the method needs. They may hold strips of the picture instead of all
+    /// of it; only [covered](Measurements::covers) tiles are then used.
     ///
     /// # Errors
-    /// If there are too few patterns, if the geometry is out of range or no pixel sees the light plane, if
-    /// the photographs are dark, overexposed or do not match their patterns, and if the executor is
-    /// cancelled.
+    /// If there are too few patterns, if the geometry is out of range or no pixel sees the light plane, if the
+    /// photographs are dark, overexposed or do not match their patterns, and if the executor is cancelled.
     pub fn prepare(
         measurements: &Measurements,
         settings: Settings,
@@ -153,8 +152,8 @@ impl Recovery {
         }
     }
 
-    /// Recovers one tile. `measurements` are those that the recovery was prepared from, or other rows of
-    /// the same capture: they cover the tile and [`halo`](Self::halo) rows around it, within the picture.
+    /// Recovers one tile. `measurements` are those that the recovery was prepared from, or other rows of the same
+    /// capture: they cover the tile and [`halo`](Self::halo) rows around it, within the picture.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
         match &self.solver {
             Solver::Learned(learned) => learned.tile(measurements, rect),

@@ -12,8 +12,8 @@ pub const MIN_PATTERNS: usize = 4;
 /// Pixels that share a window, each with its position in a region, row by row.
 pub(super) type PixelsOfWindow = [(usize, CameraPx)];
 
-/// Squares of `side²` pixels spread evenly over the picture, without overlap, at most `max_count`. Only
-/// squares whose measurements are in memory.
+/// Squares of `side²` pixels spread evenly over the picture, without overlap, at most `max_count`. Only squares whose
+/// measurements are in memory.
 pub(super) fn spread_squares(
     measurements: &Measurements,
     side: u32,
@@ -97,8 +97,8 @@ pub(super) fn sees_light_plane(geometry: &Geometry) -> bool {
     })
 }
 
-/// The patterns of `pattern_indices` under which none of the pixels and channels is saturated; all of them
-/// if those are fewer than [`MIN_PATTERNS`].
+/// The patterns of `pattern_indices` under which none of the pixels and channels is saturated; all of them if those are
+/// fewer than [`MIN_PATTERNS`].
 pub(super) fn unsaturated(
     measurements: &Measurements,
     pattern_indices: &[usize],

@@ -1,6 +1,22 @@
-//! Random least-squares problems, and what may be asked of an answer to one.
+//! Synthetic problems with known properties.
 
-/// `A`, `[rows, k]`, and several measurements `y`, `[rows]`.
+use crate::capture::{Measurements, Noise, Pattern, Rows};
+use crate::transport::{
+    CHANNELS, Correspondence, Extent, Geometry, TileRect, TransportFunctions, Window,
+};
+
+/// Numbers uniform in [−½, ½), the same for each seed.
+pub(super) fn uniform(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed | 1;
+    move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    }
+}
+
+/// A least-squares problem: `A`, `[rows, k]`, and several measurements `y`, `[rows]`.
 pub(super) struct Problem {
     pub k: usize,
     pub matrix: Vec<f64>,
@@ -8,15 +24,9 @@ pub(super) struct Problem {
 }
 
 impl Problem {
-    /// Entries of A uniform around `offset`, of y around half of it.
+    /// Entries of A are uniform around `offset`, of y around half of it.
     pub fn random(k: usize, rows: usize, seed: u64, offset: f64) -> Self {
-        let mut state = seed | 1;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
+        let mut next = uniform(seed);
         Self {
             k,
             matrix: (0..rows * k).map(|_| next() + offset).collect(),
@@ -49,8 +59,8 @@ impl Problem {
     }
 
     fn differences(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
-        let seen = |r: &[f64]| r.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
-        self.rows().zip(y).map(|(r, y)| y - seen(r)).collect()
+        let product = |r: &[f64]| r.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
+        self.rows().zip(y).map(|(r, y)| y - product(r)).collect()
     }
 
     /// `‖y − Ax‖`.
@@ -61,5 +71,80 @@ impl Problem {
     /// `Aᵀ(y − Ax)`.
     pub fn correlation(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
         self.right_hand_side(&self.differences(x, y))
+    }
+}
+
+/// Noiseless measurements of pixels that all have one light transport function, times a brightness of their own.
+pub(super) struct SyntheticCapture {
+    pub geometry: Geometry,
+    /// The function, of sum 1, `[slot]`.
+    pub function: Vec<f64>,
+    pub measurements: Measurements,
+}
+
+impl SyntheticCapture {
+    pub fn new(patterns: usize) -> Self {
+        let square = |side| Extent {
+            width: side,
+            height: side,
+        };
+        let geometry = Geometry {
+            camera: square(32),
+            light: square(16),
+            window: Window::new(5).unwrap(),
+            correspondence: Correspondence {
+                affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
+            },
+            tile_side: 32,
+        };
+        let weights: Vec<f64> = (0..25)
+            .map(|s| f64::from(2 * (s % 5) + s / 5 % 3))
+            .collect();
+        let sum: f64 = weights.iter().sum();
+        let mut next = uniform(7);
+        let area = geometry.light.area();
+        let patterns = (0..patterns).map(|_| (0..area).map(|_| (next() + 0.5) as f32).collect());
+        let patterns: Vec<Pattern> = patterns.map(Pattern::Grey).collect();
+        let mut capture = Self {
+            geometry,
+            function: weights.iter().map(|w| w / sum).collect(),
+            measurements: Measurements {
+                camera: geometry.camera,
+                light: geometry.light,
+                correspondence: geometry.correspondence,
+                full_scale: vec![1.0; patterns.len()],
+                patterns,
+                rows: Rows::all(geometry.camera.height),
+                pictures: Vec::new(),
+                noise: Noise {
+                    gain: [0.0; CHANNELS],
+                    floor: [0.0; CHANNELS],
+                },
+            },
+        };
+        let picture = capture.functions(1.0);
+        let y = super::prediction::predictions(&geometry, &capture.measurements.patterns, &picture);
+        let (count, pixels) = (capture.measurements.patterns.len(), geometry.camera.area());
+        capture.measurements.pictures = (0..count)
+            .map(|l| {
+                (0..pixels)
+                    .map(|n| [0, 1, 2].map(|c| y[(n * count + l) * CHANNELS + c] as f32))
+                    .collect()
+            })
+            .collect();
+        capture
+    }
+
+    /// The true functions of the picture, times `factor`.
+    pub fn functions(&self, factor: f64) -> TransportFunctions {
+        let extent = self.geometry.camera;
+        let mut functions =
+            TransportFunctions::zeros(TileRect { x: 0, y: 0, extent }, self.function.len());
+        for (i, tau) in functions.tau.iter_mut().enumerate() {
+            let (n, slot) = (i / self.function.len(), i % self.function.len());
+            let brightness = 0.1 + 0.02 * (n * 37 % 29) as f64;
+            *tau = [1.0, 0.8, 0.5].map(|c| (factor * c * brightness * self.function[slot]) as f32);
+        }
+        functions
     }
 }

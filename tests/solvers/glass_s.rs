@@ -1,4 +1,4 @@
-//! The capture `glass-s`, carried in the test program: browsers have no folders.
+//! The capture `glass-s`, embedded in the test program: browsers have no folders.
 
 use std::io::Cursor;
 
@@ -30,7 +30,7 @@ const SHOTS: [(&[u8], &[u8]); 60] = shots![
     "0050" "0051" "0052" "0053" "0054" "0055" "0056" "0057" "0058" "0059"
 ];
 
-/// What was measured: every shot, linear, less the dark.
+/// The measurements: every shot, linear, less the dark frame.
 pub fn measurements() -> Measurements {
     let json = std::str::from_utf8(file!("capture.json")).unwrap();
     let manifest = Manifest::parse(json, "capture.json".as_ref()).unwrap();
@@ -99,7 +99,7 @@ pub fn true_window() -> Window {
     Window::new(13).unwrap()
 }
 
-/// The light transport functions themselves, `[pixel, element]`.
+/// The true light transport functions, `[pixel, slot]`.
 pub fn true_functions() -> Vec<[f64; CHANNELS]> {
     // NumPy's format 1.0: magic, length of the header, header, values.
     let npy = file!("truth/tau.npy");
