@@ -12,6 +12,7 @@ mod new_folder;
 mod photographs;
 mod process;
 mod recover;
+mod recovery_remedy;
 mod relight;
 mod report;
 mod simulate;

@@ -18,6 +18,7 @@ use super::encode::{self, QualityArgs};
 use super::memory::{self, Plan};
 use super::photographs::Photographs;
 use super::process::{Interrupt, Interrupted};
+use super::recovery_remedy::recovery_remedy;
 use super::{Usage, files, process, report, tile_record};
 use crate::capture::{self, CaptureFolder, DarkFrame, Measurements, Noise, Rows, Shot};
 use crate::format::{CaptureNote, FormatError, Metadata};
@@ -276,7 +277,10 @@ fn recover(
         RecoverError::MismatchedPatterns { pattern_indices } => {
             astray(folder, pattern_indices.iter().map(|&l| shots[l]))
         }
-        other => anyhow::Error::new(other).context(args.capture.display().to_string()),
+        other => match recovery_remedy(&other) {
+            Some(remedy) => anyhow!("{}: {other}; {remedy}", args.capture.display()),
+            None => anyhow::Error::new(other).context(args.capture.display().to_string()),
+        },
     };
     let band = match args.window {
         WindowChoice::Auto => Some(
