@@ -210,7 +210,7 @@ mod tests {
             &SequentialExecutor,
             recover,
         )
-        .unwrap()
+        .ok()?
     }
 
     fn cropped(functions: &TransportFunctions, rect: TileRect) -> TransportFunctions {

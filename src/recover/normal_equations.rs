@@ -68,12 +68,13 @@ impl WeightedColumns {
     /// Applies W to `Aᵀ`, `[k, L]`.
     #[inline(always)]
     pub fn new(mut columns: Vec<f64>, weights: EquationWeights) -> Self {
-        let means = columns.chunks_exact_mut(weights.len().max(1));
-        Self {
-            means: means.map(|column| weights.apply(column)).collect(),
-            columns,
-            weights,
+        for column in columns.chunks_exact_mut(weights.len().max(1)) {
+            column
+                .iter_mut()
+                .zip(&weights.patterns)
+                .for_each(|(a, w)| *a *= w);
         }
+        Self::from_weighted(columns, weights)
     }
 
     /// Applies W to `Aᵀ diag(w)`, `[k, L]`.

@@ -74,6 +74,12 @@ impl Problem {
     }
 }
 
+/// The window of a [`SyntheticCapture`].
+const WINDOW: Window = match Window::new(5) {
+    Ok(window) => window,
+    Err(_) => panic!("5 is odd"),
+};
+
 /// Noiseless measurements of pixels that all have one light transport function, times a brightness of their own.
 pub(super) struct SyntheticCapture {
     pub geometry: Geometry,
@@ -91,7 +97,7 @@ impl SyntheticCapture {
         let geometry = Geometry {
             camera: square(32),
             light: square(16),
-            window: Window::new(5).unwrap(),
+            window: WINDOW,
             correspondence: Correspondence {
                 affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
             },

@@ -12,11 +12,11 @@
 //! have cheaper steps but need thousands: with few patterns, or ε near ‖y‖, the problem is almost a linear
 //! program.
 
-use super::SparsityBasis;
 use super::iterate::Iterate;
 use super::newton::NewtonSystem;
 use super::sensing_operator::SensingOperator;
 use super::solution::{Constraint, Solution};
+use super::sparsity_basis::SparsityBasis;
 use crate::linalg::{dot, vectorise};
 
 /// Relative duality gap at which a solution is accepted; noise changes the objective by far more.

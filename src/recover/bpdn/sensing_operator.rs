@@ -4,7 +4,7 @@
 //! φᵀ, `[side², k]`, maps them to coefficients in the sparsity basis. φ is separable, `B ⊗ B` with B,
 //! `[side, side]`, along one axis, so that a product costs O(side³) instead of O(side⁴).
 
-use super::SparsityBasis;
+use super::sparsity_basis::SparsityBasis;
 use crate::linalg;
 use crate::linalg::{add_scaled, dot};
 

@@ -9,7 +9,7 @@
 use super::inference::LearnedModel;
 use crate::capture::Measurements;
 use crate::executor::Executor;
-use crate::recover::RecoverError;
+use crate::recover::error::RecoverError;
 use crate::recover::holdout::HoldoutSplit;
 use crate::recover::pixelwise::PixelwiseRecovery;
 use crate::recover::prediction;

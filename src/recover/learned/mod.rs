@@ -33,9 +33,10 @@ mod regression;
 mod tests;
 mod training;
 
+use super::common_mode::CommonMode;
+use super::error::RecoverError;
 use super::holdout::HoldoutSplit;
 use super::pixelwise::PixelwiseRecovery;
-use super::{CommonMode, RecoverError};
 use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::transport::{Basis, CHANNELS, Geometry, RecoveredTile, TileRect, Window};

@@ -17,9 +17,10 @@ use super::nonnegativity::NonNegativityPenalty;
 use super::posterior_means::{NEIGHBOURHOOD_RADIUS, PosteriorMeans};
 use crate::capture::Measurements;
 use crate::executor::Executor;
+use crate::recover::error::RecoverError;
 use crate::recover::holdout::HoldoutSplit;
+use crate::recover::pooled;
 use crate::recover::sampling::spread_squares;
-use crate::recover::{RecoverError, pooled};
 use crate::transport::{Geometry, TileRect, Window};
 
 /// Ranks to choose from; each fills vector registers together with the mean function.
