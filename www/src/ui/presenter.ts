@@ -69,8 +69,9 @@ export class Presenter {
       !isPictureShown,
       reveal.needsPress(options),
     );
-    if (options.controls && isPictureShown) this.#updateToolbar(isPaused, isTilting);
-    else this.#hideToolbar();
+    const hasToolbar = options.controls && isPictureShown;
+    if (hasToolbar && !this.#isToolbarRequested) void this.#fetchToolbar();
+    this.#toolbar?.update(hasToolbar ? this.#toolbarState(isPaused, isTilting) : null);
   }
 
   /** Shows the toolbar after an input: for good after a key press, otherwise for some seconds. */
@@ -102,8 +103,8 @@ export class Presenter {
 
   /** `null` hides the message. */
   showError(details: string | null): void {
-    const isFatal = this.#state.errorMessage !== null;
-    this.#dom.showError(details === null ? null : { isFatal, details }, this.language);
+    const summary = this.#state.errorMessage === null ? 'degraded' : 'broken';
+    this.#dom.showError(details, this.#t(summary));
   }
 
   /** Explains how to zoom, after the page scrolled instead. */
@@ -124,21 +125,6 @@ export class Presenter {
 
   announceLight(item: LightItem): void {
     this.#dom.announce(`${this.#t('light')}: ${this.#t(item)}`);
-  }
-
-  #hideToolbar(): void {
-    if (!this.#toolbar) return;
-    this.#toolbar.bar.hidden = true;
-    this.#toolbar.closeMenu();
-  }
-
-  #updateToolbar(isPaused: boolean, isTilting: boolean | null): void {
-    if (!this.#toolbar) {
-      if (!this.#isToolbarRequested) void this.#fetchToolbar();
-      return;
-    }
-    this.#toolbar.bar.hidden = false;
-    this.#toolbar.update(this.#toolbarState(isPaused, isTilting));
   }
 
   /** The toolbar is a separate script, fetched when the `controls` attribute is used for the first time. */

@@ -11,12 +11,6 @@ import { createElement, createSlot, updateAttribute, updateText } from './dom-he
 import { createIcon, LIGHT_ICON } from './icons.js';
 import ELEMENT_CSS from './style.css';
 
-export interface ErrorMessage {
-  /** Whether there is no picture because of the error. */
-  readonly isFatal: boolean;
-  readonly details: string;
-}
-
 export interface LayoutState {
   /** The torch handle is present. */
   readonly hasHandle: boolean;
@@ -169,7 +163,7 @@ export class ShadowDom {
     this.#canvas = null;
     this.#picture.replaceChildren();
     this.updateProgress(null);
-    this.showError(null, 'en');
+    this.showError(null);
   }
 
   /** Shows a part of the picture. The handle is at the torch's position, or at the nearest edge of the view. */
@@ -218,12 +212,11 @@ export class ShadowDom {
   }
 
   /** Shows a message over the picture; `null` hides it. */
-  showError(error: ErrorMessage | null, language: Language): void {
-    if (error) {
-      updateText(this.#errorSummary, t(error.isFatal ? 'broken' : 'degraded', language));
-      updateText(this.#errorDetails, error.details);
-    }
-    this.#message.hidden = error === null;
+  showError(details: string | null, summary = ''): void {
+    this.#message.hidden = details === null;
+    if (details === null) return;
+    updateText(this.#errorSummary, summary);
+    updateText(this.#errorDetails, details);
   }
 
   /** Shows a hint over the picture for a moment. */

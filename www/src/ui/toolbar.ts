@@ -100,7 +100,13 @@ export class Toolbar {
     });
   }
 
-  update(state: ToolbarState): void {
+  /** `null` hides the toolbar. */
+  update(state: ToolbarState | null): void {
+    this.bar.hidden = state === null;
+    if (!state) {
+      this.closeMenu();
+      return;
+    }
     const { t, item, isPlaying, zoom, isTilting, isFullscreen } = state;
     const { light, zoomOut, zoomIn, tilt } = this.#buttons;
     const show = (name: ButtonName, isVisible: boolean, icon: IconName = name) => {
