@@ -9,16 +9,14 @@ import { wander } from './wander.js';
 /** A glide ends below this speed, in pictures per second. */
 const MIN_GLIDE_SPEED = 0.02;
 
+type AnimatedLight = Pick<LightState, 'advanceFire' | 'torch' | 'isTorch'>;
+
 export class LightAnimator {
-  readonly #light: Pick<LightState, 'advanceFire' | 'torch' | 'isTorch'>;
+  readonly #light: AnimatedLight;
   readonly #loop: AnimationLoop;
   readonly #changed: () => void;
 
-  constructor(
-    light: Pick<LightState, 'advanceFire' | 'torch' | 'isTorch'>,
-    loop: AnimationLoop,
-    changed: () => void,
-  ) {
+  constructor(light: AnimatedLight, loop: AnimationLoop, changed: () => void) {
     this.#light = light;
     this.#loop = loop;
     this.#changed = changed;

@@ -22,37 +22,19 @@ export type LightPicture = BrowserPicture | LinearLight;
  */
 export type LightSource = LightPicture | MediaStream;
 
-interface BrowserClasses {
-  HTMLImageElement: HTMLImageElement;
-  HTMLCanvasElement: HTMLCanvasElement;
-  OffscreenCanvas: OffscreenCanvas;
-  ImageBitmap: ImageBitmap;
-  ImageData: ImageData;
-  HTMLVideoElement: HTMLVideoElement;
-  MediaStream: MediaStream;
-}
-
-type ClassName = keyof BrowserClasses;
-
-const LIVE_CLASSES: readonly ClassName[] = [
+const LIVE_CLASSES = [
   'HTMLCanvasElement',
   'OffscreenCanvas',
   'ImageBitmap',
   'HTMLVideoElement',
-];
-
-const CLASSES: readonly ClassName[] = [
-  ...LIVE_CLASSES,
-  'HTMLImageElement',
-  'ImageData',
-  'MediaStream',
-];
+] as const;
+const CLASSES = [...LIVE_CLASSES, 'HTMLImageElement', 'ImageData', 'MediaStream'] as const;
 
 /** Whether `value` is an instance of a browser class. Some browsers lack some of the classes. */
-export function isInstance<K extends ClassName>(
+export function isInstance<K extends (typeof CLASSES)[number]>(
   name: K,
   value: unknown,
-): value is BrowserClasses[K] {
+): value is InstanceType<(typeof globalThis)[K]> {
   const type = (globalThis as Record<string, unknown>)[name];
   return typeof type === 'function' && value instanceof type;
 }
