@@ -394,12 +394,12 @@ test('an error ends the transfer', async (t) => {
 });
 
 test('an abort ends the pause before a retry', async (t) => {
-  const server = await serve(t, (_, response) =>
-    response.writeHead(503, { 'retry-after': '20' }).end(),
-  );
   const controller = new AbortController();
+  const server = await serve(t, (_, response) => {
+    response.writeHead(503, { 'retry-after': '20' }).end();
+    setTimeout(() => controller.abort(new Error('no longer needed')), 50);
+  });
   const source = new HttpSource(server.url, { fetch });
-  setTimeout(() => controller.abort(new Error('no longer needed')), 50);
   await assert.rejects(drain(source, range(0, 10), controller.signal), /no longer needed/);
   assert.equal(server.ranges.length, 1);
 });

@@ -200,7 +200,7 @@ export class HttpSource {
   ): Promise<T> {
     const ms = this.#ports.stallMs;
     const onTimeout = () => Promise.reject(errors.stalled(this.url, ms));
-    return withTimeout(promise, { signal, timeout: { ms, onTimeout } }).catch((cause: unknown) => {
+    return withTimeout(promise, { signal, ms, onTimeout }).catch((cause: unknown) => {
       signal.throwIfAborted();
       throw cause instanceof PhotoError ? cause : toError(cause);
     });

@@ -5,15 +5,8 @@ import { messageOf, PhotoError } from '../shared/errors.js';
 
 /** An error after which the same request may succeed. */
 export class RetryableError extends PhotoError {
-  constructor(
-    code: string,
-    message: string,
-    cause?: unknown,
-    /** The response's Retry-After header. */
-    readonly retryAfter: string | null = null,
-  ) {
-    super(code, message, cause);
-  }
+  /** The response's Retry-After header. */
+  retryAfter: string | null = null;
 
   /** The error to report after `attempts` failed. */
   afterAttempts(attempts: number): PhotoError {
@@ -26,35 +19,31 @@ const RETRYABLE_STATUS = [408, 425, 429, 500, 502, 503, 504];
 
 export function badStatus(url: string, response: Response): PhotoError {
   const status = `${response.status} ${response.statusText}`.trim();
-  const message = `${fileName(url)} could not be loaded: the server answered ${status}.`;
-  return RETRYABLE_STATUS.includes(response.status)
-    ? new RetryableError('http-status', message, undefined, response.headers.get('retry-after'))
-    : new PhotoError('http-status', message);
+  const text = `could not be loaded: the server answered ${status}.`;
+  if (!RETRYABLE_STATUS.includes(response.status)) return fileError('http-status', url, text);
+  const error = retryable('http-status', url, text);
+  error.retryAfter = response.headers.get('retry-after');
+  return error;
 }
 
 export function unreachable(url: string, cause: unknown): RetryableError {
-  return new RetryableError(
-    'http-network',
-    `${fileName(url)} could not be fetched: the server cannot be reached, or its CORS headers do not ` +
-      'allow this page to read the file.',
-    cause,
-  );
+  const reason =
+    'the server cannot be reached, or its CORS headers do not allow this page to read the file';
+  return retryable('http-network', url, `could not be fetched: ${reason}.`, cause);
 }
 
 export function forbiddenByPolicy(url: string, directive: string, cause: unknown): PhotoError {
   const origin = URL.canParse(url) ? new URL(url).origin : "the file's origin";
-  return new PhotoError(
-    'csp-connect',
-    `${fileName(url)} could not be fetched: add ${origin} to ${directive} of the page's content ` +
-      'security policy.',
-    cause,
-  );
+  const remedy = `add ${origin} to ${directive} of the page's content security policy`;
+  return fileError('csp-connect', url, `could not be fetched: ${remedy}.`, cause);
 }
 
 export function stalled(url: string, ms: number): RetryableError {
-  return new RetryableError(
+  const seconds = Math.round(ms / 1000);
+  return retryable(
     'http-stalled',
-    `${fileName(url)} could not be loaded: no data arrived for ${Math.round(ms / 1000)} seconds.`,
+    url,
+    `could not be loaded: no data arrived for ${seconds} seconds.`,
   );
 }
 
@@ -67,71 +56,64 @@ export function endedEarly(
 ): RetryableError {
   const before = end === undefined ? '' : `, before byte ${end}`;
   const why = cause === undefined ? '' : ` (${messageOf(cause)})`;
-  return new RetryableError(
-    'http-short',
-    `${fileName(url)} is incomplete: the transfer ended at byte ${at}${before}${why}.`,
-    cause,
-  );
+  const text = `is incomplete: the transfer ended at byte ${at}${before}${why}.`;
+  return retryable('http-short', url, text, cause);
 }
 
 export function webPage(url: string, type: string): PhotoError {
-  return new PhotoError(
-    'http-type',
-    `${fileName(url)} could not be loaded: the server sent a web page (${type}) instead.`,
-  );
+  const text = `could not be loaded: the server sent a web page (${type}) instead.`;
+  return fileError('http-type', url, text);
 }
 
 export function compressed(url: string, encoding: string): PhotoError {
-  return new PhotoError(
-    'http-encoding',
-    `${fileName(url)} cannot be read in parts, because the server compresses it (${encoding}). ` +
-      'Configure the server to send .ltm files without compression.',
-  );
+  const text = `cannot be read in parts, because the server compresses it (${encoding}).`;
+  const remedy = 'Configure the server to send .ltm files without compression.';
+  return fileError('http-encoding', url, `${text} ${remedy}`);
 }
 
 export function changed(url: string): PhotoError {
-  return new PhotoError(
+  return fileError(
     'http-changed',
-    `${fileName(url)} was replaced on the server during the transfer: load it again.`,
+    url,
+    'was replaced on the server during the transfer: load it again.',
   );
 }
 
 /** The server sent other bytes than `range`. */
 export function wrongRange(url: string, range: ByteRange, sent: string): PhotoError {
-  return new PhotoError(
-    'http-range',
-    `${fileName(url)} cannot be read in parts: bytes ${rangeText(range)} were requested, but the server ` +
-      `sent others (${sent}).`,
-  );
+  const reason = `bytes ${rangeText(range)} were requested, but the server sent others (${sent})`;
+  return fileError('http-range', url, `cannot be read in parts: ${reason}.`);
 }
 
 /** The same code as the decoder's error for a truncated file. */
 export function tooShort(url: string, range: ByteRange, size: number): PhotoError {
-  return new PhotoError(
-    'format-truncated',
-    `${fileName(url)} is too short: bytes ${rangeText(range)} are needed, but the server has only ${size}.`,
-  );
+  const reason = `bytes ${rangeText(range)} are needed, but the server has only ${size}`;
+  return fileError('format-truncated', url, `is too short: ${reason}.`);
 }
 
 /** The same code as the decoder's error for data after the end of the photograph. */
 export function tooLong(url: string, end: number, size: number): PhotoError {
-  return new PhotoError(
-    'format-invalid',
-    `${fileName(url)} is too long: the photograph ends at byte ${end}, but the server has ${size}.`,
-  );
+  const reason = `the photograph ends at byte ${end}, but the server has ${size}`;
+  return fileError('format-invalid', url, `is too long: ${reason}.`);
 }
 
 export function rangeRefused(url: string, range: ByteRange): PhotoError {
-  return new PhotoError(
-    'http-range',
-    `${fileName(url)} could not be loaded: the server says that it has no bytes ${rangeText(range)}.`,
-  );
+  const reason = `the server says that it has no bytes ${rangeText(range)}`;
+  return fileError('http-range', url, `could not be loaded: ${reason}.`);
 }
 
 /** The last part of a URL's path. */
 export function fileName(url: string): string {
   const path = url.split(/[?#]/, 1)[0] ?? url;
   return path.split('/').filter(Boolean).pop() ?? url;
+}
+
+function fileError(code: string, url: string, text: string, cause?: unknown): PhotoError {
+  return new PhotoError(code, `${fileName(url)} ${text}`, cause);
+}
+
+function retryable(code: string, url: string, text: string, cause?: unknown): RetryableError {
+  return new RetryableError(code, `${fileName(url)} ${text}`, cause);
 }
 
 function rangeText({ start, end }: ByteRange): string {

@@ -35,5 +35,5 @@ function retryAfterMs(header: string | null, now: number): number {
 
 /** Rejects with the signal's reason if it is aborted. */
 export function sleep(ms: number, signal: AbortSignal): Promise<void> {
-  return withTimeout(new Promise(() => {}), { signal, timeout: { ms, onTimeout: () => {} } });
+  return withTimeout(new Promise(() => {}), { signal, ms, onTimeout: () => {} });
 }

@@ -26,7 +26,7 @@ export interface PhotoDecoder {
   preview(): Promise<Photograph | null>;
   /** The photograph. Ends the decoder, also if it rejects. */
   finish(): Promise<Photograph>;
-  /** Ends the decoder without waiting for what it is doing. Does nothing if it has ended. */
+  /** Ends the decoder at once, even in the middle of a task. Does nothing if it has ended. */
   free(): void;
 }
 

@@ -66,7 +66,7 @@ export class WorkerDecoder implements PhotoDecoder {
     try {
       const photograph = await this.#requestPhoto('finish', 1);
       if (photograph) return photograph;
-      throw new PhotoError('internal', 'The decoding worker sent no photograph.');
+      throw incomplete();
     } finally {
       this.free();
     }
@@ -86,10 +86,7 @@ export class WorkerDecoder implements PhotoDecoder {
     if (descriptor.tiles === tiles.length) {
       return Photograph.fromTiles(descriptor, tiles, completeness);
     }
-    throw new PhotoError(
-      'internal',
-      'The decoding worker sent a photograph without all its tiles.',
-    );
+    throw incomplete();
   }
 
   async #request(task: DecodeTask): Promise<DecodeResult> {
@@ -97,4 +94,8 @@ export class WorkerDecoder implements PhotoDecoder {
     if ('error' in result) throw new PhotoError(result.error.code, result.error.message);
     return result;
   }
+}
+
+function incomplete(): PhotoError {
+  return new PhotoError('internal', 'The decoding worker sent no complete photograph.');
 }

@@ -167,7 +167,7 @@ test('repeated losses of tiles fail after five fetches without a frame', async (
   while (fetched < 100 && (await lose()));
   assert.equal(fetched, 4 + 5);
   assert.equal(f.session.backend, null);
-  // Whoever asks for it gets it.
+  // A reload on request starts the count again.
   f.session.set(cpu, true);
   await f.finishLoad('a.ltm');
   await f.createRenderer(f.requests.length - 1);

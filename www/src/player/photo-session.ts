@@ -88,7 +88,7 @@ export class PhotoSession<R extends Renderer> {
     return this.#selector.active?.hasDrawn ? this.#quality : null;
   }
 
-  /** Applies new settings; what has changed is a new object. `reload` fetches the photograph again even if its address is the same. */
+  /** Applies new settings; a changed setting is a new object. `reload` fetches the file even if its address is the same. */
   set(settings: SessionSettings, reload = false): void {
     const previous = this.#settings;
     this.#settings = settings;

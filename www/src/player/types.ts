@@ -1,4 +1,4 @@
-/** What a photo session needs from its surroundings, and what it reports to the element. */
+/** The interfaces of a photo session: its settings, its ports to the browser, and its listener. */
 
 import type { OutputSettings } from '../engine/output-settings.js';
 import type { Backend } from '../engine/types.js';

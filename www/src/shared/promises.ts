@@ -17,18 +17,19 @@ export class Deferred {
   });
 }
 
-/** How long to wait for a promise. */
+/** When a wait for a promise ends early. */
 export interface WaitLimits<T> {
-  /** The wait rejects with this signal's reason once it is aborted. */
+  /** Once it is aborted, the wait rejects with its reason. */
   readonly signal?: AbortSignal;
-  /** After `ms` milliseconds, the result of `onTimeout` takes the promise's place. */
-  readonly timeout?: { readonly ms: number; readonly onTimeout: () => T | Promise<T> };
+  /** After this time, the result of `onTimeout` takes the promise's place. */
+  readonly ms?: number;
+  readonly onTimeout?: () => T | Promise<T>;
 }
 
 /** Waits for a promise until a signal is aborted or a time has passed. */
 export function withTimeout<T>(
   promise: Promise<T>,
-  { signal, timeout }: WaitLimits<T>,
+  { signal, ms, onTimeout }: WaitLimits<T>,
 ): Promise<T> {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let onAbort = () => {};
@@ -36,7 +37,7 @@ export function withTimeout<T>(
     onAbort = () => reject(signal?.reason);
     if (signal?.aborted) onAbort();
     signal?.addEventListener('abort', onAbort);
-    if (timeout) timer = setTimeout(() => resolve(timeout.onTimeout()), timeout.ms);
+    if (onTimeout) timer = setTimeout(() => resolve(onTimeout()), ms);
     promise.then(resolve, reject);
   }).finally(() => {
     clearTimeout(timer);

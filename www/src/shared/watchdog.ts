@@ -15,29 +15,26 @@ export interface WatchdogLimits {
 
 /** Calls back if it is not reset for a number of checks. */
 export class Watchdog {
+  readonly #intervalMs: number;
+  readonly #onTimeout: () => void;
   #timer: ReturnType<typeof setInterval> | undefined;
-  #checksLeft = 0;
 
-  constructor(
-    readonly intervalMs: number,
-    readonly onTimeout: () => void,
-  ) {}
-
-  get isRunning(): boolean {
-    return this.#timer !== undefined;
+  constructor(intervalMs: number, onTimeout: () => void) {
+    this.#intervalMs = intervalMs;
+    this.#onTimeout = onTimeout;
   }
 
   /** Starts the count, or starts it again. */
   reset(maxChecks: number): void {
-    this.#checksLeft = maxChecks;
-    this.#timer ??= setInterval(() => {
-      this.#checksLeft -= 1;
-      if (this.#checksLeft < 0) this.onTimeout();
-    }, this.intervalMs);
+    this.stop();
+    let checks = 0;
+    this.#timer = setInterval(() => {
+      checks += 1;
+      if (checks > maxChecks) this.#onTimeout();
+    }, this.#intervalMs);
   }
 
   stop(): void {
     clearInterval(this.#timer);
-    this.#timer = undefined;
   }
 }

@@ -97,7 +97,7 @@ export class WorkerClient<Task, Ready, Result> {
       this.#worker.postMessage({ id, task }, transfer);
       this.#lastId = id;
       this.#pending.set(id, { group, resolve, reject });
-      if (!this.#watchdog.isRunning) this.#watchdog.reset(this.#options.limits.maxChecks);
+      if (this.#pending.size === 1) this.#watchdog.reset(this.#options.limits.maxChecks);
     });
   }
 

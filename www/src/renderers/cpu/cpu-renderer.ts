@@ -1,6 +1,6 @@
 /**
- * Creates renderers for the CPU: in the page's worker pool, or on the page's thread if there are no workers. It is a
- * script of its own with copies of what it shares with the element's script.
+ * Creates renderers for the CPU: in the page's worker pool, or on the page's thread if there are no workers. It is a separate script, which
+ * has its own copies of shared code.
  */
 
 import type { CpuModule, Gamut } from '../../engine/types.js';

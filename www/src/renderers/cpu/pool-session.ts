@@ -6,7 +6,6 @@ import { type PhotoError, photoReleased } from '../../shared/errors.js';
 import { allSettledOrThrow } from '../../shared/promises.js';
 import type { WorkerClient } from '../../shared/worker-client.js';
 import type { FrameSettings, RelightTask, RowRange, RowTask } from './protocol.js';
-import type { TileRowRange } from './row-ranges.js';
 
 type RelightClient = WorkerClient<RelightTask, string, ArrayBuffer>;
 
@@ -158,4 +157,31 @@ export class PoolSession implements TileSession {
     const part = this.#parts.find(({ range }) => tile < range.endTile) as WorkerPart;
     return part.client;
   }
+}
+
+/** Whole rows of tiles. */
+export interface TileRowRange extends RowRange {
+  readonly firstTile: number;
+  readonly endTile: number;
+}
+
+/** At most `maxRanges` row ranges, which have about the same height. */
+export function splitRows(
+  { width, height, tileSide }: PhotoDescriptor,
+  maxRanges: number,
+): TileRowRange[] {
+  const columns = Math.ceil(width / tileSide);
+  const tileRows = Math.ceil(height / tileSide);
+  const count = Math.min(maxRanges, tileRows);
+  return Array.from({ length: count }, (_, i) => {
+    const first = Math.round((i * tileRows) / count);
+    const end = Math.round(((i + 1) * tileRows) / count);
+    const firstRow = first * tileSide;
+    return {
+      firstRow,
+      rows: Math.min(end * tileSide, height) - firstRow,
+      firstTile: first * columns,
+      endTile: end * columns,
+    };
+  });
 }

@@ -7,9 +7,8 @@ import type { PhotoDescriptor, TileWorkers } from '../../photo/types.js';
 import { PhotoError } from '../../shared/errors.js';
 import type { WatchdogLimits } from '../../shared/watchdog.js';
 import { WorkerClient } from '../../shared/worker-client.js';
-import { PoolSession } from './pool-session.js';
+import { PoolSession, splitRows } from './pool-session.js';
 import type { RelightTask, RelightWorker } from './protocol.js';
-import { splitRows } from './row-ranges.js';
 
 /** Failures of workers without a frame in between, after which the page draws by itself. */
 const MAX_INCIDENTS = 3;

@@ -136,7 +136,7 @@ export class Devices {
       );
       return Promise.reject(this.#silence);
     };
-    return withTimeout(answer, { timeout: { ms, onTimeout } });
+    return withTimeout(answer, { ms, onTimeout });
   }
 
   async #openWebGl2(load: LoadGraphics, lose: (reason: string) => void): Promise<Graphics> {
