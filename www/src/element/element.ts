@@ -73,44 +73,48 @@ export class RelightablePhoto extends Base {
   }
 
   readonly #controller: PhotoController;
+  readonly #state: PhotoController['state'];
+  readonly #session: PhotoController['session'];
 
   constructor() {
     super();
     this.#controller = new PhotoController(this);
+    this.#state = this.#controller.state;
+    this.#session = this.#controller.session;
   }
 
   /** The colour space of the canvas; `null` without a picture. */
   get activeGamut(): Gamut | null {
-    return this.#controller.session.renderer?.gamut ?? null;
+    return this.#session.renderer?.gamut ?? null;
   }
 
   /** The current built-in light, or the one that a source replaces. A visitor may have selected it. */
   get activeLight(): LightName {
-    return this.#controller.state.light.name;
+    return this.#state.light.name;
   }
 
   /** The torch's position on the picture; `null` behind the centre of the light plane. */
   get torch(): PicturePoint | null {
-    return this.#controller.state.light.torch;
+    return this.#state.light.torch;
   }
   set torch(point: PicturePoint | null) {
     if (point && !(Number.isFinite(point.x) && Number.isFinite(point.y))) {
       throw new TypeError('torch must be null or have finite numbers x and y, from 0 to 1');
     }
-    this.#controller.state.light.torch = point;
+    this.#state.light.torch = point;
     this.#controller.schedule();
   }
 
   /** The visible part of the picture: its centre, and a magnification of at most `zoom`. */
   get view(): PhotoView {
-    return this.#controller.state.view;
+    return this.#state.view;
   }
   set view(view: PhotoView) {
     if (![view?.zoom, view?.x, view?.y].every(Number.isFinite)) {
       throw new TypeError('view must have finite numbers zoom, from 1, and x and y, from 0 to 1');
     }
     this.#controller.readOptions();
-    this.#controller.state.view = view;
+    this.#state.view = view;
     this.#controller.schedule();
   }
 
@@ -128,19 +132,17 @@ export class RelightablePhoto extends Base {
    * viewport. A WebGL canvas needs `preserveDrawingBuffer`, because the element reads it after its frame has ended.
    */
   get lightSource(): LightSource | null {
-    return this.#controller.state.light.source;
+    return this.#state.light.source;
   }
   set lightSource(value: LightSource | null) {
     const source = value === null ? null : checkLightSource(value);
-    if (source !== null && source === this.#controller.state.light.activeSource)
-      this.lightChanged();
+    if (source !== null && source === this.#state.light.activeSource) this.lightChanged();
     else this.#controller.setLightSource(source);
   }
 
   /** Reads the `lightSource` again in the next frame. Canvases, `ImageData` and numbers do not report changes. */
   lightChanged(): void {
-    const { state, session } = this.#controller;
-    if (state.light.activeSource) session.redraw();
+    if (this.#state.light.activeSource) this.#session.redraw();
   }
 
   /**
@@ -148,12 +150,11 @@ export class RelightablePhoto extends Base {
    * and colour; or a source, as with `lightSource`; `null` is the light of the attributes, without a source.
    */
   setLight(light: LightName | LightPose | LightSource | null): void {
-    const { state } = this.#controller;
     if (light === null || isLightSource(light)) {
-      state.light.reset();
+      this.#state.light.reset();
       this.lightSource = light;
     } else {
-      state.setLight(typeof light === 'string' ? { name: light } : light);
+      this.#state.setLight(typeof light === 'string' ? { name: light } : light);
     }
     this.#controller.schedule();
   }
@@ -166,7 +167,7 @@ export class RelightablePhoto extends Base {
   /** Light and view as a short text that is safe in an address. It does not contain what a source shows. */
   getState(): string {
     this.#controller.readOptions();
-    return this.#controller.state.sharedState;
+    return this.#state.sharedState;
   }
 
   /** Restores a text of `getState`, of this or another element. Missing values follow the attributes. */
@@ -174,7 +175,7 @@ export class RelightablePhoto extends Base {
     const controller = this.#controller;
     controller.reset();
     controller.readOptions();
-    for (const error of controller.state.restore(text)) controller.reportError(error);
+    for (const error of this.#state.restore(text)) controller.reportError(error);
   }
 
   /** Removes the poster as soon as there is a picture. */
@@ -192,7 +193,7 @@ export class RelightablePhoto extends Base {
 
   /** The backend in use; `null` if there is none. */
   get activeBackend(): Backend | null {
-    return this.#controller.session.backend;
+    return this.#session.backend;
   }
 
   /**
@@ -200,17 +201,17 @@ export class RelightablePhoto extends Base {
    * the picture changes faster than it can be drawn in full. `null` without a picture.
    */
   get detail(): number | null {
-    return this.#controller.session.quality;
+    return this.#session.quality;
   }
 
   /** The SIMD level or the graphics adapter of the backend. */
   get kernel(): string | null {
-    return this.#controller.session.renderer?.kernel ?? null;
+    return this.#session.renderer?.kernel ?? null;
   }
 
   /** Facts about the photograph; `null` until it is decoded. */
   get info(): PhotoInfo | null {
-    return this.#controller.session.photo?.info ?? null;
+    return this.#session.photo?.info ?? null;
   }
 
   /**
