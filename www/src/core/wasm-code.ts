@@ -1,7 +1,7 @@
 /** Where the core gets its modules: from the caller, from files in Node, or from the network. */
 
 import { type FetchWasm, fetchWasm } from '../engine/wasm-loader.js';
-import type { ModuleName } from '../shared/names.js';
+import type { WasmModuleName } from '../shared/names.js';
 
 /** A module's bytes, or their address. */
 export type WasmCode = ArrayBuffer | ArrayBufferView<ArrayBuffer> | URL | string;
@@ -13,10 +13,10 @@ interface NodeProcess {
   ): { readFile(file: URL): Promise<Uint8Array> } | undefined;
 }
 
-const provided = new Map<ModuleName, WasmCode>();
+const provided = new Map<WasmModuleName, WasmCode>();
 
 /** Sets the code of a module that has not started yet. */
-export function provideCode(name: ModuleName, code: WasmCode): void {
+export function provideCode(name: WasmModuleName, code: WasmCode): void {
   provided.set(name, code);
 }
 

@@ -3,7 +3,7 @@
  * descriptor and tiles. `tests/browser/engine-contract.ts` compares these types with those of wasm-bindgen.
  */
 
-import type { Gamut, ModuleName, ToneCurve } from '../shared/names.js';
+import type { Gamut, ToneCurve, WasmModuleName } from '../shared/names.js';
 
 export type { Backend, Gamut, ToneCurve } from '../shared/names.js';
 
@@ -150,7 +150,7 @@ export interface WebGl2Module extends RelightModule {
 }
 
 /** All modules by name. */
-export interface Modules extends Record<ModuleName, unknown> {
+export interface Modules extends Record<WasmModuleName, unknown> {
   decoder: DecoderModule;
   cpu: CpuModule;
   webgl2: WebGl2Module;

@@ -2,13 +2,13 @@
 
 import { withPolicyErrors } from '../shared/content-security-policy.js';
 import { messageOf, PhotoError } from '../shared/errors.js';
-import type { ModuleName } from '../shared/names.js';
+import type { WasmModuleName } from '../shared/names.js';
 
 /** The bytes of a module, or the response that brings them. */
 type WasmSource = ArrayBuffer | ArrayBufferView<ArrayBuffer> | Response;
 
 /** Gets the module with the given name, whose file is at `url`. */
-export type FetchWasm = (name: ModuleName, url: URL | string) => Promise<WasmSource>;
+export type FetchWasm = (name: WasmModuleName, url: URL | string) => Promise<WasmSource>;
 
 export const fetchWasm: FetchWasm = (_, url) => fetch(url);
 
@@ -49,7 +49,7 @@ export function moduleFolder(): string | null {
  * `task` is what the module does, for error messages: "decodes photographs".
  */
 export function createLoader<M>(
-  name: ModuleName,
+  name: WasmModuleName,
   task: string,
   builds: WasmBuilds,
 ): (fetchModule?: FetchWasm) => Promise<M> {
@@ -81,7 +81,7 @@ function wasmForbidden(_: string, cause: unknown): PhotoError {
 
 /** Starts the build that this machine can run. */
 async function startModule<M>(
-  name: ModuleName,
+  name: WasmModuleName,
   { glue, simd, scalar }: WasmBuilds,
   fetchModule: FetchWasm,
 ): Promise<M> {

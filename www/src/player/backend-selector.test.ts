@@ -33,7 +33,7 @@ test('other options change the backend; the photograph is not loaded again', asy
   f.session.set({ ...SETTINGS, renderOptions: withBackends(['cpu']) });
   await f.createRenderer(1);
   assert.deepEqual(f.takeLog(), ['backend webgpu -> cpu', 'cpu draws flood', 'free webgpu']);
-  // One that begins with the back end in use leaves it alone.
+  // Options that begin with the active backend keep it.
   f.session.set({ ...SETTINGS, renderOptions: withBackends(['cpu', 'webgpu']) });
   await settle();
   assert.deepEqual(f.takeLog(), ['cpu draws flood']);
@@ -177,7 +177,7 @@ test('a backend lost at any moment after its setup is replaced and freed once', 
     for (let tick = 0; tick < ticks; tick += 1) await Promise.resolve();
     f.lose(0, 'the device is gone.');
     await settle();
-    // Where it had drawn, it is tried again.
+    // A backend that has drawn a frame is tried again.
     if (f.requests[1]?.backend === 'webgpu') await f.failRenderer(1, 'it is gone');
     await f.createRenderer(f.requests.length - 1);
     const log = f.takeLog();

@@ -1,7 +1,7 @@
 /** The order in which backends are tried. */
 
 import type { Backend } from '../engine/types.js';
-import { endSentence, messageOf, PhotoError, toPhotoError } from '../shared/errors.js';
+import { endSentence, hasCode, messageOf, PhotoError } from '../shared/errors.js';
 
 /** The backends' names in messages. */
 export const BACKEND_TITLES: Readonly<Record<Backend, string>> = {
@@ -36,7 +36,7 @@ export async function firstWorking<T>(
       return { backend, value, reason: failures.join(' ') };
     } catch (thrown) {
       checkCancelled();
-      if (toPhotoError(thrown).code === 'csp-wasm') throw thrown;
+      if (hasCode(thrown, 'csp-wasm')) throw thrown;
       cause = thrown;
       failures.push(`${BACKEND_TITLES[backend]}: ${endSentence(messageOf(thrown))}`);
     }

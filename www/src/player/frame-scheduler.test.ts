@@ -48,7 +48,7 @@ test('if settings change faster than frames are drawn, the newest is drawn next'
     await f.frame();
   }
   assert.deepEqual(f.takeLog(), ['webgpu draws torch']);
-  // At once, without another frame of the browser's.
+  // At once, without waiting for the browser's next frame.
   frames[0]?.done();
   await settle();
   assert.deepEqual(f.takeLog(), ['webgpu draws stripes']);
@@ -295,7 +295,7 @@ test('renderNow draws in full quality during an animation', async () => {
   const light = { name: 'torch', torch: null, image: null } as const;
   f.session.set({ ...SETTINGS, light });
   await f.frame();
-  // Whether or not a frame of the motion is to come next.
+  // A requested frame of the animation makes no difference.
   f.session.redraw();
   await f.frame();
   const asked = f.session.renderNow();

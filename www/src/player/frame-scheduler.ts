@@ -14,7 +14,7 @@ export class FrameScheduler {
   readonly #draw: (isFullQuality: boolean) => void;
   #isVisible = true;
   /** Whether a first picture is on the screen. Until then, visibility does not matter. */
-  #hasPicture = false;
+  hasPicture = false;
   /** The last frame is out of date. */
   #isStale = false;
   /** The last frame has reduced quality. */
@@ -59,7 +59,7 @@ export class FrameScheduler {
   }
 
   frameDrawn(isReduced: boolean): void {
-    this.#hasPicture = true;
+    this.hasPicture = true;
     this.#isReduced = isReduced;
     if (isReduced && !this.#isStale && !this.#isHidden) this.#awaitRest();
   }
@@ -69,15 +69,11 @@ export class FrameScheduler {
     this.#cancelRest();
     this.#isStale = false;
     this.#isReduced = false;
-    this.#hasPicture &&= keepsPicture;
-  }
-
-  get hasPicture(): boolean {
-    return this.#hasPicture;
+    this.hasPicture &&= keepsPicture;
   }
 
   get #isHidden(): boolean {
-    return this.#hasPicture && !this.#isVisible;
+    return this.hasPicture && !this.#isVisible;
   }
 
   #awaitRest(): void {

@@ -22,7 +22,7 @@ test('another address aborts the load, and only the new photograph is drawn', as
   const f = fakeSession();
   f.session.set(SETTINGS);
   f.session.set({ ...SETTINGS, src: 'b.ltm' });
-  // The old load may still succeed, late.
+  // The old load succeeds too late.
   await f.finishLoad('a.ltm');
   await f.finishLoad('b.ltm');
   await f.createRenderer(0);
@@ -112,9 +112,9 @@ test('a photograph that lost tiles is fetched again, and its picture stays until
   const asked = assert.rejects(f.session.renderNow(), { name: 'PhotoError' });
   frames[0]?.fail(new PhotoError('photo-lost', 'a worker stopped.'));
   await asked;
-  // Not 'loading', which would take the picture away.
+  // There is no 'loading', which would remove the picture.
   assert.deepEqual(f.takeLog(), ['cpu draws flood', 'free cpu', 'free a.ltm']);
-  // Nor a coarser one.
+  // Previews are not drawn either.
   await f.sendPreview('a.ltm', 0.5);
   assert.equal(f.requests.length, 1);
   await f.finishLoad('a.ltm');
@@ -292,7 +292,7 @@ test('a request that waits for a preview’s frame is drawn with the photograph'
   f.session.set({ ...cpu, output: withExposure(2) });
   await f.frame();
   assert.equal(frames.length, 1);
-  // Asked for while that is drawn.
+  // Requested during that frame.
   const waiting = f.session.renderNow();
   await f.finishLoad('a.ltm');
   frames.shift()?.fail(new PhotoError('internal', 'it was let go'));

@@ -194,12 +194,12 @@ export class PhotoSession<R extends Renderer> {
     this.#photo = shared;
     // The canvas of the CPU keeps its picture by itself, and memory may suffice for one photograph only.
     if (backend === 'cpu') this.#selector.active?.free();
-    if (!this.#settings) return;
-    const { renderOptions } = this.#settings;
-    if (!backend) return this.#selector.select(shared, renderOptions, previous, reason);
+    const options = this.#settings?.renderOptions;
+    if (!options) return;
+    if (!backend) return this.#selector.select(shared, options, previous, reason);
     // Backends that could not draw the preview are not tried again.
-    const backends = backendsFrom(renderOptions.backends, backend);
-    return this.#selector.select(shared, { ...renderOptions, backends }, backend, '');
+    const backends = backendsFrom(options.backends, backend);
+    return this.#selector.select(shared, { ...options, backends }, backend, '');
   }
 
   /** Draws a frame that nobody waits for. */

@@ -22,7 +22,7 @@ export type CrossOrigin = 'anonymous' | 'use-credentials' | null;
 export type ToneCurve = 'clip' | 'filmic';
 
 /** The WebAssembly modules: the decoder and one for each backend. */
-export type ModuleName = 'decoder' | Backend;
+export type WasmModuleName = 'decoder' | Backend;
 
 /** The modules that the core uses. */
-export const CORE_MODULES = ['decoder', 'cpu'] as const satisfies readonly ModuleName[];
+export const CORE_MODULES = ['decoder', 'cpu'] as const satisfies readonly WasmModuleName[];
