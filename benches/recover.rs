@@ -26,7 +26,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use rayon::prelude::*;
-use relightable_photo::capture::{Measurements, Noise, Pattern, Picture, Rows};
+use relightable_photo::capture::{LinearPhoto, Measurements, NoiseModel, Pattern, RowSet};
 use relightable_photo::executor::{Executor, SequentialExecutor};
 use relightable_photo::recover::{Homotopy, Method, Nnls, Recovery, Settings, SparsityBasis};
 use relightable_photo::simulate::{
@@ -100,7 +100,7 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
         }
     }
     let code = 1.0 / (sensor.white - sensor.black);
-    let photograph = |seen: &[[f32; CHANNELS]], number: u32| -> Picture {
+    let photograph = |seen: &[[f32; CHANNELS]], number: u32| -> LinearPhoto {
         let mut noise = RandomStream::Photograph(number).start(SEED);
         let photo = sensor.photograph(seen, &mut noise).unwrap();
         let linear = |value: u16| ((f64::from(value) - sensor.black) * code) as f32;
@@ -122,11 +122,11 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
         correspondence: geometry.correspondence,
         patterns: patterns.collect(),
         full_scale: vec![1.0; PATTERNS],
-        rows: Rows::all(camera.height),
-        pictures,
-        noise: Noise::from_dark(&dark, camera.width, code),
+        rows: RowSet::all(camera.height),
+        photos: pictures,
+        noise: NoiseModel::from_dark(&dark, camera.width, code),
     };
-    measurements.noise = Noise::with_gain_from(&measurements);
+    measurements.noise = NoiseModel::with_gain_from(&measurements);
     (measurements, truth)
 }
 

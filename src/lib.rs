@@ -1,41 +1,42 @@
-//! Photographs under every light.
+//! Relightable photographs: light transport recovery, a file format and real-time relighting.
 //!
-//! A photograph is one picture under one light. The *light transport matrix* `T` of an object is
-//! its picture under every light: `y = pT`. For nearly planar objects `T` is a band, which can be
-//! recovered from about 80 photographs, kept in a small file and relit at video rate.
+//! An ordinary photograph shows an object under one light. Its *light transport matrix* `T` gives the
+//! picture `y = pT` under any light `p`. For a nearly planar object `T` is a band, which can be
+//! recovered from about 80 photographs, stored in a compact file and multiplied by a light at video
+//! rate (Thanikachalam et al. 2014).
 //!
-//! Data flows one way, through one module after the other:
+//! Data flows in one direction through these modules:
 //!
-//! | module | from | to |
-//! |---|---|---|
-//! | [`simulate`] (native) | a built-in scene | a capture folder with known transport |
-//! | [`capture`] | a capture folder | linear measurements |
-//! | [`calibrate`] | photographs of Gray code | the correspondence |
-//! | [`recover`] | measurements | light transport functions |
-//! | [`transport`] | – | what the rooms around it share: windows, tiles, the band |
-//! | [`format`] | a transport | an `.ltm` file, and back |
-//! | [`relight`] | a transport and a light | a picture |
-//! | [`study`] (native) | known transport | how well all of this does: figures and tables |
+//! | module | from | to | feature |
+//! |---|---|---|---|
+//! | [`simulate`] | a built-in scene | photographs with known transport | `simulate` |
+//! | [`capture`] | a capture folder | linear measurements | `capture` for files |
+//! | [`calibrate`] | photographs of Gray code | the correspondence | |
+//! | [`recover`] | measurements | light transport functions | |
+//! | [`transport`] | – | the matrix in memory, shared by the others | |
+//! | [`format`] | a transport | an `.ltm` file, and back | |
+//! | [`relight`] | a transport and a light | a picture | |
+//! | [`study`] | known transport | accuracy figures and tables | `study` |
 //!
-//! `cli` (native) and `web` (wasm32) are thin faces on them.
+//! `cli` (feature `cli`) and `web` (wasm32) call these modules and add no algorithms.
 
 pub mod calibrate;
 pub mod capture;
-#[cfg(not(target_arch = "wasm32"))]
+#[cfg(all(feature = "cli", not(target_arch = "wasm32")))]
 pub mod cli;
 pub mod executor;
 pub mod format;
 mod linalg;
 pub mod recover;
 pub mod relight;
-#[cfg(not(target_arch = "wasm32"))]
+#[cfg(all(feature = "simulate", not(target_arch = "wasm32")))]
 pub mod simulate;
-#[cfg(not(target_arch = "wasm32"))]
+#[cfg(all(feature = "study", not(target_arch = "wasm32")))]
 pub mod study;
 pub mod transport;
 #[cfg(target_arch = "wasm32")]
 pub mod web;
 
-// Unit tests of wasm32 run where the kernels and canvases are: in a browser.
+// Browsers have the vector instructions and canvases that unit tests of wasm32 need.
 #[cfg(all(test, target_arch = "wasm32"))]
 wasm_bindgen_test::wasm_bindgen_test_configure!(run_in_browser);

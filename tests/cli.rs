@@ -403,7 +403,7 @@ fn an_input_named_as_output_is_not_destroyed() {
     let jpeg = folder.path().join("x.jpg");
     let message = relight_to(&jpeg);
     assert!(
-        message.contains("x.jpg: a PNG is what is written"),
+        message.contains("x.jpg: a PNG is written; give a name with its extension"),
         "{message}"
     );
     assert_eq!(fs::read(&file).unwrap(), before);
@@ -411,7 +411,7 @@ fn an_input_named_as_output_is_not_destroyed() {
     let photo = capture.join("photos/0000.png");
     let before = fs::read(&photo).unwrap();
     let message = relight_to(&photo);
-    assert!(message.contains("such as this writes"), "{message}");
+    assert!(message.contains("written by this program"), "{message}");
     assert_eq!(fs::read(&photo).unwrap(), before);
     assert!(complaint(&["verify", text(folder.path())]).contains("is a folder"));
     // What the program wrote itself is replaced.

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use assert_cmd::Command;
-use relightable_photo::capture::{CaptureFolder, Pattern, Picture, Rows};
+use relightable_photo::capture::{CaptureFolder, LinearPhoto, Pattern, RowSet};
 use relightable_photo::simulate::{
     Camera, EmissionMatrix, LightCodes, RandomStream, SceneKind, SimulatedScene,
 };
@@ -108,8 +108,8 @@ fn photographs_and_relit_pictures_are_the_truth_and_its_noise() {
             let Pattern::Grey(pattern) = folder.read_pattern(i).unwrap() else {
                 panic!("patterns are grey")
             };
-            let (mut shot, mut photo) = (folder.shot(i, &dark).unwrap(), Picture::new());
-            let rows = Rows::all(folder.manifest().camera.height);
+            let (mut shot, mut photo) = (folder.open_shot(i, &dark).unwrap(), LinearPhoto::new());
+            let rows = RowSet::all(folder.manifest().camera.height);
             shot.read(&rows, &mut photo).unwrap();
             assert_eq!(shot.finish().unwrap(), 0, "saturated samples");
             let light: Vec<_> = pattern.iter().map(|&p| [f64::from(p); CHANNELS]).collect();
@@ -235,7 +235,7 @@ fn what_cannot_be_is_refused_and_nothing_is_written() {
         .code(1)
         .get_output()
         .clone();
-    assert!(String::from_utf8_lossy(&output.stderr).contains("something in it"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("is not empty"));
     assert_eq!(
         contents(root.path()).keys().collect::<Vec<_>>(),
         ["out/notes.txt"]

@@ -223,7 +223,11 @@ fn an_interrupted_recovery_goes_on_to_the_same_bytes() {
     }
     // Nothing to resume from is no hindrance.
     let output = recovery.recover("new.ltm", &["--resume"]).output().unwrap();
-    assert!(said(&output).contains("starting anew"), "{}", said(&output));
+    assert!(
+        said(&output).contains("starting from the beginning"),
+        "{}",
+        said(&output)
+    );
     assert!(fs::read(recovery.path("new.ltm")).unwrap() == recovery.whole);
 }
 

@@ -1,10 +1,10 @@
-//! `ltm-export`: photographs in, a relightable photograph out.
+//! `ltm-export`: recovers, inspects and relights `.ltm` files.
 
 #[cfg(not(target_arch = "wasm32"))]
 fn main() -> std::process::ExitCode {
     relightable_photo::cli::main()
 }
 
-/// There is no command line in a browser; the library is what is built for one.
+/// Cargo builds every target for wasm32 too, where there is no command line.
 #[cfg(target_arch = "wasm32")]
 fn main() {}

@@ -1,24 +1,24 @@
-//! Gray code to correspondence.
+//! The correspondence from photographs of Gray code: an affine map `(x+½, y+½, 1) → (u, v)`.
 //!
-//! Each bit of an element's column and row number, in Gray code, was shown once as it is and once
-//! inverted. A camera pixel brighter in the first saw a 1. On glass that scatters, the finest
-//! stripes blur into grey: a pixel's bits count only as far as they are clear, and it then tells its
-//! place the more coarsely.
+//! Patterns show each bit of the Gray code of the column and row numbers, once plain and once inverted.
+//! The bit is 1 at a camera pixel that is brighter under the plain pattern. Scattering objects blur the
+//! finest stripes to grey, so decoding of a pixel stops at its first unclear bit, which leaves a range
+//! of light elements instead of one.
 
 use thiserror::Error;
 
-use super::fit::{Sample, robust_affine};
+use super::affine_fit::{DecodedPixel, fit_affine_row};
 use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent};
 
-/// Contrast `|p − n| / (p + n)` below which a bit is not clear: scattering lowers it smoothly, and
-/// near the border of a stripe, where noise would decide, it passes through zero.
-const LEAST_CONTRAST: f32 = 0.15;
-/// Brightness `p + n`, as a share of the brightest pixel's, below which a pixel is lead or shadow.
-const LEAST_BRIGHTNESS: f32 = 0.05;
-/// Fewest pixels to fit six numbers to.
-const FEWEST_PIXELS: usize = 100;
+/// Least contrast `|p − n| / (p + n)` of a clear bit. Scattering lowers the contrast; at the edge of a
+/// stripe it passes through zero, and noise would decide.
+const MIN_CONTRAST: f32 = 0.15;
+/// Least brightness `p + n` of a usable pixel, relative to the brightest.
+const MIN_RELATIVE_BRIGHTNESS: f32 = 0.05;
+/// Least number of decoded pixels for a reliable fit.
+const MIN_DECODED_PIXELS: usize = 100;
 
-/// Which number of an element a bit belongs to.
+/// The axis of the light plane that a bit numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// Columns.
@@ -27,51 +27,68 @@ pub enum Axis {
     Y,
 }
 
+impl std::fmt::Display for Axis {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::X => "x",
+            Self::Y => "y",
+        })
+    }
+}
+
 /// Photographs of one bit, `[rows, width]` in units of the measurement; NaN where saturated.
 #[derive(Clone, Debug)]
 pub struct BitPair {
-    /// With the bit shown as it is.
+    /// Under the plain pattern.
     pub plain: Vec<[f32; CHANNELS]>,
-    /// With the bit shown inverted.
+    /// Under the inverted pattern.
     pub inverted: Vec<[f32; CHANNELS]>,
 }
 
-/// Why Gray code gives no correspondence.
+/// Why no correspondence can be decoded.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum CalibrationError {
-    /// A bit is not there.
-    #[error("\"graycode\" has no bits for axis {0:?}; photograph them, or give \"correspondence\"")]
-    NoBits(Axis),
-    /// Hardly a pixel has clear bits.
+    /// The Gray code has no bits for an axis.
+    #[error("\"graycode\" has no photographs for axis {0}")]
+    MissingBits(Axis),
+    /// Too few pixels have clear bits.
     #[error(
-        "only {0} camera pixels see clear Gray code along {1:?}; photograph it again with more light, or give \"correspondence\""
+        "only {decoded} camera pixels show clear Gray code along axis {axis}; at least {MIN_DECODED_PIXELS} are needed"
     )]
-    FewPixels(usize, Axis),
+    TooFewPixels {
+        /// Number of decoded pixels.
+        decoded: usize,
+        /// The axis.
+        axis: Axis,
+    },
 }
 
-/// Photographed Gray code: the bits of each axis, most significant first, in the camera rows given.
+/// Photographs of Gray code: the bits of each axis, most significant first.
 #[derive(Clone, Debug, Default)]
-pub struct GrayCode {
+pub struct GrayCodePhotos {
     /// Bits of the column number.
     pub x: Vec<BitPair>,
     /// Bits of the row number.
     pub y: Vec<BitPair>,
-    /// The camera rows that the bits have, from the top down.
+    /// The camera rows that were read, from the top down.
     pub rows: Vec<u32>,
 }
 
-impl GrayCode {
-    /// Decodes every pixel of the rows at hand and fits an affine map to where they look.
+impl GrayCodePhotos {
+    /// Decodes all pixels and fits an affine map to their positions. `camera` is the size of the camera grid.
+    ///
+    /// # Errors
+    /// If an axis has no bits or too few pixels can be decoded.
     pub fn correspondence(&self, camera: Extent) -> Result<Correspondence, CalibrationError> {
         let axis = |bits: &[BitPair], axis| {
             if bits.is_empty() {
-                return Err(CalibrationError::NoBits(axis));
+                return Err(CalibrationError::MissingBits(axis));
             }
-            let samples = decode(bits, &self.rows, camera.width);
-            let fitted = (samples.len() >= FEWEST_PIXELS).then(|| robust_affine(&samples));
-            fitted
-                .flatten()
-                .ok_or(CalibrationError::FewPixels(samples.len(), axis))
+            let pixels = decode(bits, &self.rows, camera.width);
+            let decoded = pixels.len();
+            let row = (decoded >= MIN_DECODED_PIXELS).then(|| fit_affine_row(&pixels));
+            row.flatten()
+                .ok_or(CalibrationError::TooFewPixels { decoded, axis })
         };
         Ok(Correspondence {
             affine: [axis(&self.x, Axis::X)?, axis(&self.y, Axis::Y)?],
@@ -79,40 +96,40 @@ impl GrayCode {
     }
 }
 
-/// Where each pixel with at least half of its bits clear looks along one axis.
-fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<Sample> {
+/// Positions along one axis of the pixels with at least half of their bits clear.
+fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<DecodedPixel> {
     let pixels = rows.len() * width as usize;
-    // A saturated sample is at least white.
-    let full = |v: &f32| if v.is_nan() { 1.0 } else { *v };
-    let sum = |p: &[f32; CHANNELS]| p.iter().map(full).sum::<f32>();
-    let light = |bit: &BitPair, n: usize| {
+    // A saturated sample is at least white, which is 1.
+    let value = |v: &f32| if v.is_nan() { 1.0 } else { *v };
+    let sum = |p: &[f32; CHANNELS]| p.iter().map(value).sum::<f32>();
+    let difference_and_sum = |bit: &BitPair, n: usize| {
         let (plain, inverted) = (sum(&bit.plain[n]), sum(&bit.inverted[n]));
         (plain - inverted, plain + inverted)
     };
     let brightest = (0..pixels)
-        .map(|n| light(&bits[0], n).1)
+        .map(|n| difference_and_sum(&bits[0], n).1)
         .fold(0.0f32, f32::max);
     let pixel = |n: usize| {
         let (mut code, mut clear) = (0u32, 0);
         for bit in bits {
-            let (difference, total) = light(bit, n);
-            let dark = total <= LEAST_BRIGHTNESS * brightest;
-            if dark || difference.abs() < LEAST_CONTRAST * total {
+            let (difference, total) = difference_and_sum(bit, n);
+            let is_dark = total <= MIN_RELATIVE_BRIGHTNESS * brightest;
+            if is_dark || difference.abs() < MIN_CONTRAST * total {
                 break;
             }
-            // Gray to binary: each bit is the one above it, flipped where the Gray bit is set.
-            let one = (difference > 0.0) != (code & 1 == 1);
-            code = code << 1 | u32::from(one);
+            // Gray to binary: each bit is the XOR of the Gray bit and the next higher bit.
+            let bit_is_set = (difference > 0.0) != (code & 1 == 1);
+            code = code << 1 | u32::from(bit_is_set);
             clear += 1;
         }
         let unclear = bits.len() - clear;
         (2 * clear >= bits.len() && clear > 0).then(|| {
-            let cell = f64::from(1u32 << unclear.min(31));
+            let range = f64::from(1u32 << unclear.min(31));
             let (x, y) = (n as u32 % width, rows[n / width as usize]);
-            Sample {
+            DecodedPixel {
                 pixel: CameraPx { x, y },
-                position: (f64::from(code) + 0.5) * cell,
-                cell,
+                position: (f64::from(code) + 0.5) * range,
+                width: range,
             }
         })
     };
@@ -124,7 +141,7 @@ mod tests {
     use super::*;
 
     /// Ideal photographs of Gray code through a known map, blurred over `blur` elements.
-    fn photograph(camera: Extent, affine: [[f64; 3]; 2], bits: u32, blur: f64) -> GrayCode {
+    fn photograph(camera: Extent, affine: [[f64; 3]; 2], bits: u32, blur: f64) -> GrayCodePhotos {
         let map = Correspondence { affine };
         let axis = |along: Axis| {
             let bit = |b: u32| {
@@ -147,7 +164,7 @@ mod tests {
             };
             (0..bits).rev().map(bit).collect()
         };
-        GrayCode {
+        GrayCodePhotos {
             x: axis(Axis::X),
             y: axis(Axis::Y),
             rows: (0..camera.height).collect(),
@@ -155,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_known_map_is_found_sharp_or_blurred() {
+    fn a_known_map_is_recovered_sharp_or_blurred() {
         let camera = Extent {
             width: 60,
             height: 40,
@@ -171,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_see_is_an_error() {
+    fn dark_photographs_and_missing_bits_are_errors() {
         let camera = Extent {
             width: 20,
             height: 20,
@@ -182,10 +199,16 @@ mod tests {
             bit.inverted.fill([0.0; 3]);
         }
         let error = code.correspondence(camera);
-        assert_eq!(error, Err(CalibrationError::FewPixels(0, Axis::Y)));
         assert_eq!(
-            GrayCode::default().correspondence(camera),
-            Err(CalibrationError::NoBits(Axis::X))
+            error,
+            Err(CalibrationError::TooFewPixels {
+                decoded: 0,
+                axis: Axis::Y
+            })
+        );
+        assert_eq!(
+            GrayCodePhotos::default().correspondence(camera),
+            Err(CalibrationError::MissingBits(Axis::X))
         );
     }
 }

@@ -1,6 +1,6 @@
-//! From calibration photographs to where each camera pixel looks.
+//! Calibration of the set-up: the correspondence from photographs of Gray code.
 
-mod fit;
+mod affine_fit;
 mod graycode;
 
-pub use graycode::{Axis, BitPair, CalibrationError, GrayCode};
+pub use graycode::{Axis, BitPair, CalibrationError, GrayCodePhotos};

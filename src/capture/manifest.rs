@@ -1,68 +1,73 @@
-//! `capture.json`: what was photographed, with what, under which light.
+//! `capture.json`: patterns, photographs, and the calibration of camera and light plane.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::CaptureError;
-use crate::transport::{Correspondence, Extent};
+use super::{CaptureError, FieldProblem};
+use crate::transport::{Correspondence, Extent, MAX_SIDE};
 
 /// The manifest's file name.
 pub const MANIFEST_NAME: &str = "capture.json";
+
+/// Largest 16-bit code.
+const MAX_CODE: f64 = 65535.0;
+/// Bits 0 to 15 number the elements of the largest light plane.
+const MAX_GRAY_CODE_BIT: u32 = 15;
 
 /// The manifest, version 1. Paths are relative to its folder. Unknown fields are ignored.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Always 1.
     pub version: u32,
-    /// What the photographs show; goes into the file, as do the next two.
+    /// Title of the object, copied into the `.ltm` file, as are the next two.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub title: String,
-    /// Who made them.
+    /// Author of the photographs.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub creator: String,
-    /// Who may do what with them.
+    /// Licence or other terms of use.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub rights: String,
-    /// The display or projector.
+    /// The light plane: a monitor or projector.
     pub light: LightSpec,
     /// The camera.
     pub camera: CameraSpec,
-    /// Photograph with every light element dark.
+    /// Photograph under no light.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dark: Option<String>,
-    /// Photograph with every light element at full brightness.
+    /// Photograph under full light.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flood: Option<String>,
     /// The patterns and their photographs.
     pub shots: Vec<Shot>,
-    /// Photographs of Gray code, most significant bit first.
+    /// Photographs of the Gray code patterns.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub graycode: Vec<GrayCodeShot>,
-    /// Camera pixels to light elements.
+    /// The correspondence; decoded from the Gray code if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correspondence: Option<AffineSpec>,
-    /// Fields that are none of these, as paths into the JSON: of a later program, or misspelt.
+    /// Paths of unknown fields: misspelt, or of a later version.
     #[serde(skip)]
     pub unknown: Vec<String>,
 }
 
-/// The light plane and how its codes turn into light.
+/// The light plane, and the emission of each code.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LightSpec {
     /// Elements along a row.
     pub width: u32,
     /// Elements down a column.
     pub height: u32,
-    /// Emitted light is `(code / 255)^gamma`.
+    /// Emission is `(code / 255)^gamma`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gamma: Option<f64>,
-    /// Or measured pairs `[code, emitted]` in rising order, interpolated linearly.
+    /// Instead of gamma: measured pairs `[code, emitted]` in rising order, interpolated linearly.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub response: Option<Vec<[f64; 2]>>,
 }
 
-/// The camera grid and its linear code range.
+/// The camera grid and its range of linear codes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CameraSpec {
     /// Pixels along a row.
@@ -71,23 +76,23 @@ pub struct CameraSpec {
     pub height: u32,
     /// Code without light.
     pub black: f64,
-    /// Code at full scale, where the measurement is 1.
+    /// Code at full scale: measurement 1.
     pub white: f64,
 }
 
-/// One pattern and its photograph.
+/// A pattern and its photograph.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Shot {
-    /// 8-bit grey or RGB PNG of the light's extent.
+    /// 8-bit grey or RGB PNG of the light plane's size.
     pub pattern: String,
-    /// 16-bit linear RGB PNG of the camera's extent.
+    /// 16-bit linear RGB PNG of the camera's size.
     pub photo: String,
     /// Exposure relative to a shot without this field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<f64>,
 }
 
-/// One photograph of a Gray code bit.
+/// A photograph of one bit of the Gray code.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GrayCodeShot {
     /// 16-bit linear RGB PNG.
@@ -100,15 +105,15 @@ pub struct GrayCodeShot {
     pub inverted: bool,
 }
 
-/// The correspondence as the manifest gives it.
+/// An affine correspondence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AffineSpec {
-    /// `(x+½, y+½, 1)` on the camera to `(u, v)` on the light.
+    /// Maps camera position `(x+½, y+½, 1)` to light plane position `(u, v)`.
     pub affine: [[f64; 3]; 2],
 }
 
 impl LightSpec {
-    /// Light plane extent.
+    /// Size of the light plane.
     pub fn extent(&self) -> Extent {
         Extent {
             width: self.width,
@@ -116,7 +121,29 @@ impl LightSpec {
         }
     }
 
-    /// Light emitted for each of the 256 codes, 1 at full brightness.
+    /// Exactly one of gamma and response must be given, and be usable.
+    fn check(&self) -> Result<(), (String, FieldProblem)> {
+        let problem = match (&self.response, self.gamma) {
+            (Some(_), Some(_)) => FieldProblem::Conflict {
+                other: "light.gamma",
+            },
+            (Some(table), None) if !is_valid_response(table) => FieldProblem::InvalidResponse,
+            (Some(_), None) => return Ok(()),
+            (None, Some(gamma)) => {
+                let allowed = || "between 0.1 and 10".to_owned();
+                let valid = (0.1..=10.0).contains(&gamma);
+                return check_range(valid, "light.gamma", gamma, allowed);
+            }
+            (None, None) => {
+                let alternative = "light.response";
+                let problem = FieldProblem::Missing { alternative };
+                return Err(("light.gamma".to_owned(), problem));
+            }
+        };
+        Err(("light.response".to_owned(), problem))
+    }
+
+    /// Emission at each of the 256 codes, 1 at full brightness.
     pub fn emission(&self) -> [f64; 256] {
         let full = self
             .response
@@ -130,7 +157,7 @@ impl LightSpec {
 }
 
 impl CameraSpec {
-    /// Camera grid.
+    /// Size of the camera grid.
     pub fn extent(&self) -> Extent {
         Extent {
             width: self.width,
@@ -138,8 +165,8 @@ impl CameraSpec {
         }
     }
 
-    /// `(code − black) / (white − black)` at unit exposure. The dark frame holds light, which grows
-    /// with exposure, so it is subtracted after this, not from the code.
+    /// `(code − black) / (white − black) / exposure`. The dark frame shows light, which scales with
+    /// exposure, and is therefore subtracted from this value, not from the code.
     pub fn linear(&self, code: u16, exposure: f64) -> f32 {
         ((f64::from(code) - self.black) / (self.white - self.black) / exposure) as f32
     }
@@ -155,163 +182,131 @@ impl From<&AffineSpec> for Correspondence {
 
 impl Manifest {
     /// Parses and checks `json`, the contents of the file at `path`.
+    ///
+    /// # Errors
+    /// If it is not JSON, has an unknown version, lacks a field, or a field has an invalid value. The
+    /// error names `path` and the field.
     pub fn parse(json: &str, path: &Path) -> Result<Self, CaptureError> {
         let json_error = |source| CaptureError::Json {
             path: path.to_owned(),
             source,
         };
-        // The version first: a later version may differ in any other field.
+        // The version first: another version may differ in any other field.
         #[derive(Deserialize)]
         struct Versioned {
             version: u64,
         }
         let Versioned { version } = serde_json::from_str(json).map_err(json_error)?;
         if version != 1 {
-            return Err(CaptureError::Version {
+            return Err(CaptureError::UnknownVersion {
                 path: path.to_owned(),
                 version,
             });
         }
         let mut source = serde_json::Deserializer::from_str(json);
         let mut unknown = Vec::new();
-        let mut note = |field: serde_ignored::Path| unknown.push(field.to_string());
-        let noting = serde_ignored::Deserializer::new(&mut source, &mut note);
-        let manifest: Self =
-            serde_path_to_error::deserialize(noting).map_err(|error| match error.path() {
-                at if at.iter().next().is_none() => json_error(error.into_inner()),
-                at => CaptureError::Form {
-                    path: path.to_owned(),
-                    field: at.to_string(),
-                    source: error.into_inner(),
-                },
-            })?;
-        source.end().map_err(json_error)?;
-        let manifest = Self {
-            unknown,
-            ..manifest
-        };
-        match manifest.problem() {
-            None => Ok(manifest),
-            Some((field, problem)) => Err(CaptureError::Field {
+        let mut add_unknown = |field: serde_ignored::Path| unknown.push(field.to_string());
+        let deserializer = serde_ignored::Deserializer::new(&mut source, &mut add_unknown);
+        let parsed: Result<Self, _> = serde_path_to_error::deserialize(deserializer);
+        let manifest = parsed.map_err(|error| match error.path() {
+            at if at.iter().next().is_none() => json_error(error.into_inner()),
+            at => CaptureError::FieldType {
                 path: path.to_owned(),
+                field: at.to_string(),
+                source: error.into_inner(),
+            },
+        })?;
+        source.end().map_err(json_error)?;
+        manifest.check().map_err(|(field, problem)| {
+            let path = path.to_owned();
+            CaptureError::Field {
+                path,
                 field,
                 problem,
-            }),
-        }
+            }
+        })?;
+        Ok(Self {
+            unknown,
+            ..manifest
+        })
     }
 
-    /// The first field whose value cannot be, and why.
-    fn problem(&self) -> Option<(String, String)> {
-        let bad = |field: &str, problem: String| Some((field.to_owned(), problem));
-        let sides = [
-            ("light.width", self.light.width),
-            ("light.height", self.light.height),
-            ("camera.width", self.camera.width),
-            ("camera.height", self.camera.height),
-        ];
-        for (name, value) in sides {
-            if !(1..=crate::transport::MAX_SIDE).contains(&value) {
-                return bad(
-                    name,
-                    format!(
-                        "is {value}; it must lie between 1 and {}",
-                        crate::transport::MAX_SIDE
-                    ),
-                );
-            }
+    /// Checks all values; the error is the first invalid field and its problem.
+    fn check(&self) -> Result<(), (String, FieldProblem)> {
+        let (light, camera) = (&self.light, &self.camera);
+        for (field, side) in [
+            ("light.width", light.width),
+            ("light.height", light.height),
+            ("camera.width", camera.width),
+            ("camera.height", camera.height),
+        ] {
+            let valid = (1..=MAX_SIDE).contains(&side);
+            check_range(valid, field, side, || format!("between 1 and {MAX_SIDE}"))?;
         }
-        let (black, white) = (self.camera.black, self.camera.white);
-        if !(0.0..65535.0).contains(&black) {
-            return bad(
-                "camera.black",
-                format!("is {black}; it must be a 16-bit code"),
-            );
-        }
-        if !(white > black && white <= 65535.0) {
-            return bad(
-                "camera.white",
-                format!("is {white}; it must be a 16-bit code above black, {black}"),
-            );
-        }
-        match (&self.light.response, self.light.gamma) {
-            (Some(table), _) => {
-                let rising = table
-                    .windows(2)
-                    .all(|w| w[0][0] < w[1][0] && w[0][1] <= w[1][1]);
-                let sane = table.iter().flatten().all(|x| x.is_finite() && *x >= 0.0);
-                if self.light.gamma.is_some() {
-                    return bad(
-                        "light.response",
-                        "is there beside \"gamma\", which it stands instead of: leave one of them"
-                            .to_owned(),
-                    );
-                }
-                let last = table.last().map_or([0.0; 2], |pair| *pair);
-                if table.len() < 2
-                    || !rising
-                    || !sane
-                    || last[0] < 255.0
-                    || interpolate(table, 255.0) <= 0.0
-                {
-                    return bad(
-                        "light.response",
-                        "must be two or more [code, emitted] pairs, both rising, up to code 255"
-                            .to_owned(),
-                    );
-                }
-            }
-            (None, Some(gamma)) if !(0.1..=10.0).contains(&gamma) => {
-                return bad(
-                    "light.gamma",
-                    format!("is {gamma}; displays have about 2.2"),
-                );
-            }
-            (None, None) => {
-                return bad(
-                    "light.gamma",
-                    "is missing; give the display's gamma, or its response as a table".to_owned(),
-                );
-            }
-            _ => {}
-        }
+        let (black, white) = (camera.black, camera.white);
+        let valid = (0.0..MAX_CODE).contains(&black);
+        check_range(valid, "camera.black", black, || "a 16-bit code".to_owned())?;
+        let valid = white > black && white <= MAX_CODE;
+        check_range(valid, "camera.white", white, || {
+            format!("a 16-bit code above \"camera.black\", {black}")
+        })?;
+        light.check()?;
         if self.shots.is_empty() {
-            return bad("shots", "is empty; recovery needs photographs".to_owned());
+            return Err(("shots".to_owned(), FieldProblem::Empty));
         }
         for (i, shot) in self.shots.iter().enumerate() {
-            if let Some(exposure) = shot.exposure
-                && !(exposure.is_finite() && exposure > 0.0)
-            {
-                return bad(
-                    &format!("shots[{i}].exposure"),
-                    format!("is {exposure}; it must be above 0"),
-                );
-            }
+            let exposure = shot.exposure.unwrap_or(1.0);
+            let valid = exposure.is_finite() && exposure > 0.0;
+            let field = format!("shots[{i}].exposure");
+            check_range(valid, &field, exposure, || "above 0".to_owned())?;
         }
-        for (i, shot) in self.graycode.iter().enumerate() {
-            if !["x", "y"].contains(&shot.axis.as_str()) {
-                let problem = format!("is {:?}; it must be \"x\" or \"y\"", shot.axis);
-                return bad(&format!("graycode[{i}].axis"), problem);
-            }
-            if shot.bit > 15 {
-                let problem = format!("is {}; bits are numbered 0 to 15", shot.bit);
-                return bad(&format!("graycode[{i}].bit"), problem);
-            }
+        for (i, GrayCodeShot { axis, bit, .. }) in self.graycode.iter().enumerate() {
+            let (valid, quoted) = (axis == "x" || axis == "y", format!("{axis:?}"));
+            let field = format!("graycode[{i}].axis");
+            check_range(valid, &field, quoted, || "\"x\" or \"y\"".to_owned())?;
+            let field = format!("graycode[{i}].bit");
+            let allowed = || format!("between 0 and {MAX_GRAY_CODE_BIT}");
+            check_range(*bit <= MAX_GRAY_CODE_BIT, &field, bit, allowed)?;
         }
-        if let Some(spec) = &self.correspondence {
-            let [[a, b, _], [c, d, _]] = spec.affine;
-            let finite = spec.affine.iter().flatten().all(|x| x.is_finite());
+        if let Some(AffineSpec { affine }) = &self.correspondence {
+            let [[a, b, _], [c, d, _]] = affine;
+            let finite = affine.iter().flatten().all(|x| x.is_finite());
             if !finite || a * d - b * c == 0.0 {
-                return bad(
-                    "correspondence.affine",
-                    "is not an invertible map of finite numbers".to_owned(),
-                );
+                let field = "correspondence.affine".to_owned();
+                return Err((field, FieldProblem::NotInvertible));
             }
         }
-        None
+        Ok(())
     }
 }
 
-/// Piecewise linear through `table`, constant beyond its ends.
+fn check_range(
+    is_valid: bool,
+    field: &str,
+    value: impl ToString,
+    allowed: impl Fn() -> String,
+) -> Result<(), (String, FieldProblem)> {
+    if is_valid {
+        return Ok(());
+    }
+    let (value, allowed) = (value.to_string(), allowed());
+    Err((
+        field.to_owned(),
+        FieldProblem::OutOfRange { value, allowed },
+    ))
+}
+
+/// Whether codes and emission rise, and reach code 255 with light.
+fn is_valid_response(table: &[[f64; 2]]) -> bool {
+    let is_rising = |w: &[[f64; 2]]| w[0][0] < w[1][0] && w[0][1] <= w[1][1];
+    table.len() >= 2
+        && table.windows(2).all(is_rising)
+        && table.iter().flatten().all(|x| x.is_finite() && *x >= 0.0)
+        && table.last().is_some_and(|last| last[0] >= 255.0)
+        && interpolate(table, 255.0) > 0.0
+}
+
+/// The piecewise linear function through `table` at `x`, constant beyond its ends.
 fn interpolate(table: &[[f64; 2]], x: f64) -> f64 {
     let after = table.partition_point(|p| p[0] <= x);
     let point = |i: usize| table.get(i).copied();
@@ -339,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_field_is_named_with_its_file() {
+    fn errors_name_the_file_and_the_field() {
         assert_eq!(manifest(|_| {}).unwrap().unknown, ["someday"]);
         type Edit = fn(&mut serde_json::Value);
         let cases: [(Edit, &str); 12] = [
@@ -363,7 +358,7 @@ mod tests {
             ),
             (
                 |j| j["light"]["response"] = serde_json::json!([[0, 0], [255, 1]]),
-                "beside \"gamma\"",
+                "\"light.response\" and \"light.gamma\"",
             ),
             (
                 |j| {
@@ -388,8 +383,8 @@ mod tests {
             assert!(message.contains("x/capture.json"), "{message}");
         }
         let missing = manifest(|j| j["camera"] = serde_json::json!({"width": 8}));
-        let CaptureError::Form { source, field, .. } = missing.unwrap_err() else {
-            panic!("another error")
+        let CaptureError::FieldType { source, field, .. } = missing.unwrap_err() else {
+            panic!("a different error")
         };
         assert_eq!(field, "camera");
         assert!(
@@ -400,7 +395,7 @@ mod tests {
 
     #[test]
     fn response_table_is_interpolated_and_gamma_is_a_power() {
-        // In candelas a square metre as well as in shares of the most.
+        // In cd/m² or relative to the maximum.
         for full in [1.0, 350.0] {
             let table = manifest(|j| {
                 j["light"] = serde_json::json!({"width": 4, "height": 4,

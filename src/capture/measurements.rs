@@ -1,21 +1,22 @@
-//! Linear measurements: what recovery works on.
+//! The linear system that recovery solves: `Y = PT` for each channel, with `L` patterns `P` `[L, M]` and
+//! their photographs `Y` `[L, N]`.
 
 use std::ops::Range;
 
-use super::{Noise, Rows};
+use super::{NoiseModel, RowSet};
 use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent, TileRect};
 
-/// The light each element emitted during one shot, 1 at full brightness, row by row.
+/// The emission of each light element during one shot, `[M]`, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pattern {
-    /// The same for all channels.
+    /// One plane for all channels.
     Grey(Vec<f32>),
-    /// Red, green, blue. A camera channel is taken to see its own primary alone.
+    /// Red, green, blue. Each camera channel is assumed to respond to its own primary only.
     Rgb([Vec<f32>; CHANNELS]),
 }
 
 impl Pattern {
-    /// The emission that drives camera channel `c`.
+    /// The emission that camera channel `c` responds to.
     pub fn plane(&self, c: usize) -> &[f32] {
         match self {
             Self::Grey(plane) => plane,
@@ -24,87 +25,83 @@ impl Pattern {
     }
 }
 
-/// What a photograph saw, `[rows, width]` for the camera rows at hand, in units of the measurement;
-/// NaN where saturated.
-pub type Picture = Vec<[f32; CHANNELS]>;
+/// Camera rows of a photograph as measurements, `[rows, width]`; NaN where saturated.
+pub type LinearPhoto = Vec<[f32; CHANNELS]>;
 
-/// `Y = PT` as photographed: patterns in, pictures out, all in linear units.
+/// Patterns and the loaded rows of their photographs, in linear units.
 ///
-/// Photographs of many megapixels need not be in memory whole: `rows` says which camera rows are at
-/// hand. Whoever prepares a recovery may get strips spread over the picture, and must then look at
-/// the tiles that are [covered](Self::covers) alone; whoever recovers a tile gets the tile's rows
-/// and as many around it as was asked for.
+/// Large photographs need not be in memory whole: `rows` lists the loaded camera rows. While a recovery
+/// is prepared these may be strips spread over the picture, of which only tiles that are loaded whole
+/// ([`has_tile`](Self::has_tile)) may be used. While a tile is recovered they include the tile and the
+/// rows around it that its recovery asked for.
 #[derive(Clone, Debug)]
 pub struct Measurements {
-    /// Camera grid, `N` pixels.
+    /// The camera grid, `N` pixels.
     pub camera: Extent,
-    /// Light grid, `M` elements.
+    /// The light plane, `M` elements.
     pub light: Extent,
-    /// Camera pixels to light elements.
+    /// Maps camera pixels to light elements.
     pub correspondence: Correspondence,
     /// `L` patterns of `M` elements.
     pub patterns: Vec<Pattern>,
-    /// For each pattern, the measurement at which a sample saturates: 1 over the exposure.
+    /// For each pattern the measurement at which a sample saturates: 1 / exposure.
     pub full_scale: Vec<f32>,
-    /// The camera rows that `pictures` hold.
-    pub rows: Rows,
-    /// `L` pictures of the rows at hand. NaN where a sample was saturated and says nothing.
-    pub pictures: Vec<Picture>,
-    /// How noisy the samples are.
-    pub noise: Noise,
+    /// The loaded camera rows.
+    pub rows: RowSet,
+    /// These rows of the `L` photographs.
+    pub photos: Vec<LinearPhoto>,
+    /// Variance of the samples.
+    pub noise: NoiseModel,
 }
 
 impl Measurements {
-    /// Whether every pattern is grey, so that channels share their equations.
-    pub fn grey(&self) -> bool {
+    /// Whether every pattern is grey, so that all channels have the same equations.
+    pub fn is_grey(&self) -> bool {
         self.patterns.iter().all(|p| matches!(p, Pattern::Grey(_)))
     }
 
-    /// The planes of the patterns, each with the camera channels that it drives: one for all where
-    /// every pattern is grey.
+    /// The planes of the patterns with the camera channels that respond to each: one plane for all
+    /// channels if every pattern is grey.
     pub fn planes(&self) -> impl Iterator<Item = (usize, Range<usize>)> + use<> {
-        let grey = self.grey();
+        let grey = self.is_grey();
         (0..if grey { 1 } else { CHANNELS }).map(move |plane| match grey {
             true => (plane, 0..CHANNELS),
             false => (plane, plane..plane + 1),
         })
     }
 
-    /// What channel `c` of a pixel saw under pattern `l`; NaN where saturated, and where the pixel's
-    /// row is not at hand.
+    /// Channel `c` of a pixel under pattern `l`; NaN if saturated or not loaded.
     pub fn sample(&self, l: usize, pixel: CameraPx, c: usize) -> f64 {
-        let pixel = self.index(pixel).map(|n| self.pictures[l][n]);
+        let pixel = self.pixel_index(pixel).map(|n| self.photos[l][n]);
         pixel.map_or(f64::NAN, |sample| f64::from(sample[c]))
     }
 
-    /// Where `pictures` have a pixel, if its row is at hand.
-    pub fn index(&self, pixel: CameraPx) -> Option<usize> {
-        let row = self.rows.place(pixel.y)?;
+    /// Index of a pixel in `photos`, if its row is loaded.
+    pub fn pixel_index(&self, pixel: CameraPx) -> Option<usize> {
+        let row = self.rows.index_of(pixel.y)?;
         Some(row * self.camera.width as usize + pixel.x as usize)
     }
 
-    /// Gives back the memory of all rows.
-    pub fn forget_rows(&mut self) {
-        self.rows = Rows::from_strips([]);
-        for picture in &mut self.pictures {
-            *picture = Picture::new();
-        }
+    /// Unloads all rows and frees their memory.
+    pub fn clear_rows(&mut self) {
+        self.rows = RowSet::from_strips([]);
+        self.photos.fill(LinearPhoto::new());
     }
 
-    /// Whether all pixels of a tile are at hand.
-    pub fn covers(&self, rect: TileRect) -> bool {
+    /// Whether all pixels of a tile are loaded.
+    pub fn has_tile(&self, rect: TileRect) -> bool {
         self.rows.contains_all(rect.y..rect.y + rect.extent.height)
     }
 
-    /// Variance of a sample of channel `c` under pattern `l` that came out as `y`.
+    /// Variance of a sample `y` of channel `c` under pattern `l`.
     pub fn variance(&self, l: usize, c: usize, y: f64) -> f64 {
         let exposure = f64::from(self.full_scale[l]).recip();
         self.noise.variance(c, y, exposure)
     }
 
-    /// What each pattern's equations count for, mean square 1: photon noise, the most of it, lets a
-    /// sample's variance fall as the exposure grows.
-    pub fn weights(&self) -> Vec<f64> {
+    /// Weight of each pattern's equations, mean square 1: the square root of its exposure, as the
+    /// variance of photon noise, the largest part, is inversely proportional to exposure.
+    pub fn pattern_weights(&self) -> Vec<f64> {
         let exposures = || self.full_scale.iter().map(|&full| f64::from(full).recip());
         let mean = exposures().sum::<f64>() / self.full_scale.len() as f64;
         exposures()
@@ -112,15 +109,14 @@ impl Measurements {
             .collect()
     }
 
-    /// Pixels of the tile of which some channel is saturated in so nearly all photographs that fewer
-    /// than `fewest` samples are left of it.
-    pub fn overexposed_pixels(&self, rect: TileRect, fewest: usize) -> usize {
-        let hopeless = |pixel: &CameraPx| {
+    /// Number of pixels of a tile with fewer than `min_samples` unsaturated samples in some channel.
+    pub fn count_overexposed_pixels(&self, rect: TileRect, min_samples: usize) -> usize {
+        let is_overexposed = |pixel: &CameraPx| {
             (0..CHANNELS).any(|c| {
-                let samples = (0..self.pictures.len()).map(|l| self.sample(l, *pixel, c));
-                samples.filter(|y| !y.is_nan()).count() < fewest
+                let samples = (0..self.photos.len()).map(|l| self.sample(l, *pixel, c));
+                samples.filter(|y| !y.is_nan()).count() < min_samples
             })
         };
-        rect.pixels().filter(hopeless).count()
+        rect.pixels().filter(is_overexposed).count()
     }
 }

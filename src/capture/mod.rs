@@ -1,36 +1,28 @@
-//! From a capture folder to linear measurements.
+//! Capture folders and the linear measurements they hold.
 //!
-//! `capture.json` ([`Manifest`]) names the photographs, the patterns shown while each was taken and
-//! what is known of camera and display. [`CaptureFolder`] opens and checks them one by one, so that
-//! whoever has threads can read them at once; a [`Photo`] is read by rows, from the top down, so that
-//! those of many megapixels need not be in memory whole. [`Measurements`] is what recovery works on.
+//! Input: a [`Manifest`] (`capture.json`) that lists patterns, their photographs, and the calibration of
+//! camera and light plane. Output: [`Measurements`], the linear system `Y = PT` that recovery solves, in
+//! units of the measurement, `(code − black) / (white − black)`.
+//!
+//! Reading files needs the feature `capture`. Photographs are read row by row from the top, so that
+//! captures larger than memory can be recovered strip by strip ([`RowSet`]).
 
-mod alike;
 mod error;
-#[cfg(not(target_arch = "wasm32"))]
+#[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
 mod folder;
-#[cfg(not(target_arch = "wasm32"))]
-mod images;
+mod group;
 mod manifest;
 mod measurements;
 mod noise;
-#[cfg(not(target_arch = "wasm32"))]
-mod photo;
 mod rows;
-#[cfg(not(target_arch = "wasm32"))]
-mod truth;
 
-pub(crate) use alike::{distinct, numbers};
-pub use error::CaptureError;
-#[cfg(not(target_arch = "wasm32"))]
-pub use folder::{CaptureFolder, DarkFrame};
+pub use error::{CaptureError, FieldProblem, ImageProblem};
+#[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
+pub use folder::{CaptureFolder, DarkFrame, PhotoReader, RELIT_FULL_SCALE, Truth};
+pub(crate) use group::{group_count, group_ids};
 pub use manifest::{
     AffineSpec, CameraSpec, GrayCodeShot, LightSpec, MANIFEST_NAME, Manifest, Shot,
 };
-pub use measurements::{Measurements, Pattern, Picture};
-pub use noise::Noise;
-#[cfg(not(target_arch = "wasm32"))]
-pub use photo::Photo;
-pub use rows::Rows;
-#[cfg(not(target_arch = "wasm32"))]
-pub use truth::{RELIT_FULL_SCALE, Truth};
+pub use measurements::{LinearPhoto, Measurements, Pattern};
+pub use noise::NoiseModel;
+pub use rows::RowSet;

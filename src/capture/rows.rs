@@ -1,25 +1,25 @@
-//! Which camera rows are at hand.
+//! A set of camera rows: the rows of the photographs that are loaded.
 
 use std::ops::Range;
 
-/// A set of camera rows: all of them, a strip, or several strips.
+/// A set of camera rows, stored as disjoint strips.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Rows {
-    /// Strips from the top down, none empty, none touching the next.
+pub struct RowSet {
+    /// From the top down; none empty, none adjacent to the next.
     strips: Vec<Range<u32>>,
-    /// Where each camera row up to the last strip's end is kept, or [`ABSENT`].
-    places: Vec<u32>,
+    /// For each camera row up to the end of the last strip its index in the set, or [`ABSENT`].
+    indices: Vec<u32>,
 }
 
 const ABSENT: u32 = u32::MAX;
 
-impl Rows {
+impl RowSet {
     /// The first `height` rows: a whole picture.
     pub fn all(height: u32) -> Self {
         Self::from_strips(std::iter::once(0..height))
     }
 
-    /// The rows of all `strips`, which may touch or overlap but must come from the top down.
+    /// The union of `strips`, which must be sorted by their start.
     pub fn from_strips(strips: impl IntoIterator<Item = Range<u32>>) -> Self {
         let mut joined: Vec<Range<u32>> = Vec::new();
         for strip in strips {
@@ -29,17 +29,17 @@ impl Rows {
                 _ => joined.push(strip),
             }
         }
-        let mut places = vec![ABSENT; joined.last().map_or(0, |last| last.end as usize)];
-        for (place, y) in joined.iter().cloned().flatten().enumerate() {
-            places[y as usize] = place as u32;
+        let mut indices = vec![ABSENT; joined.last().map_or(0, |last| last.end as usize)];
+        for (i, y) in joined.iter().cloned().flatten().enumerate() {
+            indices[y as usize] = i as u32;
         }
         Self {
             strips: joined,
-            places,
+            indices,
         }
     }
 
-    /// The strips, from the top down; no two touch.
+    /// The strips, from the top down; no two are adjacent.
     pub fn strips(&self) -> &[Range<u32>] {
         &self.strips
     }
@@ -54,21 +54,21 @@ impl Rows {
         self.strips.iter().map(|strip| strip.len()).sum()
     }
 
-    /// Whether row `y` is among them.
+    /// Whether the set contains row `y`.
     pub fn contains(&self, y: u32) -> bool {
-        self.place(y).is_some()
+        self.index_of(y).is_some()
     }
 
-    /// Whether every row of `strip` is.
+    /// Whether the set contains every row of `strip`.
     pub fn contains_all(&self, strip: Range<u32>) -> bool {
-        let mut holders = self.strips.iter();
-        strip.is_empty() || holders.any(|s| s.start <= strip.start && strip.end <= s.end)
+        let mut strips = self.strips.iter();
+        strip.is_empty() || strips.any(|s| s.start <= strip.start && strip.end <= s.end)
     }
 
-    /// How many of the rows lie above row `y`, if it is among them.
-    pub fn place(&self, y: u32) -> Option<usize> {
-        let place = *self.places.get(y as usize)?;
-        (place != ABSENT).then_some(place as usize)
+    /// Index of row `y` in the set: the number of its rows above `y`.
+    pub fn index_of(&self, y: u32) -> Option<usize> {
+        let index = *self.indices.get(y as usize)?;
+        (index != ABSENT).then_some(index as usize)
     }
 }
 
@@ -77,24 +77,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strips_join_and_rows_have_their_places() {
-        let rows = Rows::from_strips([2..4, 4..5, 5..5, 8..10, 9..11]);
+    fn strips_are_merged_and_rows_indexed() {
+        let rows = RowSet::from_strips([2..4, 4..5, 5..5, 8..10, 9..11]);
         assert_eq!(rows.strips(), [2..5, 8..11]);
         assert_eq!(rows.count(), 6);
-        let places = (0..12).map(|y| rows.place(y));
-        let kept: Vec<_> = places
+        let indices = (0..12).map(|y| rows.index_of(y));
+        let present: Vec<_> = indices
             .enumerate()
-            .filter_map(|(y, p)| Some((y, p?)))
+            .filter_map(|(y, i)| Some((y, i?)))
             .collect();
-        assert_eq!(kept, [(2, 0), (3, 1), (4, 2), (8, 3), (9, 4), (10, 5)]);
+        assert_eq!(present, [(2, 0), (3, 1), (4, 2), (8, 3), (9, 4), (10, 5)]);
         assert!(
             rows.iter()
                 .enumerate()
-                .all(|(i, y)| rows.place(y) == Some(i))
+                .all(|(i, y)| rows.index_of(y) == Some(i))
         );
         assert!(rows.contains_all(2..5) && rows.contains_all(9..10) && rows.contains_all(6..6));
         assert!(!rows.contains_all(4..9) && !rows.contains_all(10..12));
-        assert_eq!(Rows::all(3), Rows::from_strips([0..1, 1..3]));
-        assert_eq!(Rows::from_strips([]).count(), 0);
+        assert_eq!(RowSet::all(3), RowSet::from_strips([0..1, 1..3]));
+        assert_eq!(RowSet::from_strips([]).count(), 0);
     }
 }

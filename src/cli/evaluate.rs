@@ -1,4 +1,5 @@
-//! `ltm-export evaluate`: an `.ltm` file against what is known of the object.
+//! `ltm-export evaluate`: the accuracy of an `.ltm` file, against the known transport of a simulated capture
+//! and against photographs that the recovery did not use.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -9,67 +10,69 @@ use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::ltm_file::{PrefixLength, read_ltm};
 use super::process::AllCores;
-use super::{files, report};
-use crate::capture::{CaptureFolder, DarkFrame, Pattern, Photo, Picture, Rows, Truth};
+use super::report::{format_bytes, print_json, print_line};
+use crate::capture::{CaptureFolder, DarkFrame, LinearPhoto, Pattern, PhotoReader, RowSet, Truth};
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{BuiltinLight, Light};
 use crate::transport::{CHANNELS, Decibels, Geometry, Transport, TransportError};
 
-/// Hold a file against a capture's known transport, relit pictures and unused photographs
+/// Compare a file with the known transport, the relit pictures and the unused photographs of a capture
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
     /// File to evaluate
     #[arg(value_name = "FILE.ltm")]
     file: PathBuf,
-    /// Capture folder it was recovered from
+    /// Capture folder that it was recovered from
     capture: PathBuf,
-    /// Only the file's first so many bytes, or hundredths, as a visitor sees it while it loads: 20K, 10%
-    #[arg(long, value_name = "BYTES|PERCENT", value_parser = files::Share::parse)]
-    first: Option<files::Share>,
+    /// Use only the first part of the file, as a page does while it loads: 20K, 10%
+    #[arg(long, value_name = "BYTES|PERCENT", value_parser = PrefixLength::parse)]
+    first: Option<PrefixLength>,
     /// Print one JSON object on standard output
     #[arg(long)]
     json: bool,
 }
 
 #[derive(Serialize)]
-struct Report {
-    /// SNR of the whole matrix against the truth; null without truth.
+struct EvaluateReport {
+    /// SNR of the whole matrix against the known transport; null without one.
     snr_db: Option<Decibels>,
-    /// PSNR of relit pictures against true ones, peak 1 in units of the measurement.
+    /// PSNR of relit pictures against the true ones, peak 1 in units of the measurement.
     relit: BTreeMap<String, Option<Decibels>>,
-    /// SNR of predicted against photographed pictures on shots not used in recovery.
+    /// SNR of predicted pictures against photographs that the recovery did not use.
     heldout_snr_db: Option<Decibels>,
     /// The same by camera channel.
     heldout_rgb_snr_db: [Option<Decibels>; CHANNELS],
     heldout_shots: usize,
-    /// SNR of the predicted against the flood photograph, which recovery does not look at; null
+    /// SNR of the predicted picture against the flood photograph, which the recovery does not use; null
     /// without one.
     flood_snr_db: Option<Decibels>,
     file_bytes: u64,
-    /// Bytes that were looked at, and scans that are whole in them.
+    /// Bytes read.
     read_bytes: u64,
+    /// Scans that are complete in them.
     read_scans: usize,
     scans: usize,
 }
 
 pub fn run(args: &EvaluateArgs) -> Result<()> {
-    let file = files::read_ltm(&args.file, args.first)?;
+    let file = read_ltm(&args.file, args.first)?;
     let header = &file.head.header;
     let folder = CaptureFolder::open(&args.capture)?;
     let (geometry, manifest) = (&header.geometry, folder.manifest());
-    for (what, ours, theirs) in [
+    for (name, found, expected) in [
         ("camera", geometry.camera, manifest.camera.extent()),
         ("light", geometry.light, manifest.light.extent()),
     ] {
         ensure!(
-            ours == theirs,
-            "{} has {what} {ours}, but {} has {theirs}: it was not recovered from this capture",
+            found == expected,
+            "{} has {name} {found}, but {} has {expected}: it was not recovered from this capture",
             args.file.display(),
             args.capture.display(),
         );
     }
-    let mut report = Report {
+    let mut report = EvaluateReport {
         snr_db: None,
         relit: BTreeMap::new(),
         heldout_snr_db: None,
@@ -83,7 +86,7 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
     };
     let mut relighter = CpuRelighter::new(Arc::new(file.transport));
     if let Some(truth) = folder.truth()? {
-        report.snr_db = against_truth(relighter.transport(), &truth).snr();
+        report.snr_db = transport_error(relighter.transport(), &truth).snr();
         for name in truth.lights()? {
             let light = Light::from_linear_rgb(geometry.light, &truth.light(&name)?)?;
             let psnr = relit_psnr(&mut relighter, &light, &truth.relit(&name)?);
@@ -91,51 +94,50 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
         }
     }
     let used = file.head.metadata.read()?.shots_used;
-    let held: Vec<usize> = (0..manifest.shots.len())
+    let heldout: Vec<usize> = (0..manifest.shots.len())
         .filter(|i| !used.contains(i))
         .collect();
     let dark = folder.read_dark()?;
-    let errors = against_shots(&mut relighter, &folder, &dark, &held)?;
-    report.flood_snr_db = against_flood(&mut relighter, &folder, &dark)?;
-    report.heldout_snr_db = together(&errors).snr();
+    let errors = shot_errors(&mut relighter, &folder, &dark, &heldout)?;
+    report.flood_snr_db = flood_snr(&mut relighter, &folder, &dark)?;
+    report.heldout_snr_db = sum(&errors).snr();
     report.heldout_rgb_snr_db = errors.map(|e| e.snr());
-    report.heldout_shots = held.len();
+    report.heldout_shots = heldout.len();
     if args.json {
-        return report::print_json(&report);
+        return print_json(&report);
     }
     print(&report)
 }
 
-fn print(report: &Report) -> Result<()> {
-    let line = |name: &str, value: &str| report::print_line(&format!("{name:28} {value}"));
-    let snr = |name: &str, of: Option<Decibels>| {
-        line(name, &of.map_or("-".to_owned(), |snr| snr.to_string()))
+fn print(report: &EvaluateReport) -> Result<()> {
+    let line = |name: &str, value: &str| print_line(&format!("{name:28} {value}"));
+    let decibels = |name: &str, value: Option<Decibels>| {
+        line(name, &value.map_or("-".to_owned(), |db| db.to_string()))
     };
-    snr("SNR against the truth", report.snr_db)?;
-    let held = format!("SNR on {} held-out shots", report.heldout_shots);
-    snr(&held, report.heldout_snr_db)?;
-    snr("SNR on the flood photo", report.flood_snr_db)?;
+    decibels("SNR of the transport", report.snr_db)?;
+    let heldout = format!("SNR on {} held-out shots", report.heldout_shots);
+    decibels(&heldout, report.heldout_snr_db)?;
+    decibels("SNR on the flood photograph", report.flood_snr_db)?;
     for (name, psnr) in &report.relit {
-        snr(&format!("PSNR relit under {name}"), *psnr)?;
+        decibels(&format!("PSNR relit under {name}"), *psnr)?;
     }
-    let bytes = report::bytes;
     match report.read_bytes < report.file_bytes {
         true => line(
             "File",
             &format!(
-                "the first {} of {}: {} of {} scans whole",
-                bytes(report.read_bytes),
-                bytes(report.file_bytes),
+                "the first {} of {}: {} of {} scans complete",
+                format_bytes(report.read_bytes),
+                format_bytes(report.file_bytes),
                 report.read_scans,
                 report.scans
             ),
         ),
-        false => line("File", &bytes(report.file_bytes)),
+        false => line("File", &format_bytes(report.file_bytes)),
     }
 }
 
-/// Adds up the error over every element that either transport has for any pixel.
-fn against_truth(transport: &Transport, truth: &Truth) -> TransportError {
+/// The error over every light element in the window of either transport, for all pixels.
+fn transport_error(transport: &Transport, truth: &Truth) -> TransportError {
     let geometry = &transport.geometry;
     let window = geometry.window;
     let tiles = transport.tiles.par_iter().map(|tile| {
@@ -144,18 +146,18 @@ fn against_truth(transport: &Transport, truth: &Truth) -> TransportError {
         let functions = functions.chunks_exact(window.area());
         for (pixel, function) in tile.rect().pixels().zip(functions) {
             let n = geometry.camera.index(pixel);
-            let (ours, theirs) = (geometry.window_origin(pixel), truth.window_origin(n));
-            let tau = truth.tau(n);
-            for (s, tau) in tau.iter().enumerate() {
-                let here = window.slot(ours, truth.window().element(theirs, s));
-                let estimate = here.map_or([0.0; CHANNELS], |s| function[s]);
+            let origin = geometry.window_origin(pixel);
+            let (true_origin, true_window) = (truth.window_origin(n), truth.window());
+            for (s, tau) in truth.tau(n).iter().enumerate() {
+                let slot = window.slot(origin, true_window.element(true_origin, s));
+                let estimate = slot.map_or([0.0; CHANNELS], |s| function[s]);
                 for c in 0..CHANNELS {
                     sum.add(tau[c].to_f64(), f64::from(estimate[c]));
                 }
             }
             for s in 0..window.area() {
-                let element = window.element(ours, s);
-                if truth.window().slot(theirs, element).is_none() {
+                let element = window.element(origin, s);
+                if true_window.slot(true_origin, element).is_none() {
                     for estimate in function[s] {
                         sum.add(0.0, f64::from(estimate));
                     }
@@ -170,23 +172,23 @@ fn against_truth(transport: &Transport, truth: &Truth) -> TransportError {
     })
 }
 
-/// 10 log10(1 / mean squared error) over all pixels and channels.
+/// PSNR 10 log10(1 / mean squared error) over all pixels and channels.
 fn relit_psnr(
     relighter: &mut CpuRelighter,
     light: &Light,
     truth: &[[f64; CHANNELS]],
 ) -> Option<Decibels> {
     relighter.relight(light, &AllCores);
-    let ours = relighter.linear();
-    let squares = ours.pixels.iter().zip(truth).flat_map(|(ours, truth)| {
-        (0..CHANNELS).map(move |c| (f64::from(ours[c]) - truth[c]).powi(2))
+    let picture = relighter.linear();
+    let squares = picture.pixels.iter().zip(truth).flat_map(|(pixel, truth)| {
+        (0..CHANNELS).map(move |c| (f64::from(pixel[c]) - truth[c]).powi(2))
     });
     let mse = squares.sum::<f64>() / (truth.len() * CHANNELS) as f64;
     (mse > 0.0).then(|| Decibels(-10.0 * mse.log10()))
 }
 
-/// Error of predicted against photographed pictures, by channel.
-fn against_shots(
+/// Error of the predicted pictures of `shots`, by channel.
+fn shot_errors(
     relighter: &mut CpuRelighter,
     folder: &CaptureFolder,
     dark: &DarkFrame,
@@ -195,55 +197,56 @@ fn against_shots(
     let mut errors = [TransportError::default(); CHANNELS];
     for &i in shots {
         let light = pattern_light(&relighter.transport().geometry, &folder.read_pattern(i)?)?;
-        add_photo(&mut errors, relighter, &light, folder.shot(i, dark)?)?;
+        add_error(&mut errors, relighter, &light, folder.open_shot(i, dark)?)?;
     }
     Ok(errors)
 }
 
-/// SNR of the predicted against the flood photograph, if there is one.
-fn against_flood(
+/// SNR of the predicted flood photograph, if there is one.
+fn flood_snr(
     relighter: &mut CpuRelighter,
     folder: &CaptureFolder,
     dark: &DarkFrame,
 ) -> Result<Option<Decibels>> {
-    let Some(photo) = folder.flood(dark)? else {
+    let Some(photo) = folder.open_flood(dark)? else {
         return Ok(None);
     };
     let light = BuiltinLight::Flood.render(relighter.transport().geometry.light);
     let mut errors = [TransportError::default(); CHANNELS];
-    add_photo(&mut errors, relighter, &light, photo)?;
-    Ok(together(&errors).snr())
+    add_error(&mut errors, relighter, &light, photo)?;
+    Ok(sum(&errors).snr())
 }
 
 /// The error over all channels.
-fn together(errors: &[TransportError; CHANNELS]) -> TransportError {
+fn sum(errors: &[TransportError; CHANNELS]) -> TransportError {
     let mut all = TransportError::default();
     errors.iter().for_each(|&e| all.merge(e));
     all
 }
 
-/// Adds what is predicted under `light` against what was photographed, saturated samples left out.
-fn add_photo(
+/// Adds the error of the picture predicted under `light`, without saturated samples.
+fn add_error(
     errors: &mut [TransportError; CHANNELS],
     relighter: &mut CpuRelighter,
     light: &Light,
-    mut photo: Photo,
+    mut reader: PhotoReader,
 ) -> Result<()> {
     relighter.relight(light, &AllCores);
-    let ours = relighter.linear();
-    let mut picture = Picture::new();
-    photo.read(&Rows::all(ours.extent.height), &mut picture)?;
-    photo.finish()?;
-    for (ours, seen) in ours.pixels.iter().zip(&picture) {
+    let picture = relighter.linear();
+    let mut photo = LinearPhoto::new();
+    reader.read(&RowSet::all(picture.extent.height), &mut photo)?;
+    reader.finish()?;
+    for (predicted, measured) in picture.pixels.iter().zip(&photo) {
         for c in 0..CHANNELS {
-            if seen[c].is_finite() {
-                errors[c].add(f64::from(seen[c]), f64::from(ours[c]));
+            if measured[c].is_finite() {
+                errors[c].add(f64::from(measured[c]), f64::from(predicted[c]));
             }
         }
     }
     Ok(())
 }
 
+/// A pattern as a light.
 fn pattern_light(geometry: &Geometry, pattern: &Pattern) -> Result<Light> {
     let values: Vec<f32> = (0..geometry.light.area())
         .flat_map(|m| [0, 1, 2].map(|c| pattern.plane(c)[m]))

@@ -1,4 +1,4 @@
-//! `ltm-export inspect`: what is in an `.ltm` file.
+//! `ltm-export inspect`: the file index of an `.ltm` file.
 
 use std::cmp::Ordering;
 use std::ops::Range;
@@ -8,14 +8,15 @@ use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 
-use super::{files, report};
+use super::ltm_file::open_ltm;
+use super::report::{format_bytes, format_shots, print_json, print_line};
 use crate::format::{Coding, Head, Metadata, PartNumber};
 use crate::transport::Decibels;
 
-/// Show what is in a relightable photograph; only its head is read
+/// Show what is in a relightable photograph; reads only its file index
 #[derive(Debug, Args)]
 pub struct InspectArgs {
-    /// File to look at
+    /// File to inspect
     #[arg(value_name = "FILE.ltm")]
     file: PathBuf,
     /// Print one JSON object on standard output
@@ -24,18 +25,19 @@ pub struct InspectArgs {
 }
 
 #[derive(Serialize)]
-struct Report {
+struct InspectReport {
     camera: [u32; 2],
     light: [u32; 2],
     window: u32,
     correspondence: [[f64; 3]; 2],
     tile_side: u32,
     tiles: usize,
-    /// By what the scans hold of them. A tile may be both direct and factored.
+    /// Tiles without any chunk.
     dark_tiles: usize,
+    /// Tiles with direct chunks; they may be factored as well.
     direct_tiles: usize,
     factored_tiles: usize,
-    /// Functions that factored tiles are combined from; none if there are no such tiles.
+    /// Number of basis functions; none without factored tiles.
     rank: Option<u16>,
     /// Bytes before the first scan.
     head_bytes: u64,
@@ -45,18 +47,18 @@ struct Report {
     metadata: Metadata,
 }
 
-/// One scan, and what the file's beginning up to its end gives.
+/// One scan, and the prefix of the file up to its end.
 #[derive(Serialize)]
 struct ScanReport {
     coding: &'static str,
-    /// Components, or slots of the window from the middle outwards.
+    /// Range of components, or of centre-out slot indices.
     items: Range<u16>,
     step: f32,
     basis_bytes: u32,
     bytes: u64,
-    /// Bytes of the file up to the scan's end.
+    /// Length of the prefix.
     prefix_bytes: u64,
-    /// SNR of the file up to the scan's end against what was recovered.
+    /// SNR of the prefix relative to the recovered transport.
     prefix_snr_db: Decibels,
 }
 
@@ -82,53 +84,55 @@ impl ScanReport {
 
     fn print(&self) -> Result<()> {
         let Range { start, end } = self.items;
-        report::print_line(&format!(
+        print_line(&format!(
             "{:15} {:13} {start:4} to {end:4} {:>12} {:>12} {:>17}",
             "  scan",
             self.coding,
-            report::bytes(self.bytes),
-            report::bytes(self.prefix_bytes),
+            format_bytes(self.bytes),
+            format_bytes(self.prefix_bytes),
             self.prefix_snr_db.to_string(),
         ))
     }
 }
 
 pub fn run(args: &InspectArgs) -> Result<()> {
-    let (file, head) = files::open_ltm(&args.file)?;
+    let (file, head) = open_ltm(&args.file)?;
     let declared = head.header.file_bytes;
     let length = file.metadata().map_or(declared, |file| file.len());
     let name = args.file.display();
     match length.cmp(&declared) {
         Ordering::Less => eprintln!(
-            "warning: {name}: is cut short, at {length} of {declared} bytes; copy or download it again"
+            "warning: {name}: is cut short after {length} of {declared} bytes; copy or download it again"
         ),
         Ordering::Equal => {}
         Ordering::Greater => eprintln!(
-            "warning: {name}: has {length} bytes, and the photograph ends after {declared}; the rest \
-             is not of it"
+            "warning: {name}: has {length} bytes, but the photograph ends after {declared}; the rest is \
+             ignored"
         ),
     }
     let geometry = &head.header.geometry;
     let chunks: Vec<PartNumber> = head.parts().filter(|part| part.tile.is_some()).collect();
-    // Whether scans hold anything of a tile: as coefficients, as functions.
-    let mut held = vec![[false; 2]; head.tiles()];
+    // Whether a tile has factored chunks, and direct chunks.
+    let mut has_chunks = vec![[false; 2]; head.tiles()];
     for part in &chunks {
         if let Some(tile) = part.tile {
-            held[tile][usize::from(head.scans[part.scan].coding.is_direct())] = true;
+            has_chunks[tile][usize::from(head.scans[part.scan].coding.is_direct())] = true;
         }
     }
-    let tiles_of = |of: fn(&[bool; 2]) -> bool| held.iter().filter(|tile| of(tile)).count();
+    let count = |is_counted: fn(&[bool; 2]) -> bool| {
+        has_chunks.iter().filter(|tile| is_counted(tile)).count()
+    };
     let sizes = chunks.iter().map(|part| head.range(*part));
-    let report = Report {
+    let report = InspectReport {
         camera: [geometry.camera.width, geometry.camera.height],
         light: [geometry.light.width, geometry.light.height],
         window: geometry.window.side(),
         correspondence: geometry.correspondence.affine,
         tile_side: geometry.tile_side,
         tiles: head.tiles(),
-        dark_tiles: tiles_of(|tile| *tile == [false; 2]),
-        direct_tiles: tiles_of(|tile| tile[1]),
-        factored_tiles: tiles_of(|tile| tile[0]),
+        dark_tiles: count(|tile| *tile == [false; 2]),
+        direct_tiles: count(|tile| tile[1]),
+        factored_tiles: count(|tile| tile[0]),
         rank: Some(head.header.rank).filter(|&rank| rank > 0),
         head_bytes: head.header.head_bytes(),
         largest_chunk_bytes: sizes.map(|r| (r.end - r.start) as u32).max().unwrap_or(0),
@@ -139,12 +143,12 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         metadata: head.metadata.read()?,
     };
     if args.json {
-        return report::print_json(&report);
+        return print_json(&report);
     }
     print(&report)
 }
 
-fn print(report: &Report) -> Result<()> {
+fn print(report: &InspectReport) -> Result<()> {
     let [a, b] = report.correspondence;
     let [camera, light] = [report.camera, report.light].map(|[w, h]| format!("{w}x{h}"));
     let metadata = &report.metadata;
@@ -171,35 +175,35 @@ fn print(report: &Report) -> Result<()> {
             "rank",
             report.rank.map_or(String::new(), |rank| rank.to_string()),
         ),
-        ("recovered", recovered(metadata)),
+        ("recovered", format_recovery(metadata)),
         ("written by", metadata.writer.clone()),
-        ("head", report::bytes(report.head_bytes)),
+        ("file index", format_bytes(report.head_bytes)),
     ] {
         if !value.is_empty() {
-            report::print_line(&format!("{name:15} {value}"))?;
+            print_line(&format!("{name:15} {value}"))?;
         }
     }
     if !report.scans.is_empty() {
-        report::print_line(&format!(
+        print_line(&format!(
             "{:15} {:13} {:12} {:>12} {:>12} {:>17}",
             "scans", "", "items", "bytes", "file to here", "SNR to recovered"
         ))?;
     }
     report.scans.iter().try_for_each(ScanReport::print)?;
-    report::print_line(&format!(
+    print_line(&format!(
         "{:15} {}",
         "file",
-        report::bytes(report.file_bytes)
+        format_bytes(report.file_bytes)
     ))
 }
 
-/// How the file came to be, in words.
-fn recovered(metadata: &Metadata) -> String {
+/// For instance "learned from 54 patterns".
+fn format_recovery(metadata: &Metadata) -> String {
     let photographs = metadata.shots_used.len();
     let patterns = match metadata.capture.patterns {
         0 => photographs,
         patterns => patterns,
     };
-    let shots = report::shots(patterns, photographs);
+    let shots = format_shots(patterns, photographs);
     format!("{} from {shots}", metadata.method)
 }

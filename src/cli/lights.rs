@@ -1,4 +1,4 @@
-//! Lights from names and image files.
+//! The argument `--light`: a built-in light or an image file.
 
 use std::path::Path;
 
@@ -8,8 +8,9 @@ use image::ImageReader;
 use crate::relight::{BuiltinLight, Light, area_resample, srgb};
 use crate::transport::Extent;
 
-/// The light that `--light` asks for: a built-in one by name, else an image file, taken as sRGB.
-pub fn named(light: &str, plane: Extent) -> Result<Light> {
+/// The built-in light of this name, or the image file at this path, decoded as sRGB and resampled to the light
+/// plane.
+pub fn load(light: &str, plane: Extent) -> Result<Light> {
     if let Some(builtin) = BuiltinLight::from_name(light) {
         return Ok(builtin.render(plane));
     }
@@ -22,7 +23,7 @@ pub fn named(light: &str, plane: Extent) -> Result<Light> {
         .and_then(ImageReader::with_guessed_format)
         .map_err(anyhow::Error::from)
         .and_then(|reader| Ok(reader.decode()?))
-        .with_context(|| format!("--light {light}: is not a readable picture"))?
+        .with_context(|| format!("--light {light}: is not a readable image"))?
         .into_rgb32f();
     let extent = Extent {
         width: picture.width(),

@@ -1,30 +1,31 @@
-//! The command line: subcommands over the library, with the files, threads and terminal that the
-//! library does not know of.
+//! The command line: one module for each subcommand of `ltm-export`, over the library.
+//!
+//! Files, threads, signals and the terminal are handled here. Errors of the library name the file and the
+//! field; [`advice`] adds the remedy.
 
-mod checkpoint;
-mod encode;
+mod advice;
+mod arguments;
 mod evaluate;
-mod files;
 mod inspect;
 mod lights;
-mod memory;
-mod new_folder;
-mod photographs;
+mod ltm_file;
+mod output_file;
+mod output_folder;
 mod process;
+mod progress;
 mod recover;
-mod recovery_remedy;
 mod relight;
 mod report;
+mod shot_reader;
 mod simulate;
 mod study;
-mod tile_record;
 mod verify;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-/// Photographs of an object under many lights in, one small file that relights it out.
+/// Recover, inspect and relight photographs of an object under many lights
 #[derive(Debug, Parser)]
 #[command(name = "ltm-export", version, propagate_version = true)]
 struct Cli {
@@ -43,7 +44,8 @@ enum Command {
     Study(study::StudyArgs),
 }
 
-/// Parses the command line and runs it. Status: 0 done, 1 failed, 2 wrong usage, 130 told to stop.
+/// Parses the command line and runs it. The exit status is 0 on success, 1 on failure, 2 for a wrong
+/// command line, 130 after an interruption.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Simulate(args) => simulate::run(&args),
@@ -54,32 +56,16 @@ pub fn main() -> ExitCode {
         Command::Verify(args) => verify::run(&args),
         Command::Study(args) => study::run(&args),
     };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) if error.is::<process::Interrupted>() => {
-            eprintln!("{error:#}");
-            ExitCode::from(process::INTERRUPTED)
-        }
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            if error.is::<Usage>() {
-                ExitCode::from(2)
-            } else {
-                ExitCode::FAILURE
-            }
-        }
+    let Err(error) = result else {
+        return ExitCode::SUCCESS;
+    };
+    if error.is::<process::Interrupted>() {
+        eprintln!("{error:#}");
+        return ExitCode::from(process::INTERRUPTED_STATUS);
     }
-}
-
-/// Options that each are fine, but not together.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-struct Usage(&'static str);
-
-/// Parses a number from `least` to `most`.
-fn number_in(text: &str, least: f32, most: f32) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(number) if (least..=most).contains(&number) => Ok(number),
-        _ => Err(format!("it must be a number from {least} to {most}")),
+    eprintln!("error: {}", advice::error_with_remedy(&error));
+    match error.is::<arguments::UsageError>() {
+        true => ExitCode::from(2),
+        false => ExitCode::FAILURE,
     }
 }

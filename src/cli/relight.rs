@@ -1,4 +1,4 @@
-//! `ltm-export relight`: a picture of the object under a light.
+//! `ltm-export relight`: a picture of the object under a light, as a PNG.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -7,8 +7,11 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
+use super::arguments::{UsageError, parse_number};
+use super::lights;
+use super::ltm_file::{PrefixLength, read_ltm};
+use super::output_file::{OutputFile, OutputFormat};
 use super::process::AllCores;
-use super::{Usage, files, lights};
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{Light, OutputTransform, TorchPose, reference};
 
@@ -21,32 +24,33 @@ pub struct RelightArgs {
     /// flood, torch, checkerboard, stripes, spectrum, fire, or an image file
     #[arg(long, value_name = "NAME|IMAGE")]
     light: String,
-    /// Where a torch shines, as fractions of the picture from its top left corner [default: over
-    /// the middle of the light]
+    /// Position of the torch, as fractions of the picture from its top left corner [default: over the
+    /// middle of the light plane]
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = parse_position)]
     at: Option<[f64; 2]>,
-    /// The moment at which a fire is shown, in seconds [default: 0]
+    /// Time at which the fire is shown, in seconds [default: 0]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_seconds)]
     time: Option<f64>,
-    /// Factor on the picture's brightness
-    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| super::number_in(text, 0.0, 1e6))]
+    /// Brightness factor
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| parse_number(text, 0.0, 1e6))]
     exposure: f32,
-    /// Only the file's first so many bytes, or hundredths, as a visitor sees it while it loads: 20K, 10%
-    #[arg(long, value_name = "BYTES|PERCENT", value_parser = files::Share::parse)]
-    first: Option<files::Share>,
-    /// What computes the picture
-    #[arg(long, value_enum, default_value_t = Backend::Cpu)]
-    backend: Backend,
+    /// Use only the first part of the file, as a page does while it loads: 20K, 10%
+    #[arg(long, value_name = "BYTES|PERCENT", value_parser = PrefixLength::parse)]
+    first: Option<PrefixLength>,
+    /// Implementation that computes the picture
+    #[arg(long, value_enum, default_value_t = BackendName::Cpu)]
+    backend: BackendName,
     /// PNG to write
     #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
 }
 
+/// Values of `--backend`.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Backend {
-    /// The fast path, in single precision
+enum BackendName {
+    /// Single precision, fast
     Cpu,
-    /// Double precision, term by term: what the others are tested against
+    /// Double precision, by the definition; slow
     Reference,
 }
 
@@ -71,17 +75,17 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 
 pub fn run(args: &RelightArgs) -> Result<()> {
     if args.at.is_some() && args.light != "torch" {
-        return Err(Usage("--at goes with --light torch").into());
+        return Err(UsageError("--at goes with --light torch").into());
     }
     if args.time.is_some() && args.light != "fire" {
-        return Err(Usage("--time goes with --light fire").into());
+        return Err(UsageError("--time goes with --light fire").into());
     }
-    let output = files::Output::create(&args.output, files::Kind::Png)?;
-    let file = files::read_ltm(&args.file, args.first)?;
+    let output = OutputFile::create(&args.output, OutputFormat::Png)?;
+    let file = read_ltm(&args.file, args.first)?;
     if args.first.is_some() {
         let scans = file.head.scans.len();
         eprintln!(
-            "note: {} of {scans} scans are whole in these {} bytes",
+            "note: {} of {scans} scans are complete in these {} bytes",
             file.scans, file.bytes
         );
     }
@@ -89,16 +93,16 @@ pub fn run(args: &RelightArgs) -> Result<()> {
     let light = match (args.at, args.time) {
         (Some([x, y]), _) => Light::torch(geometry.light, TorchPose::behind(geometry, x, y)),
         (None, Some(seconds)) => Light::fire(geometry.light, seconds),
-        (None, None) => lights::named(&args.light, geometry.light)?,
+        (None, None) => lights::load(&args.light, geometry.light)?,
     };
     let transform = OutputTransform::srgb(args.exposure);
     let picture = match args.backend {
-        Backend::Cpu => {
+        BackendName::Cpu => {
             let mut relighter = CpuRelighter::new(Arc::new(file.transport));
             relighter.relight(&light, &AllCores);
             relighter.picture(&transform, &AllCores)
         }
-        Backend::Reference => reference::picture(&file.transport, &light, &transform),
+        BackendName::Reference => reference::picture(&file.transport, &light, &transform),
     };
     let rgb: Vec<u8> = picture
         .pixels

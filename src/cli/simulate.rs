@@ -1,7 +1,8 @@
-//! `ltm-export simulate`: a built-in scene, photographed into a capture folder.
+//! `ltm-export simulate`: photographs a built-in scene into a capture folder with its known transport.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -12,7 +13,8 @@ use image::{ExtendedColorType, ImageEncoder};
 use npyz::WriterBuilder;
 use rayon::prelude::*;
 
-use super::{new_folder, process};
+use super::report::format_bytes;
+use super::{output_folder, progress};
 use crate::capture::{
     AffineSpec, CameraSpec, GrayCodeShot, LightSpec, MANIFEST_NAME, Manifest, RELIT_FULL_SCALE,
     Shot,
@@ -23,19 +25,20 @@ use crate::simulate::{
 };
 use crate::transport::{CHANNELS, Extent, TileRect, TransportFunctions};
 
-/// Camera pixel rows whose transport is in memory at once, per thread.
-const STRIP: u32 = 4;
-/// Sides below which there is no picture, and above which no simulation is worth its time.
-const CAMERA_SIDES: [u32; 2] = [8, 1024];
-const LIGHT_SIDES: [u32; 2] = [4, 512];
-/// Files are numbered with four digits.
-const MOST_PATTERNS: i64 = 10_000;
-/// All photographs are exposed while the transport passes by, so all are in memory.
-const MOST_PICTURE_BYTES: usize = 3 << 30;
-/// Beyond, shot noise is long below a code and Poisson sampling only loses precision.
-const MOST_ELECTRONS: u64 = 1_000_000_000_000;
+/// Camera rows whose transport is computed as one job.
+const STRIP_ROWS: u32 = 4;
+/// Range of the sides of the camera grid.
+const CAMERA_SIDES: RangeInclusive<u32> = 8..=1024;
+/// Range of the sides of the light plane.
+const LIGHT_SIDES: RangeInclusive<u32> = 4..=512;
+/// File names have four digits.
+const MAX_PATTERNS: i64 = 10_000;
+/// All pictures are in memory, as each strip of transport is computed once and exposes all of them.
+const MAX_PICTURE_BYTES: usize = 3 << 30;
+/// With more electrons photon noise is far below a code, and Poisson sampling loses precision.
+const MAX_ELECTRONS: u64 = 1_000_000_000_000;
 
-/// Photograph a built-in scene whose transport is known into a capture folder
+/// Photograph a built-in scene with known transport into a capture folder
 #[derive(Debug, Args)]
 pub struct SimulateArgs {
     /// Scene
@@ -45,24 +48,24 @@ pub struct SimulateArgs {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Camera pixels
-    #[arg(long, value_name = "WxH", default_value = "128x128", value_parser = extent::<0>)]
+    #[arg(long, value_name = "WxH", default_value = "128x128", value_parser = |text: &str| parse_extent(text, CAMERA_SIDES))]
     camera: Extent,
     /// Light elements
-    #[arg(long, value_name = "WxH", default_value = "64x64", value_parser = extent::<1>)]
+    #[arg(long, value_name = "WxH", default_value = "64x64", value_parser = |text: &str| parse_extent(text, LIGHT_SIDES))]
     light: Extent,
-    /// Patterns to photograph
+    /// Number of patterns
     #[arg(long, value_name = "N", default_value_t = 80,
-          value_parser = clap::value_parser!(u32).range(1..=MOST_PATTERNS))]
+          value_parser = clap::value_parser!(u32).range(1..=MAX_PATTERNS))]
     patterns: u32,
-    /// Kind of patterns [default: gaussian for stained-glass, bernoulli for cookies]
+    /// Distribution of the patterns [default: gaussian for stained-glass, bernoulli for cookies]
     #[arg(long, value_enum)]
     ensemble: Option<EnsembleName>,
-    /// Seed of patterns and noise: the same seed writes the same bytes
+    /// Seed of patterns and noise; the same seed writes the same bytes
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Electrons at full scale; fewer are noisier
+    /// Electrons at full scale; fewer mean more noise
     #[arg(long, value_name = "N", default_value_t = 40_000,
-          value_parser = clap::value_parser!(u64).range(1..=MOST_ELECTRONS))]
+          value_parser = clap::value_parser!(u64).range(1..=MAX_ELECTRONS))]
     electrons: u64,
 }
 
@@ -82,12 +85,14 @@ enum EnsembleName {
     Bernoulli,
 }
 
-/// Parses `WxH`; `KIND` 0 is a camera, 1 a light.
-fn extent<const KIND: usize>(text: &str) -> Result<Extent, String> {
-    let [least, most] = [CAMERA_SIDES, LIGHT_SIDES][KIND];
+/// Parses `WxH` with both sides in the range `sides`.
+fn parse_extent(text: &str, sides: RangeInclusive<u32>) -> Result<Extent, String> {
     let side = |s: &str| {
-        let side = s.parse().ok().filter(|n| (least..=most).contains(n));
-        side.ok_or_else(|| format!("each side must lie between {least} and {most}"))
+        let side = s.parse().ok().filter(|n| sides.contains(n));
+        side.ok_or_else(|| {
+            let (min, max) = (sides.start(), sides.end());
+            format!("each side must be between {min} and {max}")
+        })
     };
     let (width, height) = text
         .split_once('x')
@@ -99,16 +104,16 @@ fn extent<const KIND: usize>(text: &str) -> Result<Extent, String> {
 }
 
 pub fn run(args: &SimulateArgs) -> Result<()> {
-    let plan = Plan::new(args)?;
+    let plan = CapturePlan::new(args)?;
     let bytes = plan.lights.len() * args.camera.area() * size_of::<[f32; CHANNELS]>();
     ensure!(
-        bytes <= MOST_PICTURE_BYTES,
-        "{} photographs of {} would need {} of memory: use a smaller --camera or fewer --patterns",
+        bytes <= MAX_PICTURE_BYTES,
+        "{} photographs of {} need {} of memory; use a smaller --camera or fewer --patterns",
         plan.lights.len(),
         args.camera,
-        indicatif::DecimalBytes(bytes as u64),
+        format_bytes(bytes as u64),
     );
-    new_folder::write_folder_whole(&args.output, |root| write(&plan, root))?;
+    output_folder::write_atomically(&args.output, |root| write(&plan, root))?;
     eprintln!(
         "{}: {} shots of {}, camera {}, light {}",
         args.output.display(),
@@ -122,26 +127,27 @@ pub fn run(args: &SimulateArgs) -> Result<()> {
     Ok(())
 }
 
-/// What is photographed under a light, and where it goes.
+/// What to write of the object under one light.
 enum Purpose {
-    /// A photograph with noise, at this path.
+    /// A photograph with noise, to this path.
     Photograph(String),
     /// The true picture under a truth light.
     Truth(TruthLight),
 }
 
-/// A whole capture, decided on but not yet computed.
-struct Plan {
+/// Everything to photograph.
+struct CapturePlan {
     scene: Box<dyn SimulatedScene>,
     camera: Camera,
     seed: u64,
     manifest: Manifest,
-    /// Every light, in step with `purposes`; patterns are the photographs' from `shots_from` on.
+    /// All lights.
     lights: Vec<LightCodes>,
+    /// For each light, what to write.
     purposes: Vec<Purpose>,
 }
 
-impl Plan {
+impl CapturePlan {
     fn new(args: &SimulateArgs) -> Result<Self> {
         let kind = match args.scene {
             SceneName::StainedGlass => SceneKind::StainedGlass,
@@ -196,7 +202,7 @@ impl Plan {
             let mut stream = RandomStream::Pattern(i).start(args.seed);
             let (pattern, photo) = (format!("patterns/{i:04}.png"), format!("photos/{i:04}.png"));
             let codes = ensemble.draw(args.light, &mut stream)?;
-            plan.photograph(codes, photo.clone());
+            plan.add_photograph(codes, photo.clone());
             plan.manifest.shots.push(Shot {
                 pattern,
                 photo,
@@ -210,18 +216,18 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Dark, flood and Gray code. They come first, so that their noise and that of the first
-    /// shots does not depend on how many shots there are.
+    /// Adds dark, flood and Gray code. They come first, so that the noise of a shot does not depend on the
+    /// number of shots.
     fn add_calibration(&mut self, light: Extent) {
-        self.photograph(LightCodes::uniform(light, 0), "photos/dark.png".to_owned());
-        self.photograph(
+        self.add_photograph(LightCodes::uniform(light, 0), "photos/dark.png".to_owned());
+        self.add_photograph(
             LightCodes::uniform(light, 255),
             "photos/flood.png".to_owned(),
         );
         for code in GrayCodePattern::all(light) {
             let sign = if code.inverted { 'n' } else { 'p' };
             let photo = format!("graycode/{}{}{sign}.png", code.axis(), code.bit);
-            self.photograph(code.codes(light), photo.clone());
+            self.add_photograph(code.codes(light), photo.clone());
             self.manifest.graycode.push(GrayCodeShot {
                 photo,
                 axis: code.axis().to_owned(),
@@ -231,14 +237,14 @@ impl Plan {
         }
     }
 
-    fn photograph(&mut self, codes: LightCodes, path: String) {
+    fn add_photograph(&mut self, codes: LightCodes, path: String) {
         self.lights.push(codes);
         self.purposes.push(Purpose::Photograph(path));
     }
 }
 
 /// Computes everything and writes it into the folder `root`.
-fn write(plan: &Plan, root: &Path) -> Result<()> {
+fn write(plan: &CapturePlan, root: &Path) -> Result<()> {
     for folder in ["patterns", "photos", "graycode", "truth"] {
         std::fs::create_dir(root.join(folder)).context(folder)?;
     }
@@ -254,13 +260,13 @@ fn write(plan: &Plan, root: &Path) -> Result<()> {
             Purpose::Truth(_) => None,
         });
     for shot in &plan.manifest.shots {
-        let mut of_shot = shot_lights.clone().filter(|(_, path)| **path == shot.photo);
-        if let Some((codes, _)) = of_shot.next() {
+        let mut lights = shot_lights.clone();
+        if let Some((codes, _)) = lights.find(|(_, path)| **path == shot.photo) {
             write_codes(&root.join(&shot.pattern), light, codes)?;
         }
     }
     let pictures = write_transport(plan, &root.join("truth"))?;
-    let bar = process::progress("photographing", pictures.len());
+    let bar = progress::bar("photographing", pictures.len());
     plan.purposes
         .par_iter()
         .zip(&pictures)
@@ -289,26 +295,27 @@ fn write(plan: &Plan, root: &Path) -> Result<()> {
 }
 
 /// Writes `tau.npy` and `uv.npy`, and returns the picture under each of the plan's lights.
-fn write_transport(plan: &Plan, truth: &Path) -> Result<Vec<Vec<[f32; CHANNELS]>>> {
+fn write_transport(plan: &CapturePlan, truth: &Path) -> Result<Vec<Vec<[f32; CHANNELS]>>> {
     let geometry = plan.scene.geometry();
     let (camera, side) = (geometry.camera, u64::from(geometry.window.side()));
     let emissions = EmissionMatrix::new(geometry.light, &plan.lights);
     let mut pictures = vec![Vec::with_capacity(camera.area()); plan.lights.len()];
     let n = camera.area() as u64;
-    let mut tau_file = npy::<f16>(&truth.join("tau.npy"), &[n, side, side, CHANNELS as u64])?;
+    let mut tau_file =
+        create_npy::<f16>(&truth.join("tau.npy"), &[n, side, side, CHANNELS as u64])?;
     let strips: Vec<_> = (0..camera.height)
-        .step_by(STRIP as usize)
+        .step_by(STRIP_ROWS as usize)
         .map(|y| TileRect {
             x: 0,
             y,
             extent: Extent {
                 width: camera.width,
-                height: STRIP.min(camera.height - y),
+                height: STRIP_ROWS.min(camera.height - y),
             },
         })
         .collect();
-    let bar = process::progress("computing transport", strips.len());
-    // A few strips for each thread at a time bounds memory; all are written in order.
+    let bar = progress::bar("computing transport", strips.len());
+    // A few strips for each thread bound the memory; they are written in order.
     for strips in strips.chunks(2 * rayon::current_num_threads()) {
         let computed: Vec<_> = strips
             .par_iter()
@@ -318,11 +325,11 @@ fn write_transport(plan: &Plan, truth: &Path) -> Result<Vec<Vec<[f32; CHANNELS]>
                 (rounded, emissions.pictures(geometry, &functions))
             })
             .collect();
-        for (tau, seen) in computed {
+        for (tau, exposed) in computed {
             tau_file
                 .write_all(&tau)
                 .context("truth/tau.npy cannot be written")?;
-            for (picture, strip) in pictures.iter_mut().zip(seen) {
+            for (picture, strip) in pictures.iter_mut().zip(exposed) {
                 picture.extend(strip);
             }
             bar.inc(1);
@@ -332,7 +339,7 @@ fn write_transport(plan: &Plan, truth: &Path) -> Result<Vec<Vec<[f32; CHANNELS]>
         .flush()
         .context("truth/tau.npy cannot be written")?;
     bar.finish_and_clear();
-    let mut uv_file = npy::<f32>(&truth.join("uv.npy"), &[n, 2])?;
+    let mut uv_file = create_npy::<f32>(&truth.join("uv.npy"), &[n, 2])?;
     let whole = TileRect {
         x: 0,
         y: 0,
@@ -348,8 +355,8 @@ fn write_transport(plan: &Plan, truth: &Path) -> Result<Vec<Vec<[f32; CHANNELS]>
     Ok(pictures)
 }
 
-/// Rounds τ to what `tau.npy` can hold, so that the file is the truth about the pictures to the
-/// bit, and returns its bytes.
+/// Rounds τ to float16, the precision of `tau.npy`, so that the pictures follow exactly from the file. Returns
+/// its bytes.
 fn round_to_f16(functions: &mut TransportFunctions) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(functions.tau.len() * CHANNELS * size_of::<f16>());
     for value in functions.tau.iter_mut().flatten() {
@@ -360,8 +367,8 @@ fn round_to_f16(functions: &mut TransportFunctions) -> Vec<u8> {
     bytes
 }
 
-/// Starts a little-endian NumPy file; the values are to follow.
-fn npy<T: npyz::AutoSerialize>(path: &Path, shape: &[u64]) -> Result<BufWriter<File>> {
+/// Creates a little-endian NumPy file and writes its header.
+fn create_npy<T: npyz::AutoSerialize>(path: &Path, shape: &[u64]) -> Result<BufWriter<File>> {
     let start = || -> Result<BufWriter<File>> {
         let mut file = BufWriter::with_capacity(1 << 20, File::create(path)?);
         npyz::WriteOptions::new_header_only()
@@ -375,7 +382,7 @@ fn npy<T: npyz::AutoSerialize>(path: &Path, shape: &[u64]) -> Result<BufWriter<F
 }
 
 fn write_rgb16(path: &Path, extent: Extent, codes: &[[u16; CHANNELS]]) -> Result<()> {
-    // The encoder takes native-endian samples.
+    // The encoder expects native-endian samples.
     write_png(
         path,
         extent,
@@ -396,7 +403,7 @@ fn write_codes(path: &Path, extent: Extent, codes: &LightCodes) -> Result<()> {
 fn write_png(path: &Path, extent: Extent, bytes: &[u8], kind: ExtendedColorType) -> Result<()> {
     let write = || -> Result<()> {
         let mut file = BufWriter::new(File::create(path)?);
-        // Photographs are mostly noise: compressing harder takes long and gains little.
+        // Photographs are mostly noise, which no level compresses well.
         PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Sub)
             .write_image(bytes, extent.width, extent.height, kind)?;
         Ok(file.flush()?)

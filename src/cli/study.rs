@@ -1,4 +1,4 @@
-//! `ltm-export study`: how well recovery does where the transport is known.
+//! `ltm-export study`: the accuracy of recovery on scenes and captures with known transport.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -6,10 +6,10 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 
-use super::photographs::Photographs;
-use super::process::{self, AllCores};
-use super::{new_folder, recover};
-use crate::capture::{CaptureFolder, Measurements, Noise, Rows};
+use super::process::AllCores;
+use super::shot_reader::{ShotReader, read_patterns};
+use super::{output_folder, progress};
+use crate::capture::{CaptureFolder, Measurements, NoiseModel, RowSet};
 use crate::relight::Light;
 use crate::simulate::{SceneKind, WINDOW_SIDE};
 use crate::study::{
@@ -17,7 +17,7 @@ use crate::study::{
 };
 use crate::transport::Extent;
 
-/// What is studied unless captures or parts are named.
+/// The built-in parts of the study.
 const PARTS: [&str; 4] = ["stained-glass", "cookies", "comparison", "scenes"];
 /// The paper's scale for glass: N = 262,144 and M = 65,536.
 const PAPER_CAMERA: u32 = 512;
@@ -25,10 +25,10 @@ const PAPER_LIGHT: u32 = 256;
 /// Scale of the comparison.
 const COMPARISON_CAMERA: u32 = 64;
 const COMPARISON_LIGHT: u32 = 32;
-/// Patterns that pictures are relit from: the paper's number.
+/// Number of patterns for relit pictures, as in the paper.
 const RELIT_PATTERNS: usize = 80;
-/// Camera pixels that slow methods are judged on unless it is said.
-const PIXELS: usize = 8192;
+/// Default number of camera pixels on which slow methods are evaluated.
+const DEFAULT_PIXELS: usize = 8192;
 const ELECTRONS: f64 = 40_000.0;
 const SEED: u64 = 2014;
 
@@ -38,19 +38,19 @@ const INTRODUCTION: &str = "# Results\n\n\
     camera pixels. Figures are numbered as in the paper (Thanikachalam et al. 2014). \
     `ltm-export study` writes this page.\n";
 
-/// Measure recovery where the transport is known: the paper's figures, its comparison, many scenes
+/// Measure the accuracy of recovery with known transport: the paper's figures, its comparison, many scenes
 #[derive(Debug, Args)]
 pub struct StudyArgs {
-    /// Capture folders with truth/, or parts by name: stained-glass, cookies (figures at the paper's
-    /// scale), comparison, scenes [default: those four]
+    /// Capture folders with truth/, or parts of the study: stained-glass, cookies (figures at the paper's
+    /// scale), comparison, scenes [default: these four]
     #[arg(value_name = "CAPTURE|PART")]
     subjects: Vec<PathBuf>,
-    /// Folder to write results.md, images and CSV to; must be new or empty
+    /// Folder for results.md, images and CSV; must be new or empty
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Camera pixels that nnls and bpdn-identity are judged on: learned on four times as many, by whole
-    /// tiles, bpdn-dct and bpdn-haar on an eighth. Fewer are quicker and less exact
-    #[arg(long, value_name = "N", default_value_t = PIXELS as u32,
+    /// Camera pixels on which nnls and bpdn-identity are evaluated. learned uses four times as many, in whole
+    /// tiles, bpdn-dct and bpdn-haar an eighth. Fewer are faster and less accurate
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_PIXELS as u32,
           value_parser = clap::value_parser!(u32).range(1..))]
     pixels: u32,
 }
@@ -61,30 +61,29 @@ pub fn run(args: &StudyArgs) -> Result<()> {
         true => PARTS.iter().map(Path::new).collect(),
         false => named.collect(),
     };
-    // What cannot work is refused before the hour that the rest may take.
+    // Errors are found before the work, which may take an hour.
     let mut names = Vec::new();
     for subject in &subjects {
         if !is_part(subject) {
             CaptureFolder::open(subject)?;
         }
-        let name = name_of(subject)?;
+        let name = result_name(subject)?;
         ensure!(
             !names.contains(&name),
-            "{name} is named twice, and its results would have the same names; give one of them \
-             another name"
+            "{name} is named twice, and its results would have the same names; rename one of the folders"
         );
         names.push(name);
     }
     let start = Instant::now();
     let progress = |text: &str| eprintln!("[{:7.1} s] {text}", start.elapsed().as_secs_f64());
-    new_folder::fill_new_folder(&args.output, |root| {
+    output_folder::write_in_place(&args.output, |root| {
         let results = root.join("results.md");
         let mut text = INTRODUCTION.to_owned();
         for (subject, name) in subjects.iter().zip(&names) {
             let pixels = args.pixels as usize;
-            let begun = Instant::now();
+            let part_start = Instant::now();
             let option = match pixels {
-                PIXELS => String::new(),
+                DEFAULT_PIXELS => String::new(),
                 other => format!(" --pixels {other}"),
             };
             text += &format!("\nFrom `ltm-export study {name} -o DIR{option}`:\n");
@@ -97,10 +96,10 @@ pub fn run(args: &StudyArgs) -> Result<()> {
             }
             text += &format!(
                 "\nThis took {:.0} s on {} threads.\n",
-                begun.elapsed().as_secs_f64(),
+                part_start.elapsed().as_secs_f64(),
                 rayon::current_num_threads()
             );
-            // Rewritten after each: an hour's work should not hang on its last minute.
+            // Rewritten after each part, so that a later failure does not lose it.
             write(&results, text.as_bytes())?;
         }
         Ok(())
@@ -109,13 +108,13 @@ pub fn run(args: &StudyArgs) -> Result<()> {
     Ok(())
 }
 
-/// Whether `subject` names a part; a capture folder of that name is given as `./cookies`.
+/// Whether `subject` is the name of a part. A capture folder of that name can be given as `./cookies`.
 fn is_part(subject: &Path) -> bool {
     PARTS.iter().any(|part| Path::new(part) == subject)
 }
 
-/// What results of `subject` are called.
-fn name_of(subject: &Path) -> Result<String> {
+/// Name of the results of `subject`.
+fn result_name(subject: &Path) -> Result<String> {
     let name = subject
         .canonicalize()
         .ok()
@@ -125,7 +124,7 @@ fn name_of(subject: &Path) -> Result<String> {
         Some(name) => Ok(name),
         None if is_part(subject) => Ok(subject.to_string_lossy().into_owned()),
         None => bail!(
-            "{}: has no name; give the folder by its name",
+            "{}: the path has no folder name; give the name of the folder",
             subject.display()
         ),
     }
@@ -172,7 +171,7 @@ fn square(side: u32) -> Extent {
     }
 }
 
-/// The paper's figures of a built-in scene at the paper's scale.
+/// The paper's figures for a built-in scene at the paper's scale.
 fn study_scene(
     kind: SceneKind,
     name: &str,
@@ -187,16 +186,16 @@ fn study_scene(
         electrons: ELECTRONS,
         seed: SEED,
     };
-    let most = SNR_PATTERNS[SNR_PATTERNS.len() - 1];
+    let max_patterns = SNR_PATTERNS[SNR_PATTERNS.len() - 1];
     progress(&format!(
-        "{name}: photographing under {most} patterns, window {WINDOW_SIDE}"
+        "{name}: photographing under {max_patterns} patterns, window {WINDOW_SIDE}"
     ));
-    let measurements = scene_camera.measure(kind.ensemble(), most, &AllCores)?;
+    let measurements = scene_camera.measure(kind.ensemble(), max_patterns, &AllCores)?;
     let lights = study::built_in_lights(light);
     figures(name, &known, measurements, lights, pixels, progress)
 }
 
-/// The paper's figures of a capture whose transport is known.
+/// The paper's figures for a capture with known transport.
 fn study_capture(
     path: &Path,
     name: &str,
@@ -206,7 +205,7 @@ fn study_capture(
     let folder = CaptureFolder::open(path)?;
     let truth = folder
         .truth()?
-        .context("has no truth/ folder: its transport is not known, and there is nothing to hold a recovery against; use evaluate")?;
+        .context("has no truth/ folder, so its transport is unknown; use evaluate instead")?;
     let mut lights = Vec::new();
     for light in truth.lights()? {
         lights.push(RelitLight {
@@ -215,31 +214,32 @@ fn study_capture(
             name: light,
         });
     }
-    // The light that shows most comes first.
+    // The flood light shows most of the object.
     lights.sort_by_key(|light| light.name != "flood");
     let shots: Vec<usize> = (0..folder.manifest().shots.len()).collect();
-    let measurements = read(&folder, &shots)?;
+    let measurements = read_measurements(&folder, &shots)?;
     let known = CaptureTruth::new(truth, measurements.correspondence)?;
     figures(name, &known, measurements, lights, pixels, progress)
 }
 
-/// Reads shots whole.
-fn read(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
-    let rows = Rows::all(folder.manifest().camera.height);
+/// Reads all rows of `shots`.
+fn read_measurements(folder: &CaptureFolder, shots: &[usize]) -> Result<Measurements> {
+    let rows = RowSet::all(folder.manifest().camera.height);
     let dark = folder.read_dark()?;
-    let mut measurements = recover::no_rows(folder, &dark, shots, &rows)?;
-    let mut photographs = Photographs::open(folder, &dark, shots)?;
-    let bar = process::progress("reading", shots.len());
-    photographs.advance(&mut measurements, &rows, || {
+    let mut measurements = read_patterns(folder, &dark, shots, &rows)?;
+    let mut reader = ShotReader::open(folder, &dark, shots)?;
+    let bar = progress::bar("reading", shots.len());
+    reader.load_rows(&mut measurements, &rows, || {
         bar.inc(1);
         true
     })?;
     bar.finish_and_clear();
-    photographs.finish()?;
-    measurements.noise = Noise::with_gain_from(&measurements);
+    reader.finish()?;
+    measurements.noise = NoiseModel::with_gain_from(&measurements);
     Ok(measurements)
 }
 
+/// All figures for one scene or capture.
 fn figures(
     name: &str,
     known: &impl KnownTransport,
@@ -264,7 +264,7 @@ fn figures(
     Ok(sections)
 }
 
-/// Writes a file, in a folder that is made if need be.
+/// Writes a file, and creates its folder if necessary.
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let write = || {
         if let Some(folder) = path.parent() {

@@ -1,4 +1,4 @@
-//! `ltm-export verify`: whether every byte of an `.ltm` file is as it was written.
+//! `ltm-export verify`: checks every checksum of an `.ltm` file and decodes every chunk.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -7,10 +7,11 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
 
-use super::{files, report};
+use super::ltm_file::{open_ltm, read_range};
+use super::report::{format_bytes, print_json, print_line};
 use crate::format::{self, FormatError, PartNumber};
 
-/// Check a relightable photograph: every checksum, every tile
+/// Check every checksum and every tile of a relightable photograph
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
     /// File to check
@@ -22,9 +23,9 @@ pub struct VerifyArgs {
 }
 
 #[derive(Default, Serialize)]
-struct Report {
+struct VerifyReport {
     ok: bool,
-    /// What is wrong first.
+    /// The first error.
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
     /// The first bad part, and how many there are.
@@ -42,35 +43,35 @@ struct Report {
 #[derive(Serialize)]
 struct BadPart {
     scan: usize,
-    /// None: the functions of the basis that the scan brings.
+    /// None for the basis functions of the scan.
     tile: Option<usize>,
-    /// Where it lies.
+    /// Its bytes in the file.
     bytes: Range<u64>,
 }
 
 pub fn run(args: &VerifyArgs) -> Result<()> {
-    let mut report = Report::default();
+    let mut report = VerifyReport::default();
     let result = verify(args, &mut report);
     report.ok = result.is_ok();
     report.error = result.as_ref().err().map(|e| format!("{e:#}"));
     if args.json {
-        report::print_json(&report)?;
+        print_json(&report)?;
     } else if let (Some(tiles), Some(scans), Some(bytes)) =
         (report.tiles, report.scans, report.file_bytes)
         && report.ok
     {
-        report::print_line(&format!(
-            "{}: sound, {tiles} tiles in {scans} scans, {}",
+        print_line(&format!(
+            "{}: intact, {tiles} tiles in {scans} scans, {}",
             args.file.display(),
-            report::bytes(bytes)
+            format_bytes(bytes)
         ))?;
     }
     result
 }
 
-/// Checks part by part; a file may be larger than memory.
-fn verify(args: &VerifyArgs, report: &mut Report) -> Result<()> {
-    let (mut file, head) = files::open_ltm(&args.file)?;
+/// Checks chunk by chunk, as a file may be larger than memory.
+fn verify(args: &VerifyArgs, report: &mut VerifyReport) -> Result<()> {
+    let (mut file, head) = open_ltm(&args.file)?;
     let name = || args.file.display().to_string();
     let end = head.header.file_bytes;
     report.tiles = Some(head.tiles());
@@ -78,7 +79,7 @@ fn verify(args: &VerifyArgs, report: &mut Report) -> Result<()> {
     report.file_bytes = Some(end);
     let mut first = None;
     for part in head.parts() {
-        let bytes = files::read_at(&mut file, head.range(part)).with_context(name)?;
+        let bytes = read_range(&mut file, head.range(part)).with_context(name)?;
         if let Err(error) = format::check(&head, part, &bytes) {
             report.bad_parts += 1;
             first.get_or_insert((part, error));

@@ -16,7 +16,7 @@ use super::holdout::pattern_ids;
 use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns};
 use super::pooled::PooledMeasurements;
 use super::sampling::{self, PixelsOfWindow};
-use crate::capture::{Measurements, distinct};
+use crate::capture::{Measurements, group_count};
 use crate::executor::Executor;
 use crate::linalg::{self, add_scaled, vectorise};
 use crate::transport::{Element, Geometry, Window};
@@ -91,7 +91,7 @@ impl WindowEstimate {
         if !sampling::sees_light_plane(&geometry) {
             return Err(RecoverError::CorrespondenceOffLightPlane);
         }
-        let rings = Rings::new(max_side, distinct(&pattern_ids(&measurements.patterns)));
+        let rings = Rings::new(max_side, group_count(&pattern_ids(&measurements.patterns)));
         let mut squares = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
         // Errors of neighbouring squares are correlated: each part is a strip of the picture.
         squares.sort_by_key(|square| (square.y, square.x));

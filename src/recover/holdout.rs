@@ -52,7 +52,7 @@ pub(super) fn pattern_ids(patterns: &[Pattern]) -> Vec<usize> {
         let planes = (0..CHANNELS).map(|c| pattern.plane(c));
         planes.flatten().map(|p| p.to_bits()).collect()
     };
-    capture::numbers(patterns.iter().map(bits))
+    capture::group_ids(patterns.iter().map(bits))
 }
 
 #[cfg(test)]

@@ -97,7 +97,7 @@ impl<'a> WindowSample<'a> {
         size: SampleSize,
     ) -> Result<Self, RecoverError> {
         let mut windows: BTreeMap<_, Vec<_>> = BTreeMap::new();
-        let covered = geometry.tiles().filter(|&tile| measurements.covers(tile));
+        let covered = geometry.tiles().filter(|&tile| measurements.has_tile(tile));
         for (origin, pixels) in covered.flat_map(|rect| sampling::pixels_by_window(&geometry, rect))
         {
             if !geometry.clip_window(origin).is_empty() {
@@ -175,7 +175,7 @@ impl<'a> WindowSample<'a> {
     fn fit_noise(&self, common_mode: CommonMode, executor: &impl Executor) -> Tolerance {
         let measurements = self.measurements;
         let all: Vec<usize> = (0..measurements.patterns.len()).collect();
-        let weights = measurements.weights();
+        let weights = measurements.pattern_weights();
         let pairs = executor.map(self.windows.len(), |i| {
             let (origin, pixel) = (self.windows[i].0, self.windows[i].1[0]);
             let mut pairs = Vec::new();

@@ -106,7 +106,7 @@ impl PixelwiseRecovery {
             corners[1].u = corners[1].u.max(origin.u);
             corners[1].v = corners[1].v.max(origin.v);
         }
-        let weights = measurements.weights();
+        let weights = measurements.pattern_weights();
         // Grey patterns drive all channels alike: one set of equations for all of them.
         for (plane, channels) in measurements.planes() {
             let cache = GramCache::new(

@@ -280,7 +280,7 @@ mod tests {
     #[test]
     fn dark_saturated_and_swapped_photographs_are_refused() {
         let mut capture = SyntheticCapture::new(60);
-        capture.measurements.pictures.swap(3, 8);
+        capture.measurements.photos.swap(3, 8);
         let error = fit(&capture).unwrap_err();
         let RecoverError::MismatchedPatterns { pattern_indices } = error else {
             panic!("{error}");

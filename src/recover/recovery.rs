@@ -1,7 +1,5 @@
 //! Recovery of a light transport matrix, tile by tile, by any of the methods.
 
-use std::fmt::Write;
-
 use super::common_mode::CommonMode;
 use super::error::RecoverError;
 use super::holdout::HoldoutSplit;
@@ -41,7 +39,7 @@ enum Solver {
 
 impl Recovery {
     /// Learns and chooses from `measurements` what the method needs. They may hold strips of the picture instead of all
-    /// of it; only [covered](Measurements::covers) tiles are then used.
+    /// of it; only [covered](Measurements::has_tile) tiles are then used.
     ///
     /// # Errors
     /// If there are too few patterns, if the geometry is out of range or no pixel sees the light plane, if the
@@ -114,15 +112,6 @@ impl Recovery {
         &self.geometry
     }
 
-    /// A checksum of the preparation. Tiles belong in one file only if it is equal.
-    pub fn fingerprint(&self) -> u32 {
-        // Over the `Debug` output, which writes numbers exactly.
-        let mut checksum = Crc32c(0);
-        let written = write!(checksum, "{:?} {:?}", self.geometry, self.solver);
-        debug_assert!(written.is_ok(), "a checksum accepts any text");
-        checksum.0
-    }
-
     /// The basis functions that factored tiles share, if there are such tiles.
     pub fn basis(&self) -> Option<&Basis> {
         match &self.solver {
@@ -159,15 +148,5 @@ impl Recovery {
             Solver::Learned(learned) => learned.tile(measurements, rect),
             Solver::Pixelwise(solver) => RecoveredTile::Direct(solver.tile(measurements, rect)),
         }
-    }
-}
-
-/// CRC-32C of the text that is written.
-struct Crc32c(u32);
-
-impl Write for Crc32c {
-    fn write_str(&mut self, text: &str) -> std::fmt::Result {
-        self.0 = crc32c::crc32c_append(self.0, text.as_bytes());
-        Ok(())
     }
 }

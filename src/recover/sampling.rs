@@ -19,7 +19,7 @@ pub(super) fn spread_squares(
     side: u32,
     max_count: usize,
 ) -> Vec<TileRect> {
-    let is_covered = |square| measurements.covers(square);
+    let is_covered = |square| measurements.has_tile(square);
     spread_over(measurements.camera, side, max_count, is_covered)
 }
 

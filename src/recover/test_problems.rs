@@ -1,6 +1,6 @@
 //! Synthetic problems with known properties.
 
-use crate::capture::{Measurements, Noise, Pattern, Rows};
+use crate::capture::{Measurements, NoiseModel, Pattern, RowSet};
 use crate::transport::{
     CHANNELS, Correspondence, Extent, Geometry, TileRect, TransportFunctions, Window,
 };
@@ -120,9 +120,9 @@ impl SyntheticCapture {
                 correspondence: geometry.correspondence,
                 full_scale: vec![1.0; patterns.len()],
                 patterns,
-                rows: Rows::all(geometry.camera.height),
+                rows: RowSet::all(geometry.camera.height),
                 pictures: Vec::new(),
-                noise: Noise {
+                noise: NoiseModel {
                     gain: [0.0; CHANNELS],
                     floor: [0.0; CHANNELS],
                 },
@@ -131,7 +131,7 @@ impl SyntheticCapture {
         let picture = capture.functions(1.0);
         let y = super::prediction::predictions(&geometry, &capture.measurements.patterns, &picture);
         let (count, pixels) = (capture.measurements.patterns.len(), geometry.camera.area());
-        capture.measurements.pictures = (0..count)
+        capture.measurements.photos = (0..count)
             .map(|l| {
                 (0..pixels)
                     .map(|n| [0, 1, 2].map(|c| y[(n * count + l) * CHANNELS + c] as f32))

@@ -12,7 +12,7 @@ use super::nystrom::{Nystrom, NystromSamples};
 use super::scene_camera::first_shots;
 use super::section::{Section, Table, seconds_cell, snr_cell};
 use super::{ProgressCallback, SceneCamera, StudyError, pixel_sampling, scanning, unwindowed};
-use crate::capture::{Measurements, Picture};
+use crate::capture::{Measurements, LinearPhoto};
 use crate::executor::Executor;
 use crate::recover::Method;
 use crate::simulate::{Ensemble, LightCodes};
@@ -266,7 +266,7 @@ fn single_elements(light: Extent) -> Vec<LightCodes> {
 fn run_nystrom(
     truth: &DenseTransport,
     scene_camera: &SceneCamera,
-    scans: &[Picture],
+    scans: &[LinearPhoto],
     photographs: usize,
     executor: &impl Executor,
 ) -> Result<(Option<Decibels>, f64), StudyError> {

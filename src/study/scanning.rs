@@ -1,14 +1,14 @@
 //! Acquisition by scanning: one photograph for each light element, without computation.
 
 use super::dense_transport::DenseTransport;
-use crate::capture::Picture;
+use crate::capture::LinearPhoto;
 use crate::transport::{CHANNELS, Decibels, TransportError};
 
 /// The SNR after scanning the first 1, 2, … M elements. Columns that have not been scanned are estimated as
 /// zero. `photographs[m]` shows element `m` alone at full brightness.
 pub(super) fn snr_by_scans(
     truth: &DenseTransport,
-    photographs: &[Picture],
+    photographs: &[LinearPhoto],
 ) -> Vec<Option<Decibels>> {
     let columns: Vec<(TransportError, TransportError)> = photographs
         .iter()

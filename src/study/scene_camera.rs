@@ -1,7 +1,7 @@
 //! Simulated photographs of a scene, in memory.
 
 use super::StudyError;
-use crate::capture::{Measurements, Noise, Pattern, Picture, Rows};
+use crate::capture::{Measurements, NoiseModel, Pattern, LinearPhoto, RowSet};
 use crate::executor::Executor;
 use crate::simulate::{
     Camera, EmissionMatrix, Ensemble, LightCodes, RandomStream, SimulatedScene, emission,
@@ -61,16 +61,16 @@ impl SceneCamera<'_> {
             correspondence: geometry.correspondence,
             patterns: codes.iter().map(emitted_pattern).collect(),
             full_scale: vec![1.0; count],
-            rows: Rows::all(geometry.camera.height),
+            rows: RowSet::all(geometry.camera.height),
             pictures,
-            noise: Noise::from_dark(&self.dark()?, geometry.camera.width, code),
+            noise: NoiseModel::from_dark(&self.dark()?, geometry.camera.width, code),
         };
-        measurements.noise = Noise::with_gain_from(&measurements);
+        measurements.noise = NoiseModel::with_gain_from(&measurements);
         Ok(measurements)
     }
 
     /// A photograph without light.
-    fn dark(&self) -> Result<Picture, StudyError> {
+    fn dark(&self) -> Result<LinearPhoto, StudyError> {
         let black = vec![[0.0; CHANNELS]; self.scene.geometry().camera.area()];
         self.add_noise(&black, 0)
     }
@@ -81,7 +81,7 @@ impl SceneCamera<'_> {
         &self,
         lights: &[LightCodes],
         executor: &impl Executor,
-    ) -> Result<Vec<Picture>, StudyError> {
+    ) -> Result<Vec<LinearPhoto>, StudyError> {
         let mut pictures = self.pictures(lights, executor);
         let dark = self.dark()?;
         let mut done = 0;
@@ -101,7 +101,7 @@ impl SceneCamera<'_> {
     }
 
     /// A photograph of `picture` with the noise of the photograph number `index`.
-    pub(super) fn add_noise(&self, picture: &Picture, index: u32) -> Result<Picture, StudyError> {
+    pub(super) fn add_noise(&self, picture: &LinearPhoto, index: u32) -> Result<LinearPhoto, StudyError> {
         let camera = self.camera();
         let mut noise = RandomStream::Photograph(index).start(self.seed);
         let codes = camera.photograph(picture, &mut noise)?;
@@ -113,7 +113,7 @@ impl SceneCamera<'_> {
     }
 
     /// The pictures of the scene under each light, without noise.
-    fn pictures(&self, lights: &[LightCodes], executor: &impl Executor) -> Vec<Picture> {
+    fn pictures(&self, lights: &[LightCodes], executor: &impl Executor) -> Vec<LinearPhoto> {
         let geometry = self.scene.geometry();
         let emissions = EmissionMatrix::new(geometry.light, lights);
         let mut pictures = vec![vec![[0.0; CHANNELS]; geometry.camera.area()]; lights.len()];
@@ -157,9 +157,9 @@ pub fn first_shots(measurements: &Measurements, count: usize) -> Measurements {
         patterns: measurements.patterns[..count].to_vec(),
         full_scale: measurements.full_scale[..count].to_vec(),
         rows: measurements.rows.clone(),
-        pictures: measurements.pictures[..count].to_vec(),
+        pictures: measurements.photos[..count].to_vec(),
         noise: measurements.noise,
     };
-    first.noise = Noise::with_gain_from(&first);
+    first.noise = NoiseModel::with_gain_from(&first);
     first
 }

@@ -6,7 +6,7 @@ use super::known_transport::KnownTransport;
 use super::methods;
 use super::section::{Section, Table, seconds_cell, snr_cell};
 use super::{ProgressCallback, StudyError};
-use crate::capture::{Measurements, Noise};
+use crate::capture::{Measurements, NoiseModel};
 use crate::executor::Executor;
 use crate::recover::Method;
 use crate::transport::Extent;
@@ -84,8 +84,8 @@ impl SnrCurves {
         for &l in counts.iter().rev() {
             measurements.patterns.truncate(l);
             measurements.full_scale.truncate(l);
-            measurements.pictures.truncate(l);
-            measurements.noise = Noise::with_gain_from(&measurements);
+            measurements.photos.truncate(l);
+            measurements.noise = NoiseModel::with_gain_from(&measurements);
             for &method in Method::ALL {
                 if methods::is_slow(method) && !SLOW_PATTERN_COUNTS.contains(&l) {
                     continue;

@@ -65,7 +65,7 @@ fn gram(measurements: &Measurements, executor: &impl Executor) -> Vec<f64> {
 /// `Pᵀy`, `[M]`.
 fn right_hand_side(measurements: &Measurements, n: usize, c: usize) -> Vec<f64> {
     let mut sums = vec![0.0; measurements.light.area()];
-    for (pattern, picture) in measurements.patterns.iter().zip(&measurements.pictures) {
+    for (pattern, picture) in measurements.patterns.iter().zip(&measurements.photos) {
         let y = f64::from(picture[n][c]);
         for (sum, &emitted) in sums.iter_mut().zip(pattern.plane(0)) {
             *sum += y * f64::from(emitted);
@@ -79,7 +79,7 @@ mod tests {
     use rand_distr::{Distribution, StandardUniform};
 
     use super::*;
-    use crate::capture::{Noise, Pattern, Rows};
+    use crate::capture::{NoiseModel, Pattern, RowSet};
     use crate::executor::SequentialExecutor;
     use crate::simulate::RandomStream;
     use crate::transport::{CHANNELS, Correspondence, Extent};
@@ -114,9 +114,9 @@ mod tests {
                 affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             },
             full_scale: vec![1.0; 10],
-            rows: Rows::all(1),
-            pictures: patterns.iter().map(seen).collect(),
-            noise: Noise {
+            rows: RowSet::all(1),
+            photos: patterns.iter().map(seen).collect(),
+            noise: NoiseModel {
                 gain: [0.0; CHANNELS],
                 floor: [0.0; CHANNELS],
             },

@@ -4,7 +4,9 @@ use std::io::Cursor;
 
 use half::f16;
 use png::{BitDepth, ColorType};
-use relightable_photo::capture::{Manifest, Measurements, Noise, Pattern, Picture, Rows};
+use relightable_photo::capture::{
+    LinearPhoto, Manifest, Measurements, NoiseModel, Pattern, RowSet,
+};
 use relightable_photo::transport::{CHANNELS, Window};
 
 /// Bytes of a file of the capture.
@@ -35,11 +37,11 @@ pub fn measurements() -> Measurements {
     let json = std::str::from_utf8(file!("capture.json")).unwrap();
     let manifest = Manifest::parse(json, "capture.json".as_ref()).unwrap();
     let (emission, camera) = (manifest.light.emission(), &manifest.camera);
-    let dark: Picture = codes16(file!("photos/dark.png"))
+    let dark: LinearPhoto = codes16(file!("photos/dark.png"))
         .into_iter()
         .map(|codes| codes.map(|code| camera.linear(code, 1.0)))
         .collect();
-    let picture = |png: &[u8]| -> Picture {
+    let picture = |png: &[u8]| -> LinearPhoto {
         let codes = codes16(png);
         assert!(
             codes
@@ -66,11 +68,11 @@ pub fn measurements() -> Measurements {
         correspondence: manifest.correspondence.as_ref().unwrap().into(),
         patterns: SHOTS.iter().map(|(png, _)| pattern(png)).collect(),
         full_scale: vec![1.0; SHOTS.len()],
-        rows: Rows::all(camera.height),
-        pictures: SHOTS.iter().map(|(_, png)| picture(png)).collect(),
-        noise: Noise::from_dark(&dark, camera.width, code),
+        rows: RowSet::all(camera.height),
+        photos: SHOTS.iter().map(|(_, png)| picture(png)).collect(),
+        noise: NoiseModel::from_dark(&dark, camera.width, code),
     };
-    measurements.noise = Noise::with_gain_from(&measurements);
+    measurements.noise = NoiseModel::with_gain_from(&measurements);
     measurements
 }
 

@@ -152,7 +152,7 @@ fn report(line: &str) {
 #[cfg(not(target_arch = "wasm32"))]
 #[test]
 fn embedded_fixture_equals_its_folder() {
-    use relightable_photo::capture::{CaptureFolder, Noise, Photo, Picture, Rows};
+    use relightable_photo::capture::{CaptureFolder, NoiseModel, PhotoReader, LinearPhoto, RowSet};
 
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/glass-s");
     let folder = CaptureFolder::open(root.as_ref()).unwrap();
@@ -161,22 +161,22 @@ fn embedded_fixture_equals_its_folder() {
     let shots: Vec<usize> = (0..folder.manifest().shots.len()).collect();
     let patterns = shots.iter().map(|&i| folder.read_pattern(i).unwrap());
     let correspondence = folder.correspondence().unwrap();
-    let mut read = folder.no_rows(&shots, patterns.collect(), correspondence, &dark);
-    read.rows = Rows::all(read.camera.height);
-    let whole = |mut photo: Photo| {
-        let mut picture = Picture::new();
+    let mut read = folder.empty_measurements(&shots, patterns.collect(), correspondence, &dark);
+    read.rows = RowSet::all(read.camera.height);
+    let whole = |mut photo: PhotoReader| {
+        let mut picture = LinearPhoto::new();
         photo.read(&read.rows, &mut picture).unwrap();
         picture
     };
-    let pictures = shots.iter().map(|&i| whole(folder.shot(i, &dark).unwrap()));
-    read.pictures = pictures.collect();
-    read.noise = Noise::with_gain_from(&read);
+    let pictures = shots.iter().map(|&i| whole(folder.open_shot(i, &dark).unwrap()));
+    read.photos = pictures.collect();
+    read.noise = NoiseModel::with_gain_from(&read);
     assert_eq!((embedded.camera, embedded.light), (read.camera, read.light));
     assert_eq!(embedded.correspondence, read.correspondence);
     assert_eq!(embedded.patterns, read.patterns);
     assert_eq!(embedded.full_scale, read.full_scale);
     assert_eq!(embedded.rows, read.rows);
-    assert_eq!(embedded.pictures, read.pictures);
+    assert_eq!(embedded.photos, read.photos);
     assert_eq!(embedded.noise, read.noise);
 
     let truth = folder.truth().unwrap().unwrap();

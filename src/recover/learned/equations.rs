@@ -108,7 +108,7 @@ impl RegionEquations {
             gram_matrices: Vec::new(),
             right_hand_sides: vec![0.0; count * rank],
         };
-        let weights = measurements.weights();
+        let weights = measurements.pattern_weights();
         for (origin, pixels) in pixels_by_window(geometry, rect) {
             for (plane, channels) in measurements.planes() {
                 let responses = basis.respond(measurements, geometry, origin, plane);
@@ -226,7 +226,7 @@ pub(super) fn brightness_thresholds(regions: &[RegionEquations]) -> BrightnessTh
 pub(super) fn with_margin(measurements: &Measurements, rect: TileRect, margin: u32) -> TileRect {
     let camera = measurements.camera;
     let (right, bottom) = (rect.x + rect.extent.width, rect.y + rect.extent.height);
-    let is_loaded = |y: &u32| measurements.rows.place(*y).is_some();
+    let is_loaded = |y: &u32| measurements.rows.index_of(*y).is_some();
     let x = rect.x.saturating_sub(margin);
     let above = (1..=margin.min(rect.y)).take_while(|d| is_loaded(&(rect.y - d)));
     let y = rect.y - above.count() as u32;

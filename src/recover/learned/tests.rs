@@ -4,7 +4,7 @@ use super::basis::LearnedBasis;
 use super::equations::RegionEquations;
 use super::posterior::{PosteriorSolver, PriorPrecision};
 use super::*;
-use crate::capture::{Noise, Pattern, Rows};
+use crate::capture::{NoiseModel, Pattern, RowSet};
 use crate::executor::{Executor, SequentialExecutor};
 use crate::recover::sampling::pixels_by_window;
 use crate::recover::{BandwidthEstimate, WindowEstimate, pooled};
@@ -125,9 +125,9 @@ fn photograph(patterns: usize, seed: u64, tau: &[[f64; CHANNELS]]) -> Measuremen
         correspondence: geometry.correspondence,
         patterns: emissions.into_iter().map(Pattern::Grey).collect(),
         full_scale: vec![1.0; patterns],
-        rows: Rows::all(SIDE),
-        pictures,
-        noise: Noise {
+        rows: RowSet::all(SIDE),
+        photos: pictures,
+        noise: NoiseModel {
             gain: [0.0; CHANNELS],
             floor: [1e-8; CHANNELS],
         },
@@ -196,7 +196,7 @@ fn short_exposures_weigh_less_than_long_ones() {
     let mut random = random(5);
     let mut normal = || (0..12).map(|_| random()).sum::<f64>() - 6.0;
     measurements.noise.gain = [2e-5; CHANNELS];
-    for (l, picture) in measurements.pictures.iter_mut().enumerate() {
+    for (l, picture) in measurements.photos.iter_mut().enumerate() {
         let exposure: f64 = if l % 2 == 0 { 1.0 } else { 1.0 / 16.0 };
         measurements.full_scale[l] = exposure.recip() as f32;
         for y in picture.iter_mut().flatten() {
@@ -251,7 +251,7 @@ fn training_uses_pixels_with_saturated_samples() {
     let windows = pixels_by_window(&geometry, picture());
     for (i, pixels) in windows.values().enumerate() {
         for &(n, _) in pixels {
-            measurements.pictures[i % 20][n] = [f32::NAN; CHANNELS];
+            measurements.photos[i % 20][n] = [f32::NAN; CHANNELS];
         }
     }
     let learned = learn(&measurements, &SequentialExecutor).unwrap();
@@ -312,7 +312,7 @@ fn blending_improves_sparse_unrelated_functions() {
 #[test]
 fn saturated_photographs_are_an_overexposed_error() {
     let (mut measurements, _) = measurements(6, 1);
-    for picture in &mut measurements.pictures {
+    for picture in &mut measurements.photos {
         picture.fill([f32::NAN; CHANNELS]);
     }
     let error = learn(&measurements, &SequentialExecutor).unwrap_err();
@@ -324,7 +324,7 @@ fn saturated_photographs_are_an_overexposed_error() {
 #[test]
 fn black_photographs_are_a_dark_error() {
     let (mut measurements, _) = measurements(6, 1);
-    for picture in &mut measurements.pictures {
+    for picture in &mut measurements.photos {
         picture.fill([0.0; CHANNELS]);
     }
     let error = learn(&measurements, &SequentialExecutor).unwrap_err();
@@ -334,14 +334,14 @@ fn black_photographs_are_a_dark_error() {
 #[test]
 fn photographs_of_other_patterns_are_an_error() {
     let (mut measurements, _) = measurements(30, 1);
-    measurements.pictures.rotate_left(1);
+    measurements.photos.rotate_left(1);
     let error = learn(&measurements, &SequentialExecutor).unwrap_err();
     assert!(
         matches!(error, RecoverError::UncorrelatedPatterns),
         "{error}"
     );
-    measurements.pictures.rotate_right(1);
-    measurements.pictures.swap(4, 20);
+    measurements.photos.rotate_right(1);
+    measurements.photos.swap(4, 20);
     let error = learn(&measurements, &SequentialExecutor).unwrap_err();
     assert!(
         matches!(&error, RecoverError::MismatchedPatterns { pattern_indices } if pattern_indices == &[4, 20]),
@@ -349,7 +349,7 @@ fn photographs_of_other_patterns_are_an_error() {
     );
     // Sensor noise only.
     let mut random = random(3);
-    for sample in measurements.pictures.iter_mut().flatten().flatten() {
+    for sample in measurements.photos.iter_mut().flatten().flatten() {
         *sample = 1e-3 * (random() - 0.499) as f32;
     }
     let error = learn(&measurements, &SequentialExecutor).unwrap_err();
@@ -420,7 +420,7 @@ fn a_saturated_sample_counts_as_missing() {
     let without: Vec<usize> = (0..10).filter(|&l| l != 4).collect();
     let clean = RegionEquations::new(&measurements, &geometry(), &basis, &without, two_by_two());
     let n = geometry().camera.index(CameraPx { x: 21, y: 20 });
-    measurements.pictures[4][n] = [f32::NAN; CHANNELS];
+    measurements.photos[4][n] = [f32::NAN; CHANNELS];
     let all: Vec<usize> = (0..10).collect();
     let saturated = RegionEquations::new(&measurements, &geometry(), &basis, &all, two_by_two());
     for index in 3..6 {

@@ -1,38 +1,37 @@
-//! A folder that appears whole or not at all.
+//! Writing folders: new ones only, complete or kept as far as they got.
 
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 
-use super::files;
+use super::output_file::temporary_beside;
 
-/// Fills a new folder beside `path` and renames it there once `fill` has succeeded. `path` must be
-/// free or an empty folder: nothing of anyone's is ever replaced.
-pub fn write_folder_whole(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+/// Calls `fill` with a temporary folder beside `path` and renames it to `path` when `fill` succeeds. `path`
+/// must not exist or be an empty folder.
+pub fn write_atomically(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let write = || -> Result<()> {
         ensure_free(path)?;
-        let (builder, parent) = files::beside(path, 0o777);
+        let (builder, parent) = temporary_beside(path, 0o777);
         let folder = builder
             .tempdir_in(parent)
             .context("cannot be created; does its parent folder exist, and may you write there?")?;
         fill(folder.path())?;
-        // Looked at again: filling takes a while. An empty folder makes way; `remove_dir` refuses
-        // any other.
+        // Checked again, as filling takes a while. `remove_dir` refuses a folder that is not empty.
         ensure_free(path)?;
         if path.exists() {
             std::fs::remove_dir(path)
                 .context("cannot be replaced; give the name of a new folder")?;
         }
-        std::fs::rename(folder.path(), path).context("cannot be put in place")?;
-        let _ = folder.keep(); // It has moved: there is nothing left to clean up.
+        std::fs::rename(folder.path(), path).context("cannot be renamed")?;
+        let _ = folder.keep(); // it has moved, so there is nothing to clean up
         Ok(())
     };
     write().with_context(|| path.display().to_string())
 }
 
-/// Makes a new folder, or takes an empty one, and fills it in place: for work so long that what is
-/// done should be kept if the rest fails.
-pub fn fill_new_folder(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+/// Creates the folder `path`, or takes an empty one, and calls `fill` with it. If `fill` fails, the files
+/// it wrote stay: the results of hours may be among them.
+pub fn write_in_place(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     ensure_free(path)
         .and_then(|()| {
             if path.is_dir() {
@@ -57,15 +56,15 @@ fn ensure_free(path: &Path) -> Result<()> {
             );
             ensure!(
                 entries.next().is_none(),
-                "is a folder with something in it; give another name, or empty it first"
+                "is a folder that is not empty; give another name, or empty it first"
             );
             Ok(())
         }
         Err(e) if e.kind() == ErrorKind::NotFound => Ok(()),
         Err(e) if e.kind() == ErrorKind::NotADirectory => {
-            bail!("is taken by a file; give another name")
+            bail!("is a file; give another name")
         }
-        Err(e) => Err(e).context("cannot be looked at"),
+        Err(e) => Err(e).context("cannot be read"),
     }
 }
 
@@ -83,11 +82,11 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_appears_whole_or_not_at_all() {
+    fn a_folder_is_written_completely_or_not_at_all() {
         let root = tempfile::tempdir().unwrap();
         let fill = |folder: &Path| Ok(std::fs::write(folder.join("a"), "1")?);
         let path = root.path().join("new");
-        let failed = write_folder_whole(&path, |folder| {
+        let failed = write_atomically(&path, |folder| {
             fill(folder)?;
             bail!("the disk is full")
         });
@@ -95,20 +94,20 @@ mod tests {
         assert_eq!(names(root.path()), [""; 0]);
 
         std::fs::create_dir(&path).unwrap();
-        write_folder_whole(&path, fill).unwrap();
+        write_atomically(&path, fill).unwrap();
         assert_eq!(names(root.path()), ["new"]);
         assert_eq!(names(&path), ["a"]);
     }
 
     #[test]
-    fn what_is_there_stays_there() {
+    fn existing_files_and_folders_are_not_replaced() {
         let root = tempfile::tempdir().unwrap();
         let (folder, file) = (root.path().join("folder"), root.path().join("file"));
         std::fs::create_dir(&folder).unwrap();
         std::fs::write(folder.join("mine"), "keep").unwrap();
         std::fs::write(&file, "keep").unwrap();
-        for (path, reason) in [(&folder, "something in it"), (&file, "taken by a file")] {
-            let refused = write_folder_whole(path, |_| panic!("must not begin"));
+        for (path, reason) in [(&folder, "not empty"), (&file, "is a file")] {
+            let refused = write_atomically(path, |_| panic!("must not begin"));
             let message = format!("{:#}", refused.unwrap_err());
             assert!(message.contains(reason), "{message}");
         }
@@ -117,7 +116,7 @@ mod tests {
             "keep"
         );
         let nowhere = root.path().join("no/where");
-        let refused = write_folder_whole(&nowhere, |_| Ok(())).unwrap_err();
+        let refused = write_atomically(&nowhere, |_| Ok(())).unwrap_err();
         assert!(
             format!("{refused:#}").contains("parent folder"),
             "{refused:#}"

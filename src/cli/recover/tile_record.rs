@@ -1,5 +1,7 @@
-//! A recovered tile as a checkpoint keeps it: half-precision floats in units of a power of two, which
-//! is far finer than any file but an archive's, and fast.
+//! A recovered tile in a checkpoint: half-precision floats `x / step` with a power of two as step, split
+//! into planes of low and high bytes and compressed by zstd.
+//!
+//! Eleven bits are finer than any `.ltm` file but a lossless one, and fast to write.
 
 use std::io::{self, ErrorKind};
 
@@ -7,14 +9,14 @@ use half::f16;
 
 use crate::transport::{CHANNELS, FactoredTile, RecoveredTile, TileRect, TransportFunctions};
 
-/// zstd level: a checkpoint is read once, and soon.
-const LEVEL: i32 = 1;
-/// Kind, and what values are in units of.
-const HEAD: usize = 5;
+/// Level of zstd: the fastest, as a checkpoint is read once and then deleted.
+const ZSTD_LEVEL: i32 = 1;
+/// Bytes before the values: whether the tile is direct or factored, and the step.
+const HEAD_BYTES: usize = 5;
 const DIRECT: u8 = 1;
 const FACTORED: u8 = 2;
 
-/// A tile as bytes.
+/// Encodes a tile.
 pub fn encode(tile: &RecoveredTile) -> io::Result<Vec<u8>> {
     let (kind, values) = match tile {
         RecoveredTile::Direct(tile) => (DIRECT, &tile.tau),
@@ -34,11 +36,11 @@ pub fn encode(tile: &RecoveredTile) -> io::Result<Vec<u8>> {
     low.extend(high);
     let mut record = vec![kind];
     record.extend(step.to_le_bytes());
-    record.extend(zstd::bulk::compress(&low, LEVEL)?);
+    record.extend(zstd::bulk::compress(&low, ZSTD_LEVEL)?);
     Ok(record)
 }
 
-/// The tile for `rect`, of `rank` components or functions of `area` elements.
+/// Decodes the tile at `rect`: `rank` coefficients or `area` elements a pixel and channel.
 pub fn decode(
     rect: TileRect,
     rank: usize,
@@ -46,7 +48,9 @@ pub fn decode(
     record: &[u8],
 ) -> io::Result<RecoveredTile> {
     let damaged = || io::Error::from(ErrorKind::InvalidData);
-    let (&[kind, a, b, c, d], frame) = record.split_first_chunk::<HEAD>().ok_or_else(damaged)?;
+    let (&[kind, a, b, c, d], frame) = record
+        .split_first_chunk::<HEAD_BYTES>()
+        .ok_or_else(damaged)?;
     let step = f32::from_le_bytes([a, b, c, d]);
     let each = match kind {
         DIRECT => area,
@@ -80,7 +84,7 @@ mod tests {
     use crate::transport::Extent;
 
     #[test]
-    fn tiles_come_back_to_eleven_bits() {
+    fn tiles_round_trip_to_eleven_bits() {
         let rect = TileRect {
             x: 3,
             y: 5,
@@ -107,7 +111,7 @@ mod tests {
                     (RecoveredTile::Factored(a), RecoveredTile::Factored(b)) => {
                         (a.coefficients, b.coefficients)
                     }
-                    _ => panic!("another kind"),
+                    _ => panic!("a different variant"),
                 };
                 for (got, want) in got.as_flattened().iter().zip(want.as_flattened()) {
                     assert!((got - want).abs() <= want.abs() / 2048.0 + size * 1e-7);

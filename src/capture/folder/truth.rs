@@ -1,4 +1,6 @@
-//! `truth/`: the transport itself, where the capture was simulated.
+//! `truth/`: the known transport of a simulated capture, and pictures relit by it.
+//!
+//! `tau.npy` has τ as float16 `[N, w, w, 3]`, `uv.npy` the correspondence as float32 `[N, 2]`.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -7,13 +9,14 @@ use std::path::{Path, PathBuf};
 use half::f16;
 use npyz::NpyFile;
 
-use super::{CaptureError, Manifest, images};
+use super::image_file::ImageFile;
+use crate::capture::{CaptureError, Manifest};
 use crate::transport::{CHANNELS, Element, Extent, LightPx, Window};
 
-/// Code in `relit_NAME.png` at which the measurement is 1.
+/// Code in `relit_NAME.png` for a measurement of 1.
 pub const RELIT_FULL_SCALE: f64 = 0.9 * 65535.0;
 
-/// Known transport and pictures under lights that recovery never saw.
+/// Known transport, and pictures under lights that recovery does not use.
 #[derive(Debug)]
 pub struct Truth {
     root: PathBuf,
@@ -42,18 +45,15 @@ impl Truth {
             _ => None,
         };
         let Some(window) = window else {
-            return Err(CaptureError::Truth {
-                path: tau_path,
-                problem: format!("has shape {:?}, not [{n}, w, w, 3] with w odd", tau.shape()),
-            });
+            let found = tau.shape();
+            let problem = format!("has shape {found:?}, not [{n}, w, w, 3] with w odd");
+            return Err(truth_error(&tau_path, problem));
         };
         let tau: Vec<f16> = read_npy(&tau_path, tau)?;
         let uv = open_npy(&uv_path)?;
         if uv.shape() != [n, 2] {
-            return Err(CaptureError::Truth {
-                path: uv_path,
-                problem: format!("has shape {:?}, not [{n}, 2]", uv.shape()),
-            });
+            let problem = format!("has shape {:?}, not [{n}, 2]", uv.shape());
+            return Err(truth_error(&uv_path, problem));
         }
         let uv: Vec<f32> = read_npy(&uv_path, uv)?;
         let origins = uv.chunks_exact(2).map(|uv| {
@@ -83,12 +83,12 @@ impl Truth {
         self.light
     }
 
-    /// The window the truth is given on.
+    /// The window of τ.
     pub fn window(&self) -> Window {
         self.window
     }
 
-    /// First element of pixel `n`'s window.
+    /// Window origin of pixel `n`.
     pub fn window_origin(&self, n: usize) -> Element {
         self.origins[n]
     }
@@ -99,7 +99,10 @@ impl Truth {
         &self.tau[n * area..(n + 1) * area]
     }
 
-    /// Names of the lights there is a true picture for, sorted.
+    /// Names of the lights with a true picture, sorted.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
     pub fn lights(&self) -> Result<Vec<String>, CaptureError> {
         let io = |source| CaptureError::Io {
             path: self.root.clone(),
@@ -117,20 +120,26 @@ impl Truth {
         Ok(names)
     }
 
-    /// The light of that name as emitted, `[M, 3]`.
+    /// The emission of light `name`, `[M, 3]`.
+    ///
+    /// # Errors
+    /// If its picture cannot be read.
     pub fn light(&self, name: &str) -> Result<Vec<f32>, CaptureError> {
         let path = self.root.join(format!("light_{name}.png"));
-        let planes = images::codes8(&path, self.light, "")?;
+        let planes = ImageFile::new(path, self.light, None).read_pattern()?;
         let rgb = (0..self.light.area())
             .flat_map(|m| [0, 1, 2].map(|c| planes[c.min(planes.len() - 1)][m]))
             .map(|code| self.emission[usize::from(code)] as f32);
         Ok(rgb.collect())
     }
 
-    /// The true picture under that light, `[N]`, in units of the measurement.
+    /// The true picture under light `name`, `[N]`, in units of the measurement.
+    ///
+    /// # Errors
+    /// If it cannot be read.
     pub fn relit(&self, name: &str) -> Result<Vec<[f64; CHANNELS]>, CaptureError> {
         let path = self.root.join(format!("relit_{name}.png"));
-        let codes = images::rgb16(&path, self.camera, "")?;
+        let codes = ImageFile::new(path, self.camera, None).read_rgb16()?;
         let linear = |code| f64::from(code) / RELIT_FULL_SCALE;
         Ok(codes.into_iter().map(|codes| codes.map(linear)).collect())
     }

@@ -1,0 +1,207 @@
+//! The two types of PNG in a capture: 8-bit patterns and 16-bit linear RGB photographs.
+//!
+//! Other formats are refused: a lossy one would change the measurements. Photographs are decoded row by
+//! row, so that hundreds can be read in parallel without one of them in memory whole.
+
+use std::fmt::Display;
+use std::fs::File;
+use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
+use std::path::PathBuf;
+
+use png::{BitDepth, ColorType, Transformations};
+
+use crate::capture::{CaptureError, ImageProblem};
+use crate::transport::{CHANNELS, Extent};
+
+/// Bytes read from a file at a time.
+const READ_BYTES: usize = 1 << 16;
+
+type PngReader = png::Reader<BufReader<ReopenedFile>>;
+
+/// A PNG and what the manifest says of it.
+pub(super) struct ImageFile {
+    path: PathBuf,
+    extent: Extent,
+    field: Option<String>,
+}
+
+impl ImageFile {
+    /// The file at `path`, which must be of size `extent`. `field` is the field of the manifest that
+    /// names it, for messages.
+    pub fn new(path: PathBuf, extent: Extent, field: Option<String>) -> Self {
+        Self {
+            path,
+            extent,
+            field,
+        }
+    }
+
+    /// The codes of an 8-bit pattern: one plane if grey, three if RGB.
+    pub fn read_pattern(&self) -> Result<Vec<Vec<u8>>, CaptureError> {
+        // Some programs store black and white in one bit, or in a palette.
+        let mut reader = self.open(Transformations::EXPAND)?;
+        let channels = match reader.output_color_type() {
+            (ColorType::Grayscale, BitDepth::Eight) => 1,
+            (ColorType::Rgb, BitDepth::Eight) => CHANNELS,
+            other => return Err(self.error(ImageProblem::PatternType(sample_type(other)))),
+        };
+        let mut codes = vec![0; channels * self.extent.area()];
+        let decoded = reader.next_frame(&mut codes);
+        decoded.map_err(|e| self.unreadable(e))?;
+        let plane = |c| codes.iter().copied().skip(c).step_by(channels).collect();
+        Ok((0..channels).map(plane).collect())
+    }
+
+    /// The codes of a 16-bit photograph, row by row.
+    pub fn read_rgb16(self) -> Result<Vec<[u16; CHANNELS]>, CaptureError> {
+        let mut codes = Vec::with_capacity(self.extent.area());
+        let mut rows = self.open_rgb16()?;
+        while let Some(row) = rows.next()? {
+            codes.extend(row);
+        }
+        rows.finish()?;
+        Ok(codes)
+    }
+
+    /// Opens a 16-bit photograph to be read row by row.
+    pub fn open_rgb16(self) -> Result<Rgb16Rows, CaptureError> {
+        let reader = self.open(Transformations::IDENTITY)?;
+        let info = reader.info();
+        let found = (info.color_type, info.bit_depth);
+        if found != (ColorType::Rgb, BitDepth::Sixteen) {
+            return Err(self.error(ImageProblem::PhotoType(sample_type(found))));
+        }
+        if info.interlaced {
+            return Err(self.error(ImageProblem::Interlaced));
+        }
+        Ok(Rgb16Rows {
+            rows_left: self.extent.height,
+            reader,
+            file: self,
+        })
+    }
+
+    fn open(&self, transformations: Transformations) -> Result<PngReader, CaptureError> {
+        let file = ReopenedFile::open(&self.path).map_err(|source| match source.kind() {
+            ErrorKind::NotFound => CaptureError::Missing {
+                path: self.path.clone(),
+                field: self.field.clone(),
+            },
+            _ => CaptureError::Io {
+                path: self.path.clone(),
+                source,
+            },
+        })?;
+        let mut decoder = png::Decoder::new(BufReader::with_capacity(READ_BYTES, file));
+        decoder.set_transformations(transformations);
+        let reader = decoder.read_info().map_err(|e| self.unreadable(e))?;
+        let found = Extent {
+            width: reader.info().width,
+            height: reader.info().height,
+        };
+        let expected = self.extent;
+        match found == expected {
+            true => Ok(reader),
+            false => Err(self.error(ImageProblem::WrongExtent { found, expected })),
+        }
+    }
+
+    fn unreadable(&self, reason: impl Display) -> CaptureError {
+        let reason = reason.to_string();
+        self.error(ImageProblem::Unreadable(
+            reason.trim_end_matches('.').to_owned(),
+        ))
+    }
+
+    fn error(&self, problem: ImageProblem) -> CaptureError {
+        CaptureError::Image {
+            path: self.path.clone(),
+            field: self.field.clone(),
+            problem,
+        }
+    }
+}
+
+/// For instance "8-bit grey with alpha".
+fn sample_type((color, depth): (ColorType, BitDepth)) -> String {
+    let color = match color {
+        ColorType::Grayscale => "grey",
+        ColorType::GrayscaleAlpha => "grey with alpha",
+        ColorType::Indexed => "with a palette",
+        ColorType::Rgb => "RGB",
+        ColorType::Rgba => "RGB with alpha",
+    };
+    format!("{}-bit {color}", depth as u8)
+}
+
+/// A 16-bit RGB photograph that is read row by row from the top.
+pub(super) struct Rgb16Rows {
+    file: ImageFile,
+    reader: PngReader,
+    rows_left: u32,
+}
+
+impl Rgb16Rows {
+    /// The codes of the next row; `None` after the last.
+    pub fn next(&mut self) -> Result<Option<impl Iterator<Item = [u16; CHANNELS]>>, CaptureError> {
+        if self.rows_left == 0 {
+            return Ok(None);
+        }
+        let row = self.reader.next_row();
+        let row = row.map_err(|e| self.file.unreadable(e))?;
+        let Some(row) = row else {
+            return Err(self.file.unreadable("it ends too soon"));
+        };
+        self.rows_left -= 1;
+        let code = |bytes: &[u8]| u16::from_be_bytes([bytes[0], bytes[1]]);
+        let pixels = row.data().chunks_exact(2 * CHANNELS);
+        Ok(Some(pixels.map(move |p| {
+            [code(&p[..2]), code(&p[2..4]), code(&p[4..])]
+        })))
+    }
+
+    /// Checks the rest of the file, once all rows are read.
+    pub fn finish(mut self) -> Result<(), CaptureError> {
+        let finished = self.reader.finish();
+        finished.map_err(|e| self.file.unreadable(e))
+    }
+}
+
+/// A file that is open only during a read: some systems allow a process no more than 256 open files.
+struct ReopenedFile {
+    path: PathBuf,
+    position: u64,
+    length: u64,
+}
+
+impl ReopenedFile {
+    fn open(path: &std::path::Path) -> io::Result<Self> {
+        Ok(Self {
+            path: path.to_owned(),
+            position: 0,
+            length: File::open(path)?.metadata()?.len(),
+        })
+    }
+}
+
+impl Read for ReopenedFile {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let mut file = File::open(&self.path)?;
+        file.seek(SeekFrom::Start(self.position))?;
+        let count = file.read(buffer)?;
+        self.position += count as u64;
+        Ok(count)
+    }
+}
+
+impl Seek for ReopenedFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let position = match to {
+            SeekFrom::Start(position) => Some(position),
+            SeekFrom::Current(by) => self.position.checked_add_signed(by),
+            SeekFrom::End(by) => self.length.checked_add_signed(by),
+        };
+        self.position = position.ok_or(ErrorKind::InvalidInput)?;
+        Ok(self.position)
+    }
+}

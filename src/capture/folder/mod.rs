@@ -1,0 +1,282 @@
+//! A capture folder on disk.
+//!
+//! The manifest is checked when the folder is opened; patterns and photographs are read one by one, so
+//! that callers may read them in parallel.
+
+mod image_file;
+mod photo_reader;
+mod truth;
+
+use std::path::{Path, PathBuf};
+
+pub use self::photo_reader::PhotoReader;
+pub use self::truth::{RELIT_FULL_SCALE, Truth};
+
+use self::image_file::ImageFile;
+use super::{
+    CaptureError, FieldProblem, LinearPhoto, MANIFEST_NAME, Manifest, Measurements, NoiseModel,
+    Pattern, RowSet,
+};
+use crate::calibrate::{BitPair, GrayCodePhotos};
+use crate::transport::{CHANNELS, Correspondence};
+
+/// A capture folder with its checked manifest.
+#[derive(Debug)]
+pub struct CaptureFolder {
+    root: PathBuf,
+    manifest: Manifest,
+    emission: [f64; 256],
+}
+
+/// The photograph under no light, which is subtracted from all others.
+#[derive(Clone, Debug)]
+pub struct DarkFrame {
+    /// `[N]`, in units of the measurement.
+    light: LinearPhoto,
+    /// The noise floor estimated from it.
+    noise: NoiseModel,
+}
+
+impl CaptureFolder {
+    /// Opens the folder `root` and reads its manifest.
+    ///
+    /// # Errors
+    /// If `root` is not a folder with a valid `capture.json`.
+    pub fn open(root: &Path) -> Result<Self, CaptureError> {
+        let path = root.join(MANIFEST_NAME);
+        let problem = match (root.exists(), root.is_dir(), path.exists()) {
+            (false, ..) => Some("there is no such folder"),
+            (_, false, _) => Some("is a file"),
+            (.., false) => Some("is not a capture folder: it has no capture.json"),
+            _ => None,
+        };
+        if let Some(problem) = problem {
+            return Err(CaptureError::NotACapture {
+                path: root.to_owned(),
+                problem,
+            });
+        }
+        let text = std::fs::read_to_string(&path).map_err(|source| CaptureError::Io {
+            path: path.clone(),
+            source,
+        })?;
+        // Some editors write a byte order mark, which is not JSON.
+        let json = text.strip_prefix('\u{feff}').unwrap_or(&text);
+        let manifest = Manifest::parse(json, &path)?;
+        Ok(Self {
+            root: root.to_owned(),
+            emission: manifest.light.emission(),
+            manifest,
+        })
+    }
+
+    /// The manifest.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// Path of the manifest.
+    pub fn manifest_path(&self) -> PathBuf {
+        self.root.join(MANIFEST_NAME)
+    }
+
+    /// Names and paths of all files that recovery from `shots` reads.
+    pub fn files(&self, shots: &[usize]) -> Vec<(&str, PathBuf)> {
+        let manifest = &self.manifest;
+        let shots = shots.iter().map(|&i| &manifest.shots[i]);
+        let shots = shots.flat_map(|shot| [&shot.pattern, &shot.photo]);
+        let gray_code = match manifest.correspondence {
+            Some(_) => &[][..],
+            None => &manifest.graycode,
+        };
+        let gray_code = gray_code.iter().map(|shot| &shot.photo);
+        let names = manifest.dark.iter().chain(shots).chain(gray_code);
+        std::iter::once(MANIFEST_NAME)
+            .chain(names.map(String::as_str))
+            .map(|name| (name, self.root.join(name)))
+            .collect()
+    }
+
+    /// The known transport, if the folder has any.
+    ///
+    /// # Errors
+    /// If its files cannot be read or have the wrong shape.
+    pub fn truth(&self) -> Result<Option<Truth>, CaptureError> {
+        Truth::open(&self.root.join("truth"), &self.manifest)
+    }
+
+    /// The correspondence, if the manifest gives it.
+    pub fn correspondence(&self) -> Option<Correspondence> {
+        self.manifest.correspondence.as_ref().map(Into::into)
+    }
+
+    /// Reads `rows` of the Gray code photographs.
+    ///
+    /// # Errors
+    /// If the manifest lacks one of the bits, plain or inverted, or a photograph cannot be read.
+    pub fn read_gray_code(
+        &self,
+        dark: &DarkFrame,
+        rows: &RowSet,
+    ) -> Result<GrayCodePhotos, CaptureError> {
+        let light = &self.manifest.light;
+        Ok(GrayCodePhotos {
+            x: self.read_bits("x", light.width, dark, rows)?,
+            y: self.read_bits("y", light.height, dark, rows)?,
+            rows: rows.iter().collect(),
+        })
+    }
+
+    /// Every bit of an axis with `side` elements, the most significant first. None may be missing: a
+    /// gap would shift the bits below it.
+    fn read_bits(
+        &self,
+        axis: &'static str,
+        side: u32,
+        dark: &DarkFrame,
+        rows: &RowSet,
+    ) -> Result<Vec<BitPair>, CaptureError> {
+        let read = |bit, inverted| {
+            let mut shots = self.manifest.graycode.iter().enumerate();
+            let shot = shots.find(|(_, shot)| {
+                shot.axis == axis && shot.bit == bit && shot.inverted == inverted
+            });
+            let Some((i, shot)) = shot else {
+                return Err(CaptureError::Field {
+                    path: self.manifest_path(),
+                    field: "graycode".to_owned(),
+                    problem: FieldProblem::MissingGrayCode {
+                        axis,
+                        bit,
+                        inverted,
+                    },
+                });
+            };
+            let field = format!("graycode[{i}].photo");
+            let mut reader = self.open_photo(&shot.photo, field, 1.0, dark)?;
+            let mut photo = LinearPhoto::new();
+            reader.read(rows, &mut photo)?;
+            reader.finish()?;
+            Ok(photo)
+        };
+        let pair = |bit| {
+            Ok(BitPair {
+                plain: read(bit, false)?,
+                inverted: read(bit, true)?,
+            })
+        };
+        let bits = side.next_power_of_two().ilog2().max(1);
+        (0..bits).rev().map(pair).collect()
+    }
+
+    /// Reads the dark frame; zeros if there is none.
+    ///
+    /// # Errors
+    /// If the photograph cannot be read.
+    pub fn read_dark(&self) -> Result<DarkFrame, CaptureError> {
+        let camera = &self.manifest.camera;
+        let light = match &self.manifest.dark {
+            None => vec![[0.0; CHANNELS]; camera.extent().area()],
+            Some(name) => {
+                let field = Some("dark".to_owned());
+                let file = ImageFile::new(self.root.join(name), camera.extent(), field);
+                let codes = file.read_rgb16()?.into_iter();
+                codes
+                    .map(|codes| codes.map(|code| camera.linear(code, 1.0)))
+                    .collect()
+            }
+        };
+        let code = 1.0 / (camera.white - camera.black);
+        let noise = NoiseModel::from_dark(&light, camera.width, code);
+        Ok(DarkFrame { light, noise })
+    }
+
+    /// Opens the flood photograph, if the manifest names one.
+    ///
+    /// # Errors
+    /// If it is missing or not a 16-bit PNG of the camera's size.
+    pub fn open_flood<'a>(
+        &'a self,
+        dark: &'a DarkFrame,
+    ) -> Result<Option<PhotoReader<'a>>, CaptureError> {
+        let flood = self.manifest.flood.as_ref();
+        let open = |name: &String| self.open_photo(name, "flood".to_owned(), 1.0, dark);
+        flood.map(open).transpose()
+    }
+
+    /// Opens the photograph of shot `i`.
+    ///
+    /// # Errors
+    /// If it is missing or not a 16-bit PNG of the camera's size.
+    ///
+    /// # Panics
+    /// If there is no such shot.
+    pub fn open_shot<'a>(
+        &'a self,
+        i: usize,
+        dark: &'a DarkFrame,
+    ) -> Result<PhotoReader<'a>, CaptureError> {
+        let field = format!("shots[{i}].photo");
+        let name = &self.manifest.shots[i].photo;
+        self.open_photo(name, field, self.exposure(i), dark)
+    }
+
+    /// Reads the pattern of shot `i`, as emission.
+    ///
+    /// # Errors
+    /// If it is missing or not an 8-bit PNG of the light plane's size.
+    ///
+    /// # Panics
+    /// If there is no such shot.
+    pub fn read_pattern(&self, i: usize) -> Result<Pattern, CaptureError> {
+        let path = self.root.join(&self.manifest.shots[i].pattern);
+        let field = Some(format!("shots[{i}].pattern"));
+        let planes = ImageFile::new(path, self.manifest.light.extent(), field).read_pattern()?;
+        let emitted = |code: u8| self.emission[usize::from(code)] as f32;
+        let mut planes = planes
+            .into_iter()
+            .map(|codes| codes.into_iter().map(emitted).collect::<Vec<_>>());
+        Ok(match (planes.next(), planes.next(), planes.next()) {
+            (Some(r), Some(g), Some(b)) => Pattern::Rgb([r, g, b]),
+            (grey, ..) => Pattern::Grey(grey.unwrap_or_default()),
+        })
+    }
+
+    /// Measurements of `shots` without any camera rows yet. Their noise has only its floor.
+    pub fn empty_measurements(
+        &self,
+        shots: &[usize],
+        patterns: Vec<Pattern>,
+        correspondence: Correspondence,
+        dark: &DarkFrame,
+    ) -> Measurements {
+        let full_scale = shots.iter().map(|&i| (1.0 / self.exposure(i)) as f32);
+        Measurements {
+            camera: self.manifest.camera.extent(),
+            light: self.manifest.light.extent(),
+            correspondence,
+            patterns,
+            full_scale: full_scale.collect(),
+            rows: RowSet::from_strips([]),
+            photos: vec![LinearPhoto::new(); shots.len()],
+            noise: dark.noise,
+        }
+    }
+
+    /// Relative exposure of shot `i`.
+    fn exposure(&self, i: usize) -> f64 {
+        self.manifest.shots[i].exposure.unwrap_or(1.0)
+    }
+
+    fn open_photo<'a>(
+        &'a self,
+        name: &str,
+        field: String,
+        exposure: f64,
+        dark: &'a DarkFrame,
+    ) -> Result<PhotoReader<'a>, CaptureError> {
+        let camera = &self.manifest.camera;
+        let file = ImageFile::new(self.root.join(name), camera.extent(), Some(field));
+        Ok(PhotoReader::new(camera, dark, exposure, file.open_rgb16()?))
+    }
+}

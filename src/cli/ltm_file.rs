@@ -1,0 +1,161 @@
+//! Reading `.ltm` files: whole, a prefix, or the file index only.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::ops::Range;
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow, ensure};
+
+use super::arguments::ByteCount;
+use crate::format::{FormatError, HEADER_BYTES, Head, Interest, Limits, Part, Reader};
+use crate::transport::Transport;
+
+/// Bytes read at a time.
+const READ_BYTES: usize = 1 << 20;
+/// More than in browsers, as a workstation has more memory than a tab.
+const LIMITS: Limits = Limits {
+    decoded_bytes: 16 << 30,
+};
+
+/// An `.ltm` file, or a prefix of one.
+pub struct LtmFile {
+    pub head: Head,
+    pub transport: Transport,
+    /// Bytes read.
+    pub bytes: u64,
+    /// Scans read completely, for all tiles.
+    pub scans: usize,
+}
+
+/// Reads and checks an `.ltm` file, or its prefix `first`.
+pub fn read_ltm(path: &Path, first: Option<PrefixLength>) -> Result<LtmFile> {
+    let read = || -> Result<LtmFile> {
+        let file = open(path)?;
+        let length = file.metadata().context("cannot be read")?.len();
+        let max_bytes = first.map_or(u64::MAX, |first| first.bytes_of(length));
+        let mut reader = Reader::new(LIMITS);
+        let fed = feed_all(&mut reader, file.take(max_bytes));
+        let Some(head) = reader.head().cloned() else {
+            fed?;
+            ensure!(
+                max_bytes >= length,
+                "the first {max_bytes} bytes end within its file index; give --first more"
+            );
+            return Err(reader.cut_short().into());
+        };
+        let progress = reader.progress();
+        let transport = fed.and_then(|()| match first {
+            Some(_) => Ok(reader.finish_early()?),
+            None => Ok(reader.finish()?),
+        });
+        let (transport, _) = transport.map_err(|error| match intact_bytes(&head, &error) {
+            Some(intact) if intact > head.header.head_bytes() => {
+                anyhow!("{error:#} (--first {intact} reads the part before the damage)")
+            }
+            _ => error,
+        })?;
+        Ok(LtmFile {
+            head,
+            transport,
+            bytes: progress.bytes,
+            scans: progress.scans,
+        })
+    };
+    read().with_context(|| path.display().to_string())
+}
+
+/// Feeds the whole of `file` to `reader`.
+fn feed_all(reader: &mut Reader, mut file: impl Read) -> Result<()> {
+    let mut buffer = vec![0; READ_BYTES];
+    let mut offset = 0;
+    loop {
+        let n = file.read(&mut buffer).context("cannot be read")?;
+        if n == 0 {
+            return Ok(());
+        }
+        reader.feed(offset, &buffer[..n])?;
+        offset += n as u64;
+    }
+}
+
+/// Number of bytes before the damage that `error` reports, if known.
+fn intact_bytes(head: &Head, error: &anyhow::Error) -> Option<u64> {
+    match error.downcast_ref::<FormatError>()? {
+        FormatError::Truncated { got, .. } => Some(*got),
+        FormatError::Checksum { part } | FormatError::Decompress { part, .. } => {
+            let bad = head.parts().find(|&number| Part::from(number) == *part);
+            bad.map(|number| head.range(number).start)
+        }
+        _ => None,
+    }
+}
+
+/// Opens an `.ltm` file and reads its file index.
+pub fn open_ltm(path: &Path) -> Result<(File, Head)> {
+    let read = || -> Result<(File, Head)> {
+        let mut file = open(path)?;
+        let mut reader = Reader::new(LIMITS);
+        loop {
+            if let Some(head) = reader.head() {
+                return Ok((file, head.clone()));
+            }
+            let wanted = reader.wants(&Interest::default()).into_iter().next();
+            let wanted = wanted.unwrap_or_default();
+            let piece = read_range(&mut file, wanted.clone())?;
+            if piece.is_empty() {
+                return Err(reader.cut_short().into());
+            }
+            // Chunks after the file index need not be decoded.
+            let head = reader.head_bytes().unwrap_or(HEADER_BYTES as u64);
+            let useful = piece.len().min((head - wanted.start) as usize);
+            reader.feed(wanted.start, &piece[..useful])?;
+        }
+    };
+    read().with_context(|| path.display().to_string())
+}
+
+/// The bytes of `range`, or up to the end of the file.
+pub fn read_range(file: &mut File, range: Range<u64>) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    file.seek(SeekFrom::Start(range.start))
+        .context("cannot be read")?;
+    let read = file.take(range.end - range.start).read_to_end(&mut bytes);
+    read.context("cannot be read")?;
+    Ok(bytes)
+}
+
+fn open(path: &Path) -> Result<File> {
+    ensure!(!path.is_dir(), "is a folder, not an .ltm file");
+    File::open(path).context("cannot be opened")
+}
+
+/// Length of a prefix: in bytes, or in per cent of the file.
+#[derive(Clone, Copy, Debug)]
+pub enum PrefixLength {
+    Bytes(u64),
+    Percent(f64),
+}
+
+impl PrefixLength {
+    /// Parses `20000`, `20K` or `10%`.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text.strip_suffix('%') {
+            Some(number) => {
+                let percent = number.parse::<f64>().map_err(|e| e.to_string())?;
+                match (0.0..=100.0).contains(&percent) {
+                    true => Ok(Self::Percent(percent)),
+                    false => Err("give a number from 0% to 100%".to_owned()),
+                }
+            }
+            None => Ok(Self::Bytes(ByteCount::parse(text)?.0)),
+        }
+    }
+
+    fn bytes_of(self, length: u64) -> u64 {
+        match self {
+            Self::Bytes(bytes) => bytes,
+            Self::Percent(percent) => (length as f64 * percent / 100.0) as u64,
+        }
+    }
+}

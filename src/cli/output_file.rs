@@ -1,0 +1,145 @@
+//! Writing files: complete or not at all, and never over a file of another format.
+
+use std::fs::File;
+use std::io::{self, BufWriter, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use tempfile::NamedTempFile;
+
+/// A builder of temporary files or folders with the permissions of ordinary ones (`mode` minus the umask,
+/// not tempfile's private default), and the folder of `path` to create them in.
+pub fn temporary_beside(path: &Path, mode: u32) -> (tempfile::Builder<'static, 'static>, &Path) {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".ltm-export-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(mode));
+    }
+    #[cfg(not(unix))]
+    let _ = mode;
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    (builder, folder)
+}
+
+/// A file format that commands write.
+#[derive(Clone, Copy, Debug)]
+pub enum OutputFormat {
+    /// A relightable photograph.
+    Ltm,
+    /// A picture.
+    Png,
+}
+
+impl OutputFormat {
+    /// The first bytes of a file.
+    fn signature(self) -> &'static [u8] {
+        match self {
+            Self::Ltm => b"\xABLTM",
+            Self::Png => b"\x89PNG",
+        }
+    }
+
+    /// Whether the extension of `path` is the format's, or there is none.
+    fn matches_extension(self, path: &Path) -> bool {
+        let extension = match self {
+            Self::Ltm => return true, // any extension will do
+            Self::Png => "png",
+        };
+        path.extension()
+            .is_none_or(|own| own.eq_ignore_ascii_case(extension))
+    }
+
+    /// Whether `path` is free, empty, or holds a file of this format as this program writes it.
+    fn may_replace(self, path: &Path) -> io::Result<bool> {
+        let file = match File::open(path) {
+            Ok(file) => file,
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(true),
+            Err(e) => return Err(e),
+        };
+        let mut start = Vec::new();
+        file.take(26).read_to_end(&mut start)?;
+        let is_own = start.starts_with(self.signature())
+            && match self {
+                Self::Ltm => true,
+                // 8-bit RGB: photographs have 16 bits.
+                Self::Png => start.get(24..) == Some(&[8, 2]),
+            };
+        Ok(start.is_empty() || is_own)
+    }
+}
+
+impl std::fmt::Display for OutputFormat {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Ltm => "an .ltm file",
+            Self::Png => "a PNG",
+        })
+    }
+}
+
+/// A file that is written under a temporary name beside its path and renamed when complete, so that the
+/// path never holds a partial file. It replaces a file of the same format only: any other is probably an
+/// input, given as output by mistake.
+pub struct OutputFile {
+    path: PathBuf,
+    file: NamedTempFile,
+}
+
+impl OutputFile {
+    /// Creates the temporary file, so that a path that cannot be written fails before the work is done.
+    pub fn create(path: &Path, format: OutputFormat) -> Result<Self> {
+        let create = || -> Result<NamedTempFile> {
+            ensure!(
+                !path.exists() || path.is_file(),
+                "is a folder or a device; give the name of a file"
+            );
+            ensure!(
+                format.may_replace(path).context("cannot be read")?,
+                "exists and is not {format} written by this program; give another name"
+            );
+            ensure!(
+                format.matches_extension(path),
+                "{format} is written; give a name with its extension"
+            );
+            let (builder, folder) = temporary_beside(path, 0o666);
+            builder
+                .tempfile_in(folder)
+                .map_err(|e| io::Error::from(e.kind())) // without the temporary name
+                .context("cannot be created; does its folder exist, and may you write there?")
+        };
+        let file = create().with_context(|| path.display().to_string())?;
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+        })
+    }
+
+    /// Writes the file and renames it to its path. Returns its length.
+    pub fn finish(
+        mut self,
+        write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<()>,
+    ) -> Result<u64> {
+        let finish = || -> Result<u64> {
+            let mut out = BufWriter::new(self.file.as_file_mut());
+            write(&mut out)?;
+            out.flush().context("cannot be written")?;
+            drop(out);
+            // On disk before it replaces another file, and before its checkpoint is deleted.
+            let synced = self.file.as_file().sync_all();
+            synced.context("cannot be written")?;
+            let metadata = self.file.as_file().metadata();
+            let bytes = metadata.context("cannot be read back")?.len();
+            self.file
+                .persist(&self.path)
+                .map_err(|e| e.error)
+                .context("cannot be renamed")?;
+            Ok(bytes)
+        };
+        finish().with_context(|| self.path.display().to_string())
+    }
+}

@@ -1,0 +1,137 @@
+//! Arguments of `ltm-export recover`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::encode::QualityArgs;
+use crate::cli::arguments::ByteCount;
+use crate::recover::{Method, SparsityBasis, WindowEstimate};
+use crate::transport::Window;
+
+/// Enough for about ten megapixels under 80 patterns. A constant, not a share of the machine's memory, so
+/// that the same command writes the same bytes on every machine.
+const DEFAULT_MEMORY: &str = "4G";
+
+/// Recover the light transport of an object from a folder of photographs
+#[derive(Debug, Args)]
+pub struct RecoverArgs {
+    /// Capture folder: capture.json and the files it names
+    pub capture: PathBuf,
+    /// File to write
+    #[arg(short, long, value_name = "FILE.ltm")]
+    pub output: PathBuf,
+    /// Recovery method
+    #[arg(long, value_enum, default_value_t = MethodName::Learned)]
+    method: MethodName,
+    /// Basis in which --method bpdn finds sparse light transport functions [default: identity]
+    #[arg(long, value_enum)]
+    basis: Option<BasisName>,
+    /// Side of the window of light elements around each camera pixel's correspondence: an odd number, or
+    /// "auto" to estimate it
+    #[arg(long, value_name = "W", default_value = "15", value_parser = parse_window)]
+    pub window: WindowChoice,
+    /// Use the first K shots only [default: all but every tenth, which are held out]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    pub patterns: Option<u32>,
+    #[command(flatten)]
+    pub quality: QualityArgs,
+    /// Limit on memory; photographs that do not fit are read in strips
+    #[arg(long, value_name = "BYTES", default_value = DEFAULT_MEMORY, value_parser = ByteCount::parse)]
+    pub memory: ByteCount,
+    /// Continue an interrupted recovery from FILE.ltm.checkpoint
+    #[arg(long)]
+    pub resume: bool,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl RecoverArgs {
+    /// The method with its basis.
+    pub fn method(&self) -> Method {
+        match self.method {
+            MethodName::Learned => Method::Learned,
+            MethodName::Nnls => Method::Nnls,
+            MethodName::Bpdn => Method::Bpdn(match self.basis {
+                Some(BasisName::Identity) | None => SparsityBasis::Identity,
+                Some(BasisName::Dct) => SparsityBasis::Dct,
+                Some(BasisName::Haar) => SparsityBasis::Haar,
+            }),
+        }
+    }
+
+    /// Whether `--basis` is given with a method that has none.
+    pub fn has_unused_basis(&self) -> bool {
+        self.basis.is_some() && self.method().basis().is_none()
+    }
+}
+
+/// The window asked for.
+#[derive(Clone, Copy, Debug)]
+pub enum WindowChoice {
+    /// Estimated from the photographs.
+    Auto,
+    /// Given.
+    Fixed(Window),
+}
+
+impl WindowChoice {
+    /// The largest window that may be chosen.
+    pub fn max(self) -> Window {
+        match self {
+            Self::Auto => WindowEstimate::MAX_WINDOW,
+            Self::Fixed(window) => window,
+        }
+    }
+
+    /// The argument as given.
+    pub fn name(self) -> String {
+        match self {
+            Self::Auto => "auto".to_owned(),
+            Self::Fixed(window) => window.side().to_string(),
+        }
+    }
+}
+
+fn parse_window(text: &str) -> Result<WindowChoice, String> {
+    if text == "auto" {
+        return Ok(WindowChoice::Auto);
+    }
+    let hint = "give an odd number of light elements, or auto";
+    let side = text.parse::<u32>().map_err(|e| format!("{e}; {hint}"))?;
+    let window = Window::new(side).map_err(|e| e.to_string())?;
+    Ok(WindowChoice::Fixed(window))
+}
+
+/// Values of `--method`.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum MethodName {
+    /// A prior learned from the photographs themselves
+    Learned,
+    /// Non-negative least squares
+    Nnls,
+    /// Basis pursuit denoising: the sparsest function that explains the photographs
+    Bpdn,
+}
+
+/// Values of `--basis`.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum BasisName {
+    /// The light elements themselves, for opaque objects
+    Identity,
+    /// Discrete cosine transform, for translucent objects
+    Dct,
+    /// Haar wavelets
+    Haar,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_memory_is_a_byte_count() {
+        assert_eq!(ByteCount::parse(DEFAULT_MEMORY), Ok(ByteCount(4 << 30)));
+    }
+}

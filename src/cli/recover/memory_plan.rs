@@ -1,0 +1,253 @@
+//! Shares the memory limit of a recovery out between photographs and tiles.
+//!
+//! All photographs are loaded if they fit beside one tile. Otherwise half of what remains after the fixed
+//! costs holds strips of rows, the rest tiles. Only the number of tiles at once depends on the number of
+//! threads, so that the loaded rows, and the result, do not.
+
+use std::ops::Range;
+
+use anyhow::{Result, ensure};
+
+use super::encode::FILE_TILE_SIDE;
+use crate::capture::{Manifest, RowSet};
+use crate::cli::arguments::ByteCount;
+use crate::recover::Method;
+use crate::transport::{CHANNELS, Geometry, Window};
+
+/// The program itself, its buffers, and what the allocator retains.
+const PROGRAM_BYTES: u64 = 32 << 20;
+/// Reading one photograph, beside its rows: a buffer and the decompressor's window.
+const READER_BYTES: u64 = 320 << 10;
+/// Compressing one recovered tile for the checkpoint, beside the tile.
+const COMPRESSOR_BYTES: u64 = 24 << 20;
+/// One coefficient or element of all channels while its tile of the file is encoded: the value, its rounding
+/// error, quantised values of two scans, and their tokens.
+const ENCODED_VALUE_BYTES: u64 = 60;
+/// Choosing the quantisation step of the file.
+const RATE_CONTROL_BYTES: u64 = 64 << 20;
+
+/// How the memory limit is used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MemoryPlan {
+    /// Bytes for rows of photographs.
+    photograph_bytes: u64,
+    /// Bytes of one camera row of all photographs.
+    row_bytes: u64,
+    height: u32,
+    width: u32,
+    tile_side: u32,
+    /// Number of tiles recovered at once.
+    pub tiles_at_once: usize,
+    threads: usize,
+    limit: ByteCount,
+    fixed_bytes: u64,
+}
+
+impl MemoryPlan {
+    /// A plan for recovery by `method` from `shots` photographs on at most `threads` threads. Fails if
+    /// `limit` is too low for one tile.
+    pub fn new(
+        limit: ByteCount,
+        manifest: &Manifest,
+        shots: usize,
+        method: Method,
+        window: Window,
+        threads: usize,
+    ) -> Result<Self> {
+        let (camera, light) = (manifest.camera.extent(), manifest.light.extent());
+        let tile_side = Geometry::DEFAULT_TILE_SIDE;
+        let pixel = (CHANNELS * size_of::<f32>()) as u64;
+        let photographs = shots as u64;
+        let width = u64::from(camera.width);
+        let fixed_bytes = PROGRAM_BYTES
+            + method.preparation_bytes(window) as u64
+            + pixel * camera.area() as u64 // the dark frame
+            + pixel * (shots * light.area()) as u64 // patterns, of any colour
+            + photographs * (READER_BYTES + 4 * 2 * CHANNELS as u64 * width);
+        // The functions of a tile as real numbers, as codes, and as byte planes to compress.
+        let element = pixel + 8 + 2 * CHANNELS as u64;
+        let tile = COMPRESSOR_BYTES
+            + method.tile_bytes(window, shots) as u64
+            + element * u64::from(tile_side * tile_side) * window.area() as u64;
+        let mut plan = Self {
+            photograph_bytes: 0,
+            row_bytes: photographs * pixel * width,
+            height: camera.height,
+            width: camera.width,
+            tile_side,
+            tiles_at_once: 0,
+            threads,
+            limit,
+            fixed_bytes,
+        };
+        let rows =
+            plan.row_bytes * u64::from((tile_side + 2 * method.max_halo()).min(camera.height));
+        plan.ensure_limit(fixed_bytes + tile + rows)?;
+        let free = limit.0 - fixed_bytes;
+        let all = plan.row_bytes * u64::from(plan.height);
+        plan.photograph_bytes = match all <= free - tile {
+            true => all,
+            false => (free / 2).clamp(rows, free - tile),
+        };
+        plan.tiles_at_once = threads.min(((free - plan.photograph_bytes) / tile) as usize);
+        Ok(plan)
+    }
+
+    /// Number of tiles of the file encoded at once, after the photographs are unloaded, for `rank`
+    /// components and functions of `window`. The encoded file is not included. Fails if the limit is too
+    /// low for one tile.
+    pub fn tiles_encoded_at_once(&self, window: Window, rank: usize) -> Result<usize> {
+        let pixels = u64::from(self.width) * u64::from(self.height);
+        let value = ENCODED_VALUE_BYTES * (window.area() + rank) as u64;
+        let tile = value * pixels.min(u64::from(FILE_TILE_SIDE).pow(2));
+        let fixed = PROGRAM_BYTES + RATE_CONTROL_BYTES.min(value * pixels);
+        self.ensure_limit(fixed + tile)?;
+        Ok(self.threads.min(((self.limit.0 - fixed) / tile) as usize))
+    }
+
+    fn ensure_limit(&self, min_bytes: u64) -> Result<()> {
+        let megabytes = min_bytes.div_ceil(1 << 20);
+        ensure!(
+            self.limit.0 >= min_bytes,
+            "--memory {} is too little for this capture; it takes at least --memory {megabytes}M",
+            self.limit,
+        );
+        Ok(())
+    }
+
+    /// Number of tiles.
+    pub fn tiles(&self) -> usize {
+        let along = |side: u32| side.div_ceil(self.tile_side) as usize;
+        along(self.width) * along(self.height)
+    }
+
+    /// Whether all photographs fit in memory whole.
+    pub fn fits_photographs(&self) -> bool {
+        self.max_rows() >= self.height
+    }
+
+    fn max_rows(&self) -> u32 {
+        u32::try_from(self.photograph_bytes / self.row_bytes.max(1)).unwrap_or(u32::MAX)
+    }
+
+    /// The camera rows to prepare the recovery from: all if they fit, otherwise rows of tiles spread
+    /// evenly over the picture.
+    pub fn sample_rows(&self) -> RowSet {
+        if self.fits_photographs() {
+            return RowSet::all(self.height);
+        }
+        let tile_rows = self.height.div_ceil(self.tile_side);
+        let count = (self.max_rows() / self.tile_side).clamp(1, tile_rows);
+        // The middles of `count` equal parts.
+        let middle = |i: u32| ((2 * i + 1) * tile_rows) / (2 * count);
+        RowSet::from_strips((0..count).map(|i| self.pixel_rows(middle(i)..middle(i) + 1, 0)))
+    }
+
+    /// Strips of tile rows from the top down, each with the camera rows to load for it: its own and `halo`
+    /// more on either side.
+    pub fn strips(&self, halo: u32) -> Vec<(Range<u32>, RowSet)> {
+        let tile_rows = self.height.div_ceil(self.tile_side);
+        if self.fits_photographs() {
+            return vec![(0..tile_rows, RowSet::all(self.height))];
+        }
+        let count = self.max_rows().saturating_sub(2 * halo) / self.tile_side;
+        let strips = (0..tile_rows).step_by(count.max(1) as usize).map(|first| {
+            let strip = first..(first + count.max(1)).min(tile_rows);
+            let rows = self.pixel_rows(strip.clone(), halo);
+            (strip, RowSet::from_strips([rows]))
+        });
+        strips.collect()
+    }
+
+    /// Whether so many Gray code photographs fit in memory whole.
+    pub fn fits_gray_code(&self, photographs: usize) -> bool {
+        self.gray_code_rows(photographs).count() == self.height as usize
+    }
+
+    /// The camera rows to decode of so many Gray code photographs: all if they fit, otherwise rows spread
+    /// evenly over the picture.
+    pub fn gray_code_rows(&self, photographs: usize) -> RowSet {
+        // The samples of a pixel and its decoded position.
+        let pixel = photographs as u64 * (CHANNELS * size_of::<f32>()) as u64 + 64;
+        let max_rows = (self.limit.0 - self.fixed_bytes) / (pixel * u64::from(self.width));
+        let interval = u64::from(self.height).div_ceil(max_rows.max(1));
+        let rows = (0..self.height).step_by(interval as usize);
+        RowSet::from_strips(rows.map(|y| y..y + 1))
+    }
+
+    fn pixel_rows(&self, tile_rows: Range<u32>, halo: u32) -> Range<u32> {
+        let start = (tile_rows.start * self.tile_side).saturating_sub(halo);
+        start..(tile_rows.end * self.tile_side + halo).min(self.height)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(megabytes: u64, threads: usize) -> Result<MemoryPlan> {
+        let manifest = Manifest::parse(
+            r#"{"version": 1, "light": {"width": 64, "height": 64, "gamma": 2},
+                "camera": {"width": 500, "height": 300, "black": 0, "white": 60000},
+                "shots": [{"pattern": "a.png", "photo": "b.png"}]}"#,
+            std::path::Path::new("capture.json"),
+        );
+        let window = Window::new(9).unwrap();
+        MemoryPlan::new(
+            ByteCount(megabytes << 20),
+            &manifest.unwrap(),
+            80,
+            Method::Nnls,
+            window,
+            threads,
+        )
+    }
+
+    #[test]
+    fn strips_fit_the_budget_and_cover_every_tile_once() {
+        for megabytes in [160, 200, 250, 400, 4000] {
+            let plan = plan(megabytes, 8).unwrap();
+            assert!((1..=8).contains(&plan.tiles_at_once));
+            for halo in [0, 8] {
+                let mut next = 0;
+                for (strip, rows) in plan.strips(halo) {
+                    assert_eq!(strip.start, next);
+                    next = strip.end;
+                    let needed =
+                        (strip.start * 32).saturating_sub(halo)..(strip.end * 32 + halo).min(300);
+                    assert!(rows.contains_all(needed));
+                    assert!(rows.count() as u64 * plan.row_bytes <= plan.photograph_bytes);
+                }
+                assert_eq!(next, 10);
+            }
+            let sample = plan.sample_rows();
+            assert!(sample.count() as u64 * plan.row_bytes <= plan.photograph_bytes);
+            assert_eq!(plan.fits_photographs(), sample == RowSet::all(300));
+            assert!(sample.iter().all(|y| y < 300));
+            assert_eq!(
+                sample,
+                super::tests::plan(megabytes, 1).unwrap().sample_rows()
+            );
+        }
+        assert!(plan(4000, 2).unwrap().fits_photographs());
+        // All rows if they fit, and never more than fit.
+        for photographs in [12, 44, 2000] {
+            let plan = plan(4000, 2).unwrap();
+            let rows = plan.gray_code_rows(photographs).count() as u64;
+            let bytes = rows * 500 * photographs as u64 * (CHANNELS * size_of::<f32>()) as u64;
+            assert!(bytes < 4000 << 20);
+            assert!(rows == 300 || photographs == 2000);
+        }
+        assert!(!plan(160, 2).unwrap().fits_photographs());
+    }
+
+    #[test]
+    fn too_little_memory_is_refused_with_the_minimum() {
+        let message = plan(30, 2).unwrap_err().to_string();
+        let words: Vec<&str> = message.split(' ').collect();
+        let least = words.last().unwrap().trim_end_matches('M').parse().unwrap();
+        assert!(message.contains("at least --memory"), "{message}");
+        assert!(plan(least, 2).is_ok());
+        assert!(plan(least - 1, 2).is_err());
+    }
+}

@@ -1,0 +1,77 @@
+//! `ltm-export recover`: a capture folder to an `.ltm` file.
+//!
+//! [`job`] reads the photographs, prepares a recovery, recovers its tiles into a [`checkpoint`] and encodes
+//! them. [`memory_plan`] keeps all of it within `--memory`.
+
+mod args;
+mod checkpoint;
+mod encode;
+mod job;
+mod memory_plan;
+mod report;
+mod run_key;
+mod shots;
+mod tile_record;
+mod tiles;
+
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+
+pub use self::args::RecoverArgs;
+
+use self::args::WindowChoice;
+use self::job::{RecoverJob, thread_pool};
+use self::memory_plan::MemoryPlan;
+use super::arguments::UsageError;
+use super::output_file::{OutputFile, OutputFormat};
+use super::process::{Interrupt, peak_rss_bytes};
+use super::report::print_json;
+use crate::capture::CaptureFolder;
+use crate::recover::{MIN_PATTERNS, RecoverError};
+
+/// Runs the command.
+pub fn run(args: &RecoverArgs) -> Result<()> {
+    let start = Instant::now();
+    if args.has_unused_basis() {
+        bail!(UsageError("--basis is for --method bpdn"));
+    }
+    let interrupt = Interrupt::listen()?;
+    // An output that cannot be written fails before the work.
+    drop(OutputFile::create(&args.output, OutputFormat::Ltm)?);
+    let folder = CaptureFolder::open(&args.capture)?;
+    let manifest = folder.manifest();
+    shots::warn_of_unknown_fields(&folder);
+    let shots = shots::choose_shots(&manifest.shots, args.patterns)?;
+    if shots.len() < MIN_PATTERNS {
+        let manifest = folder.manifest_path().display().to_string();
+        let (count, min) = (shots.len(), MIN_PATTERNS);
+        return Err(RecoverError::TooFewPatterns { count, min }).context(manifest);
+    }
+    let method = args.method();
+    let plan = MemoryPlan::new(
+        args.memory,
+        manifest,
+        shots.len(),
+        method,
+        args.window.max(),
+        rayon::current_num_threads(),
+    )?;
+    if let WindowChoice::Fixed(window) = args.window {
+        plan.tiles_encoded_at_once(window, method.max_rank(window))?;
+    }
+    let job = RecoverJob {
+        args,
+        folder: &folder,
+        shots: &shots,
+        plan: &plan,
+        interrupt: &interrupt,
+    };
+    let mut report = thread_pool(plan.tiles_at_once)?.install(|| job.run())?;
+    report.seconds = start.elapsed().as_secs_f64();
+    report.peak_rss_bytes = peak_rss_bytes();
+    match args.json {
+        true => print_json(&report),
+        false => report.print(args, manifest),
+    }
+}

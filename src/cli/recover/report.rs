@@ -1,0 +1,67 @@
+//! The result of `ltm-export recover`.
+
+use anyhow::Result;
+use serde::Serialize;
+
+use super::args::RecoverArgs;
+use crate::capture::{Manifest, NoiseModel};
+use crate::cli::report::{format_bytes, format_shots, print_line};
+use crate::recover::{CommonMode, Method, SparsityBasis};
+use crate::transport::Decibels;
+
+/// Fields of `recover --json`; see docs/capture.md.
+#[derive(Serialize)]
+pub struct RecoverReport {
+    pub seconds: f64,
+    pub peak_rss_bytes: Option<u64>,
+    pub method: Method,
+    /// Of bpdn only.
+    pub basis: Option<SparsityBasis>,
+    pub window: u32,
+    /// With `--window auto`: estimated share of light from outside the window.
+    pub leak: Option<f64>,
+    /// None if every tile is direct.
+    pub rank: Option<usize>,
+    pub patterns: usize,
+    /// More than `patterns` if some were photographed at several exposures.
+    pub photographs: usize,
+    /// SNR of the recovered transport against the object, estimated on held-out patterns.
+    pub expected_snr_db: Option<Decibels>,
+    /// SNR of the file relative to the recovered transport.
+    pub file_snr_db: Option<Decibels>,
+    pub common_mode: Option<CommonMode>,
+    pub noise: NoiseModel,
+    /// Number of strips in which the photographs were read; 1 if they fit in memory whole.
+    pub strips: usize,
+    pub saturated_samples: usize,
+    /// Pixels saturated in nearly all photographs.
+    pub overexposed_pixels: usize,
+    pub file_bytes: u64,
+}
+
+impl RecoverReport {
+    /// Prints the report as text.
+    pub fn print(&self, args: &RecoverArgs, manifest: &Manifest) -> Result<()> {
+        print_line(&format!(
+            "{}: {} camera pixels, {} light elements, window {}, from {} in {:.1} s, {}",
+            args.output.display(),
+            manifest.camera.extent(),
+            manifest.light.extent(),
+            self.window,
+            format_shots(self.patterns, self.photographs),
+            self.seconds,
+            format_bytes(self.file_bytes),
+        ))?;
+        if let Some(snr) = self.expected_snr_db {
+            print_line(&format!(
+                "SNR of the recovered light transport: about {snr}, estimated on held-out patterns"
+            ))?;
+        }
+        if let Some(snr) = self.file_snr_db {
+            print_line(&format!(
+                "SNR of the file relative to the recovered light transport: {snr}"
+            ))?;
+        }
+        Ok(())
+    }
+}

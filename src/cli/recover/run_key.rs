@@ -1,0 +1,169 @@
+//! What the tiles of a recovery depend on. A checkpoint is resumed only with an equal key.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, ErrorKind, Read};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::args::RecoverArgs;
+use super::memory_plan::MemoryPlan;
+use crate::capture::CaptureFolder;
+use crate::cli::process::{Interrupt, Interrupted};
+use crate::recover::{HoldoutValidation, Recovery};
+
+/// Bytes of a file hashed at a time.
+const READ_BYTES: usize = 1 << 18;
+
+/// Name and version of this program.
+pub const PROGRAM: &str = concat!("ltm-export ", env!("CARGO_PKG_VERSION"));
+
+/// Everything that determines the recovered tiles.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RunKey {
+    /// Name and version of the program.
+    pub program: String,
+    /// `--method`.
+    pub method: String,
+    /// `--basis`; of bpdn only.
+    pub basis: Option<String>,
+    /// `--window`.
+    pub window: String,
+    /// `--patterns`, if given.
+    pub patterns: Option<u32>,
+    /// `--memory`, unless all photographs fit in it.
+    pub memory_bytes: Option<u64>,
+    /// The files read, by their names in the manifest.
+    pub files: BTreeMap<String, FileDigest>,
+    /// Number of tiles.
+    pub tiles: usize,
+}
+
+impl RunKey {
+    /// The key of a recovery by `args` from `shots`. Reads all their files.
+    pub fn new(
+        args: &RecoverArgs,
+        folder: &CaptureFolder,
+        shots: &[usize],
+        plan: &MemoryPlan,
+        interrupt: &Interrupt,
+    ) -> Result<Self> {
+        let digest = |(name, path): (&str, PathBuf)| -> Result<(String, FileDigest)> {
+            if interrupt.is_requested() {
+                bail!(Interrupted(
+                    "interrupted before anything was read".to_owned()
+                ));
+            }
+            let digest = FileDigest::of(&path).with_context(|| path.display().to_string())?;
+            Ok((name.to_owned(), digest))
+        };
+        let files = folder.files(shots).into_par_iter().map(digest);
+        let method = args.method();
+        let fits = plan.fits_gray_code(folder.manifest().graycode.len());
+        Ok(Self {
+            program: PROGRAM.to_owned(),
+            method: method.name().to_owned(),
+            basis: method.basis().map(|basis| basis.name().to_owned()),
+            window: args.window.name(),
+            patterns: args.patterns,
+            memory_bytes: (!(plan.fits_photographs() && fits)).then_some(args.memory.0),
+            files: files.collect::<Result<_>>()?,
+            tiles: plan.tiles(),
+        })
+    }
+
+    /// Describes the first difference between this key, of a checkpoint, and that of the present run.
+    pub fn difference(&self, present: &Self) -> Option<String> {
+        if self.program != present.program {
+            let (was, is) = (&self.program, &present.program);
+            return Some(format!("it was written by {was}, and this is {is}"));
+        }
+        let changed = self.options().into_iter().zip(present.options());
+        for ((name, was), (_, is)) in changed {
+            if was != is {
+                return Some(format!("{name} was {was}, and is {is} now"));
+            }
+        }
+        let mut names = self.files.keys().chain(present.files.keys());
+        let changed = names.find(|name| self.files.get(*name) != present.files.get(*name));
+        let tiles = || (self.tiles != present.tiles).then(|| "the tiles differ".to_owned());
+        changed
+            .map(|name| format!("{name} in the capture has changed since"))
+            .or_else(tiles)
+    }
+
+    /// Names and values of the options.
+    fn options(&self) -> [(&'static str, String); 5] {
+        let or_none = |value: Option<String>| value.unwrap_or_else(|| "not given".to_owned());
+        let memory = self.memory_bytes.map(|bytes| bytes.to_string());
+        [
+            ("--method", self.method.clone()),
+            ("--basis", or_none(self.basis.clone())),
+            ("--window", self.window.clone()),
+            ("--patterns", or_none(self.patterns.map(|k| k.to_string()))),
+            (
+                "--memory",
+                memory.unwrap_or_else(|| "enough for all photographs".to_owned()),
+            ),
+        ]
+    }
+}
+
+/// Length and CRC-32C of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileDigest {
+    bytes: u64,
+    crc: u32,
+}
+
+impl FileDigest {
+    /// Reads the whole file.
+    pub fn of(path: &Path) -> io::Result<Self> {
+        let mut file = File::open(path)?;
+        let mut buffer = vec![0; READ_BYTES];
+        let mut digest = Self { bytes: 0, crc: 0 };
+        loop {
+            match file.read(&mut buffer) {
+                Ok(0) => return Ok(digest),
+                Ok(n) => {
+                    digest.bytes += n as u64;
+                    digest.crc = crc32c::crc32c_append(digest.crc, &buffer[..n]);
+                }
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                Err(e) => return Err(e),
+            }
+        }
+    }
+}
+
+/// CRC-32C of what a recovery learned or chose: its geometry, basis, weight of the common mode, and SNR on
+/// held-out patterns. Another build or machine may learn different values from the same photographs, and
+/// its tiles would not fit.
+pub fn recovery_fingerprint(recovery: &Recovery) -> u32 {
+    let geometry = recovery.geometry();
+    let grids = [
+        geometry.camera.width,
+        geometry.camera.height,
+        geometry.light.width,
+        geometry.light.height,
+        geometry.window.side(),
+        geometry.tile_side,
+    ];
+    let affine = geometry.correspondence.affine.into_iter().flatten();
+    let common_mode = recovery.common_mode().map(|mode| mode.weight());
+    let snr = recovery
+        .holdout_validation()
+        .and_then(HoldoutValidation::snr);
+    let chosen = [common_mode, snr.map(|snr| snr.0)].map(|value| value.unwrap_or(f64::NAN));
+    let basis = recovery.basis().into_iter().flat_map(|b| b.kernels.iter());
+    let bytes: Vec<u8> = grids
+        .into_iter()
+        .flat_map(u32::to_le_bytes)
+        .chain(affine.chain(chosen).flat_map(f64::to_le_bytes))
+        .chain(basis.flatten().flat_map(|value| value.to_le_bytes()))
+        .collect();
+    crc32c::crc32c(&bytes)
+}
