@@ -1,7 +1,7 @@
-//! `ltm-export` as a person meets it: real photographs in, figures and pictures out, and a clear
-//! word when something is wrong.
+//! The commands of `ltm-export` end to end, on the capture `glass-s`: figures, pictures, and messages for
+//! wrong inputs.
 #![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // a test that cannot go on should stop
+#![allow(clippy::unwrap_used)] // a panic fails the test
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -31,8 +31,8 @@ fn json(args: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Runs what must fail; returns what it says.
-fn complaint(args: &[&str]) -> String {
+/// Runs a command that must fail; returns its message.
+fn error_message(args: &[&str]) -> String {
     let output = run(args);
     assert_eq!(output.status.code(), Some(1), "{args:?}");
     assert!(output.stdout.is_empty(), "errors go to standard error");
@@ -54,22 +54,22 @@ fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
-/// A copy of the fixture to spoil, and a place for output.
-fn spoilt(spoil: impl FnOnce(&Path)) -> (TempDir, PathBuf, PathBuf) {
+/// A copy of the fixture changed by `modify`, and a path for the output.
+fn modified_capture(modify: impl FnOnce(&Path)) -> (TempDir, PathBuf, PathBuf) {
     let folder = TempDir::new().unwrap();
     let capture = folder.path().join("capture");
     copy_folder(&fixture(), &capture);
-    spoil(&capture);
+    modify(&capture);
     let output = folder.path().join("out/photo.ltm");
     fs::create_dir(output.parent().unwrap()).unwrap();
     (folder, capture, output)
 }
 
-/// Recovery from a spoilt capture must fail with a message that has all of `words`, and leave
-/// nothing behind.
-fn refuses(spoil: impl FnOnce(&Path), words: &[&str]) {
-    let (_folder, capture, output) = spoilt(spoil);
-    let message = complaint(&[
+/// Asserts that recovery from a capture changed by `modify` fails with a message that contains all of `words`,
+/// and leaves no file.
+fn assert_refused(modify: impl FnOnce(&Path), words: &[&str]) {
+    let (_folder, capture, output) = modified_capture(modify);
+    let message = error_message(&[
         "recover",
         text(&capture),
         "-o",
@@ -80,8 +80,8 @@ fn refuses(spoil: impl FnOnce(&Path), words: &[&str]) {
     for word in words {
         assert!(message.contains(word), "no {word:?} in: {message}");
     }
-    let left = fs::read_dir(output.parent().unwrap()).unwrap().count();
-    assert_eq!(left, 0, "files left behind");
+    let files = fs::read_dir(output.parent().unwrap()).unwrap().count();
+    assert_eq!(files, 0, "files left behind");
 }
 
 fn edit_manifest(capture: &Path, edit: impl FnOnce(&mut Value)) {
@@ -102,7 +102,7 @@ fn small_ltm(folder: &Path) -> PathBuf {
 }
 
 #[test]
-fn photographs_become_a_file_that_relights_them() {
+fn photographs_are_recovered_evaluated_inspected_and_verified() {
     let folder = TempDir::new().unwrap();
     let (fixture, file) = (fixture(), folder.path().join("glass.ltm"));
     let recovered = json(&[
@@ -124,8 +124,7 @@ fn photographs_become_a_file_that_relights_them() {
     let bytes = fs::metadata(&file).unwrap().len();
     assert_eq!(recovered["file_bytes"], bytes);
 
-    // Floors a decibel below what the learned prior reaches on this noisy, strongly scattering
-    // capture.
+    // A decibel below the SNR of the learned prior on this noisy, strongly scattering capture.
     let evaluated = json(&["evaluate", text(&file), text(&fixture), "--json"]);
     assert!(evaluated["snr_db"].as_f64().unwrap() > 32.4, "{evaluated}");
     assert!(
@@ -161,7 +160,7 @@ fn photographs_become_a_file_that_relights_them() {
     assert_eq!(verified["ok"], true);
     assert_eq!(verified["file_bytes"], bytes);
 
-    // Unless archives are asked for, a file is a tenth of that and nearly as good.
+    // The default file is about a tenth as large, and loses little.
     let args = ["--window", "13", "--json"];
     let small = json(&[&["recover", text(&fixture), "-o", text(&file)], &args[..]].concat());
     assert!(small["file_bytes"].as_u64().unwrap() * 6 < bytes, "{small}");
@@ -176,7 +175,7 @@ fn photographs_become_a_file_that_relights_them() {
         evaluated["snr_db"].as_f64().unwrap() > lossless - 0.3,
         "{evaluated}"
     );
-    // A tenth of it relights too.
+    // The first tenth of it relights as well.
     let args = [
         "evaluate",
         text(&file),
@@ -191,7 +190,7 @@ fn photographs_become_a_file_that_relights_them() {
 }
 
 #[test]
-fn a_file_is_as_good_or_as_small_as_asked_for() {
+fn quality_and_size_of_the_file_are_as_requested() {
     let folder = TempDir::new().unwrap();
     let (fixture, file) = (fixture(), folder.path().join("glass.ltm"));
     let recover = |args: &[&str]| {
@@ -214,28 +213,28 @@ fn a_file_is_as_good_or_as_small_as_asked_for() {
     let small = recover(&["--max-bytes", "20000"]);
     let bytes = small["file_bytes"].as_u64().unwrap();
     assert!((18_000..=20_000).contains(&bytes), "{small}");
-    let most = |bytes: &'static str| {
+    let max_bytes = |bytes: &'static str| {
         let start = ["recover", text(&fixture), "-o", text(&file)];
         [&start[..], &["--window", "5", "--max-bytes", bytes]].concat()
     };
     let before = fs::read(&file).unwrap();
-    let message = complaint(&most("600"));
+    let message = error_message(&max_bytes("600"));
     assert!(
         ["at least", "600", "--resume"].map(|words| message.contains(words)) == [true; 3],
         "{message}"
     );
     assert!(fs::read(&file).unwrap() == before);
-    // Nothing is recovered twice.
-    let resumed = run(&[&most("20kB")[..], &["--resume"]].concat());
+    // The checkpoint has all tiles.
+    let resumed = run(&[&max_bytes("20kB")[..], &["--resume"]].concat());
     assert!(String::from_utf8_lossy(&resumed.stderr).contains("resuming with 4 of 4 tiles"));
     assert!(fs::read(&file).unwrap() == before);
-    assert_eq!(run(&most("99")).status.code(), Some(2));
+    assert_eq!(run(&max_bytes("99")).status.code(), Some(2));
     let both = ["recover", "x", "-o", "y", "--lossless", "--quality", "30"];
     assert_eq!(run(&both).status.code(), Some(2));
 }
 
 #[test]
-fn each_method_is_chosen_by_name_and_named_in_the_file() {
+fn each_method_is_selected_by_name_and_recorded_in_the_file() {
     let folder = TempDir::new().unwrap();
     let (fixture, file) = (fixture(), folder.path().join("glass.ltm"));
     let recover = ["recover", text(&fixture), "-o", text(&file), "--json"];
@@ -303,11 +302,11 @@ fn relit_pictures_agree_with_the_reference_and_follow_the_torch() {
     let right = relit("r.png", &["--light", "torch", "--at", "0.9,0.5"]);
     assert!(brightness(&left, true) > 2 * brightness(&left, false));
     assert!(brightness(&right, false) > 2 * brightness(&right, true));
-    // The built-in fire is the first moment of the one that burns.
+    // Without --time the fire is that of time 0.
     let fire = relit("f.png", &["--light", "fire"]);
     assert_eq!(fire, relit("f0.png", &["--light", "fire", "--time", "0"]));
     assert_ne!(fire, relit("f2.png", &["--light", "fire", "--time", "2.5"]));
-    // A picture as the light, larger than the light plane; then half as bright.
+    // An image as the light, larger than the light plane; then half as bright.
     let white = folder.path().join("white.png");
     image::RgbImage::from_pixel(90, 50, image::Rgb([255; 3]))
         .save(&white)
@@ -320,7 +319,7 @@ fn relit_pictures_agree_with_the_reference_and_follow_the_torch() {
 
 #[test]
 fn a_missing_photograph_is_named_with_its_field() {
-    refuses(
+    assert_refused(
         |c| fs::remove_file(c.join("photos/0003.png")).unwrap(),
         &[
             "photos/0003.png",
@@ -329,23 +328,23 @@ fn a_missing_photograph_is_named_with_its_field() {
             "add it",
         ],
     );
-    refuses(
+    assert_refused(
         |c| fs::remove_file(c.join("patterns/0000.png")).unwrap(),
         &["patterns/0000.png", "shots[0].pattern"],
     );
-    refuses(
+    assert_refused(
         |c| fs::remove_file(c.join("capture.json")).unwrap(),
         &["is not a capture folder", "capture.json"],
     );
     let out = TempDir::new().unwrap();
     let output = out.path().join("x.ltm");
-    let recover = |capture: &Path| complaint(&["recover", text(capture), "-o", text(&output)]);
+    let recover = |capture: &Path| error_message(&["recover", text(capture), "-o", text(&output)]);
     assert!(recover(&out.path().join("nowhere")).contains("there is no such folder"));
     assert!(recover(&fixture().join("capture.json")).contains("is a file"));
 }
 
 #[test]
-fn photographs_that_are_all_one_are_refused() {
+fn identical_photographs_are_refused() {
     let folder = TempDir::new().unwrap();
     let capture = folder.path().join("cookies");
     let size = ["--camera", "32x32", "--light", "16x16", "--patterns", "20"];
@@ -356,7 +355,7 @@ fn photographs_that_are_all_one_are_refused() {
         fs::copy(photo(0), photo(i)).unwrap();
     }
     let file = folder.path().join("cookies.ltm");
-    let message = complaint(&["recover", text(&capture), "-o", text(&file)]);
+    let message = error_message(&["recover", text(&capture), "-o", text(&file)]);
     assert!(
         message.contains("capture.json: photographs do not differ from pattern to pattern"),
         "{message}"
@@ -364,8 +363,8 @@ fn photographs_that_are_all_one_are_refused() {
 }
 
 #[test]
-fn what_a_file_says_does_not_control_the_terminal() {
-    let (folder, capture, _) = spoilt(|capture| {
+fn control_characters_of_a_file_are_escaped() {
+    let (folder, capture, _) = modified_capture(|capture| {
         edit_manifest(capture, |m| m["title"] = "a\u{1b}]0;x\u{7}\nb".into());
     });
     let file = folder.path().join("x.ltm");
@@ -385,17 +384,17 @@ fn what_a_file_says_does_not_control_the_terminal() {
 }
 
 #[test]
-fn an_input_named_as_output_is_not_destroyed() {
-    let (folder, capture, _) = spoilt(|_| {});
+fn an_input_given_as_output_is_not_overwritten() {
+    let (folder, capture, _) = modified_capture(|_| {});
     let manifest = capture.join("capture.json");
     let before = fs::read(&manifest).unwrap();
-    let message = complaint(&["recover", text(&capture), "-o", text(&manifest)]);
+    let message = error_message(&["recover", text(&capture), "-o", text(&manifest)]);
     assert!(message.contains("is not an .ltm file"), "{message}");
     assert_eq!(fs::read(&manifest).unwrap(), before);
     let file = small_ltm(folder.path());
     let relight_to = |output: &Path| {
         let start = ["relight", text(&file), "--light", "flood", "-o"];
-        complaint(&[&start[..], &[text(output)]].concat())
+        error_message(&[&start[..], &[text(output)]].concat())
     };
     let before = fs::read(&file).unwrap();
     let message = relight_to(&file);
@@ -407,20 +406,20 @@ fn an_input_named_as_output_is_not_destroyed() {
         "{message}"
     );
     assert_eq!(fs::read(&file).unwrap(), before);
-    // Nor is a photograph, which is a PNG as well.
+    // A photograph is a PNG, but not one that the program writes.
     let photo = capture.join("photos/0000.png");
     let before = fs::read(&photo).unwrap();
     let message = relight_to(&photo);
     assert!(message.contains("written by this program"), "{message}");
     assert_eq!(fs::read(&photo).unwrap(), before);
-    assert!(complaint(&["verify", text(folder.path())]).contains("is a folder"));
-    // What the program wrote itself is replaced.
+    assert!(error_message(&["verify", text(folder.path())]).contains("is a folder"));
+    // A file that the program wrote is replaced.
     assert_eq!(small_ltm(folder.path()), file);
 }
 
 #[test]
 fn a_picture_of_the_wrong_size_or_depth_is_refused() {
-    refuses(
+    assert_refused(
         |c| {
             image::RgbImage::new(64, 63)
                 .save(c.join("photos/0001.png"))
@@ -428,7 +427,7 @@ fn a_picture_of_the_wrong_size_or_depth_is_refused() {
         },
         &["photos/0001.png", "64x63", "64x64"],
     );
-    refuses(
+    assert_refused(
         |c| {
             image::RgbImage::new(64, 64)
                 .save(c.join("photos/0001.png"))
@@ -436,11 +435,11 @@ fn a_picture_of_the_wrong_size_or_depth_is_refused() {
         },
         &["photos/0001.png", "8-bit RGB", "16-bit linear RGB"],
     );
-    refuses(
+    assert_refused(
         |c| fs::write(c.join("photos/0002.png"), b"not a picture").unwrap(),
         &["photos/0002.png", "not a readable PNG"],
     );
-    refuses(
+    assert_refused(
         |c| {
             let path = c.join("photos/0002.png");
             let photo = fs::read(&path).unwrap();
@@ -448,7 +447,7 @@ fn a_picture_of_the_wrong_size_or_depth_is_refused() {
         },
         &["photos/0002.png", "not a readable PNG"],
     );
-    refuses(
+    assert_refused(
         |c| {
             let picture = image::ImageBuffer::<image::Luma<u16>, _>::new(32, 32);
             picture.save(c.join("patterns/0001.png")).unwrap();
@@ -467,7 +466,7 @@ fn an_interlaced_photograph_is_refused() {
             })
         })
     };
-    refuses(
+    assert_refused(
         |c| {
             let path = c.join("photos/0002.png");
             let mut photo = fs::read(&path).unwrap();
@@ -481,8 +480,8 @@ fn an_interlaced_photograph_is_refused() {
 }
 
 #[test]
-fn a_jpeg_is_no_pattern_and_a_named_flood_must_be_there() {
-    refuses(
+fn jpeg_patterns_and_missing_flood_photographs_are_refused() {
+    assert_refused(
         |c| {
             let jpeg = c.join("grey.jpg");
             image::GrayImage::new(32, 32).save(&jpeg).unwrap();
@@ -490,7 +489,7 @@ fn a_jpeg_is_no_pattern_and_a_named_flood_must_be_there() {
         },
         &["patterns/0000.png", "not a readable PNG"],
     );
-    refuses(
+    assert_refused(
         |c| edit_manifest(c, |m| m["flood"] = "photos/none.png".into()),
         &["photos/none.png", "(flood in capture.json)"],
     );
@@ -498,7 +497,7 @@ fn a_jpeg_is_no_pattern_and_a_named_flood_must_be_there() {
 
 #[test]
 fn a_manifest_with_a_byte_order_mark_is_read() {
-    let (_folder, capture, output) = spoilt(|c| {
+    let (_folder, capture, output) = modified_capture(|c| {
         let path = c.join("capture.json");
         let json = fs::read_to_string(&path).unwrap();
         fs::write(path, format!("\u{feff}{json}")).unwrap();
@@ -510,7 +509,7 @@ fn a_manifest_with_a_byte_order_mark_is_read() {
 
 #[test]
 fn a_pixel_saturated_in_every_photograph_is_white_and_reported() {
-    let (folder, capture, output) = spoilt(|c| {
+    let (folder, capture, output) = modified_capture(|c| {
         for i in 0..12 {
             let path = c.join(format!("photos/{i:04}.png"));
             let mut photo = image::open(&path).unwrap().into_rgb16();
@@ -545,7 +544,7 @@ fn a_pixel_saturated_in_every_photograph_is_white_and_reported() {
 
 #[test]
 fn cookies_are_recovered_well() {
-    // The floor lies a decibel below what is reached from 54 photographs of this scene.
+    // A decibel below the SNR from 54 photographs of this scene.
     let folder = TempDir::new().unwrap();
     let (capture, file) = (
         folder.path().join("cookies"),
@@ -568,15 +567,15 @@ fn cookies_are_recovered_well() {
 
 #[test]
 fn a_bad_manifest_is_refused_by_field() {
-    refuses(
+    assert_refused(
         |c| edit_manifest(c, |m| m["version"] = 7.into()),
         &["capture.json", "\"version\" is 7"],
     );
-    refuses(
+    assert_refused(
         |c| fs::write(c.join("capture.json"), "{ \"version\": 1, ").unwrap(),
         &["capture.json: is not a capture manifest: ", "line 1"],
     );
-    refuses(
+    assert_refused(
         |c| {
             edit_manifest(c, |m| {
                 drop(m["camera"].as_object_mut().unwrap().remove("white"))
@@ -584,15 +583,15 @@ fn a_bad_manifest_is_refused_by_field() {
         },
         &["capture.json", "missing field `white`"],
     );
-    refuses(
+    assert_refused(
         |c| edit_manifest(c, |m| m["correspondence"]["affine"][0][2] = 1e6.into()),
         &["correspondence", "no camera pixel"],
     );
-    refuses(
+    assert_refused(
         |c| edit_manifest(c, |m| m["shots"].as_array_mut().unwrap().truncate(3)),
         &["3 patterns are too few"],
     );
-    refuses(
+    assert_refused(
         |c| {
             edit_manifest(c, |m| {
                 let photo = m["shots"][3]["photo"].take();
@@ -603,7 +602,7 @@ fn a_bad_manifest_is_refused_by_field() {
         &["capture.json", "shots[3] (", "shots[5] (", "take them out"],
     );
     // Every photograph listed with the pattern before its own.
-    refuses(
+    assert_refused(
         |c| {
             edit_manifest(c, |m| {
                 let shots = m["shots"].as_array_mut().unwrap();
@@ -619,7 +618,7 @@ fn a_bad_manifest_is_refused_by_field() {
 }
 
 #[test]
-fn options_that_cannot_be_are_refused() {
+fn invalid_options_are_refused() {
     let folder = TempDir::new().unwrap();
     let (fixture, out) = (fixture(), folder.path().join("x.ltm"));
     let recover =
@@ -650,7 +649,7 @@ fn options_that_cannot_be_are_refused() {
     assert_eq!(run(&["recover"]).status.code(), Some(2));
     assert_eq!(run(&["frobnicate"]).status.code(), Some(2));
     let nowhere = folder.path().join("no/such/folder/x.ltm");
-    let message = complaint(&[
+    let message = error_message(&[
         "recover",
         text(&fixture),
         "-o",
@@ -668,7 +667,7 @@ fn options_that_cannot_be_are_refused() {
 #[test]
 fn damaged_files_are_refused_by_every_command() {
     let folder = TempDir::new().unwrap();
-    let sound = fs::read(small_ltm(folder.path())).unwrap();
+    let intact = fs::read(small_ltm(folder.path())).unwrap();
     let file = folder.path().join("damaged.ltm");
     let (fixture, png) = (fixture(), folder.path().join("x.png"));
     type Damage = fn(&mut Vec<u8>);
@@ -687,7 +686,7 @@ fn damaged_files_are_refused_by_every_command() {
         (|f| f.push(0), "goes on after its end"),
     ];
     for (damage, word) in cases {
-        let mut bytes = sound.clone();
+        let mut bytes = intact.clone();
         damage(&mut bytes);
         fs::write(&file, bytes).unwrap();
         for args in [
@@ -695,16 +694,16 @@ fn damaged_files_are_refused_by_every_command() {
             &["relight", text(&file), "--light", "flood", "-o", text(&png)],
             &["evaluate", text(&file), text(&fixture)],
         ] {
-            let message = complaint(args);
+            let message = error_message(args);
             assert!(message.contains(word), "{args:?}: {message}");
             assert!(message.contains("damaged.ltm"), "{args:?}: {message}");
         }
-        // What does not read the whole of a file tells at least of its length.
+        // `inspect` reads the file index only, and compares the length.
         let inspected = run(&["inspect", text(&file)]);
-        let told = String::from_utf8_lossy(&inspected.stderr).into_owned();
+        let message = String::from_utf8_lossy(&inspected.stderr).into_owned();
         assert!(
-            told.contains(word) || word == "damaged" || told.contains("warning"),
-            "{told}"
+            message.contains(word) || word == "damaged" || message.contains("warning"),
+            "{message}"
         );
         let verified = run(&["verify", text(&file), "--json"]);
         assert_eq!(verified.status.code(), Some(1));
@@ -713,25 +712,26 @@ fn damaged_files_are_refused_by_every_command() {
         assert!(report["error"].as_str().unwrap().contains(word));
     }
     assert!(!png.exists());
-    assert!(complaint(&["verify", "nowhere.ltm"]).contains("nowhere.ltm"));
+    assert!(error_message(&["verify", "nowhere.ltm"]).contains("nowhere.ltm"));
 }
 
 #[test]
 fn a_file_from_another_capture_is_not_evaluated() {
-    let (folder, capture, _) = spoilt(|c| edit_manifest(c, |m| m["light"]["width"] = 33.into()));
+    let (folder, capture, _) =
+        modified_capture(|c| edit_manifest(c, |m| m["light"]["width"] = 33.into()));
     let file = small_ltm(folder.path());
-    let message = complaint(&["evaluate", text(&file), text(&capture)]);
+    let message = error_message(&["evaluate", text(&file), text(&capture)]);
     assert!(message.contains("33x32"), "{message}");
 }
 
 #[test]
-fn without_a_correspondence_gray_code_gives_it() {
-    let forget = |c: &Path| {
+fn without_a_correspondence_the_gray_code_is_decoded() {
+    let remove_correspondence = |c: &Path| {
         edit_manifest(c, |m| {
             drop(m.as_object_mut().unwrap().remove("correspondence"))
         })
     };
-    let (_folder, capture, output) = spoilt(forget);
+    let (_folder, capture, output) = modified_capture(remove_correspondence);
     let args = ["--patterns", "20", "--window", "5"];
     let recovered = run(&[&["recover", text(&capture), "-o", text(&output)], &args[..]].concat());
     assert!(
@@ -758,9 +758,9 @@ fn without_a_correspondence_gray_code_gives_it() {
             assert!(off.abs() < 0.35, "{off} elements off: {row:?}");
         }
     }
-    refuses(
+    assert_refused(
         |c| {
-            forget(c);
+            remove_correspondence(c);
             edit_manifest(c, |m| {
                 m["graycode"]
                     .as_array_mut()
@@ -774,9 +774,9 @@ fn without_a_correspondence_gray_code_gives_it() {
             "axis y, bit 4, inverted false",
         ],
     );
-    refuses(
+    assert_refused(
         |c| {
-            forget(c);
+            remove_correspondence(c);
             edit_manifest(c, |m| drop(m["graycode"].as_array_mut().unwrap().remove(3)));
         },
         &[
@@ -789,8 +789,8 @@ fn without_a_correspondence_gray_code_gives_it() {
 
 #[test]
 fn exposure_and_saturation_are_accounted_for() {
-    // Halving the codes above black and saying so must not change what is recovered, and samples
-    // at white must be left out, not believed.
+    // Half the codes above black with half the exposure must give the same result; samples at white must be
+    // left out.
     let recover = |capture: &Path, output: &Path| {
         let args = ["--patterns", "30", "--window", "5", "--json"];
         json(&[&["recover", text(capture), "-o", text(output)], &args[..]].concat())
@@ -799,11 +799,11 @@ fn exposure_and_saturation_are_accounted_for() {
         let evaluated = json(&["evaluate", text(file), text(&fixture()), "--json"]);
         evaluated["snr_db"].as_f64().unwrap()
     };
-    let (_plain_folder, capture, output) = spoilt(|_| {});
+    let (_plain_folder, capture, output) = modified_capture(|_| {});
     let plain = recover(&capture, &output);
     assert_eq!(plain["saturated_samples"], 0);
     let expected = snr(&output);
-    let (_folder, capture, output) = spoilt(|c| {
+    let (_folder, capture, output) = modified_capture(|c| {
         let path = c.join("photos/0004.png");
         let mut photo = image::open(&path).unwrap().into_rgb16();
         for code in photo.iter_mut() {

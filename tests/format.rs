@@ -36,7 +36,7 @@ impl Recovered {
     fn direct(geometry: Geometry, seed: u64) -> Self {
         let tiles = functions(geometry, seed).into_iter().map(|functions| {
             let mut tile = BandTile::dark(functions.rect);
-            tile.put(RecoveredTile::Direct(functions));
+            tile.insert(RecoveredTile::Direct(functions));
             tile
         });
         Self {
@@ -71,7 +71,7 @@ impl Recovered {
                 [1.0, 0.5, 2.0].map(|c| c * size * (noise.next() as f32 - 0.3))
             };
             let mut tile = BandTile::dark(rect);
-            tile.put(RecoveredTile::Factored(FactoredTile {
+            tile.insert(RecoveredTile::Factored(FactoredTile {
                 rect,
                 coefficients: (0..rect.extent.area() * rank).map(coefficient).collect(),
             }));

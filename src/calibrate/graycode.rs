@@ -145,7 +145,7 @@ mod tests {
         let map = Correspondence { affine };
         let axis = |along: Axis| {
             let bit = |b: u32| {
-                let seen = |n: usize| -> f32 {
+                let brightness = |n: usize| -> f32 {
                     let (x, y) = (n as u32 % camera.width, n as u32 / camera.width);
                     let at = map.at(CameraPx { x, y });
                     let centre = if along == Axis::X { at.u } else { at.v };
@@ -156,7 +156,7 @@ mod tests {
                     });
                     lit.count() as f32 / 17.0
                 };
-                let plain: Vec<_> = (0..camera.area()).map(|n| [seen(n); 3]).collect();
+                let plain: Vec<_> = (0..camera.area()).map(|n| [brightness(n); 3]).collect();
                 BitPair {
                     inverted: plain.iter().map(|p| p.map(|v| 1.0 - v)).collect(),
                     plain,

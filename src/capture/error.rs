@@ -68,7 +68,7 @@ pub enum CaptureError {
         path: PathBuf,
         /// The field, as a path into the JSON.
         field: String,
-        /// What is wrong with its value.
+        /// The problem of its value.
         problem: FieldProblem,
     },
     /// A picture has the wrong size or type, or is damaged.
@@ -78,7 +78,7 @@ pub enum CaptureError {
         path: PathBuf,
         /// The field of the manifest that names it, if any.
         field: Option<String>,
-        /// What is wrong with it.
+        /// The problem.
         problem: ImageProblem,
     },
     /// A file of known transport has the wrong form.
@@ -86,12 +86,12 @@ pub enum CaptureError {
     Truth {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
 }
 
-/// What is wrong with the value of a field of the manifest; reads on after the field's name.
+/// A problem of a field of the manifest. Its text continues the name of the field.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum FieldProblem {
     /// A number or string outside its range.
@@ -135,7 +135,7 @@ pub enum FieldProblem {
     },
 }
 
-/// What is wrong with a picture.
+/// A problem of a picture.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ImageProblem {
     /// Not a PNG, or damaged.

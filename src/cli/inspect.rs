@@ -13,7 +13,7 @@ use super::report::{format_bytes, format_shots, print_json, print_line};
 use crate::format::{Coding, Head, Metadata, PartNumber};
 use crate::transport::Decibels;
 
-/// Show what is in a relightable photograph; reads only its file index
+/// Show the contents of a relightable photograph; reads its file index only
 #[derive(Debug, Args)]
 pub struct InspectArgs {
     /// File to inspect

@@ -100,16 +100,16 @@ pub fn open_ltm(path: &Path) -> Result<(File, Head)> {
             if let Some(head) = reader.head() {
                 return Ok((file, head.clone()));
             }
-            let wanted = reader.wants(&Interest::default()).into_iter().next();
-            let wanted = wanted.unwrap_or_default();
-            let piece = read_range(&mut file, wanted.clone())?;
-            if piece.is_empty() {
+            let range = reader.wants(&Interest::default()).into_iter().next();
+            let range = range.unwrap_or_default();
+            let bytes = read_range(&mut file, range.clone())?;
+            if bytes.is_empty() {
                 return Err(reader.cut_short().into());
             }
             // Chunks after the file index need not be decoded.
             let head = reader.head_bytes().unwrap_or(HEADER_BYTES as u64);
-            let useful = piece.len().min((head - wanted.start) as usize);
-            reader.feed(wanted.start, &piece[..useful])?;
+            let index_bytes = bytes.len().min((head - range.start) as usize);
+            reader.feed(range.start, &bytes[..index_bytes])?;
         }
     };
     read().with_context(|| path.display().to_string())

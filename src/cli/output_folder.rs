@@ -1,4 +1,4 @@
-//! Writing folders: new ones only, complete or kept as far as they got.
+//! Writing new folders: either complete or not at all, or file by file.
 
 use std::path::Path;
 

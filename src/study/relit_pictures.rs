@@ -176,7 +176,7 @@ fn pictures(
     let done = AtomicUsize::new(0);
     let tiles = executor.map(rects.len(), |i| {
         let mut tile = BandTile::dark(rects[i]);
-        tile.put(recovery.tile(measurements, rects[i]));
+        tile.insert(recovery.tile(measurements, rects[i]));
         // Quantised as in a file.
         let functions = Tile::quantise(&tile, basis.rank()).functions(&geometry, &basis);
         let pictures = lights.iter().map(|light| {

@@ -1,45 +1,47 @@
-//! Tiles whose light transport functions are combinations of a few shared ones.
+//! Tiles as real numbers: coefficients over a shared basis, direct functions, or both.
+//!
+//! A factored tile has `τ_n = Σ_k c_nk v_k` with coefficients `c_nk` for each pixel `n`, component `k` and
+//! channel; all tiles share the basis functions `v_k` of `S` values.
 
 use super::{CHANNELS, Geometry, TileRect, TransportFunctions};
 
-/// Light transport functions that others are combined from: `τ_n ≈ Σ_k c_nk v_k`.
+/// The basis functions `v_k` of a factored transport, `τ_n ≈ Σ_k c_nk v_k`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Basis {
-    /// `v_k` as `[rank, element]`, window rows (v) then columns (u), the most important first.
+    /// `v_k` as `[rank, slot]`, the most important first.
     pub kernels: Vec<Vec<f32>>,
 }
 
 impl Basis {
-    /// Number of functions, `r`.
+    /// Number of basis functions, `r`.
     pub fn rank(&self) -> usize {
         self.kernels.len()
     }
 }
 
-/// A tile kept as coefficients over a [`Basis`].
+/// A tile as coefficients over a [`Basis`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct FactoredTile {
-    /// The pixels covered.
+    /// The pixels of the tile.
     pub rect: TileRect,
     /// `c_nk` as `[pixel, component, channel]`, pixels row by row; in units of the measurement.
     pub coefficients: Vec<[f32; CHANNELS]>,
 }
 
-/// Elements multiplied out at once. With three channels their sums take nine registers of four
-/// lanes: of sixteen, that leaves enough for kernel and coefficients.
-const BLOCK: usize = 12;
+/// Slots computed together. The sums of three channels take nine of sixteen four-lane registers, which leaves
+/// enough for the basis function and the coefficients.
+const BLOCK_SLOTS: usize = 12;
 
 impl FactoredTile {
-    /// The light transport functions themselves: elements off the display send nothing. What the
-    /// combination leaves below zero stays so: without it the sum, a picture, would be too bright.
+    /// The light transport functions, zero at elements off the light plane. Negative values of the sum are
+    /// kept: pictures would be too bright without them.
     pub fn expand(&self, geometry: &Geometry, basis: &Basis) -> TransportFunctions {
         let mut functions = TransportFunctions::zeros(self.rect, geometry.window.area());
         self.expand_into(geometry, basis, &mut functions.tau);
         functions
     }
 
-    /// [`expand`](Self::expand), added to what `tau` has as `[pixel, element, channel]`. Elements off
-    /// the display become zero.
+    /// Adds the functions to `tau`, `[pixel, slot, channel]`, and zeroes elements off the light plane.
     pub(crate) fn expand_into(
         &self,
         geometry: &Geometry,
@@ -50,16 +52,16 @@ impl FactoredTile {
         if rank == 0 {
             return;
         }
-        // `[block, component, element]`: what the inner loop reads lies in one run.
-        let mut kernels = vec![[0.0; BLOCK]; area.div_ceil(BLOCK) * rank];
+        // `[block, component, slot]`, so that the inner loop reads consecutive values.
+        let mut kernels = vec![[0.0; BLOCK_SLOTS]; area.div_ceil(BLOCK_SLOTS) * rank];
         for (k, kernel) in basis.kernels.iter().enumerate() {
-            for (b, elements) in kernel.chunks(BLOCK).enumerate() {
-                kernels[b * rank + k][..elements.len()].copy_from_slice(elements);
+            for (b, slots) in kernel.chunks(BLOCK_SLOTS).enumerate() {
+                kernels[b * rank + k][..slots.len()].copy_from_slice(slots);
             }
         }
         let pixels = self.rect.pixels().zip(tau.chunks_exact_mut(area));
         for ((pixel, tau), coefficients) in pixels.zip(self.coefficients.chunks_exact(rank)) {
-            for (tau, kernels) in tau.chunks_mut(BLOCK).zip(kernels.chunks_exact(rank)) {
+            for (tau, kernels) in tau.chunks_mut(BLOCK_SLOTS).zip(kernels.chunks_exact(rank)) {
                 let sums = combine(coefficients, kernels);
                 for (s, tau) in tau.iter_mut().enumerate() {
                     (0..CHANNELS).for_each(|c| tau[c] += sums[c][s]);
@@ -70,11 +72,15 @@ impl FactoredTile {
     }
 }
 
-/// `Σ_k c_k v_k` on one block of elements, per channel. Sums run over `k` in order, so that results
-/// do not depend on blocking.
-fn combine(coefficients: &[[f32; CHANNELS]], kernels: &[[f32; BLOCK]]) -> [[f32; BLOCK]; CHANNELS] {
-    // By name, for a compiler to keep them in registers.
-    let (mut red, mut green, mut blue) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
+/// `Σ_k c_k v_k` on one block of slots by channel. Sums run over `k` in order, so that results do not depend on
+/// the size of blocks.
+fn combine(
+    coefficients: &[[f32; CHANNELS]],
+    kernels: &[[f32; BLOCK_SLOTS]],
+) -> [[f32; BLOCK_SLOTS]; CHANNELS] {
+    // Three variables instead of an array, which the compiler would keep in memory.
+    let (mut red, mut green, mut blue) =
+        ([0.0; BLOCK_SLOTS], [0.0; BLOCK_SLOTS], [0.0; BLOCK_SLOTS]);
     for ([r, g, b], kernel) in coefficients.iter().zip(kernels) {
         for (s, v) in kernel.iter().enumerate() {
             red[s] += r * v;
@@ -85,19 +91,19 @@ fn combine(coefficients: &[[f32; CHANNELS]], kernels: &[[f32; BLOCK]]) -> [[f32;
     [red, green, blue]
 }
 
-/// A tile as a file has it: `τ_n = Σ_k c_nk v_k + d_n`, either part of which may be missing.
+/// A tile of a file, before quantisation: `τ_n = Σ_k c_nk v_k + d_n`. Either part may be zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BandTile {
-    /// The pixels covered.
+    /// The pixels of the tile.
     pub rect: TileRect,
     /// `c_nk` as `[pixel, component, channel]`; empty if all are zero.
     pub coefficients: Vec<[f32; CHANNELS]>,
-    /// `d_n` as `[pixel, element, channel]`; empty if all are zero.
+    /// `d_n` as `[pixel, slot, channel]`; empty if all are zero.
     pub functions: Vec<[f32; CHANNELS]>,
 }
 
 impl BandTile {
-    /// A tile from which no light comes, whatever the light.
+    /// A tile that is dark under every light.
     pub fn dark(rect: TileRect) -> Self {
         Self {
             rect,
@@ -106,56 +112,56 @@ impl BandTile {
         }
     }
 
-    /// Whether neither part is there.
+    /// Whether both parts are zero.
     pub fn is_dark(&self) -> bool {
         self.coefficients.is_empty() && self.functions.is_empty()
     }
 
-    /// Puts what a solver yields for some of the tile's pixels in its place.
+    /// Copies a recovered tile into this tile.
     ///
     /// # Panics
     /// If `part` is not within the tile.
-    pub fn put(&mut self, part: RecoveredTile) {
-        let (values, rect, of_part) = match part {
+    pub fn insert(&mut self, part: RecoveredTile) {
+        let (values, rect, part_values) = match part {
             RecoveredTile::Direct(part) => (&mut self.functions, part.rect, part.tau),
             RecoveredTile::Factored(part) => (&mut self.coefficients, part.rect, part.coefficients),
         };
-        let each = of_part.len() / rect.extent.area();
+        let values_per_pixel = part_values.len() / rect.extent.area();
         if values.is_empty() {
-            values.resize(self.rect.extent.area() * each, [0.0; CHANNELS]);
+            values.resize(self.rect.extent.area() * values_per_pixel, [0.0; CHANNELS]);
         }
-        let width = rect.extent.width as usize * each;
-        for (row, y) in of_part
+        let width = rect.extent.width as usize * values_per_pixel;
+        for (row, y) in part_values
             .chunks_exact(width.max(1))
             .zip(rect.y - self.rect.y..)
         {
             let at = y as usize * self.rect.extent.width as usize;
-            let at = (at + (rect.x - self.rect.x) as usize) * each;
+            let at = (at + (rect.x - self.rect.x) as usize) * values_per_pixel;
             values[at..at + width].copy_from_slice(row);
         }
     }
 
-    /// What of the tile lies in `rect`.
+    /// The part of the tile in `rect`.
     ///
     /// # Panics
     /// If `rect` is not within the tile.
     pub fn crop(&self, rect: TileRect) -> Self {
         let pixels = self.rect.extent.area();
         let (left, top) = ((rect.x - self.rect.x) as usize, rect.y - self.rect.y);
-        let (width, of_tile) = (rect.extent.width as usize, self.rect.extent.width as usize);
-        let of_rect = |values: &[[f32; CHANNELS]]| {
-            let each = values.len() / pixels;
+        let (width, tile_width) = (rect.extent.width as usize, self.rect.extent.width as usize);
+        let crop = |values: &[[f32; CHANNELS]]| {
+            let values_per_pixel = values.len() / pixels;
             let rows = top as usize..(top + rect.extent.height) as usize;
             let rows = rows.flat_map(|y| {
-                let at = (y * of_tile + left) * each;
-                &values[at..at + width * each]
+                let at = (y * tile_width + left) * values_per_pixel;
+                &values[at..at + width * values_per_pixel]
             });
             rows.copied().collect()
         };
         Self {
             rect,
-            coefficients: of_rect(&self.coefficients),
-            functions: of_rect(&self.functions),
+            coefficients: crop(&self.coefficients),
+            functions: crop(&self.functions),
         }
     }
 
@@ -179,17 +185,17 @@ impl BandTile {
     }
 }
 
-/// A tile as a solver yields it.
+/// A tile as a recovery yields it.
 #[derive(Clone, Debug)]
 pub enum RecoveredTile {
-    /// Every element of every function.
+    /// The value of every slot.
     Direct(TransportFunctions),
-    /// Coefficients over the basis that goes with the whole transport.
+    /// Coefficients over the basis of the recovery.
     Factored(FactoredTile),
 }
 
 impl RecoveredTile {
-    /// The pixels covered.
+    /// The pixels of the tile.
     pub fn rect(&self) -> TileRect {
         match self {
             Self::Direct(tile) => tile.rect,
@@ -197,7 +203,7 @@ impl RecoveredTile {
         }
     }
 
-    /// The light transport functions themselves.
+    /// The light transport functions. A factored tile needs its `basis`.
     pub fn functions(self, geometry: &Geometry, basis: Option<&Basis>) -> TransportFunctions {
         match (self, basis) {
             (Self::Direct(functions), _) => functions,
@@ -219,8 +225,8 @@ mod tests {
     }
 
     #[test]
-    fn expansion_is_the_sum_it_says_it_is() {
-        // Windows hang over every edge; 49 elements are no whole number of blocks.
+    fn expansion_is_the_sum_over_components() {
+        // Windows cross every edge of the light plane; 49 slots are not a multiple of the block size.
         let extent = |width, height| Extent { width, height };
         let geometry = Geometry {
             camera: extent(21, 11),
@@ -266,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_is_the_sum_of_its_parts_and_crops_are_of_its_pixels() {
+    fn a_tile_is_the_sum_of_its_parts_and_crops_have_its_pixels() {
         let extent = |width, height| Extent { width, height };
         let geometry = Geometry {
             camera: extent(40, 30),

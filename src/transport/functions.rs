@@ -1,19 +1,19 @@
-//! Light transport functions as a solver or a simulation yields them: real numbers, pixel by pixel.
+//! Light transport functions τ_n as real numbers, from a solver or a simulation.
 
 use super::{CHANNELS, TileRect};
 
-/// The light transport functions of one tile's pixels, before any quantisation.
+/// The light transport functions of the pixels of a tile, before quantisation.
 #[derive(Clone, Debug)]
 pub struct TransportFunctions {
-    /// The pixels covered.
+    /// The pixels of the tile.
     pub rect: TileRect,
-    /// τ as `[pixel, element, channel]`: pixels row by row, window rows (v) then columns (u), RGB;
-    /// in units of the measurement for an element at full brightness.
+    /// τ as `[pixel, slot, channel]`, pixels and slots row by row, in units of the measurement for a light
+    /// element at full emission.
     pub tau: Vec<[f32; CHANNELS]>,
 }
 
 impl TransportFunctions {
-    /// All-dark functions for `rect` and a window of `area` elements.
+    /// Zeros for `rect` and windows of `area` slots.
     pub fn zeros(rect: TileRect, area: usize) -> Self {
         Self {
             rect,

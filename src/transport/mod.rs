@@ -1,13 +1,12 @@
-//! The light transport matrix of a nearly planar object, kept as a band.
+//! The light transport matrix of a nearly planar object in memory, as a band.
 //!
-//! `y = pT`: light pattern `p` on `M` light elements in, picture `y` of `N` camera pixels out.
-//! Pixel `n` sees only the elements of a square window `W_n` around its correspondence, so its
-//! column of `T` shrinks to a light transport function `τ_n` of `S = w²` values a channel
-//! (Thanikachalam et al. 2014, section 3).
+//! `T` is M × N for each channel: a light `p` on `M` light elements gives the picture `y = pT` of `N` camera
+//! pixels. Column `n` is zero outside a square window `W_n` of `S = w²` elements around the correspondence
+//! of pixel `n`; inside it is the light transport function `τ_n` (Thanikachalam et al. 2014, section 3).
 //!
-//! This is the one room that `recover`, `format` and `relight` all know: where pixels, windows and
-//! tiles lie ([`Geometry`]), what a tile holds ([`Tile`]), and how far two transports are
-//! apart ([`TransportError`]).
+//! `recover`, `format` and `relight` share this module: the positions of pixels, windows and tiles
+//! ([`Geometry`]), the values of a tile as real numbers ([`BandTile`]) and as codes ([`Tile`]), and the
+//! distance of two transports ([`TransportError`]).
 
 mod factored;
 mod functions;

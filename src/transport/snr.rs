@@ -1,8 +1,8 @@
-//! How far one transport is from another.
+//! The distance of two transports as a signal-to-noise ratio.
 
 use std::fmt;
 
-/// A ratio in decibels, 20 log10 of an amplitude ratio.
+/// A ratio in decibels: 20 log10 of a ratio of amplitudes.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, serde::Serialize)]
 #[serde(transparent)]
 pub struct Decibels(pub f64);
@@ -13,8 +13,8 @@ impl fmt::Display for Decibels {
     }
 }
 
-/// Running sums for SNR(T, T̂) = 20 log10(‖T‖_F / ‖T − T̂‖_F) (paper, section 4): feed it every
-/// element either matrix has, in any order.
+/// Sums for SNR(T, T̂) = 20 log10(‖T‖_F / ‖T − T̂‖_F) (paper, section 4) over all entries of both
+/// matrices, in any order.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TransportError {
     signal: f64,
@@ -22,13 +22,13 @@ pub struct TransportError {
 }
 
 impl TransportError {
-    /// Adds one element: its true value and its estimate.
+    /// Adds one entry: its true value and its estimate.
     pub fn add(&mut self, truth: f64, estimate: f64) {
         self.signal += truth * truth;
         self.error += (truth - estimate) * (truth - estimate);
     }
 
-    /// Joins sums gathered elsewhere, for instance by another thread.
+    /// Adds the sums of other entries, for instance of another thread.
     pub fn merge(&mut self, other: Self) {
         self.signal += other.signal;
         self.error += other.error;
@@ -44,7 +44,7 @@ impl TransportError {
         self.error
     }
 
-    /// The SNR; `None` where there is no error or no signal, for which no decibel figure exists.
+    /// The SNR; `None` if the error or the signal is zero, as the ratio then has no finite logarithm.
     pub fn snr(&self) -> Option<Decibels> {
         (self.signal > 0.0 && self.error > 0.0)
             .then(|| Decibels(10.0 * (self.signal / self.error).log10()))
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tenth_off_is_twenty_decibels() {
+    fn an_error_of_a_tenth_is_twenty_decibels() {
         let mut e = TransportError::default();
         for t in [1.0, 2.0, -3.0] {
             e.add(t, 0.9 * t);

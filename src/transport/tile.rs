@@ -1,49 +1,50 @@
-//! Tiles as relighting wants them, in memory and on the GPU: 16-bit codes.
+//! Tiles as 16-bit codes, the form in which the CPU and the GPU relight them.
+//!
+//! `τ_n = Σ_k c_nk v_k + d_n`: coefficients `c` ([`CoefficientTile`]) over the basis of the transport, and
+//! direct functions `d` ([`DirectTile`]). Each channel of a tile has one quantisation step.
 
 use super::{BandTile, Basis, FactoredTile, Geometry, TileRect, TransportFunctions};
 
 /// Camera channels: red, green, blue.
 pub const CHANNELS: usize = 3;
 
-/// Four codes: a texel of an `rgba16sint` texture, and one SIMD load. Signed: light transport has no
-/// negative elements, but a truncated sum of basis functions has, and to clip them would brighten the
-/// picture.
+/// Four codes: a texel of an `rgba16sint` texture, and one SIMD load. They are signed, as a truncated sum of
+/// basis functions has negative values, and clipping these would brighten the picture.
 pub type TexelCode = [i16; 4];
 
-/// Components in one texel of coefficients.
+/// Components in one texel of coefficients: a quad.
 pub const QUAD: usize = 4;
 
-/// Largest code written. 12 bits put the quantisation noise of an unsparse pixel (S = 225, all
-/// elements off by step/√12) some 60 dB below it, under what any photograph can tell; 16 would
-/// store noise.
-const TOP_CODE: f32 = 4095.0;
+/// Largest code of a direct tile. With 12 bits the quantisation noise of a pixel whose function is not sparse
+/// (S = 225, error step/√12 in each slot) is about 60 dB below the signal, less than the noise of any
+/// photograph.
+const MAX_DIRECT_CODE: f32 = 4095.0;
 
-/// A tile that keeps every element of every pixel's window: `τ = code · step`.
+/// A tile with the value of every slot of every pixel: `d = code · step`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DirectTile {
-    /// The pixels covered.
+    /// The pixels of the tile.
     pub rect: TileRect,
     /// Value of one code, per channel.
     pub step: [f32; CHANNELS],
-    /// `[pixel, element]`, pixels row by row, window rows (v) then columns (u); empty for a tile
-    /// that is all dark.
+    /// `[pixel, slot]`, both row by row; empty if all are zero.
     pub codes: Vec<TexelCode>,
 }
 
 impl DirectTile {
-    /// Rounds functions, `[pixel, element, channel]`, to codes, with a step per channel set by the tile's largest element.
-    /// Non-finite values, which no light transport function has, become zero.
+    /// Rounds functions, `[pixel, slot, channel]`, to codes. The largest value of each channel sets its step;
+    /// values that are not finite become zero.
     pub fn quantise(rect: TileRect, functions: &[[f32; CHANNELS]]) -> Self {
         Self::quantise_into(rect, functions, Vec::new())
     }
 
-    /// [`quantise`](Self::quantise) into memory the caller has: a vector that is empty.
+    /// [`quantise`](Self::quantise) into the memory of an empty vector.
     pub(crate) fn quantise_into(
         rect: TileRect,
         functions: &[[f32; CHANNELS]],
         mut codes: Vec<TexelCode>,
     ) -> Self {
-        let Some(step) = steps(functions, TOP_CODE) else {
+        let Some(step) = steps(functions, MAX_DIRECT_CODE) else {
             return Self::dark(rect);
         };
         let codes_of = |t: &[f32; CHANNELS]| {
@@ -58,7 +59,7 @@ impl DirectTile {
         Self { rect, step, codes }
     }
 
-    /// A tile from which no light comes, whatever the light.
+    /// A tile that is dark under every light.
     pub fn dark(rect: TileRect) -> Self {
         Self {
             rect,
@@ -67,20 +68,20 @@ impl DirectTile {
         }
     }
 
-    /// Whether the tile is all dark and so holds no codes.
+    /// Whether all values are zero, and so not stored.
     pub fn is_dark(&self) -> bool {
         self.codes.is_empty()
     }
 
-    /// τ of element `s` of pixel `p` (both in tile order), given the window's area.
+    /// Value of slot `s` of pixel `p` of the tile, for windows of `area` slots.
     pub fn tau(&self, area: usize, p: usize, s: usize) -> [f32; CHANNELS] {
         let code = self.codes.get(p * area + s).unwrap_or(&[0; 4]);
         std::array::from_fn(|c| f32::from(code[c]) * self.step[c])
     }
 }
 
-/// Steps by which the largest value of each channel is `top` codes; none if all are dark.
-fn steps(values: &[[f32; CHANNELS]], top: f32) -> Option<[f32; CHANNELS]> {
+/// For each channel the step by which its largest value has the code `max_code`; `None` if all are dark.
+fn steps(values: &[[f32; CHANNELS]], max_code: f32) -> Option<[f32; CHANNELS]> {
     let mut peak = [0.0f32; CHANNELS];
     for value in values {
         for c in 0..CHANNELS {
@@ -89,14 +90,14 @@ fn steps(values: &[[f32; CHANNELS]], top: f32) -> Option<[f32; CHANNELS]> {
             }
         }
     }
-    // A step below this would not be a normal number; so dim a channel is dark.
-    let lit = |step: &f32| *step >= f32::MIN_POSITIVE;
-    let step = peak.map(|peak| peak / top);
-    let some = step.iter().any(lit);
-    some.then(|| step.map(|step| if lit(&step) { step } else { 1.0 }))
+    // A channel whose step would be subnormal is dark.
+    let is_lit = |step: &f32| *step >= f32::MIN_POSITIVE;
+    let steps = peak.map(|peak| peak / max_code);
+    let any_lit = steps.iter().any(is_lit);
+    any_lit.then(|| steps.map(|step| if is_lit(&step) { step } else { 1.0 }))
 }
 
-/// The code next to a value; of what is no number, 0.
+/// The code nearest to a value; 0 for a value that is not finite.
 fn code(value: f32, step: f32) -> i16 {
     match value.is_finite() {
         true => (value / step + 0.5f32.copysign(value)) as i16, // rounds; `as` saturates
@@ -104,19 +105,18 @@ fn code(value: f32, step: f32) -> i16 {
     }
 }
 
-/// A tile kept as coefficients over the transport's basis: `c = code · step`.
+/// A tile as coefficients over the basis of the transport: `c = code · step`.
 ///
-/// All components share a step. The pixels' brightness is what an eye compares, and to that each
-/// contributes in proportion to its coefficient: a code of a weak component is worth no more than one
-/// of a strong one.
+/// All components share a step: each contributes to the brightness of a pixel in proportion to its
+/// coefficient, so equal errors of weak and strong components are equally visible.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoefficientTile {
-    /// The pixels covered.
+    /// The pixels of the tile.
     pub rect: TileRect,
     /// Value of one code, per channel.
     pub step: [f32; CHANNELS],
-    /// `[channel, quad, pixel]`, each the codes of [`QUAD`] components, zero beyond the last; planes
-    /// of [`plane`](Self::plane) texels, pixels row by row. Empty for a tile without coefficients.
+    /// `[channel, quad, pixel]`: texels with the codes of [`QUAD`] components, zero beyond the last, in planes
+    /// of [`plane`](Self::plane) texels with pixels row by row. Empty if all are zero.
     pub codes: Vec<TexelCode>,
 }
 
@@ -127,8 +127,7 @@ impl CoefficientTile {
         Self::quantise_into(rect, coefficients, rank, codes)
     }
 
-    /// [`quantise`](Self::quantise) into memory the caller has: as many zeros as there are
-    /// [`texels`](Self::texels).
+    /// [`quantise`](Self::quantise) into a vector of [`texels`](Self::texels) zeros.
     pub(crate) fn quantise_into(
         rect: TileRect,
         coefficients: &[[f32; CHANNELS]],
@@ -139,8 +138,8 @@ impl CoefficientTile {
             return Self::dark(rect);
         };
         let (plane, quads) = (Self::plane(rect), rank.div_ceil(QUAD));
-        for (p, of_pixel) in coefficients.chunks_exact(rank).enumerate() {
-            for (k, value) in of_pixel.iter().enumerate() {
+        for (p, coefficients) in coefficients.chunks_exact(rank).enumerate() {
+            for (k, value) in coefficients.iter().enumerate() {
                 for c in 0..CHANNELS {
                     let texel = (c * quads + k / QUAD) * plane + p;
                     codes[texel][k % QUAD] = code(value[c], step[c]);
@@ -150,7 +149,7 @@ impl CoefficientTile {
         Self { rect, step, codes }
     }
 
-    /// A tile without coefficients.
+    /// A tile with all coefficients zero.
     pub fn dark(rect: TileRect) -> Self {
         Self {
             rect,
@@ -159,24 +158,24 @@ impl CoefficientTile {
         }
     }
 
-    /// Whether there are no coefficients.
+    /// Whether all coefficients are zero, and so not stored.
     pub fn is_dark(&self) -> bool {
         self.codes.is_empty()
     }
 
-    /// Texels from the beginning of one plane to that of the next. A cache line more than there are
-    /// pixels: planes a power of two apart would all lie in the same lines of a cache.
+    /// Distance of two planes in texels: the number of pixels, rounded up to whole cache lines, and one line
+    /// more. Planes at a distance of a power of two would compete for the same lines of the cache.
     pub fn plane(rect: TileRect) -> usize {
         const LINE: usize = 64 / size_of::<TexelCode>();
         rect.extent.area().next_multiple_of(LINE) + LINE
     }
 
-    /// Texels of a tile over a basis of `rank` functions.
+    /// Number of texels of a tile over a basis of `rank` functions.
     pub fn texels(rect: TileRect, rank: usize) -> usize {
         CHANNELS * rank.div_ceil(QUAD) * Self::plane(rect)
     }
 
-    /// The first `rank` components of all that a tile over a basis of `all` functions has.
+    /// The first `rank` components of this tile over a basis of `all` functions.
     pub(crate) fn first_components(&self, all: usize, rank: usize) -> Self {
         let (plane, quads) = (Self::plane(self.rect), rank.div_ceil(QUAD));
         let mut codes = Vec::with_capacity(self.codes.len().min(CHANNELS * quads * plane));
@@ -197,7 +196,7 @@ impl CoefficientTile {
         }
     }
 
-    /// Coefficient `k` of pixel `p` (in tile order), for a basis of `rank` functions.
+    /// Coefficient `k` of pixel `p` of the tile, for a basis of `rank` functions.
     pub fn coefficient(&self, rank: usize, p: usize, k: usize) -> [f32; CHANNELS] {
         let (plane, quads) = (Self::plane(self.rect), rank.div_ceil(QUAD));
         std::array::from_fn(|c| {
@@ -207,7 +206,7 @@ impl CoefficientTile {
     }
 }
 
-/// A tile in memory: `τ_n = Σ_k c_nk v_k + d_n`, either part of which may be dark.
+/// A tile as codes: `τ_n = Σ_k c_nk v_k + d_n`. Either part may be dark.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
     /// `c_nk`.
@@ -229,7 +228,7 @@ impl Tile {
         }
     }
 
-    /// A tile from which no light comes, whatever the light.
+    /// A tile that is dark under every light.
     pub fn dark(rect: TileRect) -> Self {
         Self {
             coefficients: CoefficientTile::dark(rect),
@@ -237,12 +236,12 @@ impl Tile {
         }
     }
 
-    /// The pixels covered.
+    /// The pixels of the tile.
     pub fn rect(&self) -> TileRect {
         self.functions.rect
     }
 
-    /// Whether neither part is there.
+    /// Whether both parts are dark.
     pub fn is_dark(&self) -> bool {
         self.coefficients.is_dark() && self.functions.is_dark()
     }
@@ -268,7 +267,7 @@ impl Tile {
         functions
     }
 
-    /// The tile by the first `rank` components of a basis of `all` functions.
+    /// The tile with the first `rank` components over a basis of `all` functions.
     pub(crate) fn first_components(&self, all: usize, rank: usize) -> Self {
         Self {
             coefficients: self.coefficients.first_components(all, rank),
@@ -276,18 +275,18 @@ impl Tile {
         }
     }
 
-    /// Bytes of its codes.
+    /// Size of the codes in bytes.
     pub fn bytes(&self) -> usize {
         (self.coefficients.codes.len() + self.functions.codes.len()) * size_of::<TexelCode>()
     }
 }
 
-/// A whole transport in memory.
+/// A whole light transport matrix, as codes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transport {
-    /// Grids, band and tiling.
+    /// Grids, windows and tiles.
     pub geometry: Geometry,
-    /// What coefficients are over.
+    /// The basis of all coefficients.
     pub basis: Basis,
     /// One tile for each of [`Geometry::tiles`].
     pub tiles: Vec<Tile>,

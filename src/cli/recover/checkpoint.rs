@@ -10,8 +10,8 @@
 //! | records | tile number, length, CRC-32C of these two and the content (4 bytes each), content |
 //!
 //! The first record has the number `u32::MAX` and holds the [fingerprint](super::run_key) of the prepared
-//! recovery; one record for each tile follows, in the order of completion. Whatever ends the process, at
-//! most the last record is incomplete, and then ignored.
+//! recovery; one record for each tile follows, in the order of completion. When the process ends,
+//! only the last record can be incomplete; it is then ignored.
 
 use std::ffi::OsString;
 use std::fs::{File, OpenOptions, TryLockError};

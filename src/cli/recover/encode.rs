@@ -71,7 +71,7 @@ impl Judge for HoldoutMetric<'_> {
     fn tiles(&self) -> Vec<BandTile> {
         let to_band_tile = |recovered: &RecoveredTile| {
             let mut tile = BandTile::dark(recovered.rect());
-            tile.put(recovered.clone());
+            tile.insert(recovered.clone());
             tile
         };
         self.0.tiles().map(to_band_tile).collect()
@@ -109,7 +109,7 @@ pub fn encode_file(
             let i = (y * recovered.tile_grid().width + x) as usize;
             let checkpoint = checkpoint.lock();
             let record = checkpoint.unwrap_or_else(PoisonError::into_inner).read(i)?;
-            tile.put(tile_record::decode(recovered.tile(i), rank, area, &record)?);
+            tile.insert(tile_record::decode(recovered.tile(i), rank, area, &record)?);
         }
         Ok(tile)
     };

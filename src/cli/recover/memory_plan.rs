@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn strips_fit_the_budget_and_cover_every_tile_once() {
+    fn strips_fit_the_limit_and_cover_every_tile_once() {
         for megabytes in [160, 200, 250, 400, 4000] {
             let plan = plan(megabytes, 8).unwrap();
             assert!((1..=8).contains(&plan.tiles_at_once));
@@ -245,9 +245,9 @@ mod tests {
     fn too_little_memory_is_refused_with_the_minimum() {
         let message = plan(30, 2).unwrap_err().to_string();
         let words: Vec<&str> = message.split(' ').collect();
-        let least = words.last().unwrap().trim_end_matches('M').parse().unwrap();
+        let min = words.last().unwrap().trim_end_matches('M').parse().unwrap();
         assert!(message.contains("at least --memory"), "{message}");
-        assert!(plan(least, 2).is_ok());
-        assert!(plan(least - 1, 2).is_err());
+        assert!(plan(min, 2).is_ok());
+        assert!(plan(min - 1, 2).is_err());
     }
 }
