@@ -1,15 +1,18 @@
-//! Where camera pixels, light elements, windows and tiles lie.
+//! Grids and maps between them: camera pixels, light elements, windows, tiles.
+//!
+//! Coordinates are continuous with cell `i` covering `[i, i + 1)`: the centre of camera pixel `(x, y)` is
+//! `(x + ½, y + ½)`, and the correspondence maps it to `(u, v)` on the light plane, in light elements.
 
 use std::ops::Range;
 
 use thiserror::Error;
 
-/// Largest side of a camera or light grid; bounds every later product well inside `u64`.
+/// Maximum side of the camera grid and the light plane; products of sides and channels fit in `u64`.
 pub const MAX_SIDE: u32 = 1 << 15;
-/// Largest window side: past this an object is not nearly planar and a band no longer pays.
+/// Maximum side of a window: an object that needs more is not nearly planar.
 pub const MAX_WINDOW: u32 = 63;
 
-/// Width and height of a grid, in its own pixels.
+/// Width and height of a grid, in its cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Extent {
     /// Columns.
@@ -24,7 +27,7 @@ impl Extent {
         pixel.y as usize * self.width as usize + pixel.x as usize
     }
 
-    /// Number of grid cells.
+    /// Number of cells.
     pub fn area(self) -> usize {
         self.width as usize * self.height as usize
     }
@@ -54,24 +57,24 @@ pub struct LightPx {
     pub v: f64,
 }
 
-/// A light element by column and row. May lie off the display, where no light is emitted.
+/// A light element by column and row. It may lie off the light plane, where there is no emission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Element {
-    /// Row; first, so that elements sort row by row.
+    /// Row; the first field, so that elements sort row by row.
     pub v: i32,
     /// Column.
     pub u: i32,
 }
 
 impl Element {
-    /// Row-major index on a display of this extent, or `None` off it.
+    /// Row-major index on a light plane of this extent, or `None` off it.
     pub fn index_in(self, light: Extent) -> Option<usize> {
         let (u, v) = (u32::try_from(self.u).ok()?, u32::try_from(self.v).ok()?);
         (u < light.width && v < light.height).then(|| (v * light.width + u) as usize)
     }
 }
 
-/// The map from camera pixels to the light elements straight behind them.
+/// The affine map from camera positions to the light plane positions behind them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correspondence {
     /// `u = a·(x+½, y+½, 1)` in row 0, `v` likewise in row 1.
@@ -79,12 +82,12 @@ pub struct Correspondence {
 }
 
 impl Correspondence {
-    /// Light-plane position seen by the centre of a camera pixel.
+    /// Light plane position behind the centre of a camera pixel.
     pub fn at(&self, pixel: CameraPx) -> LightPx {
         self.map(f64::from(pixel.x) + 0.5, f64::from(pixel.y) + 0.5)
     }
 
-    /// Light-plane position behind a continuous camera position; pixel `x` covers `[x, x + 1)`.
+    /// Light plane position behind a camera position.
     pub fn map(&self, x: f64, y: f64) -> LightPx {
         let row = |[a, b, c]: [f64; 3]| a * x + b * y + c;
         LightPx {
@@ -102,6 +105,9 @@ pub struct Window {
 
 impl Window {
     /// A window of odd side 1 to [`MAX_WINDOW`].
+    ///
+    /// # Errors
+    /// If the side is even or too large.
     pub const fn new(side: u32) -> Result<Self, GeometryError> {
         if side % 2 == 1 && side <= MAX_WINDOW {
             Ok(Self { side })
@@ -120,17 +126,17 @@ impl Window {
         (self.side * self.side) as usize
     }
 
-    /// First (top left) element of the window centred on `floor(centre)`.
+    /// Window origin: the top left element of the window around `floor(centre)`.
     pub fn origin(self, centre: LightPx) -> Element {
         let half = (self.side / 2) as i32;
-        // A position far off any display saturates: its window is then simply all dark.
+        // Positions far off the light plane saturate; their windows are off it as well.
         Element {
             u: (centre.u.floor() as i32).saturating_sub(half),
             v: (centre.v.floor() as i32).saturating_sub(half),
         }
     }
 
-    /// Element in slot `slot` (row by row, 0 to S - 1) of the window that starts at `origin`.
+    /// Element of slot `slot`, 0 to S - 1, in the window with this origin.
     pub fn element(self, origin: Element, slot: usize) -> Element {
         let side = self.side as usize;
         Element {
@@ -139,7 +145,7 @@ impl Window {
         }
     }
 
-    /// Slot of an element in the window that starts at `origin`, or `None` outside it.
+    /// Slot of an element in the window with this origin, or `None` outside it.
     pub fn slot(self, origin: Element, element: Element) -> Option<usize> {
         let side = i64::from(self.side);
         let u = i64::from(element.u) - i64::from(origin.u);
@@ -148,19 +154,19 @@ impl Window {
     }
 }
 
-/// The rectangle of camera pixels one tile covers.
+/// The camera pixels of a tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TileRect {
     /// Column of the first pixel.
     pub x: u32,
     /// Row of the first pixel.
     pub y: u32,
-    /// Pixels covered; less than a full tile at the right and bottom borders.
+    /// Size; smaller than other tiles at the right and bottom borders.
     pub extent: Extent,
 }
 
 impl TileRect {
-    /// The tile's pixels, row by row.
+    /// The pixels, row by row.
     pub fn pixels(self) -> impl Iterator<Item = CameraPx> {
         let TileRect { x, y, extent } = self;
         (y..y + extent.height)
@@ -168,27 +174,30 @@ impl TileRect {
     }
 }
 
-/// Everything about a transport but its values: both grids, the band and its tiling.
+/// The grids, windows and tiles of a transport; everything except its values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
-    /// Camera grid, `N` pixels.
+    /// The camera grid, `N` pixels.
     pub camera: Extent,
-    /// Light grid, `M` elements.
+    /// The light plane, `M` elements.
     pub light: Extent,
-    /// Window around each pixel's correspondence.
+    /// The window around the correspondence of each pixel.
     pub window: Window,
-    /// Camera pixels to light elements.
+    /// Maps camera pixels to light elements.
     pub correspondence: Correspondence,
-    /// Camera pixels along a full tile's side.
+    /// Camera pixels along a side of a tile.
     pub tile_side: u32,
 }
 
 impl Geometry {
-    /// Tile side used when nothing else is asked for: at two camera pixels an element a tile's
-    /// windows overlap by half, and a direct tile still decodes in one cache-sized piece.
+    /// Default side of a tile. At two camera pixels a light element the windows of such a tile overlap by
+    /// half, and a direct tile fits in a CPU cache.
     pub const DEFAULT_TILE_SIDE: u32 = 32;
 
-    /// Checks every field's range. All other code may rely on it.
+    /// Checks the range of every field, on which all other code relies.
+    ///
+    /// # Errors
+    /// If a field is out of range; the error names it.
     pub fn validate(self) -> Result<Self, GeometryError> {
         let side = |name, value: u32| match value {
             1..=MAX_SIDE => Ok(()),
@@ -247,7 +256,7 @@ impl Geometry {
         }
     }
 
-    /// First element of a pixel's window.
+    /// Window origin of a pixel.
     pub fn window_origin(&self, pixel: CameraPx) -> Element {
         self.window.origin(self.correspondence.at(pixel))
     }
@@ -325,24 +334,24 @@ impl ClippedRect {
     }
 }
 
-/// A geometry no transport can have.
+/// A field of a [`Geometry`] that is out of range.
 #[derive(Debug, Error, PartialEq)]
 pub enum GeometryError {
-    /// Zero or absurdly large grid.
-    #[error("{name} is {value}; it must lie between 1 and {MAX_SIDE}")]
+    /// A side of a grid is zero or too large.
+    #[error("{name} is {value}; it must be between 1 and {MAX_SIDE}")]
     Side {
-        /// Which side of which grid.
+        /// The grid and its side.
         name: &'static str,
         /// The value given.
         value: u32,
     },
-    /// Even or too large window.
+    /// The side of the window is even or too large.
     #[error("window side is {0}; it must be odd and at most {MAX_WINDOW}")]
     Window(u32),
-    /// Tile side out of range.
-    #[error("tile side is {0}; it must lie between 8 and 256")]
+    /// The side of a tile is out of range.
+    #[error("tile side is {0}; it must be between 8 and 256")]
     TileSide(u32),
-    /// Infinite or NaN coefficient.
+    /// A coefficient is infinite or NaN.
     #[error("the correspondence has a coefficient that is not a finite number")]
     Correspondence,
 }
