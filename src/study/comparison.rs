@@ -12,7 +12,7 @@ use super::nystrom::{Nystrom, NystromSamples};
 use super::scene_camera::first_shots;
 use super::section::{Section, Table, seconds_cell, snr_cell};
 use super::{ProgressCallback, SceneCamera, StudyError, pixel_sampling, scanning, unwindowed};
-use crate::capture::{Measurements, LinearPhoto};
+use crate::capture::{LinearPhoto, Measurements};
 use crate::executor::Executor;
 use crate::recover::Method;
 use crate::simulate::{Ensemble, LightCodes};

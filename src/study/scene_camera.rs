@@ -1,7 +1,7 @@
 //! Simulated photographs of a scene, in memory.
 
 use super::StudyError;
-use crate::capture::{Measurements, NoiseModel, Pattern, LinearPhoto, RowSet};
+use crate::capture::{LinearPhoto, Measurements, NoiseModel, Pattern, RowSet};
 use crate::executor::Executor;
 use crate::simulate::{
     Camera, EmissionMatrix, Ensemble, LightCodes, RandomStream, SimulatedScene, emission,
@@ -62,7 +62,7 @@ impl SceneCamera<'_> {
             patterns: codes.iter().map(emitted_pattern).collect(),
             full_scale: vec![1.0; count],
             rows: RowSet::all(geometry.camera.height),
-            pictures,
+            photos: pictures,
             noise: NoiseModel::from_dark(&self.dark()?, geometry.camera.width, code),
         };
         measurements.noise = NoiseModel::with_gain_from(&measurements);
@@ -101,7 +101,11 @@ impl SceneCamera<'_> {
     }
 
     /// A photograph of `picture` with the noise of the photograph number `index`.
-    pub(super) fn add_noise(&self, picture: &LinearPhoto, index: u32) -> Result<LinearPhoto, StudyError> {
+    pub(super) fn add_noise(
+        &self,
+        picture: &LinearPhoto,
+        index: u32,
+    ) -> Result<LinearPhoto, StudyError> {
         let camera = self.camera();
         let mut noise = RandomStream::Photograph(index).start(self.seed);
         let codes = camera.photograph(picture, &mut noise)?;
@@ -157,7 +161,7 @@ pub fn first_shots(measurements: &Measurements, count: usize) -> Measurements {
         patterns: measurements.patterns[..count].to_vec(),
         full_scale: measurements.full_scale[..count].to_vec(),
         rows: measurements.rows.clone(),
-        pictures: measurements.photos[..count].to_vec(),
+        photos: measurements.photos[..count].to_vec(),
         noise: measurements.noise,
     };
     first.noise = NoiseModel::with_gain_from(&first);
