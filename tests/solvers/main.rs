@@ -152,7 +152,7 @@ fn report(line: &str) {
 #[cfg(not(target_arch = "wasm32"))]
 #[test]
 fn embedded_fixture_equals_its_folder() {
-    use relightable_photo::capture::{CaptureFolder, NoiseModel, PhotoReader, LinearPhoto, RowSet};
+    use relightable_photo::capture::{CaptureFolder, LinearPhoto, NoiseModel, PhotoReader, RowSet};
 
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/glass-s");
     let folder = CaptureFolder::open(root.as_ref()).unwrap();
@@ -168,7 +168,9 @@ fn embedded_fixture_equals_its_folder() {
         photo.read(&read.rows, &mut picture).unwrap();
         picture
     };
-    let pictures = shots.iter().map(|&i| whole(folder.open_shot(i, &dark).unwrap()));
+    let pictures = shots
+        .iter()
+        .map(|&i| whole(folder.open_shot(i, &dark).unwrap()));
     read.photos = pictures.collect();
     read.noise = NoiseModel::with_gain_from(&read);
     assert_eq!((embedded.camera, embedded.light), (read.camera, read.light));
