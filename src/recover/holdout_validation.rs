@@ -268,7 +268,7 @@ mod tests {
         capture.measurements.noise.floor = [1e-6; CHANNELS];
         capture
             .measurements
-            .pictures
+            .photos
             .iter_mut()
             .for_each(|picture| picture.fill([0.2; CHANNELS]));
         let validation = validate(&capture, 1.0).unwrap();

@@ -288,13 +288,13 @@ mod tests {
         assert_eq!(pattern_indices, [3, 8]);
         capture
             .measurements
-            .pictures
+            .photos
             .iter_mut()
             .for_each(|picture| picture.fill([0.0; CHANNELS]));
         assert!(matches!(fit(&capture), Err(RecoverError::NoSignal)));
         capture
             .measurements
-            .pictures
+            .photos
             .iter_mut()
             .for_each(|picture| picture.fill([f32::NAN; CHANNELS]));
         assert!(matches!(fit(&capture), Err(RecoverError::Overexposed)));

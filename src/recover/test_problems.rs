@@ -121,7 +121,7 @@ impl SyntheticCapture {
                 full_scale: vec![1.0; patterns.len()],
                 patterns,
                 rows: RowSet::all(geometry.camera.height),
-                pictures: Vec::new(),
+                photos: Vec::new(),
                 noise: NoiseModel {
                     gain: [0.0; CHANNELS],
                     floor: [0.0; CHANNELS],
