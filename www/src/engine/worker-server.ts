@@ -1,7 +1,7 @@
 /** The worker's side of `shared/worker-client.ts`, and how the page starts a worker. */
 
 import { messageOf } from '../shared/errors.js';
-import type { WorkerRequest, WorkerResponse } from '../shared/worker-client.js';
+import { START_ID, type WorkerRequest, type WorkerResponse } from '../shared/worker-client.js';
 import { moduleFolder, setModuleFolder } from './wasm-loader.js';
 
 /** The first message to a worker. */
@@ -59,7 +59,7 @@ export function serve<Task, Ready, Result>(
       setModuleFolder(modules);
       const service = await setUp();
       scope.onmessage = ({ data }) => answer(service, data);
-      send({ kind: 'ready', ready: service.ready });
+      send({ kind: 'done', id: START_ID, result: service.ready });
     } catch (thrown) {
       fail(thrown);
     }

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { RelightModule } from '../engine/types.js';
-import type { WorkerRequest, WorkerResponse } from '../shared/worker-client.js';
+import { START_ID, type WorkerRequest, type WorkerResponse } from '../shared/worker-client.js';
 import type { DecoderState } from './photo-decoder.js';
 import {
   type DecodeResult,
@@ -74,7 +74,7 @@ function photoWith(...tileLengths: number[]): DecodeResult {
 async function started(answer: (task: DecodeTask) => DecodeResult | undefined) {
   const worker = new FakeWorker(answer);
   const starting = WorkerDecoder.start(worker, LIMITS);
-  worker.respond({ kind: 'ready', ready: stateAt(0) });
+  worker.respond({ kind: 'done', id: START_ID, result: stateAt(0) });
   return { worker, decoder: await starting };
 }
 

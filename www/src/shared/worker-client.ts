@@ -14,9 +14,8 @@ export interface WorkerRequest<Task> {
 
 /** A message from the worker. */
 export type WorkerResponse<Ready, Result> =
-  /** The worker has started. */
-  | { readonly kind: 'ready'; readonly ready: Ready }
-  | { readonly kind: 'done'; readonly id: number; readonly result: Result }
+  /** The result of a task; that of `START_ID` says that the worker has started. */
+  | { readonly kind: 'done'; readonly id: number; readonly result: Ready | Result }
   /** The worker could not start, or could not do a task: its state is undefined from now on. */
   | { readonly kind: 'failed'; readonly message: string };
 
@@ -39,6 +38,9 @@ export interface WorkerClientOptions {
   readonly onFailure?: () => void;
 }
 
+/** The id of the response to the start, which no request has. */
+export const START_ID = 0;
+
 interface PendingRequest<Result> {
   readonly group: number;
   readonly resolve: (result: Result) => void;
@@ -52,14 +54,13 @@ export class WorkerClient<Task, Ready, Result> {
   readonly #worker: WorkerLike<Task, Ready, Result>;
   readonly #options: WorkerClientOptions;
   readonly #watchdog: Watchdog;
-  readonly #pending = new Map<number, PendingRequest<Result>>();
+  readonly #pending = new Map<number, PendingRequest<never>>();
   /** Why the worker is unusable; `null` while it works. */
   failure: PhotoError | null = null;
   hasStarted = false;
   /** Whether the watchdog gave the worker up, which another worker may not repeat. */
   isSilent = false;
-  #rejectReady = (_: PhotoError): void => {};
-  #lastId = 0;
+  #lastId = START_ID;
 
   constructor(worker: WorkerLike<Task, Ready, Result>, options: WorkerClientOptions) {
     const { intervalMs, maxStartChecks } = options.limits;
@@ -70,10 +71,10 @@ export class WorkerClient<Task, Ready, Result> {
       this.#fail('It does not answer.');
     });
     this.ready = new Promise((resolve, reject) => {
-      this.#rejectReady = reject;
-      worker.onmessage = ({ data }) => this.#receive(data, resolve);
+      this.#pending.set(START_ID, { group: START_ID, resolve, reject });
     });
     this.ready.catch(() => {});
+    worker.onmessage = ({ data }) => this.#receive(data);
     worker.onerror = (event) => {
       event.preventDefault?.();
       this.#fail(event.message ?? '');
@@ -115,19 +116,15 @@ export class WorkerClient<Task, Ready, Result> {
     this.#fail('It was ended.', false);
   }
 
-  #receive(response: WorkerResponse<Ready, Result>, resolveReady: (ready: Ready) => void): void {
+  #receive(response: WorkerResponse<Ready, Result>): void {
     if (response.kind === 'failed') {
       this.#fail(response.message);
       return;
     }
-    if (response.kind === 'ready') {
-      this.hasStarted = true;
-      resolveReady(response.ready);
-    } else {
-      const pending = this.#pending.get(response.id);
-      this.#pending.delete(response.id);
-      pending?.resolve(response.result);
-    }
+    this.hasStarted = true;
+    const pending = this.#pending.get(response.id);
+    this.#pending.delete(response.id);
+    pending?.resolve(response.result as never);
     if (this.#pending.size > 0) this.#watchdog.reset(this.#options.limits.maxChecks);
     else this.#watchdog.stop();
   }
@@ -144,7 +141,6 @@ export class WorkerClient<Task, Ready, Result> {
     this.#worker.terminate();
     // Before the rejections, so that their handlers see the final state.
     if (isReported) onFailure?.();
-    this.#rejectReady(failure);
     for (const { reject } of this.#pending.values()) reject(failure);
     this.#pending.clear();
   }

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import type { WatchdogLimits } from '../../shared/watchdog.js';
-import type { WorkerRequest, WorkerResponse } from '../../shared/worker-client.js';
+import { START_ID, type WorkerRequest, type WorkerResponse } from '../../shared/worker-client.js';
 import { PLAIN } from '../settings-fakes.js';
 import type { RowPixels } from './pool-session.js';
 import type { FrameSettings, RelightTask, RelightWorker } from './protocol.js';
@@ -36,7 +36,7 @@ export class FakeWorker implements RelightWorker {
   sendError: Error | null = null;
 
   start(): this {
-    this.respond({ kind: 'ready', ready: 'fake' });
+    this.respond({ kind: 'done', id: START_ID, result: 'fake' });
     return this;
   }
 
