@@ -16,6 +16,13 @@ const FIREFOX_PREFERENCES = {
   'gfx.webgpu.ignore-blocklist': true,
   'webgl.force-enabled': true,
 };
+const chromium = {
+  testIgnore: ['firefox.spec.js', 'webkitgtk.spec.ts'],
+  use: {
+    browserName: 'chromium' as const,
+    launchOptions: chromiumOptions('--font-render-hinting=none'),
+  },
+};
 const results = '../../target/browser-tests';
 
 export default defineConfig<object, WorkerOptions>({
@@ -30,17 +37,16 @@ export default defineConfig<object, WorkerOptions>({
   expect: { timeout: 10_000 },
   forbidOnly: Boolean(process.env['CI']),
   reporter: 'list',
-  use: { actionTimeout: 30_000, navigationTimeout: 30_000 },
+  use: {
+    actionTimeout: 30_000,
+    navigationTimeout: 30_000,
+    // Without screenshots and DOM snapshots, which slow down and have no canvas.
+    trace: { mode: 'retain-on-failure', screenshots: false, snapshots: false },
+  },
   projects: [
-    {
-      name: 'chromium',
-      testIgnore: ['firefox.spec.js', 'webkitgtk.spec.ts'],
-      use: {
-        browserName: 'chromium',
-        launchOptions: chromiumOptions('--font-render-hinting=none'),
-        trace: { mode: 'retain-on-failure', screenshots: false, snapshots: false },
-      },
-    },
+    { name: 'chromium', grepInvert: /webgpu/i, ...chromium },
+    // SwiftShader's WebGPU uses all cores, so these tests run one at a time.
+    { name: 'chromium-webgpu', grep: /webgpu/i, workers: 1, ...chromium },
     {
       name: 'firefox',
       testMatch: 'firefox.spec.js',
@@ -52,7 +58,6 @@ export default defineConfig<object, WorkerOptions>({
           firefoxUserPrefs: FIREFOX_PREFERENCES,
         },
         needsDisplay: Boolean(process.env['FIREFOX']),
-        trace: { mode: 'retain-on-failure', screenshots: false, snapshots: false },
       },
     },
     { name: 'webkitgtk', testMatch: 'webkitgtk.spec.ts', workers: 1 },
