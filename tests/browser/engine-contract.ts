@@ -11,10 +11,10 @@ import type {
   BandRelighter,
   DecodedPhoto,
   Decoder,
-  Display,
   Gamut,
   Graphics,
   Light,
+  OutputTransform,
   ReceivedPhoto,
   Relighter,
   RelightModule,
@@ -42,7 +42,7 @@ type _CpuSrgb = Extends<
   [Cpu.Photo, Uint8ClampedArray, number, number],
   Parameters<typeof Cpu.Light.fromSrgb>
 >;
-type _CpuDisplay = Extends<Cpu.Display, Display>;
+type _CpuDisplay = Extends<Cpu.Display, OutputTransform>;
 type _CpuDisplayOf = Extends<
   ConstructorParameters<RelightModule['Display']>,
   ConstructorParameters<typeof Cpu.Display>
@@ -70,7 +70,7 @@ type _WebGl2Srgb = Extends<
   [WebGl2.Photo, Uint8ClampedArray, number, number],
   Parameters<typeof WebGl2.Light.fromSrgb>
 >;
-type _WebGl2Display = Extends<WebGl2.Display, Display>;
+type _WebGl2Display = Extends<WebGl2.Display, OutputTransform>;
 type _WebGl2DisplayOf = Extends<
   ConstructorParameters<RelightModule['Display']>,
   ConstructorParameters<typeof WebGl2.Display>
@@ -104,7 +104,7 @@ type _WebGpuSrgb = Extends<
   [WebGpu.Photo, Uint8ClampedArray, number, number],
   Parameters<typeof WebGpu.Light.fromSrgb>
 >;
-type _WebGpuDisplay = Extends<WebGpu.Display, Display>;
+type _WebGpuDisplay = Extends<WebGpu.Display, OutputTransform>;
 type _WebGpuDisplayOf = Extends<
   ConstructorParameters<RelightModule['Display']>,
   ConstructorParameters<typeof WebGpu.Display>

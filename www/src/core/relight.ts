@@ -1,7 +1,7 @@
 /** Relights a photograph with the CPU on the calling thread. */
 
 import { loadCpu } from '../engine/core-modules.js';
-import { makeDisplay } from '../engine/output-settings.js';
+import { createOutputTransform } from '../engine/output-settings.js';
 import type { BandRelighter, CpuModule, Light, ReceivedPhoto } from '../engine/types.js';
 import { toPhotoError } from '../shared/errors.js';
 import type { Gamut, LightName, ToneCurve } from '../shared/names.js';
@@ -88,13 +88,13 @@ export async function relight(
     await photo.photograph.withModule(module, (modulePhoto) => {
       const relighter = relighterOf(module, photo, modulePhoto);
       const lightInModule = createLight(module, modulePhoto, light);
-      const display = makeDisplay(module, output, outputGamut);
+      const transform = createOutputTransform(module, output, outputGamut);
       try {
         const [first = 0, end = 0] = relighter.lightRows;
         const out = new Uint8Array(pixels.buffer);
-        relighter.relight(lightInModule.linearRgb(first, end), display, detail, out);
+        relighter.relight(lightInModule.linearRgb(first, end), transform, detail, out);
       } finally {
-        display.free();
+        transform.free();
         lightInModule.free();
       }
     });

@@ -1,7 +1,7 @@
 /** The output transform's settings: how a linear picture becomes codes on the canvas. */
 
 import type { RgbFactors } from '../shared/values.js';
-import type { Display, Gamut, RelightModule, ToneCurve } from './types.js';
+import type { Gamut, OutputTransform, RelightModule, ToneCurve } from './types.js';
 
 /** Immutable: a change makes a new object. */
 export interface OutputSettings {
@@ -11,11 +11,11 @@ export interface OutputSettings {
   readonly tone: ToneCurve;
 }
 
-/** The output transform in a WebAssembly module, for a canvas of the given gamut. */
-export function makeDisplay(
+/** The output transform, which a module calls a display, for a canvas of the given gamut. */
+export function createOutputTransform(
   { Display }: Pick<RelightModule, 'Display'>,
   { exposure, whiteBalance, tone }: OutputSettings,
   gamut: Gamut,
-): Display {
+): OutputTransform {
   return new Display(exposure, Float64Array.from(whiteBalance), tone, gamut);
 }

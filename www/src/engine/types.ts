@@ -68,8 +68,8 @@ export interface Decoder extends Freeable {
   finish(): DecodedPhoto;
 }
 
-/** An output transform. */
-export interface Display extends Freeable {}
+/** An output transform, in the modules' class `Display`. */
+export interface OutputTransform extends Freeable {}
 
 /** A graphics device, which photographs share. */
 export interface Graphics extends Freeable {
@@ -89,14 +89,14 @@ export interface Relighter extends Freeable {
   readonly kernel: string;
   /** The canvas's gamut. */
   readonly gamut: Gamut;
-  render(light: Light, display: Display, quality: number): void;
+  render(light: Light, transform: OutputTransform, quality: number): void;
   /**
    * Uploads a picture as the light of `renderPicture`; `false` if the backend cannot. Throws the browser's error, and
    * keeps the last light then.
    */
   takePicture(picture: LivePicture, width: number, height: number): boolean;
   /** As `render`, with the uploaded picture. */
-  renderPicture(display: Display, quality: number): void;
+  renderPicture(transform: OutputTransform, quality: number): void;
 }
 
 /** Relights rows of a picture with the CPU, without a canvas. */
@@ -104,7 +104,12 @@ export interface BandRelighter extends Freeable {
   /** The first light row that is needed, and the end of those rows. */
   readonly lightRows: Uint32Array;
   /** `light` has linear R, G and B of those rows; `null` reuses the last one. Writes RGBA into `out`, row by row. */
-  relight(light: Float32Array | null, display: Display, quality: number, out: Uint8Array): void;
+  relight(
+    light: Float32Array | null,
+    transform: OutputTransform,
+    quality: number,
+    out: Uint8Array,
+  ): void;
 }
 
 export interface DecoderModule {
@@ -128,7 +133,7 @@ export interface RelightModule {
     fromSrgb(photo: ReceivedPhoto, rgba: Uint8ClampedArray, width: number, height: number): Light;
   };
   Display: {
-    new (exposure: number, balance: Float64Array, curve: ToneCurve, gamut: Gamut): Display;
+    new (exposure: number, balance: Float64Array, curve: ToneCurve, gamut: Gamut): OutputTransform;
   };
 }
 

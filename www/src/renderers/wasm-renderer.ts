@@ -1,6 +1,6 @@
 /** Draws on a canvas with a WebAssembly module on the page's thread: WebGPU, WebGL2 or the CPU. */
 
-import { makeDisplay, type OutputSettings } from '../engine/output-settings.js';
+import { createOutputTransform, type OutputSettings } from '../engine/output-settings.js';
 import type { Gamut, ReceivedPhoto, Relighter, RelightModule } from '../engine/types.js';
 import type { ImageLight } from '../lights/image-light.js';
 import { LightCache } from '../lights/light-cache.js';
@@ -49,25 +49,25 @@ export class WasmRenderer implements CanvasRenderer {
   }
 
   render(setting: LightSetting, output: OutputSettings, quality: number): FrameResult {
-    const display = makeDisplay(this.#module, output, this.gamut);
+    const transform = createOutputTransform(this.#module, output, this.gamut);
     try {
       if (this.#upload(setting.image)) {
         this.#hasUploadedImage = true;
-        this.#relighter.renderPicture(display, quality);
+        this.#relighter.renderPicture(transform, quality);
         return { lightApplied: true, lightError: null };
       }
       const { light, lightApplied, lightError } = this.#lights.get(setting, this.#lightPlane);
       // An image that is no longer readable keeps its last uploaded content.
       this.#hasUploadedImage &&= !lightApplied;
-      if (this.#hasUploadedImage) this.#relighter.renderPicture(display, quality);
-      else this.#relighter.render(light, display, quality);
+      if (this.#hasUploadedImage) this.#relighter.renderPicture(transform, quality);
+      else this.#relighter.render(light, transform, quality);
       return { lightApplied, lightError };
     } catch (thrown) {
       const { code, message } = toPhotoError(thrown);
       if (code === 'backend-lost') this.#device?.fail(message);
       throw thrown;
     } finally {
-      display.free();
+      transform.free();
     }
   }
 

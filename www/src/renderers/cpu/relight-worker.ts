@@ -1,7 +1,7 @@
 /** The script of a worker that relights row ranges of photographs for a `WorkerPool`. */
 
 import { loadCpu } from '../../engine/core-modules.js';
-import { makeDisplay } from '../../engine/output-settings.js';
+import { createOutputTransform } from '../../engine/output-settings.js';
 import type { BandRelighter, CpuModule, ReceivedPhoto } from '../../engine/types.js';
 import { serve } from '../../engine/worker-server.js';
 import type { RelightTask, RowRange, RowTask } from './protocol.js';
@@ -29,12 +29,12 @@ function handle(module: CpuModule, photo: number, task: RowTask): ArrayBuffer {
       return Uint32Array.from(relighterOf(module, stored).lightRows).buffer;
     case 'relight': {
       const { light, settings, pixels } = task;
-      const display = makeDisplay(module, settings.output, settings.gamut);
+      const transform = createOutputTransform(module, settings.output, settings.gamut);
       try {
         const out = new Uint8Array(pixels);
-        relighterOf(module, stored).relight(light, display, settings.quality, out);
+        relighterOf(module, stored).relight(light, transform, settings.quality, out);
       } finally {
-        display.free();
+        transform.free();
       }
       return pixels;
     }
