@@ -90,29 +90,23 @@ impl<V: Vector> Complex<V> {
     }
 }
 
-impl<V: Vector> Add for Complex<V> {
-    type Output = Self;
+macro_rules! impl_partwise {
+    ($($operator:ident $method:ident $symbol:tt),*) => {$(
+        impl<V: Vector> $operator for Complex<V> {
+            type Output = Self;
 
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self {
-            re: self.re + other.re,
-            im: self.im + other.im,
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self {
+                    re: self.re $symbol other.re,
+                    im: self.im $symbol other.im,
+                }
+            }
         }
-    }
+    )*};
 }
 
-impl<V: Vector> Sub for Complex<V> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self {
-            re: self.re - other.re,
-            im: self.im - other.im,
-        }
-    }
-}
+impl_partwise!(Add add +, Sub sub -);
 
 impl<V: Vector> Mul for Complex<V> {
     type Output = Self;

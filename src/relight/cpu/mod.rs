@@ -141,10 +141,9 @@ impl CpuRelighter {
             })
             .collect();
         let this = &*self;
-        let level = SimdLevel::widest();
         executor.map(stale.len(), |i| {
             let mut scratch = lock(&this.scratch_pool).pop();
-            level.run(BlockKernel {
+            SimdLevel::widest().run(BlockKernel {
                 relighter: this,
                 block: stale[i],
                 scratch: &mut scratch,

@@ -39,7 +39,7 @@ struct PhotoResources {
     light: Texture,
     basis_response: Texture,
     /// Coefficients, codes, origins, steps and tiles.
-    transport: [Texture; 5],
+    transport: Vec<Texture>,
     /// For each two layers of the basis response.
     framebuffers: Vec<Framebuffer>,
     frame: UniformBuffer,
@@ -179,12 +179,13 @@ impl PhotoResources {
             }
         }
         let uniforms = |bytes: &[u8]| UniformBuffer::new(gl, bytes);
-        let basis = layout.basis_uniforms(&transport.basis);
-        let basis = basis
-            .iter()
-            .map(|pair| uniforms(bytemuck::cast_slice(pair)));
-        let channels = TextureLayout::CHANNEL_WEIGHTS;
-        let channels = channels.map(|weights| uniforms(bytemuck::cast_slice(&weights)));
+        let (mut basis, mut channels) = (Vec::new(), Vec::new());
+        for pair in layout.basis_uniforms(&transport.basis) {
+            basis.push(uniforms(bytemuck::cast_slice(&pair))?);
+        }
+        for weights in TextureLayout::CHANNEL_WEIGHTS {
+            channels.push(uniforms(bytemuck::cast_slice(&weights))?);
+        }
         let mut staging = Int16Array::new_with_length(0);
         let mut write = |texture: &Texture, region: TextureRegion<'_>| {
             let components = region.texels.as_flattened();
@@ -210,11 +211,11 @@ impl PhotoResources {
         Ok(Self {
             light: flat(LIGHT, RGBA32_FLOAT, layout.light())?,
             basis_response,
-            transport: [coefficients, codes, origins, steps, tiles],
+            transport: vec![coefficients, codes, origins, steps, tiles],
             framebuffers,
             frame: uniforms(&[0; size_of::<FrameUniforms>()])?,
-            basis: basis.collect::<Result<_, _>>()?,
-            channels: channels.into_iter().collect::<Result<_, _>>()?,
+            basis,
+            channels,
             gl: gl.clone(),
         })
     }

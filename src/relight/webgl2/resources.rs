@@ -17,31 +17,19 @@ pub(super) struct TexelFormat {
     component: u32,
 }
 
-pub(super) const RGBA16_SINT: TexelFormat = TexelFormat {
-    internal: Gl::RGBA16I,
-    format: Gl::RGBA_INTEGER,
-    component: Gl::SHORT,
-};
-pub(super) const RG16_SINT: TexelFormat = TexelFormat {
-    internal: Gl::RG16I,
-    format: Gl::RG_INTEGER,
-    component: Gl::SHORT,
-};
-pub(super) const RGBA32_SINT: TexelFormat = TexelFormat {
-    internal: Gl::RGBA32I,
-    format: Gl::RGBA_INTEGER,
-    component: Gl::INT,
-};
-pub(super) const RGBA32_FLOAT: TexelFormat = TexelFormat {
-    internal: Gl::RGBA32F,
-    format: Gl::RGBA,
-    component: Gl::FLOAT,
-};
-pub(super) const RGBA8_UNORM: TexelFormat = TexelFormat {
-    internal: Gl::RGBA8,
-    format: Gl::RGBA,
-    component: Gl::UNSIGNED_BYTE,
-};
+const fn texel_format(internal: u32, format: u32, component: u32) -> TexelFormat {
+    TexelFormat {
+        internal,
+        format,
+        component,
+    }
+}
+
+pub(super) const RGBA16_SINT: TexelFormat = texel_format(Gl::RGBA16I, Gl::RGBA_INTEGER, Gl::SHORT);
+pub(super) const RG16_SINT: TexelFormat = texel_format(Gl::RG16I, Gl::RG_INTEGER, Gl::SHORT);
+pub(super) const RGBA32_SINT: TexelFormat = texel_format(Gl::RGBA32I, Gl::RGBA_INTEGER, Gl::INT);
+pub(super) const RGBA32_FLOAT: TexelFormat = texel_format(Gl::RGBA32F, Gl::RGBA, Gl::FLOAT);
+pub(super) const RGBA8_UNORM: TexelFormat = texel_format(Gl::RGBA8, Gl::RGBA, Gl::UNSIGNED_BYTE);
 
 /// A texture, or a texture array.
 #[derive(Debug)]
@@ -54,9 +42,6 @@ pub(super) struct Texture {
 
 impl Texture {
     /// Creates a texture, an array if it has `layers`, and binds it to a unit.
-    ///
-    /// # Errors
-    /// [`BackendError::Device`] if the context is lost.
     pub fn new(
         gl: &Gl,
         unit: u32,
@@ -103,9 +88,6 @@ impl Texture {
     }
 
     /// Writes all texels of a 2D texture.
-    ///
-    /// # Errors
-    /// [`BackendError::Upload`] if the browser rejects it.
     pub fn write(
         &self,
         format: TexelFormat,
@@ -129,9 +111,6 @@ impl Texture {
     }
 
     /// Writes a rectangle of one layer of a bound array, from that column, row and layer on.
-    ///
-    /// # Errors
-    /// [`BackendError::Upload`] if the browser rejects it.
     pub fn write_layer(
         &self,
         format: TexelFormat,
@@ -172,9 +151,6 @@ pub(super) struct Framebuffer {
 
 impl Framebuffer {
     /// Draws into a 2D texture.
-    ///
-    /// # Errors
-    /// [`BackendError::Device`] if the context is lost.
     pub fn of_texture(gl: &Gl, texture: &Texture) -> Result<Self, BackendError> {
         let created = Self::new(gl)?;
         let (target, attachment) = (Gl::FRAMEBUFFER, Gl::COLOR_ATTACHMENT0);
@@ -190,9 +166,6 @@ impl Framebuffer {
     }
 
     /// Draws into two layers of a texture array.
-    ///
-    /// # Errors
-    /// [`BackendError::Upload`] if the device cannot draw into it, [`BackendError::Device`] if the context is lost.
     pub fn of_two_layers(gl: &Gl, array: &Texture, first: u32) -> Result<Self, BackendError> {
         let created = Self::new(gl)?;
         let targets = [Gl::COLOR_ATTACHMENT0, Gl::COLOR_ATTACHMENT1];
@@ -241,9 +214,6 @@ pub(super) struct UniformBuffer {
 
 impl UniformBuffer {
     /// Creates a buffer with these bytes.
-    ///
-    /// # Errors
-    /// [`BackendError::Device`] if the context is lost.
     pub fn new(gl: &Gl, bytes: &[u8]) -> Result<Self, BackendError> {
         let created = Self {
             gl: gl.clone(),

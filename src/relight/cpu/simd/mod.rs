@@ -170,11 +170,31 @@ pub enum SimdLevel {
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
     Simd128(Simd128),
     /// The target's baseline, as far as the compiler vectorises.
+    #[cfg_attr(
+        all(target_arch = "wasm32", target_feature = "simd128", not(test)),
+        expect(dead_code)
+    )]
     Scalar(Scalar),
 }
 
 impl SimdLevel {
-    /// All that the CPU has, from the widest on.
+    /// The widest that the CPU has. Inlined, so that a module with simd128 gets no scalar kernels.
+    #[inline(always)]
+    pub fn widest() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = Avx512::detect() {
+            return Self::Avx512(simd);
+        } else if let Some(simd) = Avx2::detect() {
+            return Self::Avx2(simd);
+        }
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        return Self::Simd128(Simd128::detect());
+        #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
+        Self::Scalar(Scalar)
+    }
+
+    /// All that the CPU has.
+    #[cfg(test)]
     pub fn available() -> impl Iterator<Item = Self> {
         let levels = [
             #[cfg(target_arch = "x86_64")]
@@ -186,11 +206,6 @@ impl SimdLevel {
             Some(Self::Scalar(Scalar)),
         ];
         levels.into_iter().flatten()
-    }
-
-    /// The widest that the CPU has.
-    pub fn widest() -> Self {
-        Self::available().next().unwrap_or(Self::Scalar(Scalar))
     }
 
     /// Runs a kernel by this instruction set.

@@ -13,43 +13,23 @@ pub struct Scalar;
 #[derive(Clone, Copy, Debug)]
 pub struct ScalarVector([f32; LANES]);
 
-impl ScalarVector {
-    #[inline(always)]
-    fn zip(self, other: Self, operation: impl Fn(f32, f32) -> f32) -> Self {
-        let mut out = [0.0; LANES];
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = operation(self.0[i], other.0[i]);
+macro_rules! impl_lanewise {
+    ($($operator:ident $method:ident $symbol:tt),*) => {$(
+        impl $operator for ScalarVector {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(mut self, other: Self) -> Self {
+                for i in 0..LANES {
+                    self.0[i] = self.0[i] $symbol other.0[i];
+                }
+                self
+            }
         }
-        Self(out)
-    }
+    )*};
 }
 
-impl Add for ScalarVector {
-    type Output = Self;
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
-    }
-}
-
-impl Sub for ScalarVector {
-    type Output = Self;
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
-    }
-}
-
-impl Mul for ScalarVector {
-    type Output = Self;
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.zip(other, |a, b| a * b)
-    }
-}
+impl_lanewise!(Add add +, Sub sub -, Mul mul *);
 
 impl Simd for Scalar {
     const LINES: usize = 1;

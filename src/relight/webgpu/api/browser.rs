@@ -48,10 +48,10 @@ pub struct UniformBuffer(js::GpuResource);
 pub struct ShaderModule(JsValue);
 
 #[derive(Debug)]
-pub struct ComputePipeline(js::GpuPipeline);
+pub struct Pipeline(js::GpuPipeline);
 
-#[derive(Debug)]
-pub struct RenderPipeline(js::GpuPipeline);
+pub type ComputePipeline = Pipeline;
+pub type RenderPipeline = Pipeline;
 
 /// The resources of a pipeline's bindings.
 #[derive(Debug)]
@@ -159,7 +159,7 @@ impl DeviceQueue {
             ("layout", "auto".into()),
             ("compute", stage(module, entry_point).into()),
         ]);
-        ComputePipeline(self.device.create_compute_pipeline(&descriptor))
+        Pipeline(self.device.create_compute_pipeline(&descriptor))
     }
 
     /// A pipeline of a vertex and a fragment shader, for one target.
@@ -178,7 +178,7 @@ impl DeviceQueue {
             ("vertex", stage(module, vertex).into()),
             ("fragment", fragment.into()),
         ]);
-        RenderPipeline(self.device.create_render_pipeline(&descriptor))
+        Pipeline(self.device.create_render_pipeline(&descriptor))
     }
 
     pub fn create_texture(&self, descriptor: &TextureDescriptor) -> Texture {
@@ -247,12 +247,10 @@ impl DeviceQueue {
     pub fn submit(&self, commands: CommandEncoder) {
         self.queue.submit(&list([commands.0.finish()]));
     }
+}
 
-    fn bind(
-        &self,
-        pipeline: &js::GpuPipeline,
-        resources: &[(u32, BindingResource<'_>)],
-    ) -> BindGroup {
+impl Pipeline {
+    pub fn bind(&self, gpu: &DeviceQueue, resources: &[(u32, BindingResource<'_>)]) -> BindGroup {
         let entry = |(binding, resource): &(u32, BindingResource<'_>)| {
             let resource = match resource {
                 BindingResource::Texture(texture) => texture.view.clone(),
@@ -262,22 +260,10 @@ impl DeviceQueue {
             };
             dictionary(&[("binding", (*binding).into()), ("resource", resource)]).into()
         };
-        BindGroup(self.device.create_bind_group(&dictionary(&[
-            ("layout", pipeline.get_bind_group_layout(0)),
+        BindGroup(gpu.device.create_bind_group(&dictionary(&[
+            ("layout", self.0.get_bind_group_layout(0)),
             ("entries", list(resources.iter().map(entry))),
         ])))
-    }
-}
-
-impl ComputePipeline {
-    pub fn bind(&self, gpu: &DeviceQueue, resources: &[(u32, BindingResource<'_>)]) -> BindGroup {
-        gpu.bind(&self.0, resources)
-    }
-}
-
-impl RenderPipeline {
-    pub fn bind(&self, gpu: &DeviceQueue, resources: &[(u32, BindingResource<'_>)]) -> BindGroup {
-        gpu.bind(&self.0, resources)
     }
 }
 

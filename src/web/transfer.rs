@@ -1,16 +1,70 @@
-//! The receiving side.
+//! Serialisation of a photograph between modules, each of which has its own memory: geometry as numbers, the basis as
+//! floats, and each tile as a [`TileHeader`] followed by its codes.
 
-use super::{TileHeader, corrupt};
+use super::CodedError;
+#[cfg(feature = "drawing")]
 use crate::transport::{
-    Basis, CoefficientTile, Correspondence, DirectTile, Extent, Geometry, TexelCode, Tile,
-    TileRect, Transport, Window,
+    Basis, CoefficientTile, Correspondence, DirectTile, Extent, TexelCode, TileRect, Transport,
+    Window,
 };
-use crate::web::CodedError;
+use crate::transport::{CHANNELS, Geometry, Tile};
+
+/// The first bytes of a packed tile.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct TileHeader {
+    /// Of the coefficients and of the functions.
+    steps: [[f32; CHANNELS]; 2],
+    /// Texels of the coefficients and of the functions.
+    texels: [u32; 2],
+}
+
+/// The error for values that the other module cannot have sent.
+pub fn corrupt() -> CodedError {
+    CodedError::new(
+        "internal",
+        "a photograph was corrupted on its way from its worker",
+    )
+}
+
+/// Grids, window, tile side and correspondence, as `unpack_transport` reads them.
+#[cfg(feature = "decoder")]
+pub fn pack_geometry(geometry: &Geometry) -> Vec<f64> {
+    let Geometry {
+        camera,
+        light,
+        window,
+        correspondence,
+        tile_side,
+    } = geometry;
+    let numbers = [
+        camera.width,
+        camera.height,
+        light.width,
+        light.height,
+        window.side(),
+        *tile_side,
+    ];
+    let affine = correspondence.affine.concat();
+    numbers.into_iter().map(f64::from).chain(affine).collect()
+}
+
+/// A header, the coefficients' codes and the functions' codes.
+pub fn pack_tile(tile: &Tile) -> Vec<u8> {
+    let codes = [&tile.coefficients.codes, &tile.functions.codes];
+    let header = TileHeader {
+        steps: [tile.coefficients.step, tile.functions.step],
+        texels: codes.map(|codes| codes.len() as u32), // fits: a 32-bit memory
+    };
+    let codes = codes.map(|codes| bytemuck::cast_slice::<_, u8>(codes));
+    [bytemuck::bytes_of(&header), codes[0], codes[1]].concat()
+}
 
 /// A transport of dark tiles.
 ///
 /// # Errors
 /// [`corrupt`] if the values describe no transport.
+#[cfg(feature = "drawing")]
 pub fn unpack_transport(geometry: &[f64], basis: &[f32]) -> Result<Transport, CodedError> {
     let &[cw, ch, lw, lh, window, tile_side, a, b, c, d, e, f] = geometry else {
         return Err(corrupt());
@@ -47,6 +101,7 @@ pub fn unpack_transport(geometry: &[f64], basis: &[f32]) -> Result<Transport, Co
 /// # Errors
 /// [`corrupt`] if the bytes are not those of a tile with that rectangle, rank and window area; `format-limit` if there is
 /// no memory.
+#[cfg(feature = "drawing")]
 pub fn unpack_tile(
     bytes: &[u8],
     rect: TileRect,
