@@ -21,7 +21,7 @@ macro_rules! impl_lanewise {
             #[inline(always)]
             fn $method(mut self, other: Self) -> Self {
                 for i in 0..LANES {
-                    self.0[i] = self.0[i] $symbol other.0[i];
+                    self.0[i] $symbol other.0[i];
                 }
                 self
             }
@@ -29,7 +29,7 @@ macro_rules! impl_lanewise {
     )*};
 }
 
-impl_lanewise!(Add add +, Sub sub -, Mul mul *);
+impl_lanewise!(Add add +=, Sub sub -=, Mul mul *=);
 
 impl Simd for Scalar {
     const LINES: usize = 1;
