@@ -1,6 +1,6 @@
-//! Simulated captures: what they promise to whoever recovers from them.
+//! Simulated captures: reproducibility, agreement with the known transport, and properties of the scenes.
 #![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // also in the helpers, which clippy does not take for tests
+#![allow(clippy::unwrap_used)] // a failed step fails the test
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,7 +20,7 @@ fn simulate(out: &Path, args: &[&str]) -> Command {
 
 const SMALL: [&str; 6] = ["--camera", "40x32", "--light", "20x16", "--patterns", "6"];
 
-/// Every file below `root` by its path.
+/// The contents of every file below `root`, by path.
 fn contents(root: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![root.to_owned()];
@@ -43,7 +43,7 @@ fn contents(root: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 #[test]
-fn the_same_seed_writes_the_same_bytes_on_any_number_of_threads() {
+fn a_seed_determines_every_byte_on_any_number_of_threads() {
     let root = tempfile::tempdir().unwrap();
     for scene in ["stained-glass", "cookies"] {
         let make = |name: &str, seed: &str, threads: &str| {
@@ -64,15 +64,19 @@ fn the_same_seed_writes_the_same_bytes_on_any_number_of_threads() {
         assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
         for (name, bytes) in &a {
             assert!(b[name] == *bytes, "{scene}: {name} differs");
-            let drawn = ["patterns/", "photos/", "graycode/"]
+            let is_random = ["patterns/", "photos/", "graycode/"]
                 .iter()
                 .any(|f| name.starts_with(f));
-            assert_eq!(c[name] != *bytes, drawn, "{scene}: {name} and another seed");
+            assert_eq!(
+                c[name] != *bytes,
+                is_random,
+                "{scene}: {name} with another seed"
+            );
         }
     }
 }
 
-/// `pT` from the truth on disk, `[N]`.
+/// y = pT, `[N]`, from the capture's `truth/` folder.
 fn picture(folder: &CaptureFolder, light: &[[f64; CHANNELS]]) -> Vec<[f64; CHANNELS]> {
     let truth = folder.truth().unwrap().unwrap();
     let manifest = folder.manifest();
@@ -84,7 +88,11 @@ fn picture(folder: &CaptureFolder, light: &[[f64; CHANNELS]]) -> Vec<[f64; CHANN
                 let element = truth.window().element(origin, s);
                 match element.index_in(manifest.light.extent()) {
                     Some(m) => (0..CHANNELS).for_each(|c| y[c] += tau[c].to_f64() * light[m][c]),
-                    None => assert_eq!(tau.map(|t| t.to_f64()), [0.0; 3], "light from nowhere"),
+                    None => assert_eq!(
+                        tau.map(|t| t.to_f64()),
+                        [0.0; 3],
+                        "transport outside the light plane"
+                    ),
                 }
             }
             y
@@ -93,7 +101,7 @@ fn picture(folder: &CaptureFolder, light: &[[f64; CHANNELS]]) -> Vec<[f64; CHANN
 }
 
 #[test]
-fn photographs_and_relit_pictures_are_the_truth_and_its_noise() {
+fn photographs_and_relit_pictures_match_the_known_transport() {
     let root = tempfile::tempdir().unwrap();
     for (scene, ensemble) in [("stained-glass", "bernoulli"), ("cookies", "gaussian")] {
         let out = root.path().join(scene);
@@ -113,11 +121,12 @@ fn photographs_and_relit_pictures_are_the_truth_and_its_noise() {
             shot.read(&rows, &mut photo).unwrap();
             assert_eq!(shot.finish().unwrap(), 0, "saturated samples");
             let light: Vec<_> = pattern.iter().map(|&p| [f64::from(p); CHANNELS]).collect();
-            for (expected, seen) in picture(&folder, &light).iter().zip(&photo) {
+            for (expected, measured) in picture(&folder, &light).iter().zip(&photo) {
                 for c in 0..CHANNELS {
-                    // Shot noise, and the read noise of two photographs: this and the dark one.
+                    // Shot noise, and the read noise of this photograph and of the dark one.
                     let variance = expected[c] * 40_000.0 + 2.0 * 64.0;
-                    squares += ((f64::from(seen[c]) - expected[c]) * 40_000.0).powi(2) / variance;
+                    squares +=
+                        ((f64::from(measured[c]) - expected[c]) * 40_000.0).powi(2) / variance;
                     samples += 1.0;
                 }
             }
@@ -125,7 +134,7 @@ fn photographs_and_relit_pictures_are_the_truth_and_its_noise() {
         let ratio = squares / samples;
         assert!(
             (0.93..1.07).contains(&ratio),
-            "{scene}: noise is {ratio} times as expected"
+            "{scene}: the noise variance is {ratio} times the expected one"
         );
 
         let truth = folder.truth().unwrap().unwrap();
@@ -140,9 +149,9 @@ fn photographs_and_relit_pictures_are_the_truth_and_its_noise() {
                 .map(|l| [l[0], l[1], l[2]].map(f64::from))
                 .collect();
             let relit = truth.relit(&name).unwrap();
-            for (expected, seen) in picture(&folder, &light).iter().zip(&relit) {
+            for (expected, measured) in picture(&folder, &light).iter().zip(&relit) {
                 for c in 0..CHANNELS {
-                    let error = (expected[c] - seen[c]).abs();
+                    let error = (expected[c] - measured[c]).abs();
                     assert!(
                         error < 0.6 / (0.9 * 65535.0),
                         "{scene} {name}: off by {error}"
@@ -154,7 +163,7 @@ fn photographs_and_relit_pictures_are_the_truth_and_its_noise() {
 }
 
 #[test]
-fn gray_code_tells_where_pixels_look() {
+fn gray_code_decodes_to_the_correspondence() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("cookies");
     simulate(&out, &["cookies"]).args(SMALL).assert().success();
@@ -170,7 +179,7 @@ fn gray_code_tells_where_pixels_look() {
             .filter(|g| g.axis == axis)
             .collect();
         let photos: Vec<_> = shots.iter().map(|g| read(&g.photo)).collect();
-        let (mut near, mut seen) = (0, 0);
+        let (mut near, mut decoded) = (0, 0);
         for (x, y, lit) in flood.enumerate_pixels() {
             if sum(lit) < 3 * 3000 {
                 continue;
@@ -182,14 +191,14 @@ fn gray_code_tells_where_pixels_look() {
                 element = element << 1 | (bit ^ element & 1);
             }
             let at = f64::from(if axis == "x" { x } else { y }) * 0.5;
-            seen += 1;
-            // Parallax moves it by up to four elements, always the same way.
+            decoded += 1;
+            // Parallax displaces it by up to four elements in one direction.
             near += u32::from((-5.5..=1.0).contains(&(f64::from(element) - at)));
         }
-        assert!(seen > 700, "{seen} pixels are lit");
+        assert!(decoded > 700, "{decoded} pixels are lit");
         assert!(
-            f64::from(near) > 0.95 * f64::from(seen),
-            "{axis}: {near} of {seen}"
+            f64::from(near) > 0.95 * f64::from(decoded),
+            "{axis}: {near} of {decoded}"
         );
         assert_eq!(shots[0].bit, top_bit);
         assert!(!shots[0].inverted && shots[1].inverted);
@@ -197,10 +206,10 @@ fn gray_code_tells_where_pixels_look() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_and_nothing_is_written() {
+fn invalid_arguments_are_errors_and_write_nothing() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("out");
-    let refused: [(&[&str], &str, i32); 8] = [
+    let cases: [(&[&str], &str, i32); 8] = [
         (
             &["stained-glass", "--patterns", "0"],
             "0 is not in 1..=10000",
@@ -218,14 +227,14 @@ fn what_cannot_be_is_refused_and_nothing_is_written() {
         (&["marble"], "stained-glass", 2),
         (&["cookies", "--ensemble", "cauchy"], "bernoulli", 2),
     ];
-    for (args, message, code) in refused {
+    for (args, message, code) in cases {
         let output = simulate(&out, args)
             .assert()
             .code(code)
             .get_output()
             .clone();
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(said.contains(message), "{args:?}: {said}");
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(stderr.contains(message), "{args:?}: {stderr}");
         assert!(output.stdout.is_empty());
     }
     std::fs::create_dir(&out).unwrap();
@@ -246,7 +255,8 @@ const fn extent(width: u32, height: u32) -> Extent {
     Extent { width, height }
 }
 
-fn whole(scene: &dyn SimulatedScene) -> TransportFunctions {
+/// The functions of all pixels.
+fn all_functions(scene: &dyn SimulatedScene) -> TransportFunctions {
     scene.tile(TileRect {
         x: 0,
         y: 0,
@@ -254,17 +264,17 @@ fn whole(scene: &dyn SimulatedScene) -> TransportFunctions {
     })
 }
 
-/// The scene's noise-free picture under flood light, `[N]`.
+/// The scene's picture under flood light without noise, `[N]`.
 fn flood(scene: &dyn SimulatedScene) -> Vec<[f32; CHANNELS]> {
     let light = scene.geometry().light;
     let emissions = EmissionMatrix::new(light, &[LightCodes::uniform(light, 255)]);
     emissions
-        .pictures(scene.geometry(), &whole(scene))
+        .pictures(scene.geometry(), &all_functions(scene))
         .remove(0)
 }
 
 #[test]
-fn transport_is_finite_not_negative_inside_the_band_and_on_the_display() {
+fn transport_is_finite_non_negative_and_inside_the_window() {
     for kind in [SceneKind::StainedGlass, SceneKind::Cookies] {
         for (camera, light) in [
             (extent(128, 128), extent(64, 64)),
@@ -274,7 +284,7 @@ fn transport_is_finite_not_negative_inside_the_band_and_on_the_display() {
             let scene = kind.build(camera, light).unwrap();
             let geometry = scene.geometry();
             let side = geometry.window.side() as usize;
-            let functions = whole(scene.as_ref());
+            let functions = all_functions(scene.as_ref());
             let (mut all, mut border) = (0.0, 0.0);
             let pixels = functions.rect.pixels();
             for (pixel, tau) in pixels.zip(functions.tau.chunks_exact(side * side)) {
@@ -287,7 +297,7 @@ fn transport_is_finite_not_negative_inside_the_band_and_on_the_display() {
                         v: origin.v + j as i32,
                     };
                     if element.index_in(light).is_none() {
-                        assert_eq!(*tau, [0.0; CHANNELS], "{kind:?} beyond the display");
+                        assert_eq!(*tau, [0.0; CHANNELS], "{kind:?} outside the light plane");
                     }
                     let energy = f64::from(tau.iter().sum::<f32>());
                     all += energy;
@@ -301,7 +311,7 @@ fn transport_is_finite_not_negative_inside_the_band_and_on_the_display() {
     }
 }
 
-/// The value that `share` of the values lie below.
+/// The quantile `share` of `values`.
 fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     values[((values.len() - 1) as f64 * share) as usize]
@@ -314,7 +324,7 @@ fn flood_light_fills_the_cameras_range_without_clipping() {
             let scene = kind
                 .build(extent(camera, camera), extent(light, light))
                 .unwrap();
-            // The brightest channel: saturated colours have dark ones.
+            // The brightest channel, as saturated colours have dark channels.
             let picture = flood(scene.as_ref());
             let brightest = |p: &[f32; 3]| f64::from(p[0].max(p[1]).max(p[2]));
             let values: Vec<_> = picture.iter().map(brightest).collect();
@@ -330,7 +340,7 @@ fn flood_light_fills_the_cameras_range_without_clipping() {
 fn cookies_are_sparse_and_glass_is_not() {
     let sparsity = |kind: SceneKind| {
         let scene = kind.build(extent(96, 96), extent(48, 48)).unwrap();
-        let functions = whole(scene.as_ref());
+        let functions = all_functions(scene.as_ref());
         let effective = functions
             .tau
             .chunks_exact(scene.geometry().window.area())
@@ -342,23 +352,23 @@ fn cookies_are_sparse_and_glass_is_not() {
         let effective: Vec<f64> = effective.collect();
         [0.5, 0.9].map(|q| quantile(effective.clone(), q))
     };
-    let [median, ninth] = sparsity(SceneKind::Cookies);
-    assert!(median < 2.2 && ninth < 4.5, "cookies: {median}, {ninth}");
-    let [median, ninth] = sparsity(SceneKind::StainedGlass);
-    assert!(median > 7.0 && ninth > 15.0, "glass: {median}, {ninth}");
+    let [median, high] = sparsity(SceneKind::Cookies);
+    assert!(median < 2.2 && high < 4.5, "cookies: {median}, {high}");
+    let [median, high] = sparsity(SceneKind::StainedGlass);
+    assert!(median > 7.0 && high > 15.0, "glass: {median}, {high}");
 }
 
 #[test]
 fn the_picture_is_the_same_at_every_resolution() {
     for kind in [SceneKind::StainedGlass, SceneKind::Cookies] {
-        let seen = |camera, light| {
+        let flood_picture = |camera, light| {
             let scene = kind
                 .build(extent(camera, camera), extent(light, light))
                 .unwrap();
             flood(scene.as_ref())
         };
-        let (coarse, fine) = (seen(128, 64), seen(256, 128));
-        // Mean over 2x2 pixels of the fine picture.
+        let (coarse, fine) = (flood_picture(128, 64), flood_picture(256, 128));
+        // The mean of 2x2 pixels of the fine picture.
         let mut reduced = vec![[0.0; CHANNELS]; 128 * 128];
         for (n, pixel) in fine.iter().enumerate() {
             for c in 0..CHANNELS {
@@ -383,12 +393,12 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn height_moves_the_light_and_casts_shadows() {
+fn height_displaces_direct_light_and_casts_shadows() {
     let scene = SceneKind::Cookies
         .build(extent(128, 128), extent(64, 64))
         .unwrap();
     let geometry = scene.geometry();
-    let functions = whole(scene.as_ref());
+    let functions = all_functions(scene.as_ref());
     let side = geometry.window.side() as usize;
     let half = (side / 2) as f64;
     let (mut shifts, mut shadows) = (Vec::new(), 0);
@@ -401,18 +411,18 @@ fn height_moves_the_light_and_casts_shadows() {
         if sum > 0.08 {
             shifts.push(-shift / sum);
         } else if sum > 0.0005 {
-            // No direct light, but some from around.
+            // Interreflections only.
             shadows += 1;
         }
     }
     let [tray, top] = [0.2, 0.95].map(|q| quantile(shifts.clone(), q));
     assert!(
         tray.abs() < 0.5,
-        "the tray lies in the middle of the window: {tray}"
+        "direct light on the tray is off the window's centre: {tray}"
     );
     assert!(
         (2.0..4.5).contains(&top),
-        "the tallest cookies are displaced: {top}"
+        "displacement on the tallest cookies: {top}"
     );
     assert!(shadows > 300, "{shadows} pixels in shadow");
 }

@@ -1,6 +1,6 @@
-//! `ltm-export study` on a capture whose transport is known.
+//! `ltm-export study` on a capture with known transport.
 #![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // a test that cannot go on should stop
+#![allow(clippy::unwrap_used)] // a failed step fails the test
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use assert_cmd::Command;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Shots left in the fixture: few, so that recovery takes little time.
+/// Number of shots that the test uses, for speed.
 const SHOTS: usize = 16;
 
 fn run(args: &[&str]) -> Output {
@@ -22,7 +22,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// The fixture with its first shots only, truth and all, called `glass`.
+/// A copy of the fixture, named `glass`, with its first shots and its truth.
 fn capture(folder: &Path) -> PathBuf {
     let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/glass-s");
     let capture = folder.join("glass");
@@ -68,9 +68,9 @@ fn figures_agree_with_recover_and_evaluate() {
     );
     assert!(output.stdout.is_empty(), "progress goes to standard error");
 
-    // Every picture that is shown is there, and is whole.
-    let shown = fs::read_to_string(results.join("results.md")).unwrap();
-    let pictures: Vec<&str> = shown
+    // Every picture in the report exists and is complete.
+    let report = fs::read_to_string(results.join("results.md")).unwrap();
+    let pictures: Vec<&str> = report
         .split("](")
         .skip(1)
         .map(|rest| rest.split(')').next().unwrap())
@@ -99,7 +99,7 @@ fn figures_agree_with_recover_and_evaluate() {
     let last = profile.last().unwrap();
     assert_eq!((last[1].as_str(), last[2].as_str()), ("100.000", "100.000"));
 
-    // Pictures are relit as by the other commands, which round to an archive's halves in between.
+    // Relit pictures agree with `recover` and `evaluate`, which round to half floats.
     let file = folder.path().join("glass.ltm");
     let window = ["--window", "13", "--patterns", "16", "--lossless"];
     let (_, rows) = csv(&results.join("glass-figure4.csv"));
@@ -114,31 +114,31 @@ fn figures_agree_with_recover_and_evaluate() {
     let evaluated: Value = serde_json::from_slice(&evaluated.stdout).unwrap();
     assert_eq!(rows.len(), 5);
     for row in rows {
-        let (ours, theirs) = (row[1].parse::<f64>().unwrap(), &evaluated["relit"][&row[0]]);
+        let (psnr, expected) = (row[1].parse::<f64>().unwrap(), &evaluated["relit"][&row[0]]);
         assert!(
-            (ours - theirs.as_f64().unwrap()).abs() < 0.05,
-            "{row:?}, {theirs}"
+            (psnr - expected.as_f64().unwrap()).abs() < 0.05,
+            "{row:?}, {expected}"
         );
     }
 }
 
 #[test]
-fn what_cannot_be_studied_is_refused_at_once() {
+fn invalid_subjects_are_errors_before_any_work() {
     let folder = TempDir::new().unwrap();
     let capture = capture(folder.path());
     let results = folder.path().join("results");
-    let refused = |subjects: &[&str], word: &str| {
+    let assert_fails = |subjects: &[&str], word: &str| {
         let args = [&["study", "-o", text(&results)], subjects].concat();
         let output = run(&args);
         let message = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(1), "{message}");
         assert!(message.contains(word), "no {word:?} in: {message}");
     };
-    refused(&["nowhere"], "nowhere");
-    refused(&[text(&capture), text(&capture)], "named twice");
+    assert_fails(&["nowhere"], "nowhere");
+    assert_fails(&[text(&capture), text(&capture)], "named twice");
     assert!(!results.exists());
     fs::remove_dir_all(capture.join("truth")).unwrap();
-    refused(&[text(&capture)], "truth/");
+    assert_fails(&[text(&capture)], "truth/");
     fs::write(folder.path().join("mine"), "keep").unwrap();
     let output = run(&["study", "scenes", "-o", text(folder.path())]);
     assert!(String::from_utf8_lossy(&output.stderr).contains("is not empty"));

@@ -36,7 +36,7 @@ mod sampling;
 mod test_problems;
 
 pub use bandwidth::{BandwidthEstimate, WindowEstimate};
-pub use bpdn::{Constraint, Homotopy, InteriorPoint, Solution, SparsityBasis};
+pub use bpdn::{BpdnConstraint, BpdnSolution, Homotopy, InteriorPoint, SparsityBasis};
 pub use common_mode::CommonMode;
 pub use error::RecoverError;
 pub use holdout_validation::HoldoutValidation;

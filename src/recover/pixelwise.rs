@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::bpdn::{Constraint, Homotopy, InteriorPoint, SparsityBasis, Tolerance};
+use super::bpdn::{BpdnConstraint, Homotopy, InteriorPoint, SparsityBasis, Tolerance};
 use super::common_mode::CommonMode;
 use super::gram_cache::{GramCache, WindowEquations};
 use super::nnls::Nnls;
@@ -211,13 +211,14 @@ impl PixelwiseRecovery {
                     (y, epsilon, least_squares)
                 });
                 let prepared: Vec<_> = prepared.collect();
-                let constraints = prepared
-                    .iter()
-                    .map(|(y, epsilon, least_squares)| Constraint {
-                        y,
-                        epsilon: *epsilon,
-                        least_squares,
-                    });
+                let constraints =
+                    prepared
+                        .iter()
+                        .map(|(y, epsilon, least_squares)| BpdnConstraint {
+                            y,
+                            epsilon: *epsilon,
+                            least_squares,
+                        });
                 let solved = solver.solve(&constraints.collect::<Vec<_>>());
                 for (PixelSamples { pixel, channel, .. }, solution) in samples.iter().zip(&solved) {
                     solutions(origin, *pixel, *channel, slots, &solution.x);

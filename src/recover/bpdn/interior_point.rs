@@ -15,7 +15,7 @@
 use super::iterate::Iterate;
 use super::newton::NewtonSystem;
 use super::sensing_operator::SensingOperator;
-use super::solution::{Constraint, Solution};
+use super::solution::{BpdnConstraint, BpdnSolution};
 use super::sparsity_basis::SparsityBasis;
 use crate::linalg::{dot, vectorise};
 
@@ -49,17 +49,17 @@ impl InteriorPoint {
 
     /// Solves for any number of right-hand sides. Every `x` is non-negative, and
     /// `‖y − Ax‖ ≤ epsilon` to rounding; where no x satisfies it, `x` is the least-squares solution.
-    pub fn solve(&self, constraints: &[Constraint]) -> Vec<Solution> {
+    pub fn solve(&self, constraints: &[BpdnConstraint]) -> Vec<BpdnSolution> {
         let operator = &self.operator;
         let mut gram = None;
-        let solve_one = |constraint: &Constraint| {
+        let solve_one = |constraint: &BpdnConstraint| {
             // Zero is the solution if it is feasible.
             let zero_is_feasible = dot(constraint.y, constraint.y).sqrt() <= constraint.epsilon;
             let x = match zero_is_feasible {
                 true => vec![0.0; operator.unknowns()],
                 false => constraint.least_squares.to_vec(),
             };
-            let mut best = Solution {
+            let mut best = BpdnSolution {
                 objective: operator.objective(&x),
                 x,
                 bound: 0.0,
@@ -85,7 +85,12 @@ impl InteriorPoint {
 
 /// Improves `best`, which is feasible, until its gap is small enough or a step fails.
 #[inline(always)]
-fn iterate(operator: &SensingOperator, gram: &[f64], constraint: &Constraint, best: &mut Solution) {
+fn iterate(
+    operator: &SensingOperator,
+    gram: &[f64],
+    constraint: &BpdnConstraint,
+    best: &mut BpdnSolution,
+) {
     let Some(mut point) = Iterate::new(operator, constraint) else {
         return;
     };
@@ -170,7 +175,7 @@ mod tests {
                 let least = problem.residual(&least_squares, y);
                 let norm = Problem::energy(y).sqrt();
                 let epsilon = share * norm;
-                let constraint = Constraint { y, epsilon, least_squares: &least_squares };
+                let constraint = BpdnConstraint { y, epsilon, least_squares: &least_squares };
                 let solution = solver.solve(&[constraint]).remove(0);
                 prop_assert!(solution.x.iter().all(|&x| x >= 0.0));
                 let objective = norm_in_basis(basis, missing, &solution.x);
@@ -200,7 +205,7 @@ mod tests {
                 let least = problem.residual(&least_squares, y);
                 let epsilon = least + share * (Problem::energy(y).sqrt() - least);
                 let exact = Homotopy::new(&gram, 25).solve(&h, Problem::energy(y), epsilon);
-                let constraint = Constraint { y, epsilon, least_squares: &least_squares };
+                let constraint = BpdnConstraint { y, epsilon, least_squares: &least_squares };
                 let found = solver.solve(&[constraint]).remove(0);
                 let best: f64 = exact.iter().sum();
                 prop_assert!((found.objective - best).abs() <= MAX_RELATIVE_GAP * best + 1e-9);
@@ -213,7 +218,7 @@ mod tests {
         let (problem, solver) = problem_and_solver(SparsityBasis::Haar, 30, 0, 7);
         let y = &problem.measurements[0];
         let least_squares = Nnls::new(&problem.gram(), 25).solve(&problem.right_hand_side(y));
-        let constraint = Constraint {
+        let constraint = BpdnConstraint {
             y,
             epsilon: 1.01 * Problem::energy(y).sqrt(),
             least_squares: &least_squares,
@@ -228,7 +233,7 @@ mod tests {
         let y = &problem.measurements[0];
         let least_squares = Nnls::new(&problem.gram(), 25).solve(&problem.right_hand_side(y));
         let epsilon = 0.5 * problem.residual(&least_squares, y);
-        let constraint = Constraint {
+        let constraint = BpdnConstraint {
             y,
             epsilon,
             least_squares: &least_squares,

@@ -3,7 +3,7 @@
 //! Notation as in [`interior_point`](super::interior_point), with coefficients `c = φᵀx`.
 
 use super::sensing_operator::SensingOperator;
-use super::solution::Constraint;
+use super::solution::BpdnConstraint;
 use crate::linalg::{add_scaled, dot};
 
 /// Share of the way to the nearest bound that a step goes.
@@ -42,7 +42,7 @@ pub(super) struct NewtonStep {
 
 /// `½(ε² − ‖residual‖²)`.
 #[inline(always)]
-fn slack(constraint: &Constraint, residual: &[f64]) -> f64 {
+fn slack(constraint: &BpdnConstraint, residual: &[f64]) -> f64 {
     let norm = dot(residual, residual).sqrt();
     0.5 * (constraint.epsilon - norm) * (constraint.epsilon + norm)
 }
@@ -50,7 +50,7 @@ fn slack(constraint: &Constraint, residual: &[f64]) -> f64 {
 impl Iterate {
     /// A strictly feasible iterate: the least-squares solution plus a constant; `None` if there is none.
     #[inline(always)]
-    pub fn new(operator: &SensingOperator, constraint: &Constraint) -> Option<Self> {
+    pub fn new(operator: &SensingOperator, constraint: &BpdnConstraint) -> Option<Self> {
         let least_squares = constraint.least_squares;
         let max_slack = slack(constraint, &operator.residual(least_squares, constraint.y));
         let mut offset = least_squares.iter().sum::<f64>() / least_squares.len() as f64;
@@ -156,7 +156,7 @@ impl Iterate {
     pub fn take_step(
         &mut self,
         operator: &SensingOperator,
-        constraint: &Constraint,
+        constraint: &BpdnConstraint,
         step: &NewtonStep,
     ) {
         let (primal, dual) = self.max_step_lengths(step);

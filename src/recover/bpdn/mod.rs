@@ -18,6 +18,6 @@ mod tolerance;
 
 pub use homotopy::Homotopy;
 pub use interior_point::InteriorPoint;
-pub use solution::{Constraint, Solution};
+pub use solution::{BpdnConstraint, BpdnSolution};
 pub use sparsity_basis::SparsityBasis;
 pub(super) use tolerance::Tolerance;

@@ -29,7 +29,7 @@ pub(super) struct NewtonSystem<'a> {
 }
 
 /// A value, or its wanted change, for each product of a slack and its multiplier.
-struct Products {
+struct ComplementarityProducts {
     /// `½(1 + s)(t − c)` and `½(1 − s)(t + c)`, `[side²]`.
     upper: Vec<f64>,
     lower: Vec<f64>,
@@ -105,10 +105,10 @@ impl<'a> NewtonSystem<'a> {
 
     /// The products of slacks and multipliers.
     #[inline(always)]
-    fn products(&self) -> Products {
+    fn products(&self) -> ComplementarityProducts {
         let point = self.point;
         let values = || (point.t.iter().zip(&point.s)).zip(&point.coefficients);
-        Products {
+        ComplementarityProducts {
             upper: values()
                 .map(|((t, s), c)| 0.5 * (1.0 + s) * (t - c))
                 .collect(),
@@ -122,7 +122,7 @@ impl<'a> NewtonSystem<'a> {
 
     /// The step that, to first order, changes the products by `change` and makes the dual residual zero.
     #[inline(always)]
-    fn newton_step(&self, change: &Products) -> NewtonStep {
+    fn newton_step(&self, change: &ComplementarityProducts) -> NewtonStep {
         let point = self.point;
         // ds for dx = 0.
         let mut s: Vec<f64> = (change.upper.iter().zip(&change.lower))

@@ -17,7 +17,7 @@ const SEARCH_STEPS: usize = 40;
 
 /// One right-hand side of a [`super::InteriorPoint`].
 #[derive(Clone, Debug)]
-pub struct Constraint<'a> {
+pub struct BpdnConstraint<'a> {
     /// Measurements, `[L]`.
     pub y: &'a [f64],
     /// Upper bound of `‖y − Ax‖`.
@@ -28,7 +28,7 @@ pub struct Constraint<'a> {
 
 /// A solution with a bound on its distance from the optimum.
 #[derive(Clone, Debug)]
-pub struct Solution {
+pub struct BpdnSolution {
     /// `x`, `[k]`.
     pub x: Vec<f64>,
     /// `‖φᵀx‖₁`.
@@ -37,7 +37,7 @@ pub struct Solution {
     pub bound: f64,
 }
 
-impl Solution {
+impl BpdnSolution {
     /// Upper bound on the objective's excess over the optimum, as a share of the optimum.
     pub(super) fn relative_gap(&self) -> f64 {
         (self.objective - self.bound) / self.bound
@@ -49,7 +49,7 @@ impl Solution {
     pub(super) fn record(
         &mut self,
         operator: &SensingOperator,
-        constraint: &Constraint,
+        constraint: &BpdnConstraint,
         x: Vec<f64>,
         s: &[f64],
     ) {
@@ -71,10 +71,10 @@ impl Solution {
 #[inline(always)]
 fn feasible_points(
     operator: &SensingOperator,
-    constraint: &Constraint,
+    constraint: &BpdnConstraint,
     x: Vec<f64>,
 ) -> impl Iterator<Item = Vec<f64>> {
-    let &Constraint {
+    let &BpdnConstraint {
         y,
         epsilon,
         least_squares,
@@ -109,7 +109,7 @@ fn first_feasible(residual: &[f64], change: &[f64], epsilon: f64) -> Option<f64>
 #[inline(always)]
 fn dual_bound(
     operator: &SensingOperator,
-    constraint: &Constraint,
+    constraint: &BpdnConstraint,
     s: &[f64],
     direction: &[f64],
 ) -> f64 {

@@ -165,10 +165,10 @@ impl RegionEquations {
 
     /// Whether an observation is bright enough for training.
     pub fn is_bright(&self, index: usize, thresholds: &BrightnessThresholds) -> bool {
-        let of = &self.observations[index];
-        of.count > 0
-            && of.scale > thresholds[index % CHANNELS]
-            && of.scale / of.variance.sqrt() > MIN_CONTRAST
+        let observation = &self.observations[index];
+        observation.count > 0
+            && observation.scale > thresholds[index % CHANNELS]
+            && observation.scale / observation.variance.sqrt() > MIN_CONTRAST
     }
 
     #[inline(always)]

@@ -23,7 +23,7 @@
 
 use super::equations::{Observation, PHASES};
 use super::posterior::{PosteriorSolver, PriorPrecision};
-use super::posterior_means::{Location, NeighbourOffset, PosteriorMeans};
+use super::posterior_means::{NeighbourOffset, ObservationLocation, PosteriorMeans};
 use super::prior::Prior;
 use super::regression::{RegressionSums, add_products, solve_regressions};
 use crate::executor::Executor;
@@ -94,8 +94,9 @@ impl NeighbourPrior {
                     || {
                         for location in region.interior_locations() {
                             if region.is_bright[location.index] {
-                                let of = &region.equations.observations[location.index];
-                                sums[class(of, location.channel)].add(region, &offsets, location);
+                                let observation = &region.equations.observations[location.index];
+                                sums[class(observation, location.channel)]
+                                    .add(region, &offsets, location);
                                 count += 1;
                             }
                         }
@@ -187,7 +188,7 @@ impl NeighbourPrior {
 
     /// m, the prediction of an observation from its neighbours.
     #[inline(always)]
-    fn predict(&self, means: &PosteriorMeans<'_>, location: Location, mean: &mut [f64]) {
+    fn predict(&self, means: &PosteriorMeans<'_>, location: ObservationLocation, mean: &mut [f64]) {
         let observation = &means.equations.observations[location.index];
         let weights = &self.weights[class(observation, location.channel)];
         let mut rows = weights.chunks_exact(self.rank);
@@ -208,7 +209,7 @@ impl NeighbourPrior {
         &self,
         means: &PosteriorMeans<'_>,
         noise: f64,
-        location: Location,
+        location: ObservationLocation,
         mean: &mut [f64],
         solver: &mut PosteriorSolver,
     ) -> f64 {

@@ -97,16 +97,19 @@ impl PosteriorSolver {
         prior_mean: &[f64],
     ) -> f64 {
         let rank = equations.rank;
-        let of = &equations.observations[index];
+        let observation = &equations.observations[index];
         let (gram, right) = (equations.gram(index), equations.right_hand_side(index));
-        let variance = of.variance * noise;
-        let (a, b) = (of.scale * of.scale / variance, of.scale / variance);
+        let variance = observation.variance * noise;
+        let (a, b) = (
+            observation.scale * observation.scale / variance,
+            observation.scale / variance,
+        );
         for ((x, p), g) in self.factor.iter_mut().zip(&prior.matrix).zip(gram) {
             *x = p + a * g;
         }
         linalg::multiply_vector(gram, prior_mean, &mut self.product);
         for k in 0..rank {
-            self.gradient[k] = b * (right[k] - of.scale * self.product[k]);
+            self.gradient[k] = b * (right[k] - observation.scale * self.product[k]);
         }
         let quadratic = a * dot(prior_mean, &self.product) - 2.0 * b * dot(prior_mean, right);
         self.mean.copy_from_slice(&self.gradient);
@@ -140,7 +143,7 @@ impl PosteriorSolver {
     #[inline(always)]
     pub fn expected_squared_residual(&mut self, equations: &RegionEquations, index: usize) -> f64 {
         let rank = equations.rank;
-        let of = &equations.observations[index];
+        let observation = &equations.observations[index];
         let gram = equations.gram(index);
         linalg::multiply_vector(gram, &self.mean, &mut self.product);
         // tr(BᵀB K⁻¹)
@@ -150,8 +153,8 @@ impl PosteriorSolver {
             let (g, p) = (&gram[row.clone()], &self.covariance[row]);
             trace += 2.0 * dot(g, p) - g[0] * p[0];
         }
-        let f = of.scale;
-        of.power - 2.0 * f * dot(&self.mean, equations.right_hand_side(index))
+        let f = observation.scale;
+        observation.power - 2.0 * f * dot(&self.mean, equations.right_hand_side(index))
             + f * f * (dot(&self.mean, &self.product) + trace)
     }
 }

@@ -44,7 +44,7 @@ impl NeighbourOffset {
 
 /// Where an observation lies in its region.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Location {
+pub(super) struct ObservationLocation {
     /// Column and row from the region's first pixel.
     x: u32,
     y: u32,
@@ -113,7 +113,11 @@ impl<'a> PosteriorMeans<'a> {
 
     /// Posterior mean of a neighbour, `[r]`, zero if it is not bright; `None` outside the region.
     #[inline(always)]
-    pub fn neighbour(&self, location: Location, offset: &NeighbourOffset) -> Option<&[f64]> {
+    pub fn neighbour(
+        &self,
+        location: ObservationLocation,
+        offset: &NeighbourOffset,
+    ) -> Option<&[f64]> {
         let (rank, Extent { width, height }) = (self.equations.rank, self.equations.rect.extent);
         let (x, y) = (location.x as i32 + offset.dx, location.y as i32 + offset.dy);
         let (x, y) = (u32::try_from(x).ok()?, u32::try_from(y).ok()?);
@@ -126,12 +130,12 @@ impl<'a> PosteriorMeans<'a> {
     }
 
     /// The observations of the interior, `[pixel, channel]`.
-    pub fn interior_locations(&self) -> impl Iterator<Item = Location> + use<> {
+    pub fn interior_locations(&self) -> impl Iterator<Item = ObservationLocation> + use<> {
         let rect = self.equations.rect;
         self.interior.pixels().flat_map(move |pixel| {
             let (x, y) = (pixel.x - rect.x, pixel.y - rect.y);
             let first = (y * rect.extent.width + x) as usize * CHANNELS;
-            (0..CHANNELS).map(move |channel| Location {
+            (0..CHANNELS).map(move |channel| ObservationLocation {
                 x,
                 y,
                 channel,

@@ -4,7 +4,7 @@
 //! equations are summed over all observations of one class (sub-element position and channel); all
 //! components are kept side by side, so that the sums are vector operations of length r.
 
-use super::posterior_means::{Location, NeighbourOffset, PosteriorMeans};
+use super::posterior_means::{NeighbourOffset, ObservationLocation, PosteriorMeans};
 use crate::linalg;
 use crate::linalg::add_scaled;
 
@@ -38,7 +38,7 @@ impl RegressionSums {
         &mut self,
         means: &PosteriorMeans<'_>,
         offsets: &[NeighbourOffset],
-        location: Location,
+        location: ObservationLocation,
     ) {
         let (rank, width) = (self.rank, 1 + offsets.len());
         let ones = vec![1.0; rank];

@@ -394,15 +394,17 @@ fn posterior_mean_minimises_the_negative_log_posterior() {
     let mut solver = PosteriorSolver::new(3);
     for index in 0..12 {
         solver.infer(&equations, index, 1.3, &prior, &mean);
-        let of = equations.observations[index];
+        let observation = equations.observations[index];
         let gram = equations.gram(index);
-        let variance = 1.3 * of.variance;
+        let variance = 1.3 * observation.variance;
         // The gradient of ‖y − fBz‖²/σ² + (z − m)ᵀC⁻¹(z − m) times C, which needs no inverse:
         // (z − m) − C f Bᵀ(y − fBz)/σ² = 0.
         let residual: Vec<f64> = (0..3)
             .map(|k| {
                 let product: f64 = (0..3).map(|j| gram[k * 3 + j] * solver.mean[j]).sum();
-                of.scale * (equations.right_hand_side(index)[k] - of.scale * product) / variance
+                observation.scale
+                    * (equations.right_hand_side(index)[k] - observation.scale * product)
+                    / variance
             })
             .collect();
         for k in 0..3 {
