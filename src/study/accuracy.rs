@@ -2,9 +2,10 @@
 
 use std::time::Instant;
 
+use super::error::StudyError;
 use super::known_transport::{KnownTransport, transport_error};
 use super::methods::sample_for;
-use super::{StudyError, pixel_sampling};
+use super::pixel_sampling;
 use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::recover::{Method, Recovery, Settings};

@@ -7,7 +7,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::StudyError;
+use super::error::StudyError;
 
 /// Width and height.
 const SIZE_PX: (u32, u32) = (960, 500);

@@ -8,7 +8,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::StudyError;
+use super::error::StudyError;
 use crate::relight::srgb;
 use crate::transport::{CHANNELS, Extent};
 

@@ -2,11 +2,11 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use super::error::StudyError;
 use super::known_transport::{KnownTransport, known_picture, relight_pixel};
 use super::methods::{self, DEFAULT_METHOD};
 use super::picture_sheet::{CaptionedPanel, Panel, PictureSheet};
-use super::section::{Section, Table, snr_cell};
-use super::{ProgressCallback, StudyError};
+use super::section::{ProgressCallback, Section, Table, snr_cell};
 use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::recover::{Recovery, Settings};

@@ -1,6 +1,6 @@
 //! Simulated photographs of a scene, in memory.
 
-use super::StudyError;
+use super::error::StudyError;
 use crate::capture::{LinearPhoto, Measurements, NoiseModel, Pattern, RowSet};
 use crate::executor::Executor;
 use crate::simulate::{

@@ -1,10 +1,11 @@
 //! A table of all methods on scenes that no parameter was chosen on, and the default method's shortfall.
 
 use super::accuracy::measure_accuracy;
+use super::error::StudyError;
 use super::known_transport::SceneTruth;
 use super::methods::{self, DEFAULT_METHOD};
-use super::section::{Section, Table, snr_cell};
-use super::{ProgressCallback, SceneCamera, StudyError};
+use super::scene_camera::SceneCamera;
+use super::section::{ProgressCallback, Section, Table, snr_cell};
 use crate::executor::Executor;
 use crate::recover::Method;
 use crate::simulate::{Ensemble, SceneKind};

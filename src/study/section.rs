@@ -1,7 +1,10 @@
 //! A section of the study's report: text, tables and pictures, in memory.
 
-use super::StudyError;
+use super::error::StudyError;
 use crate::transport::Decibels;
+
+/// Receives a line of text when a part of the study advances.
+pub type ProgressCallback<'a> = &'a (dyn Fn(&str) + Sync);
 
 /// A section of the report.
 #[derive(Debug, Default)]

@@ -2,10 +2,10 @@
 
 use super::accuracy::{Accuracy, measure_accuracy};
 use super::chart::{Chart, Series, TopAxis, axis_range};
+use super::error::StudyError;
 use super::known_transport::KnownTransport;
 use super::methods;
-use super::section::{Section, Table, seconds_cell, snr_cell};
-use super::{ProgressCallback, StudyError};
+use super::section::{ProgressCallback, Section, Table, seconds_cell, snr_cell};
 use crate::capture::{Measurements, NoiseModel};
 use crate::executor::Executor;
 use crate::recover::Method;

@@ -2,10 +2,10 @@
 //! profile), where they are in the matrix, and one light transport function.
 
 use super::chart::{Chart, Series};
+use super::error::StudyError;
 use super::known_transport::KnownTransport;
 use super::picture_sheet::{CaptionedPanel, Panel, PictureSheet};
-use super::section::{Section, Table};
-use super::{ProgressCallback, StudyError};
+use super::section::{ProgressCallback, Section, Table};
 use crate::executor::Executor;
 use crate::transport::{CHANNELS, CameraPx, Extent, Geometry};
 

@@ -7,8 +7,8 @@
 //! `h = Aᵀy`. ‖y − Ax‖² is quadratic in λ there, so that the λ with `‖y − Ax‖ = ε`, where x solves the
 //! constrained problem, is the root of a quadratic equation.
 
-use super::super::passive_set::PassiveSet;
 use crate::linalg::{add_scaled, vectorise};
+use crate::recover::passive_set::PassiveSet;
 
 /// Solver for right-hand sides that share one Gram matrix.
 #[derive(Debug)]
@@ -181,8 +181,8 @@ impl<'a> Homotopy<'a> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::super::test_problems::Problem;
     use super::*;
+    use crate::recover::test_problems::Problem;
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(200))]

@@ -117,9 +117,9 @@ fn iterate(
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::super::test_problems::Problem;
     use super::*;
     use crate::linalg;
+    use crate::recover::test_problems::Problem;
     use crate::recover::{Homotopy, Nnls};
 
     /// A problem and its solver for a window of 5 × 5 elements, of which the first `missing` are outside the

@@ -16,8 +16,7 @@ use crate::capture::Measurements;
 use crate::linalg::{dot, vectorise};
 use crate::recover::common_mode::CommonMode;
 use crate::recover::normal_equations::{EquationWeights, WeightedColumns};
-use crate::recover::sampling::MIN_PATTERNS;
-use crate::recover::sampling::pixels_by_window;
+use crate::recover::sampling::{MIN_PATTERNS, pixels_by_window};
 use crate::transport::{CHANNELS, CameraPx, Extent, Geometry, TileRect};
 
 /// Sub-element positions along one axis. With two camera pixels for each light element, neighbours lie

@@ -12,8 +12,8 @@ mod tray;
 
 use surface_grid::{SurfaceGrid, SurfacePoint};
 
-use super::SimulatedScene;
 use super::coordinates::{Vec2, vec2};
+use super::scene::SimulatedScene;
 use crate::transport::{CHANNELS, CameraPx, Element, Extent, Geometry, LightPx};
 
 /// Samples along each side of a camera pixel.

@@ -17,9 +17,9 @@ mod rose;
 use glass::{Optics, transmittance};
 use rose::{GlassPoint, glass_at};
 
-use super::SimulatedScene;
 use super::coordinates::{UnitPlane, Vec2, mix, smoothstep, vec2};
 use super::gradient_noise::{noise, unit_hash};
+use super::scene::SimulatedScene;
 use crate::transport::{CHANNELS, CameraPx, Element, Geometry, LightPx};
 
 /// Samples along each side of a pixel or element, for averages over its area.
@@ -228,7 +228,7 @@ fn mean_over(corner: Vec2, size: Vec2, f: impl Fn(LightPx) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::SceneKind;
+    use crate::simulate::scene::scene_geometry;
     use crate::transport::Extent;
 
     #[test]
@@ -251,7 +251,7 @@ mod tests {
             width: n,
             height: n,
         };
-        let scene = SceneKind::StainedGlass.build(side(192), side(96)).unwrap();
+        let scene = StainedGlass::new(scene_geometry(side(192), side(96)).unwrap());
         let geometry = scene.geometry();
         let plane = UnitPlane::new(geometry.light);
         let (mut lead, mut glass) = (0, 0);

@@ -1,0 +1,49 @@
+//! The interface of simulated scenes, and their geometry.
+
+use crate::transport::{
+    CHANNELS, CameraPx, Correspondence, Extent, Geometry, GeometryError, TileRect,
+    TransportFunctions, Window,
+};
+
+/// Side of the window that holds every built-in scene's band, in light elements.
+pub const WINDOW_SIDE: u32 = 15;
+
+/// A scene with known light transport.
+pub trait SimulatedScene: Sync {
+    /// Camera and light plane, window and correspondence.
+    fn geometry(&self) -> &Geometry;
+
+    /// Writes the light transport function of one pixel, `[S]`, to `tau`, which holds zeros. Elements
+    /// outside the light plane stay zero.
+    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]);
+
+    /// The light transport functions of the pixels in `rect`.
+    fn tile(&self, rect: TileRect) -> TransportFunctions {
+        let area = self.geometry().window.area();
+        let mut functions = TransportFunctions::zeros(rect, area);
+        for (pixel, tau) in rect.pixels().zip(functions.tau.chunks_exact_mut(area)) {
+            self.transport_function(pixel, tau);
+        }
+        functions
+    }
+}
+
+/// The geometry of a scene: the light plane fills the camera's picture.
+///
+/// # Errors
+/// [`GeometryError`] for extents of zero, too large, or smaller than the window.
+pub(super) fn scene_geometry(camera: Extent, light: Extent) -> Result<Geometry, GeometryError> {
+    Geometry {
+        camera,
+        light,
+        window: Window::new(WINDOW_SIDE)?,
+        correspondence: Correspondence {
+            affine: [
+                [f64::from(light.width) / f64::from(camera.width), 0.0, 0.0],
+                [0.0, f64::from(light.height) / f64::from(camera.height), 0.0],
+            ],
+        },
+        tile_side: Geometry::DEFAULT_TILE_SIDE,
+    }
+    .validate()
+}

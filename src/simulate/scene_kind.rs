@@ -1,0 +1,43 @@
+//! The built-in scenes by name.
+
+use super::cookies::Cookies;
+use super::light_codes::Ensemble;
+use super::scene::{SimulatedScene, scene_geometry};
+use super::stained_glass::StainedGlass;
+use crate::transport::{Extent, GeometryError};
+
+/// The built-in scenes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SceneKind {
+    /// A rose window of coloured glass and lead, lit from behind.
+    StainedGlass,
+    /// Cookies on a tray, lit by a projector at an angle.
+    Cookies,
+}
+
+impl SceneKind {
+    /// The scene, seen by a camera of `camera` pixels under a light plane of `light` elements.
+    ///
+    /// # Errors
+    /// [`GeometryError`] for extents of zero, too large, or smaller than the window.
+    pub fn build(
+        self,
+        camera: Extent,
+        light: Extent,
+    ) -> Result<Box<dyn SimulatedScene>, GeometryError> {
+        let geometry = scene_geometry(camera, light)?;
+        Ok(match self {
+            Self::StainedGlass => Box::new(StainedGlass::new(geometry)),
+            Self::Cookies => Box::new(Cookies::new(geometry)),
+        })
+    }
+
+    /// The default ensemble: Gaussian for glass, as in the paper; Bernoulli for cookies, as its higher
+    /// contrast helps sparse transport.
+    pub fn ensemble(self) -> Ensemble {
+        match self {
+            Self::StainedGlass => Ensemble::Gaussian,
+            Self::Cookies => Ensemble::Bernoulli,
+        }
+    }
+}

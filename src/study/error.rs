@@ -1,0 +1,29 @@
+//! Why a part of the study fails.
+
+use thiserror::Error;
+
+use crate::recover::RecoverError;
+use crate::transport::GeometryError;
+
+/// Why a part of the study fails.
+#[derive(Debug, Error)]
+pub enum StudyError {
+    /// A method cannot recover the transport from the measurements.
+    #[error(transparent)]
+    Recover(#[from] RecoverError),
+    /// The geometry of a scene is invalid.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+    /// A random distribution has invalid parameters.
+    #[error("the simulated camera has invalid noise parameters")]
+    Noise(#[from] rand_distr::NormalError),
+    /// Drawing a chart failed.
+    #[error("a chart cannot be drawn: {0}")]
+    Chart(String),
+    /// Encoding a picture failed.
+    #[error("a picture cannot be encoded")]
+    Picture(#[from] image::ImageError),
+    /// Writing a table as CSV failed.
+    #[error("a table cannot be written as CSV")]
+    Table(#[from] csv::Error),
+}
