@@ -1,9 +1,8 @@
 //! Relightable photographs: light transport recovery, a file format and real-time relighting.
 //!
-//! An ordinary photograph shows an object under one light. Its *light transport matrix* `T` gives the
-//! picture `y = pT` under any light `p`. For a nearly planar object `T` is a band, which can be
-//! recovered from about 80 photographs, stored in a compact file and multiplied by a light at video
-//! rate (Thanikachalam et al. 2014).
+//! An ordinary photograph shows an object under one light. Its *light transport matrix* `T` gives the picture `y = pT`
+//! under any light `p`. For a nearly planar object `T` is a band, which can be recovered from about 80 photographs,
+//! stored in a compact file and multiplied by a light at video rate (Thanikachalam et al. 2014).
 //!
 //! Data flows in one direction through these modules:
 //!

@@ -1,7 +1,7 @@
 //! Robust least squares for one row of the affine correspondence: `position ≈ a·(x+½, y+½, 1)`.
 //!
-//! Wrong bits of the Gray code put a pixel far off, so weights are iteratively reduced for pixels that
-//! disagree (Cauchy weights).
+//! Wrong bits of the Gray code put a pixel far off, so weights are iteratively reduced for pixels that disagree (Cauchy
+//! weights).
 
 use crate::transport::CameraPx;
 

@@ -1,17 +1,16 @@
 //! The correspondence from photographs of Gray code: an affine map `(x+½, y+½, 1) → (u, v)`.
 //!
-//! Patterns show each bit of the Gray code of the column and row numbers, once plain and once inverted.
-//! The bit is 1 at a camera pixel that is brighter under the plain pattern. Scattering objects blur the
-//! finest stripes to grey, so decoding of a pixel stops at its first unclear bit, which leaves a range
-//! of light elements instead of one.
+//! Patterns show each bit of the Gray code of the column and row numbers, once plain and once inverted. The bit is 1 at
+//! a camera pixel that is brighter under the plain pattern. Scattering objects blur the finest stripes to grey, so
+//! decoding of a pixel stops at its first unclear bit, which leaves a range of light elements instead of one.
 
 use thiserror::Error;
 
 use super::affine_fit::{DecodedPixel, fit_affine_row};
 use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent};
 
-/// Least contrast `|p − n| / (p + n)` of a clear bit. Scattering lowers the contrast; at the edge of a
-/// stripe it passes through zero, and noise would decide.
+/// Least contrast `|p − n| / (p + n)` of a clear bit. Scattering lowers the contrast; at the edge of a stripe it passes
+/// through zero, and noise would decide.
 const MIN_CONTRAST: f32 = 0.15;
 /// Least brightness `p + n` of a usable pixel, relative to the brightest.
 const MIN_RELATIVE_BRIGHTNESS: f32 = 0.05;

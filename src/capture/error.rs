@@ -1,12 +1,13 @@
-//! Errors of capture folders. Each names the file and the field of the manifest; remedies are left to
-//! the caller.
+//! Errors of capture folders. Each names the file and the field of the manifest; remedies are left to the caller.
 
 use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::MANIFEST_NAME;
 use crate::transport::Extent;
+
+/// The manifest's file name.
+pub const MANIFEST_NAME: &str = "capture.json";
 
 /// Why a capture cannot be used.
 #[derive(Debug, Error)]

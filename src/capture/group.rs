@@ -3,8 +3,7 @@
 use std::collections::HashMap;
 use std::hash::Hash;
 
-/// For each item the id of its group: equal items share an id, and ids count from 0 in the order of
-/// first occurrence.
+/// For each item the id of its group: equal items share an id, and ids count from 0 in the order of first occurrence.
 pub(crate) fn group_ids<T: Eq + Hash>(items: impl IntoIterator<Item = T>) -> Vec<usize> {
     let mut ids = HashMap::new();
     let id = |item| {

@@ -4,11 +4,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CaptureError, FieldProblem};
+use super::error::{CaptureError, FieldProblem};
 use crate::transport::{Correspondence, Extent, MAX_SIDE};
-
-/// The manifest's file name.
-pub const MANIFEST_NAME: &str = "capture.json";
 
 /// Largest 16-bit code.
 const MAX_CODE: f64 = 65535.0;
@@ -165,8 +162,8 @@ impl CameraSpec {
         }
     }
 
-    /// `(code − black) / (white − black) / exposure`. The dark frame shows light, which scales with
-    /// exposure, and is therefore subtracted from this value, not from the code.
+    /// `(code − black) / (white − black) / exposure`. The dark frame shows light, which scales with exposure, and is
+    /// therefore subtracted from this value, not from the code.
     pub fn linear(&self, code: u16, exposure: f64) -> f32 {
         ((f64::from(code) - self.black) / (self.white - self.black) / exposure) as f32
     }
@@ -184,8 +181,8 @@ impl Manifest {
     /// Parses and checks `json`, the contents of the file at `path`.
     ///
     /// # Errors
-    /// If it is not JSON, has an unknown version, lacks a field, or a field has an invalid value. The
-    /// error names `path` and the field.
+    /// If it is not JSON, has an unknown version, lacks a field, or a field has an invalid value. The error names
+    /// `path` and the field.
     pub fn parse(json: &str, path: &Path) -> Result<Self, CaptureError> {
         let json_error = |source| CaptureError::Json {
             path: path.to_owned(),

@@ -1,9 +1,10 @@
-//! The linear system that recovery solves: `Y = PT` for each channel, with `L` patterns `P` `[L, M]` and
-//! their photographs `Y` `[L, N]`.
+//! The linear system that recovery solves: `Y = PT` for each channel, with `L` patterns `P` `[L, M]` and their
+//! photographs `Y` `[L, N]`.
 
 use std::ops::Range;
 
-use super::{NoiseModel, RowSet};
+use super::noise_model::NoiseModel;
+use super::rows::RowSet;
 use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent, TileRect};
 
 /// The emission of each light element during one shot, `[M]`, row by row.
@@ -30,10 +31,10 @@ pub type LinearPhoto = Vec<[f32; CHANNELS]>;
 
 /// Patterns and the loaded rows of their photographs, in linear units.
 ///
-/// Large photographs need not be in memory whole: `rows` lists the loaded camera rows. While a recovery
-/// is prepared these may be strips spread over the picture, of which only tiles that are loaded whole
-/// ([`has_tile`](Self::has_tile)) may be used. While a tile is recovered they include the tile and the
-/// rows around it that its recovery asked for.
+/// Large photographs need not be in memory whole: `rows` lists the loaded camera rows. While a recovery is prepared
+/// these may be strips spread over the picture, of which only tiles that are loaded whole
+/// ([`has_tile`](Self::has_tile)) may be used. While a tile is recovered they include the tile and the rows around it
+/// that its recovery asked for.
 #[derive(Clone, Debug)]
 pub struct Measurements {
     /// The camera grid, `N` pixels.
@@ -60,8 +61,8 @@ impl Measurements {
         self.patterns.iter().all(|p| matches!(p, Pattern::Grey(_)))
     }
 
-    /// The planes of the patterns with the camera channels that respond to each: one plane for all
-    /// channels if every pattern is grey.
+    /// The planes of the patterns with the camera channels that respond to each: one plane for all channels if every
+    /// pattern is grey.
     pub fn planes(&self) -> impl Iterator<Item = (usize, Range<usize>)> + use<> {
         let grey = self.is_grey();
         (0..if grey { 1 } else { CHANNELS }).map(move |plane| match grey {
@@ -99,8 +100,8 @@ impl Measurements {
         self.noise.variance(c, y, exposure)
     }
 
-    /// Weight of each pattern's equations, mean square 1: the square root of its exposure, as the
-    /// variance of photon noise, the largest part, is inversely proportional to exposure.
+    /// Weight of each pattern's equations, mean square 1: the square root of its exposure, as the variance of photon
+    /// noise, the largest part, is inversely proportional to exposure.
     pub fn pattern_weights(&self) -> Vec<f64> {
         let exposures = || self.full_scale.iter().map(|&full| f64::from(full).recip());
         let mean = exposures().sum::<f64>() / self.full_scale.len() as f64;

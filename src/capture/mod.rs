@@ -1,11 +1,11 @@
 //! Capture folders and the linear measurements they hold.
 //!
-//! Input: a [`Manifest`] (`capture.json`) that lists patterns, their photographs, and the calibration of
-//! camera and light plane. Output: [`Measurements`], the linear system `Y = PT` that recovery solves, in
-//! units of the measurement, `(code − black) / (white − black)`.
+//! Input: a [`Manifest`] (`capture.json`) that lists patterns, their photographs, and the calibration of camera and
+//! light plane. Output: [`Measurements`], the linear system `Y = PT` that recovery solves, in units of the measurement,
+//! `(code − black) / (white − black)`.
 //!
-//! Reading files needs the feature `capture`. Photographs are read row by row from the top, so that
-//! captures larger than memory can be recovered strip by strip ([`RowSet`]).
+//! Reading files needs the feature `capture`. Photographs are read row by row from the top, so that captures larger
+//! than memory can be recovered strip by strip ([`RowSet`]).
 
 mod error;
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
@@ -13,16 +13,15 @@ mod folder;
 mod group;
 mod manifest;
 mod measurements;
-mod noise;
+mod noise_gain;
+mod noise_model;
 mod rows;
 
-pub use error::{CaptureError, FieldProblem, ImageProblem};
+pub use error::{CaptureError, FieldProblem, ImageProblem, MANIFEST_NAME};
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
 pub use folder::{CaptureFolder, DarkFrame, PhotoReader, RELIT_FULL_SCALE, Truth};
 pub(crate) use group::{group_count, group_ids};
-pub use manifest::{
-    AffineSpec, CameraSpec, GrayCodeShot, LightSpec, MANIFEST_NAME, Manifest, Shot,
-};
+pub use manifest::{AffineSpec, CameraSpec, GrayCodeShot, LightSpec, Manifest, Shot};
 pub use measurements::{LinearPhoto, Measurements, Pattern};
-pub use noise::NoiseModel;
+pub use noise_model::NoiseModel;
 pub use rows::RowSet;

@@ -20,8 +20,8 @@ pub fn parse_number(text: &str, min: f32, max: f32) -> Result<f32, String> {
 pub struct ByteCount(pub u64);
 
 impl ByteCount {
-    /// Parses `512M`, `4GiB`, `500kB` or a number of bytes. `K`, `M`, `G` and `T` are powers of 1024;
-    /// `kB`, `MB`, `GB` and `TB`, the units of printed amounts, are powers of 1000.
+    /// Parses `512M`, `4GiB`, `500kB` or a number of bytes. `K`, `M`, `G` and `T` are powers of 1024; `kB`, `MB`, `GB`
+    /// and `TB`, the units of printed amounts, are powers of 1000.
     pub fn parse(text: &str) -> Result<Self, String> {
         let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
         let unit: u64 = match text[digits.len()..].to_ascii_lowercase().as_str() {

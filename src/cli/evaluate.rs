@@ -1,5 +1,5 @@
-//! `ltm-export evaluate`: the accuracy of an `.ltm` file, against the known transport of a simulated capture
-//! and against photographs that the recovery did not use.
+//! `ltm-export evaluate`: the accuracy of an `.ltm` file, against the known transport of a simulated capture and
+//! against photographs that the recovery did not use.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -45,8 +45,7 @@ struct EvaluateReport {
     /// The same by camera channel.
     heldout_rgb_snr_db: [Option<Decibels>; CHANNELS],
     heldout_shots: usize,
-    /// SNR of the predicted picture against the flood photograph, which the recovery does not use; null
-    /// without one.
+    /// SNR of the predicted picture against the flood photograph, which the recovery does not use; null without one.
     flood_snr_db: Option<Decibels>,
     file_bytes: u64,
     /// Bytes read.

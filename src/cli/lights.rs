@@ -8,8 +8,7 @@ use image::ImageReader;
 use crate::relight::{BuiltinLight, Light, area_resample, srgb};
 use crate::transport::Extent;
 
-/// The built-in light of this name, or the image file at this path, decoded as sRGB and resampled to the light
-/// plane.
+/// The built-in light of this name, or the image file at this path, decoded as sRGB and resampled to the light plane.
 pub fn load(light: &str, plane: Extent) -> Result<Light> {
     if let Some(builtin) = BuiltinLight::from_name(light) {
         return Ok(builtin.render(plane));

@@ -1,7 +1,7 @@
 //! The command line: one module for each subcommand of `ltm-export`, over the library.
 //!
-//! Files, threads, signals and the terminal are handled here. Errors of the library name the file and the
-//! field; [`advice`] adds the remedy.
+//! Files, threads, signals and the terminal are handled here. Errors of the library name the file and the field;
+//! [`advice`] adds the remedy.
 
 mod advice;
 mod arguments;
@@ -44,8 +44,8 @@ enum Command {
     Study(study::StudyArgs),
 }
 
-/// Parses the command line and runs it. The exit status is 0 on success, 1 on failure, 2 for a wrong
-/// command line, 130 after an interruption.
+/// Parses the command line and runs it. The exit status is 0 on success, 1 on failure, 2 for a wrong command line, 130
+/// after an interruption.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Simulate(args) => simulate::run(&args),

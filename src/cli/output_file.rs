@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use tempfile::NamedTempFile;
 
-/// A builder of temporary files or folders with the permissions of ordinary ones (`mode` minus the umask,
-/// not tempfile's private default), and the folder of `path` to create them in.
+/// A builder of temporary files or folders with the permissions of ordinary ones (`mode` minus the umask, not
+/// tempfile's private default), and the folder of `path` to create them in.
 pub fn temporary_beside(path: &Path, mode: u32) -> (tempfile::Builder<'static, 'static>, &Path) {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".ltm-export-");
@@ -82,9 +82,9 @@ impl std::fmt::Display for OutputFormat {
     }
 }
 
-/// A file that is written under a temporary name beside its path and renamed when complete, so that the
-/// path never holds a partial file. It replaces a file of the same format only: any other is probably an
-/// input, given as output by mistake.
+/// A file that is written under a temporary name beside its path and renamed when complete, so that the path never
+/// holds a partial file. It replaces a file of the same format only: any other is probably an input, given as output by
+/// mistake.
 pub struct OutputFile {
     path: PathBuf,
     file: NamedTempFile,

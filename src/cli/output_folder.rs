@@ -6,8 +6,8 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::output_file::temporary_beside;
 
-/// Calls `fill` with a temporary folder beside `path` and renames it to `path` when `fill` succeeds. `path`
-/// must not exist or be an empty folder.
+/// Calls `fill` with a temporary folder beside `path` and renames it to `path` when `fill` succeeds. `path` must not
+/// exist or be an empty folder.
 pub fn write_atomically(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let write = || -> Result<()> {
         ensure_free(path)?;
@@ -29,8 +29,8 @@ pub fn write_atomically(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> 
     write().with_context(|| path.display().to_string())
 }
 
-/// Creates the folder `path`, or takes an empty one, and calls `fill` with it. If `fill` fails, the files
-/// it wrote stay: the results of hours may be among them.
+/// Creates the folder `path`, or takes an empty one, and calls `fill` with it. If `fill` fails, the files it wrote
+/// stay: the results of hours may be among them.
 pub fn write_in_place(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     ensure_free(path)
         .and_then(|()| {

@@ -24,8 +24,8 @@ pub struct RelightArgs {
     /// flood, torch, checkerboard, stripes, spectrum, fire, or an image file
     #[arg(long, value_name = "NAME|IMAGE")]
     light: String,
-    /// Position of the torch, as fractions of the picture from its top left corner [default: over the
-    /// middle of the light plane]
+    /// Position of the torch, as fractions of the picture from its top left corner [default: over the middle of the
+    /// light plane]
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = parse_position)]
     at: Option<[f64; 2]>,
     /// Time at which the fire is shown, in seconds [default: 0]

@@ -11,8 +11,7 @@ pub fn print_json(report: &impl Serialize) -> Result<()> {
     print_line(&json)
 }
 
-/// Prints one line. Control characters, which texts from files may contain, are escaped; a closed pipe is
-/// no error.
+/// Prints one line. Control characters, which texts from files may contain, are escaped; a closed pipe is no error.
 pub fn print_line(line: &str) -> Result<()> {
     let escape = |c: char| match c.is_control() {
         true => c.escape_default().to_string(),

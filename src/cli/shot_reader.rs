@@ -7,8 +7,8 @@ use crate::capture::{
     CaptureError, CaptureFolder, DarkFrame, LinearPhoto, Measurements, PhotoReader, RowSet,
 };
 
-/// Reads the patterns of `shots` and the correspondence, by `gray_code_rows` of the Gray code if the
-/// manifest does not give it. The measurements have no camera rows yet.
+/// Reads the patterns of `shots` and the correspondence, by `gray_code_rows` of the Gray code if the manifest does not
+/// give it. The measurements have no camera rows yet.
 pub fn read_patterns(
     folder: &CaptureFolder,
     dark: &DarkFrame,
@@ -45,9 +45,8 @@ impl<'a> ShotReader<'a> {
         })
     }
 
-    /// Makes `rows` the loaded rows of `measurements`: keeps those it has, reads the others, which must
-    /// lie below all rows read before. Calls `may_continue` before each photograph, and returns false if
-    /// any call did.
+    /// Makes `rows` the loaded rows of `measurements`: keeps those it has, reads the others, which must lie below all
+    /// rows read before. Calls `may_continue` before each photograph, and returns false if any call did.
     pub fn load_rows(
         &mut self,
         measurements: &mut Measurements,
@@ -74,8 +73,8 @@ impl<'a> ShotReader<'a> {
         Ok(loaded)
     }
 
-    /// Reads the rest of all files, which checks that they are whole. Returns the number of saturated
-    /// samples in the photographs.
+    /// Reads the rest of all files, which checks that they are whole. Returns the number of saturated samples in the
+    /// photographs.
     pub fn finish(self) -> Result<usize, CaptureError> {
         let saturated = self.photos.into_par_iter().map(PhotoReader::finish);
         saturated.try_reduce(|| 0, |a, b| Ok(a + b))

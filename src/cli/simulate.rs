@@ -216,8 +216,8 @@ impl CapturePlan {
         Ok(plan)
     }
 
-    /// Adds dark, flood and Gray code. They come first, so that the noise of a shot does not depend on the
-    /// number of shots.
+    /// Adds dark, flood and Gray code. They come first, so that the noise of a shot does not depend on the number of
+    /// shots.
     fn add_calibration(&mut self, light: Extent) {
         self.add_photograph(LightCodes::uniform(light, 0), "photos/dark.png".to_owned());
         self.add_photograph(
@@ -355,8 +355,8 @@ fn write_transport(plan: &CapturePlan, truth: &Path) -> Result<Vec<Vec<[f32; CHA
     Ok(pictures)
 }
 
-/// Rounds τ to float16, the precision of `tau.npy`, so that the pictures follow exactly from the file. Returns
-/// its bytes.
+/// Rounds τ to float16, the precision of `tau.npy`, so that the pictures follow exactly from the file. Returns its
+/// bytes.
 fn round_to_f16(functions: &mut TransportFunctions) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(functions.tau.len() * CHANNELS * size_of::<f16>());
     for value in functions.tau.iter_mut().flatten() {

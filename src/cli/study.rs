@@ -41,15 +41,15 @@ const INTRODUCTION: &str = "# Results\n\n\
 /// Measure the accuracy of recovery with known transport: the paper's figures, its comparison, many scenes
 #[derive(Debug, Args)]
 pub struct StudyArgs {
-    /// Capture folders with truth/, or parts of the study: stained-glass, cookies (figures at the paper's
-    /// scale), comparison, scenes [default: these four]
+    /// Capture folders with truth/, or parts of the study: stained-glass, cookies (figures at the paper's scale),
+    /// comparison, scenes [default: these four]
     #[arg(value_name = "CAPTURE|PART")]
     subjects: Vec<PathBuf>,
     /// Folder for results.md, images and CSV; must be new or empty
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Camera pixels on which nnls and bpdn-identity are evaluated. learned uses four times as many, in whole
-    /// tiles, bpdn-dct and bpdn-haar an eighth. Fewer are faster and less accurate
+    /// Camera pixels on which nnls and bpdn-identity are evaluated. learned uses four times as many, in whole tiles,
+    /// bpdn-dct and bpdn-haar an eighth. Fewer are faster and less accurate
     #[arg(long, value_name = "N", default_value_t = DEFAULT_PIXELS as u32,
           value_parser = clap::value_parser!(u32).range(1..))]
     pixels: u32,

@@ -1,9 +1,10 @@
 //! Tiles as real numbers: coefficients over a shared basis, direct functions, or both.
 //!
-//! A factored tile has `τ_n = Σ_k c_nk v_k` with coefficients `c_nk` for each pixel `n`, component `k` and
-//! channel; all tiles share the basis functions `v_k` of `S` values.
+//! A factored tile has `τ_n = Σ_k c_nk v_k` with coefficients `c_nk` for each pixel `n`, component `k` and channel; all
+//! tiles share the basis functions `v_k` of `S` values.
 
-use super::{CHANNELS, Geometry, TileRect, TransportFunctions};
+use super::functions::TransportFunctions;
+use super::geometry::{CHANNELS, Geometry, TileRect};
 
 /// The basis functions `v_k` of a factored transport, `τ_n ≈ Σ_k c_nk v_k`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,13 +29,13 @@ pub struct FactoredTile {
     pub coefficients: Vec<[f32; CHANNELS]>,
 }
 
-/// Slots computed together. The sums of three channels take nine of sixteen four-lane registers, which leaves
-/// enough for the basis function and the coefficients.
+/// Slots computed together. The sums of three channels take nine of sixteen four-lane registers, which leaves enough
+/// for the basis function and the coefficients.
 const BLOCK_SLOTS: usize = 12;
 
 impl FactoredTile {
-    /// The light transport functions, zero at elements off the light plane. Negative values of the sum are
-    /// kept: pictures would be too bright without them.
+    /// The light transport functions, zero at elements off the light plane. Negative values of the sum are kept:
+    /// pictures would be too bright without them.
     pub fn expand(&self, geometry: &Geometry, basis: &Basis) -> TransportFunctions {
         let mut functions = TransportFunctions::zeros(self.rect, geometry.window.area());
         self.expand_into(geometry, basis, &mut functions.tau);
@@ -72,8 +73,8 @@ impl FactoredTile {
     }
 }
 
-/// `Σ_k c_k v_k` on one block of slots by channel. Sums run over `k` in order, so that results do not depend on
-/// the size of blocks.
+/// `Σ_k c_k v_k` on one block of slots by channel. Sums run over `k` in order, so that results do not depend on the
+/// size of blocks.
 fn combine(
     coefficients: &[[f32; CHANNELS]],
     kernels: &[[f32; BLOCK_SLOTS]],

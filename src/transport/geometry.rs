@@ -1,12 +1,14 @@
 //! Grids and maps between them: camera pixels, light elements, windows, tiles.
 //!
-//! Coordinates are continuous with cell `i` covering `[i, i + 1)`: the centre of camera pixel `(x, y)` is
-//! `(x + ½, y + ½)`, and the correspondence maps it to `(u, v)` on the light plane, in light elements.
+//! Coordinates are continuous with cell `i` covering `[i, i + 1)`: the centre of camera pixel `(x, y)` is `(x + ½, y +
+//! ½)`, and the correspondence maps it to `(u, v)` on the light plane, in light elements.
 
 use std::ops::Range;
 
 use thiserror::Error;
 
+/// Camera channels: red, green, blue.
+pub const CHANNELS: usize = 3;
 /// Maximum side of the camera grid and the light plane; products of sides and channels fit in `u64`.
 pub const MAX_SIDE: u32 = 1 << 15;
 /// Maximum side of a window: an object that needs more is not nearly planar.
@@ -190,8 +192,8 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Default side of a tile. At two camera pixels a light element the windows of such a tile overlap by
-    /// half, and a direct tile fits in a CPU cache.
+    /// Default side of a tile. At two camera pixels a light element the windows of such a tile overlap by half, and a
+    /// direct tile fits in a CPU cache.
     pub const DEFAULT_TILE_SIDE: u32 = 32;
 
     /// Checks the range of every field, on which all other code relies.

@@ -1,12 +1,12 @@
 //! The light transport matrix of a nearly planar object in memory, as a band.
 //!
-//! `T` is M × N for each channel: a light `p` on `M` light elements gives the picture `y = pT` of `N` camera
-//! pixels. Column `n` is zero outside a square window `W_n` of `S = w²` elements around the correspondence
-//! of pixel `n`; inside it is the light transport function `τ_n` (Thanikachalam et al. 2014, section 3).
+//! `T` is M × N for each channel: a light `p` on `M` light elements gives the picture `y = pT` of `N` camera pixels.
+//! Column `n` is zero outside a square window `W_n` of `S = w²` elements around the correspondence of pixel `n`; inside
+//! it is the light transport function `τ_n` (Thanikachalam et al. 2014, section 3).
 //!
-//! `recover`, `format` and `relight` share this module: the positions of pixels, windows and tiles
-//! ([`Geometry`]), the values of a tile as real numbers ([`BandTile`]) and as codes ([`Tile`]), and the
-//! distance of two transports ([`TransportError`]).
+//! `recover`, `format` and `relight` share this module: the positions of pixels, windows and tiles ([`Geometry`]), the
+//! values of a tile as real numbers ([`BandTile`]) and as codes ([`Tile`]), and the distance of two transports
+//! ([`TransportError`]).
 
 mod factored;
 mod functions;
@@ -18,8 +18,8 @@ pub use factored::{BandTile, Basis, FactoredTile, RecoveredTile};
 pub use functions::TransportFunctions;
 pub(crate) use geometry::ClippedRect;
 pub use geometry::{
-    CameraPx, Correspondence, Element, Extent, Geometry, GeometryError, LightPx, MAX_SIDE,
-    MAX_WINDOW, TileRect, Window,
+    CHANNELS, CameraPx, Correspondence, Element, Extent, Geometry, GeometryError, LightPx,
+    MAX_SIDE, MAX_WINDOW, TileRect, Window,
 };
 pub use snr::{Decibels, TransportError};
-pub use tile::{CHANNELS, CoefficientTile, DirectTile, QUAD, TexelCode, Tile, Transport};
+pub use tile::{CoefficientTile, DirectTile, QUAD, TexelCode, Tile, Transport};

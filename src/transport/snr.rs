@@ -13,8 +13,8 @@ impl fmt::Display for Decibels {
     }
 }
 
-/// Sums for SNR(T, T̂) = 20 log10(‖T‖_F / ‖T − T̂‖_F) (paper, section 4) over all entries of both
-/// matrices, in any order.
+/// Sums for SNR(T, T̂) = 20 log10(‖T‖_F / ‖T − T̂‖_F) (paper, section 4) over all entries of both matrices, in any
+/// order.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TransportError {
     signal: f64,

@@ -1,23 +1,21 @@
 //! Tiles as 16-bit codes, the form in which the CPU and the GPU relight them.
 //!
-//! `τ_n = Σ_k c_nk v_k + d_n`: coefficients `c` ([`CoefficientTile`]) over the basis of the transport, and
-//! direct functions `d` ([`DirectTile`]). Each channel of a tile has one quantisation step.
+//! `τ_n = Σ_k c_nk v_k + d_n`: coefficients `c` ([`CoefficientTile`]) over the basis of the transport, and direct
+//! functions `d` ([`DirectTile`]). Each channel of a tile has one quantisation step.
 
-use super::{BandTile, Basis, FactoredTile, Geometry, TileRect, TransportFunctions};
+use super::factored::{BandTile, Basis, FactoredTile};
+use super::functions::TransportFunctions;
+use super::geometry::{CHANNELS, Geometry, TileRect};
 
-/// Camera channels: red, green, blue.
-pub const CHANNELS: usize = 3;
-
-/// Four codes: a texel of an `rgba16sint` texture, and one SIMD load. They are signed, as a truncated sum of
-/// basis functions has negative values, and clipping these would brighten the picture.
+/// Four codes: a texel of an `rgba16sint` texture, and one SIMD load. They are signed, as a truncated sum of basis
+/// functions has negative values, and clipping these would brighten the picture.
 pub type TexelCode = [i16; 4];
 
 /// Components in one texel of coefficients: a quad.
 pub const QUAD: usize = 4;
 
-/// Largest code of a direct tile. With 12 bits the quantisation noise of a pixel whose function is not sparse
-/// (S = 225, error step/√12 in each slot) is about 60 dB below the signal, less than the noise of any
-/// photograph.
+/// Largest code of a direct tile. With 12 bits the quantisation noise of a pixel whose function is not sparse (S = 225,
+/// error step/√12 in each slot) is about 60 dB below the signal, less than the noise of any photograph.
 const MAX_DIRECT_CODE: f32 = 4095.0;
 
 /// A tile with the value of every slot of every pixel: `d = code · step`.
@@ -32,8 +30,8 @@ pub struct DirectTile {
 }
 
 impl DirectTile {
-    /// Rounds functions, `[pixel, slot, channel]`, to codes. The largest value of each channel sets its step;
-    /// values that are not finite become zero.
+    /// Rounds functions, `[pixel, slot, channel]`, to codes. The largest value of each channel sets its step; values
+    /// that are not finite become zero.
     pub fn quantise(rect: TileRect, functions: &[[f32; CHANNELS]]) -> Self {
         Self::quantise_into(rect, functions, Vec::new())
     }
@@ -107,16 +105,16 @@ fn code(value: f32, step: f32) -> i16 {
 
 /// A tile as coefficients over the basis of the transport: `c = code · step`.
 ///
-/// All components share a step: each contributes to the brightness of a pixel in proportion to its
-/// coefficient, so equal errors of weak and strong components are equally visible.
+/// All components share a step: each contributes to the brightness of a pixel in proportion to its coefficient, so
+/// equal errors of weak and strong components are equally visible.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoefficientTile {
     /// The pixels of the tile.
     pub rect: TileRect,
     /// Value of one code, per channel.
     pub step: [f32; CHANNELS],
-    /// `[channel, quad, pixel]`: texels with the codes of [`QUAD`] components, zero beyond the last, in planes
-    /// of [`plane`](Self::plane) texels with pixels row by row. Empty if all are zero.
+    /// `[channel, quad, pixel]`: texels with the codes of [`QUAD`] components, zero beyond the last, in planes of
+    /// [`plane`](Self::plane) texels with pixels row by row. Empty if all are zero.
     pub codes: Vec<TexelCode>,
 }
 
@@ -163,8 +161,8 @@ impl CoefficientTile {
         self.codes.is_empty()
     }
 
-    /// Distance of two planes in texels: the number of pixels, rounded up to whole cache lines, and one line
-    /// more. Planes at a distance of a power of two would compete for the same lines of the cache.
+    /// Distance of two planes in texels: the number of pixels, rounded up to whole cache lines, and one line more.
+    /// Planes at a distance of a power of two would compete for the same lines of the cache.
     pub fn plane(rect: TileRect) -> usize {
         const LINE: usize = 64 / size_of::<TexelCode>();
         rect.extent.area().next_multiple_of(LINE) + LINE

@@ -1,7 +1,7 @@
 //! The two types of PNG in a capture: 8-bit patterns and 16-bit linear RGB photographs.
 //!
-//! Other formats are refused: a lossy one would change the measurements. Photographs are decoded row by
-//! row, so that hundreds can be read in parallel without one of them in memory whole.
+//! Other formats are refused: a lossy one would change the measurements. Photographs are decoded row by row, so that
+//! hundreds can be read in parallel without one of them in memory whole.
 
 use std::fmt::Display;
 use std::fs::File;
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 use png::{BitDepth, ColorType, Transformations};
 
-use crate::capture::{CaptureError, ImageProblem};
+use crate::capture::error::{CaptureError, ImageProblem};
 use crate::transport::{CHANNELS, Extent};
 
 /// Bytes read from a file at a time.
@@ -26,8 +26,8 @@ pub(super) struct ImageFile {
 }
 
 impl ImageFile {
-    /// The file at `path`, which must be of size `extent`. `field` is the field of the manifest that
-    /// names it, for messages.
+    /// The file at `path`, which must be of size `extent`. `field` is the field of the manifest that names it, for
+    /// messages.
     pub fn new(path: PathBuf, extent: Extent, field: Option<String>) -> Self {
         Self {
             path,

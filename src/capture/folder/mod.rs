@@ -1,22 +1,25 @@
 //! A capture folder on disk.
 //!
-//! The manifest is checked when the folder is opened; patterns and photographs are read one by one, so
-//! that callers may read them in parallel.
+//! The manifest is checked when the folder is opened; patterns and photographs are read one by one, so that callers may
+//! read them in parallel.
 
+mod dark_frame;
 mod image_file;
 mod photo_reader;
 mod truth;
 
 use std::path::{Path, PathBuf};
 
+pub use self::dark_frame::DarkFrame;
 pub use self::photo_reader::PhotoReader;
 pub use self::truth::{RELIT_FULL_SCALE, Truth};
 
 use self::image_file::ImageFile;
-use super::{
-    CaptureError, FieldProblem, LinearPhoto, MANIFEST_NAME, Manifest, Measurements, NoiseModel,
-    Pattern, RowSet,
-};
+use super::error::{CaptureError, FieldProblem, MANIFEST_NAME};
+use super::manifest::Manifest;
+use super::measurements::{LinearPhoto, Measurements, Pattern};
+use super::noise_model::NoiseModel;
+use super::rows::RowSet;
 use crate::calibrate::{BitPair, GrayCodePhotos};
 use crate::transport::{CHANNELS, Correspondence};
 
@@ -26,15 +29,6 @@ pub struct CaptureFolder {
     root: PathBuf,
     manifest: Manifest,
     emission: [f64; 256],
-}
-
-/// The photograph under no light, which is subtracted from all others.
-#[derive(Clone, Debug)]
-pub struct DarkFrame {
-    /// `[N]`, in units of the measurement.
-    light: LinearPhoto,
-    /// The noise floor estimated from it.
-    noise: NoiseModel,
 }
 
 impl CaptureFolder {
@@ -127,8 +121,8 @@ impl CaptureFolder {
         })
     }
 
-    /// Every bit of an axis with `side` elements, the most significant first. None may be missing: a
-    /// gap would shift the bits below it.
+    /// Every bit of an axis with `side` elements, the most significant first. None may be missing: a gap would shift
+    /// the bits below it.
     fn read_bits(
         &self,
         axis: &'static str,

@@ -1,8 +1,11 @@
 //! One photograph as measurements, read row by row.
 
-use super::DarkFrame;
+use super::dark_frame::DarkFrame;
 use super::image_file::Rgb16Rows;
-use crate::capture::{CameraSpec, CaptureError, LinearPhoto, RowSet};
+use crate::capture::error::CaptureError;
+use crate::capture::manifest::CameraSpec;
+use crate::capture::measurements::LinearPhoto;
+use crate::capture::rows::RowSet;
 use crate::transport::CHANNELS;
 
 /// Reads the camera rows of one photograph once, from the top down.
@@ -32,8 +35,8 @@ impl<'a> PhotoReader<'a> {
         }
     }
 
-    /// Appends those of `rows` that were not read before to `photo`, as measurements minus the dark
-    /// frame, NaN where saturated. Skips the rows between them.
+    /// Appends those of `rows` that were not read before to `photo`, as measurements minus the dark frame, NaN where
+    /// saturated. Skips the rows between them.
     ///
     /// # Errors
     /// If the file is damaged or ends early.

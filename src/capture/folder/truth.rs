@@ -10,7 +10,8 @@ use half::f16;
 use npyz::NpyFile;
 
 use super::image_file::ImageFile;
-use crate::capture::{CaptureError, Manifest};
+use crate::capture::error::CaptureError;
+use crate::capture::manifest::Manifest;
 use crate::transport::{CHANNELS, Element, Extent, LightPx, Window};
 
 /// Code in `relit_NAME.png` for a measurement of 1.

@@ -4,14 +4,21 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::encode::QualityArgs;
-use crate::cli::arguments::ByteCount;
+use crate::cli::arguments::{ByteCount, parse_number};
+use crate::format::{HEADER_BYTES, Judge, Quality};
 use crate::recover::{Method, SparsityBasis, WindowEstimate};
-use crate::transport::Window;
+use crate::transport::{Decibels, Window};
 
-/// Enough for about ten megapixels under 80 patterns. A constant, not a share of the machine's memory, so
-/// that the same command writes the same bytes on every machine.
+/// Enough for about ten megapixels under 80 patterns. A constant, not a share of the machine's memory, so that the same
+/// command writes the same bytes on every machine.
 const DEFAULT_MEMORY: &str = "4G";
+
+/// Default loss of SNR by the file, as hold-out validation estimates it. Validation recovers from fewer patterns, and
+/// so with slightly more noise.
+const DEFAULT_LOSS: Decibels = Decibels(0.5);
+/// Default SNR of the file relative to the recovered transport without hold-out validation. With so few patterns the
+/// transport is noisy.
+const DEFAULT_SNR: Decibels = Decibels(32.0);
 
 /// Recover the light transport of an object from a folder of photographs
 #[derive(Debug, Args)]
@@ -27,8 +34,8 @@ pub struct RecoverArgs {
     /// Basis in which --method bpdn finds sparse light transport functions [default: identity]
     #[arg(long, value_enum)]
     basis: Option<BasisName>,
-    /// Side of the window of light elements around each camera pixel's correspondence: an odd number, or
-    /// "auto" to estimate it
+    /// Side of the window of light elements around each camera pixel's correspondence: an odd number, or "auto" to
+    /// estimate it
     #[arg(long, value_name = "W", default_value = "15", value_parser = parse_window)]
     pub window: WindowChoice,
     /// Use the first K shots only [default: all but every tenth, which are held out]
@@ -64,6 +71,46 @@ impl RecoverArgs {
     /// Whether `--basis` is given with a method that has none.
     pub fn has_unused_basis(&self) -> bool {
         self.basis.is_some() && self.method().basis().is_none()
+    }
+}
+
+/// Quality or size of the file.
+#[derive(Debug, Args)]
+#[group(multiple = false)]
+pub struct QualityArgs {
+    /// SNR of the file relative to the recovered light transport, in dB; more is larger [default: as much as the noise
+    /// of the photographs justifies]
+    #[arg(long, value_name = "DB", value_parser = |text: &str| parse_number(text, 5.0, 75.0))]
+    quality: Option<f32>,
+    /// Write the best file of at most this size: 500kB, 2MB (kB and MB are powers of 1000, KiB and MiB of 1024)
+    #[arg(long, value_name = "BYTES", value_parser = parse_max_bytes)]
+    max_bytes: Option<ByteCount>,
+    /// Store eleven bits of every coefficient, for archives; many times larger
+    #[arg(long)]
+    lossless: bool,
+}
+
+/// Parses a size larger than that of the header.
+fn parse_max_bytes(text: &str) -> Result<ByteCount, String> {
+    let max_bytes = ByteCount::parse(text)?;
+    match max_bytes.0 > HEADER_BYTES as u64 {
+        true => Ok(max_bytes),
+        false => Err(format!(
+            "the header of a file alone has {HEADER_BYTES} bytes; give more"
+        )),
+    }
+}
+
+impl QualityArgs {
+    /// The quality asked for, or the default, which needs a distortion metric.
+    pub fn quality<'a>(&self, metric: Option<&'a dyn Judge>) -> Quality<'a> {
+        match (self.quality, self.max_bytes, metric) {
+            (Some(snr), ..) => Quality::Snr(Decibels(f64::from(snr))),
+            (_, Some(max_bytes), _) => Quality::Bytes(max_bytes.0),
+            _ if self.lossless => Quality::Lossless,
+            (.., Some(metric)) => Quality::Loss(DEFAULT_LOSS, metric),
+            (.., None) => Quality::Snr(DEFAULT_SNR),
+        }
     }
 }
 

@@ -9,9 +9,9 @@
 //! | … | the [`RunKey`] as JSON |
 //! | records | tile number, length, CRC-32C of these two and the content (4 bytes each), content |
 //!
-//! The first record has the number `u32::MAX` and holds the [fingerprint](super::run_key) of the prepared
-//! recovery; one record for each tile follows, in the order of completion. When the process ends,
-//! only the last record can be incomplete; it is then ignored.
+//! The first record has the number `u32::MAX` and holds the [fingerprint](super::run_key) of the prepared recovery; one
+//! record for each tile follows, in the order of completion. When the process ends, only the last record can be
+//! incomplete; it is then ignored.
 
 use std::ffi::OsString;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -122,8 +122,8 @@ impl Checkpoint {
         ))
     }
 
-    /// Records the fingerprint of the prepared recovery, or compares it with that of the tiles in the
-    /// checkpoint, which must be equal.
+    /// Records the fingerprint of the prepared recovery, or compares it with that of the tiles in the checkpoint, which
+    /// must be equal.
     pub fn set_fingerprint(&mut self, fingerprint: u32) -> Result<()> {
         let fingerprint = fingerprint.to_le_bytes();
         match &self.fingerprint {

@@ -4,65 +4,14 @@ use std::io::{self, ErrorKind};
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use clap::Args;
-
+use super::args::QualityArgs;
 use super::checkpoint::Checkpoint;
+use super::memory_plan::FILE_TILE_SIDE;
 use super::tile_record;
-use crate::cli::arguments::{ByteCount, parse_number};
 use crate::cli::process::Interrupt;
-use crate::format::{EncodedFile, FormatError, HEADER_BYTES, Judge, Metadata, Quality, Source};
+use crate::format::{EncodedFile, FormatError, Judge, Metadata, Source};
 use crate::recover::{HoldoutValidation, Recovery};
 use crate::transport::{BandTile, Basis, Decibels, Geometry, RecoveredTile, TransportFunctions};
-
-/// Camera pixels along a side of a tile in the file. Larger tiles than those of the recovery compress
-/// better; these are still small enough to load only the visible ones.
-pub const FILE_TILE_SIDE: u32 = 128;
-/// Default loss of SNR by the file, as hold-out validation estimates it. Validation recovers from fewer
-/// patterns, and so with slightly more noise.
-const DEFAULT_LOSS: Decibels = Decibels(0.5);
-/// Default SNR of the file relative to the recovered transport without hold-out validation. With so few
-/// patterns the transport is noisy.
-const DEFAULT_SNR: Decibels = Decibels(32.0);
-
-/// Quality or size of the file.
-#[derive(Debug, Args)]
-#[group(multiple = false)]
-pub struct QualityArgs {
-    /// SNR of the file relative to the recovered light transport, in dB; more is larger [default: as much as
-    /// the noise of the photographs justifies]
-    #[arg(long, value_name = "DB", value_parser = |text: &str| parse_number(text, 5.0, 75.0))]
-    quality: Option<f32>,
-    /// Write the best file of at most this size: 500kB, 2MB (kB and MB are powers of 1000, KiB and MiB of 1024)
-    #[arg(long, value_name = "BYTES", value_parser = parse_max_bytes)]
-    max_bytes: Option<ByteCount>,
-    /// Store eleven bits of every coefficient, for archives; many times larger
-    #[arg(long)]
-    lossless: bool,
-}
-
-/// Parses a size larger than that of the header.
-fn parse_max_bytes(text: &str) -> Result<ByteCount, String> {
-    let max_bytes = ByteCount::parse(text)?;
-    match max_bytes.0 > HEADER_BYTES as u64 {
-        true => Ok(max_bytes),
-        false => Err(format!(
-            "the header of a file alone has {HEADER_BYTES} bytes; give more"
-        )),
-    }
-}
-
-impl QualityArgs {
-    /// The quality asked for, or the default.
-    fn quality<'a>(&self, metric: Option<&'a HoldoutMetric<'a>>) -> Quality<'a> {
-        match (self.quality, self.max_bytes, metric) {
-            (Some(snr), ..) => Quality::Snr(Decibels(f64::from(snr))),
-            (_, Some(max_bytes), _) => Quality::Bytes(max_bytes.0),
-            _ if self.lossless => Quality::Lossless,
-            (.., Some(metric)) => Quality::Loss(DEFAULT_LOSS, metric),
-            (.., None) => Quality::Snr(DEFAULT_SNR),
-        }
-    }
-}
 
 /// Distortion metric: the loss of SNR on held-out patterns.
 struct HoldoutMetric<'a>(&'a HoldoutValidation);
@@ -82,8 +31,8 @@ impl Judge for HoldoutMetric<'_> {
     }
 }
 
-/// Encodes the tiles in `checkpoint` of `recovery`. An interruption is reported as
-/// [`FormatError::Source`] with [`ErrorKind::Interrupted`].
+/// Encodes the tiles in `checkpoint` of `recovery`. An interruption is reported as [`FormatError::Source`] with
+/// [`ErrorKind::Interrupted`].
 pub fn encode_file(
     args: &QualityArgs,
     checkpoint: &Mutex<Checkpoint>,
@@ -121,7 +70,11 @@ pub fn encode_file(
         extensions: Vec::new(),
     };
     let metric = recovery.holdout_validation().map(HoldoutMetric);
-    EncodedFile::new(source, args.quality(metric.as_ref()), &interrupt.cores())
+    EncodedFile::new(
+        source,
+        args.quality(metric.as_ref().map(|metric| metric as &dyn Judge)),
+        &interrupt.cores(),
+    )
 }
 
 /// Columns or rows of the recovered tiles that cover `length` pixels from `start`.

@@ -113,8 +113,8 @@ impl RecoverJob<'_> {
         })
     }
 
-    /// Loads the rows to prepare the recovery from, and estimates the noise. Returns the number of
-    /// saturated samples in all photographs.
+    /// Loads the rows to prepare the recovery from, and estimates the noise. Returns the number of saturated samples in
+    /// all photographs.
     fn load_sample(
         &self,
         measurements: &mut Measurements,

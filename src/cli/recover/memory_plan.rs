@@ -1,27 +1,29 @@
 //! Shares the memory limit of a recovery out between photographs and tiles.
 //!
-//! All photographs are loaded if they fit beside one tile. Otherwise half of what remains after the fixed
-//! costs holds strips of rows, the rest tiles. Only the number of tiles at once depends on the number of
-//! threads, so that the loaded rows, and the result, do not.
+//! All photographs are loaded if they fit beside one tile. Otherwise half of what remains after the fixed costs holds
+//! strips of rows, the rest tiles. Only the number of tiles at once depends on the number of threads, so that the
+//! loaded rows, and the result, do not.
 
 use std::ops::Range;
 
 use anyhow::{Result, ensure};
 
-use super::encode::FILE_TILE_SIDE;
 use crate::capture::{Manifest, RowSet};
 use crate::cli::arguments::ByteCount;
 use crate::recover::Method;
 use crate::transport::{CHANNELS, Geometry, Window};
 
+/// Camera pixels along a side of a tile in the file. Larger tiles than those of the recovery compress better; these are
+/// still small enough to load only the visible ones.
+pub const FILE_TILE_SIDE: u32 = 128;
 /// The program itself, its buffers, and what the allocator retains.
 const PROGRAM_BYTES: u64 = 32 << 20;
 /// Reading one photograph, beside its rows: a buffer and the decompressor's window.
 const READER_BYTES: u64 = 320 << 10;
 /// Compressing one recovered tile for the checkpoint, beside the tile.
 const COMPRESSOR_BYTES: u64 = 24 << 20;
-/// One coefficient or element of all channels while its tile of the file is encoded: the value, its rounding
-/// error, quantised values of two scans, and their tokens.
+/// One coefficient or element of all channels while its tile of the file is encoded: the value, its rounding error,
+/// quantised values of two scans, and their tokens.
 const ENCODED_VALUE_BYTES: u64 = 60;
 /// Choosing the quantisation step of the file.
 const RATE_CONTROL_BYTES: u64 = 64 << 20;
@@ -44,8 +46,8 @@ pub struct MemoryPlan {
 }
 
 impl MemoryPlan {
-    /// A plan for recovery by `method` from `shots` photographs on at most `threads` threads. Fails if
-    /// `limit` is too low for one tile.
+    /// A plan for recovery by `method` from `shots` photographs on at most `threads` threads. Fails if `limit` is too
+    /// low for one tile.
     pub fn new(
         limit: ByteCount,
         manifest: &Manifest,
@@ -93,9 +95,8 @@ impl MemoryPlan {
         Ok(plan)
     }
 
-    /// Number of tiles of the file encoded at once, after the photographs are unloaded, for `rank`
-    /// components and functions of `window`. The encoded file is not included. Fails if the limit is too
-    /// low for one tile.
+    /// Number of tiles of the file encoded at once, after the photographs are unloaded, for `rank` components and
+    /// functions of `window`. The encoded file is not included. Fails if the limit is too low for one tile.
     pub fn tiles_encoded_at_once(&self, window: Window, rank: usize) -> Result<usize> {
         let pixels = u64::from(self.width) * u64::from(self.height);
         let value = ENCODED_VALUE_BYTES * (window.area() + rank) as u64;
@@ -130,8 +131,8 @@ impl MemoryPlan {
         u32::try_from(self.photograph_bytes / self.row_bytes.max(1)).unwrap_or(u32::MAX)
     }
 
-    /// The camera rows to prepare the recovery from: all if they fit, otherwise rows of tiles spread
-    /// evenly over the picture.
+    /// The camera rows to prepare the recovery from: all if they fit, otherwise rows of tiles spread evenly over the
+    /// picture.
     pub fn sample_rows(&self) -> RowSet {
         if self.fits_photographs() {
             return RowSet::all(self.height);
@@ -143,8 +144,8 @@ impl MemoryPlan {
         RowSet::from_strips((0..count).map(|i| self.pixel_rows(middle(i)..middle(i) + 1, 0)))
     }
 
-    /// Strips of tile rows from the top down, each with the camera rows to load for it: its own and `halo`
-    /// more on either side.
+    /// Strips of tile rows from the top down, each with the camera rows to load for it: its own and `halo` more on
+    /// either side.
     pub fn strips(&self, halo: u32) -> Vec<(Range<u32>, RowSet)> {
         let tile_rows = self.height.div_ceil(self.tile_side);
         if self.fits_photographs() {
@@ -164,8 +165,8 @@ impl MemoryPlan {
         self.gray_code_rows(photographs).count() == self.height as usize
     }
 
-    /// The camera rows to decode of so many Gray code photographs: all if they fit, otherwise rows spread
-    /// evenly over the picture.
+    /// The camera rows to decode of so many Gray code photographs: all if they fit, otherwise rows spread evenly over
+    /// the picture.
     pub fn gray_code_rows(&self, photographs: usize) -> RowSet {
         // The samples of a pixel and its decoded position.
         let pixel = photographs as u64 * (CHANNELS * size_of::<f32>()) as u64 + 64;

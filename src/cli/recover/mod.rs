@@ -1,7 +1,7 @@
 //! `ltm-export recover`: a capture folder to an `.ltm` file.
 //!
-//! [`job`] reads the photographs, prepares a recovery, recovers its tiles into a [`checkpoint`] and encodes
-//! them. [`memory_plan`] keeps all of it within `--memory`.
+//! [`job`] reads the photographs, prepares a recovery, recovers its tiles into a [`checkpoint`] and encodes them.
+//! [`memory_plan`] keeps all of it within `--memory`.
 
 mod args;
 mod checkpoint;

@@ -139,9 +139,9 @@ impl FileDigest {
     }
 }
 
-/// CRC-32C of what a recovery learned or chose: its geometry, basis, weight of the common mode, and SNR on
-/// held-out patterns. Another build or machine may learn different values from the same photographs, and
-/// its tiles would not fit.
+/// CRC-32C of what a recovery learned or chose: its geometry, basis, weight of the common mode, and SNR on held-out
+/// patterns. Another build or machine may learn different values from the same photographs, and its tiles would not
+/// fit.
 pub fn recovery_fingerprint(recovery: &Recovery) -> u32 {
     let geometry = recovery.geometry();
     let grids = [

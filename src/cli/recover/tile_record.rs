@@ -1,5 +1,5 @@
-//! A recovered tile in a checkpoint: half-precision floats `x / step` with a power of two as step, split
-//! into planes of low and high bytes and compressed by zstd.
+//! A recovered tile in a checkpoint: half-precision floats `x / step` with a power of two as step, split into planes of
+//! low and high bytes and compressed by zstd.
 //!
 //! Eleven bits are finer than any `.ltm` file but a lossless one, and fast to write.
 

@@ -37,8 +37,8 @@ impl<'a> TileRecovery<'a> {
         }
     }
 
-    /// Recovers those tiles in the rows of tiles `tile_rows` that the checkpoint lacks. Returns the number
-    /// of overexposed pixels in these rows, which is zero without any `has_saturation`.
+    /// Recovers those tiles in the rows of tiles `tile_rows` that the checkpoint lacks. Returns the number of
+    /// overexposed pixels in these rows, which is zero without any `has_saturation`.
     pub fn recover_rows(
         &self,
         measurements: &Measurements,

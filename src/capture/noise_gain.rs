@@ -1,19 +1,16 @@
-//! Noise model of the measurements: estimates the gain and floor of their variance.
+//! Gain of the noise model, estimated from the shots, as one flood photograph cannot separate noise from texture.
 //!
-//! The floor comes from the dark frame. The gain comes from the shots, as one flood photograph cannot
-//! separate noise from texture: neighbouring pixels respond to the same few light elements, so the
-//! samples of a block of `p` values over `L` shots are an `[L, p]` matrix of low rank plus noise of full
-//! rank. The smallest eigenvalues of its Gram matrix give the noise (Liu, Tanaka and Okutomi,
-//! *Single-image noise level estimation for blind denoising*, 2013, with shots in place of patches).
+//! Neighbouring pixels respond to the same few light elements, so the samples of a block of `p` values over `L` shots
+//! are an `[L, p]` matrix of low rank plus noise of full rank. The smallest eigenvalues of its Gram matrix give the noise
+//! (Liu, Tanaka and Okutomi, *Single-image noise level estimation for blind denoising*, 2013, with shots in place of
+//! patches).
 
-use serde::Serialize;
-
-use super::Measurements;
+use super::measurements::Measurements;
+use super::noise_model::{NoiseModel, quantile};
 use crate::linalg::symmetric_eigen;
 use crate::transport::{CHANNELS, CameraPx};
 
-/// Camera pixels along a side of a block. At two pixels a light element, signal then takes a minority of
-/// the ranks.
+/// Camera pixels along a side of a block. At two pixels a light element, signal then takes a minority of the ranks.
 const BLOCK_SIDE: u32 = 3;
 /// Samples of a block in one shot, `p`.
 const BLOCK_SERIES: usize = (BLOCK_SIDE * BLOCK_SIDE) as usize * CHANNELS;
@@ -25,61 +22,9 @@ const MIN_SHOTS: usize = 4;
 const GAIN_ROUNDS: usize = 4;
 /// Upper bound on the largest eigenvalue of pure noise, relative to its asymptotic value.
 const MAX_NOISE_EIGENVALUE_RATIO: f64 = 1.05;
-/// Standard deviation of a Gaussian over its median absolute deviation.
-const SIGMA_PER_MAD: f64 = 1.4826;
-/// Differences of neighbours above this many standard deviations are edges or hot pixels.
-const MAX_NOISE_SIGMAS: f64 = 4.0;
-
-/// Variance of samples per channel, in squared units of the measurement.
-///
-/// A sample `y` at relative exposure `e` has variance `gain·y/e + floor/e²`. The subtracted dark frame
-/// has noise of variance `floor` as well, which is not included: it adds the same constant to a pixel in
-/// all shots. Subtraction cancels the fixed pattern of the sensor.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct NoiseModel {
-    /// Variance per unit of measurement at exposure 1: 1 / electrons at measurement 1.
-    pub gain: [f64; CHANNELS],
-    /// Variance without light at exposure 1: read noise and rounding to codes.
-    pub floor: [f64; CHANNELS],
-}
-
 impl NoiseModel {
-    /// Estimates the floor from a dark frame with rows of `width` pixels; the gain is zero.
-    ///
-    /// The floor is half the mean squared difference of horizontal neighbours, and at least the variance
-    /// of rounding to codes `quantum` apart.
-    pub fn from_dark(dark: &[[f32; CHANNELS]], width: u32, quantum: f64) -> Self {
-        let rounding = quantum * quantum / 12.0;
-        let floor = std::array::from_fn(|c| {
-            let rows = dark.chunks_exact(width as usize);
-            let differences = rows.flat_map(|row| {
-                let pairs = row.chunks_exact(2);
-                pairs.map(|pair| f64::from(pair[1][c]) - f64::from(pair[0][c]))
-            });
-            let mut magnitudes: Vec<f64> = differences.map(f64::abs).collect();
-            let Some(median) = quantile(&mut magnitudes, 1, 2) else {
-                return rounding;
-            };
-            // LightCodes are coarse compared with the noise of a good camera, and so is the median: it only
-            // serves to reject outliers, and `quantum` keeps it above zero.
-            let limit = MAX_NOISE_SIGMAS * (SIGMA_PER_MAD * median).max(quantum);
-            let inliers = magnitudes.iter().take_while(|d| **d <= limit);
-            let (count, sum) = inliers.fold((0.0, 0.0), |(n, sum), d| (n + 1.0, sum + d * d));
-            (sum / (2.0 * f64::max(count, 1.0))).max(rounding)
-        });
-        Self {
-            gain: [0.0; CHANNELS],
-            floor,
-        }
-    }
-
-    /// Variance of a sample `y` of channel `c` at relative exposure `exposure`.
-    pub fn variance(&self, c: usize, y: f64, exposure: f64) -> f64 {
-        (self.gain[c] * y.max(0.0) + self.floor[c] / exposure) / exposure
-    }
-
-    /// Adds the gain to the floor of `measurements.noise`. The gain is zero if all pixels are saturated
-    /// in too many shots.
+    /// Adds the gain to the floor of `measurements.noise`. The gain is zero if all pixels are saturated in too many
+    /// shots.
     pub fn with_gain_from(measurements: &Measurements) -> Self {
         let mut noise = measurements.noise;
         let blocks = blocks(measurements);
@@ -181,8 +126,8 @@ impl PixelBlock {
         means.sum::<f64>() * CHANNELS as f64 / BLOCK_SERIES as f64
     }
 
-    /// Variance of the noise by channel, relative to the `expected` variance of each sample; `None` if
-    /// the signal takes too many ranks.
+    /// Variance of the noise by channel, relative to the `expected` variance of each sample; `None` if the signal takes
+    /// too many ranks.
     fn relative_noise(&self, expected: &[f64; BLOCK_SERIES]) -> Option<[f64; CHANNELS]> {
         let p = BLOCK_SERIES;
         let scale = expected.map(|v| v.sqrt().recip());
@@ -201,8 +146,8 @@ impl PixelBlock {
         }
         let (values, vectors) = symmetric_eigen(gram, p);
         let degrees = self.weights.len() - 1;
-        // The signal has the smallest rank for which the rest may be pure noise: noise of variance 1
-        // has eigenvalues up to (√n + √p)² (Marchenko and Pastur).
+        // The signal has the smallest rank for which the rest may be pure noise: noise of variance 1 has eigenvalues up
+        // to (√n + √p)² (Marchenko and Pastur).
         let rank = (0..p.min(degrees)).find(|&k| {
             let (n, q) = ((degrees - k) as f64, (p - k) as f64);
             let level = values[k..].iter().sum::<f64>() / (n * q);
@@ -270,12 +215,6 @@ fn estimate_gain(
     })
 }
 
-/// Sorts `values` and returns their quantile `numerator / denominator`; `None` if there are none.
-fn quantile(values: &mut [f64], numerator: usize, denominator: usize) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() * numerator / denominator).copied()
-}
-
 #[cfg(test)]
 #[cfg(all(feature = "simulate", not(target_arch = "wasm32")))]
 mod tests {
@@ -284,8 +223,8 @@ mod tests {
     use crate::simulate::{Camera, EmissionMatrix, Ensemble, LightCodes, RandomStream, SceneKind};
     use crate::transport::{Extent, TileRect};
 
-    /// Photographs a scene with `electrons` at full scale, every third shot at twice the exposure,
-    /// and less a dark frame; channel 1 as if binned from two samples.
+    /// Photographs a scene with `electrons` at full scale, every third shot at twice the exposure, and less a dark
+    /// frame; channel 1 as if binned from two samples.
     fn measure(kind: SceneKind, camera: [u32; 2], patterns: u32, electrons: f64) -> Measurements {
         let extent = |[width, height]: [u32; 2]| Extent { width, height };
         let (camera, light) = (extent(camera), extent([24, 24]));
