@@ -57,8 +57,7 @@ impl Mul<f64> for Vec2 {
     }
 }
 
-/// Unit coordinates of a light plane: the origin in its centre, ±1 at the ends of its shorter side, y
-/// downwards.
+/// Unit coordinates of a light plane: the origin in its centre, ±1 at the ends of its shorter side, y downwards.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct UnitPlane {
     centre: Vec2,

@@ -80,8 +80,7 @@ pub struct GrayCodePattern {
 }
 
 impl GrayCodePattern {
-    /// All patterns of a light plane: columns, then rows, most significant bit first, each followed by its
-    /// inverse.
+    /// All patterns of a light plane: columns, then rows, most significant bit first, each followed by its inverse.
     pub fn all(light: Extent) -> Vec<Self> {
         let axis = |columns, side: u32| {
             let bits = u32::BITS - (side - 1).leading_zeros();

@@ -264,8 +264,7 @@ fn single_elements(light: Extent) -> Vec<LightCodes> {
     (0..light.area()).map(single).collect()
 }
 
-/// Kernel Nyström from random columns and rows, half of `photographs` each: its SNR and its computing time in
-/// seconds.
+/// Kernel Nyström from random columns and rows, half of `photographs` each: its SNR and its computing time in seconds.
 fn run_nystrom(
     truth: &DenseTransport,
     scene_camera: &SceneCamera,

@@ -75,8 +75,7 @@ impl SceneCamera<'_> {
         self.add_noise(&black, 0)
     }
 
-    /// One photograph for each light, in units of the measurement, minus a dark photograph; saturated samples
-    /// are NaN.
+    /// One photograph for each light, in units of the measurement, minus a dark photograph; saturated samples are NaN.
     pub(super) fn photographs(
         &self,
         lights: &[LightCodes],

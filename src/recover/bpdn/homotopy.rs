@@ -1,5 +1,4 @@
-//! Basis pursuit denoising with φ = I, where light transport functions themselves are sparse: the homotopy
-//! method.
+//! Basis pursuit denoising with φ = I, where light transport functions themselves are sparse: the homotopy method.
 //!
 //! The solutions of `min ½‖y − Ax‖² + λ 1ᵀx, x ≥ 0` for all λ form a piecewise linear path (LARS, Efron et
 //! al. 2004; for non-negative x Mørup et al. 2008). [`Homotopy`] follows it from x = 0, the solution for
@@ -130,8 +129,7 @@ impl<'a> Homotopy<'a> {
         terms.map(|(&j, &x)| (h[j] + lambda) * x).sum()
     }
 
-    /// How far λ falls to the end of the segment, and that end. `excess` is the squared residual minus its
-    /// limit.
+    /// How far λ falls to the end of the segment, and that end. `excess` is the squared residual minus its limit.
     #[inline(always)]
     fn next_event(&self, lambda: f64, excess: f64) -> (f64, PathEvent) {
         // With s = 1ᵀG[P, P]⁻¹1 the squared residual falls by 2γλs − γ²s over a step γ.

@@ -5,12 +5,11 @@
 //! min Σ t   subject to   −t ≤ φᵀx ≤ t,   x ≥ 0,   ½(ε² − ‖y − Ax‖²) ≥ 0
 //! ```
 //!
-//! with multipliers ½(1 + s) and ½(1 − s), w, and λ. The Karush–Kuhn–Tucker (KKT) conditions are
-//! `φs = w + λAᵀ(y − Ax)` and complementarity: each constraint's slack times its multiplier is zero.
-//! Newton's method drives these products to a common μ that falls from step to step. Eliminating t, s, w
-//! and λ leaves one system in x, `[k, k]`, to factor for each of ten to twenty steps. Splitting methods
-//! have cheaper steps but need thousands: with few patterns, or ε near ‖y‖, the problem is almost a linear
-//! program.
+//! with multipliers ½(1 + s) and ½(1 − s), w, and λ. The Karush–Kuhn–Tucker (KKT) conditions are `φs = w + λAᵀ(y − Ax)`
+//! and complementarity: each constraint's slack times its multiplier is zero. Newton's method drives these products to
+//! a common μ that falls from step to step. Eliminating t, s, w and λ leaves one system in x, `[k, k]`, to factor for
+//! each of ten to twenty steps. Splitting methods have cheaper steps but need thousands: with few patterns, or ε near
+//! ‖y‖, the problem is almost a linear program.
 
 use super::iterate::Iterate;
 use super::newton::NewtonSystem;
@@ -33,8 +32,7 @@ pub struct InteriorPoint {
 }
 
 impl InteriorPoint {
-    /// A solver for `Aᵀ = columns`, `[k, rows]`, whose unknowns are the elements `slots` of a window
-    /// of `side²`.
+    /// A solver for `Aᵀ = columns`, `[k, rows]`, whose unknowns are the elements `slots` of a window of `side²`.
     pub fn new(
         basis: SparsityBasis,
         columns: &[f64],

@@ -1,5 +1,4 @@
-//! Basis pursuit denoising: `min ‖φᵀτ‖₁` subject to `‖y − P̂τ‖₂ ≤ ε` and `τ ≥ 0` (paper, section 3,
-//! case (b)).
+//! Basis pursuit denoising: `min ‖φᵀτ‖₁` subject to `‖y − P̂τ‖₂ ≤ ε` and `τ ≥ 0` (paper, section 3, case (b)).
 //!
 //! In this module A is the weighted P̂, `[L, k]`, of one window, and x, `[k]`, the unknown τ on the
 //! window's elements inside the light plane. With φ the identity, [`Homotopy`] follows the path of

@@ -1,9 +1,8 @@
 //! Blends the learned recovery with non-negative least squares (NNLS).
 //!
-//! A Gaussian prior does not know that light is non-negative. Where functions are sparse and unlike each
-//! other, NNLS (paper, section 3, case (a)) uses that and errs differently, so that the blend
-//! `τ = (1 − w) τ_learned + w τ_nnls` is better than either. With the residuals a and b of the two on
-//! held-out patterns, the squared residual `‖(1 − w) a + w b‖²` is least at
+//! A Gaussian prior does not know that light is non-negative. Where functions are sparse and unlike each other, NNLS
+//! (paper, section 3, case (a)) uses that and errs differently, so that the blend `τ = (1 − w) τ_learned + w τ_nnls`
+//! is better than either. With the residuals a and b of the two on held-out patterns, `‖(1 − w) a + w b‖²` is least at
 //! `w = (aᵀa − aᵀb) / ‖a − b‖²`, clamped to 0..=1.
 
 use super::inference::LearnedModel;

@@ -220,8 +220,7 @@ pub(super) fn brightness_thresholds(regions: &[RegionEquations]) -> BrightnessTh
     })
 }
 
-/// `rect` with a border of `margin` pixels, where the picture has such pixels and their measurements are
-/// loaded.
+/// `rect` with a border of `margin` pixels, where the picture has such pixels and their measurements are loaded.
 pub(super) fn with_margin(measurements: &Measurements, rect: TileRect, margin: u32) -> TileRect {
     let camera = measurements.camera;
     let (right, bottom) = (rect.x + rect.extent.width, rect.y + rect.extent.height);

@@ -1,9 +1,8 @@
 //! Inference: from a tile's measurements to its coefficients under the learned model.
 //!
-//! In: the measurements of the tile and of a [halo](LearnedModel::halo) around it, and the patterns to
-//! use. Out: coefficients f ẑ, `[pixel, component]` with a value for each channel. ẑ is the posterior
-//! mean under the pixel prior or, if the model has a neighbour prior, under the mixture of both, moved by
-//! the non-negativity penalty.
+//! In: the measurements of the tile and of a [halo](LearnedModel::halo) around it, and the patterns to use. Out:
+//! coefficients f ẑ, `[pixel, component]` with a value for each channel. ẑ is the posterior mean under the pixel prior
+//! or, if the model has a neighbour prior, under the mixture of both, moved by the non-negativity penalty.
 
 use super::basis::LearnedBasis;
 use super::equations::{BrightnessThresholds, RegionEquations, with_margin};

@@ -72,8 +72,7 @@ impl LearnedRecovery {
         training::max_rank(window)
     }
 
-    /// Trains on all of `measurements`, starting from their
-    /// [mean function](super::pooled::mean_function), `[S]`.
+    /// Trains on all of `measurements`, starting from their [mean function](super::pooled::mean_function), `[S]`.
     ///
     /// # Errors
     /// [`RecoverError::NoSignal`] where no prior can be learned, [`RecoverError::Cancelled`] after

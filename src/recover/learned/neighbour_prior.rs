@@ -202,8 +202,7 @@ impl NeighbourPrior {
         }
     }
 
-    /// Leaves the prediction m of an observation in `mean` and its posterior in `solver`; returns its
-    /// responsibility q.
+    /// Leaves the prediction m of an observation in `mean` and its posterior in `solver`; returns its responsibility q.
     #[inline(always)]
     pub fn infer(
         &self,

@@ -1,8 +1,7 @@
 //! A penalty on negative light, applied to a posterior mean.
 //!
-//! A Gaussian posterior does not know that light is non-negative: an unusual function comes out with
-//! negative lobes and too much light elsewhere. Clipping the lobes would make the pixel too bright.
-//! Instead this module minimises
+//! A Gaussian posterior does not know that light is non-negative: an unusual function comes out with negative lobes and
+//! too much light elsewhere. Clipping the lobes would make the pixel too bright. Instead this module minimises
 //!
 //! ```text
 //! ½(z − ẑ)ᵀK(z − ẑ) + ½w Σ_s (v_sᵀz)²     over the elements s with v_sᵀẑ < 0
@@ -79,8 +78,7 @@ impl NonNegativityPenalty {
         &self.elements[s * self.rank..(s + 1) * self.rank]
     }
 
-    /// Moves `z`, the mean of a posterior whose precision has the Cholesky factor `factor`, towards the
-    /// minimum.
+    /// Moves `z`, the mean of a posterior whose precision has the Cholesky factor `factor`, towards the minimum.
     #[inline(always)]
     pub fn apply(&self, factor: &[f64], z: &mut [f64], workspace: &mut PenaltyWorkspace) {
         let PenaltyWorkspace {

@@ -84,9 +84,8 @@ impl PosteriorSolver {
         }
     }
 
-    /// The posterior of observation `index` under the prior N(`prior_mean`, C). The noise has `noise`
-    /// times the estimated variance. Leaves ẑ in `mean`; returns ln p(y) up to a constant that does not
-    /// depend on the prior.
+    /// The posterior of observation `index` under the prior N(`prior_mean`, C). The noise has `noise` times the
+    /// estimated variance. Leaves ẑ in `mean`; returns ln p(y) up to a constant that does not depend on the prior.
     #[inline(always)]
     pub fn infer(
         &mut self,

@@ -31,9 +31,8 @@ const EXPOSURE: f64 = 0.70;
 /// Brightest specular highlight, and its exponent.
 const HIGHLIGHT: f64 = 0.40;
 const SHININESS: f64 = 50.0;
-/// Half of the light plane's shorter side, in elements, for which parallax and shading are consistent. On a
-/// finer light plane true parallax would need a wider band: parallax there is that of a steeper projector,
-/// shading stays the same.
+/// Half of the light plane's shorter side, in elements, for which parallax and shading are consistent. On a finer light
+/// plane true parallax would need a wider band: parallax there is that of a steeper projector, shading stays the same.
 const SHADING_HALF_SIDE: f64 = 32.0;
 
 /// The cookies scene.

@@ -91,8 +91,7 @@ impl SurfaceGrid {
         )
     }
 
-    /// Whether the surface blocks the beam to `point`. A beam moves by `tilt` light elements while it descends
-    /// by 1.
+    /// Whether the surface blocks the beam to `point`. A beam moves by `tilt` light elements while it descends by 1.
     pub fn is_shaded(&self, point: &SurfacePoint, tilt: Vec2) -> bool {
         let max_rise = 1.0 - point.height;
         let tilt_samples = vec2(tilt.x / self.pitch.x, tilt.y / self.pitch.y);

@@ -6,10 +6,9 @@
 //! τ_m = attenuation · visible_m · (b · G_peak(m) + (1 − b) · (0.45 G_narrow(m) + 0.55 G_wide(m)))
 //! ```
 //!
-//! with Gaussians G, integrated over light element m: the ballistic peak, displaced by refraction at the
-//! rough faces, and a scattering tail, wider for red. b is the ballistic share. The attenuation is the
-//! transmittance of glass, paint and lead over the pixel's area; visible_m is the share of element m that
-//! lead does not hide.
+//! with Gaussians G, integrated over light element m: the ballistic peak, displaced by refraction at the rough faces,
+//! and a scattering tail, wider for red. b is the ballistic share. The attenuation is the transmittance of glass, paint
+//! and lead over the pixel's area; visible_m is the share of element m that lead does not hide.
 
 mod glass;
 mod rose;
