@@ -42,7 +42,12 @@ const ANSWERS = [
     'http-changed',
     /was replaced on the server/,
   ],
-  ['another range', '/faults/other-part', 'http-range', /bytes 0 to 16383, the server sent others/],
+  [
+    'another range',
+    '/faults/other-part',
+    'http-range',
+    /bytes 0 to 16383 were requested, but the server sent others/,
+  ],
   [
     '416 for the first range',
     '/faults/refused',
@@ -107,7 +112,7 @@ test.describe('an invalid attribute', () => {
       /“1e300”.* 1e\+30/,
     ],
     ['whose src is no URL', { src: 'http://[' }, 'attribute', /“http:\/\/\[”/],
-    ['that is a missing src', {}, 'src-missing', /src is not set/],
+    ['that is a missing src', {}, 'src-missing', /set the src attribute/],
   ];
   for (const [what, attributes, code, text] of cases) {
     test(`${what} causes ${code}`, async ({ openPage }) => {
@@ -203,13 +208,13 @@ test.describe('a page', () => {
       'whose policy forbids the photograph’s address',
       "default-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; connect-src 'self'",
       'csp-connect',
-      /window\.ltm .*http:\/\/127\.0\.0\.1:9 in connect-src/,
+      /window\.ltm .*http:\/\/127\.0\.0\.1:9 to connect-src/,
     ],
     [
       'whose policy forbids WebAssembly',
       "default-src 'self' 'unsafe-inline'",
       'csp-wasm',
-      /'wasm-unsafe-eval' in script-src/,
+      /'wasm-unsafe-eval' to script-src/,
     ],
   ])) {
     test(`${what} causes ${code}`, async ({ openPage }) => {
