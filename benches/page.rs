@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a failed benchmark stops
 
 mod figures;
-mod made_up;
+mod synthetic_photo;
 
 use std::fs;
 use std::io::{BufWriter, Write};
@@ -14,7 +14,7 @@ use relightable_photo::format::{EncodedFile, Metadata, Quality, Source};
 use serde_json::{Value, json};
 
 use figures::Figures;
-use made_up::{Cores, RANKS, SIDES};
+use synthetic_photo::{RANKS, RayonExecutor, SIDES};
 
 fn main() {
     let folder = figures::folder().join("page");
@@ -46,7 +46,7 @@ fn write_photograph(folder: &Path, side: u32, rank: usize) -> Value {
         write_file(&part, side, rank);
         fs::rename(part, path).unwrap();
     }
-    json!({"name": name, "side": side, "rank": rank, "frame_bytes": made_up::bytes(side, rank)})
+    json!({"name": name, "side": side, "rank": rank, "frame_bytes": synthetic_photo::bytes(side, rank)})
 }
 
 /// Whether a file exists and is not older than this program.
@@ -57,17 +57,17 @@ fn is_up_to_date(path: &Path) -> bool {
 }
 
 fn write_file(path: &Path, side: u32, rank: usize) {
-    let geometry = made_up::geometry(side);
-    let basis = made_up::basis(&geometry, rank);
+    let geometry = synthetic_photo::geometry(side);
+    let basis = synthetic_photo::basis(&geometry, rank);
     let source = Source {
         geometry,
         basis: Some(&basis),
-        tile: &|i| Ok(made_up::tile(&geometry, rank, i)),
+        tile: &|i| Ok(synthetic_photo::tile(&geometry, rank, i)),
         metadata: Metadata::default(),
         extensions: Vec::new(),
     };
     // A lower quality might drop components.
-    let encoded = EncodedFile::new(source, Quality::Lossless, &Cores).unwrap();
+    let encoded = EncodedFile::new(source, Quality::Lossless, &RayonExecutor).unwrap();
     let kept = usize::from(encoded.head().header.rank);
     assert_eq!(kept, rank, "components of the file");
     let mut file = BufWriter::new(fs::File::create(path).unwrap());

@@ -27,17 +27,17 @@ mod figures;
 #[cfg(feature = "gpu")]
 #[path = "relight/gpu.rs"]
 mod gpu;
-mod made_up;
 #[path = "relight/peers.rs"]
 mod peers;
+mod synthetic_photo;
 
 use std::collections::BTreeMap;
 use std::fs;
 
 use animated_photo::{AnimatedPhoto, FrameTime, LIGHT_SEQUENCES};
 use figures::Figures;
-use made_up::{RANKS, SIDES};
 use rayon::prelude::*;
+use synthetic_photo::{RANKS, SIDES};
 
 fn main() {
     // `cargo bench` passes flags of a harness; they are ignored.
@@ -112,7 +112,7 @@ fn copy_bandwidth() -> f64 {
 }
 
 fn bandwidth(copied: f64, figures: &mut Figures) {
-    let bytes = made_up::bytes(peers::SIDE, peers::RANK) as f64;
+    let bytes = synthetic_photo::bytes(peers::SIDE, peers::RANK) as f64;
     let frame = figures[&key(peers::SIDE, peers::RANK, "video", false)];
     figures.insert("copy_bandwidth_gb_s".to_owned(), copied / 1e9);
     figures.insert("video_frame_mb".to_owned(), bytes / 1e6);

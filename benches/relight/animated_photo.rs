@@ -9,7 +9,7 @@ use relightable_photo::relight::cpu::CpuRelighter;
 use relightable_photo::relight::{Light, OutputTransform, Rgba8Picture, TorchPose};
 use relightable_photo::transport::{Extent, LightPx, Tile, Transport};
 
-use crate::made_up::{self, Cores, noise, square};
+use crate::synthetic_photo::{self, RayonExecutor, noise, square};
 
 /// Lights of a sequence, which repeats.
 const SEQUENCE_LIGHTS: usize = 4;
@@ -92,7 +92,7 @@ impl AnimatedPhoto {
     pub fn load(&mut self, sequence: LightSequence) {
         self.lights = sequence.lights(self.relighter.transport().geometry.light);
         self.frame = 0;
-        self.render_frame(&Cores);
+        self.render_frame(&RayonExecutor);
     }
 
     fn render_frame(&mut self, executor: &impl Executor) -> FrameTime {
@@ -114,7 +114,7 @@ impl AnimatedPhoto {
         let (start, mut best, mut frames) = (Instant::now(), [FrameTime::INFINITE; 2], 0);
         while frames < 5 || frames < 200 && start.elapsed().as_secs_f64() < seconds {
             best[0] = best[0].min(self.render_frame(&SequentialExecutor));
-            best[1] = best[1].min(self.render_frame(&Cores));
+            best[1] = best[1].min(self.render_frame(&RayonExecutor));
             frames += 1;
         }
         best
@@ -132,12 +132,12 @@ pub fn fastest_seconds(runs: usize, mut work: impl FnMut()) -> f64 {
 }
 
 pub fn transport(side: u32, rank: usize) -> Transport {
-    let geometry = made_up::geometry(side);
-    let tile = |t: usize| Tile::quantise(&made_up::tile(&geometry, rank, t), rank);
+    let geometry = synthetic_photo::geometry(side);
+    let tile = |t: usize| Tile::quantise(&synthetic_photo::tile(&geometry, rank, t), rank);
     let tiles = (0..geometry.tile_grid().area()).into_par_iter();
     Transport {
         tiles: tiles.map(tile).collect(),
-        basis: made_up::basis(&geometry, rank),
+        basis: synthetic_photo::basis(&geometry, rank),
         geometry,
     }
 }

@@ -9,7 +9,7 @@ use relightable_photo::relight::webgpu::{Device, OffscreenRenderer};
 use relightable_photo::relight::{Light, OutputTransform};
 
 use super::animated_photo::{self, LightSequence};
-use super::{Figures, RANKS, made_up};
+use super::{Figures, RANKS, synthetic_photo};
 
 const SIDES: [u32; 2] = [512, 2048];
 /// Bytes copied to measure the memory's bandwidth.
@@ -55,7 +55,7 @@ pub fn frames(figures: &mut Figures) {
             let last = frame_ms(&device, |i| {
                 draw(&mut photo, &lights[0], 1.0 + (i % 100) as f32 / 100.0);
             });
-            let fraction = made_up::bytes(side, rank) as f64 / (last / 1e3) / copied;
+            let fraction = synthetic_photo::bytes(side, rank) as f64 / (last / 1e3) / copied;
             println!(
                 "{:20} {video:10.3} {last:10.3} {:11.0}%",
                 format!("{side}² rank {rank}"),

@@ -1,4 +1,4 @@
-//! Photographs with made-up coefficients: the time that relighting takes does not depend on their values.
+//! Photographs with pseudo-random coefficients: the time of relighting does not depend on their values.
 
 use rayon::prelude::*;
 use relightable_photo::executor::Executor;
@@ -12,16 +12,16 @@ const WINDOW: u32 = 15;
 pub const SIDES: [u32; 3] = [128, 512, 2048];
 pub const RANKS: [usize; 3] = [8, 16, 32];
 
-/// All cores.
-pub struct Cores;
+/// Runs jobs on all cores.
+pub struct RayonExecutor;
 
-impl Executor for Cores {
-    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-        (0..count).into_par_iter().map(work).collect()
+impl Executor for RayonExecutor {
+    fn map<T: Send>(&self, count: usize, job: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        (0..count).into_par_iter().map(job).collect()
     }
 }
 
-/// A square picture, two camera pixels a light element.
+/// A square picture with two camera pixels for each light element.
 pub fn geometry(side: u32) -> Geometry {
     Geometry {
         camera: square(side),
@@ -53,22 +53,22 @@ pub fn basis(geometry: &Geometry, rank: usize) -> Basis {
     }
 }
 
-/// A tile by its number.
-pub fn tile(geometry: &Geometry, rank: usize, number: usize) -> BandTile {
-    let mut tile = BandTile::dark(geometry.tile(number));
+/// The tile of this index.
+pub fn tile(geometry: &Geometry, rank: usize, index: usize) -> BandTile {
+    let mut tile = BandTile::dark(geometry.tile(index));
     let values = tile.rect.extent.area() * rank;
-    let coefficient = |i| [0, 1, 2].map(|c| (noise(3 * (i + number * values) + c) - 0.3) * 0.02);
+    let coefficient = |i| [0, 1, 2].map(|c| (noise(3 * (i + index * values) + c) - 0.3) * 0.02);
     tile.coefficients = (0..values).map(coefficient).collect();
     tile
 }
 
-/// Codes that a frame reads, and the picture it writes.
+/// Bytes of a frame: the codes that it reads, and the picture that it writes.
 pub fn bytes(side: u32, rank: usize) -> usize {
     let codes = CHANNELS * rank.div_ceil(QUAD) * size_of::<TexelCode>();
     square(side).area() * (codes + size_of::<[u8; 4]>())
 }
 
-/// A number from 0 to 1 for every other number.
+/// A pseudo-random number from 0 to 1 for each index.
 pub fn noise(i: usize) -> f32 {
     let mut h = (i as u32).wrapping_mul(0x9e37_79b9);
     h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
