@@ -45,7 +45,7 @@ const PARTS: usize = 8;
 pub struct WindowEstimate {
     /// The smallest window that holds nearly all light, as far as that is known.
     pub window: Window,
-    /// What is known of the light from outside it.
+    /// The light from outside it.
     pub bandwidth: BandwidthEstimate,
 }
 
@@ -59,7 +59,7 @@ pub enum BandwidthEstimate {
     },
     /// At least as wide as the widest window that was searched.
     Unbounded,
-    /// There are too few measurements to tell.
+    /// Too few measurements to estimate it.
     Undetermined,
 }
 

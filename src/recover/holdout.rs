@@ -1,5 +1,4 @@
-//! Divides the patterns into training patterns and held-out ones, by which everything is chosen that the measurements
-//! themselves have to tell.
+//! Divides the patterns into training patterns, which recoveries use, and held-out ones, which choose between recoveries.
 
 use super::sampling::MIN_PATTERNS;
 use crate::capture::{self, Measurements, Pattern};

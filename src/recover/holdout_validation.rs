@@ -20,7 +20,7 @@ const MAX_SQUARES: usize = 96;
 const SQUARE_SIDE: u32 = 8;
 /// Fewest held-out patterns that have a variance.
 const MIN_HELD_OUT: usize = 2;
-/// Smallest error that the noise lets one tell, as a share of the noise: its variance is known to a few hundredths.
+/// Smallest error that is distinguishable from noise, as a share of the noise, whose variance is known to a few percent.
 const ERROR_RESOLUTION: f64 = 0.1;
 
 /// Squares of the picture, recovered from the training patterns, with their measurements under the held-out ones.

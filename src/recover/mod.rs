@@ -7,9 +7,8 @@
 //! and basis pursuit denoising ([`Homotopy`] and [`InteriorPoint`], case (b)).
 //!
 //! Pixels and channels with one window share their normal equations, and windows share the patterns' correlations: that
-//! makes recovery fast. The weight of the patterns' common mode ([`CommonMode`]) makes it accurate. Whatever the
-//! measurements themselves can tell is chosen on held-out patterns, which also estimate the SNR
-//! ([`HoldoutValidation`]).
+//! makes recovery fast. The weight of the patterns' common mode ([`CommonMode`]) makes it accurate. Parameters
+//! are chosen on held-out patterns, which also estimate the SNR ([`HoldoutValidation`]).
 //!
 //! [`Recovery`] has no threads and no files: an [`Executor`](crate::executor::Executor) runs its jobs.
 
