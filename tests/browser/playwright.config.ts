@@ -45,8 +45,8 @@ export default defineConfig<object, WorkerOptions>({
   },
   projects: [
     { name: 'chromium', grepInvert: /webgpu/i, ...chromium },
-    // SwiftShader's WebGPU uses all cores, so these tests run one at a time.
-    { name: 'chromium-webgpu', grep: /webgpu/i, workers: 1, ...chromium },
+    // SwiftShader's WebGPU uses all cores, so these tests run one at a time. `grep` also reads the project's name.
+    { name: 'chromium-serial', grep: /webgpu/i, workers: 1, ...chromium },
     {
       name: 'firefox',
       testMatch: 'firefox.spec.js',
