@@ -24,7 +24,7 @@ use std::time::Instant;
 use npyz::WriterBuilder;
 use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{
-    EncodedFile, HEADER_BYTES, Head, Limits, Metadata, PartNumber, Quality, Reader, Source,
+    ChunkId, EncodedFile, FileIndex, HEADER_BYTES, Limits, Metadata, RateTarget, Reader, Source,
     decode_basis, decode_tile,
 };
 use relightable_photo::transport::{BandTile, Basis, CHANNELS, Decibels, TransportError};
@@ -115,9 +115,9 @@ fn prefix(files: &Files, capture: &Path, figures: &mut Figures) {
     );
 }
 
-/// A file's head, basis and tiles as they are in it.
+/// A file's index, basis and tiles as they are in it.
 struct Decoded {
-    head: Head,
+    index: FileIndex,
     basis: Basis,
     tiles: Vec<BandTile>,
 }
@@ -126,21 +126,21 @@ fn decode(path: &Path) -> Decoded {
     let bytes = fs::read(path).unwrap();
     let mut reader = Reader::new(Limits::default());
     reader.feed(0, &bytes[..HEADER_BYTES]).unwrap();
-    let head = reader.head_bytes().unwrap() as usize;
-    reader.feed(0, &bytes[..head]).unwrap();
-    let head = reader.head().unwrap().clone();
-    let fetch = |part: PartNumber| {
-        let range = head.range(part);
+    let index = reader.index_bytes().unwrap() as usize;
+    reader.feed(0, &bytes[..index]).unwrap();
+    let index = reader.index().unwrap().clone();
+    let fetch = |part: ChunkId| {
+        let range = index.range(part);
         Ok::<_, relightable_photo::format::FormatError>(
             bytes[range.start as usize..range.end as usize].to_vec(),
         )
     };
-    let basis = decode_basis(&head, fetch).unwrap();
-    let tiles = (0..head.tiles()).map(|i| decode_tile(&head, i, fetch).unwrap());
+    let basis = decode_basis(&index, fetch).unwrap();
+    let tiles = (0..index.tiles()).map(|i| decode_tile(&index, i, fetch).unwrap());
     Decoded {
         tiles: tiles.collect(),
         basis,
-        head,
+        index,
     }
 }
 
@@ -159,7 +159,7 @@ fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
         return;
     };
     let (given, ours) = (decode(&files.archive), decode(&files.file));
-    let geometry = given.head.header.geometry;
+    let geometry = given.index.header.geometry;
     let (camera, area) = (geometry.camera, geometry.window.area());
     let rank = given.basis.rank();
     let mut band = vec![0.0f32; camera.area() * area * CHANNELS];
@@ -270,14 +270,14 @@ fn rates(files: &Files, figures: &mut Figures) {
         (values * CHANNELS * size_of::<f32>()) as f64 / 1e6
     };
     let source = Source {
-        geometry: given.head.header.geometry,
+        geometry: given.index.header.geometry,
         basis: Some(&given.basis),
         tile: &|i| Ok(given.tiles[i].clone()),
         metadata: Metadata::default(),
         extensions: Vec::new(),
     };
     let start = Instant::now();
-    EncodedFile::new(source, Quality::Snr(Decibels(33.0)), &SequentialExecutor).unwrap();
+    EncodedFile::new(source, RateTarget::Snr(Decibels(33.0)), &SequentialExecutor).unwrap();
     let encoding = megabytes(&given) / start.elapsed().as_secs_f64();
     figures.insert("encode_native_mb_s".to_owned(), encoding);
     let fastest = (0..5).map(|_| {

@@ -10,7 +10,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::Command;
 
-use relightable_photo::format::{EncodedFile, Metadata, Quality, Source};
+use relightable_photo::format::{EncodedFile, Metadata, RateTarget, Source};
 use serde_json::{Value, json};
 
 use figures::Figures;
@@ -67,8 +67,8 @@ fn write_file(path: &Path, side: u32, rank: usize) {
         extensions: Vec::new(),
     };
     // A lower quality might drop components.
-    let encoded = EncodedFile::new(source, Quality::Lossless, &RayonExecutor).unwrap();
-    let kept = usize::from(encoded.head().header.rank);
+    let encoded = EncodedFile::new(source, RateTarget::Lossless, &RayonExecutor).unwrap();
+    let kept = usize::from(encoded.index().header.rank);
     assert_eq!(kept, rank, "components of the file");
     let mut file = BufWriter::new(fs::File::create(path).unwrap());
     encoded.write(&mut file).unwrap();

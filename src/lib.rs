@@ -19,6 +19,7 @@
 //!
 //! `cli` (feature `cli`) and `web` (wasm32) call these modules and add no algorithms.
 
+mod bisect;
 pub mod calibrate;
 pub mod capture;
 #[cfg(all(feature = "cli", not(target_arch = "wasm32")))]

@@ -14,8 +14,8 @@ use std::sync::Once;
 use common::{Noise, functions, tiled};
 use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{
-    self, CaptureNote, EncodedFile, Extension, FormatError, Head, Limits, Metadata, PartNumber,
-    Quality, Reader, Source,
+    self, CaptureNote, ChunkId, EncodedFile, Extension, FileIndex, FormatError, Limits, Metadata,
+    RateTarget, Reader, Source,
 };
 use relightable_photo::transport::{BandTile, Basis, CHANNELS, Decibels, Geometry, Tile, TileRect};
 
@@ -111,7 +111,12 @@ impl Synthetic {
         self
     }
 
-    fn encode(&self, quality: Quality, metadata: Metadata, extensions: Vec<Extension>) -> Vec<u8> {
+    fn encode(
+        &self,
+        target: RateTarget<'_>,
+        metadata: Metadata,
+        extensions: Vec<Extension>,
+    ) -> Vec<u8> {
         let source = Source {
             geometry: self.geometry,
             basis: self.basis.as_ref(),
@@ -120,7 +125,7 @@ impl Synthetic {
             extensions,
         };
         let mut file = Vec::new();
-        let encoded = EncodedFile::new(source, quality, &SequentialExecutor).unwrap();
+        let encoded = EncodedFile::new(source, target, &SequentialExecutor).unwrap();
         encoded.write(&mut file).unwrap();
         file
     }
@@ -177,8 +182,8 @@ fn make(name: &str) -> Vec<u8> {
     );
     // Windows hang over every edge of the display, and lie off it.
     let hanging = tiled([20, 10], [8, 5], 5, 8, [[0.7, 0.0, -4.0], [0.0, 0.7, -1.0]]);
-    let snr = |snr| Quality::Snr(Decibels(snr));
-    let (synthetic, quality) = match name {
+    let snr = |snr| RateTarget::Snr(Decibels(snr));
+    let (synthetic, target) = match name {
         "transform" => (Synthetic::factored(wide, 4, &[0, 2, 3, 4]), snr(40.0)),
         "coarse" => (
             Synthetic::factored(narrow, 5, &[0, 2, 3, 4]).dark_when_flat(4),
@@ -195,13 +200,13 @@ fn make(name: &str) -> Vec<u8> {
         ),
         "lossless" => (
             Synthetic::factored(small, 3, &[0, 2, 4]).and_direct(&[1, 2]),
-            Quality::Lossless,
+            RateTarget::Lossless,
         ),
         "extended" => return extended(&Synthetic::factored(small, 2, &[0, 2, 3, 4])),
         "dark" => (Synthetic::factored(small, 2, &[]), snr(30.0)),
         _ => unreachable!("{name}"),
     };
-    synthetic.encode(quality, metadata(), Vec::new())
+    synthetic.encode(target, metadata(), Vec::new())
 }
 
 /// What a reader of version 1.0 has to pass over, and letters of all sorts.
@@ -224,7 +229,7 @@ fn extended(synthetic: &Synthetic) -> Vec<u8> {
         data: data.to_vec(),
     };
     let extensions = vec![extension(b"test", b"anything"), extension(b"none", b"")];
-    let mut file = synthetic.encode(Quality::Snr(Decibels(30.0)), metadata, extensions);
+    let mut file = synthetic.encode(RateTarget::Snr(Decibels(30.0)), metadata, extensions);
     // A field that version 1.0 does not have.
     let units = b"\"units\"";
     let at = file.windows(units.len()).position(|bytes| bytes == units);
@@ -241,26 +246,26 @@ fn read(file: &[u8]) -> Reader {
     reader
 }
 
-/// A file's head, and its parts by their number.
-fn parts(file: &[u8]) -> (Head, impl Fn(PartNumber) -> Result<Vec<u8>, FormatError>) {
-    let head = read(file).head().unwrap().clone();
-    let ranges = head.clone();
+/// A file's index, and its parts by their number.
+fn parts(file: &[u8]) -> (FileIndex, impl Fn(ChunkId) -> Result<Vec<u8>, FormatError>) {
+    let index = read(file).index().unwrap().clone();
+    let ranges = index.clone();
     let part = move |part| {
         let range = ranges.range(part);
         Ok(file[range.start as usize..range.end as usize].to_vec())
     };
-    (head, part)
+    (index, part)
 }
 
 /// Coefficients and functions of every tile, then the basis, as they come out of the decoder.
 fn decoded(file: &[u8]) -> Vec<u8> {
-    let (head, part) = parts(file);
-    let geometry = head.header.geometry;
+    let (index, part) = parts(file);
+    let geometry = index.header.geometry;
     let mut values: Vec<f32> = Vec::new();
     for (i, rect) in geometry.tiles().enumerate() {
-        let tile = format::decode_tile(&head, i, &part).unwrap();
+        let tile = format::decode_tile(&index, i, &part).unwrap();
         let of_tile = [
-            (tile.coefficients, usize::from(head.header.rank)),
+            (tile.coefficients, usize::from(index.header.rank)),
             (tile.functions, geometry.window.area()),
         ];
         for (mut of_tile, each) in of_tile {
@@ -268,7 +273,7 @@ fn decoded(file: &[u8]) -> Vec<u8> {
             values.extend(of_tile.as_flattened());
         }
     }
-    let basis = format::decode_basis(&head, &part).unwrap();
+    let basis = format::decode_basis(&index, &part).unwrap();
     values.extend(basis.kernels.iter().flatten());
     values
         .iter()
@@ -308,12 +313,12 @@ fn conformance_files_decode_to_the_same_bits() {
 fn tiles_are_made_of_these_values() {
     for name in NAMES {
         let file = fixture(name, "ltm");
-        let (head, part) = parts(&file);
-        let basis = format::decode_basis(&head, &part).unwrap();
+        let (index, part) = parts(&file);
+        let basis = format::decode_basis(&index, &part).unwrap();
         let (transport, _) = read(&file).finish().unwrap();
         assert_eq!(transport.basis, basis, "{name}");
         for (i, tile) in transport.tiles.iter().enumerate() {
-            let numbers = format::decode_tile(&head, i, &part).unwrap();
+            let numbers = format::decode_tile(&index, i, &part).unwrap();
             assert_eq!(
                 tile,
                 &Tile::quantise(&numbers, basis.rank()),

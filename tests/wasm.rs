@@ -12,7 +12,7 @@ use common::relit::{self, TileContents};
 use common::{band_tile, tiled};
 use js_sys::{Float32Array, Object, Reflect, Uint8ClampedArray};
 use relightable_photo::executor::SequentialExecutor;
-use relightable_photo::format::{EncodedFile, Limits, Metadata, Quality, Reader, Source};
+use relightable_photo::format::{EncodedFile, Limits, Metadata, RateTarget, Reader, Source};
 use relightable_photo::relight::{self, BuiltinLight, Rgba8Picture, reference};
 use relightable_photo::transport::{Extent, Geometry, Tile, Transport};
 use relightable_photo::web::{
@@ -116,7 +116,7 @@ fn file(transport: &Transport, metadata: &Metadata) -> Vec<u8> {
         extensions: Vec::new(),
     };
     let mut bytes = Vec::new();
-    let file = EncodedFile::new(source, Quality::Lossless, &SequentialExecutor).unwrap();
+    let file = EncodedFile::new(source, RateTarget::Lossless, &SequentialExecutor).unwrap();
     file.write(&mut bytes).unwrap();
     bytes
 }

@@ -6,17 +6,23 @@ use std::path::Path;
 
 use fuzzing::choices::Choices;
 use fuzzing::source::Given;
-use relightable_photo::format::{Metadata, Quality};
+use relightable_photo::executor::SequentialExecutor;
+use relightable_photo::format::{Metadata, RateTarget};
 use relightable_photo::transport::{
     BandTile, Basis, Correspondence, Decibels, Extent, Geometry, Window,
 };
-use relightable_photo::executor::SequentialExecutor;
 
 /// Two tiles of 8 by 8 pixels and less: the first over a basis, or all functions by element.
 fn given(rank: usize) -> Given {
     let geometry = Geometry {
-        camera: Extent { width: 10, height: 8 },
-        light: Extent { width: 5, height: 4 },
+        camera: Extent {
+            width: 10,
+            height: 8,
+        },
+        light: Extent {
+            width: 5,
+            height: 4,
+        },
         window: Window::new(3).expect("an odd side"),
         correspondence: Correspondence {
             affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
@@ -54,20 +60,20 @@ fn given(rank: usize) -> Given {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("seeds");
-    let snr = Quality::Snr(Decibels(20.0));
+    let snr = RateTarget::Snr(Decibels(20.0));
     for (name, rank, quality) in [
         ("transform", 3, snr),
-        ("halves", 2, Quality::Lossless),
+        ("halves", 2, RateTarget::Lossless),
         ("direct", 0, snr),
-        ("direct-halves", 0, Quality::Lossless),
+        ("direct-halves", 0, RateTarget::Lossless),
     ] {
         let file = given(rank).encode(quality, &SequentialExecutor)?;
         let mut bytes = Vec::new();
         file.write(&mut bytes)?;
-        let head = file.head().header.head_bytes() as usize;
-        println!("{name}: {} bytes, {head} of head", bytes.len());
+        let index = file.index().header.index_bytes() as usize;
+        println!("{name}: {} bytes, {index} of index", bytes.len());
         for (target, seed) in [
-            ("open", bytes[..head].to_vec()),
+            ("open", bytes[..index].to_vec()),
             ("decode", bytes.clone()),
             ("chunked", [&bytes[..], &[0; 64]].concat()),
         ] {

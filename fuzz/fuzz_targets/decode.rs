@@ -1,4 +1,4 @@
-//! A file is read or refused, in no more memory than it says, and checking it part by part agrees.
+//! A file is read or refused within the memory budget, and checking it chunk by chunk agrees.
 #![no_main]
 
 use fuzzing::{reading, seal};
@@ -7,6 +7,7 @@ use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 fuzz_target!(|file: &[u8]| {
     seal::keep(file);
     let _ = reading::check_file(file);
+    reading::check_previews(file);
     reading::check_early(file);
 });
 

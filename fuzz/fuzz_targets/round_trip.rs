@@ -5,7 +5,7 @@ use fuzzing::choices::Choices;
 use fuzzing::source::{Backwards, Given, Wanted};
 use fuzzing::{reading, seal};
 use libfuzzer_sys::fuzz_target;
-use relightable_photo::format::{EncodedFile, FormatError, Quality};
+use relightable_photo::format::{EncodedFile, FormatError, RateTarget};
 
 fuzz_target!(|data: &[u8]| {
     let mut choices = Choices(data);
@@ -18,8 +18,8 @@ fuzz_target!(|data: &[u8]| {
     let given = Given::new(&mut choices);
     let encoded = match wanted.encode(&given, &opinions) {
         Ok(encoded) => encoded,
-        Err(FormatError::TooLarge { least, most }) if matches!(wanted, Wanted::Bytes(_)) => {
-            assert!(least > most);
+        Err(FormatError::TooLarge { smallest, limit }) if matches!(wanted, Wanted::Bytes(_)) => {
+            assert!(smallest > limit);
             return;
         }
         Err(error) => panic!("{given:?}, {wanted:?}: {error}"),
@@ -35,11 +35,11 @@ fuzz_target!(|data: &[u8]| {
     if let Wanted::Bytes(most) = wanted {
         assert!(encoded.bytes() <= most);
     }
-    for (s, scan) in encoded.head().scans.iter().enumerate() {
+    for (s, scan) in encoded.index().scans.iter().enumerate() {
         assert!(!scan.snr.0.is_nan(), "scan {s} of {given:?}, {wanted:?}");
     }
     if backwards && let Wanted::Snr(snr) = wanted {
-        let again = given.encode(Quality::Snr(snr), &Backwards);
+        let again = given.encode(RateTarget::Snr(snr), &Backwards);
         assert!(again.is_ok_and(|again| bytes(&again) == file));
     }
     if given.tame && given.inside() {

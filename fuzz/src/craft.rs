@@ -103,7 +103,11 @@ fn scans(choices: &mut Choices<'_>, geometry: &Geometry, rank: usize) -> Vec<Sca
     let (mut scans, mut known) = (Vec::new(), 0);
     for _ in 0..choices.below(7) {
         let direct = rank == 0 || choices.chance(80);
-        let (most_first, end) = if direct { (area - 1, area) } else { (known.min(rank - 1), rank) };
+        let (most_first, end) = if direct {
+            (area - 1, area)
+        } else {
+            (known.min(rank - 1), rank)
+        };
         let first = usize::from(choices.byte()) % (most_first + 1);
         let count = 1 + usize::from(choices.byte()) % (end - first);
         let coding = if direct { functions } else { coefficients };
@@ -328,7 +332,9 @@ thread_local! {
 /// One zstd frame, or rarely what is not quite one.
 fn frame(choices: &mut Choices<'_>, plain: &[u8]) -> Vec<u8> {
     let mut frame = COMPRESSOR.with_borrow_mut(|compressor| {
-        compressor.compress(plain).expect("memory is compressed to memory")
+        compressor
+            .compress(plain)
+            .expect("memory is compressed to memory")
     });
     if !choices.rarely() {
         return frame;
@@ -378,10 +384,18 @@ fn assemble(
     directory.extend(chunks().flat_map(|(bytes, _)| (bytes.len() as u32).to_le_bytes()));
     let plain = |(bytes, plain): &(Vec<u8>, u32)| if bytes.is_empty() { 0 } else { *plain };
     directory.extend(chunks().flat_map(|chunk| plain(chunk).to_le_bytes()));
-    let crc = |bytes: &[u8]| if bytes.is_empty() { 0 } else { crc32c::crc32c(bytes) };
+    let crc = |bytes: &[u8]| {
+        if bytes.is_empty() {
+            0
+        } else {
+            crc32c::crc32c(bytes)
+        }
+    };
     directory.extend(chunks().flat_map(|(bytes, _)| crc(bytes).to_le_bytes()));
     let directory = COMPRESSOR.with_borrow_mut(|compressor| {
-        compressor.compress(&directory).expect("memory is compressed to memory")
+        compressor
+            .compress(&directory)
+            .expect("memory is compressed to memory")
     });
     let extensions = match choices.rarely() {
         true => choices.up_to(40).to_vec(),
@@ -391,7 +405,7 @@ fn assemble(
         true => choices.up_to(80).to_vec(),
         false => b"{}".to_vec(),
     };
-    let head = [&directory, &extensions, &metadata];
+    let index = [&directory, &extensions, &metadata];
     let parts: usize = scans
         .iter()
         .map(|scan| {
@@ -399,7 +413,7 @@ fn assemble(
             scan.basis.len() + chunks.sum::<usize>()
         })
         .sum();
-    let bytes = HEADER_BYTES + head.iter().map(|part| part.len()).sum::<usize>() + parts;
+    let bytes = HEADER_BYTES + index.iter().map(|part| part.len()).sum::<usize>() + parts;
 
     let mut file = b"\xABLTM 10\xBB\r\n\x1A\n\x01\0\0\0".to_vec();
     for side in [
@@ -418,13 +432,13 @@ fn assemble(
     file.extend((bytes as u64).to_le_bytes());
     file.extend((rank as u32).to_le_bytes());
     file.extend((scans.len() as u32).to_le_bytes());
-    for part in head {
+    for part in index {
         file.extend((part.len() as u32).to_le_bytes());
         file.extend(crc32c::crc32c(part).to_le_bytes());
     }
     file.extend([0; 12]);
     file.extend(crc32c::crc32c(&file).to_le_bytes());
-    for part in head {
+    for part in index {
         file.extend(part);
     }
     for scan in scans {

@@ -1,39 +1,35 @@
-//! How much memory Rust code holds. zstd's own contexts are not counted.
+//! An allocator that counts the memory of Rust code. zstd's own contexts are not counted.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-static HELD: AtomicUsize = AtomicUsize::new(0);
-static MOST: AtomicUsize = AtomicUsize::new(0);
+static ALLOCATED_BYTES: AtomicUsize = AtomicUsize::new(0);
+static PEAK_BYTES: AtomicUsize = AtomicUsize::new(0);
 
 /// The system's allocator, counted.
 #[derive(Debug)]
-pub struct Counting;
+pub struct CountingAllocator;
 
-fn add(size: usize) {
-    let held = HELD.fetch_add(size, Relaxed) + size;
-    MOST.fetch_max(held, Relaxed);
-}
-
-// SAFETY: all of it is the system allocator's doing.
-unsafe impl GlobalAlloc for Counting {
+// SAFETY: every call is passed on to the system's allocator.
+unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        add(layout.size());
+        let bytes = ALLOCATED_BYTES.fetch_add(layout.size(), Relaxed) + layout.size();
+        PEAK_BYTES.fetch_max(bytes, Relaxed);
         // SAFETY: the caller's promises are the same.
         unsafe { System.alloc(layout) }
     }
 
-    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
-        HELD.fetch_sub(layout.size(), Relaxed);
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        ALLOCATED_BYTES.fetch_sub(layout.size(), Relaxed);
         // SAFETY: the caller's promises are the same.
-        unsafe { System.dealloc(place, layout) }
+        unsafe { System.dealloc(memory, layout) }
     }
 }
 
-/// What `work` gives, and how many bytes more than before it held at most.
-pub fn most_held<T>(work: impl FnOnce() -> T) -> (T, usize) {
-    let before = HELD.load(Relaxed);
-    MOST.store(before, Relaxed);
+/// The result of `work`, and the peak of its allocated bytes above those allocated before.
+pub fn with_peak_bytes<T>(work: impl FnOnce() -> T) -> (T, usize) {
+    let before = ALLOCATED_BYTES.load(Relaxed);
+    PEAK_BYTES.store(before, Relaxed);
     let result = work();
-    (result, MOST.load(Relaxed).saturating_sub(before))
+    (result, PEAK_BYTES.load(Relaxed).saturating_sub(before))
 }

@@ -2,8 +2,8 @@
 //!
 //! | target | its input | what must hold |
 //! |---|---|---|
-//! | `open` | a file | its head is read or refused, and nobody is promised more than limits allow |
-//! | `decode` | a file | it is read or refused, in no more memory than it says, and `check` agrees |
+//! | `open` | a file | its index is read or refused, and no length exceeds the limits |
+//! | `decode` | a file | it is read or refused within the memory budget, previews included, and `check` agrees |
 //! | `chunked` | a file, and choices | pieces in any order give what the whole gives |
 //! | `crafted` | choices | the same of files that are put together part by part, past zstd |
 //! | `round_trip` | choices | what the encoder writes the reader reads, as well as the file says |
@@ -19,4 +19,4 @@ pub mod seal;
 pub mod source;
 
 #[global_allocator]
-static HEAP: heap::Counting = heap::Counting;
+static HEAP: heap::CountingAllocator = heap::CountingAllocator;

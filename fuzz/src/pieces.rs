@@ -1,6 +1,6 @@
 //! A file in pieces.
 
-use relightable_photo::format::{Head, Interest, Reader};
+use relightable_photo::format::{FileIndex, Interest, Reader};
 use relightable_photo::transport::Decibels;
 
 use crate::choices::Choices;
@@ -16,16 +16,18 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
     let mut failed = None;
     // Each turn feeds at least a byte that was not there.
     for _ in 0..=2 * file.len() {
-        let interest = match choices.chance(64) && reader.head().is_some() {
+        let interest = match choices.chance(64) && reader.index().is_some() {
             true => Interest {
                 viewport: Some((0..choices.byte().into(), 0..choices.byte().into())),
-                quality: choices.chance(128).then(|| Decibels(choices.byte().into())),
+                snr: choices.chance(128).then(|| Decibels(choices.byte().into())),
             },
             false => Interest::default(),
         };
         let there = |reader: &Reader, interest: &Interest| -> Vec<_> {
             let wanted = reader.wants(interest).into_iter();
-            wanted.filter(|range| range.start < file.len() as u64).collect()
+            wanted
+                .filter(|range| range.start < file.len() as u64)
+                .collect()
         };
         let mut ranges = there(&reader, &interest);
         if ranges.is_empty() {
@@ -37,7 +39,9 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
         let range = &ranges[usize::from(choices.u16()) % ranges.len()];
         let (start, end) = (range.start as usize, (range.end as usize).min(file.len()));
         let mut range = start..end;
-        if choices.chance(160) && let Some(part) = part(reader.head(), &range, choices) {
+        if choices.chance(160)
+            && let Some(part) = part(reader.index(), &range, choices)
+        {
             range = part;
         }
         let length = match choices.byte() {
@@ -51,7 +55,10 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
             let wanted = reader.wants(&Interest::default());
             let ends = wanted.iter().map(|range| range.end as usize);
             let known = ends.filter(|end| *end <= range.start).max().unwrap_or(0);
-            if wanted.iter().any(|wanted| wanted.start == range.start as u64) {
+            if wanted
+                .iter()
+                .any(|wanted| wanted.start == range.start as u64)
+            {
                 let before = range.start - known;
                 range.start -= before.min(choices.byte().into());
             }
@@ -90,12 +97,12 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
 
 /// A part within a range.
 fn part(
-    head: Option<&Head>,
+    index: Option<&FileIndex>,
     range: &std::ops::Range<usize>,
     choices: &mut Choices<'_>,
 ) -> Option<std::ops::Range<usize>> {
-    let head = head?;
-    let ranges = head.parts().map(|part| head.range(part));
+    let index = index?;
+    let ranges = index.chunks().map(|part| index.range(part));
     let ranges = ranges.map(|part| part.start as usize..part.end as usize);
     let inside = ranges.filter(|part| part.start >= range.start && part.end <= range.end);
     let inside: Vec<_> = inside.collect();
@@ -109,7 +116,7 @@ fn part(
 /// If they differ.
 pub fn check(file: &[u8], choices: &mut Choices<'_>) {
     // Nobody wants what follows the end: a reader that gets it all the same refuses it.
-    let end = reading::head(file).map(|head| head.header.file_bytes);
+    let end = reading::index(file).map(|index| index.header.file_bytes);
     let end = end.and_then(|end| usize::try_from(end).ok());
     let file = &file[..end.unwrap_or(file.len()).min(file.len())];
     match (read(file, choices), reading::whole(file)) {

@@ -1,22 +1,20 @@
 //! Reading a file in all the ways there are, and what must hold of each.
 
 use relightable_photo::format::{
-    self, FIRST_BYTES, FormatError, HEADER_BYTES, Head, Interest, Limits, MetadataJson, Reader,
+    self, FIRST_BYTES, FileIndex, FormatError, HEADER_BYTES, Interest, Limits, MetadataJson, Reader,
 };
 use relightable_photo::transport::{CHANNELS, CoefficientTile, Decibels, Tile, Transport};
 
 use crate::choices::Choices;
-use crate::heap::most_held;
+use crate::heap::with_peak_bytes;
 use crate::source::{Given, Wanted};
 
-/// What decoding may ask for. 16 MiB of it are for tokens, of which fuzzers make few.
+/// The memory budget of fuzzed readers.
 pub const LIMITS: Limits = Limits {
     decoded_bytes: 40 << 20,
 };
-/// Most bytes of a part before compression.
-const MOST_PLAIN: u64 = 8 << 20;
-/// Bytes not worth counting: messages, tables of a file without tiles.
-const SMALL: usize = 64 << 10;
+/// Bytes that the budget does not count: messages, ranges.
+const UNCOUNTED_BYTES: usize = 64 << 10;
 
 /// What a file gives.
 pub type Read = Result<(Transport, MetadataJson), FormatError>;
@@ -28,49 +26,58 @@ pub fn whole(file: &[u8]) -> Read {
     reader.finish()
 }
 
-/// The head, if it can be read and file bytes suffice.
-pub fn head(file: &[u8]) -> Option<Head> {
+/// The index, if it can be read and file bytes suffice.
+pub fn index(file: &[u8]) -> Option<FileIndex> {
     let mut reader = Reader::new(LIMITS);
     reader.feed(0, &file[..file.len().min(HEADER_BYTES)]).ok()?;
-    let end = usize::try_from(reader.head_bytes()?).ok()?;
+    let end = usize::try_from(reader.index_bytes()?).ok()?;
     reader.feed(0, file.get(..end)?).ok()?;
-    reader.head().cloned()
+    reader.index().cloned()
 }
 
-/// What must hold of every head.
+/// What must hold of every index.
 ///
 /// # Panics
 /// If it does not.
 pub fn check_head(file: &[u8], choices: &mut Choices<'_>) {
     let mut reader = Reader::new(LIMITS);
     assert_eq!(reader.wants(&Interest::default()), [0..FIRST_BYTES]);
-    if reader.feed(0, &file[..file.len().min(HEADER_BYTES)]).is_err() {
+    if reader
+        .feed(0, &file[..file.len().min(HEADER_BYTES)])
+        .is_err()
+    {
         return;
     }
-    let Some(end) = reader.head_bytes() else {
+    let Some(end) = reader.index_bytes() else {
         return;
     };
     // What decompresses to so much is at most about as long; the rest has limits of its own.
     let most = HEADER_BYTES as u64 + 2 * LIMITS.decoded_bytes + (16 << 20) + (1 << 20);
-    assert!(end <= most, "the head has {end} bytes, though limits allow {most}");
+    assert!(
+        end <= most,
+        "the index has {end} bytes, though limits allow {most}"
+    );
     assert_eq!(
         reader.wants(&Interest::default()),
         [file.len().min(HEADER_BYTES) as u64..end]
     );
-    let Some(head) = head(file) else {
+    let Some(index) = index(file) else {
         return;
     };
-    let geometry = head.header.geometry;
+    let geometry = index.header.geometry;
     assert!(geometry.validate().is_ok());
-    assert_eq!(head.tiles(), geometry.tile_grid().area());
-    let mut next = head.header.head_bytes();
-    for part in head.parts() {
-        let range = head.range(part);
-        assert!(range.start == next && range.end > next, "parts are in a row");
+    assert_eq!(index.tiles(), geometry.tile_grid().area());
+    let mut next = index.header.index_bytes();
+    for part in index.chunks() {
+        let range = index.range(part);
+        assert!(
+            range.start == next && range.end > next,
+            "parts are in a row"
+        );
         next = range.end;
     }
-    assert_eq!(next, head.header.file_bytes);
-    for scan in &head.scans {
+    assert_eq!(next, index.header.file_bytes);
+    for scan in &index.scans {
         assert!(scan.step > 0.0 && scan.step.is_finite());
     }
     let mut reader = Reader::new(LIMITS);
@@ -79,23 +86,28 @@ pub fn check_head(file: &[u8], choices: &mut Choices<'_>) {
     }
     let all = reader.wants(&Interest::default());
     let sum: u64 = all.iter().map(|range| range.end - range.start).sum();
-    assert_eq!(sum, head.header.file_bytes - end, "all of it is wanted");
+    assert_eq!(sum, index.header.file_bytes - end, "all of it is wanted");
     let interest = Interest {
         viewport: Some((
             choices.u32()..choices.u32(),
             choices.u16().into()..choices.u16().into(),
         )),
-        quality: Some(Decibels(choices.f64())),
+        snr: Some(Decibels(choices.f64())),
     };
     for range in reader.wants(&interest) {
-        let inside = all.iter().any(|all| all.start <= range.start && range.end <= all.end);
+        let inside = all
+            .iter()
+            .any(|all| all.start <= range.start && range.end <= all.end);
         assert!(inside && range.start < range.end);
     }
     let progress = reader.progress();
-    assert_eq!((progress.bytes, progress.file_bytes), (end, Some(head.header.file_bytes)));
+    assert_eq!(
+        (progress.bytes, progress.file_bytes),
+        (end, Some(index.header.file_bytes))
+    );
     let early = reader.finish_early();
-    let (early, _) = early.expect("a head alone relights, darkly");
-    assert_eq!(early.tiles.len(), head.tiles());
+    let (early, _) = early.expect("a index alone relights, darkly");
+    assert_eq!(early.tiles.len(), index.tiles());
     assert!(early.tiles.iter().all(|tile| tile.is_dark()));
 }
 
@@ -108,12 +120,22 @@ pub fn check_transport(transport: &Transport) {
     let tiles: Vec<_> = geometry.tiles().collect();
     assert_eq!(transport.tiles.len(), tiles.len());
     let (rank, area) = (transport.basis.rank(), geometry.window.area());
-    assert!(transport.basis.kernels.iter().all(|kernel| kernel.len() == area));
+    assert!(
+        transport
+            .basis
+            .kernels
+            .iter()
+            .all(|kernel| kernel.len() == area)
+    );
     for (tile, rect) in transport.tiles.iter().zip(tiles) {
         let (coefficients, functions) = (&tile.coefficients, &tile.functions);
         assert_eq!((coefficients.rect, functions.rect), (rect, rect));
         let steps = coefficients.step.iter().chain(&functions.step);
-        assert!(steps.into_iter().all(|step| step.is_normal() && *step > 0.0));
+        assert!(
+            steps
+                .into_iter()
+                .all(|step| step.is_normal() && *step > 0.0)
+        );
         let texels = CoefficientTile::texels(rect, rank);
         assert!(coefficients.is_dark() || coefficients.codes.len() == texels);
         let codes = rect.extent.area() * area;
@@ -121,32 +143,30 @@ pub fn check_transport(transport: &Transport) {
     }
 }
 
-/// Reads a file, and checks it part by part: one takes it where the other does, and neither in more
-/// memory than the head foretells.
+/// Reads a file within the memory budget, and checks it chunk by chunk: both accept it or both refuse it.
 ///
 /// # Panics
 /// If one does not.
 pub fn check_file(file: &[u8]) -> Read {
-    let (read, most) = most_held(|| whole(file));
+    let (read, peak) = with_peak_bytes(|| whole(file));
+    check_peak(peak);
     if let Ok((transport, _)) = &read {
         check_transport(transport);
     }
-    let Some(head) = head(file) else {
-        assert!(read.is_err(), "a file without a head was read");
+    let Some(index) = index(file) else {
+        assert!(read.is_err(), "a file without an index was read");
         return read;
     };
-    let foretold = foretold(&head, file);
-    assert!(most <= foretold, "reading holds {most} bytes, {foretold} were foretold");
-    if file.len() as u64 != head.header.file_bytes {
+    if file.len() as u64 != index.header.file_bytes {
         assert!(read.is_err(), "a file of another length was read");
         return read;
     }
-    let checked = head.parts().try_for_each(|part| {
-        let range = head.range(part);
+    let checked = index.chunks().try_for_each(|part| {
+        let range = index.range(part);
         let bytes = &file[range.start as usize..range.end as usize];
-        format::check(&head, part, bytes)
+        format::check(&index, part, bytes)
     });
-    let by_itself = tiles_by_themselves(&head, file);
+    let by_itself = tiles_by_themselves(&index, file);
     match (&read, &by_itself) {
         (Ok((transport, _)), Ok(tiles)) => assert!(transport.tiles == *tiles, "tiles differ"),
         (Err(_), Err(_)) => {}
@@ -162,51 +182,65 @@ pub fn check_file(file: &[u8]) -> Read {
 }
 
 /// The tiles of a file, each read by itself.
-fn tiles_by_themselves(head: &Head, file: &[u8]) -> Result<Vec<Tile>, FormatError> {
+fn tiles_by_themselves(index: &FileIndex, file: &[u8]) -> Result<Vec<Tile>, FormatError> {
     let fetch = |part| {
-        let range = head.range(part);
+        let range = index.range(part);
         Ok(file[range.start as usize..range.end as usize].to_vec())
     };
-    let rank = format::decode_basis::<FormatError>(head, fetch)?.rank();
+    let rank = format::decode_basis::<FormatError>(index, fetch)?.rank();
     let tile = |i| {
-        let tile = format::decode_tile::<FormatError>(head, i, fetch)?;
+        let tile = format::decode_tile::<FormatError>(index, i, fetch)?;
         Ok(Tile::quantise(&tile, rank))
     };
-    (0..head.tiles()).map(tile).collect()
+    (0..index.tiles()).map(tile).collect()
 }
 
-/// Bytes that reading may hold: what the limits count, with the tokens that there are in place of the
-/// most there can be, and what is kept of the file itself.
-fn foretold(head: &Head, file: &[u8]) -> usize {
-    // Refused for what the header says, and then perhaps for what the directory says.
-    let mut need = 0;
-    let head_bytes = head.header.head_bytes() as usize;
-    while let Err(error) = Reader::new(Limits { decoded_bytes: need }).feed(0, &file[..head_bytes]) {
-        match error {
-            FormatError::Limit { need: more, .. } if more > need => need = more,
-            error => panic!("limits change another error: {error}"),
+fn check_peak(peak: usize) {
+    let allowed = LIMITS.decoded_bytes as usize + UNCOUNTED_BYTES;
+    assert!(
+        peak <= allowed,
+        "reading allocates {peak} bytes, {allowed} are allowed"
+    );
+}
+
+/// Reads a file scan by scan, with a preview after each: neither exceeds the memory budget.
+///
+/// # Panics
+/// If one does.
+pub fn check_previews(file: &[u8]) {
+    let Some(index) = index(file) else {
+        return;
+    };
+    let ends = (0..index.scans.len()).map(|scan| index.scan_range(scan).end);
+    let ends: Vec<u64> = std::iter::once(index.header.index_bytes()).chain(ends).collect();
+    let (previews, peak) = with_peak_bytes(|| -> Result<(), FormatError> {
+        let mut reader = Reader::new(LIMITS);
+        let mut start = 0;
+        for end in ends {
+            let Some(bytes) = file.get(start as usize..end as usize) else {
+                break;
+            };
+            reader.feed(start, bytes)?;
+            if let Some(preview) = reader.preview()? {
+                assert_eq!(preview.tiles.len(), index.tiles());
+            }
+            start = end;
         }
-    }
-    let counted = (need - 2 * MOST_PLAIN) as usize;
-    let plain = head.parts().filter_map(|part| {
-        let tile = part.tile?;
-        Some(head.entry(part.scan, tile).plain as usize)
+        Ok(())
     });
-    let tokens = 2 * plain.max().unwrap_or(0);
-    // Lists in JSON are shorter than in memory.
-    let metadata = 16 * head.header.metadata_bytes as usize;
-    counted + tokens + metadata + 4 * file.len() + SMALL
+    drop(previews); // errors are those of `check_file`
+    check_peak(peak);
 }
 
-/// What is there of a file whose end is not: any beginning that has the head relights.
+/// Every prefix of a file that has the index gives light transport.
 ///
 /// # Panics
 /// If it does not.
 pub fn check_early(file: &[u8]) {
-    let Some(head) = head(file) else {
+    let Some(index) = index(file) else {
         return;
     };
-    let head_bytes = head.header.head_bytes() as usize;
+    let head_bytes = index.header.index_bytes() as usize;
     let mut reader = Reader::new(LIMITS);
     let there = file.len() - head_bytes;
     if reader.feed(0, &file[..head_bytes + there / 2]).is_err() {
@@ -245,7 +279,10 @@ pub fn check_error(
         codes += worth(tile.coefficients.step) * coefficients as f64;
     }
     let Some(claimed) = claimed else {
-        assert!(energy == 0.0 || error <= energy, "all of it is lost: {given:?}, {wanted:?}");
+        assert!(
+            energy == 0.0 || error <= energy,
+            "all of it is lost: {given:?}, {wanted:?}"
+        );
         return;
     };
     if let Wanted::Snr(snr) = wanted

@@ -16,7 +16,9 @@ const ENTRY: usize = 12;
 const MOST_DIRECTORY: usize = 1 << 20;
 
 fn u32_at(bytes: &[u8], at: usize) -> usize {
-    let field = bytes.get(at..at + 4).and_then(|field| field.try_into().ok());
+    let field = bytes
+        .get(at..at + 4)
+        .and_then(|field| field.try_into().ok());
     field.map_or(0, u32::from_le_bytes) as usize
 }
 

@@ -2,14 +2,14 @@
 
 use std::ops::RangeInclusive;
 
+use relightable_photo::executor::{Executor, SequentialExecutor};
 use relightable_photo::format::{
-    EncodedFile, Extension, FormatError, Judge, Metadata, Quality, Source,
+    DistortionMetric, EncodedFile, Extension, FormatError, Metadata, RateTarget, Source,
 };
 use relightable_photo::transport::{
     BandTile, Basis, CHANNELS, Correspondence, Decibels, Extent, Geometry, TileRect,
     TransportFunctions, Window,
 };
-use relightable_photo::executor::{SequentialExecutor, Executor};
 
 use crate::choices::Choices;
 
@@ -173,24 +173,34 @@ impl Given {
             }
             // Sparse.
             5 => (0..count)
-                .map(|_| if noise.next() % 16 == 0 { noise.signed() } else { 0.0 })
+                .map(|_| {
+                    if noise.next() % 16 == 0 {
+                        noise.signed()
+                    } else {
+                        0.0
+                    }
+                })
                 .collect(),
             // Smooth.
             6 => {
                 let (start, slope) = (noise.signed(), noise.signed() * 0.05);
-                (0..count).map(|i| start + slope * (i % 64) as f32).collect()
+                (0..count)
+                    .map(|i| start + slope * (i % 64) as f32)
+                    .collect()
             }
             _ => (0..count).map(|_| noise.signed()).collect(),
         };
         let tame = |v: &f32| *v == 0.0 || TAME.contains(&v.abs());
-        self.tame &= numbers.iter().all(|v| tame(v) || v.abs() < 1.0 && v.abs() > 1e-9);
+        self.tame &= numbers
+            .iter()
+            .all(|v| tame(v) || v.abs() < 1.0 && v.abs() > 1e-9);
         self.tame &= numbers.iter().fold(0.0, |peak: f32, v| peak.max(v.abs())) != 0.0;
         numbers
     }
 
     pub fn encode(
         &self,
-        quality: Quality<'_>,
+        quality: RateTarget<'_>,
         executor: &impl Executor,
     ) -> Result<EncodedFile, FormatError> {
         let source = Source {
@@ -224,11 +234,14 @@ impl Given {
     pub fn inside(&self) -> bool {
         let side = i64::from(self.geometry.window.side());
         let fits = |at: i32, length: u32| at >= 0 && i64::from(at) + side <= length.into();
-        self.geometry.tiles().flat_map(TileRect::pixels).all(|pixel| {
-            let origin = self.geometry.window_origin(pixel);
-            let light = self.geometry.light;
-            fits(origin.u, light.width) && fits(origin.v, light.height)
-        })
+        self.geometry
+            .tiles()
+            .flat_map(TileRect::pixels)
+            .all(|pixel| {
+                let origin = self.geometry.window_origin(pixel);
+                let light = self.geometry.light;
+                fits(origin.u, light.width) && fits(origin.v, light.height)
+            })
     }
 }
 
@@ -271,10 +284,10 @@ impl Wanted {
             asked: std::sync::atomic::AtomicUsize::new(0),
         };
         let quality = match self {
-            Self::Snr(snr) => Quality::Snr(snr),
-            Self::Bytes(most) => Quality::Bytes(most),
-            Self::Lossless => Quality::Lossless,
-            Self::Loss(most) => Quality::Loss(most, &judge),
+            Self::Snr(snr) => RateTarget::Snr(snr),
+            Self::Bytes(most) => RateTarget::Bytes(most),
+            Self::Lossless => RateTarget::Lossless,
+            Self::Loss(most) => RateTarget::Loss(most, &judge),
         };
         given.encode(quality, &SequentialExecutor)
     }
@@ -287,7 +300,7 @@ struct Whim<'a> {
     asked: std::sync::atomic::AtomicUsize,
 }
 
-impl Judge for Whim<'_> {
+impl DistortionMetric for Whim<'_> {
     fn tiles(&self) -> Vec<BandTile> {
         let some = self.given.tiles.iter().step_by(3);
         some.take(3).cloned().collect()
@@ -299,7 +312,9 @@ impl Judge for Whim<'_> {
             let area = self.given.geometry.window.area();
             assert_eq!(functions.tau.len(), tile.rect.extent.area() * area);
         }
-        let asked = self.asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        let asked = self
+            .asked
+            .fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         match self.opinions.get(asked).copied().unwrap_or(0) {
             255 => Decibels(f64::NAN),
             opinion => Decibels(f64::from(opinion) / 100.0),

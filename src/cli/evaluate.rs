@@ -57,7 +57,7 @@ struct EvaluateReport {
 
 pub fn run(args: &EvaluateArgs) -> Result<()> {
     let file = read_ltm(&args.file, args.first)?;
-    let header = &file.head.header;
+    let header = &file.index.header;
     let folder = CaptureFolder::open(&args.capture)?;
     let (geometry, manifest) = (&header.geometry, folder.manifest());
     for (name, found, expected) in [
@@ -81,7 +81,7 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
         file_bytes: header.file_bytes,
         read_bytes: file.bytes,
         read_scans: file.scans,
-        scans: file.head.scans.len(),
+        scans: file.index.scans.len(),
     };
     let mut relighter = CpuRelighter::new(Arc::new(file.transport));
     if let Some(truth) = folder.truth()? {
@@ -92,7 +92,7 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
             report.relit.insert(name, psnr);
         }
     }
-    let used = file.head.metadata.read()?.shots_used;
+    let used = file.index.metadata.read()?.shots_used;
     let heldout: Vec<usize> = (0..manifest.shots.len())
         .filter(|i| !used.contains(i))
         .collect();

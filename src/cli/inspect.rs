@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::ltm_file::open_ltm;
 use super::report::{format_bytes, format_shots, print_json, print_line};
-use crate::format::{Coding, Head, Metadata, PartNumber};
+use crate::format::{ChunkId, Coding, FileIndex, Metadata};
 use crate::transport::Decibels;
 
 /// Show the contents of a relightable photograph; reads its file index only
@@ -63,9 +63,9 @@ struct ScanReport {
 }
 
 impl ScanReport {
-    fn new(head: &Head, scan: usize) -> Self {
-        let range = head.scan_range(scan);
-        let scan = &head.scans[scan];
+    fn new(index: &FileIndex, scan: usize) -> Self {
+        let range = index.scan_range(scan);
+        let scan = &index.scans[scan];
         Self {
             coding: match scan.coding {
                 Coding::Transform => "transform",
@@ -96,8 +96,8 @@ impl ScanReport {
 }
 
 pub fn run(args: &InspectArgs) -> Result<()> {
-    let (file, head) = open_ltm(&args.file)?;
-    let declared = head.header.file_bytes;
+    let (file, index) = open_ltm(&args.file)?;
+    let declared = index.header.file_bytes;
     let length = file.metadata().map_or(declared, |file| file.len());
     let name = args.file.display();
     match length.cmp(&declared) {
@@ -110,37 +110,37 @@ pub fn run(args: &InspectArgs) -> Result<()> {
              ignored"
         ),
     }
-    let geometry = &head.header.geometry;
-    let chunks: Vec<PartNumber> = head.parts().filter(|part| part.tile.is_some()).collect();
+    let geometry = &index.header.geometry;
+    let chunks: Vec<ChunkId> = index.chunks().filter(|part| part.tile.is_some()).collect();
     // Whether a tile has factored chunks, and direct chunks.
-    let mut has_chunks = vec![[false; 2]; head.tiles()];
+    let mut has_chunks = vec![[false; 2]; index.tiles()];
     for part in &chunks {
         if let Some(tile) = part.tile {
-            has_chunks[tile][usize::from(head.scans[part.scan].coding.is_direct())] = true;
+            has_chunks[tile][usize::from(index.scans[part.scan].coding.is_direct())] = true;
         }
     }
     let count = |is_counted: fn(&[bool; 2]) -> bool| {
         has_chunks.iter().filter(|tile| is_counted(tile)).count()
     };
-    let sizes = chunks.iter().map(|part| head.range(*part));
+    let sizes = chunks.iter().map(|part| index.range(*part));
     let report = InspectReport {
         camera: [geometry.camera.width, geometry.camera.height],
         light: [geometry.light.width, geometry.light.height],
         window: geometry.window.side(),
         correspondence: geometry.correspondence.affine,
         tile_side: geometry.tile_side,
-        tiles: head.tiles(),
+        tiles: index.tiles(),
         dark_tiles: count(|tile| *tile == [false; 2]),
         direct_tiles: count(|tile| tile[1]),
         factored_tiles: count(|tile| tile[0]),
-        rank: Some(head.header.rank).filter(|&rank| rank > 0),
-        head_bytes: head.header.head_bytes(),
+        rank: Some(index.header.rank).filter(|&rank| rank > 0),
+        head_bytes: index.header.index_bytes(),
         largest_chunk_bytes: sizes.map(|r| (r.end - r.start) as u32).max().unwrap_or(0),
-        scans: (0..head.scans.len())
-            .map(|scan| ScanReport::new(&head, scan))
+        scans: (0..index.scans.len())
+            .map(|scan| ScanReport::new(&index, scan))
             .collect(),
-        file_bytes: head.header.file_bytes,
-        metadata: head.metadata.read()?,
+        file_bytes: index.header.file_bytes,
+        metadata: index.metadata.read()?,
     };
     if args.json {
         return print_json(&report);

@@ -8,7 +8,7 @@ use std::path::Path;
 use anyhow::{Context, Result, anyhow, ensure};
 
 use super::arguments::ByteCount;
-use crate::format::{FormatError, HEADER_BYTES, Head, Interest, Limits, Part, Reader};
+use crate::format::{FileIndex, FileSection, FormatError, HEADER_BYTES, Interest, Limits, Reader};
 use crate::transport::Transport;
 
 /// Bytes read at a time.
@@ -20,7 +20,7 @@ const LIMITS: Limits = Limits {
 
 /// An `.ltm` file, or a prefix of one.
 pub struct LtmFile {
-    pub head: Head,
+    pub index: FileIndex,
     pub transport: Transport,
     /// Bytes read.
     pub bytes: u64,
@@ -36,27 +36,27 @@ pub fn read_ltm(path: &Path, first: Option<PrefixLength>) -> Result<LtmFile> {
         let max_bytes = first.map_or(u64::MAX, |first| first.bytes_of(length));
         let mut reader = Reader::new(LIMITS);
         let fed = feed_all(&mut reader, file.take(max_bytes));
-        let Some(head) = reader.head().cloned() else {
+        let Some(index) = reader.index().cloned() else {
             fed?;
             ensure!(
                 max_bytes >= length,
                 "the first {max_bytes} bytes end within its file index; give --first more"
             );
-            return Err(reader.cut_short().into());
+            return Err(reader.truncated().into());
         };
         let progress = reader.progress();
         let transport = fed.and_then(|()| match first {
             Some(_) => Ok(reader.finish_early()?),
             None => Ok(reader.finish()?),
         });
-        let (transport, _) = transport.map_err(|error| match intact_bytes(&head, &error) {
-            Some(intact) if intact > head.header.head_bytes() => {
+        let (transport, _) = transport.map_err(|error| match intact_bytes(&index, &error) {
+            Some(intact) if intact > index.header.index_bytes() => {
                 anyhow!("{error:#} (--first {intact} reads the part before the damage)")
             }
             _ => error,
         })?;
         Ok(LtmFile {
-            head,
+            index,
             transport,
             bytes: progress.bytes,
             scans: progress.scans,
@@ -80,35 +80,38 @@ fn feed_all(reader: &mut Reader, mut file: impl Read) -> Result<()> {
 }
 
 /// Number of bytes before the damage that `error` reports, if known.
-fn intact_bytes(head: &Head, error: &anyhow::Error) -> Option<u64> {
+fn intact_bytes(index: &FileIndex, error: &anyhow::Error) -> Option<u64> {
     match error.downcast_ref::<FormatError>()? {
         FormatError::Truncated { got, .. } => Some(*got),
-        FormatError::Checksum { part } | FormatError::Decompress { part, .. } => {
-            let bad = head.parts().find(|&number| Part::from(number) == *part);
-            bad.map(|number| head.range(number).start)
+        FormatError::ChecksumMismatch {
+            section: FileSection::Chunk(chunk),
         }
+        | FormatError::DamagedSection {
+            section: FileSection::Chunk(chunk),
+            ..
+        } => Some(index.range(*chunk).start),
         _ => None,
     }
 }
 
 /// Opens an `.ltm` file and reads its file index.
-pub fn open_ltm(path: &Path) -> Result<(File, Head)> {
-    let read = || -> Result<(File, Head)> {
+pub fn open_ltm(path: &Path) -> Result<(File, FileIndex)> {
+    let read = || -> Result<(File, FileIndex)> {
         let mut file = open(path)?;
         let mut reader = Reader::new(LIMITS);
         loop {
-            if let Some(head) = reader.head() {
-                return Ok((file, head.clone()));
+            if let Some(index) = reader.index() {
+                return Ok((file, index.clone()));
             }
             let range = reader.wants(&Interest::default()).into_iter().next();
             let range = range.unwrap_or_default();
             let bytes = read_range(&mut file, range.clone())?;
             if bytes.is_empty() {
-                return Err(reader.cut_short().into());
+                return Err(reader.truncated().into());
             }
             // Chunks after the file index need not be decoded.
-            let head = reader.head_bytes().unwrap_or(HEADER_BYTES as u64);
-            let index_bytes = bytes.len().min((head - range.start) as usize);
+            let index = reader.index_bytes().unwrap_or(HEADER_BYTES as u64);
+            let index_bytes = bytes.len().min((index - range.start) as usize);
             reader.feed(range.start, &bytes[..index_bytes])?;
         }
     };

@@ -83,13 +83,13 @@ pub fn run(args: &RelightArgs) -> Result<()> {
     let output = OutputFile::create(&args.output, OutputFormat::Png)?;
     let file = read_ltm(&args.file, args.first)?;
     if args.first.is_some() {
-        let scans = file.head.scans.len();
+        let scans = file.index.scans.len();
         eprintln!(
             "note: {} of {scans} scans are complete in these {} bytes",
             file.scans, file.bytes
         );
     }
-    let geometry = &file.head.header.geometry;
+    let geometry = &file.index.header.geometry;
     let light = match (args.at, args.time) {
         (Some([x, y]), _) => Light::torch(geometry.light, TorchPose::behind(geometry, x, y)),
         (None, Some(seconds)) => Light::fire(geometry.light, seconds),

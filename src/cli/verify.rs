@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::ltm_file::{open_ltm, read_range};
 use super::report::{format_bytes, print_json, print_line};
-use crate::format::{self, FormatError, PartNumber};
+use crate::format::{self, ChunkId, FormatError};
 
 /// Check every checksum and every tile of a relightable photograph
 #[derive(Debug, Args)]
@@ -71,23 +71,23 @@ pub fn run(args: &VerifyArgs) -> Result<()> {
 
 /// Checks chunk by chunk, as a file may be larger than memory.
 fn verify(args: &VerifyArgs, report: &mut VerifyReport) -> Result<()> {
-    let (mut file, head) = open_ltm(&args.file)?;
+    let (mut file, index) = open_ltm(&args.file)?;
     let name = || args.file.display().to_string();
-    let end = head.header.file_bytes;
-    report.tiles = Some(head.tiles());
-    report.scans = Some(head.scans.len());
+    let end = index.header.file_bytes;
+    report.tiles = Some(index.tiles());
+    report.scans = Some(index.scans.len());
     report.file_bytes = Some(end);
     let mut first = None;
-    for part in head.parts() {
-        let bytes = read_range(&mut file, head.range(part)).with_context(name)?;
-        if let Err(error) = format::check(&head, part, &bytes) {
+    for part in index.chunks() {
+        let bytes = read_range(&mut file, index.range(part)).with_context(name)?;
+        if let Err(error) = format::check(&index, part, &bytes) {
             report.bad_parts += 1;
             first.get_or_insert((part, error));
         }
     }
-    if let Some((PartNumber { scan, tile }, error)) = first {
-        let bytes = head.range(PartNumber { scan, tile });
-        let (bad, parts) = (report.bad_parts, head.parts().count());
+    if let Some((ChunkId { scan, tile }, error)) = first {
+        let bytes = index.range(ChunkId { scan, tile });
+        let (bad, parts) = (report.bad_parts, index.chunks().count());
         let at = format!(
             "{bad} of {parts} parts are bad, the first at bytes {} to {}",
             bytes.start, bytes.end

@@ -1,26 +1,55 @@
-//! One tile's share of one scan.
+//! Chunks: runs of bytes that have their own length and checksum.
 
-/// Bytes as they stand in a file, and how many they are before compression.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Chunk {
-    /// As in the file.
-    pub bytes: Vec<u8>,
-    /// Bytes of its zstd frames' contents.
-    pub plain: u32,
+/// A basis chunk or a tile chunk of one scan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ChunkId {
+    /// Number of the scan.
+    pub scan: usize,
+    /// Number of the tile; `None` for the basis chunk.
+    pub tile: Option<usize>,
 }
 
-/// What the directory says of a chunk.
+impl ChunkId {
+    /// The chunk of a tile.
+    pub fn of_tile(scan: usize, tile: usize) -> Self {
+        Self {
+            scan,
+            tile: Some(tile),
+        }
+    }
+
+    /// The chunk of a scan's basis functions.
+    pub fn of_basis(scan: usize) -> Self {
+        Self { scan, tile: None }
+    }
+}
+
+impl std::fmt::Display for ChunkId {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let scan = self.scan;
+        match self.tile {
+            None => write!(f, "basis (scan {scan})"),
+            Some(tile) => write!(f, "picture data (scan {scan}, tile {tile})"),
+        }
+    }
+}
+
+/// The directory's entry for a tile chunk.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ChunkEntry {
-    /// Bytes in the file; 0 of a chunk that is not there, all of whose numbers are zero.
+    /// Bytes in the file; 0 if there is no chunk, which stands for zeros.
     pub bytes: u32,
-    /// Bytes of its zstd frames' contents.
-    pub plain: u32,
-    /// crc32c of the bytes in the file.
+    /// Bytes of the contents of its zstd frames; a token is one byte.
+    pub content_bytes: u32,
+    /// CRC-32C of the bytes in the file.
     pub crc: u32,
 }
 
-impl ChunkEntry {
-    /// Bytes of an entry in the directory.
-    pub const BYTES: usize = 12;
+/// A tile chunk as the encoder makes it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EncodedChunk {
+    /// Bytes in the file.
+    pub bytes: Vec<u8>,
+    /// Bytes of the contents of its zstd frames.
+    pub content_bytes: u32,
 }

@@ -1,109 +1,108 @@
-//! What can be wrong with an `.ltm` file.
+//! Errors of reading and writing `.ltm` files.
 
 use thiserror::Error;
 
-use super::header::{MAX_EXTENSION_BYTES, MAX_RANK};
-use super::metadata::MAX_METADATA_BYTES;
-use super::scan::MOST_SCANS;
+use super::chunk::ChunkId;
+use super::constants::{MAX_EXTENSION_BYTES, MAX_METADATA_BYTES, MAX_RANK, MAX_SCANS};
 use crate::transport::GeometryError;
 
-/// Why bytes are not a readable `.ltm` file.
+/// Why bytes are not a readable `.ltm` file, or a file cannot be written.
 #[derive(Debug, Error)]
 pub enum FormatError {
-    /// The magic is not there.
+    /// The file does not begin with the magic number.
     #[error(
-        "this is not an .ltm file: it {}; see whether it is the file that was meant",
-        beginning(found)
+        "this is not an .ltm file: it {}; check that it is the right file",
+        describe_beginning(found)
     )]
-    Magic {
+    UnknownMagic {
         /// First bytes found.
         found: Vec<u8>,
     },
-    /// The magic was damaged by a transfer in text mode.
+    /// A transfer in text mode damaged the magic number.
     #[error("{0} in this .ltm file, as a transfer in text mode does; transfer it again as binary")]
-    TextMode(TextDamage),
-    /// A version this reader does not know.
+    TextModeTransfer(TextDamage),
+    /// This reader does not know the version.
     #[error(
         "the file has format version {major}.{minor}, which this reader does not know: get the reader for it, or export the file again; if it is damaged, copy it again"
     )]
-    Version {
+    UnsupportedVersion {
         /// Major version found.
         major: u16,
         /// Minor version found.
         minor: u16,
     },
     /// Bytes do not match their checksum.
-    #[error("the {part} is damaged: its checksum does not match; copy or export the file again")]
-    Checksum {
-        /// Which part.
-        part: Part,
+    #[error("the {section} is damaged: its checksum does not match; copy or export the file again")]
+    ChecksumMismatch {
+        /// Where.
+        section: FileSection,
     },
-    /// The geometry cannot be.
+    /// The header has an invalid geometry.
     #[error("the header is invalid: {0}")]
-    Geometry(GeometryError),
-    /// A scan that this file cannot have.
+    InvalidGeometry(GeometryError),
+    /// The directory has an invalid scan record.
     #[error(
-        "the directory is invalid: scan {scan} is of unknown coding, or has components, a step or a length that it cannot have"
+        "the directory is invalid: scan {scan} has an unknown coding, or components, a step or a length outside its range; export the file again"
     )]
-    Scan {
-        /// Scan number; the number of scans if they do not go together.
+    InvalidScan {
+        /// Scan number; the number of scans if they are invalid together.
         scan: usize,
     },
-    /// Too many scans.
-    #[error("the file has {0} scans, more than the {MOST_SCANS} allowed")]
-    Scans(u32),
-    /// A chunk that this file cannot have.
+    /// The header declares too many scans.
+    #[error("the file has {0} scans, more than the {MAX_SCANS} allowed")]
+    TooManyScans(u32),
+    /// The directory has an invalid chunk entry.
     #[error(
-        "the directory is invalid: scan {scan} of tile {tile} has a length that it cannot have"
+        "the directory is invalid: scan {scan} of tile {tile} has a length outside its range; export the file again"
     )]
-    Entry {
+    InvalidChunkEntry {
         /// Scan number.
         scan: usize,
         /// Tile number.
         tile: usize,
     },
-    /// The parts do not add up to the file.
+    /// The lengths of the chunks do not add up to the length of the file.
     #[error(
-        "the directory is invalid: its parts end at byte {end}, and the file at byte {file_bytes}"
+        "the directory is invalid: its chunks end at byte {end}, and the file at byte {file_bytes}; export the file again"
     )]
-    Length {
-        /// End of the last part.
+    LengthMismatch {
+        /// End of the last chunk.
         end: u64,
         /// Length in the header.
         file_bytes: u64,
     },
     /// The extensions are too long.
     #[error("the file has {0} bytes of extensions, more than the {MAX_EXTENSION_BYTES} allowed")]
-    ExtensionLength(u32),
-    /// An extension that must be understood and is not.
+    ExtensionsTooLong(u32),
+    /// The reader does not know an extension that it must understand.
     #[error(
         "the file needs a reader that knows its extension \"{}\": get a newer one", tag.escape_ascii()
     )]
-    Extension {
+    UnknownExtension {
         /// Its name.
         tag: [u8; 4],
     },
-    /// Too large a basis.
+    /// The basis is too large.
     #[error("the basis has {0} functions, more than the {MAX_RANK} allowed")]
-    Rank(u64),
+    RankTooLarge(u64),
     /// The metadata is too long.
     #[error("the file has {0} bytes of metadata, more than the {MAX_METADATA_BYTES} allowed")]
-    MetadataLength(u64),
+    MetadataTooLong(u64),
     /// The metadata is not JSON of the expected form.
     #[error("the metadata is invalid: {0}")]
-    Metadata(String),
-    /// The metadata is not text.
+    InvalidMetadata(String),
+    /// The metadata is not UTF-8.
     #[error("the metadata is invalid: {0}")]
-    MetadataText(std::str::Utf8Error),
-    /// A part does not decompress to what the header asks for.
-    #[error("the {part} does not decompress: {reason}")]
-    Decompress {
-        /// Basis or which tile.
-        part: Part,
-        /// zstd's word for it, or what is wrong with what it gave.
+    InvalidMetadataText(std::str::Utf8Error),
+    /// A section does not decode.
+    #[error("the {section} does not decompress: {reason}; copy or export the file again")]
+    DamagedSection {
+        /// Where.
+        section: FileSection,
+        /// zstd's message, or the rule that is broken.
         reason: String,
     },
-    /// Decoding would take more memory than allowed.
+    /// Decoding would exceed the memory budget.
     #[error(
         "the file decodes to {need} bytes, more than the {limit} this program allows; use a smaller picture or window"
     )]
@@ -121,23 +120,23 @@ pub enum FormatError {
         /// Bytes asked for.
         need: usize,
     },
-    /// The file ended early.
+    /// The file ends early.
     #[error(
         "the file is cut short: it ends after {got} of {need} bytes; copy or download it again"
     )]
     Truncated {
         /// Bytes received.
         got: u64,
-        /// Bytes the file has, as far as is known.
+        /// Bytes of the file, as far as known.
         need: u64,
     },
-    /// Bytes were fed that were not next.
-    #[error("bytes from offset {got} were fed where {wanted} was wanted")]
-    Offset {
-        /// Where they came from.
+    /// The reader was fed bytes that do not follow those it has.
+    #[error("the reader got bytes from offset {got} and expected offset {expected}")]
+    Gap {
+        /// Offset of the bytes.
         got: u64,
-        /// What was next.
-        wanted: u64,
+        /// Offset of the next byte that the reader can take.
+        expected: u64,
     },
     /// Bytes follow the end that the header declares.
     #[error("the file goes on after its end at byte {end}; copy or export it again")]
@@ -145,41 +144,41 @@ pub enum FormatError {
         /// Length in the header.
         end: u64,
     },
-    /// Writing: zstd failed.
+    /// Writing: zstd fails.
     #[error("light transport does not compress: {0}")]
     Compress(std::io::Error),
-    /// Writing: the output failed.
+    /// Writing: the output fails.
     #[error("the file cannot be written: {0}")]
     Write(std::io::Error),
-    /// Writing: a tile cannot be had.
+    /// Writing: the source of a tile fails.
     #[error("a tile cannot be read back: {0}")]
     Source(std::io::Error),
-    /// Writing: not even the coarsest file is small enough.
-    #[error("the file takes at least {least} bytes, more than the {most} asked for")]
+    /// Writing: the coarsest file is larger than asked for.
+    #[error("the file takes at least {smallest} bytes, more than the {limit} asked for")]
     TooLarge {
         /// Bytes allowed.
-        most: u64,
+        limit: u64,
         /// Bytes of the smallest file.
-        least: u64,
+        smallest: u64,
     },
 }
 
-/// What a transfer in text mode did to a file.
+/// How a transfer in text mode changed a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum TextDamage {
     /// CR LF became LF, or LF CR LF.
     #[error("line ends were converted")]
     LineEnds,
-    /// Seven bits of each byte are left.
+    /// The highest bit of each byte is 0.
     #[error("the highest bit of bytes was cleared")]
     HighBit,
-    /// Bytes were taken for Latin-1 characters, or for UTF-8 that they are not, and written as UTF-8.
+    /// The bytes were read as Latin-1 or as invalid UTF-8, and written as UTF-8.
     #[error("bytes above 127 were replaced by characters in UTF-8")]
     Utf8,
 }
 
-/// What bytes that are no `.ltm` file are, as far as their beginning tells.
-fn beginning(found: &[u8]) -> String {
+/// What a file that is not an `.ltm` file is, by its first bytes.
+fn describe_beginning(found: &[u8]) -> String {
     let known: [(&[u8], &str); 7] = [
         (b"\x89PNG", "is a PNG picture"),
         (b"\xFF\xD8\xFF", "is a JPEG picture"),
@@ -196,47 +195,71 @@ fn beginning(found: &[u8]) -> String {
     )
 }
 
-// By hand, as its text holds all of the source's: a chain of causes would say it twice.
+// Not `#[from]`: the message holds the whole source, and a chain of causes would repeat it.
 impl From<GeometryError> for FormatError {
     fn from(error: GeometryError) -> Self {
-        Self::Geometry(error)
+        Self::InvalidGeometry(error)
     }
 }
 
-/// A part of the file, for messages.
+/// A section of the file, for messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub enum FileSection {
     /// The fixed header.
     Header,
-    /// The tile directory.
+    /// The directory.
     Directory,
     /// The extensions.
     Extensions,
     /// The JSON metadata.
     Metadata,
-    /// Functions of the basis.
-    Basis {
-        /// The scan that brings them.
-        scan: usize,
-    },
-    /// A tile's share of a scan.
-    Chunk {
-        /// Scan number.
-        scan: usize,
-        /// Tile number.
-        tile: usize,
-    },
+    /// A basis chunk or a tile chunk.
+    Chunk(ChunkId),
 }
 
-impl std::fmt::Display for Part {
+impl std::fmt::Display for FileSection {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Header => f.write_str("header"),
             Self::Directory => f.write_str("directory"),
             Self::Extensions => f.write_str("list of extensions"),
             Self::Metadata => f.write_str("metadata"),
-            Self::Basis { scan } => write!(f, "basis (scan {scan})"),
-            Self::Chunk { scan, tile } => write!(f, "picture data (scan {scan}, tile {tile})"),
+            Self::Chunk(chunk) => chunk.fmt(f),
         }
     }
+}
+
+/// Why the bytes of a section cannot be decoded, before the section is named.
+#[derive(Debug)]
+pub(super) enum SectionError {
+    /// The bytes are damaged: zstd's message, or the rule that is broken.
+    Damaged(String),
+    /// The memory budget, or the system, refuses memory.
+    NoMemory(FormatError),
+}
+
+impl SectionError {
+    /// The error with the section's name.
+    pub fn in_section(self, section: FileSection) -> FormatError {
+        match self {
+            Self::Damaged(reason) => FormatError::DamagedSection { section, reason },
+            Self::NoMemory(error) => error,
+        }
+    }
+
+    /// The error with the chunk's name.
+    pub fn in_chunk(self, chunk: ChunkId) -> FormatError {
+        self.in_section(FileSection::Chunk(chunk))
+    }
+}
+
+impl From<FormatError> for SectionError {
+    fn from(error: FormatError) -> Self {
+        Self::NoMemory(error)
+    }
+}
+
+/// A section that breaks a rule.
+pub(super) fn damaged(rule: impl Into<String>) -> SectionError {
+    SectionError::Damaged(rule.into())
 }

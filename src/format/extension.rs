@@ -1,17 +1,18 @@
-//! What later versions and other programs add to a file.
+//! Extensions: blocks of data that later versions and other programs add to a file.
 
-use super::FormatError;
-use super::error::Part;
+use super::budget::Budget;
+use super::error::{FileSection, FormatError};
+use super::fields::FieldReader;
 
-/// Bytes before an extension's data: tag, flags, length.
-const HEAD: usize = 12;
-/// The flag of what a reader must not pass over.
+/// Bytes of a record before its data: tag, flags, length.
+const RECORD_HEADER_BYTES: usize = 12;
+/// The flag of an extension that a reader must know to read the file.
 const MUST_UNDERSTAND: u32 = 1;
 
-/// A named block of data. This reader knows none; it keeps those that it may pass over.
+/// A named block of data. This version knows none; it keeps those that a reader may ignore.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Extension {
-    /// Its name: four characters of ASCII.
+    /// Its name: four ASCII characters.
     pub tag: [u8; 4],
     /// Whether a reader that does not know it has to refuse the file.
     pub must_understand: bool,
@@ -19,41 +20,57 @@ pub struct Extension {
     pub data: Vec<u8>,
 }
 
-/// As in a file.
+/// The records of `extensions` one after another.
 pub(super) fn encode(extensions: &[Extension]) -> Vec<u8> {
     let mut bytes = Vec::new();
     for extension in extensions {
         let flags = u32::from(extension.must_understand) * MUST_UNDERSTAND;
         bytes.extend(extension.tag);
         bytes.extend(flags.to_le_bytes());
-        bytes.extend((extension.data.len() as u32).to_le_bytes()); // the writer bounds the whole
+        bytes.extend((extension.data.len() as u32).to_le_bytes()); // the header's check bounds the sum
         bytes.extend(&extension.data);
     }
     bytes
 }
 
-/// Reads extensions; an error if there is one that has to be understood.
-pub(super) fn decode(mut bytes: &[u8]) -> Result<Vec<Extension>, FormatError> {
-    let cut = || FormatError::Decompress {
-        part: Part::Extensions,
-        reason: "they end within one".to_owned(),
-    };
-    let mut extensions = Vec::new();
-    while !bytes.is_empty() {
-        let (&[a, b, c, d, f0, f1, f2, f3, l0, l1, l2, l3], rest) =
-            bytes.split_first_chunk::<HEAD>().ok_or_else(cut)?;
-        let (tag, flags) = ([a, b, c, d], u32::from_le_bytes([f0, f1, f2, f3]));
-        if flags & MUST_UNDERSTAND != 0 {
-            return Err(FormatError::Extension { tag });
-        }
-        let length = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
-        let (data, rest) = rest.split_at_checked(length).ok_or_else(cut)?;
+/// Reads the records in `bytes`.
+pub(super) fn decode(bytes: &[u8], budget: &Budget) -> Result<Vec<Extension>, FormatError> {
+    let mut count = 0;
+    for_records(bytes, |_, _| {
+        count += 1;
+        Ok(())
+    })?;
+    let mut extensions = budget.try_with_capacity(count)?;
+    for_records(bytes, |tag, data| {
         extensions.push(Extension {
             tag,
             must_understand: false,
-            data: data.to_vec(),
+            data: budget.try_copy(data)?,
         });
-        bytes = rest;
-    }
+        Ok(())
+    })?;
     Ok(extensions)
+}
+
+/// Calls `visit` with the tag and data of each record.
+fn for_records(
+    bytes: &[u8],
+    mut visit: impl FnMut([u8; 4], &[u8]) -> Result<(), FormatError>,
+) -> Result<(), FormatError> {
+    let cut = || FormatError::DamagedSection {
+        section: FileSection::Extensions,
+        reason: "the last one is cut".to_owned(),
+    };
+    let mut fields = FieldReader(bytes);
+    while !fields.0.is_empty() {
+        let header = fields.try_bytes(RECORD_HEADER_BYTES).ok_or_else(cut)?;
+        let tag = [header[0], header[1], header[2], header[3]];
+        let mut lengths = FieldReader(&header[4..]);
+        if lengths.u32() & MUST_UNDERSTAND != 0 {
+            return Err(FormatError::UnknownExtension { tag });
+        }
+        let data = fields.try_bytes(lengths.u32() as usize).ok_or_else(cut)?;
+        visit(tag, data)?;
+    }
+    Ok(())
 }

@@ -1,10 +1,25 @@
-//! Little-endian fields of fixed places.
+//! Little-endian fields.
 
-/// Takes fields from the front. The caller knows that there are enough bytes.
+/// Reads fields from the front of some bytes.
 #[derive(Debug)]
-pub struct Fields<'a>(pub &'a [u8]);
+pub struct FieldReader<'a>(pub &'a [u8]);
 
-impl Fields<'_> {
+impl<'a> FieldReader<'a> {
+    /// The next `count` bytes, if there are so many.
+    pub fn try_bytes(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(count)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    /// The next four bytes as a length, if they are there.
+    pub fn try_length(&mut self) -> Option<usize> {
+        let (field, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(u32::from_le_bytes(*field) as usize)
+    }
+
+    /// The next bytes of a record whose length the caller has checked.
     fn take<const K: usize>(&mut self) -> [u8; K] {
         let (field, rest) = self.0.split_at(K);
         self.0 = rest;

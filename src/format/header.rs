@@ -1,71 +1,71 @@
-//! The fixed header.
+//! The fixed header: 144 bytes, little endian.
 
-use super::codec::{checksum, intact};
-use super::error::{Part, TextDamage};
-use super::fields::Fields;
-use super::metadata::MAX_METADATA_BYTES;
-use super::scan::MOST_SCANS;
-use super::{ChunkEntry, FormatError, Scan};
+use super::checksum::{checksum, crc_matches};
+use super::constants::{
+    HEADER_BYTES, MAX_EXTENSION_BYTES, MAX_METADATA_BYTES, MAX_RANK, MAX_SCANS,
+};
+use super::error::{FileSection, FormatError, TextDamage};
+use super::fields::FieldReader;
 use crate::transport::{Correspondence, Extent, Geometry, Window};
 
-/// Version of the format that is written. Other minor versions are read, other major ones are not.
-pub(super) const MAJOR: u16 = 1;
-pub(super) const MINOR: u16 = 0;
-/// Shows text-mode damage as PNG's and KTX2's do: a high bit, CR LF, ^Z, LF. The digits are those of
-/// version 1.0 and stand for all of major version 1.
+/// Version of written files. A reader accepts other minor versions and refuses other major ones.
+const MAJOR: u16 = 1;
+const MINOR: u16 = 0;
+/// The magic number. A high bit, CR LF, ^Z and LF show damage by text mode, as in PNG and KTX2. The
+/// digits are those of version 1.0 and stand for major version 1.
 const MAGIC: [u8; 12] = *b"\xABLTM 10\xBB\r\n\x1A\n";
-/// Bytes of it by which a file is known though it was damaged.
-const NAME: usize = 4;
-/// Where the version's digits stand in it.
+/// Bytes of the magic number that identify a damaged `.ltm` file.
+const MAGIC_NAME_BYTES: usize = 4;
+/// The version's digits in the magic number.
 const MAGIC_VERSION: std::ops::Range<usize> = 5..7;
-/// Bytes of the fixed header.
-pub const HEADER_BYTES: usize = 144;
-/// Bytes that hold all a reader needs before the first chunk, for files up to the paper's scale: what
-/// to ask for first.
-pub const FIRST_BYTES: u64 = 16 << 10;
-/// Largest basis: as many functions as any window of up to 31 elements can tell apart.
-pub(super) const MAX_RANK: u16 = 1024;
-/// Longest extensions a reader accepts.
-pub(super) const MAX_EXTENSION_BYTES: u32 = 16 << 20;
-
 /// The fixed header, checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Header {
-    /// Grids, band and tiling.
+    /// Grids, window, correspondence and tiling.
     pub geometry: Geometry,
-    /// Length of the whole file.
+    /// Bytes of the whole file.
     pub file_bytes: u64,
-    /// Functions in the basis; 0 for none.
+    /// Number of basis functions; 0 for none.
     pub rank: u16,
     /// Number of scans.
     pub scans: u32,
-    /// Compressed length of the directory, which follows the header.
+    /// Bytes of the compressed directory, which follows the header.
     pub directory_bytes: u32,
     pub(super) directory_crc: u32,
-    /// Length of the extensions, which follow the directory.
+    /// Bytes of the extensions, which follow the directory.
     pub extension_bytes: u32,
     pub(super) extension_crc: u32,
-    /// Length of the metadata, which follow the extensions.
+    /// Bytes of the metadata, which follows the extensions.
     pub metadata_bytes: u32,
     pub(super) metadata_crc: u32,
 }
 
 impl Header {
-    /// Length of all that comes before the first scan.
-    pub fn head_bytes(&self) -> u64 {
+    /// A header for `geometry`; the encoder of the index sets lengths and checksums.
+    pub(super) fn new(geometry: Geometry, rank: u16) -> Self {
+        Self {
+            geometry,
+            file_bytes: 0,
+            rank,
+            scans: 0,
+            directory_bytes: 0,
+            directory_crc: 0,
+            extension_bytes: 0,
+            extension_crc: 0,
+            metadata_bytes: 0,
+            metadata_crc: 0,
+        }
+    }
+
+    /// Bytes before the first scan.
+    pub fn index_bytes(&self) -> u64 {
         HEADER_BYTES as u64
             + u64::from(self.directory_bytes)
             + u64::from(self.extension_bytes)
             + u64::from(self.metadata_bytes)
     }
 
-    /// Length of the directory before compression.
-    pub(super) fn directory_plain_bytes(&self) -> u64 {
-        // At most 1024 · (24 + 12 · 2^24): no overflow.
-        let tiles = self.geometry.tile_grid().area() as u64;
-        u64::from(self.scans) * (Scan::BYTES as u64 + ChunkEntry::BYTES as u64 * tiles)
-    }
-
+    /// The header's bytes, with their checksum.
     pub(super) fn encode(&self) -> [u8; HEADER_BYTES] {
         let g = &self.geometry;
         let mut out = Vec::with_capacity(HEADER_BYTES);
@@ -95,28 +95,32 @@ impl Header {
             self.extension_crc,
             self.metadata_bytes,
             self.metadata_crc,
-            0, // reserved
-            0,
-            0,
         ] {
             out.extend(field.to_le_bytes());
         }
+        out.extend([0; 12]); // reserved
         out.extend(checksum(&out).to_le_bytes());
         let mut header = [0; HEADER_BYTES];
         header.copy_from_slice(&out);
         header
     }
 
+    /// Reads the bytes of a header.
+    ///
+    /// # Errors
+    /// The [`FormatError`] of the first field that is out of its range.
     pub(super) fn decode(bytes: &[u8; HEADER_BYTES]) -> Result<Self, FormatError> {
         check_magic(bytes)?;
-        let mut fields = Fields(&bytes[MAGIC.len()..]);
+        let mut fields = FieldReader(&bytes[MAGIC.len()..]);
         let (major, minor) = (fields.u16(), fields.u16());
         if major != MAJOR {
-            return Err(FormatError::Version { major, minor });
+            return Err(FormatError::UnsupportedVersion { major, minor });
         }
         let (fixed, crc) = bytes.split_at(HEADER_BYTES - 4);
-        if !intact(fixed, Fields(crc).u32()) {
-            return Err(FormatError::Checksum { part: Part::Header });
+        if !crc_matches(fixed, FieldReader(crc).u32()) {
+            return Err(FormatError::ChecksumMismatch {
+                section: FileSection::Header,
+            });
         }
         let camera = Extent {
             width: fields.u32(),
@@ -136,7 +140,7 @@ impl Header {
         let rank = u16::try_from(rank)
             .ok()
             .filter(|rank| *rank <= MAX_RANK)
-            .ok_or(FormatError::Rank(rank.into()))?;
+            .ok_or(FormatError::RankTooLarge(rank.into()))?;
         let header = Self {
             geometry: Geometry {
                 camera,
@@ -156,27 +160,31 @@ impl Header {
             metadata_bytes: fields.u32(),
             metadata_crc: fields.u32(),
         };
-        if header.scans > MOST_SCANS {
-            return Err(FormatError::Scans(header.scans));
+        if header.scans > MAX_SCANS {
+            return Err(FormatError::TooManyScans(header.scans));
         }
         if header.extension_bytes > MAX_EXTENSION_BYTES {
-            return Err(FormatError::ExtensionLength(header.extension_bytes));
+            return Err(FormatError::ExtensionsTooLong(header.extension_bytes));
         }
         if header.metadata_bytes > MAX_METADATA_BYTES {
-            return Err(FormatError::MetadataLength(header.metadata_bytes.into()));
+            return Err(FormatError::MetadataTooLong(header.metadata_bytes.into()));
         }
-        if file_bytes < header.head_bytes() {
+        if file_bytes < header.index_bytes() {
             return Err(FormatError::Truncated {
                 got: file_bytes,
-                need: header.head_bytes(),
+                need: header.index_bytes(),
             });
         }
         Ok(header)
     }
 }
 
-/// Tells a wrong file from a damaged one, and from one of another version, from the first bytes,
-/// once there are four of them.
+/// Checks the file's first bytes, of which there may be few: four tell a file of another kind, another
+/// version and a transfer in text mode apart.
+///
+/// # Errors
+/// [`FormatError::UnknownMagic`], [`FormatError::UnsupportedVersion`] or
+/// [`FormatError::TextModeTransfer`].
 pub(super) fn check_magic(bytes: &[u8]) -> Result<(), FormatError> {
     let name = MAGIC_VERSION.start;
     if let Some(digits @ &[b'0'..=b'9', b'0'..=b'9']) = bytes.get(MAGIC_VERSION)
@@ -184,23 +192,23 @@ pub(super) fn check_magic(bytes: &[u8]) -> Result<(), FormatError> {
         && digits != &MAGIC[MAGIC_VERSION]
     {
         let [major, minor] = [digits[0], digits[1]].map(|digit| u16::from(digit - b'0'));
-        return Err(FormatError::Version { major, minor });
+        return Err(FormatError::UnsupportedVersion { major, minor });
     }
-    if bytes.len() < NAME {
+    if bytes.len() < MAGIC_NAME_BYTES {
         return Ok(());
     }
-    let looks_like = |damaged: &[u8]| bytes[..NAME] == damaged[..NAME];
+    let looks_like = |damaged: &[u8]| bytes[..MAGIC_NAME_BYTES] == damaged[..MAGIC_NAME_BYTES];
     if looks_like(&MAGIC.map(|byte| byte & 0x7F)) {
-        return Err(FormatError::TextMode(TextDamage::HighBit));
+        return Err(FormatError::TextModeTransfer(TextDamage::HighBit));
     }
     if looks_like(b"\xC2\xABLT") || looks_like(b"\xEF\xBF\xBDL") {
-        return Err(FormatError::TextMode(TextDamage::Utf8));
+        return Err(FormatError::TextModeTransfer(TextDamage::Utf8));
     }
     match bytes.iter().zip(&MAGIC).position(|(a, b)| a != b) {
         None => Ok(()),
-        // Past the name: only the line ends that are there to catch this.
-        Some(8..) => Err(FormatError::TextMode(TextDamage::LineEnds)),
-        Some(_) => Err(FormatError::Magic {
+        // After the name only the line ends can differ.
+        Some(8..) => Err(FormatError::TextModeTransfer(TextDamage::LineEnds)),
+        Some(_) => Err(FormatError::UnknownMagic {
             found: bytes[..bytes.len().min(MAGIC.len())].to_vec(),
         }),
     }

@@ -1,4 +1,4 @@
-//! What a file says about where it came from.
+//! Metadata: a JSON object about the origin of a file. It does not affect decoding.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -7,37 +7,39 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::FormatError;
+use super::budget::Budget;
+use super::error::FormatError;
 
-/// Longest metadata a reader accepts: room for any caption, none for an attack.
-pub(super) const MAX_METADATA_BYTES: u32 = 1 << 20;
+/// Bytes of parsed JSON for each byte of its text, at most: an array grows to twice its length, of eight
+/// bytes for every two characters.
+#[cfg(not(target_arch = "wasm32"))]
+const PARSED_BYTES_PER_TEXT_BYTE: u64 = 16;
 
-/// JSON metadata. Unknown fields are ignored, so that later writers may add some; fields that say
-/// nothing are left out.
+/// Metadata. Readers ignore unknown fields, so that later writers may add some; writers leave out empty
+/// fields.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Metadata {
-    /// What the picture shows.
+    /// Title of the picture.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub title: String,
-    /// Who made the photographs.
+    /// Photographer.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub creator: String,
-    /// Who may do what with it.
+    /// Copyright and licence.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub rights: String,
-    /// What the object's light transport was measured with.
+    /// How the object was captured.
     #[serde(deserialize_with = "object")]
     pub capture: CaptureNote,
     /// Program and version that wrote the file.
     pub writer: String,
     /// Recovery method.
     pub method: String,
-    /// What a coefficient or element of 1 stands for.
+    /// Unit of the light transport.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub units: String,
-    /// Indices of the capture's shots that the transport was recovered from. The others can be held
-    /// against it.
+    /// Indices of the capture's shots that the recovery used. The others can validate it.
     pub shots_used: Vec<usize>,
 }
 
@@ -45,44 +47,56 @@ pub struct Metadata {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct CaptureNote {
-    /// Different patterns that were shown.
+    /// Number of different patterns.
     pub patterns: usize,
-    /// Photographs that the transport was recovered from.
+    /// Number of photographs that the recovery used.
     pub photographs: usize,
 }
 
-/// Metadata as a file has them.
+/// The metadata's JSON text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MetadataJson(String);
 
 impl MetadataJson {
-    /// What is to be written of `metadata`.
-    pub(super) fn of(metadata: &Metadata) -> Result<Self, FormatError> {
-        let json = serde_json::to_string(metadata).map_err(wrong)?;
+    /// The JSON of `metadata`.
+    ///
+    /// # Errors
+    /// [`FormatError::InvalidMetadata`] if serde fails.
+    pub(super) fn encode(metadata: &Metadata) -> Result<Self, FormatError> {
+        let json = serde_json::to_string(metadata).map_err(invalid)?;
         Ok(Self(json))
     }
 
-    /// Takes the bytes of a file. That they are metadata is left to who has JSON at hand in browsers, where
-    /// reading it here would be a tenth of the decoder.
-    pub(super) fn decode(json: &[u8]) -> Result<Self, FormatError> {
-        // Strings that are passed over would go unchecked.
-        let text = str::from_utf8(json).map_err(FormatError::MetadataText)?;
-        let json = Self(text.to_owned());
+    /// Takes the bytes of a file. In browsers the page parses the JSON: a parser here would be a tenth of
+    /// the decoder.
+    ///
+    /// # Errors
+    /// [`FormatError::InvalidMetadataText`], outside browsers [`FormatError::InvalidMetadata`], and the
+    /// errors of `budget`.
+    pub(super) fn decode(json: &[u8], budget: &Budget) -> Result<Self, FormatError> {
+        // The parser does not check the strings of unknown fields.
+        str::from_utf8(json).map_err(FormatError::InvalidMetadataText)?;
+        let text = String::from_utf8(budget.try_copy(json)?);
+        let json = Self(text.unwrap_or_default());
         #[cfg(not(target_arch = "wasm32"))]
-        json.read()?;
+        {
+            let _scratch = budget.scratch();
+            budget.reserve(PARSED_BYTES_PER_TEXT_BYTE * json.0.len() as u64)?;
+            json.read()?;
+        }
         Ok(json)
     }
 
-    /// The JSON.
+    /// The JSON text.
     pub fn text(&self) -> &str {
         &self.0
     }
 
-    /// What it says.
+    /// The parsed metadata.
     ///
     /// # Errors
-    /// `FormatError::Metadata` where it is not JSON of the expected form, which a reader has found out
-    /// already outside browsers.
+    /// [`FormatError::InvalidMetadata`] if the text is not JSON of the expected form. Outside browsers a
+    /// reader has checked that already.
     pub fn read(&self) -> Result<Metadata, FormatError> {
         let read = || {
             let mut json = serde_json::Deserializer::from_str(&self.0);
@@ -90,16 +104,16 @@ impl MetadataJson {
             json.end()?;
             Ok(metadata)
         };
-        read().map_err(wrong)
+        read().map_err(invalid)
     }
 }
 
-/// As text, for browsers not to load what says more.
-fn wrong(error: serde_json::Error) -> FormatError {
-    FormatError::Metadata(error.to_string())
+/// The error as text, which keeps serde's type out of the WebAssembly module.
+fn invalid(error: serde_json::Error) -> FormatError {
+    FormatError::InvalidMetadata(error.to_string())
 }
 
-/// Reads an object. In a list, which serde takes too, fields have no names to know them by.
+/// Reads an object. serde takes an array too, whose fields have no names.
 fn object<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<T, D::Error> {
     struct Object<T>(PhantomData<T>);
     impl<'de, T: Deserialize<'de>> Visitor<'de> for Object<T> {
@@ -121,12 +135,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn metadata_are_one_object_of_text() {
-        let json = MetadataJson::decode(br#"{"title": "A", "other": ["B"]}"#).unwrap();
+    fn metadata_is_one_json_object_in_utf8() {
+        let decode = |bytes: &[u8]| MetadataJson::decode(bytes, &Budget::unlimited());
+        let json = decode(br#"{"title": "A", "other": ["B"]}"#).unwrap();
         let title = json.read().unwrap().title;
         assert_eq!(title, "A");
         for bad in [&b"[]"[..], b"{} {}", b"", b"{\"other\": \"\xFF\"}"] {
-            assert!(MetadataJson::decode(bad).is_err(), "{}", bad.escape_ascii());
+            assert!(decode(bad).is_err(), "{}", bad.escape_ascii());
         }
     }
 }

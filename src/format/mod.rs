@@ -1,47 +1,49 @@
-//! The `.ltm` file, version 1.0: `docs/format.md` is its specification.
-//!
-//! A head, then scans: passes over all tiles, of which the first gives a coarse picture under any
-//! light and each later one a better one. Every prefix of a file relights.
+//! The `.ltm` file, version 1.0, as `docs/format.md` specifies it.
 //!
 //! ```text
-//! header        144 bytes, little endian: grids, window, correspondence, lengths and checksums
-//! directory     zstd frame: what each scan holds; length and checksum of each of its chunks
-//! extensions    what later versions add
-//! metadata      JSON
-//! scans         each: the functions of the basis that it brings, then a chunk for each tile
+//! index         header       144 bytes, little endian: grids, window, correspondence, lengths, checksums
+//!               directory    zstd frame: a record for each scan, length and checksum of each chunk
+//!               extensions   data of later versions
+//!               metadata     JSON
+//! scans         each a basis chunk, then a tile chunk for each tile
 //! ```
 //!
-//! [`Reader`] does no I/O: it is fed bytes, in any pieces, and says what it wants. [`EncodedFile`] is
-//! the way back.
+//! A scan is a pass over all tiles: the first gives a coarse picture under any light, each later one
+//! a better picture. Every prefix of a file relights.
+//!
+//! [`Reader`] does no I/O: it is fed bytes in any pieces and lists the byte ranges that it needs.
+//! [`EncodedFile`] is the inverse.
 
+mod budget;
+mod checksum;
 mod chunk;
 mod codec;
+mod constants;
+mod decoder_state;
+mod directory;
 mod encode;
 mod error;
 mod extension;
 mod fields;
-mod head;
 mod header;
-mod limits;
+mod index;
+mod memory;
 mod metadata;
-mod quality;
 mod reader;
 mod scan;
-mod tile;
-mod turn;
+mod tile_decoder;
 mod verify;
 
-use chunk::Chunk;
-
-pub use chunk::ChunkEntry;
-pub use encode::{EncodedFile, Judge, Quality, Source};
-pub use error::{FormatError, Part, TextDamage};
+pub use budget::Limits;
+pub use chunk::{ChunkEntry, ChunkId};
+pub use constants::{FIRST_BYTES, HEADER_BYTES};
+pub use encode::{DistortionMetric, EncodedFile, RateTarget, Source};
+pub use error::{FileSection, FormatError, TextDamage};
 pub use extension::Extension;
-pub use head::{Head, PartNumber};
-pub use header::{FIRST_BYTES, HEADER_BYTES, Header};
-pub use limits::Limits;
+pub use header::Header;
+pub use index::FileIndex;
 pub use metadata::{CaptureNote, Metadata, MetadataJson};
 pub use reader::{Interest, Progress, Reader};
 pub use scan::{Coding, Scan};
-pub use tile::{decode_basis, decode_tile};
+pub use tile_decoder::{decode_basis, decode_tile};
 pub use verify::check;

@@ -173,10 +173,15 @@ impl CoefficientTile {
         CHANNELS * rank.div_ceil(QUAD) * Self::plane(rect)
     }
 
-    /// The first `rank` components of this tile over a basis of `all` functions.
-    pub(crate) fn first_components(&self, all: usize, rank: usize) -> Self {
+    /// The first `rank` components of this tile over a basis of `all` functions, in `codes`: an empty vector
+    /// with room for them.
+    pub(crate) fn first_components(
+        &self,
+        all: usize,
+        rank: usize,
+        mut codes: Vec<TexelCode>,
+    ) -> Self {
         let (plane, quads) = (Self::plane(self.rect), rank.div_ceil(QUAD));
-        let mut codes = Vec::with_capacity(self.codes.len().min(CHANNELS * quads * plane));
         for channel in self.codes.chunks_exact(all.div_ceil(QUAD).max(1) * plane) {
             codes.extend_from_slice(&channel[..quads * plane]);
             let last = match rank % QUAD {
@@ -263,14 +268,6 @@ impl Tile {
             tile.expand_into(geometry, basis, &mut functions.tau);
         }
         functions
-    }
-
-    /// The tile with the first `rank` components over a basis of `all` functions.
-    pub(crate) fn first_components(&self, all: usize, rank: usize) -> Self {
-        Self {
-            coefficients: self.coefficients.first_components(all, rank),
-            functions: self.functions.clone(),
-        }
     }
 
     /// Size of the codes in bytes.

@@ -63,10 +63,10 @@ impl Decoder {
     /// # Errors
     /// A code that begins with `format-`.
     pub fn preview(&self) -> Result<Option<Photo>, CodedError> {
-        let (Some(transport), Some(head)) = (self.0.preview()?, self.0.head()) else {
+        let (Some(transport), Some(index)) = (self.0.preview()?, self.0.index()) else {
             return Ok(None);
         };
-        Ok(Some(Photo::new(transport, &head.metadata)))
+        Ok(Some(Photo::new(transport, &index.metadata)))
     }
 
     /// The photograph, once the file is complete.

@@ -44,10 +44,10 @@ impl From<CodedError> for JsValue {
 impl From<FormatError> for CodedError {
     fn from(error: FormatError) -> Self {
         let code = match error {
-            FormatError::Magic { .. } => "format-magic",
-            FormatError::TextMode(_) => "format-text-mode",
-            FormatError::Version { .. } => "format-version",
-            FormatError::Checksum { .. } => "format-checksum",
+            FormatError::UnknownMagic { .. } => "format-magic",
+            FormatError::TextModeTransfer(_) => "format-text-mode",
+            FormatError::UnsupportedVersion { .. } => "format-version",
+            FormatError::ChecksumMismatch { .. } => "format-checksum",
             FormatError::Limit { .. } | FormatError::Memory { .. } => "format-limit",
             FormatError::Truncated { .. } => "format-truncated",
             _ => "format-invalid",

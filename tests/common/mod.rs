@@ -135,7 +135,7 @@ fn seal_chunks(file: &mut Vec<u8>) {
     else {
         return;
     };
-    let (count, head) = (entries / 12, 24 * scans);
+    let (count, index) = (entries / 12, 24 * scans);
     if count % scans != 0 {
         return;
     }
@@ -150,9 +150,9 @@ fn seal_chunks(file: &mut Vec<u8>) {
         let sum = crc(&mut at, basis);
         plain[24 * scan + 20..24 * scan + 24].copy_from_slice(&sum);
         for i in scan * (count / scans)..(scan + 1) * (count / scans) {
-            let length = u32_at(&plain, head + 4 * i);
+            let length = u32_at(&plain, index + 4 * i);
             let sum = crc(&mut at, length);
-            let place = head + 4 * (2 * count + i);
+            let place = index + 4 * (2 * count + i);
             if length > 0 {
                 plain[place..place + 4].copy_from_slice(&sum);
             }
@@ -169,7 +169,7 @@ fn seal_chunks(file: &mut Vec<u8>) {
     file[88..96].copy_from_slice(&total.to_le_bytes());
 }
 
-/// Checksums of the head's parts, and the header's own.
+/// Checksums of the index's parts, and the header's own.
 fn seal_head(file: &mut [u8]) {
     let mut start = HEADER_BYTES;
     for length_at in [104, 112, 120] {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use crate::cli::arguments::{ByteCount, parse_number};
-use crate::format::{HEADER_BYTES, Judge, Quality};
+use crate::format::{DistortionMetric, HEADER_BYTES, RateTarget};
 use crate::recover::{Method, SparsityBasis, WindowEstimate};
 use crate::transport::{Decibels, Window};
 
@@ -103,13 +103,13 @@ fn parse_max_bytes(text: &str) -> Result<ByteCount, String> {
 
 impl QualityArgs {
     /// The quality asked for, or the default, which needs a distortion metric.
-    pub fn quality<'a>(&self, metric: Option<&'a dyn Judge>) -> Quality<'a> {
+    pub fn quality<'a>(&self, metric: Option<&'a dyn DistortionMetric>) -> RateTarget<'a> {
         match (self.quality, self.max_bytes, metric) {
-            (Some(snr), ..) => Quality::Snr(Decibels(f64::from(snr))),
-            (_, Some(max_bytes), _) => Quality::Bytes(max_bytes.0),
-            _ if self.lossless => Quality::Lossless,
-            (.., Some(metric)) => Quality::Loss(DEFAULT_LOSS, metric),
-            (.., None) => Quality::Snr(DEFAULT_SNR),
+            (Some(snr), ..) => RateTarget::Snr(Decibels(f64::from(snr))),
+            (_, Some(max_bytes), _) => RateTarget::Bytes(max_bytes.0),
+            _ if self.lossless => RateTarget::Lossless,
+            (.., Some(metric)) => RateTarget::Loss(DEFAULT_LOSS, metric),
+            (.., None) => RateTarget::Snr(DEFAULT_SNR),
         }
     }
 }

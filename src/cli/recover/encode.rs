@@ -9,14 +9,14 @@ use super::checkpoint::Checkpoint;
 use super::memory_plan::FILE_TILE_SIDE;
 use super::tile_record;
 use crate::cli::process::Interrupt;
-use crate::format::{EncodedFile, FormatError, Judge, Metadata, Source};
+use crate::format::{DistortionMetric, EncodedFile, FormatError, Metadata, Source};
 use crate::recover::{HoldoutValidation, Recovery};
 use crate::transport::{BandTile, Basis, Decibels, Geometry, RecoveredTile, TransportFunctions};
 
 /// Distortion metric: the loss of SNR on held-out patterns.
 struct HoldoutMetric<'a>(&'a HoldoutValidation);
 
-impl Judge for HoldoutMetric<'_> {
+impl DistortionMetric for HoldoutMetric<'_> {
     fn tiles(&self) -> Vec<BandTile> {
         let to_band_tile = |recovered: &RecoveredTile| {
             let mut tile = BandTile::dark(recovered.rect());
@@ -72,7 +72,11 @@ pub fn encode_file(
     let metric = recovery.holdout_validation().map(HoldoutMetric);
     EncodedFile::new(
         source,
-        args.quality(metric.as_ref().map(|metric| metric as &dyn Judge)),
+        args.quality(
+            metric
+                .as_ref()
+                .map(|metric| metric as &dyn DistortionMetric),
+        ),
         &interrupt.cores(),
     )
 }

@@ -1,52 +1,54 @@
-//! Functions of the basis, as the scans bring them.
+//! Basis chunks: functions v_k `[function, slot]`, each rounded to 16-bit multiples of 2^-e.
+//!
+//! Content of the frame: e `[function]` as u8, then all codes as [byte planes](super::byte_planes).
 
-use super::bytes::{join, split, unzigzag, zigzag};
-use super::{PartError, compress, damaged, decompress, zeros};
-use crate::format::FormatError;
+use super::byte_planes::{join, split, unzigzag, zigzag};
+use super::zstd_frame::{compress, decompress};
+use crate::format::budget::Budget;
+use crate::format::error::{FormatError, SectionError, damaged};
 
-/// Largest exponent: elements are whole multiples of at least `2⁻³⁰`.
-const MOST_EXPONENT: u8 = 30;
+/// Largest exponent: values are multiples of `2⁻³⁰` or coarser.
+const MAX_EXPONENT: u8 = 30;
 
-/// Bytes of so many functions before compression.
-pub fn plain_bytes(functions: usize, area: usize) -> usize {
+/// Bytes of `functions` functions of `area` slots before compression.
+pub fn content_bytes(functions: usize, area: usize) -> usize {
     functions * (1 + 2 * area)
 }
 
-/// Functions rounded to multiples of a power of two each, and what is left of them.
+/// Basis functions, each rounded to multiples of a power of two.
 #[derive(Clone, Debug, Default)]
-pub struct Rounded {
+pub struct QuantisedBasis {
     exponents: Vec<u8>,
     codes: Vec<i16>,
 }
 
-impl Rounded {
-    /// Rounds each function about as coarsely as its `step` says.
+impl QuantisedBasis {
+    /// Rounds each function to the power of two at or below its step.
     pub fn new(functions: &[Vec<f32>], steps: &[f32]) -> Self {
-        let mut rounded = Self::default();
+        let mut quantised = Self::default();
         for (function, step) in functions.iter().zip(steps) {
             let peak = function.iter().fold(0.0f32, |peak, v| peak.max(v.abs()));
-            // As fine as codes allow, where nothing coarser is asked for.
             let finest = (f32::from(i16::MAX) / peak.max(1e-6)).log2().floor();
             let wanted = (-step.log2()).ceil();
-            let exponent = wanted.min(finest).clamp(0.0, f32::from(MOST_EXPONENT));
+            let exponent = wanted.min(finest).clamp(0.0, f32::from(MAX_EXPONENT));
             let scale = exponent.exp2();
-            rounded.exponents.push(exponent as u8);
+            quantised.exponents.push(exponent as u8);
             let codes = function.iter().map(|v| (v * scale).round() as i16);
-            rounded.codes.extend(codes); // `as` saturates
+            quantised.codes.extend(codes); // `as` saturates
         }
-        rounded
+        quantised
     }
 
-    /// The sum of the squares of what rounding changed about a function, the `k`th.
+    /// Squared rounding error of function `k`.
     pub fn error(&self, k: usize, function: &[f32]) -> f64 {
         let codes = self.codes.chunks_exact(function.len()).nth(k);
         let pairs = codes.unwrap_or_default().iter().zip(function);
-        let off =
+        let error =
             |(&code, v): (&i16, &f32)| f64::from(value(code, self.exponents[k])) - f64::from(*v);
-        pairs.map(|pair| off(pair).powi(2)).sum()
+        pairs.map(|pair| error(pair).powi(2)).sum()
     }
 
-    /// The functions as a reader will have them.
+    /// The functions as a reader decodes them.
     #[cfg(test)]
     pub fn functions(&self, area: usize) -> Vec<Vec<f32>> {
         let codes = self.codes.chunks_exact(area).zip(&self.exponents);
@@ -55,12 +57,15 @@ impl Rounded {
             .collect()
     }
 
-    /// Compresses functions `from` and on, `count` of them.
+    /// The basis chunk of functions `from` to `from + count - 1`.
+    ///
+    /// # Errors
+    /// [`FormatError::Compress`].
     pub fn encode(&self, from: usize, count: usize, area: usize) -> Result<Vec<u8>, FormatError> {
-        let mut plain = self.exponents[from..from + count].to_vec();
+        let mut content = self.exponents[from..from + count].to_vec();
         let codes = &self.codes[from * area..(from + count) * area];
-        plain.extend(split(codes.iter().map(|&code| zigzag(code))));
-        compress(&plain)
+        content.extend(split(codes.iter().map(|&code| zigzag(code))));
+        compress(&content)
     }
 }
 
@@ -68,21 +73,38 @@ fn value(code: i16, exponent: u8) -> f32 {
     f32::from(code) / (1u32 << exponent) as f32
 }
 
-/// Decompresses `count` functions of `area` elements.
-pub fn decode(frame: &[u8], count: usize, area: usize) -> Result<Vec<Vec<f32>>, PartError> {
-    let plain = decompress(frame, plain_bytes(count, area))?;
-    let (exponents, planes) = plain.split_at(count);
-    if exponents.iter().any(|&exponent| exponent > MOST_EXPONENT) {
-        return Err(damaged(format!("an exponent is above {MOST_EXPONENT}")));
+/// Decodes a basis chunk into `functions`, all of `area` slots.
+///
+/// # Errors
+/// [`SectionError`] if the chunk is damaged, or the budget refuses memory.
+pub fn decode(
+    frame: &[u8],
+    functions: &mut [Vec<f32>],
+    area: usize,
+    budget: &Budget,
+) -> Result<(), SectionError> {
+    let content = decompress(frame, content_bytes(functions.len(), area), budget)?;
+    let (exponents, planes) = content.split_at(functions.len());
+    if exponents.iter().any(|&exponent| exponent > MAX_EXPONENT) {
+        return Err(damaged(format!("an exponent is above {MAX_EXPONENT}")));
     }
     let mut codes = join(planes);
-    let mut functions = Vec::new();
-    for &exponent in exponents {
-        let mut function: Vec<f32> = zeros(area)?;
+    for (function, &exponent) in functions.iter_mut().zip(exponents) {
         for (v, code) in function.iter_mut().zip(&mut codes) {
             *v = value(unzigzag(code), exponent);
         }
-        functions.push(function);
+    }
+    Ok(())
+}
+
+/// `rank` functions of zeros.
+///
+/// # Errors
+/// The errors of `budget`.
+pub fn try_zeroed(rank: usize, area: usize, budget: &Budget) -> Result<Vec<Vec<f32>>, FormatError> {
+    let mut functions = budget.try_with_capacity(rank)?;
+    for _ in 0..rank {
+        functions.push(budget.try_zeroed(area)?);
     }
     Ok(functions)
 }
@@ -92,32 +114,37 @@ mod tests {
     use super::*;
 
     #[test]
-    fn functions_come_back_to_within_their_step() {
+    fn decoded_functions_are_within_their_step() {
         let function = |k: usize| (0..25).map(|s| ((s * k + s) as f32).sin() * 0.3).collect();
         let functions: Vec<Vec<f32>> = (0..4).map(function).collect();
         let steps = [1e-4, 1e-3, 1e-2, 1e-9];
-        let rounded = Rounded::new(&functions, &steps);
-        let want = rounded.functions(25);
+        let quantised = QuantisedBasis::new(&functions, &steps);
+        let want = quantised.functions(25);
         let frames = [
-            rounded.encode(0, 1, 25).unwrap(),
-            rounded.encode(1, 3, 25).unwrap(),
+            quantised.encode(0, 1, 25).unwrap(),
+            quantised.encode(1, 3, 25).unwrap(),
         ];
+        let decode = |frame: &[u8], count: usize| {
+            let budget = Budget::unlimited();
+            let mut functions = try_zeroed(count, 25, &budget).unwrap();
+            decode(frame, &mut functions, 25, &budget).map(|()| functions)
+        };
         let got = [
-            decode(&frames[0], 1, 25).unwrap(),
-            decode(&frames[1], 3, 25).unwrap(),
+            decode(&frames[0], 1).unwrap(),
+            decode(&frames[1], 3).unwrap(),
         ]
         .concat();
         assert_eq!(got, want);
         for (k, (got, given)) in got.iter().zip(&functions).enumerate() {
             let square = |(a, b): (&f32, &f32)| (f64::from(*a) - f64::from(*b)).powi(2);
             let squares: f64 = got.iter().zip(given).map(square).sum();
-            assert!((rounded.error(k, given) - squares).abs() <= 1e-12 * squares);
+            assert!((quantised.error(k, given) - squares).abs() <= 1e-12 * squares);
         }
         for ((got, given), step) in got.iter().zip(&functions).zip(steps) {
             let off = got.iter().zip(given).map(|(a, b)| (a - b).abs());
             let bound = 0.5 * step.max(2e-5);
             assert!(off.fold(0.0, f32::max) <= bound, "{step}");
         }
-        assert!(decode(&frames[0], 2, 25).is_err());
+        assert!(decode(&frames[0], 2).is_err());
     }
 }

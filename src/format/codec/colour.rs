@@ -1,24 +1,30 @@
-//! Colour axes in which most of a pixel lies on the first.
+//! Colour transforms of three values, which concentrate energy in the first.
+//!
+//! | transform | of | reference |
+//! |---|---|---|
+//! | [`ColourKlt`] | component 0 of a tile | Karhunen 1947, Loève 1948 |
+//! | [`HouseholderReflection`] | other components, by the pixel's own colour | Householder 1958 |
+//! | [`ycocg_forward`] | quantised direct functions | Malvar and Sullivan 2003 |
 
 use crate::linalg::symmetric_eigen;
 use crate::transport::CHANNELS;
 
-/// Red, green, blue, or shares of other axes.
+/// Red, green and blue, or the coordinates on other axes.
 pub type Pixel = [f32; CHANNELS];
 
-/// One in a table of colours.
+/// The integer that stands for 1 in a stored matrix.
 const UNIT: f32 = 16384.0;
 
-/// Axes of a tile's first component: its principal colours, in units of 2⁻¹⁴, the strongest first.
+/// The colour KLT of a tile's component 0: its principal axes in units of 2⁻¹⁴, the strongest first.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Palette(pub [[i16; CHANNELS]; CHANNELS]);
+pub struct ColourKlt(pub [[i16; CHANNELS]; CHANNELS]);
 
-impl Palette {
+impl ColourKlt {
     /// Bytes in a file.
     pub const BYTES: usize = 2 * CHANNELS * CHANNELS;
 
-    /// Principal axes of the colours of `pixels`.
-    pub fn principal(pixels: impl Iterator<Item = Pixel>) -> Self {
+    /// The principal axes of `pixels`.
+    pub fn of_pixels(pixels: impl Iterator<Item = Pixel>) -> Self {
         let mut moment = vec![0.0f64; CHANNELS * CHANNELS];
         for pixel in pixels {
             for i in 0..CHANNELS {
@@ -33,7 +39,7 @@ impl Palette {
         }))
     }
 
-    /// As in a file.
+    /// The bytes in a file.
     pub fn to_bytes(self) -> [u8; Self::BYTES] {
         let mut bytes = [0; Self::BYTES];
         for (bytes, entry) in bytes.chunks_exact_mut(2).zip(self.0.iter().flatten()) {
@@ -42,43 +48,45 @@ impl Palette {
         bytes
     }
 
-    /// From a file's bytes.
+    /// Reads [`BYTES`](Self::BYTES) bytes.
     pub fn from_bytes(bytes: &[u8]) -> Self {
-        let mut palette = [[0; CHANNELS]; CHANNELS];
-        let entries = palette.iter_mut().flatten();
+        let mut matrix = [[0; CHANNELS]; CHANNELS];
+        let entries = matrix.iter_mut().flatten();
         for (entry, bytes) in entries.zip(bytes.chunks_exact(2)) {
             *entry = i16::from_le_bytes([bytes[0], bytes[1]]);
         }
-        Self(palette)
+        Self(matrix)
     }
 
     fn axes(&self) -> [Pixel; CHANNELS] {
         self.0.map(|axis| axis.map(|c| f32::from(c) / UNIT))
     }
 
-    /// A colour's shares of the axes.
-    pub fn turn(&self, rgb: Pixel) -> Pixel {
+    /// A colour's coordinates on the axes.
+    pub fn forward(&self, rgb: Pixel) -> Pixel {
         self.axes().map(|axis| dot(axis, rgb))
     }
 
-    /// The colour of these shares.
-    pub fn turn_back(&self, shares: Pixel) -> Pixel {
+    /// The colour with these coordinates.
+    pub fn inverse(&self, coordinates: Pixel) -> Pixel {
         let [a, b, d] = self.axes();
-        std::array::from_fn(|c| shares[0] * a[c] + shares[1] * b[c] + shares[2] * d[c])
+        std::array::from_fn(|c| {
+            coordinates[0] * a[c] + coordinates[1] * b[c] + coordinates[2] * d[c]
+        })
     }
 }
 
-/// The reflection (Householder 1958) that takes a colour to the first axis, and back.
+/// The reflection that maps a colour to the first axis, and back.
 #[derive(Clone, Copy, Debug)]
-pub struct Mirror {
+pub struct HouseholderReflection {
     normal: Pixel,
-    /// `2 / ‖normal‖²`, or 0 where nothing is to be mirrored.
+    /// `2 / ‖normal‖²`, or 0 for the identity.
     factor: f32,
 }
 
-impl Mirror {
-    /// The mirror of a pixel whose first component has this colour.
-    pub fn of(colour: Pixel) -> Self {
+impl HouseholderReflection {
+    /// The reflection of a pixel whose component 0 has this colour.
+    pub fn of_colour(colour: Pixel) -> Self {
         let length = dot(colour, colour).sqrt();
         let normal = [colour[0] - length, colour[1], colour[2]];
         let square = dot(normal, normal);
@@ -94,10 +102,10 @@ impl Mirror {
         }
     }
 
-    /// Mirrors a pixel; twice gives the pixel itself.
+    /// Reflects a pixel. The reflection is its own inverse.
     pub fn apply(&self, pixel: Pixel) -> Pixel {
-        let share = self.factor * dot(self.normal, pixel);
-        std::array::from_fn(|c| pixel[c] - share * self.normal[c])
+        let scale = self.factor * dot(self.normal, pixel);
+        std::array::from_fn(|c| pixel[c] - scale * self.normal[c])
     }
 }
 
@@ -105,19 +113,19 @@ fn dot(a: Pixel, b: Pixel) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Luma and two differences of colours, in whole numbers (YCoCg-R; Malvar and Sullivan 2003).
-pub fn luma_chroma([red, green, blue]: [i32; CHANNELS]) -> [i32; CHANNELS] {
-    let orange = red - blue;
-    let middle = blue + (orange >> 1);
-    let greenish = green - middle;
-    [middle + (greenish >> 1), orange, greenish]
+/// Integer RGB to Y, Co, Cg (YCoCg-R).
+pub fn ycocg_forward([red, green, blue]: [i32; CHANNELS]) -> [i32; CHANNELS] {
+    let co = red - blue;
+    let middle = blue + (co >> 1);
+    let cg = green - middle;
+    [middle + (cg >> 1), co, cg]
 }
 
-/// The colours that [`luma_chroma`] made these of.
-pub fn red_green_blue([luma, orange, greenish]: [i32; CHANNELS]) -> [i32; CHANNELS] {
-    let middle = luma - (greenish >> 1);
-    let blue = middle - (orange >> 1);
-    [blue + orange, greenish + middle, blue]
+/// The inverse of [`ycocg_forward`].
+pub fn ycocg_inverse([luma, co, cg]: [i32; CHANNELS]) -> [i32; CHANNELS] {
+    let middle = luma - (cg >> 1);
+    let blue = middle - (co >> 1);
+    [blue + co, cg + middle, blue]
 }
 
 #[cfg(test)]
@@ -125,31 +133,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whole_numbers_come_back() {
+    fn ycocg_is_invertible() {
         for red in [-70, -1, 0, 3, 32767] {
             for green in [-5, 0, 8, 32767] {
                 for blue in [-9, 0, 1, 500] {
                     let rgb = [red, green, blue];
-                    assert_eq!(red_green_blue(luma_chroma(rgb)), rgb);
+                    assert_eq!(ycocg_inverse(ycocg_forward(rgb)), rgb);
                 }
             }
         }
     }
 
     #[test]
-    fn a_mirror_takes_its_colour_to_the_first_axis_and_back() {
+    fn a_reflection_maps_its_colour_to_the_first_axis_and_back() {
         let near = |a: Pixel, b: Pixel| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
         for colour in [[0.3, 0.9, 0.1], [1.0, 0.0, 0.0], [-1.0, 0.2, 0.1], [0.0; 3]] {
-            let mirror = Mirror::of(colour);
+            let reflection = HouseholderReflection::of_colour(colour);
             let length = dot(colour, colour).sqrt();
-            assert!(near(mirror.apply(colour), [length, 0.0, 0.0]), "{colour:?}");
+            assert!(
+                near(reflection.apply(colour), [length, 0.0, 0.0]),
+                "{colour:?}"
+            );
             let other = [0.2, -0.4, 0.7];
-            assert!(near(mirror.apply(mirror.apply(other)), other));
+            assert!(near(reflection.apply(reflection.apply(other)), other));
         }
-        // Colours that overflow or vanish mirror nothing, and are numbers all the same.
+        // Colours that overflow or vanish give the identity.
         for colour in [[f32::MAX; 3], [1e-30; 3]] {
             assert!(
-                Mirror::of(colour)
+                HouseholderReflection::of_colour(colour)
                     .apply([1.0; 3])
                     .iter()
                     .all(|c| c.is_finite())
@@ -158,12 +169,12 @@ mod tests {
     }
 
     #[test]
-    fn a_palette_turns_there_and_back() {
+    fn the_klt_is_invertible() {
         let colours = [[0.9, 0.2, 0.1], [0.1, 0.3, 0.8], [0.5, 0.5, 0.45]];
-        let palette = Palette::principal(colours.into_iter());
-        assert_eq!(Palette::from_bytes(&palette.to_bytes()), palette);
+        let klt = ColourKlt::of_pixels(colours.into_iter());
+        assert_eq!(ColourKlt::from_bytes(&klt.to_bytes()), klt);
         for colour in colours {
-            let back = palette.turn_back(palette.turn(colour));
+            let back = klt.inverse(klt.forward(colour));
             assert!(back.iter().zip(colour).all(|(a, b)| (a - b).abs() < 1e-3));
         }
     }

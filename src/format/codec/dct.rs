@@ -1,4 +1,4 @@
-//! The discrete cosine transform of blocks of 8 by 8 (Ahmed, Natarajan & Rao 1974), orthonormal.
+//! The orthonormal discrete cosine transform of blocks of 8 x 8 pixels (Ahmed, Natarajan and Rao 1974).
 
 /// Pixels along a block's side.
 pub const SIDE: usize = 8;
@@ -21,32 +21,32 @@ const COSINES: [f32; 9] = [
     0.0,
 ];
 
-/// `[frequency][place]`: `½ cos((2 place + 1) frequency π / 16)`, and `√⅛` for frequency 0.
+/// `[frequency][x]`: `½ cos((2x + 1) frequency π / 16)`, and `√⅛` for frequency 0.
 pub const BASIS: [[f32; SIDE]; SIDE] = basis();
 
 const fn basis() -> [[f32; SIDE]; SIDE] {
     let mut basis = [[0.0; SIDE]; SIDE];
     let mut frequency = 0;
     while frequency < SIDE {
-        let mut place = 0;
-        while place < SIDE {
+        let mut x = 0;
+        while x < SIDE {
             // The angle in sixteenths of π, folded into the first quarter of the circle.
-            let turn = (2 * place + 1) * frequency % 32;
-            let half = if turn > 16 { 32 - turn } else { turn };
+            let angle = (2 * x + 1) * frequency % 32;
+            let half = if angle > 16 { 32 - angle } else { angle };
             let cosine = if half > 8 {
                 -COSINES[16 - half]
             } else {
                 COSINES[half]
             };
-            basis[frequency][place] = 0.5 * if frequency == 0 { COSINES[4] } else { cosine };
-            place += 1;
+            basis[frequency][x] = 0.5 * if frequency == 0 { COSINES[4] } else { cosine };
+            x += 1;
         }
         frequency += 1;
     }
     basis
 }
 
-/// Order of coefficients: by the sum of their frequencies, then to and fro.
+/// JPEG's order of coefficients: by the sum of their frequencies, diagonals in alternating direction.
 pub const ZIGZAG: [u8; AREA] = zigzag();
 
 const fn zigzag() -> [u8; AREA] {
@@ -68,7 +68,7 @@ const fn zigzag() -> [u8; AREA] {
     order
 }
 
-/// Coefficients of a block's pixels.
+/// The coefficients of a block's pixels.
 pub fn forward(pixels: &Block) -> Block {
     let mut rows = [0.0; AREA];
     for y in 0..SIDE {
@@ -85,7 +85,7 @@ pub fn forward(pixels: &Block) -> Block {
     coefficients
 }
 
-/// Pixels of a block's coefficients: columns first, then rows, each sum from frequency 0 upwards.
+/// The pixels of a block's coefficients: columns first, then rows, each sum from frequency 0 upwards.
 pub fn inverse(coefficients: &Block) -> Block {
     let mut columns = [0.0f32; AREA];
     for v in 0..SIDE {
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn zigzag_is_that_of_jpeg() {
+    fn the_zigzag_order_is_that_of_jpeg() {
         assert_eq!(ZIGZAG[..10], [0, 1, 8, 16, 9, 2, 3, 10, 17, 24]);
         let mut all = ZIGZAG;
         all.sort();
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_come_back() {
+    fn the_inverse_gives_the_pixels_back() {
         let pixels: Block = std::array::from_fn(|i| ((i * i) as f32 * 0.37).sin());
         let back = inverse(&forward(&pixels));
         for (a, b) in back.iter().zip(&pixels) {

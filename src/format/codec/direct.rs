@@ -1,174 +1,260 @@
-//! Light transport functions element by element, in few bytes.
+//! Coding 3: direct functions, slot by slot.
 //!
-//! Elements come by their distance from the window's middle, where functions peak: what is far is
-//! mostly zero, and a run of zeros to the end is one token. Channels of an element are rounded to
-//! multiples of the scan's step, then luma and differences of colours are kept. Scans add up.
+//! Slots come in centre-out order, as functions peak near the window's centre: slots far away are mostly
+//! zero, and zeros to the end of a run are one token. Red, green and blue of a slot are rounded to multiples
+//! of the scan's step, then transformed to Y, Co, Cg. A chunk is one token string with a run
+//! `[item, Y Co Cg]` for each pixel. Scans add up.
 
-use super::colour::{Pixel, luma_chroma, red_green_blue};
-use super::tokens::{self, MOST, Reader, Writer};
-use super::{MOST_PLAIN, PartError, damaged, zeros};
-use crate::format::FormatError;
-use crate::format::chunk::Chunk;
+use std::ops::Range;
+
+use super::colour::{Pixel, ycocg_forward, ycocg_inverse};
+use super::tokens::{self, ItemRuns, MAX_MAGNITUDE, QuantisedRun, TokenReader, TokenWriter};
+use crate::format::budget::{Budget, vec_bytes};
+use crate::format::chunk::EncodedChunk;
+use crate::format::constants::MAX_CONTENT_BYTES;
+use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::scan::Scan;
 use crate::transport::{CHANNELS, Extent, Window};
 
-/// As in the cosine transform's: small elements are noise.
-const ROUNDING: f32 = 0.2;
-const ROUNDING_AT_FIRST: f32 = 0.3;
+/// Added to a magnitude in steps before it is truncated. Less than a half: small values are mostly noise,
+/// whose bits reduce the error less than those of large ones.
+const ROUNDING_OFFSET: f32 = 0.2;
+/// The same where a later scan refines the value.
+const COARSE_ROUNDING_OFFSET: f32 = 0.3;
 
-/// Slots of a window from its middle outwards, equally far ones row by row.
-pub fn order(window: Window) -> Vec<u16> {
+/// The centre-out order of a window's slots: by distance from its centre, then by slot.
+///
+/// # Errors
+/// The errors of `budget`.
+pub fn centre_out_order(window: Window, budget: &Budget) -> Result<Vec<u16>, FormatError> {
     let side = window.side() as i32;
     let distance = |slot: i32| (slot % side - side / 2).pow(2) + (slot / side - side / 2).pow(2);
-    // By rings, not by sorting, which browsers would have to load.
-    let mut rings = vec![Vec::new(); distance(0) as usize + 1];
+    let scratch = budget.scratch();
+    // A counting sort: the code of a general one would have to be downloaded.
+    let mut next: Vec<u16> = budget.try_zeroed(distance(0) as usize + 2)?;
     for slot in 0..side * side {
-        rings[distance(slot) as usize].push(slot as u16);
+        next[distance(slot) as usize + 1] += 1;
     }
-    rings.concat()
+    for d in 1..next.len() {
+        next[d] += next[d - 1];
+    }
+    let mut order = budget.try_zeroed(window.area())?;
+    for slot in 0..side * side {
+        let at = &mut next[distance(slot) as usize];
+        order[usize::from(*at)] = slot as u16;
+        *at += 1;
+    }
+    scratch.keep(vec_bytes(&order));
+    Ok(order)
 }
 
-/// Most tokens of a tile in a scan: one a number.
-pub fn most_plain(extent: Extent, count: u16) -> u64 {
+/// Maximum tokens of a chunk: one for each number.
+pub fn max_tokens(extent: Extent, count: u16) -> u64 {
     (extent.area() * CHANNELS) as u64 * u64::from(count)
 }
 
-/// Most bytes of a chunk of so many tokens.
-pub fn bound(plain: u64) -> u64 {
-    tokens::bound(plain)
+/// Maximum bytes of a chunk of `tokens` tokens.
+pub fn max_bytes(tokens: u64) -> u64 {
+    tokens::max_bytes(tokens)
 }
 
-/// Slots of which any tile's numbers are few enough for one chunk, however they are kept.
-pub fn most_slots(tile_side: u32) -> u64 {
-    MOST_PLAIN / (2 * CHANNELS as u64 * u64::from(tile_side).pow(2))
+/// Number of slots whose values fit into one chunk of any tile, in coding 3 and coding 4.
+pub fn max_slots(tile_side: u32) -> u64 {
+    MAX_CONTENT_BYTES / (2 * CHANNELS as u64 * u64::from(tile_side).pow(2))
 }
 
-/// The finest step by which no number is too large, of elements of this peak.
+/// The finest step that keeps the numbers of values up to `peak` within [`MAX_MAGNITUDE`].
 pub fn finest_step(peak: f32) -> f32 {
-    2.0 * peak / MOST as f32
+    2.0 * peak / MAX_MAGNITUDE as f32
 }
 
-/// Adds a tile's chunk of `scan` to functions as `[pixel, element]`.
+/// Adds a tile's chunk of `scan` to its functions, `[pixel, slot]`.
+///
+/// # Errors
+/// [`SectionError`] if the chunk is damaged, or the budget refuses memory.
 pub fn add(
     functions: &mut [Pixel],
     order: &[u16],
     scan: &Scan,
     bytes: &[u8],
-    plain: u32,
-) -> Result<(), PartError> {
-    let mut reader = Reader::new(bytes, plain as usize)?;
-    if reader.tokens() < plain as usize {
-        return Err(damaged("it has fewer tokens than it says"));
+    tokens: u32,
+    budget: &Budget,
+) -> Result<(), SectionError> {
+    let mut reader = TokenReader::new(bytes, tokens as usize, budget)?;
+    if reader.tokens() < tokens as usize {
+        return Err(damaged("it has fewer tokens than its entry says"));
     }
     let slots = &order[usize::from(scan.first)..scan.end()];
-    let mut numbers: Vec<i32> = zeros(slots.len() * CHANNELS)?;
+    let mut numbers: Vec<i32> = budget.try_zeroed(slots.len() * CHANNELS)?;
     for function in functions.chunks_exact_mut(order.len()) {
-        let end = reader.block(&mut numbers)?;
-        let (elements, _) = numbers.as_chunks_mut::<CHANNELS>();
+        let end = reader.read_run(&mut numbers)?;
+        let (items, _) = numbers.as_chunks_mut::<CHANNELS>();
         let used = end.div_ceil(CHANNELS);
-        for (element, &slot) in elements[..used].iter_mut().zip(slots) {
-            let rgb = red_green_blue(*element);
+        for (item, &slot) in items[..used].iter_mut().zip(slots) {
+            let rgb = ycocg_inverse(*item);
             for (value, number) in function[usize::from(slot)].iter_mut().zip(rgb) {
                 *value += number as f32 * scan.step;
             }
-            *element = [0; CHANNELS];
+            *item = [0; CHANNELS];
         }
     }
     reader.finish()
 }
 
-/// Light transport functions as the numbers of their scans.
-#[derive(Clone, Debug)]
-pub struct Numbers {
-    /// `[scan]`, then `[pixel, slot in order, channel]`.
-    scans: Vec<Vec<i32>>,
-    /// Squared elements.
-    pub energy: f64,
-    /// Squared errors that are left after each scan.
-    pub errors: Vec<f64>,
-    /// What is left at the end, `[pixel, slot in order]`.
-    rest: Vec<Pixel>,
+/// The direct functions of a tile in centre-out order, before quantisation.
+#[derive(Debug)]
+pub struct OrderedFunctions {
+    slots: usize,
+    /// `[pixel, centre-out index]`.
+    values: Vec<Pixel>,
 }
 
-impl Numbers {
-    /// Rounds functions as `[pixel, element]` as `scans` say.
-    pub fn new(functions: &[Pixel], order: &[u16], scans: &[&Scan]) -> Self {
-        let mut rest: Vec<Pixel> = Vec::with_capacity(functions.len());
-        for function in functions.chunks_exact(order.len()) {
-            let ordered = order.iter().map(|&slot| function[usize::from(slot)]);
-            rest.extend(ordered.map(finite));
+impl OrderedFunctions {
+    /// Orders functions, `[pixel, slot]`.
+    pub fn new(functions: &[Pixel], order: &[u16]) -> Self {
+        let pixels = functions.chunks_exact(order.len());
+        let ordered = |function: &[Pixel]| -> Vec<Pixel> {
+            let values = order.iter().map(|&slot| function[usize::from(slot)]);
+            values.map(finite).collect()
+        };
+        Self {
+            slots: order.len(),
+            values: pixels.flat_map(ordered).collect(),
         }
-        let square = |rest: &[Pixel]| {
-            let all = rest.iter().flatten();
+    }
+}
+
+impl ItemRuns for OrderedFunctions {
+    fn for_runs(&self, items: Range<usize>, step: f32, mut visit: impl FnMut(QuantisedRun<'_>)) {
+        let (mut residuals, mut numbers) = (Vec::new(), Vec::new());
+        for function in self.values.chunks_exact(self.slots) {
+            residuals.clear();
+            numbers.clear();
+            let function = &function[items.clone()];
+            for tau in function {
+                let rgb = tau.map(|t| round(t, step, ROUNDING_OFFSET));
+                residuals.extend((0..CHANNELS).map(|c| tau[c] - rgb[c] as f32 * step));
+                numbers.extend(ycocg_forward(rgb));
+            }
+            visit(QuantisedRun {
+                string: 0,
+                first_item: items.start,
+                values_per_item: CHANNELS,
+                values: function.as_flattened(),
+                residuals: &residuals,
+                numbers: &numbers,
+            });
+        }
+    }
+}
+
+/// The direct functions of a tile, quantised scan by scan.
+#[derive(Clone, Debug)]
+pub struct QuantisedFunctions {
+    /// `[scan]`, then `[pixel, item, Y Co Cg]`.
+    scans: Vec<Vec<i32>>,
+    /// Sum of squared values.
+    pub energy: f64,
+    /// Sum of squared errors after each scan.
+    pub errors: Vec<f64>,
+    /// The error after the last scan, `[pixel, centre-out index]`.
+    residual: Vec<Pixel>,
+}
+
+impl QuantisedFunctions {
+    /// Quantises functions, `[pixel, slot]`, by `scans`.
+    pub fn new(functions: &[Pixel], order: &[u16], scans: &[&Scan]) -> Self {
+        let mut residual = OrderedFunctions::new(functions, order).values;
+        let square = |residual: &[Pixel]| {
+            let all = residual.iter().flatten();
             all.map(|t| f64::from(*t).powi(2)).sum::<f64>()
         };
-        let mut numbers = Self {
+        let mut quantised = Self {
             scans: Vec::new(),
-            energy: square(&rest),
+            energy: square(&residual),
             errors: Vec::new(),
-            rest: Vec::new(),
+            residual: Vec::new(),
         };
         for (s, scan) in scans.iter().enumerate() {
-            let later = scans[s + 1..].iter().any(|later| later.first == scan.first);
-            let rounding = if later { ROUNDING_AT_FIRST } else { ROUNDING };
+            let slots = usize::from(scan.first)..scan.end();
+            let is_last = |k: usize| {
+                let covers = |later: &&Scan| usize::from(later.first) <= k && k < later.end();
+                !scans[s + 1..].iter().any(covers)
+            };
+            let offsets: Vec<f32> = slots
+                .clone()
+                .map(|k| {
+                    if is_last(k) {
+                        ROUNDING_OFFSET
+                    } else {
+                        COARSE_ROUNDING_OFFSET
+                    }
+                })
+                .collect();
             let mut own = Vec::new();
-            for function in rest.chunks_exact_mut(order.len()) {
-                for tau in &mut function[usize::from(scan.first)..scan.end()] {
-                    let rgb = tau.map(|t| round(t, scan.step, rounding));
+            for function in residual.chunks_exact_mut(order.len()) {
+                for (tau, offset) in function[slots.clone()].iter_mut().zip(&offsets) {
+                    let rgb = tau.map(|t| round(t, scan.step, *offset));
                     for (t, number) in tau.iter_mut().zip(rgb) {
                         *t -= number as f32 * scan.step;
                     }
-                    own.extend(luma_chroma(rgb));
+                    own.extend(ycocg_forward(rgb));
                 }
             }
-            numbers.scans.push(own);
-            numbers.errors.push(square(&rest));
+            quantised.scans.push(own);
+            quantised.errors.push(square(&residual));
         }
-        numbers.rest = rest;
-        numbers
+        quantised.residual = residual;
+        quantised
     }
 
-    /// What a reader will have of the `functions` that these are of.
+    /// The functions as a reader decodes them, of the `functions` that were quantised.
     pub fn decoded(&self, functions: &[Pixel], order: &[u16]) -> Vec<Pixel> {
         let mut decoded: Vec<Pixel> = functions.iter().copied().map(finite).collect();
         let of_pixels = decoded.chunks_exact_mut(order.len());
-        for (function, rest) in of_pixels.zip(self.rest.chunks_exact(order.len())) {
-            for (&slot, rest) in order.iter().zip(rest) {
-                for (value, rest) in function[usize::from(slot)].iter_mut().zip(rest) {
-                    *value -= rest;
+        for (function, residual) in of_pixels.zip(self.residual.chunks_exact(order.len())) {
+            for (&slot, residual) in order.iter().zip(residual) {
+                for (value, residual) in function[usize::from(slot)].iter_mut().zip(residual) {
+                    *value -= residual;
                 }
             }
         }
         decoded
     }
 
-    /// Compresses the chunks, `None` where there is none.
-    pub fn chunks(&self, scans: &[&Scan]) -> Result<Vec<Option<Chunk>>, FormatError> {
+    /// The chunks, `None` where all numbers are zero.
+    ///
+    /// # Errors
+    /// [`FormatError::Compress`].
+    pub fn chunks(&self, scans: &[&Scan]) -> Result<Vec<Option<EncodedChunk>>, FormatError> {
         let each = self.scans.iter().zip(scans);
         each.map(|(numbers, scan)| {
             if numbers.iter().all(|number| *number == 0) {
                 return Ok(None);
             }
-            let mut writer = Writer::default();
+            let mut writer = TokenWriter::default();
             for function in numbers.chunks_exact(usize::from(scan.count) * CHANNELS) {
-                writer.block(function);
+                writer.write_run(function);
             }
-            let (bytes, plain) = writer.finish()?;
-            Ok(Some(Chunk { bytes, plain }))
+            let (bytes, content_bytes) = writer.finish()?;
+            Ok(Some(EncodedChunk {
+                bytes,
+                content_bytes,
+            }))
         })
         .collect()
     }
 }
 
-/// What is no number counts for none.
+/// Values that are not finite count as zero.
 fn finite(tau: Pixel) -> Pixel {
     tau.map(|t| if t.is_finite() { t } else { 0.0 })
 }
 
-fn round(x: f32, step: f32, rounding: f32) -> i32 {
-    // Differences of colours are up to twice as large.
-    let steps = (x.abs() / step + rounding) as i32; // `as` saturates
-    steps.min(MOST / 2) * if x < 0.0 { -1 } else { 1 }
+fn round(x: f32, step: f32, offset: f32) -> i32 {
+    // Co and Cg are up to twice as large.
+    let steps = (x.abs() / step + offset) as i32; // `as` saturates
+    steps.min(MAX_MAGNITUDE / 2) * if x < 0.0 { -1 } else { 1 }
 }
 
 #[cfg(test)]
@@ -181,6 +267,10 @@ mod tests {
         height: 4,
     };
 
+    fn order(side: u32) -> Vec<u16> {
+        centre_out_order(Window::new(side).unwrap(), &Budget::unlimited()).unwrap()
+    }
+
     fn functions(area: usize) -> Vec<Pixel> {
         let tau = |i: usize| {
             let near = 1.0 / (1.0 + (i % area) as f32);
@@ -190,14 +280,13 @@ mod tests {
     }
 
     #[test]
-    fn slots_come_from_the_middle() {
-        let window = Window::new(3).unwrap();
-        assert_eq!(order(window), [4, 1, 3, 5, 7, 0, 2, 6, 8]);
+    fn slots_are_ordered_from_the_centre() {
+        assert_eq!(order(3), [4, 1, 3, 5, 7, 0, 2, 6, 8]);
     }
 
     #[test]
-    fn functions_come_back_scan_by_scan() {
-        let order = order(Window::new(5).unwrap());
+    fn decoded_functions_have_the_error_of_their_scans() {
+        let order = order(5);
         let functions = functions(25);
         for step in [1e-4, 1e-2] {
             let scans = [
@@ -206,17 +295,21 @@ mod tests {
                 Scan::new(Coding::Direct, 10, 15, step),
             ];
             let scans: Vec<&Scan> = scans.iter().collect();
-            let numbers = Numbers::new(&functions, &order, &scans);
+            let quantised = QuantisedFunctions::new(&functions, &order, &scans);
             let mut got = vec![[0.0; CHANNELS]; functions.len()];
-            let chunks = numbers.chunks(&scans).unwrap();
-            for ((scan, chunk), error) in scans.iter().zip(chunks).zip(&numbers.errors) {
+            let chunks = quantised.chunks(&scans).unwrap();
+            for ((scan, chunk), error) in scans.iter().zip(chunks).zip(&quantised.errors) {
                 if let Some(chunk) = chunk {
-                    assert!(u64::from(chunk.plain) <= most_plain(EXTENT, scan.count));
-                    assert!(chunk.bytes.len() as u64 <= bound(chunk.plain.into()));
-                    add(&mut got, &order, scan, &chunk.bytes, chunk.plain).unwrap();
+                    let add_to = |functions: &mut [Pixel], bytes: &[u8]| {
+                        let budget = Budget::unlimited();
+                        add(functions, &order, scan, bytes, chunk.content_bytes, &budget)
+                    };
+                    assert!(u64::from(chunk.content_bytes) <= max_tokens(EXTENT, scan.count));
+                    assert!(chunk.bytes.len() as u64 <= max_bytes(chunk.content_bytes.into()));
+                    add_to(&mut got, &chunk.bytes).unwrap();
                     for cut in 0..chunk.bytes.len() {
                         let cut = &chunk.bytes[..cut];
-                        assert!(add(&mut got.clone(), &order, scan, cut, chunk.plain).is_err());
+                        assert!(add_to(&mut got.clone(), cut).is_err());
                     }
                 }
                 let off = got.iter().zip(&functions);
@@ -228,15 +321,16 @@ mod tests {
     }
 
     #[test]
-    fn numbers_too_large_saturate() {
-        let order = order(Window::new(1).unwrap());
+    fn numbers_saturate() {
+        let order = order(1);
         let scan = Scan::new(Coding::Direct, 0, 1, 1e-6);
         let functions = [[1.0, -1.0, f32::NAN]];
-        let numbers = Numbers::new(&functions, &order, &[&scan]);
-        let chunk = numbers.chunks(&[&scan]).unwrap().pop().unwrap().unwrap();
+        let quantised = QuantisedFunctions::new(&functions, &order, &[&scan]);
+        let chunk = quantised.chunks(&[&scan]).unwrap().pop().unwrap().unwrap();
         let mut got = [[0.0; CHANNELS]];
-        add(&mut got, &order, &scan, &chunk.bytes, chunk.plain).unwrap();
-        let most = (MOST / 2) as f32 * 1e-6;
-        assert_eq!(got, [[most, -most, 0.0]]);
+        let (tokens, budget) = (chunk.content_bytes, Budget::unlimited());
+        add(&mut got, &order, &scan, &chunk.bytes, tokens, &budget).unwrap();
+        let max = (MAX_MAGNITUDE / 2) as f32 * 1e-6;
+        assert_eq!(got, [[max, -max, 0.0]]);
     }
 }

@@ -1,41 +1,47 @@
-//! Values as half-precision floats: for archives.
+//! Codings 2 and 4: values as half-precision floats in units of the scan's step, for archives.
+//!
+//! Content of the frame: binary16 `[item, channel, pixel]` as [byte planes](super::byte_planes). An item is
+//! a component, or a slot in centre-out order.
 
 use half::f16;
 
-use super::bytes::{join, split};
+use super::byte_planes::{join, split};
 use super::colour::Pixel;
-use super::{PartError, compress, damaged, decompress};
-use crate::format::FormatError;
+use super::zstd_frame::{compress, decompress};
+use crate::format::budget::Budget;
+use crate::format::error::{FormatError, SectionError, damaged};
+use crate::format::scan::Scan;
 use crate::transport::CHANNELS;
 
-/// Bytes of so many values before compression.
-pub fn plain_bytes(values: usize) -> usize {
+/// Bytes of `values` values before compression.
+pub fn content_bytes(values: usize) -> usize {
     2 * values
 }
 
-/// The largest power of two by which values of this peak can be divided to be as precise as half
-/// precision allows.
+/// The power of two that brings values of this peak to half precision's most precise range.
 pub fn step_for(peak: f32) -> f32 {
-    // Halves reach to 65504; a few binades are left for what other tiles have.
+    // Half precision ends at 65504; a few binades remain for other tiles.
     match peak.is_normal() {
         true => (peak.log2().ceil() - 14.0).clamp(-120.0, 100.0).exp2(),
         false => 1.0,
     }
 }
 
-/// Compresses values in units of `step`. Those that are not finite become zero, those too large the
-/// largest there are.
+/// Compresses values in units of `step`. Values that are not finite become zero; the range is clipped.
+///
+/// # Errors
+/// [`FormatError::Compress`].
 pub fn encode(values: &[f32], step: f32) -> Result<Vec<u8>, FormatError> {
     compress(&split(
         values.iter().map(|value| half(*value, step).to_bits()),
     ))
 }
 
-/// The sum of the squares of what [`encode`] changes about finite values.
+/// Squared error of [`encode`] on finite values.
 pub fn error(values: &[f32], step: f32) -> f64 {
-    let off =
+    let error =
         |value: &f32| f64::from(half(*value, step).to_f32()) * f64::from(step) - f64::from(*value);
-    values.iter().map(|value| off(value).powi(2)).sum()
+    values.iter().map(|value| error(value).powi(2)).sum()
 }
 
 fn half(value: f32, step: f32) -> f16 {
@@ -46,39 +52,53 @@ fn half(value: f32, step: f32) -> f16 {
     }
 }
 
-/// Adds values in the order `[place, channel, pixel]` to `values` as `[pixel, place]`, of which
-/// there are `each` a pixel.
+/// The column of `values` that item `item` of a scan stands for; `order` is that of direct scans' slots.
+fn column(scan: &Scan, order: Option<&[u16]>, item: usize) -> usize {
+    let at = usize::from(scan.first) + item;
+    order.map_or(at, |order| order[at].into())
+}
+
+/// Adds the values of a chunk to `values`, `[pixel, column]` of `columns` columns.
+///
+/// # Errors
+/// [`SectionError`] if the chunk is damaged or holds a value that is not finite, or the budget refuses
+/// memory.
 pub fn add(
     values: &mut [Pixel],
-    each: usize,
-    places: &[u16],
-    step: f32,
+    columns: usize,
+    scan: &Scan,
+    order: Option<&[u16]>,
     frame: &[u8],
-) -> Result<(), PartError> {
-    let pixels = values.len() / each;
-    let plain = decompress(frame, plain_bytes(pixels * places.len() * CHANNELS))?;
-    let mut halves = join(&plain).map(f16::from_bits);
-    for &place in places {
+    budget: &Budget,
+) -> Result<(), SectionError> {
+    let count = usize::from(scan.count);
+    let length = content_bytes(values.len() / columns * count * CHANNELS);
+    let content = decompress(frame, length, budget)?;
+    let mut halves = join(&content).map(f16::from_bits);
+    for item in 0..count {
+        let column = column(scan, order, item);
         for c in 0..CHANNELS {
-            let of_place = values.iter_mut().skip(place.into()).step_by(each);
-            for (value, half) in of_place.zip(&mut halves) {
+            let of_column = values.iter_mut().skip(column).step_by(columns);
+            for (value, half) in of_column.zip(&mut halves) {
                 if !half.is_finite() {
                     return Err(damaged("a value is not a finite number"));
                 }
-                value[c] += half.to_f32() * step;
+                value[c] += half.to_f32() * scan.step;
             }
         }
     }
     Ok(())
 }
 
-/// The values that [`add`] takes.
-pub fn gather(values: &[Pixel], each: usize, places: &[u16]) -> Vec<f32> {
-    let mut gathered = Vec::with_capacity(values.len() / each * places.len() * CHANNELS);
-    for &place in places {
+/// The values that [`add`] reads.
+pub fn gather(values: &[Pixel], columns: usize, scan: &Scan, order: Option<&[u16]>) -> Vec<f32> {
+    let count = usize::from(scan.count);
+    let mut gathered = Vec::with_capacity(values.len() / columns.max(1) * count * CHANNELS);
+    for item in 0..count {
+        let column = column(scan, order, item);
         for c in 0..CHANNELS {
-            let of_place = values.iter().skip(place.into()).step_by(each);
-            gathered.extend(of_place.map(|value| value[c]));
+            let of_column = values.iter().skip(column).step_by(columns);
+            gathered.extend(of_column.map(|value| value[c]));
         }
     }
     gathered
@@ -87,25 +107,34 @@ pub fn gather(values: &[Pixel], each: usize, places: &[u16]) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::scan::Coding;
+
+    fn scan(first: u16, count: u16, step: f32) -> Scan {
+        Scan::new(Coding::DirectHalves, first, count, step)
+    }
 
     #[test]
-    fn values_come_back_to_eleven_bits() {
+    fn decoded_values_have_eleven_bits() {
         for peak in [1e-6f32, 0.3, 7e5] {
             let value = |i: usize| [1.0, 0.5, -0.7].map(|c| c * peak * (i as f32 * 0.37).sin());
             let values: Vec<Pixel> = (0..5 * 40).map(value).collect();
             let step = step_for(peak);
             let mut got = vec![[0.0; CHANNELS]; values.len()];
-            let mut said = 0.0;
-            for places in [&[3, 0][..], &[1, 2, 4]] {
-                let gathered = gather(&values, 5, places);
+            let mut claimed = 0.0;
+            let order = Some(&[3, 0, 1, 2, 4][..]);
+            for scan in [scan(0, 2, step), scan(2, 3, step)] {
+                let gathered = gather(&values, 5, &scan, order);
                 let frame = encode(&gathered, step).unwrap();
-                add(&mut got, 5, places, step, &frame).unwrap();
-                said += error(&gathered, step);
+                add(&mut got, 5, &scan, order, &frame, &Budget::unlimited()).unwrap();
+                claimed += error(&gathered, step);
             }
-            let off = |(got, want): (&f32, &f32)| f64::from(got - want).powi(2);
+            let square = |(got, want): (&f32, &f32)| f64::from(got - want).powi(2);
             let pairs = got.as_flattened().iter().zip(values.as_flattened());
-            let off: f64 = pairs.map(off).sum();
-            assert!((off / said - 1.0).abs() < 1e-3, "{off:e}, not {said:e}");
+            let error: f64 = pairs.map(square).sum();
+            assert!(
+                (error / claimed - 1.0).abs() < 1e-3,
+                "{error:e}, not {claimed:e}"
+            );
             for (got, want) in got.as_flattened().iter().zip(values.as_flattened()) {
                 assert!((got - want).abs() <= want.abs() / 2048.0 + peak * 1e-7);
             }
@@ -113,12 +142,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_refused_and_not_written() {
+    fn values_that_are_not_finite_are_written_as_zero_and_refused_in_a_file() {
         let mut got = [[1.0; CHANNELS]];
         let frame = encode(&[f32::NAN, f32::INFINITY, f32::MAX], 1.0).unwrap();
-        add(&mut got, 1, &[0], 1.0, &frame).unwrap();
-        assert_eq!(got, [[1.0, 1.0, 65505.0]]);
-        let frame = compress(&[0, 0, 0, 0, 0, 0x7C]).unwrap();
-        assert!(add(&mut got, 1, &[0], 1.0, &frame).is_err());
+        let mut add = |frame: &[u8]| {
+            let scan = scan(0, 1, 1.0);
+            add(&mut got, 1, &scan, None, frame, &Budget::unlimited()).map(|()| got)
+        };
+        assert_eq!(add(&frame).unwrap(), [[1.0, 1.0, 65505.0]]);
+        assert!(add(&compress(&[0, 0, 0, 0, 0, 0x7C]).unwrap()).is_err());
     }
 }

@@ -1,191 +1,229 @@
-//! Coefficients over the basis, in few bytes.
+//! Coding 1: coefficients by colour transform, cosine transform and quantisation.
 //!
-//! Channels first: the first component's are turned to the tile's principal colours, every other's
-//! are mirrored so that the pixel's own colour, that of its first component, becomes the first axis;
-//! what is left on the others is small. Then, component by component, blocks of 8 by 8 pixels of each
-//! axis go through the cosine transform and are rounded to multiples of the scan's step. The basis is
-//! orthonormal and so are these: an error in any number is as large in the transport.
+//! For pixel p and component k, with c_pk in red, green and blue and q_pk on three other axes:
 //!
-//! Scans add up: what one has rounded away a later one, of a smaller step, may bring.
+//! ```text
+//! q_p0 = K c_p0           K: the colour KLT of the tile's component 0
+//! q_pk = H(c_p0) c_pk     H: the Householder reflection that maps the pixel's own colour to axis 0
+//! ```
+//!
+//! Most energy lies on axis 0 then, as the components of a pixel have similar colours. Each axis goes
+//! through the cosine transform in blocks of 8 x 8 pixels and is rounded to multiples of the scan's step.
+//! With an orthonormal basis every stage is orthonormal: an error of a number is as large in τ. Scans add
+//! up. Values are `[component, axis, pixel]`.
+//!
+//! A chunk is the KLT (18 bytes, in the tile's first chunk with component 0), the length of the main token
+//! string, the main token string (axis 0, a run of 64 numbers for each component and block) and the side
+//! token string (axes 1 and 2 interleaved, a run of 128).
 
-use super::bytes::Fields;
-use super::colour::{Mirror, Palette, Pixel};
+use super::colour::{ColourKlt, HouseholderReflection, Pixel};
 use super::dct::{self, AREA, Block, SIDE, ZIGZAG};
-use super::tokens::{self, MOST, Reader, Writer};
-use super::{MOST_PLAIN, PartError, damaged, zeros};
-use crate::format::FormatError;
-use crate::format::chunk::Chunk;
+use super::tokens::{self, MAX_MAGNITUDE, TokenReader};
+use crate::format::budget::{Budget, vec_bytes};
+use crate::format::constants::MAX_CONTENT_BYTES;
+use crate::format::error::{FormatError, SectionError, damaged};
+use crate::format::fields::FieldReader;
 use crate::format::scan::Scan;
-use crate::transport::{CHANNELS, Extent, FactoredTile};
+use crate::transport::{CHANNELS, Extent};
 
-/// What is added to a magnitude, in steps, before it is cut to a whole number: by how many units the
-/// numbers before and after it come to, up to two each. Below a half, numbers that are mostly noise
-/// become zero, which costs fewer bits than the error is worth; those that stand alone cost most.
-const ROUNDING: [f32; 5] = [0.0, 0.2, 0.3, 0.3, 0.3];
-/// The same for a first guess at the neighbours.
-const ROUNDING_ALONE: f32 = 0.2;
-/// The same where a later scan brings the rest.
-const ROUNDING_AT_FIRST: f32 = 0.3;
+/// The axes of one component of a tile, `[axis, pixel]`; empty if all are zero.
+pub type Plane = Vec<f32>;
 
-/// The axes of one component of a tile, `[axis, pixel]`; empty where all are zero.
-type Plane = Vec<f32>;
-
-/// Coefficients of a tile as far as scans have brought them.
+/// Coefficients of a tile on their transformed axes: the sum of its scans so far.
 #[derive(Clone, Debug, Default)]
 pub struct Planes {
-    palette: Option<Palette>,
-    components: Vec<Plane>,
+    pub klt: Option<ColourKlt>,
+    pub components: Vec<Plane>,
 }
 
 impl Planes {
-    /// Planes to which a tile's later chunks may be added by themselves.
-    pub fn with_palette() -> Self {
+    /// Planes to which one of a tile's later chunks, without a KLT, can be added.
+    pub fn with_klt() -> Self {
         Self {
-            palette: Some(Palette([[0; CHANNELS]; CHANNELS])),
+            klt: Some(ColourKlt([[0; CHANNELS]; CHANNELS])),
             components: Vec::new(),
         }
     }
 
-    /// Whether no scan has brought anything.
+    /// Whether all coefficients are zero.
     pub fn is_dark(&self) -> bool {
         self.components.iter().all(Vec::is_empty)
     }
 
+    /// Bytes allocated.
+    pub fn bytes(&self) -> u64 {
+        vec_bytes(&self.components) + self.components.iter().map(vec_bytes).sum::<u64>()
+    }
+
     /// Red, green and blue as `[pixel, component]`, of the first `rank` components.
-    pub fn coefficients(&self, extent: Extent, rank: usize) -> Result<Vec<Pixel>, PartError> {
+    ///
+    /// # Errors
+    /// The errors of `budget`.
+    pub fn coefficients(
+        &self,
+        extent: Extent,
+        rank: usize,
+        budget: &Budget,
+    ) -> Result<Vec<Pixel>, FormatError> {
         let pixels = extent.area();
-        let mut coefficients: Vec<Pixel> = zeros(pixels * rank)?;
-        let mut mirrors: Vec<Mirror> = Vec::new();
-        if let (Some(palette), Some(plane)) = (self.palette, self.components.first())
+        let mut coefficients: Vec<Pixel> = budget.try_zeroed(pixels * rank)?;
+        let mut reflections = budget.try_with_capacity(pixels)?;
+        if let (Some(klt), Some(plane)) = (self.klt, self.components.first())
             && !plane.is_empty()
             && rank > 0
         {
             for p in 0..pixels {
-                let rgb = palette.turn_back(shares(plane, pixels, p));
+                let rgb = klt.inverse(axis_values(plane, pixels, p));
                 coefficients[p * rank] = rgb;
-                mirrors.push(Mirror::of(rgb));
+                reflections.push(HouseholderReflection::of_colour(rgb));
             }
         } else {
-            mirrors.resize(pixels, Mirror::of([0.0; CHANNELS]));
+            reflections.resize(pixels, HouseholderReflection::of_colour([0.0; CHANNELS]));
         }
         let others = self.components.iter().enumerate().take(rank).skip(1);
         for (k, plane) in others.filter(|(_, plane)| !plane.is_empty()) {
-            for (p, mirror) in mirrors.iter().enumerate() {
-                coefficients[p * rank + k] = mirror.apply(shares(plane, pixels, p));
+            for (p, reflection) in reflections.iter().enumerate() {
+                coefficients[p * rank + k] = reflection.apply(axis_values(plane, pixels, p));
             }
         }
+        budget.release_vec(reflections);
         Ok(coefficients)
     }
 
-    /// Adds a tile's chunk of `scan`.
+    /// Adds a tile's chunk of `scan`, which has `tokens` tokens.
+    ///
+    /// # Errors
+    /// [`SectionError`] if the chunk is damaged, or the budget refuses memory.
     pub fn add(
         &mut self,
         extent: Extent,
         scan: &Scan,
         bytes: &[u8],
-        plain: u32,
-    ) -> Result<(), PartError> {
-        let mut fields = Fields(bytes);
-        if scan.first == 0 && self.palette.is_none() {
-            self.palette = Some(Palette::from_bytes(fields.bytes(Palette::BYTES)?));
+        tokens: u32,
+        budget: &Budget,
+    ) -> Result<(), SectionError> {
+        let too_short = || damaged("it is shorter than it says");
+        let mut fields = FieldReader(bytes);
+        if scan.first == 0 && self.klt.is_none() {
+            let klt = fields.try_bytes(ColourKlt::BYTES).ok_or_else(too_short)?;
+            self.klt = Some(ColourKlt::from_bytes(klt));
         }
-        let length = fields.length()?;
-        let most = plain as usize;
-        let mut first = Reader::new(fields.bytes(length)?, most)?;
-        let mut second = Reader::new(fields.0, most - first.tokens())?;
-        if first.tokens() + second.tokens() < most {
-            return Err(damaged("it has fewer tokens than it says"));
+        let length = fields.try_length().ok_or_else(too_short)?;
+        let main = fields.try_bytes(length).ok_or_else(too_short)?;
+        let tokens = tokens as usize;
+        let mut main = TokenReader::new(main, tokens, budget)?;
+        let mut side = TokenReader::new(fields.0, tokens - main.tokens(), budget)?;
+        if main.tokens() + side.tokens() < tokens {
+            return Err(damaged("it has fewer tokens than its entry says"));
         }
-        let components = usize::from(scan.first)..usize::from(scan.first) + usize::from(scan.count);
+        let components = usize::from(scan.first)..scan.end();
         if self.components.len() < components.end {
-            self.components.resize(components.end, Vec::new());
+            let mut grown = budget.try_with_capacity(components.end)?;
+            grown.append(&mut self.components);
+            grown.resize(components.end, Plane::new());
+            self.components = grown;
         }
+        let planes = &mut self.components[components];
         let mut numbers = [0; 2 * AREA];
-        for plane in &mut self.components[components.clone()] {
-            for corner in corners(extent) {
-                let end = first.block(&mut numbers[..AREA])?;
+        for plane in &mut *planes {
+            for corner in block_corners(extent) {
+                let end = main.read_run(&mut numbers[..AREA])?;
                 if end > 0 {
                     let block = dequantise(&numbers[..end], scan.step);
-                    add_block(axis(plane, extent, 0)?, extent, corner, &block);
+                    let axis = try_axis(plane, extent, 0, budget)?;
+                    add_block(axis, extent, corner, &block);
                     numbers[..end].fill(0);
                 }
             }
         }
-        first.finish()?;
-        for plane in &mut self.components[components] {
-            for corner in corners(extent) {
-                let end = second.block(&mut numbers)?;
+        main.finish()?;
+        for plane in planes {
+            for corner in block_corners(extent) {
+                let end = side.read_run(&mut numbers)?;
                 for a in [1, 2] {
                     let of_axis = numbers[..end].iter().skip(a - 1).step_by(2);
                     let mut own = [0; AREA];
-                    let mut any = false;
+                    let mut is_zero = true;
                     for (own, &number) in own.iter_mut().zip(of_axis) {
                         *own = number;
-                        any |= number != 0;
+                        is_zero &= number == 0;
                     }
-                    if any {
+                    if !is_zero {
                         let block = dequantise(&own, scan.step);
-                        add_block(axis(plane, extent, a)?, extent, corner, &block);
+                        let axis = try_axis(plane, extent, a, budget)?;
+                        add_block(axis, extent, corner, &block);
                     }
                 }
                 numbers[..end].fill(0);
             }
         }
-        second.finish()
+        side.finish()
     }
 }
 
-/// Most tokens of a tile in a scan: one a number.
-pub fn most_plain(extent: Extent, count: u16) -> u64 {
-    (blocks(extent) * AREA * CHANNELS) as u64 * u64::from(count)
+/// Maximum tokens of a chunk: one for each number.
+pub fn max_tokens(extent: Extent, count: u16) -> u64 {
+    (block_count(extent) * AREA * CHANNELS) as u64 * u64::from(count)
 }
 
-/// Most bytes of a chunk of so many tokens.
-pub fn bound(plain: u64) -> u64 {
-    Palette::BYTES as u64 + 4 + tokens::bound(0) + tokens::bound(plain)
+/// Maximum bytes of a chunk of `tokens` tokens.
+pub fn max_bytes(tokens: u64) -> u64 {
+    ColourKlt::BYTES as u64 + 4 + tokens::max_bytes(0) + tokens::max_bytes(tokens)
 }
 
-/// Components of which any tile's tokens are few enough for one chunk.
-pub fn most_components(tile_side: u32) -> u64 {
+/// Number of components whose tokens fit into one chunk of any tile.
+pub fn max_components(tile_side: u32) -> u64 {
     let extent = Extent {
         width: tile_side,
         height: tile_side,
     };
-    MOST_PLAIN / most_plain(extent, 1)
+    MAX_CONTENT_BYTES / max_tokens(extent, 1)
 }
 
-/// The finest step by which no number is too large, of coefficients of this peak.
-pub fn finest_step(peak: f32) -> f32 {
-    // A block's lowest frequency is eight times its pixels' mean; a turn may gather three channels.
-    peak * (8 * 2) as f32 / MOST as f32
+/// The finest step that keeps numbers within [`MAX_MAGNITUDE`], for coefficients up to `peak` whose squares sum
+/// to `energy`.
+pub fn finest_step(peak: f32, energy: f64) -> f32 {
+    // Frequency 0 is eight times a block's mean, and a colour transform adds up to √3; no number exceeds
+    // the norm of all. Rounded colour axes are a little longer than 1.
+    let max_value = (peak * (8 * 2) as f32).min(1.01 * energy.sqrt() as f32);
+    max_value / MAX_MAGNITUDE as f32
 }
 
-fn blocks(extent: Extent) -> usize {
+/// Number of blocks of a tile.
+pub fn block_count(extent: Extent) -> usize {
     (extent.width as usize).div_ceil(SIDE) * (extent.height as usize).div_ceil(SIDE)
 }
 
-/// Upper left corners of a tile's blocks.
-fn corners(extent: Extent) -> impl Iterator<Item = (usize, usize)> {
-    let (across, down) = (extent.width as usize, extent.height as usize);
-    let tops = (0..down).step_by(SIDE);
-    tops.flat_map(move |top| (0..across).step_by(SIDE).map(move |left| (left, top)))
+/// Column and row of each block's top left pixel.
+pub fn block_corners(extent: Extent) -> impl Iterator<Item = (usize, usize)> {
+    let (width, height) = (extent.width as usize, extent.height as usize);
+    let tops = (0..height).step_by(SIDE);
+    tops.flat_map(move |top| (0..width).step_by(SIDE).map(move |left| (left, top)))
 }
 
-fn shares(plane: &[f32], pixels: usize, p: usize) -> Pixel {
+fn axis_values(plane: &[f32], pixels: usize, p: usize) -> Pixel {
     std::array::from_fn(|axis| plane[axis * pixels + p])
 }
 
-/// One axis of a component, which is made where there is none yet.
-fn axis(plane: &mut Plane, extent: Extent, axis: usize) -> Result<&mut [f32], PartError> {
+/// One axis of a component, whose plane is allocated with its first number that is not zero.
+///
+/// # Errors
+/// The errors of `budget`.
+pub fn try_axis<'a>(
+    plane: &'a mut Plane,
+    extent: Extent,
+    axis: usize,
+    budget: &Budget,
+) -> Result<&'a mut [f32], FormatError> {
     let pixels = extent.area();
     if plane.is_empty() {
-        *plane = zeros(CHANNELS * pixels)?;
+        *plane = budget.try_zeroed(CHANNELS * pixels)?;
     }
     Ok(&mut plane[axis * pixels..(axis + 1) * pixels])
 }
 
-/// The pixels that a block's numbers stand for.
-fn dequantise(numbers: &[i32], step: f32) -> Block {
+/// The pixels of a block of numbers in zigzag order.
+pub fn dequantise(numbers: &[i32], step: f32) -> Block {
     let mut block = [0.0; AREA];
     for (number, i) in numbers.iter().zip(ZIGZAG) {
         block[usize::from(i)] = *number as f32 * step;
@@ -193,341 +231,15 @@ fn dequantise(numbers: &[i32], step: f32) -> Block {
     dct::inverse(&block)
 }
 
-/// Adds a block's pixels where they belong, as far as the tile goes.
-fn add_block(axis: &mut [f32], extent: Extent, corner: (usize, usize), block: &Block) {
-    let (across, down) = (extent.width as usize, extent.height as usize);
+/// Adds a block's pixels to the axis of a tile, cut at the tile's edges.
+pub fn add_block(axis: &mut [f32], extent: Extent, corner: (usize, usize), block: &Block) {
+    let (width, height) = (extent.width as usize, extent.height as usize);
     let (left, top) = corner;
-    let width = SIDE.min(across - left);
-    for (y, row) in (top..down).zip(block.chunks_exact(SIDE)) {
-        let at = y * across + left;
-        for (pixel, value) in axis[at..at + width].iter_mut().zip(row) {
+    let columns = SIDE.min(width - left);
+    for (y, row) in (top..height).zip(block.chunks_exact(SIDE)) {
+        let at = y * width + left;
+        for (pixel, value) in axis[at..at + columns].iter_mut().zip(row) {
             *pixel += value;
         }
-    }
-}
-
-/// A tile's coefficients as the numbers of its scans.
-#[derive(Clone, Debug)]
-pub struct Numbers {
-    palette: Palette,
-    blocks: usize,
-    /// `[scan]`, then `[component, axis, block, coefficient in zigzag order]`.
-    scans: Vec<Vec<i32>>,
-    /// Squared coefficients.
-    pub energy: f64,
-    /// Squared errors that are left after each scan, but for the palette's.
-    pub errors: Vec<f64>,
-    /// Squared error of the first component's colours by a palette that is rounded, which no step mends.
-    pub of_palette: f64,
-    /// What a reader will have of it: the first component, and the others if they are wanted.
-    planes: Planes,
-}
-
-impl Numbers {
-    /// Transforms a tile and rounds it as `scans` say, which cover its components; `keep` says whether
-    /// what it will be [decoded](Self::decoded) to is wanted.
-    pub fn new(tile: &FactoredTile, scans: &[&Scan], keep: bool) -> Self {
-        let extent = tile.rect.extent;
-        let rank = tile.coefficients.len() / extent.area();
-        let of = |p: usize, k: usize| {
-            tile.coefficients[p * rank + k].map(|c| if c.is_finite() { c } else { 0.0 })
-        };
-        let mut numbers = Self {
-            palette: Palette::principal((0..extent.area()).map(|p| of(p, 0))),
-            blocks: blocks(extent),
-            scans: Vec::new(),
-            energy: 0.0,
-            errors: vec![0.0; scans.len()],
-            of_palette: 0.0,
-            planes: Planes::default(),
-        };
-        for scan in scans {
-            let length = usize::from(scan.count) * CHANNELS * numbers.blocks * AREA;
-            numbers.scans.push(vec![0; length]);
-        }
-        let mut planes = Planes {
-            palette: Some(numbers.palette),
-            components: vec![Vec::new()],
-        };
-        let turned = |p: usize| numbers.palette.turn(of(p, 0));
-        let pixels: Vec<Pixel> = (0..extent.area()).map(turned).collect();
-        let off = |(p, turned): (usize, &Pixel)| -> f64 {
-            let (got, want) = (numbers.palette.turn_back(*turned), of(p, 0));
-            (0..CHANNELS)
-                .map(|c| f64::from(got[c] - want[c]).powi(2))
-                .sum()
-        };
-        numbers.of_palette = pixels.iter().enumerate().map(off).sum();
-        let first = Some(&mut planes.components[0]);
-        numbers.component(0, &pixels, extent, scans, first);
-        // As a reader will know them once every scan has come.
-        let mirrors: Vec<Mirror> = match planes.coefficients(extent, 1) {
-            Ok(colours) => colours.into_iter().map(Mirror::of).collect(),
-            Err(_) => vec![Mirror::of([0.0; CHANNELS]); extent.area()],
-        };
-        let mut pixels = pixels;
-        for k in 1..rank {
-            for (p, pixel) in pixels.iter_mut().enumerate() {
-                *pixel = mirrors[p].apply(of(p, k));
-            }
-            let mut plane = Plane::new();
-            numbers.component(k, &pixels, extent, scans, keep.then_some(&mut plane));
-            planes.components.push(plane);
-        }
-        numbers.planes = planes;
-        numbers
-    }
-
-    /// The coefficients that a reader will have, `[pixel, component]`, where they were kept.
-    pub fn decoded(&self, extent: Extent) -> Result<Vec<Pixel>, PartError> {
-        self.planes
-            .coefficients(extent, self.planes.components.len())
-    }
-
-    /// Rounds component `k`; leaves what a reader will see of it in `seen`.
-    fn component(
-        &mut self,
-        k: usize,
-        pixels: &[Pixel],
-        extent: Extent,
-        scans: &[&Scan],
-        mut seen: Option<&mut Plane>,
-    ) {
-        let covers = |scan: &Scan| (usize::from(scan.first)..scan.end()).contains(&k);
-        let last = scans.iter().rposition(|scan| covers(scan));
-        for a in 0..CHANNELS {
-            for (b, (left, top)) in corners(extent).enumerate() {
-                let mut rest = transformed(pixels, extent, (left, top), a);
-                let inside = (
-                    SIDE.min(extent.width as usize - left),
-                    SIDE.min(extent.height as usize - top),
-                );
-                let mut left_over = square(&rest, inside);
-                self.energy += left_over;
-                for (s, scan) in scans.iter().enumerate() {
-                    if covers(scan) {
-                        let at = (k - usize::from(scan.first)) * CHANNELS + a;
-                        let at = (at * self.blocks + b) * AREA;
-                        let numbers = &mut self.scans[s][at..at + AREA];
-                        match Some(s) == last {
-                            true => round_block(&rest, scan.step, numbers),
-                            false => round_all(&rest, scan.step, |_| ROUNDING_AT_FIRST, numbers),
-                        }
-                        for (number, rest) in numbers.iter().zip(&mut rest) {
-                            *rest -= *number as f32 * scan.step;
-                        }
-                        left_over = square(&rest, inside);
-                        if let Some(plane) = &mut seen
-                            && numbers.iter().any(|number| *number != 0)
-                            && let Ok(axis) = axis(plane, extent, a)
-                        {
-                            add_block(axis, extent, (left, top), &dequantise(numbers, scan.step));
-                        }
-                    }
-                    self.errors[s] += left_over;
-                }
-            }
-        }
-    }
-
-    /// Compresses the chunks, `None` where there is none.
-    pub fn chunks(&self, scans: &[&Scan]) -> Result<Vec<Option<Chunk>>, FormatError> {
-        let mut has_palette = false;
-        let mut chunks = Vec::with_capacity(scans.len());
-        for (scan, numbers) in scans.iter().zip(&self.scans) {
-            if numbers.iter().all(|number| *number == 0) {
-                chunks.push(None);
-                continue;
-            }
-            let mut bytes = Vec::new();
-            if scan.first == 0 && !has_palette {
-                bytes.extend(self.palette.to_bytes());
-                has_palette = true;
-            }
-            chunks.push(Some(self.chunk(numbers, bytes)?));
-        }
-        Ok(chunks)
-    }
-
-    /// The chunk of some numbers, after what `bytes` has already.
-    fn chunk(&self, numbers: &[i32], mut bytes: Vec<u8>) -> Result<Chunk, FormatError> {
-        let axis = self.blocks * AREA;
-        let mut writer = Writer::default();
-        for component in numbers.chunks_exact(CHANNELS * axis) {
-            for block in component[..axis].chunks_exact(AREA) {
-                writer.block(block);
-            }
-        }
-        let (first, first_tokens) = writer.finish()?;
-        let mut writer = Writer::default();
-        let mut both = [0; 2 * AREA];
-        for component in numbers.chunks_exact(CHANNELS * axis) {
-            let (second, third) = component[axis..].split_at(axis);
-            for (second, third) in second.chunks_exact(AREA).zip(third.chunks_exact(AREA)) {
-                for i in 0..AREA {
-                    [both[2 * i], both[2 * i + 1]] = [second[i], third[i]];
-                }
-                writer.block(&both);
-            }
-        }
-        let (second, second_tokens) = writer.finish()?;
-        bytes.extend((first.len() as u32).to_le_bytes()); // a chunk is below some times MOST_PLAIN
-        bytes.extend(first);
-        bytes.extend(second);
-        Ok(Chunk {
-            bytes,
-            plain: first_tokens + second_tokens,
-        })
-    }
-}
-
-/// A block's coefficients in zigzag order.
-fn transformed(
-    pixels: &[Pixel],
-    extent: Extent,
-    (left, top): (usize, usize),
-    axis: usize,
-) -> Block {
-    let (across, down) = (extent.width as usize, extent.height as usize);
-    // Beyond the tile's edge its last pixels go on.
-    let block: Block = std::array::from_fn(|i| {
-        let x = (left + i % SIDE).min(across - 1);
-        let y = (top + i / SIDE).min(down - 1);
-        pixels[y * across + x][axis]
-    });
-    let coefficients = dct::forward(&block);
-    ZIGZAG.map(|i| coefficients[usize::from(i)])
-}
-
-/// Rounds a block to the numbers that are worth their bits.
-fn round_block(block: &Block, step: f32, numbers: &mut [i32]) {
-    round_all(block, step, |_| ROUNDING_ALONE, numbers);
-    let mut first = [0; AREA + 2];
-    for (first, number) in first[1..].iter_mut().zip(numbers.iter()) {
-        *first = number.unsigned_abs().min(2);
-    }
-    let neighbours = |i: usize| (first[i] + first[i + 2]) as usize;
-    round_all(block, step, |i| ROUNDING[neighbours(i)], numbers);
-}
-
-fn round_all(block: &Block, step: f32, rounding: impl Fn(usize) -> f32, numbers: &mut [i32]) {
-    for (i, (number, x)) in numbers.iter_mut().zip(block).enumerate() {
-        let steps = (x.abs() / step + rounding(i)) as i32; // `as` saturates
-        *number = steps.min(MOST) * if *x < 0.0 { -1 } else { 1 };
-    }
-}
-
-/// Squared pixels of a block whose coefficients in zigzag order are these, of as many columns and rows
-/// as lie inside the tile.
-fn square(zigzag: &Block, (columns, rows): (usize, usize)) -> f64 {
-    let sum = |values: &[f32]| values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
-    if (columns, rows) == (SIDE, SIDE) {
-        return sum(zigzag);
-    }
-    let mut block = [0.0; AREA];
-    for (value, i) in zigzag.iter().zip(ZIGZAG) {
-        block[usize::from(i)] = *value;
-    }
-    let pixels = dct::inverse(&block);
-    let lines = pixels.chunks_exact(SIDE).take(rows);
-    lines.map(|line| sum(&line[..columns])).sum()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::format::scan::Coding;
-    use crate::transport::TileRect;
-
-    /// Coefficients that fall off from one component to the next, smooth in space, of a few colours.
-    fn tile(width: u32, height: u32, rank: usize) -> FactoredTile {
-        let rect = TileRect {
-            x: 0,
-            y: 0,
-            extent: Extent { width, height },
-        };
-        let mut coefficients = Vec::new();
-        for pixel in rect.pixels() {
-            let (x, y) = (pixel.x as f32, pixel.y as f32);
-            let colour = match x > y {
-                true => [1.0, 0.3, 0.1],
-                false => [0.2, 0.5, 0.9],
-            };
-            for k in 0..rank {
-                let wave = (0.2 * x + 0.31 * k as f32).sin() * (0.17 * y - k as f32).cos();
-                let size = if k == 0 { 2.0 + wave } else { wave / k as f32 };
-                coefficients.push(colour.map(|c| c * size));
-            }
-        }
-        FactoredTile { rect, coefficients }
-    }
-
-    fn scan(first: u16, count: u16, step: f32) -> Scan {
-        Scan::new(Coding::Transform, first, count, step)
-    }
-
-    fn squared_error(planes: &Planes, tile: &FactoredTile, rank: usize) -> f64 {
-        let decoded = planes.coefficients(tile.rect.extent, rank).unwrap();
-        let off = decoded.iter().zip(&tile.coefficients);
-        let off = off.flat_map(|(a, b)| (0..CHANNELS).map(move |c| f64::from(a[c] - b[c])));
-        off.map(|off| off * off).sum()
-    }
-
-    #[test]
-    fn a_tile_comes_back_scan_by_scan_as_near_as_it_says() {
-        for (width, height) in [(32, 32), (29, 9), (1, 1), (8, 16)] {
-            let rank = 6;
-            let tile = tile(width, height, rank);
-            let extent = tile.rect.extent;
-            for step in [1e-4, 1e-2, 0.1] {
-                let scans = [
-                    scan(0, 2, 8.0 * step),
-                    scan(0, 1, step / 3.0),
-                    scan(1, 1, step),
-                    scan(2, 4, step),
-                ];
-                let scans: Vec<&Scan> = scans.iter().collect();
-                let numbers = Numbers::new(&tile, &scans, true);
-                let mut planes = Planes::default();
-                let decoded = numbers.decoded(extent).unwrap();
-                let chunks = numbers.chunks(&scans).unwrap();
-                for ((scan, chunk), error) in scans.iter().zip(chunks).zip(&numbers.errors) {
-                    if let Some(chunk) = chunk {
-                        assert!(u64::from(chunk.plain) <= most_plain(extent, scan.count));
-                        assert!(chunk.bytes.len() as u64 <= bound(chunk.plain.into()));
-                        planes.add(extent, scan, &chunk.bytes, chunk.plain).unwrap();
-                    }
-                    // But for mirrors of a first component that is not there yet, and for errors of
-                    // which one happens to mend the other.
-                    let left = squared_error(&planes, &tile, rank);
-                    let said = error + numbers.of_palette;
-                    assert!((left - said).abs() <= 0.03 * said + 1e-6, "{left} {said}");
-                }
-                assert_eq!(planes.coefficients(extent, rank).unwrap(), decoded);
-            }
-        }
-    }
-
-    #[test]
-    fn what_is_dark_takes_nothing_and_what_is_cut_is_an_error() {
-        let mut dark = tile(16, 16, 3);
-        dark.coefficients.fill([0.0; CHANNELS]);
-        let scan = scan(0, 3, 1e-2);
-        let chunks = |tile| {
-            Numbers::new(tile, &[&scan], false)
-                .chunks(&[&scan])
-                .unwrap()
-        };
-        assert!(chunks(&dark)[0].is_none());
-        let tile = tile(16, 16, 3);
-        let chunk = chunks(&tile).pop().unwrap().unwrap();
-        let decode =
-            |bytes: &[u8], plain: u32| Planes::default().add(tile.rect.extent, &scan, bytes, plain);
-        decode(&chunk.bytes, chunk.plain).unwrap();
-        for cut in 0..chunk.bytes.len() {
-            assert!(decode(&chunk.bytes[..cut], chunk.plain).is_err());
-        }
-        assert!(decode(&[&chunk.bytes[..], &[0]].concat(), chunk.plain).is_err());
-        assert!(decode(&chunk.bytes, chunk.plain + 1).is_err());
     }
 }

@@ -1,31 +1,32 @@
-//! The basis of a file: another one of the same span, in the order in which a reader wants it.
+//! The basis of a file: an orthonormal basis of the recovered basis's span, whose first function alone
+//! responds to a flat light, and whose others are the principal components of the coefficients.
 
-use crate::linalg::symmetric_eigen;
+use crate::linalg::{mirror_upper, multiply, symmetric_eigen, transpose};
 use crate::transport::{BandTile, Basis, CHANNELS};
 
-/// Share of the largest direction's below which a direction of the span is none.
-const LEAST: f64 = 1e-9;
+/// Smallest eigenvalue of the Gram matrix, relative to the largest, of a direction of the span.
+const MIN_EIGENVALUE_RATIO: f64 = 1e-9;
 
-/// An orthonormal basis, and how coefficients are turned to it.
+/// An orthonormal basis, and the rotation of coefficients to it.
 ///
-/// Its first function is the constant one's image in the span: under a flat light the first component
-/// is the whole picture and no other has any part in it, so that errors of the others, of which there
-/// are many, do not show where eyes are best. The others are principal, the strongest first.
+/// Function 0 is the projection of the constant function on the span: a flat light sees component 0 and no
+/// other, so that errors of the others do not show under it. The other functions are principal components,
+/// the strongest first.
 #[derive(Clone, Debug)]
-pub struct Turn {
-    /// `[rank, element]`.
+pub struct BasisRotation {
+    /// `[component, slot]`.
     pub functions: Vec<Vec<f32>>,
-    /// Squared coefficients of each component.
+    /// Sum of squared coefficients of each component.
     pub energies: Vec<f64>,
-    /// `[given, rank]`.
-    rotation: Vec<f64>,
-    given: usize,
+    /// `[input component, component]`.
+    matrix: Vec<f64>,
+    input_rank: usize,
 }
 
-impl Turn {
-    /// From a basis, and the sums of products of coefficients over it, `[rank, rank]`.
+impl BasisRotation {
+    /// The rotation for a basis whose coefficients have the given [moments](coefficient_moments).
     pub fn new(basis: &Basis, moment: &[f64]) -> Self {
-        let given = basis.rank();
+        let input_rank = basis.rank();
         let area = basis.kernels.first().map_or(0, Vec::len);
         let dot = |a: &[f32], b: &[f32]| -> f64 {
             a.iter()
@@ -33,35 +34,48 @@ impl Turn {
                 .map(|(a, b)| f64::from(*a) * f64::from(*b))
                 .sum()
         };
-        let gram = (0..given * given)
-            .map(|i| dot(&basis.kernels[i / given], &basis.kernels[i % given]))
+        let gram = (0..input_rank * input_rank)
+            .map(|i| {
+                dot(
+                    &basis.kernels[i / input_rank],
+                    &basis.kernels[i % input_rank],
+                )
+            })
             .collect();
-        let (values, vectors) = symmetric_eigen(gram, given);
+        let (values, vectors) = symmetric_eigen(gram, input_rank);
         let rank = values
             .iter()
-            .take_while(|v| **v > LEAST * values[0])
+            .take_while(|v| **v > MIN_EIGENVALUE_RATIO * values[0])
             .count();
-        // From coefficients as given to those over orthonormal functions.
-        let mut to_orthonormal = vec![0.0; given * rank];
+        if rank == 0 {
+            return Self {
+                functions: Vec::new(),
+                energies: Vec::new(),
+                matrix: Vec::new(),
+                input_rank,
+            };
+        }
+        // Input coefficients to coefficients over orthonormal functions.
+        let mut to_orthonormal = vec![0.0; input_rank * rank];
         let mut orthonormal = vec![vec![0.0f64; area]; rank];
         for i in 0..rank {
             let length = values[i].sqrt();
-            for k in 0..given {
-                let share = vectors[i * given + k];
+            for k in 0..input_rank {
+                let share = vectors[i * input_rank + k];
                 to_orthonormal[k * rank + i] = share * length;
                 for (q, v) in orthonormal[i].iter_mut().zip(&basis.kernels[k]) {
                     *q += share / length * f64::from(*v);
                 }
             }
         }
-        let moment = congruent(moment, &to_orthonormal, given, rank);
+        let moment = congruence(moment, &to_orthonormal, input_rank, rank);
         let sums: Vec<f64> = orthonormal.iter().map(|q| q.iter().sum()).collect();
-        let (turned, energies) = flat_first(&moment, &sums, rank);
+        let (rotated, energies) = flat_first(&moment, &sums, rank);
         let functions = (0..rank)
             .map(|j| {
                 let element = |s: usize| -> f64 {
                     (0..rank)
-                        .map(|i| turned[i * rank + j] * orthonormal[i][s])
+                        .map(|i| rotated[i * rank + j] * orthonormal[i][s])
                         .sum()
                 };
                 (0..area).map(|s| element(s) as f32).collect()
@@ -70,8 +84,8 @@ impl Turn {
         Self {
             functions,
             energies,
-            rotation: multiply(&to_orthonormal, &turned, rank, rank),
-            given,
+            matrix: multiply(&to_orthonormal, &rotated, rank, rank),
+            input_rank,
         }
     }
 
@@ -80,53 +94,52 @@ impl Turn {
         self.functions.len()
     }
 
-    /// Squared coefficients of all components.
+    /// Sum of squared coefficients of all components.
     pub fn energy(&self) -> f64 {
         self.energies.iter().sum()
     }
 
-    /// How many times larger than the largest coefficient given one over this basis can be.
-    pub fn gain(&self) -> f32 {
-        let of_component = |j: usize| -> f64 {
-            let rows = self.rotation.chunks_exact(self.rank());
-            rows.map(|row| row[j].abs()).sum()
-        };
-        (0..self.rank()).map(of_component).fold(0.0, f64::max) as f32
+    /// Upper bound on the ratio of a coefficient of component `j` to the largest input coefficient: the ℓ1
+    /// norm of a column.
+    pub fn gain(&self, j: usize) -> f64 {
+        let rows = self.matrix.chunks_exact(self.rank());
+        rows.map(|row| row[j].abs()).sum()
     }
 
-    /// Leaves out all components past the first `rank`.
-    pub fn cut(&mut self, rank: usize) {
-        let old = self.rank();
+    /// Drops all but the first `rank` components.
+    pub fn truncate(&mut self, rank: usize) {
+        let old_rank = self.rank();
         self.functions.truncate(rank);
         self.energies.truncate(rank);
-        let rows = self.rotation.chunks_exact(old);
-        self.rotation = rows.flat_map(|row| &row[..rank]).copied().collect();
+        let rows = self.matrix.chunks_exact(old_rank);
+        self.matrix = rows.flat_map(|row| &row[..rank]).copied().collect();
     }
 
-    /// A tile's coefficients over this basis as `[pixel, component]`; none if it has none.
+    /// A tile's coefficients over this basis, `[pixel, component]`; empty if it has none.
     pub fn coefficients(&self, tile: &BandTile) -> Vec<[f32; CHANNELS]> {
         let rank = self.rank();
         if tile.coefficients.is_empty() {
             return Vec::new();
         }
-        let mut turned = vec![[0.0f32; CHANNELS]; tile.rect.extent.area() * rank];
-        let rotation: Vec<f32> = self.rotation.iter().map(|r| *r as f32).collect();
-        let pixels = tile.coefficients.chunks_exact(self.given);
-        for (given, turned) in pixels.zip(turned.chunks_exact_mut(rank)) {
-            for (c, row) in given.iter().zip(rotation.chunks_exact(rank)) {
-                for (turned, share) in turned.iter_mut().zip(row) {
+        let mut rotated = vec![[0.0f32; CHANNELS]; tile.rect.extent.area() * rank];
+        let matrix: Vec<f32> = self.matrix.iter().map(|r| *r as f32).collect();
+        let pixels = tile.coefficients.chunks_exact(self.input_rank);
+        for (input, rotated) in pixels.zip(rotated.chunks_exact_mut(rank)) {
+            for (c, row) in input.iter().zip(matrix.chunks_exact(rank)) {
+                for (rotated, weight) in rotated.iter_mut().zip(row) {
                     for channel in 0..CHANNELS {
-                        turned[channel] += c[channel] * share;
+                        rotated[channel] += c[channel] * weight;
                     }
                 }
             }
         }
-        turned
+        rotated
     }
 }
 
-/// Sums of products of a tile's coefficients, `[rank, rank]`. Those that are no numbers count for none.
-pub fn moment(tile: &BandTile, rank: usize) -> Vec<f64> {
+/// Second moments of a tile's coefficients: Σ c cᵀ over pixels and channels, `[rank, rank]`. Values that are
+/// not finite count as zero.
+pub fn coefficient_moments(tile: &BandTile, rank: usize) -> Vec<f64> {
     let mut moment = vec![0.0f64; rank * rank];
     let mut values = vec![0.0f64; rank];
     for pixel in tile.coefficients.chunks_exact(rank.max(1)) {
@@ -144,34 +157,30 @@ pub fn moment(tile: &BandTile, rank: usize) -> Vec<f64> {
             }
         }
     }
-    for i in 0..rank {
-        for j in 0..i {
-            moment[i * rank + j] = moment[j * rank + i];
-        }
-    }
+    mirror_upper(&mut moment, rank);
     moment
 }
 
-/// An orthogonal `[n, n]` matrix whose first column points along `sums`, the others being principal,
-/// and the moment along each column.
+/// An orthogonal `[n, n]` matrix whose first column points along `sums` and whose others are principal axes
+/// of the rest, and the moment along each column.
 fn flat_first(moment: &[f64], sums: &[f64], n: usize) -> (Vec<f64>, Vec<f64>) {
     let length = sums.iter().map(|s| s * s).sum::<f64>().sqrt();
     if length < 1e-6 {
-        // No part of the span is flat.
+        // The span has no function that responds to a flat light.
         let (energies, rows) = symmetric_eigen(moment.to_vec(), n);
         return (transpose(&rows, n), energies);
     }
-    // The reflection that takes the first axis there takes the others to a basis of the rest.
+    // The Householder reflection of the first axis to `sums` maps the others to a basis of the rest.
     let mut normal: Vec<f64> = sums.iter().map(|s| s / length).collect();
     normal[0] -= 1.0;
     let square: f64 = normal.iter().map(|x| x * x).sum();
     let factor = if square > 1e-24 { 2.0 / square } else { 0.0 };
-    let mirror: Vec<f64> = (0..n * n)
+    let reflection: Vec<f64> = (0..n * n)
         .map(|i| f64::from(u8::from(i / n == i % n)) - factor * normal[i / n] * normal[i % n])
         .collect();
-    let mirrored = congruent(moment, &mirror, n, n);
+    let reflected = congruence(moment, &reflection, n, n);
     let rest = n - 1;
-    let block = (0..rest * rest).map(|i| mirrored[(i / rest + 1) * n + i % rest + 1]);
+    let block = (0..rest * rest).map(|i| reflected[(i / rest + 1) * n + i % rest + 1]);
     let (values, rows) = symmetric_eigen(block.collect(), rest);
     let mut inner = vec![0.0; n * n];
     inner[0] = 1.0;
@@ -180,37 +189,13 @@ fn flat_first(moment: &[f64], sums: &[f64], n: usize) -> (Vec<f64>, Vec<f64>) {
             inner[(i + 1) * n + j + 1] = rows[j * rest + i];
         }
     }
-    let energies = [&mirrored[..1], &values].concat();
-    (multiply(&mirror, &inner, n, n), energies)
+    let energies = [&reflected[..1], &values].concat();
+    (multiply(&reflection, &inner, n, n), energies)
 }
 
 /// `bᵀ a b` of a symmetric `[n, n]` and an `[n, m]` matrix.
-fn congruent(a: &[f64], b: &[f64], n: usize, m: usize) -> Vec<f64> {
-    let ab = multiply(a, b, n, m);
-    let mut product = vec![0.0; m * m];
-    for k in 0..n {
-        for i in 0..m {
-            for j in 0..m {
-                product[i * m + j] += b[k * m + i] * ab[k * m + j];
-            }
-        }
-    }
-    product
-}
-
-/// `a b` of an `[_, inner]` and an `[inner, columns]` matrix.
-fn multiply(a: &[f64], b: &[f64], inner: usize, columns: usize) -> Vec<f64> {
-    let mut product = Vec::with_capacity(a.len() / inner.max(1) * columns);
-    for row in a.chunks_exact(inner.max(1)) {
-        for j in 0..columns {
-            product.push((0..inner).map(|k| row[k] * b[k * columns + j]).sum());
-        }
-    }
-    product
-}
-
-fn transpose(a: &[f64], n: usize) -> Vec<f64> {
-    (0..n * n).map(|i| a[i % n * n + i / n]).collect()
+fn congruence(a: &[f64], b: &[f64], n: usize, m: usize) -> Vec<f64> {
+    multiply(&transpose(b, m), &multiply(a, b, n, m), n, m)
 }
 
 #[cfg(test)]
@@ -249,11 +234,11 @@ mod tests {
     }
 
     #[test]
-    fn the_same_functions_over_an_orthonormal_basis_the_flat_one_first() {
+    fn the_rotated_basis_is_orthonormal_flat_first_and_gives_the_same_functions() {
         let (basis, tile) = (basis(), tile());
-        let turn = Turn::new(&basis, &moment(&tile, 5));
-        assert_eq!(turn.rank(), 4);
-        let turned = turn.coefficients(&tile);
+        let rotation = BasisRotation::new(&basis, &coefficient_moments(&tile, 5));
+        assert_eq!(rotation.rank(), 4);
+        let rotated = rotation.coefficients(&tile);
         for p in 0..30 {
             for s in 0..49 {
                 for c in 0..CHANNELS {
@@ -262,44 +247,47 @@ mod tests {
                         terms.map(|(a, v)| a[c] * v[s]).sum()
                     };
                     let want = sum(&tile.coefficients[p * 5..][..5], &basis.kernels);
-                    let got = sum(&turned[p * 4..][..4], &turn.functions);
+                    let got = sum(&rotated[p * 4..][..4], &rotation.functions);
                     assert!((got - want).abs() < 1e-4, "{got} {want}");
                 }
             }
         }
-        for (j, a) in turn.functions.iter().enumerate() {
-            for (i, b) in turn.functions.iter().enumerate() {
+        for (j, a) in rotation.functions.iter().enumerate() {
+            for (i, b) in rotation.functions.iter().enumerate() {
                 let dot: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
                 assert!((dot - f32::from(u8::from(i == j))).abs() < 1e-5);
             }
             let sum: f32 = a.iter().sum();
             assert_eq!(sum > 0.01, j == 0, "function {j} sums to {sum}");
-            let energy: f32 = turned
+            let energy: f32 = rotated
                 .iter()
                 .skip(j)
                 .step_by(4)
                 .flatten()
                 .map(|c| c * c)
                 .sum();
-            let off = f64::from(energy) - turn.energies[j];
+            let error = f64::from(energy) - rotation.energies[j];
             assert!(
-                off.abs() < 1e-4 * turn.energies[1],
+                error.abs() < 1e-4 * rotation.energies[1],
                 "{energy} {:?}",
-                turn.energies
+                rotation.energies
             );
         }
-        assert!(turn.energies[1] > turn.energies[2] && turn.energies[2] > turn.energies[3]);
+        assert!(
+            rotation.energies[1] > rotation.energies[2]
+                && rotation.energies[2] > rotation.energies[3]
+        );
     }
 
     #[test]
-    fn what_is_cut_is_the_end() {
+    fn truncation_drops_the_last_components() {
         let (basis, tile) = (basis(), tile());
-        let whole = Turn::new(&basis, &moment(&tile, 5));
-        let mut cut = whole.clone();
-        cut.cut(2);
-        let (all, some) = (whole.coefficients(&tile), cut.coefficients(&tile));
-        for (all, some) in all.chunks_exact(4).zip(some.chunks_exact(2)) {
-            assert_eq!(all[..2], *some);
+        let whole = BasisRotation::new(&basis, &coefficient_moments(&tile, 5));
+        let mut truncated = whole.clone();
+        truncated.truncate(2);
+        let (all, first) = (whole.coefficients(&tile), truncated.coefficients(&tile));
+        for (all, first) in all.chunks_exact(4).zip(first.chunks_exact(2)) {
+            assert_eq!(all[..2], *first);
         }
     }
 }

@@ -1,0 +1,460 @@
+//! The encoder of coding 1: coefficients to quantised numbers and chunks.
+//!
+//! Scans are quantised one after another, each the residual of those before it.
+
+use std::ops::Range;
+
+use super::colour::{ColourKlt, HouseholderReflection, Pixel};
+use super::dct::{self, AREA, Block, SIDE, ZIGZAG};
+use super::tokens::{ItemRuns, MAX_MAGNITUDE, QuantisedRun, TokenWriter};
+use super::transform::{
+    Plane, Planes, add_block, block_corners, block_count, dequantise, try_axis,
+};
+use crate::format::budget::Budget;
+use crate::format::chunk::EncodedChunk;
+use crate::format::error::FormatError;
+use crate::format::scan::Scan;
+use crate::transport::{CHANNELS, Extent, FactoredTile};
+
+/// Added to a magnitude in steps before it is truncated, by the sum of the magnitudes of the numbers before
+/// and after it, each counted as 2 at most. Less than a half: small values are mostly noise, whose bits
+/// reduce the error less than those of large ones; isolated ones cost most.
+const ROUNDING_OFFSETS: [f32; 5] = [0.0, 0.2, 0.3, 0.3, 0.3];
+/// The same for a first estimate of the neighbours.
+const ISOLATED_ROUNDING_OFFSET: f32 = 0.2;
+/// The same where a later scan refines the value.
+const COARSE_ROUNDING_OFFSET: f32 = 0.3;
+
+/// The cosine transform of a tile's coefficients, `[component, axis, block, zigzag index]`, before
+/// quantisation.
+#[derive(Debug)]
+pub struct TransformedTile {
+    blocks: usize,
+    values: Vec<f32>,
+}
+
+impl TransformedTile {
+    /// Transforms a tile. Reflections are those of its exact colours.
+    pub fn new(tile: &FactoredTile) -> Self {
+        let extent = tile.rect.extent;
+        let pixels = extent.area();
+        let rank = tile.coefficients.len() / pixels;
+        let of = |p: usize, k: usize| finite(tile.coefficients[p * rank + k]);
+        let klt = ColourKlt::of_pixels((0..pixels).map(|p| of(p, 0)));
+        let mut values = Vec::with_capacity(rank * CHANNELS * block_count(extent) * AREA);
+        for k in 0..rank {
+            let on_axes = |p: usize| match k {
+                0 => klt.forward(of(p, 0)),
+                _ => HouseholderReflection::of_colour(of(p, 0)).apply(of(p, k)),
+            };
+            let component: Vec<Pixel> = (0..pixels).map(on_axes).collect();
+            for axis in 0..CHANNELS {
+                for corner in block_corners(extent) {
+                    values.extend(transformed(&component, extent, corner, axis));
+                }
+            }
+        }
+        Self {
+            blocks: block_count(extent),
+            values,
+        }
+    }
+}
+
+impl ItemRuns for TransformedTile {
+    fn for_runs(&self, items: Range<usize>, step: f32, mut visit: impl FnMut(QuantisedRun<'_>)) {
+        let axis = self.blocks * AREA;
+        let components = self.values.chunks_exact(CHANNELS * axis).enumerate();
+        for (k, component) in components.take(items.end).skip(items.start) {
+            for b in (0..axis).step_by(AREA) {
+                let mut side = ([0.0; 2 * AREA], [0.0; 2 * AREA], [0; 2 * AREA]);
+                for a in 0..CHANNELS {
+                    let values = &component[a * axis + b..][..AREA];
+                    let mut numbers = [0; AREA];
+                    round_by_neighbours(values, step, &mut numbers);
+                    let residual = |i: usize| values[i] - numbers[i] as f32 * step;
+                    let residuals: Block = std::array::from_fn(residual);
+                    if a == 0 {
+                        visit(QuantisedRun {
+                            string: 0,
+                            first_item: k,
+                            values_per_item: AREA,
+                            values,
+                            residuals: &residuals,
+                            numbers: &numbers,
+                        });
+                    }
+                    for i in (0..AREA).filter(|_| a > 0) {
+                        let at = 2 * i + a - 1;
+                        (side.0[at], side.1[at], side.2[at]) =
+                            (values[i], residuals[i], numbers[i]);
+                    }
+                }
+                visit(QuantisedRun {
+                    string: 1,
+                    first_item: k,
+                    values_per_item: 2 * AREA,
+                    values: &side.0,
+                    residuals: &side.1,
+                    numbers: &side.2,
+                });
+            }
+        }
+    }
+}
+
+/// Values that are not finite count as zero.
+fn finite(pixel: Pixel) -> Pixel {
+    pixel.map(|c| if c.is_finite() { c } else { 0.0 })
+}
+
+/// The coefficients of a tile, quantised scan by scan.
+#[derive(Clone, Debug)]
+pub struct QuantisedCoefficients {
+    klt: ColourKlt,
+    blocks: usize,
+    /// `[scan]`, then `[component, axis, block, coefficient in zigzag order]`.
+    scans: Vec<Vec<i32>>,
+    /// Sum of squared coefficients.
+    pub energy: f64,
+    /// Sum of squared errors after each scan, without the error of the KLT.
+    pub errors: Vec<f64>,
+    /// Squared error of component 0 from the rounding of the KLT, which no step reduces.
+    pub klt_error: f64,
+    /// The planes as a reader decodes them: component 0, and the others if they were kept.
+    planes: Planes,
+}
+
+impl QuantisedCoefficients {
+    /// Transforms a tile and quantises it by `scans`, which cover its components; `keep_decoded` says
+    /// whether [`decoded`](Self::decoded) will be called.
+    pub fn new(tile: &FactoredTile, scans: &[&Scan], keep_decoded: bool) -> Self {
+        let extent = tile.rect.extent;
+        let rank = tile.coefficients.len() / extent.area();
+        let of = |p: usize, k: usize| finite(tile.coefficients[p * rank + k]);
+        let mut quantised = Self {
+            klt: ColourKlt::of_pixels((0..extent.area()).map(|p| of(p, 0))),
+            blocks: block_count(extent),
+            scans: Vec::new(),
+            energy: 0.0,
+            errors: vec![0.0; scans.len()],
+            klt_error: 0.0,
+            planes: Planes::default(),
+        };
+        for scan in scans {
+            let length = usize::from(scan.count) * CHANNELS * quantised.blocks * AREA;
+            quantised.scans.push(vec![0; length]);
+        }
+        let mut planes = Planes {
+            klt: Some(quantised.klt),
+            components: vec![Vec::new()],
+        };
+        let on_axes = |p: usize| quantised.klt.forward(of(p, 0));
+        let mut pixels: Vec<Pixel> = (0..extent.area()).map(on_axes).collect();
+        let square = |(p, on_axes): (usize, &Pixel)| -> f64 {
+            let (got, want) = (quantised.klt.inverse(*on_axes), of(p, 0));
+            (0..CHANNELS)
+                .map(|c| f64::from(got[c] - want[c]).powi(2))
+                .sum()
+        };
+        quantised.klt_error = pixels.iter().enumerate().map(square).sum();
+        let first = Some(&mut planes.components[0]);
+        quantised.quantise_component(0, &pixels, extent, scans, first);
+        // The colours that a reader knows after the last scan.
+        let colours = planes.coefficients(extent, 1, &Budget::unlimited());
+        let colours = colours.unwrap_or_else(|_| vec![[0.0; CHANNELS]; extent.area()]);
+        let reflections: Vec<_> = colours
+            .into_iter()
+            .map(HouseholderReflection::of_colour)
+            .collect();
+        for k in 1..rank {
+            for (p, pixel) in pixels.iter_mut().enumerate() {
+                *pixel = reflections[p].apply(of(p, k));
+            }
+            let mut plane = Plane::new();
+            let kept = keep_decoded.then_some(&mut plane);
+            quantised.quantise_component(k, &pixels, extent, scans, kept);
+            planes.components.push(plane);
+        }
+        quantised.planes = planes;
+        quantised
+    }
+
+    /// The coefficients as a reader decodes them, `[pixel, component]`, if they were kept.
+    ///
+    /// # Errors
+    /// [`FormatError::Memory`].
+    pub fn decoded(&self, extent: Extent) -> Result<Vec<Pixel>, FormatError> {
+        let rank = self.planes.components.len();
+        self.planes.coefficients(extent, rank, &Budget::unlimited())
+    }
+
+    /// Quantises component `k`, and adds its decoded values to `decoded`.
+    fn quantise_component(
+        &mut self,
+        k: usize,
+        pixels: &[Pixel],
+        extent: Extent,
+        scans: &[&Scan],
+        mut decoded: Option<&mut Plane>,
+    ) {
+        let covers = |scan: &Scan| (usize::from(scan.first)..scan.end()).contains(&k);
+        let last = scans.iter().rposition(|scan| covers(scan));
+        for a in 0..CHANNELS {
+            for (b, (left, top)) in block_corners(extent).enumerate() {
+                let mut residual = transformed(pixels, extent, (left, top), a);
+                let inside = (
+                    SIDE.min(extent.width as usize - left),
+                    SIDE.min(extent.height as usize - top),
+                );
+                let mut error = squared_pixels(&residual, inside);
+                self.energy += error;
+                for (s, scan) in scans.iter().enumerate() {
+                    if covers(scan) {
+                        let at = (k - usize::from(scan.first)) * CHANNELS + a;
+                        let at = (at * self.blocks + b) * AREA;
+                        let numbers = &mut self.scans[s][at..at + AREA];
+                        match Some(s) == last {
+                            true => round_by_neighbours(&residual, scan.step, numbers),
+                            false => {
+                                round(&residual, scan.step, |_| COARSE_ROUNDING_OFFSET, numbers);
+                            }
+                        }
+                        for (number, residual) in numbers.iter().zip(&mut residual) {
+                            *residual -= *number as f32 * scan.step;
+                        }
+                        error = squared_pixels(&residual, inside);
+                        if let Some(plane) = &mut decoded
+                            && numbers.iter().any(|number| *number != 0)
+                            && let Ok(axis) = try_axis(plane, extent, a, &Budget::unlimited())
+                        {
+                            add_block(axis, extent, (left, top), &dequantise(numbers, scan.step));
+                        }
+                    }
+                    self.errors[s] += error;
+                }
+            }
+        }
+    }
+
+    /// The chunks, `None` where all numbers are zero.
+    ///
+    /// # Errors
+    /// [`FormatError::Compress`].
+    pub fn chunks(&self, scans: &[&Scan]) -> Result<Vec<Option<EncodedChunk>>, FormatError> {
+        let mut has_klt = false;
+        let mut chunks = Vec::with_capacity(scans.len());
+        for (scan, numbers) in scans.iter().zip(&self.scans) {
+            if numbers.iter().all(|number| *number == 0) {
+                chunks.push(None);
+                continue;
+            }
+            let mut bytes = Vec::new();
+            if scan.first == 0 && !has_klt {
+                bytes.extend(self.klt.to_bytes());
+                has_klt = true;
+            }
+            chunks.push(Some(self.chunk(numbers, bytes)?));
+        }
+        Ok(chunks)
+    }
+
+    /// Appends the token strings of a scan's numbers to `bytes`.
+    fn chunk(&self, numbers: &[i32], mut bytes: Vec<u8>) -> Result<EncodedChunk, FormatError> {
+        let axis = self.blocks * AREA;
+        let mut writer = TokenWriter::default();
+        for component in numbers.chunks_exact(CHANNELS * axis) {
+            for block in component[..axis].chunks_exact(AREA) {
+                writer.write_run(block);
+            }
+        }
+        let (main, main_tokens) = writer.finish()?;
+        let mut writer = TokenWriter::default();
+        let mut both = [0; 2 * AREA];
+        for component in numbers.chunks_exact(CHANNELS * axis) {
+            let (second, third) = component[axis..].split_at(axis);
+            for (second, third) in second.chunks_exact(AREA).zip(third.chunks_exact(AREA)) {
+                for i in 0..AREA {
+                    [both[2 * i], both[2 * i + 1]] = [second[i], third[i]];
+                }
+                writer.write_run(&both);
+            }
+        }
+        let (side, side_tokens) = writer.finish()?;
+        bytes.extend((main.len() as u32).to_le_bytes()); // a chunk is below 2^25 bytes
+        bytes.extend(main);
+        bytes.extend(side);
+        Ok(EncodedChunk {
+            bytes,
+            content_bytes: main_tokens + side_tokens,
+        })
+    }
+}
+
+/// A block's coefficients in zigzag order.
+fn transformed(
+    pixels: &[Pixel],
+    extent: Extent,
+    (left, top): (usize, usize),
+    axis: usize,
+) -> Block {
+    let (width, height) = (extent.width as usize, extent.height as usize);
+    // Beyond its edges the tile repeats its last column and row.
+    let block: Block = std::array::from_fn(|i| {
+        let x = (left + i % SIDE).min(width - 1);
+        let y = (top + i / SIDE).min(height - 1);
+        pixels[y * width + x][axis]
+    });
+    let coefficients = dct::forward(&block);
+    ZIGZAG.map(|i| coefficients[usize::from(i)])
+}
+
+/// Rounds a block with an offset that depends on each number's neighbours.
+fn round_by_neighbours(block: &[f32], step: f32, numbers: &mut [i32]) {
+    round(block, step, |_| ISOLATED_ROUNDING_OFFSET, numbers);
+    let mut estimates = [0; AREA + 2];
+    for (estimate, number) in estimates[1..].iter_mut().zip(numbers.iter()) {
+        *estimate = number.unsigned_abs().min(2);
+    }
+    let neighbours = |i: usize| (estimates[i] + estimates[i + 2]) as usize;
+    round(block, step, |i| ROUNDING_OFFSETS[neighbours(i)], numbers);
+}
+
+fn round(block: &[f32], step: f32, offset: impl Fn(usize) -> f32, numbers: &mut [i32]) {
+    for (i, (number, x)) in numbers.iter_mut().zip(block).enumerate() {
+        let steps = (x.abs() / step + offset(i)) as i32; // `as` saturates
+        *number = steps.min(MAX_MAGNITUDE) * if *x < 0.0 { -1 } else { 1 };
+    }
+}
+
+/// Sum of squared pixels of a block in zigzag order, over the columns and rows inside the tile.
+fn squared_pixels(zigzag: &Block, (columns, rows): (usize, usize)) -> f64 {
+    let sum = |values: &[f32]| values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
+    if (columns, rows) == (SIDE, SIDE) {
+        return sum(zigzag);
+    }
+    let mut block = [0.0; AREA];
+    for (value, i) in zigzag.iter().zip(ZIGZAG) {
+        block[usize::from(i)] = *value;
+    }
+    let pixels = dct::inverse(&block);
+    let lines = pixels.chunks_exact(SIDE).take(rows);
+    lines.map(|line| sum(&line[..columns])).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::transform::{max_bytes, max_tokens};
+    use super::*;
+    use crate::format::scan::Coding;
+    use crate::transport::TileRect;
+
+    /// Coefficients that fall off from one component to the next, smooth in space, of a few colours.
+    fn tile(width: u32, height: u32, rank: usize) -> FactoredTile {
+        let rect = TileRect {
+            x: 0,
+            y: 0,
+            extent: Extent { width, height },
+        };
+        let mut coefficients = Vec::new();
+        for pixel in rect.pixels() {
+            let (x, y) = (pixel.x as f32, pixel.y as f32);
+            let colour = match x > y {
+                true => [1.0, 0.3, 0.1],
+                false => [0.2, 0.5, 0.9],
+            };
+            for k in 0..rank {
+                let wave = (0.2 * x + 0.31 * k as f32).sin() * (0.17 * y - k as f32).cos();
+                let size = if k == 0 { 2.0 + wave } else { wave / k as f32 };
+                coefficients.push(colour.map(|c| c * size));
+            }
+        }
+        FactoredTile { rect, coefficients }
+    }
+
+    fn scan(first: u16, count: u16, step: f32) -> Scan {
+        Scan::new(Coding::Transform, first, count, step)
+    }
+
+    fn decoded(planes: &Planes, extent: Extent, rank: usize) -> Vec<Pixel> {
+        planes
+            .coefficients(extent, rank, &Budget::unlimited())
+            .unwrap()
+    }
+
+    fn squared_error(planes: &Planes, tile: &FactoredTile, rank: usize) -> f64 {
+        let decoded = decoded(planes, tile.rect.extent, rank);
+        let pairs = decoded.iter().zip(&tile.coefficients);
+        let errors = pairs.flat_map(|(a, b)| (0..CHANNELS).map(move |c| f64::from(a[c] - b[c])));
+        errors.map(|error| error * error).sum()
+    }
+
+    #[test]
+    fn a_decoded_tile_has_the_error_of_its_scans() {
+        for (width, height) in [(32, 32), (29, 9), (1, 1), (8, 16)] {
+            let rank = 6;
+            let tile = tile(width, height, rank);
+            let extent = tile.rect.extent;
+            for step in [1e-4, 1e-2, 0.1] {
+                let scans = [
+                    scan(0, 2, 8.0 * step),
+                    scan(0, 1, step / 3.0),
+                    scan(1, 1, step),
+                    scan(2, 4, step),
+                ];
+                let scans: Vec<&Scan> = scans.iter().collect();
+                let quantised = QuantisedCoefficients::new(&tile, &scans, true);
+                let mut planes = Planes::default();
+                let chunks = quantised.chunks(&scans).unwrap();
+                for ((scan, chunk), error) in scans.iter().zip(chunks).zip(&quantised.errors) {
+                    if let Some(chunk) = chunk {
+                        let tokens = chunk.content_bytes;
+                        assert!(u64::from(tokens) <= max_tokens(extent, scan.count));
+                        assert!(chunk.bytes.len() as u64 <= max_bytes(tokens.into()));
+                        let budget = Budget::unlimited();
+                        planes
+                            .add(extent, scan, &chunk.bytes, tokens, &budget)
+                            .unwrap();
+                    }
+                    // Reflections by a coarse component 0, and errors that cancel, differ a little.
+                    let got = squared_error(&planes, &tile, rank);
+                    let claimed = error + quantised.klt_error;
+                    assert!(
+                        (got - claimed).abs() <= 0.03 * claimed + 1e-6,
+                        "{got} {claimed}"
+                    );
+                }
+                assert_eq!(
+                    decoded(&planes, extent, rank),
+                    quantised.decoded(extent).unwrap()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn dark_tiles_have_no_chunks_and_cut_chunks_are_errors() {
+        let mut dark = tile(16, 16, 3);
+        dark.coefficients.fill([0.0; CHANNELS]);
+        let scan = scan(0, 3, 1e-2);
+        let chunks = |tile| {
+            QuantisedCoefficients::new(tile, &[&scan], false)
+                .chunks(&[&scan])
+                .unwrap()
+        };
+        assert!(chunks(&dark)[0].is_none());
+        let tile = tile(16, 16, 3);
+        let chunk = chunks(&tile).pop().unwrap().unwrap();
+        let decode = |bytes: &[u8], tokens: u32| {
+            let extent = tile.rect.extent;
+            Planes::default().add(extent, &scan, bytes, tokens, &Budget::unlimited())
+        };
+        let tokens = chunk.content_bytes;
+        decode(&chunk.bytes, tokens).unwrap();
+        for length in 0..chunk.bytes.len() {
+            assert!(decode(&chunk.bytes[..length], tokens).is_err());
+        }
+        assert!(decode(&[&chunk.bytes[..], &[0]].concat(), tokens).is_err());
+        assert!(decode(&chunk.bytes, tokens + 1).is_err());
+    }
+}

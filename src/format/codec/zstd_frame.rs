@@ -1,0 +1,57 @@
+//! Zstandard frames (RFC 8878) whose content length the caller knows.
+
+use zstd::zstd_safe;
+
+use crate::format::budget::Budget;
+use crate::format::constants::MAX_CONTENT_BYTES;
+use crate::format::error::{FormatError, SectionError, damaged};
+
+/// The highest level whose window stays within 8 MiB. Decoding speed does not depend on it.
+const LEVEL: i32 = 19;
+
+/// Maximum bytes of the frame of `content` bytes (ZSTD_COMPRESSBOUND, rounded up). A longer chunk is
+/// refused by the directory alone.
+pub fn compressed_bound(content: u64) -> u64 {
+    content + content / 256 + 64
+}
+
+/// Compresses into one frame.
+///
+/// # Errors
+/// [`FormatError::Compress`].
+pub fn compress(content: &[u8]) -> Result<Vec<u8>, FormatError> {
+    zstd::bulk::compress(content, LEVEL).map_err(FormatError::Compress)
+}
+
+/// Decompresses one frame to exactly `length` bytes.
+///
+/// # Errors
+/// [`SectionError`] if `frame` is not one frame of this content, or the budget refuses memory.
+pub fn decompress(frame: &[u8], length: usize, budget: &Budget) -> Result<Vec<u8>, SectionError> {
+    check_frame(frame)?;
+    let mut content = budget.try_zeroed(length)?;
+    let got = zstd_safe::decompress(&mut content[..], frame)
+        .map_err(|code| damaged(zstd_safe::get_error_name(code)))?;
+    match got == length {
+        true => Ok(content),
+        false => Err(damaged(format!("it has {got} bytes, not {length}"))),
+    }
+}
+
+/// Checks that the bytes are one frame, with a window that every decoder must support (RFC 8878, section
+/// 3.1.1).
+fn check_frame(frame: &[u8]) -> Result<(), SectionError> {
+    let &[0x28, 0xB5, 0x2F, 0xFD, descriptor, window, ..] = frame else {
+        return Err(damaged("it is not a zstd frame"));
+    };
+    if zstd_safe::find_frame_compressed_size(frame) != Ok(frame.len()) {
+        return Err(damaged("it is not one zstd frame"));
+    }
+    let is_single_segment = descriptor & 0x20 != 0;
+    let (exponent, mantissa) = (u64::from(window >> 3), u64::from(window & 7));
+    let window = (8 + mantissa) << (7 + exponent);
+    match is_single_segment || window <= MAX_CONTENT_BYTES {
+        true => Ok(()),
+        false => Err(damaged(format!("its zstd window has {window} bytes"))),
+    }
+}

@@ -1,0 +1,372 @@
+//! The state of a [`Reader`](super::Reader) that has the index: which chunks have come, and the tiles so
+//! far.
+//!
+//! Tiles decode their chunks in the order of scans. A chunk that comes early waits for those before it.
+
+use std::ops::Range;
+
+use super::budget::Budget;
+use super::chunk::ChunkId;
+use super::codec::{basis, direct};
+use super::error::FormatError;
+use super::index::FileIndex;
+use super::metadata::MetadataJson;
+use super::tile_decoder::TileDecoder;
+use crate::transport::{Basis, CoefficientTile, Decibels, DirectTile, Tile, Transport};
+
+/// Maximum number of ranges that [`DecoderState::wants`] returns.
+const MAX_RANGES: usize = 1024;
+
+/// The chunks and tiles of a file.
+#[derive(Debug)]
+pub(super) struct DecoderState {
+    index: FileIndex,
+    /// Functions whose chunk has not come are zero.
+    basis: Basis,
+    /// The centre-out order of slots.
+    order: Vec<u16>,
+    tiles: Vec<TileState>,
+    /// In file order.
+    chunks: Vec<ChunkState>,
+    /// `[scan]`: number of chunks that have not come.
+    missing: Vec<usize>,
+}
+
+/// What has come of a chunk.
+#[derive(Debug)]
+enum ChunkState {
+    /// Its first bytes, or none.
+    Partial(Vec<u8>),
+    /// All bytes, which wait for earlier scans of the tile.
+    Waiting(Vec<u8>),
+    /// It is decoded, or empty.
+    Decoded,
+}
+
+/// What has come of a tile.
+#[derive(Debug)]
+enum TileState {
+    Partial(TileDecoder),
+    Complete(Tile),
+}
+
+impl DecoderState {
+    pub fn new(index: FileIndex, budget: &Budget) -> Result<Self, FormatError> {
+        let (tiles, scans) = (index.tiles(), index.scans.len());
+        let window = index.header.geometry.window;
+        let mut state = Self {
+            basis: Basis {
+                kernels: basis::try_zeroed(index.header.rank.into(), window.area(), budget)?,
+            },
+            order: direct::centre_out_order(window, budget)?,
+            tiles: budget.try_with_capacity(tiles)?,
+            chunks: budget.try_with_capacity(scans * (tiles + 1))?,
+            missing: budget.try_zeroed(scans)?,
+            index,
+        };
+        state
+            .tiles
+            .resize_with(tiles, || TileState::Partial(TileDecoder::default()));
+        state
+            .chunks
+            .resize_with(scans * (tiles + 1), || ChunkState::Decoded);
+        for chunk in state.index.chunks() {
+            let at = state.index.chunk_number(chunk);
+            state.chunks[at] = ChunkState::Partial(Vec::new());
+            state.missing[chunk.scan] += 1;
+        }
+        // Dark tiles are complete from the beginning.
+        for tile in 0..tiles {
+            state.advance_tile(tile, budget)?;
+        }
+        Ok(state)
+    }
+
+    pub fn index(&self) -> &FileIndex {
+        &self.index
+    }
+
+    /// Number of scans that are complete for every tile.
+    pub fn complete_scans(&self) -> usize {
+        let incomplete = self.missing.iter().position(|missing| *missing > 0);
+        incomplete.unwrap_or(self.missing.len())
+    }
+
+    /// Number of complete tiles.
+    pub fn complete_tiles(&self) -> usize {
+        let is_complete = |tile: &&TileState| matches!(tile, TileState::Complete(_));
+        self.tiles.iter().filter(is_complete).count()
+    }
+
+    /// Whether all chunks have come.
+    pub fn is_complete(&self) -> bool {
+        self.complete_scans() == self.missing.len()
+    }
+
+    /// Byte ranges to fetch, in file order: of tiles that `viewport` shows, and of scans up to the first
+    /// with an SNR of `snr`.
+    pub fn wants(
+        &self,
+        viewport: Option<&(Range<u32>, Range<u32>)>,
+        snr: Option<Decibels>,
+    ) -> Vec<Range<u64>> {
+        let sufficient = snr.and_then(|snr| {
+            let scans = &self.index.scans;
+            scans.iter().position(|scan| scan.snr.0 >= snr.0)
+        });
+        let scans = sufficient.map_or(self.index.scans.len(), |last| last + 1);
+        let geometry = &self.index.header.geometry;
+        let is_visible = |chunk: &ChunkId| match (viewport, chunk.tile) {
+            (Some((x, y)), Some(tile)) => {
+                let (rect, side) = (geometry.tile(tile), geometry.tile_side);
+                rect.x < x.end
+                    && rect.x + side > x.start
+                    && rect.y < y.end
+                    && rect.y + side > y.start
+            }
+            _ => true,
+        };
+        let mut ranges: Vec<Range<u64>> = Vec::new();
+        let chunks = self.index.chunks().take_while(|chunk| chunk.scan < scans);
+        for chunk in chunks.filter(is_visible) {
+            let ChunkState::Partial(bytes) = &self.chunks[self.index.chunk_number(chunk)] else {
+                continue;
+            };
+            let mut range = self.index.range(chunk);
+            range.start += bytes.len() as u64;
+            let is_full = ranges.len() == MAX_RANGES;
+            match ranges.last_mut() {
+                Some(last) if last.end == range.start => last.end = range.end,
+                _ if is_full => break,
+                _ => ranges.push(range),
+            }
+        }
+        ranges
+    }
+
+    /// Takes bytes from `offset` on. Returns how many of them are new.
+    pub fn feed(
+        &mut self,
+        mut offset: u64,
+        mut bytes: &[u8],
+        budget: &Budget,
+    ) -> Result<u64, FormatError> {
+        let end = self.index.header.file_bytes;
+        let mut new_bytes = 0;
+        // A server may send the index again.
+        let index_bytes = self.index.header.index_bytes();
+        if offset < index_bytes {
+            let known = usize::try_from(index_bytes - offset).unwrap_or(usize::MAX);
+            bytes = bytes.get(known..).unwrap_or_default();
+            offset = index_bytes;
+        }
+        while !bytes.is_empty() {
+            if offset >= end {
+                return Err(FormatError::TrailingBytes { end });
+            }
+            let chunk = self.index.chunk_at(offset);
+            let range = self.index.range(chunk);
+            let here = bytes.len().min((range.end - offset) as usize); // a chunk is below 4 GiB
+            let (now, later) = bytes.split_at(here);
+            new_bytes += self.feed_chunk(chunk, range, offset, now, budget)?;
+            offset += here as u64;
+            bytes = later;
+        }
+        Ok(new_bytes)
+    }
+
+    /// Takes some bytes of one chunk. Returns how many of them are new.
+    fn feed_chunk(
+        &mut self,
+        chunk: ChunkId,
+        range: Range<u64>,
+        offset: u64,
+        bytes: &[u8],
+        budget: &Budget,
+    ) -> Result<u64, FormatError> {
+        let number = self.index.chunk_number(chunk);
+        let ChunkState::Partial(partial) = &mut self.chunks[number] else {
+            return Ok(0);
+        };
+        let length = (range.end - range.start) as usize;
+        if bytes.len() == length {
+            let partial = std::mem::take(partial);
+            let known = partial.len() as u64;
+            budget.release_vec(partial);
+            self.take_chunk(chunk, bytes, budget)?;
+            return Ok(length as u64 - known);
+        }
+        let at = (offset - range.start) as usize;
+        if at > partial.len() {
+            return Err(FormatError::Gap {
+                got: offset,
+                expected: range.start + partial.len() as u64,
+            });
+        }
+        let new = bytes.get(partial.len() - at..).unwrap_or_default();
+        budget.try_extend(partial, new, length)?;
+        if partial.len() == length {
+            let complete = std::mem::take(partial);
+            let taken = self.take_chunk(chunk, &complete, budget);
+            budget.release_vec(complete);
+            taken?;
+        }
+        Ok(new.len() as u64)
+    }
+
+    /// Takes a complete chunk.
+    fn take_chunk(
+        &mut self,
+        chunk: ChunkId,
+        bytes: &[u8],
+        budget: &Budget,
+    ) -> Result<(), FormatError> {
+        self.index.check_crc(chunk, bytes)?;
+        let number = self.index.chunk_number(chunk);
+        self.chunks[number] = match chunk.tile {
+            Some(tile) if !self.is_next(chunk.scan, tile) => {
+                ChunkState::Waiting(budget.try_copy(bytes)?)
+            }
+            _ => ChunkState::Decoded,
+        };
+        self.missing[chunk.scan] -= 1;
+        let Some(tile) = chunk.tile else {
+            let functions = &mut self.basis.kernels[self.index.new_basis_functions(chunk.scan)];
+            let area = self.index.header.geometry.window.area();
+            let _scratch = budget.scratch();
+            return basis::decode(bytes, functions, area, budget)
+                .map_err(|error| error.in_chunk(chunk));
+        };
+        if self.is_next(chunk.scan, tile) {
+            self.decode_chunk(tile, bytes, budget)?;
+            self.advance_tile(tile, budget)?;
+        }
+        Ok(())
+    }
+
+    /// Whether the tile decodes its chunk of `scan` next.
+    fn is_next(&self, scan: usize, tile: usize) -> bool {
+        matches!(&self.tiles[tile], TileState::Partial(decoder) if decoder.scans == scan)
+    }
+
+    /// Decodes the next chunk of a tile.
+    fn decode_chunk(
+        &mut self,
+        tile: usize,
+        bytes: &[u8],
+        budget: &Budget,
+    ) -> Result<(), FormatError> {
+        match &mut self.tiles[tile] {
+            TileState::Partial(decoder) => {
+                decoder.add(&self.index, &self.order, tile, bytes, budget)
+            }
+            TileState::Complete(_) => Ok(()),
+        }
+    }
+
+    /// Skips scans that have no chunk for the tile, decodes chunks that waited, and turns the tile into codes
+    /// after its last scan.
+    fn advance_tile(&mut self, tile: usize, budget: &Budget) -> Result<(), FormatError> {
+        while let TileState::Partial(decoder) = &mut self.tiles[tile] {
+            if decoder.scans == self.index.scans.len() {
+                let quantised = decoder.quantise(&self.index, tile, self.basis.rank(), budget)?;
+                budget.release(decoder.bytes());
+                self.tiles[tile] = TileState::Complete(quantised);
+                break;
+            }
+            let chunk = ChunkId::of_tile(decoder.scans, tile);
+            if self.index.entry(chunk.scan, tile).bytes == 0 {
+                decoder.scans += 1;
+                continue;
+            }
+            let number = self.index.chunk_number(chunk);
+            let ChunkState::Waiting(bytes) = &mut self.chunks[number] else {
+                break;
+            };
+            let bytes = std::mem::take(bytes);
+            self.chunks[number] = ChunkState::Decoded;
+            let decoded = self.decode_chunk(tile, &bytes, budget);
+            budget.release_vec(bytes);
+            decoded?;
+        }
+        Ok(())
+    }
+
+    /// The transport by the components of complete scans, as [`Reader::preview`](super::Reader::preview)
+    /// says. Its memory is reserved while it is made, and is the caller's afterwards.
+    pub fn preview(&self, budget: &Budget) -> Result<Option<Transport>, FormatError> {
+        let scans = self.complete_scans();
+        if scans == 0 || scans == self.missing.len() {
+            return Ok(None);
+        }
+        let _scratch = budget.scratch();
+        match self.transport(self.index.new_basis_functions(scans - 1).end, budget) {
+            Ok(transport) => Ok(Some(transport)),
+            Err(FormatError::Limit { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn transport(&self, rank: usize, budget: &Budget) -> Result<Transport, FormatError> {
+        let mut kernels = budget.try_with_capacity(rank)?;
+        for kernel in &self.basis.kernels[..rank] {
+            kernels.push(budget.try_copy(kernel)?);
+        }
+        let mut tiles = budget.try_with_capacity(self.tiles.len())?;
+        for (i, tile) in self.tiles.iter().enumerate() {
+            tiles.push(match tile {
+                TileState::Partial(decoder) => decoder.quantise(&self.index, i, rank, budget)?,
+                TileState::Complete(tile) => self.copy_components(tile, rank, budget)?,
+            });
+        }
+        Ok(Transport {
+            geometry: self.index.header.geometry,
+            basis: Basis { kernels },
+            tiles,
+        })
+    }
+
+    /// A copy of a tile by the first `rank` components.
+    fn copy_components(
+        &self,
+        tile: &Tile,
+        rank: usize,
+        budget: &Budget,
+    ) -> Result<Tile, FormatError> {
+        let CoefficientTile {
+            rect, ref codes, ..
+        } = tile.coefficients;
+        let texels = codes.len().min(CoefficientTile::texels(rect, rank));
+        let codes = budget.try_with_capacity(texels)?;
+        Ok(Tile {
+            coefficients: (tile.coefficients).first_components(self.basis.rank(), rank, codes),
+            functions: DirectTile {
+                codes: budget.try_copy(&tile.functions.codes)?,
+                rect,
+                step: tile.functions.step,
+            },
+        })
+    }
+
+    /// The transport of all chunks so far.
+    pub fn finish(self, budget: &Budget) -> Result<(Transport, MetadataJson), FormatError> {
+        let rank = self.basis.rank();
+        let mut tiles = budget.try_with_capacity(self.tiles.len())?;
+        for (i, tile) in self.tiles.into_iter().enumerate() {
+            tiles.push(match tile {
+                TileState::Complete(tile) => tile,
+                TileState::Partial(decoder) => {
+                    let tile = decoder.quantise(&self.index, i, rank, budget)?;
+                    budget.release(decoder.bytes());
+                    tile
+                }
+            });
+        }
+        let transport = Transport {
+            geometry: self.index.header.geometry,
+            basis: self.basis,
+            tiles,
+        };
+        Ok((transport, self.index.metadata))
+    }
+}

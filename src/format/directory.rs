@@ -1,0 +1,130 @@
+//! The directory: a record for each scan and an entry for each tile chunk, and the rules for both.
+//!
+//! Decompressed it is `scan record [scan]`, then three tables of `u32 [scan, tile]`: bytes, content
+//! bytes, checksums. Equal fields stand together, as that compresses better.
+
+use super::budget::Budget;
+use super::chunk::ChunkEntry;
+use super::codec::zstd_frame::compressed_bound;
+use super::codec::{basis, direct, halves, transform};
+use super::constants::{CHUNK_ENTRY_BYTES, MAX_CONTENT_BYTES, SCAN_RECORD_BYTES};
+use super::error::FormatError;
+use super::header::Header;
+use super::scan::{Coding, Scan};
+use crate::transport::{CHANNELS, Extent};
+
+/// The records of a directory.
+pub(super) type Directory = (Vec<Scan>, Vec<ChunkEntry>);
+
+/// Bytes of the directory before compression. At most 1024 · (24 + 12 · 2^24): no overflow.
+pub(super) fn content_bytes(header: &Header) -> u64 {
+    let tiles = header.geometry.tile_grid().area() as u64;
+    u64::from(header.scans) * (SCAN_RECORD_BYTES as u64 + CHUNK_ENTRY_BYTES as u64 * tiles)
+}
+
+/// The directory before compression; `entries` are `[scan, tile]`.
+pub(super) fn encode(scans: &[Scan], entries: &[ChunkEntry]) -> Vec<u8> {
+    let mut bytes: Vec<u8> = scans.iter().flat_map(Scan::encode).collect();
+    let fields: [fn(&ChunkEntry) -> u32; 3] = [|e| e.bytes, |e| e.content_bytes, |e| e.crc];
+    for field in fields {
+        bytes.extend(entries.iter().flat_map(|entry| field(entry).to_le_bytes()));
+    }
+    bytes
+}
+
+/// Reads a decompressed directory of [`content_bytes`].
+///
+/// # Errors
+/// [`FormatError::InvalidScan`] or [`FormatError::InvalidChunkEntry`] if a record breaks the rules, and
+/// the errors of `budget`.
+pub(super) fn decode(
+    header: &Header,
+    bytes: &[u8],
+    budget: &Budget,
+) -> Result<Directory, FormatError> {
+    let scans = decode_scans(header, bytes, budget)?;
+    let geometry = &header.geometry;
+    let tiles = geometry.tile_grid().area();
+    let count = scans.len() * tiles;
+    let tables = bytes[scans.len() * SCAN_RECORD_BYTES..].as_chunks().0;
+    let field = |i: usize| u32::from_le_bytes(tables[i]);
+    let mut entries = budget.try_with_capacity(count)?;
+    for (scan, record) in scans.iter().enumerate() {
+        for tile in 0..tiles {
+            let i = scan * tiles + tile;
+            let entry = ChunkEntry {
+                bytes: field(i),
+                content_bytes: field(count + i),
+                crc: field(2 * count + i),
+            };
+            if !is_valid_entry(record, geometry.tile(tile).extent, entry) {
+                return Err(FormatError::InvalidChunkEntry { scan, tile });
+            }
+            entries.push(entry);
+        }
+    }
+    Ok((scans, entries))
+}
+
+fn decode_scans(header: &Header, bytes: &[u8], budget: &Budget) -> Result<Vec<Scan>, FormatError> {
+    let mut scans = budget.try_with_capacity(header.scans as usize)?;
+    let mut known = 0;
+    let records = bytes.as_chunks().0.iter().take(header.scans as usize);
+    for (scan, record) in records.enumerate() {
+        let record = Scan::decode(record).filter(|record| is_valid_scan(header, record, known));
+        let record = record.ok_or(FormatError::InvalidScan { scan })?;
+        known += record.new_basis_functions(known);
+        scans.push(record);
+    }
+    let has = |coding| scans.iter().any(|scan: &Scan| scan.coding == coding);
+    let is_mixed = has(Coding::Transform) && has(Coding::Halves)
+        || has(Coding::Direct) && has(Coding::DirectHalves);
+    match is_mixed || known != usize::from(header.rank) {
+        true => Err(FormatError::InvalidScan { scan: scans.len() }),
+        false => Ok(scans),
+    }
+}
+
+/// Whether the file can have the scan, where earlier scans have brought `known` basis functions.
+fn is_valid_scan(header: &Header, scan: &Scan, known: usize) -> bool {
+    let area = header.geometry.window.area();
+    let is_in_range = match scan.coding.is_direct() {
+        true => scan.end() <= area,
+        false => usize::from(scan.first) <= known && scan.end() <= usize::from(header.rank),
+    };
+    let basis_bytes = u64::from(scan.basis_bytes);
+    is_in_range
+        && match scan.new_basis_functions(known) {
+            0 => basis_bytes == 0,
+            functions => {
+                let content = basis::content_bytes(functions, area) as u64;
+                (1..=compressed_bound(content)).contains(&basis_bytes)
+            }
+        }
+}
+
+/// Whether a tile of this extent can have the chunk.
+fn is_valid_entry(scan: &Scan, extent: Extent, entry: ChunkEntry) -> bool {
+    let (bytes, content) = (u64::from(entry.bytes), u64::from(entry.content_bytes));
+    if bytes == 0 {
+        return content == 0;
+    }
+    let values = extent.area() * CHANNELS * usize::from(scan.count);
+    let (min_content, max_content, max_bytes) = match scan.coding {
+        Coding::Transform => (
+            1,
+            transform::max_tokens(extent, scan.count),
+            transform::max_bytes(content),
+        ),
+        Coding::Direct => (
+            1,
+            direct::max_tokens(extent, scan.count),
+            direct::max_bytes(content),
+        ),
+        Coding::Halves | Coding::DirectHalves => {
+            let exact = halves::content_bytes(values) as u64;
+            (exact, exact, compressed_bound(content))
+        }
+    };
+    (min_content..=max_content.min(MAX_CONTENT_BYTES)).contains(&content) && bytes <= max_bytes
+}

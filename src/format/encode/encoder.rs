@@ -1,0 +1,160 @@
+//! The encoder's view of a source: the rotated basis, energies and peaks, from one pass over all tiles.
+
+use super::basis_rotation::{BasisRotation, coefficient_moments};
+use super::source::Source;
+use crate::executor::Executor;
+use crate::format::budget::Budget;
+use crate::format::codec::{direct, transform};
+use crate::format::error::FormatError;
+use crate::transport::{BandTile, Basis, CHANNELS, FactoredTile};
+
+/// Number of tiles that are encoded at a time.
+const BATCH_TILES: usize = 64;
+
+/// A source whose tiles have been analysed.
+pub struct Encoder<'a> {
+    pub source: Source<'a>,
+    /// The rotation to the file's basis; `None` if there are no coefficients.
+    pub rotation: Option<BasisRotation>,
+    pub has_functions: bool,
+    /// Sum of squared coefficients over the orthonormal basis and of squared direct functions.
+    pub energy: f64,
+    pub coefficient_energy: f64,
+    /// Largest magnitude of an input coefficient, and of a value of a direct function.
+    pub coefficient_peak: f32,
+    pub function_peak: f32,
+    /// The centre-out order of slots.
+    pub order: Vec<u16>,
+    /// Numbers of the tiles that are not dark.
+    pub lit_tiles: Vec<usize>,
+}
+
+/// What the encoder needs to know of one tile.
+struct TileAnalysis {
+    moments: Vec<f64>,
+    function_energy: f64,
+    coefficient_peak: f32,
+    function_peak: f32,
+}
+
+impl TileAnalysis {
+    fn new(tile: &BandTile, rank: usize, area: usize) -> Self {
+        let pixels = tile.rect.extent.area();
+        let fits = |length: usize, columns: usize| length == 0 || length == pixels * columns;
+        assert!(
+            fits(tile.coefficients.len(), rank) && fits(tile.functions.len(), area),
+            "a value for each pixel and component or slot"
+        );
+        let functions = tile.functions.iter().flatten().filter(|v| v.is_finite());
+        Self {
+            moments: coefficient_moments(tile, rank),
+            function_energy: functions.map(|v| f64::from(*v).powi(2)).sum(),
+            coefficient_peak: peak(&tile.coefficients),
+            function_peak: peak(&tile.functions),
+        }
+    }
+}
+
+fn peak(values: &[[f32; CHANNELS]]) -> f32 {
+    let finite = values.iter().flatten().filter(|v| v.is_finite());
+    finite.fold(0.0, |peak, v| peak.max(v.abs()))
+}
+
+impl<'a> Encoder<'a> {
+    /// Analyses all tiles of a source.
+    ///
+    /// # Errors
+    /// [`FormatError::Source`] if a tile cannot be read.
+    ///
+    /// # Panics
+    /// If a tile or a basis function has the wrong length.
+    pub fn new(source: Source<'a>, executor: &impl Executor) -> Result<Self, FormatError> {
+        let rank = source.basis.map_or(0, Basis::rank);
+        let area = source.geometry.window.area();
+        if let Some(basis) = source.basis {
+            let fits = basis.kernels.iter().all(|kernel| kernel.len() == area);
+            assert!(fits, "basis functions of the window's area");
+        }
+        let mut moments = vec![0.0; rank * rank];
+        let (mut function_energy, mut coefficient_peak, mut function_peak) = (0.0, 0.0f32, 0.0f32);
+        let mut lit_tiles = Vec::new();
+        let analyse = |tile: BandTile| TileAnalysis::new(&tile, rank, area);
+        for_tiles(&source, executor, analyse, |i, tile| {
+            if tile.coefficient_peak.max(tile.function_peak) > 0.0 {
+                lit_tiles.push(i);
+            }
+            for (sum, m) in moments.iter_mut().zip(tile.moments) {
+                *sum += m;
+            }
+            function_energy += tile.function_energy;
+            coefficient_peak = coefficient_peak.max(tile.coefficient_peak);
+            function_peak = function_peak.max(tile.function_peak);
+            Ok(())
+        })?;
+        let basis = source.basis.filter(|_| moments.iter().any(|m| *m != 0.0));
+        let rotation = basis.map(|basis| BasisRotation::new(basis, &moments));
+        let rotation = rotation.filter(|rotation| rotation.rank() > 0);
+        let coefficient_energy = rotation.as_ref().map_or(0.0, BasisRotation::energy);
+        Ok(Self {
+            order: direct::centre_out_order(source.geometry.window, &Budget::unlimited())?,
+            energy: coefficient_energy + function_energy,
+            coefficient_energy,
+            has_functions: function_energy > 0.0,
+            coefficient_peak,
+            function_peak,
+            source,
+            rotation,
+            lit_tiles,
+        })
+    }
+
+    /// Number of components of the file.
+    pub fn rank(&self) -> usize {
+        self.rotation.as_ref().map_or(0, BasisRotation::rank)
+    }
+
+    /// Number of slots that scans of direct functions cover: all, or none.
+    pub fn slots(&self) -> usize {
+        usize::from(self.has_functions) * self.order.len()
+    }
+
+    /// A tile's coefficients over the file's basis; `None` if there are none.
+    pub fn rotated(&self, tile: &BandTile) -> Option<FactoredTile> {
+        let coefficients = self.rotation.as_ref()?.coefficients(tile);
+        (!coefficients.is_empty()).then_some(FactoredTile {
+            rect: tile.rect,
+            coefficients,
+        })
+    }
+
+    /// The finest step of component `k` whose numbers do not overflow: from the largest coefficient there can
+    /// be, or from the component's whole energy.
+    pub fn finest_step(&self, k: usize) -> f32 {
+        self.rotation.as_ref().map_or(0.0, |rotation| {
+            let peak = f64::from(self.coefficient_peak) * rotation.gain(k);
+            transform::finest_step(peak as f32, rotation.energies[k])
+        })
+    }
+}
+
+/// Reads each tile, works on it, and takes the results in order.
+///
+/// # Errors
+/// [`FormatError::Source`] if a tile cannot be read, and the errors of `take`.
+pub fn for_tiles<T: Send>(
+    source: &Source<'_>,
+    executor: &impl Executor,
+    work: impl Fn(BandTile) -> T + Sync + Send,
+    mut take: impl FnMut(usize, T) -> Result<(), FormatError>,
+) -> Result<(), FormatError> {
+    let count = source.geometry.tile_grid().area();
+    for first in (0..count).step_by(BATCH_TILES) {
+        let results = executor.map(BATCH_TILES.min(count - first), |i| {
+            (source.tile)(first + i).map(&work)
+        });
+        for (i, result) in results.into_iter().enumerate() {
+            take(first + i, result.map_err(FormatError::Source)?)?;
+        }
+    }
+    Ok(())
+}

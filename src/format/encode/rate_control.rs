@@ -1,0 +1,287 @@
+//! Rate control: the quantisation step and the rank for a quality or a size.
+//!
+//! Both are found by bisection on a sample. Components whose energy is far below the quantisation error
+//! are then dropped.
+
+use std::ops::RangeInclusive;
+
+use super::assembly::{self, EncodedFile, QuantisedTile};
+use super::encoder::Encoder;
+use super::quantisation_error::QuantisationError;
+use super::sampling::{SampledPart, sample};
+use super::scan_costs::CostModel;
+use super::scan_plan::{self, MAX_SHARES, SHARES, Shares};
+use super::source::{DistortionMetric, RateTarget};
+use crate::bisect::bisect;
+use crate::executor::Executor;
+use crate::format::constants::FIRST_BYTES;
+use crate::format::error::FormatError;
+use crate::format::scan::Scan;
+use crate::transport::{BandTile, Basis, Decibels, TransportFunctions};
+
+/// Energy of the dropped components, relative to the quantisation error.
+const DROPPED_ENERGY_RATIO: f64 = 0.01;
+/// Range of steps of a loss, as powers of two of the coarsest step, and halvings: to 0.5 %.
+const LOSS_EXPONENTS: [f64; 2] = [-20.0, 0.0];
+const LOSS_HALVINGS: usize = 12;
+/// Range of steps of an SNR, and halvings: to 0.3 %.
+const SNR_EXPONENTS: [f64; 2] = [-26.0, 0.0];
+const SNR_HALVINGS: usize = 13;
+/// Range of SNRs of a file size in dB, and halvings.
+const SIZE_SNRS: [f64; 2] = [3.0, 75.0];
+const SIZE_HALVINGS: usize = 9;
+/// Corrections of the step by the error of the plan: their number, their largest factor, and the ratio of
+/// steps that needs none.
+const STEP_CORRECTIONS: usize = 4;
+const MAX_STEP_CORRECTION: f32 = 1.25;
+const STEP_TOLERANCE: RangeInclusive<f32> = 0.985..=1.05;
+/// Factors of the planned shares, if a file exceeds [`MAX_SHARES`].
+const SHARE_FACTORS: [f64; 3] = [1.0, 0.75, 0.5];
+
+/// Encodes the source for a target.
+///
+/// # Errors
+/// As [`EncodedFile::new`].
+pub fn encode(
+    mut encoder: Encoder<'_>,
+    target: RateTarget<'_>,
+    executor: &impl Executor,
+) -> Result<EncodedFile, FormatError> {
+    match target {
+        RateTarget::Lossless => assembly::encode_lossless(&encoder, executor),
+        RateTarget::Bytes(limit) => encode_to_size(encoder, limit, executor),
+        RateTarget::Snr(snr) => {
+            let sample = sample(&encoder)?;
+            encode_to_snr(&mut encoder, snr, &sample, executor)
+        }
+        RateTarget::Loss(loss, metric) => encode_to_loss(encoder, loss, metric, executor),
+    }
+}
+
+fn encode_to_snr(
+    encoder: &mut Encoder<'_>,
+    snr: Decibels,
+    sample: &[SampledPart],
+    executor: &impl Executor,
+) -> Result<EncodedFile, FormatError> {
+    let step = step_for(snr, |step| {
+        error_of(encoder, sample, &scan_plan::trial(encoder, step), executor)
+    });
+    encode_with_step(encoder, step, sample, executor)
+}
+
+fn encode_to_loss(
+    mut encoder: Encoder<'_>,
+    max_loss: Decibels,
+    metric: &dyn DistortionMetric,
+    executor: &impl Executor,
+) -> Result<EncodedFile, FormatError> {
+    let sample = sample(&encoder)?;
+    let pixels = encoder.source.geometry.camera.area() as f64;
+    // The step at which nothing is left.
+    let coarsest = 16.0 * (encoder.energy / pixels).sqrt();
+    if !(coarsest as f32).is_normal() {
+        return encode_with_step(&mut encoder, None, &sample, executor);
+    }
+    let tiles = codable(&encoder, metric.tiles());
+    // The metric may have direct functions where the file has none.
+    let has_functions = encoder.has_functions;
+    encoder.has_functions |= tiles.iter().any(|tile| !tile.functions.is_empty());
+    let [exponent, _] = bisect(LOSS_EXPONENTS, LOSS_HALVINGS, |exponent| {
+        let scans = scan_plan::trial(&encoder, (coarsest * exponent.exp2()) as f32);
+        let decoded = executor.map(tiles.len(), |i| decoded(&encoder, &tiles[i], &scans));
+        metric.loss(&decoded).0 <= max_loss.0
+    });
+    encoder.has_functions = has_functions;
+    let step = (coarsest * exponent.exp2()) as f32;
+    encode_with_step(&mut encoder, Some(step), &sample, executor)
+}
+
+fn encode_to_size(
+    mut encoder: Encoder<'_>,
+    limit: u64,
+    executor: &impl Executor,
+) -> Result<EncodedFile, FormatError> {
+    let sample = sample(&encoder)?;
+    let rotation = encoder.rotation.clone();
+    let mut try_snr = |snr: f64| {
+        encoder.rotation.clone_from(&rotation);
+        encode_to_snr(&mut encoder, Decibels(snr), &sample, executor)
+    };
+    let mut best = try_snr(SIZE_SNRS[0])?;
+    if best.bytes() > limit {
+        return Err(FormatError::TooLarge {
+            limit,
+            smallest: best.bytes(),
+        });
+    }
+    let mut failed = None;
+    bisect(SIZE_SNRS, SIZE_HALVINGS, |snr| match try_snr(snr) {
+        Ok(file) if file.bytes() <= limit => {
+            best = file;
+            true
+        }
+        Ok(_) => false,
+        Err(error) => {
+            failed = Some(error);
+            false
+        }
+    });
+    failed.map_or(Ok(best), Err)
+}
+
+/// Encodes all tiles; without a step there is no light. Plans anew with smaller shares if the file exceeds
+/// [`MAX_SHARES`]: predictions from samples may err.
+fn encode_with_step(
+    encoder: &mut Encoder<'_>,
+    step: Option<f32>,
+    sample: &[SampledPart],
+    executor: &impl Executor,
+) -> Result<EncodedFile, FormatError> {
+    let Some(step) = step else {
+        return assembly::encode_quantised(encoder, Vec::new(), executor);
+    };
+    let expected = error_of(encoder, sample, &scan_plan::trial(encoder, step), executor);
+    drop_weak_components(encoder, expected);
+    let model = CostModel::new(encoder, sample, executor);
+    let plan = |step: f32, factor: f64| {
+        let shares = Shares {
+            first: SHARES.first * factor,
+            scan: SHARES.scan * factor,
+        };
+        scan_plan::plan(encoder, &model, step, shares, executor)
+    };
+    // The plan's layers change the error a little.
+    let mut step = step;
+    for _ in 0..STEP_CORRECTIONS {
+        let planned = error_of(encoder, sample, &plan(step, 1.0)?.scans, executor);
+        let ratio = (expected.error / planned.error.max(f64::MIN_POSITIVE)).sqrt() as f32;
+        if STEP_TOLERANCE.contains(&ratio) {
+            break;
+        }
+        step *= 0.99 * ratio.clamp(MAX_STEP_CORRECTION.recip(), MAX_STEP_CORRECTION);
+    }
+    let encode = |factor: f64| {
+        let plan = plan(step, factor)?;
+        let first_scans = plan.first_scans;
+        let file = assembly::encode_quantised(encoder, plan.scans, executor)?;
+        let is_within = is_within_shares(&file, first_scans);
+        Ok::<_, FormatError>((file, is_within))
+    };
+    let (mut file, mut is_within) = encode(SHARE_FACTORS[0])?;
+    for factor in &SHARE_FACTORS[1..] {
+        // A reader fetches small files at once.
+        if is_within || file.bytes() <= FIRST_BYTES {
+            break;
+        }
+        (file, is_within) = encode(*factor)?;
+    }
+    Ok(file)
+}
+
+/// Whether the index with the first `first_scans` scans, and every later scan, keep [`MAX_SHARES`].
+fn is_within_shares(file: &EncodedFile, first_scans: usize) -> bool {
+    let index = file.index();
+    let share = |bytes: u64| bytes as f64 / file.bytes() as f64;
+    let scan_range = |scan: usize| index.scan_range(scan);
+    share(scan_range(first_scans - 1).end) <= MAX_SHARES.first
+        && (first_scans..index.scans.len())
+            .map(scan_range)
+            .all(|range| share(range.end - range.start) <= MAX_SHARES.scan)
+}
+
+/// The metric's tiles in the file's coding: as direct functions where the file has no components.
+fn codable(encoder: &Encoder<'_>, mut tiles: Vec<BandTile>) -> Vec<BandTile> {
+    if encoder.rotation.is_none()
+        && let Some(basis) = encoder.source.basis
+    {
+        for tile in &mut tiles {
+            let functions = std::mem::replace(tile, BandTile::dark(tile.rect))
+                .functions(&encoder.source.geometry, basis);
+            tile.functions = functions.tau;
+        }
+    }
+    tiles
+}
+
+/// The functions of a tile as a reader decodes them.
+fn decoded(encoder: &Encoder<'_>, tile: &BandTile, scans: &[Scan]) -> TransportFunctions {
+    let quantised = QuantisedTile::new(encoder, tile, scans, true);
+    let kernels = encoder
+        .rotation
+        .as_ref()
+        .map_or(Vec::new(), |rotation| rotation.functions.clone());
+    quantised
+        .decoded(tile, &encoder.order)
+        .functions(&encoder.source.geometry, &Basis { kernels })
+}
+
+/// The quantisation error of some scans, predicted from the sample.
+fn error_of(
+    encoder: &Encoder<'_>,
+    sample: &[SampledPart],
+    scans: &[Scan],
+    executor: &impl Executor,
+) -> QuantisationError {
+    let errors = executor.map(sample.len(), |i| {
+        let SampledPart { tile, weight } = &sample[i];
+        let quantised = QuantisedTile::new(encoder, tile, scans, false);
+        quantised.error().times(*weight)
+    });
+    // In order, so that the sum does not depend on threads.
+    errors
+        .into_iter()
+        .fold(QuantisationError::default(), QuantisationError::plus)
+}
+
+/// Drops the last components, as far as their energy is small against the quantisation error.
+fn drop_weak_components(
+    encoder: &mut Encoder<'_>,
+    QuantisationError { energy, error }: QuantisationError,
+) {
+    let allowed = DROPPED_ENERGY_RATIO * encoder.energy * error / energy.max(f64::MIN_POSITIVE);
+    if let Some(rotation) = &mut encoder.rotation {
+        let mut dropped = 0.0;
+        let weak = rotation.energies.iter().rev().take_while(|energy| {
+            dropped += **energy;
+            dropped <= allowed
+        });
+        let rank = rotation.rank() - weak.count();
+        rotation.truncate(rank.max(1));
+    }
+}
+
+/// The coarsest step with the given SNR, where `error` gives the error of a step. `None` if all values are
+/// zero.
+fn step_for(snr: Decibels, error: impl Fn(f32) -> QuantisationError) -> Option<f32> {
+    let norm = error(1.0).energy.sqrt() as f32;
+    if !norm.is_normal() {
+        return None;
+    }
+    // Even a value as large as the norm is zero at twice that step.
+    let step = |exponent: f64| 2.0 * norm * exponent.exp2() as f32;
+    let [exponent, _] = bisect(SNR_EXPONENTS, SNR_HALVINGS, |exponent| {
+        error(step(exponent)).snr().0 >= snr.0
+    });
+    Some(step(exponent))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_step_is_the_coarsest_with_the_snr() {
+        // The error of values that are large against the step.
+        let error = |step: f32| QuantisationError {
+            energy: 1e4,
+            error: f64::from(step).powi(2),
+        };
+        for target in [10.0, 34.0, 60.0] {
+            let step = step_for(Decibels(target), error).unwrap();
+            let snr = 10.0 * (1e4 / f64::from(step).powi(2)).log10();
+            assert!((0.0..0.1).contains(&(snr - target)), "{snr} dB");
+        }
+        assert!(step_for(Decibels(30.0), |_| QuantisationError::default()).is_none());
+    }
+}

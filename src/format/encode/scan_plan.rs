@@ -1,0 +1,287 @@
+//! The scan plan: which components and slots each scan brings, and at which step.
+//!
+//! A coarse first layer gives a picture under any light. The last layer has the step that the rate control
+//! has found; it is cut into scans of consecutive components or slots. At one step all values have the same
+//! slope of error against bytes, which makes the layers efficient. More layers would cost some per cent
+//! of the file each. Two shares of the file bound the plan:
+//!
+//! - the index and the first layer: its step is the finest that fits, and it leaves out items that reduce
+//!   the error by less than the same bytes do elsewhere;
+//! - any later scan. An item that is larger by itself is refined in several scans.
+
+use super::encoder::Encoder;
+use super::scan_costs::{CostModel, ItemCost};
+use crate::bisect::bisect;
+use crate::executor::Executor;
+use crate::format::codec::{direct, transform};
+use crate::format::constants::FIRST_BYTES;
+use crate::format::error::FormatError;
+use crate::format::scan::{Coding, Scan};
+
+/// The shares that a plan aims for. Predictions err; files keep [`MAX_SHARES`].
+pub const SHARES: Shares = Shares {
+    first: 0.08,
+    scan: 0.18,
+};
+/// The shares of files that fit into a reader's first request, where many scans cost more than they give.
+const SMALL_FILE_SHARES: Shares = Shares {
+    first: 0.3,
+    scan: f64::INFINITY,
+};
+/// The shares that files keep: a tenth and a quarter.
+pub const MAX_SHARES: Shares = Shares {
+    first: 0.1,
+    scan: 0.25,
+};
+/// The step of component 0 in the first and in the last layer, relative to the others: under a flat light it
+/// alone is the picture, and under most lights most of it.
+const FIRST_FLAT_STEP_RATIO: f32 = 0.15;
+const LAST_FLAT_STEP_RATIO: f32 = 0.5;
+/// Ratio of the steps of two scans that refine the same item.
+const PASS_STEP_RATIO: f32 = 4.0;
+/// Ratio of the first step to the last, and the inverse share of items in the first layer, in a plan for
+/// measuring.
+const TRIAL_FIRST_STEP_RATIO: f32 = 16.0;
+const TRIAL_FIRST_ITEMS: usize = 5;
+/// Largest ratio of the first step to the last, as a power of two, and trials of the search.
+const MAX_FIRST_STEP_EXPONENT: f64 = 12.0;
+const FIRST_STEP_TRIALS: usize = 6;
+
+/// Bytes of a basis function in a basis chunk, for each slot.
+const BASIS_BYTES_PER_SLOT: f64 = 1.2;
+
+/// The scans of a file.
+pub struct ScanPlan {
+    pub scans: Vec<Scan>,
+    /// Number of scans of the first layer.
+    pub first_scans: usize,
+}
+
+/// Bounds on the parts of a file, as shares of its bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Shares {
+    /// Of the index and the first layer.
+    pub first: f64,
+    /// Of any later scan.
+    pub scan: f64,
+}
+
+/// Components, or slots.
+#[derive(Clone, Copy, Debug)]
+struct Items {
+    coding: Coding,
+    count: usize,
+    /// Maximum number in one scan.
+    max_per_scan: usize,
+}
+
+impl Items {
+    /// Components and slots of a source, where there are some.
+    fn of(encoder: &Encoder<'_>) -> Vec<Self> {
+        let side = encoder.source.geometry.tile_side;
+        let components = Self {
+            coding: Coding::Transform,
+            count: encoder.rank(),
+            max_per_scan: transform::max_components(side) as usize,
+        };
+        let slots = Self {
+            coding: Coding::Direct,
+            count: encoder.slots(),
+            max_per_scan: direct::max_slots(side) as usize,
+        };
+        let mut kinds = Vec::from([components, slots]);
+        kinds.retain(|items| items.count > 0);
+        kinds
+    }
+
+    /// The finest step at which no number of items `from` and later overflows.
+    fn finest_step(&self, encoder: &Encoder<'_>, from: usize) -> f32 {
+        match self.coding.is_direct() {
+            true => direct::finest_step(encoder.function_peak),
+            false => {
+                let steps = (from..self.count).map(|k| encoder.finest_step(k));
+                steps.fold(0.0, f32::max)
+            }
+        }
+    }
+
+    fn costs(&self, model: &CostModel, step: f32, executor: &impl Executor) -> Vec<ItemCost> {
+        match self.coding.is_direct() {
+            true => model.slots(step, executor),
+            false => model.components(step, executor),
+        }
+    }
+
+    /// Codes the items from `first` on, of the given bytes, at `step`, in scans of at most `max_bytes`.
+    /// The step of component 0 is smaller by `flat_step_ratio`.
+    fn layer(
+        &self,
+        first: usize,
+        bytes: Vec<f64>,
+        step: f32,
+        flat_step_ratio: f32,
+        max_bytes: f64,
+        scans: &mut Vec<Scan>,
+    ) {
+        let is_flat = |item: usize| item == 0 && !self.coding.is_direct();
+        let mut push = |first: usize, end: usize, step: f32| {
+            // Ranks and slots are below 2^12.
+            scans.push(Scan::new(
+                self.coding,
+                first as u16,
+                (end - first) as u16,
+                step,
+            ));
+        };
+        let (mut start, mut scan_bytes) = (first, 0.0);
+        for (item, item_bytes) in (first..).zip(&bytes) {
+            let is_full = scan_bytes + item_bytes > max_bytes || item - start == self.max_per_scan;
+            if item > start && (is_full || is_flat(start)) {
+                push(
+                    start,
+                    item,
+                    if is_flat(start) {
+                        step * flat_step_ratio
+                    } else {
+                        step
+                    },
+                );
+                (start, scan_bytes) = (item, 0.0);
+            }
+            scan_bytes += item_bytes;
+            // Coarser scans first, for an item that exceeds the bytes by itself.
+            let passes = (item_bytes / max_bytes).ceil() as i32;
+            for pass in (1..passes).rev() {
+                push(item, item + 1, step * PASS_STEP_RATIO.powi(pass));
+            }
+        }
+        let end = first + bytes.len();
+        push(
+            start,
+            end,
+            if is_flat(start) {
+                step * flat_step_ratio
+            } else {
+                step
+            },
+        );
+    }
+}
+
+/// A plan without shares, by which the rate control measures a step.
+pub fn trial(encoder: &Encoder<'_>, step: f32) -> Vec<Scan> {
+    let mut scans = Vec::new();
+    for items in Items::of(encoder) {
+        let first_step = items
+            .finest_step(encoder, 0)
+            .max(TRIAL_FIRST_STEP_RATIO * step);
+        let mut layer = |first: usize, count: usize, step: f32, ratio: f32| {
+            items.layer(
+                first,
+                vec![0.0; count],
+                step,
+                ratio,
+                f64::INFINITY,
+                &mut scans,
+            );
+        };
+        let first_count = items.count.div_ceil(TRIAL_FIRST_ITEMS);
+        layer(0, first_count, first_step, FIRST_FLAT_STEP_RATIO);
+        let finest = items.finest_step(encoder, first_count);
+        if finest > step && first_count < items.count {
+            layer(first_count, items.count - first_count, finest, 1.0);
+        }
+        layer(0, items.count, step, LAST_FLAT_STEP_RATIO);
+    }
+    scans
+}
+
+/// The plan of a file whose last layer has `step`.
+///
+/// # Errors
+/// [`FormatError::Compress`].
+pub fn plan(
+    encoder: &Encoder<'_>,
+    model: &CostModel,
+    step: f32,
+    shares: Shares,
+    executor: &impl Executor,
+) -> Result<ScanPlan, FormatError> {
+    let area = encoder.order.len() as f64;
+    let kinds = Items::of(encoder);
+    let costs = kinds.iter().map(|items| items.costs(model, step, executor));
+    let last: Vec<Vec<ItemCost>> = costs.collect();
+    let basis_bytes = BASIS_BYTES_PER_SLOT * area;
+    let file_bytes = basis_bytes * encoder.rank() as f64
+        + last.iter().flatten().map(|cost| cost.bytes).sum::<f64>();
+    // A reader fetches small files at once.
+    let shares = match file_bytes <= FIRST_BYTES as f64 {
+        true => SMALL_FILE_SHARES,
+        false => shares,
+    };
+    let first_layer = |step: f32| {
+        let mut scans = Vec::new();
+        for items in &kinds {
+            let mut costs = items.costs(model, step, executor);
+            let of_basis = f64::from(u8::from(!items.coding.is_direct())) * basis_bytes;
+            costs.iter_mut().for_each(|cost| cost.bytes += of_basis);
+            let count = worthwhile(&costs, step).max(1);
+            let step = step.max(items.finest_step(encoder, 0));
+            items.layer(
+                0,
+                vec![0.0; count],
+                step,
+                FIRST_FLAT_STEP_RATIO,
+                f64::INFINITY,
+                &mut scans,
+            );
+        }
+        scans
+    };
+    let mut failed = None;
+    let exceeds = |exponent: f64| {
+        let scans = first_layer(step * exponent.exp2() as f32);
+        let mut bytes = 0.0;
+        for scan in &scans {
+            match model.compressed_bytes(scan, executor) {
+                Ok(scan_bytes) => bytes += scan_bytes,
+                Err(error) => failed = Some(error),
+            }
+        }
+        let components = scans.iter().filter(|scan| !scan.coding.is_direct());
+        let functions = components.map(Scan::end).max().unwrap_or(0);
+        bytes + basis_bytes * functions as f64 > shares.first * file_bytes
+    };
+    let [_, exponent] = bisect([0.0, MAX_FIRST_STEP_EXPONENT], FIRST_STEP_TRIALS, exceeds);
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    let mut scans = first_layer(step * exponent.exp2() as f32);
+    let first_scans = scans.len();
+    let max_bytes = shares.scan * file_bytes;
+    for (items, last) in kinds.iter().zip(&last) {
+        let of_kind = scans.iter().filter(|scan| scan.coding == items.coding);
+        let coded = of_kind.map(Scan::end).max().unwrap_or(0);
+        // Numbers of items that no scan has coded must not overflow.
+        let finest = items.finest_step(encoder, coded);
+        if finest > step && coded < items.count {
+            let bytes = vec![0.0; items.count - coded];
+            items.layer(coded, bytes, finest, 1.0, max_bytes, &mut scans);
+        }
+        let bytes = last.iter().map(|cost| cost.bytes).collect();
+        items.layer(0, bytes, step, LAST_FLAT_STEP_RATIO, max_bytes, &mut scans);
+    }
+    Ok(ScanPlan { scans, first_scans })
+}
+
+/// Number of first items up to the last whose gain is worth its bytes: at a step, a bit reduces the squared
+/// error of a value by 2 ln 2 step² / 12.
+fn worthwhile(costs: &[ItemCost], step: f32) -> usize {
+    let gain_per_byte = 8.0 * 2.0 * std::f64::consts::LN_2 * f64::from(step).powi(2) / 12.0;
+    let is_worthwhile =
+        |cost: &ItemCost| cost.energy - cost.error > gain_per_byte * cost.bytes && cost.bytes > 0.0;
+    costs
+        .iter()
+        .rposition(is_worthwhile)
+        .map_or(0, |last| last + 1)
+}

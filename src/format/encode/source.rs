@@ -1,0 +1,57 @@
+//! What the encoder is given, and what it is asked for.
+
+use std::fmt;
+use std::io;
+
+use crate::format::extension::Extension;
+use crate::format::metadata::Metadata;
+use crate::transport::{BandTile, Basis, Decibels, Geometry, TransportFunctions};
+
+/// The light transport of a file.
+pub struct Source<'a> {
+    /// Grids, window, correspondence and the file's tiling.
+    pub geometry: Geometry,
+    /// The functions that coefficients belong to, if any tile has coefficients.
+    pub basis: Option<&'a Basis>,
+    /// Gives a tile by its number; called several times for each.
+    pub tile: &'a (dyn Fn(usize) -> io::Result<BandTile> + Sync),
+    /// Origin of the file.
+    pub metadata: Metadata,
+    /// Extensions of the file.
+    pub extensions: Vec<Extension>,
+}
+
+/// Measures how much accuracy of light transport a file loses. Recovered light transport contains noise,
+/// so that SNR against it overestimates the loss.
+pub trait DistortionMetric: Sync {
+    /// Tiles, of any place and size, that the metric compares; their coefficients are over the source's
+    /// basis.
+    fn tiles(&self) -> Vec<BandTile>;
+
+    /// Estimated loss of SNR against the object's light transport if `functions` replace the tiles.
+    fn loss(&self, functions: &[TransportFunctions]) -> Decibels;
+}
+
+/// What the rate control aims for.
+#[derive(Clone, Copy)]
+pub enum RateTarget<'a> {
+    /// The smallest file whose loss, by a metric, is at most this.
+    Loss(Decibels, &'a dyn DistortionMetric),
+    /// The smallest file with this SNR against the source.
+    Snr(Decibels),
+    /// The best file of at most so many bytes.
+    Bytes(u64),
+    /// Eleven bits of every value, for archives.
+    Lossless,
+}
+
+impl fmt::Debug for RateTarget<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Loss(loss, _) => write!(f, "Loss({loss})"),
+            Self::Snr(snr) => write!(f, "Snr({snr})"),
+            Self::Bytes(bytes) => write!(f, "Bytes({bytes})"),
+            Self::Lossless => f.write_str("Lossless"),
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! The file index: header, directory, extensions and metadata, which is everything but the values.
+
+use std::ops::Range;
+
+use super::budget::Budget;
+use super::checksum::{checksum, crc_matches};
+use super::chunk::{ChunkEntry, ChunkId};
+use super::codec::zstd_frame::{compress, decompress};
+use super::constants::HEADER_BYTES;
+use super::error::{FileSection, FormatError};
+use super::extension::{self, Extension};
+use super::header::Header;
+use super::metadata::{Metadata, MetadataJson};
+use super::scan::{Coding, Scan};
+use super::{directory, memory};
+
+/// Everything that precedes the first scan.
+#[derive(Clone, Debug)]
+pub struct FileIndex {
+    /// The fixed header.
+    pub header: Header,
+    /// The scans, in file order.
+    pub scans: Vec<Scan>,
+    /// Extensions that readers may ignore.
+    pub extensions: Vec<Extension>,
+    /// Origin of the file.
+    pub metadata: MetadataJson,
+    /// `[scan, tile]`.
+    entries: Vec<ChunkEntry>,
+    /// Where each chunk begins, and where the last ends: of each scan the basis chunk, then a tile chunk
+    /// for each tile.
+    offsets: Vec<u64>,
+}
+
+impl FileIndex {
+    /// Reads the [`index_bytes`](Header::index_bytes) of a file whose header is `header`.
+    ///
+    /// # Errors
+    /// A [`FormatError`] if a section breaks a rule, or if the file needs more memory than `budget` has.
+    pub(super) fn decode(
+        header: Header,
+        bytes: &[u8],
+        budget: &Budget,
+    ) -> Result<Self, FormatError> {
+        let mut rest = &bytes[HEADER_BYTES..];
+        let mut take = |length: u32, crc: u32, section: FileSection| {
+            let (taken, after) = rest.split_at(length as usize);
+            rest = after;
+            match crc_matches(taken, crc) {
+                true => Ok(taken),
+                false => Err(FormatError::ChecksumMismatch { section }),
+            }
+        };
+        let frame = take(
+            header.directory_bytes,
+            header.directory_crc,
+            FileSection::Directory,
+        )?;
+        let extensions = take(
+            header.extension_bytes,
+            header.extension_crc,
+            FileSection::Extensions,
+        )?;
+        let metadata = take(
+            header.metadata_bytes,
+            header.metadata_crc,
+            FileSection::Metadata,
+        )?;
+        let extensions = extension::decode(extensions, budget)?;
+        let content_bytes = usize::try_from(directory::content_bytes(&header));
+        let records = decompress(frame, content_bytes.unwrap_or(usize::MAX), budget)
+            .map_err(|error| error.in_section(FileSection::Directory))?;
+        let (scans, entries) = directory::decode(&header, &records, budget)?;
+        budget.release_vec(records);
+        let index = Self {
+            offsets: offsets(&header, &scans, &entries, budget)?,
+            header,
+            scans,
+            entries,
+            extensions,
+            metadata: MetadataJson::decode(metadata, budget)?,
+        };
+        let (end, file_bytes) = (index.end(), header.file_bytes);
+        if end != file_bytes {
+            return Err(FormatError::LengthMismatch { end, file_bytes });
+        }
+        budget.check(memory::file_bytes(&index))?;
+        Ok(index)
+    }
+
+    /// Assembles the index of a file, and its bytes. Sets the lengths and checksums of `header`.
+    ///
+    /// # Errors
+    /// [`FormatError::Compress`], and the errors of [`Header::decode`] if a length is too large.
+    ///
+    /// # Panics
+    /// If there is not one entry for each scan and tile.
+    pub(super) fn encode(
+        mut header: Header,
+        scans: Vec<Scan>,
+        entries: Vec<ChunkEntry>,
+        extensions: Vec<Extension>,
+        metadata: &Metadata,
+    ) -> Result<(Self, Vec<u8>), FormatError> {
+        let tiles = header.geometry.tile_grid().area();
+        assert_eq!(entries.len(), scans.len() * tiles, "one entry of each");
+        let directory = compress(&directory::encode(&scans, &entries))?;
+        let extension_bytes = extension::encode(&extensions);
+        let metadata = MetadataJson::encode(metadata)?;
+        let json = metadata.text().as_bytes();
+        let length = |bytes: &[u8]| u32::try_from(bytes.len()).unwrap_or(u32::MAX);
+        header.scans = scans.len() as u32; // the header's check bounds it
+        header.directory_bytes = length(&directory);
+        header.directory_crc = checksum(&directory);
+        header.extension_bytes = length(&extension_bytes);
+        header.extension_crc = checksum(&extension_bytes);
+        header.metadata_bytes = length(json);
+        header.metadata_crc = checksum(json);
+        let offsets = offsets(&header, &scans, &entries, &Budget::unlimited())?;
+        header.file_bytes = offsets.last().copied().unwrap_or(header.index_bytes());
+        let fixed = header.encode();
+        // Refuses what a reader would refuse.
+        Header::decode(&fixed)?;
+        let bytes = [&fixed[..], &directory, &extension_bytes, json].concat();
+        let index = Self {
+            header,
+            scans,
+            extensions,
+            metadata,
+            entries,
+            offsets,
+        };
+        Ok((index, bytes))
+    }
+
+    /// Number of tiles.
+    pub fn tiles(&self) -> usize {
+        self.header.geometry.tile_grid().area()
+    }
+
+    /// The directory's entry for a tile's chunk of a scan.
+    pub fn entry(&self, scan: usize, tile: usize) -> ChunkEntry {
+        self.entries[scan * self.tiles() + tile]
+    }
+
+    /// Bytes of the file that a chunk takes.
+    pub fn range(&self, chunk: ChunkId) -> Range<u64> {
+        let at = self.chunk_number(chunk);
+        self.offsets[at]..self.offsets[at + 1]
+    }
+
+    /// Bytes of the file that a scan takes.
+    pub fn scan_range(&self, scan: usize) -> Range<u64> {
+        let chunks = self.tiles() + 1;
+        self.offsets[scan * chunks]..self.offsets[(scan + 1) * chunks]
+    }
+
+    /// All chunks that are not empty, in file order.
+    pub fn chunks(&self) -> impl Iterator<Item = ChunkId> + use<'_> {
+        let chunks = (0..self.offsets.len() - 1).map(|at| self.chunk_id(at));
+        chunks.filter(|&chunk| !self.range(chunk).is_empty())
+    }
+
+    /// Whether a tile's chunk of a scan begins with the tile's colour KLT: its first chunk with component 0
+    /// does.
+    pub(super) fn has_colour_klt(&self, scan: usize, tile: usize) -> bool {
+        let has = |scan: usize| self.scans[scan].first == 0 && self.entry(scan, tile).bytes > 0;
+        let first =
+            (0..scan).find(|&before| self.scans[before].coding == Coding::Transform && has(before));
+        has(scan) && first.is_none()
+    }
+
+    /// Checks the bytes of a chunk.
+    ///
+    /// # Errors
+    /// [`FormatError::ChecksumMismatch`].
+    pub(super) fn check_crc(&self, chunk: ChunkId, bytes: &[u8]) -> Result<(), FormatError> {
+        let crc = match chunk.tile {
+            None => self.scans[chunk.scan].basis_crc,
+            Some(tile) => self.entry(chunk.scan, tile).crc,
+        };
+        match crc_matches(bytes, crc) {
+            true => Ok(()),
+            false => Err(FormatError::ChecksumMismatch {
+                section: FileSection::Chunk(chunk),
+            }),
+        }
+    }
+
+    /// The basis functions in the basis chunk of a scan.
+    pub(super) fn new_basis_functions(&self, scan: usize) -> Range<usize> {
+        let known = self.scans[..scan]
+            .iter()
+            .fold(0, |known, scan| known + scan.new_basis_functions(known));
+        known..known + self.scans[scan].new_basis_functions(known)
+    }
+
+    /// The chunk that holds the byte at `offset`.
+    pub(super) fn chunk_at(&self, offset: u64) -> ChunkId {
+        let at = self.offsets.partition_point(|&start| start <= offset);
+        self.chunk_id(at.saturating_sub(1))
+    }
+
+    /// Where the last chunk ends.
+    fn end(&self) -> u64 {
+        self.offsets.last().copied().unwrap_or(0)
+    }
+
+    /// The chunk's number in file order, empty chunks counted.
+    pub(super) fn chunk_number(&self, chunk: ChunkId) -> usize {
+        chunk.scan * (self.tiles() + 1) + chunk.tile.map_or(0, |tile| tile + 1)
+    }
+
+    fn chunk_id(&self, number: usize) -> ChunkId {
+        let chunks = self.tiles() + 1;
+        ChunkId {
+            scan: number / chunks,
+            tile: (number % chunks).checked_sub(1),
+        }
+    }
+}
+
+/// Chunk offsets, from the end of the index on. There are at most 2^34 chunks of less than 2^25 bytes:
+/// no overflow.
+fn offsets(
+    header: &Header,
+    scans: &[Scan],
+    entries: &[ChunkEntry],
+    budget: &Budget,
+) -> Result<Vec<u64>, FormatError> {
+    let mut offsets = budget.try_with_capacity(scans.len() + entries.len() + 1)?;
+    let mut next = header.index_bytes();
+    offsets.push(next);
+    let tiles = header.geometry.tile_grid().area();
+    for (scan, entries) in scans.iter().zip(entries.chunks_exact(tiles)) {
+        let of_tiles = entries.iter().map(|entry| entry.bytes);
+        for bytes in std::iter::once(scan.basis_bytes).chain(of_tiles) {
+            next += u64::from(bytes);
+            offsets.push(next);
+        }
+    }
+    Ok(offsets)
+}

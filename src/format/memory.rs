@@ -1,0 +1,75 @@
+//! How much memory reading a file takes, from its header and from its index.
+//!
+//! A reader refuses a file before it takes memory for it. The estimate counts what the reader reserves
+//! when chunks come in file order; out of order, chunks that wait are reserved in addition.
+
+use super::chunk::{ChunkEntry, ChunkId};
+use super::codec::basis;
+use super::directory;
+use super::header::Header;
+use super::index::FileIndex;
+use super::scan::Scan;
+use crate::transport::{CHANNELS, CoefficientTile, TexelCode};
+
+/// Bytes that the state of a chunk and of a tile take.
+const STATE_BYTES: u64 = 32;
+const TILE_STATE_BYTES: u64 = 256;
+
+/// Bytes that relighting takes: a picture, a light and the previous light, four floats an element.
+pub(super) fn relight_bytes(header: &Header) -> u64 {
+    let geometry = &header.geometry;
+    let elements = geometry.camera.area() as u64 + 2 * geometry.light.area() as u64;
+    elements * size_of::<[f32; 4]>() as u64
+}
+
+/// Bytes that the index takes while it is decoded, with what the reader keeps for it and for relighting.
+pub(super) fn index_bytes(header: &Header) -> u64 {
+    let (tiles, scans) = (
+        header.geometry.tile_grid().area() as u64,
+        u64::from(header.scans),
+    );
+    let area = header.geometry.window.area();
+    let entry = (size_of::<ChunkEntry>() + size_of::<u64>()) as u64 + STATE_BYTES;
+    let basis = 4 * basis::content_bytes(header.rank.into(), area) as u64;
+    relight_bytes(header)
+        + header.index_bytes()
+        + directory::content_bytes(header)
+        + scans * ((tiles + 1) * entry + size_of::<Scan>() as u64)
+        + tiles * TILE_STATE_BYTES
+        + basis
+}
+
+/// Bytes that reading the whole file takes.
+pub(super) fn file_bytes(index: &FileIndex) -> u64 {
+    let Header { geometry, rank, .. } = index.header;
+    let value = (CHANNELS * size_of::<f32>()) as u64;
+    let (rank, area) = (usize::from(rank), geometry.window.area() as u64);
+    let has_chunk = |tile: usize, is_direct: bool| {
+        let scans = index.scans.iter().enumerate();
+        let mut scans = scans.filter(|(_, scan)| scan.coding.is_direct() == is_direct);
+        scans.any(|(i, _)| index.entry(i, tile).bytes > 0)
+    };
+    // At most 2^30 pixels of 63² elements of 12 bytes: no overflow.
+    let (mut kept, mut working) = (0, 0);
+    for (i, rect) in geometry.tiles().enumerate() {
+        let pixels = rect.extent.area() as u64;
+        // A tile is kept as decoded values until it is complete, and then as codes.
+        let codes = (CoefficientTile::texels(rect, rank) * size_of::<TexelCode>()) as u64;
+        let coefficients = pixels * rank as u64 * value;
+        let functions = pixels * area * value;
+        let [factored, direct] = [false, true].map(|direct| u64::from(has_chunk(i, direct)));
+        kept += factored * codes.max(coefficients) + direct * functions;
+        // Coefficients in red, green and blue with a reflection of each pixel, and codes of both.
+        let reflections = pixels * 4 * size_of::<f32>() as u64;
+        working = working.max(factored * (coefficients + codes + reflections) + direct * functions);
+    }
+    let chunk = |id: ChunkId| {
+        let content = id
+            .tile
+            .map_or(0, |tile| index.entry(id.scan, tile).content_bytes);
+        let range = index.range(id);
+        range.end - range.start + u64::from(content)
+    };
+    let largest_chunk = index.chunks().map(chunk).max().unwrap_or(0);
+    index_bytes(&index.header) + kept + working + largest_chunk
+}
