@@ -1,7 +1,6 @@
 /** `<relightable-photo>`: the public interface. The class delegates to `PhotoController`. */
 
 import { checkLightSource, isLightSource, type LightSource } from '../lights/light-source.js';
-import { encodeCanvas, resampleCanvas } from '../renderers/canvas-export.js';
 import type { Backend, Gamut, LightName } from '../shared/names.js';
 import type { PhotoInfo } from '../shared/photo-info.js';
 import type { PicturePoint } from '../shared/values.js';
@@ -222,9 +221,8 @@ export class RelightablePhoto extends Base {
     if (!(scale > 0 && scale <= MAX_SCALE)) {
       throw new RangeError(`scale must be more than 0 and at most ${MAX_SCALE}`);
     }
-    const { canvas, gamut } = await this.#controller.renderNow();
     // Nothing may be awaited in between: the canvas of a GPU keeps its content only until the next frame.
-    return encodeCanvas(scale === 1 ? canvas : resampleCanvas(canvas, scale, gamut), type, quality);
+    return (await this.#controller.renderNow()).encode(type, quality, scale);
   }
 
   connectedCallback(): void {

@@ -178,14 +178,12 @@ export class PhotoController {
       play: () => {
         this.isPaused = !this.isPaused;
       },
-      zoomOut: () => this.interaction.zoom(-1),
-      zoomIn: () => this.interaction.zoom(1),
+      zoom: (by) => this.interaction.zoom(by),
       reset: () => this.reset(),
       tilt: () => this.interaction.toggleTilt(),
-      fullscreen: () => this.#presenter.toggleFullscreen(),
     };
     return new Presenter(this.#host, this.#dom, this.state, actions, {
-      toolbarLoaded: () => this.schedule(),
+      loaded: () => this.schedule(),
       failed: (error) => this.reportError(error),
     });
   }
@@ -204,7 +202,7 @@ export class PhotoController {
       qualityChanged: (quality) => this.#dispatch(new QualityChangeEvent(quality)),
       loaded: () => {
         this.#dom.updateProgress(null);
-        this.#presenter.announceLoaded();
+        this.#presenter.announce('loaded');
         this.#dispatch(createLoadEvent());
       },
       rendererChanged: ({ canvas }) => {

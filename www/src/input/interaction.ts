@@ -219,7 +219,7 @@ export class InteractionController {
     this.#state.view = view;
     const hasChanged = this.#state.view !== last;
     if (hasChanged) {
-      this.#presenter.announceZoom();
+      this.#presenter.announce('zoomed');
       this.#listener.changed();
     }
     return hasChanged;
@@ -262,7 +262,8 @@ export class InteractionController {
       case 'reset-view':
         return this.#setView(FULL_VIEW);
       case 'select-light':
-        this.#presenter.announceLight(this.#state.selectNextLight(action.by));
+        this.#state.selectNextLight(action.by);
+        this.#presenter.announce('light');
         this.#listener.changed();
         return true;
       case 'escape':

@@ -1,28 +1,29 @@
-/** Encodes and scales the picture on a canvas. */
+/** Encodes the picture on a renderer's canvas. Part of the renderers' scripts, because it needs a picture. */
 
-import type { Gamut } from '../engine/types.js';
 import { PhotoError } from '../shared/errors.js';
+import type { CanvasRenderer } from './types.js';
 
-/** The canvas's picture as a file of the MIME type `type`; `quality` is that of `toBlob`. */
-export function encodeCanvas(
-  canvas: HTMLCanvasElement,
+/** Implements `CanvasRenderer.encode`. Reads the canvas at once: that of a GPU keeps its content only until the next frame. */
+export function encodePicture(
+  this: Pick<CanvasRenderer, 'canvas' | 'gamut'>,
   type: string,
-  quality?: number,
+  quality: number | undefined,
+  scale: number,
 ): Promise<Blob> {
   return new Promise((resolve, reject) => {
     const settle = (blob: Blob | null) =>
       blob
         ? resolve(blob)
         : reject(new PhotoError('internal', `The browser could not encode ${type}.`));
+    const canvas = scale === 1 ? this.canvas : resample(this, scale);
     canvas.toBlob(settle, type, quality);
   });
 }
 
 /** A copy of a canvas, `scale` times as wide and as high. */
-export function resampleCanvas(
-  canvas: HTMLCanvasElement,
+function resample(
+  { canvas, gamut }: Pick<CanvasRenderer, 'canvas' | 'gamut'>,
   scale: number,
-  gamut: Gamut,
 ): HTMLCanvasElement {
   const copy = document.createElement('canvas');
   copy.width = Math.max(1, Math.round(canvas.width * scale));

@@ -53,6 +53,11 @@ export type CreateRenderer<R extends Renderer> = (
 /** A renderer whose surface is a canvas element. */
 export interface CanvasRenderer extends Renderer {
   readonly canvas: HTMLCanvasElement;
+  /**
+   * The canvas's picture as a file of the MIME type `type`, `scale` times as wide and as high; `quality` is that of
+   * `HTMLCanvasElement.toBlob`.
+   */
+  encode(type: string, quality: number | undefined, scale: number): Promise<Blob>;
 }
 
 /** The light with which a frame was drawn. */

@@ -6,6 +6,7 @@ import type { ImageLight } from '../lights/image-light.js';
 import { LightCache } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import { toPhotoError } from '../shared/errors.js';
+import { encodePicture } from './canvas-export.js';
 import type { CanvasRenderer, FrameResult } from './types.js';
 
 /** The graphics device that a renderer shares with others. */
@@ -16,6 +17,7 @@ export interface DeviceHandle {
 }
 
 export class WasmRenderer implements CanvasRenderer {
+  readonly encode = encodePicture;
   readonly #module: RelightModule;
   readonly #lights: LightCache;
   /** The photograph without tiles. */

@@ -7,12 +7,7 @@ import type { LightName } from '../shared/names.js';
 import { reuse } from '../shared/reuse.js';
 import { CENTRE, clampToPicture } from '../shared/values.js';
 import { PARSERS } from './attribute-values.js';
-import {
-  type LightItem,
-  type LightOverrides,
-  LightState,
-  type LightStateListener,
-} from './light-state.js';
+import { type LightOverrides, LightState, type LightStateListener } from './light-state.js';
 import type { ElementOptions } from './options.js';
 import { RevealState } from './reveal.js';
 import { formatState, parseState } from './share-state.js';
@@ -118,11 +113,9 @@ export class ViewerState {
   }
 
   /** Selects another item of the light menu, `by` items away. */
-  selectNextLight(by: 1 | -1): LightItem {
+  selectNextLight(by: 1 | -1): void {
     const { items, item } = this.light;
-    const next = items.at((items.indexOf(item) + by) % items.length) ?? item;
-    this.light.item = next;
-    return next;
+    this.light.item = items.at((items.indexOf(item) + by) % items.length) ?? item;
   }
 
   /** Back to the options. */

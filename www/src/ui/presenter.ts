@@ -1,18 +1,17 @@
 /** Shows the viewer's state in the shadow DOM and the toolbar, and announces changes, in the page's language. */
 
 import { languageOf } from '../i18n/language.js';
-import { isPending, type Language, type StringKey, t } from '../i18n/strings.js';
+import { type Language, type StringKey, t } from '../i18n/strings.js';
 import { missingScript, type PhotoError } from '../shared/errors.js';
 import { CENTRE } from '../shared/values.js';
-import type { LightItem } from '../state/light-state.js';
 import type { ViewerState } from '../state/viewer-state.js';
 import { describeLight } from './light-description.js';
 import type { ShadowDom } from './shadow-dom.js';
-import type { Toolbar, ToolbarActions, ToolbarState } from './toolbar.js';
+import type { Toolbar, ToolbarActions } from './toolbar.js';
 
 export interface PresenterListener {
   /** The toolbar has been loaded: call `update`. */
-  toolbarLoaded(): void;
+  loaded(): void;
   failed(error: PhotoError): void;
 }
 
@@ -71,7 +70,13 @@ export class Presenter {
     );
     const hasToolbar = options.controls && isPictureShown;
     if (hasToolbar && !this.#isToolbarRequested) void this.#fetchToolbar();
-    this.#toolbar?.update(hasToolbar ? this.#toolbarState(isPaused, isTilting) : null);
+    const toolbarState = {
+      t: (key: StringKey) => t(key, language),
+      viewer: this.#state,
+      isPaused,
+      isTilting,
+    };
+    this.#toolbar?.update(hasToolbar ? toolbarState : null);
   }
 
   /** Shows the toolbar after an input: for good after a key press, otherwise for some seconds. */
@@ -83,21 +88,10 @@ export class Presenter {
     this.#toolbar?.closeMenu();
   }
 
-  get #isFullscreen(): boolean {
-    return this.#host.matches(':fullscreen');
-  }
-
-  /** Does nothing where the browser, an enclosing frame or the visitor refuses. */
-  toggleFullscreen(): void {
-    const isLeaving = this.#isFullscreen;
-    const change = isLeaving ? document.exitFullscreen() : this.#host.requestFullscreen();
-    void change.catch(() => {});
-  }
-
   /** Returns whether the element was in full screen. */
   leaveFullscreen(): boolean {
-    const wasFullscreen = this.#isFullscreen;
-    if (wasFullscreen) this.toggleFullscreen();
+    const wasFullscreen = this.#host.matches(':fullscreen');
+    if (wasFullscreen) document.exitFullscreen().catch(() => {});
     return wasFullscreen;
   }
 
@@ -113,18 +107,12 @@ export class Presenter {
     this.#dom.showHint(this.#t(by === 'wheel' ? 'wheelHint' : 'touchHint', key));
   }
 
-  announceLoaded(): void {
-    this.#dom.announce(this.#t('loaded'));
-  }
-
-  announceZoom(): void {
-    const { zoom } = this.#state.view;
-    const text = zoom.toLocaleString(this.language, { maximumFractionDigits: 1 });
-    this.#dom.announce(this.#t('zoomed', text));
-  }
-
-  announceLight(item: LightItem): void {
-    this.#dom.announce(`${this.#t('light')}: ${this.#t(item)}`);
+  /** Has a screen reader read a change of the state. */
+  announce(change: 'loaded' | 'light' | 'zoomed'): void {
+    const { light, view } = this.#state;
+    const zoom = view.zoom.toLocaleString(this.language, { maximumFractionDigits: 1 });
+    const text = this.#t(change, zoom);
+    this.#dom.announce(change === 'light' ? `${text}: ${this.#t(light.item)}` : text);
   }
 
   /** The toolbar is a separate script, fetched when the `controls` attribute is used for the first time. */
@@ -132,31 +120,13 @@ export class Presenter {
     this.#isToolbarRequested = true;
     try {
       const { Toolbar } = await import('./toolbar.js');
-      const toolbar = new Toolbar(this.#actions);
+      const toolbar = new Toolbar(this.#host, this.#actions);
       this.#toolbar = toolbar;
       this.#dom.mountControls([toolbar.menu, toolbar.bar], toolbar.css);
-      this.#listener.toolbarLoaded();
+      this.#listener.loaded();
     } catch (cause) {
       this.#listener.failed(missingScript('controls-unavailable', 'the controls', cause));
     }
-  }
-
-  #toolbarState(isPaused: boolean, isTilting: boolean | null): ToolbarState {
-    const { options, view, light } = this.#state;
-    const isPlayable = light.isPlayable || (light.isTorch && options.autoplayLight);
-    return {
-      t: (key) => this.#t(key),
-      languageKey: `${this.language} ${isPending(this.language)}`,
-      items: light.items,
-      item: light.item,
-      isPlaying: isPlayable ? !isPaused : null,
-      zoom:
-        options.maxZoom > 1
-          ? { canZoomIn: view.zoom < options.maxZoom, canZoomOut: view.zoom > 1 }
-          : null,
-      isTilting,
-      isFullscreen: document.fullscreenEnabled ? this.#isFullscreen : null,
-    };
   }
 
   #t(key: StringKey, ...values: readonly string[]): string {

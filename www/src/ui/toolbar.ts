@@ -5,32 +5,31 @@
 
 import type { StringKey } from '../i18n/strings.js';
 import type { LightItem } from '../state/light-state.js';
+import type { ViewerState } from '../state/viewer-state.js';
 import { createElement, updateAttribute, updateText } from './dom-helpers.js';
 import { createIcon, LIGHT_ICON, setIcon } from './icons.js';
 import TOOLBAR_CSS from './toolbar.css';
 
-/** The state that the buttons show; `null` hides a button. */
+/** The state that the buttons show. */
 export interface ToolbarState {
   /** A text in the visitor's language. */
   readonly t: (key: StringKey) => string;
-  /** Changes whenever the texts do. */
-  readonly languageKey: string;
-  readonly items: readonly LightItem[];
-  readonly item: LightItem;
-  readonly isPlaying: boolean | null;
-  readonly zoom: { readonly canZoomIn: boolean; readonly canZoomOut: boolean } | null;
+  readonly viewer: Pick<ViewerState, 'light' | 'options' | 'view'>;
+  readonly isPaused: boolean;
+  /** Whether the torch follows the device's tilt; `null` if it cannot. */
   readonly isTilting: boolean | null;
-  readonly isFullscreen: boolean | null;
 }
-
-type ActionName = 'play' | 'zoomOut' | 'zoomIn' | 'reset' | 'tilt' | 'fullscreen';
 
 /** The actions of the buttons and the menu. */
-export interface ToolbarActions extends Readonly<Record<ActionName, () => void>> {
-  readonly selectLight: (item: LightItem) => void;
+export interface ToolbarActions {
+  selectLight(item: LightItem): void;
+  play(): void;
+  zoom(by: 1 | -1): void;
+  reset(): void;
+  tilt(): void;
 }
 
-type ButtonName = 'light' | ActionName;
+type ButtonName = 'light' | 'play' | 'zoomOut' | 'zoomIn' | 'reset' | 'tilt' | 'fullscreen';
 
 const MAGNIFIER = 'M10.5 4a6.5 6.5 0 1 0 0 13a6.5 6.5 0 1 0 0-13M15.3 15.3L20 20M8 10.5h5';
 
@@ -59,19 +58,22 @@ export class Toolbar {
   readonly menu: HTMLElement;
   readonly #buttons: Readonly<Record<ButtonName, HTMLButtonElement>>;
   readonly #lightName = createElement('span');
-  /** The items and the language of the current menu. */
-  #menuKey = '';
+  readonly #host: Element;
+  /** The texts of the current menu. */
+  #menuTexts = '';
   #hideTimer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(actions: ToolbarActions) {
+  /** `host` is the element that the toolbar belongs to. */
+  constructor(host: Element, actions: ToolbarActions) {
+    this.#host = host;
     this.#buttons = {
       light: createButton('light', () => this.#setMenuOpen(this.menu.hidden === true)),
       play: createButton('play', actions.play),
-      zoomOut: createButton('zoomOut', actions.zoomOut),
-      zoomIn: createButton('zoomIn', actions.zoomIn),
+      zoomOut: createButton('zoomOut', () => actions.zoom(-1)),
+      zoomIn: createButton('zoomIn', () => actions.zoom(1)),
       reset: createButton('reset', actions.reset),
       tilt: createButton('tilt', actions.tilt),
-      fullscreen: createButton('fullscreen', actions.fullscreen),
+      fullscreen: createButton('fullscreen', () => this.#toggleFullscreen()),
     };
     this.#buttons.light.append(this.#lightName);
     updateAttribute(this.#buttons.light, 'aria-controls', 'lights');
@@ -107,7 +109,11 @@ export class Toolbar {
       this.closeMenu();
       return;
     }
-    const { t, item, isPlaying, zoom, isTilting, isFullscreen } = state;
+    const { t, viewer, isPaused, isTilting } = state;
+    const { light: lightState, options, view } = viewer;
+    const { item, items } = lightState;
+    const isPlayable = lightState.isPlayable || (lightState.isTorch && options.autoplayLight);
+    const zooms = options.maxZoom > 1;
     const { light, zoomOut, zoomIn, tilt } = this.#buttons;
     const show = (name: ButtonName, isVisible: boolean, icon: IconName = name) => {
       const button = this.#buttons[name];
@@ -115,21 +121,22 @@ export class Toolbar {
       setLabel(button, t(icon));
       if (button.firstElementChild) setIcon(button.firstElementChild, ICONS[icon]);
     };
-    this.#updateMenu(state);
+    this.#updateMenu(items, items.map(t));
     for (const input of this.menu.querySelectorAll('input')) input.checked = input.value === item;
     updateAttribute(this.bar, 'aria-label', t('controls'));
     updateAttribute(this.menu, 'aria-label', t('light'));
     updateText(this.#lightName, t(item));
     setLabel(light, `${t('light')}: ${t(item)}`);
-    show('play', isPlaying !== null, isPlaying ? 'pause' : 'play');
-    show('zoomOut', zoom !== null);
-    show('zoomIn', zoom !== null);
-    updateAttribute(zoomOut, 'aria-disabled', String(!zoom?.canZoomOut));
-    updateAttribute(zoomIn, 'aria-disabled', String(!zoom?.canZoomIn));
+    show('play', isPlayable, isPaused ? 'play' : 'pause');
+    show('zoomOut', zooms);
+    show('zoomIn', zooms);
+    updateAttribute(zoomOut, 'aria-disabled', String(view.zoom <= 1));
+    updateAttribute(zoomIn, 'aria-disabled', String(view.zoom >= options.maxZoom));
     show('reset', true);
     show('tilt', isTilting !== null);
     updateAttribute(tilt, 'aria-pressed', String(isTilting === true));
-    show('fullscreen', isFullscreen !== null, isFullscreen ? 'leaveFullscreen' : 'fullscreen');
+    const fullscreenIcon = this.#isFullscreen ? 'leaveFullscreen' : 'fullscreen';
+    show('fullscreen', document.fullscreenEnabled, fullscreenIcon);
     // The button that was the tab stop may be hidden now.
     const stops = this.#visibleButtons.filter((button) => button.tabIndex === 0);
     if (stops.length !== 1) this.#setTabStop(light);
@@ -149,6 +156,17 @@ export class Toolbar {
     }, HIDE_MS);
   }
 
+  get #isFullscreen(): boolean {
+    return this.#host.matches(':fullscreen');
+  }
+
+  /** Does nothing where the browser, an enclosing frame or the visitor refuses. */
+  #toggleFullscreen(): void {
+    const isLeaving = this.#isFullscreen;
+    const change = isLeaving ? document.exitFullscreen() : this.#host.requestFullscreen();
+    void change.catch(() => {});
+  }
+
   get #visibleButtons(): HTMLButtonElement[] {
     return Object.values(this.#buttons).filter((button) => !button.hidden);
   }
@@ -159,13 +177,12 @@ export class Toolbar {
     if (isOpen) this.menu.querySelector<HTMLInputElement>('input:checked')?.focus();
   }
 
-  #updateMenu({ items, languageKey, t }: ToolbarState): void {
-    const key = `${items} ${languageKey}`;
-    if (key === this.#menuKey) return;
-    this.#menuKey = key;
-    const labels = items.map((item) => {
+  #updateMenu(items: readonly LightItem[], texts: readonly string[]): void {
+    if (String(texts) === this.#menuTexts) return;
+    this.#menuTexts = String(texts);
+    const labels = items.map((item, index) => {
       const input = createElement('input', { type: 'radio', name: 'light', value: item });
-      return createElement('label', {}, input, createElement('span', {}, t(item)));
+      return createElement('label', {}, input, createElement('span', {}, texts[index] ?? ''));
     });
     this.menu.replaceChildren(...labels);
   }

@@ -7,10 +7,12 @@ import type { CpuModule, Gamut, ReceivedPhoto } from '../../engine/types.js';
 import type { LightSetting } from '../../lights/light-setting.js';
 import type { Photograph } from '../../photo/photograph.js';
 import { photoReleased } from '../../shared/errors.js';
+import { encodePicture } from '../canvas-export.js';
 import type { CanvasRenderer, FrameResult } from '../types.js';
 import { WasmRenderer } from '../wasm-renderer.js';
 
 export class MainThreadRenderer implements CanvasRenderer {
+  readonly encode = encodePicture;
   readonly canvas = document.createElement('canvas');
   readonly kernel: string;
   readonly #module: CpuModule;
