@@ -62,7 +62,7 @@ export class PhotoController {
     this.#dom = new ShadowDom(host);
     this.state = new ViewerState(readOptions(this.#reader, null), {
       changed: () => this.session.redraw(),
-      sourceSupportLoaded: () => this.schedule(),
+      loaded: () => this.schedule(),
       errorChanged: (error) => this.#lightErrorChanged(error),
     });
     this.#reportedView = this.state.view;

@@ -13,7 +13,7 @@ function createRecognizer() {
     restoreLight: () => log.push('restore'),
     throwLight: ({ x, y }) => log.push(`throw ${round(x, y).join(' ')}`),
     pan: (dx, dy) => log.push(`pan ${dx} ${dy}`),
-    zoom: (factor, x, y) => log.push(`zoom ${round(factor).join()} at ${x} ${y}`),
+    zoom: (factor, x, y) => log.push(`zoom ${round(factor).join()} at ${x} ${y}`) > 0,
     doubleTap: (x, y) => log.push(`double ${x} ${y}`),
   });
   return { recognizer, calls: () => log.splice(0) };

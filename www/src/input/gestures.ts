@@ -31,8 +31,8 @@ export interface GestureListener {
   /** The light was released in motion; the velocity is in pixels per second. */
   throwLight(velocity: Velocity): void;
   pan(dx: number, dy: number): void;
-  /** Magnify by `factor` around a point. */
-  zoom(factor: number, x: number, y: number): void;
+  /** Magnify by `factor` around a point. Returns whether the view has changed. */
+  zoom(factor: number, x: number, y: number): boolean;
   doubleTap(x: number, y: number): void;
 }
 

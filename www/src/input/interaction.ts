@@ -143,7 +143,6 @@ export class InteractionController {
     const pointer = new PointerInput(viewport, {
       permissions: () => this.#permissions,
       isCooperative: () => state.options.cooperativeGestures,
-      wheelZoom: (factor, at) => this.#zoomAt(factor, at),
       zoomIgnored: (by) => this.#presenter.hintAtZoom(by),
       active: () => this.markActive(),
       pressed: () => (handle.hidden ? viewport : handle).focus({ preventScroll: true }),

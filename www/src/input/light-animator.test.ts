@@ -7,7 +7,7 @@ import { LightAnimator } from './light-animator.js';
 function createAnimator(options: { name: 'fire' | 'torch' }) {
   const light = new LightState({
     changed: () => {},
-    sourceSupportLoaded: () => {},
+    loaded: () => {},
     errorChanged: () => {},
   });
   light.setOptions({

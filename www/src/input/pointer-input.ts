@@ -11,8 +11,6 @@ import {
 
 export interface PointerInputListener extends GestureListener {
   permissions(): GesturePermissions;
-  /** Magnify at a viewport point, 0 to 1. Returns whether the view has changed. */
-  wheelZoom(factor: number, at: PicturePoint): boolean;
   /** Whether the page keeps the wheel unless a modifier key is held. */
   isCooperative(): boolean;
   /** The page scrolled where the visitor may have wanted to zoom. */
@@ -100,11 +98,11 @@ export class PointerInput {
       return;
     }
     const { left, top } = this.#viewport.getBoundingClientRect();
-    const at = this.toUnits(event.clientX - left, event.clientY - top);
     const delta = isPinch ? PINCH_WHEEL_GAIN * event.deltaY : event.deltaY;
     this.#listener.active();
     // At the smallest and largest zoom the page scrolls on, so that the picture does not trap the wheel.
-    const hasZoomed = this.#listener.wheelZoom(wheelFactor(delta, event.deltaMode), at);
+    const factor = wheelFactor(delta, event.deltaMode);
+    const hasZoomed = this.#listener.zoom(factor, event.clientX - left, event.clientY - top);
     if (hasZoomed || isPinch) event.preventDefault();
   }
 

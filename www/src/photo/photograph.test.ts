@@ -21,7 +21,7 @@ function fromWorker() {
   const tiles = ALL.map((index) => photo.takeTile(index) as TileBytes);
   const descriptor = describePhoto(photo);
   photo.free();
-  return { photograph: Photograph.fromTiles(descriptor, tiles), tilesInModules, state, module };
+  return { photograph: new Photograph(descriptor, tiles), tilesInModules, state, module };
 }
 
 async function relight(photograph: Photograph, pool: WorkerPool): Promise<number[]> {

@@ -39,7 +39,7 @@ export class Photograph implements Freeable {
   readonly descriptor: PhotoDescriptor;
   /** The share of the file that this photograph was decoded from, 0 to 1. */
   readonly completeness: number;
-  readonly #tiles: TileLocation[];
+  #tiles: TileLocation[];
   /** One, unless a move has failed halfway. */
   readonly #stores = new Set<TileStore>();
   #session: TileSession | null = null;
@@ -48,7 +48,12 @@ export class Photograph implements Freeable {
   /** Settles after the last use that was requested. */
   #lastUse: Promise<unknown> = Promise.resolve();
 
-  private constructor(descriptor: PhotoDescriptor, tiles: TileLocation[], completeness: number) {
+  /**
+   * A photograph whose tiles are on the page.
+   *
+   * @throws `format-invalid`
+   */
+  constructor(descriptor: PhotoDescriptor, tiles: TileBytes[], completeness = 1) {
     const { width, height, lightWidth, lightHeight, decodedBytes } = descriptor;
     const metadata = parseMetadata(descriptor.metadata);
     this.info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
@@ -66,23 +71,14 @@ export class Photograph implements Freeable {
     const store: TileStore = { module: null, photo, onLeave: new Set() };
     try {
       const descriptor = describePhoto(photo);
-      const tiles = Array.from({ length: descriptor.tiles }, () => store);
-      const photograph = new Photograph(descriptor, tiles, completeness);
+      const photograph = new Photograph(descriptor, [], completeness);
+      photograph.#tiles = Array.from({ length: descriptor.tiles }, () => store);
       photograph.#stores.add(store);
       return photograph;
     } catch (thrown) {
       photo.free();
       throw thrown;
     }
-  }
-
-  /**
-   * A photograph that a worker has decoded.
-   *
-   * @throws `format-invalid`
-   */
-  static fromTiles(descriptor: PhotoDescriptor, tiles: TileBytes[], completeness = 1): Photograph {
-    return new Photograph(descriptor, tiles, completeness);
   }
 
   /** Whether this is the whole photograph and not a preview. */

@@ -1,8 +1,7 @@
 /** Decodes in a worker of its own, which ends with the decoder and so gives its memory back. */
 
 import { PhotoError } from '../shared/errors.js';
-import type { WatchdogLimits } from '../shared/watchdog.js';
-import { WorkerClient, type WorkerLike } from '../shared/worker-client.js';
+import { type WatchdogLimits, WorkerClient, type WorkerLike } from '../shared/worker-client.js';
 import { completenessOf, type DecoderState, type PhotoDecoder } from './photo-decoder.js';
 import { Photograph } from './photograph.js';
 import type { PhotoDescriptor, TileBytes } from './types.js';
@@ -32,41 +31,39 @@ const LIMITS: WatchdogLimits = { intervalMs: 1000, maxChecks: 30, maxStartChecks
 
 export class WorkerDecoder implements PhotoDecoder {
   readonly #client: WorkerClient<DecodeTask, DecoderState, DecodeResult>;
-  #state: DecoderState = { bytesFed: 0, fileBytes: undefined, scansDone: 0, next: undefined };
+  /** The state after the last task. */
+  state: DecoderState;
 
-  private constructor(worker: DecodeWorker, limits: WatchdogLimits) {
-    this.#client = new WorkerClient(worker, {
-      name: 'decoding worker',
-      limits,
-      remedy: 'Load the photograph again.',
-    });
+  private constructor(
+    client: WorkerClient<DecodeTask, DecoderState, DecodeResult>,
+    state: DecoderState,
+  ) {
+    this.#client = client;
+    this.state = state;
   }
 
   /** Waits until the worker has started. Rejects with `worker-unavailable` if it does not. */
   static async start(worker: DecodeWorker, limits = LIMITS): Promise<WorkerDecoder> {
-    const decoder = new WorkerDecoder(worker, limits);
-    decoder.#state = await decoder.#client.ready;
-    return decoder;
-  }
-
-  get state(): DecoderState {
-    return this.#state;
+    const client = new WorkerClient(worker, {
+      name: 'decoding worker',
+      limits,
+      remedy: 'Load the photograph again.',
+    });
+    return new WorkerDecoder(client, await client.ready);
   }
 
   async feed(offset: number, bytes: Uint8Array): Promise<void> {
     const result = await this.#request({ kind: 'feed', offset, bytes });
-    if ('state' in result) this.#state = result.state;
+    if ('state' in result) this.state = result.state;
   }
 
   preview(): Promise<Photograph | null> {
-    return this.#requestPhoto('preview', completenessOf(this.#state));
+    return this.#requestPhoto('preview', completenessOf(this.state));
   }
 
   async finish(): Promise<Photograph> {
     try {
-      const photograph = await this.#requestPhoto('finish', 1);
-      if (photograph) return photograph;
-      throw incomplete();
+      return (await this.#requestPhoto('finish', 1)) as Photograph;
     } finally {
       this.free();
     }
@@ -76,17 +73,18 @@ export class WorkerDecoder implements PhotoDecoder {
     this.#client.terminate();
   }
 
+  /** Resolves to `null` only for a preview. */
   async #requestPhoto(
     kind: 'preview' | 'finish',
     completeness: number,
   ): Promise<Photograph | null> {
     const result = await this.#request({ kind });
-    if (!('photo' in result) || !result.photo) return null;
-    const { descriptor, tiles } = result.photo;
-    if (descriptor.tiles === tiles.length) {
-      return Photograph.fromTiles(descriptor, tiles, completeness);
+    const photo = 'photo' in result ? result.photo : null;
+    if (!photo && kind === 'preview') return null;
+    if (photo && photo.descriptor.tiles === photo.tiles.length) {
+      return new Photograph(photo.descriptor, photo.tiles, completeness);
     }
-    throw incomplete();
+    throw new PhotoError('internal', 'The decoding worker sent no complete photograph.');
   }
 
   async #request(task: DecodeTask): Promise<DecodeResult> {
@@ -94,8 +92,4 @@ export class WorkerDecoder implements PhotoDecoder {
     if ('error' in result) throw new PhotoError(result.error.code, result.error.message);
     return result;
   }
-}
-
-function incomplete(): PhotoError {
-  return new PhotoError('internal', 'The decoding worker sent no complete photograph.');
 }

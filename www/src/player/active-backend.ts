@@ -4,7 +4,6 @@ import type { Backend, Freeable } from '../engine/types.js';
 import type { Photograph } from '../photo/photograph.js';
 import type { Renderer, RenderOptions } from '../renderers/types.js';
 import type { Deferred } from '../shared/promises.js';
-import { QualityController } from './quality-controller.js';
 
 /** An object that is freed when its last user releases it. The creator is its first user. */
 export class RefCounted<T extends Freeable> {
@@ -28,7 +27,6 @@ export class RefCounted<T extends Freeable> {
 
 /** A renderer with its state. */
 export class ActiveBackend<R extends Renderer> {
-  readonly quality = new QualityController();
   hasDrawn = false;
   /** Why the backend stopped working; `null` while it works. */
   lossReason: string | null = null;

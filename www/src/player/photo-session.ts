@@ -247,12 +247,12 @@ export class PhotoSession<R extends Renderer> {
     this.#isFullQualityRequested = false;
     if (!active || !this.#settings) throw notLoaded();
     const { light, output } = this.#settings;
-    const quality = isFullQuality ? 1 : active.quality.quality;
+    const quality = isFullQuality ? 1 : active.renderer.quality.quality;
     this.#scheduler.frameStarted();
     try {
       const startMs = this.#ports.now();
       let frame = active.renderer.render(light, output, quality);
-      if (!isFullQuality) this.#measure(active, startMs, frame);
+      if (!isFullQuality) this.#measure(active.renderer, startMs, frame);
       if (frame instanceof Promise) {
         active.frame = new Deferred();
         frame = await frame;
@@ -278,11 +278,7 @@ export class PhotoSession<R extends Renderer> {
   }
 
   /** Measures a frame of an animation for the choice of the next one's quality. */
-  #measure(
-    { quality }: ActiveBackend<R>,
-    startMs: number,
-    frame: FrameResult | Promise<FrameResult>,
-  ): void {
+  #measure({ quality }: R, startMs: number, frame: FrameResult | Promise<FrameResult>): void {
     const record = () => quality.recordFrame(startMs, this.#ports.now());
     if (frame instanceof Promise) frame.then(record, () => {});
     // A graphics device still works on the frame, which delays the browser's next one.

@@ -2,6 +2,7 @@
 
 import type { Backend } from '../engine/types.js';
 import type { Photograph } from '../photo/photograph.js';
+import { QualityController } from '../renderers/quality-controller.js';
 import { withBackends, withExposure } from '../renderers/settings-fakes.js';
 import type { Renderer } from '../renderers/types.js';
 import { PhotoError } from '../shared/errors.js';
@@ -83,6 +84,7 @@ export function fakeSession() {
           const renderer: Renderer = {
             kernel: 'fake',
             gamut: options.gamut,
+            quality: new QualityController(),
             render: ({ name }, _output, quality) => {
               if (isLostAtFrame) throw new PhotoError('backend-lost', 'the device is gone.');
               log.push(`${backend} draws ${name}${quality < 1 ? ` with ${quality}` : ''}`);

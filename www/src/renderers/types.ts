@@ -5,6 +5,7 @@ import type { Backend, Freeable, Gamut } from '../engine/types.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { Photograph } from '../photo/photograph.js';
 import type { PhotoError } from '../shared/errors.js';
+import type { QualityController } from './quality-controller.js';
 
 /** Which backends may draw, and in which colours. */
 export interface RenderOptions {
@@ -24,6 +25,8 @@ export interface Renderer extends Freeable {
   readonly gamut: Gamut;
   /** Reason for degraded rendering, if any. */
   readonly warning?: string;
+  /** Chooses the quality of an animation's frames: frame times of other renderers say nothing about it. */
+  readonly quality: QualityController;
   /**
    * Draws one frame with a share of the components (`quality`, 0 to 1). Call it again only after the
    * last promise has settled. If the light is unavailable, the last available one is used and

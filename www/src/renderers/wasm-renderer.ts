@@ -7,6 +7,7 @@ import { LightCache } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import { toPhotoError } from '../shared/errors.js';
 import { encodePicture } from './canvas-export.js';
+import { QualityController } from './quality-controller.js';
 import type { CanvasRenderer, FrameResult } from './types.js';
 
 /** The graphics device that a renderer shares with others. */
@@ -18,6 +19,7 @@ export interface DeviceHandle {
 
 export class WasmRenderer implements CanvasRenderer {
   readonly encode = encodePicture;
+  readonly quality = new QualityController();
   readonly #module: RelightModule;
   readonly #lights: LightCache;
   /** The photograph without tiles. */

@@ -4,7 +4,19 @@
  */
 
 import { joinSentences, PhotoError } from './errors.js';
-import { Watchdog, type WatchdogLimits } from './watchdog.js';
+
+/** When the watchdog declares a silent worker dead: browsers do not report every worker that they end. */
+export interface WatchdogLimits {
+  /** Time between two checks, in milliseconds. */
+  readonly intervalMs: number;
+  /**
+   * Checks without an answer after which a worker counts as dead. The watchdog counts checks and not time, because a
+   * page that sleeps checks no more often than its workers work.
+   */
+  readonly maxChecks: number;
+  /** The same for a worker that still starts, which includes a download and a compilation. */
+  readonly maxStartChecks: number;
+}
 
 /** A message to the worker. */
 export interface WorkerRequest<Task> {
@@ -53,7 +65,6 @@ export class WorkerClient<Task, Ready, Result> {
   readonly ready: Promise<Ready>;
   readonly #worker: WorkerLike<Task, Ready, Result>;
   readonly #options: WorkerClientOptions;
-  readonly #watchdog: Watchdog;
   readonly #pending = new Map<number, PendingRequest<never>>();
   /** Why the worker is unusable; `null` while it works. */
   failure: PhotoError | null = null;
@@ -61,15 +72,11 @@ export class WorkerClient<Task, Ready, Result> {
   /** Whether the watchdog gave the worker up, which another worker may not repeat. */
   isSilent = false;
   #lastId = START_ID;
+  #watchdog: ReturnType<typeof setInterval> | undefined;
 
   constructor(worker: WorkerLike<Task, Ready, Result>, options: WorkerClientOptions) {
-    const { intervalMs, maxStartChecks } = options.limits;
     this.#worker = worker;
     this.#options = options;
-    this.#watchdog = new Watchdog(intervalMs, () => {
-      this.isSilent = true;
-      this.#fail('It does not answer.');
-    });
     this.ready = new Promise((resolve, reject) => {
       this.#pending.set(START_ID, { group: START_ID, resolve, reject });
     });
@@ -80,7 +87,7 @@ export class WorkerClient<Task, Ready, Result> {
       this.#fail(event.message ?? '');
     };
     worker.onmessageerror = () => this.#fail('The browser could not read its answer.');
-    this.#watchdog.reset(maxStartChecks);
+    this.#watch(options.limits.maxStartChecks);
   }
 
   /**
@@ -98,7 +105,7 @@ export class WorkerClient<Task, Ready, Result> {
       this.#worker.postMessage({ id, task }, transfer);
       this.#lastId = id;
       this.#pending.set(id, { group, resolve, reject });
-      if (this.#pending.size === 1) this.#watchdog.reset(this.#options.limits.maxChecks);
+      if (this.#pending.size === 1) this.#watch(this.#options.limits.maxChecks);
     });
   }
 
@@ -125,8 +132,20 @@ export class WorkerClient<Task, Ready, Result> {
     const pending = this.#pending.get(response.id);
     this.#pending.delete(response.id);
     pending?.resolve(response.result as never);
-    if (this.#pending.size > 0) this.#watchdog.reset(this.#options.limits.maxChecks);
-    else this.#watchdog.stop();
+    if (this.#pending.size > 0) this.#watch(this.#options.limits.maxChecks);
+    else clearInterval(this.#watchdog);
+  }
+
+  /** Starts the watchdog's count, or starts it again. */
+  #watch(maxChecks: number): void {
+    clearInterval(this.#watchdog);
+    let checks = 0;
+    this.#watchdog = setInterval(() => {
+      checks += 1;
+      if (checks <= maxChecks) return;
+      this.isSilent = true;
+      this.#fail('It does not answer.');
+    }, this.#options.limits.intervalMs);
   }
 
   #fail(reason: string, isReported = true): void {
@@ -136,7 +155,7 @@ export class WorkerClient<Task, Ready, Result> {
     const message = joinSentences([summary, reason, remedy]);
     const failure = new PhotoError('worker-unavailable', message);
     this.failure = failure;
-    this.#watchdog.stop();
+    clearInterval(this.#watchdog);
     this.#worker.onmessage = null;
     this.#worker.terminate();
     // Before the rejections, so that their handlers see the final state.

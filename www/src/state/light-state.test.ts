@@ -23,7 +23,7 @@ function createLight(options = OPTIONS, fetchSupport = async () => sourceSupport
   const calls: string[] = [];
   const listener = {
     changed: () => calls.push('changed'),
-    sourceSupportLoaded: () => {
+    loaded: () => {
       calls.push('loaded');
       light.setOptions(options);
     },

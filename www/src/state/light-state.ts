@@ -28,7 +28,7 @@ export interface LightOverrides {
 
 export interface LightStateListener extends LightSourceListener {
   /** The support for sources has been fetched: call `setOptions` again. */
-  sourceSupportLoaded(): void;
+  loaded(): void;
 }
 
 /** An item of the light menu: a built-in light, or the page's source. */
@@ -232,7 +232,7 @@ export class LightState {
       this.#fetchError = missingScript('light-source', 'images as light', cause);
     }
     this.#fetching = null;
-    if (!this.#fetchError) this.#listener.sourceSupportLoaded();
+    if (!this.#fetchError) this.#listener.loaded();
     else if (this.#usesSource) this.#listener.errorChanged(this.#fetchError);
   }
 

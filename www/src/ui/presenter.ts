@@ -48,15 +48,13 @@ export class Presenter {
     const { language } = this;
     const hasHandle = isPictureShown && light.isTorch;
     const zooms = isPictureShown && options.maxZoom > 1;
-    const isZoomed = view.zoom > 1;
-    const capturesTouch = zooms && !options.cooperativeGestures && (hasHandle || isZoomed);
+    const capturesTouch = zooms && !options.cooperativeGestures && (hasHandle || view.zoom > 1);
     const torch = light.torch ?? CENTRE;
     this.#dom.updateLabels(this.#host.getAttribute('alt'), language);
     this.#dom.updateLayout(
       {
         hasHandle,
         isFocusable: zooms && !hasHandle,
-        isZoomed,
         touchAction: capturesTouch ? 'none' : hasHandle || zooms ? 'pan-y' : 'auto',
       },
       language,

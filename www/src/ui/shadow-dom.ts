@@ -16,7 +16,6 @@ export interface LayoutState {
   readonly hasHandle: boolean;
   /** The viewport itself takes the focus, because there is no handle. */
   readonly isFocusable: boolean;
-  readonly isZoomed: boolean;
   /** The browser's own gestures for single fingers, as in CSS. */
   readonly touchAction: 'auto' | 'pan-y' | 'none';
 }
@@ -133,12 +132,11 @@ export class ShadowDom {
   /** Updates the handle and the focus. When the handle disappears, its focus moves to the viewport. */
   updateLayout(state: LayoutState, language: Language): void {
     const { handle, viewport } = this;
-    const { hasHandle, isFocusable, isZoomed, touchAction } = state;
+    const { hasHandle, isFocusable, touchAction } = state;
     const focused = this.root.activeElement;
     const keepsFocus = !hasHandle && (focused === handle || focused === viewport);
     handle.hidden = !hasHandle;
     viewport.classList.toggle('has-handle', hasHandle);
-    viewport.classList.toggle('zoomed', isZoomed);
     viewport.style.setProperty('--touch-action', touchAction);
     const hasRole = isFocusable || keepsFocus;
     updateAttribute(viewport, 'tabindex', isFocusable ? '0' : keepsFocus ? '-1' : null);
@@ -168,11 +166,12 @@ export class ShadowDom {
 
   /** Shows a part of the picture. The handle is at the torch's position, or at the nearest edge of the view. */
   updateView(view: PhotoView, torch: PicturePoint, description: string): void {
+    const { zoom } = view;
+    this.viewport.classList.toggle('zoomed', zoom > 1);
     if (this.#canvas) {
-      const { zoom, x, y } = view;
       const shift = (centre: number) => `${100 * (0.5 - centre * zoom)}%`;
       this.#canvas.style.transform =
-        zoom > 1 ? `translate(${shift(x)}, ${shift(y)}) scale(${zoom})` : '';
+        zoom > 1 ? `translate(${shift(view.x)}, ${shift(view.y)}) scale(${zoom})` : '';
       this.#canvas.classList.toggle('pixelated', zoom > MIN_PIXELATED_ZOOM);
     }
     const { x, y } = toViewport(view, torch);

@@ -8,11 +8,13 @@ import type { LightSetting } from '../../lights/light-setting.js';
 import type { Photograph } from '../../photo/photograph.js';
 import { photoReleased } from '../../shared/errors.js';
 import { encodePicture } from '../canvas-export.js';
+import { QualityController } from '../quality-controller.js';
 import type { CanvasRenderer, FrameResult } from '../types.js';
 import { WasmRenderer } from '../wasm-renderer.js';
 
 export class MainThreadRenderer implements CanvasRenderer {
   readonly encode = encodePicture;
+  readonly quality = new QualityController();
   readonly canvas = document.createElement('canvas');
   readonly kernel: string;
   readonly #module: CpuModule;

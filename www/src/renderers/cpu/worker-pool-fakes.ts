@@ -1,8 +1,12 @@
 /** Workers for tests of the pool. They paint each tile's pixel with the tile's index. */
 
 import assert from 'node:assert/strict';
-import type { WatchdogLimits } from '../../shared/watchdog.js';
-import { START_ID, type WorkerRequest, type WorkerResponse } from '../../shared/worker-client.js';
+import {
+  START_ID,
+  type WatchdogLimits,
+  type WorkerRequest,
+  type WorkerResponse,
+} from '../../shared/worker-client.js';
 import { PLAIN } from '../settings-fakes.js';
 import type { RowPixels } from './pool-session.js';
 import type { FrameSettings, RelightTask, RelightWorker } from './protocol.js';

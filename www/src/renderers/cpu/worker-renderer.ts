@@ -7,12 +7,14 @@ import type { LightSetting } from '../../lights/light-setting.js';
 import type { Photograph } from '../../photo/photograph.js';
 import { hasCode, messageOf, PhotoError, photoReleased } from '../../shared/errors.js';
 import { encodePicture } from '../canvas-export.js';
+import { QualityController } from '../quality-controller.js';
 import type { CanvasRenderer, FrameResult } from '../types.js';
 import type { RowPixels } from './pool-session.js';
 import type { WorkerPool } from './worker-pool.js';
 
 export class WorkerRenderer implements CanvasRenderer {
   readonly encode = encodePicture;
+  readonly quality = new QualityController();
   readonly canvas: HTMLCanvasElement;
   readonly #lights: LightCache;
   /** The photograph without tiles. */

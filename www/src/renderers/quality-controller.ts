@@ -40,7 +40,7 @@ interface Drop {
   readonly ms: number;
 }
 
-/** For one photograph on one backend: frame times of others say nothing about it. */
+/** For one renderer. It is part of the renderers' scripts. */
 export class QualityController {
   /** Index of the current quality in `QUALITY_LEVELS`. */
   #level = 0;
