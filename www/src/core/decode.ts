@@ -50,17 +50,10 @@ export async function decode(
   const url = absoluteUrl(file);
   const bytes = url.startsWith('file:') ? await readFileOrThrow(url) : null;
   if (bytes) return decode(bytes, { signal, onProgress });
-  const photograph = openPhoto(
-    url,
-    { signal, onProgress, onPreview: null },
-    {
-      createDecoder,
-      fetch: (...request) => fetch(...request),
-      yieldToPage,
-      now,
-    },
-  );
-  return new DecodedPhotograph(await photograph);
+  const fetchFile: typeof fetch = (...request) => fetch(...request);
+  const ports = { createDecoder, fetch: fetchFile, yieldToPage, now };
+  const options = { signal, onProgress, onPreview: null };
+  return new DecodedPhotograph(await openPhoto(url, options, ports));
 }
 
 /** Decodes pieces of a file that come in order. */

@@ -24,9 +24,7 @@ export function observeVisibility(element: Element, callback: VisibilityCallback
     for (const [visibility] of ROOT_MARGINS) callback(visibility, true);
     return;
   }
-  observers ??= ROOT_MARGINS.map(([visibility, rootMargin]) =>
-    createObserver(visibility, rootMargin),
-  );
+  observers ??= ROOT_MARGINS.map(createObserver);
   for (const observer of observers) observer.observe(element);
 }
 
@@ -35,12 +33,9 @@ export function unobserveVisibility(element: Element): void {
   for (const observer of observers ?? []) observer.unobserve(element);
 }
 
-function createObserver(visibility: Visibility, rootMargin: string): IntersectionObserver {
-  return new IntersectionObserver(
-    (entries) => {
-      for (const { target, isIntersecting } of entries)
-        callbacks.get(target)?.(visibility, isIntersecting);
-    },
-    { rootMargin },
-  );
+function createObserver([visibility, rootMargin]: readonly [Visibility, string]) {
+  const report = (entries: readonly IntersectionObserverEntry[]) => {
+    for (const entry of entries) callbacks.get(entry.target)?.(visibility, entry.isIntersecting);
+  };
+  return new IntersectionObserver(report, { rootMargin });
 }

@@ -1,5 +1,6 @@
 /** Turns input by pointer, wheel, keyboard and tilt into changes of the viewer's state, and runs its animations. */
 
+import { callLater } from '../shared/promises.js';
 import { CENTRE, type PicturePoint } from '../shared/values.js';
 import type { ViewerState } from '../state/viewer-state.js';
 import {
@@ -58,7 +59,7 @@ export class InteractionController {
     this.#presenter = presenter;
     this.#listener = listener;
     this.#animator = new LightAnimator(state.light, this.#loop, () => listener.changed());
-    this.#idle = new IdleTimer(delay, {
+    this.#idle = new IdleTimer(callLater, {
       rested: () => {
         this.#isActive = false;
         listener.changed();
@@ -270,9 +271,4 @@ export class InteractionController {
         return false;
     }
   }
-}
-
-function delay(ms: number, callback: () => void): () => void {
-  const timer = setTimeout(callback, ms);
-  return () => clearTimeout(timer);
 }

@@ -1,6 +1,6 @@
 /** Reads the pixels of an image that is used as light. */
 
-import { PhotoError } from '../shared/errors.js';
+import { messageOf, PhotoError } from '../shared/errors.js';
 import type { ImageLight } from './image-light.js';
 import {
   type BrowserPicture,
@@ -66,8 +66,7 @@ function readPixels(image: BrowserPicture): ImageData | null {
     sharedContext = null;
     if (cause instanceof PhotoError) throw cause;
     if (cause instanceof DOMException && cause.name === 'SecurityError') throw taintedError(cause);
-    const reason = cause instanceof Error ? cause.message : String(cause);
-    const message = `The light image cannot be read any more. The browser says: ${reason}`;
+    const message = `The light image cannot be read any more. The browser says: ${messageOf(cause)}`;
     throw new PhotoError('light-source', message, cause);
   }
 }

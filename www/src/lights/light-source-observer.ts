@@ -57,8 +57,7 @@ export class LightSourceObserver {
 
   #observeImage(image: HTMLImageElement, signal: AbortSignal): void {
     const fail = () => {
-      const message = `The light image could not be loaded: ${image.currentSrc}`;
-      this.#fail(new PhotoError('light-source', message));
+      this.#fail(`The light image could not be loaded: ${image.currentSrc}`);
     };
     // decode() works off the main thread; the first drawImage would block the page otherwise. It rejects
     // if the image gets another address meanwhile, which fires another load event.
@@ -75,8 +74,7 @@ export class LightSourceObserver {
   #observeVideo(video: HTMLVideoElement, signal: AbortSignal): void {
     const fail = () => {
       const reason = video.error?.message || 'the format is unknown, or the file did not arrive.';
-      const message = `The light video cannot be played. The browser says: ${reason}`;
-      this.#fail(new PhotoError('light-source', message, video.error));
+      this.#fail(`The light video cannot be played. The browser says: ${reason}`, video.error);
     };
     const changed = () => this.#changed();
     // Some browsers report frames only while the video plays.
@@ -94,16 +92,14 @@ export class LightSourceObserver {
       video.srcObject = null;
     });
     const ended = () => {
-      const message = 'The light stream has ended, or its device was disconnected.';
-      this.#fail(new PhotoError('light-source', message));
+      this.#fail('The light stream has ended, or its device was disconnected.');
     };
     video.addEventListener('ended', ended, { signal });
     if (stream.active === false) ended();
     video.srcObject = stream;
     video.play().catch((cause: unknown) => {
       if (signal.aborted) return;
-      const message = `The light stream cannot be played: ${messageOf(cause)}`;
-      this.#fail(new PhotoError('light-source', message, cause));
+      this.#fail(`The light stream cannot be played: ${messageOf(cause)}`, cause);
     });
   }
 
@@ -115,10 +111,10 @@ export class LightSourceObserver {
     this.#listener.changed();
   }
 
-  #fail(error: PhotoError): void {
-    if (error.message === this.#error?.message) return;
-    this.#error = error;
-    this.#listener.errorChanged(error);
+  #fail(message: string, cause?: unknown): void {
+    if (message === this.#error?.message) return;
+    this.#error = new PhotoError('light-source', message, cause);
+    this.#listener.errorChanged(this.#error);
   }
 }
 

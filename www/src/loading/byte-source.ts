@@ -5,7 +5,7 @@
 
 import type { ByteRange } from '../shared/byte-range.js';
 import { PhotoError } from '../shared/errors.js';
-import { withTimeout } from '../shared/promises.js';
+import { linkedController, withTimeout } from '../shared/promises.js';
 import * as errors from './http-errors.js';
 import { RetryableError } from './http-errors.js';
 import {
@@ -113,9 +113,7 @@ export class HttpSource {
   /** Sends one request and yields its bytes, without those received before an interruption. */
   async *#attempt(transfer: Transfer, signal: AbortSignal): AsyncGenerator<Piece, void> {
     // However the attempt ends, its request ends too.
-    const stop = new AbortController();
-    const forwardAbort = () => stop.abort(signal.reason);
-    signal.addEventListener('abort', forwardAbort);
+    const stop = linkedController(signal);
     try {
       const response = await this.#request(transfer, stop.signal);
       if (response.status === 416 && transfer.usesRange) return this.#endBefore(transfer, response);
@@ -154,7 +152,6 @@ export class HttpSource {
       this.#isSizeCertain = this.#size !== undefined;
       this.#size = offset;
     } finally {
-      signal.removeEventListener('abort', forwardAbort);
       stop.abort();
     }
   }

@@ -39,12 +39,8 @@ export function forbiddenByPolicy(url: string, directive: string, cause: unknown
 }
 
 export function stalled(url: string, ms: number): RetryableError {
-  const seconds = Math.round(ms / 1000);
-  return retryable(
-    'http-stalled',
-    url,
-    `could not be loaded: no data arrived for ${seconds} seconds.`,
-  );
+  const text = `could not be loaded: no data arrived for ${Math.round(ms / 1000)} seconds.`;
+  return retryable('http-stalled', url, text);
 }
 
 /** The transfer ended at byte `at` of the file, but should have reached `end`. */
@@ -72,11 +68,8 @@ export function compressed(url: string, encoding: string): PhotoError {
 }
 
 export function changed(url: string): PhotoError {
-  return fileError(
-    'http-changed',
-    url,
-    'was replaced on the server during the transfer: load it again.',
-  );
+  const text = 'was replaced on the server during the transfer: load it again.';
+  return fileError('http-changed', url, text);
 }
 
 /** The server sent other bytes than `range`. */

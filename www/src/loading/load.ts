@@ -4,7 +4,7 @@ import type { PhotoDecoder } from '../photo/photo-decoder.js';
 import type { Photograph } from '../photo/photograph.js';
 import type { ByteRange } from '../shared/byte-range.js';
 import { endSentence, hasCode, PhotoError, toPhotoError } from '../shared/errors.js';
-import { withTimeout } from '../shared/promises.js';
+import { linkedController, withTimeout } from '../shared/promises.js';
 import { HttpSource, type Piece } from './byte-source.js';
 import { fileName, tooLong } from './http-errors.js';
 
@@ -51,10 +51,8 @@ export async function openPhoto(
 
 async function open(url: string, options: LoadOptions, ports: LoadPorts): Promise<Photograph> {
   const { signal } = options;
-  const stop = new AbortController();
-  const forwardAbort = () => stop.abort(signal.reason);
   signal.throwIfAborted();
-  signal.addEventListener('abort', forwardAbort);
+  const stop = linkedController(signal);
   try {
     const source = new HttpSource(url, { fetch: ports.fetch });
     const firstPieces = source.read(FIRST_RANGE, stop.signal);
@@ -73,7 +71,6 @@ async function open(url: string, options: LoadOptions, ports: LoadPorts): Promis
     signal.throwIfAborted();
     throw withFileName(toPhotoError(thrown), url);
   } finally {
-    signal.removeEventListener('abort', forwardAbort);
     // Ends the transfer and frees the decoder.
     stop.abort();
   }

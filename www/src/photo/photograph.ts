@@ -98,7 +98,7 @@ export class Photograph implements Freeable {
   withModule<T>(
     module: RelightModule,
     use: (photo: ReceivedPhoto) => T | Promise<T>,
-    { signal, onLeave }: { signal?: AbortSignal; onLeave?: () => void } = {},
+    { signal, onLeave }: { signal?: AbortSignal | undefined; onLeave?: () => void } = {},
   ): Promise<T> {
     return this.#enqueue(async () => {
       signal?.throwIfAborted();

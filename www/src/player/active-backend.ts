@@ -14,9 +14,8 @@ export class RefCounted<T extends Freeable> {
     this.value = value;
   }
 
-  retain(): this {
+  retain(): void {
     this.#users += 1;
-    return this;
   }
 
   release(): void {

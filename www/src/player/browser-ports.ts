@@ -6,6 +6,7 @@ import { createDecoder } from '../photo/decoders.js';
 import { createRenderer, prepare } from '../renderers/renderer-factory.js';
 import type { CanvasRenderer } from '../renderers/types.js';
 import { withPolicyErrors } from '../shared/content-security-policy.js';
+import { callLater } from '../shared/promises.js';
 import type { SessionPorts } from './types.js';
 
 export const BROWSER_PORTS: SessionPorts<CanvasRenderer> = {
@@ -24,10 +25,7 @@ export const BROWSER_PORTS: SessionPorts<CanvasRenderer> = {
   createRenderer,
   prepare: (options, signal) => void prepare(options, signal),
   nextFrame: (callback) => requestAnimationFrame(callback),
-  later: (ms, callback) => {
-    const timer = setTimeout(callback, ms);
-    return () => clearTimeout(timer);
-  },
+  later: callLater,
   now: () => performance.now(),
 };
 

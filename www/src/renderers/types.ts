@@ -28,10 +28,9 @@ export interface Renderer extends Freeable {
   /** Chooses the quality of an animation's frames: frame times of other renderers say nothing about it. */
   readonly quality: QualityController;
   /**
-   * Draws one frame with a share of the components (`quality`, 0 to 1). Call it again only after the
-   * last promise has settled. If the light is unavailable, the last available one is used and
-   * `FrameResult` has the error. Throws or rejects with `backend-lost`, or with `photo-lost` if parts of
-   * the photograph are lost.
+   * Draws one frame with a share of the components (`quality`, 0 to 1). Call it again only after the last promise has
+   * settled. If the light is unavailable, the last available one is used and `FrameResult` has the error. Throws or
+   * rejects with `backend-lost`, or with `photo-lost` if parts of the photograph are lost.
    */
   render(
     light: LightSetting,

@@ -1,4 +1,4 @@
-/** Additions to `Promise`. */
+/** Additions to `Promise`, `AbortController` and `setTimeout`. */
 
 /** As `Promise.all`, but rejects only after every promise has settled. */
 export async function allSettledOrThrow<T>(promises: readonly Promise<T>[]): Promise<T[]> {
@@ -15,6 +15,19 @@ export class Deferred {
   readonly promise = new Promise<void>((resolve) => {
     this.resolve = resolve;
   });
+}
+
+/** Calls back once after `ms` milliseconds. The returned function cancels. */
+export function callLater(ms: number, callback: () => void): () => void {
+  const timer = setTimeout(callback, ms);
+  return () => clearTimeout(timer);
+}
+
+/** A controller that is aborted with a signal as well. Abort it in the end, which removes its listener. */
+export function linkedController(signal: AbortSignal): AbortController {
+  const linked = new AbortController();
+  signal.addEventListener('abort', () => linked.abort(signal.reason), { signal: linked.signal });
+  return linked;
 }
 
 /** When a wait for a promise ends early. */

@@ -11,11 +11,12 @@ export const CENTRE: PicturePoint = { x: 0.5, y: 0.5 };
 /** Factors on linear red, green and blue. */
 export type RgbFactors = readonly [red: number, green: number, blue: number];
 
-/** The nearest point on the picture, rounded to 4 decimals so that shared states stay short. */
+/** The nearest point on the picture. */
 export function clampToPicture({ x, y }: PicturePoint): PicturePoint {
-  return { x: clampCoordinate(x), y: clampCoordinate(y) };
+  return { x: clampAndRound(x, 0, 1), y: clampAndRound(y, 0, 1) };
 }
 
-function clampCoordinate(value: number): number {
-  return Math.round(Math.min(1, Math.max(0, value)) * 1e4) / 1e4;
+/** The nearest value in a range, with four decimals: far finer than a pixel, and short in shared states. */
+export function clampAndRound(value: number, min: number, max: number): number {
+  return Math.round(Math.min(max, Math.max(min, value)) * 1e4) / 1e4;
 }

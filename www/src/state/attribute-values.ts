@@ -19,6 +19,7 @@ const LOADINGS = ['auto', 'lazy', 'eager'] as const;
 const REVEALS = ['auto', 'interaction', 'manual'] as const;
 /** In units of the light plane's shorter side. A larger torch lights the plane evenly. */
 export const MAX_TORCH_SIZE = 100;
+const LIGHT_SIZE_HINT = 'it is a fraction of the light’s shorter side';
 /** The WebAssembly modules use this radius when none is given. */
 export const DEFAULT_TORCH_SIZE = 1 / 7;
 const MAX_ZOOM = 100;
@@ -45,13 +46,7 @@ export const PARSERS = {
   gamut: parseGamut,
   /** The torch's radius in units of the light plane's shorter side. */
   'light-size': (text: Text) =>
-    parseNumber(
-      text,
-      'light size',
-      1e-6,
-      MAX_TORCH_SIZE,
-      'it is a fraction of the light’s shorter side',
-    ),
+    parseNumber(text, 'light size', 1e-6, MAX_TORCH_SIZE, LIGHT_SIZE_HINT),
   'light-x': (text: Text) => parseCoordinate(text, 'light-x'),
   'light-y': (text: Text) => parseCoordinate(text, 'light-y'),
   /** In order of preference. */

@@ -38,14 +38,7 @@ const fetchSourceSupport = (): Promise<typeof SourceSupport> =>
   import('../lights/light-sources.js');
 
 const NO_OVERRIDES: LightOverrides = { name: null, torch: null, size: null, color: null };
-const DEFAULTS: LightOptions = {
-  name: 'flood',
-  src: null,
-  crossOrigin: null,
-  torch: null,
-  size: null,
-  color: null,
-};
+const DEFAULTS: LightOptions = { ...NO_OVERRIDES, name: 'flood', src: null, crossOrigin: null };
 const FIRE_FRAME_SECONDS = 1 / 30;
 /** Frames of a 30 Hz screen arrive a little early at times. */
 const FIRE_TOLERANCE_SECONDS = 0.004;

@@ -20,12 +20,12 @@ export class RevealState {
     return loading === 'lazy' ? this.isVisible : this.isNear;
   }
 
-  isPosterShown({ reveal }: Pick<RevealOptions, 'reveal'>): boolean {
+  isPosterShown({ reveal }: RevealOptions): boolean {
     return !this.isDrawn || (reveal !== 'auto' && !this.isDismissed);
   }
 
   /** Whether the poster waits for a press. */
-  needsPress({ reveal }: Pick<RevealOptions, 'reveal'>): boolean {
+  needsPress({ reveal }: RevealOptions): boolean {
     return reveal === 'interaction' && !this.isDismissed;
   }
 }

@@ -61,9 +61,8 @@ export function parseState(text: string): { state: SharedState; errors: readonly
       const parsed = value.trim() === '' ? Number.NaN : Number(value);
       return parsed >= min && parsed <= max ? parsed : null;
     });
-  const light = read('l', `one of ${LIGHTS.join(', ')}`, (value) => {
-    return LIGHTS.find((known) => known === value) ?? null;
-  });
+  const findLight = (value: string) => LIGHTS.find((known) => known === value) ?? null;
+  const light = read('l', `one of ${LIGHTS.join(', ')}`, findLight);
   const color = read('c', 'a colour in hexadecimal digits', (value) =>
     /^([0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})$/i.test(value) ? `#${value}` : null,
   );

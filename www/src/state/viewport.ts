@@ -3,7 +3,7 @@
  * are in units of the box, 0 to 1. A view never shows anything beyond the picture.
  */
 
-import { CENTRE, type PicturePoint } from '../shared/values.js';
+import { CENTRE, clampAndRound, type PicturePoint } from '../shared/values.js';
 
 /** The part of the picture that is shown. */
 export interface PhotoView {
@@ -27,10 +27,9 @@ const WHEEL_LINE_PIXELS = 40;
 
 /** The nearest view inside the picture, with a magnification of at most `maxZoom`. */
 export function clampView({ zoom, x, y }: PhotoView, maxZoom: number): PhotoView {
-  const clamped = Math.min(maxZoom, Math.max(1, zoom));
-  const edge = 0.5 / clamped;
-  const clampCentre = (value: number) => round4(Math.min(1 - edge, Math.max(edge, value)));
-  return { zoom: round4(clamped), x: clampCentre(x), y: clampCentre(y) };
+  const edge = 0.5 / Math.min(maxZoom, Math.max(1, zoom));
+  const clampCentre = (value: number) => clampAndRound(value, edge, 1 - edge);
+  return { zoom: clampAndRound(zoom, 1, maxZoom), x: clampCentre(x), y: clampCentre(y) };
 }
 
 /** From viewport to picture coordinates. */
@@ -73,9 +72,4 @@ export function wheelFactor(delta: number, mode: number): number {
   const unit = [1, WHEEL_LINE_PIXELS, MAX_WHEEL_PIXELS][mode] ?? 1;
   const pixels = Math.max(-MAX_WHEEL_PIXELS, Math.min(MAX_WHEEL_PIXELS, unit * delta));
   return 2 ** (-pixels / WHEEL_PIXELS_PER_DOUBLING);
-}
-
-/** Four decimals keep shared states short and are far finer than a pixel. */
-function round4(value: number): number {
-  return Math.round(value * 1e4) / 1e4;
 }

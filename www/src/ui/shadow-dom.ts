@@ -130,9 +130,8 @@ export class ShadowDom {
   }
 
   /** Updates the handle and the focus. When the handle disappears, its focus moves to the viewport. */
-  updateLayout(state: LayoutState, language: Language): void {
+  updateLayout({ hasHandle, isFocusable, touchAction }: LayoutState, language: Language): void {
     const { handle, viewport } = this;
-    const { hasHandle, isFocusable, touchAction } = state;
     const focused = this.root.activeElement;
     const keepsFocus = !hasHandle && (focused === handle || focused === viewport);
     handle.hidden = !hasHandle;

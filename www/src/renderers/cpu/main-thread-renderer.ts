@@ -69,11 +69,7 @@ export class MainThreadRenderer implements CanvasRenderer {
       return this.#renderer;
     };
     const onLeave = () => this.#stop();
-    return this.#photograph.withModule(
-      this.#module,
-      use,
-      signal ? { signal, onLeave } : { onLeave },
-    );
+    return this.#photograph.withModule(this.#module, use, { signal, onLeave });
   }
 
   #stop(): void {

@@ -5,8 +5,7 @@
 
 import type { PhotoDescriptor, TileWorkers } from '../../photo/types.js';
 import { PhotoError } from '../../shared/errors.js';
-import type { WatchdogLimits } from '../../shared/worker-client.js';
-import { WorkerClient } from '../../shared/worker-client.js';
+import { type WatchdogLimits, WorkerClient } from '../../shared/worker-client.js';
 import { PoolSession, splitRows } from './pool-session.js';
 import type { RelightTask, RelightWorker } from './protocol.js';
 
