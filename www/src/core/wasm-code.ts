@@ -1,7 +1,10 @@
 /** Where the core gets its modules: from the caller, from files in Node, or from the network. */
 
 import { type FetchWasm, fetchWasm } from '../engine/wasm-loader.js';
-import type { WasmModuleName } from '../shared/names.js';
+import { CORE_MODULES } from '../shared/names.js';
+
+/** The name of a WebAssembly module. */
+export type ModuleName = (typeof CORE_MODULES)[number];
 
 /** A module's bytes, or their address. */
 export type WasmCode = ArrayBuffer | ArrayBufferView<ArrayBuffer> | URL | string;
@@ -13,11 +16,22 @@ interface NodeProcess {
   ): { readFile(file: URL): Promise<Uint8Array> } | undefined;
 }
 
-const provided = new Map<WasmModuleName, WasmCode>();
+const provided = new Map<string, WasmCode>();
 
-/** Sets the code of a module that has not started yet. */
-export function provideCode(name: WasmModuleName, code: WasmCode): void {
-  provided.set(name, code);
+/**
+ * Sets the bytes or the addresses of WebAssembly modules, where the files beside the script can be neither fetched nor
+ * read. Call it before the first `decode`. Code with SIMD needs a machine with SIMD.
+ */
+export function provideWasm(codes: Readonly<Partial<Record<ModuleName, WasmCode>>>): void {
+  const known: readonly string[] = CORE_MODULES;
+  for (const [name, code] of Object.entries(codes)) {
+    if (!known.includes(name)) {
+      throw new TypeError(
+        `There is no module named “${name}”. Known modules: ${known.join(', ')}.`,
+      );
+    }
+    if (code !== undefined) provided.set(name, code);
+  }
 }
 
 export const fetchCoreWasm: FetchWasm = async (name, url) => {
