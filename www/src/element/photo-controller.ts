@@ -24,7 +24,6 @@ import { ViewerState } from '../state/viewer-state.js';
 import type { PhotoView } from '../state/viewport.js';
 import { Presenter } from '../ui/presenter.js';
 import { ShadowDom } from '../ui/shadow-dom.js';
-import type { ToolbarActions } from '../ui/toolbar.js';
 import {
   BackendChangeEvent,
   ContextLostEvent,
@@ -169,7 +168,7 @@ export class PhotoController {
   }
 
   #createPresenter(): Presenter {
-    const actions: ToolbarActions = {
+    return new Presenter(this.#host, this.#dom, this.state, {
       selectLight: (item) => {
         this.state.light.item = item;
         this.interaction.markActive();
@@ -181,8 +180,6 @@ export class PhotoController {
       zoom: (by) => this.interaction.zoom(by),
       reset: () => this.reset(),
       tilt: () => this.interaction.toggleTilt(),
-    };
-    return new Presenter(this.#host, this.#dom, this.state, actions, {
       loaded: () => this.schedule(),
       failed: (error) => this.reportError(error),
     });

@@ -9,7 +9,7 @@ import { describeLight } from './light-description.js';
 import type { ShadowDom } from './shadow-dom.js';
 import type { Toolbar, ToolbarActions } from './toolbar.js';
 
-export interface PresenterListener {
+export interface PresenterListener extends ToolbarActions {
   /** The toolbar has been loaded: call `update`. */
   loaded(): void;
   failed(error: PhotoError): void;
@@ -19,22 +19,14 @@ export class Presenter {
   readonly #host: Element;
   readonly #dom: ShadowDom;
   readonly #state: ViewerState;
-  readonly #actions: ToolbarActions;
   readonly #listener: PresenterListener;
   #toolbar: Toolbar | null = null;
   #isToolbarRequested = false;
 
-  constructor(
-    host: Element,
-    dom: ShadowDom,
-    state: ViewerState,
-    actions: ToolbarActions,
-    listener: PresenterListener,
-  ) {
+  constructor(host: Element, dom: ShadowDom, state: ViewerState, listener: PresenterListener) {
     this.#host = host;
     this.#dom = dom;
     this.#state = state;
-    this.#actions = actions;
     this.#listener = listener;
   }
 
@@ -118,7 +110,7 @@ export class Presenter {
     this.#isToolbarRequested = true;
     try {
       const { Toolbar } = await import('./toolbar.js');
-      const toolbar = new Toolbar(this.#host, this.#actions);
+      const toolbar = new Toolbar(this.#host, this.#listener);
       this.#toolbar = toolbar;
       this.#dom.mountControls([toolbar.menu, toolbar.bar], toolbar.css);
       this.#listener.loaded();
