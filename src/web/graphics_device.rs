@@ -18,7 +18,7 @@ use crate::relight::webgpu::{Device, WebGpuBackend};
 
 /// A WebGPU device or a WebGL2 context. Freeing a device frees everything on it, also for relighters that still use it;
 /// a context is freed with its last relighter.
-#[wasm_bindgen(js_name = Graphics)]
+#[wasm_bindgen]
 #[derive(Debug)]
 pub struct GraphicsDevice(DeviceHandle);
 
@@ -30,7 +30,7 @@ enum DeviceHandle {
     WebGl2(Rc<Context>),
 }
 
-#[wasm_bindgen(js_class = Graphics)]
+#[wasm_bindgen]
 impl GraphicsDevice {
     /// Opens a WebGPU device.
     #[cfg(feature = "webgpu")]

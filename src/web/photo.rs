@@ -151,13 +151,13 @@ impl Photo {
     }
 
     /// Grids, window and correspondence, for `Photo.receive` of another module.
-    #[wasm_bindgen(js_name = geometryParcel)]
+    #[wasm_bindgen(js_name = packGeometry)]
     pub fn pack_geometry(&self) -> Vec<f64> {
         transfer::pack_geometry(self.geometry())
     }
 
     /// The basis, for `Photo.receive` of another module.
-    #[wasm_bindgen(js_name = basisParcel)]
+    #[wasm_bindgen(js_name = packBasis)]
     pub fn pack_basis(&self) -> Vec<f32> {
         self.transport.basis.kernels.concat()
     }

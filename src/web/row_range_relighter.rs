@@ -11,13 +11,13 @@ use crate::relight::cpu::{self, CpuRelighter, STRIP_ROWS};
 use crate::transport::CHANNELS;
 
 /// Relights a row range of a photograph. Only its tiles are needed.
-#[wasm_bindgen(js_name = BandRelighter)]
+#[wasm_bindgen]
 pub struct RowRangeRelighter {
     relighter: CpuRelighter,
     rows: Range<u32>,
 }
 
-#[wasm_bindgen(js_class = BandRelighter)]
+#[wasm_bindgen]
 impl RowRangeRelighter {
     /// For `rows` rows of the picture from `first` on. The photograph cannot give or take tiles until this is freed.
     ///

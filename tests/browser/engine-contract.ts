@@ -8,16 +8,16 @@ import type * as Decoders from '../../dist/wasm/decoder.js';
 import type * as WebGl2 from '../../dist/wasm/webgl2.js';
 import type * as WebGpu from '../../dist/wasm/webgpu.js';
 import type {
-  BandRelighter,
   DecodedPhoto,
   Decoder,
   Gamut,
-  Graphics,
+  GraphicsDevice,
   Light,
   OutputTransform,
   ReceivedPhoto,
   Relighter,
   RelightModule,
+  RowRangeRelighter,
 } from '../../www/src/engine/types.js';
 
 // Its classes are nominal, so functions of one cannot be assigned to functions of the other; what
@@ -42,14 +42,20 @@ type _CpuSrgb = Extends<
   [Cpu.Photo, Uint8ClampedArray, number, number],
   Parameters<typeof Cpu.Light.fromSrgb>
 >;
-type _CpuDisplay = Extends<Cpu.Display, OutputTransform>;
+type _CpuDisplay = Extends<Cpu.OutputTransform, OutputTransform>;
 type _CpuDisplayOf = Extends<
-  ConstructorParameters<RelightModule['Display']>,
-  ConstructorParameters<typeof Cpu.Display>
+  ConstructorParameters<RelightModule['OutputTransform']>,
+  ConstructorParameters<typeof Cpu.OutputTransform>
 >;
-type _CpuRelighter = Extends<Cpu.Relighter, Omit<Relighter, 'render' | 'renderPicture'>>;
-type _CpuRender = Extends<[Cpu.Light, Cpu.Display, number], Parameters<Cpu.Relighter['render']>>;
-type _CpuRenderPicture = Extends<[Cpu.Display, number], Parameters<Cpu.Relighter['renderPicture']>>;
+type _CpuRelighter = Extends<Cpu.Relighter, Omit<Relighter, 'render' | 'renderLightImage'>>;
+type _CpuRender = Extends<
+  [Cpu.Light, Cpu.OutputTransform, number],
+  Parameters<Cpu.Relighter['render']>
+>;
+type _CpuRenderPicture = Extends<
+  [Cpu.OutputTransform, number],
+  Parameters<Cpu.Relighter['renderLightImage']>
+>;
 
 type _WebGl2Receive = Extends<ReturnType<typeof WebGl2.Photo.receive>, ReceivedPhoto>;
 type _WebGl2Parcels = Extends<
@@ -70,19 +76,19 @@ type _WebGl2Srgb = Extends<
   [WebGl2.Photo, Uint8ClampedArray, number, number],
   Parameters<typeof WebGl2.Light.fromSrgb>
 >;
-type _WebGl2Display = Extends<WebGl2.Display, OutputTransform>;
+type _WebGl2Display = Extends<WebGl2.OutputTransform, OutputTransform>;
 type _WebGl2DisplayOf = Extends<
-  ConstructorParameters<RelightModule['Display']>,
-  ConstructorParameters<typeof WebGl2.Display>
+  ConstructorParameters<RelightModule['OutputTransform']>,
+  ConstructorParameters<typeof WebGl2.OutputTransform>
 >;
-type _WebGl2Relighter = Extends<WebGl2.Relighter, Omit<Relighter, 'render' | 'renderPicture'>>;
+type _WebGl2Relighter = Extends<WebGl2.Relighter, Omit<Relighter, 'render' | 'renderLightImage'>>;
 type _WebGl2Render = Extends<
-  [WebGl2.Light, WebGl2.Display, number],
+  [WebGl2.Light, WebGl2.OutputTransform, number],
   Parameters<WebGl2.Relighter['render']>
 >;
 type _WebGl2RenderPicture = Extends<
-  [WebGl2.Display, number],
-  Parameters<WebGl2.Relighter['renderPicture']>
+  [WebGl2.OutputTransform, number],
+  Parameters<WebGl2.Relighter['renderLightImage']>
 >;
 
 type _WebGpuReceive = Extends<ReturnType<typeof WebGpu.Photo.receive>, ReceivedPhoto>;
@@ -104,51 +110,54 @@ type _WebGpuSrgb = Extends<
   [WebGpu.Photo, Uint8ClampedArray, number, number],
   Parameters<typeof WebGpu.Light.fromSrgb>
 >;
-type _WebGpuDisplay = Extends<WebGpu.Display, OutputTransform>;
+type _WebGpuDisplay = Extends<WebGpu.OutputTransform, OutputTransform>;
 type _WebGpuDisplayOf = Extends<
-  ConstructorParameters<RelightModule['Display']>,
-  ConstructorParameters<typeof WebGpu.Display>
+  ConstructorParameters<RelightModule['OutputTransform']>,
+  ConstructorParameters<typeof WebGpu.OutputTransform>
 >;
-type _WebGpuRelighter = Extends<WebGpu.Relighter, Omit<Relighter, 'render' | 'renderPicture'>>;
+type _WebGpuRelighter = Extends<WebGpu.Relighter, Omit<Relighter, 'render' | 'renderLightImage'>>;
 type _WebGpuRender = Extends<
-  [WebGpu.Light, WebGpu.Display, number],
+  [WebGpu.Light, WebGpu.OutputTransform, number],
   Parameters<WebGpu.Relighter['render']>
 >;
 type _WebGpuRenderPicture = Extends<
-  [WebGpu.Display, number],
-  Parameters<WebGpu.Relighter['renderPicture']>
+  [WebGpu.OutputTransform, number],
+  Parameters<WebGpu.Relighter['renderLightImage']>
 >;
 
 type _RelighterOf = Extends<
   [Cpu.Photo, HTMLCanvasElement, Gamut],
   ConstructorParameters<typeof Cpu.Relighter>
 >;
-type _Band = Extends<Cpu.BandRelighter, Omit<BandRelighter, 'relight'>>;
+type _Band = Extends<Cpu.RowRangeRelighter, Omit<RowRangeRelighter, 'relight'>>;
 type _BandOf = Extends<
   [Cpu.Photo, number, number],
-  ConstructorParameters<typeof Cpu.BandRelighter>
+  ConstructorParameters<typeof Cpu.RowRangeRelighter>
 >;
 type _BandRelight = Extends<
-  [Float32Array | null, Cpu.Display, number, Uint8Array],
-  Parameters<Cpu.BandRelighter['relight']>
+  [Float32Array | null, Cpu.OutputTransform, number, Uint8Array],
+  Parameters<Cpu.RowRangeRelighter['relight']>
 >;
 type _Kernel = Extends<ReturnType<typeof Cpu.cpuKernel>, string>;
 
-type _WebGl2Graphics = Extends<WebGl2.Graphics, Omit<Graphics, 'draw'>>;
+type _WebGl2Graphics = Extends<WebGl2.GraphicsDevice, Omit<GraphicsDevice, 'draw'>>;
 type _WebGl2Draw = Extends<
   [WebGl2.Photo, HTMLCanvasElement, Gamut],
-  Parameters<WebGl2.Graphics['draw']>
+  Parameters<WebGl2.GraphicsDevice['draw']>
 >;
-type _WebGl2Drawn = Extends<ReturnType<WebGl2.Graphics['draw']>, Promise<WebGl2.Relighter>>;
+type _WebGl2Drawn = Extends<ReturnType<WebGl2.GraphicsDevice['draw']>, Promise<WebGl2.Relighter>>;
 
-type _WebGpuGraphics = Extends<WebGpu.Graphics, Omit<Graphics, 'draw'>>;
+type _WebGpuGraphics = Extends<WebGpu.GraphicsDevice, Omit<GraphicsDevice, 'draw'>>;
 type _WebGpuDraw = Extends<
   [WebGpu.Photo, HTMLCanvasElement, Gamut],
-  Parameters<WebGpu.Graphics['draw']>
+  Parameters<WebGpu.GraphicsDevice['draw']>
 >;
-type _WebGpuDrawn = Extends<ReturnType<WebGpu.Graphics['draw']>, Promise<WebGpu.Relighter>>;
-type _WebGpuOpen = Extends<ReturnType<typeof WebGpu.Graphics.webgpu>, Promise<WebGpu.Graphics>>;
-type _WebGl2Open = Extends<[HTMLCanvasElement], Parameters<typeof WebGl2.Graphics.webgl2>>;
+type _WebGpuDrawn = Extends<ReturnType<WebGpu.GraphicsDevice['draw']>, Promise<WebGpu.Relighter>>;
+type _WebGpuOpen = Extends<
+  ReturnType<typeof WebGpu.GraphicsDevice.webgpu>,
+  Promise<WebGpu.GraphicsDevice>
+>;
+type _WebGl2Open = Extends<[HTMLCanvasElement], Parameters<typeof WebGl2.GraphicsDevice.webgl2>>;
 
 export type Contract = [
   _Decoder,

@@ -7,7 +7,7 @@ use crate::transport::CHANNELS;
 use crate::web::CodedError;
 
 /// Exposure, white balance, tone curve and gamut, with dither.
-#[wasm_bindgen(js_name = Display)]
+#[wasm_bindgen]
 #[derive(Clone, Copy, Debug)]
 pub struct OutputTransform(relight::OutputTransform);
 
@@ -17,7 +17,7 @@ impl OutputTransform {
     }
 }
 
-#[wasm_bindgen(js_class = Display)]
+#[wasm_bindgen]
 impl OutputTransform {
     /// `exposure` is a factor on all channels, `balance` one on each of red, green and blue; `gamut` is that of the
     /// canvas.

@@ -72,7 +72,7 @@ impl Relighter {
     ///
     /// # Errors
     /// What the browser throws, for instance for pictures of another origin. The last light stays.
-    #[wasm_bindgen(js_name = takePicture)]
+    #[wasm_bindgen(js_name = setLightImage)]
     pub fn set_light_image(
         &mut self,
         image: &JsValue,
@@ -87,7 +87,7 @@ impl Relighter {
     ///
     /// # Errors
     /// Code `backend-lost` if the device is lost.
-    #[wasm_bindgen(js_name = renderPicture)]
+    #[wasm_bindgen(js_name = renderLightImage)]
     pub fn render_light_image(
         &mut self,
         output: &OutputTransform,

@@ -2,7 +2,7 @@
 
 import { loadCpu } from '../engine/core-modules.js';
 import { createOutputTransform } from '../engine/output-settings.js';
-import type { BandRelighter, CpuModule, Light, ReceivedPhoto } from '../engine/types.js';
+import type { CpuModule, Light, ReceivedPhoto, RowRangeRelighter } from '../engine/types.js';
 import { toPhotoError } from '../shared/errors.js';
 import type { Gamut, LightName, ToneCurve } from '../shared/names.js';
 import {
@@ -60,7 +60,7 @@ export interface Picture {
 }
 
 /** The relighter of each photograph, for its next picture. */
-const relighters = new WeakMap<DecodedPhotograph, BandRelighter>();
+const relighters = new WeakMap<DecodedPhotograph, RowRangeRelighter>();
 
 /**
  * Relights a photograph. Rejects with a `PhotoError`: `attribute` for an invalid option, `light-…` for an invalid
@@ -108,10 +108,10 @@ function relighterOf(
   module: CpuModule,
   photo: DecodedPhotograph,
   modulePhoto: ReceivedPhoto,
-): BandRelighter {
+): RowRangeRelighter {
   const known = relighters.get(photo);
   if (known) return known;
-  const relighter = new module.BandRelighter(modulePhoto, 0, photo.height);
+  const relighter = new module.RowRangeRelighter(modulePhoto, 0, photo.height);
   relighters.set(photo, relighter);
   photo.onFree = () => relighter.free();
   return relighter;

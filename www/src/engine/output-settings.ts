@@ -13,9 +13,9 @@ export interface OutputSettings {
 
 /** The output transform, which a module calls a display, for a canvas of the given gamut. */
 export function createOutputTransform(
-  { Display }: Pick<RelightModule, 'Display'>,
+  { OutputTransform }: Pick<RelightModule, 'OutputTransform'>,
   { exposure, whiteBalance, tone }: OutputSettings,
   gamut: Gamut,
 ): OutputTransform {
-  return new Display(exposure, Float64Array.from(whiteBalance), tone, gamut);
+  return new OutputTransform(exposure, Float64Array.from(whiteBalance), tone, gamut);
 }

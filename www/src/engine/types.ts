@@ -35,8 +35,8 @@ export interface DecodedPhoto extends ModulePhoto {
   /** Camera pixels along a tile's side; tiles at the right and lower edges may be smaller. */
   readonly tileSide: number;
   /** The arguments of `Photo.receive`. */
-  geometryParcel(): Float64Array;
-  basisParcel(): Float32Array;
+  packGeometry(): Float64Array;
+  packBasis(): Float32Array;
 }
 
 /** A photograph that another module has decoded. */
@@ -68,11 +68,11 @@ export interface Decoder extends Freeable {
   finish(): DecodedPhoto;
 }
 
-/** An output transform, in the modules' class `Display`. */
+/** An output transform. */
 export interface OutputTransform extends Freeable {}
 
 /** A graphics device, which photographs share. */
-export interface Graphics extends Freeable {
+export interface GraphicsDevice extends Freeable {
   readonly kernel: string;
   /** Settles when a WebGPU device is lost; `undefined` for WebGL2, whose canvas fires an event. */
   readonly lost: Promise<{ readonly message: string }> | undefined;
@@ -91,16 +91,16 @@ export interface Relighter extends Freeable {
   readonly gamut: Gamut;
   render(light: Light, transform: OutputTransform, quality: number): void;
   /**
-   * Uploads a picture as the light of `renderPicture`; `false` if the backend cannot. Throws the browser's error, and
+   * Uploads a picture as the light of `renderLightImage`; `false` if the backend cannot. Throws the browser's error, and
    * keeps the last light then.
    */
-  takePicture(picture: LivePicture, width: number, height: number): boolean;
+  setLightImage(picture: LivePicture, width: number, height: number): boolean;
   /** As `render`, with the uploaded picture. */
-  renderPicture(transform: OutputTransform, quality: number): void;
+  renderLightImage(transform: OutputTransform, quality: number): void;
 }
 
 /** Relights rows of a picture with the CPU, without a canvas. */
-export interface BandRelighter extends Freeable {
+export interface RowRangeRelighter extends Freeable {
   /** The first light row that is needed, and the end of those rows. */
   readonly lightRows: Uint32Array;
   /** `light` has linear R, G and B of those rows; `null` reuses the last one. Writes RGBA into `out`, row by row. */
@@ -132,7 +132,7 @@ export interface RelightModule {
     /** From sRGB codes with straight alpha of a picture of any size: RGBA, row by row. */
     fromSrgb(photo: ReceivedPhoto, rgba: Uint8ClampedArray, width: number, height: number): Light;
   };
-  Display: {
+  OutputTransform: {
     new (exposure: number, balance: Float64Array, curve: ToneCurve, gamut: Gamut): OutputTransform;
   };
 }
@@ -140,18 +140,20 @@ export interface RelightModule {
 export interface CpuModule extends RelightModule {
   /** `simd128` or `scalar`. */
   cpuKernel(): string;
-  BandRelighter: { new (photo: ReceivedPhoto, firstRow: number, rows: number): BandRelighter };
+  RowRangeRelighter: {
+    new (photo: ReceivedPhoto, firstRow: number, rows: number): RowRangeRelighter;
+  };
   /** Draws on the calling thread. */
   Relighter: { new (photo: ReceivedPhoto, canvas: HTMLCanvasElement, gamut: Gamut): Relighter };
 }
 
 export interface WebGpuModule extends RelightModule {
-  Graphics: { webgpu(): Promise<Graphics> };
+  GraphicsDevice: { webgpu(): Promise<GraphicsDevice> };
 }
 
 export interface WebGl2Module extends RelightModule {
   /** The device uses the canvas alone. */
-  Graphics: { webgl2(canvas: HTMLCanvasElement): Graphics };
+  GraphicsDevice: { webgl2(canvas: HTMLCanvasElement): GraphicsDevice };
 }
 
 /** All modules by name. */

@@ -53,14 +53,14 @@ export function fakePhoto(tileCount: number) {
     tiles: tileCount,
     metadata: '{}',
     decodedBytes: tileCount,
-    geometryParcel: () => new Float64Array(12),
-    basisParcel: () => new Float32Array(9),
+    packGeometry: () => new Float64Array(12),
+    packBasis: () => new Float32Array(9),
     ...createModulePhoto(new Set(tilesInModules)),
   };
   const module = {
     Photo: { receive: () => createModulePhoto(new Set()) },
     Light: { builtin: () => fakeLight, torch: () => fakeLight },
-    Display: class {
+    OutputTransform: class {
       free() {}
     },
     cpuKernel: () => 'fake, on the page',

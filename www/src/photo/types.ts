@@ -22,7 +22,7 @@ export interface PhotoDescriptor extends Omit<PhotoInfo, 'metadata'> {
 /** The descriptor of a photograph in the decoder's module. */
 export function describePhoto(photo: DecodedPhoto): PhotoDescriptor {
   const { width, height, lightWidth, lightHeight, decodedBytes, metadata, tiles, tileSide } = photo;
-  const [geometry, basis] = [photo.geometryParcel(), photo.basisParcel()];
+  const [geometry, basis] = [photo.packGeometry(), photo.packBasis()];
   const info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
   return { ...info, tiles, tileSide, geometry, basis };
 }

@@ -57,13 +57,13 @@ export class WasmRenderer implements CanvasRenderer {
     try {
       if (this.#upload(setting.image)) {
         this.#hasUploadedImage = true;
-        this.#relighter.renderPicture(transform, quality);
+        this.#relighter.renderLightImage(transform, quality);
         return { lightApplied: true, lightError: null };
       }
       const { light, lightApplied, lightError } = this.#lights.get(setting, this.#lightPlane);
       // An image that is no longer readable keeps its last uploaded content.
       this.#hasUploadedImage &&= !lightApplied;
-      if (this.#hasUploadedImage) this.#relighter.renderPicture(transform, quality);
+      if (this.#hasUploadedImage) this.#relighter.renderLightImage(transform, quality);
       else this.#relighter.render(light, transform, quality);
       return { lightApplied, lightError };
     } catch (thrown) {
@@ -80,7 +80,7 @@ export class WasmRenderer implements CanvasRenderer {
     const source = image?.uploadable();
     if (!source) return false;
     try {
-      return this.#relighter.takePicture(source.image, source.width, source.height);
+      return this.#relighter.setLightImage(source.image, source.width, source.height);
     } catch {
       // Reading its pixels, which follows, reports the error.
       return false;

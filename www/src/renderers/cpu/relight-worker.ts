@@ -2,14 +2,14 @@
 
 import { loadCpu } from '../../engine/core-modules.js';
 import { createOutputTransform } from '../../engine/output-settings.js';
-import type { BandRelighter, CpuModule, ReceivedPhoto } from '../../engine/types.js';
+import type { CpuModule, ReceivedPhoto, RowRangeRelighter } from '../../engine/types.js';
 import { serve } from '../../engine/worker-server.js';
 import type { RelightTask, RowRange, RowTask } from './protocol.js';
 
 interface StoredRows extends RowRange {
   readonly photo: ReceivedPhoto;
   /** `null` while tiles are moved. */
-  relighter: BandRelighter | null;
+  relighter: RowRangeRelighter | null;
 }
 
 const storedRows = new Map<number, StoredRows>();
@@ -53,8 +53,8 @@ function handle(module: CpuModule, photo: number, task: RowTask): ArrayBuffer {
   }
 }
 
-function relighterOf(module: CpuModule, stored: StoredRows): BandRelighter {
-  stored.relighter ??= new module.BandRelighter(stored.photo, stored.firstRow, stored.rows);
+function relighterOf(module: CpuModule, stored: StoredRows): RowRangeRelighter {
+  stored.relighter ??= new module.RowRangeRelighter(stored.photo, stored.firstRow, stored.rows);
   return stored.relighter;
 }
 

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { Graphics } from '../../engine/types.js';
+import type { GraphicsDevice } from '../../engine/types.js';
 import { Devices, type LoadGraphics } from './devices.js';
 import type { GraphicsPorts } from './graphics-ports.js';
 
@@ -15,14 +15,14 @@ function fakeDevices() {
   let openError: Error | null = null;
   let silent = false;
   let unanswered = 0;
-  const device = (name: string, lost: Graphics['lost']): Graphics => ({
+  const device = (name: string, lost: GraphicsDevice['lost']): GraphicsDevice => ({
     kernel: name,
     lost,
     draw: () => Promise.reject(new Error('not here')),
     free: () => log.push(`free ${name}`),
   });
   const module = {
-    Graphics: {
+    GraphicsDevice: {
       webgpu: async () => {
         if (openError) throw openError;
         if (silent) {

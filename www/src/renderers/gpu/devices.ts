@@ -3,7 +3,7 @@
  * next lease after a loss gets a new device, unless losses are frequent.
  */
 
-import type { Graphics, Modules } from '../../engine/types.js';
+import type { GraphicsDevice, Modules } from '../../engine/types.js';
 import { PhotoError } from '../../shared/errors.js';
 import { withTimeout } from '../../shared/promises.js';
 import type { DeviceHandle } from '../wasm-renderer.js';
@@ -15,12 +15,12 @@ export type LoadGraphics = <N extends GraphicsBackend>(name: N) => Promise<Modul
 
 /** A photograph's use of a device. Free what was drawn with it before `release`. */
 export interface Lease extends DeviceHandle {
-  readonly graphics: Graphics;
+  readonly graphics: GraphicsDevice;
 }
 
 /** A device that is open or being opened. */
 interface SharedDevice {
-  readonly graphics: Promise<Graphics>;
+  readonly graphics: Promise<GraphicsDevice>;
   /** Called when the device is lost. */
   readonly holders: Set<(reason: string) => void>;
   /** Lost or freed: later events of the device are ignored. */
@@ -116,9 +116,9 @@ export class Devices {
     return name;
   }
 
-  async #openWebGpu(load: LoadGraphics): Promise<Graphics> {
-    const { Graphics } = await load('webgpu');
-    return await this.#untilAnswered(Graphics.webgpu(), (device) => device.free());
+  async #openWebGpu(load: LoadGraphics): Promise<GraphicsDevice> {
+    const { GraphicsDevice } = await load('webgpu');
+    return await this.#untilAnswered(GraphicsDevice.webgpu(), (device) => device.free());
   }
 
   /** Waits for an answer of WebGPU; `onLate` gets one that comes after the time limit. */
@@ -139,10 +139,10 @@ export class Devices {
     return withTimeout(answer, { ms, onTimeout });
   }
 
-  async #openWebGl2(load: LoadGraphics, lose: (reason: string) => void): Promise<Graphics> {
-    const { Graphics } = await load('webgl2');
+  async #openWebGl2(load: LoadGraphics, lose: (reason: string) => void): Promise<GraphicsDevice> {
+    const { GraphicsDevice } = await load('webgl2');
     const canvas = this.#ports.createCanvas();
-    const graphics = Graphics.webgl2(canvas);
+    const graphics = GraphicsDevice.webgl2(canvas);
     canvas.addEventListener('webglcontextlost', () => lose('the browser took it away.'));
     return graphics;
   }
