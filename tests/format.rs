@@ -959,12 +959,13 @@ fn a_preview_stays_within_the_memory_limit() {
         let file = recovered.file(QUALITY);
         let limit = smallest_limit(&file);
         let index = read(&file, file.len()).unwrap().index().unwrap().clone();
-        let first_scan = index.scan_range(0).end as usize;
+        // By then most components are there.
+        let prefix = index.scan_range(index.scans.len() - 2).end as usize;
         for (decoded_bytes, has_preview) in [(limit, false), (2 * limit, true)] {
             let mut reader = Reader::new(Limits { decoded_bytes });
-            reader.feed(0, &file[..first_scan]).unwrap();
+            reader.feed(0, &file[..prefix]).unwrap();
             assert_eq!(reader.preview().unwrap().is_some(), has_preview);
-            reader.feed(first_scan as u64, &file[first_scan..]).unwrap();
+            reader.feed(prefix as u64, &file[prefix..]).unwrap();
             reader.finish().unwrap();
         }
     }

@@ -24,7 +24,7 @@ use crate::format::constants::MAX_CONTENT_BYTES;
 use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::fields::FieldReader;
 use crate::format::scan::Scan;
-use crate::transport::{CHANNELS, Extent};
+use crate::transport::{CHANNELS, Extent, Geometry};
 
 /// The axes of one component of a tile, `[axis, pixel]`; empty if all are zero.
 pub type Plane = Vec<f32>;
@@ -178,6 +178,20 @@ pub fn max_components(tile_side: u32) -> u64 {
         height: tile_side,
     };
     MAX_CONTENT_BYTES / max_tokens(extent, 1)
+}
+
+/// Upper bound on the ratio of a block's energy with its padding, which repeats the last column and row of
+/// a tile, to that without.
+pub fn padding_factor(geometry: &Geometry) -> f64 {
+    let copies = |camera: u32| {
+        let lengths = [geometry.tile_side.min(camera), camera % geometry.tile_side];
+        let copies = lengths.map(|length| match length % SIDE as u32 {
+            0 => 1,
+            rest => SIDE as u32 + 1 - rest,
+        });
+        f64::from(copies[0].max(copies[1]))
+    };
+    copies(geometry.camera.width) * copies(geometry.camera.height)
 }
 
 /// The finest step that keeps numbers within [`MAX_MAGNITUDE`], for coefficients up to `peak` whose squares sum

@@ -132,7 +132,8 @@ impl<'a> Encoder<'a> {
     pub fn finest_step(&self, k: usize) -> f32 {
         self.rotation.as_ref().map_or(0.0, |rotation| {
             let peak = f64::from(self.coefficient_peak) * rotation.gain(k);
-            transform::finest_step(peak as f32, rotation.energies[k])
+            let padding = transform::padding_factor(&self.source.geometry);
+            transform::finest_step(peak as f32, padding * rotation.energies[k])
         })
     }
 }

@@ -3,8 +3,6 @@
 //! Both are found by bisection on a sample. Components whose energy is far below the quantisation error
 //! are then dropped.
 
-use std::ops::RangeInclusive;
-
 use super::assembly::{self, EncodedFile, QuantisedTile};
 use super::encoder::Encoder;
 use super::quantisation_error::QuantisationError;
@@ -30,11 +28,12 @@ const SNR_HALVINGS: usize = 13;
 /// Range of SNRs of a file size in dB, and halvings.
 const SIZE_SNRS: [f64; 2] = [3.0, 75.0];
 const SIZE_HALVINGS: usize = 9;
-/// Corrections of the step by the error of the plan: their number, their largest factor, and the ratio of
-/// steps that needs none.
-const STEP_CORRECTIONS: usize = 4;
+/// Corrections of the step by the error of the plan: their maximum number and factor, and the range of ratios
+/// that needs none.
+const STEP_CORRECTIONS: usize = 8;
 const MAX_STEP_CORRECTION: f32 = 1.25;
-const STEP_TOLERANCE: RangeInclusive<f32> = 0.985..=1.05;
+const MIN_STEP_RATIO: f32 = 0.99;
+const MAX_STEP_RATIO: f32 = 1.05;
 /// Factors of the planned shares, if a file exceeds [`MAX_SHARES`].
 const SHARE_FACTORS: [f64; 3] = [1.0, 0.75, 0.5];
 
@@ -153,10 +152,11 @@ fn encode_with_step(
     };
     // The plan's layers change the error a little.
     let mut step = step;
-    for _ in 0..STEP_CORRECTIONS {
+    for correction in 0..STEP_CORRECTIONS {
         let planned = error_of(encoder, sample, &plan(step, 1.0)?.scans, executor);
         let ratio = (expected.error / planned.error.max(f64::MIN_POSITIVE)).sqrt() as f32;
-        if STEP_TOLERANCE.contains(&ratio) {
+        // Only the first correction makes the step coarser, so that the others converge.
+        if ratio >= MIN_STEP_RATIO && (ratio <= MAX_STEP_RATIO || correction > 0) {
             break;
         }
         step *= 0.99 * ratio.clamp(MAX_STEP_CORRECTION.recip(), MAX_STEP_CORRECTION);

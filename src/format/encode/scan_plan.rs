@@ -9,6 +9,8 @@
 //!   the error by less than the same bytes do elsewhere;
 //! - any later scan. An item that is larger by itself is refined in several scans.
 
+use std::ops::Range;
+
 use super::encoder::Encoder;
 use super::scan_costs::{CostModel, ItemCost};
 use crate::bisect::bisect;
@@ -94,15 +96,40 @@ impl Items {
         kinds
     }
 
-    /// The finest step at which no number of items `from` and later overflows.
-    fn finest_step(&self, encoder: &Encoder<'_>, from: usize) -> f32 {
+    /// The finest step at which no number of `items` overflows.
+    fn finest_step(&self, encoder: &Encoder<'_>, items: Range<usize>) -> f32 {
         match self.coding.is_direct() {
             true => direct::finest_step(encoder.function_peak),
-            false => {
-                let steps = (from..self.count).map(|k| encoder.finest_step(k));
-                steps.fold(0.0, f32::max)
-            }
+            false => items.map(|k| encoder.finest_step(k)).fold(0.0, f32::max),
         }
+    }
+
+    /// Codes the first `count` items at `step`, or at the finest step that does not overflow.
+    fn first_layer(&self, encoder: &Encoder<'_>, count: usize, step: f32, scans: &mut Vec<Scan>) {
+        let flat_step = (step * FIRST_FLAT_STEP_RATIO).max(self.finest_step(encoder, 0..1));
+        let others = usize::from(!self.coding.is_direct())..self.count;
+        let step = step.max(self.finest_step(encoder, others));
+        self.layer(0, vec![0.0; count], [flat_step, step], f64::INFINITY, scans);
+    }
+
+    /// Codes items `from` and later before they are refined, if they would overflow at `step`.
+    fn overflow_layer(&self, encoder: &Encoder<'_>, from: usize, step: f32, scans: &mut Vec<Scan>) {
+        let finest = self.finest_step(encoder, from..self.count);
+        if finest > step && from < self.count {
+            let bytes = vec![0.0; self.count - from];
+            self.layer(from, bytes, [finest; 2], f64::INFINITY, scans);
+        }
+    }
+
+    /// Codes all items at `step`, in scans of at most `max_bytes`.
+    fn last_layer(&self, bytes: Vec<f64>, step: f32, max_bytes: f64, scans: &mut Vec<Scan>) {
+        self.layer(
+            0,
+            bytes,
+            [step * LAST_FLAT_STEP_RATIO, step],
+            max_bytes,
+            scans,
+        );
     }
 
     fn costs(&self, model: &CostModel, step: f32, executor: &impl Executor) -> Vec<ItemCost> {
@@ -113,13 +140,12 @@ impl Items {
     }
 
     /// Codes the items from `first` on, of the given bytes, at `step`, in scans of at most `max_bytes`.
-    /// The step of component 0 is smaller by `flat_step_ratio`.
+    /// Component 0 has a scan and a step of its own.
     fn layer(
         &self,
         first: usize,
         bytes: Vec<f64>,
-        step: f32,
-        flat_step_ratio: f32,
+        [flat_step, step]: [f32; 2],
         max_bytes: f64,
         scans: &mut Vec<Scan>,
     ) {
@@ -137,15 +163,7 @@ impl Items {
         for (item, item_bytes) in (first..).zip(&bytes) {
             let is_full = scan_bytes + item_bytes > max_bytes || item - start == self.max_per_scan;
             if item > start && (is_full || is_flat(start)) {
-                push(
-                    start,
-                    item,
-                    if is_flat(start) {
-                        step * flat_step_ratio
-                    } else {
-                        step
-                    },
-                );
+                push(start, item, if is_flat(start) { flat_step } else { step });
                 (start, scan_bytes) = (item, 0.0);
             }
             scan_bytes += item_bytes;
@@ -156,15 +174,7 @@ impl Items {
             }
         }
         let end = first + bytes.len();
-        push(
-            start,
-            end,
-            if is_flat(start) {
-                step * flat_step_ratio
-            } else {
-                step
-            },
-        );
+        push(start, end, if is_flat(start) { flat_step } else { step });
     }
 }
 
@@ -172,26 +182,10 @@ impl Items {
 pub fn trial(encoder: &Encoder<'_>, step: f32) -> Vec<Scan> {
     let mut scans = Vec::new();
     for items in Items::of(encoder) {
-        let first_step = items
-            .finest_step(encoder, 0)
-            .max(TRIAL_FIRST_STEP_RATIO * step);
-        let mut layer = |first: usize, count: usize, step: f32, ratio: f32| {
-            items.layer(
-                first,
-                vec![0.0; count],
-                step,
-                ratio,
-                f64::INFINITY,
-                &mut scans,
-            );
-        };
-        let first_count = items.count.div_ceil(TRIAL_FIRST_ITEMS);
-        layer(0, first_count, first_step, FIRST_FLAT_STEP_RATIO);
-        let finest = items.finest_step(encoder, first_count);
-        if finest > step && first_count < items.count {
-            layer(first_count, items.count - first_count, finest, 1.0);
-        }
-        layer(0, items.count, step, LAST_FLAT_STEP_RATIO);
+        let count = items.count.div_ceil(TRIAL_FIRST_ITEMS);
+        items.first_layer(encoder, count, TRIAL_FIRST_STEP_RATIO * step, &mut scans);
+        items.overflow_layer(encoder, count, step, &mut scans);
+        items.last_layer(vec![0.0; items.count], step, f64::INFINITY, &mut scans);
     }
     scans
 }
@@ -226,15 +220,7 @@ pub fn plan(
             let of_basis = f64::from(u8::from(!items.coding.is_direct())) * basis_bytes;
             costs.iter_mut().for_each(|cost| cost.bytes += of_basis);
             let count = worthwhile(&costs, step).max(1);
-            let step = step.max(items.finest_step(encoder, 0));
-            items.layer(
-                0,
-                vec![0.0; count],
-                step,
-                FIRST_FLAT_STEP_RATIO,
-                f64::INFINITY,
-                &mut scans,
-            );
+            items.first_layer(encoder, count, step, &mut scans);
         }
         scans
     };
@@ -262,14 +248,9 @@ pub fn plan(
     for (items, last) in kinds.iter().zip(&last) {
         let of_kind = scans.iter().filter(|scan| scan.coding == items.coding);
         let coded = of_kind.map(Scan::end).max().unwrap_or(0);
-        // Numbers of items that no scan has coded must not overflow.
-        let finest = items.finest_step(encoder, coded);
-        if finest > step && coded < items.count {
-            let bytes = vec![0.0; items.count - coded];
-            items.layer(coded, bytes, finest, 1.0, max_bytes, &mut scans);
-        }
+        items.overflow_layer(encoder, coded, step, &mut scans);
         let bytes = last.iter().map(|cost| cost.bytes).collect();
-        items.layer(0, bytes, step, LAST_FLAT_STEP_RATIO, max_bytes, &mut scans);
+        items.last_layer(bytes, step, max_bytes, &mut scans);
     }
     Ok(ScanPlan { scans, first_scans })
 }
