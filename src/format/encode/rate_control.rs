@@ -8,7 +8,7 @@ use super::encoder::Encoder;
 use super::quantisation_error::QuantisationError;
 use super::sampling::{SampledPart, sample};
 use super::scan_costs::CostModel;
-use super::scan_plan::{self, MAX_SHARES, SHARES, Shares};
+use super::scan_plan::{self, MAX_SHARES, SHARES, ScanPlan, Shares};
 use super::source::{DistortionMetric, RateTarget};
 use crate::bisect::bisect;
 use crate::executor::Executor;
@@ -34,8 +34,8 @@ const STEP_CORRECTIONS: usize = 8;
 const MAX_STEP_CORRECTION: f32 = 1.25;
 const MIN_STEP_RATIO: f32 = 0.99;
 const MAX_STEP_RATIO: f32 = 1.05;
-/// Factors of the planned shares, if a file exceeds [`MAX_SHARES`].
-const SHARE_FACTORS: [f64; 3] = [1.0, 0.75, 0.5];
+/// Factors of the planned shares in new plans for a file that exceeds [`MAX_SHARES`].
+const RETRY_SHARE_FACTORS: [f64; 2] = [0.75, 0.5];
 
 /// Encodes the source for a target.
 ///
@@ -151,30 +151,29 @@ fn encode_with_step(
         scan_plan::plan(encoder, &model, step, shares, executor)
     };
     // The plan's layers change the error a little.
-    let mut step = step;
+    let (mut step, mut planned) = (step, plan(step, 1.0)?);
     for correction in 0..STEP_CORRECTIONS {
-        let planned = error_of(encoder, sample, &plan(step, 1.0)?.scans, executor);
-        let ratio = (expected.error / planned.error.max(f64::MIN_POSITIVE)).sqrt() as f32;
+        let error = error_of(encoder, sample, &planned.scans, executor).error;
+        let ratio = (expected.error / error.max(f64::MIN_POSITIVE)).sqrt() as f32;
         // Only the first correction makes the step coarser, so that the others converge.
         if ratio >= MIN_STEP_RATIO && (ratio <= MAX_STEP_RATIO || correction > 0) {
             break;
         }
         step *= 0.99 * ratio.clamp(MAX_STEP_CORRECTION.recip(), MAX_STEP_CORRECTION);
+        planned = plan(step, 1.0)?;
     }
-    let encode = |factor: f64| {
-        let plan = plan(step, factor)?;
-        let first_scans = plan.first_scans;
-        let file = assembly::encode_quantised(encoder, plan.scans, executor)?;
+    let encode = |ScanPlan { scans, first_scans }| {
+        let file = assembly::encode_quantised(encoder, scans, executor)?;
         let is_within = is_within_shares(&file, first_scans);
         Ok::<_, FormatError>((file, is_within))
     };
-    let (mut file, mut is_within) = encode(SHARE_FACTORS[0])?;
-    for factor in &SHARE_FACTORS[1..] {
+    let (mut file, mut is_within) = encode(planned)?;
+    for factor in RETRY_SHARE_FACTORS {
         // A reader fetches small files at once.
         if is_within || file.bytes() <= FIRST_BYTES {
             break;
         }
-        (file, is_within) = encode(*factor)?;
+        (file, is_within) = encode(plan(step, factor)?)?;
     }
     Ok(file)
 }
