@@ -143,37 +143,39 @@ fn encode_with_step(
     let expected = error_of(encoder, sample, &scan_plan::trial(encoder, step), executor);
     drop_weak_components(encoder, expected);
     let model = CostModel::new(encoder, sample, executor);
-    let plan = |step: f32, factor: f64| {
+    let plan = |factor: f64| {
         let shares = Shares {
             first: SHARES.first * factor,
             scan: SHARES.scan * factor,
         };
-        scan_plan::plan(encoder, &model, step, shares, executor)
-    };
-    // The plan's layers change the error a little.
-    let (mut step, mut planned) = (step, plan(step, 1.0)?);
-    for correction in 0..STEP_CORRECTIONS {
-        let error = error_of(encoder, sample, &planned.scans, executor).error;
-        let ratio = (expected.error / error.max(f64::MIN_POSITIVE)).sqrt() as f32;
-        // Only the first correction makes the step coarser, so that the others converge.
-        if ratio >= MIN_STEP_RATIO && (ratio <= MAX_STEP_RATIO || correction > 0) {
-            break;
+        let plan = |step: f32| scan_plan::plan(encoder, &model, step, shares, executor);
+        // The plan's layers change the error a little.
+        let (mut step, mut planned) = (step, plan(step)?);
+        for correction in 0..STEP_CORRECTIONS {
+            let error = error_of(encoder, sample, &planned.scans, executor).error;
+            let ratio = (expected.error / error.max(f64::MIN_POSITIVE)).sqrt() as f32;
+            // Only the first correction makes the step coarser, so that the others converge.
+            if ratio >= MIN_STEP_RATIO && (ratio <= MAX_STEP_RATIO || correction > 0) {
+                break;
+            }
+            step *= 0.99 * ratio.clamp(MAX_STEP_CORRECTION.recip(), MAX_STEP_CORRECTION);
+            planned = plan(step)?;
         }
-        step *= 0.99 * ratio.clamp(MAX_STEP_CORRECTION.recip(), MAX_STEP_CORRECTION);
-        planned = plan(step, 1.0)?;
-    }
-    let encode = |ScanPlan { scans, first_scans }| {
+        Ok::<_, FormatError>(planned)
+    };
+    let encode = |factor: f64| {
+        let ScanPlan { scans, first_scans } = plan(factor)?;
         let file = assembly::encode_quantised(encoder, scans, executor)?;
         let is_within = is_within_shares(&file, first_scans);
         Ok::<_, FormatError>((file, is_within))
     };
-    let (mut file, mut is_within) = encode(planned)?;
+    let (mut file, mut is_within) = encode(1.0)?;
     for factor in RETRY_SHARE_FACTORS {
         // A reader fetches small files at once.
         if is_within || file.bytes() <= FIRST_BYTES {
             break;
         }
-        (file, is_within) = encode(plan(step, factor)?)?;
+        (file, is_within) = encode(factor)?;
     }
     Ok(file)
 }
