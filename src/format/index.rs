@@ -7,12 +7,12 @@ use super::checksum::{checksum, crc_matches};
 use super::chunk::{ChunkEntry, ChunkId};
 use super::codec::zstd_frame::{compress, decompress};
 use super::constants::HEADER_BYTES;
+use super::directory;
 use super::error::{FileSection, FormatError};
 use super::extension::{self, Extension};
 use super::header::Header;
 use super::metadata::{Metadata, MetadataJson};
 use super::scan::{Coding, Scan};
-use super::{directory, memory};
 
 /// Everything that precedes the first scan.
 #[derive(Clone, Debug)]
@@ -36,7 +36,7 @@ impl FileIndex {
     /// Reads the [`index_bytes`](Header::index_bytes) of a file whose header is `header`.
     ///
     /// # Errors
-    /// A [`FormatError`] if a section breaks a rule, or if the file needs more memory than `budget` has.
+    /// A [`FormatError`] if a section breaks a rule, or if the index needs more memory than `budget` has.
     pub(super) fn decode(
         header: Header,
         bytes: &[u8],
@@ -84,7 +84,6 @@ impl FileIndex {
         if end != file_bytes {
             return Err(FormatError::LengthMismatch { end, file_bytes });
         }
-        budget.check(memory::file_bytes(&index))?;
         Ok(index)
     }
 

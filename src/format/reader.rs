@@ -172,6 +172,7 @@ impl Reader {
         };
         if self.gathered.len() as u64 == header.index_bytes() {
             let index = FileIndex::decode(header, &self.gathered, &self.budget)?;
+            self.budget.check(memory::file_bytes(&index))?;
             self.state = Some(DecoderState::new(index, &self.budget)?);
             self.budget.release_vec(std::mem::take(&mut self.gathered));
         }
