@@ -34,7 +34,7 @@ enum DeviceHandle {
 impl GraphicsDevice {
     /// Opens a WebGPU device.
     #[cfg(feature = "webgpu")]
-    #[wasm_bindgen(unchecked_return_type = "Promise<Graphics>")]
+    #[wasm_bindgen(unchecked_return_type = "Promise<GraphicsDevice>")]
     pub fn webgpu() -> Promise {
         future_to_promise(async {
             let device = Device::for_canvases().await.map_err(CodedError::from)?;
