@@ -370,7 +370,7 @@ test.describe('a light source', () => {
         .filter((/** @type {any} */ { type }) => type === 'error')
         .map((/** @type {any} */ { code }) => code);
     await waitForEvents(page, 'error');
-    await (await openAlertDetails(page)).getByText('needs 6').waitFor();
+    await (await openAlertDetails(page)).getByText('need 6').waitFor();
     expect(await capturePicture(page)).toMatchPicture(nativePicture('spectrum'), 1);
     for (const value of ['-1', 'NaN', 'Infinity']) {
       const light = `{ data: new Float32Array([1, 1, ${value}]), width: 1, height: 1 }`;
