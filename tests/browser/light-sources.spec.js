@@ -289,7 +289,7 @@ test.describe('a light source', () => {
     const want = nativePicture(LIGHT_IMAGE_FILE);
     await expect(async () => {
       expect(await screenPicture(page)).toMatchPicture(want, 2);
-    }).toPass({ timeout: 10_000 });
+    }).toPass({ timeout: 30_000 });
     expect(await countEvents(page, 'error')).toBe(0);
   });
 

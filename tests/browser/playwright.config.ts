@@ -33,20 +33,30 @@ export default defineConfig<object, WorkerOptions>({
   globalSetup: './global-setup.js',
   fullyParallel: true,
   workers: 2,
-  timeout: 60_000,
-  expect: { timeout: 10_000 },
+  // Long enough for a machine that compiles Rust meanwhile.
+  timeout: 120_000,
+  expect: { timeout: 30_000 },
   forbidOnly: Boolean(process.env['CI']),
   reporter: 'list',
   use: {
-    actionTimeout: 30_000,
-    navigationTimeout: 30_000,
+    actionTimeout: 60_000,
+    navigationTimeout: 60_000,
     // Without screenshots and DOM snapshots, which slow down and have no canvas.
     trace: { mode: 'retain-on-failure', screenshots: false, snapshots: false },
   },
   projects: [
     { name: 'chromium', grepInvert: /webgpu/i, ...chromium },
-    // SwiftShader's WebGPU uses all cores, so these tests run one at a time. `grep` also reads the project's name.
-    { name: 'chromium-serial', grep: /webgpu/i, workers: 1, ...chromium },
+    // SwiftShader's WebGPU uses all cores, so these tests run one at a time, and its first frame in each quality can
+    // take half a minute. `grep` also reads the project's name.
+    {
+      name: 'chromium-serial',
+      grep: /webgpu/i,
+      workers: 1,
+      timeout: 300_000,
+      expect: { timeout: 120_000 },
+      testIgnore: chromium.testIgnore,
+      use: { ...chromium.use, actionTimeout: 120_000 },
+    },
     {
       name: 'firefox',
       testMatch: 'firefox.spec.js',

@@ -149,7 +149,7 @@ function waitUntilDrawable(page) {
       const blobs = await Promise.allSettled(photos.map((photo) => photo.toBlob()));
       return blobs.filter(({ status }) => status === 'rejected').length;
     });
-  return expect.poll(rejected, { timeout: 30_000 }).toBe(0);
+  return expect.poll(rejected).toBe(0);
 }
 
 /**
