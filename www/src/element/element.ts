@@ -6,6 +6,7 @@ import type { PhotoInfo } from '../shared/photo-info.js';
 import type { PicturePoint } from '../shared/values.js';
 import type { LightPose } from '../state/viewer-state.js';
 import type { PhotoView } from '../state/viewport.js';
+import { encodePicture } from './encode-picture.js';
 import type { RelightablePhotoEventMap } from './events.js';
 import { PhotoController } from './photo-controller.js';
 import { ATTRIBUTES, PROPERTIES, type Reflected, reflect } from './reflect.js';
@@ -222,7 +223,7 @@ export class RelightablePhoto extends Base {
       throw new RangeError(`scale must be more than 0 and at most ${MAX_SCALE}`);
     }
     // Nothing may be awaited in between: the canvas of a GPU keeps its content only until the next frame.
-    return (await this.#controller.renderNow()).encode(type, quality, scale);
+    return encodePicture(await this.#controller.renderNow(), type, quality, scale);
   }
 
   connectedCallback(): void {

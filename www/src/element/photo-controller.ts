@@ -8,12 +8,13 @@ import { setModuleFolder } from '../engine/wasm-loader.js';
 import { fetchStrings, isPending } from '../i18n/strings.js';
 import { InteractionController } from '../input/interaction.js';
 import { reducedMotion } from '../input/reduced-motion.js';
+import type { FrameResult } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
 import { BROWSER_PORTS } from '../player/browser-ports.js';
 import { PhotoSession } from '../player/photo-session.js';
 import type { SessionSettings } from '../player/types.js';
-import type { CanvasRenderer, FrameResult } from '../renderers/types.js';
+import type { Renderer } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
 import { BACKENDS } from '../shared/names.js';
 import { reuse } from '../shared/reuse.js';
@@ -38,7 +39,7 @@ import { observeVisibility, unobserveVisibility } from './visibility.js';
 
 export class PhotoController {
   readonly state: ViewerState;
-  readonly session: PhotoSession<CanvasRenderer>;
+  readonly session: PhotoSession;
   readonly interaction: InteractionController;
   readonly #host: HTMLElement;
   readonly #reader: AttributeReader;
@@ -153,7 +154,7 @@ export class PhotoController {
   }
 
   /** Draws the current state in full quality, after the fetch of the support for its light source. */
-  async renderNow(): Promise<CanvasRenderer> {
+  async renderNow(): Promise<Renderer> {
     this.update();
     const pending = this.state.light.pendingSource;
     if (pending) {
@@ -185,8 +186,8 @@ export class PhotoController {
     });
   }
 
-  #createSession(): PhotoSession<CanvasRenderer> {
-    return new PhotoSession<CanvasRenderer>(BROWSER_PORTS, {
+  #createSession(): PhotoSession {
+    return new PhotoSession(BROWSER_PORTS, {
       loadStarted: () => {
         this.#clearPicture();
         this.#dom.updateProgress(Number.NaN);

@@ -7,7 +7,6 @@ import { LightCache } from './light-cache.js';
 import type { LightSetting } from './light-setting.js';
 import type { LightPicture, LinearLight } from './light-source.js';
 
-const PHOTO = {} as ReceivedPhoto;
 const GOOD: LinearLight = { data: new Float32Array(3), width: 1, height: 1 };
 const BAD: LinearLight = { data: new Float32Array(1), width: 1, height: 1 };
 
@@ -36,14 +35,19 @@ function createCache() {
       },
     },
   };
-  const cache = new LightCache(module as unknown as Pick<RelightModule, 'Light'>);
+  const cache = new LightCache(
+    module as unknown as Pick<RelightModule, 'Light'>,
+    {
+      free: () => {},
+    } as unknown as ReceivedPhoto,
+  );
   return { cache, live };
 }
 
 test('the cache holds one light at a time', () => {
   const { cache, live } = createCache();
-  cache.get(setting(null), PHOTO);
-  cache.get(setting(GOOD), PHOTO);
+  cache.get(setting(null));
+  cache.get(setting(GOOD));
   assert.deepEqual([...live], ['linear']);
   cache.free();
   assert.equal(live.size, 0);
@@ -51,7 +55,7 @@ test('the cache holds one light at a time', () => {
 
 test('a built-in light is made again only for another setting', () => {
   const { cache, live } = createCache();
-  const get = (setting: LightSetting) => cache.get(setting, PHOTO).light;
+  const get = (setting: LightSetting) => cache.get(setting).light;
   const builtin = setting(null);
   const fire = get(builtin);
   assert.equal(get(builtin), fire);
@@ -65,25 +69,25 @@ test('a built-in light is made again only for another setting', () => {
 
 test('the last light substitutes for an unreadable image, and the built-in light before any', () => {
   const { cache, live } = createCache();
-  const first = cache.get(setting(BAD), PHOTO);
+  const first = cache.get(setting(BAD));
   assert.equal(first.lightError?.code, 'light-size');
   assert.deepEqual([...live], ['fire 0']);
-  cache.get(setting(GOOD), PHOTO);
-  const last = cache.get(setting(BAD), PHOTO);
+  cache.get(setting(GOOD));
+  const last = cache.get(setting(BAD));
   assert.equal(last.lightError?.code, 'light-size');
   assert.deepEqual([...live], ['linear']);
-  assert.equal(cache.get(setting(null), PHOTO).lightError, null);
+  assert.equal(cache.get(setting(null)).lightError, null);
   assert.deepEqual([...live], ['fire 0']);
 });
 
 test('a torch has a size, and a fire has a time', () => {
   const { cache, live } = createCache();
-  cache.get({ name: 'torch', torch: { x: 0.2, y: 0.3 }, size: 0.5, image: null }, PHOTO);
+  cache.get({ name: 'torch', torch: { x: 0.2, y: 0.3 }, size: 0.5, image: null });
   assert.deepEqual([...live], ['torch 0.2 0.3 0.5']);
-  cache.get({ name: 'torch', torch: null, size: 0.5, image: null }, PHOTO);
+  cache.get({ name: 'torch', torch: null, size: 0.5, image: null });
   assert.deepEqual([...live], ['torch 0.5 0.5 0.5']);
-  cache.get({ name: 'fire', torch: null, seconds: 0.1, image: null }, PHOTO);
+  cache.get({ name: 'fire', torch: null, seconds: 0.1, image: null });
   assert.deepEqual([...live], ['fire 0.1']);
-  cache.get({ name: 'fire', torch: null, seconds: 0.2, image: null }, PHOTO);
+  cache.get({ name: 'fire', torch: null, seconds: 0.2, image: null });
   assert.deepEqual([...live], ['fire 0.2']);
 });

@@ -4,36 +4,44 @@ import type { Freeable, Light, ReceivedPhoto, RelightModule } from '../engine/ty
 import { type PhotoError, toPhotoError } from '../shared/errors.js';
 import { createBuiltinLight, type LightSetting } from './light-setting.js';
 
-export interface LightResult {
+/** Whether a frame has the requested light. */
+export interface FrameResult {
+  /** False if the frame shows the last light, because the requested one has no picture (yet). */
+  readonly lightApplied: boolean;
+  /** Why the requested light is unavailable; `null` if it is not, or is only loading. */
+  readonly lightError: PhotoError | null;
+}
+
+/** The light of a frame. */
+export interface FrameLight extends FrameResult {
   /** Owned by the cache. The same object as last time if and only if its content is unchanged. */
   readonly light: Light;
-  /** Whether this is the requested light and not a substitute. */
-  readonly lightApplied: boolean;
-  /** The reason for a substitute; `null` also while an image is loading. */
-  readonly lightError: PhotoError | null;
 }
 
 export class LightCache implements Freeable {
   readonly #module: Pick<RelightModule, 'Light'>;
+  readonly #lightPlane: ReceivedPhoto;
   #light: Light | null = null;
   /** The setting of `#light`; `null` for an image, whose content may change. */
   #setting: LightSetting | null = null;
 
-  constructor(module: Pick<RelightModule, 'Light'>) {
+  /** `lightPlane` is a photograph without tiles, which is freed with the cache. */
+  constructor(module: Pick<RelightModule, 'Light'>, lightPlane: ReceivedPhoto) {
     this.#module = module;
+    this.#lightPlane = lightPlane;
   }
 
   /**
    * The light of a setting. While its image cannot be read, the last light substitutes for it, or, if there is
    * none, the built-in light.
    */
-  get(setting: LightSetting, photo: ReceivedPhoto): LightResult {
+  get(setting: LightSetting): FrameLight {
     let lightApplied = true;
     let lightError: PhotoError | null = null;
     if (setting.image) {
       let light: Light | null = null;
       try {
-        light = setting.image.createLight(this.#module, photo);
+        light = setting.image.createLight(this.#module, this.#lightPlane);
       } catch (thrown) {
         lightError = toPhotoError(thrown);
       }
@@ -43,14 +51,15 @@ export class LightCache implements Freeable {
     const isCurrent = setting.image !== null || setting === this.#setting;
     if (this.#light && isCurrent) return { light: this.#light, lightApplied, lightError };
     // Lights are large: free the old one before making the new one.
-    this.free();
-    const light = createBuiltinLight(this.#module, photo, setting);
+    this.#replace(null, null);
+    const light = createBuiltinLight(this.#module, this.#lightPlane, setting);
     this.#replace(light, setting);
     return { light, lightApplied, lightError };
   }
 
   free(): void {
     this.#replace(null, null);
+    this.#lightPlane.free();
   }
 
   #replace(light: Light | null, setting: LightSetting | null): void {

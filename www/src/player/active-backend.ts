@@ -4,6 +4,7 @@ import type { Backend, Freeable } from '../engine/types.js';
 import type { Photograph } from '../photo/photograph.js';
 import type { Renderer, RenderOptions } from '../renderers/types.js';
 import type { Deferred } from '../shared/promises.js';
+import { QualityController } from './quality-controller.js';
 
 /** An object that is freed when its last user releases it. The creator is its first user. */
 export class RefCounted<T extends Freeable> {
@@ -25,7 +26,9 @@ export class RefCounted<T extends Freeable> {
 }
 
 /** A renderer with its state. */
-export class ActiveBackend<R extends Renderer> {
+export class ActiveBackend {
+  /** For this renderer alone: frame times of other renderers say nothing about it. */
+  readonly quality = new QualityController();
   hasDrawn = false;
   /** Why the backend stopped working; `null` while it works. */
   lossReason: string | null = null;
@@ -36,7 +39,7 @@ export class ActiveBackend<R extends Renderer> {
   constructor(
     readonly backend: Backend,
     readonly options: RenderOptions,
-    readonly renderer: R,
+    readonly renderer: Renderer,
     readonly photo: RefCounted<Photograph>,
   ) {
     photo.retain();

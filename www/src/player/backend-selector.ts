@@ -6,11 +6,11 @@
 
 import type { Backend } from '../engine/types.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { CreateRenderer, Renderer, RenderOptions } from '../renderers/types.js';
+import type { CreateRenderer, RenderOptions } from '../renderers/types.js';
 import { joinSentences, PhotoError, toPhotoError } from '../shared/errors.js';
 import { Deferred } from '../shared/promises.js';
 import { ActiveBackend, type RefCounted } from './active-backend.js';
-import { BACKEND_TITLES, backendsAfter, backendsFrom, firstWorking } from './backends.js';
+import { BACKEND_TITLES, firstWorking } from './backends.js';
 import type { SessionListener } from './types.js';
 
 /** What a selector reports to its session. */
@@ -25,42 +25,34 @@ export interface SelectorEvents {
 
 /** A search, which ends also when it is cancelled. */
 class BackendSearch extends Deferred {
-  readonly #abort = new AbortController();
-
-  get signal(): AbortSignal {
-    return this.#abort.signal;
-  }
+  readonly abort = new AbortController();
 
   cancel(): void {
-    this.#abort.abort();
+    this.abort.abort();
     this.resolve();
   }
 }
 
-export class BackendSelector<R extends Renderer> {
+export class BackendSelector {
   /** The options with which a lost backend is replaced. */
   options: RenderOptions | null = null;
-  readonly #createRenderer: CreateRenderer<R>;
-  readonly #listener: SessionListener<R>;
+  readonly #createRenderer: CreateRenderer;
+  readonly #listener: SessionListener;
   readonly #events: SelectorEvents;
-  #active: ActiveBackend<R> | null = null;
+  #active: ActiveBackend | null = null;
   /** On the screen until `#active` has drawn. */
-  #outgoing: ActiveBackend<R> | null = null;
+  #outgoing: ActiveBackend | null = null;
   #search: BackendSearch | null = null;
   /** The photograph of the last search. */
   #photo: RefCounted<Photograph> | null = null;
 
-  constructor(
-    createRenderer: CreateRenderer<R>,
-    listener: SessionListener<R>,
-    events: SelectorEvents,
-  ) {
+  constructor(createRenderer: CreateRenderer, listener: SessionListener, events: SelectorEvents) {
     this.#createRenderer = createRenderer;
     this.#listener = listener;
     this.#events = events;
   }
 
-  get active(): ActiveBackend<R> | null {
+  get active(): ActiveBackend | null {
     return this.#active;
   }
 
@@ -81,7 +73,7 @@ export class BackendSelector<R extends Renderer> {
   ): Promise<void> {
     this.#search?.cancel();
     const search = new BackendSearch();
-    const { signal } = search;
+    const { signal } = search.abort;
     this.#search = search;
     this.#photo = photo;
     // An attempt reads the photograph until it ends, even after the search was cancelled.
@@ -90,7 +82,7 @@ export class BackendSelector<R extends Renderer> {
       const working = await firstWorking(
         options.backends,
         (backend) => this.#attempt(backend, options, photo, signal),
-        () => signal.throwIfAborted(),
+        signal,
       );
       signal.throwIfAborted();
       this.#search = null;
@@ -116,7 +108,7 @@ export class BackendSelector<R extends Renderer> {
    * A backend stopped working. It is set up again, or replaced by the next one if it never drew a frame. A search in
    * progress goes on instead.
    */
-  lose(lost: ActiveBackend<R>, reason: string): void {
+  lose(lost: ActiveBackend, reason: string): void {
     const isReported = lost.lossReason !== null;
     lost.lossReason ??= reason;
     if (this.#active !== lost) return;
@@ -145,7 +137,7 @@ export class BackendSelector<R extends Renderer> {
   }
 
   #use(
-    found: ActiveBackend<R>,
+    found: ActiveBackend,
     options: RenderOptions,
     previous: Backend | null,
     reasons: readonly string[],
@@ -170,16 +162,14 @@ export class BackendSelector<R extends Renderer> {
   }
 
   #replace(
-    { backend, hasDrawn, lossReason }: ActiveBackend<R>,
+    { backend, hasDrawn, lossReason }: ActiveBackend,
     options: RenderOptions,
     previous: Backend | null,
     reasonBefore: string,
   ): void {
-    const reason = joinSentences([
-      reasonBefore,
-      `${BACKEND_TITLES[backend]} was lost: ${lossReason}`,
-    ]);
-    const backends = (hasDrawn ? backendsFrom : backendsAfter)(options.backends, backend);
+    const loss = `${BACKEND_TITLES[backend]} was lost: ${lossReason}`;
+    const reason = joinSentences([reasonBefore, loss]);
+    const backends = options.backends.slice(options.backends.indexOf(backend) + (hasDrawn ? 0 : 1));
     this.drop();
     if (this.#photo && backends.length > 0) {
       void this.select(this.#photo, { ...options, backends }, previous, reason);
@@ -195,12 +185,12 @@ export class BackendSelector<R extends Renderer> {
     options: RenderOptions,
     photo: RefCounted<Photograph>,
     signal: AbortSignal,
-  ): Promise<ActiveBackend<R>> {
+  ): Promise<ActiveBackend> {
     const active = this.#active;
     if (active?.photo === photo && active.lossReason === null && meets(active, backend, options)) {
       return active;
     }
-    let created: ActiveBackend<R> | null = null;
+    let created: ActiveBackend | null = null;
     let earlyLoss: string | null = null;
     const onLost = (reason: string): void => {
       if (created) this.lose(created, reason);
@@ -230,8 +220,8 @@ export class BackendSelector<R extends Renderer> {
   }
 }
 
-function meets<R extends Renderer>(
-  active: ActiveBackend<R>,
+function meets(
+  active: ActiveBackend,
   backend: Backend,
   { gamut, software }: RenderOptions,
 ): boolean {

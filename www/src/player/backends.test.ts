@@ -2,17 +2,13 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { Backend } from '../engine/types.js';
 import { PhotoError } from '../shared/errors.js';
-import { backendsAfter, backendsFrom, firstWorking } from './backends.js';
+import { firstWorking } from './backends.js';
 
-const neverCancelled = () => {};
+const { signal } = new AbortController();
 
 test('the first backend that works has no reason', async () => {
-  const working = await firstWorking(
-    ['webgl2', 'cpu'],
-    async (backend) => `on ${backend}`,
-    neverCancelled,
-  );
-  assert.deepEqual(working, { backend: 'webgl2', value: 'on webgl2', reason: '' });
+  const working = await firstWorking(['webgl2', 'cpu'], async (backend) => `on ${backend}`, signal);
+  assert.deepEqual(working, { value: 'on webgl2', reason: '' });
 });
 
 test('each failure leads to the next backend, and is a reason', async () => {
@@ -24,7 +20,7 @@ test('each failure leads to the next backend, and is a reason', async () => {
       if (backend !== 'cpu') throw new Error(`no ${backend} here`);
       return backend;
     },
-    neverCancelled,
+    signal,
   );
   assert.deepEqual(tried, ['webgpu', 'webgl2', 'cpu']);
   assert.equal(working.reason, 'WebGPU: no webgpu here. WebGL2: no webgl2 here.');
@@ -32,11 +28,7 @@ test('each failure leads to the next backend, and is a reason', async () => {
 
 test('if none works, the error has every reason', async () => {
   await assert.rejects(
-    firstWorking(
-      ['webgpu', 'webgl2'],
-      (backend) => Promise.reject(new Error(backend)),
-      neverCancelled,
-    ),
+    firstWorking(['webgpu', 'webgl2'], (backend) => Promise.reject(new Error(backend)), signal),
     {
       code: 'backend-unavailable',
       message: /WebGPU: webgpu\. WebGL2: webgl2\./,
@@ -46,24 +38,18 @@ test('if none works, the error has every reason', async () => {
 
 test('a cancelled search tries no further', async () => {
   const tried: Backend[] = [];
+  const abort = new AbortController();
   const search = firstWorking(
     ['webgpu', 'cpu'],
     (backend) => {
       tried.push(backend);
+      abort.abort(new Error('cancelled'));
       return Promise.reject(new Error('no'));
     },
-    () => {
-      throw new Error('cancelled');
-    },
+    abort.signal,
   );
   await assert.rejects(search, /cancelled/);
   assert.deepEqual(tried, ['webgpu']);
-});
-
-test('after a failure the next backends are left, after a loss also the same one', () => {
-  assert.deepEqual(backendsAfter(['webgpu', 'webgl2', 'cpu'], 'webgl2'), ['cpu']);
-  assert.deepEqual(backendsAfter(['cpu'], 'cpu'), []);
-  assert.deepEqual(backendsFrom(['webgpu', 'webgl2', 'cpu'], 'webgl2'), ['webgl2', 'cpu']);
 });
 
 test('csp-wasm ends the search at once', async () => {
@@ -75,7 +61,7 @@ test('csp-wasm ends the search at once', async () => {
       tried.push(backend);
       return Promise.reject(forbidden);
     },
-    () => {},
+    signal,
   );
   await assert.rejects(search, { code: 'csp-wasm' });
   assert.deepEqual(tried, ['webgpu']);

@@ -4,12 +4,11 @@ import { forbiddenByPolicy } from '../loading/http-errors.js';
 import { openPhoto } from '../loading/load.js';
 import { createDecoder } from '../photo/decoders.js';
 import { createRenderer, prepare } from '../renderers/renderer-factory.js';
-import type { CanvasRenderer } from '../renderers/types.js';
 import { withPolicyErrors } from '../shared/content-security-policy.js';
 import { callLater } from '../shared/promises.js';
 import type { SessionPorts } from './types.js';
 
-export const BROWSER_PORTS: SessionPorts<CanvasRenderer> = {
+export const BROWSER_PORTS: SessionPorts = {
   open: (src, credentials, options) =>
     openPhoto(src, options, {
       createDecoder,

@@ -11,54 +11,43 @@
  */
 
 import type { Backend } from '../engine/types.js';
+import type { FrameResult } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import { missingSource } from '../loading/load.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { FrameResult, Renderer } from '../renderers/types.js';
+import type { Renderer } from '../renderers/types.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
 import { Deferred } from '../shared/promises.js';
 import { type ActiveBackend, RefCounted } from './active-backend.js';
 import { BackendSelector } from './backend-selector.js';
-import { backendsFrom } from './backends.js';
 import { FrameScheduler } from './frame-scheduler.js';
 import type { SessionListener, SessionPorts, SessionSettings } from './types.js';
 
 /** How often a photograph that loses tiles is fetched again without a frame in between. */
 const MAX_REFETCHES = 5;
 
-/** The state of a load, as far as the page knows it. */
-type SessionStatus =
-  | 'idle'
-  /** Until a frame of the whole photograph is drawn; previews are drawn before. */
-  | 'loading'
-  /** A frame of the whole photograph was drawn. */
-  | 'loaded'
-  | SessionFailure;
-
-interface SessionFailure {
-  /** The status after the next frame; `null` if a frame, of a preview, does not repair the failure. */
-  readonly recovered: SessionStatus | null;
-}
-
-export class PhotoSession<R extends Renderer> {
-  readonly #ports: SessionPorts<R>;
-  readonly #listener: SessionListener<R>;
-  readonly #selector: BackendSelector<R>;
+export class PhotoSession {
+  readonly #ports: SessionPorts;
+  readonly #listener: SessionListener;
+  readonly #selector: BackendSelector;
   readonly #scheduler: FrameScheduler;
   #settings: SessionSettings | null = null;
-  #status: SessionStatus = 'idle';
+  /** Whether a frame of the whole photograph was drawn; previews are drawn before. */
+  #isLoaded = false;
+  /** A failed load is permanent: frames, which are of a preview then, do not repair it. */
+  #failure: 'temporary' | 'permanent' | null = null;
   /** Aborted when the load and its photograph are released. */
   #load = new AbortController();
   #photo: RefCounted<Photograph> | null = null;
   /** Fetches since the photograph was last drawn. */
   #refetches = 0;
   /** The frame after the one, or the search, that is in progress. */
-  #nextFrame: Promise<R> | null = null;
+  #nextFrame: Promise<Renderer> | null = null;
   /** The next frame has full quality, even if the device is slow. */
   #isFullQualityRequested = false;
   #quality = 1;
 
-  constructor(ports: SessionPorts<R>, listener: SessionListener<R>) {
+  constructor(ports: SessionPorts, listener: SessionListener) {
     this.#ports = ports;
     this.#listener = listener;
     this.#selector = new BackendSelector(ports.createRenderer, listener, {
@@ -79,7 +68,7 @@ export class PhotoSession<R extends Renderer> {
     return this.#selector.active?.backend ?? null;
   }
 
-  get renderer(): R | null {
+  get renderer(): Renderer | null {
     return this.#selector.active?.renderer ?? null;
   }
 
@@ -126,7 +115,7 @@ export class PhotoSession<R extends Renderer> {
    * progress; all requests made meanwhile get the same frame. Rejects with `not-loaded` if there is no photograph, and
    * with the error of a frame that fails.
    */
-  renderNow(): Promise<R> {
+  renderNow(): Promise<Renderer> {
     this.#isFullQualityRequested = true;
     return this.#renderNext();
   }
@@ -143,7 +132,7 @@ export class PhotoSession<R extends Renderer> {
   #refetch(reason: string): void {
     const src = this.#settings?.src;
     const previous = this.backend;
-    const hasFailed = typeof this.#status === 'object';
+    const hasFailed = this.#failure !== null;
     this.#release(true);
     if (this.#refetches === MAX_REFETCHES) {
       const summary = `The photograph was fetched ${MAX_REFETCHES} more times without success. Reload the page.`;
@@ -151,7 +140,7 @@ export class PhotoSession<R extends Renderer> {
       return;
     }
     this.#refetches += 1;
-    if (hasFailed) this.#status = { recovered: 'loading' };
+    if (hasFailed) this.#failure = 'temporary';
     if (src) void this.#run(src, previous, reason);
   }
 
@@ -159,7 +148,6 @@ export class PhotoSession<R extends Renderer> {
   async #run(src: string, previous: Backend | null, reason: string): Promise<void> {
     const { signal } = this.#load;
     const preparation = new AbortController();
-    if (this.#status === 'idle') this.#status = 'loading';
     if (this.#settings) this.#ports.prepare(this.#settings.renderOptions, preparation.signal);
     const onPreview = (preview: Photograph): void => {
       // The last preview must be drawn first.
@@ -180,7 +168,9 @@ export class PhotoSession<R extends Renderer> {
       if (signal.aborted) photo.free();
       else await this.#use(photo, previous, reason);
     } catch (thrown) {
-      if (!signal.aborted) this.#fail(toPhotoError(thrown), true);
+      if (signal.aborted) return;
+      this.#failure = 'permanent';
+      this.#fail(toPhotoError(thrown));
     } finally {
       preparation.abort();
     }
@@ -198,7 +188,7 @@ export class PhotoSession<R extends Renderer> {
     if (!options) return;
     if (!backend) return this.#selector.select(shared, options, previous, reason);
     // Backends that could not draw the preview are not tried again.
-    const backends = backendsFrom(options.backends, backend);
+    const backends = options.backends.slice(options.backends.indexOf(backend));
     return this.#selector.select(shared, { ...options, backends }, backend, '');
   }
 
@@ -216,7 +206,7 @@ export class PhotoSession<R extends Renderer> {
     );
   }
 
-  #renderNext(): Promise<R> {
+  #renderNext(): Promise<Renderer> {
     if (!this.#nextFrame && !this.#inProgress) return this.#render();
     this.#nextFrame ??= this.#renderAfterWait();
     return this.#nextFrame;
@@ -230,7 +220,7 @@ export class PhotoSession<R extends Renderer> {
     return this.#selector.search ?? this.#selector.active?.frame?.promise;
   }
 
-  async #renderAfterWait(): Promise<R> {
+  async #renderAfterWait(): Promise<Renderer> {
     const { signal } = this.#load;
     while (this.#inProgress) {
       await this.#inProgress;
@@ -240,19 +230,19 @@ export class PhotoSession<R extends Renderer> {
     return await this.#render();
   }
 
-  async #render(): Promise<R> {
+  async #render(): Promise<Renderer> {
     const { signal } = this.#load;
     const { active } = this.#selector;
     const isFullQuality = this.#isFullQualityRequested;
     this.#isFullQualityRequested = false;
     if (!active || !this.#settings) throw notLoaded();
     const { light, output } = this.#settings;
-    const quality = isFullQuality ? 1 : active.renderer.quality.quality;
+    const quality = isFullQuality ? 1 : active.quality.quality;
     this.#scheduler.frameStarted();
     try {
       const startMs = this.#ports.now();
       let frame = active.renderer.render(light, output, quality);
-      if (!isFullQuality) this.#measure(active.renderer, startMs, frame);
+      if (!isFullQuality) this.#measure(active, startMs, frame);
       if (frame instanceof Promise) {
         active.frame = new Deferred();
         frame = await frame;
@@ -278,7 +268,11 @@ export class PhotoSession<R extends Renderer> {
   }
 
   /** Measures a frame of an animation for the choice of the next one's quality. */
-  #measure({ quality }: R, startMs: number, frame: FrameResult | Promise<FrameResult>): void {
+  #measure(
+    { quality }: ActiveBackend,
+    startMs: number,
+    frame: FrameResult | Promise<FrameResult>,
+  ): void {
     const record = () => quality.recordFrame(startMs, this.#ports.now());
     if (frame instanceof Promise) frame.then(record, () => {});
     // A graphics device still works on the frame, which delays the browser's next one.
@@ -288,7 +282,7 @@ export class PhotoSession<R extends Renderer> {
   }
 
   #report(
-    active: ActiveBackend<R>,
+    active: ActiveBackend,
     frame: FrameResult,
     light: LightSetting,
     frameQuality: number,
@@ -308,7 +302,7 @@ export class PhotoSession<R extends Renderer> {
     if (isChanged) this.#listener.qualityChanged(quality);
   }
 
-  #handleFrameError(active: ActiveBackend<R>, error: PhotoError): void {
+  #handleFrameError(active: ActiveBackend, error: PhotoError): void {
     if (error.code === 'backend-lost') this.#selector.lose(active, error.message);
     else if (error.code !== 'photo-lost') this.#fail(error);
     else if (active.photo.value.isComplete) this.#refetch(error.message);
@@ -317,20 +311,17 @@ export class PhotoSession<R extends Renderer> {
   }
 
   #recover(): void {
-    if (typeof this.#status === 'object' && this.#status.recovered) {
-      this.#status = this.#status.recovered;
-      this.#listener.recovered();
-    }
-    if (this.#status === 'loading' && this.photo?.isComplete) {
-      this.#status = 'loaded';
+    if (this.#failure === 'permanent') return;
+    if (this.#failure) this.#listener.recovered();
+    this.#failure = null;
+    if (!this.#isLoaded && this.photo?.isComplete) {
+      this.#isLoaded = true;
       this.#listener.loaded();
     }
   }
 
-  #fail(error: PhotoError, isFinal = false): void {
-    const status = this.#status;
-    const recovered = typeof status === 'object' ? status.recovered : status;
-    this.#status = { recovered: isFinal ? null : recovered };
+  #fail(error: PhotoError): void {
+    this.#failure ??= 'temporary';
     this.#listener.failed(error);
   }
 
@@ -343,7 +334,8 @@ export class PhotoSession<R extends Renderer> {
     this.#photo = null;
     this.#nextFrame = null;
     this.#isFullQualityRequested = false;
-    this.#status = 'idle';
+    this.#isLoaded = false;
+    this.#failure = null;
   }
 }
 

@@ -2,7 +2,6 @@
 
 import type { Backend } from '../engine/types.js';
 import type { Photograph } from '../photo/photograph.js';
-import { QualityController } from '../renderers/quality-controller.js';
 import { withBackends, withExposure } from '../renderers/settings-fakes.js';
 import type { Renderer } from '../renderers/types.js';
 import { PhotoError } from '../shared/errors.js';
@@ -60,7 +59,7 @@ export function fakeSession() {
   let lightError: PhotoError | null = null;
   /** The frames in progress; `null` while frames are drawn at once. */
   let slowFrames: SlowFrame[] | null = null;
-  const session = new PhotoSession<Renderer>(
+  const session = new PhotoSession(
     {
       open: (src, _credentials, { signal, onPreview }) =>
         new Promise((resolve, reject) => {
@@ -84,7 +83,7 @@ export function fakeSession() {
           const renderer: Renderer = {
             kernel: 'fake',
             gamut: options.gamut,
-            quality: new QualityController(),
+            canvas: {} as HTMLCanvasElement,
             render: ({ name }, _output, quality) => {
               if (isLostAtFrame) throw new PhotoError('backend-lost', 'the device is gone.');
               log.push(`${backend} draws ${name}${quality < 1 ? ` with ${quality}` : ''}`);

@@ -2,10 +2,11 @@
 
 import type { OutputSettings } from '../engine/output-settings.js';
 import type { Backend } from '../engine/types.js';
+import type { FrameResult } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LoadOptions } from '../loading/load.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { CreateRenderer, FrameResult, Renderer, RenderOptions } from '../renderers/types.js';
+import type { CreateRenderer, Renderer, RenderOptions } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
 
 /** Everything that the element's attributes and the visitor decide. */
@@ -29,20 +30,20 @@ export interface FramePorts {
 }
 
 /** Loading and drawing; tests replace them. */
-export interface SessionPorts<R extends Renderer> extends FramePorts {
+export interface SessionPorts extends FramePorts {
   open(src: string, credentials: RequestCredentials, options: LoadOptions): Promise<Photograph>;
   /** Warms up the backend that will probably be used, until `signal` is aborted. */
   prepare(options: RenderOptions, signal: AbortSignal): void;
-  readonly createRenderer: CreateRenderer<R>;
+  readonly createRenderer: CreateRenderer;
 }
 
 /** What a session reports. */
-export interface SessionListener<R extends Renderer> {
+export interface SessionListener {
   /** A load starts; the last photograph is gone. */
   loadStarted(): void;
   progress: LoadOptions['onProgress'];
-  /** A new renderer has drawn its first frame: its surface replaces the last one. */
-  rendererChanged(renderer: R): void;
+  /** A new renderer has drawn its first frame: its canvas replaces the last one. */
+  rendererChanged(renderer: Renderer): void;
   /** A frame was drawn; `light` is the light that was requested for it. */
   frameDrawn(frame: FrameResult, light: LightSetting): void;
   /** That frame has another quality than the last one. The first frame is compared with 1. */

@@ -13,7 +13,6 @@ import type { Devices, LoadGraphics } from './gpu/devices.js';
 import { gpuRenderers } from './gpu/gpu-renderer.js';
 import { rendererFactory } from './renderer-factory.js';
 import { PLAIN, withBackends, withExposure } from './settings-fakes.js';
-import type { CanvasRenderer } from './types.js';
 
 const SETTINGS: SessionSettings = {
   src: 'a.ltm',
@@ -79,7 +78,7 @@ async function startSession(t: TestContext, open = async (_: Backend): Promise<v
   const { createDevices, created, released } = fakeDevices(tilesInModules);
   const frames: (() => void)[] = [];
   const changes: string[] = [];
-  const session = new PhotoSession<CanvasRenderer>(
+  const session = new PhotoSession(
     {
       open: async () => Photograph.fromModule(photo),
       prepare: () => {},

@@ -10,7 +10,8 @@ import { startWorker } from '../engine/worker-server.js';
 import { messageOf, PhotoError } from '../shared/errors.js';
 import type { CpuRenderers } from './cpu/cpu-renderer.js';
 import type { GpuRenderers } from './gpu/gpu-renderer.js';
-import type { CanvasRenderer, CreateRenderer, RenderOptions } from './types.js';
+import type { GraphicsBackend } from './gpu/graphics-ports.js';
+import type { CreateRenderer, RenderOptions } from './types.js';
 
 /** More workers would wait for memory and for each other. */
 const MAX_WORKERS = 4;
@@ -18,7 +19,7 @@ const MAX_WORKERS = 4;
 const IDLE_DELAY_MS = 1000;
 
 export interface RendererFactory {
-  readonly createRenderer: CreateRenderer<CanvasRenderer>;
+  readonly createRenderer: CreateRenderer;
   /** Warms up the first backend that works until `signal` is aborted. Errors are left to `createRenderer`. */
   prepare(options: RenderOptions, signal: AbortSignal): Promise<void>;
 }
@@ -69,8 +70,7 @@ export function rendererFactory({ gpu, cpu, cpuModule }: RendererLoaders): Rende
   };
 }
 
-const MODULE_LOADERS: { readonly [B in Backend]: () => Promise<Modules[B]> } = {
-  cpu: loadCpu,
+const GRAPHICS_LOADERS: { readonly [B in GraphicsBackend]: () => Promise<Modules[B]> } = {
   webgl2: loadWebGl2,
   webgpu: loadWebGpu,
 };
@@ -80,8 +80,8 @@ const poolSize = Math.min(MAX_WORKERS, globalThis.navigator?.hardwareConcurrency
 /** The factory of this page. */
 export const { createRenderer, prepare } = rendererFactory({
   gpu: loadOnce(async () => {
-    const { Devices, gpuRenderers } = await import('./gpu/gpu-renderer.js');
-    return gpuRenderers((name) => MODULE_LOADERS[name](), new Devices());
+    const { gpuRenderers } = await import('./gpu/gpu-renderer.js');
+    return gpuRenderers((name) => GRAPHICS_LOADERS[name]());
   }),
   cpu: loadOnce(async () => {
     const { WorkerPool, cpuRenderers } = await import('./cpu/cpu-renderer.js');

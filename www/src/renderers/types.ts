@@ -2,10 +2,9 @@
 
 import type { OutputSettings } from '../engine/output-settings.js';
 import type { Backend, Freeable, Gamut } from '../engine/types.js';
+import type { FrameResult } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { PhotoError } from '../shared/errors.js';
-import type { QualityController } from './quality-controller.js';
 
 /** Which backends may draw, and in which colours. */
 export interface RenderOptions {
@@ -19,14 +18,13 @@ export interface RenderOptions {
 
 /** Draws one photograph with one backend. */
 export interface Renderer extends Freeable {
+  readonly canvas: HTMLCanvasElement;
   /** The implementation, for people: the SIMD level or the graphics adapter. */
   readonly kernel: string;
   /** The gamut that the canvas really has. */
   readonly gamut: Gamut;
   /** Reason for degraded rendering, if any. */
   readonly warning?: string;
-  /** Chooses the quality of an animation's frames: frame times of other renderers say nothing about it. */
-  readonly quality: QualityController;
   /**
    * Draws one frame with a share of the components (`quality`, 0 to 1). Call it again only after the last promise has
    * settled. If the light is unavailable, the last available one is used and `FrameResult` has the error. Throws or
@@ -40,32 +38,14 @@ export interface Renderer extends Freeable {
 }
 
 /**
- * Creates a renderer with a surface of its own, because a canvas cannot change from one graphics API to another. It may
+ * Creates a renderer with a canvas of its own, because a canvas cannot change from one graphics API to another. It may
  * stop early once `signal` is aborted. Calls `onLost` at most once. Rejects with `backend-unavailable`, in which case
  * the tiles stay where they are, or with `photo-lost`.
  */
-export type CreateRenderer<R extends Renderer> = (
+export type CreateRenderer = (
   backend: Backend,
   photo: Photograph,
   options: RenderOptions,
   onLost: (reason: string) => void,
   signal: AbortSignal,
-) => Promise<R>;
-
-/** A renderer whose surface is a canvas element. */
-export interface CanvasRenderer extends Renderer {
-  readonly canvas: HTMLCanvasElement;
-  /**
-   * The canvas's picture as a file of the MIME type `type`, `scale` times as wide and as high; `quality` is that of
-   * `HTMLCanvasElement.toBlob`.
-   */
-  encode(type: string, quality: number | undefined, scale: number): Promise<Blob>;
-}
-
-/** The light with which a frame was drawn. */
-export interface FrameResult {
-  /** False if the frame shows the last light, because the requested one has no picture (yet). */
-  readonly lightApplied: boolean;
-  /** Why the requested light is unavailable; `null` if it is not, or is only loading. */
-  readonly lightError: PhotoError | null;
-}
+) => Promise<Renderer>;

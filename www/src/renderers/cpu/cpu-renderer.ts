@@ -1,15 +1,15 @@
 /**
- * Creates renderers for the CPU: in the page's worker pool, or on the page's thread if there are no workers. It is a separate script, which
- * has its own copies of shared code.
+ * Creates renderers for the CPU: in the page's worker pool, or on the page's thread if there are no workers. It is a
+ * separate script, which has its own copies of shared code.
  */
 
 import type { CpuModule, Gamut } from '../../engine/types.js';
 import type { Photograph } from '../../photo/photograph.js';
 import { hasCode, messageOf } from '../../shared/errors.js';
-import type { CanvasRenderer } from '../types.js';
-import { MainThreadRenderer } from './main-thread-renderer.js';
+import type { Renderer } from '../types.js';
+import { createMainThreadRenderer } from './main-thread-renderer.js';
 import type { WorkerPool } from './worker-pool.js';
-import { WorkerRenderer } from './worker-renderer.js';
+import { createWorkerRenderer } from './worker-renderer.js';
 
 export { WorkerPool } from './worker-pool.js';
 
@@ -25,17 +25,17 @@ export function cpuRenderers(pool: WorkerPool) {
       photograph: Photograph,
       gamut: Gamut,
       signal: AbortSignal,
-    ): Promise<CanvasRenderer> {
+    ): Promise<Renderer> {
       if (!warnings.has(photograph)) {
         try {
-          return await WorkerRenderer.create(module, photograph, pool, gamut);
+          return await createWorkerRenderer(module, photograph, pool, gamut);
         } catch (thrown) {
           if (!hasCode(thrown, 'worker-unavailable')) throw thrown;
           warnings.set(photograph, `The page relights without workers: ${messageOf(thrown)}`);
         }
       }
       const warning = warnings.get(photograph) ?? '';
-      return await MainThreadRenderer.create(module, photograph, gamut, warning, signal);
+      return await createMainThreadRenderer(module, photograph, gamut, warning, signal);
     },
     /** Starts workers. The returned function releases them. */
     warmUp: () => pool.warmUp(),

@@ -6,10 +6,8 @@
 import type { GraphicsDevice, Modules } from '../../engine/types.js';
 import { PhotoError } from '../../shared/errors.js';
 import { withTimeout } from '../../shared/promises.js';
-import type { DeviceHandle } from '../wasm-renderer.js';
+import type { DeviceHandle } from '../module-renderer.js';
 import { BROWSER_GRAPHICS, type GraphicsBackend, type GraphicsPorts } from './graphics-ports.js';
-
-export type { GraphicsBackend } from './graphics-ports.js';
 
 export type LoadGraphics = <N extends GraphicsBackend>(name: N) => Promise<Modules[N]>;
 

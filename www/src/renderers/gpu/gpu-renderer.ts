@@ -1,18 +1,14 @@
-/**
- * Creates renderers for graphics devices. It is a script of its own with copies of what it shares with the element's
- * script.
- */
+/** Creates renderers for graphics devices. It is a separate script, which has its own copies of shared code. */
 
 import type { Photograph } from '../../photo/photograph.js';
-import type { CanvasRenderer, RenderOptions } from '../types.js';
-import { WasmRenderer } from '../wasm-renderer.js';
-import type { Devices, GraphicsBackend, LoadGraphics } from './devices.js';
-
-export { Devices } from './devices.js';
+import { createModuleRenderer } from '../module-renderer.js';
+import type { Renderer, RenderOptions } from '../types.js';
+import { Devices, type LoadGraphics } from './devices.js';
+import type { GraphicsBackend } from './graphics-ports.js';
 
 export type GpuRenderers = ReturnType<typeof gpuRenderers>;
 
-export function gpuRenderers(load: LoadGraphics, devices: Devices) {
+export function gpuRenderers(load: LoadGraphics, devices = new Devices()) {
   return {
     async create(
       backend: GraphicsBackend,
@@ -20,7 +16,7 @@ export function gpuRenderers(load: LoadGraphics, devices: Devices) {
       { gamut, software }: RenderOptions,
       onLost: (reason: string) => void,
       signal: AbortSignal,
-    ): Promise<CanvasRenderer> {
+    ): Promise<Renderer> {
       const lease = await devices.lease(load, backend, software, onLost);
       try {
         signal.throwIfAborted();
@@ -30,8 +26,7 @@ export function gpuRenderers(load: LoadGraphics, devices: Devices) {
           async (photo) => {
             const canvas = document.createElement('canvas');
             const relighter = await lease.graphics.draw(photo, canvas, gamut);
-            const lightPlane = photograph.createLightPlane(module);
-            return new WasmRenderer(module, lightPlane, relighter, canvas, lease);
+            return createModuleRenderer(module, photograph, relighter, canvas, lease);
           },
           { signal },
         );

@@ -20,19 +20,8 @@ export const BROWSER_GRAPHICS: GraphicsPorts = {
   now: () => performance.now(),
 };
 
-/** The part of WebGPU that is used here; TypeScript's DOM types lack it. */
-interface Gpu {
-  requestAdapter(): Promise<{ readonly info?: AdapterInfo } | null>;
-}
-interface AdapterInfo {
-  readonly vendor?: string;
-  readonly architecture?: string;
-  readonly description?: string;
-  readonly isFallbackAdapter?: boolean;
-}
-
 async function webGpuName(): Promise<string | null> {
-  const adapter = await (navigator as { gpu?: Gpu }).gpu?.requestAdapter();
+  const adapter = await navigator.gpu?.requestAdapter();
   if (!adapter) return null;
   const { vendor, architecture, description, isFallbackAdapter } = adapter.info ?? {};
   return [vendor, architecture, description, isFallbackAdapter ? 'software' : ''].join(' ').trim();

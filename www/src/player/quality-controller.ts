@@ -1,8 +1,6 @@
 /**
  * Chooses the quality of an animation's frames, so that they keep a rate of 30 a second. It learns only from the begin
- * and end of frames; it has no clock.
- *
- * Every wait is counted in frames of animations, because other frames teach nothing.
+ * and end of such frames, and has no clock: every delay is a number of frames.
  */
 
 /** The shares of the components to choose from. Half of the components take at best half of the time. */
@@ -40,7 +38,6 @@ interface Drop {
   readonly ms: number;
 }
 
-/** For one renderer. It is part of the renderers' scripts. */
 export class QualityController {
   /** Index of the current quality in `QUALITY_LEVELS`. */
   #level = 0;

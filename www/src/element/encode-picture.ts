@@ -1,11 +1,16 @@
-/** Encodes the picture on a renderer's canvas. Part of the renderers' scripts, because it needs a picture. */
+/** Encodes the picture on a renderer's canvas as a file. */
 
+import type { Renderer } from '../renderers/types.js';
 import { PhotoError } from '../shared/errors.js';
-import type { CanvasRenderer } from './types.js';
 
-/** Implements `CanvasRenderer.encode`. Reads the canvas at once: that of a GPU keeps its content only until the next frame. */
+type Picture = Pick<Renderer, 'canvas' | 'gamut'>;
+
+/**
+ * The picture as a file of the MIME type `type`, `scale` times as wide and as high; `quality` is that of
+ * `HTMLCanvasElement.toBlob`. Reads the canvas at once: that of a GPU keeps its content only until the next frame.
+ */
 export function encodePicture(
-  this: Pick<CanvasRenderer, 'canvas' | 'gamut'>,
+  picture: Picture,
   type: string,
   quality: number | undefined,
   scale: number,
@@ -15,16 +20,13 @@ export function encodePicture(
       blob
         ? resolve(blob)
         : reject(new PhotoError('internal', `The browser could not encode ${type}.`));
-    const canvas = scale === 1 ? this.canvas : resample(this, scale);
+    const canvas = scale === 1 ? picture.canvas : resample(picture, scale);
     canvas.toBlob(settle, type, quality);
   });
 }
 
 /** A copy of a canvas, `scale` times as wide and as high. */
-function resample(
-  { canvas, gamut }: Pick<CanvasRenderer, 'canvas' | 'gamut'>,
-  scale: number,
-): HTMLCanvasElement {
+function resample({ canvas, gamut }: Picture, scale: number): HTMLCanvasElement {
   const copy = document.createElement('canvas');
   copy.width = Math.max(1, Math.round(canvas.width * scale));
   copy.height = Math.max(1, Math.round(canvas.height * scale));

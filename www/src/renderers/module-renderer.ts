@@ -1,0 +1,74 @@
+/** Draws on a canvas with a WebAssembly module on the page's thread: WebGPU, WebGL2 or the CPU. */
+
+import { createOutputTransform } from '../engine/output-settings.js';
+import type { Relighter, RelightModule } from '../engine/types.js';
+import type { ImageLight } from '../lights/image-light.js';
+import { LightCache } from '../lights/light-cache.js';
+import type { Photograph } from '../photo/photograph.js';
+import { toPhotoError } from '../shared/errors.js';
+import type { Renderer } from './types.js';
+
+/** The graphics device that a renderer shares with others. */
+export interface DeviceHandle {
+  /** Reports that the device does not work. */
+  fail(reason: string): void;
+  release(): void;
+}
+
+/** A renderer with a module's relighter, which is freed with it; `device` is released. */
+export function createModuleRenderer(
+  module: RelightModule,
+  photograph: Photograph,
+  relighter: Relighter,
+  canvas: HTMLCanvasElement,
+  device: DeviceHandle | null = null,
+): Renderer {
+  const { kernel, gamut } = relighter;
+  const lights = new LightCache(module, photograph.createLightPlane(module));
+  /** Whether the device's light is an uploaded image. */
+  let hasUploadedImage = false;
+  return {
+    canvas,
+    kernel,
+    gamut,
+    render(setting, output, quality) {
+      const transform = createOutputTransform(module, output, gamut);
+      try {
+        if (upload(relighter, setting.image)) {
+          hasUploadedImage = true;
+          relighter.renderLightImage(transform, quality);
+          return { lightApplied: true, lightError: null };
+        }
+        const { light, lightApplied, lightError } = lights.get(setting);
+        // An image that is no longer readable keeps its last uploaded content.
+        hasUploadedImage &&= !lightApplied;
+        if (hasUploadedImage) relighter.renderLightImage(transform, quality);
+        else relighter.render(light, transform, quality);
+        return { lightApplied, lightError };
+      } catch (thrown) {
+        const { code, message } = toPhotoError(thrown);
+        if (code === 'backend-lost') device?.fail(message);
+        throw thrown;
+      } finally {
+        transform.free();
+      }
+    },
+    free() {
+      relighter.free();
+      device?.release();
+      lights.free();
+    },
+  };
+}
+
+/** Uploads an image directly to the device, if both support that: its pixels bypass the page's memory. */
+function upload(relighter: Relighter, image: ImageLight | null): boolean {
+  const source = image?.uploadable();
+  if (!source) return false;
+  try {
+    return relighter.setLightImage(source.image, source.width, source.height);
+  } catch {
+    // Reading its pixels, which follows, reports the error.
+    return false;
+  }
+}
