@@ -1,11 +1,11 @@
 /** Decodes a file from any source on the calling thread. */
 
 import { loadDecoder } from '../engine/core-modules.js';
+import type { Piece } from '../loading/byte-source.js';
 import { tooLong } from '../loading/http-errors.js';
-import { openPhoto } from '../loading/load.js';
+import { decodePieces, openPhoto } from '../loading/load.js';
 import { MainThreadDecoder } from '../photo/main-thread-decoder.js';
 import type { PhotoDecoder } from '../photo/photo-decoder.js';
-import type { Photograph } from '../photo/photograph.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
 import { DecodedPhotograph } from './decoded-photo.js';
 import type { CorePhotograph } from './types.js';
@@ -43,53 +43,44 @@ export async function decode(
   signal.throwIfAborted();
   const now = () => performance.now();
   const createDecoder = async () => new MainThreadDecoder(await loadDecoder(fetchCoreWasm), now);
+  const options = { signal, onProgress, onPreview: null };
   if (typeof file !== 'string' && !(file instanceof URL)) {
-    const photograph = decodePieces(await createDecoder(), piecesOf(file), signal, onProgress);
-    return new DecodedPhotograph(await photograph);
+    const arriving = arrivingBytes(file);
+    const decoder = await createDecoder();
+    try {
+      const pieces = piecesOf(arriving, decoder);
+      const photograph = await decodePieces(decoder, pieces, options, { now, yieldToPage });
+      return new DecodedPhotograph(photograph);
+    } catch (thrown) {
+      signal.throwIfAborted();
+      throw toPhotoError(thrown);
+    } finally {
+      decoder.free();
+    }
   }
   const url = absoluteUrl(file);
   const bytes = url.startsWith('file:') ? await readFileOrThrow(url) : null;
   if (bytes) return decode(bytes, { signal, onProgress });
   const fetchFile: typeof fetch = (...request) => fetch(...request);
   const ports = { createDecoder, fetch: fetchFile, yieldToPage, now };
-  const options = { signal, onProgress, onPreview: null };
   return new DecodedPhotograph(await openPhoto(url, options, ports));
 }
 
-/** Decodes pieces of a file that come in order. */
-async function decodePieces(
+/** The pieces of a file whose bytes arrive in order. */
+async function* piecesOf(
+  arriving: Iterable<Uint8Array> | AsyncIterable<Uint8Array>,
   decoder: PhotoDecoder,
-  pieces: Iterable<Uint8Array> | AsyncIterable<Uint8Array>,
-  signal: AbortSignal,
-  onProgress: (loaded: number, total: number) => void,
-): Promise<Photograph> {
-  const yieldOrThrow = async () => {
-    await yieldToPage();
-    signal.throwIfAborted();
-  };
-  try {
-    let offset = 0;
-    for await (const bytes of pieces) {
-      signal.throwIfAborted();
-      await decoder.feed(offset, bytes, yieldOrThrow);
-      offset += bytes.byteLength;
-      const { bytesFed, fileBytes } = decoder.state;
-      if (fileBytes !== undefined && offset > fileBytes) {
-        throw tooLong('The file', fileBytes, offset);
-      }
-      onProgress(bytesFed, fileBytes ?? 0);
-      signal.throwIfAborted();
-    }
-    return await decoder.finish();
-  } catch (thrown) {
-    signal.throwIfAborted();
-    throw toPhotoError(thrown);
-  } finally {
-    decoder.free();
+): AsyncGenerator<Piece, void> {
+  let offset = 0;
+  for await (const bytes of arriving) {
+    yield { offset, bytes };
+    offset += bytes.byteLength;
+    const { fileBytes = offset } = decoder.state;
+    if (offset > fileBytes) throw tooLong('The file', fileBytes, offset);
   }
 }
 
-function piecesOf(
+function arrivingBytes(
   file: Exclude<PhotoFile, string | URL>,
 ): Iterable<Uint8Array> | AsyncIterable<Uint8Array> {
   if (file instanceof ArrayBuffer) return [new Uint8Array(file)];

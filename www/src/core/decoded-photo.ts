@@ -1,15 +1,16 @@
 /** The class behind `CorePhotograph`. */
 
+import type { RowRangeRelighter } from '../engine/types.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { PhotoInfo } from '../shared/photo-info.js';
+import type { PhotoInfo } from '../shared/values.js';
 import type { CorePhotograph } from './types.js';
 
 export interface DecodedPhotograph extends PhotoInfo {}
 
 // biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the constructor assigns the interface's properties
 export class DecodedPhotograph implements CorePhotograph {
-  /** Called before the photograph is freed. */
-  onFree: (() => void) | null = null;
+  /** Made for the first picture. */
+  relighter: RowRangeRelighter | null = null;
   #isFreed = false;
 
   constructor(readonly photograph: Photograph) {
@@ -19,7 +20,7 @@ export class DecodedPhotograph implements CorePhotograph {
   free(): void {
     if (this.#isFreed) return;
     this.#isFreed = true;
-    this.onFree?.();
+    this.relighter?.free();
     this.photograph.free();
   }
 }

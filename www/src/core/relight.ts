@@ -2,7 +2,7 @@
 
 import { loadCpu } from '../engine/core-modules.js';
 import { createOutputTransform } from '../engine/output-settings.js';
-import type { CpuModule, Light, ReceivedPhoto, RowRangeRelighter } from '../engine/types.js';
+import type { CpuModule, Light, ReceivedPhoto } from '../engine/types.js';
 import { toPhotoError } from '../shared/errors.js';
 import type { Gamut, LightName, ToneCurve } from '../shared/names.js';
 import {
@@ -59,9 +59,6 @@ export interface Picture {
   readonly pixels: Uint8ClampedArray<ArrayBuffer>;
 }
 
-/** The relighter of each photograph, for its next picture. */
-const relighters = new WeakMap<DecodedPhotograph, RowRangeRelighter>();
-
 /**
  * Relights a photograph. Rejects with a `PhotoError`: `attribute` for an invalid option, `light-…` for an invalid
  * light.
@@ -86,7 +83,8 @@ export async function relight(
   const module = await loadCpu(fetchCoreWasm);
   try {
     await photo.photograph.withModule(module, (modulePhoto) => {
-      const relighter = relighterOf(module, photo, modulePhoto);
+      photo.relighter ??= new module.RowRangeRelighter(modulePhoto, 0, height);
+      const { relighter } = photo;
       const lightInModule = createLight(module, modulePhoto, light);
       const transform = createOutputTransform(module, output, outputGamut);
       try {
@@ -102,19 +100,6 @@ export async function relight(
     throw toPhotoError(thrown);
   }
   return { width, height, pixels };
-}
-
-function relighterOf(
-  module: CpuModule,
-  photo: DecodedPhotograph,
-  modulePhoto: ReceivedPhoto,
-): RowRangeRelighter {
-  const known = relighters.get(photo);
-  if (known) return known;
-  const relighter = new module.RowRangeRelighter(modulePhoto, 0, photo.height);
-  relighters.set(photo, relighter);
-  photo.onFree = () => relighter.free();
-  return relighter;
 }
 
 function createLight({ Light }: CpuModule, modulePhoto: ReceivedPhoto, light: CoreLight): Light {

@@ -2,8 +2,7 @@
 
 import { checkLightSource, isLightSource, type LightSource } from '../lights/light-source.js';
 import type { Backend, Gamut, LightName } from '../shared/names.js';
-import type { PhotoInfo } from '../shared/photo-info.js';
-import type { PicturePoint } from '../shared/values.js';
+import type { PhotoInfo, PicturePoint } from '../shared/values.js';
 import type { LightPose } from '../state/viewer-state.js';
 import type { PhotoView } from '../state/viewport.js';
 import { encodePicture } from './encode-picture.js';
@@ -14,7 +13,7 @@ import { ATTRIBUTES, PROPERTIES, type Reflected, reflect } from './reflect.js';
 // Servers have no HTMLElement, but importing this module must work there.
 const Base = globalThis.HTMLElement ?? (class {} as unknown as typeof HTMLElement);
 
-export type { PhotoInfo } from '../shared/photo-info.js';
+export type { PhotoInfo } from '../shared/values.js';
 
 /** Options of `toBlob`. */
 export interface BlobOptions {

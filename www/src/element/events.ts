@@ -6,7 +6,7 @@ import type { Backend, LightName } from '../shared/names.js';
 import type { PicturePoint } from '../shared/values.js';
 import type { PhotoView } from '../state/viewport.js';
 
-const EVENT_OPTIONS: EventInit = { bubbles: true, composed: true };
+export const EVENT_OPTIONS: EventInit = { bubbles: true, composed: true };
 
 /** An event with further fields. */
 class PhotoEvent extends Event {
@@ -14,21 +14,6 @@ class PhotoEvent extends Event {
     super(type, EVENT_OPTIONS);
     Object.assign(this, fields);
   }
-}
-
-/** `load`: the whole photograph is drawn. */
-export function createLoadEvent(): Event {
-  return new Event('load', EVENT_OPTIONS);
-}
-
-/** `progress`: more of the file has arrived; `total` is 0 while unknown. */
-export function createProgressEvent(loaded: number, total: number): ProgressEvent {
-  return new ProgressEvent('progress', {
-    ...EVENT_OPTIONS,
-    loaded,
-    total,
-    lengthComputable: total > 0,
-  });
 }
 
 /** `error`: something failed. The element shows the message as well. */

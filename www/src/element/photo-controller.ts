@@ -28,14 +28,13 @@ import { ShadowDom } from '../ui/shadow-dom.js';
 import {
   BackendChangeEvent,
   ContextLostEvent,
-  createLoadEvent,
-  createProgressEvent,
+  EVENT_OPTIONS,
   LightChangeEvent,
   PhotoErrorEvent,
   QualityChangeEvent,
   ViewChangeEvent,
 } from './events.js';
-import { observeVisibility, unobserveVisibility } from './visibility.js';
+import { observeVisibility, type Visibility } from './visibility.js';
 
 export class PhotoController {
   readonly state: ViewerState;
@@ -194,14 +193,15 @@ export class PhotoController {
       },
       progress: (loaded, total) => {
         this.#dom.updateProgress(total > 0 ? Math.min(1, loaded / total) : Number.NaN);
-        this.#dispatch(createProgressEvent(loaded, total));
+        const progress = { loaded, total, lengthComputable: total > 0 };
+        this.#dispatch(new ProgressEvent('progress', { ...EVENT_OPTIONS, ...progress }));
       },
       frameDrawn: (frame, light) => this.#frameDrawn(frame, light),
       qualityChanged: (quality) => this.#dispatch(new QualityChangeEvent(quality)),
       loaded: () => {
         this.#dom.updateProgress(null);
         this.#presenter.announce('loaded');
-        this.#dispatch(createLoadEvent());
+        this.#dispatch(new Event('load', EVENT_OPTIONS));
       },
       rendererChanged: ({ canvas }) => {
         this.#dom.showCanvas(canvas);
@@ -243,11 +243,12 @@ export class PhotoController {
     this.#connection = new AbortController();
     const { signal } = this.#connection;
     reducedMotion().addEventListener('change', () => this.schedule(), { signal });
-    observeVisibility(this.#host, (visibility, isTrue) => {
+    const update = (visibility: Visibility, isTrue: boolean) => {
       this.state.reveal[visibility] = isTrue;
       if (visibility === 'isVisible') this.session.setVisible(isTrue);
       this.schedule();
-    });
+    };
+    observeVisibility(this.#host, update, signal);
   }
 
   /** Gives the session new settings, as soon as the photograph may be fetched. */
@@ -315,7 +316,6 @@ export class PhotoController {
 
   /** The element has left the document. */
   #release(): void {
-    unobserveVisibility(this.#host);
     this.#connection?.abort();
     this.#connection = null;
     this.state.reveal.isNear = false;

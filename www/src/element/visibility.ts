@@ -1,41 +1,34 @@
-/** Observes whether elements are in the viewport or near it. All elements share two observers, which report together. */
+/** Observes whether an element is in the viewport or near it. */
 
 import type { RevealState } from '../state/reveal.js';
 
 /** The fields of the reveal state that this module observes. */
 export type Visibility = keyof Pick<RevealState, 'isNear' | 'isVisible'>;
 
-type VisibilityCallback = (visibility: Visibility, isTrue: boolean) => void;
-
 /** How far outside of the viewport counts: drawing begins shortly before an element becomes visible. */
-const ROOT_MARGINS: readonly (readonly [Visibility, string])[] = [
-  ['isVisible', '64px'],
-  ['isNear', '100%'],
-];
+const ROOT_MARGINS = { isVisible: '64px', isNear: '100%' } as const;
 
-const callbacks = new Map<Element, VisibilityCallback>();
-let observers: readonly IntersectionObserver[] | undefined;
-
-/** Calls back soon for the first time, and then at each change. Without browser support, all elements are visible. */
-export function observeVisibility(element: Element, callback: VisibilityCallback): void {
-  if (callbacks.has(element)) return;
-  callbacks.set(element, callback);
-  if (!globalThis.IntersectionObserver) {
-    for (const [visibility] of ROOT_MARGINS) callback(visibility, true);
-    return;
+/**
+ * Calls back soon for the first time, and then at each change, until `signal` is aborted. Without browser support, all
+ * elements are visible.
+ */
+export function observeVisibility(
+  element: Element,
+  callback: (visibility: Visibility, isTrue: boolean) => void,
+  signal: AbortSignal,
+): void {
+  for (const visibility of ['isVisible', 'isNear'] as const) {
+    if (!globalThis.IntersectionObserver) {
+      callback(visibility, true);
+      continue;
+    }
+    const report = (entries: readonly IntersectionObserverEntry[]) => {
+      const last = entries.at(-1);
+      // The browser may report changes from before `disconnect` after it.
+      if (last && !signal.aborted) callback(visibility, last.isIntersecting);
+    };
+    const observer = new IntersectionObserver(report, { rootMargin: ROOT_MARGINS[visibility] });
+    observer.observe(element);
+    signal.addEventListener('abort', () => observer.disconnect());
   }
-  observers ??= ROOT_MARGINS.map(createObserver);
-  for (const observer of observers) observer.observe(element);
-}
-
-export function unobserveVisibility(element: Element): void {
-  if (!callbacks.delete(element)) return;
-  for (const observer of observers ?? []) observer.unobserve(element);
-}
-
-function createObserver([visibility, rootMargin]: readonly [Visibility, string]) {
-  const report = (entries: readonly IntersectionObserverEntry[]) => {
-    for (const entry of entries) callbacks.get(entry.target)?.(visibility, entry.isIntersecting);
-  };
-  return new IntersectionObserver(report, { rootMargin });
 }

@@ -11,7 +11,6 @@ export interface OutputSettings {
   readonly tone: ToneCurve;
 }
 
-/** The output transform, which a module calls a display, for a canvas of the given gamut. */
 export function createOutputTransform(
   { OutputTransform }: Pick<RelightModule, 'OutputTransform'>,
   { exposure, whiteBalance, tone }: OutputSettings,

@@ -14,16 +14,13 @@ export const fetchWasm: FetchWasm = (_, url) => fetch(url);
 
 /** A module's files. Functions, because bundlers recognise only literal paths. */
 export interface WasmBuilds {
-  /** The script of wasm-bindgen, which all builds share. */
-  readonly glue: () => Promise<unknown>;
+  /** The script of wasm-bindgen, which all builds share; its default export starts the module. */
+  readonly glue: () => Promise<{
+    default(options: { module_or_path: WasmSource }): Promise<unknown>;
+  }>;
   readonly simd: () => URL;
   /** The build for machines without SIMD; absent if one build runs everywhere. */
   readonly scalar?: () => URL;
-}
-
-/** The exports of wasm-bindgen's script that start the module. */
-interface Glue {
-  default(options: { module_or_path: WasmSource }): Promise<unknown>;
 }
 
 // The smallest module with a 128-bit operation: () => i8x16.splat(0), dropped.
@@ -33,15 +30,11 @@ const SIMD_PROBE = new Uint8Array([
 ]);
 
 /** The folder of the modules, with a slash at its end; `null` if they lie beside this script. */
-let folder: string | null = null;
+export let moduleFolder: string | null = null;
 
 /** Sets the folder of modules that are started from now on. */
 export function setModuleFolder(url: string | null): void {
-  folder = url;
-}
-
-export function moduleFolder(): string | null {
-  return folder;
+  moduleFolder = url;
 }
 
 /**
@@ -88,13 +81,13 @@ async function startModule<M>(
   // Without SIMD support, a SIMD build does not even compile.
   const scalarBuild = scalar && !WebAssembly.validate(SIMD_PROBE) ? scalar : null;
   const url =
-    folder === null
+    moduleFolder === null
       ? (scalarBuild ?? simd)()
-      : `${folder}${name}${scalarBuild ? '_scalar' : ''}_bg.wasm`;
+      : `${moduleFolder}${name}${scalarBuild ? '_scalar' : ''}_bg.wasm`;
   // The module and its script load at the same time.
   const source = fetchModule(name, url);
   source.catch(() => {});
-  const module = (await glue()) as Glue;
+  const module = await glue();
   await module.default({ module_or_path: await source });
   return module as M;
 }

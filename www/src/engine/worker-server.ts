@@ -31,7 +31,7 @@ interface WorkerScope {
 export function startWorker(create: () => Worker): Worker | null {
   try {
     const worker = create();
-    worker.postMessage({ modules: moduleFolder() } satisfies StartMessage);
+    worker.postMessage({ modules: moduleFolder } satisfies StartMessage);
     return worker;
   } catch {
     return null;

@@ -24,8 +24,10 @@ export class AnimationLoop {
     this.#request();
   }
 
-  has(name: string): boolean {
-    return this.#steps.has(name);
+  /** Starts the animation of that name unless it runs, or ends it. */
+  toggle(name: string, isRunning: boolean, createStep: () => AnimationStep): void {
+    if (!isRunning) this.set(name, null);
+    else if (!this.#steps.has(name)) this.set(name, createStep());
   }
 
   /** Suspends or resumes all animations. */

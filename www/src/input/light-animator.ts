@@ -2,7 +2,7 @@
 
 import { CENTRE } from '../shared/values.js';
 import type { LightState } from '../state/light-state.js';
-import type { AnimationLoop } from './animation-loop.js';
+import type { AnimationLoop, AnimationStep } from './animation-loop.js';
 import { glide, speedOf, type Velocity } from './inertia.js';
 import { wander } from './wander.js';
 
@@ -24,10 +24,11 @@ export class LightAnimator {
 
   /** Starts and stops the continuous animations. */
   update({ fire, wander }: { readonly fire: boolean; readonly wander: boolean }): void {
-    if (!fire) this.#loop.set('fire', null);
-    else if (!this.#loop.has('fire')) this.#startFire();
-    if (!wander) this.#loop.set('wander', null);
-    else if (!this.#loop.has('wander')) this.#startWandering();
+    this.#loop.toggle('fire', fire, () => (seconds) => {
+      if (this.#light.advanceFire(seconds)) this.#changed();
+      return true;
+    });
+    this.#loop.toggle('wander', wander, () => this.#wander());
   }
 
   /** Lets the torch glide on; the velocity is in pictures per second. */
@@ -50,21 +51,14 @@ export class LightAnimator {
     this.#loop.set('wander', null);
   }
 
-  #startFire(): void {
-    this.#loop.set('fire', (seconds) => {
-      if (this.#light.advanceFire(seconds)) this.#changed();
-      return true;
-    });
-  }
-
-  #startWandering(): void {
+  #wander(): AnimationStep {
     const start = this.#light.torch ?? CENTRE;
     let elapsed = 0;
-    this.#loop.set('wander', (seconds) => {
+    return (seconds) => {
       elapsed += seconds;
       this.#light.torch = wander(start, elapsed);
       this.#changed();
       return true;
-    });
+    };
   }
 }

@@ -3,9 +3,9 @@
  * the browser does not request them, the file is read from start to end instead.
  */
 
-import type { ByteRange } from '../shared/byte-range.js';
 import { PhotoError } from '../shared/errors.js';
 import { linkedController, withTimeout } from '../shared/promises.js';
+import type { ByteRange } from '../shared/values.js';
 import * as errors from './http-errors.js';
 import { RetryableError } from './http-errors.js';
 import {

@@ -10,7 +10,7 @@ import {
 } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import type { TestContext } from 'node:test';
-import type { ByteRange } from '../shared/byte-range.js';
+import type { ByteRange } from '../shared/values.js';
 import { HttpSource, type SourcePorts } from './byte-source.js';
 
 /** A signal that is never aborted. */

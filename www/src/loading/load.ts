@@ -2,9 +2,9 @@
 
 import type { PhotoDecoder } from '../photo/photo-decoder.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { ByteRange } from '../shared/byte-range.js';
 import { endSentence, hasCode, PhotoError, toPhotoError } from '../shared/errors.js';
 import { linkedController, withTimeout } from '../shared/promises.js';
+import type { ByteRange } from '../shared/values.js';
 import { HttpSource, type Piece } from './byte-source.js';
 import { fileName, tooLong } from './http-errors.js';
 
@@ -66,7 +66,7 @@ async function open(url: string, options: LoadOptions, ports: LoadPorts): Promis
       firstPieces.next(),
     ]);
     const pieces = piecesFor(decoder, source, first, firstPieces, stop.signal);
-    return await decode(decoder, pieces, options, ports);
+    return await decodePieces(decoder, pieces, options, ports);
   } catch (thrown) {
     signal.throwIfAborted();
     throw withFileName(toPhotoError(thrown), url);
@@ -107,11 +107,12 @@ async function* piecesFor(
   }
 }
 
-async function decode(
+/** Decodes pieces of a file in the order in which they arrive. The caller frees the decoder. */
+export async function decodePieces(
   decoder: PhotoDecoder,
   pieces: AsyncIterable<Piece>,
   { signal, onProgress, onPreview }: LoadOptions,
-  ports: LoadPorts,
+  ports: Pick<LoadPorts, 'now' | 'yieldToPage'>,
 ): Promise<Photograph> {
   let reported = 0;
   const nextPreview = previewsOf(decoder, ports.now);

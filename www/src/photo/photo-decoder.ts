@@ -1,6 +1,6 @@
 /** The interface of the decoders. */
 
-import type { ByteRange } from '../shared/byte-range.js';
+import type { ByteRange } from '../shared/values.js';
 import type { Photograph } from './photograph.js';
 
 /** The progress of a decoder. */

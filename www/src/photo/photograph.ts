@@ -12,8 +12,8 @@ import type {
   RelightModule,
 } from '../engine/types.js';
 import { messageOf, PhotoError, photoReleased } from '../shared/errors.js';
-import type { PhotoInfo } from '../shared/photo-info.js';
 import { allSettledOrThrow } from '../shared/promises.js';
+import type { PhotoInfo } from '../shared/values.js';
 import {
   describePhoto,
   type PhotoDescriptor,

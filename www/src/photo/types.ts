@@ -2,7 +2,7 @@
 
 import type { DecodedPhoto } from '../engine/types.js';
 import type { PhotoError } from '../shared/errors.js';
-import type { PhotoInfo } from '../shared/photo-info.js';
+import type { PhotoInfo } from '../shared/values.js';
 
 /** A tile on its way between two modules. */
 export type TileBytes = Uint8Array<ArrayBuffer>;

@@ -1,4 +1,26 @@
-/** Plain value types that settings, events and the public API share. */
+/** Plain value types that many modules share. Free of DOM types, because the core's types depend on it. */
+
+/** A range of a file's bytes, without the byte at `end`. */
+export interface ByteRange {
+  readonly start: number;
+  readonly end: number;
+}
+
+/** What the file's index says about a photograph. */
+export interface PhotoInfo {
+  /** The picture's width in pixels. */
+  readonly width: number;
+  /** The picture's height in pixels. */
+  readonly height: number;
+  /** The light plane's width in light elements. */
+  readonly lightWidth: number;
+  /** The light plane's height in light elements. */
+  readonly lightHeight: number;
+  /** Memory that the decoded light transport matrix takes, in bytes. */
+  readonly decodedBytes: number;
+  /** The file's metadata, a JSON object. */
+  readonly metadata: unknown;
+}
 
 /** A position on the picture: (0, 0) is its top left corner and (1, 1) its bottom right corner. */
 export interface PicturePoint {

@@ -54,7 +54,6 @@ export interface WorkerClientOptions {
 export const START_ID = 0;
 
 interface PendingRequest<Result> {
-  readonly group: number;
   readonly resolve: (result: Result) => void;
   readonly reject: (error: PhotoError) => void;
 }
@@ -78,7 +77,7 @@ export class WorkerClient<Task, Ready, Result> {
     this.#worker = worker;
     this.#options = options;
     this.ready = new Promise((resolve, reject) => {
-      this.#pending.set(START_ID, { group: START_ID, resolve, reject });
+      this.#pending.set(START_ID, { resolve, reject });
     });
     this.ready.catch(() => {});
     worker.onmessage = ({ data }) => this.#receive(data);
@@ -91,31 +90,18 @@ export class WorkerClient<Task, Ready, Result> {
   }
 
   /**
-   * Sends a task; the worker does tasks in order. `group` is for `abandon`. Rejects with
-   * `worker-unavailable` if the worker has failed, or fails before it answers. If the browser cannot
-   * send the message, it rejects with the browser's error, and nothing has been transferred.
+   * Sends a task; the worker does tasks in order. Rejects with `worker-unavailable` if the worker has failed, or fails
+   * before it answers, and with the browser's error if it cannot send the message; then nothing has been transferred.
    */
-  request(task: Task, transfer: Transferable[] = [], group = 0): Promise<Result> {
+  request(task: Task, transfer: Transferable[] = []): Promise<Result> {
     return new Promise((resolve, reject) => {
-      if (this.failure) {
-        reject(this.failure);
-        return;
-      }
+      if (this.failure) throw this.failure;
       const id = this.#lastId + 1;
       this.#worker.postMessage({ id, task }, transfer);
       this.#lastId = id;
-      this.#pending.set(id, { group, resolve, reject });
+      this.#pending.set(id, { resolve, reject });
       if (this.#pending.size === 1) this.#watch(this.#options.limits.maxChecks);
     });
-  }
-
-  /** Rejects the pending requests of a group; the worker still does them. */
-  abandon(group: number, reason: PhotoError): void {
-    for (const [id, pending] of this.#pending) {
-      if (pending.group !== group) continue;
-      this.#pending.delete(id);
-      pending.reject(reason);
-    }
   }
 
   /** Ends the worker and rejects everything that is pending. */

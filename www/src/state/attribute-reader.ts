@@ -6,12 +6,6 @@
 import { type PhotoError, toPhotoError } from '../shared/errors.js';
 import { type PARSERS, type ParsedValue, parseAddress, parserOf } from './attribute-values.js';
 
-/** The part of an element from which attributes are read. */
-export interface AttributeSource {
-  readonly baseURI: string;
-  getAttribute(name: string): string | null;
-}
-
 /** An attribute's text and what the parser made of it. */
 interface ParsedAttribute {
   readonly text: string | null;
@@ -22,11 +16,11 @@ interface ParsedAttribute {
 }
 
 export class AttributeReader {
-  readonly #source: AttributeSource;
+  readonly #source: Pick<Element, 'baseURI' | 'getAttribute'>;
   readonly #attributes = new Map<string, ParsedAttribute>();
   #newErrors: PhotoError[] = [];
 
-  constructor(source: AttributeSource) {
+  constructor(source: Pick<Element, 'baseURI' | 'getAttribute'>) {
     this.#source = source;
   }
 

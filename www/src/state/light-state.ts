@@ -17,14 +17,10 @@ import { reuse } from '../shared/reuse.js';
 import { clampToPicture, type PicturePoint } from '../shared/values.js';
 import type { LightOptions } from './options.js';
 
-/** Values that take precedence over the options; `null` leaves an option in effect. */
-export interface LightOverrides {
-  /** A built-in light, which also takes precedence over a source. */
-  readonly name: LightName | null;
-  readonly torch: PicturePoint | null;
-  readonly size: number | null;
-  readonly color: LightColor | null;
-}
+/** Values that take precedence over the options, and a name also over a source; `null` leaves an option in effect. */
+export type LightOverrides = {
+  readonly [K in 'name' | 'torch' | 'size' | 'color']: LightOptions[K] | null;
+};
 
 export interface LightStateListener extends LightSourceListener {
   /** The support for sources has been fetched: call `setOptions` again. */

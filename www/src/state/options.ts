@@ -1,49 +1,15 @@
 /** The element's options: the values of all its attributes. Immutable: a change makes a new object. */
 
-import { type CssColorParser, type LightColor, parseLightColor } from '../lights/light-color.js';
-import type { Backend, CrossOrigin, Gamut, LightName, ToneCurve } from '../shared/names.js';
+import { type CssColorParser, parseLightColor } from '../lights/light-color.js';
 import { reuse } from '../shared/reuse.js';
-import { CENTRE, type PicturePoint, type RgbFactors } from '../shared/values.js';
+import { CENTRE, type PicturePoint } from '../shared/values.js';
 import type { AttributeReader } from './attribute-reader.js';
-import type { Loading, Reveal } from './attribute-values.js';
 
-/** Addresses are absolute; an absent address is `null`. */
-export interface ElementOptions {
-  readonly src: string | null;
-  /** In order of preference; `null` leaves the order to the element. */
-  readonly backends: readonly Backend[] | null;
-  readonly gamut: Gamut;
-  readonly exposure: number;
-  readonly whiteBalance: RgbFactors;
-  readonly tone: ToneCurve;
-  readonly light: LightOptions;
-  readonly poster: string | null;
-  readonly loading: Loading;
-  readonly reveal: Reveal;
-  readonly controls: boolean;
-  /** The largest magnification; 1 disables zooming. */
-  readonly maxZoom: number;
-  readonly cooperativeGestures: boolean;
-  readonly autoplayLight: boolean;
-  /** 0 is never. */
-  readonly kioskSeconds: number;
-  /** Folder of the WebAssembly modules, ending in a slash; `null` for the one beside the script. */
-  readonly wasmUrl: string | null;
-  readonly crossOrigin: CrossOrigin;
-}
+/** As `PARSERS` gives them. Addresses are absolute; an absent address is `null`. */
+export type ElementOptions = Readonly<ReturnType<typeof readAttributes>>;
 
 /** The light before a visitor or a script chooses another. */
-export interface LightOptions {
-  readonly name: LightName;
-  /** An image or video that replaces the built-in light. */
-  readonly src: string | null;
-  readonly crossOrigin: CrossOrigin;
-  /** The torch's position; `null` behind the centre of the picture. */
-  readonly torch: PicturePoint | null;
-  /** The torch's radius; `null` for the default. */
-  readonly size: number | null;
-  readonly color: LightColor | null;
-}
+export type LightOptions = Readonly<ReturnType<typeof readLight>>;
 
 /** Reads all attributes. Objects whose fields are unchanged are taken from `last`. */
 export function readOptions(
@@ -51,19 +17,15 @@ export function readOptions(
   last: ElementOptions | null,
   parseColor?: CssColorParser,
 ): ElementOptions {
-  const crossOrigin = reader.read('crossorigin');
-  const [x, y] = [reader.read('light-x'), reader.read('light-y')];
-  const point = { x: x ?? CENTRE.x, y: y ?? CENTRE.y };
-  const light = reuse(last?.light, {
-    name: reader.read('light'),
-    src: reader.readAddress('light-src'),
-    crossOrigin,
-    torch: x === null && y === null ? null : reuse(last?.light.torch, point),
-    size: reader.read('light-size'),
-    color: reader.parse('light-color', (text) => parseLightColor(text, parseColor)),
-  });
-  return reuse(last, {
-    light,
+  const options = readAttributes(reader, parseColor);
+  const torch = options.light.torch && reuse(last?.light.torch, options.light.torch);
+  const light = reuse(last?.light, { ...options.light, torch });
+  return reuse(last, { ...options, light });
+}
+
+function readAttributes(reader: AttributeReader, parseColor?: CssColorParser) {
+  return {
+    light: readLight(reader, parseColor),
     backends: reader.read('backend'),
     exposure: reader.read('exposure'),
     whiteBalance: reader.read('white-balance'),
@@ -78,7 +40,23 @@ export function readOptions(
     cooperativeGestures: reader.has('cooperative-gestures'),
     autoplayLight: reader.has('autoplay-light'),
     kioskSeconds: reader.read('kiosk'),
+    /** Folder of the WebAssembly modules, ending in a slash; `null` for the one beside the script. */
     wasmUrl: reader.readAddress('wasm-url')?.replace(/\/?$/, '/') ?? null,
-    crossOrigin,
-  });
+    crossOrigin: reader.read('crossorigin'),
+  };
+}
+
+function readLight(reader: AttributeReader, parseColor?: CssColorParser) {
+  const [x, y] = [reader.read('light-x'), reader.read('light-y')];
+  const point: PicturePoint = { x: x ?? CENTRE.x, y: y ?? CENTRE.y };
+  return {
+    name: reader.read('light'),
+    /** An image or video that replaces the built-in light. */
+    src: reader.readAddress('light-src'),
+    crossOrigin: reader.read('crossorigin'),
+    /** The torch's position; `null` behind the centre of the picture. */
+    torch: x === null && y === null ? null : point,
+    size: reader.read('light-size'),
+    color: reader.parse('light-color', (text) => parseLightColor(text, parseColor)),
+  };
 }

@@ -43,30 +43,15 @@ export class Presenter {
     const capturesTouch = zooms && !options.cooperativeGestures && (hasHandle || view.zoom > 1);
     const torch = light.torch ?? CENTRE;
     this.#dom.updateLabels(this.#host.getAttribute('alt'), language);
-    this.#dom.updateLayout(
-      {
-        hasHandle,
-        isFocusable: zooms && !hasHandle,
-        touchAction: capturesTouch ? 'none' : hasHandle || zooms ? 'pan-y' : 'auto',
-      },
-      language,
-    );
+    const touchAction = capturesTouch ? 'none' : hasHandle || zooms ? 'pan-y' : 'auto';
+    this.#dom.updateLayout(hasHandle, zooms && !hasHandle, touchAction, language);
     this.#dom.updateView(view, torch, describeLight(torch, language));
-    this.#dom.updatePoster(
-      options.poster,
-      options.crossOrigin,
-      !isPictureShown,
-      reveal.needsPress(options),
-    );
+    const { poster, crossOrigin } = options;
+    this.#dom.updatePoster(poster, crossOrigin, !isPictureShown, reveal.needsPress(options));
     const hasToolbar = options.controls && isPictureShown;
     if (hasToolbar && !this.#isToolbarRequested) void this.#fetchToolbar();
-    const toolbarState = {
-      t: (key: StringKey) => t(key, language),
-      viewer: this.#state,
-      isPaused,
-      isTilting,
-    };
-    this.#toolbar?.update(hasToolbar ? toolbarState : null);
+    if (hasToolbar) this.#toolbar?.update((key) => t(key, language), isPaused, isTilting);
+    else this.#toolbar?.hide();
   }
 
   /** Shows the toolbar after an input: for good after a key press, otherwise for some seconds. */
@@ -110,7 +95,7 @@ export class Presenter {
     this.#isToolbarRequested = true;
     try {
       const { Toolbar } = await import('./toolbar.js');
-      const toolbar = new Toolbar(this.#host, this.#listener);
+      const toolbar = new Toolbar(this.#host, this.#state, this.#listener);
       this.#toolbar = toolbar;
       this.#dom.mountControls([toolbar.menu, toolbar.bar], toolbar.css);
       this.#listener.loaded();

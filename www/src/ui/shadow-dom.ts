@@ -11,15 +11,6 @@ import { createElement, createSlot, updateAttribute, updateText } from './dom-he
 import { createIcon, LIGHT_ICON } from './icons.js';
 import ELEMENT_CSS from './style.css';
 
-export interface LayoutState {
-  /** The torch handle is present. */
-  readonly hasHandle: boolean;
-  /** The viewport itself takes the focus, because there is no handle. */
-  readonly isFocusable: boolean;
-  /** The browser's own gestures for single fingers, as in CSS. */
-  readonly touchAction: 'auto' | 'pan-y' | 'none';
-}
-
 /** Beyond this zoom, pixels are drawn as squares. */
 const MIN_PIXELATED_ZOOM = 4;
 /** An announcement waits this long, so that a newer one can replace it. */
@@ -43,7 +34,7 @@ export class ShadowDom {
   readonly revealButton = createElement(
     'button',
     { class: 'reveal', part: 'button', type: 'button', hidden: '' },
-    createElement('span', {}, createIcon(LIGHT_ICON), this.#revealText),
+    createElement('span', { class: 'panel' }, createIcon(LIGHT_ICON), this.#revealText),
   );
   readonly #picture = createElement('div', { class: 'picture', part: 'picture' });
   readonly #posterImage = createElement('img', { part: 'poster', alt: '', hidden: '' });
@@ -52,7 +43,7 @@ export class ShadowDom {
     { class: 'poster' },
     createSlot('poster', this.#posterImage),
   );
-  readonly #hint = createElement('div', { class: 'hint', part: 'hint', hidden: '' });
+  readonly #hint = createElement('div', { class: 'hint panel', part: 'hint', hidden: '' });
   /** The box that shows the picture and receives pointer events. */
   readonly viewport = createElement(
     'div',
@@ -129,8 +120,16 @@ export class ShadowDom {
     updateText(this.#detailsLabel, t('details', language));
   }
 
-  /** Updates the handle and the focus. When the handle disappears, its focus moves to the viewport. */
-  updateLayout({ hasHandle, isFocusable, touchAction }: LayoutState, language: Language): void {
+  /**
+   * Updates the handle, the focus and the browser's own gestures for single fingers. When the handle disappears, its
+   * focus moves to the viewport, which may be focusable itself without a handle.
+   */
+  updateLayout(
+    hasHandle: boolean,
+    isFocusable: boolean,
+    touchAction: 'auto' | 'pan-y' | 'none',
+    language: Language,
+  ): void {
     const { handle, viewport } = this;
     const focused = this.root.activeElement;
     const keepsFocus = !hasHandle && (focused === handle || focused === viewport);

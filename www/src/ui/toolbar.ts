@@ -10,16 +10,6 @@ import { createElement, updateAttribute, updateText } from './dom-helpers.js';
 import { createIcon, LIGHT_ICON, setIcon } from './icons.js';
 import TOOLBAR_CSS from './toolbar.css';
 
-/** The state that the buttons show. */
-export interface ToolbarState {
-  /** A text in the visitor's language. */
-  readonly t: (key: StringKey) => string;
-  readonly viewer: Pick<ViewerState, 'light' | 'options' | 'view'>;
-  readonly isPaused: boolean;
-  /** Whether the torch follows the device's tilt; `null` if it cannot. */
-  readonly isTilting: boolean | null;
-}
-
 /** The actions of the buttons and the menu. */
 export interface ToolbarActions {
   selectLight(item: LightItem): void;
@@ -59,13 +49,15 @@ export class Toolbar {
   readonly #buttons: Readonly<Record<ButtonName, HTMLButtonElement>>;
   readonly #lightName = createElement('span');
   readonly #host: Element;
+  readonly #viewer: ViewerState;
   /** The texts of the current menu. */
   #menuTexts = '';
   #hideTimer: ReturnType<typeof setTimeout> | undefined;
 
   /** `host` is the element that the toolbar belongs to. */
-  constructor(host: Element, actions: ToolbarActions) {
+  constructor(host: Element, viewer: ViewerState, actions: ToolbarActions) {
     this.#host = host;
+    this.#viewer = viewer;
     this.#buttons = {
       light: createButton('light', () => this.#setMenuOpen(this.menu.hidden === true)),
       play: createButton('play', actions.play),
@@ -79,11 +71,11 @@ export class Toolbar {
     updateAttribute(this.#buttons.light, 'aria-controls', 'lights');
     this.bar = createElement(
       'div',
-      { class: 'toolbar', part: 'controls', role: 'toolbar' },
+      { class: 'toolbar panel', part: 'controls', role: 'toolbar' },
       ...Object.values(this.#buttons),
     );
     this.menu = createElement('div', {
-      class: 'menu',
+      class: 'menu panel',
       part: 'menu',
       role: 'radiogroup',
       id: 'lights',
@@ -102,15 +94,15 @@ export class Toolbar {
     });
   }
 
-  /** `null` hides the toolbar. */
-  update(state: ToolbarState | null): void {
-    this.bar.hidden = state === null;
-    if (!state) {
-      this.closeMenu();
-      return;
-    }
-    const { t, viewer, isPaused, isTilting } = state;
-    const { light: lightState, options, view } = viewer;
+  hide(): void {
+    this.bar.hidden = true;
+    this.closeMenu();
+  }
+
+  /** Shows the viewer's state in the language of `t`. `isTilting` is `null` if the torch cannot follow the tilt. */
+  update(t: (key: StringKey) => string, isPaused: boolean, isTilting: boolean | null): void {
+    this.bar.hidden = false;
+    const { light: lightState, options, view } = this.#viewer;
     const { item, items } = lightState;
     const isPlayable = lightState.isPlayable || (lightState.isTorch && options.autoplayLight);
     const zooms = options.maxZoom > 1;

@@ -3,11 +3,8 @@
 import type { Light } from '../../engine/types.js';
 import type { PhotoDescriptor, TileBytes, TileSession } from '../../photo/types.js';
 import { type PhotoError, photoReleased } from '../../shared/errors.js';
-import { allSettledOrThrow } from '../../shared/promises.js';
-import type { WorkerClient } from '../../shared/worker-client.js';
-import type { FrameSettings, RelightTask, RowRange, RowTask } from './protocol.js';
-
-type RelightClient = WorkerClient<RelightTask, string, ArrayBuffer>;
+import { allSettledOrThrow, withTimeout } from '../../shared/promises.js';
+import type { FrameSettings, RelightClient, RowRange, RowTask } from './protocol.js';
 
 /** Rows of a picture. */
 export interface RowPixels extends RowRange {
@@ -42,7 +39,8 @@ export class PoolSession implements TileSession {
   readonly #events: PoolSessionEvents;
   /** Whether the workers know their light rows; false while tiles are moved. */
   #isPlanned = false;
-  #hasEnded = false;
+  /** Aborted when the session ends. */
+  readonly #end = new AbortController();
 
   constructor(
     photo: number,
@@ -134,23 +132,24 @@ export class PoolSession implements TileSession {
 
   /** Releases the photograph in the workers and rejects pending requests. */
   end(): void {
-    if (this.#hasEnded) return;
+    if (this.#end.signal.aborted) return;
     for (const { client } of this.#parts) {
-      client.abandon(this.#photo, photoReleased());
       if (!client.failure) this.#request(client, { kind: 'close' }).catch(() => {});
     }
-    this.#hasEnded = true;
+    this.#end.abort(photoReleased());
     this.#events.ended();
   }
 
+  /** Rejects when the session ends; the worker still does the task. */
   async #request(
     client: RelightClient,
     task: RowTask,
-    transfer: Transferable[] = [],
+    transfer?: Transferable[],
   ): Promise<ArrayBuffer> {
+    const { signal } = this.#end;
     // A worker fails if it is asked for a photograph that it has released.
-    if (this.#hasEnded) throw photoReleased();
-    return await client.request({ photo: this.#photo, task }, transfer, this.#photo);
+    signal.throwIfAborted();
+    return await withTimeout(client.request({ photo: this.#photo, task }, transfer), { signal });
   }
 
   #clientOf(tile: number): RelightClient {

@@ -2,7 +2,7 @@
 
 import type { OutputSettings } from '../../engine/output-settings.js';
 import type { Gamut } from '../../engine/types.js';
-import type { WorkerLike } from '../../shared/worker-client.js';
+import type { WorkerClient, WorkerLike } from '../../shared/worker-client.js';
 
 /** How a frame is drawn. */
 export interface FrameSettings {
@@ -51,3 +51,4 @@ export interface RelightTask {
 
 /** `Ready` is the kernel's name, `Result` the bytes that the task asks for. */
 export type RelightWorker = WorkerLike<RelightTask, string, ArrayBuffer>;
+export type RelightClient = WorkerClient<RelightTask, string, ArrayBuffer>;

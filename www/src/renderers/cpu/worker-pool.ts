@@ -7,7 +7,7 @@ import type { PhotoDescriptor, TileWorkers } from '../../photo/types.js';
 import { PhotoError } from '../../shared/errors.js';
 import { type WatchdogLimits, WorkerClient } from '../../shared/worker-client.js';
 import { PoolSession, splitRows } from './pool-session.js';
-import type { RelightTask, RelightWorker } from './protocol.js';
+import type { RelightClient, RelightWorker } from './protocol.js';
 
 /** Failures of workers without a frame in between, after which the page draws by itself. */
 const MAX_INCIDENTS = 3;
@@ -20,7 +20,7 @@ const WARM_WORKERS = 2;
 
 /** A worker, and how many photographs have rows in it. */
 export interface PoolWorker {
-  readonly client: WorkerClient<RelightTask, string, ArrayBuffer>;
+  readonly client: RelightClient;
   photos: number;
 }
 
@@ -99,7 +99,7 @@ export class WorkerPool implements TileWorkers<PoolSession> {
       this.#fault = new PhotoError('worker-unavailable', 'The page may not start workers.');
       throw this.#fault;
     }
-    const client = new WorkerClient<RelightTask, string, ArrayBuffer>(worker, {
+    const client: RelightClient = new WorkerClient(worker, {
       name: 'relighting worker',
       limits: this.#limits,
       remedy: REMEDY,
