@@ -4,7 +4,7 @@ import { loadDecoder } from '../engine/core-modules.js';
 import type { Piece } from '../loading/byte-source.js';
 import { tooLong } from '../loading/http-errors.js';
 import { decodePieces, openPhoto } from '../loading/load.js';
-import { MainThreadDecoder } from '../photo/main-thread-decoder.js';
+import { createMainThreadDecoder } from '../photo/main-thread-decoder.js';
 import type { PhotoDecoder } from '../photo/photo-decoder.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
 import { DecodedPhotograph } from './decoded-photo.js';
@@ -42,7 +42,7 @@ export async function decode(
 ): Promise<CorePhotograph> {
   signal.throwIfAborted();
   const now = () => performance.now();
-  const createDecoder = async () => new MainThreadDecoder(await loadDecoder(fetchCoreWasm), now);
+  const createDecoder = async () => createMainThreadDecoder(await loadDecoder(fetchCoreWasm), now);
   const options = { signal, onProgress, onPreview: null };
   if (typeof file !== 'string' && !(file instanceof URL)) {
     const arriving = arrivingBytes(file);

@@ -4,6 +4,7 @@
  */
 
 import type { Gamut, ToneCurve, WasmModuleName } from '../shared/names.js';
+import type { PhotoInfo } from '../shared/values.js';
 
 export type { Backend, Gamut, ToneCurve } from '../shared/names.js';
 
@@ -22,14 +23,9 @@ export interface ModulePhoto extends Freeable {
 }
 
 /** A photograph in the decoder's memory. */
-export interface DecodedPhoto extends ModulePhoto {
-  readonly width: number;
-  readonly height: number;
-  readonly lightWidth: number;
-  readonly lightHeight: number;
+export interface DecodedPhoto extends ModulePhoto, Omit<PhotoInfo, 'metadata'> {
   /** JSON text, which is not validated. */
   readonly metadata: string;
-  readonly decodedBytes: number;
   /** Number of tiles, which are numbered row by row. */
   readonly tiles: number;
   /** Camera pixels along a tile's side; tiles at the right and lower edges may be smaller. */

@@ -5,7 +5,7 @@ import test from 'node:test';
 import { gzipSync } from 'node:zlib';
 import { answer } from '../../tools/ranges.js';
 import type { DecodedPhoto, Decoder } from '../engine/types.js';
-import { MainThreadDecoder } from '../photo/main-thread-decoder.js';
+import { createMainThreadDecoder } from '../photo/main-thread-decoder.js';
 import type { Photograph } from '../photo/photograph.js';
 import { fakePhoto } from '../photo/photograph-fakes.js';
 import { never, serve, type TestServer } from './http-fakes.js';
@@ -98,7 +98,7 @@ function countBytes(ranges: TestServer['ranges'], size: number): number {
 function portsOf(ports: Partial<LoadPorts> = {}): LoadPorts {
   let time = 0;
   return {
-    createDecoder: async () => new MainThreadDecoder({ Decoder: FakeDecoder }, () => time++),
+    createDecoder: async () => createMainThreadDecoder({ Decoder: FakeDecoder }, () => time++),
     fetch: (input, init) => fetch(input, init),
     yieldToPage: () => Promise.resolve(),
     now: () => 0,
@@ -403,7 +403,7 @@ test('a decoder that asks for the same bytes again is an error', async (t) => {
     override wants = () => Float64Array.of(0, 100);
   }
   const server = await serve(t, (request, response) => send(request, response, fileOf()));
-  const decoder = async () => new MainThreadDecoder({ Decoder: Glutton }, () => 0);
+  const decoder = async () => createMainThreadDecoder({ Decoder: Glutton }, () => 0);
   await assert.rejects(load(server.url, { createDecoder: decoder }), {
     code: 'internal',
     message: /already has/,
@@ -423,7 +423,7 @@ test('the decoder’s first range is requested, and then the next one at that ti
   }
   const file = fileOf();
   const server = await serve(t, (request, response) => send(request, response, file));
-  const decoder = async () => new MainThreadDecoder({ Decoder: InThree }, () => 0);
+  const decoder = async () => createMainThreadDecoder({ Decoder: InThree }, () => 0);
   await load(server.url, { createDecoder: decoder });
   assert.deepEqual(server.ranges, ['0-16383', '16384-49999', '50000-299999', '300000-799999']);
   assert.ok(FakeDecoder.fed.equals(file));

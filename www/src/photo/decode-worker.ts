@@ -1,4 +1,4 @@
-/** The script of the worker that decodes one photograph for a `WorkerDecoder`. */
+/** The script of the worker that decodes one photograph. */
 
 import { loadDecoder } from '../engine/core-modules.js';
 import type { DecodedPhoto, Decoder } from '../engine/types.js';

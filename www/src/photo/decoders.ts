@@ -2,16 +2,16 @@
 
 import { loadDecoder } from '../engine/core-modules.js';
 import { startWorker } from '../engine/worker-server.js';
-import { MainThreadDecoder } from './main-thread-decoder.js';
+import { createMainThreadDecoder } from './main-thread-decoder.js';
 import type { PhotoDecoder } from './photo-decoder.js';
-import { WorkerDecoder } from './worker-decoder.js';
+import { startWorkerDecoder } from './worker-decoder.js';
 
 /** Makes a decoder for one photograph. */
 export async function createDecoder(): Promise<PhotoDecoder> {
   const worker = startWorker(
     () => new Worker(new URL('./relightable-photo-worker.js', import.meta.url), { type: 'module' }),
   );
-  const decoder = worker && (await WorkerDecoder.start(worker).catch(() => null));
+  const decoder = worker && (await startWorkerDecoder(worker).catch(() => null));
   // If the module cannot start at all, the page's attempt reports why.
-  return decoder ?? new MainThreadDecoder(await loadDecoder(), () => performance.now());
+  return decoder ?? createMainThreadDecoder(await loadDecoder(), () => performance.now());
 }

@@ -1,12 +1,7 @@
 /** Decodes on the page's thread, in slices between which the page can draw. */
 
 import type { Decoder, DecoderModule } from '../engine/types.js';
-import {
-  completenessOf,
-  type DecoderState,
-  type PhotoDecoder,
-  type YieldToPage,
-} from './photo-decoder.js';
+import { completenessOf, type DecoderState, type PhotoDecoder } from './photo-decoder.js';
 import { Photograph } from './photograph.js';
 
 /** Bytes decoded at once: so few that hardly more than one tile is completed by them. */
@@ -14,46 +9,39 @@ const SLICE_BYTES = 1 << 10;
 /** Decoding time between two yields: half a frame at 60 Hz. */
 const YIELD_INTERVAL_MS = 8;
 
-export class MainThreadDecoder implements PhotoDecoder {
-  readonly #decoder: Decoder;
-  readonly #now: () => number;
-  #hasEnded = false;
-  #lastYieldMs: number;
-
-  /** `now` gives milliseconds, from any start. */
-  constructor(module: DecoderModule, now: () => number) {
-    this.#decoder = new module.Decoder();
-    this.#now = now;
-    this.#lastYieldMs = now();
-  }
-
-  get state(): DecoderState {
-    return decoderState(this.#decoder);
-  }
-
-  async feed(offset: number, bytes: Uint8Array, yieldToPage: YieldToPage): Promise<void> {
-    for (let start = 0; start < bytes.byteLength; start += SLICE_BYTES) {
-      this.#decoder.feed(offset + start, bytes.subarray(start, start + SLICE_BYTES));
-      if (this.#now() - this.#lastYieldMs < YIELD_INTERVAL_MS) continue;
-      await yieldToPage();
-      this.#lastYieldMs = this.#now();
-    }
-  }
-
-  async preview(): Promise<Photograph | null> {
-    const photo = this.#decoder.preview();
-    return photo ? Photograph.fromModule(photo, completenessOf(this.state)) : null;
-  }
-
-  async finish(): Promise<Photograph> {
-    this.#hasEnded = true;
-    return Photograph.fromModule(this.#decoder.finish());
-  }
-
-  free(): void {
-    if (!this.#hasEnded) this.#decoder.free();
-    this.#hasEnded = true;
-  }
+/** `now` gives milliseconds, from any start. */
+export function createMainThreadDecoder(
+  { Decoder }: DecoderModule,
+  now: () => number,
+): PhotoDecoder {
+  const decoder = new Decoder();
+  let hasEnded = false;
+  let lastYieldMs = now();
+  return {
+    get state() {
+      return decoderState(decoder);
+    },
+    async feed(offset, bytes, yieldToPage) {
+      for (let start = 0; start < bytes.byteLength; start += SLICE_BYTES) {
+        decoder.feed(offset + start, bytes.subarray(start, start + SLICE_BYTES));
+        if (now() - lastYieldMs < YIELD_INTERVAL_MS) continue;
+        await yieldToPage();
+        lastYieldMs = now();
+      }
+    },
+    async preview() {
+      const photo = decoder.preview();
+      return photo ? Photograph.fromModule(photo, completenessOf(decoderState(decoder))) : null;
+    },
+    async finish() {
+      hasEnded = true;
+      return Photograph.fromModule(decoder.finish());
+    },
+    free() {
+      if (!hasEnded) decoder.free();
+      hasEnded = true;
+    },
+  };
 }
 
 /** The state of a module's decoder. */

@@ -2,19 +2,13 @@
 
 import type { DecodedPhoto } from '../engine/types.js';
 import type { PhotoError } from '../shared/errors.js';
-import type { PhotoInfo } from '../shared/values.js';
 
 /** A tile on its way between two modules. */
 export type TileBytes = Uint8Array<ArrayBuffer>;
 
 /** A photograph without its tiles: what a module needs to create it. */
-export interface PhotoDescriptor extends Omit<PhotoInfo, 'metadata'> {
-  /** JSON text. */
-  readonly metadata: string;
-  /** Number of tiles, which are numbered row by row. */
-  readonly tiles: number;
-  /** Camera pixels along a tile's side; tiles at the right and lower edges may be smaller. */
-  readonly tileSide: number;
+export interface PhotoDescriptor
+  extends Omit<DecodedPhoto, 'takeTile' | 'packGeometry' | 'packBasis' | 'free'> {
   readonly geometry: Float64Array;
   readonly basis: Float32Array;
 }

@@ -7,7 +7,7 @@ import {
   type DecodeResult,
   type DecodeTask,
   type DecodeWorker,
-  WorkerDecoder,
+  startWorkerDecoder,
 } from './worker-decoder.js';
 
 const LIMITS = { intervalMs: 1, maxChecks: 3, maxStartChecks: 1000 };
@@ -73,7 +73,7 @@ function photoWith(...tileLengths: number[]): DecodeResult {
 
 async function started(answer: (task: DecodeTask) => DecodeResult | undefined) {
   const worker = new FakeWorker(answer);
-  const starting = WorkerDecoder.start(worker, LIMITS);
+  const starting = startWorkerDecoder(worker, LIMITS);
   worker.respond({ kind: 'done', id: START_ID, result: stateAt(0) });
   return { worker, decoder: await starting };
 }
@@ -130,7 +130,7 @@ test('a worker that does not start rejects and is ended', async () => {
     (worker: FakeWorker) => worker.respond({ kind: 'failed', message: 'no module' }),
   ]) {
     const worker = new FakeWorker(() => undefined);
-    const starting = WorkerDecoder.start(worker);
+    const starting = startWorkerDecoder(worker);
     fail(worker);
     await assert.rejects(starting, { name: 'PhotoError' });
     assert.ok(worker.hasEnded);

@@ -29,67 +29,47 @@ export type DecodeWorker = WorkerLike<DecodeTask, DecoderState, DecodeResult>;
 /** A task takes a second at most; a start includes a download and a compilation. */
 const LIMITS: WatchdogLimits = { intervalMs: 1000, maxChecks: 30, maxStartChecks: 15 };
 
-export class WorkerDecoder implements PhotoDecoder {
-  readonly #client: WorkerClient<DecodeTask, DecoderState, DecodeResult>;
+/** Waits until the worker has started. Rejects with `worker-unavailable` if it does not. */
+export async function startWorkerDecoder(worker: DecodeWorker, limits = LIMITS) {
+  const remedy = 'Load the photograph again.';
+  const client: WorkerClient<DecodeTask, DecoderState, DecodeResult> = new WorkerClient(worker, {
+    name: 'decoding worker',
+    limits,
+    remedy,
+  });
   /** The state after the last task. */
-  state: DecoderState;
+  let state = await client.ready;
 
-  private constructor(
-    client: WorkerClient<DecodeTask, DecoderState, DecodeResult>,
-    state: DecoderState,
-  ) {
-    this.#client = client;
-    this.state = state;
-  }
-
-  /** Waits until the worker has started. Rejects with `worker-unavailable` if it does not. */
-  static async start(worker: DecodeWorker, limits = LIMITS): Promise<WorkerDecoder> {
-    const client = new WorkerClient(worker, {
-      name: 'decoding worker',
-      limits,
-      remedy: 'Load the photograph again.',
-    });
-    return new WorkerDecoder(client, await client.ready);
-  }
-
-  async feed(offset: number, bytes: Uint8Array): Promise<void> {
-    const result = await this.#request({ kind: 'feed', offset, bytes });
-    if ('state' in result) this.state = result.state;
-  }
-
-  preview(): Promise<Photograph | null> {
-    return this.#requestPhoto('preview', completenessOf(this.state));
-  }
-
-  async finish(): Promise<Photograph> {
-    try {
-      return (await this.#requestPhoto('finish', 1)) as Photograph;
-    } finally {
-      this.free();
-    }
-  }
-
-  free(): void {
-    this.#client.terminate();
-  }
-
-  /** Resolves to `null` only for a preview. */
-  async #requestPhoto(
-    kind: 'preview' | 'finish',
-    completeness: number,
-  ): Promise<Photograph | null> {
-    const result = await this.#request({ kind });
+  const request = async (task: DecodeTask): Promise<DecodeResult> => {
+    const result = await client.request(task);
+    if ('error' in result) throw new PhotoError(result.error.code, result.error.message);
+    return result;
+  };
+  const requestPhoto = async (kind: 'preview' | 'finish', completeness: number) => {
+    const result = await request({ kind });
     const photo = 'photo' in result ? result.photo : null;
     if (!photo && kind === 'preview') return null;
     if (photo && photo.descriptor.tiles === photo.tiles.length) {
       return new Photograph(photo.descriptor, photo.tiles, completeness);
     }
     throw new PhotoError('internal', 'The decoding worker sent no complete photograph.');
-  }
-
-  async #request(task: DecodeTask): Promise<DecodeResult> {
-    const result = await this.#client.request(task);
-    if ('error' in result) throw new PhotoError(result.error.code, result.error.message);
-    return result;
-  }
+  };
+  return {
+    get state() {
+      return state;
+    },
+    async feed(offset: number, bytes: Uint8Array) {
+      const result = await request({ kind: 'feed', offset, bytes });
+      if ('state' in result) state = result.state;
+    },
+    preview: () => requestPhoto('preview', completenessOf(state)),
+    async finish() {
+      try {
+        return (await requestPhoto('finish', 1)) as Photograph;
+      } finally {
+        client.terminate();
+      }
+    },
+    free: () => client.terminate(),
+  } satisfies PhotoDecoder;
 }
