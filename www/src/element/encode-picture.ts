@@ -25,7 +25,6 @@ export function encodePicture(
   });
 }
 
-/** A copy of a canvas, `scale` times as wide and as high. */
 function resample({ canvas, gamut }: Picture, scale: number): HTMLCanvasElement {
   const copy = document.createElement('canvas');
   copy.width = Math.max(1, Math.round(canvas.width * scale));

@@ -2,7 +2,6 @@
 
 import type { RevealState } from '../state/reveal.js';
 
-/** The fields of the reveal state that this module observes. */
 export type Visibility = keyof Pick<RevealState, 'isNear' | 'isVisible'>;
 
 /** How far outside of the viewport counts: drawing begins shortly before an element becomes visible. */

@@ -72,7 +72,6 @@ function wasmForbidden(_: string, cause: unknown): PhotoError {
   );
 }
 
-/** Starts the build that this machine can run. */
 async function startModule<M>(
   name: WasmModuleName,
   { glue, simd, scalar }: WasmBuilds,

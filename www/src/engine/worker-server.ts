@@ -4,7 +4,6 @@ import { messageOf } from '../shared/errors.js';
 import { START_ID, type WorkerRequest, type WorkerResponse } from '../shared/worker-client.js';
 import { moduleFolder, setModuleFolder } from './wasm-loader.js';
 
-/** The first message to a worker. */
 interface StartMessage {
   /** The folder of the WebAssembly modules; `null` if they lie beside the worker. */
   readonly modules: string | null;

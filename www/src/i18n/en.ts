@@ -46,7 +46,6 @@ export const ENGLISH = {
   lowerRight: 'lower right',
 } as const;
 
-/** The name of a text. */
 export type StringKey = keyof typeof ENGLISH;
 
 /** All texts in one language; the compiler reports missing ones. `{0}`, `{1}`… are placeholders. */

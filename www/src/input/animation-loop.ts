@@ -30,7 +30,6 @@ export class AnimationLoop {
     else if (!this.#steps.has(name)) this.set(name, createStep());
   }
 
-  /** Suspends or resumes all animations. */
   set isEnabled(isEnabled: boolean) {
     this.#isEnabled = isEnabled;
     this.#request();

@@ -8,14 +8,12 @@ import { speedOf, type Velocity, VelocityTracker } from './inertia.js';
 export interface PointerSample {
   readonly id: number;
   readonly kind: 'mouse' | 'touch' | 'pen';
-  /** Viewport pixels. */
   readonly x: number;
   readonly y: number;
   /** Milliseconds since any origin. */
   readonly time: number;
 }
 
-/** Which gestures the current state permits. */
 export interface GesturePermissions {
   readonly movesLight: boolean;
   readonly zooms: boolean;

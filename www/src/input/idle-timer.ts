@@ -1,7 +1,6 @@
 /** Reports that a visitor has been inactive: first for the wandering torch, later for the kiosk mode. */
 
-/** Calls back once after `ms` milliseconds. The returned function cancels. */
-export type Delay = (ms: number, callback: () => void) => () => void;
+import type { callLater } from '../shared/promises.js';
 
 export interface IdleListener {
   /** No input for `REST_MS`. */
@@ -14,15 +13,15 @@ export interface IdleListener {
 export const REST_MS = 8000;
 
 export class IdleTimer {
-  readonly #delay: Delay;
+  readonly #callLater: typeof callLater;
   readonly #listener: IdleListener;
   #kioskMs = 0;
   #isActive = false;
   #cancelRest = (): void => {};
   #cancelKiosk = (): void => {};
 
-  constructor(delay: Delay, listener: IdleListener) {
-    this.#delay = delay;
+  constructor(later: typeof callLater, listener: IdleListener) {
+    this.#callLater = later;
     this.#listener = listener;
   }
 
@@ -33,11 +32,10 @@ export class IdleTimer {
     if (this.#isActive) this.#startKiosk();
   }
 
-  /** Restarts after an input. */
   restart(): void {
     this.#isActive = true;
     this.#cancelRest();
-    this.#cancelRest = this.#delay(REST_MS, () => this.#listener.rested());
+    this.#cancelRest = this.#callLater(REST_MS, () => this.#listener.rested());
     this.#startKiosk();
   }
 
@@ -50,7 +48,7 @@ export class IdleTimer {
   #startKiosk(): void {
     this.#cancelKiosk();
     if (this.#kioskMs === 0) return;
-    this.#cancelKiosk = this.#delay(this.#kioskMs, () => {
+    this.#cancelKiosk = this.#callLater(this.#kioskMs, () => {
       this.#isActive = false;
       this.#listener.expired();
     });

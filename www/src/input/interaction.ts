@@ -41,11 +41,9 @@ export class InteractionController {
   readonly #loop = new AnimationLoop(requestAnimationFrame.bind(globalThis));
   readonly #animator: LightAnimator;
   readonly #idle: IdleTimer;
-  /** There was input recently. */
   #isActive = false;
   /** The torch handle has the keyboard's focus: a light that a screen reader describes must not move. */
   #isHandleFocused = false;
-  /** The torch's position before the last move of a drag. */
   #torchBeforeMove: PicturePoint | null = null;
 
   constructor(

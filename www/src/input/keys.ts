@@ -54,7 +54,6 @@ const LIGHT_MOVES: Readonly<Record<string, Vector>> = {
   End: [1, 0],
 };
 
-/** The action of a key press; `null` if it is not the element's. */
 export function keyAction(press: KeyPress, focus: FocusTarget): KeyAction | null {
   const { key, metaKey, ctrlKey, altKey } = press;
   if (metaKey || (ctrlKey && !altKey)) return null;

@@ -45,7 +45,6 @@ export class LightAnimator {
     });
   }
 
-  /** Stops the torch where it is. */
   stopTorch(): void {
     this.#loop.set('glide', null);
     this.#loop.set('wander', null);

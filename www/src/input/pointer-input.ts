@@ -15,7 +15,6 @@ export interface PointerInputListener extends GestureListener {
   isCooperative(): boolean;
   /** The page scrolled where the visitor may have wanted to zoom. */
   zoomIgnored(by: 'wheel' | 'touch'): void;
-  /** Any input. */
   active(): void;
   /** The picture was pressed and should take the keyboard's focus. */
   pressed(): void;

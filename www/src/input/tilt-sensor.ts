@@ -2,9 +2,6 @@
 
 import type { PicturePoint } from '../shared/values.js';
 
-/** Some browsers ask the visitor for permission. */
-type PermissionRequester = { requestPermission?: () => Promise<string> };
-
 /** Whether the device is likely to have an orientation sensor: handheld devices. */
 export function isTiltSupported(): boolean {
   return 'DeviceOrientationEvent' in globalThis && matchMedia('(pointer: coarse)').matches;
@@ -24,8 +21,9 @@ export class TiltSensor {
 
   /** Starts; the current orientation is neutral. Resolves to whether permission was granted. */
   async request(): Promise<boolean> {
+    // Some browsers ask the visitor for permission.
     const { DeviceOrientationEvent: type } = globalThis as {
-      DeviceOrientationEvent?: PermissionRequester;
+      DeviceOrientationEvent?: { requestPermission?: () => Promise<string> };
     };
     if (!type) return false;
     try {

@@ -4,9 +4,7 @@ import { CENTRE, clampToPicture, type PicturePoint } from '../shared/values.js';
 
 /** In degrees, as in a `deviceorientation` event. */
 export interface DeviceAngles {
-  /** Front to back, −180 to 180. */
   readonly beta: number;
-  /** Left to right, −90 to 90. */
   readonly gamma: number;
 }
 

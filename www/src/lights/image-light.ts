@@ -11,7 +11,6 @@ export interface UploadableImage {
 
 /** Its content may change between frames. */
 export interface ImageLight {
-  /** The current content, if a graphics device can upload it. */
   uploadable(): UploadableImage | null;
   /**
    * The current content as a light of a WebAssembly module; `null` while nothing is loaded.
@@ -21,5 +20,4 @@ export interface ImageLight {
   createLight(module: Pick<RelightModule, 'Light'>, photo: ReceivedPhoto): Light | null;
 }
 
-/** An image that is not loaded yet. */
 export const PENDING_IMAGE: ImageLight = { uploadable: () => null, createLight: () => null };

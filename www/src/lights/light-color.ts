@@ -40,7 +40,6 @@ export function parseLightColor(
   };
 }
 
-/** Multiplies channel by channel. */
 export function multiplyRgb(a: RgbFactors, b: RgbFactors): RgbFactors {
   return [a[0] * b[0], a[1] * b[1], a[2] * b[2]];
 }

@@ -6,7 +6,6 @@ import { CENTRE, type PicturePoint } from '../shared/values.js';
 import type { ImageLight } from './image-light.js';
 
 export interface LightSetting {
-  /** The built-in light. */
   readonly name: LightName;
   /** The torch's position; `null` behind the centre of the picture, and for other lights. */
   readonly torch: PicturePoint | null;
@@ -18,7 +17,6 @@ export interface LightSetting {
   readonly image: ImageLight | null;
 }
 
-/** Makes the built-in light of a setting. */
 export function createBuiltinLight(
   { Light }: Pick<RelightModule, 'Light'>,
   photo: ReceivedPhoto,

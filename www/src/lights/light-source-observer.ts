@@ -6,7 +6,6 @@ import { toImageLight } from './image-pixels.js';
 import { isInstance, type LightPicture, type LightSource } from './light-source.js';
 
 export interface LightSourceListener {
-  /** The source shows something else. */
   changed(): void;
   /** The source has failed, or works again (`null`). */
   errorChanged(error: PhotoError | null): void;

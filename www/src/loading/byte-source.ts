@@ -39,7 +39,6 @@ const DEFAULT_PORTS: Omit<SourcePorts, 'fetch'> = {
   maxRetries: 4,
 };
 
-/** The progress of one range. */
 interface Transfer {
   readonly start: number;
   /** The start of the next piece. */

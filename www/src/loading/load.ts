@@ -27,7 +27,6 @@ export interface LoadPorts {
 
 /** The first request. It contains the index of most files, and small files as a whole. */
 const FIRST_RANGE: ByteRange = { start: 0, end: 1 << 14 };
-/** Minimum time between two previews. */
 const MIN_PREVIEW_INTERVAL_MS = 400;
 
 /**
@@ -76,7 +75,6 @@ async function open(url: string, options: LoadOptions, ports: LoadPorts): Promis
   }
 }
 
-/** Adds the file's name to the decoder's errors. */
 function withFileName(error: PhotoError, url: string): PhotoError {
   const { code, message, cause } = error;
   if (!code.startsWith('format-') || message.includes(fileName(url))) return error;
@@ -164,7 +162,6 @@ function previewsOf(decoder: PhotoDecoder, now: () => number): () => Promise<Pho
   };
 }
 
-/** The error of an element without `src`. */
 export function missingSource(): PhotoError {
   return new PhotoError('src-missing', 'There is no photograph to show: set the src attribute.');
 }

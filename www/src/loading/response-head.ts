@@ -3,11 +3,9 @@
 import type { ByteRange } from '../shared/values.js';
 import { badStatus, compressed, webPage, wrongRange } from './http-errors.js';
 
-/** What the headers say about the body. */
 export interface ResponseHead {
   /** Whether the body is the whole file, whatever was requested. */
   readonly isWhole: boolean;
-  /** The byte of the file at which the body begins. */
   readonly start: number;
   /** The byte of the file at which the body ends, if known. */
   readonly end: number | undefined;

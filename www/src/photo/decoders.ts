@@ -6,7 +6,6 @@ import { createMainThreadDecoder } from './main-thread-decoder.js';
 import type { PhotoDecoder } from './photo-decoder.js';
 import { startWorkerDecoder } from './worker-decoder.js';
 
-/** Makes a decoder for one photograph. */
 export async function createDecoder(): Promise<PhotoDecoder> {
   const worker = startWorker(
     () => new Worker(new URL('./relightable-photo-worker.js', import.meta.url), { type: 'module' }),

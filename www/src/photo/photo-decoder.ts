@@ -3,7 +3,6 @@
 import type { ByteRange } from '../shared/values.js';
 import type { Photograph } from './photograph.js';
 
-/** The progress of a decoder. */
 export interface DecoderState {
   /** Bytes of the file that were fed; repeated ones count once. */
   readonly bytesFed: number;

@@ -13,7 +13,6 @@ export interface PhotoDescriptor
   readonly basis: Float32Array;
 }
 
-/** The descriptor of a photograph in the decoder's module. */
 export function describePhoto(photo: DecodedPhoto): PhotoDescriptor {
   const { width, height, lightWidth, lightHeight, decodedBytes, metadata, tiles, tileSide } = photo;
   const [geometry, basis] = [photo.packGeometry(), photo.packBasis()];
@@ -29,14 +28,12 @@ export interface TileSession {
   readonly tiles: readonly (readonly number[])[];
   /** Moves a tile to its worker. If that fails before it is sent, `bytes` are still there. */
   put(index: number, bytes: TileBytes): Promise<void>;
-  /** Moves a tile back. */
   take(index: number): Promise<TileBytes>;
   /** Prepares relighting, once all tiles are there. */
   plan(): Promise<void>;
   end(): void;
 }
 
-/** Workers that keep tiles and relight them. */
 export interface TileWorkers<S extends TileSession> {
   /** Rejects with `worker-unavailable`. */
   open(photo: PhotoDescriptor): Promise<S>;

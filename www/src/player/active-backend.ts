@@ -25,7 +25,6 @@ export class RefCounted<T extends Freeable> {
   }
 }
 
-/** A renderer with its state. */
 export class ActiveBackend {
   /** For this renderer alone: frame times of other renderers say nothing about it. */
   readonly quality = new QualityController();

@@ -13,9 +13,7 @@ import { ActiveBackend, type RefCounted } from './active-backend.js';
 import { BACKEND_TITLES, firstWorking } from './backends.js';
 import type { SessionListener } from './types.js';
 
-/** What a selector reports to its session. */
 export interface SelectorEvents {
-  /** No backend works. */
   failed(error: PhotoError): void;
   /** A search has ended with a backend that works. */
   selected(): void;
@@ -116,7 +114,6 @@ export class BackendSelector {
     if (!this.#search && this.options) this.#replace(lost, this.options, lost.backend, '');
   }
 
-  /** The active backend has drawn its first frame. */
   freeOutgoing(): void {
     this.#outgoing?.free();
     this.#outgoing = null;

@@ -3,7 +3,6 @@
 import type { Backend } from '../engine/types.js';
 import { endSentence, hasCode, messageOf, PhotoError } from '../shared/errors.js';
 
-/** The backends' names in messages. */
 export const BACKEND_TITLES: Readonly<Record<Backend, string>> = {
   webgpu: 'WebGPU',
   webgl2: 'WebGL2',

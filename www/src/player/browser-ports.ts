@@ -24,7 +24,7 @@ export const BROWSER_PORTS: SessionPorts = {
   createRenderer,
   prepare: (options, signal) => void prepare(options, signal),
   nextFrame: (callback) => requestAnimationFrame(callback),
-  later: callLater,
+  callLater,
   now: () => performance.now(),
 };
 

@@ -85,7 +85,7 @@ export class FrameScheduler {
     // Pages request frames at the rate of the browser's own. If these are slow, the picture still moves.
     this.#ports.nextFrame(() => {
       if (isCancelled) return;
-      this.#cancelRest = this.#ports.later(REST_DELAY_MS, () => this.#draw(true));
+      this.#cancelRest = this.#ports.callLater(REST_DELAY_MS, () => this.#draw(true));
     });
   }
 }

@@ -63,7 +63,6 @@ export class PhotoSession {
     return this.#photo?.value ?? null;
   }
 
-  /** The backend in use. */
   get backend(): Backend | null {
     return this.#selector.active?.backend ?? null;
   }
@@ -104,7 +103,6 @@ export class PhotoSession {
     this.#scheduler.setVisible(isVisible);
   }
 
-  /** Releases the photograph and the backend. */
   stop(): void {
     this.#settings = null;
     this.#release(false);
@@ -176,7 +174,6 @@ export class PhotoSession {
     }
   }
 
-  /** Has a photograph or a preview drawn from now on. */
   async #use(photo: Photograph, previous: Backend | null, reason: string): Promise<void> {
     const { backend } = this;
     this.#photo?.release();

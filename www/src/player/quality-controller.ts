@@ -39,9 +39,7 @@ interface Drop {
 }
 
 export class QualityController {
-  /** Index of the current quality in `QUALITY_LEVELS`. */
   #level = 0;
-  /** Durations of the last frames at this level. */
   #durations: number[] = [];
   #lastEndMs = Number.NEGATIVE_INFINITY;
   #frames = 0;
@@ -53,7 +51,6 @@ export class QualityController {
   #noDropBeforeFrame = 0;
   #dropDelay = DROP_DELAY_FRAMES;
 
-  /** The share of the components for the next frame of an animation. */
   get quality(): number {
     return qualityAt(this.#level);
   }

@@ -102,7 +102,7 @@ export function fakeSession() {
           requests.push({ backend, resolve: () => resolve(renderer), reject, lose: onLost });
         }),
       nextFrame: (callback) => frames.push(callback),
-      later: (ms, callback) => {
+      callLater: (ms, callback) => {
         timers.set(callback, now + ms);
         return () => timers.delete(callback);
       },

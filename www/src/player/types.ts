@@ -8,6 +8,7 @@ import type { LoadOptions } from '../loading/load.js';
 import type { Photograph } from '../photo/photograph.js';
 import type { CreateRenderer, Renderer, RenderOptions } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
+import type { callLater } from '../shared/promises.js';
 
 /** Everything that the element's attributes and the visitor decide. */
 export interface SessionSettings {
@@ -21,10 +22,8 @@ export interface SessionSettings {
 
 /** The browser's clock and frames. */
 export interface FramePorts {
-  /** Calls back before the browser draws its next frame. */
   nextFrame(callback: () => void): void;
-  /** Calls back once after `ms` milliseconds. The returned function cancels it. */
-  later(ms: number, callback: () => void): () => void;
+  readonly callLater: typeof callLater;
   /** Milliseconds, from any start. */
   now(): number;
 }
@@ -37,7 +36,6 @@ export interface SessionPorts extends FramePorts {
   readonly createRenderer: CreateRenderer;
 }
 
-/** What a session reports. */
 export interface SessionListener {
   /** A load starts; the last photograph is gone. */
   loadStarted(): void;
@@ -52,7 +50,6 @@ export interface SessionListener {
   loaded(): void;
   /** Another backend is in use, or the same one again after a loss. */
   backendChanged(backend: Backend, previous: Backend | null, reason: string): void;
-  /** The backend in use stopped working. */
   backendLost(backend: Backend, reason: string): void;
   failed(error: PhotoError): void;
   /** A frame was drawn after a failure. */

@@ -84,7 +84,7 @@ async function startSession(t: TestContext, open = async (_: Backend): Promise<v
       prepare: () => {},
       createRenderer: factoryFor(module, pool, createDevices(open)).createRenderer,
       nextFrame: (callback) => frames.push(callback),
-      later: () => () => {},
+      callLater: () => () => {},
       now: () => 0,
     },
     {

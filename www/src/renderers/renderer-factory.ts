@@ -18,20 +18,28 @@ const MAX_WORKERS = 4;
 /** Delay of background loading in browsers without `requestIdleCallback`. */
 const IDLE_DELAY_MS = 1000;
 
-export interface RendererFactory {
-  readonly createRenderer: CreateRenderer;
-  /** Warms up the first backend that works until `signal` is aborted. Errors are left to `createRenderer`. */
-  prepare(options: RenderOptions, signal: AbortSignal): Promise<void>;
-}
-
-/** The separately loaded parts. */
-export interface RendererLoaders {
+/** `gpu`, `cpu` and `cpuModule` load what is fetched only when it is needed. */
+export function rendererFactory({
+  gpu,
+  cpu,
+  cpuModule,
+}: {
   readonly gpu: () => Promise<GpuRenderers>;
   readonly cpu: () => Promise<CpuRenderers>;
   readonly cpuModule: () => Promise<CpuModule>;
-}
-
-export function rendererFactory({ gpu, cpu, cpuModule }: RendererLoaders): RendererFactory {
+}) {
+  const createRenderer: CreateRenderer = async (backend, photograph, options, onLost, signal) => {
+    if (backend === 'cpu') {
+      const [module, renderers] = await Promise.all([cpuModule(), cpu()]);
+      return await renderers.create(module, photograph, options.gamut, signal);
+    }
+    const renderers = await gpu();
+    signal.throwIfAborted();
+    const renderer = await renderers.create(backend, photograph, options, onLost, signal);
+    // The CPU replaces a device that is lost, perhaps when the network is gone too.
+    whenIdle(() => Promise.allSettled([cpuModule(), cpu()]));
+    return renderer;
+  };
   const warmUp = async (backend: Backend, software: boolean, signal: AbortSignal) => {
     if (backend !== 'cpu') {
       const renderers = await gpu();
@@ -41,33 +49,21 @@ export function rendererFactory({ gpu, cpu, cpuModule }: RendererLoaders): Rende
     const [renderers] = await Promise.all([cpu(), cpuModule()]);
     return signal.aborted ? () => {} : renderers.warmUp();
   };
-  return {
-    async createRenderer(backend, photograph, options, onLost, signal) {
-      if (backend === 'cpu') {
-        const [module, renderers] = await Promise.all([cpuModule(), cpu()]);
-        return await renderers.create(module, photograph, options.gamut, signal);
+  /** Warms up the first backend that works until `signal` is aborted. Errors are left to `createRenderer`. */
+  const prepare = async ({ backends, software }: RenderOptions, signal: AbortSignal) => {
+    for (const backend of backends) {
+      if (signal.aborted) return;
+      try {
+        const release = await warmUp(backend, software, signal);
+        if (signal.aborted) release();
+        else signal.addEventListener('abort', release);
+        return;
+      } catch {
+        // The next backend may work.
       }
-      const renderers = await gpu();
-      signal.throwIfAborted();
-      const renderer = await renderers.create(backend, photograph, options, onLost, signal);
-      // The CPU replaces a device that is lost, perhaps when the network is gone too.
-      whenIdle(() => Promise.allSettled([cpuModule(), cpu()]));
-      return renderer;
-    },
-    async prepare({ backends, software }, signal) {
-      for (const backend of backends) {
-        if (signal.aborted) return;
-        try {
-          const release = await warmUp(backend, software, signal);
-          if (signal.aborted) release();
-          else signal.addEventListener('abort', release);
-          return;
-        } catch {
-          // The next backend may work.
-        }
-      }
-    },
+    }
   };
+  return { createRenderer, prepare };
 }
 
 const GRAPHICS_LOADERS: { readonly [B in GraphicsBackend]: () => Promise<Modules[B]> } = {
@@ -77,7 +73,6 @@ const GRAPHICS_LOADERS: { readonly [B in GraphicsBackend]: () => Promise<Modules
 
 const poolSize = Math.min(MAX_WORKERS, globalThis.navigator?.hardwareConcurrency ?? 1);
 
-/** The factory of this page. */
 export const { createRenderer, prepare } = rendererFactory({
   gpu: loadOnce(async () => {
     const { gpuRenderers } = await import('./gpu/gpu-renderer.js');

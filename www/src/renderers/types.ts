@@ -12,18 +12,15 @@ export interface RenderOptions {
   readonly backends: readonly Backend[];
   /** Whether WebGPU and WebGL2 may be software renderers. */
   readonly software: boolean;
-  /** The gamut of the canvas, where the browser supports it. */
   readonly gamut: Gamut;
 }
 
-/** Draws one photograph with one backend. */
 export interface Renderer extends Freeable {
   readonly canvas: HTMLCanvasElement;
   /** The implementation, for people: the SIMD level or the graphics adapter. */
   readonly kernel: string;
   /** The gamut that the canvas really has. */
   readonly gamut: Gamut;
-  /** Reason for degraded rendering, if any. */
   readonly warning?: string;
   /**
    * Draws one frame with a share of the components (`quality`, 0 to 1). Call it again only after the last promise has

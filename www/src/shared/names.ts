@@ -3,13 +3,11 @@
 /** The built-in lights, in the order of the light menu. */
 export const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum', 'fire'] as const;
 
-/** The name of a built-in light. */
 export type LightName = (typeof LIGHTS)[number];
 
 /** The backends from fastest to slowest, which is the order in which they are tried. */
 export const BACKENDS: readonly [Backend, ...Backend[]] = ['webgpu', 'webgl2', 'cpu'];
 
-/** The name of a backend. */
 export type Backend = 'webgpu' | 'webgl2' | 'cpu';
 
 /** The colour space of the canvas. */
@@ -24,5 +22,4 @@ export type ToneCurve = 'clip' | 'filmic';
 /** The WebAssembly modules: the decoder and one for each backend. */
 export type WasmModuleName = 'decoder' | Backend;
 
-/** The modules that the core uses. */
 export const CORE_MODULES = ['decoder', 'cpu'] as const satisfies readonly WasmModuleName[];

@@ -30,20 +30,15 @@ export function linkedController(signal: AbortSignal): AbortController {
   return linked;
 }
 
-/** When a wait for a promise ends early. */
-export interface WaitLimits<T> {
-  /** Once it is aborted, the wait rejects with its reason. */
-  readonly signal?: AbortSignal;
-  /** After this time, the result of `onTimeout` takes the promise's place. */
-  readonly ms?: number;
-  readonly onTimeout?: () => T | Promise<T>;
-}
-
-/** Waits for a promise until a signal is aborted or a time has passed. */
+/**
+ * Waits for a promise. Rejects with the signal's reason once it is aborted; after `ms` milliseconds, the result of
+ * `onTimeout` takes the promise's place.
+ */
 export function withTimeout<T>(
   promise: Promise<T>,
-  { signal, ms, onTimeout }: WaitLimits<T>,
+  limits: { signal?: AbortSignal; ms?: number; onTimeout?: () => T | Promise<T> },
 ): Promise<T> {
+  const { signal, ms, onTimeout } = limits;
   let timer: ReturnType<typeof setTimeout> | undefined;
   let onAbort = () => {};
   return new Promise<T>((resolve, reject) => {

@@ -30,7 +30,6 @@ export interface PicturePoint {
 
 export const CENTRE: PicturePoint = { x: 0.5, y: 0.5 };
 
-/** Factors on linear red, green and blue. */
 export type RgbFactors = readonly [red: number, green: number, blue: number];
 
 /** The nearest point on the picture. */

@@ -18,7 +18,6 @@ export interface WatchdogLimits {
   readonly maxStartChecks: number;
 }
 
-/** A message to the worker. */
 export interface WorkerRequest<Task> {
   readonly id: number;
   readonly task: Task;

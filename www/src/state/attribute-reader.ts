@@ -72,7 +72,6 @@ export class AttributeReader {
     return this.#newErrors.splice(0);
   }
 
-  /** Forgets all values and errors. */
   clear(): void {
     this.#attributes.clear();
     this.#newErrors = [];

@@ -121,17 +121,14 @@ export class LightState {
     this.#update();
   }
 
-  /** Clears all overrides. */
   reset(): void {
     this.override(NO_OVERRIDES);
   }
 
-  /** All items of the light menu. */
   get items(): readonly LightItem[] {
     return this.#hasSource ? ['projection', ...LIGHTS] : LIGHTS;
   }
 
-  /** The selected item of the light menu. */
   get item(): LightItem {
     return this.#usesSource ? 'projection' : this.name;
   }

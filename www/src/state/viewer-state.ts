@@ -118,7 +118,6 @@ export class ViewerState {
     this.light.item = items.at((items.indexOf(item) + by) % items.length) ?? item;
   }
 
-  /** Back to the options. */
   reset(): void {
     this.light.reset();
     this.#view = FULL_VIEW;

@@ -16,7 +16,6 @@ export interface PhotoView {
 
 export const FULL_VIEW: PhotoView = { zoom: 1, ...CENTRE };
 const DOUBLE_TAP_ZOOM = 2.5;
-/** The factor of one key press or button press. */
 export const ZOOM_STEP = 1.5;
 /** Pixels of wheel rotation that double the magnification. */
 const WHEEL_PIXELS_PER_DOUBLING = 240;
@@ -32,7 +31,6 @@ export function clampView({ zoom, x, y }: PhotoView, maxZoom: number): PhotoView
   return { zoom: clampAndRound(zoom, 1, maxZoom), x: clampCentre(x), y: clampCentre(y) };
 }
 
-/** From viewport to picture coordinates. */
 export function toPicture(view: PhotoView, { x, y }: PicturePoint): PicturePoint {
   return { x: view.x + (x - 0.5) / view.zoom, y: view.y + (y - 0.5) / view.zoom };
 }

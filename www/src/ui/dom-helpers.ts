@@ -11,7 +11,6 @@ export function createElement<K extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
-/** A slot with fallback content. */
 export function createSlot(name: string, ...fallback: (Node | string)[]): HTMLSlotElement {
   return createElement('slot', { name }, ...fallback);
 }

@@ -24,7 +24,6 @@ export function describeLight({ x, y }: PicturePoint, language: Language): strin
   return t('lightAt', language, t(direction, language), distance, position);
 }
 
-/** 0, 1 or 2: before, in or after the middle. */
 function third(coordinate: number): number {
   if (coordinate < 0.5 - MIDDLE_DISTANCE) return 0;
   return coordinate > 0.5 + MIDDLE_DISTANCE ? 2 : 1;

@@ -30,7 +30,6 @@ export class ShadowDom {
     hidden: '',
   });
   readonly #revealText = createElement('span');
-  /** Dismisses the poster. */
   readonly revealButton = createElement(
     'button',
     { class: 'reveal', part: 'button', type: 'button', hidden: '' },
@@ -144,7 +143,6 @@ export class ShadowDom {
     if (hasHandle && focused === viewport) handle.focus({ preventScroll: true });
   }
 
-  /** Replaces the canvas. */
   showCanvas(canvas: HTMLCanvasElement): void {
     canvas.setAttribute('part', 'canvas');
     this.#canvas = canvas;
@@ -226,7 +224,6 @@ export class ShadowDom {
     }, HINT_MS);
   }
 
-  /** Removes the focus from inside the element. */
   blur(): void {
     (this.root.activeElement as HTMLElement | null)?.blur();
   }

@@ -10,7 +10,6 @@ import { createElement, updateAttribute, updateText } from './dom-helpers.js';
 import { createIcon, LIGHT_ICON, setIcon } from './icons.js';
 import TOOLBAR_CSS from './toolbar.css';
 
-/** The actions of the buttons and the menu. */
 export interface ToolbarActions {
   selectLight(item: LightItem): void;
   play(): void;
@@ -50,7 +49,6 @@ export class Toolbar {
   readonly #lightName = createElement('span');
   readonly #host: Element;
   readonly #viewer: ViewerState;
-  /** The texts of the current menu. */
   #menuTexts = '';
   #hideTimer: ReturnType<typeof setTimeout> | undefined;
 

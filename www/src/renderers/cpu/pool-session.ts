@@ -6,13 +6,11 @@ import { type PhotoError, photoReleased } from '../../shared/errors.js';
 import { allSettledOrThrow, withTimeout } from '../../shared/promises.js';
 import type { FrameSettings, RelightClient, RowRange, RowTask } from './protocol.js';
 
-/** Rows of a picture. */
 export interface RowPixels extends RowRange {
   /** RGBA, row by row. */
   readonly pixels: ArrayBuffer;
 }
 
-/** What a session reports to its pool. */
 interface PoolSessionEvents {
   frameDrawn(): void;
   ended(): void;
@@ -39,7 +37,6 @@ export class PoolSession implements TileSession {
   readonly #events: PoolSessionEvents;
   /** Whether the workers know their light rows; false while tiles are moved. */
   #isPlanned = false;
-  /** Aborted when the session ends. */
   readonly #end = new AbortController();
 
   constructor(
@@ -158,7 +155,6 @@ export class PoolSession implements TileSession {
   }
 }
 
-/** Whole rows of tiles. */
 export interface TileRowRange extends RowRange {
   readonly firstTile: number;
   readonly endTile: number;

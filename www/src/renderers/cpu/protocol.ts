@@ -4,10 +4,8 @@ import type { OutputSettings } from '../../engine/output-settings.js';
 import type { Gamut } from '../../engine/types.js';
 import type { WorkerClient, WorkerLike } from '../../shared/worker-client.js';
 
-/** How a frame is drawn. */
 export interface FrameSettings {
   readonly output: OutputSettings;
-  /** The canvas's gamut. */
   readonly gamut: Gamut;
   /** Share of the components, 0 to 1. */
   readonly quality: number;
@@ -27,7 +25,6 @@ export type RowTask =
       readonly geometry: Float64Array;
       readonly basis: Float32Array;
     } & RowRange)
-  /** Stores a tile. */
   | { readonly kind: 'put'; readonly index: number; readonly bytes: Uint8Array<ArrayBuffer> }
   /** Gives a tile back: the result is its bytes. */
   | { readonly kind: 'take'; readonly index: number }
@@ -44,7 +41,6 @@ export type RowTask =
   | { readonly kind: 'close' };
 
 export interface RelightTask {
-  /** The photograph's number. */
   readonly photo: number;
   readonly task: RowTask;
 }

@@ -79,7 +79,6 @@ export class WorkerPool implements TileWorkers<PoolSession> {
     return () => this.#release([]);
   }
 
-  /** The workers with the fewest photographs; starts new ones before any gets a second photograph. */
   #pick(count: number): PoolWorker[] {
     const picked: PoolWorker[] = [];
     while (picked.length < count) {

@@ -19,7 +19,6 @@ export interface Lease extends DeviceHandle {
 /** A device that is open or being opened. */
 interface SharedDevice {
   readonly graphics: Promise<GraphicsDevice>;
-  /** Called when the device is lost. */
   readonly holders: Set<(reason: string) => void>;
   /** Lost or freed: later events of the device are ignored. */
   isClosed: boolean;
