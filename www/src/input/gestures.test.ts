@@ -23,10 +23,10 @@ function at(
   x: number,
   y: number,
   time = 0,
-  kind: PointerSample['kind'] = 'touch',
+  kind: 'touch' | 'mouse' | 'pen' = 'touch',
   id = 1,
 ): PointerSample {
-  return { id, kind, x, y, time };
+  return { id, isTouch: kind === 'touch', x, y, time };
 }
 
 test('a finger moves the light', () => {

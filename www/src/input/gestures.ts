@@ -7,7 +7,7 @@ import { speedOf, type Velocity, VelocityTracker } from './inertia.js';
 
 export interface PointerSample {
   readonly id: number;
-  readonly kind: 'mouse' | 'touch' | 'pen';
+  readonly isTouch: boolean;
   readonly x: number;
   readonly y: number;
   /** Milliseconds since any origin. */
@@ -87,10 +87,10 @@ export class GestureRecognizer {
     }
   }
 
-  move({ id, kind, x, y, time }: PointerSample, allowed: GesturePermissions): void {
+  move({ id, isTouch, x, y, time }: PointerSample, allowed: GesturePermissions): void {
     const pointer = this.#pressed.get(id);
     if (!pointer) {
-      if (kind !== 'touch' && !this.isPressed) this.#hover(x, y, allowed);
+      if (!isTouch && !this.isPressed) this.#hover(x, y, allowed);
       return;
     }
     const before = this.#pinchGeometry();

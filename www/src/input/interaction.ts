@@ -20,7 +20,7 @@ import { IdleTimer } from './idle-timer.js';
 import type { Velocity } from './inertia.js';
 import { type FocusTarget, type KeyAction, keyAction } from './keys.js';
 import { LightAnimator } from './light-animator.js';
-import { PointerInput } from './pointer-input.js';
+import { listenToPointer, toViewportUnits } from './pointer-input.js';
 import { reducedMotion } from './reduced-motion.js';
 import { isTiltSupported, TiltSensor } from './tilt-sensor.js';
 
@@ -36,12 +36,13 @@ export class InteractionController {
   readonly #dom: ShadowDom;
   readonly #presenter: Presenter;
   readonly #listener: InteractionListener;
-  readonly #pointer: PointerInput;
   readonly #tilt: TiltSensor;
   readonly #loop = new AnimationLoop(requestAnimationFrame.bind(globalThis));
   readonly #animator: LightAnimator;
   readonly #idle: IdleTimer;
   #isActive = false;
+  /** The space key is held: drags pan. */
+  #isPanning = false;
   /** The torch handle has the keyboard's focus: a light that a screen reader describes must not move. */
   #isHandleFocused = false;
   #torchBeforeMove: PicturePoint | null = null;
@@ -73,7 +74,7 @@ export class InteractionController {
       this.markActive();
       this.#moveTorch(point);
     });
-    this.#pointer = this.#listenToPointer();
+    this.#listenToPointer();
     this.#listenToKeyboard();
   }
 
@@ -136,18 +137,20 @@ export class InteractionController {
     this.#loop.clear();
   }
 
-  #listenToPointer(): PointerInput {
+  #listenToPointer(): void {
     const state = this.#state;
     const { handle, viewport } = this.#dom;
-    const pointer = new PointerInput(viewport, {
+    const toUnits = (x: number, y: number) => toViewportUnits(viewport, x, y);
+    listenToPointer(viewport, {
       permissions: () => this.#permissions,
+      isPanning: () => this.#isPanning,
       isCooperative: () => state.options.cooperativeGestures,
       zoomIgnored: (by) => this.#presenter.hintAtZoom(by),
       active: () => this.markActive(),
       pressed: () => (handle.hidden ? viewport : handle).focus({ preventScroll: true }),
       moveLight: (x, y) => {
         this.#torchBeforeMove = state.light.torch;
-        this.#moveTorch(toPicture(state.view, pointer.toUnits(x, y)));
+        this.#moveTorch(toPicture(state.view, toUnits(x, y)));
       },
       restoreLight: () => {
         state.light.torch = this.#torchBeforeMove;
@@ -156,30 +159,29 @@ export class InteractionController {
       throwLight: ({ x, y }: Velocity) => {
         if (reducedMotion().matches) return;
         const { zoom } = state.view;
-        const velocity = pointer.toUnits(x, y);
+        const velocity = toUnits(x, y);
         this.#animator.throwTorch({ x: velocity.x / zoom, y: velocity.y / zoom });
       },
       pan: (dx, dy) => {
-        const moved = pointer.toUnits(dx, dy);
+        const moved = toUnits(dx, dy);
         this.#pan(moved.x, moved.y);
       },
-      zoom: (factor, x, y) => this.#zoomAt(factor, pointer.toUnits(x, y)),
+      zoom: (factor, x, y) => this.#zoomAt(factor, toUnits(x, y)),
       doubleTap: (x, y) =>
-        this.#setView(toggleZoom(state.view, pointer.toUnits(x, y), state.options.maxZoom)),
+        this.#setView(toggleZoom(state.view, toUnits(x, y), state.options.maxZoom)),
     });
-    return pointer;
   }
 
   #listenToKeyboard(): void {
     const { root, handle } = this.#dom;
     root.addEventListener('keydown', (event) => this.#keyDown(event as KeyboardEvent));
     root.addEventListener('keyup', (event) => {
-      if ((event as KeyboardEvent).key === ' ') this.#pointer.isPanning = false;
+      if ((event as KeyboardEvent).key === ' ') this.#isPanning = false;
     });
     const focusChanged = () => {
       // A press with a pointer focuses the handle without :focus-visible.
       this.#isHandleFocused = handle.matches(':focus-visible');
-      this.#pointer.isPanning = false;
+      this.#isPanning = false;
       this.#listener.changed();
     };
     handle.addEventListener('focus', focusChanged);
@@ -228,7 +230,7 @@ export class InteractionController {
     if (!focus) return;
     this.markActive(true);
     if (event.key === ' ' && focus !== 'controls') {
-      this.#pointer.isPanning = true;
+      this.#isPanning = true;
       event.preventDefault();
       return;
     }

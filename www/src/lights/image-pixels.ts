@@ -1,7 +1,7 @@
 /** Reads the pixels of an image that is used as light. */
 
 import { messageOf, PhotoError } from '../shared/errors.js';
-import type { ImageLight } from './image-light.js';
+import type { ImageLight } from './light-setting.js';
 import {
   type BrowserPicture,
   isInstance,
@@ -43,9 +43,8 @@ export function toImageLight(image: LightPicture): ImageLight {
 }
 
 /**
- * The current pixels in sRGB with straight alpha; `null` while nothing is loaded.
- *
- * @throws `light-tainted`, `light-size` or `light-source`
+ * The current pixels in sRGB with straight alpha; `null` while nothing is loaded. Throws `light-tainted`, `light-size` or
+ * `light-source`.
  */
 function readPixels(image: BrowserPicture): ImageData | null {
   const size = imageSize(image);

@@ -15,11 +15,7 @@ export interface LightColor {
 /** Parses a CSS colour into red, green, blue and alpha from 0 to 255; `null` if it is invalid. */
 export type CssColorParser = (css: string) => readonly number[] | null;
 
-/**
- * The `light-color` attribute; `null`, which is white, for an empty value. Alpha scales the brightness.
- *
- * @throws `attribute` for an invalid colour
- */
+/** The `light-color` attribute; `null`, which is white, for an empty value. Alpha scales the brightness. Throws `attribute`. */
 export function parseLightColor(
   value: string | null,
   parse: CssColorParser = parseCssColor,

@@ -1,9 +1,8 @@
 /** The light of one frame. Immutable: a change makes a new object. */
 
-import type { Light, ReceivedPhoto, RelightModule } from '../engine/types.js';
+import type { Light, LivePicture, ReceivedPhoto, RelightModule } from '../engine/types.js';
 import type { LightName } from '../shared/names.js';
 import { CENTRE, type PicturePoint } from '../shared/values.js';
-import type { ImageLight } from './image-light.js';
 
 export interface LightSetting {
   readonly name: LightName;
@@ -16,6 +15,23 @@ export interface LightSetting {
   /** Replaces the built-in light as soon as it is loaded. */
   readonly image: ImageLight | null;
 }
+
+/** An image that is used as light in place of a built-in light. Its content may change between frames. */
+export interface ImageLight {
+  /** The current content and its size in pixels, if a graphics device can upload it directly. */
+  uploadable(): {
+    readonly image: LivePicture;
+    readonly width: number;
+    readonly height: number;
+  } | null;
+  /**
+   * The current content as a light of a WebAssembly module; `null` while nothing is loaded. Throws `light-tainted`,
+   * `light-size`, `light-value` or `light-source`.
+   */
+  createLight(module: Pick<RelightModule, 'Light'>, photo: ReceivedPhoto): Light | null;
+}
+
+export const PENDING_IMAGE: ImageLight = { uploadable: () => null, createLight: () => null };
 
 export function createBuiltinLight(
   { Light }: Pick<RelightModule, 'Light'>,

@@ -1,8 +1,8 @@
 /** Observes a light source: reports when its content changes and when it fails. */
 
 import { messageOf, PhotoError } from '../shared/errors.js';
-import type { ImageLight } from './image-light.js';
 import { toImageLight } from './image-pixels.js';
+import type { ImageLight } from './light-setting.js';
 import { isInstance, type LightPicture, type LightSource } from './light-source.js';
 
 export interface LightSourceListener {

@@ -21,11 +21,7 @@ export interface FileVersion {
   readonly modified?: string | undefined;
 }
 
-/**
- * Reads the head of the response to a request for a range or for the whole file.
- *
- * @throws `http-status`, `http-type`, `http-encoding` or `http-range` if the body is not the requested data
- */
+/** Throws `http-status`, `http-type`, `http-encoding` or `http-range` if the body is not the requested data. */
 export function readHead(
   url: string,
   response: Response,

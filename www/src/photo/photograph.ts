@@ -48,11 +48,7 @@ export class Photograph implements Freeable {
   /** Settles after the last use that was requested. */
   #lastUse: Promise<unknown> = Promise.resolve();
 
-  /**
-   * A photograph whose tiles are on the page.
-   *
-   * @throws `format-invalid`
-   */
+  /** A photograph whose tiles are on the page. Throws `format-invalid`. */
   constructor(descriptor: PhotoDescriptor, tiles: TileBytes[], completeness = 1) {
     const { width, height, lightWidth, lightHeight, decodedBytes } = descriptor;
     const metadata = parseMetadata(descriptor.metadata);
@@ -62,11 +58,7 @@ export class Photograph implements Freeable {
     this.#tiles = tiles;
   }
 
-  /**
-   * A photograph in the memory of the page's decoder, which is freed with it or if this throws.
-   *
-   * @throws `format-invalid`
-   */
+  /** A photograph in the memory of the page's decoder, which is freed with it or if this throws `format-invalid`. */
   static fromModule(photo: DecodedPhoto, completeness = 1): Photograph {
     const store: TileStore = { module: null, photo, onLeave: new Set() };
     try {

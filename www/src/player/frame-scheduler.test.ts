@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { ImageLight } from '../lights/image-light.js';
+import type { ImageLight } from '../lights/light-setting.js';
 import { withBackends, withExposure } from '../renderers/settings-fakes.js';
 import { PhotoError } from '../shared/errors.js';
 import { type FakeSession, fakeSession, loadedSession, SETTINGS, settle } from './session-fakes.js';

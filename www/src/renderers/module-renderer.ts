@@ -2,8 +2,8 @@
 
 import { createOutputTransform } from '../engine/output-settings.js';
 import type { Relighter, RelightModule } from '../engine/types.js';
-import type { ImageLight } from '../lights/image-light.js';
 import { LightCache } from '../lights/light-cache.js';
+import type { ImageLight } from '../lights/light-setting.js';
 import type { Photograph } from '../photo/photograph.js';
 import { toPhotoError } from '../shared/errors.js';
 import type { Renderer } from './types.js';

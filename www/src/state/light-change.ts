@@ -9,10 +9,9 @@ import type { LightName } from '../shared/names.js';
 import { reuse } from '../shared/reuse.js';
 import type { PicturePoint } from '../shared/values.js';
 
+/** As in a `lightchange` event. */
 export interface ActiveLight {
-  /** The built-in light, or the one that the source replaces. */
   readonly name: LightName;
-  /** The torch's position; `null` behind the centre, and for other lights. */
   readonly torch: PicturePoint | null;
   readonly source: LightSource | null;
 }

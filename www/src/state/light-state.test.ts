@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { PENDING_IMAGE } from '../lights/image-light.js';
 import { isVideoAddress } from '../lights/light-media.js';
+import { PENDING_IMAGE } from '../lights/light-setting.js';
 import type { LinearLight } from '../lights/light-source.js';
 import * as sourceSupport from '../lights/light-sources.js';
 import type { PhotoError } from '../shared/errors.js';

@@ -4,10 +4,9 @@
  * fetches when a source is used for the first time.
  */
 
-import { PENDING_IMAGE } from '../lights/image-light.js';
 import type { LightColor } from '../lights/light-color.js';
 import type { LightMedia } from '../lights/light-media.js';
-import type { LightSetting } from '../lights/light-setting.js';
+import { type LightSetting, PENDING_IMAGE } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
 import type { LightSourceListener, LightSourceObserver } from '../lights/light-source-observer.js';
 import type * as SourceSupport from '../lights/light-sources.js';
