@@ -71,16 +71,9 @@ export class RelightablePhoto extends Base {
     reflect(RelightablePhoto.prototype);
   }
 
-  readonly #controller: PhotoController;
-  readonly #state: PhotoController['state'];
-  readonly #session: PhotoController['session'];
-
-  constructor() {
-    super();
-    this.#controller = new PhotoController(this);
-    this.#state = this.#controller.state;
-    this.#session = this.#controller.session;
-  }
+  readonly #controller = new PhotoController(this);
+  readonly #state = this.#controller.state;
+  readonly #session = this.#controller.session;
 
   /** The colour space of the canvas; `null` without a picture. */
   get activeGamut(): Gamut | null {

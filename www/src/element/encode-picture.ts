@@ -3,14 +3,14 @@
 import type { Renderer } from '../renderers/types.js';
 import { PhotoError } from '../shared/errors.js';
 
-type Picture = Pick<Renderer, 'canvas' | 'gamut'>;
+type DrawnPicture = Pick<Renderer, 'canvas' | 'gamut'>;
 
 /**
  * The picture as a file of the MIME type `type`, `scale` times as wide and as high; `quality` is that of
  * `HTMLCanvasElement.toBlob`. Reads the canvas at once: that of a GPU keeps its content only until the next frame.
  */
 export function encodePicture(
-  picture: Picture,
+  picture: DrawnPicture,
   type: string,
   quality: number | undefined,
   scale: number,
@@ -25,7 +25,7 @@ export function encodePicture(
   });
 }
 
-function resample({ canvas, gamut }: Picture, scale: number): HTMLCanvasElement {
+function resample({ canvas, gamut }: DrawnPicture, scale: number): HTMLCanvasElement {
   const copy = document.createElement('canvas');
   copy.width = Math.max(1, Math.round(canvas.width * scale));
   copy.height = Math.max(1, Math.round(canvas.height * scale));

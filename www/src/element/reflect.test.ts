@@ -74,12 +74,18 @@ test('properties write their attributes', () => {
   assert.deepEqual([element.zoom, element.loading], [1, 'auto']);
 });
 
-test('all options are read together, and errors name their attribute', () => {
+test('all options are read together, and errors name their attribute', (t) => {
+  // The element parses CSS colours by painting a pixel.
+  const getImageData = () => ({ data: [255, 0, 0, 255] });
+  const context = { fillStyle: '', clearRect: () => {}, fillRect: () => {}, getImageData };
+  const createCanvas = () => ({ getContext: () => context });
+  Object.assign(globalThis, { document: { createElement: createCanvas } });
+  t.after(() => Reflect.deleteProperty(globalThis, 'document'));
   const element = createElement();
   const reader = new AttributeReader(element);
   let options: ElementOptions | null = null;
   const read = () => {
-    options = readOptions(reader, options, () => [255, 0, 0, 255]);
+    options = readOptions(reader, options);
     return options;
   };
   element.setAttribute('src', 'window.ltm');

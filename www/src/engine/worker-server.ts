@@ -10,7 +10,7 @@ interface StartMessage {
 }
 
 /** What a worker serves once it has started. */
-export interface Service<Task, Ready, Result> {
+export interface WorkerService<Task, Ready, Result> {
   /** Sent to the page with the news that the worker has started. */
   readonly ready: Ready;
   /** Does one task; gives its result and the buffers to transfer with it. */
@@ -39,13 +39,16 @@ export function startWorker(create: () => Worker): Worker | null {
 
 /** Runs in a worker: sets a service up, and answers the page's requests with it. */
 export function serve<Task, Ready, Result>(
-  setUp: () => Promise<Service<Task, Ready, Result>>,
+  setUp: () => Promise<WorkerService<Task, Ready, Result>>,
 ): void {
   const scope = globalThis as unknown as WorkerScope;
   const send = (message: WorkerResponse<Ready, Result>, transfer: Transferable[] = []): void =>
     scope.postMessage(message, transfer);
   const fail = (thrown: unknown): void => send({ kind: 'failed', message: messageOf(thrown) });
-  const answer = (service: Service<Task, Ready, Result>, request: WorkerRequest<Task>): void => {
+  const answer = (
+    service: WorkerService<Task, Ready, Result>,
+    request: WorkerRequest<Task>,
+  ): void => {
     try {
       const [result, transfer] = service.handle(request.task);
       send({ kind: 'done', id: request.id, result }, transfer);

@@ -19,7 +19,7 @@ export class LightSourceObserver {
   readonly image: ImageLight;
   readonly #listener: LightSourceListener;
   #observing: AbortController | null = null;
-  #error: PhotoError | null = null;
+  error: PhotoError | null = null;
   /** The fingerprint of the content when the observer was last active. */
   #fingerprint: string;
 
@@ -29,10 +29,6 @@ export class LightSourceObserver {
     this.image = toImageLight(this.picture);
     this.#listener = listener;
     this.#fingerprint = fingerprintOf(this.picture);
-  }
-
-  get error(): PhotoError | null {
-    return this.#error;
   }
 
   /** Reports all changes from now on, and at once a change since `stop`. */
@@ -103,17 +99,17 @@ export class LightSourceObserver {
   }
 
   #changed(): void {
-    if (this.#error) {
-      this.#error = null;
+    if (this.error) {
+      this.error = null;
       this.#listener.errorChanged(null);
     }
     this.#listener.changed();
   }
 
   #fail(message: string, cause?: unknown): void {
-    if (message === this.#error?.message) return;
-    this.#error = new PhotoError('light-source', message, cause);
-    this.#listener.errorChanged(this.#error);
+    if (message === this.error?.message) return;
+    this.error = new PhotoError('light-source', message, cause);
+    this.#listener.errorChanged(this.error);
   }
 }
 

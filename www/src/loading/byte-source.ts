@@ -39,7 +39,7 @@ const DEFAULT_PORTS: Omit<SourcePorts, 'fetch'> = {
   maxRetries: 4,
 };
 
-interface Transfer {
+interface RangeTransfer {
   readonly start: number;
   /** The start of the next piece. */
   position: number;
@@ -52,21 +52,17 @@ interface Transfer {
 export class HttpSource {
   readonly url: string;
   readonly #ports: SourcePorts;
-  #size: number | undefined;
+  /** Size of the whole file in bytes, once known. */
+  size: number | undefined;
   /** Whether a header has told the size, and not only the end of a transfer. */
   #isSizeCertain = true;
   #version: FileVersion | undefined;
   /** The transfer of the whole file, once the server has sent it instead of a range. */
-  #wholeTransfer: Transfer | undefined;
+  #wholeTransfer: RangeTransfer | undefined;
 
   constructor(url: string, ports: Pick<SourcePorts, 'fetch'> & Partial<SourcePorts>) {
     this.url = url;
     this.#ports = { ...DEFAULT_PORTS, ...ports };
-  }
-
-  /** Size of the whole file in bytes, once known. */
-  get size(): number | undefined {
-    return this.#size;
   }
 
   /**
@@ -80,7 +76,7 @@ export class HttpSource {
     let failures = 0;
     for (;;) {
       signal.throwIfAborted();
-      transfer.end = Math.min(transfer.end, this.#size ?? transfer.end);
+      transfer.end = Math.min(transfer.end, this.size ?? transfer.end);
       const { position } = transfer;
       if (position >= transfer.end) break;
       try {
@@ -103,14 +99,14 @@ export class HttpSource {
 
   /** Throws if the file is known to end before `end`. */
   #checkSize(range: ByteRange, end: number): void {
-    const size = this.#size ?? end;
+    const size = this.size ?? end;
     if (size >= end) return;
     if (!this.#isSizeCertain) throw errors.endedEarly(this.url, size, range.end);
     throw errors.tooShort(this.url, range, size);
   }
 
   /** Sends one request and yields its bytes, without those received before an interruption. */
-  async *#attempt(transfer: Transfer, signal: AbortSignal): AsyncGenerator<Piece, void> {
+  async *#attempt(transfer: RangeTransfer, signal: AbortSignal): AsyncGenerator<Piece, void> {
     // However the attempt ends, its request ends too.
     const stop = linkedController(signal);
     try {
@@ -125,7 +121,7 @@ export class HttpSource {
         transfer.position = 0;
         transfer.end = Number.POSITIVE_INFINITY;
       }
-      const end = head.end ?? this.#size;
+      const end = head.end ?? this.size;
       let offset = head.start;
       const reader = response.body?.getReader();
       while (reader) {
@@ -148,14 +144,17 @@ export class HttpSource {
         throw errors.endedEarly(this.url, offset, end);
       }
       if (!this.#wholeTransfer) return;
-      this.#isSizeCertain = this.#size !== undefined;
-      this.#size = offset;
+      this.#isSizeCertain = this.size !== undefined;
+      this.size = offset;
     } finally {
       stop.abort();
     }
   }
 
-  async #request({ usesRange, position, end }: Transfer, signal: AbortSignal): Promise<Response> {
+  async #request(
+    { usesRange, position, end }: RangeTransfer,
+    signal: AbortSignal,
+  ): Promise<Response> {
     // Range is the only header here that needs no permission of another origin.
     const headers = { Range: `bytes=${position}-${end - 1}` };
     const { fetch } = this.#ports; // The browser's `fetch` cannot be called as a method.
@@ -166,7 +165,7 @@ export class HttpSource {
   }
 
   /** Handles status 416: the file ends before the requested range. */
-  #endBefore({ start, position, end }: Transfer, response: Response): void {
+  #endBefore({ start, position, end }: RangeTransfer, response: Response): void {
     // If everything before this position has arrived, the file ends here.
     const size = sizeFromUnsatisfiedRange(response) ?? (position > start ? position : undefined);
     this.#checkVersion({}, size);
@@ -178,14 +177,14 @@ export class HttpSource {
   /** Throws if a response belongs to another version of the file than the ones before. */
   #checkVersion(version: FileVersion, size: number | undefined): void {
     const known = this.#version ?? version;
-    if (isOtherVersion(known, version) || (this.#size ?? size) !== (size ?? this.#size)) {
+    if (isOtherVersion(known, version) || (this.size ?? size) !== (size ?? this.size)) {
       throw errors.changed(this.url);
     }
     this.#version = {
       etag: known.etag ?? version.etag,
       modified: known.modified ?? version.modified,
     };
-    this.#size ??= size;
+    this.size ??= size;
   }
 
   /** Waits for the next data of a request. */

@@ -161,7 +161,3 @@ function previewsOf(decoder: PhotoDecoder, now: () => number): () => Promise<Pho
     return preview;
   };
 }
-
-export function missingSource(): PhotoError {
-  return new PhotoError('src-missing', 'There is no photograph to show: set the src attribute.');
-}

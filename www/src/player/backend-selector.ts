@@ -37,8 +37,8 @@ export class BackendSelector {
   readonly #createRenderer: CreateRenderer;
   readonly #listener: SessionListener;
   readonly #events: SelectorEvents;
-  #active: ActiveBackend | null = null;
-  /** On the screen until `#active` has drawn. */
+  active: ActiveBackend | null = null;
+  /** On the screen until `active` has drawn. */
   #outgoing: ActiveBackend | null = null;
   #search: BackendSearch | null = null;
   /** The photograph of the last search. */
@@ -48,10 +48,6 @@ export class BackendSelector {
     this.#createRenderer = createRenderer;
     this.#listener = listener;
     this.#events = events;
-  }
-
-  get active(): ActiveBackend | null {
-    return this.#active;
   }
 
   /** Resolves when the search in progress ends; `null` if there is none. */
@@ -90,7 +86,7 @@ export class BackendSelector {
       this.#search = null;
       // A preview needs no error: the search for the whole photograph reports the same.
       if (!photo.value.isComplete) {
-        if (this.#active?.isFreed) this.#active = null;
+        if (this.active?.isFreed) this.active = null;
         return;
       }
       this.drop();
@@ -109,7 +105,7 @@ export class BackendSelector {
   lose(lost: ActiveBackend, reason: string): void {
     const isReported = lost.lossReason !== null;
     lost.lossReason ??= reason;
-    if (this.#active !== lost) return;
+    if (this.active !== lost) return;
     if (!isReported) this.#listener.backendLost(lost.backend, reason);
     if (!this.#search && this.options) this.#replace(lost, this.options, lost.backend, '');
   }
@@ -121,8 +117,8 @@ export class BackendSelector {
 
   /** Frees the backends, but not a search in progress. */
   drop(): void {
-    this.#active?.free();
-    this.#active = null;
+    this.active?.free();
+    this.active = null;
     this.freeOutgoing();
   }
 
@@ -139,10 +135,10 @@ export class BackendSelector {
     previous: Backend | null,
     reasons: readonly string[],
   ): void {
-    const last = this.#active;
+    const last = this.active;
     const isReplacement = reasons[0] !== '' || (last !== null && last.lossReason !== null);
     if (found !== last) {
-      this.#active = found;
+      this.active = found;
       if (last?.hasDrawn && last.lossReason === null) this.#outgoing = last;
       else last?.free();
     }
@@ -183,7 +179,7 @@ export class BackendSelector {
     photo: RefCounted<Photograph>,
     signal: AbortSignal,
   ): Promise<ActiveBackend> {
-    const active = this.#active;
+    const active = this.active;
     if (active?.photo === photo && active.lossReason === null && meets(active, backend, options)) {
       return active;
     }

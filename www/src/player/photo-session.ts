@@ -13,7 +13,6 @@
 import type { Backend } from '../engine/types.js';
 import type { FrameResult } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
-import { missingSource } from '../loading/load.js';
 import type { Photograph } from '../photo/photograph.js';
 import type { Renderer } from '../renderers/types.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
@@ -83,9 +82,14 @@ export class PhotoSession {
     this.#selector.options = settings.renderOptions;
     const isSameFile =
       previous?.src === settings.src && previous.credentials === settings.credentials;
-    if (!previous || reload || !isSameFile) this.#start(settings.src);
-    else if (previous.renderOptions === settings.renderOptions) this.#scheduler.invalidate();
-    else if (this.#photo) {
+    if (!previous || reload || !isSameFile) {
+      this.#release(false);
+      this.#refetches = 0;
+      this.#listener.loadStarted();
+      void this.#run(settings, null, '');
+    } else if (previous.renderOptions === settings.renderOptions) {
+      this.#scheduler.invalidate();
+    } else if (this.#photo) {
       void this.#selector.select(this.#photo, settings.renderOptions, this.backend, '');
     }
   }
@@ -118,17 +122,9 @@ export class PhotoSession {
     return this.#renderNext();
   }
 
-  #start(src: string | null): void {
-    this.#release(false);
-    this.#refetches = 0;
-    this.#listener.loadStarted();
-    if (src === null) this.#fail(missingSource());
-    else void this.#run(src, null, '');
-  }
-
   /** Fetches a photograph that has lost tiles again. Its picture stays until the new one is drawn. */
   #refetch(reason: string): void {
-    const src = this.#settings?.src;
+    const settings = this.#settings;
     const previous = this.backend;
     const hasFailed = this.#failure !== null;
     this.#release(true);
@@ -139,21 +135,29 @@ export class PhotoSession {
     }
     this.#refetches += 1;
     if (hasFailed) this.#failure = 'temporary';
-    if (src) void this.#run(src, previous, reason);
+    if (settings) void this.#run(settings, previous, reason);
   }
 
   /** Loads a file, and has it and its previews drawn. `reason` says why `previous` is replaced. */
-  async #run(src: string, previous: Backend | null, reason: string): Promise<void> {
+  async #run(
+    { src, credentials, renderOptions }: SessionSettings,
+    previous: Backend | null,
+    reason: string,
+  ): Promise<void> {
     const { signal } = this.#load;
     const preparation = new AbortController();
-    if (this.#settings) this.#ports.prepare(this.#settings.renderOptions, preparation.signal);
     const onPreview = (preview: Photograph): void => {
       // The last preview must be drawn first.
       if (signal.aborted || this.#selector.search) preview.free();
       else void this.#use(preview, previous, reason);
     };
     try {
-      const photo = await this.#ports.open(src, this.#settings?.credentials ?? 'same-origin', {
+      if (src === null) {
+        const message = 'There is no photograph to show: set the src attribute.';
+        throw new PhotoError('src-missing', message);
+      }
+      this.#ports.prepare(renderOptions, preparation.signal);
+      const photo = await this.#ports.open(src, credentials, {
         signal,
         onProgress: (loaded, total) => {
           if (!signal.aborted) this.#listener.progress(loaded, total);

@@ -33,7 +33,7 @@ const MAX_DROP_DELAY_FRAMES = 64 * DROP_DELAY_FRAMES;
 const MIN_SAVING = 1 / 4;
 
 /** The level and the median frame time before the quality was lowered. */
-interface Drop {
+interface QualityDrop {
   readonly level: number;
   readonly ms: number;
 }
@@ -47,7 +47,7 @@ export class QualityController {
   #raisedAtFrame = Number.NEGATIVE_INFINITY;
   #raiseDelay = RAISE_DELAY_FRAMES;
   /** The last drop, until its effect is known. */
-  #drop: Drop | null = null;
+  #drop: QualityDrop | null = null;
   #noDropBeforeFrame = 0;
   #dropDelay = DROP_DELAY_FRAMES;
 
@@ -81,7 +81,7 @@ export class QualityController {
   }
 
   /** A lower quality does not help if the page itself is slow, or its display. */
-  #hasHelped(drop: Drop, ms: number): boolean {
+  #hasHelped(drop: QualityDrop, ms: number): boolean {
     const idealSaving = 1 - this.quality / qualityAt(drop.level);
     return ms <= drop.ms * (1 - MIN_SAVING * idealSaving);
   }

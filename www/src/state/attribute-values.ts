@@ -35,7 +35,7 @@ export type Loading = (typeof LOADINGS)[number];
 /** When the poster gives way to the picture: when it is drawn, on a press, or by `dismissPoster()`. */
 export type Reveal = (typeof REVEALS)[number];
 
-type Text = string | null;
+type AttributeText = string | null;
 
 /** By attribute. Absent coordinates, sizes, backends and addresses are `null`. */
 export const PARSERS = {
@@ -45,30 +45,30 @@ export const PARSERS = {
   tone: parseTone,
   gamut: parseGamut,
   /** The torch's radius in units of the light plane's shorter side. */
-  'light-size': (text: Text) =>
+  'light-size': (text: AttributeText) =>
     parseNumber(text, 'light size', 1e-6, MAX_TORCH_SIZE, LIGHT_SIZE_HINT),
-  'light-x': (text: Text) => parseCoordinate(text, 'light-x'),
-  'light-y': (text: Text) => parseCoordinate(text, 'light-y'),
+  'light-x': (text: AttributeText) => parseCoordinate(text, 'light-x'),
+  'light-y': (text: AttributeText) => parseCoordinate(text, 'light-y'),
   /** In order of preference. */
-  backend: (text: Text): readonly Backend[] | null => {
+  backend: (text: AttributeText): readonly Backend[] | null => {
     const names = text?.split(/[\s,]+/).filter(Boolean) ?? [];
     if (names.length === 0) return null;
     return [...new Set(names.map((name) => parseName(name, BACKENDS, 'backend')))];
   },
   /** The largest magnification; 1 disables zooming. */
-  zoom: (text: Text) =>
+  zoom: (text: AttributeText) =>
     text?.trim() === ''
       ? EMPTY_ZOOM
       : (parseNumber(text, 'zoom', 1, MAX_ZOOM, '1 disables zooming') ?? 1),
   /** Seconds without input before the element resets itself; 0 is never. */
-  kiosk: (text: Text) =>
+  kiosk: (text: AttributeText) =>
     text?.trim() === ''
       ? EMPTY_KIOSK_SECONDS
       : (parseNumber(text, 'kiosk', 0, MAX_KIOSK_SECONDS, 'it is in seconds, 0 is never') ?? 0),
-  loading: (text: Text) => parseName(text, LOADINGS, 'loading mode'),
-  reveal: (text: Text) => parseName(text, REVEALS, 'reveal mode'),
+  loading: (text: AttributeText) => parseName(text, LOADINGS, 'loading mode'),
+  reveal: (text: AttributeText) => parseName(text, REVEALS, 'reveal mode'),
   /** As on `<img>`: any unknown value means `anonymous`. */
-  crossorigin: (text: Text): CrossOrigin => {
+  crossorigin: (text: AttributeText): CrossOrigin => {
     if (text === null) return null;
     return text.trim().toLowerCase() === 'use-credentials' ? 'use-credentials' : 'anonymous';
   },
@@ -77,16 +77,18 @@ export const PARSERS = {
 export type ParsedValue<K extends keyof typeof PARSERS> = ReturnType<(typeof PARSERS)[K]>;
 
 /** The parser of an attribute, typed by the attribute's name. */
-export function parserOf<K extends keyof typeof PARSERS>(name: K): (text: Text) => ParsedValue<K> {
-  return PARSERS[name] as (text: Text) => ParsedValue<K>;
+export function parserOf<K extends keyof typeof PARSERS>(
+  name: K,
+): (text: AttributeText) => ParsedValue<K> {
+  return PARSERS[name] as (text: AttributeText) => ParsedValue<K>;
 }
 
-function parseCoordinate(text: Text, name: string): number | null {
+function parseCoordinate(text: AttributeText, name: string): number | null {
   return parseNumber(text, name, 0, 1, '0 is the picture’s left or upper edge');
 }
 
 /** An absolute URL, resolved against `base`; `null` for an empty value. */
-export function parseAddress(text: Text, name: string, base: string): string | null {
+export function parseAddress(text: AttributeText, name: string, base: string): string | null {
   const address = text?.trim();
   if (!address) return null;
   try {

@@ -1,6 +1,6 @@
 /** The element's options: the values of all its attributes. Immutable: a change makes a new object. */
 
-import { type CssColorParser, parseLightColor } from '../lights/light-color.js';
+import { parseLightColor } from '../lights/light-color.js';
 import { reuse } from '../shared/reuse.js';
 import { CENTRE, type PicturePoint } from '../shared/values.js';
 import type { AttributeReader } from './attribute-reader.js';
@@ -12,20 +12,16 @@ export type ElementOptions = Readonly<ReturnType<typeof readAttributes>>;
 export type LightOptions = Readonly<ReturnType<typeof readLight>>;
 
 /** Reads all attributes. Objects whose fields are unchanged are taken from `last`. */
-export function readOptions(
-  reader: AttributeReader,
-  last: ElementOptions | null,
-  parseColor?: CssColorParser,
-): ElementOptions {
-  const options = readAttributes(reader, parseColor);
+export function readOptions(reader: AttributeReader, last: ElementOptions | null): ElementOptions {
+  const options = readAttributes(reader);
   const torch = options.light.torch && reuse(last?.light.torch, options.light.torch);
   const light = reuse(last?.light, { ...options.light, torch });
   return reuse(last, { ...options, light });
 }
 
-function readAttributes(reader: AttributeReader, parseColor?: CssColorParser) {
+function readAttributes(reader: AttributeReader) {
   return {
-    light: readLight(reader, parseColor),
+    light: readLight(reader),
     backends: reader.read('backend'),
     exposure: reader.read('exposure'),
     whiteBalance: reader.read('white-balance'),
@@ -46,7 +42,7 @@ function readAttributes(reader: AttributeReader, parseColor?: CssColorParser) {
   };
 }
 
-function readLight(reader: AttributeReader, parseColor?: CssColorParser) {
+function readLight(reader: AttributeReader) {
   const [x, y] = [reader.read('light-x'), reader.read('light-y')];
   const point: PicturePoint = { x: x ?? CENTRE.x, y: y ?? CENTRE.y };
   return {
@@ -57,6 +53,6 @@ function readLight(reader: AttributeReader, parseColor?: CssColorParser) {
     /** The torch's position; `null` behind the centre of the picture. */
     torch: x === null && y === null ? null : point,
     size: reader.read('light-size'),
-    color: reader.parse('light-color', (text) => parseLightColor(text, parseColor)),
+    color: reader.parse('light-color', parseLightColor),
   };
 }
