@@ -40,7 +40,6 @@ export class PhotoController {
   readonly state: ViewerState;
   readonly session: PhotoSession;
   readonly interaction: InteractionController;
-  readonly #host: HTMLElement;
   readonly #reader: AttributeReader;
   readonly #dom: ShadowDom;
   readonly #presenter: Presenter;
@@ -55,8 +54,7 @@ export class PhotoController {
   /** Why the last frame was not drawn with the requested light. */
   #lightError: PhotoError | null = null;
 
-  constructor(host: HTMLElement) {
-    this.#host = host;
+  constructor(private readonly host: HTMLElement) {
     this.#reader = new AttributeReader(host);
     this.#dom = new ShadowDom(host);
     this.state = new ViewerState(readOptions(this.#reader, null), {
@@ -90,7 +88,7 @@ export class PhotoController {
   /** Brings everything up to date with the attributes and the viewer's state. */
   update(): void {
     this.#isUpdateScheduled = false;
-    if (!this.#host.isConnected) {
+    if (!this.host.isConnected) {
       this.#release();
       return;
     }
@@ -168,7 +166,7 @@ export class PhotoController {
   }
 
   #createPresenter(): Presenter {
-    return new Presenter(this.#host, this.#dom, this.state, {
+    return new Presenter(this.host, this.#dom, this.state, {
       selectLight: (item) => {
         this.state.light.item = item;
         this.interaction.markActive();
@@ -248,7 +246,7 @@ export class PhotoController {
       if (visibility === 'isVisible') this.session.setVisible(isTrue);
       this.schedule();
     };
-    observeVisibility(this.#host, update, signal);
+    observeVisibility(this.host, update, signal);
   }
 
   /** Gives the session new settings, as soon as the photograph may be fetched. */
@@ -291,7 +289,7 @@ export class PhotoController {
   /** The photograph continues to load and to be drawn. */
   #lightErrorChanged(error: PhotoError | null): void {
     this.#showError();
-    if (error && this.#host.isConnected) this.reportError(error);
+    if (error && this.host.isConnected) this.reportError(error);
   }
 
   #showError(): void {
@@ -327,6 +325,6 @@ export class PhotoController {
   }
 
   #dispatch(event: Event): void {
-    this.#host.dispatchEvent(event);
+    this.host.dispatchEvent(event);
   }
 }

@@ -7,15 +7,12 @@ export type AnimationStep = (seconds: number) => boolean;
 const MAX_STEP_SECONDS = 0.1;
 
 export class AnimationLoop {
-  readonly #requestFrame: (callback: (ms: number) => void) => void;
   readonly #steps = new Map<string, AnimationStep>();
   #isEnabled = true;
   #isRequested = false;
   #lastMs: number | null = null;
 
-  constructor(requestFrame: (callback: (ms: number) => void) => void) {
-    this.#requestFrame = requestFrame;
-  }
+  constructor(private readonly requestFrame: (callback: (ms: number) => void) => void) {}
 
   /** Starts or replaces the animation of that name; `null` ends it. */
   set(name: string, step: AnimationStep | null): void {
@@ -46,7 +43,7 @@ export class AnimationLoop {
   #request(): void {
     if (this.#isRequested || !this.#isRunning) return;
     this.#isRequested = true;
-    this.#requestFrame((ms) => this.#runFrame(ms));
+    this.requestFrame((ms) => this.#runFrame(ms));
   }
 
   #runFrame(ms: number): void {

@@ -52,7 +52,6 @@ interface PressedPointer {
 }
 
 export class GestureRecognizer {
-  readonly #listener: GestureListener;
   readonly #pressed = new Map<number, PressedPointer>();
   #velocity = new VelocityTracker();
   /** Two fingers were down at once; ignore the remaining finger until all are up. */
@@ -60,9 +59,7 @@ export class GestureRecognizer {
   #lastTap: { readonly x: number; readonly y: number; readonly time: number } | null = null;
   #throwPoint: { readonly x: number; readonly y: number } | null = null;
 
-  constructor(listener: GestureListener) {
-    this.#listener = listener;
-  }
+  constructor(private readonly listener: GestureListener) {}
 
   get isPressed(): boolean {
     return this.#pressed.size > 0;
@@ -78,12 +75,12 @@ export class GestureRecognizer {
       this.#velocity = new VelocityTracker();
       if (pans) return;
       this.#velocity.add(x, y, time);
-      this.#listener.moveLight(x, y);
+      this.listener.moveLight(x, y);
     } else if (allowed.zooms && !this.#hasPinched) {
       this.#hasPinched = true;
       this.#lastTap = null;
       const first = this.#pressed.values().next().value;
-      if (!first?.pans) this.#listener.restoreLight();
+      if (!first?.pans) this.listener.restoreLight();
     }
   }
 
@@ -100,17 +97,17 @@ export class GestureRecognizer {
     pointer.hasMoved ||= Math.hypot(x - pointer.startX, y - pointer.startY) > MAX_TAP_PIXELS;
     if (this.#pressed.size > 1 && allowed.zooms) {
       const after = this.#pinchGeometry();
-      this.#listener.pan(after.x - before.x, after.y - before.y);
+      this.listener.pan(after.x - before.x, after.y - before.y);
       if (before.distance > 0 && after.distance > 0) {
-        this.#listener.zoom(after.distance / before.distance, after.x, after.y);
+        this.listener.zoom(after.distance / before.distance, after.x, after.y);
       }
     } else if (this.#hasPinched) {
       // Ignore the remaining finger of a pinch.
     } else if (pointer.pans) {
-      if (allowed.isZoomed) this.#listener.pan(dx, dy);
+      if (allowed.isZoomed) this.listener.pan(dx, dy);
     } else if (allowed.movesLight && id === this.#pressed.keys().next().value) {
       this.#velocity.add(x, y, time);
-      this.#listener.moveLight(x, y);
+      this.listener.moveLight(x, y);
     }
   }
 
@@ -127,7 +124,7 @@ export class GestureRecognizer {
     const velocity = this.#velocity.velocityAt(time);
     if (pointer.pans || !allowed.movesLight || speedOf(velocity) < MIN_THROW_SPEED) return;
     this.#throwPoint = { x, y };
-    this.#listener.throwLight(velocity);
+    this.listener.throwLight(velocity);
   }
 
   /** The browser uses the pointer for itself, for example for scrolling. */
@@ -141,7 +138,7 @@ export class GestureRecognizer {
     const from = this.#throwPoint;
     if (from && Math.hypot(x - from.x, y - from.y) < MIN_HOVER_PIXELS) return;
     this.#throwPoint = null;
-    this.#listener.moveLight(x, y);
+    this.listener.moveLight(x, y);
   }
 
   #tap(x: number, y: number, time: number, { zooms }: GesturePermissions): void {
@@ -151,7 +148,7 @@ export class GestureRecognizer {
       time - last.time <= DOUBLE_TAP_MS &&
       Math.hypot(x - last.x, y - last.y) <= 2 * MAX_TAP_PIXELS;
     this.#lastTap = isDouble ? null : { x, y, time };
-    if (isDouble && zooms) this.#listener.doubleTap(x, y);
+    if (isDouble && zooms) this.listener.doubleTap(x, y);
   }
 
   /** The midpoint and distance of the first two pointers. */

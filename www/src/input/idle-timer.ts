@@ -14,15 +14,16 @@ export const REST_MS = 8000;
 
 export class IdleTimer {
   readonly #callLater: typeof callLater;
-  readonly #listener: IdleListener;
   #kioskMs = 0;
   #isActive = false;
   #cancelRest = (): void => {};
   #cancelKiosk = (): void => {};
 
-  constructor(later: typeof callLater, listener: IdleListener) {
+  constructor(
+    later: typeof callLater,
+    private readonly listener: IdleListener,
+  ) {
     this.#callLater = later;
-    this.#listener = listener;
   }
 
   /** 0 is never. */
@@ -35,7 +36,7 @@ export class IdleTimer {
   restart(): void {
     this.#isActive = true;
     this.#cancelRest();
-    this.#cancelRest = this.#callLater(REST_MS, () => this.#listener.rested());
+    this.#cancelRest = this.#callLater(REST_MS, () => this.listener.rested());
     this.#startKiosk();
   }
 
@@ -50,7 +51,7 @@ export class IdleTimer {
     if (this.#kioskMs === 0) return;
     this.#cancelKiosk = this.#callLater(this.#kioskMs, () => {
       this.#isActive = false;
-      this.#listener.expired();
+      this.listener.expired();
     });
   }
 }

@@ -32,10 +32,6 @@ export interface InteractionListener {
 }
 
 export class InteractionController {
-  readonly #state: ViewerState;
-  readonly #dom: ShadowDom;
-  readonly #presenter: Presenter;
-  readonly #listener: InteractionListener;
   readonly #tilt: TiltSensor;
   readonly #loop = new AnimationLoop(requestAnimationFrame.bind(globalThis));
   readonly #animator: LightAnimator;
@@ -48,15 +44,11 @@ export class InteractionController {
   #torchBeforeMove: PicturePoint | null = null;
 
   constructor(
-    state: ViewerState,
-    dom: ShadowDom,
-    presenter: Presenter,
-    listener: InteractionListener,
+    private readonly state: ViewerState,
+    private readonly dom: ShadowDom,
+    private readonly presenter: Presenter,
+    private readonly listener: InteractionListener,
   ) {
-    this.#state = state;
-    this.#dom = dom;
-    this.#presenter = presenter;
-    this.#listener = listener;
     this.#animator = new LightAnimator(state.light, this.#loop, () => listener.changed());
     this.#idle = new IdleTimer(callLater, {
       rested: () => {
@@ -80,7 +72,7 @@ export class InteractionController {
 
   /** Starts and stops animations. */
   update(isPlaying: boolean): void {
-    const { light, isPictureShown, options, reveal } = this.#state;
+    const { light, isPictureShown, options, reveal } = this.state;
     this.#idle.kioskSeconds = options.kioskSeconds;
     this.#loop.isEnabled = reveal.isVisible;
     const isInUse = this.#isActive || this.#isHandleFocused || this.#tilt.isActive;
@@ -95,12 +87,12 @@ export class InteractionController {
   markActive(byKeyboard = false): void {
     this.#isActive = true;
     this.#idle.restart();
-    this.#presenter.showToolbar(byKeyboard);
+    this.presenter.showToolbar(byKeyboard);
   }
 
   /** Whether the torch follows the device's tilt; `null` if it cannot. */
   get isTilting(): boolean | null {
-    return this.#state.light.isTorch && isTiltSupported() ? this.#tilt.isActive : null;
+    return this.state.light.isTorch && isTiltSupported() ? this.#tilt.isActive : null;
   }
 
   toggleTilt(): void {
@@ -109,13 +101,13 @@ export class InteractionController {
       return;
     }
     this.reset();
-    this.#listener.changed();
+    this.listener.changed();
   }
 
   /** Resolves to whether permission was granted. */
   async requestTilt(): Promise<boolean> {
     const isGranted = await this.#tilt.request();
-    this.#listener.changed();
+    this.listener.changed();
     return isGranted;
   }
 
@@ -138,14 +130,14 @@ export class InteractionController {
   }
 
   #listenToPointer(): void {
-    const state = this.#state;
-    const { handle, viewport } = this.#dom;
+    const state = this.state;
+    const { handle, viewport } = this.dom;
     const toUnits = (x: number, y: number) => toViewportUnits(viewport, x, y);
     listenToPointer(viewport, {
       permissions: () => this.#permissions,
       isPanning: () => this.#isPanning,
       isCooperative: () => state.options.cooperativeGestures,
-      zoomIgnored: (by) => this.#presenter.hintAtZoom(by),
+      zoomIgnored: (by) => this.presenter.hintAtZoom(by),
       active: () => this.markActive(),
       pressed: () => (handle.hidden ? viewport : handle).focus({ preventScroll: true }),
       moveLight: (x, y) => {
@@ -154,7 +146,7 @@ export class InteractionController {
       },
       restoreLight: () => {
         state.light.torch = this.#torchBeforeMove;
-        this.#listener.changed();
+        this.listener.changed();
       },
       throwLight: ({ x, y }: Velocity) => {
         if (reducedMotion().matches) return;
@@ -173,7 +165,7 @@ export class InteractionController {
   }
 
   #listenToKeyboard(): void {
-    const { root, handle } = this.#dom;
+    const { root, handle } = this.dom;
     root.addEventListener('keydown', (event) => this.#keyDown(event as KeyboardEvent));
     root.addEventListener('keyup', (event) => {
       if ((event as KeyboardEvent).key === ' ') this.#isPanning = false;
@@ -182,14 +174,14 @@ export class InteractionController {
       // A press with a pointer focuses the handle without :focus-visible.
       this.#isHandleFocused = handle.matches(':focus-visible');
       this.#isPanning = false;
-      this.#listener.changed();
+      this.listener.changed();
     };
     handle.addEventListener('focus', focusChanged);
     handle.addEventListener('blur', focusChanged);
   }
 
   get #permissions(): GesturePermissions {
-    const { light, options, isPictureShown, view } = this.#state;
+    const { light, options, isPictureShown, view } = this.state;
     return {
       movesLight: isPictureShown && light.isTorch,
       zooms: isPictureShown && options.maxZoom > 1,
@@ -199,28 +191,28 @@ export class InteractionController {
 
   #moveTorch(point: PicturePoint): void {
     this.#animator.stopTorch();
-    this.#state.light.torch = point;
-    this.#listener.changed();
+    this.state.light.torch = point;
+    this.listener.changed();
   }
 
   #zoomAt(factor: number, at: PicturePoint): boolean {
-    const { view, options } = this.#state;
+    const { view, options } = this.state;
     return this.#setView(zoomAt(view, factor, at, options.maxZoom));
   }
 
   #pan(dx: number, dy: number): boolean {
-    const { view, options } = this.#state;
+    const { view, options } = this.state;
     return this.#setView(pan(view, dx, dy, options.maxZoom));
   }
 
   /** Returns whether the view has changed. */
   #setView(view: PhotoView): boolean {
-    const last = this.#state.view;
-    this.#state.view = view;
-    const hasChanged = this.#state.view !== last;
+    const last = this.state.view;
+    this.state.view = view;
+    const hasChanged = this.state.view !== last;
     if (hasChanged) {
-      this.#presenter.announce('zoomed');
-      this.#listener.changed();
+      this.presenter.announce('zoomed');
+      this.listener.changed();
     }
     return hasChanged;
   }
@@ -239,8 +231,8 @@ export class InteractionController {
   }
 
   #focusTarget(target: EventTarget | null): FocusTarget | null {
-    if (target === this.#dom.handle) return 'light';
-    if (target === this.#dom.viewport) return 'picture';
+    if (target === this.dom.handle) return 'light';
+    if (target === this.dom.viewport) return 'picture';
     const isControl =
       target instanceof Element && target.closest('[role=toolbar], [role=radiogroup]');
     return isControl ? 'controls' : null;
@@ -248,7 +240,7 @@ export class InteractionController {
 
   /** Returns whether the key was used. */
   #perform(action: KeyAction): boolean {
-    const { light, options } = this.#state;
+    const { light, options } = this.state;
     const torch = light.torch ?? CENTRE;
     switch (action.kind) {
       case 'move-light':
@@ -262,12 +254,12 @@ export class InteractionController {
       case 'reset-view':
         return this.#setView(FULL_VIEW);
       case 'select-light':
-        this.#state.selectNextLight(action.by);
-        this.#presenter.announce('light');
-        this.#listener.changed();
+        this.state.selectNextLight(action.by);
+        this.presenter.announce('light');
+        this.listener.changed();
         return true;
       case 'escape':
-        if (!this.#presenter.leaveFullscreen()) this.#dom.blur();
+        if (!this.presenter.leaveFullscreen()) this.dom.blur();
         return false;
     }
   }

@@ -12,51 +12,47 @@ const MIN_GLIDE_SPEED = 0.02;
 type AnimatedLight = Pick<LightState, 'advanceFire' | 'torch' | 'isTorch'>;
 
 export class LightAnimator {
-  readonly #light: AnimatedLight;
-  readonly #loop: AnimationLoop;
-  readonly #changed: () => void;
-
-  constructor(light: AnimatedLight, loop: AnimationLoop, changed: () => void) {
-    this.#light = light;
-    this.#loop = loop;
-    this.#changed = changed;
-  }
+  constructor(
+    private readonly light: AnimatedLight,
+    private readonly loop: AnimationLoop,
+    private readonly changed: () => void,
+  ) {}
 
   /** Starts and stops the continuous animations. */
   update({ fire, wander }: { readonly fire: boolean; readonly wander: boolean }): void {
-    this.#loop.toggle('fire', fire, () => (seconds) => {
-      if (this.#light.advanceFire(seconds)) this.#changed();
+    this.loop.toggle('fire', fire, () => (seconds) => {
+      if (this.light.advanceFire(seconds)) this.changed();
       return true;
     });
-    this.#loop.toggle('wander', wander, () => this.#wander());
+    this.loop.toggle('wander', wander, () => this.#wander());
   }
 
   /** Lets the torch glide on; the velocity is in pictures per second. */
   throwTorch(initial: Velocity): void {
     let velocity = initial;
-    this.#loop.set('glide', (seconds) => {
-      if (!this.#light.isTorch) return false;
+    this.loop.set('glide', (seconds) => {
+      if (!this.light.isTorch) return false;
       const next = glide(velocity, seconds);
       velocity = next.velocity;
-      const { x, y } = this.#light.torch ?? CENTRE;
-      this.#light.torch = { x: x + next.moved.x, y: y + next.moved.y };
-      this.#changed();
+      const { x, y } = this.light.torch ?? CENTRE;
+      this.light.torch = { x: x + next.moved.x, y: y + next.moved.y };
+      this.changed();
       return speedOf(velocity) > MIN_GLIDE_SPEED;
     });
   }
 
   stopTorch(): void {
-    this.#loop.set('glide', null);
-    this.#loop.set('wander', null);
+    this.loop.set('glide', null);
+    this.loop.set('wander', null);
   }
 
   #wander(): AnimationStep {
-    const start = this.#light.torch ?? CENTRE;
+    const start = this.light.torch ?? CENTRE;
     let elapsed = 0;
     return (seconds) => {
       elapsed += seconds;
-      this.#light.torch = wander(start, elapsed);
-      this.#changed();
+      this.light.torch = wander(start, elapsed);
+      this.changed();
       return true;
     };
   }

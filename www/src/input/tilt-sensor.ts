@@ -8,12 +8,9 @@ export function isTiltSupported(): boolean {
 }
 
 export class TiltSensor {
-  readonly #moveTorch: (point: PicturePoint) => void;
   #listening: AbortController | null = null;
 
-  constructor(moveTorch: (point: PicturePoint) => void) {
-    this.#moveTorch = moveTorch;
-  }
+  constructor(private readonly moveTorch: (point: PicturePoint) => void) {}
 
   get isActive(): boolean {
     return this.#listening !== null;
@@ -39,7 +36,7 @@ export class TiltSensor {
     try {
       // A separate script, fetched after the request, which browsers accept only directly after a press.
       const { observeTilt } = await import('./tilt.js');
-      observeTilt(this.#moveTorch, listening.signal);
+      observeTilt(this.moveTorch, listening.signal);
     } catch {
       if (this.#listening === listening) this.stop();
     }

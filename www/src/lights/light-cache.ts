@@ -19,17 +19,15 @@ export interface FrameLight extends FrameResult {
 }
 
 export class LightCache implements Freeable {
-  readonly #module: Pick<RelightModule, 'Light'>;
-  readonly #lightPlane: ReceivedPhoto;
   #light: Light | null = null;
   /** The setting of `#light`; `null` for an image, whose content may change. */
   #setting: LightSetting | null = null;
 
   /** `lightPlane` is a photograph without tiles, which is freed with the cache. */
-  constructor(module: Pick<RelightModule, 'Light'>, lightPlane: ReceivedPhoto) {
-    this.#module = module;
-    this.#lightPlane = lightPlane;
-  }
+  constructor(
+    private readonly module: Pick<RelightModule, 'Light'>,
+    private readonly lightPlane: ReceivedPhoto,
+  ) {}
 
   /**
    * The light of a setting. While its image cannot be read, the last light substitutes for it, or, if there is
@@ -41,7 +39,7 @@ export class LightCache implements Freeable {
     if (setting.image) {
       let light: Light | null = null;
       try {
-        light = setting.image.createLight(this.#module, this.#lightPlane);
+        light = setting.image.createLight(this.module, this.lightPlane);
       } catch (thrown) {
         lightError = toPhotoError(thrown);
       }
@@ -52,14 +50,14 @@ export class LightCache implements Freeable {
     if (this.#light && isCurrent) return { light: this.#light, lightApplied, lightError };
     // Lights are large: free the old one before making the new one.
     this.#replace(null, null);
-    const light = createBuiltinLight(this.#module, this.#lightPlane, setting);
+    const light = createBuiltinLight(this.module, this.lightPlane, setting);
     this.#replace(light, setting);
     return { light, lightApplied, lightError };
   }
 
   free(): void {
     this.#replace(null, null);
-    this.#lightPlane.free();
+    this.lightPlane.free();
   }
 
   #replace(light: Light | null, setting: LightSetting | null): void {

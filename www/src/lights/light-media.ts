@@ -11,15 +11,14 @@ export function isVideoAddress(address: string): boolean {
 
 /** One address; another address needs another object. */
 export class LightMedia {
-  readonly address: string;
-  readonly crossOrigin: CrossOrigin;
   readonly source: HTMLImageElement | HTMLVideoElement;
   readonly #video: HTMLVideoElement | null = null;
   #playing = false;
 
-  constructor(address: string, crossOrigin: CrossOrigin) {
-    this.address = address;
-    this.crossOrigin = crossOrigin;
+  constructor(
+    readonly address: string,
+    readonly crossOrigin: CrossOrigin,
+  ) {
     if (isVideoAddress(address)) {
       const video = document.createElement('video');
       Object.assign(video, { muted: true, loop: true, playsInline: true, preload: 'auto' });

@@ -13,21 +13,20 @@ export interface LightSourceListener {
 
 /** Holds listeners and plays streams only between `start` and `stop`. */
 export class LightSourceObserver {
-  readonly source: LightSource;
   /** The source itself, or a video that plays the stream. */
   readonly picture: LightPicture;
   readonly image: ImageLight;
-  readonly #listener: LightSourceListener;
   #observing: AbortController | null = null;
   error: PhotoError | null = null;
   /** The fingerprint of the content when the observer was last active. */
   #fingerprint: string;
 
-  constructor(source: LightSource, listener: LightSourceListener) {
-    this.source = source;
+  constructor(
+    readonly source: LightSource,
+    private readonly listener: LightSourceListener,
+  ) {
     this.picture = isInstance('MediaStream', source) ? createMutedVideo() : source;
     this.image = toImageLight(this.picture);
-    this.#listener = listener;
     this.#fingerprint = fingerprintOf(this.picture);
   }
 
@@ -101,15 +100,15 @@ export class LightSourceObserver {
   #changed(): void {
     if (this.error) {
       this.error = null;
-      this.#listener.errorChanged(null);
+      this.listener.errorChanged(null);
     }
-    this.#listener.changed();
+    this.listener.changed();
   }
 
   #fail(message: string, cause?: unknown): void {
     if (message === this.error?.message) return;
     this.error = new PhotoError('light-source', message, cause);
-    this.#listener.errorChanged(this.error);
+    this.listener.errorChanged(this.error);
   }
 }
 

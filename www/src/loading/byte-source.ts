@@ -50,7 +50,6 @@ interface RangeTransfer {
 
 /** A file at a URL. Only one `read` may run at a time. */
 export class HttpSource {
-  readonly url: string;
   readonly #ports: SourcePorts;
   /** Size of the whole file in bytes, once known. */
   size: number | undefined;
@@ -60,8 +59,10 @@ export class HttpSource {
   /** The transfer of the whole file, once the server has sent it instead of a range. */
   #wholeTransfer: RangeTransfer | undefined;
 
-  constructor(url: string, ports: Pick<SourcePorts, 'fetch'> & Partial<SourcePorts>) {
-    this.url = url;
+  constructor(
+    readonly url: string,
+    ports: Pick<SourcePorts, 'fetch'> & Partial<SourcePorts>,
+  ) {
     this.#ports = { ...DEFAULT_PORTS, ...ports };
   }
 

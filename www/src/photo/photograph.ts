@@ -36,9 +36,6 @@ type TileLocation = TileStore | 'workers' | 'in transit' | TileBytes;
 
 export class Photograph implements Freeable {
   readonly info: PhotoInfo;
-  readonly descriptor: PhotoDescriptor;
-  /** The share of the file that this photograph was decoded from, 0 to 1. */
-  readonly completeness: number;
   #tiles: TileLocation[];
   /** One, unless a move has failed halfway. */
   readonly #stores = new Set<TileStore>();
@@ -48,13 +45,18 @@ export class Photograph implements Freeable {
   /** Settles after the last use that was requested. */
   #lastUse: Promise<unknown> = Promise.resolve();
 
-  /** A photograph whose tiles are on the page. Throws `format-invalid`. */
-  constructor(descriptor: PhotoDescriptor, tiles: TileBytes[], completeness = 1) {
+  /**
+   * A photograph whose tiles are on the page. `completeness` is the share of the file that it was decoded from, 0 to 1.
+   * Throws `format-invalid`.
+   */
+  constructor(
+    readonly descriptor: PhotoDescriptor,
+    tiles: TileBytes[],
+    readonly completeness = 1,
+  ) {
     const { width, height, lightWidth, lightHeight, decodedBytes } = descriptor;
     const metadata = parseMetadata(descriptor.metadata);
     this.info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
-    this.descriptor = descriptor;
-    this.completeness = completeness;
     this.#tiles = tiles;
   }
 

@@ -8,12 +8,9 @@ import { QualityController } from './quality-controller.js';
 
 /** An object that is freed when its last user releases it. The creator is its first user. */
 export class RefCounted<T extends Freeable> {
-  readonly value: T;
   #users = 1;
 
-  constructor(value: T) {
-    this.value = value;
-  }
+  constructor(readonly value: T) {}
 
   retain(): void {
     this.#users += 1;

@@ -34,9 +34,6 @@ class BackendSearch extends Deferred {
 export class BackendSelector {
   /** The options with which a lost backend is replaced. */
   options: RenderOptions | null = null;
-  readonly #createRenderer: CreateRenderer;
-  readonly #listener: SessionListener;
-  readonly #events: SelectorEvents;
   active: ActiveBackend | null = null;
   /** On the screen until `active` has drawn. */
   #outgoing: ActiveBackend | null = null;
@@ -44,11 +41,11 @@ export class BackendSelector {
   /** The photograph of the last search. */
   #photo: RefCounted<Photograph> | null = null;
 
-  constructor(createRenderer: CreateRenderer, listener: SessionListener, events: SelectorEvents) {
-    this.#createRenderer = createRenderer;
-    this.#listener = listener;
-    this.#events = events;
-  }
+  constructor(
+    private readonly createRenderer: CreateRenderer,
+    private readonly listener: SessionListener,
+    private readonly events: SelectorEvents,
+  ) {}
 
   /** Resolves when the search in progress ends; `null` if there is none. */
   get search(): Promise<void> | null {
@@ -91,7 +88,7 @@ export class BackendSelector {
       }
       this.drop();
       const { code, message } = toPhotoError(thrown);
-      this.#events.failed(new PhotoError(code, joinSentences([reason, message]), thrown));
+      this.events.failed(new PhotoError(code, joinSentences([reason, message]), thrown));
     } finally {
       search.resolve();
       photo.release();
@@ -106,7 +103,7 @@ export class BackendSelector {
     const isReported = lost.lossReason !== null;
     lost.lossReason ??= reason;
     if (this.active !== lost) return;
-    if (!isReported) this.#listener.backendLost(lost.backend, reason);
+    if (!isReported) this.listener.backendLost(lost.backend, reason);
     if (!this.#search && this.options) this.#replace(lost, this.options, lost.backend, '');
   }
 
@@ -149,9 +146,9 @@ export class BackendSelector {
     }
     // The same backend with another gamut is no change.
     if (found !== last && (found.backend !== previous || isReplacement)) {
-      this.#listener.backendChanged(found.backend, previous, reason);
+      this.listener.backendChanged(found.backend, previous, reason);
     }
-    this.#events.selected();
+    this.events.selected();
   }
 
   #replace(
@@ -169,7 +166,7 @@ export class BackendSelector {
       return;
     }
     const message = `${reason} No other backend is left to try. Reload the page.`;
-    this.#events.failed(new PhotoError('backend-lost', message));
+    this.events.failed(new PhotoError('backend-lost', message));
   }
 
   /** Sets a backend up, unless the active one already meets the options. */
@@ -190,7 +187,7 @@ export class BackendSelector {
       else earlyLoss ??= reason;
     };
     try {
-      const renderer = await this.#createRenderer(backend, photo.value, options, onLost, signal);
+      const renderer = await this.createRenderer(backend, photo.value, options, onLost, signal);
       if (!signal.aborted && earlyLoss === null) {
         created = new ActiveBackend(backend, options, renderer, photo);
         return created;
@@ -206,7 +203,7 @@ export class BackendSelector {
       const error = toPhotoError(thrown);
       // No other backend could use this photograph either; fetching it again ends the search.
       if (error.code === 'photo-lost' && !signal.aborted && photo.value.isComplete) {
-        this.#events.photoLost(error.message);
+        this.events.photoLost(error.message);
       }
       throw error;
     }

@@ -10,8 +10,6 @@ import type { FramePorts } from './types.js';
 const REST_DELAY_MS = 150;
 
 export class FrameScheduler {
-  readonly #ports: FramePorts;
-  readonly #draw: (isFullQuality: boolean) => void;
   #isVisible = true;
   /** Whether a first picture is on the screen. Until then, visibility does not matter. */
   hasPicture = false;
@@ -23,10 +21,10 @@ export class FrameScheduler {
   #cancelRest = (): void => {};
 
   /** `draw` draws a frame, with the quality that the device has time for unless it is to be full. */
-  constructor(ports: FramePorts, draw: (isFullQuality: boolean) => void) {
-    this.#ports = ports;
-    this.#draw = draw;
-  }
+  constructor(
+    private readonly ports: FramePorts,
+    private readonly draw: (isFullQuality: boolean) => void,
+  ) {}
 
   setVisible(isVisible: boolean): void {
     this.#isVisible = isVisible;
@@ -46,9 +44,9 @@ export class FrameScheduler {
   requestFrame(): void {
     if (this.#isFrameRequested || this.#isHidden) return;
     this.#isFrameRequested = true;
-    this.#ports.nextFrame(() => {
+    this.ports.nextFrame(() => {
       this.#isFrameRequested = false;
-      if (this.#isStale && !this.#isHidden) this.#draw(false);
+      if (this.#isStale && !this.#isHidden) this.draw(false);
     });
   }
 
@@ -83,9 +81,9 @@ export class FrameScheduler {
       isCancelled = true;
     };
     // Pages request frames at the rate of the browser's own. If these are slow, the picture still moves.
-    this.#ports.nextFrame(() => {
+    this.ports.nextFrame(() => {
       if (isCancelled) return;
-      this.#cancelRest = this.#ports.callLater(REST_DELAY_MS, () => this.#draw(true));
+      this.#cancelRest = this.ports.callLater(REST_DELAY_MS, () => this.draw(true));
     });
   }
 }

@@ -26,8 +26,6 @@ import type { SessionListener, SessionPorts, SessionSettings } from './types.js'
 const MAX_REFETCHES = 5;
 
 export class PhotoSession {
-  readonly #ports: SessionPorts;
-  readonly #listener: SessionListener;
   readonly #selector: BackendSelector;
   readonly #scheduler: FrameScheduler;
   #settings: SessionSettings | null = null;
@@ -46,9 +44,10 @@ export class PhotoSession {
   #isFullQualityRequested = false;
   #quality = 1;
 
-  constructor(ports: SessionPorts, listener: SessionListener) {
-    this.#ports = ports;
-    this.#listener = listener;
+  constructor(
+    private readonly ports: SessionPorts,
+    private readonly listener: SessionListener,
+  ) {
     this.#selector = new BackendSelector(ports.createRenderer, listener, {
       failed: (error) => this.#fail(error),
       selected: () => this.#drawFrame(true),
@@ -85,7 +84,7 @@ export class PhotoSession {
     if (!previous || reload || !isSameFile) {
       this.#release(false);
       this.#refetches = 0;
-      this.#listener.loadStarted();
+      this.listener.loadStarted();
       void this.#run(settings, null, '');
     } else if (previous.renderOptions === settings.renderOptions) {
       this.#scheduler.invalidate();
@@ -156,11 +155,11 @@ export class PhotoSession {
         const message = 'There is no photograph to show: set the src attribute.';
         throw new PhotoError('src-missing', message);
       }
-      this.#ports.prepare(renderOptions, preparation.signal);
-      const photo = await this.#ports.open(src, credentials, {
+      this.ports.prepare(renderOptions, preparation.signal);
+      const photo = await this.ports.open(src, credentials, {
         signal,
         onProgress: (loaded, total) => {
-          if (!signal.aborted) this.#listener.progress(loaded, total);
+          if (!signal.aborted) this.listener.progress(loaded, total);
         },
         // After a loss, the picture on the screen is finer than a preview.
         onPreview: this.#scheduler.hasPicture ? null : onPreview,
@@ -241,7 +240,7 @@ export class PhotoSession {
     const quality = isFullQuality ? 1 : active.quality.quality;
     this.#scheduler.frameStarted();
     try {
-      const startMs = this.#ports.now();
+      const startMs = this.ports.now();
       let frame = active.renderer.render(light, output, quality);
       if (!isFullQuality) this.#measure(active, startMs, frame);
       if (frame instanceof Promise) {
@@ -274,10 +273,10 @@ export class PhotoSession {
     startMs: number,
     frame: FrameResult | Promise<FrameResult>,
   ): void {
-    const record = () => quality.recordFrame(startMs, this.#ports.now());
+    const record = () => quality.recordFrame(startMs, this.ports.now());
     if (frame instanceof Promise) frame.then(record, () => {});
     // A graphics device still works on the frame, which delays the browser's next one.
-    else this.#ports.nextFrame(record);
+    else this.ports.nextFrame(record);
     // The page's own callback in the next frame may change the settings before the session's.
     this.#scheduler.requestFrame();
   }
@@ -294,13 +293,13 @@ export class PhotoSession {
     this.#scheduler.frameDrawn(frameQuality < 1);
     if (!active.hasDrawn) {
       active.hasDrawn = true;
-      this.#listener.rendererChanged(active.renderer);
+      this.listener.rendererChanged(active.renderer);
       this.#selector.freeOutgoing();
     }
     // An error of an image that has been replaced during the frame is obsolete.
     const isObsolete = light.image !== this.#settings?.light.image;
-    this.#listener.frameDrawn(isObsolete ? { ...frame, lightError: null } : frame, light);
-    if (isChanged) this.#listener.qualityChanged(quality);
+    this.listener.frameDrawn(isObsolete ? { ...frame, lightError: null } : frame, light);
+    if (isChanged) this.listener.qualityChanged(quality);
   }
 
   #handleFrameError(active: ActiveBackend, error: PhotoError): void {
@@ -313,17 +312,17 @@ export class PhotoSession {
 
   #recover(): void {
     if (this.#failure === 'permanent') return;
-    if (this.#failure) this.#listener.recovered();
+    if (this.#failure) this.listener.recovered();
     this.#failure = null;
     if (!this.#isLoaded && this.photo?.isComplete) {
       this.#isLoaded = true;
-      this.#listener.loaded();
+      this.listener.loaded();
     }
   }
 
   #fail(error: PhotoError): void {
     this.#failure ??= 'temporary';
-    this.#listener.failed(error);
+    this.listener.failed(error);
   }
 
   #release(keepsPicture: boolean): void {

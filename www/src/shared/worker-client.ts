@@ -61,8 +61,6 @@ interface PendingRequest<Result> {
 export class WorkerClient<Task, Ready, Result> {
   /** Settles when the worker has started, or cannot. */
   readonly ready: Promise<Ready>;
-  readonly #worker: WorkerLike<Task, Ready, Result>;
-  readonly #options: WorkerClientOptions;
   readonly #pending = new Map<number, PendingRequest<never>>();
   /** Why the worker is unusable; `null` while it works. */
   failure: PhotoError | null = null;
@@ -72,9 +70,10 @@ export class WorkerClient<Task, Ready, Result> {
   #lastId = START_ID;
   #watchdog: ReturnType<typeof setInterval> | undefined;
 
-  constructor(worker: WorkerLike<Task, Ready, Result>, options: WorkerClientOptions) {
-    this.#worker = worker;
-    this.#options = options;
+  constructor(
+    private readonly worker: WorkerLike<Task, Ready, Result>,
+    private readonly options: WorkerClientOptions,
+  ) {
     this.ready = new Promise((resolve, reject) => {
       this.#pending.set(START_ID, { resolve, reject });
     });
@@ -96,10 +95,10 @@ export class WorkerClient<Task, Ready, Result> {
     return new Promise((resolve, reject) => {
       if (this.failure) throw this.failure;
       const id = this.#lastId + 1;
-      this.#worker.postMessage({ id, task }, transfer);
+      this.worker.postMessage({ id, task }, transfer);
       this.#lastId = id;
       this.#pending.set(id, { resolve, reject });
-      if (this.#pending.size === 1) this.#watch(this.#options.limits.maxChecks);
+      if (this.#pending.size === 1) this.#watch(this.options.limits.maxChecks);
     });
   }
 
@@ -117,7 +116,7 @@ export class WorkerClient<Task, Ready, Result> {
     const pending = this.#pending.get(response.id);
     this.#pending.delete(response.id);
     pending?.resolve(response.result as never);
-    if (this.#pending.size > 0) this.#watch(this.#options.limits.maxChecks);
+    if (this.#pending.size > 0) this.#watch(this.options.limits.maxChecks);
     else clearInterval(this.#watchdog);
   }
 
@@ -130,19 +129,19 @@ export class WorkerClient<Task, Ready, Result> {
       if (checks <= maxChecks) return;
       this.isSilent = true;
       this.#fail('It does not answer.');
-    }, this.#options.limits.intervalMs);
+    }, this.options.limits.intervalMs);
   }
 
   #fail(reason: string, isReported = true): void {
     if (this.failure) return;
-    const { name, remedy, onFailure } = this.#options;
+    const { name, remedy, onFailure } = this.options;
     const summary = `The ${name} ${this.hasStarted ? 'stopped' : 'did not start'}.`;
     const message = joinSentences([summary, reason, remedy]);
     const failure = new PhotoError('worker-unavailable', message);
     this.failure = failure;
     clearInterval(this.#watchdog);
-    this.#worker.onmessage = null;
-    this.#worker.terminate();
+    this.worker.onmessage = null;
+    this.worker.terminate();
     // Before the rejections, so that their handlers see the final state.
     if (isReported) onFailure?.();
     for (const { reject } of this.#pending.values()) reject(failure);

@@ -16,13 +16,10 @@ interface ParsedAttribute {
 }
 
 export class AttributeReader {
-  readonly #source: Pick<Element, 'baseURI' | 'getAttribute'>;
   readonly #attributes = new Map<string, ParsedAttribute>();
   #newErrors: PhotoError[] = [];
 
-  constructor(source: Pick<Element, 'baseURI' | 'getAttribute'>) {
-    this.#source = source;
-  }
+  constructor(private readonly source: Pick<Element, 'baseURI' | 'getAttribute'>) {}
 
   /** The parsed value of one of the attributes in `PARSERS`. */
   read<K extends keyof typeof PARSERS>(name: K): ParsedValue<K> {
@@ -31,7 +28,7 @@ export class AttributeReader {
 
   /** Parses any attribute. `parse(null)` must give the default. */
   parse<T>(name: string, parse: (text: string | null) => T, base = ''): T {
-    const text = this.#source.getAttribute(name);
+    const text = this.source.getAttribute(name);
     const last = this.#attributes.get(name);
     if (last?.text === text && last.base === base) return last.value as T;
     let value: unknown;
@@ -49,12 +46,12 @@ export class AttributeReader {
 
   /** The absolute URL of an attribute; `null` if it is empty. */
   readAddress(name: string): string | null {
-    const { baseURI } = this.#source;
+    const { baseURI } = this.source;
     return this.parse(name, (text) => parseAddress(text, name, baseURI), baseURI);
   }
 
   has(name: string): boolean {
-    return this.#source.getAttribute(name) !== null;
+    return this.source.getAttribute(name) !== null;
   }
 
   isInvalid(name: string): boolean {

@@ -39,8 +39,6 @@ const FIRE_FRAME_SECONDS = 1 / 30;
 const FIRE_TOLERANCE_SECONDS = 0.004;
 
 export class LightState {
-  readonly #listener: LightStateListener;
-  readonly #fetchSupport: typeof fetchSourceSupport;
   #support: typeof SourceSupport | null = null;
   #fetching: Promise<void> | null = null;
   /** Why the support could not be fetched. */
@@ -58,10 +56,10 @@ export class LightState {
   #fireFrame = 0;
   #nextFireFrame = FIRE_FRAME_SECONDS;
 
-  constructor(listener: LightStateListener, fetchSupport = fetchSourceSupport) {
-    this.#listener = listener;
-    this.#fetchSupport = fetchSupport;
-  }
+  constructor(
+    private readonly listener: LightStateListener,
+    private readonly fetchSupport = fetchSourceSupport,
+  ) {}
 
   setOptions(options: LightOptions): void {
     // Another source is a reason to try the fetch again.
@@ -205,20 +203,20 @@ export class LightState {
     if (source !== (this.#observer?.source ?? null)) {
       this.#observer?.stop();
       this.#observer =
-        source && support ? new support.LightSourceObserver(source, this.#listener) : null;
+        source && support ? new support.LightSourceObserver(source, this.listener) : null;
     }
     this.#updateObserver();
   }
 
   async #fetch(): Promise<void> {
     try {
-      this.#support = await this.#fetchSupport();
+      this.#support = await this.fetchSupport();
     } catch (cause) {
       this.#fetchError = missingScript('light-source', 'images as light', cause);
     }
     this.#fetching = null;
-    if (!this.#fetchError) this.#listener.loaded();
-    else if (this.#usesSource) this.#listener.errorChanged(this.#fetchError);
+    if (!this.#fetchError) this.listener.loaded();
+    else if (this.#usesSource) this.listener.errorChanged(this.#fetchError);
   }
 
   #updateObserver(): void {

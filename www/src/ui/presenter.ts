@@ -16,38 +16,34 @@ export interface PresenterListener extends ToolbarActions {
 }
 
 export class Presenter {
-  readonly #host: Element;
-  readonly #dom: ShadowDom;
-  readonly #state: ViewerState;
-  readonly #listener: PresenterListener;
   #toolbar: Toolbar | null = null;
   #isToolbarRequested = false;
 
-  constructor(host: Element, dom: ShadowDom, state: ViewerState, listener: PresenterListener) {
-    this.#host = host;
-    this.#dom = dom;
-    this.#state = state;
-    this.#listener = listener;
-  }
+  constructor(
+    private readonly host: Element,
+    private readonly dom: ShadowDom,
+    private readonly state: ViewerState,
+    private readonly listener: PresenterListener,
+  ) {}
 
   get language(): Language {
-    return languageOf(this.#host);
+    return languageOf(this.host);
   }
 
   /** `isTilting`: whether the torch follows the device's tilt; `null` if it cannot. */
   update(isPaused: boolean, isTilting: boolean | null): void {
-    const { options, view, isPictureShown, reveal, light } = this.#state;
+    const { options, view, isPictureShown, reveal, light } = this.state;
     const { language } = this;
     const hasHandle = isPictureShown && light.isTorch;
     const zooms = isPictureShown && options.maxZoom > 1;
     const capturesTouch = zooms && !options.cooperativeGestures && (hasHandle || view.zoom > 1);
     const torch = light.torch ?? CENTRE;
-    this.#dom.updateLabels(this.#host.getAttribute('alt'), language);
+    this.dom.updateLabels(this.host.getAttribute('alt'), language);
     const touchAction = capturesTouch ? 'none' : hasHandle || zooms ? 'pan-y' : 'auto';
-    this.#dom.updateLayout(hasHandle, zooms && !hasHandle, touchAction, language);
-    this.#dom.updateView(view, torch, describeLight(torch, language));
+    this.dom.updateLayout(hasHandle, zooms && !hasHandle, touchAction, language);
+    this.dom.updateView(view, torch, describeLight(torch, language));
     const { poster, crossOrigin } = options;
-    this.#dom.updatePoster(poster, crossOrigin, !isPictureShown, reveal.needsPress(options));
+    this.dom.updatePoster(poster, crossOrigin, !isPictureShown, reveal.needsPress(options));
     const hasToolbar = options.controls && isPictureShown;
     if (hasToolbar && !this.#isToolbarRequested) void this.#fetchToolbar();
     if (hasToolbar) this.#toolbar?.update((key) => t(key, language), isPaused, isTilting);
@@ -65,29 +61,29 @@ export class Presenter {
 
   /** Returns whether the element was in full screen. */
   leaveFullscreen(): boolean {
-    const wasFullscreen = this.#host.matches(':fullscreen');
+    const wasFullscreen = this.host.matches(':fullscreen');
     if (wasFullscreen) document.exitFullscreen().catch(() => {});
     return wasFullscreen;
   }
 
   /** `null` hides the message. */
   showError(details: string | null): void {
-    const summary = this.#state.errorMessage === null ? 'degraded' : 'broken';
-    this.#dom.showError(details, this.#t(summary));
+    const summary = this.state.errorMessage === null ? 'degraded' : 'broken';
+    this.dom.showError(details, this.#t(summary));
   }
 
   /** Explains how to zoom, after the page scrolled instead. */
   hintAtZoom(by: 'wheel' | 'touch'): void {
     const key = /mac|iphone|ipad/i.test(navigator.platform) ? '⌘' : 'Ctrl';
-    this.#dom.showHint(this.#t(by === 'wheel' ? 'wheelHint' : 'touchHint', key));
+    this.dom.showHint(this.#t(by === 'wheel' ? 'wheelHint' : 'touchHint', key));
   }
 
   /** Has a screen reader read a change of the state. */
   announce(change: 'loaded' | 'light' | 'zoomed'): void {
-    const { light, view } = this.#state;
+    const { light, view } = this.state;
     const zoom = view.zoom.toLocaleString(this.language, { maximumFractionDigits: 1 });
     const text = this.#t(change, zoom);
-    this.#dom.announce(change === 'light' ? `${text}: ${this.#t(light.item)}` : text);
+    this.dom.announce(change === 'light' ? `${text}: ${this.#t(light.item)}` : text);
   }
 
   /** The toolbar is a separate script, fetched when the `controls` attribute is used for the first time. */
@@ -95,12 +91,12 @@ export class Presenter {
     this.#isToolbarRequested = true;
     try {
       const { Toolbar } = await import('./toolbar.js');
-      const toolbar = new Toolbar(this.#host, this.#state, this.#listener);
+      const toolbar = new Toolbar(this.host, this.state, this.listener);
       this.#toolbar = toolbar;
-      this.#dom.mountControls([toolbar.menu, toolbar.bar], toolbar.css);
-      this.#listener.loaded();
+      this.dom.mountControls([toolbar.menu, toolbar.bar], toolbar.css);
+      this.listener.loaded();
     } catch (cause) {
-      this.#listener.failed(missingScript('controls-unavailable', 'the controls', cause));
+      this.listener.failed(missingScript('controls-unavailable', 'the controls', cause));
     }
   }
 

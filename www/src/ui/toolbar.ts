@@ -47,15 +47,15 @@ export class Toolbar {
   readonly menu: HTMLElement;
   readonly #buttons: Readonly<Record<ButtonName, HTMLButtonElement>>;
   readonly #lightName = createElement('span');
-  readonly #host: Element;
-  readonly #viewer: ViewerState;
   #menuTexts = '';
   #hideTimer: ReturnType<typeof setTimeout> | undefined;
 
   /** `host` is the element that the toolbar belongs to. */
-  constructor(host: Element, viewer: ViewerState, actions: ToolbarActions) {
-    this.#host = host;
-    this.#viewer = viewer;
+  constructor(
+    private readonly host: Element,
+    private readonly viewer: ViewerState,
+    actions: ToolbarActions,
+  ) {
     this.#buttons = {
       light: createButton('light', () => this.#setMenuOpen(this.menu.hidden === true)),
       play: createButton('play', actions.play),
@@ -100,7 +100,7 @@ export class Toolbar {
   /** Shows the viewer's state in the language of `t`. `isTilting` is `null` if the torch cannot follow the tilt. */
   update(t: (key: StringKey) => string, isPaused: boolean, isTilting: boolean | null): void {
     this.bar.hidden = false;
-    const { light: lightState, options, view } = this.#viewer;
+    const { light: lightState, options, view } = this.viewer;
     const { item, items } = lightState;
     const isPlayable = lightState.isPlayable || (lightState.isTorch && options.autoplayLight);
     const zooms = options.maxZoom > 1;
@@ -147,13 +147,13 @@ export class Toolbar {
   }
 
   get #isFullscreen(): boolean {
-    return this.#host.matches(':fullscreen');
+    return this.host.matches(':fullscreen');
   }
 
   /** Does nothing where the browser, an enclosing frame or the visitor refuses. */
   #toggleFullscreen(): void {
     const isLeaving = this.#isFullscreen;
-    const change = isLeaving ? document.exitFullscreen() : this.#host.requestFullscreen();
+    const change = isLeaving ? document.exitFullscreen() : this.host.requestFullscreen();
     void change.catch(() => {});
   }
 

@@ -29,28 +29,22 @@ interface WorkerPart {
 }
 
 export class PoolSession implements TileSession {
-  /** What the workers compute with: `simd128` or `scalar`. */
-  readonly kernel: string;
-  readonly #photo: number;
   readonly #width: number;
   readonly #parts: readonly WorkerPart[];
-  readonly #events: PoolSessionEvents;
   /** Whether the workers know their light rows; false while tiles are moved. */
   #isPlanned = false;
   readonly #end = new AbortController();
 
+  /** `photo` is its number in the workers; `kernel`, `simd128` or `scalar`, is what these compute with. */
   constructor(
-    photo: number,
+    private readonly photo: number,
     { width, geometry, basis }: PhotoDescriptor,
     clients: readonly RelightClient[],
     ranges: readonly TileRowRange[],
-    kernel: string,
-    events: PoolSessionEvents,
+    readonly kernel: string,
+    private readonly events: PoolSessionEvents,
   ) {
-    this.kernel = kernel;
-    this.#photo = photo;
     this.#width = width;
-    this.#events = events;
     this.#parts = ranges.map((range, i) => {
       const client = clients[i] as RelightClient;
       return { client, range, lightRows: [0, 0], light: null, pixels: null };
@@ -109,7 +103,7 @@ export class PoolSession implements TileSession {
     const picture = await allSettledOrThrow(
       this.#parts.map((part) => this.#relightPart(part, light, settings)),
     );
-    this.#events.frameDrawn();
+    this.events.frameDrawn();
     return picture;
   }
 
@@ -134,7 +128,7 @@ export class PoolSession implements TileSession {
       if (!client.failure) this.#request(client, { kind: 'close' }).catch(() => {});
     }
     this.#end.abort(photoReleased());
-    this.#events.ended();
+    this.events.ended();
   }
 
   /** Rejects when the session ends; the worker still does the task. */
@@ -146,7 +140,7 @@ export class PoolSession implements TileSession {
     const { signal } = this.#end;
     // A worker fails if it is asked for a photograph that it has released.
     signal.throwIfAborted();
-    return await withTimeout(client.request({ photo: this.#photo, task }, transfer), { signal });
+    return await withTimeout(client.request({ photo: this.photo, task }, transfer), { signal });
   }
 
   #clientOf(tile: number): RelightClient {

@@ -25,9 +25,6 @@ export interface PoolWorker {
 }
 
 export class WorkerPool implements TileWorkers<PoolSession> {
-  readonly #start: () => RelightWorker | null;
-  readonly #size: number;
-  readonly #limits: WatchdogLimits;
   #workers: PoolWorker[] = [];
   /** Sessions and warm-ups; without any, the workers end. */
   #users = 0;
@@ -39,18 +36,18 @@ export class WorkerPool implements TileWorkers<PoolSession> {
   #fault: PhotoError | null = null;
 
   /** `start` gives `null` if the page may not start workers. At most `size` workers run at a time. */
-  constructor(start: () => RelightWorker | null, size: number, limits = LIMITS) {
-    this.#start = start;
-    this.#size = size;
-    this.#limits = limits;
-  }
+  constructor(
+    private readonly start: () => RelightWorker | null,
+    private readonly size: number,
+    private readonly limits = LIMITS,
+  ) {}
 
   /** Makes room for a photograph. Rejects with `worker-unavailable`. */
   async open(photo: PhotoDescriptor): Promise<PoolSession> {
     this.#users += 1;
     let workers: PoolWorker[] = [];
     try {
-      const ranges = splitRows(photo, this.#size);
+      const ranges = splitRows(photo, this.size);
       workers = this.#pick(ranges.length);
       for (const worker of workers) worker.photos += 1;
       const kernels = await Promise.all(workers.map(({ client }) => client.ready));
@@ -72,7 +69,7 @@ export class WorkerPool implements TileWorkers<PoolSession> {
   warmUp(): () => void {
     this.#users += 1;
     try {
-      this.#pick(Math.min(this.#size, WARM_WORKERS));
+      this.#pick(Math.min(this.size, WARM_WORKERS));
     } catch {
       // `open` reports the same error.
     }
@@ -85,7 +82,7 @@ export class WorkerPool implements TileWorkers<PoolSession> {
       if (this.#fault) throw this.#fault;
       const others = this.#workers.filter((worker) => !picked.includes(worker));
       const idlest = others.sort((a, b) => a.photos - b.photos)[0];
-      const isFull = this.#workers.length >= this.#size;
+      const isFull = this.#workers.length >= this.size;
       if (idlest && (idlest.photos === 0 || isFull)) picked.push(idlest);
       else picked.push(this.#startWorker());
     }
@@ -93,14 +90,14 @@ export class WorkerPool implements TileWorkers<PoolSession> {
   }
 
   #startWorker(): PoolWorker {
-    const worker = this.#start();
+    const worker = this.start();
     if (!worker) {
       this.#fault = new PhotoError('worker-unavailable', 'The page may not start workers.');
       throw this.#fault;
     }
     const client: RelightClient = new WorkerClient(worker, {
       name: 'relighting worker',
-      limits: this.#limits,
+      limits: this.limits,
       remedy: REMEDY,
       onFailure: () => this.#handleFailure(started),
     });

@@ -33,8 +33,6 @@ const MAX_ANSWER_MS = 10_000;
 const SOFTWARE_RENDERERS = /swiftshader|llvmpipe|lavapipe|softpipe|basic render|software/i;
 
 export class Devices {
-  readonly #ports: GraphicsPorts;
-  readonly #maxAnswerMs: number;
   readonly #devices = new Map<GraphicsBackend, SharedDevice>();
   /** The names of adapters, once requested. */
   readonly #names = new Map<GraphicsBackend, Promise<string | null>>();
@@ -42,10 +40,10 @@ export class Devices {
   #silence: PhotoError | null = null;
   readonly #losses = new Map<GraphicsBackend, { count: number; lastMs: number }>();
 
-  constructor(ports: GraphicsPorts = BROWSER_GRAPHICS, maxAnswerMs = MAX_ANSWER_MS) {
-    this.#ports = ports;
-    this.#maxAnswerMs = maxAnswerMs;
-  }
+  constructor(
+    private readonly ports: GraphicsPorts = BROWSER_GRAPHICS,
+    private readonly maxAnswerMs = MAX_ANSWER_MS,
+  ) {}
 
   /**
    * Leases the device of a backend; `software` allows a software renderer. `onLost` is called at most once. Rejects
@@ -84,7 +82,7 @@ export class Devices {
   #checkLosses(backend: GraphicsBackend): void {
     const losses = this.#losses.get(backend);
     if (!losses || losses.count < MAX_LOSSES) return;
-    if (this.#ports.now() - losses.lastMs > LOSS_MEMORY_MS) this.#losses.delete(backend);
+    if (this.ports.now() - losses.lastMs > LOSS_MEMORY_MS) this.#losses.delete(backend);
     else throw unavailable(`it was lost ${losses.count} times within a short time`);
   }
 
@@ -105,7 +103,7 @@ export class Devices {
   #nameOf(backend: GraphicsBackend): Promise<string | null> {
     const known = this.#names.get(backend);
     if (known) return known;
-    const name = this.#untilAnswered(this.#ports.nameOf(backend), () => {});
+    const name = this.#untilAnswered(this.ports.nameOf(backend), () => {});
     this.#names.set(backend, name);
     // A device that is missing now may come back, with a restarted driver.
     const forget = () => this.#names.delete(backend);
@@ -120,7 +118,7 @@ export class Devices {
 
   /** Waits for an answer of WebGPU; `onLate` gets one that comes after the time limit. */
   #untilAnswered<T>(answer: Promise<T>, onLate: (answer: T) => void): Promise<T> {
-    const ms = this.#maxAnswerMs;
+    const ms = this.maxAnswerMs;
     const onTimeout = () => {
       this.#silence = unavailable(`it does not answer within ${ms / 1000} seconds`);
       answer.then(
@@ -138,7 +136,7 @@ export class Devices {
 
   async #openWebGl2(load: LoadGraphics, lose: (reason: string) => void): Promise<GraphicsDevice> {
     const { GraphicsDevice } = await load('webgl2');
-    const canvas = this.#ports.createCanvas();
+    const canvas = this.ports.createCanvas();
     const graphics = GraphicsDevice.webgl2(canvas);
     canvas.addEventListener('webglcontextlost', () => lose('the browser took it away.'));
     return graphics;
@@ -147,7 +145,7 @@ export class Devices {
   #lose(backend: GraphicsBackend, device: SharedDevice, reason: string): void {
     if (device.isClosed) return;
     const losses = this.#losses.get(backend) ?? { count: 0, lastMs: 0 };
-    const now = this.#ports.now();
+    const now = this.ports.now();
     const isRecent = now - losses.lastMs <= LOSS_MEMORY_MS;
     this.#losses.set(backend, { count: isRecent ? losses.count + 1 : 1, lastMs: now });
     // The next device may be a software renderer.
