@@ -45,8 +45,6 @@ export class PhotoController {
   readonly #presenter: Presenter;
   readonly #lightChanges = new LightChangeDetector();
   #reportedView: PhotoView;
-  /** The last settings of the session; `null` while it has none. */
-  #settings: SessionSettings | null = null;
   #mustReload = false;
   #isUpdateScheduled = false;
   /** Ends the listeners that exist only while the element is in the document. */
@@ -252,7 +250,7 @@ export class PhotoController {
   /** Gives the session new settings, as soon as the photograph may be fetched. */
   #updateSession(options: ElementOptions): void {
     const { src, wasmUrl } = options;
-    const last = this.#settings;
+    const last = this.session.settings;
     // An invalid address neither reloads the last photograph nor reports a missing address.
     const isInvalid = this.#reader.isInvalid('src');
     if (src === null && isInvalid) return;
@@ -277,9 +275,7 @@ export class PhotoController {
       output: this.state.output,
       light: this.state.light.setting,
     });
-    if (settings === last && !reload) return;
-    this.#settings = settings;
-    this.session.set(settings, reload);
+    if (settings !== last || reload) this.session.set(settings, reload);
   }
 
   #reportLight(light: ActiveLight | null): void {
@@ -308,7 +304,6 @@ export class PhotoController {
 
   #stopSession(): void {
     this.session.stop();
-    this.#settings = null;
     this.#clearPicture();
   }
 

@@ -1,26 +1,22 @@
 /** The interface of the decoders. */
 
+import type { Decoder } from '../engine/types.js';
 import type { ByteRange } from '../shared/values.js';
 import type { Photograph } from './photograph.js';
 
-export interface DecoderState {
-  /** Bytes of the file that were fed; repeated ones count once. */
-  readonly bytesFed: number;
-  readonly fileBytes: number | undefined;
-  /** Scans that are complete for every tile. */
-  readonly scansDone: number;
+export interface DecoderState extends Pick<Decoder, 'bytesFed' | 'fileBytes' | 'scansDone'> {
   /** The range to feed next; `undefined` once the file is complete. */
   readonly next: ByteRange | undefined;
 }
 
-/** Lets the page draw and handle input. Throws if the load was cancelled meanwhile. */
-export type YieldToPage = () => Promise<void>;
-
 /** Decodes one file, on the page's thread or in a worker. */
 export interface PhotoDecoder {
   readonly state: DecoderState;
-  /** Feeds bytes of the file that begin at `offset`. Bytes of one range must come in order. */
-  feed(offset: number, bytes: Uint8Array, yieldToPage: YieldToPage): Promise<void>;
+  /**
+   * Feeds bytes of the file that begin at `offset`. Bytes of one range must come in order. `yieldToPage` lets the page
+   * draw and handle input; it throws if the load was cancelled meanwhile.
+   */
+  feed(offset: number, bytes: Uint8Array, yieldToPage: () => Promise<void>): Promise<void>;
   /** A coarser photograph from the bytes so far; `null` if they do not suffice. */
   preview(): Promise<Photograph | null>;
   /** The photograph. Ends the decoder, also if it rejects. */

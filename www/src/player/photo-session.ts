@@ -28,7 +28,8 @@ const MAX_REFETCHES = 5;
 export class PhotoSession {
   readonly #selector: BackendSelector;
   readonly #scheduler: FrameScheduler;
-  #settings: SessionSettings | null = null;
+  /** `null` while it is stopped. */
+  settings: SessionSettings | null = null;
   /** Whether a frame of the whole photograph was drawn; previews are drawn before. */
   #isLoaded = false;
   /** A failed load is permanent: frames, which are of a preview then, do not repair it. */
@@ -76,8 +77,8 @@ export class PhotoSession {
 
   /** Applies new settings; a changed setting is a new object. `reload` fetches the file even if its address is the same. */
   set(settings: SessionSettings, reload = false): void {
-    const previous = this.#settings;
-    this.#settings = settings;
+    const previous = this.settings;
+    this.settings = settings;
     this.#selector.options = settings.renderOptions;
     const isSameFile =
       previous?.src === settings.src && previous.credentials === settings.credentials;
@@ -107,7 +108,7 @@ export class PhotoSession {
   }
 
   stop(): void {
-    this.#settings = null;
+    this.settings = null;
     this.#release(false);
   }
 
@@ -123,7 +124,7 @@ export class PhotoSession {
 
   /** Fetches a photograph that has lost tiles again. Its picture stays until the new one is drawn. */
   #refetch(reason: string): void {
-    const settings = this.#settings;
+    const settings = this.settings;
     const previous = this.backend;
     const hasFailed = this.#failure !== null;
     this.#release(true);
@@ -184,7 +185,7 @@ export class PhotoSession {
     this.#photo = shared;
     // The canvas of the CPU keeps its picture by itself, and memory may suffice for one photograph only.
     if (backend === 'cpu') this.#selector.active?.free();
-    const options = this.#settings?.renderOptions;
+    const options = this.settings?.renderOptions;
     if (!options) return;
     if (!backend) return this.#selector.select(shared, options, previous, reason);
     // Backends that could not draw the preview are not tried again.
@@ -235,8 +236,8 @@ export class PhotoSession {
     const { active } = this.#selector;
     const isFullQuality = this.#isFullQualityRequested;
     this.#isFullQualityRequested = false;
-    if (!active || !this.#settings) throw notLoaded();
-    const { light, output } = this.#settings;
+    if (!active || !this.settings) throw notLoaded();
+    const { light, output } = this.settings;
     const quality = isFullQuality ? 1 : active.quality.quality;
     this.#scheduler.frameStarted();
     try {
@@ -297,7 +298,7 @@ export class PhotoSession {
       this.#selector.freeOutgoing();
     }
     // An error of an image that has been replaced during the frame is obsolete.
-    const isObsolete = light.image !== this.#settings?.light.image;
+    const isObsolete = light.image !== this.settings?.light.image;
     this.listener.frameDrawn(isObsolete ? { ...frame, lightError: null } : frame, light);
     if (isChanged) this.listener.qualityChanged(quality);
   }

@@ -1,49 +1,28 @@
 /** The errors that the package reports. Pages may rely on the codes, but not on the messages. */
 
-/** Codes of the package's TypeScript. */
+/** Codes of the package's TypeScript, which the site's page about troubleshooting explains. */
 export type PageErrorCode =
-  /** An attribute has an unknown or invalid value. */
-  | 'attribute'
-  /** The text passed to `setState` has an invalid value. */
-  | 'state'
-  /** `src` is not set. */
-  | 'src-missing'
-  /** The server cannot be reached, or this page may not read its response. */
-  | 'http-network'
-  /** The server answered with an error status, such as 404. */
-  | 'http-status'
-  /** The server sent a web page instead of the file. */
-  | 'http-type'
-  /** The transfer ended before the end of the file. */
-  | 'http-short'
-  /** No data arrived for 30 seconds. */
-  | 'http-stalled'
-  /** The file on the server was replaced during the transfer. */
-  | 'http-changed'
-  /** The server compresses partial responses, which makes them unreadable. */
-  | 'http-encoding'
-  /** The server refused a range of the file, or sent another one. */
-  | 'http-range'
-  /** The page's content security policy blocks the request for the file. */
-  | 'csp-connect'
-  /** The page's content security policy blocks WebAssembly. */
-  | 'csp-wasm'
-  /** A WebAssembly module could not be loaded. */
-  | 'wasm-unavailable'
-  /** The toolbar's script could not be loaded. */
-  | 'controls-unavailable'
-  /** The worker that decodes the photograph stopped, usually because memory ran out. */
-  | 'worker-unavailable'
-  /** A worker with a part of the photograph stopped. The photograph is fetched again, up to five times. */
-  | 'photo-lost'
-  /** The light image contains data of another origin, which this page may not read. */
-  | 'light-tainted'
-  /** The light image could not be loaded, played or read. */
-  | 'light-source'
-  /** A method was called before the photograph was loaded. */
-  | 'not-loaded'
-  /** A bug in this package. */
-  | 'internal';
+  | 'attribute' // An attribute has an unknown or invalid value.
+  | 'state' // The text passed to `setState` has an invalid value.
+  | 'src-missing' // `src` is not set.
+  | 'http-network' // The server cannot be reached, or this page may not read its response.
+  | 'http-status' // The server answered with an error status, such as 404.
+  | 'http-type' // The server sent a web page instead of the file.
+  | 'http-short' // The transfer ended before the end of the file.
+  | 'http-stalled' // No data arrived for 30 seconds.
+  | 'http-changed' // The file on the server was replaced during the transfer.
+  | 'http-encoding' // The server compresses partial responses, which makes them unreadable.
+  | 'http-range' // The server refused a range of the file, or sent another one.
+  | 'csp-connect' // The page's content security policy blocks the request for the file.
+  | 'csp-wasm' // The page's content security policy blocks WebAssembly.
+  | 'wasm-unavailable' // A WebAssembly module could not be loaded.
+  | 'controls-unavailable' // The toolbar's script could not be loaded.
+  | 'worker-unavailable' // The worker that decodes the photograph stopped, usually because memory ran out.
+  | 'photo-lost' // A worker with a part of the photograph stopped. The photograph is fetched again, up to five times.
+  | 'light-tainted' // The light image contains data of another origin, which this page may not read.
+  | 'light-source' // The light image could not be loaded, played or read.
+  | 'not-loaded' // A method was called before the photograph was loaded.
+  | 'internal'; // A bug in this package.
 
 /** Codes of the WebAssembly modules. */
 export type EngineErrorCode =
