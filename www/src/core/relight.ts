@@ -59,10 +59,7 @@ export interface Picture {
   readonly pixels: Uint8ClampedArray<ArrayBuffer>;
 }
 
-/**
- * Relights a photograph. Rejects with a `PhotoError`: `attribute` for an invalid option, `light-…` for an invalid
- * light.
- */
+/** Rejects with a `PhotoError`: `attribute` for an invalid option, `light-…` for an invalid light. */
 export async function relight(
   photo: CorePhotograph,
   light: CoreLight = 'flood',

@@ -57,10 +57,7 @@ export class BackendChangeEvent extends PhotoEvent {
   }
 }
 
-/**
- * `qualitychange`: the picture is drawn with another share of the photograph's components. The share is below 1
- * only while the picture changes faster than it can be drawn in full.
- */
+/** `qualitychange`: another share of the components is drawn, below 1 only while the picture changes fast. */
 export class QualityChangeEvent extends PhotoEvent {
   /** 0 to 1; the first picture has 1. */
   declare readonly share: number;

@@ -1,7 +1,6 @@
 /**
- * Connects the parts of an element. Attributes and input change the viewer's state; `update` then brings the session,
- * the shadow DOM, the animations and the page's event listeners up to date with it. Changes within one script are
- * collected and handled by one update.
+ * Connects the parts of an element. Attributes and input change the viewer's state; one `update` for all changes of a
+ * script then brings the session, the shadow DOM, the animations and the page's listeners up to date with it.
  */
 
 import { setModuleFolder } from '../engine/wasm-loader.js';

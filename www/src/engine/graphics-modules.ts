@@ -1,4 +1,4 @@
-/** Loads the modules of the graphics backends, apart from the core's: a bundler keeps the files that a script imports. */
+/** Loads the modules of the graphics backends, apart from the core's: bundlers keep the files that a script imports. */
 
 import type { WebGl2Module, WebGpuModule } from './types.js';
 import { createLoader } from './wasm-loader.js';

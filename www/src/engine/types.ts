@@ -86,10 +86,7 @@ export interface Relighter extends Freeable {
   /** The canvas's gamut. */
   readonly gamut: Gamut;
   render(light: Light, transform: OutputTransform, quality: number): void;
-  /**
-   * Uploads a picture as the light of `renderLightImage`; `false` if the backend cannot. Throws the browser's error, and
-   * keeps the last light then.
-   */
+  /** Uploads a picture for `renderLightImage`; `false` if the backend cannot. If it throws, the last light stays. */
   setLightImage(picture: LivePicture, width: number, height: number): boolean;
   /** As `render`, with the uploaded picture. */
   renderLightImage(transform: OutputTransform, quality: number): void;

@@ -38,8 +38,8 @@ export function setModuleFolder(url: string | null): void {
 }
 
 /**
- * Makes the function that loads a module once per page. After a failure, the next call tries again.
- * `task` is what the module does, for error messages: "decodes photographs".
+ * Makes the function that loads a module once per page. After a failure, the next call tries again. `task` is what the
+ * module does, for error messages: "decodes photographs".
  */
 export function createLoader<M>(
   name: WasmModuleName,
@@ -65,11 +65,9 @@ export function createLoader<M>(
 }
 
 function wasmForbidden(_: string, cause: unknown): PhotoError {
-  return new PhotoError(
-    'csp-wasm',
-    "The page's content security policy blocks WebAssembly: add 'wasm-unsafe-eval' to script-src.",
-    cause,
-  );
+  const message =
+    "The page's content security policy blocks WebAssembly: add 'wasm-unsafe-eval' to script-src.";
+  return new PhotoError('csp-wasm', message, cause);
 }
 
 async function startModule<M>(

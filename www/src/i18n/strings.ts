@@ -1,7 +1,4 @@
-/**
- * The texts that visitors see or hear. English is built in; the element fetches the script of another language when a
- * page needs it, and shows English until then.
- */
+/** The texts that visitors see or hear. English is built in, and shown until the script of another language arrives. */
 
 import { ENGLISH, type StringKey, type Strings } from './en.js';
 

@@ -1,7 +1,4 @@
-/**
- * Recognises gestures on the picture: moving and throwing the light, panning, pinching, double taps. Input:
- * pointer samples in pixels of the viewport. Output: calls of a `GestureListener`. Independent of the DOM.
- */
+/** Recognises gestures on the picture: moving and throwing the light, panning, pinching, double taps. Uses no DOM. */
 
 import { speedOf, type Velocity, VelocityTracker } from './inertia.js';
 

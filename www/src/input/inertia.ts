@@ -1,9 +1,6 @@
-/**
- * The glide after a throw. The velocity decays exponentially, v(t) = v₀ e^(−t/τ), so a throw travels v₀τ in total.
- * Distances are in any unit; sample times are in milliseconds.
- */
+/** The glide after a throw. The velocity decays exponentially, v(t) = v₀ e^(−t/τ), so a throw travels v₀τ in total. */
 
-/** Units per second. */
+/** Any unit per second. */
 export interface Velocity {
   readonly x: number;
   readonly y: number;
@@ -20,6 +17,7 @@ const DECAY_SECONDS = 0.28;
 export class VelocityTracker {
   #samples: { readonly x: number; readonly y: number; readonly time: number }[] = [];
 
+  /** `time` is in milliseconds. */
   add(x: number, y: number, time: number): void {
     this.#samples = this.#samples.filter((sample) => time - sample.time <= SAMPLE_WINDOW_MS);
     this.#samples.push({ x, y, time });

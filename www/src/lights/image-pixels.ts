@@ -16,9 +16,8 @@ interface Size {
 }
 
 /**
- * The browser scales larger images down before they are read. It averages sRGB codes where linear light should be
- * averaged, but a larger image takes a second to read, and has so many pixels for each light element that the
- * error hardly shows.
+ * The browser scales larger images down, which take a second to read. It averages sRGB codes and not linear light, but
+ * with so many pixels for each light element the error hardly shows.
  */
 const MAX_PIXELS = 1 << 22;
 
@@ -43,8 +42,8 @@ export function toImageLight(image: LightPicture): ImageLight {
 }
 
 /**
- * The current pixels in sRGB with straight alpha; `null` while nothing is loaded. Throws `light-tainted`, `light-size` or
- * `light-source`.
+ * The current pixels in sRGB with straight alpha; `null` while nothing is loaded. Throws `light-tainted`, `light-size`
+ * or `light-source`.
  */
 function readPixels(image: BrowserPicture): ImageData | null {
   const size = imageSize(image);

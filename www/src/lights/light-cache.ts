@@ -29,10 +29,7 @@ export class LightCache implements Freeable {
     private readonly lightPlane: ReceivedPhoto,
   ) {}
 
-  /**
-   * The light of a setting. While its image cannot be read, the last light substitutes for it, or, if there is
-   * none, the built-in light.
-   */
+  /** While a setting's image cannot be read, the last light replaces it, or, if there is none, the built-in light. */
   get(setting: LightSetting): FrameLight {
     let lightApplied = true;
     let lightError: PhotoError | null = null;

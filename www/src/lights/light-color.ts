@@ -1,6 +1,6 @@
 /**
- * The colour of a light. The light transport matrix keeps channels apart, so a coloured light multiplies the
- * picture's channels: the renderer applies the colour as part of the white balance.
+ * The colour of a light. The light transport matrix keeps channels apart, so a colour multiplies the picture's
+ * channels, as part of the white balance.
  */
 
 import { PhotoError } from '../shared/errors.js';
@@ -15,7 +15,7 @@ export interface LightColor {
 /** Parses a CSS colour into red, green, blue and alpha from 0 to 255; `null` if it is invalid. */
 export type CssColorParser = (css: string) => readonly number[] | null;
 
-/** The `light-color` attribute; `null`, which is white, for an empty value. Alpha scales the brightness. Throws `attribute`. */
+/** The attribute `light-color`; `null`, for white, if it is empty. Alpha scales the brightness. Throws `attribute`. */
 export function parseLightColor(
   value: string | null,
   parse: CssColorParser = parseCssColor,

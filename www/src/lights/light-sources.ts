@@ -1,7 +1,4 @@
-/**
- * Support for images, videos, cameras and numbers as light. The element fetches this script only when a page uses
- * such a light; the script contains its own copies of the modules that it shares with the element.
- */
+/** Images, videos, cameras and numbers as light: a separate script, which has its own copies of shared code. */
 
 export { LightMedia } from './light-media.js';
 export { LightSourceObserver } from './light-source-observer.js';

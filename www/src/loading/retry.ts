@@ -15,10 +15,7 @@ export interface RetryPorts {
   readonly now: () => number;
 }
 
-/**
- * Exponential backoff with jitter: the pause after the nth failure in a row. The jitter keeps the pages that an outage
- * has cut off from returning at the same moment.
- */
+/** The pause after the nth failure in a row: exponential backoff, with jitter lest all pages return at once. */
 export function retryPauseMs(error: RetryableError, failures: number, ports: RetryPorts): number {
   const backoff = Math.min(MAX_PAUSE_MS, FIRST_PAUSE_MS * 2 ** (failures - 1));
   const requested = Math.min(MAX_RETRY_AFTER_MS, retryAfterMs(error.retryAfter, ports.now()));

@@ -1,7 +1,6 @@
 /**
- * A decoded photograph. Its tiles exist once, because they take most of the memory: as bytes on the page, in the memory
- * of one of the page's modules, or in workers. A renderer has them moved to where it draws. Uses of the tiles run one
- * after another, in the order of the calls.
+ * A decoded photograph. Its tiles take most of the memory and exist once: as bytes on the page, in one of its modules,
+ * or in workers. A renderer has them moved to where it draws. Uses of the tiles run in the order of the calls.
  */
 
 import type {

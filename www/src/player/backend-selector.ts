@@ -1,7 +1,6 @@
 /**
- * Finds a backend for a photograph and replaces it when it is lost. There is at most one search at a time: a new one
- * cancels the last, whose result is freed when it comes. The picture of the last backend stays until the new one has
- * drawn a frame.
+ * Finds a backend for a photograph and replaces it when it is lost. A new search cancels the last, whose result is
+ * freed when it comes. The picture of the last backend stays until the new one has drawn a frame.
  */
 
 import type { Backend } from '../engine/types.js';
@@ -95,10 +94,7 @@ export class BackendSelector {
     }
   }
 
-  /**
-   * A backend stopped working. It is set up again, or replaced by the next one if it never drew a frame. A search in
-   * progress goes on instead.
-   */
+  /** Sets a lost backend up again, or the next one if it never drew a frame, unless a search is in progress. */
   lose(lost: ActiveBackend, reason: string): void {
     const isReported = lost.lossReason !== null;
     lost.lossReason ??= reason;

@@ -1,7 +1,6 @@
 /**
- * Decides when a frame is drawn: once before the browser's next frame, however often the settings have changed until
- * then; and once more in full quality when a picture of reduced quality is at rest. While nobody can see the picture,
- * changes wait.
+ * Decides when a frame is drawn: once before the browser's next frame, however often the settings change until then,
+ * and again in full quality when a picture of reduced quality is at rest. Changes wait while nobody can see the picture.
  */
 
 import type { FramePorts } from './types.js';

@@ -1,13 +1,12 @@
 /**
- * One photograph on the page: it is loaded, given a backend, drawn and released. The session uses no
- * DOM: the element passes ports, tests pass fakes.
+ * One photograph on the page: it is loaded, given a backend, drawn and released. Ports stand for the browser.
  *
  *     set ─▶ load ─▶ preview or photograph ─▶ BackendSelector ─▶ renderer ─▶ frames (FrameScheduler)
  *             ▲                                   │ photo-lost
  *             └───────────────────────────────────┘
  *
- * Each load has a signal, which is aborted when another load starts or the session stops. Whatever
- * continues after a wait checks it, and frees its result if it has come too late.
+ * Each load has a signal, which is aborted when another load starts or the session stops. Whatever continues after a
+ * wait checks it, and frees its result if it has come too late.
  */
 
 import type { Backend } from '../engine/types.js';
@@ -75,7 +74,7 @@ export class PhotoSession {
     return this.#selector.active?.hasDrawn ? this.#quality : null;
   }
 
-  /** Applies new settings; a changed setting is a new object. `reload` fetches the file even if its address is the same. */
+  /** A changed setting is a new object. `reload` fetches the file even if its address is the same. */
   set(settings: SessionSettings, reload = false): void {
     const previous = this.settings;
     this.settings = settings;
@@ -99,10 +98,7 @@ export class PhotoSession {
     if (this.#photo) this.#scheduler.invalidate();
   }
 
-  /**
-   * Whether the picture can be seen. If not, changes are not drawn; but the first picture is, the first of another
-   * backend, and those that `renderNow` requests.
-   */
+  /** An invisible picture is drawn for the first time, for another backend and by `renderNow`, but not for changes. */
   setVisible(isVisible: boolean): void {
     this.#scheduler.setVisible(isVisible);
   }
@@ -213,10 +209,7 @@ export class PhotoSession {
     return this.#nextFrame;
   }
 
-  /**
-   * The search or the frame that the next frame waits for. A frame during a search would take back tiles that the new
-   * backend needs.
-   */
+  /** What the next frame waits for. A frame during a search would take back tiles that the new backend needs. */
   get #inProgress(): Promise<void> | undefined {
     return this.#selector.search ?? this.#selector.active?.frame?.promise;
   }

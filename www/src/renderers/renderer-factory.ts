@@ -1,7 +1,4 @@
-/**
- * Creates renderers for a backend. The code of the graphics backends and of the CPU are separate scripts, which are
- * fetched when they are needed.
- */
+/** Creates renderers for a backend. Those of the graphics backends and of the CPU are separate scripts. */
 
 import { loadCpu } from '../engine/core-modules.js';
 import { loadWebGl2, loadWebGpu } from '../engine/graphics-modules.js';

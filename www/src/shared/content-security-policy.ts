@@ -11,10 +11,7 @@ const MAX_EVENT_DELAY_MS = 50;
 /** Where the event is fired: the document of a page, or the global scope of a worker. */
 type ViolationTarget = Partial<Pick<EventTarget, 'addEventListener' | 'removeEventListener'>>;
 
-/**
- * Does some work. If it fails, and a directive that matches `directive` was violated meanwhile, rejects with
- * `toError(violated directive, cause)` instead.
- */
+/** Does some work. If it fails, and a directive that matches `directive` was violated meanwhile, `toError` says why. */
 export async function withPolicyErrors<T>(
   work: () => Promise<T>,
   directive: RegExp,

@@ -1,7 +1,4 @@
-/**
- * Change detection by reference. Immutable settings objects pass through `reuse`, so that an object is new only if one
- * of its fields has changed. Consumers then compare references instead of fields.
- */
+/** Change detection by reference: `reuse` replaces an immutable object only if one of its fields has changed. */
 
 /** `previous` if each of its fields is identical to that of `next`; otherwise `next`. */
 export function reuse<T extends object>(previous: T | null | undefined, next: T): T {

@@ -1,7 +1,4 @@
-/**
- * The page's side of one worker, which answers numbered requests. The decoder and the worker pool use it;
- * `engine/worker-server.ts` is the worker's side.
- */
+/** The page's side of one worker, which answers numbered requests. `engine/worker-server.ts` is the worker's side. */
 
 import { joinSentences, PhotoError } from './errors.js';
 

@@ -1,6 +1,6 @@
 /**
- * Reads and parses attributes. An invalid attribute keeps its last valid value (or its default); other attributes
- * are unaffected. An attribute is parsed again only after a change, so equal values are the same object.
+ * Reads and parses attributes. An invalid attribute keeps its last valid value, or its default. An attribute is parsed
+ * again only after a change, so equal values are the same object.
  */
 
 import { type PhotoError, toPhotoError } from '../shared/errors.js';

@@ -1,7 +1,4 @@
-/**
- * Parsers of all attributes that are not plain text. `null` is an absent attribute. A parser throws a `PhotoError` with
- * the code `attribute`, whose message names the accepted values.
- */
+/** Parsers of all attributes that are not plain text; `null` is an absent one. As in `parse-settings`, they throw. */
 
 import { PhotoError } from '../shared/errors.js';
 import { BACKENDS, type Backend, type CrossOrigin } from '../shared/names.js';

@@ -1,6 +1,6 @@
 /**
- * Detects when the light that the photograph is drawn with becomes another one, for the `lightchange` event. A
- * source counts from its first drawn frame. While a source is active, only another source is a change.
+ * Detects when the photograph is drawn with another light, for the `lightchange` event. A source counts from its first
+ * drawn frame. While a source is active, only another source is a change.
  */
 
 import type { LightSetting } from '../lights/light-setting.js';

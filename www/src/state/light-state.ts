@@ -1,7 +1,6 @@
 /**
  * The light: as the options and `lightSource` request it, until a visitor or `setLight` overrides it. `reset` and a
- * change of an option clear overrides. The support for images and videos is a separate script, which this module
- * fetches when a source is used for the first time.
+ * change of an option clear overrides. The script for sources is fetched when one is used for the first time.
  */
 
 import type { LightColor } from '../lights/light-color.js';

@@ -1,7 +1,4 @@
-/**
- * The element's shadow DOM: the viewport with the picture, its poster and the torch handle, and below them the
- * controls, a progress bar and a message. It keeps no state apart from the elements.
- */
+/** The element's shadow DOM: the viewport with picture, poster and torch handle; controls, progress bar and message. */
 
 import { type Language, t } from '../i18n/strings.js';
 import type { PicturePoint } from '../shared/values.js';

@@ -1,7 +1,4 @@
-/**
- * The toolbar and the light menu. The toolbar is a single tab stop; the arrow keys move between its buttons. A
- * separate script, which is fetched only for pages that use `controls`.
- */
+/** The toolbar, a single tab stop whose buttons the arrow keys focus, and the light menu. It is a separate script. */
 
 import type { StringKey } from '../i18n/strings.js';
 import type { LightItem } from '../state/light-state.js';

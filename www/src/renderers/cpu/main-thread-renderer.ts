@@ -1,4 +1,4 @@
-/** Draws with the CPU on the page's thread. If another renderer moves the tiles away, the next frame moves them back. */
+/** Draws with the CPU on the page's thread. If another renderer takes the tiles, the next frame takes them back. */
 
 import type { CpuModule, Gamut } from '../../engine/types.js';
 import type { Photograph } from '../../photo/photograph.js';

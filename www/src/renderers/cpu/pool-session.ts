@@ -95,9 +95,8 @@ export class PoolSession implements TileSession {
   }
 
   /**
-   * Relights the whole picture. Call it after `plan`, and again only after it has settled, which is when all workers
-   * are done; the next call reuses the memory of the pixels. `light` may be freed at once. The same object is not sent
-   * to the workers twice.
+   * Relights the whole picture. Call it after `plan`, and again only after it has settled: the next call reuses the
+   * memory of the pixels. `light` may be freed at once. The same object is not sent to the workers twice.
    */
   async relight(light: Light, settings: FrameSettings): Promise<RowPixels[]> {
     const picture = await allSettledOrThrow(

@@ -1,7 +1,4 @@
-/**
- * The page's workers that relight with the CPU; all photographs share them. Each worker has a row range of a
- * photograph, with the only copy of its tiles.
- */
+/** The page's workers that relight with the CPU. Each has rows of a photograph, with the only copy of their tiles. */
 
 import type { PhotoDescriptor, TileWorkers } from '../../photo/types.js';
 import { PhotoError } from '../../shared/errors.js';

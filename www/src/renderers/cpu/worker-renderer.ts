@@ -18,10 +18,7 @@ export async function createWorkerRenderer(
   canvas.width = photograph.info.width;
   canvas.height = photograph.info.height;
   // Keeps the canvas in the page's memory: a software renderer would copy every frame twice.
-  const context = canvas.getContext('2d', {
-    colorSpace: requestedGamut,
-    willReadFrequently: true,
-  });
+  const context = canvas.getContext('2d', { colorSpace: requestedGamut, willReadFrequently: true });
   if (!context) {
     throw new PhotoError('backend-unavailable', 'The browser has no canvas with a 2D context.');
   }
