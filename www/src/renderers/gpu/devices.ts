@@ -81,9 +81,10 @@ export class Devices {
 
   #checkLosses(backend: GraphicsBackend): void {
     const losses = this.#losses.get(backend);
-    if (!losses || losses.count < MAX_LOSSES) return;
-    if (this.ports.now() - losses.lastMs > LOSS_MEMORY_MS) this.#losses.delete(backend);
-    else throw unavailable(`it was lost ${losses.count} times within a short time`);
+    if (!losses || this.ports.now() - losses.lastMs > LOSS_MEMORY_MS) return;
+    if (losses.count >= MAX_LOSSES) {
+      throw unavailable(`it was lost ${losses.count} times within a short time`);
+    }
   }
 
   #open(load: LoadGraphics, backend: GraphicsBackend): SharedDevice {
@@ -91,12 +92,11 @@ export class Devices {
     const graphics = backend === 'webgpu' ? this.#openWebGpu(load) : this.#openWebGl2(load, lose);
     const device: SharedDevice = { graphics, holders: new Set(), isClosed: false };
     this.#devices.set(backend, device);
-    graphics.then(
-      ({ lost }) => {
-        void lost?.then(({ message }) => lose(message || 'the graphics device is gone.'));
-      },
-      () => {}, // `lease` rejects with it
-    );
+    graphics
+      .then(({ lost }) =>
+        lost?.then(({ message }) => lose(message || 'the graphics device is gone.')),
+      )
+      .catch(() => {}); // `lease` rejects with it
     return device;
   }
 
@@ -159,10 +159,7 @@ export class Devices {
     if (device.isClosed) return;
     device.isClosed = true;
     if (this.#devices.get(backend) === device) this.#devices.delete(backend);
-    device.graphics.then(
-      (graphics) => graphics.free(),
-      () => {},
-    );
+    device.graphics.then((graphics) => graphics.free()).catch(() => {});
   }
 }
 
