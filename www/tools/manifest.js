@@ -34,7 +34,7 @@ const GLOBAL = ['lang'];
  * @typedef {{ kind: string, name: string, members: Member[], events: Entry[], attributes: Attribute[], cssParts: Entry[], cssProperties: Entry[], slots: Entry[], superclass?: unknown }} Declaration
  */
 
-/** @returns {Promise<{ manifest: object, element: Declaration, attributes: string }>} needs dist/element.js */
+/** @returns {Promise<{ manifest: object, attributes: string }>} needs dist/element.js */
 export async function makeManifest() {
   const sources = SOURCES.map(parse);
   const context = { dev: false, thirdPartyCEMs: [] };
@@ -82,7 +82,7 @@ export async function makeManifest() {
       },
     ],
   };
-  return { manifest, element, attributes: jsxAttributes(element) };
+  return { manifest, attributes: jsxAttributes(element) };
 }
 
 /** @param {string} file */

@@ -55,28 +55,6 @@ export function brightest({ width, height, data }) {
   return { x: x / sum / width, y: y / sum / height, mean: sum / (3 * width * height) };
 }
 
-/**
- * Counts the pixels with a code that differs by more than `tolerance`.
- *
- * @param {Picture} a
- * @param {Picture} b of the same size
- * @param {number} tolerance out of 255
- * @returns {{ count: number, difference: Picture }} `difference` is white at those pixels and black elsewhere
- */
-export function differing(a, b, tolerance) {
-  checkSameSize(a, b);
-  const data = new Uint8Array(a.data.length);
-  let count = 0;
-  for (let at = 0; at < data.length; at += 4) {
-    const differs = [0, 1, 2, 3].some(
-      (c) => Math.abs((a.data[at + c] ?? 0) - (b.data[at + c] ?? 0)) > tolerance,
-    );
-    if (differs) count += 1;
-    data.set(differs ? [255, 255, 255, 255] : [0, 0, 0, 255], at);
-  }
-  return { count, difference: { width: a.width, height: a.height, data } };
-}
-
 /** @param {Picture} a @param {Picture} b */
 function checkSameSize(a, b) {
   if (a.width === b.width && a.height === b.height) return;

@@ -59,7 +59,9 @@ export async function decode(
     }
   }
   const url = absoluteUrl(file);
-  const bytes = url.startsWith('file:') ? await readFileOrThrow(url) : null;
+  const bytes = await readFile(url).catch((cause: unknown) => {
+    throw new PhotoError('http-status', `${url} could not be read: ${String(cause)}`, cause);
+  });
   if (bytes) return decode(bytes, { signal, onProgress });
   const fetchFile: typeof fetch = (...request) => fetch(...request);
   const ports = { createDecoder, fetch: fetchFile, yieldToPage, now };
@@ -119,14 +121,6 @@ function absoluteUrl(file: string | URL): string {
       `“${file}” is not a URL. Outside of a page, use an absolute URL with https: or file:.`,
       cause,
     );
-  }
-}
-
-async function readFileOrThrow(url: string): Promise<Uint8Array | null> {
-  try {
-    return await readFile(url);
-  } catch (cause) {
-    throw new PhotoError('http-status', `${url} could not be read: ${String(cause)}`, cause);
   }
 }
 

@@ -13,18 +13,15 @@ export interface IdleListener {
 export const REST_MS = 8000;
 
 export class IdleTimer {
-  readonly #callLater: typeof callLater;
   #kioskMs = 0;
   #isActive = false;
   #cancelRest = (): void => {};
   #cancelKiosk = (): void => {};
 
   constructor(
-    later: typeof callLater,
+    private readonly later: typeof callLater,
     private readonly listener: IdleListener,
-  ) {
-    this.#callLater = later;
-  }
+  ) {}
 
   /** 0 is never. */
   set kioskSeconds(seconds: number) {
@@ -36,7 +33,7 @@ export class IdleTimer {
   restart(): void {
     this.#isActive = true;
     this.#cancelRest();
-    this.#cancelRest = this.#callLater(REST_MS, () => this.listener.rested());
+    this.#cancelRest = this.later(REST_MS, () => this.listener.rested());
     this.#startKiosk();
   }
 
@@ -49,7 +46,7 @@ export class IdleTimer {
   #startKiosk(): void {
     this.#cancelKiosk();
     if (this.#kioskMs === 0) return;
-    this.#cancelKiosk = this.#callLater(this.#kioskMs, () => {
+    this.#cancelKiosk = this.later(this.#kioskMs, () => {
       this.#isActive = false;
       this.listener.expired();
     });
