@@ -57,7 +57,7 @@ export class InteractionController {
       },
       expired: () => {
         listener.expired();
-        presenter.closeMenu();
+        presenter.toolbar?.closeMenu();
         presenter.leaveFullscreen();
       },
     });
@@ -87,7 +87,7 @@ export class InteractionController {
   markActive(byKeyboard = false): void {
     this.#isActive = true;
     this.#idle.restart();
-    this.presenter.showToolbar(byKeyboard);
+    this.presenter.toolbar?.show(byKeyboard);
   }
 
   /** Whether the torch follows the device's tilt; `null` if it cannot. */
@@ -259,7 +259,8 @@ export class InteractionController {
         this.listener.changed();
         return true;
       case 'escape':
-        if (!this.presenter.leaveFullscreen()) this.dom.blur();
+        if (this.presenter.leaveFullscreen()) return false;
+        (this.dom.root.activeElement as HTMLElement | null)?.blur();
         return false;
     }
   }

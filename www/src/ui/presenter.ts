@@ -16,7 +16,8 @@ export interface PresenterListener extends ToolbarActions {
 }
 
 export class Presenter {
-  #toolbar: Toolbar | null = null;
+  /** `null` until it is needed. */
+  toolbar: Toolbar | null = null;
   #isToolbarRequested = false;
 
   constructor(
@@ -46,17 +47,8 @@ export class Presenter {
     this.dom.updatePoster(poster, crossOrigin, !isPictureShown, reveal.needsPress(options));
     const hasToolbar = options.controls && isPictureShown;
     if (hasToolbar && !this.#isToolbarRequested) void this.#fetchToolbar();
-    if (hasToolbar) this.#toolbar?.update((key) => t(key, language), isPaused, isTilting);
-    else this.#toolbar?.hide();
-  }
-
-  /** Shows the toolbar after an input: for good after a key press, otherwise for some seconds. */
-  showToolbar(byKeyboard: boolean): void {
-    this.#toolbar?.show(byKeyboard);
-  }
-
-  closeMenu(): void {
-    this.#toolbar?.closeMenu();
+    if (hasToolbar) this.toolbar?.update((key) => t(key, language), isPaused, isTilting);
+    else this.toolbar?.hide();
   }
 
   /** Returns whether the element was in full screen. */
@@ -92,7 +84,7 @@ export class Presenter {
     try {
       const { Toolbar } = await import('./toolbar.js');
       const toolbar = new Toolbar(this.host, this.state, this.listener);
-      this.#toolbar = toolbar;
+      this.toolbar = toolbar;
       this.dom.mountControls([toolbar.menu, toolbar.bar], toolbar.css);
       this.listener.loaded();
     } catch (cause) {

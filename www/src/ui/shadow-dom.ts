@@ -32,7 +32,7 @@ export class ShadowDom {
     { class: 'reveal', part: 'button', type: 'button', hidden: '' },
     createElement('span', { class: 'panel' }, createIcon(LIGHT_ICON), this.#revealText),
   );
-  readonly #picture = createElement('div', { class: 'picture', part: 'picture' });
+  readonly #picture = createElement('div', { part: 'picture' });
   readonly #posterImage = createElement('img', { part: 'poster', alt: '', hidden: '' });
   readonly #poster = createElement(
     'div',
@@ -219,10 +219,6 @@ export class ShadowDom {
     this.#hintTimer = setTimeout(() => {
       this.#hint.hidden = true;
     }, HINT_MS);
-  }
-
-  blur(): void {
-    (this.root.activeElement as HTMLElement | null)?.blur();
   }
 
   /** Has a screen reader read a text, unless another one follows at once. */
