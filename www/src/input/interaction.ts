@@ -201,11 +201,10 @@ export class InteractionController {
   }
 
   #pan(dx: number, dy: number): boolean {
-    const { view, options } = this.state;
-    return this.#setView(pan(view, dx, dy, options.maxZoom));
+    return this.#setView(pan(this.state.view, dx, dy));
   }
 
-  /** Returns whether the view has changed. */
+  /** Sets the nearest view inside the picture. Returns whether the view has changed. */
   #setView(view: PhotoView): boolean {
     const last = this.state.view;
     this.state.view = view;

@@ -10,10 +10,7 @@ import {
   type LightPicture,
 } from './light-source.js';
 
-interface Size {
-  readonly width: number;
-  readonly height: number;
-}
+type Size = Pick<ImageData, 'width' | 'height'>;
 
 /**
  * The browser scales larger images down, which take a second to read. It averages sRGB codes and not linear light, but

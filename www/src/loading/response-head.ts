@@ -52,11 +52,7 @@ export function isOtherVersion(a: FileVersion, b: FileVersion): boolean {
   return a.modified !== undefined && b.modified !== undefined && a.modified !== b.modified;
 }
 
-function readContentRange(
-  url: string,
-  response: Response,
-  requested: ByteRange,
-): { start: number; end: number; size: number | undefined } {
+function readContentRange(url: string, response: Response, requested: ByteRange) {
   const encoding = contentEncoding(response);
   if (encoding !== undefined) throw compressed(url, encoding);
   // Browsers hide Content-Range of other origins unless the server exposes it, but not Content-Length.

@@ -24,7 +24,7 @@ export class RefCounted<T extends Freeable> {
 
 export class ActiveBackend {
   /** For this renderer alone: frame times of other renderers say nothing about it. */
-  readonly quality = new QualityController();
+  readonly qualityController = new QualityController();
   hasDrawn = false;
   /** Why the backend stopped working; `null` while it works. */
   lossReason: string | null = null;

@@ -231,7 +231,7 @@ export class PhotoSession {
     this.#isFullQualityRequested = false;
     if (!active || !this.settings) throw notLoaded();
     const { light, output } = this.settings;
-    const quality = isFullQuality ? 1 : active.quality.quality;
+    const quality = isFullQuality ? 1 : active.qualityController.quality;
     this.#scheduler.frameStarted();
     try {
       const startMs = this.ports.now();
@@ -263,11 +263,11 @@ export class PhotoSession {
 
   /** Measures a frame of an animation for the choice of the next one's quality. */
   #measure(
-    { quality }: ActiveBackend,
+    { qualityController }: ActiveBackend,
     startMs: number,
     frame: FrameResult | Promise<FrameResult>,
   ): void {
-    const record = () => quality.recordFrame(startMs, this.ports.now());
+    const record = () => qualityController.recordFrame(startMs, this.ports.now());
     if (frame instanceof Promise) frame.then(record, () => {});
     // A graphics device still works on the frame, which delays the browser's next one.
     else this.ports.nextFrame(record);

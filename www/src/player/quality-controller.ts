@@ -3,9 +3,8 @@
  * and end of such frames, and has no clock: every delay is a number of frames.
  */
 
-/** The shares of the components to choose from. Half of the components take at best half of the time. */
-const QUALITY_LEVELS = [1, 1 / 2, 1 / 4] as const;
-const MAX_LEVEL = QUALITY_LEVELS.length - 1;
+/** Quality changes by factors of two. Half of the components take at best half of the time. */
+const MIN_QUALITY = 1 / 4;
 const FRAME_BUDGET_MS = 1000 / 30;
 /** Longer frames are slow. Above the budget, because a display of 30 Hz shows no frame sooner. */
 const SLOW_FRAME_MS = 1.2 * FRAME_BUDGET_MS;
@@ -32,14 +31,16 @@ const MAX_DROP_DELAY_FRAMES = 64 * DROP_DELAY_FRAMES;
 /** The least that a lower quality must save, relative to a saving in proportion to the components. */
 const MIN_SAVING = 1 / 4;
 
-/** The level and the median frame time before the quality was lowered. */
+/** The quality and the median frame time before the quality was lowered. */
 interface QualityDrop {
-  readonly level: number;
+  readonly quality: number;
   readonly ms: number;
 }
 
 export class QualityController {
-  #level = 0;
+  /** The share of the components for the next frame of an animation. */
+  quality = 1;
+  /** Of the last frames in this quality. */
   #durations: number[] = [];
   #lastEndMs = Number.NEGATIVE_INFINITY;
   #frames = 0;
@@ -50,10 +51,6 @@ export class QualityController {
   #drop: QualityDrop | null = null;
   #noDropBeforeFrame = 0;
   #dropDelay = DROP_DELAY_FRAMES;
-
-  get quality(): number {
-    return qualityAt(this.#level);
-  }
 
   /** Records a frame of an animation. `endMs` is when the next frame could have begun, whether or not one was due. */
   recordFrame(startMs: number, endMs: number): void {
@@ -77,12 +74,12 @@ export class QualityController {
   }
 
   get #canLower(): boolean {
-    return this.#level < MAX_LEVEL && this.#frames >= this.#noDropBeforeFrame;
+    return this.quality > MIN_QUALITY && this.#frames >= this.#noDropBeforeFrame;
   }
 
   /** A lower quality does not help if the page itself is slow, or its display. */
   #hasHelped(drop: QualityDrop, ms: number): boolean {
-    const idealSaving = 1 - this.quality / qualityAt(drop.level);
+    const idealSaving = 1 - this.quality / drop.quality;
     return ms <= drop.ms * (1 - MIN_SAVING * idealSaving);
   }
 
@@ -90,46 +87,42 @@ export class QualityController {
   #undoDrop(): void {
     this.#noDropBeforeFrame = this.#frames + this.#dropDelay;
     this.#dropDelay = Math.min(2 * this.#dropDelay, MAX_DROP_DELAY_FRAMES);
-    this.#setLevel(0);
+    this.#setQuality(1);
   }
 
-  /** Goes to the first level that is expected to fit. */
+  /** Goes to the highest quality that is expected to fit. */
   #lower(ms: number): void {
     const isFailedRaise = this.#frames - this.#raisedAtFrame < MIN_LASTING_FRAMES;
     this.#raiseDelay = isFailedRaise
       ? Math.min(2 * this.#raiseDelay, MAX_RAISE_DELAY_FRAMES)
       : RAISE_DELAY_FRAMES;
-    this.#drop = { level: this.#level, ms };
-    let level = this.#level + 1;
-    while (level < MAX_LEVEL && this.#expectedMs(ms, level) > FRAME_BUDGET_MS) level += 1;
-    this.#setLevel(level);
+    this.#drop = { quality: this.quality, ms };
+    let quality = this.quality / 2;
+    while (quality > MIN_QUALITY && this.#expectedMs(ms, quality) > FRAME_BUDGET_MS) quality /= 2;
+    this.#setQuality(quality);
   }
 
-  /** Rarely, it also tries a level that is not expected to fit. */
+  /** Rarely, it also tries a quality that is not expected to fit. */
   #raiseIfDue(ms: number): void {
-    if (this.#level === 0) return;
-    const level = this.#level - 1;
-    const isLikely = this.#expectedMs(ms, level) <= MAX_EXPECTED_MS;
+    if (this.quality === 1) return;
+    const quality = 2 * this.quality;
+    const isLikely = this.#expectedMs(ms, quality) <= MAX_EXPECTED_MS;
     const delay = isLikely ? this.#raiseDelay : UNLIKELY_RAISE_FACTOR * this.#raiseDelay;
     if (this.#frames - this.#changedAtFrame < delay) return;
     this.#raisedAtFrame = this.#frames;
-    this.#setLevel(level);
+    this.#setQuality(quality);
   }
 
-  /** The duration at another level, if it is proportional to the number of components. */
-  #expectedMs(ms: number, level: number): number {
-    return (ms * qualityAt(level)) / this.quality;
+  /** The duration in another quality, if it is proportional to the number of components. */
+  #expectedMs(ms: number, quality: number): number {
+    return (ms * quality) / this.quality;
   }
 
-  #setLevel(level: number): void {
-    this.#level = level;
+  #setQuality(quality: number): void {
+    this.quality = quality;
     this.#changedAtFrame = this.#frames;
     this.#durations = [];
   }
-}
-
-function qualityAt(level: number): number {
-  return QUALITY_LEVELS[level] as number;
 }
 
 function median(values: readonly number[]): number {

@@ -40,7 +40,7 @@ export function toViewport(view: PhotoView, { x, y }: PicturePoint): PicturePoin
   return { x: (x - view.x) * view.zoom + 0.5, y: (y - view.y) * view.zoom + 0.5 };
 }
 
-/** Magnifies by `factor`. The picture stays fixed at the viewport point `at`, as far as the edges allow. */
+/** Magnifies by `factor`. The picture stays fixed at the viewport point `at`; the centre may lie beyond the edges. */
 export function zoomAt(
   view: PhotoView,
   factor: number,
@@ -51,13 +51,12 @@ export function zoomAt(
   const zoom = Math.min(maxZoom, Math.max(1, view.zoom * factor));
   const x = fixed.x - (at.x - 0.5) / zoom;
   const y = fixed.y - (at.y - 0.5) / zoom;
-  return clampView({ zoom, x, y }, maxZoom);
+  return { zoom, x, y };
 }
 
-/** Moves the picture by (dx, dy) in viewport coordinates. */
-export function pan(view: PhotoView, dx: number, dy: number, maxZoom: number): PhotoView {
-  const { zoom } = view;
-  return clampView({ zoom, x: view.x - dx / zoom, y: view.y - dy / zoom }, maxZoom);
+/** Moves the picture by (dx, dy) in viewport coordinates, perhaps beyond its edges. */
+export function pan({ zoom, x, y }: PhotoView, dx: number, dy: number): PhotoView {
+  return { zoom, x: x - dx / zoom, y: y - dy / zoom };
 }
 
 /** Zooms in at a viewport point, or back out to the whole picture. */
