@@ -1,13 +1,12 @@
 /** Creates renderers for a backend. Those of the graphics backends and of the CPU are separate scripts. */
 
 import { loadCpu } from '../engine/core-modules.js';
-import { loadWebGl2, loadWebGpu } from '../engine/graphics-modules.js';
-import type { Backend, CpuModule, Modules } from '../engine/types.js';
+import { GRAPHICS_LOADERS } from '../engine/graphics-modules.js';
+import type { Backend, CpuModule } from '../engine/types.js';
 import { startWorker } from '../engine/worker-server.js';
 import { messageOf, PhotoError } from '../shared/errors.js';
 import type { CpuRenderers } from './cpu/cpu-renderer.js';
 import type { GpuRenderers } from './gpu/gpu-renderer.js';
-import type { GraphicsBackend } from './gpu/graphics-ports.js';
 import type { CreateRenderer, RenderOptions } from './types.js';
 
 /** More workers would wait for memory and for each other. */
@@ -62,11 +61,6 @@ export function rendererFactory({
   };
   return { createRenderer, prepare };
 }
-
-const GRAPHICS_LOADERS: { readonly [B in GraphicsBackend]: () => Promise<Modules[B]> } = {
-  webgl2: loadWebGl2,
-  webgpu: loadWebGpu,
-};
 
 const poolSize = Math.min(MAX_WORKERS, globalThis.navigator?.hardwareConcurrency ?? 1);
 
