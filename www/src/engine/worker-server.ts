@@ -44,30 +44,25 @@ export function serve<Task, Ready, Result>(
   const scope = globalThis as unknown as WorkerScope;
   const send = (message: WorkerResponse<Ready, Result>, transfer: Transferable[] = []): void =>
     scope.postMessage(message, transfer);
-  const fail = (thrown: unknown): void => send({ kind: 'failed', message: messageOf(thrown) });
-  const answer = (
-    service: WorkerService<Task, Ready, Result>,
-    request: WorkerRequest<Task>,
-  ): void => {
+  const orReport = async (work: () => void | Promise<void>): Promise<void> => {
     try {
-      const [result, transfer] = service.handle(request.task);
-      send({ kind: 'done', id: request.id, result }, transfer);
+      await work();
     } catch (thrown) {
-      fail(thrown);
+      send({ kind: 'failed', message: messageOf(thrown) });
     }
   };
   const start = async ({ modules }: StartMessage): Promise<void> => {
-    try {
-      setModuleFolder(modules);
-      const service = await setUp();
-      scope.onmessage = ({ data }) => answer(service, data);
-      send({ kind: 'done', id: START_ID, result: service.ready });
-    } catch (thrown) {
-      fail(thrown);
-    }
+    setModuleFolder(modules);
+    const service = await setUp();
+    const answer = ({ id, task }: WorkerRequest<Task>): void => {
+      const [result, transfer] = service.handle(task);
+      send({ kind: 'done', id, result }, transfer);
+    };
+    scope.onmessage = ({ data }) => void orReport(() => answer(data));
+    send({ kind: 'done', id: START_ID, result: service.ready });
   };
   scope.onmessage = ({ data }) => {
     scope.onmessage = null;
-    void start(data);
+    void orReport(() => start(data));
   };
 }

@@ -4,18 +4,14 @@ import { LANGUAGES, type Language } from './strings.js';
 
 /** By the nearest `lang` attribute, also outside of shadow roots, and otherwise by the browser's language. */
 export function languageOf(element: Element): Language {
-  const tags = [navigator.language];
-  let current: Element | null = element;
-  while (current) {
-    const labelled: Element | null = current.closest('[lang]');
-    if (labelled) {
-      tags.unshift(labelled.getAttribute('lang') ?? '');
-      break;
-    }
-    const root = current.getRootNode();
-    current = root instanceof ShadowRoot ? root.host : null;
-  }
-  return firstSupported(tags);
+  return firstSupported([tagOf(element), navigator.language]);
+}
+
+function tagOf(element: Element): string {
+  const labelled = element.closest('[lang]');
+  if (labelled) return labelled.getAttribute('lang') ?? '';
+  const root = element.getRootNode();
+  return root instanceof ShadowRoot ? tagOf(root.host) : '';
 }
 
 /** The first supported language of some BCP 47 tags; English if there is none. */

@@ -1,16 +1,9 @@
 /** Maps key presses to actions. Independent of the DOM. */
 
-/** The fields of a `KeyboardEvent` that count. */
-export interface KeyPress {
-  /** The character or key name. */
-  readonly key: string;
-  /** The physical key, independent of the keyboard's layout. */
-  readonly code: string;
-  readonly shiftKey: boolean;
-  readonly ctrlKey: boolean;
-  readonly metaKey: boolean;
-  readonly altKey: boolean;
-}
+export type KeyPress = Pick<
+  KeyboardEvent,
+  'key' | 'code' | 'shiftKey' | 'ctrlKey' | 'metaKey' | 'altKey'
+>;
 
 /** Distances are fractions of the picture for the light, and of the viewport for panning. */
 export type KeyAction =
