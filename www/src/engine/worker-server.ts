@@ -9,7 +9,6 @@ interface StartMessage {
   readonly modules: string | null;
 }
 
-/** What a worker serves once it has started. */
 export interface WorkerService<Task, Ready, Result> {
   /** Sent to the page with the news that the worker has started. */
   readonly ready: Ready;

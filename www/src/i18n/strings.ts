@@ -6,6 +6,7 @@ export type { StringKey } from './en.js';
 
 /** Written out, because bundlers need literal addresses. */
 const FETCHERS = {
+  en: async () => ({ default: ENGLISH }),
   fr: () => import('./fr.js'),
   de: () => import('./de.js'),
   it: () => import('./it.js'),
@@ -14,30 +15,25 @@ const FETCHERS = {
   zh: () => import('./zh.js'),
 } as const;
 
-type FetchedLanguage = keyof typeof FETCHERS;
+export type Language = keyof typeof FETCHERS;
 
-export type Language = 'en' | FetchedLanguage;
-
-export const LANGUAGES = ['en', ...(Object.keys(FETCHERS) as FetchedLanguage[])] as const;
+export const LANGUAGES = Object.keys(FETCHERS) as Language[];
 
 const strings: Partial<Record<Language, Strings>> = { en: ENGLISH };
 const fetches: Partial<Record<Language, Promise<void>>> = {};
 
 /** Whether the texts of a language are yet to be fetched. */
-export function isPending(language: Language): language is FetchedLanguage {
+export function isPending(language: Language): boolean {
   return !strings[language];
 }
 
 /** Fetches the texts of a language once per page. A failed fetch leaves English. */
-export function fetchStrings(language: FetchedLanguage): Promise<void> {
-  fetches[language] ??= FETCHERS[language]().then(
-    (script) => {
+export function fetchStrings(language: Language): Promise<void> {
+  fetches[language] ??= FETCHERS[language]()
+    .catch(FETCHERS.en)
+    .then((script) => {
       strings[language] = script.default;
-    },
-    () => {
-      strings[language] = ENGLISH;
-    },
-  );
+    });
   return fetches[language];
 }
 

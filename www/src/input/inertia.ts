@@ -13,7 +13,6 @@ const MAX_REST_MS = 60;
 /** τ: the velocity falls to 37 % in this time. */
 const DECAY_SECONDS = 0.28;
 
-/** Estimates a pointer's velocity from its recent samples. */
 export class VelocityTracker {
   #samples: { readonly x: number; readonly y: number; readonly time: number }[] = [];
 

@@ -112,7 +112,6 @@ export class LightSourceObserver {
   }
 }
 
-/** Calls back for each frame that a video shows. */
 function observeFrames(video: HTMLVideoElement, onFrame: () => void, signal: AbortSignal): void {
   let handle = 0;
   if (typeof video.requestVideoFrameCallback === 'function') {

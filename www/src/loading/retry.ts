@@ -30,7 +30,6 @@ function retryAfterMs(header: string | null, now: number): number {
   return Number.isNaN(date) ? 0 : date - now;
 }
 
-/** Rejects with the signal's reason if it is aborted. */
 export function sleep(ms: number, signal: AbortSignal): Promise<void> {
   return withTimeout(new Promise(() => {}), { signal, ms, onTimeout: () => {} });
 }

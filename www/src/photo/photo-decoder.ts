@@ -1,4 +1,4 @@
-/** The interface of the decoders. */
+/** The interface of the decoders, each of which decodes one file, on the page's thread or in a worker. */
 
 import type { Decoder } from '../engine/types.js';
 import type { ByteRange } from '../shared/values.js';
@@ -9,7 +9,6 @@ export interface DecoderState extends Pick<Decoder, 'bytesFed' | 'fileBytes' | '
   readonly next: ByteRange | undefined;
 }
 
-/** Decodes one file, on the page's thread or in a worker. */
 export interface PhotoDecoder {
   readonly state: DecoderState;
   /**

@@ -189,7 +189,6 @@ export class PhotoSession {
     return this.#selector.select(shared, { ...options, backends }, backend, '');
   }
 
-  /** Draws a frame that nobody waits for. */
   #drawFrame(isFullQuality: boolean): void {
     this.#isFullQualityRequested ||= isFullQuality;
     const { active, search } = this.#selector;

@@ -20,7 +20,6 @@ export interface SessionSettings {
   readonly output: OutputSettings;
 }
 
-/** The browser's clock and frames. */
 export interface FramePorts {
   nextFrame(callback: () => void): void;
   readonly callLater: typeof callLater;

@@ -35,7 +35,6 @@ export type WorkerLike<Task, Ready, Result> = Pick<Worker, 'terminate'> & {
   onmessageerror: ((event: MessageEvent) => void) | null;
 };
 
-/** What differs between the kinds of workers. */
 export interface WorkerClientOptions {
   /** The worker's name in error messages: "decoding worker". */
   readonly name: string;

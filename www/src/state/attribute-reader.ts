@@ -6,7 +6,6 @@
 import { type PhotoError, toPhotoError } from '../shared/errors.js';
 import { type PARSERS, type ParsedValue, parseAddress, parserOf } from './attribute-values.js';
 
-/** An attribute's text and what the parser made of it. */
 interface ParsedAttribute {
   readonly text: string | null;
   /** The base address against which an address was resolved. */

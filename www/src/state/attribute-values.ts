@@ -73,7 +73,6 @@ export const PARSERS = {
 
 export type ParsedValue<K extends keyof typeof PARSERS> = ReturnType<(typeof PARSERS)[K]>;
 
-/** The parser of an attribute, typed by the attribute's name. */
 export function parserOf<K extends keyof typeof PARSERS>(
   name: K,
 ): (text: AttributeText) => ParsedValue<K> {

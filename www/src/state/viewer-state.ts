@@ -125,7 +125,6 @@ export class ViewerState {
     this.paused = null;
   }
 
-  /** The state as text, for links. */
   get sharedState(): string {
     const { item, torch, size, color } = this.light;
     const { exposure } = this.output;

@@ -17,7 +17,6 @@ export interface PhotoView {
 export const FULL_VIEW: PhotoView = { zoom: 1, ...CENTRE };
 const DOUBLE_TAP_ZOOM = 2.5;
 export const ZOOM_STEP = 1.5;
-/** Pixels of wheel rotation that double the magnification. */
 const WHEEL_PIXELS_PER_DOUBLING = 240;
 /** A coarse wheel turns in large steps; limit one event. */
 const MAX_WHEEL_PIXELS = 120;

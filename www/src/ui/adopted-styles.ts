@@ -2,7 +2,6 @@
 
 const sheets = new Map<string, CSSStyleSheet>();
 
-/** Adds a style sheet to a shadow root. */
 export function adoptStyles(root: ShadowRoot, css: string): void {
   let sheet = sheets.get(css);
   if (!sheet) {

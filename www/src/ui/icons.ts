@@ -2,7 +2,6 @@
 
 const SVG_NAMESPACE = 'http://www.w3.org/2000/svg';
 
-/** A light bulb with rays. */
 export const LIGHT_ICON =
   'M12 8a4 4 0 1 0 0 8a4 4 0 1 0 0-8M12 2.5v2M12 19.5v2M2.5 12h2M19.5 12h2M5.3 5.3l1.4 1.4' +
   'M17.3 17.3l1.4 1.4M5.3 18.7l1.4-1.4M17.3 6.7l1.4-1.4';

@@ -211,7 +211,6 @@ export class ShadowDom {
     updateText(this.#errorDetails, details);
   }
 
-  /** Shows a hint over the picture for a moment. */
   showHint(text: string): void {
     updateText(this.#hint, text);
     this.#hint.hidden = false;

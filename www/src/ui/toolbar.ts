@@ -47,7 +47,6 @@ export class Toolbar {
   #menuTexts = '';
   #hideTimer: ReturnType<typeof setTimeout> | undefined;
 
-  /** `host` is the element that the toolbar belongs to. */
   constructor(
     private readonly host: Element,
     private readonly viewer: ViewerState,

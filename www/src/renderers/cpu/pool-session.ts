@@ -16,7 +16,6 @@ interface PoolSessionEvents {
   ended(): void;
 }
 
-/** One worker's part of the photograph. */
 interface WorkerPart {
   readonly client: RelightClient;
   readonly range: TileRowRange;
@@ -56,7 +55,6 @@ export class PoolSession implements TileSession {
     }
   }
 
-  /** The number of workers. */
   get size(): number {
     return this.#parts.length;
   }
