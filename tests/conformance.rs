@@ -1,9 +1,9 @@
-//! The conformance files of `docs/format.md`: they decode to the same bits for ever.
+//! The conformance files of `docs/format.md` decode to the same bits, and the document shows the library's figures.
 //!
-//! `UPDATE_CONFORMANCE=1 cargo test --test conformance` makes them anew, which only a change of what
-//! they are to cover asks for: that the encoder chooses other numbers is no reason.
+//! `UPDATE_CONFORMANCE=1 cargo test --test conformance` encodes the files again. Only files that should cover
+//! something else need that; a different choice by the encoder does not.
 #![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // a test that cannot go on should stop
+#![allow(clippy::unwrap_used)] // a failed test should panic
 
 mod common;
 
@@ -17,9 +17,12 @@ use relightable_photo::format::{
     self, CaptureNote, ChunkId, EncodedFile, Extension, FileIndex, FormatError, Limits, Metadata,
     RateTarget, Reader, Source,
 };
-use relightable_photo::transport::{BandTile, Basis, CHANNELS, Decibels, Geometry, Tile, TileRect};
+use relightable_photo::relight::{Light, OutputTransform, reference};
+use relightable_photo::transport::{
+    BandTile, Basis, CHANNELS, CameraPx, Decibels, Geometry, Tile, TileRect,
+};
 
-/// What each file is, as `docs/format.md` lists them.
+/// The files, as appendix G of `docs/format.md` lists them.
 const NAMES: [&str; 7] = [
     "transform",
     "coarse",
@@ -30,7 +33,7 @@ const NAMES: [&str; 7] = [
     "dark",
 ];
 
-/// A file next to the others, made anew first where that is asked for.
+/// The bytes of a fixture; with `UPDATE_CONFORMANCE` all fixtures are written first.
 fn fixture(name: &str, extension: &str) -> Vec<u8> {
     static UPDATED: Once = Once::new();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/format");
@@ -50,7 +53,7 @@ fn fixture(name: &str, extension: &str) -> Vec<u8> {
     fs::read(path(name, extension)).unwrap()
 }
 
-/// A transport made from nothing.
+/// A synthetic light transport.
 struct Synthetic {
     geometry: Geometry,
     basis: Option<Basis>,
@@ -58,7 +61,7 @@ struct Synthetic {
 }
 
 impl Synthetic {
-    /// Coefficients for the tiles of these numbers; the others are dark.
+    /// Coefficients for the tiles `lit`; the others are dark.
     fn factored(geometry: Geometry, rank: usize, lit: &[usize]) -> Self {
         let mut noise = Noise(7);
         let kernel = |k: usize| -> Vec<f32> {
@@ -79,7 +82,7 @@ impl Synthetic {
         }
     }
 
-    /// With functions of their own for some tiles, that peak in the middle of the window.
+    /// Adds direct functions to some tiles, with a peak in the centre of the window.
     fn and_direct(mut self, tiles: &[usize]) -> Self {
         let functions = functions(self.geometry, 3);
         let (side, area) = (
@@ -88,18 +91,18 @@ impl Synthetic {
         );
         for &i in tiles {
             let element = |(at, tau): (usize, &[f32; CHANNELS])| {
-                let from_middle = |place: usize| place.abs_diff(side / 2).pow(2) as f32;
+                let squared_distance = |i: usize| i.abs_diff(side / 2).pow(2) as f32;
                 let slot = at % area;
-                let far = 1.0 + from_middle(slot % side) + from_middle(slot / side);
-                tau.map(|t| (40.0 * t - 1.0) / (far * far))
+                let distance = 1.0 + squared_distance(slot % side) + squared_distance(slot / side);
+                tau.map(|t| (40.0 * t - 1.0) / (distance * distance))
             };
             self.tiles[i].functions = functions[i].tau.iter().enumerate().map(element).collect();
         }
         self
     }
 
-    /// With a tile that is dark under a flat light, so that its first component is zero.
-    fn dark_when_flat(mut self, tile: usize) -> Self {
+    /// Makes a tile dark under a uniform light, so that its component 0 is zero.
+    fn dark_under_uniform_light(mut self, tile: usize) -> Self {
         if let Some(basis) = &self.basis {
             let sum = |k: usize| basis.kernels[k].iter().sum::<f32>();
             let share = -sum(0) / sum(1);
@@ -131,7 +134,7 @@ impl Synthetic {
     }
 }
 
-/// Two colours, one on either side of a diagonal, that change slowly along both axes.
+/// One colour on either side of a diagonal; brightness changes slowly along both axes.
 fn coefficients(rect: TileRect, rank: usize, noise: &mut Noise) -> Vec<[f32; CHANNELS]> {
     let mut coefficients = Vec::new();
     for pixel in rect.pixels() {
@@ -157,7 +160,7 @@ fn metadata() -> Metadata {
 }
 
 fn make(name: &str) -> Vec<u8> {
-    // Tiles at the edges are a few pixels across, or less than that.
+    // Tiles at the borders have few columns or rows.
     let wide = tiled(
         [70, 37],
         [36, 19],
@@ -180,13 +183,13 @@ fn make(name: &str) -> Vec<u8> {
         24,
         [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
     );
-    // Windows hang over every edge of the display, and lie off it.
-    let hanging = tiled([20, 10], [8, 5], 5, 8, [[0.7, 0.0, -4.0], [0.0, 0.7, -1.0]]);
+    // Windows cross each border of the light plane, or lie off it.
+    let crossing = tiled([20, 10], [8, 5], 5, 8, [[0.7, 0.0, -4.0], [0.0, 0.7, -1.0]]);
     let snr = |snr| RateTarget::Snr(Decibels(snr));
     let (synthetic, target) = match name {
         "transform" => (Synthetic::factored(wide, 4, &[0, 2, 3, 4]), snr(40.0)),
         "coarse" => (
-            Synthetic::factored(narrow, 5, &[0, 2, 3, 4]).dark_when_flat(4),
+            Synthetic::factored(narrow, 5, &[0, 2, 3, 4]).dark_under_uniform_light(4),
             snr(14.0),
         ),
         "direct" => {
@@ -195,7 +198,7 @@ fn make(name: &str) -> Vec<u8> {
             (direct, snr(22.0))
         }
         "mixed" => (
-            Synthetic::factored(hanging, 3, &[1, 3, 5]).and_direct(&[2, 3]),
+            Synthetic::factored(crossing, 3, &[1, 3, 5]).and_direct(&[2, 3]),
             snr(30.0),
         ),
         "lossless" => (
@@ -209,7 +212,7 @@ fn make(name: &str) -> Vec<u8> {
     synthetic.encode(target, metadata(), Vec::new())
 }
 
-/// What a reader of version 1.0 has to pass over, and letters of all sorts.
+/// A file with everything that a reader of version 1.0 ignores, and text beyond ASCII.
 fn extended(synthetic: &Synthetic) -> Vec<u8> {
     let metadata = Metadata {
         title: "Rosace nord – «la Création» · 北の薔薇窓 🌹".to_owned(),
@@ -246,34 +249,35 @@ fn read(file: &[u8]) -> Reader {
     reader
 }
 
-/// A file's index, and its parts by their number.
-fn parts(file: &[u8]) -> (FileIndex, impl Fn(ChunkId) -> Result<Vec<u8>, FormatError>) {
+/// A file's index, and a function that gives the bytes of a chunk.
+fn chunks(file: &[u8]) -> (FileIndex, impl Fn(ChunkId) -> Result<Vec<u8>, FormatError>) {
     let index = read(file).index().unwrap().clone();
     let ranges = index.clone();
-    let part = move |part| {
-        let range = ranges.range(part);
+    let fetch = move |chunk| {
+        let range = ranges.range(chunk);
         Ok(file[range.start as usize..range.end as usize].to_vec())
     };
-    (index, part)
+    (index, fetch)
 }
 
-/// Coefficients and functions of every tile, then the basis, as they come out of the decoder.
+/// The decoded values of a file: coefficients and direct functions of each tile, then the basis.
 fn decoded(file: &[u8]) -> Vec<u8> {
-    let (index, part) = parts(file);
+    let (index, fetch) = chunks(file);
     let geometry = index.header.geometry;
     let mut values: Vec<f32> = Vec::new();
     for (i, rect) in geometry.tiles().enumerate() {
-        let tile = format::decode_tile(&index, i, &part).unwrap();
-        let of_tile = [
+        let tile = format::decode_tile(&index, i, &fetch).unwrap();
+        let tile_values = [
             (tile.coefficients, usize::from(index.header.rank)),
             (tile.functions, geometry.window.area()),
         ];
-        for (mut of_tile, each) in of_tile {
-            of_tile.resize(rect.extent.area() * each, [0.0; CHANNELS]); // where it has none
-            values.extend(of_tile.as_flattened());
+        for (mut tile_values, values_per_pixel) in tile_values {
+            // A vector is empty if all values are zero.
+            tile_values.resize(rect.extent.area() * values_per_pixel, [0.0; CHANNELS]);
+            values.extend(tile_values.as_flattened());
         }
     }
-    let basis = format::decode_basis(&index, &part).unwrap();
+    let basis = format::decode_basis(&index, &fetch).unwrap();
     values.extend(basis.kernels.iter().flatten());
     values
         .iter()
@@ -281,7 +285,7 @@ fn decoded(file: &[u8]) -> Vec<u8> {
         .collect()
 }
 
-/// Bytes as `docs/format.md` shows them.
+/// A hexadecimal dump as in `docs/format.md`.
 fn dump(bytes: &[u8]) -> String {
     let line = |(i, line): (usize, &[u8])| {
         let hex: Vec<String> = line.iter().map(|byte| format!("{byte:02X}")).collect();
@@ -310,28 +314,100 @@ fn conformance_files_decode_to_the_same_bits() {
 }
 
 #[test]
-fn tiles_are_made_of_these_values() {
+fn the_reader_quantises_the_decoded_values() {
     for name in NAMES {
         let file = fixture(name, "ltm");
-        let (index, part) = parts(&file);
-        let basis = format::decode_basis(&index, &part).unwrap();
+        let (index, fetch) = chunks(&file);
+        let basis = format::decode_basis(&index, &fetch).unwrap();
         let (transport, _) = read(&file).finish().unwrap();
         assert_eq!(transport.basis, basis, "{name}");
         for (i, tile) in transport.tiles.iter().enumerate() {
-            let numbers = format::decode_tile(&index, i, &part).unwrap();
+            let values = format::decode_tile(&index, i, &fetch).unwrap();
             assert_eq!(
                 tile,
-                &Tile::quantise(&numbers, basis.rank()),
+                &Tile::quantise(&values, basis.rank()),
                 "{name}, tile {i}"
             );
         }
     }
 }
 
+/// Panics unless `docs/format.md` has these lines.
+fn assert_specified(lines: &str) {
+    let document = include_str!("../docs/format.md");
+    assert!(document.contains(lines), "docs/format.md lacks\n{lines}");
+}
+
 #[test]
-fn the_specification_shows_the_smallest_file_as_it_is() {
-    let text = include_str!("../docs/format.md");
-    let file = fixture("dark", "ltm");
-    let dump = dump(&file);
-    assert!(text.contains(&dump), "docs/format.md lacks\n{dump}");
+fn the_specification_shows_the_smallest_file() {
+    assert_specified(&dump(&fixture("dark", "ltm")));
+}
+
+/// Appendix K, which `tests/format_example.py` computes as well.
+#[test]
+fn the_specification_shows_windows_light_transport_functions_and_a_picture() {
+    let file = fixture("mixed", "ltm");
+    let (index, fetch) = chunks(&file);
+    let geometry = index.header.geometry;
+    let (window, plane) = (geometry.window, geometry.light);
+
+    let pixels = [(0, 0), (5, 1), (5, 8), (12, 3), (19, 9)];
+    let windows = pixels.map(|(x, y)| {
+        let pixel = CameraPx { x, y };
+        let (at, origin) = (
+            geometry.correspondence.at(pixel),
+            geometry.window_origin(pixel),
+        );
+        format!(
+            "    pixel ({x}, {y}): u {:.2}, v {:.2}, origin ({}, {})\n",
+            at.u, at.v, origin.u, origin.v
+        )
+    });
+    assert_specified(&windows.concat());
+
+    let origin = geometry.window_origin(CameraPx { x: 5, y: 8 });
+    let elements: Vec<_> = (0..window.area())
+        .map(|slot| window.element(origin, slot).index_in(plane))
+        .collect();
+    let row = |(i, row): (usize, &[Option<usize>])| {
+        let element = |m: &Option<usize>| m.map_or("   -".to_owned(), |m| format!("{m:4}"));
+        let row: String = row.iter().map(element).collect();
+        format!("    slots {:2} to {:2}:{row}\n", 5 * i, 5 * i + 4)
+    };
+    let mask: String = elements.chunks(5).enumerate().map(row).collect();
+    assert_specified(&mask);
+
+    let numbers = |values: &[f32]| -> String {
+        let values: Vec<_> = values.iter().map(|value| format!("{value:.6}")).collect();
+        values.join(" ")
+    };
+    let basis = format::decode_basis(&index, &fetch).unwrap();
+    let tile = format::decode_tile(&index, 3, &fetch).unwrap();
+    let tau = tile.functions(&geometry, &basis).tau;
+    for slot in [2, 3, 14] {
+        let tau = tau[5 * window.area() + slot];
+        assert_specified(&format!("      τ                 {}\n", numbers(&tau)));
+    }
+
+    let light = Light::from_srgb_rows(plane, plane, |v, row| {
+        for (u, pixel) in row.as_chunks_mut().0.iter_mut().enumerate() {
+            *pixel = [255 - 32 * u, 60 * v, 15 + 16 * (u + v), 255].map(|code| code as u8);
+        }
+    });
+    let light = light.unwrap();
+    for m in [0, 17, 39] {
+        let emission = numbers(&light.elements()[m][..CHANNELS]);
+        assert_specified(&format!(", light {emission}\n"));
+    }
+
+    let (transport, _) = read(&file).finish().unwrap();
+    let picture = reference::picture(&transport, &light, &OutputTransform::srgb(1.0 / 16.0));
+    for channel in 0..CHANNELS {
+        let row = |row: &[[u8; 4]]| {
+            let codes = row.iter().map(|pixel| format!(" {:3}", pixel[channel]));
+            format!("   {}\n", codes.collect::<String>())
+        };
+        let rows: String = picture.pixels.chunks(20).map(row).collect();
+        assert_specified(&rows);
+    }
 }

@@ -1,9 +1,9 @@
-"""An independent decoder of .ltm files, written from docs/format.md alone: the test of that text.
+"""An independent decoder of .ltm files, written from docs/format.md alone: the test of that document.
 
     python format_decoder.py FILE.ltm...            compares each with FILE.expected.zst, bit for bit
-    python format_decoder.py --dump FILE.ltm OUT    writes what would be compared
+    python format_decoder.py --dump FILE.ltm OUT    writes the decoded values
 
-It needs Python 3.10, numpy and zstandard. Sections are those of the text.
+It needs Python 3.10, numpy and zstandard. Sections and appendices are those of the document.
 """
 
 import json
@@ -16,16 +16,16 @@ import numpy as np
 import zstandard
 
 f32 = np.float32
-MOST = 1 << 23
+MAX_CONTENT_BYTES = MAX_WINDOW_BYTES = 1 << 23  # appendix A
 
 
 class Refused(Exception):
-    pass
+    """The file breaks a rule of appendix A."""
 
 
-def require(condition, what):
+def require(condition, fault):
     if not condition:
-        raise Refused(what)
+        raise Refused(fault)
 
 
 def crc_of_byte(crc):
@@ -44,230 +44,248 @@ def crc32c(data):  # section 2
     return crc ^ 0xFFFFFFFF
 
 
-def bound(n):  # section 8
-    return n + n // 256 + 64
+def bound(length):  # appendix A
+    return length + length // 256 + 64
 
 
-def decompress(frame, length):  # section 8
-    require(frame[:4] == b"\x28\xb5\x2f\xfd", "no zstd frame")
+def decompress(frame, length):  # section 4, appendix A
+    require(frame[:4] == b"\x28\xb5\x2f\xfd", "bytes that are no zstd frame")
     try:
-        said = zstandard.get_frame_parameters(frame)
-        require(frame[4] & 0x20 or said.window_size <= MOST, "a zstd window that is too large")
-        require(said.dict_id == 0, "a zstd dictionary")
+        header = zstandard.get_frame_parameters(frame)
+        is_single_segment = frame[4] & 0x20
+        require(is_single_segment or header.window_size <= MAX_WINDOW_BYTES, "a large zstd window")
+        require(header.dict_id == 0, "a zstd dictionary")
         decoder = zstandard.ZstdDecompressor(max_window_size=1 << 31).decompressobj()
         content = decoder.decompress(frame)
     except zstandard.ZstdError as error:
         raise Refused(error) from None
-    require(decoder.eof and not decoder.unused_data, "not one zstd frame")
-    require(len(content) == length, "a frame of another length")
+    require(decoder.eof and not decoder.unused_data, "bytes that are not one zstd frame")
+    require(len(content) == length, "a frame whose content has another length")
     return content
 
 
-class Head:
+class FileIndex:
+    """Header and directory, checked, and the bytes of all chunks."""
+
     def __init__(self, file):
         self.read_header(file)
-        at, parts = 144, []
-        for length, crc in self.lengths:
-            parts.append(file[at : at + length])
-            require(crc32c(parts[-1]) == crc, "a wrong checksum in the head")
+        at, sections = 144, []
+        for length, crc in self.sections:
+            sections.append(file[at : at + length])
+            require(crc32c(sections[-1]) == crc, "a checksum of the index that does not match")
             at += length
-        self.read_directory(parts[0])
-        read_extensions(parts[1])
-        read_metadata(parts[2])
-        self.take_parts(file, at)
+        self.index_bytes = at
+        self.read_directory(sections[0])
+        read_extensions(sections[1])
+        read_metadata(sections[2])
+        self.take_chunks(file)
 
-    def read_header(self, file):  # section 4
-        require(file[:12] == b"\xabLTM 10\xbb\r\n\x1a\n", "a wrong magic")
-        require(len(file) >= 144, "cut short")
+    def read_header(self, file):  # section 3.1
+        require(file[:12] == b"\xabLTM 10\xbb\r\n\x1a\n", "another magic number")
+        require(len(file) >= 144, "a header that is cut short")
         require(unpack_from("<H", file, 12)[0] == 1, "another major version")
-        require(crc32c(file[:140]) == unpack_from("<I", file, 140)[0], "a wrong header checksum")
-        *sides, self.w, tile_side = unpack_from("<6I", file, 16)
-        require(all(1 <= side <= 32768 for side in sides), "the side of a grid")
-        require(self.w % 2 == 1 and self.w <= 63, "the window's side")
-        require(8 <= tile_side <= 256, "the tile side")
-        require(all(map(math.isfinite, unpack_from("<6d", file, 40))), "the correspondence")
+        crc = unpack_from("<I", file, 140)[0]
+        require(crc32c(file[:140]) == crc, "a header whose checksum does not match")
+        *sides, self.w, self.tile_side = unpack_from("<6I", file, 16)
+        require(all(1 <= side <= 32768 for side in sides), "a side of the camera or light grid")
+        require(self.w % 2 == 1 and self.w <= 63, "the side of the window")
+        require(8 <= self.tile_side <= 256, "the side of tiles")
+        self.width, self.height, self.light_width, self.light_height = sides
+        self.affine = unpack_from("<6d", file, 40)
+        require(all(map(math.isfinite, self.affine)), "a correspondence that is not finite")
         file_bytes, self.rank, self.scan_count = unpack_from("<QII", file, 88)
         fields = unpack_from("<6I", file, 104)
-        self.lengths = list(zip(fields[::2], fields[1::2]))
-        require(self.rank <= 1024 and self.scan_count <= 1024, "too high a rank, or too many scans")
-        require(fields[2] <= 1 << 24 and fields[4] <= 1 << 20, "long extensions or metadata")
-        require(144 + sum(fields[::2]) <= file_bytes == len(file), "a file of another length")
-        corners = [range(0, side, tile_side) for side in sides[1::-1]]
-        width, height = sides[:2]
+        self.sections = list(zip(fields[::2], fields[1::2]))
+        require(self.rank <= 1024 and self.scan_count <= 1024, "the rank or the number of scans")
+        require(fields[2] <= 1 << 24, "the length of extensions")
+        require(fields[4] <= 1 << 20, "the length of the metadata")
+        require(144 + sum(fields[::2]) <= file_bytes == len(file), "the length of the file")
+        side = self.tile_side
+        self.corners = [
+            (x, y) for y in range(0, self.height, side) for x in range(0, self.width, side)
+        ]
         self.tiles = [  # columns and rows
-            (min(tile_side, width - x), min(tile_side, height - y))
-            for y in corners[0]
-            for x in corners[1]
+            (min(side, self.width - x), min(side, self.height - y)) for x, y in self.corners
         ]
 
-    def read_directory(self, frame):  # section 5
+    def read_directory(self, frame):  # section 3.2
         scans, tiles, area = self.scan_count, len(self.tiles), self.w**2
-        plain = decompress(frame, scans * (24 + 12 * tiles))
-        self.scans = [unpack_from("<4Hf4xII", plain, 24 * s) for s in range(scans)]
-        self.brought, known = [], 0
+        content = decompress(frame, scans * (24 + 12 * tiles))
+        self.scans = [unpack_from("<4Hf4xII", content, 24 * s) for s in range(scans)]
+        self.new_functions, known = [], 0
         for coding, first, count, reserved, step, basis_bytes, _ in self.scans:
-            require(1 <= coding <= 4 and count > 0 and reserved == 0, "a scan")
+            require(1 <= coding <= 4 and count > 0 and reserved == 0, "a scan record")
             require(0 < step < math.inf, "a step")
             end = first + count
-            brings = max(0, end - known) if coding <= 2 else 0
-            require(end <= area if coding > 2 else first <= known and end <= self.rank, "a scan")
-            most = bound(brings * (1 + 2 * area)) if brings else 0
-            require((brings > 0) <= basis_bytes <= most, "functions of a strange length")
-            known += brings
-            self.brought.append(brings)
-        require(known == self.rank, "a basis that does not come")
+            new = max(0, end - known) if coding <= 2 else 0
+            fits = end <= area if coding > 2 else first <= known and end <= self.rank
+            require(fits, "a scan of other components or slots than the file has")
+            max_bytes = bound(new * (1 + 2 * area)) if new else 0
+            require((new > 0) <= basis_bytes <= max_bytes, "the length of a basis chunk")
+            known += new
+            self.new_functions.append(new)
+        require(known == self.rank, "basis functions that no scan brings")
         codings = {scan[0] for scan in self.scans}
         require(not {1, 2} <= codings and not {3, 4} <= codings, "mixed codings")
-        fields = np.frombuffer(plain, "<u4", offset=24 * scans).reshape(3, scans, tiles)
-        self.bytes, self.plain, self.crc = fields.tolist()
-        for scan, lengths, plains in zip(self.scans, self.bytes, self.plain):
-            for tile, length, size in zip(self.tiles, lengths, plains):
-                fits = can_be(scan[0], scan[2], tile, length, size) if length else size == 0
-                require(fits, "a chunk of a strange length")
+        fields = np.frombuffer(content, "<u4", offset=24 * scans).reshape(3, scans, tiles)
+        self.bytes, self.content_bytes, self.crc = fields.tolist()
+        for scan, lengths, contents in zip(self.scans, self.bytes, self.content_bytes):
+            for tile, length, content in zip(self.tiles, lengths, contents):
+                valid = is_valid_entry(scan[0], scan[2], tile, length, content)
+                require(valid if length else content == 0, "the lengths of a tile chunk")
 
-    def take_parts(self, file, at):  # section 3
-        self.parts = []
+    def take_chunks(self, file):  # section 3: [scan][0] basis chunk, [scan][1 + tile] tile chunk
+        self.chunks, self.offsets, at = [], [], self.index_bytes
         for scan, lengths, crcs in zip(self.scans, self.bytes, self.crc):
-            self.parts.append([])
+            self.chunks.append([])
+            self.offsets.append([])
             for length, crc in zip([scan[5], *lengths], [scan[6], *crcs]):
-                part = file[at : at + length]
-                require(length == 0 or crc32c(part) == crc, "a wrong checksum of a part")
-                self.parts[-1].append(part)
+                chunk = file[at : at + length]
+                require(length == 0 or crc32c(chunk) == crc, "a chunk whose checksum does not match")
+                self.chunks[-1].append(chunk)
+                self.offsets[-1].append(at)
                 at += length
-        require(at == len(file), "parts that do not add up")
+        require(at == len(file), "chunks whose lengths do not add up")
 
 
-def can_be(coding, count, tile, length, plain):  # section 5
+def is_valid_entry(coding, count, tile, length, content):  # appendix A
     columns, rows = tile
     halves = 6 * columns * rows * count
     blocks = -(-columns // 8) * -(-rows // 8)
-    low, high, most = {
-        1: (1, 192 * blocks * count, 584 + 3 * plain + plain // 256),
-        3: (1, halves // 2, 281 + 3 * plain + plain // 256),
-    }.get(coding, (halves, halves, bound(plain)))
-    return low <= plain <= min(high, MOST) and length <= most
+    low, high, max_bytes = {
+        1: (1, 192 * blocks * count, 584 + 3 * content + content // 256),
+        3: (1, halves // 2, 281 + 3 * content + content // 256),
+    }.get(coding, (halves, halves, bound(content)))
+    return low <= content <= min(high, MAX_CONTENT_BYTES) and length <= max_bytes
 
 
-def read_extensions(data):  # section 6
+def read_extensions(data):  # section 3.3
     at = 0
     while at < len(data):
-        require(at + 12 <= len(data), "a cut extension")
+        require(at + 12 <= len(data), "an extension that is cut short")
         tag, flags, length = unpack_from("<4sII", data, at)
         require(not flags & 1, f"an extension that must be understood: {tag}")
         at += 12 + length
-        require(at <= len(data), "a cut extension")
+        require(at <= len(data), "an extension that is cut short")
 
 
-def read_metadata(data):  # section 7
-    class Pairs(list):
-        pass
+def read_metadata(data):  # appendix C
+    class Fields(list):
+        """The fields of an object, repeated ones included."""
 
-    def fits(value, types):
-        if not isinstance(value, Pairs):
+    def is_object(value, types):
+        if not isinstance(value, Fields):
             return False
         known = [(types[name](field), name) for name, field in value if name in types]
-        return len(known) == len(set(known)) and all(right for right, _ in known)
+        return len(known) == len(set(known)) and all(valid for valid, _ in known)
 
-    def integer(value):
+    def is_integer(value):
         return type(value) is int
 
-    def whole(text):
+    def parse_int(text):
         return int(text) if text[0] != "-" else None
 
-    def no_number(name):
+    def refuse_constant(name):
         raise ValueError(name)
 
     strings = ["title", "creator", "rights", "writer", "method", "units"]
     types = dict.fromkeys(strings, lambda value: isinstance(value, str))
-    counts = {"patterns": integer, "photographs": integer}
-    types["capture"] = lambda value: fits(value, counts)
-    types["shots_used"] = lambda value: type(value) is list and all(map(integer, value))
+    counts = {"patterns": is_integer, "photographs": is_integer}
+    types["capture"] = lambda value: is_object(value, counts)
+    types["shots_used"] = lambda value: type(value) is list and all(map(is_integer, value))
     try:
         decoder = json.JSONDecoder(
-            object_pairs_hook=Pairs, parse_int=whole, parse_constant=no_number
+            object_pairs_hook=Fields, parse_int=parse_int, parse_constant=refuse_constant
         )
         value = decoder.decode(data.decode())
     except (ValueError, RecursionError) as error:
         raise Refused(error) from None
-    require(fits(value, types), "metadata of another form")
+    require(is_object(value, types), "metadata of another form")
 
 
-def join(planes, kind):
-    return np.frombuffer(planes, np.uint8).reshape(2, -1).T.copy().view(kind).reshape(-1)
+def join_bytes(data, kind):
+    """Values of two bytes from all low bytes, then all high bytes."""
+    return np.frombuffer(data, np.uint8).reshape(2, -1).T.copy().view(kind).reshape(-1)
 
 
-def read_basis(part, functions, area):  # section 9
-    plain = decompress(part, functions * (1 + 2 * area))
-    exponents = np.frombuffer(plain[:functions], np.uint8)
+def read_basis(chunk, functions, area):  # section 5
+    content = decompress(chunk, functions * (1 + 2 * area))
+    exponents = np.frombuffer(content[:functions], np.uint8)
     require(exponents.max() <= 30, "an exponent")
-    code = join(plain[functions:], "<u2").astype(int).reshape(functions, area)
+    code = join_bytes(content[functions:], "<u2").astype(int).reshape(functions, area)
     number = np.where(code % 2 == 0, code >> 1, -(code >> 1) - 1)
     return (number / 2.0 ** exponents[:, None]).astype(f32)
 
 
-class Tokens:  # section 10
-    def __init__(self, data, most):
-        require(data[:1] in (b"\1", b"\3"), "a strange number of token streams")
+class TokenString:  # section 6
+    def __init__(self, data, max_tokens):
+        require(data[:1] in (b"\1", b"\3"), "another number of token streams")
         at = 1 + 8 * data[0]
-        require(at <= len(data), "a cut token string")
-        lengths = [unpack_from("<II", data, 1 + 8 * i) for i in range(data[0])]
-        self.count = sum(tokens for tokens, _ in lengths)
-        require(self.count <= most, "too many tokens")
-        self.streams = []
-        for tokens, length in lengths:
-            require(at + length <= len(data), "a cut token string")
+        require(at <= len(data), "a token string that is cut short")
+        self.lengths = [unpack_from("<II", data, 1 + 8 * i) for i in range(data[0])]
+        self.count = sum(tokens for tokens, _ in self.lengths)
+        require(self.count <= max_tokens, "too many tokens")
+        self.contents = []
+        for tokens, length in self.lengths:
+            require(at + length <= len(data), "a token string that is cut short")
             frame = data[at : at + length]
-            self.streams.append(iter(decompress(frame, tokens) if tokens or frame else b""))
+            self.contents.append(decompress(frame, tokens) if tokens or frame else b"")
             at += length
+        self.streams = [iter(content) for content in self.contents]
         self.bits, self.taken = int.from_bytes(data[at:], "little"), 0
-        self.most_bits = 8 * (len(data) - at)
+        self.bit_count = 8 * (len(data) - at)
 
     def take(self, count):
         bits = self.bits >> self.taken & (1 << count) - 1
         self.taken += count
-        require(self.taken <= self.most_bits, "too few bits")
+        require(self.taken <= self.bit_count, "too few bits")
         return bits
 
-    def run(self, length):
+    def read_run(self, length, trace=lambda *_: None):
+        """The numbers of a run. `trace` gets each token with its context, bits, index and number."""
         numbers = [0] * length
-        at = stream = 0
+        at = context = 0
         while at < length:
-            token = next(self.streams[stream if len(self.streams) > 1 else 0], None)
+            token = next(self.streams[context if len(self.streams) > 1 else 0], None)
             require(token is not None, "too few tokens")
-            stream = 1 if token % 16 <= 1 else 2
+            own_context, context = context, 1 if token % 16 <= 1 else 2
             if token == 0:
+                trace(own_context, token, None, at, 0)
                 break
             if token == 0xF0:
+                trace(own_context, token, None, at, 0)
                 at += 16
                 continue
             size = token % 16
             at += token >> 4
-            require(size > 0 and at < length, "a token that cannot be")
-            sign = self.take(1)
-            magnitude = (1 << size - 1) + self.take(size - 1)
+            require(size > 0 and at < length, "an invalid token")
+            sign, below = self.take(1), self.take(size - 1)
+            magnitude = (1 << size - 1) + below
             numbers[at] = -magnitude if sign else magnitude
+            trace(own_context, token, [sign, *(below >> i & 1 for i in range(size - 1))], at, numbers[at])
             at += 1
         return numbers
 
     def finish(self):
-        require(all(next(stream, None) is None for stream in self.streams), "tokens left over")
-        require(self.most_bits - self.taken < 8 and not self.bits >> self.taken, "bits left over")
+        require(all(next(stream, None) is None for stream in self.streams), "tokens after the last run")
+        no_bits = self.bit_count - self.taken < 8 and not self.bits >> self.taken
+        require(no_bits, "bits after the last run")
 
 
-# Section 11.
-BITS = "3F800000 3F7B14BE 3F6C835E 3F54DB31 3F3504F3 3F0E39DA 3EC3EF15 3E47C5C2 00000000"
-CONSTANT = np.frombuffer(bytes.fromhex(BITS), ">f4").astype(f32)
+# Section 7.1.
+COSINE_BITS = "3F800000 3F7B14BE 3F6C835E 3F54DB31 3F3504F3 3F0E39DA 3EC3EF15 3E47C5C2 00000000"
+COSINES = np.frombuffer(bytes.fromhex(COSINE_BITS), ">f4").astype(f32)
 
 
-def cosine(f, x):
-    turn = (2 * x + 1) * f % 32
-    turn = 32 - turn if turn > 16 else turn
-    value = CONSTANT[turn] if turn <= 8 else -CONSTANT[16 - turn]
-    return f32(0.5) * (CONSTANT[4] if f == 0 else value)
+def dct_factor(f, x):
+    i = (2 * x + 1) * f % 32
+    i = 32 - i if i > 16 else i
+    cosine = COSINES[i] if i <= 8 else -COSINES[16 - i]
+    return f32(0.5) * (COSINES[4] if f == 0 else cosine)
 
 
-G = np.array([[cosine(f, x) for x in range(8)] for f in range(8)], f32)
-ZIGZAG = [
+G = np.array([[dct_factor(f, x) for x in range(8)] for f in range(8)], f32)
+ZIGZAG = [  # frequency, 8 · row + column, of each zigzag index
     8 * row + total - row
     for total in range(15)
     for row in (range(total, -1, -1) if total % 2 == 0 else range(total + 1))
@@ -275,7 +293,7 @@ ZIGZAG = [
 ]
 
 
-def inverse_transform(numbers, step):
+def inverse_dct(numbers, step):
     f, partial, pixels = (np.zeros((8, 8), f32) for _ in range(3))
     f.reshape(-1)[ZIGZAG] = np.array(numbers, f32) * step
     for row in range(8):
@@ -290,40 +308,47 @@ def dot(a, b):
 
 
 class Planes:
+    """The sum of a tile's chunks of coding 1: `[component, axis, row, column]`."""
+
     def __init__(self, tile, rank):
         columns, rows = tile
         self.planes = np.zeros((rank, 3, rows, columns), f32)
         self.blocks = [(y, x) for y in range(0, rows, 8) for x in range(0, columns, 8)]
-        self.present, self.palette = [False] * rank, None
+        self.present, self.klt = [False] * rank, None
 
-    def add(self, chunk, plain, components, step):
-        if components[0] == 0 and self.palette is None:
-            require(len(chunk) >= 18, "a cut palette")
-            self.palette = np.frombuffer(chunk[:18], "<i2").reshape(3, 3)
+    def split(self, chunk, content_bytes, components):
+        """The token strings of a chunk, main and side."""
+        if components[0] == 0 and self.klt is None:
+            require(len(chunk) >= 18, "a colour KLT that is cut short")
+            self.klt = np.frombuffer(chunk[:18], "<i2").reshape(3, 3)
             chunk = chunk[18:]
-        require(len(chunk) >= 4, "a cut chunk")
+        require(len(chunk) >= 4, "a chunk that is cut short")
         end = 4 + unpack_from("<I", chunk)[0]
-        require(end <= len(chunk), "a cut chunk")
-        main = Tokens(chunk[4:end], plain)
-        side = Tokens(chunk[end:], plain - main.count)
-        require(main.count + side.count == plain, "fewer tokens than it says")
+        require(end <= len(chunk), "a chunk that is cut short")
+        main = TokenString(chunk[4:end], content_bytes)
+        side = TokenString(chunk[end:], content_bytes - main.count)
+        require(main.count + side.count == content_bytes, "too few tokens")
+        return main, side
+
+    def add(self, chunk, content_bytes, components, step):
+        main, side = self.split(chunk, content_bytes, components)
         for tokens, axes in (main, [0]), (side, [1, 2]):
             for k in components:
                 for y, x in self.blocks:
-                    numbers = tokens.run(64 * len(axes))
+                    numbers = tokens.read_run(64 * len(axes))
                     self.present[k] |= any(numbers)
                     for i, axis in enumerate(axes):
-                        pixels = inverse_transform(numbers[i :: len(axes)], step)
+                        pixels = inverse_dct(numbers[i :: len(axes)], step)
                         inside = self.planes[k, axis, y : y + 8, x : x + 8]
                         inside += pixels[: inside.shape[0], : inside.shape[1]]
             tokens.finish()
 
-    def coefficients(self):
+    def coefficients(self):  # section 7.2
         rank = len(self.present)
         planes = self.planes.reshape(rank, 3, -1)
         c = np.zeros_like(planes)
         if self.present[0]:
-            unit = self.palette.astype(f32) / f32(16384)
+            unit = self.klt.astype(f32) / f32(16384)
             for channel in range(3):
                 c[0, channel] = dot(planes[0], unit[:, channel])
         red, green, blue = c[0]
@@ -337,63 +362,106 @@ class Planes:
         return c.transpose(2, 0, 1)
 
 
-def add_halves(values, items, chunk, step):  # section 12
-    halves = join(decompress(chunk, 6 * len(values) * len(items)), "<f2")
-    require(np.isfinite(halves).all(), "a value that is no finite number")
+def add_halves(values, items, chunk, step):  # sections 7.3 and 8
+    halves = join_bytes(decompress(chunk, 6 * len(values) * len(items)), "<f2")
+    require(np.isfinite(halves).all(), "a half float that is not finite")
     halves = halves.reshape(len(items), 3, -1).transpose(2, 0, 1)
     values[:, items] += halves.astype(f32) * step
 
 
-def slot_order(w):  # section 13
+def centre_out_order(w):  # section 8
     def distance(slot):
         return (slot % w - w // 2) ** 2 + (slot // w - w // 2) ** 2
 
     return sorted(range(w * w), key=lambda slot: (distance(slot), slot))
 
 
-def add_direct(values, slots, chunk, plain, step):  # section 13
-    tokens = Tokens(chunk, plain)
-    require(tokens.count == plain, "fewer tokens than it says")
-    numbers = np.array([tokens.run(3 * len(slots)) for _ in values]).reshape(-1, len(slots), 3)
+def colours_of(numbers):  # section 8: YCoCg-R to red, green and blue, on the last axis
+    luma, co, cg = np.moveaxis(np.asarray(numbers), -1, 0)
+    middle = luma - (cg >> 1)
+    blue = middle - (co >> 1)
+    return np.stack([blue + co, cg + middle, blue], axis=-1)
+
+
+def add_direct(values, slots, chunk, content_bytes, step):  # section 8
+    tokens = TokenString(chunk, content_bytes)
+    require(tokens.count == content_bytes, "too few tokens")
+    numbers = np.array([tokens.read_run(3 * len(slots)) for _ in values])
     tokens.finish()
-    luma, orange, greenish = numbers.transpose(2, 0, 1)
-    middle = luma - (greenish >> 1)
-    blue = middle - (orange >> 1)
-    colours = np.stack([blue + orange, greenish + middle, blue], axis=-1)
-    values[:, slots] += colours.astype(f32) * step
+    values[:, slots] += colours_of(numbers.reshape(-1, len(slots), 3)).astype(f32) * step
 
 
-@np.errstate(all="ignore")  # what is not normal is mirrored in vain, and large steps overflow
-def decode(file):  # section 14
-    """c and d of each tile, and the basis."""
-    head = Head(file)
-    area, order = head.w**2, slot_order(head.w)
+@np.errstate(all="ignore")  # reflections that are not used, and large steps, overflow
+def decode(file, scans=None):  # section 4
+    """c and d of each tile, and the basis; of the first `scans` scans, or all."""
+    index = FileIndex(file)
+    area, order = index.w**2, centre_out_order(index.w)
+    scans = range(index.scan_count if scans is None else scans)
     basis = [np.zeros((0, area), f32)]
-    for parts, functions in zip(head.parts, head.brought):
-        if functions:
-            basis.append(read_basis(parts[0], functions, area))
+    for s in scans:
+        if index.new_functions[s]:
+            basis.append(read_basis(index.chunks[s][0], index.new_functions[s], area))
     tiles = []
-    for t, tile in enumerate(head.tiles):
-        planes, pixels = Planes(tile, head.rank), tile[0] * tile[1]
-        c, d = (np.zeros((pixels, each, 3), f32) for each in (head.rank, area))
-        for s, (coding, first, count, _, step, _, _) in enumerate(head.scans):
-            chunk, plain = head.parts[s][1 + t], head.plain[s][t]
+    for t, tile in enumerate(index.tiles):
+        planes, pixels = Planes(tile, index.rank), tile[0] * tile[1]
+        c, d = (np.zeros((pixels, each, 3), f32) for each in (index.rank, area))
+        for s in scans:
+            coding, first, count, _, step, _, _ = index.scans[s]
+            chunk, content_bytes = index.chunks[s][1 + t], index.content_bytes[s][t]
             items, step = range(first, first + count), f32(step)
             if not chunk:
                 continue
             if coding == 1:
-                planes.add(chunk, plain, items, step)
+                planes.add(chunk, content_bytes, items, step)
             elif coding == 2:
                 add_halves(c, items, chunk, step)
             elif coding == 3:
-                add_direct(d, [order[place] for place in items], chunk, plain, step)
+                add_direct(d, [order[i] for i in items], chunk, content_bytes, step)
             else:
-                add_halves(d, [order[place] for place in items], chunk, step)
+                add_halves(d, [order[i] for i in items], chunk, step)
         tiles.append((planes.coefficients() if any(planes.present) else c, d))
     return tiles, np.concatenate(basis)
 
 
-def dump(file):  # section 19
+def window_origin(index, x, y):  # section 9
+    a0, a1, a2, b0, b1, b2 = index.affine
+    u = a0 * (x + 0.5) + a1 * (y + 0.5) + a2
+    v = b0 * (x + 0.5) + b1 * (y + 0.5) + b2
+
+    def limited_floor(value):
+        if math.isnan(value):
+            return 0
+        return math.floor(min(max(value, -(2.0**31)), 2.0**31 - 1))
+
+    return limited_floor(u) - (index.w - 1) // 2, limited_floor(v) - (index.w - 1) // 2
+
+
+def element_of_slot(index, origin, slot):  # section 9
+    """The number of the slot's light element; None off the light plane."""
+    u, v = origin[0] + slot % index.w, origin[1] + slot // index.w
+    on_plane = 0 <= u < index.light_width and 0 <= v < index.light_height
+    return v * index.light_width + u if on_plane else None
+
+
+def unmasked_function(c, d, basis):  # section 9, in binary64: d + Σ c v, [slot, channel]
+    tau = d.astype(float)
+    for coefficients, function in zip(c.astype(float), basis.astype(float)):
+        tau += function[:, None] * coefficients
+    return tau
+
+
+def emission_of_code(code):  # section 10
+    e = code / 255
+    return e / 12.92 if e <= 0.04045 else ((e + 0.055) / 1.055) ** 2.4
+
+
+def code_of_light(y):  # section 10
+    y = min(max(y, 0.0), 1.0)
+    e = 12.92 * y if y <= 0.0031308 else 1.055 * y ** (1 / 2.4) - 0.055
+    return math.floor(255 * e + 0.5)
+
+
+def dump(file):  # appendix G
     tiles, basis = decode(file)
     values = [value for tile in tiles for value in tile] + [basis]
     return b"".join(np.ascontiguousarray(value, "<f4").tobytes() for value in values)

@@ -1,157 +1,392 @@
-"""Section 21 of docs/format.md has the bytes and values of the file that it is about.
+"""Tables, listings and test vectors of docs/format.md, computed by format_decoder.py.
 
-    python format_example.py            fails where the text differs
-    python format_example.py --print    what the text should have
+    python format_example.py            fails if the document has other figures
+    python format_example.py --print    prints what the document should have
 
 It needs what format_decoder.py needs.
 """
 
+import re
 import sys
 from pathlib import Path
 from struct import pack, unpack_from
 
+import format_decoder as decoder
 import numpy as np
-from format_decoder import G, ZIGZAG, Head, Planes, Tokens, decode, decompress, dot, f32
+from format_decoder import FileIndex, Planes, TokenString, decode, decompress, dot, f32
 
 HERE = Path(__file__).parent
-FILE = HERE / "fixtures/format/coarse.ltm"
-TEXT = HERE.parent / "docs/format.md"
+DOCUMENT = HERE.parent / "docs/format.md"
+TYPE_BYTES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8, "f32": 4, "f64": 8}
+
+
+def read(name):
+    file = (HERE / f"fixtures/format/{name}.ltm").read_bytes()
+    return file, FileIndex(file)
+
+
+def listing(data, at, pieces):
+    """Hexadecimal lines of `data`, which is at offset `at`: one for each (length, meaning)."""
+    start = at
+    for length, meaning in pieces:
+        piece = data[at - start : at - start + length]
+        yield f"    {at:04X}  {piece.hex(' ').upper():<28}  {meaning}"
+        at += length
+    assert at - start == len(data), "the pieces have another length than the data"
+
+
+# Sections 2, 7.1 and 8: constants.
+
+
+def constants():
+    yield [f"`123456789` is 0x{decoder.crc32c(b'123456789'):08X}. A reader MUST check them before it uses the bytes."]
+    values = [f"| {i} | {value!s} | {bits} |" for i, (value, bits) in enumerate(zip(decoder.COSINES, decoder.COSINE_BITS.split()))]
+    values = [re.sub(r"(\d)\.0 ", r"\1 ", value) for value in values]
+    yield [f"{values[i]} {values[i + 5] if i < 4 else '| | | |'}" for i in range(5)]
+    grid = np.argsort(decoder.ZIGZAG).reshape(8, 8)
+    yield [f"        {row}    " + "".join(f"{z:4}" for z in line) for row, line in enumerate(grid)]
+    yield ["    order = " + ", ".join(map(str, decoder.centre_out_order(3)))]
+
+
+def check_offsets(text):
+    """Each field of a table of offsets begins where the field before it ends."""
+    tables = re.findall(r"^\| offset \| type .*\n.*\n((?:\|.*\n)+)", text, re.MULTILINE)
+    for table in tables:
+        at = 0
+        for row in table.splitlines():
+            offset, kind = [cell.strip() for cell in row.split("|")[1:3]]
+            assert int(offset) == at, f"a table of offsets has {offset}, not {at}"
+            name, _, count = kind.partition(" x ")
+            if kind:
+                size = TYPE_BYTES[name] if name in TYPE_BYTES else int(name.removesuffix(" bytes"))
+                at += size * int(count or 1)
+    assert len(tables) == 3, "other tables of offsets than header, scan record and extension"
+
+
+# Appendix H: a whole file.
+
+
+def whole_file():
+    file, index = read("dark")
+    lines = []
+    for at in range(0, len(file), 16):
+        line = file[at : at + 16]
+        text = "".join(chr(byte) if 32 <= byte < 127 else "." for byte in line)
+        lines.append(f"    {at:04X}  {line.hex(' ').upper():<47}  {text}")
+    yield lines
+    (directory, directory_crc), (extensions, extension_crc), (metadata, metadata_crc) = index.sections
+    a0, a1, a2, b0, b1, b2 = (f"{a:g}" for a in index.affine)
+    yield [
+        f"| 0010 | camera {index.width} x {index.height}, light {index.light_width} x "
+        f"{index.light_height}, w {index.w}, `tile_side` {index.tile_side} |",
+        f"| 0028 | correspondence {a0}, {a1}, {a2}, {b0}, {b1}, {b2} |",
+        f"| 0058 | `file_bytes` {len(file)} = 144 + {directory} + {extensions} + {metadata} |",
+        f"| 0060 | r {index.rank}, `scans` {index.scan_count} |",
+        f"| 0068 | `directory_bytes` {directory}, checksum {directory_crc:08X} |",
+        f"| 0070 | `extension_bytes` {extensions}, checksum {extension_crc:08X} |",
+        f"| 0078 | `metadata_bytes` {metadata}, checksum {metadata_crc:08X} |",
+        "| 0080 | reserved |",
+        f"| 008C | header checksum {unpack_from('<I', file, 140)[0]:08X} |",
+    ]
+
+
+# Appendix I: tile 3 of coarse.ltm.
+
 TILE, SCANS, PIXELS = 3, (1, 2), (0, 15)
 
 
-def lines_of(data, at, pieces):
-    """A dump of `data`, which lies at `at`: a line for each piece of so many bytes."""
-    start = at
-    for length, what in pieces:
-        piece = data[at - start : at - start + length]
-        yield f"    {at:04X}  {piece.hex(' ').upper():<28}  {what}"
-        at += length
-    assert at - start == len(data), "not all that there is"
-
-
-def directory(head, file):
-    content = decompress(file[144 : 144 + head.lengths[0][0]], 4 * (24 + 12 * 6))
+def directory(index, file):
+    tiles = len(index.tiles)
+    content = decompress(file[144 : 144 + index.sections[0][0]], index.scan_count * (24 + 12 * tiles))
+    lines = []
     for s in SCANS:
-        coding, first, count, _, step, basis_bytes, _ = head.scans[s]
-        says = f"scan {s}: coding {coding}, first {first}, count {count}, reserved 0"
+        coding, first, count, _, step, basis_bytes, _ = index.scans[s]
+        record = f"scan {s}: coding {coding}, first {first}, count {count}, reserved 0"
         snr = unpack_from("<f", content, 24 * s + 12)[0]
-        pieces = [(8, says), (8, f"step {step:.9g}, snr {snr:.4g}")]
+        pieces = [(8, record), (8, f"step {step:.9g}, snr {snr:.4g}")]
         pieces += [(8, f"basis_bytes {basis_bytes}, basis_crc 0")]
-        yield from lines_of(content[24 * s : 24 * s + 24], 24 * s, pieces)
-    for name, base in ("bytes", 96), ("plain", 192), ("crc", 288):
+        lines += listing(content[24 * s : 24 * s + 24], 24 * s, pieces)
+    for table, name in enumerate(("bytes", "content_bytes", "crc")):
         for s in SCANS:
-            at = base + 4 * (6 * s + TILE)
+            at = 24 * index.scan_count + 4 * (tiles * (table * index.scan_count + s) + TILE)
             value = unpack_from("<I", content, at)[0]
-            says = f"{value:08X}" if name == "crc" else value
-            yield from lines_of(content[at : at + 4], at, [(4, f"{name}[{s}, {TILE}] = {says}")])
+            value = f"{value:08X}" if name == "crc" else value
+            lines += listing(content[at : at + 4], at, [(4, f"{name}[{s}, {TILE}] = {value}")])
+    return lines
 
 
-def string(data):
-    """What a token string of one stream is made of."""
+def layout(index):
+    for s in range(index.scan_count):
+        basis, *tiles = map(len, index.chunks[s])
+        lengths = ", ".join(map(str, tiles))
+        yield f"    {index.offsets[s][0]:04X}  scan {s}: basis chunk of {basis} bytes, tile chunks of {lengths}"
+
+
+def token_string(data):
+    """The pieces of a token string of one stream, in one raw block."""
     tokens, length = unpack_from("<II", data, 1)
     yield from [(1, "streams"), (8, f"{tokens} tokens, in a frame of {length} bytes")]
-    yield from [(4, "zstd's magic"), (2, f"descriptor: a single segment; content size {tokens}")]
-    yield from [(3, f"block header: the last, raw, of {tokens} bytes"), (tokens, "tokens")]
+    yield from [(4, "zstd's magic number"), (2, f"descriptor: single segment; content size {tokens}")]
+    yield from [(3, f"block header: last block, raw, of {tokens} bytes"), (tokens, "tokens")]
     if len(data) > 9 + length:
         yield len(data) - 9 - length, "bits"
 
 
-def chunk(head, s):
-    data = head.parts[s][1 + TILE]
-    before = sum(map(len, (part for parts in head.parts[:s] for part in parts)))
-    at = 144 + sum(length for length, _ in head.lengths) + before
-    at += sum(map(len, head.parts[s][: 1 + TILE]))
+def chunk(index, s):
+    data = index.chunks[s][1 + TILE]
+    klt = 18 if s == SCANS[0] else 0
     pieces = []
-    palette = 18 if s == SCANS[0] else 0
-    for axis in range(palette // 6):
+    for axis in range(klt // 6):
         values = unpack_from("<3h", data, 6 * axis)
-        pieces.append((6, f"palette[{axis}]: " + ", ".join(map(str, values))))
-    main = unpack_from("<I", data, palette)[0]
+        pieces.append((6, f"klt[{axis}]: " + ", ".join(map(str, values))))
+    main = unpack_from("<I", data, klt)[0]
     pieces.append((4, f"main_bytes {main}"))
-    end = palette + 4 + main
-    pieces += [*string(data[palette + 4 : end]), *string(data[end:])]
-    return list(lines_of(data, at, pieces)), data[palette + 4 : end]
+    end = klt + 4 + main
+    pieces += [*token_string(data[klt + 4 : end]), *token_string(data[end:])]
+    return list(listing(data, index.offsets[s][1 + TILE], pieces)), data[klt + 4 : end]
 
 
-def real(value):
+def binary32(value):
     return f"{value:.9g} ({pack('>f', value).hex().upper()})"
 
 
-def numbers(s, main):
-    """Every token of the main string, with its bits in the order in which they come."""
-    tokens, block, z = Tokens(main, 100), 0, 0
-    for token in tokens.streams[0]:
-        says = f"    scan {s}, block {block}: token {token:02X}, "
-        if token == 0:
-            yield says + "the rest is zero"
-            block, z = block + 1, 0
-            continue
-        zeros, size = divmod(token, 16)
-        sign, below, z = tokens.take(1), tokens.take(size - 1), z + zeros
-        bits = " ".join([str(sign), *f"{below:0{size - 1}b}"[::-1]][:size])
-        value = (2 ** (size - 1) + below) * (-1) ** sign
-        yield says + f"bits {bits + ',':<6} z = {z}: {value}"
-        z += 1
+def bit_list(bits):
+    return " ".join(map(str, bits))
 
 
-def transform(head, main):
+def quantised_numbers(s, main, blocks):
+    """The tokens of the main token string, with their bits in the order of the bit stream."""
+    tokens, lines = TokenString(main, 100), []
+    for block in range(blocks):
+
+        def trace(_, token, bits, z, number):
+            line = f"    scan {s}, block {block}: token {token:02X}, "
+            if bits is None:
+                lines.append(line + "all further numbers are zero")
+            else:
+                lines.append(line + f"bits {bit_list(bits) + ',':<6} z = {z}: {number}")
+
+        tokens.read_run(64, trace)
+    return lines
+
+
+def inverse_dct(index, main):
     """The first pixel of the first block, step by step."""
-    step = f32(head.scans[SCANS[0]][4])
+    step = f32(index.scans[SCANS[0]][4])
     frequencies = np.zeros((8, 8), f32)
-    frequencies.reshape(-1)[ZIGZAG] = np.array(Tokens(main, 100).run(64), f32) * step
+    frequencies.reshape(-1)[decoder.ZIGZAG] = np.array(TokenString(main, 100).read_run(64), f32) * step
     for row, column in np.argwhere(frequencies):
-        yield f"    F[{row}, {column}]       {real(frequencies[row, column])}"
+        yield f"    F[{row}, {column}]       {binary32(frequencies[row, column])}"
     partial, pixel = np.zeros(8, f32), f32(0)
     for row in range(8):
-        partial += G[row, 0] * frequencies[row]
+        partial += decoder.G[row, 0] * frequencies[row]
     for column in range(8):
-        pixel += partial[column] * G[column, 0]
-    yield f"    partial[0, 0] {real(partial[0])}"
-    yield f"    partial[0, 1] {real(partial[1])}"
-    yield f"    pixel[0, 0]   {real(pixel)}"
+        pixel += partial[column] * decoder.G[column, 0]
+    yield f"    partial[0, 0] {binary32(partial[0])}"
+    yield f"    partial[0, 1] {binary32(partial[1])}"
+    yield f"    pixel[0, 0]   {binary32(pixel)}"
 
 
-def coefficients(head, file):
-    planes = Planes(head.tiles[TILE], head.rank)
+def colours(index, file):
+    planes = Planes(index.tiles[TILE], index.rank)
     for s in SCANS:
-        first, count, step = head.scans[s][1], head.scans[s][2], f32(head.scans[s][4])
-        planes.add(head.parts[s][1 + TILE], head.plain[s][TILE], range(first, first + count), step)
+        first, count, step = index.scans[s][1], index.scans[s][2], f32(index.scans[s][4])
+        components = range(first, first + count)
+        planes.add(index.chunks[s][1 + TILE], index.content_bytes[s][TILE], components, step)
     c = decode(file)[0][TILE][0]
     for p in PIXELS:
-        y, x = divmod(p, head.tiles[TILE][0])
+        y, x = divmod(p, index.tiles[TILE][0])
         q = planes.planes[:, :, y, x]
         length = np.sqrt(dot(c[p, 0], c[p, 0]))
         h = np.array([c[p, 0, 0] - length, c[p, 0, 1], c[p, 0, 2]])
         factor = f32(2) / dot(h, h)
         yield f"    pixel {p}: column {x}, row {y} of the tile"
-        yield f"      plane[0, 0]   {real(q[0, 0])}"
+        yield f"      plane[0, 0]   {binary32(q[0, 0])}"
         for channel in range(3):
-            yield f"      c[0, {channel}]       {real(c[p, 0, channel])}"
-        yield f"      plane[1, 0]   {real(q[1, 0])}"
-        yield f"      length        {real(length)}"
-        yield f"      factor        {real(factor)}"
-        yield f"      share         {real(factor * dot(h, q[1]))}"
+            yield f"      c[0, {channel}]       {binary32(c[p, 0, channel])}"
+        yield f"      plane[1, 0]   {binary32(q[1, 0])}"
+        yield f"      length        {binary32(length)}"
+        yield f"      factor        {binary32(factor)}"
+        yield f"      scale         {binary32(factor * dot(h, q[1]))}"
         for channel in range(3):
-            yield f"      c[1, {channel}]       {real(c[p, 1, channel])}"
+            yield f"      c[1, {channel}]       {binary32(c[p, 1, channel])}"
+
+
+def tile_of_coding_1():
+    file, index = read("coarse")
+    chunks = [chunk(index, s) for s in SCANS]
+    blocks = len(Planes(index.tiles[TILE], 0).blocks)
+    yield directory(index, file)
+    yield layout(index)
+    yield from (lines for lines, _ in chunks)
+    yield [line for s, (_, main) in zip(SCANS, chunks) for line in quantised_numbers(s, main, blocks)]
+    yield inverse_dct(index, chunks[0][1])
+    yield colours(index, file)
+
+
+# Appendix J: the chunk of scan 1 and tile 1 of direct.ltm.
+
+
+def three_streams():
+    file, index = read("direct")
+    scan, tile, shown = 1, 1, 16
+    data, count = index.chunks[scan][1 + tile], index.scans[scan][2]
+    tokens = TokenString(data, index.content_bytes[scan][tile])
+    start = index.offsets[scan][1 + tile]
+    pieces = [(1, "streams")]
+    for i, (number, length) in enumerate(tokens.lengths):
+        pieces.append((8, f"stream {i}: {number} tokens, in a frame of {length} bytes"))
+    lines = list(listing(data[:25], start, pieces))
+    at = 25
+    for i, (number, length) in enumerate(tokens.lengths):
+        lines += listing(data[at : at + 8], start + at, [(8, f"frame of stream {i}, its first 8 of {length} bytes")])
+        at += length
+    lines += listing(data[at : at + 8], start + at, [(8, f"bits, the first 8 of {len(data) - at} bytes")])
+    yield lines
+    yield [f"    stream {i}  {content[:shown].hex(' ').upper()} ..." for i, content in enumerate(tokens.contents)]
+
+    lines = []
+
+    def trace(context, token, bits, at, number):
+        line = f"    stream {context}: token {token:02X}"
+        if token == 0xF0:
+            lines.append(line + f"{'':12}sixteen zeros, numbers {at} to {at + 15}")
+        elif bits is None:
+            lines.append(line + f"{'':12}numbers {at} to {3 * count - 1} are zero")
+        else:
+            lines.append(line + f", bits {bit_list(bits):<7}  number {at} is {number}")
+
+    numbers = np.array(tokens.read_run(3 * count, trace)).reshape(-1, 3)
+    yield lines
+
+    lines = []
+    order, step = decoder.centre_out_order(index.w), f32(index.scans[scan][4])
+    before, after = (decode(file, scans)[0][tile][1] for scans in (scan, scan + 1))
+    for item in (0, 2):
+        slot, colour = order[item], decoder.colours_of(numbers[item])
+        y_co_cg, rgb = (", ".join(map(str, values)) for values in (numbers[item], colour))
+        lines.append(f"    item {item}, slot {slot}: Y, Co, Cg = {y_co_cg}; red, green, blue = {rgb}")
+        for channel in range(3):
+            old, new = before[0, slot, channel], after[0, slot, channel]
+            assert new == old + f32(colour[channel]) * step
+            lines.append(f"      d[0, {slot}, {channel}] = {binary32(old)} + {colour[channel]} · step = {binary32(new)}")
+    yield lines
+
+
+# Appendix K: mixed.ltm. tests/conformance.rs computes the same lines with the library.
+
+WINDOW_PIXELS = [(0, 0), (5, 1), (5, 8), (12, 3), (19, 9)]
+PIXEL, SLOTS = (5, 8), (2, 3, 14)
+ELEMENTS = [(0, 0), (1, 2), (7, 4)]
+EXPOSURE = 1 / 16
+
+
+def image_codes(u, v):
+    return 255 - 32 * u, 60 * v, 15 + 16 * (u + v)
+
+
+def reals(values):
+    return " ".join(f"{value:.6f}" for value in values)
+
+
+def tile_and_pixel(index, x, y):
+    side = index.tile_side
+    tile = y // side * -(-index.width // side) + x // side
+    return tile, y % side * index.tiles[tile][0] + x % side
+
+
+def picture(index, tiles, basis):
+    emissions = [
+        [decoder.emission_of_code(code) for code in image_codes(u, v)]
+        for v in range(index.light_height)
+        for u in range(index.light_width)
+    ]
+    result = np.zeros((index.height, index.width, 3))
+    for y, x in np.ndindex(index.height, index.width):
+        tile, p = tile_and_pixel(index, x, y)
+        c, d = tiles[tile]
+        tau = decoder.unmasked_function(c[p], d[p], basis)
+        origin = decoder.window_origin(index, x, y)
+        for slot, values in enumerate(tau):
+            m = decoder.element_of_slot(index, origin, slot)
+            if m is not None:
+                result[y, x] += values * emissions[m]
+    return result
+
+
+def windows_to_picture():
+    file, index = read("mixed")
+    tiles, basis = decode(file)
+
+    lines = []
+    for x, y in WINDOW_PIXELS:
+        u, v = (a * (x + 0.5) + b * (y + 0.5) + c for a, b, c in np.reshape(index.affine, (2, 3)))
+        origin = decoder.window_origin(index, x, y)
+        lines.append(f"    pixel ({x}, {y}): u {u:.2f}, v {v:.2f}, origin ({origin[0]}, {origin[1]})")
+    yield lines
+
+    (x, y), origin = PIXEL, decoder.window_origin(index, *PIXEL)
+    elements = [decoder.element_of_slot(index, origin, slot) for slot in range(index.w**2)]
+    lines = []
+    for first in range(0, index.w**2, index.w):
+        row = elements[first : first + index.w]
+        row = "".join("   -" if m is None else f"{m:4}" for m in row)
+        lines.append(f"    slots {first:2} to {first + index.w - 1:2}:{row}")
+    yield lines
+
+    tile, p = tile_and_pixel(index, x, y)
+    c, d = (values[p] for values in tiles[tile])
+    lines = [f"    c[{k}]  {reals(c[k])}" for k in range(index.rank)]
+    tau = decoder.unmasked_function(c, d, basis)
+    for slot in SLOTS:
+        place = "off the light plane" if elements[slot] is None else f"element {elements[slot]}"
+        masked = tau[slot] * (elements[slot] is not None)
+        lines.append(f"    slot {slot}, {place}")
+        lines.append(f"      v[0], v[1], v[2]  {reals(basis[:, slot])}")
+        lines.append(f"      d                 {reals(d[slot])}")
+        lines.append(f"      d + Σ c · v       {reals(tau[slot])}")
+        lines.append(f"      τ                 {reals(np.abs(masked) if not masked.any() else masked)}")
+    yield lines
+
+    lines = []
+    for u, v in ELEMENTS:
+        codes = image_codes(u, v)
+        m = v * index.light_width + u
+        emission = reals(map(decoder.emission_of_code, codes))
+        lines.append(f"    element {m}: codes {' '.join(map(str, codes))}, light {emission}")
+    yield lines
+
+    values = picture(index, tiles, basis)
+    yield [f"    pixel ({x}, {y}): {reals(values[y, x])}"]
+    for channel in range(3):
+        yield [
+            "    " + " ".join(f"{decoder.code_of_light(value * EXPOSURE):3}" for value in row)
+            for row in values[:, :, channel]
+        ]
 
 
 def main():
-    file = FILE.read_bytes()
-    head = Head(file)
-    chunks = [chunk(head, s) for s in SCANS]
-    strings = [main for _, main in chunks]
-    written = [line for s, main in zip(SCANS, strings) for line in numbers(s, main)]
-    parts = [directory(head, file), *(lines for lines, _ in chunks), written]
-    parts += [transform(head, strings[0]), coefficients(head, file)]
-    blocks = ["\n".join(line.rstrip() for line in lines) + "\n" for lines in parts]
-    if sys.argv[1:] == ["--print"]:
-        print("\n".join(blocks), end="")
-        return
-    text = TEXT.read_text(encoding="utf-8")
-    missing = [block for block in blocks if f"\n\n{block}\n" not in text]
-    for block in missing:
-        print(f"docs/format.md lacks\n{block}")
-    print(f"docs/format.md, section 21: {len(blocks) - len(missing)} of {len(blocks)} blocks right")
+    sections = {
+        "constants": constants,
+        "appendix H": whole_file,
+        "appendix I": tile_of_coding_1,
+        "appendix J": three_streams,
+        "appendix K": windows_to_picture,
+    }
+    text = DOCUMENT.read_text(encoding="utf-8")
+    missing = 0
+    for name, section in sections.items():
+        blocks = ["\n".join(line.rstrip() for line in lines) + "\n" for lines in section()]
+        if sys.argv[1:] == ["--print"]:
+            print(f"{name}\n\n" + "\n".join(blocks))
+            continue
+        lacking = [block for block in blocks if f"\n{block}" not in text]
+        for block in lacking:
+            print(f"docs/format.md lacks\n{block}")
+        print(f"docs/format.md, {name}: {len(blocks) - len(lacking)} of {len(blocks)} blocks match")
+        missing += len(lacking)
+    if sys.argv[1:] != ["--print"]:
+        check_offsets(text)
     sys.exit(bool(missing))
 
 

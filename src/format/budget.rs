@@ -15,7 +15,7 @@ use super::error::FormatError;
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Bytes that a reader may hold at a time: the index, all tiles, the working memory of one tile,
-    /// and a light and a picture, which relighting needs besides.
+    /// and for relighting a light and a picture.
     pub decoded_bytes: u64,
 }
 
@@ -37,7 +37,7 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// A budget of which nothing is reserved.
+    /// A budget with nothing reserved.
     pub fn new(limits: Limits) -> Self {
         Self {
             limit: limits.decoded_bytes,
@@ -77,17 +77,17 @@ impl Budget {
         }
     }
 
-    /// Gives `bytes` back.
+    /// Releases `bytes`.
     pub fn release(&self, bytes: u64) {
         self.reserved.set(self.reserved.get().saturating_sub(bytes));
     }
 
-    /// Drops a vector and gives its bytes back.
+    /// Drops a vector and releases its bytes.
     pub fn release_vec<T>(&self, values: Vec<T>) {
         self.release(vec_bytes(&values));
     }
 
-    /// Begins work whose reservations end with the returned guard.
+    /// Starts a scope: dropping the guard releases all bytes reserved since.
     pub fn scratch(&self) -> Scratch<'_> {
         Scratch {
             budget: self,
@@ -144,7 +144,7 @@ impl Budget {
         Ok(())
     }
 
-    /// Makes room for `capacity` values in all.
+    /// Grows the capacity to `capacity` values.
     fn try_grow<T>(&self, values: &mut Vec<T>, capacity: usize) -> Result<(), FormatError> {
         let before = vec_bytes(values);
         let need = (capacity as u64).saturating_mul(size_of::<T>() as u64);
@@ -158,7 +158,7 @@ impl Budget {
     }
 }
 
-/// Gives back on drop what was reserved since [`Budget::scratch`], but for what is kept.
+/// Releases on drop all bytes reserved since [`Budget::scratch`], except those that [`keep`](Self::keep) names.
 #[derive(Debug)]
 pub struct Scratch<'a> {
     budget: &'a Budget,
@@ -166,7 +166,7 @@ pub struct Scratch<'a> {
 }
 
 impl Scratch<'_> {
-    /// Ends the work, of which `bytes` stay reserved.
+    /// Ends the scope; `bytes` stay reserved.
     pub fn keep(mut self, bytes: u64) {
         self.reserved_after += bytes;
     }
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn scratch_memory_is_given_back_but_for_what_is_kept() {
+    fn scratch_memory_is_released_except_for_kept_bytes() {
         let budget = budget(100);
         budget.reserve(10).unwrap();
         let scratch = budget.scratch();

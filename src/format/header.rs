@@ -18,6 +18,7 @@ const MAGIC: [u8; 12] = *b"\xABLTM 10\xBB\r\n\x1A\n";
 const MAGIC_NAME_BYTES: usize = 4;
 /// The version's digits in the magic number.
 const MAGIC_VERSION: std::ops::Range<usize> = 5..7;
+
 /// The fixed header, checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Header {
@@ -179,8 +180,8 @@ impl Header {
     }
 }
 
-/// Checks the file's first bytes, of which there may be few: four tell a file of another kind, another
-/// version and a transfer in text mode apart.
+/// Checks the first bytes of a file, however few have come. Four bytes identify a file of another kind and a
+/// transfer in text mode.
 ///
 /// # Errors
 /// [`FormatError::UnknownMagic`], [`FormatError::UnsupportedVersion`] or

@@ -1,4 +1,4 @@
-//! What the encoder is given, and what it is asked for.
+//! The encoder's input: light transport, rate target and distortion metric.
 
 use std::fmt;
 use std::io;
@@ -11,9 +11,9 @@ use crate::transport::{BandTile, Basis, Decibels, Geometry, TransportFunctions};
 pub struct Source<'a> {
     /// Grids, window, correspondence and the file's tiling.
     pub geometry: Geometry,
-    /// The functions that coefficients belong to, if any tile has coefficients.
+    /// The basis of the coefficients, if a tile has any.
     pub basis: Option<&'a Basis>,
-    /// Gives a tile by its number; called several times for each.
+    /// Returns a tile by its number. The encoder calls it several times for each tile.
     pub tile: &'a (dyn Fn(usize) -> io::Result<BandTile> + Sync),
     /// Origin of the file.
     pub metadata: Metadata,
@@ -24,22 +24,22 @@ pub struct Source<'a> {
 /// Measures how much accuracy of light transport a file loses. Recovered light transport contains noise,
 /// so that SNR against it overestimates the loss.
 pub trait DistortionMetric: Sync {
-    /// Tiles, of any place and size, that the metric compares; their coefficients are over the source's
-    /// basis.
+    /// The tiles that the metric compares, at any position and of any size. Their coefficients are over the
+    /// source's basis.
     fn tiles(&self) -> Vec<BandTile>;
 
     /// Estimated loss of SNR against the object's light transport if `functions` replace the tiles.
     fn loss(&self, functions: &[TransportFunctions]) -> Decibels;
 }
 
-/// What the rate control aims for.
+/// The target of the rate control.
 #[derive(Clone, Copy)]
 pub enum RateTarget<'a> {
     /// The smallest file whose loss, by a metric, is at most this.
     Loss(Decibels, &'a dyn DistortionMetric),
     /// The smallest file with this SNR against the source.
     Snr(Decibels),
-    /// The best file of at most so many bytes.
+    /// The best file of at most this many bytes.
     Bytes(u64),
     /// Eleven bits of every value, for archives.
     Lossless,
