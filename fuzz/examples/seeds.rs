@@ -1,19 +1,19 @@
-//! Writes the seeds of the targets that take files: one in each coding, as small as can be.
+//! Writes the seeds of the targets that take files: one small file in each coding.
 //!
-//! `cargo run --manifest-path fuzz/Cargo.toml --example seeds`, after a change of the format.
+//! Run `cargo run --manifest-path fuzz/Cargo.toml --example seeds` after a change of the format.
 
 use std::path::Path;
 
 use fuzzing::choices::Choices;
-use fuzzing::source::Given;
+use fuzzing::source::EncoderInput;
 use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{Metadata, RateTarget};
 use relightable_photo::transport::{
     BandTile, Basis, Correspondence, Decibels, Extent, Geometry, Window,
 };
 
-/// Two tiles of 8 by 8 pixels and less: the first over a basis, or all functions by element.
-fn given(rank: usize) -> Given {
+/// Two tiles of at most 8 x 8 pixels: the first factored if `rank` is not 0, the other direct.
+fn input(rank: usize) -> EncoderInput {
     let geometry = Geometry {
         camera: Extent {
             width: 10,
@@ -29,7 +29,6 @@ fn given(rank: usize) -> Given {
         },
         tile_side: 8,
     };
-    // Noise that needs no bytes of an input.
     let mut noise = Choices(&[7]).noise();
     let mut colours = |count: usize| -> Vec<[f32; 3]> {
         (0..count)
@@ -46,7 +45,7 @@ fn given(rank: usize) -> Given {
         tile
     });
     let kernel = |k: usize| (0..area).map(|s| ((s * k) as f32).cos()).collect();
-    Given {
+    EncoderInput {
         geometry,
         tiles: tiles.collect(),
         basis: (rank > 0).then(|| Basis {
@@ -54,7 +53,7 @@ fn given(rank: usize) -> Given {
         }),
         metadata: Metadata::default(),
         extensions: Vec::new(),
-        tame: true,
+        is_moderate: true,
     }
 }
 
@@ -67,11 +66,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("direct", 0, snr),
         ("direct-halves", 0, RateTarget::Lossless),
     ] {
-        let file = given(rank).encode(quality, &SequentialExecutor)?;
+        let file = input(rank).encode(quality, &SequentialExecutor)?;
         let mut bytes = Vec::new();
         file.write(&mut bytes)?;
         let index = file.index().header.index_bytes() as usize;
-        println!("{name}: {} bytes, {index} of index", bytes.len());
+        println!("{name}: {} bytes, {index} of them file index", bytes.len());
         for (target, seed) in [
             ("open", bytes[..index].to_vec()),
             ("decode", bytes.clone()),

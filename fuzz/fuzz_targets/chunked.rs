@@ -1,4 +1,5 @@
-//! Pieces of any size and order give what the whole gives. The last bytes of an input say which.
+//! A file read in pieces, of any size and in any order, gives the same as the whole file. The last bytes of the
+//! fuzzer's input choose the pieces.
 #![no_main]
 
 use fuzzing::choices::Choices;

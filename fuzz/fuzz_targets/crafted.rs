@@ -1,4 +1,4 @@
-//! Files that are put together part by part: what is inside the zstd frames is chosen too.
+//! Reads assembled files, of which the fuzzer also chooses the contents of zstd frames.
 #![no_main]
 
 use fuzzing::choices::Choices;

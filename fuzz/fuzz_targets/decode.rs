@@ -1,4 +1,4 @@
-//! A file is read or refused within the memory budget, and checking it chunk by chunk agrees.
+//! A file is read or refused within the memory budget, and a check chunk by chunk has the same result.
 #![no_main]
 
 use fuzzing::{reading, seal};

@@ -1,4 +1,4 @@
-//! A head is read or refused, and nobody is promised more than limits allow.
+//! A file index is read or refused, and its lengths are within the limits.
 #![no_main]
 
 use fuzzing::choices::Choices;
@@ -7,9 +7,9 @@ use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 
 fuzz_target!(|file: &[u8]| {
     seal::keep(file);
-    // What is asked of the reader follows from the file, mutation by mutation.
+    // The last bytes of the file choose the viewport and SNR of the requests.
     let choices = &file[file.len() - file.len().min(32)..];
-    reading::check_head(file, &mut Choices(choices));
+    reading::check_index(file, &mut Choices(choices));
 });
 
 fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {

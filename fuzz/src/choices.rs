@@ -1,7 +1,7 @@
-//! Bytes of the fuzzer as decisions. Those that follow the last are all 0: every input means something,
-//! and one byte changed changes one decision.
+//! The fuzzer's bytes as decisions. Past the end all bytes are 0, so that every input is valid, and a change
+//! of one byte changes one decision.
 
-/// What is left of an input.
+/// The bytes of an input that are not used yet.
 #[derive(Debug)]
 pub struct Choices<'a>(pub &'a [u8]);
 
@@ -24,19 +24,19 @@ impl<'a> Choices<'a> {
         std::array::from_fn(|_| self.byte())
     }
 
-    /// As many of the next bytes as there are.
+    /// The next `count` bytes, or all that are left.
     pub fn up_to(&mut self, count: usize) -> &'a [u8] {
         let (taken, rest) = self.0.split_at(count.min(self.0.len()));
         self.0 = rest;
         taken
     }
 
-    /// True for one byte in 256: rarely, and never once the input has ended.
+    /// True for one byte value in 256, and false past the end of the input.
     pub fn rarely(&mut self) -> bool {
         self.byte() == 0xFF
     }
 
-    /// True for `of_256` bytes in 256, not for 0.
+    /// True for the `of_256` largest byte values, and false past the end of the input.
     pub fn chance(&mut self, of_256: u8) -> bool {
         self.byte() > 255 - of_256
     }
@@ -65,7 +65,7 @@ impl<'a> Choices<'a> {
         values[usize::from(self.byte()) % K]
     }
 
-    /// `length` bytes by few choices: all alike, a pattern, noise, or those that come.
+    /// `length` bytes from few decisions: a constant, a pattern, noise, or bytes of the input.
     pub fn fill(&mut self, length: usize) -> Vec<u8> {
         match self.below(4) {
             0 => vec![self.byte(); length],
@@ -90,7 +90,7 @@ impl<'a> Choices<'a> {
     }
 }
 
-/// Reproducible numbers that need no input.
+/// A linear congruential generator.
 #[derive(Debug)]
 pub struct Noise(u64);
 
@@ -103,7 +103,7 @@ impl Noise {
         (self.0 >> 32) as u32
     }
 
-    /// In -1..1.
+    /// A number in -1..1.
     pub fn signed(&mut self) -> f32 {
         self.next() as i32 as f32 / (1u32 << 31) as f32
     }

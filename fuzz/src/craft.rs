@@ -1,5 +1,5 @@
-//! Files put together from choices. zstd frames do not survive mutation; here what is inside them is
-//! chosen, and mostly such that a reader takes it: only then does it come to what lies deeper.
+//! Files assembled from choices. Mutated zstd frames do not decompress, so here the fuzzer chooses their contents,
+//! mostly valid ones: only these reach the decoders of tokens and values.
 
 use std::cell::RefCell;
 
@@ -9,13 +9,13 @@ use relightable_photo::transport::{CHANNELS, Extent, Geometry};
 use crate::choices::Choices;
 use crate::source;
 
-/// Pixels of a block's side in [`Coding::Transform`].
-const SIDE: u32 = 8;
-const END: u8 = 0;
+/// Pixels along a side of a block of [`Coding::Transform`].
+const BLOCK_SIDE: u32 = 8;
+const END_OF_RUN: u8 = 0;
 const SIXTEEN_ZEROS: u8 = 0xF0;
-const PALETTE: usize = 2 * CHANNELS * CHANNELS;
+const KLT_BYTES: usize = 2 * CHANNELS * CHANNELS;
 
-/// One scan as the directory has it.
+/// A scan and its chunks, each with its content bytes.
 struct Scan {
     coding: Coding,
     first: u16,
@@ -52,7 +52,8 @@ impl Scan {
         usize::from(self.first) + usize::from(self.count)
     }
 
-    fn brings(&self, known: usize) -> usize {
+    /// Number of basis functions in the basis chunk, if earlier scans have brought `known`.
+    fn new_functions(&self, known: usize) -> usize {
         match self.coding.is_direct() {
             true => 0,
             false => self.end().saturating_sub(known),
@@ -60,7 +61,7 @@ impl Scan {
     }
 }
 
-/// A whole file, its lengths and checksums right.
+/// A whole file with correct lengths and checksums.
 pub fn file(choices: &mut Choices<'_>) -> Vec<u8> {
     let geometry = source::geometry(choices);
     let rank = match choices.below(4) {
@@ -72,17 +73,17 @@ pub fn file(choices: &mut Choices<'_>) -> Vec<u8> {
     let mut scans = scans(choices, &geometry, rank);
     let area = geometry.window.area();
     let mut known = 0;
-    let mut has_palette = vec![false; geometry.tile_grid().area()];
+    let mut has_klt = vec![false; geometry.tile_grid().area()];
     for scan in &mut scans {
-        let brings = scan.brings(known);
-        known += brings;
-        if brings > 0 {
-            scan.basis = basis(choices, brings, area);
+        let new_functions = scan.new_functions(known);
+        known += new_functions;
+        if new_functions > 0 {
+            scan.basis = basis(choices, new_functions, area);
         }
-        for (has_palette, rect) in has_palette.iter_mut().zip(geometry.tiles()) {
+        for (has_klt, rect) in has_klt.iter_mut().zip(geometry.tiles()) {
             let chunk = match choices.chance(96) {
                 true => (Vec::new(), 0),
-                false => chunk(choices, scan, rect.extent, area, has_palette),
+                false => chunk(choices, scan, rect.extent, area, has_klt),
             };
             scan.chunks.push(chunk);
         }
@@ -103,12 +104,12 @@ fn scans(choices: &mut Choices<'_>, geometry: &Geometry, rank: usize) -> Vec<Sca
     let (mut scans, mut known) = (Vec::new(), 0);
     for _ in 0..choices.below(7) {
         let direct = rank == 0 || choices.chance(80);
-        let (most_first, end) = if direct {
+        let (max_first, end) = if direct {
             (area - 1, area)
         } else {
             (known.min(rank - 1), rank)
         };
-        let first = usize::from(choices.byte()) % (most_first + 1);
+        let first = usize::from(choices.byte()) % (max_first + 1);
         let count = 1 + usize::from(choices.byte()) % (end - first);
         let coding = if direct { functions } else { coefficients };
         let mut scan = Scan::new(coding, first as u16, count as u16, choices);
@@ -121,7 +122,7 @@ fn scans(choices: &mut Choices<'_>, geometry: &Geometry, rank: usize) -> Vec<Sca
                 Coding::DirectHalves,
             ]);
         }
-        known += scan.brings(known);
+        known += scan.new_functions(known);
         scans.push(scan);
     }
     if known < rank {
@@ -129,7 +130,7 @@ fn scans(choices: &mut Choices<'_>, geometry: &Geometry, rank: usize) -> Vec<Sca
         scans.push(Scan::new(coefficients, first, count, choices));
     }
     if choices.rarely() {
-        // Many, most of which a small input leaves dark.
+        // Many scans; a small input leaves most of them without chunks.
         for _ in 0..choices.byte() {
             let coding = if rank > 0 { coefficients } else { functions };
             scans.push(Scan::new(coding, 0, 1, choices));
@@ -138,107 +139,110 @@ fn scans(choices: &mut Choices<'_>, geometry: &Geometry, rank: usize) -> Vec<Sca
     scans
 }
 
-/// Functions of the basis as a scan brings them.
+/// A basis chunk.
 fn basis(choices: &mut Choices<'_>, functions: usize, area: usize) -> Vec<u8> {
-    let mut plain = choices.fill(functions);
+    let mut content = choices.fill(functions);
     if !choices.rarely() {
-        plain.iter_mut().for_each(|exponent| *exponent %= 31);
+        content.iter_mut().for_each(|exponent| *exponent %= 31);
     }
-    plain.extend(choices.fill(2 * functions * area));
-    frame(choices, &plain)
+    content.extend(choices.fill(2 * functions * area));
+    frame(choices, &content)
 }
 
-/// A chunk, and what the directory is to say that it has before compression.
+/// A tile chunk and its content bytes.
 fn chunk(
     choices: &mut Choices<'_>,
     scan: &Scan,
     extent: Extent,
     area: usize,
-    has_palette: &mut bool,
+    has_klt: &mut bool,
 ) -> (Vec<u8>, u32) {
     let count = usize::from(scan.count);
     match scan.coding {
         Coding::Halves | Coding::DirectHalves => {
             let numbers = extent.area() * CHANNELS * count.min(area.max(40));
-            let mut plain = choices.fill(2 * numbers);
+            let mut content = choices.fill(2 * numbers);
             if !choices.rarely() {
-                // Finite: not all bits of the exponent.
-                plain[numbers..].iter_mut().for_each(|high| *high &= !0x40);
+                // Finite values: not all bits of the exponent are set.
+                content[numbers..]
+                    .iter_mut()
+                    .for_each(|high| *high &= !0x40);
             }
-            let bytes = frame(choices, &plain);
-            (bytes, plain.len() as u32)
+            let bytes = frame(choices, &content);
+            (bytes, content.len() as u32)
         }
         Coding::Direct => {
-            let blocks = std::iter::repeat_n(count.min(area) * CHANNELS, extent.area());
-            tokens(choices, blocks)
+            let runs = std::iter::repeat_n(count.min(area) * CHANNELS, extent.area());
+            token_string(choices, runs)
         }
         Coding::Transform => {
             let mut bytes = Vec::new();
-            if scan.first == 0 && !*has_palette {
-                *has_palette = true;
-                bytes = choices.fill(PALETTE);
+            if scan.first == 0 && !*has_klt {
+                *has_klt = true;
+                bytes = choices.fill(KLT_BYTES);
             }
-            let blocks = extent.width.div_ceil(SIDE) * extent.height.div_ceil(SIDE);
+            let blocks = extent.width.div_ceil(BLOCK_SIDE) * extent.height.div_ceil(BLOCK_SIDE);
             let blocks = blocks as usize * count.min(40);
-            let axis = (SIDE * SIDE) as usize;
-            let (first, first_tokens) = tokens(choices, std::iter::repeat_n(axis, blocks));
-            let (second, second_tokens) = tokens(choices, std::iter::repeat_n(2 * axis, blocks));
-            let mut length = first.len() as u32;
+            let area = (BLOCK_SIDE * BLOCK_SIDE) as usize;
+            let (main, main_tokens) = token_string(choices, std::iter::repeat_n(area, blocks));
+            let (side, side_tokens) = token_string(choices, std::iter::repeat_n(2 * area, blocks));
+            let mut length = main.len() as u32;
             if choices.rarely() {
                 length = choices.u32();
             }
             bytes.extend(length.to_le_bytes());
-            bytes.extend(first);
-            bytes.extend(second);
-            (bytes, first_tokens + second_tokens)
+            bytes.extend(main);
+            bytes.extend(side);
+            (bytes, main_tokens + side_tokens)
         }
     }
 }
 
-/// Blocks of numbers on their way into a chunk.
+/// A token string that runs are added to.
 #[derive(Default)]
-struct Blocks {
-    /// `[class]`
+struct TokenWriter {
+    /// `[context]`
     tokens: [Vec<u8>; 3],
-    apart: bool,
+    has_contexts: bool,
     bits: Vec<u8>,
+    /// Bits not yet in `bits`, the first one lowest.
     pending: u32,
-    count: u32,
+    pending_count: u32,
 }
 
-impl Blocks {
+impl TokenWriter {
     fn token(&mut self, before: &mut Option<u8>, token: u8) {
-        let class = match before {
+        let context = match before {
             None => 0,
             Some(before) if *before & 15 <= 1 => 1,
             Some(_) => 2,
         };
-        self.tokens[if self.apart { class } else { 0 }].push(token);
+        self.tokens[if self.has_contexts { context } else { 0 }].push(token);
         *before = Some(token);
     }
 
     fn number(&mut self, bits: u32, size: u8) {
-        self.pending |= (bits & ((1 << size) - 1)) << self.count;
-        self.count += u32::from(size);
-        while self.count >= 8 {
+        self.pending |= (bits & ((1 << size) - 1)) << self.pending_count;
+        self.pending_count += u32::from(size);
+        while self.pending_count >= 8 {
             self.bits.push(self.pending as u8);
             self.pending >>= 8;
-            self.count -= 8;
+            self.pending_count -= 8;
         }
     }
 
-    /// One block of `length` numbers, of about as many tokens as are wanted.
-    fn block(&mut self, choices: &mut Choices<'_>, length: usize, wanted: u8) {
+    /// Adds a run of `length` numbers in at most `max_tokens` tokens and an end of run.
+    fn run(&mut self, choices: &mut Choices<'_>, length: usize, max_tokens: u8) {
         let (mut at, mut before) = (0, None);
-        for _ in 0..wanted {
+        for _ in 0..max_tokens {
             let token = choices.byte();
-            let (run, size) = (usize::from(token >> 4), token & 15);
+            let (zeros, size) = (usize::from(token >> 4), token & 15);
             if token == SIXTEEN_ZEROS {
-                // They may reach beyond the block's end.
+                // The zeros may extend beyond the run.
                 at += 16;
                 self.token(&mut before, token);
-            } else if at + run < length && size > 0 {
-                at += run + 1;
+            } else if at + zeros < length && size > 0 {
+                at += zeros + 1;
                 self.token(&mut before, token);
                 let bits = u32::from(choices.byte()) * 0x8101;
                 self.number(bits, size);
@@ -247,80 +251,80 @@ impl Blocks {
                 return;
             }
         }
-        self.token(&mut before, END);
+        self.token(&mut before, END_OF_RUN);
     }
 }
 
-/// Streams of tokens of these blocks, and how many tokens they have.
-fn tokens(choices: &mut Choices<'_>, lengths: impl Iterator<Item = usize>) -> (Vec<u8>, u32) {
-    let mut blocks = Blocks {
-        apart: choices.chance(128),
-        ..Blocks::default()
+/// A token string of runs of these lengths, and its number of tokens.
+fn token_string(choices: &mut Choices<'_>, lengths: impl Iterator<Item = usize>) -> (Vec<u8>, u32) {
+    let mut writer = TokenWriter {
+        has_contexts: choices.chance(128),
+        ..TokenWriter::default()
     };
-    let mut dark = 0u32;
+    // Number of further runs without numbers.
+    let mut empty_runs = 0u32;
     for length in lengths {
-        let wanted = match dark {
+        let max_tokens = match empty_runs {
             0 => match choices.byte() {
                 few @ 0..=15 => few,
                 many @ 16..=31 => 8 * (many - 15),
-                // So many blocks hold nothing.
-                some => {
-                    dark = u32::from(some - 31) * if some > 240 { 16 } else { 1 };
+                other => {
+                    empty_runs = u32::from(other - 31) * if other > 240 { 16 } else { 1 };
                     0
                 }
             },
             _ => {
-                dark -= 1;
+                empty_runs -= 1;
                 0
             }
         };
-        blocks.block(choices, length, wanted);
+        writer.run(choices, length, max_tokens);
     }
-    if blocks.count > 0 {
-        blocks.bits.push(blocks.pending as u8);
+    if writer.pending_count > 0 {
+        writer.bits.push(writer.pending as u8);
     }
-    let mut count = if blocks.apart { 3 } else { 1 };
+    let mut streams = if writer.has_contexts { 3 } else { 1 };
     if choices.chance(16) {
-        damage(choices, &mut blocks);
+        damage(choices, &mut writer);
     }
     if choices.rarely() {
-        count = choices.byte();
+        streams = choices.byte();
     }
-    let all = blocks.tokens.iter().map(Vec::len).sum::<usize>() as u32;
-    let mut bytes = vec![count];
+    let all = writer.tokens.iter().map(Vec::len).sum::<usize>() as u32;
+    let mut bytes = vec![streams];
     let mut frames = Vec::new();
-    for tokens in &blocks.tokens[..usize::from(count).min(3)] {
+    for tokens in &writer.tokens[..usize::from(streams).min(3)] {
         let frame = match tokens.is_empty() {
             true => Vec::new(),
             false => frame(choices, tokens),
         };
-        let [mut of_tokens, mut of_frame] = [tokens.len() as u32, frame.len() as u32];
+        let [mut token_count, mut frame_bytes] = [tokens.len() as u32, frame.len() as u32];
         if choices.rarely() {
-            (of_tokens, of_frame) = (choices.u32(), choices.u32());
+            (token_count, frame_bytes) = (choices.u32(), choices.u32());
         }
-        bytes.extend(of_tokens.to_le_bytes());
-        bytes.extend(of_frame.to_le_bytes());
+        bytes.extend(token_count.to_le_bytes());
+        bytes.extend(frame_bytes.to_le_bytes());
         frames.extend(frame);
     }
     bytes.extend(frames);
-    bytes.extend(blocks.bits);
-    let claimed = if choices.rarely() { choices.u32() } else { all };
-    (bytes, claimed)
+    bytes.extend(writer.bits);
+    let content_bytes = if choices.rarely() { choices.u32() } else { all };
+    (bytes, content_bytes)
 }
 
-/// Something that no writer does.
-fn damage(choices: &mut Choices<'_>, blocks: &mut Blocks) {
+/// Changes a token string in a way that no writer does.
+fn damage(choices: &mut Choices<'_>, writer: &mut TokenWriter) {
     let stream = usize::from(choices.below(3));
-    let tokens = &mut blocks.tokens[stream];
+    let tokens = &mut writer.tokens[stream];
     let at = usize::from(choices.u16()) % tokens.len().max(1);
     match choices.below(7) {
         0 => tokens.truncate(at),
         1 => tokens.insert(at, choices.byte()),
         2 if !tokens.is_empty() => tokens[at] = choices.byte(),
         3 => *tokens = choices.fill(usize::from(choices.0.first().copied().unwrap_or(0))),
-        4 => blocks.bits.truncate(at),
-        5 => blocks.bits.push(choices.byte()),
-        _ => blocks.bits = choices.fill(at),
+        4 => writer.bits.truncate(at),
+        5 => writer.bits.push(choices.byte()),
+        _ => writer.bits = choices.fill(at),
     }
 }
 
@@ -329,12 +333,12 @@ thread_local! {
         RefCell::new(zstd::bulk::Compressor::new(1).expect("level 1 is a level"));
 }
 
-/// One zstd frame, or rarely what is not quite one.
-fn frame(choices: &mut Choices<'_>, plain: &[u8]) -> Vec<u8> {
+/// One zstd frame, or rarely a damaged one.
+fn frame(choices: &mut Choices<'_>, content: &[u8]) -> Vec<u8> {
     let mut frame = COMPRESSOR.with_borrow_mut(|compressor| {
         compressor
-            .compress(plain)
-            .expect("memory is compressed to memory")
+            .compress(content)
+            .expect("compression in memory does not fail")
     });
     if !choices.rarely() {
         return frame;
@@ -348,16 +352,17 @@ fn frame(choices: &mut Choices<'_>, plain: &[u8]) -> Vec<u8> {
         2 => frame.extend(choices.fill(usize::from(choices.0.first().copied().unwrap_or(0)))),
         3 => frame.extend(frame.clone()),
         4 => frame = choices.up_to(64).to_vec(),
-        // Of no length that it tells, and a window of its own.
+        // A frame without a content size, and with another window.
         _ => {
             let level = i32::from(choices.below(19)) + 1;
-            frame = zstd::stream::encode_all(plain, level).expect("memory to memory");
+            frame = zstd::stream::encode_all(content, level)
+                .expect("compression in memory does not fail");
         }
     }
     frame
 }
 
-/// Header, directory, extensions, metadata, scans.
+/// Header, directory, extensions, metadata and scans, one after another.
 fn assemble(
     choices: &mut Choices<'_>,
     geometry: &Geometry,
@@ -382,8 +387,11 @@ fn assemble(
     }
     let chunks = || scans.iter().flat_map(|scan| &scan.chunks);
     directory.extend(chunks().flat_map(|(bytes, _)| (bytes.len() as u32).to_le_bytes()));
-    let plain = |(bytes, plain): &(Vec<u8>, u32)| if bytes.is_empty() { 0 } else { *plain };
-    directory.extend(chunks().flat_map(|chunk| plain(chunk).to_le_bytes()));
+    let content_bytes = |(bytes, content_bytes): &(Vec<u8>, u32)| match bytes.is_empty() {
+        true => 0,
+        false => *content_bytes,
+    };
+    directory.extend(chunks().flat_map(|chunk| content_bytes(chunk).to_le_bytes()));
     let crc = |bytes: &[u8]| {
         if bytes.is_empty() {
             0
@@ -395,7 +403,7 @@ fn assemble(
     let directory = COMPRESSOR.with_borrow_mut(|compressor| {
         compressor
             .compress(&directory)
-            .expect("memory is compressed to memory")
+            .expect("compression in memory does not fail")
     });
     let extensions = match choices.rarely() {
         true => choices.up_to(40).to_vec(),
@@ -405,15 +413,16 @@ fn assemble(
         true => choices.up_to(80).to_vec(),
         false => b"{}".to_vec(),
     };
-    let index = [&directory, &extensions, &metadata];
-    let parts: usize = scans
+    let sections = [&directory, &extensions, &metadata];
+    let chunk_bytes: usize = scans
         .iter()
         .map(|scan| {
             let chunks = scan.chunks.iter().map(|(bytes, _)| bytes.len());
             scan.basis.len() + chunks.sum::<usize>()
         })
         .sum();
-    let bytes = HEADER_BYTES + index.iter().map(|part| part.len()).sum::<usize>() + parts;
+    let bytes =
+        HEADER_BYTES + sections.iter().map(|section| section.len()).sum::<usize>() + chunk_bytes;
 
     let mut file = b"\xABLTM 10\xBB\r\n\x1A\n\x01\0\0\0".to_vec();
     for side in [
@@ -432,14 +441,14 @@ fn assemble(
     file.extend((bytes as u64).to_le_bytes());
     file.extend((rank as u32).to_le_bytes());
     file.extend((scans.len() as u32).to_le_bytes());
-    for part in index {
-        file.extend((part.len() as u32).to_le_bytes());
-        file.extend(crc32c::crc32c(part).to_le_bytes());
+    for section in sections {
+        file.extend((section.len() as u32).to_le_bytes());
+        file.extend(crc32c::crc32c(section).to_le_bytes());
     }
     file.extend([0; 12]);
     file.extend(crc32c::crc32c(&file).to_le_bytes());
-    for part in index {
-        file.extend(part);
+    for section in sections {
+        file.extend(section);
     }
     for scan in scans {
         file.extend(&scan.basis);

@@ -1,14 +1,14 @@
-//! What the fuzz targets share. `pkg-scripts/fuzz` runs them.
+//! Modules that the fuzz targets share. `pkg-scripts/fuzz` runs the targets.
 //!
-//! | target | its input | what must hold |
+//! | target | input | property |
 //! |---|---|---|
-//! | `open` | a file | its index is read or refused, and no length exceeds the limits |
-//! | `decode` | a file | it is read or refused within the memory budget, previews included, and `check` agrees |
-//! | `chunked` | a file, and choices | pieces in any order give what the whole gives |
-//! | `crafted` | choices | the same of files that are put together part by part, past zstd |
-//! | `round_trip` | choices | what the encoder writes the reader reads, as well as the file says |
+//! | `open` | a file | its file index is read or refused, and no length exceeds the limits |
+//! | `decode` | a file | it is read or refused within the memory budget, previews included, and `check` has the same result |
+//! | `chunked` | a file and choices | pieces in any order give the same as the whole file |
+//! | `crafted` | choices | the properties of `decode` and `chunked`, for assembled files with arbitrary frame contents |
+//! | `round_trip` | choices | the reader reads what the encoder writes, with the error that the file declares |
 //!
-//! cargo fuzz sets `cfg(fuzzing)`, by which the reader passes over checksums.
+//! cargo fuzz sets `cfg(fuzzing)`, with which the reader ignores checksums.
 
 pub mod choices;
 pub mod craft;

@@ -1,4 +1,4 @@
-//! A file in pieces.
+//! Reading a file in pieces.
 
 use relightable_photo::format::{FileIndex, Interest, Reader};
 use relightable_photo::transport::Decibels;
@@ -6,15 +6,15 @@ use relightable_photo::transport::Decibels;
 use crate::choices::Choices;
 use crate::reading::{self, LIMITS, Read, check_transport};
 
-/// A file as a browser may get it: what is wanted, in no order, in pieces of any size, some of it again.
-/// What it gives when all of it that is there has been fed.
+/// Feeds a file to a reader as a browser may: ranges that the reader wants, in any order, in pieces of any size, some
+/// of them twice. Returns the result when no wanted byte is left in the file.
 ///
 /// # Panics
-/// If the reader wants what it has, or never has enough.
+/// If the reader wants bytes that it has, or still wants bytes at the end.
 pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
     let mut reader = Reader::new(LIMITS);
     let mut failed = None;
-    // Each turn feeds at least a byte that was not there.
+    // Each iteration feeds at least one new byte.
     for _ in 0..=2 * file.len() {
         let interest = match choices.chance(64) && reader.index().is_some() {
             true => Interest {
@@ -23,15 +23,15 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
             },
             false => Interest::default(),
         };
-        let there = |reader: &Reader, interest: &Interest| -> Vec<_> {
+        let wanted_in_file = |reader: &Reader, interest: &Interest| -> Vec<_> {
             let wanted = reader.wants(interest).into_iter();
             wanted
                 .filter(|range| range.start < file.len() as u64)
                 .collect()
         };
-        let mut ranges = there(&reader, &interest);
+        let mut ranges = wanted_in_file(&reader, &interest);
         if ranges.is_empty() {
-            ranges = there(&reader, &Interest::default());
+            ranges = wanted_in_file(&reader, &Interest::default());
         }
         if ranges.is_empty() {
             break;
@@ -40,9 +40,9 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
         let (start, end) = (range.start as usize, (range.end as usize).min(file.len()));
         let mut range = start..end;
         if choices.chance(160)
-            && let Some(part) = part(reader.index(), &range, choices)
+            && let Some(chunk) = chunk_within(reader.index(), &range, choices)
         {
-            range = part;
+            range = chunk;
         }
         let length = match choices.byte() {
             0 => range.len(),
@@ -51,7 +51,7 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
         range.end = range.start + length;
         let before = reader.progress().bytes;
         if choices.chance(32) {
-            // And some of what is there already just before it.
+            // Also some of the bytes that the reader already has before the range.
             let wanted = reader.wants(&Interest::default());
             let ends = wanted.iter().map(|range| range.end as usize);
             let known = ends.filter(|end| *end <= range.start).max().unwrap_or(0);
@@ -64,7 +64,7 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
             }
         }
         match reader.feed(range.start as u64, &file[range]) {
-            Ok(()) => assert!(reader.progress().bytes > before, "what was wanted is new"),
+            Ok(()) => assert!(reader.progress().bytes > before, "a wanted byte is not new"),
             Err(error) => {
                 failed = Some(error);
                 break;
@@ -77,11 +77,11 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
                 .wants(&Interest::default())
                 .iter()
                 .all(|range| range.start >= file.len() as u64),
-            "it never has enough"
+            "the reader wants more of a file that it has"
         );
         return reader.finish();
     };
-    // Whatever else is done with it then, nothing worse happens.
+    // After an error no call panics.
     let mut at = usize::from(choices.u16()) % file.len().max(1);
     while at < file.len() {
         let end = file.len().min(at + 1 + usize::from(choices.u16()));
@@ -95,16 +95,16 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
     Err(error)
 }
 
-/// A part within a range.
-fn part(
+/// A chunk within a range of bytes.
+fn chunk_within(
     index: Option<&FileIndex>,
     range: &std::ops::Range<usize>,
     choices: &mut Choices<'_>,
 ) -> Option<std::ops::Range<usize>> {
     let index = index?;
-    let ranges = index.chunks().map(|part| index.range(part));
-    let ranges = ranges.map(|part| part.start as usize..part.end as usize);
-    let inside = ranges.filter(|part| part.start >= range.start && part.end <= range.end);
+    let ranges = index.chunks().map(|chunk| index.range(chunk));
+    let ranges = ranges.map(|chunk| chunk.start as usize..chunk.end as usize);
+    let inside = ranges.filter(|chunk| chunk.start >= range.start && chunk.end <= range.end);
     let inside: Vec<_> = inside.collect();
     let at = usize::from(choices.u16()).checked_rem(inside.len())?;
     inside.get(at).cloned()
@@ -113,16 +113,19 @@ fn part(
 /// Reads a file in pieces and whole.
 ///
 /// # Panics
-/// If they differ.
+/// If the results differ.
 pub fn check(file: &[u8], choices: &mut Choices<'_>) {
-    // Nobody wants what follows the end: a reader that gets it all the same refuses it.
+    // Without bytes after the end, which a reader never wants, and refuses in a whole file.
     let end = reading::index(file).map(|index| index.header.file_bytes);
     let end = end.and_then(|end| usize::try_from(end).ok());
     let file = &file[..end.unwrap_or(file.len()).min(file.len())];
     match (read(file, choices), reading::whole(file)) {
-        (Ok(pieces), Ok(whole)) => assert!(pieces == whole, "pieces make another transport"),
+        (Ok(pieces), Ok(whole)) => assert!(
+            pieces == whole,
+            "the pieces give another transport than the whole file"
+        ),
         (Err(_), Err(_)) => {}
-        (Ok(_), Err(error)) => panic!("in pieces it is read, whole it is not: {error}"),
-        (Err(error), Ok(_)) => panic!("whole it is read, in pieces it is not: {error}"),
+        (Ok(_), Err(error)) => panic!("the file is read in pieces, but refused whole: {error}"),
+        (Err(error), Ok(_)) => panic!("the file is read whole, but refused in pieces: {error}"),
     }
 }

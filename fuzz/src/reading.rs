@@ -1,4 +1,4 @@
-//! Reading a file in all the ways there are, and what must hold of each.
+//! All ways of reading a file, and the properties that must hold.
 
 use relightable_photo::format::{
     self, FIRST_BYTES, FileIndex, FormatError, HEADER_BYTES, Interest, Limits, MetadataJson, Reader,
@@ -7,26 +7,26 @@ use relightable_photo::transport::{CHANNELS, CoefficientTile, Decibels, Tile, Tr
 
 use crate::choices::Choices;
 use crate::heap::with_peak_bytes;
-use crate::source::{Given, Wanted};
+use crate::source::{EncoderInput, TargetChoice};
 
 /// The memory budget of fuzzed readers.
 pub const LIMITS: Limits = Limits {
     decoded_bytes: 40 << 20,
 };
-/// Bytes that the budget does not count: messages, ranges.
+/// Maximum bytes of messages and ranges, which the budget does not count.
 const UNCOUNTED_BYTES: usize = 64 << 10;
 
-/// What a file gives.
+/// The result of reading a file.
 pub type Read = Result<(Transport, MetadataJson), FormatError>;
 
-/// The whole file in one piece, to its end.
+/// Reads the whole file in one piece.
 pub fn whole(file: &[u8]) -> Read {
     let mut reader = Reader::new(LIMITS);
     reader.feed(0, file)?;
     reader.finish()
 }
 
-/// The index, if it can be read and file bytes suffice.
+/// The file index, if it is valid and complete.
 pub fn index(file: &[u8]) -> Option<FileIndex> {
     let mut reader = Reader::new(LIMITS);
     reader.feed(0, &file[..file.len().min(HEADER_BYTES)]).ok()?;
@@ -35,11 +35,11 @@ pub fn index(file: &[u8]) -> Option<FileIndex> {
     reader.index().cloned()
 }
 
-/// What must hold of every index.
+/// Checks the properties of a file's index, and of the ranges that a reader wants.
 ///
 /// # Panics
-/// If it does not.
-pub fn check_head(file: &[u8], choices: &mut Choices<'_>) {
+/// If one does not hold.
+pub fn check_index(file: &[u8], choices: &mut Choices<'_>) {
     let mut reader = Reader::new(LIMITS);
     assert_eq!(reader.wants(&Interest::default()), [0..FIRST_BYTES]);
     if reader
@@ -51,11 +51,11 @@ pub fn check_head(file: &[u8], choices: &mut Choices<'_>) {
     let Some(end) = reader.index_bytes() else {
         return;
     };
-    // What decompresses to so much is at most about as long; the rest has limits of its own.
-    let most = HEADER_BYTES as u64 + 2 * LIMITS.decoded_bytes + (16 << 20) + (1 << 20);
+    // A frame is at most about as long as its content; extensions and metadata have limits of their own.
+    let max_bytes = HEADER_BYTES as u64 + 2 * LIMITS.decoded_bytes + (16 << 20) + (1 << 20);
     assert!(
-        end <= most,
-        "the index has {end} bytes, though limits allow {most}"
+        end <= max_bytes,
+        "the index has {end} bytes, but the limits allow {max_bytes}"
     );
     assert_eq!(
         reader.wants(&Interest::default()),
@@ -68,11 +68,11 @@ pub fn check_head(file: &[u8], choices: &mut Choices<'_>) {
     assert!(geometry.validate().is_ok());
     assert_eq!(index.tiles(), geometry.tile_grid().area());
     let mut next = index.header.index_bytes();
-    for part in index.chunks() {
-        let range = index.range(part);
+    for chunk in index.chunks() {
+        let range = index.range(chunk);
         assert!(
             range.start == next && range.end > next,
-            "parts are in a row"
+            "chunks do not follow each other"
         );
         next = range.end;
     }
@@ -86,7 +86,11 @@ pub fn check_head(file: &[u8], choices: &mut Choices<'_>) {
     }
     let all = reader.wants(&Interest::default());
     let sum: u64 = all.iter().map(|range| range.end - range.start).sum();
-    assert_eq!(sum, index.header.file_bytes - end, "all of it is wanted");
+    assert_eq!(
+        sum,
+        index.header.file_bytes - end,
+        "the reader does not want all chunks"
+    );
     let interest = Interest {
         viewport: Some((
             choices.u32()..choices.u32(),
@@ -106,15 +110,15 @@ pub fn check_head(file: &[u8], choices: &mut Choices<'_>) {
         (end, Some(index.header.file_bytes))
     );
     let early = reader.finish_early();
-    let (early, _) = early.expect("a index alone relights, darkly");
+    let (early, _) = early.expect("a file index gives a dark transport");
     assert_eq!(early.tiles.len(), index.tiles());
     assert!(early.tiles.iter().all(|tile| tile.is_dark()));
 }
 
-/// What must hold of every transport that was read.
+/// Checks the properties of a transport that was read.
 ///
 /// # Panics
-/// If it does not.
+/// If one does not hold.
 pub fn check_transport(transport: &Transport) {
     let geometry = transport.geometry;
     let tiles: Vec<_> = geometry.tiles().collect();
@@ -143,10 +147,10 @@ pub fn check_transport(transport: &Transport) {
     }
 }
 
-/// Reads a file within the memory budget, and checks it chunk by chunk: both accept it or both refuse it.
+/// Reads a file whole within the memory budget, tile by tile, and with [`format::check`] chunk by chunk.
 ///
 /// # Panics
-/// If one does not.
+/// If one accepts the file and another refuses it, or tiles differ.
 pub fn check_file(file: &[u8]) -> Read {
     let (read, peak) = with_peak_bytes(|| whole(file));
     check_peak(peak);
@@ -154,37 +158,37 @@ pub fn check_file(file: &[u8]) -> Read {
         check_transport(transport);
     }
     let Some(index) = index(file) else {
-        assert!(read.is_err(), "a file without an index was read");
+        assert!(read.is_err(), "a file without a valid index was read");
         return read;
     };
     if file.len() as u64 != index.header.file_bytes {
         assert!(read.is_err(), "a file of another length was read");
         return read;
     }
-    let checked = index.chunks().try_for_each(|part| {
-        let range = index.range(part);
+    let checked = index.chunks().try_for_each(|chunk| {
+        let range = index.range(chunk);
         let bytes = &file[range.start as usize..range.end as usize];
-        format::check(&index, part, bytes)
+        format::check(&index, chunk, bytes)
     });
-    let by_itself = tiles_by_themselves(&index, file);
-    match (&read, &by_itself) {
+    let tile_by_tile = decode_tiles(&index, file);
+    match (&read, &tile_by_tile) {
         (Ok((transport, _)), Ok(tiles)) => assert!(transport.tiles == *tiles, "tiles differ"),
         (Err(_), Err(_)) => {}
-        (Ok(_), Err(error)) => panic!("what is read whole is not read by tiles: {error}"),
-        (Err(error), Ok(_)) => panic!("what is read by tiles is not read whole: {error}"),
+        (Ok(_), Err(error)) => panic!("the file is read whole, but refused tile by tile: {error}"),
+        (Err(error), Ok(_)) => panic!("the file is read tile by tile, but refused whole: {error}"),
     }
     match (&read, &checked) {
         (Ok(_), Ok(())) | (Err(_), Err(_)) => {}
-        (Ok(_), Err(error)) => panic!("what is read is not passed: {error}"),
-        (Err(error), Ok(())) => panic!("what is passed is not read: {error}"),
+        (Ok(_), Err(error)) => panic!("the file is read, but the check refuses it: {error}"),
+        (Err(error), Ok(())) => panic!("the check accepts the file, but it is not read: {error}"),
     }
     read
 }
 
-/// The tiles of a file, each read by itself.
-fn tiles_by_themselves(index: &FileIndex, file: &[u8]) -> Result<Vec<Tile>, FormatError> {
-    let fetch = |part| {
-        let range = index.range(part);
+/// Decodes the tiles of a file separately.
+fn decode_tiles(index: &FileIndex, file: &[u8]) -> Result<Vec<Tile>, FormatError> {
+    let fetch = |chunk| {
+        let range = index.range(chunk);
         Ok(file[range.start as usize..range.end as usize].to_vec())
     };
     let rank = format::decode_basis::<FormatError>(index, fetch)?.rank();
@@ -199,20 +203,22 @@ fn check_peak(peak: usize) {
     let allowed = LIMITS.decoded_bytes as usize + UNCOUNTED_BYTES;
     assert!(
         peak <= allowed,
-        "reading allocates {peak} bytes, {allowed} are allowed"
+        "reading allocates {peak} bytes, but {allowed} are allowed"
     );
 }
 
-/// Reads a file scan by scan, with a preview after each: neither exceeds the memory budget.
+/// Reads a file scan by scan, with a preview after each scan.
 ///
 /// # Panics
-/// If one does.
+/// If that exceeds the memory budget.
 pub fn check_previews(file: &[u8]) {
     let Some(index) = index(file) else {
         return;
     };
     let ends = (0..index.scans.len()).map(|scan| index.scan_range(scan).end);
-    let ends: Vec<u64> = std::iter::once(index.header.index_bytes()).chain(ends).collect();
+    let ends: Vec<u64> = std::iter::once(index.header.index_bytes())
+        .chain(ends)
+        .collect();
     let (previews, peak) = with_peak_bytes(|| -> Result<(), FormatError> {
         let mut reader = Reader::new(LIMITS);
         let mut start = 0;
@@ -228,76 +234,83 @@ pub fn check_previews(file: &[u8]) {
         }
         Ok(())
     });
-    drop(previews); // errors are those of `check_file`
+    drop(previews); // `check_file` checks errors
     check_peak(peak);
 }
 
-/// Every prefix of a file that has the index gives light transport.
+/// Reads the first half of a file's chunks.
 ///
 /// # Panics
-/// If it does not.
+/// If that gives no light transport.
 pub fn check_early(file: &[u8]) {
     let Some(index) = index(file) else {
         return;
     };
-    let head_bytes = index.header.index_bytes() as usize;
+    let index_bytes = index.header.index_bytes() as usize;
     let mut reader = Reader::new(LIMITS);
-    let there = file.len() - head_bytes;
-    if reader.feed(0, &file[..head_bytes + there / 2]).is_err() {
+    let chunk_bytes = file.len() - index_bytes;
+    if reader
+        .feed(0, &file[..index_bytes + chunk_bytes / 2])
+        .is_err()
+    {
         return;
     }
-    let (early, _) = reader.finish_early().expect("what has come relights");
+    let (early, _) = reader
+        .finish_early()
+        .expect("a prefix gives light transport");
     check_transport(&early);
 }
 
-/// How far a transport is from what was given: as far as the file says, and as rounding to codes adds.
+/// Checks the error of a transport against the encoder's input.
 ///
 /// # Panics
-/// If it is further.
+/// If it exceeds the error that the file declares and that of rounding to codes.
 pub fn check_error(
-    given: &Given,
+    input: &EncoderInput,
     transport: &Transport,
-    claimed: Option<Decibels>,
-    wanted: Wanted,
+    declared: Option<Decibels>,
+    target: TargetChoice,
 ) {
-    let (mut energy, mut error, mut codes) = (0.0, 0.0, 0.0);
+    let (mut energy, mut error, mut code_error) = (0.0, 0.0, 0.0);
     for (i, tile) in transport.tiles.iter().enumerate() {
-        energy += given.energy(i);
+        energy += input.energy(i);
         let got = tile.functions(&transport.geometry, &transport.basis).tau;
-        for (got, want) in got.iter().zip(given.functions(i).tau) {
+        for (got, want) in got.iter().zip(input.functions(i).tau) {
             for c in 0..CHANNELS {
                 let (got, want) = (f64::from(got[c]), f64::from(want[c]));
                 error += (got - want) * (got - want);
             }
         }
-        // Off by half a code at most: each element, and each coefficient of functions of unit norm.
-        let worth = |step: [f32; CHANNELS]| -> f64 {
+        // Half a code at most for each slot, and for each coefficient of basis functions of unit norm.
+        let squared_error = |step: [f32; CHANNELS]| -> f64 {
             step.iter().map(|step| f64::from(*step).powi(2) / 4.0).sum()
         };
-        codes += worth(tile.functions.step) * tile.functions.codes.len() as f64;
+        code_error += squared_error(tile.functions.step) * tile.functions.codes.len() as f64;
         let coefficients = tile.rect().extent.area() * transport.basis.rank().pow(2);
-        codes += worth(tile.coefficients.step) * coefficients as f64;
+        code_error += squared_error(tile.coefficients.step) * coefficients as f64;
     }
-    let Some(claimed) = claimed else {
+    let Some(declared) = declared else {
         assert!(
             energy == 0.0 || error <= energy,
-            "all of it is lost: {given:?}, {wanted:?}"
+            "a file without values has an error above the energy: {input:?}, {target:?}"
         );
         return;
     };
-    if let Wanted::Snr(snr) = wanted
+    if let TargetChoice::Snr(snr) = target
         && (5.0..60.0).contains(&snr.0)
     {
-        assert!(claimed.0 > snr.0 - 0.5, "{claimed}: {given:?}, {wanted:?}");
+        assert!(
+            declared.0 > snr.0 - 0.5,
+            "{declared}: {input:?}, {target:?}"
+        );
     }
-    let said = energy * 10f64.powf(-claimed.0 / 10.0);
-    // What is said adds up what rounding does to coefficients, to colours, to the first function of the
-    // basis and to the others, as if none had to do with another: in a picture of few pixels they may all
-    // point the same way, as may what codes add.
-    let most = ((4.0 * said).sqrt() + codes.sqrt()).powi(2) + 1e-9 * energy;
+    let declared_error = energy * 10f64.powf(-declared.0 / 10.0);
+    // The encoder adds the errors of coefficients, colours, the first basis function and the others as if they were
+    // independent. In a picture of few pixels they may have the same sign, and so may the errors of codes.
+    let max_error = ((4.0 * declared_error).sqrt() + code_error.sqrt()).powi(2) + 1e-9 * energy;
     assert!(
-        error <= most,
-        "{error:e} of {energy:e}, where {claimed} are {said:e} and codes {codes:e}: \
-         {given:?}, {wanted:?}"
+        error <= max_error,
+        "error {error:e} of energy {energy:e}; {declared} declares {declared_error:e}, codes add {code_error:e}: \
+         {input:?}, {target:?}"
     );
 }

@@ -1,4 +1,4 @@
-//! Small transports of any values at all, to encode.
+//! Small light transports with arbitrary values, for the encoder.
 
 use std::ops::RangeInclusive;
 
@@ -13,8 +13,8 @@ use relightable_photo::transport::{
 
 use crate::choices::Choices;
 
-/// Numbers that arithmetic stumbles over.
-const ODD: [f32; 16] = [
+/// Values for which arithmetic often fails.
+const SPECIAL_VALUES: [f32; 16] = [
     0.0,
     f32::NAN,
     f32::INFINITY,
@@ -32,10 +32,10 @@ const ODD: [f32; 16] = [
     -1.0,
     65504.0,
 ];
-/// Magnitudes of numbers that nothing stumbles over.
-const TAME: RangeInclusive<f32> = 1e-4..=1e4;
+/// Magnitudes for which arithmetic does not fail.
+const MODERATE_MAGNITUDES: RangeInclusive<f32> = 1e-4..=1e4;
 
-/// Grids of a few tiles.
+/// A geometry of few tiles.
 pub fn geometry(choices: &mut Choices<'_>) -> Geometry {
     let side = |choices: &mut Choices<'_>| 1 + u32::from(choices.below(40));
     let camera = Extent {
@@ -45,7 +45,7 @@ pub fn geometry(choices: &mut Choices<'_>) -> Geometry {
     let tile_side = choices.of([8, 8, 9, 16, 32]);
     let window = choices.of([1, 3, 5, 7]);
     let offset = match choices.below(4) {
-        // Wholly on a display of 64 by 64 elements.
+        // All windows lie on a light plane of 64 x 64 elements.
         0..=2 => 16.0,
         _ => choices.of([-30.0, 0.0, 60.0, 1e9, -1e300, f64::MAX]),
     };
@@ -63,63 +63,67 @@ pub fn geometry(choices: &mut Choices<'_>) -> Geometry {
         tile_side,
     }
     .validate()
-    .expect("all of it is in range")
+    .expect("all fields are in their ranges")
 }
 
-/// What is to be encoded, and how.
-pub struct Given {
+/// The input of the encoder.
+pub struct EncoderInput {
     pub geometry: Geometry,
     pub basis: Option<Basis>,
     pub tiles: Vec<BandTile>,
     pub metadata: Metadata,
     pub extensions: Vec<Extension>,
-    /// All numbers are zero or about as large as numbers are, and so is the range they span.
-    pub tame: bool,
+    /// Whether all values are 0 or of moderate magnitude, and not all 0.
+    pub is_moderate: bool,
 }
 
-impl std::fmt::Debug for Given {
+impl std::fmt::Debug for EncoderInput {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let rank = self.basis.as_ref().map(Basis::rank);
-        write!(f, "rank {rank:?}, tame {}, {:?}", self.tame, self.geometry)
+        write!(
+            f,
+            "rank {rank:?}, moderate {}, {:?}",
+            self.is_moderate, self.geometry
+        )
     }
 }
 
-impl Given {
+impl EncoderInput {
     pub fn new(choices: &mut Choices<'_>) -> Self {
-        let mut given = Self {
+        let mut input = Self {
             geometry: geometry(choices),
             basis: None,
             tiles: Vec::new(),
             metadata: Metadata::default(),
             extensions: Vec::new(),
-            tame: true,
+            is_moderate: true,
         };
-        let area = given.geometry.window.area();
+        let area = input.geometry.window.area();
         let rank = match choices.chance(192) {
             true => usize::from(choices.below(9)),
             false => 0,
         };
         if rank > 0 || choices.rarely() {
-            let kernels = (0..rank).map(|_| given.numbers(choices, area)).collect();
-            given.basis = Some(Basis { kernels });
+            let kernels = (0..rank).map(|_| input.values(choices, area)).collect();
+            input.basis = Some(Basis { kernels });
         }
-        for rect in given.geometry.tiles() {
-            let tile = given.tile(choices, rect, rank, area);
-            given.tiles.push(tile);
+        for rect in input.geometry.tiles() {
+            let tile = input.tile(choices, rect, rank, area);
+            input.tiles.push(tile);
         }
         if choices.chance(32) {
             let text = choices.up_to(40);
-            given.metadata.title = String::from_utf8_lossy(text).into_owned();
-            given.metadata.shots_used = vec![choices.u32() as usize; choices.byte().into()];
+            input.metadata.title = String::from_utf8_lossy(text).into_owned();
+            input.metadata.shots_used = vec![choices.u32() as usize; choices.byte().into()];
         }
         if choices.chance(32) {
-            given.extensions.push(Extension {
+            input.extensions.push(Extension {
                 tag: choices.bytes(),
                 must_understand: false,
                 data: choices.fill(3),
             });
         }
-        given
+        input
     }
 
     fn tile(
@@ -131,45 +135,45 @@ impl Given {
     ) -> BandTile {
         let mut tile = BandTile::dark(rect);
         let pixels = rect.extent.area();
-        let what = choices.below(8);
-        let colours = |numbers: Vec<f32>| {
-            let (colours, _) = numbers.as_chunks::<CHANNELS>();
+        let parts = choices.below(8);
+        let colours = |values: Vec<f32>| {
+            let (colours, _) = values.as_chunks::<CHANNELS>();
             colours.to_vec()
         };
-        if what & 1 != 0 && rank > 0 {
-            tile.coefficients = colours(self.numbers(choices, pixels * rank * CHANNELS));
+        if parts & 1 != 0 && rank > 0 {
+            tile.coefficients = colours(self.values(choices, pixels * rank * CHANNELS));
         }
-        if what & 6 == 6 || what & 3 == 2 {
-            tile.functions = colours(self.numbers(choices, pixels * area * CHANNELS));
+        if parts & 6 == 6 || parts & 3 == 2 {
+            tile.functions = colours(self.values(choices, pixels * area * CHANNELS));
         }
         tile
     }
 
-    /// So many numbers by few choices.
-    fn numbers(&mut self, choices: &mut Choices<'_>, count: usize) -> Vec<f32> {
+    /// `count` values from few decisions.
+    fn values(&mut self, choices: &mut Choices<'_>, count: usize) -> Vec<f32> {
         let mut noise = choices.noise();
-        let numbers: Vec<f32> = match choices.below(8) {
-            0 => vec![choices.of(ODD); count],
+        let values: Vec<f32> = match choices.below(8) {
+            0 => vec![choices.of(SPECIAL_VALUES); count],
             1 => {
-                let odd: [f32; 3] = std::array::from_fn(|_| choices.of(ODD));
-                odd.into_iter().cycle().take(count).collect()
+                let pattern: [f32; 3] = std::array::from_fn(|_| choices.of(SPECIAL_VALUES));
+                pattern.into_iter().cycle().take(count).collect()
             }
-            // Of any size.
+            // Noise of one magnitude.
             2 => {
-                let size = f32::from(choices.byte() as i8).exp2();
-                (0..count).map(|_| noise.signed() * size).collect()
+                let magnitude = f32::from(choices.byte() as i8).exp2();
+                (0..count).map(|_| noise.signed() * magnitude).collect()
             }
-            // Of every size.
+            // Arbitrary bits.
             3 => (0..count).map(|_| f32::from_bits(noise.next())).collect(),
-            // Noise, and one number that is none.
+            // Noise and one arbitrary value.
             4 => {
-                let mut numbers: Vec<f32> = (0..count).map(|_| noise.signed()).collect();
+                let mut values: Vec<f32> = (0..count).map(|_| noise.signed()).collect();
                 let at = usize::from(choices.u16()) % count;
-                numbers[at] = match choices.chance(128) {
+                values[at] = match choices.chance(128) {
                     true => choices.f32(),
-                    false => choices.of(ODD),
+                    false => choices.of(SPECIAL_VALUES),
                 };
-                numbers
+                values
             }
             // Sparse.
             5 => (0..count)
@@ -190,17 +194,17 @@ impl Given {
             }
             _ => (0..count).map(|_| noise.signed()).collect(),
         };
-        let tame = |v: &f32| *v == 0.0 || TAME.contains(&v.abs());
-        self.tame &= numbers
+        let is_moderate = |v: &f32| *v == 0.0 || MODERATE_MAGNITUDES.contains(&v.abs());
+        self.is_moderate &= values
             .iter()
-            .all(|v| tame(v) || v.abs() < 1.0 && v.abs() > 1e-9);
-        self.tame &= numbers.iter().fold(0.0, |peak: f32, v| peak.max(v.abs())) != 0.0;
-        numbers
+            .all(|v| is_moderate(v) || v.abs() < 1.0 && v.abs() > 1e-9);
+        self.is_moderate &= values.iter().fold(0.0, |peak: f32, v| peak.max(v.abs())) != 0.0;
+        values
     }
 
     pub fn encode(
         &self,
-        quality: RateTarget<'_>,
+        target: RateTarget<'_>,
         executor: &impl Executor,
     ) -> Result<EncodedFile, FormatError> {
         let source = Source {
@@ -210,7 +214,7 @@ impl Given {
             metadata: self.metadata.clone(),
             extensions: self.extensions.clone(),
         };
-        EncodedFile::new(source, quality, executor)
+        EncodedFile::new(source, target, executor)
     }
 
     /// Light transport functions of tile `i`.
@@ -219,19 +223,19 @@ impl Given {
         self.tiles[i].clone().functions(&self.geometry, &basis)
     }
 
-    /// Squared elements of tile `i`, of its coefficients and of its functions each by themselves: where they
-    /// cancel, what is left of them is no measure of what is coded.
+    /// The energy of tile `i`: of its coefficients and of its direct functions separately, as the encoder codes both
+    /// even where they cancel.
     pub fn energy(&self, i: usize) -> f64 {
         let basis = self.basis.clone().unwrap_or_default();
         let mut coefficients = self.tiles[i].clone();
         let functions = std::mem::take(&mut coefficients.functions);
-        let of_coefficients = coefficients.functions(&self.geometry, &basis).tau;
-        let elements = of_coefficients.iter().chain(&functions).flatten();
-        elements.map(|v| f64::from(*v).powi(2)).sum()
+        let factored = coefficients.functions(&self.geometry, &basis).tau;
+        let values = factored.iter().chain(&functions).flatten();
+        values.map(|v| f64::from(*v).powi(2)).sum()
     }
 
-    /// Whether every window lies on the display whole.
-    pub fn inside(&self) -> bool {
+    /// Whether all windows lie on the light plane.
+    pub fn has_all_windows_on_plane(&self) -> bool {
         let side = i64::from(self.geometry.window.side());
         let fits = |at: i32, length: u32| at >= 0 && i64::from(at) + side <= length.into();
         self.geometry
@@ -245,11 +249,11 @@ impl Given {
     }
 }
 
-/// A worker who does the last first.
+/// An executor that runs jobs in reverse order.
 #[derive(Debug)]
-pub struct Backwards;
+pub struct ReversedExecutor;
 
-impl Executor for Backwards {
+impl Executor for ReversedExecutor {
     fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         let mut results: Vec<T> = (0..count).rev().map(work).collect();
         results.reverse();
@@ -257,16 +261,16 @@ impl Executor for Backwards {
     }
 }
 
-/// How good a file is to be, before it is asked of a judge.
+/// A rate target, without the distortion metric.
 #[derive(Clone, Copy, Debug)]
-pub enum Wanted {
+pub enum TargetChoice {
     Snr(Decibels),
     Bytes(u64),
     Lossless,
     Loss(Decibels),
 }
 
-impl Wanted {
+impl TargetChoice {
     pub fn new(choices: &mut Choices<'_>) -> Self {
         match choices.below(8) {
             0 => Self::Lossless,
@@ -277,47 +281,51 @@ impl Wanted {
         }
     }
 
-    pub fn encode(self, given: &Given, opinions: &[u8]) -> Result<EncodedFile, FormatError> {
-        let judge = Whim {
-            given,
-            opinions,
-            asked: std::sync::atomic::AtomicUsize::new(0),
+    /// Encodes `input`. A distortion metric returns `losses`, in hundredths of a decibel; 255 stands for NaN.
+    ///
+    /// # Errors
+    /// The errors of the encoder.
+    pub fn encode(self, input: &EncoderInput, losses: &[u8]) -> Result<EncodedFile, FormatError> {
+        let metric = ArbitraryMetric {
+            input,
+            losses,
+            calls: std::sync::atomic::AtomicUsize::new(0),
         };
-        let quality = match self {
+        let target = match self {
             Self::Snr(snr) => RateTarget::Snr(snr),
-            Self::Bytes(most) => RateTarget::Bytes(most),
+            Self::Bytes(limit) => RateTarget::Bytes(limit),
             Self::Lossless => RateTarget::Lossless,
-            Self::Loss(most) => RateTarget::Loss(most, &judge),
+            Self::Loss(limit) => RateTarget::Loss(limit, &metric),
         };
-        given.encode(quality, &SequentialExecutor)
+        input.encode(target, &SequentialExecutor)
     }
 }
 
-/// A judge who says anything.
-struct Whim<'a> {
-    given: &'a Given,
-    opinions: &'a [u8],
-    asked: std::sync::atomic::AtomicUsize,
+/// A distortion metric with arbitrary results.
+struct ArbitraryMetric<'a> {
+    input: &'a EncoderInput,
+    losses: &'a [u8],
+    calls: std::sync::atomic::AtomicUsize,
 }
 
-impl DistortionMetric for Whim<'_> {
+impl DistortionMetric for ArbitraryMetric<'_> {
     fn tiles(&self) -> Vec<BandTile> {
-        let some = self.given.tiles.iter().step_by(3);
-        some.take(3).cloned().collect()
+        let tiles = self.input.tiles.iter().step_by(3);
+        tiles.take(3).cloned().collect()
     }
 
     fn loss(&self, functions: &[TransportFunctions]) -> Decibels {
         for (functions, tile) in functions.iter().zip(self.tiles()) {
             assert_eq!(functions.rect, tile.rect);
-            let area = self.given.geometry.window.area();
+            let area = self.input.geometry.window.area();
             assert_eq!(functions.tau.len(), tile.rect.extent.area() * area);
         }
-        let asked = self
-            .asked
+        let call = self
+            .calls
             .fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        match self.opinions.get(asked).copied().unwrap_or(0) {
+        match self.losses.get(call).copied().unwrap_or(0) {
             255 => Decibels(f64::NAN),
-            opinion => Decibels(f64::from(opinion) / 100.0),
+            loss => Decibels(f64::from(loss) / 100.0),
         }
     }
 }
