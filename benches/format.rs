@@ -1,17 +1,17 @@
-//! `pkg-scripts/bench format`: what light transport takes in a file and how fast it comes out, against
-//! other codecs at equal SNR in the same run.
+//! `pkg-scripts/bench format`: size of files and speed of decoding, compared with other codecs at equal SNR in the same
+//! run.
 //!
-//! - At the paper's scale, and on a scene a quarter as wide: bytes of a default file, and how much SNR
-//!   against the truth is lost by it (an archive, `--lossless`, is the recovered transport).
-//! - First tenth of a file: the least PSNR of pictures relit by it.
-//! - Peers (`format_peers.py`) code the recovered band, or its coefficients as pictures, as coarsely as
-//!   our file's SNR against it allows. `vs_best_band_codec` is against f16 + zstd-19, CSR, blosc2 and zfp
-//!   where lossless ones get numbers rounded for them, each in its best arrangement;
-//!   `vs_best_plain_band_codec` against these as they are: zfp at equal SNR, or half floats as recovered.
-//! - Decoding: MB of dequantised coefficients, four bytes each, a second: natively tile by tile, on one
-//!   thread; in WebAssembly with simd128, of all scans but the last, in Node on one thread.
+//! - `*_scale_*`: bytes of a default file, and its loss of SNR against the known transport, relative to a `--lossless`
+//!   file of the same recovery. At the paper's scale, and for a scene of a quarter of its width.
+//! - `prefix10_min_psnr_db`: minimum PSNR of pictures relit by the first tenth of a file.
+//! - `vs_*`: bytes of a peer (`format_peers.py`) over ours. Peers code the recovered band, or its coefficients as
+//!   pictures, as coarsely as the SNR of our file allows. `vs_best_band_codec`: the best of f16 + zstd-19, CSR, blosc2
+//!   and zfp, where lossless coders get quantised values in their best layout. `vs_best_plain_band_codec`: the best of
+//!   zfp at equal SNR, and f16 + zstd-19 without quantisation.
+//! - `decode_*`: MB of dequantised coefficients, four bytes each, per second and thread: natively tile by tile; in
+//!   WebAssembly with simd128, in Node, all scans except the last.
 
-#![allow(clippy::unwrap_used, clippy::expect_used)] // a bench that cannot go on should stop
+#![allow(clippy::unwrap_used, clippy::expect_used)] // a failed benchmark should panic
 
 mod figures;
 
@@ -32,9 +32,10 @@ use serde_json::{Value, json};
 
 use figures::Figures;
 
-/// Peers of the plain band that keep what they are given.
-const KEEPERS: [&str; 4] = ["band_f16_zstd19", "dense_f16_zstd19", "csr_npz", "blosc2"];
-const PLANES: [&str; 2] = ["jpeg_planes", "webp_planes"];
+/// Lossless peers that code the band.
+const LOSSLESS_PEERS: [&str; 4] = ["band_f16_zstd19", "dense_f16_zstd19", "csr_npz", "blosc2"];
+/// Peers that code the coefficients as pictures.
+const IMAGE_PEERS: [&str; 2] = ["jpeg_planes", "webp_planes"];
 
 fn main() {
     let folder = figures::folder();
@@ -60,37 +61,37 @@ fn ltm_export(args: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or(Value::Null)
 }
 
-/// Stained glass at two camera pixels an element under 80 patterns.
+/// A simulated capture of stained glass, with two camera pixels along each side of a light element, under 80 patterns.
 fn simulated(folder: &Path, name: &str, side: u32) -> PathBuf {
     let capture = folder.join(name);
     if !capture.join("capture.json").exists() {
         let [camera, light] = [side, side / 2].map(|side| format!("{side}x{side}"));
         let grids = ["--camera", &camera, "--light", &light, "--patterns", "80"];
-        let what = ["simulate", "stained-glass", "-o", capture.to_str().unwrap()];
-        ltm_export(&[&what[..], &grids].concat());
+        let command = ["simulate", "stained-glass", "-o", capture.to_str().unwrap()];
+        ltm_export(&[&command[..], &grids].concat());
     }
     capture
 }
 
-/// A default file, and the archive of the same recovery.
+/// A default file, and a lossless file of the same recovery.
 struct Files {
     file: PathBuf,
-    archive: PathBuf,
+    lossless: PathBuf,
 }
 
 fn loss(folder: &Path, name: &str, capture: &Path, figures: &mut Figures) -> Files {
     let files = Files {
         file: folder.join(format!("{name}.ltm")),
-        archive: folder.join(format!("{name}-lossless.ltm")),
+        lossless: folder.join(format!("{name}-lossless.ltm")),
     };
     let capture = capture.to_str().unwrap();
     let mut snr = [0.0; 2];
-    for (i, (path, how)) in [(&files.archive, "--lossless"), (&files.file, "--json")]
+    for (i, (path, option)) in [(&files.lossless, "--lossless"), (&files.file, "--json")]
         .into_iter()
         .enumerate()
     {
         let path = path.to_str().unwrap();
-        ltm_export(&["recover", capture, "-o", path, "--patterns", "80", how]);
+        ltm_export(&["recover", capture, "-o", path, "--patterns", "80", option]);
         let evaluated = ltm_export(&["evaluate", path, capture, "--json"]);
         snr[i] = evaluated["snr_db"].as_f64().unwrap();
     }
@@ -115,7 +116,7 @@ fn prefix(files: &Files, capture: &Path, figures: &mut Figures) {
     );
 }
 
-/// A file's index, basis and tiles as they are in it.
+/// The index, basis and tiles of a file.
 struct Decoded {
     index: FileIndex,
     basis: Basis,
@@ -129,8 +130,8 @@ fn decode(path: &Path) -> Decoded {
     let index = reader.index_bytes().unwrap() as usize;
     reader.feed(0, &bytes[..index]).unwrap();
     let index = reader.index().unwrap().clone();
-    let fetch = |part: ChunkId| {
-        let range = index.range(part);
+    let fetch = |chunk: ChunkId| {
+        let range = index.range(chunk);
         Ok::<_, relightable_photo::format::FormatError>(
             bytes[range.start as usize..range.end as usize].to_vec(),
         )
@@ -155,10 +156,10 @@ fn npy<T: npyz::AutoSerialize + Copy>(path: &Path, shape: &[usize], values: &[T]
 
 fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
     let Ok(python) = std::env::var("BENCH_PYTHON") else {
-        println!("no peers: run pkg-scripts/bench format");
+        println!("no Python for the peers: run pkg-scripts/bench format");
         return;
     };
-    let (given, ours) = (decode(&files.archive), decode(&files.file));
+    let (given, ours) = (decode(&files.lossless), decode(&files.file));
     let geometry = given.index.header.geometry;
     let (camera, area) = (geometry.camera, geometry.window.area());
     let rank = given.basis.rank();
@@ -203,14 +204,14 @@ fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
     npy(&file("basis.npy"), &[rank, area], &kernels);
     npy(&file("origins.npy"), &[camera.area(), 2], &origins);
     let snr = error.snr().unwrap().0;
-    let about = json!({
+    let description = json!({
         "camera": [camera.width, camera.height],
         "light": [geometry.light.width, geometry.light.height],
         "window": geometry.window.side(),
         "snr_db": snr,
         "ours_bytes": bytes,
     });
-    fs::write(problem.join("problem.json"), about.to_string()).unwrap();
+    fs::write(problem.join("problem.json"), description.to_string()).unwrap();
     let output = Command::new(python)
         .arg(concat!(
             env!("CARGO_MANIFEST_DIR"),
@@ -223,7 +224,7 @@ fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
         .unwrap();
     assert!(output.status.success());
     let peers: Value = serde_json::from_slice(&output.stdout).unwrap();
-    println!("\nAt {snr:.2} dB against the recovered band, of {bytes} bytes:");
+    println!("\nPeers at {snr:.2} dB against the recovered band (ours: {bytes} bytes):");
     for (name, peer) in peers.as_object().unwrap() {
         println!("{name:20} {peer}");
     }
@@ -232,7 +233,7 @@ fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
         let ratios = names.iter().filter_map(|name| ratio(name));
         ratios.fold(f64::INFINITY, f64::min)
     };
-    for name in KEEPERS.iter().chain(&PLANES).chain(&["zfp"]) {
+    for name in LOSSLESS_PEERS.iter().chain(&IMAGE_PEERS).chain(&["zfp"]) {
         if let Some(ratio) = ratio(name) {
             figures.insert(format!("vs_{name}"), ratio);
         }
@@ -241,11 +242,14 @@ fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
     figures.insert("vs_plain_f16_zstd19".to_owned(), plain);
     let zfp = ratio("zfp").unwrap_or(f64::INFINITY);
     figures.insert("vs_best_plain_band_codec".to_owned(), zfp.min(plain));
-    figures.insert("vs_best_band_codec".to_owned(), least(&KEEPERS).min(zfp));
-    figures.insert("vs_best_image_planes".to_owned(), least(&PLANES));
+    figures.insert(
+        "vs_best_band_codec".to_owned(),
+        least(&LOSSLESS_PEERS).min(zfp),
+    );
+    figures.insert("vs_best_image_planes".to_owned(), least(&IMAGE_PEERS));
 }
 
-/// The band as half floats in planes of bytes, compressed.
+/// Bytes of the band as half floats, split into low and high bytes, by zstd.
 fn half_floats(band: &[f32]) -> usize {
     let halves = || {
         band.iter()
@@ -258,9 +262,9 @@ fn half_floats(band: &[f32]) -> usize {
     zstd::bulk::compress(&planes, 19).unwrap().len()
 }
 
-/// Encoding and decoding on one thread, natively.
+/// Native encoding and decoding on one thread.
 fn rates(files: &Files, figures: &mut Figures) {
-    let given = decode(&files.archive);
+    let given = decode(&files.lossless);
     let megabytes = |decoded: &Decoded| {
         let values: usize = decoded
             .tiles
@@ -288,7 +292,7 @@ fn rates(files: &Files, figures: &mut Figures) {
     figures.insert("decode_native_mb_s".to_owned(), fastest.fold(0.0, f64::max));
 }
 
-/// Decoding in WebAssembly, where the player has been built.
+/// Decoding in WebAssembly, if `BENCH_NODE` names Node.
 fn wasm_rate(file: &Path, figures: &mut Figures) {
     let Ok(node) = std::env::var("BENCH_NODE") else {
         return;

@@ -1,22 +1,22 @@
-"""Bytes that peers take for a band of light transport at the SNR at which ours was coded.
+"""Bytes of other codecs for a band of light transport, at the SNR of our file.
 
 python format_peers.py PROBLEM_DIR
 
-PROBLEM_DIR, which benches/format.rs writes, has problem.json {"camera": [W, H], "light": [LW, LH],
-"window": w, "snr_db", "ours_bytes"}; origins.npy, int32 [N, 2], the first element (u, v) of each
-camera pixel's window; band.npy, float32 [N, w·w, 3], 0 off the display; and the same transport as
-coefficients.npy, float32 [r, 3, H, W], over basis.npy, float32 [r, w·w], of orthonormal rows.
+benches/format.rs writes PROBLEM_DIR: problem.json {"camera": [W, H], "light": [LW, LH], "window": w,
+"snr_db", "ours_bytes"}; origins.npy, int32 [N, 2], the window origin (u, v) of each camera pixel;
+band.npy, float32 [N, w·w, 3], 0 off the light plane; and the same transport as coefficients.npy,
+float32 [r, 3, H, W], over basis.npy, float32 [r, w·w], with orthonormal rows.
 
-Prints {peer: {"bytes", "snr_db", "parameter", "encode_seconds", "decode_seconds"}}, null where a
-peer cannot take the problem, and "raw_f16_band_bytes". Every peer codes as coarsely as the SNR
-allows, in the best of several arrangements; one that cannot reach it says "reached": false.
+Prints {peer: {"bytes", "snr_db", "parameter", "encode_seconds", "decode_seconds"}}, null if a peer
+does not support the problem, and "raw_f16_band_bytes". Each peer codes as coarsely as the SNR allows,
+in the best of several layouts; a peer that cannot reach the SNR has "reached": false.
 
-SNR is 20 log10(‖T‖/‖T − T̂‖), T̂ decoded from the bytes that are counted. Nothing is counted for
-where the windows lie. Encoding is timed from the band (or the coefficients) to bytes, parameters
-being known; decoding from bytes to float32 in the peer's own arrangement.
+SNR is 20 log10(‖T‖/‖T − T̂‖), with T̂ decoded from the counted bytes. Window origins are not counted.
+Encoding is timed from the band (or the coefficients) to bytes, with known parameters; decoding from
+bytes to float32 in the peer's own layout.
 
-Peers that lose nothing by themselves are given codes: the band over a step, rounded, and 0 below a
-threshold, since coders of entropy do best with one a little over half a step.
+Lossless peers get codes: the band divided by a step and rounded, and 0 below a threshold, as entropy
+coders do best with a threshold slightly above half a step.
 """
 
 import io
@@ -29,7 +29,7 @@ from pathlib import Path
 
 import numpy as np
 
-CLOSE = 0.02  # dB over the target that will do
+SNR_TOLERANCE_DB = 0.02  # above the target
 THRESHOLDS = [0.5, 0.55, 0.6, 0.65, 0.7, 0.8, 1.0]  # in steps
 LAYOUTS = {
     "slot, channel, pixel": (1, 2, 0),
@@ -37,17 +37,17 @@ LAYOUTS = {
     "channel, pixel, slot": (2, 0, 1),
     "pixel, slot, channel": (0, 1, 2),
 }
-DENSE_LIMIT = 10**9
-DENSE_BLOCK = 1 << 22  # numbers
-STEP_BYTES = 4  # a float32 that turns codes into numbers
+MAX_DENSE_BYTES = 10**9
+DENSE_BLOCK_VALUES = 1 << 22
+STEP_BYTES = 4  # a float32
 
 
 class Problem:
     def __init__(self, folder):
-        about = json.loads((folder / "problem.json").read_text())
-        self.width, self.height = about["camera"]
-        self.light_width, self.light_height = about["light"]
-        self.window, self.target = about["window"], about["snr_db"]
+        description = json.loads((folder / "problem.json").read_text())
+        self.width, self.height = description["camera"]
+        self.light_width, self.light_height = description["light"]
+        self.window, self.target = description["window"], description["snr_db"]
         self.band = np.load(folder / "band.npy")
         self.coefficients = np.load(folder / "coefficients.npy")
         self.basis = np.load(folder / "basis.npy")
@@ -55,14 +55,14 @@ class Problem:
         slots = np.arange(self.window**2)
         u = self.origins[:, :1] + slots % self.window
         v = self.origins[:, 1:] + slots // self.window
-        self.on_display = (u >= 0) & (u < self.light_width) & (v >= 0) & (v < self.light_height)
+        self.on_plane = (u >= 0) & (u < self.light_width) & (v >= 0) & (v < self.light_height)
         self.elements = v * self.light_width + u
         self.steps = {}
 
     def codes(self, threshold):
-        """The coarsest step that reaches the target with this threshold, and the codes."""
+        """The coarsest step that reaches the target with this threshold, and its codes."""
         if threshold not in self.steps:
-            # As if rounding noise were uniform.
+            # First step: for uniform rounding noise.
             noise = energy(self.band) / self.band.size / 10 ** (self.target / 10)
             self.steps[threshold] = coarsest(
                 lambda step: snr(self.band, quantise(self.band, step, threshold) * step),
@@ -72,7 +72,7 @@ class Problem:
         step = self.steps[threshold]
         codes = quantise(self.band, step, threshold)
         if codes.max() > 65535:
-            sys.exit(f"{self.target} dB is more than codes of 16 bits reach")
+            sys.exit(f"problem.json: 16-bit codes cannot reach {self.target} dB; lower snr_db")
         return step, codes.astype(np.uint16)
 
 
@@ -97,7 +97,7 @@ def snr(truth, values):
 
 
 def coarsest(snr_at, target, step):
-    """The largest step whose SNR is at least the target, sought from the given one."""
+    """The largest step whose SNR is at least the target, by a search from `step`."""
     at, fine, coarse = np.log2(step), None, None
     for _ in range(30):
         found = snr_at(np.float32(2.0**at))
@@ -105,13 +105,13 @@ def coarsest(snr_at, target, step):
             fine = at, found
         else:
             coarse = at, found
-        if fine and (fine[1] - target <= CLOSE or coarse and abs(coarse[0] - fine[0]) < 1e-4):
+        if fine and (fine[1] - target <= SNR_TOLERANCE_DB or coarse and abs(coarse[0] - fine[0]) < 1e-4):
             break
         if fine and coarse:
-            share = (fine[1] - target - CLOSE / 2) / (fine[1] - coarse[1])
+            share = (fine[1] - target - SNR_TOLERANCE_DB / 2) / (fine[1] - coarse[1])
             at = fine[0] + (coarse[0] - fine[0]) * np.clip(share, 0.1, 0.9)
         else:
-            at += (found - target - CLOSE / 2) / 6
+            at += (found - target - SNR_TOLERANCE_DB / 2) / 6
     return np.float32(2.0 ** fine[0])
 
 
@@ -129,56 +129,56 @@ def report(problem, size, reached, parameter, encode, decode):
 
 
 def number(codes, kind):
-    """The type of number for these codes, which holds them exactly."""
+    """A numeric type that represents these codes exactly."""
     if kind == "float16" and codes.max() <= 2048:
         return np.float16
     return np.uint8 if codes.max() < 256 else np.uint16
 
 
-def lossless(problem, ways, encode, decode):
-    """What a lossless coder takes at best, and the threshold for that.
+def lossless(problem, options, encode, decode):
+    """The smallest result of a lossless coder, and its threshold.
 
-    encode(array, way, quick) gives bytes, decode(bytes, way, array to fill) their numbers; where
-    quick, sizes need only tell arrangements apart.
+    encode(array, option, quick) returns bytes, decode(bytes, option, array) fills the array; with `quick`
+    the encoder may be fast, as sizes only serve to compare layouts.
     """
 
     def arranged(codes, layout, kind):
         return np.ascontiguousarray(codes.transpose(LAYOUTS[layout]).astype(number(codes, kind)))
 
     _, codes = problem.codes(0.6)
-    tries = {}  # by size: where that is the same, so is the arrangement
+    tries = {}  # by size: equal sizes mean equal layouts
     for layout, kind in itertools.product(LAYOUTS, ["integer", "float16"]):
         array = arranged(codes, layout, kind)
-        for way in ways:
-            tries.setdefault(len(encode(array, ways[way], True)), (layout, kind, way))
+        for option in options:
+            tries.setdefault(len(encode(array, options[option], True)), (layout, kind, option))
     leading = [tries[size] for size in sorted(tries)[:2]]
 
-    layout, kind, way = leading[0]
+    layout, kind, option = leading[0]
     sizes = {}
     for threshold in THRESHOLDS:
         _, codes = problem.codes(threshold)
-        sizes[threshold] = len(encode(arranged(codes, layout, kind), ways[way], True))
+        sizes[threshold] = len(encode(arranged(codes, layout, kind), options[option], True))
     threshold = min(sizes, key=sizes.get)
     step, _ = problem.codes(threshold)
 
     results = []
-    for layout, kind, way in leading:
+    for layout, kind, option in leading:
         start = time.perf_counter()
         array = arranged(quantise(problem.band, step, threshold), layout, kind)
-        data = encode(array, ways[way], False)
+        data = encode(array, options[option], False)
         encoded = time.perf_counter() - start
         start = time.perf_counter()
-        decoded = decode(data, ways[way], np.empty_like(array)).astype(np.float32) * step
+        decoded = decode(data, options[option], np.empty_like(array)).astype(np.float32) * step
         took = time.perf_counter() - start
         reached = snr(problem.band, decoded.transpose(np.argsort(LAYOUTS[layout])))
-        name = f"[{layout}] {array.dtype}, {way}, step {step:.4g}, threshold {threshold}"
+        name = f"[{layout}] {array.dtype}, {option}, step {step:.4g}, threshold {threshold}"
         size = len(data) + STEP_BYTES
         results.append(report(problem, size, reached, name, encoded, took))
     return min(results, key=lambda result: result["bytes"]), threshold
 
 
 def zstd(level, size):
-    """zstd with a window as long as the data, as far as decoders take it unasked."""
+    """zstd with a window as long as the data, up to the limit of default decoders."""
     import zstandard
 
     window = int(np.clip(np.ceil(np.log2(size)), 20, 27))
@@ -203,8 +203,8 @@ def band_zstd(problem):
             plain = np.ascontiguousarray(plain.reshape(array.itemsize, -1).T)
         return plain.view(array.dtype).reshape(array.shape)
 
-    ways = {"bytes together": False, "bytes split": True}
-    return lossless(problem, ways, encode, decode)
+    options = {"bytes together": False, "bytes split": True}
+    return lossless(problem, options, encode, decode)
 
 
 def blosc(problem):
@@ -226,20 +226,20 @@ def blosc(problem):
         blosc2.decompress2(data, dst=array, nthreads=1)
         return array
 
-    ways = {"its own blocks": 0, "blocks of 1 MiB": 1 << 20, "blocks of 8 MiB": 1 << 23}
-    return lossless(problem, ways, encode, decode)[0]
+    options = {"its own blocks": 0, "blocks of 1 MiB": 1 << 20, "blocks of 8 MiB": 1 << 23}
+    return lossless(problem, options, encode, decode)[0]
 
 
 def dense_blocks(problem, values, layout):
-    """The whole matrix of a band's values, block by block of its rows or columns."""
+    """The dense matrix of a band, in blocks of its rows or columns."""
     light = problem.light_width * problem.light_height
     pixels = len(values)
     if layout == "pixel, channel, element":
-        many = max(1, DENSE_BLOCK // (3 * light))
+        many = max(1, DENSE_BLOCK_VALUES // (3 * light))
         for first in range(0, pixels, many):
             here = slice(first, min(first + many, pixels))
             block = np.zeros((here.stop - first, 3, light), values.dtype)
-            n, s = np.nonzero(problem.on_display[here])
+            n, s = np.nonzero(problem.on_plane[here])
             block[n, :, problem.elements[here][n, s]] = values[here][n, s]
             yield block
         return
@@ -257,7 +257,7 @@ def dense_zstd(problem, threshold):
     import zstandard
 
     size = 2 * 3 * len(problem.band) * problem.light_width * problem.light_height
-    if size > DENSE_LIMIT:
+    if size > MAX_DENSE_BYTES:
         return None
     step, codes = problem.codes(threshold)
     codes = codes.astype(np.float16)
@@ -304,7 +304,7 @@ def csr(problem):
             files.append(file.getvalue())
         return files
 
-    # Where a number is 0, its index goes too, so thresholds may pay that are no use elsewhere.
+    # A zero saves its index too, so larger thresholds than for the other coders may be best.
     middle = problem.height // 2
     strip = slice(middle * problem.width, (middle + problem.height // 8 + 1) * problem.width)
     sizes = {}
@@ -338,7 +338,7 @@ def csr(problem):
 def zfp(problem):
     import zfpy
 
-    # Axes: camera y, x; window v, u; channel c. Where c comes first, each has an array of its own.
+    # Axes: camera y, x; window v, u; channel c. If c comes first, each channel has an array of its own.
     def axes(layout):
         return ["yxvuc".index(axis) for axis in layout.replace(" ", "")]
 
@@ -351,7 +351,7 @@ def zfp(problem):
         return [math.prod(lengths[axis] for axis in group) for group in layout.split()]
 
     def fits(layout):
-        """Whether its header has room: 48 bits for all sides, the same for each."""
+        """Whether the header can hold the shape: 48 bits for all sides, the same number for each."""
         lengths = shape(len(problem.band), layout)[layout[0] == "c" :]
         return max(lengths) <= 1 << 48 // len(lengths)
 
@@ -366,19 +366,19 @@ def zfp(problem):
         array = array.reshape([lengths[axis] for axis in axes(layout)])
         return array.transpose(np.argsort(axes(layout))).reshape(-1, problem.window**2, 3)
 
-    # It rounds its tolerance down to a power of two; scaled numbers have the effect of any other.
+    # zfp rounds its tolerance down to a power of two; scaled values have the effect of any tolerance.
     def encode(parts, step):
         return [zfpy.compress_numpy(part / step, tolerance=1.0) for part in parts]
 
     def decode(files, step):
         return [np.maximum(zfpy.decompress_numpy(file), 0) * step for file in files]
 
-    def tuned(band, on_display, layout, step):
+    def tuned(band, on_plane, layout, step):
         parts = arrays(band, layout)
-        display = on_display[:, :, None]
+        mask = on_plane[:, :, None]
 
         def snr_at(step):
-            return snr(band, band_of(decode(encode(parts, step), step), layout) * display)
+            return snr(band, band_of(decode(encode(parts, step), step), layout) * mask)
 
         return coarsest(snr_at, problem.target, step)
 
@@ -388,11 +388,11 @@ def zfp(problem):
     step, tries = problem.codes(0.5)[0], []
     layouts = ["c y x v u", "c vu y x", "c yx v u", "c y x vu", "y x vu c", "yx v u c"]
     for layout in filter(fits, layouts):
-        step = tuned(problem.band[strip], problem.on_display[strip], layout, step)
+        step = tuned(problem.band[strip], problem.on_plane[strip], layout, step)
         size = sum(map(len, encode(arrays(problem.band[strip], layout), step)))
         tries.append((size, layout, step))
     _, layout, step = min(tries)
-    step = tuned(problem.band, problem.on_display, layout, step)
+    step = tuned(problem.band, problem.on_plane, layout, step)
 
     start = time.perf_counter()
     files = encode(arrays(problem.band, layout), step)
@@ -400,7 +400,7 @@ def zfp(problem):
     start = time.perf_counter()
     parts = decode(files, step)
     took = time.perf_counter() - start
-    back = band_of(parts, layout) * problem.on_display[:, :, None]
+    back = band_of(parts, layout) * problem.on_plane[:, :, None]
     size = sum(map(len, files)) + STEP_BYTES
     name = f"[{layout}], tolerance 1 of numbers over {step:.4g}"
     return report(problem, size, snr(problem.band, back), name, encoded, took)
@@ -409,7 +409,7 @@ def zfp(problem):
 def save_jpeg(picture, quality):
     from PIL import ImageFile
 
-    # The whole file must fit in one block, and what is taken for it by itself may be too small.
+    # The whole file must fit into one block; Pillow's default may be too small.
     ImageFile.MAXBLOCK = 8 * picture.width * picture.height + 65536
     files = []
     for progressive in [False, True]:
@@ -428,12 +428,12 @@ def save_webp(picture, quality):
 
 
 class Plane:
-    """One component's coefficients as an 8 bit picture."""
+    """The coefficients of one component as an 8-bit picture."""
 
-    def __init__(self, values, way, save, quality):
+    def __init__(self, values, layout, save, quality):
         from PIL import Image
 
-        colour, self.clip = way
+        colour, self.clip = layout
         self.shape, self.colour, self.quality = values.shape, colour, quality
         low, high = np.quantile(values, [self.clip, 1 - self.clip])
         self.scale, self.bias = np.float32(max(high - low, 1e-30) / 255), np.float32(low)
@@ -451,24 +451,24 @@ class Plane:
 
 
 def planes(problem, save, qualities):
-    """A picture of each component, as viewers of reflectance transformation images have them.
+    """A picture of each component, as in viewers of reflectance transformation images.
 
-    Of each component the three channels are one colour picture, or three grey ones in a file; its
-    range is from the least to the greatest, or without 0.1 % at either end. Of all ways and
-    qualities, and to leave it out, each component has what is cheapest where error has a price, the
-    same for all. SNR is against the band that the coefficients themselves make.
+    The three channels of a component are one colour picture, or three grey pictures in one file. Codes
+    cover all values, or all but 0.1 % at either end. Each component has the option of least
+    bytes + price · error, over all layouts and qualities and no picture at all; the price is the same for
+    all components. SNR is measured against the band of the given coefficients.
     """
     import zstandard
 
     basis = zstd(19, problem.basis.nbytes).compress(problem.basis.astype(np.float16).tobytes())
     rank = len(problem.basis)
-    ways = list(itertools.product([True, False], [0.0, 0.001]))
+    layouts = list(itertools.product([True, False], [0.0, 0.001]))  # in colour, clipped share
     options = []
     for values in problem.coefficients:
         mine = [(0, energy(values), None)]
-        for way, quality in itertools.product(ways, qualities):
-            plane = Plane(values, way, save, quality)
-            mine.append((plane.size, energy(values - plane.decode()), (way, quality)))
+        for layout, quality in itertools.product(layouts, qualities):
+            plane = Plane(values, layout, save, quality)
+            mine.append((plane.size, energy(values - plane.decode()), (layout, quality)))
         options.append(mine)
 
     def chosen(price):
@@ -494,7 +494,7 @@ def planes(problem, save, qualities):
         for first in range(0, len(problem.band), 4096):
             here = slice(first, first + 4096)
             truth, got = (
-                np.maximum(np.tensordot(c[:, :, here], b, (0, 0)), 0) * problem.on_display[here]
+                np.maximum(np.tensordot(c[:, :, here], b, (0, 0)), 0) * problem.on_plane[here]
                 for c, b in flat
             )
             signal += energy(truth)
@@ -508,7 +508,7 @@ def planes(problem, save, qualities):
     low, high = np.log(1e-2 / total), np.log(1e12 / total)
     reached = snr_at(np.exp(high))
     if reached >= problem.target:
-        while high - low > 1e-3 and reached - problem.target > CLOSE:
+        while high - low > 1e-3 and reached - problem.target > SNR_TOLERANCE_DB:
             middle = (low + high) / 2
             found = snr_at(np.exp(middle))
             if found >= problem.target:

@@ -1,5 +1,5 @@
-//! The `.ltm` file: what goes in comes out, and nothing damaged passes.
-#![allow(clippy::unwrap_used)] // a test that cannot go on should stop
+//! The `.ltm` file: the reader gives what the encoder was given, and refuses every damaged file.
+#![allow(clippy::unwrap_used)] // a failed test should panic
 
 mod common;
 
@@ -15,7 +15,7 @@ use relightable_photo::transport::{
     TransportError, TransportFunctions,
 };
 
-/// What a recovery yields.
+/// A recovered light transport.
 #[derive(Clone)]
 struct Recovered {
     geometry: Geometry,
@@ -23,7 +23,7 @@ struct Recovered {
     tiles: Vec<BandTile>,
 }
 
-// Briefly: what a failing case prints is what it was made from.
+// Brief, for the messages of failed cases.
 impl std::fmt::Debug for Recovered {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let rank = self.basis.as_ref().map(Basis::rank);
@@ -32,7 +32,7 @@ impl std::fmt::Debug for Recovered {
 }
 
 impl Recovered {
-    /// Direct tiles, the first of them dark.
+    /// Direct tiles; the first is dark.
     fn direct(geometry: Geometry, seed: u64) -> Self {
         let tiles = functions(geometry, seed).into_iter().map(|functions| {
             let mut tile = BandTile::dark(functions.rect);
@@ -46,8 +46,8 @@ impl Recovered {
         }
     }
 
-    /// The same with every other tile factored over a basis of unit norm, in the last component
-    /// never, and one factored tile dark.
+    /// Direct tiles, with every other tile factored over basis functions of unit norm. The last component is zero, and so
+    /// is one factored tile.
     fn mixed(geometry: Geometry, rank: usize, seed: u64) -> Self {
         let mut recovered = Self::direct(geometry, seed);
         let mut noise = Noise(seed);
@@ -110,8 +110,8 @@ impl Recovered {
         self.tiles[i].clone().functions(&self.geometry, &basis)
     }
 
-    /// The share of all windows' elements that are on the display.
-    fn on_display(&self) -> f64 {
+    /// The share of all windows' slots that lie on the light plane.
+    fn share_on_plane(&self) -> f64 {
         let Geometry { light, window, .. } = self.geometry;
         let origins = self
             .geometry
@@ -125,7 +125,7 @@ impl Recovered {
         lit.sum::<usize>() as f64 / (self.geometry.camera.area() * window.area()) as f64
     }
 
-    /// How far a transport is from this one.
+    /// The error of a decoded transport against this one.
     fn error(&self, decoded: &Transport) -> TransportError {
         let mut error = TransportError::default();
         for (i, tile) in decoded.tiles.iter().enumerate() {
@@ -184,7 +184,7 @@ fn mixed() -> Recovered {
     Recovered::mixed(small_geometry(), 4, 1)
 }
 
-/// A file in each coding: rounded and in half precision, direct and mixed.
+/// Files with all codings: quantised and as half floats, direct and mixed.
 fn small_files() -> Vec<Vec<u8>> {
     let mut files = Vec::new();
     for recovered in [mixed(), Recovered::direct(small_geometry(), 1)] {
@@ -193,7 +193,7 @@ fn small_files() -> Vec<Vec<u8>> {
     files
 }
 
-/// Transports, and geometries of theirs, of all sorts.
+/// Arbitrary transports with arbitrary geometries.
 fn any_recovered() -> impl Strategy<Value = Recovered> {
     let sides = ([1u32..40, 1u32..40], [1u32..20, 1u32..20], 0u32..4);
     let others = (-30.0f64..30.0, 0usize..20, any::<u64>());
@@ -211,7 +211,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
     #[test]
-    fn archives_keep_eleven_bits(recovered in any_recovered(), piece in 1usize..5000) {
+    fn lossless_files_keep_eleven_bits(recovered in any_recovered(), piece in 1usize..5000) {
         let (decoded, meta) = decode(&recovered.file(RateTarget::Lossless), piece).unwrap();
         prop_assert_eq!(meta, metadata());
         prop_assert_eq!(decoded.geometry, recovered.geometry);
@@ -220,18 +220,17 @@ proptest! {
     }
 
     #[test]
-    fn files_have_the_snr_asked_for(
+    fn files_reach_the_target_snr(
         recovered in any_recovered(), quality in 15.0f64..60.0, piece in 1usize..5000,
     ) {
         let encoded = recovered.encode(RateTarget::Snr(Decibels(quality))).unwrap();
         let (decoded, _) = decode(&bytes(&encoded), piece).unwrap();
         let snr = recovered.error(&decoded).snr();
-        // What functions have off the display counts for the encoder and is not there for the eye;
-        // and codes of twelve bits have noise of their own.
-        let snr = snr.filter(|_| recovered.on_display() > 0.8);
+        // The encoder also counts values off the light plane; and rounding to twelve bits adds noise.
+        let snr = snr.filter(|_| recovered.share_on_plane() > 0.8);
         prop_assert!(snr.is_none_or(|snr| snr.0 > quality.min(52.0) - 3.0), "{:?}", snr);
-        if let Some(claimed) = encoded.snr() {
-            prop_assert!(claimed.0 > quality - 0.3, "{}", claimed.0);
+        if let Some(declared) = encoded.snr() {
+            prop_assert!(declared.0 > quality - 0.3, "{}", declared.0);
         }
     }
 
@@ -245,15 +244,15 @@ proptest! {
             let range = ranges[(noise.next() * ranges.len() as f64) as usize].clone();
             let mut range = range.start as usize..file.len().min(range.end as usize);
             if let Some(index) = reader.index() && noise.next() < 0.7 {
-                // A part by itself, from the middle of what is wanted.
-                let parts: Vec<_> = index
+                // One chunk from the wanted range.
+                let chunks: Vec<_> = index
                     .chunks()
-                    .map(|part| index.range(part))
-                    .filter(|part| part.start as usize >= range.start && part.end as usize <= range.end)
+                    .map(|chunk| index.range(chunk))
+                    .filter(|chunk| chunk.start as usize >= range.start && chunk.end as usize <= range.end)
                     .collect();
-                if !parts.is_empty() {
-                    let part = &parts[(noise.next() * parts.len() as f64) as usize];
-                    range = part.start as usize..part.end as usize;
+                if !chunks.is_empty() {
+                    let chunk = &chunks[(noise.next() * chunks.len() as f64) as usize];
+                    range = chunk.start as usize..chunk.end as usize;
                 }
             }
             let length = (noise.next() * 2.0 * range.len() as f64) as usize;
@@ -267,10 +266,10 @@ proptest! {
     }
 }
 
-/// A worker who does the last first.
-struct Backwards;
+/// An executor that runs jobs in reverse order.
+struct ReversedExecutor;
 
-impl Executor for Backwards {
+impl Executor for ReversedExecutor {
     fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         let mut results: Vec<T> = (0..count).rev().map(work).collect();
         results.reverse();
@@ -282,13 +281,15 @@ impl Executor for Backwards {
 fn the_same_transport_gives_the_same_bytes() {
     for quality in [QUALITY, RateTarget::Bytes(6000), RateTarget::Lossless] {
         let first = mixed().file(quality);
-        let again = mixed().encode_by(quality, &Backwards, Vec::new()).unwrap();
+        let again = mixed()
+            .encode_by(quality, &ReversedExecutor, Vec::new())
+            .unwrap();
         assert!(first == bytes(&again), "{quality:?}");
     }
 }
 
 #[test]
-fn every_scan_makes_it_better_and_says_by_how_much() {
+fn every_scan_raises_the_snr_as_declared() {
     let geometry = geometry([70, 50], [40, 30], 7, [[0.5, 0.0, 2.0], [0.0, 0.5, 2.0]]);
     for (recovered, quality) in [
         (
@@ -307,7 +308,7 @@ fn every_scan_makes_it_better_and_says_by_how_much() {
         for (s, scan) in index.scans.iter().enumerate() {
             let end = index.scan_range(s).end as usize;
             let mut reader = read(&file[..end], 3000).unwrap();
-            assert!(reader.progress().scans > s); // later ones may hold nothing
+            assert!(reader.progress().scans > s); // later scans may have no chunks
             assert!(
                 reader
                     .wants(&Interest::default())
@@ -319,14 +320,14 @@ fn every_scan_makes_it_better_and_says_by_how_much() {
                 viewport: None,
             };
             assert!(reader.wants(&enough).is_empty(), "scan {s}");
-            reader.feed(3, &file[3..end]).unwrap(); // once more, which changes nothing
+            reader.feed(3, &file[3..end]).unwrap(); // known bytes change nothing
             let scans = reader.progress().scans;
             let preview = reader.preview().unwrap();
             assert_eq!(preview.is_none(), scans == index.scans.len());
             let (transport, _) = reader.finish_early().unwrap();
             let snr = recovered.error(&transport).snr().unwrap().0;
             if let Some(preview) = preview {
-                // What has come, and no room for what has not.
+                // A preview has the values of the prefix, and no memory for later components.
                 let error = recovered.error(&preview).snr().unwrap().0;
                 assert!(
                     (error - snr).abs() < 0.05,
@@ -340,11 +341,11 @@ fn every_scan_makes_it_better_and_says_by_how_much() {
                 let bytes = |t: &Transport| t.tiles.iter().map(Tile::bytes).sum::<usize>();
                 assert!(bytes(&preview) <= bytes(&transport));
             }
-            // Colour axes that are not final yet, and codes of twelve bits, take their part.
-            let [snr, claimed] = [snr, scan.snr.0].map(|snr| snr.min(55.0));
+            // Preliminary reflections and rounding to twelve bits add errors.
+            let [snr, declared] = [snr, scan.snr.0].map(|snr| snr.min(55.0));
             assert!(
-                (snr - claimed).abs() < 2.5,
-                "scan {s}: {snr} dB for {claimed}"
+                (snr - declared).abs() < 2.5,
+                "scan {s}: {snr} dB, declared {declared}"
             );
             assert!(snr > before - 0.01, "scan {s}: {snr} dB after {before}");
             before = snr;
@@ -353,20 +354,20 @@ fn every_scan_makes_it_better_and_says_by_how_much() {
 }
 
 #[test]
-fn a_file_can_be_as_small_as_asked_for() {
+fn files_stay_within_the_target_size() {
     let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
     let geometry = common::tiled([128, 128], [64, 64], 5, 64, affine);
     let recovered = Recovered::mixed(geometry, 8, 5);
     let mut before = 0.0;
-    for most in [30_000, 60_000, 120_000] {
-        let file = recovered.encode(RateTarget::Bytes(most)).unwrap();
+    for limit in [30_000, 60_000, 120_000] {
+        let file = recovered.encode(RateTarget::Bytes(limit)).unwrap();
         assert!(
-            (most * 9 / 10..=most).contains(&file.bytes()),
-            "{} of {most}",
+            (limit * 9 / 10..=limit).contains(&file.bytes()),
+            "{} of {limit} bytes",
             file.bytes()
         );
         let snr = file.snr().unwrap().0;
-        assert!(snr > before + 1.0, "{snr} dB in {most} bytes");
+        assert!(snr > before + 1.0, "{snr} dB in {limit} bytes");
         before = snr;
     }
     let error = recovered.encode(RateTarget::Bytes(300)).unwrap_err();
@@ -376,14 +377,14 @@ fn a_file_can_be_as_small_as_asked_for() {
     );
 }
 
-/// Who knows the object's transport: what is to be lost of it is SNR below 30 dB.
-struct Knowing<'a> {
+/// A distortion metric with a known transport: the loss is how far the SNR is below 30 dB.
+struct KnownTransportMetric<'a> {
     geometry: Geometry,
     basis: &'a Basis,
     tiles: Vec<BandTile>,
 }
 
-impl DistortionMetric for Knowing<'_> {
+impl DistortionMetric for KnownTransportMetric<'_> {
     fn tiles(&self) -> Vec<BandTile> {
         self.tiles.clone()
     }
@@ -401,7 +402,7 @@ impl DistortionMetric for Knowing<'_> {
 }
 
 #[test]
-fn a_judge_may_have_tiles_of_another_kind_than_the_file() {
+fn a_metric_may_have_tiles_of_another_kind_than_the_file() {
     let mixed = Recovered::mixed(small_geometry(), 4, 3);
     let basis = mixed.basis.as_ref().unwrap();
     let only = |kind: &dyn Fn(&BandTile) -> bool| -> Vec<BandTile> {
@@ -413,50 +414,50 @@ fn a_judge_may_have_tiles_of_another_kind_than_the_file() {
     };
     let direct = only(&|tile| tile.coefficients.is_empty());
     let factored = only(&|tile| tile.functions.is_empty());
-    for (tiles, of_judge) in [(&direct, &factored), (&factored, &direct)] {
+    for (tiles, metric_tiles) in [(&direct, &factored), (&factored, &direct)] {
         let recovered = Recovered {
             tiles: tiles.clone(),
             ..mixed.clone()
         };
-        let judge = Knowing {
+        let metric = KnownTransportMetric {
             geometry: mixed.geometry,
             basis,
-            tiles: of_judge.clone(),
+            tiles: metric_tiles.clone(),
         };
-        let quality = RateTarget::Loss(Decibels(0.0), &judge);
+        let quality = RateTarget::Loss(Decibels(0.0), &metric);
         let snr = recovered.encode(quality).unwrap().snr().unwrap();
-        // The same step is another error in another kind.
+        // The same step gives different errors in factored and direct tiles.
         assert!((20.0..40.0).contains(&snr.0), "{snr}");
     }
 }
 
 #[test]
-fn what_is_seen_is_wanted_and_nothing_else() {
+fn only_visible_tiles_are_wanted() {
     let geometry = geometry([64, 48], [32, 24], 5, [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]);
     let file = Recovered::mixed(geometry, 6, 2).file(QUALITY);
     let mut reader = Reader::new(Limits::default());
     let first = reader.wants(&Interest::default());
     assert_eq!((first.len(), &first[0]), (1, &(0..format::FIRST_BYTES)));
-    let head_bytes = read(&file, file.len()).unwrap().index_bytes().unwrap();
+    let index_bytes = read(&file, file.len()).unwrap().index_bytes().unwrap();
     reader.feed(0, &file[..200]).unwrap();
     let then = reader.wants(&Interest::default());
-    assert_eq!((then.len(), &then[0]), (1, &(200..head_bytes)));
-    reader.feed(200, &file[200..head_bytes as usize]).unwrap();
+    assert_eq!((then.len(), &then[0]), (1, &(200..index_bytes)));
+    reader.feed(200, &file[200..index_bytes as usize]).unwrap();
     let interest = Interest {
         viewport: Some((20..33, 9..16)),
         snr: None,
     };
     // Tiles 2, 3 and 4 of the second row of eight.
     let index = reader.index().unwrap().clone();
-    let seen = [10, 11, 12];
+    let visible = [10, 11, 12];
     for range in reader.wants(&interest) {
-        let part = index
+        let chunk = index
             .chunks()
-            .find(|part| index.range(*part).start == range.start)
+            .find(|chunk| index.range(*chunk).start == range.start)
             .unwrap();
         assert!(
-            part.tile.is_none_or(|tile| seen.contains(&tile)),
-            "{part:?}"
+            chunk.tile.is_none_or(|tile| visible.contains(&tile)),
+            "{chunk:?}"
         );
         reader
             .feed(range.start, &file[range.start as usize..range.end as usize])
@@ -470,17 +471,17 @@ fn what_is_seen_is_wanted_and_nothing_else() {
         .sum();
     let others = index
         .chunks()
-        .filter(|part| part.tile.is_some_and(|tile| !seen.contains(&tile)));
+        .filter(|chunk| chunk.tile.is_some_and(|tile| !visible.contains(&tile)));
     let others: u64 = others
-        .map(|part| index.range(part).end - index.range(part).start)
+        .map(|chunk| index.range(chunk).end - index.range(chunk).start)
         .sum();
     assert_eq!(rest, others);
     let (whole, _) = decode(&file, file.len()).unwrap();
-    let (part, _) = reader.finish_early().unwrap();
-    for tile in seen {
-        assert_eq!(part.tiles[tile], whole.tiles[tile]);
+    let (visible_part, _) = reader.finish_early().unwrap();
+    for tile in visible {
+        assert_eq!(visible_part.tiles[tile], whole.tiles[tile]);
     }
-    assert!(part.tiles[20].is_dark() && !whole.tiles[20].is_dark());
+    assert!(visible_part.tiles[20].is_dark() && !whole.tiles[20].is_dark());
 }
 
 #[test]
@@ -519,7 +520,7 @@ fn dark_tiles_take_no_bytes() {
 }
 
 #[test]
-fn a_picture_with_light_in_one_corner_keeps_the_quality_asked_for() {
+fn a_transport_with_one_lit_tile_reaches_the_target_snr() {
     let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
     let geometry = geometry([112, 112], [56, 56], 3, affine);
     let mut recovered = Recovered::mixed(geometry, 4, 9);
@@ -533,8 +534,8 @@ fn a_picture_with_light_in_one_corner_keeps_the_quality_asked_for() {
     assert!((29.0..33.0).contains(&snr.0), "{snr}");
 }
 
-/// Whether what codecs do at the borders of tiles shows: light transport that is smooth all over the
-/// picture, under a flat light and under the edge of a shadow.
+/// Errors at the borders of tiles are no larger than inside, for smooth light transport under a uniform light and under
+/// the edge of a shadow.
 #[test]
 fn tiles_have_no_seams() {
     let side = 64;
@@ -596,15 +597,15 @@ fn tiles_have_no_seams() {
         let [border, inside] = [border, inside].map(|[squares, count]| squares / count);
         assert!(
             inside > 0.0 && border < 1.6 * inside,
-            "edge {edge}: {border} against {inside}"
+            "edge {edge}: squared error {border} at borders, {inside} inside"
         );
     }
 }
 
 #[test]
-fn every_truncation_is_refused_and_relights_as_far_as_it_goes() {
+fn every_truncated_file_is_refused_and_gives_the_transport_of_its_chunks() {
     for file in small_files() {
-        let head_bytes = read(&file, file.len()).unwrap().index_bytes().unwrap();
+        let index_bytes = read(&file, file.len()).unwrap().index_bytes().unwrap();
         for length in 0..file.len() {
             let error = decode(&file[..length], 97).unwrap_err();
             assert!(
@@ -614,7 +615,7 @@ fn every_truncation_is_refused_and_relights_as_far_as_it_goes() {
             let early = read(&file[..length], 97).unwrap().finish_early();
             assert_eq!(
                 early.is_ok(),
-                length as u64 >= head_bytes,
+                length as u64 >= index_bytes,
                 "cut to {length}"
             );
         }
@@ -637,15 +638,15 @@ fn every_flipped_bit_is_refused() {
     }
 }
 
-/// Checksums made right, so that what lies behind them is met: pictures of noise, or an error.
+/// The mutated files have correct checksums, so that decoders see the mutations. They give errors or finite values.
 #[test]
-fn ten_thousand_mutations_do_no_harm() {
+fn ten_thousand_mutations_give_errors_or_finite_values() {
     let limits = Limits {
         decoded_bytes: 64 << 20,
     };
     let files = small_files();
     let mut noise = Noise(11);
-    let mut fate = [0, 0];
+    let mut outcomes = [0, 0];
     for round in 0..10_000 {
         let mut file = files[round % files.len()].clone();
         for _ in 0..1 + (noise.next() * 4.0) as usize {
@@ -666,14 +667,17 @@ fn ten_thousand_mutations_do_no_harm() {
         if let Ok((transport, _)) = &result {
             assert!(steps(transport).all(f32::is_finite), "round {round}");
         }
-        fate[usize::from(result.is_ok())] += 1;
+        outcomes[usize::from(result.is_ok())] += 1;
     }
-    // Neither is rare, or this would be a test of one path.
-    assert!(fate.iter().all(|count| *count > 500), "{fate:?}");
+    // Both are common: the test covers both paths.
+    assert!(
+        outcomes.iter().all(|count| *count > 500),
+        "refused and read: {outcomes:?}"
+    );
 }
 
 #[test]
-fn error_messages_say_what_is_wrong() {
+fn error_messages_name_the_fault() {
     let file = mixed().file(QUALITY);
     let message = |edit: &dyn Fn(&mut Vec<u8>)| {
         let mut file = file.clone();
@@ -695,7 +699,7 @@ fn error_messages_say_what_is_wrong() {
     let error = decode(&mangled, 1).unwrap_err();
     let line_ends = FormatError::TextModeTransfer(TextDamage::LineEnds);
     assert_eq!(error.to_string(), line_ends.to_string());
-    // By the name, and by the field.
+    // Versions in the magic number and in the field.
     assert!(message(&|f| f[5..7].copy_from_slice(b"01")).contains("version 0.1"));
     assert!(message(&|f| f[12] = 2).contains("version 2.0"));
     assert!(message(&|f| f[20] ^= 1).contains("header is damaged"));
@@ -747,17 +751,17 @@ mod field {
     pub const DIRECTORY_BYTES: usize = 104;
     pub const EXTENSION_BYTES: usize = 112;
     pub const METADATA_BYTES: usize = 120;
-    /// Of the directory, decompressed.
+    // Of a scan record in the decompressed directory.
     pub const CODING: usize = 0;
     pub const FIRST: usize = 2;
     pub const COUNT: usize = 4;
     pub const STEP: usize = 8;
     pub const BASIS_BYTES: usize = 16;
-    pub const SCAN: usize = 24;
+    pub const SCAN_RECORD_BYTES: usize = 24;
 }
 
 #[test]
-fn a_crafted_file_is_refused_for_what_is_wrong_with_it() {
+fn a_crafted_file_is_refused_with_its_fault() {
     let file = mixed().file(QUALITY);
     let header = |at: usize, value: u32| {
         let edit = |f: &mut Vec<u8>| f[at..at + 4].copy_from_slice(&value.to_le_bytes());
@@ -787,7 +791,7 @@ fn a_crafted_file_is_refused_for_what_is_wrong_with_it() {
     let error = header(field::METADATA_BYTES, 1 << 30);
     assert!(matches!(error, FormatError::MetadataTooLong(_)), "{error}");
 
-    // Fields in a list have no names.
+    // Arrays in place of objects.
     for json in [&b"[\"a\"]"[..], b"{\"capture\":[5,80]}"] {
         let listed = sealed(file.clone(), |f| {
             let length = |at: usize| u32::from_le_bytes(f[at..at + 4].try_into().unwrap()) as usize;
@@ -827,15 +831,15 @@ fn a_crafted_file_is_refused_for_what_is_wrong_with_it() {
         );
     }
     let scans = read(&file, 1000).unwrap().index().unwrap().scans.len();
-    let lengths = scans * field::SCAN;
-    let plains = lengths + 4 * 6 * scans;
-    // The first scan has nothing for tile 0, and something for tile 1.
+    let lengths = scans * field::SCAN_RECORD_BYTES;
+    let contents = lengths + 4 * 6 * scans;
+    // The first scan has no chunk for tile 0, and one for tile 1.
     for (at, value) in [
         (lengths + 4, 0u32),
         (lengths + 4, u32::MAX),
-        (plains + 4, 0),
-        (plains + 4, u32::MAX),
-        (plains, 1),
+        (contents + 4, 0),
+        (contents + 4, u32::MAX),
+        (contents, 1),
     ] {
         let error = directory(at, &value.to_le_bytes());
         assert!(
@@ -848,8 +852,7 @@ fn a_crafted_file_is_refused_for_what_is_wrong_with_it() {
         matches!(error, FormatError::InvalidChunkEntry { scan: 0, tile: 0 }),
         "{error}"
     );
-    let one = u32::from_le_bytes([1, 0, 0, 0]);
-    let longer = |d: &mut Vec<u8>| d[lengths + 4] += one as u8;
+    let longer = |d: &mut Vec<u8>| d[lengths + 4] += 1;
     let error = decode(&common::with_directory(&file, longer), 1 << 20).unwrap_err();
     assert!(
         matches!(error, FormatError::LengthMismatch { .. }),
@@ -861,23 +864,23 @@ fn a_crafted_file_is_refused_for_what_is_wrong_with_it() {
 fn checking_chunks_one_by_one_agrees_with_reading() {
     for file in small_files() {
         let index = read(&file, file.len()).unwrap().index().unwrap().clone();
-        for part in index.chunks() {
-            let range = index.range(part);
+        for chunk in index.chunks() {
+            let range = index.range(chunk);
             let bytes = &file[range.start as usize..range.end as usize];
-            format::check(&index, part, bytes).unwrap();
+            format::check(&index, chunk, bytes).unwrap();
             let mut damaged = bytes.to_vec();
             damaged[bytes.len() / 2] ^= 1;
-            let error = format::check(&index, part, &damaged).unwrap_err();
+            let error = format::check(&index, chunk, &damaged).unwrap_err();
             assert!(
-                matches!(error, FormatError::ChecksumMismatch { section } if section == FileSection::Chunk(part))
+                matches!(error, FormatError::ChecksumMismatch { section } if section == FileSection::Chunk(chunk))
             );
-            assert!(format::check(&index, part, &bytes[1..]).is_err());
+            assert!(format::check(&index, chunk, &bytes[1..]).is_err());
         }
     }
 }
 
 #[test]
-fn numbers_at_the_ends_of_single_precision_are_written_and_read() {
+fn values_near_the_limits_of_single_precision_are_written_and_read() {
     for size in [1e37, f32::MAX, 1e-37, f32::MIN_POSITIVE, 1e-45] {
         let mut recovered = mixed();
         for tile in &mut recovered.tiles {
@@ -896,7 +899,7 @@ fn numbers_at_the_ends_of_single_precision_are_written_and_read() {
 }
 
 #[test]
-fn a_basis_of_nothing_is_no_basis() {
+fn a_basis_of_zeros_is_written_and_read() {
     let mut recovered = mixed();
     recovered.basis = Some(Basis {
         kernels: vec![vec![0.0; 9]; 4],
@@ -906,14 +909,14 @@ fn a_basis_of_nothing_is_no_basis() {
     }
 }
 
-/// What a code is worth, of both parts of all tiles.
+/// The quantisation steps of coefficients and direct functions of all tiles.
 fn steps(transport: &Transport) -> impl Iterator<Item = f32> {
     let tiles = transport.tiles.iter();
     tiles.flat_map(|tile| [tile.coefficients.step, tile.functions.step].concat())
 }
 
 #[test]
-fn numbers_that_are_none_become_zero() {
+fn values_that_are_not_finite_become_zero() {
     let mut recovered = mixed();
     recovered.tiles[1].coefficients[5] = [f32::NAN, f32::INFINITY, 0.1];
     recovered.tiles[2].functions[7] = [f32::NEG_INFINITY, 0.1, f32::NAN];
@@ -924,7 +927,7 @@ fn numbers_that_are_none_become_zero() {
 }
 
 #[test]
-fn a_file_that_asks_for_too_much_memory_is_refused_before_it_gets_any() {
+fn a_file_that_needs_too_much_memory_is_refused_before_allocation() {
     let file = mixed().file(QUALITY);
     let mut reader = Reader::new(Limits {
         decoded_bytes: 12_000,
@@ -959,7 +962,7 @@ fn a_preview_stays_within_the_memory_limit() {
         let file = recovered.file(QUALITY);
         let limit = smallest_limit(&file);
         let index = read(&file, file.len()).unwrap().index().unwrap().clone();
-        // By then most components are there.
+        // A prefix with most components.
         let prefix = index.scan_range(index.scans.len() - 2).end as usize;
         for (decoded_bytes, has_preview) in [(limit, false), (2 * limit, true)] {
             let mut reader = Reader::new(Limits { decoded_bytes });
@@ -1012,7 +1015,7 @@ fn scans_keep_their_shares_of_the_file() {
 }
 
 #[test]
-fn gaps_are_refused() {
+fn bytes_after_a_gap_are_refused() {
     let file = mixed().file(QUALITY);
     let mut reader = Reader::new(Limits::default());
     let error = reader.feed(3, &[0]).unwrap_err();
@@ -1029,11 +1032,11 @@ fn gaps_are_refused() {
     )
     .unwrap();
     let index = reader.index().unwrap().clone();
-    let part = ChunkId {
+    let chunk = ChunkId {
         scan: 0,
         tile: Some(1),
     };
-    let start = index.range(part).start;
+    let start = index.range(chunk).start;
     reader
         .feed(start, &file[start as usize..start as usize + 3])
         .unwrap();

@@ -1,6 +1,6 @@
-//! Recovery within little memory, and recovery that is interrupted and goes on.
+//! Recovery with little memory, and recovery that is interrupted and resumed.
 #![cfg(unix)]
-#![allow(clippy::unwrap_used)] // a test that cannot go on should stop
+#![allow(clippy::unwrap_used)] // a failed test should panic
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,12 +20,12 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-fn said(output: &Output) -> String {
+fn stderr_text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 fn json(output: &Output) -> Value {
-    assert!(output.status.success(), "{}", said(output));
+    assert!(output.status.success(), "{}", stderr_text(output));
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
@@ -33,12 +33,12 @@ fn simulate(folder: &TempDir, scene: &str, size: &[&str]) -> PathBuf {
     let capture = folder.path().join("capture");
     let args = ["simulate", scene, "-o", text(&capture)];
     let output = command(&[&args, size].concat()).output().unwrap();
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", stderr_text(&output));
     capture
 }
 
 #[test]
-fn little_memory_reads_photographs_by_strips_and_recovers_the_same() {
+fn with_little_memory_photographs_are_read_in_strips_with_the_same_result() {
     let folder = TempDir::new().unwrap();
     let size = [
         "--camera",
@@ -63,7 +63,7 @@ fn little_memory_reads_photographs_by_strips_and_recovers_the_same() {
             method,
             "--memory",
             memory,
-            // How good a file is worth being is judged by the sample, too.
+            // A fixed quality: the default depends on the sample of pixels.
             "--quality",
             "40",
         ];
@@ -74,7 +74,7 @@ fn little_memory_reads_photographs_by_strips_and_recovers_the_same() {
     let whole_and_strips = |method: &str| {
         let (_, refused) = recover(method, "1M");
         assert_eq!(refused.status.code(), Some(1));
-        let message = said(&refused);
+        let message = stderr_text(&refused);
         assert!(message.contains("--memory 1M is too little"), "{message}");
         let least = message.trim().rsplit(' ').next().unwrap();
         let budget = least.trim_end_matches('M').parse::<u64>().unwrap() << 20;
@@ -85,16 +85,16 @@ fn little_memory_reads_photographs_by_strips_and_recovers_the_same() {
         assert!(report["strips"].as_u64().unwrap() > 2, "{report}");
         assert!(peak(&report) < budget, "{report}");
         if method == "nnls" {
-            // Learning takes more than the photographs of a capture as small as this.
+            // Not for the learned recovery, which needs more memory than these few photographs.
             assert!(peak(&report) < peak(&whole_report), "{report}");
             assert_eq!(whole_report["common_mode"], report["common_mode"]);
         }
         [whole, strips]
     };
-    // Least squares chooses one weight, the same from either sample, and so recovers the same.
+    // NNLS chooses one weight of the common mode, the same from both samples, so the files are equal.
     let [whole, strips] = whole_and_strips("nnls").map(|file| fs::read(file).unwrap());
     assert!(whole == strips);
-    // What is learned depends on the sample, but not how good it is.
+    // The learned prior depends on the sample, but its accuracy does not.
     let [whole, strips] = whole_and_strips("learned").map(|file| {
         let args = ["evaluate", text(&file), text(&capture), "--json"];
         let evaluated = json(&command(&args).output().unwrap());
@@ -105,10 +105,11 @@ fn little_memory_reads_photographs_by_strips_and_recovers_the_same() {
     assert_eq!(impossible.status.code(), Some(2));
 }
 
-/// A recovery of many tiles to interrupt, and what it comes to when it is not.
+/// A recovery of many tiles that tests interrupt.
 struct Interruptible {
     folder: TempDir,
     capture: PathBuf,
+    /// The file of an uninterrupted recovery.
     whole: Vec<u8>,
 }
 
@@ -130,7 +131,7 @@ impl Interruptible {
             whole: Vec::new(),
         };
         let output = this.recover("whole.ltm", &[]).output().unwrap();
-        assert!(output.status.success(), "{}", said(&output));
+        assert!(output.status.success(), "{}", stderr_text(&output));
         this.whole = fs::read(this.path("whole.ltm")).unwrap();
         this
     }
@@ -151,19 +152,19 @@ impl Interruptible {
         command(&[&args, window, more].concat())
     }
 
-    /// Recovers until the first tile is kept, then sends `signal`.
+    /// Recovers until the checkpoint has the first tile, then sends `signal`.
     fn interrupt(&self, name: &str, signal: &str) -> Output {
         let output = self.signal(name, signal, wait_for_a_tile);
         assert!(self.path(&format!("{name}.checkpoint")).exists());
         output
     }
 
-    /// Recovers until the end of `wait`, which is given the checkpoint, then sends `signal`.
+    /// Recovers until `wait` returns, then sends `signal`. `wait` gets the path of the checkpoint.
     fn signal(&self, name: &str, signal: &str, wait: impl Fn(&mut Child, &Path)) -> Output {
         assert!(!self.path(name).exists());
         let checkpoint = self.path(&format!("{name}.checkpoint"));
         let mut recover = self.recover(name, &["--memory", "4G"]);
-        // On one thread, most tiles are yet to come when the first is there.
+        // On one thread most tiles are missing when the first is complete.
         recover.env("RAYON_NUM_THREADS", "1");
         let mut child = recover.stderr(Stdio::piped()).spawn().unwrap();
         wait(&mut child, &checkpoint);
@@ -171,20 +172,27 @@ impl Interruptible {
         let sent = Command::new("kill").args([signal, &id]).status().unwrap();
         assert!(sent.success());
         let output = child.wait_with_output().unwrap();
-        assert!(!self.path(name).exists(), "never half a file");
+        assert!(
+            !self.path(name).exists(),
+            "an interrupted recovery must not write the file"
+        );
         output
     }
 
     fn resumes(&self, name: &str) {
         let output = self.recover(name, &["--resume"]).output().unwrap();
-        assert!(output.status.success(), "{}", said(&output));
-        assert!(said(&output).contains("resuming with"), "{}", said(&output));
+        assert!(output.status.success(), "{}", stderr_text(&output));
+        assert!(
+            stderr_text(&output).contains("resuming with"),
+            "{}",
+            stderr_text(&output)
+        );
         assert!(fs::read(self.path(name)).unwrap() == self.whole);
         assert!(!self.path(&format!("{name}.checkpoint")).exists());
     }
 }
 
-/// Waits until the checkpoint holds more than its head and what was learned.
+/// Waits until the checkpoint has a tile, after its run key and the learned prior.
 fn wait_for_a_tile(child: &mut Child, checkpoint: &Path) {
     let (mut last, mut grown) = (0, 0);
     loop {
@@ -194,60 +202,78 @@ fn wait_for_a_tile(child: &mut Child, checkpoint: &Path) {
         if grown == 3 {
             return;
         }
-        assert!(child.try_wait().unwrap().is_none(), "ended too soon");
+        assert!(
+            child.try_wait().unwrap().is_none(),
+            "the recovery ended before the signal"
+        );
         std::thread::sleep(Duration::from_millis(1));
     }
 }
 
 #[test]
-fn an_interrupted_recovery_goes_on_to_the_same_bytes() {
+fn an_interrupted_recovery_resumes_to_the_same_bytes() {
     let recovery = Interruptible::new();
     for signal in ["-INT", "-TERM"] {
-        let output = recovery.interrupt("told.ltm", signal);
-        assert_eq!(output.status.code(), Some(130), "{}", said(&output));
+        let output = recovery.interrupt("stopped.ltm", signal);
+        assert_eq!(output.status.code(), Some(130), "{}", stderr_text(&output));
         let words = [
             "interrupted: ",
             " of 16 tiles",
-            "told.ltm.checkpoint",
+            "stopped.ltm.checkpoint",
             "--resume",
         ];
         for word in words {
-            assert!(said(&output).contains(word), "no {word}: {}", said(&output));
+            assert!(
+                stderr_text(&output).contains(word),
+                "no {word}: {}",
+                stderr_text(&output)
+            );
         }
-        // Not lost by forgetting to say so.
-        let again = recovery.recover("told.ltm", &[]).output().unwrap();
+        // Without --resume the checkpoint is kept.
+        let again = recovery.recover("stopped.ltm", &[]).output().unwrap();
         assert_eq!(again.status.code(), Some(1));
-        assert!(said(&again).contains("add --resume"), "{}", said(&again));
-        recovery.resumes("told.ltm");
-        fs::remove_file(recovery.path("told.ltm")).unwrap();
+        assert!(
+            stderr_text(&again).contains("add --resume"),
+            "{}",
+            stderr_text(&again)
+        );
+        recovery.resumes("stopped.ltm");
+        fs::remove_file(recovery.path("stopped.ltm")).unwrap();
     }
-    // Nothing to resume from is no hindrance.
+    // Without a checkpoint --resume starts from the beginning.
     let output = recovery.recover("new.ltm", &["--resume"]).output().unwrap();
     assert!(
-        said(&output).contains("starting from the beginning"),
+        stderr_text(&output).contains("starting from the beginning"),
         "{}",
-        said(&output)
+        stderr_text(&output)
     );
     assert!(fs::read(recovery.path("new.ltm")).unwrap() == recovery.whole);
 }
 
 #[test]
-fn learning_stops_when_told_and_leaves_nothing() {
+fn an_interrupt_during_training_leaves_no_checkpoint() {
     let recovery = Interruptible::new();
     let output = recovery.signal("early.ltm", "-INT", |child, checkpoint| {
         while !checkpoint.exists() {
-            assert!(child.try_wait().unwrap().is_none(), "ended too soon");
+            assert!(
+                child.try_wait().unwrap().is_none(),
+                "the recovery ended before the signal"
+            );
             std::thread::sleep(Duration::from_millis(1));
         }
     });
-    assert_eq!(output.status.code(), Some(130), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(130), "{}", stderr_text(&output));
     let before = "interrupted before the first tile: nothing is kept";
-    assert!(said(&output).contains(before), "{}", said(&output));
+    assert!(
+        stderr_text(&output).contains(before),
+        "{}",
+        stderr_text(&output)
+    );
     assert!(!recovery.path("early.ltm.checkpoint").exists());
 }
 
 #[test]
-fn a_killed_recovery_goes_on_too_and_what_does_not_fit_is_named() {
+fn a_killed_recovery_resumes_and_mismatches_are_named() {
     let recovery = Interruptible::new();
     recovery.interrupt("killed.ltm", "-KILL");
     let checkpoint = recovery.path("killed.ltm.checkpoint");
@@ -255,9 +281,13 @@ fn a_killed_recovery_goes_on_too_and_what_does_not_fit_is_named() {
     let refuses = |more: &[&str], words: &[&str]| {
         let args = [&["--resume"], more].concat();
         let output = recovery.recover("killed.ltm", &args).output().unwrap();
-        assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+        assert_eq!(output.status.code(), Some(1), "{}", stderr_text(&output));
         for word in words.iter().chain(&["killed.ltm.checkpoint"]) {
-            assert!(said(&output).contains(word), "no {word}: {}", said(&output));
+            assert!(
+                stderr_text(&output).contains(word),
+                "no {word}: {}",
+                stderr_text(&output)
+            );
         }
         assert!(fs::read(&checkpoint).unwrap() == kept);
     };
@@ -274,31 +304,35 @@ fn a_killed_recovery_goes_on_too_and_what_does_not_fit_is_named() {
     refuses(&[], &["photos/0003.png in the capture has changed"]);
     fs::write(&photo, sound).unwrap();
 
-    // As if another build had begun it, and learned something else.
-    let head = 16 + u32::from_le_bytes(kept[8..12].try_into().unwrap()) as usize;
-    assert_eq!(kept[head..head + 4], u32::MAX.to_le_bytes());
-    let length = u32::from_le_bytes(kept[head + 4..head + 8].try_into().unwrap()) as usize;
+    // A checkpoint of another build, with another learned prior.
+    let prior = 16 + u32::from_le_bytes(kept[8..12].try_into().unwrap()) as usize;
+    assert_eq!(kept[prior..prior + 4], u32::MAX.to_le_bytes());
+    let length = u32::from_le_bytes(kept[prior + 4..prior + 8].try_into().unwrap()) as usize;
     let mut other = kept.clone();
-    other[head + 12] ^= 1;
-    let crc = crc32c::crc32c(&other[head..head + 8]);
-    let crc = crc32c::crc32c_append(crc, &other[head + 12..head + 12 + length]);
-    other[head + 8..head + 12].copy_from_slice(&crc.to_le_bytes());
-    // And as if the disk had lost a bit of what was asked for.
+    other[prior + 12] ^= 1;
+    let crc = crc32c::crc32c(&other[prior..prior + 8]);
+    let crc = crc32c::crc32c_append(crc, &other[prior + 12..prior + 12 + length]);
+    other[prior + 8..prior + 12].copy_from_slice(&crc.to_le_bytes());
+    // A damaged run key.
     let mut damaged = kept.clone();
     damaged[20] ^= 1;
     for (bytes, words) in [(other, "another build"), (damaged, "is damaged; delete it")] {
         fs::write(&checkpoint, &bytes).unwrap();
         for more in [&["--resume"][..], &[]] {
             let output = recovery.recover("killed.ltm", more).output().unwrap();
-            assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+            assert_eq!(output.status.code(), Some(1), "{}", stderr_text(&output));
             if words.contains("damaged") || !more.is_empty() {
-                assert!(said(&output).contains(words), "{}", said(&output));
+                assert!(
+                    stderr_text(&output).contains(words),
+                    "{}",
+                    stderr_text(&output)
+                );
             }
             assert!(fs::read(&checkpoint).unwrap() == bytes);
         }
     }
 
-    // As if the process had died while it wrote.
+    // A record that is cut off, as by a crash.
     let mut torn = kept.clone();
     torn.extend([1, 0, 0, 0, 200, 0, 0, 0, 9, 9]);
     fs::write(&checkpoint, torn).unwrap();
@@ -310,9 +344,9 @@ fn a_killed_recovery_goes_on_too_and_what_does_not_fit_is_named() {
         .output()
         .unwrap();
     assert!(
-        said(&output).contains("is not a checkpoint"),
+        stderr_text(&output).contains("is not a checkpoint"),
         "{}",
-        said(&output)
+        stderr_text(&output)
     );
     assert_eq!(fs::read(&checkpoint).unwrap(), b"somebody's notes");
 }
