@@ -16,7 +16,16 @@ import numpy as np
 import zstandard
 
 f32 = np.float32
-MAX_CONTENT_BYTES = MAX_WINDOW_BYTES = 1 << 23  # appendix A
+
+# Appendix A.
+MAX_SIDE = 32768
+MAX_WINDOW = 63
+TILE_SIDES = 8, 256
+MAX_RANK = MAX_SCANS = 1024
+MAX_EXTENSION_BYTES = 1 << 24
+MAX_METADATA_BYTES = 1 << 20
+MAX_CONTENT_BYTES = MAX_WINDOW_BYTES = 1 << 23
+MAX_EXPONENT = 30
 
 
 class Refused(Exception):
@@ -87,18 +96,18 @@ class FileIndex:
         crc = unpack_from("<I", file, 140)[0]
         require(crc32c(file[:140]) == crc, "a header whose checksum does not match")
         *sides, self.w, self.tile_side = unpack_from("<6I", file, 16)
-        require(all(1 <= side <= 32768 for side in sides), "a side of the camera or light grid")
-        require(self.w % 2 == 1 and self.w <= 63, "the side of the window")
-        require(8 <= self.tile_side <= 256, "the side of tiles")
+        require(all(1 <= side <= MAX_SIDE for side in sides), "a side of the camera or light grid")
+        require(self.w % 2 == 1 and self.w <= MAX_WINDOW, "the side of the window")
+        require(TILE_SIDES[0] <= self.tile_side <= TILE_SIDES[1], "the side of tiles")
         self.width, self.height, self.light_width, self.light_height = sides
         self.affine = unpack_from("<6d", file, 40)
         require(all(map(math.isfinite, self.affine)), "a correspondence that is not finite")
         file_bytes, self.rank, self.scan_count = unpack_from("<QII", file, 88)
         fields = unpack_from("<6I", file, 104)
         self.sections = list(zip(fields[::2], fields[1::2]))
-        require(self.rank <= 1024 and self.scan_count <= 1024, "the rank or the number of scans")
-        require(fields[2] <= 1 << 24, "the length of extensions")
-        require(fields[4] <= 1 << 20, "the length of the metadata")
+        require(self.rank <= MAX_RANK and self.scan_count <= MAX_SCANS, "the rank or number of scans")
+        require(fields[2] <= MAX_EXTENSION_BYTES, "the length of extensions")
+        require(fields[4] <= MAX_METADATA_BYTES, "the length of the metadata")
         require(144 + sum(fields[::2]) <= file_bytes == len(file), "the length of the file")
         side = self.tile_side
         self.corners = [
@@ -148,13 +157,18 @@ class FileIndex:
         require(at == len(file), "chunks whose lengths do not add up")
 
 
+def max_token_bytes(tokens, has_klt):  # appendix A
+    """The bound on a chunk of token strings: one of coding 3, or two and a colour KLT."""
+    return (584 if has_klt else 281) + 3 * tokens + tokens // 256
+
+
 def is_valid_entry(coding, count, tile, length, content):  # appendix A
     columns, rows = tile
     halves = 6 * columns * rows * count
     blocks = -(-columns // 8) * -(-rows // 8)
     low, high, max_bytes = {
-        1: (1, 192 * blocks * count, 584 + 3 * content + content // 256),
-        3: (1, halves // 2, 281 + 3 * content + content // 256),
+        1: (1, 192 * blocks * count, max_token_bytes(content, True)),
+        3: (1, halves // 2, max_token_bytes(content, False)),
     }.get(coding, (halves, halves, bound(content)))
     return low <= content <= min(high, MAX_CONTENT_BYTES) and length <= max_bytes
 
@@ -211,7 +225,7 @@ def join_bytes(data, kind):
 def read_basis(chunk, functions, area):  # section 5
     content = decompress(chunk, functions * (1 + 2 * area))
     exponents = np.frombuffer(content[:functions], np.uint8)
-    require(exponents.max() <= 30, "an exponent")
+    require(exponents.max() <= MAX_EXPONENT, "an exponent")
     code = join_bytes(content[functions:], "<u2").astype(int).reshape(functions, area)
     number = np.where(code % 2 == 0, code >> 1, -(code >> 1) - 1)
     return (number / 2.0 ** exponents[:, None]).astype(f32)
@@ -262,7 +276,8 @@ class TokenString:  # section 6
             sign, below = self.take(1), self.take(size - 1)
             magnitude = (1 << size - 1) + below
             numbers[at] = -magnitude if sign else magnitude
-            trace(own_context, token, [sign, *(below >> i & 1 for i in range(size - 1))], at, numbers[at])
+            bits = [sign, *(below >> i & 1 for i in range(size - 1))]
+            trace(own_context, token, bits, at, numbers[at])
             at += 1
         return numbers
 

@@ -35,17 +35,46 @@ def listing(data, at, pieces):
     assert at - start == len(data), "the pieces have another length than the data"
 
 
-# Sections 2, 7.1 and 8: constants.
+# Sections 2, 7.1 and 8, appendix A: constants.
 
 
 def constants():
-    yield [f"`123456789` is 0x{decoder.crc32c(b'123456789'):08X}. A reader MUST check them before it uses the bytes."]
-    values = [f"| {i} | {value!s} | {bits} |" for i, (value, bits) in enumerate(zip(decoder.COSINES, decoder.COSINE_BITS.split()))]
-    values = [re.sub(r"(\d)\.0 ", r"\1 ", value) for value in values]
-    yield [f"{values[i]} {values[i + 5] if i < 4 else '| | | |'}" for i in range(5)]
+    crc = decoder.crc32c(b"123456789")
+    yield [f"`123456789` is 0x{crc:08X}. A reader MUST check them before it uses the bytes."]
+    cosines = [f"{value:.9g}" if value in (0, 1) else str(value) for value in decoder.COSINES]
+    cells = enumerate(zip(cosines, decoder.COSINE_BITS.split()))
+    cells = [f"| {i} | {cosine} | {bits} |" for i, (cosine, bits) in cells] + ["| | | |"]
+    yield [f"{cells[i]} {cells[i + 5]}" for i in range(5)]
     grid = np.argsort(decoder.ZIGZAG).reshape(8, 8)
     yield [f"        {row}    " + "".join(f"{z:4}" for z in line) for row, line in enumerate(grid)]
     yield ["    order = " + ", ".join(map(str, decoder.centre_out_order(3)))]
+    side, content = decoder.MAX_SIDE, decoder.MAX_CONTENT_BYTES
+    low, high = decoder.TILE_SIDES
+    yield [
+        f"| camera width and height, light width and height | 1 to {side} |",
+        f"| window side | 1 to {decoder.MAX_WINDOW}, odd |",
+        f"| tile side | {low} to {high} |",
+        f"| rank | {decoder.MAX_RANK} |",
+        f"| scans | {decoder.MAX_SCANS} |",
+        f"| extensions | {power_of_two(decoder.MAX_EXTENSION_BYTES)} bytes |",
+        f"| metadata | {power_of_two(decoder.MAX_METADATA_BYTES)} bytes |",
+        f"| content of a frame other than the directory | {power_of_two(content)} bytes |",
+        f"| tokens of a chunk | {power_of_two(content)} |",
+        f"| zstd window | {power_of_two(decoder.MAX_WINDOW_BYTES)} bytes |",
+        f"| exponent of a basis function | {decoder.MAX_EXPONENT} |",
+    ]
+    tokens = "3 · `content_bytes` + ⌊`content_bytes` / 256⌋"
+    transform, direct = decoder.max_token_bytes(0, True), decoder.max_token_bytes(0, False)
+    yield [
+        f"   | 1 transform | 1 to 192 · `blocks` · `count` | {transform} + {tokens} |",
+        "   | 2, 4 half floats | 6 · P · `count` | bound(`content_bytes`) |",
+        f"   | 3 direct | 1 to 3 · P · `count` | {direct} + {tokens} |",
+    ]
+
+
+def power_of_two(value):
+    assert value.bit_count() == 1
+    return f"2^{value.bit_length() - 1}"
 
 
 def check_offsets(text):
@@ -74,17 +103,21 @@ def whole_file():
         text = "".join(chr(byte) if 32 <= byte < 127 else "." for byte in line)
         lines.append(f"    {at:04X}  {line.hex(' ').upper():<47}  {text}")
     yield lines
-    (directory, directory_crc), (extensions, extension_crc), (metadata, metadata_crc) = index.sections
+    lengths, crcs = zip(*index.sections)
+    sections = [
+        f"`{name}_bytes` {length}, checksum {crc:08X}"
+        for name, length, crc in zip(("directory", "extension", "metadata"), lengths, crcs)
+    ]
     a0, a1, a2, b0, b1, b2 = (f"{a:g}" for a in index.affine)
     yield [
         f"| 0010 | camera {index.width} x {index.height}, light {index.light_width} x "
         f"{index.light_height}, w {index.w}, `tile_side` {index.tile_side} |",
         f"| 0028 | correspondence {a0}, {a1}, {a2}, {b0}, {b1}, {b2} |",
-        f"| 0058 | `file_bytes` {len(file)} = 144 + {directory} + {extensions} + {metadata} |",
+        f"| 0058 | `file_bytes` {len(file)} = 144 + {lengths[0]} + {lengths[1]} + {lengths[2]} |",
         f"| 0060 | r {index.rank}, `scans` {index.scan_count} |",
-        f"| 0068 | `directory_bytes` {directory}, checksum {directory_crc:08X} |",
-        f"| 0070 | `extension_bytes` {extensions}, checksum {extension_crc:08X} |",
-        f"| 0078 | `metadata_bytes` {metadata}, checksum {metadata_crc:08X} |",
+        f"| 0068 | {sections[0]} |",
+        f"| 0070 | {sections[1]} |",
+        f"| 0078 | {sections[2]} |",
         "| 0080 | reserved |",
         f"| 008C | header checksum {unpack_from('<I', file, 140)[0]:08X} |",
     ]
@@ -96,8 +129,8 @@ TILE, SCANS, PIXELS = 3, (1, 2), (0, 15)
 
 
 def directory(index, file):
-    tiles = len(index.tiles)
-    content = decompress(file[144 : 144 + index.sections[0][0]], index.scan_count * (24 + 12 * tiles))
+    tiles, end = len(index.tiles), 144 + index.sections[0][0]
+    content = decompress(file[144:end], index.scan_count * (24 + 12 * tiles))
     lines = []
     for s in SCANS:
         coding, first, count, _, step, basis_bytes, _ = index.scans[s]
@@ -118,8 +151,8 @@ def directory(index, file):
 def layout(index):
     for s in range(index.scan_count):
         basis, *tiles = map(len, index.chunks[s])
-        lengths = ", ".join(map(str, tiles))
-        yield f"    {index.offsets[s][0]:04X}  scan {s}: basis chunk of {basis} bytes, tile chunks of {lengths}"
+        lengths = f"basis chunk of {basis} bytes, tile chunks of {', '.join(map(str, tiles))}"
+        yield f"    {index.offsets[s][0]:04X}  scan {s}: {lengths}"
 
 
 def token_string(data):
@@ -174,7 +207,8 @@ def inverse_dct(index, main):
     """The first pixel of the first block, step by step."""
     step = f32(index.scans[SCANS[0]][4])
     frequencies = np.zeros((8, 8), f32)
-    frequencies.reshape(-1)[decoder.ZIGZAG] = np.array(TokenString(main, 100).read_run(64), f32) * step
+    numbers = np.array(TokenString(main, 100).read_run(64), f32)
+    frequencies.reshape(-1)[decoder.ZIGZAG] = numbers * step
     for row, column in np.argwhere(frequencies):
         yield f"    F[{row}, {column}]       {binary32(frequencies[row, column])}"
     partial, pixel = np.zeros(8, f32), f32(0)
@@ -219,7 +253,8 @@ def tile_of_coding_1():
     yield directory(index, file)
     yield layout(index)
     yield from (lines for lines, _ in chunks)
-    yield [line for s, (_, main) in zip(SCANS, chunks) for line in quantised_numbers(s, main, blocks)]
+    strings = [(s, main) for s, (_, main) in zip(SCANS, chunks)]
+    yield [line for s, main in strings for line in quantised_numbers(s, main, blocks)]
     yield inverse_dct(index, chunks[0][1])
     yield colours(index, file)
 
@@ -239,11 +274,13 @@ def three_streams():
     lines = list(listing(data[:25], start, pieces))
     at = 25
     for i, (number, length) in enumerate(tokens.lengths):
-        lines += listing(data[at : at + 8], start + at, [(8, f"frame of stream {i}, its first 8 of {length} bytes")])
+        meaning = f"frame of stream {i}, its first 8 of {length} bytes"
+        lines += listing(data[at : at + 8], start + at, [(8, meaning)])
         at += length
-    lines += listing(data[at : at + 8], start + at, [(8, f"bits, the first 8 of {len(data) - at} bytes")])
-    yield lines
-    yield [f"    stream {i}  {content[:shown].hex(' ').upper()} ..." for i, content in enumerate(tokens.contents)]
+    meaning = f"bits, the first 8 of {len(data) - at} bytes"
+    yield lines + list(listing(data[at : at + 8], start + at, [(8, meaning)]))
+    first = [content[:shown].hex(" ").upper() for content in tokens.contents]
+    yield [f"    stream {i}  {content} ..." for i, content in enumerate(first)]
 
     lines = []
 
@@ -266,10 +303,11 @@ def three_streams():
         slot, colour = order[item], decoder.colours_of(numbers[item])
         y_co_cg, rgb = (", ".join(map(str, values)) for values in (numbers[item], colour))
         lines.append(f"    item {item}, slot {slot}: Y, Co, Cg = {y_co_cg}; red, green, blue = {rgb}")
-        for channel in range(3):
+        for channel, number in enumerate(colour):
             old, new = before[0, slot, channel], after[0, slot, channel]
-            assert new == old + f32(colour[channel]) * step
-            lines.append(f"      d[0, {slot}, {channel}] = {binary32(old)} + {colour[channel]} · step = {binary32(new)}")
+            assert new == old + f32(number) * step
+            sum_text = f"{binary32(old)} + {number} · step = {binary32(new)}"
+            lines.append(f"      d[0, {slot}, {channel}] = {sum_text}")
     yield lines
 
 
@@ -339,13 +377,13 @@ def windows_to_picture():
     lines = [f"    c[{k}]  {reals(c[k])}" for k in range(index.rank)]
     tau = decoder.unmasked_function(c, d, basis)
     for slot in SLOTS:
-        place = "off the light plane" if elements[slot] is None else f"element {elements[slot]}"
-        masked = tau[slot] * (elements[slot] is not None)
+        is_off = elements[slot] is None
+        place = "off the light plane" if is_off else f"element {elements[slot]}"
         lines.append(f"    slot {slot}, {place}")
         lines.append(f"      v[0], v[1], v[2]  {reals(basis[:, slot])}")
         lines.append(f"      d                 {reals(d[slot])}")
         lines.append(f"      d + Σ c · v       {reals(tau[slot])}")
-        lines.append(f"      τ                 {reals(np.abs(masked) if not masked.any() else masked)}")
+        lines.append(f"      τ                 {reals(np.zeros(3) if is_off else tau[slot])}")
     yield lines
 
     lines = []
