@@ -40,7 +40,7 @@ def listing(data, at, pieces):
 
 def constants():
     crc = decoder.crc32c(b"123456789")
-    yield [f"`123456789` is 0x{crc:08X}. A reader MUST check them before it uses the bytes."]
+    yield [f"`123456789` is 0x{crc:08X}. A reader MUST check each checksum before it uses the bytes."]
     cosines = [f"{value:.9g}" if value in (0, 1) else str(value) for value in decoder.COSINES]
     cells = enumerate(zip(cosines, decoder.COSINE_BITS.split()))
     cells = [f"| {i} | {cosine} | {bits} |" for i, (cosine, bits) in cells] + ["| | | |"]
@@ -352,6 +352,71 @@ def picture(index, tiles, basis):
     return result
 
 
+def facts():
+    """Sentences with figures of the fixtures. Line breaks do not matter."""
+    for name in "transform", "coarse", "direct", "mixed", "lossless", "extended", "dark":
+        _, index = read(name)
+        sides = f"{index.width} x {index.height} | {index.tile_side} | {index.w} | {index.rank}"
+        yield f"| `{name}` | {sides} |"
+
+    file, index = read("dark")
+    yield f"This is all of `dark.ltm`, {len(file)} bytes without light:"
+
+    _, index = read("coarse")
+    columns, rows = index.tiles[TILE]
+    blocks = len(Planes((columns, rows), 0).blocks)
+    left, top = index.corners[TILE]
+    tiles = len(index.tiles)
+    content_bytes = index.scan_count * (24 + 12 * tiles)
+    yield f"This is tile {TILE} of `coarse.ltm`"
+    yield (
+        f"camera {index.width} x {index.height}, w = {index.w}, `tile_side` {index.tile_side}, "
+        f"r = {index.rank}, {index.scan_count} scans. There are {-(-index.width // index.tile_side)} x "
+        f"{-(-index.height // index.tile_side)} tiles, and tile {TILE} is the left one of the lower row: "
+        f"columns {left} to {left + columns - 1} and rows {top} to {top + rows - 1}, so P = "
+        f"{columns * rows} pixels in `blocks` = {blocks} blocks"
+    )
+    yield (
+        f"The frame at {144:04X} decompresses to {index.scan_count} · (24 + 12 · {tiles}) = "
+        f"{content_bytes} bytes"
+    )
+    yield f"The file index has {index.index_bytes} bytes, {index.index_bytes:04X} in hexadecimal."
+    offsets = index.offsets[SCANS[0]]
+    before = " + ".join(str(index.bytes[SCANS[0]][tile]) for tile in range(TILE))
+    yield (
+        f"begins {before} bytes after {offsets[0]:04X}, at {offsets[1 + TILE]:04X}, and that of scan "
+        f"{SCANS[1]} at {index.offsets[SCANS[1]][1 + TILE]:04X}."
+    )
+    counts = [string.count for string in chunk_strings(index, SCANS[0])]
+    total = index.content_bytes[SCANS[0]][TILE]
+    yield f"The tokens of both strings are {counts[0]} + {counts[1]} = {total}, which is `content_bytes`."
+
+    _, index = read("direct")
+    columns, rows = index.tiles[1]
+    _, first, count, *_ = index.scans[1]
+    yield f"`first` = {first} and `count` = {count}: all slots of a window with w = {index.w}."
+    yield (
+        f"The tile has {columns} x {rows} = {columns * rows} pixels, each with a run of {3 * count} numbers. "
+        f"So stream 0, which has the first token of each run, has {columns * rows} tokens."
+    )
+
+    _, index = read("mixed")
+    a0, a1, a2, b0, b1, b2 = index.affine
+    assert a1 == b0 == 0
+    yield (
+        f"camera {index.width} x {index.height}, light plane {index.light_width} x {index.light_height}, "
+        f"w = {index.w}, r = {index.rank}, the correspondence u = {a0:g} · (x + 0.5) - {-a2:g}, "
+        f"v = {b1:g} · (y + 0.5) - {-b2:g}."
+    )
+    tile, p = tile_and_pixel(index, *PIXEL)
+    yield f"Pixel {PIXEL} is pixel {p} of tile {tile},"
+
+
+def chunk_strings(index, s):
+    data, first = index.chunks[s][1 + TILE], index.scans[s][1]
+    return Planes(index.tiles[TILE], index.rank).split(data, index.content_bytes[s][TILE], [first])
+
+
 def windows_to_picture():
     file, index = read("mixed")
     tiles, basis = decode(file)
@@ -425,6 +490,11 @@ def main():
         missing += len(lacking)
     if sys.argv[1:] != ["--print"]:
         check_offsets(text)
+        words = " ".join(text.split())
+        for fact in facts():
+            if fact not in words:
+                print(f"docs/format.md lacks: {fact}")
+                missing += 1
     sys.exit(bool(missing))
 
 
