@@ -282,7 +282,8 @@ class TokenString:  # section 6
         return numbers
 
     def finish(self):
-        require(all(next(stream, None) is None for stream in self.streams), "tokens after the last run")
+        no_tokens = all(next(stream, None) is None for stream in self.streams)
+        require(no_tokens, "tokens after the last run")
         no_bits = self.bit_count - self.taken < 8 and not self.bits >> self.taken
         require(no_bits, "bits after the last run")
 

@@ -366,14 +366,14 @@ def facts():
     columns, rows = index.tiles[TILE]
     blocks = len(Planes((columns, rows), 0).blocks)
     left, top = index.corners[TILE]
-    tiles = len(index.tiles)
+    tiles, side = len(index.tiles), index.tile_side
+    grid = f"{-(-index.width // side)} x {-(-index.height // side)}"
     content_bytes = index.scan_count * (24 + 12 * tiles)
     yield f"This is tile {TILE} of `coarse.ltm`"
     yield (
-        f"camera {index.width} x {index.height}, w = {index.w}, `tile_side` {index.tile_side}, "
-        f"r = {index.rank}, {index.scan_count} scans. There are {-(-index.width // index.tile_side)} x "
-        f"{-(-index.height // index.tile_side)} tiles, and tile {TILE} is the left one of the lower row: "
-        f"columns {left} to {left + columns - 1} and rows {top} to {top + rows - 1}, so P = "
+        f"camera {index.width} x {index.height}, w = {index.w}, `tile_side` {side}, r = {index.rank}, "
+        f"{index.scan_count} scans. There are {grid} tiles, and tile {TILE} is the left one of the "
+        f"lower row: columns {left} to {left + columns - 1} and rows {top} to {top + rows - 1}, so P = "
         f"{columns * rows} pixels in `blocks` = {blocks} blocks"
     )
     yield (
@@ -387,25 +387,25 @@ def facts():
         f"begins {before} bytes after {offsets[0]:04X}, at {offsets[1 + TILE]:04X}, and that of scan "
         f"{SCANS[1]} at {index.offsets[SCANS[1]][1 + TILE]:04X}."
     )
-    counts = [string.count for string in chunk_strings(index, SCANS[0])]
+    main, side = chunk_strings(index, SCANS[0])
     total = index.content_bytes[SCANS[0]][TILE]
-    yield f"The tokens of both strings are {counts[0]} + {counts[1]} = {total}, which is `content_bytes`."
+    yield f"The tokens of both strings are {main.count} + {side.count} = {total}, which"
 
     _, index = read("direct")
     columns, rows = index.tiles[1]
     _, first, count, *_ = index.scans[1]
     yield f"`first` = {first} and `count` = {count}: all slots of a window with w = {index.w}."
     yield (
-        f"The tile has {columns} x {rows} = {columns * rows} pixels, each with a run of {3 * count} numbers. "
-        f"So stream 0, which has the first token of each run, has {columns * rows} tokens."
+        f"The tile has {columns} x {rows} = {columns * rows} pixels, each with a run of {3 * count} "
+        f"numbers. So stream 0, which has the first token of each run, has {columns * rows} tokens."
     )
 
     _, index = read("mixed")
     a0, a1, a2, b0, b1, b2 = index.affine
     assert a1 == b0 == 0
     yield (
-        f"camera {index.width} x {index.height}, light plane {index.light_width} x {index.light_height}, "
-        f"w = {index.w}, r = {index.rank}, the correspondence u = {a0:g} · (x + 0.5) - {-a2:g}, "
+        f"camera {index.width} x {index.height}, light plane {index.light_width} x "
+        f"{index.light_height}, w = {index.w}, r = {index.rank}, the correspondence u = {a0:g} · (x + 0.5) - {-a2:g}, "
         f"v = {b1:g} · (y + 0.5) - {-b2:g}."
     )
     tile, p = tile_and_pixel(index, *PIXEL)

@@ -1,5 +1,5 @@
-//! What the integration tests share: small transports made from nothing.
-#![allow(dead_code)] // each test binary uses its own part
+//! Synthetic transports, and edits of files with correct checksums, for all integration tests.
+#![allow(dead_code)] // each test program uses some of it
 #![allow(clippy::unwrap_used)]
 
 pub mod relit;
@@ -46,7 +46,7 @@ pub fn tiled(
     .unwrap()
 }
 
-/// Light transport functions of peaks and noise, masked to the display; the first tile is all dark.
+/// Noisy light transport functions, zero off the light plane; the first tile is dark.
 pub fn functions(geometry: Geometry, seed: u64) -> Vec<TransportFunctions> {
     let mut noise = Noise(seed);
     let (side, area) = (geometry.window.side() as usize, geometry.window.area());
@@ -68,7 +68,7 @@ pub fn functions(geometry: Geometry, seed: u64) -> Vec<TransportFunctions> {
     tiles.collect()
 }
 
-/// A tile's own values, as a file has them.
+/// The values of a quantised tile.
 pub fn band_tile(tile: &Tile, geometry: &Geometry, basis: &Basis) -> BandTile {
     let (rank, area) = (basis.rank(), geometry.window.area());
     let pixels = tile.rect().extent.area();
@@ -85,30 +85,29 @@ pub fn band_tile(tile: &Tile, geometry: &Geometry, basis: &Basis) -> BandTile {
     band
 }
 
-/// A file after an edit of its header or parts, all checksums made right again as far as the file's
-/// own lengths make sense.
+/// A file after an edit of its header or chunks, with correct checksums as far as the file's lengths are valid.
 pub fn sealed(mut file: Vec<u8>, edit: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     edit(&mut file);
     if file.len() < HEADER_BYTES {
         return file;
     }
     seal_chunks(&mut file);
-    seal_head(&mut file);
+    seal_header(&mut file);
     file
 }
 
-/// A file whose directory, decompressed, was edited.
+/// A file after an edit of its decompressed directory.
 pub fn with_directory(file: &[u8], edit: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let [directory, rest] = directory_bounds(file);
-    let mut plain = zstd::bulk::decompress(&file[directory..rest], 1 << 20).unwrap();
-    edit(&mut plain);
-    let packed = zstd::bulk::compress(&plain, 19).unwrap();
+    let mut content = zstd::bulk::decompress(&file[directory..rest], 1 << 20).unwrap();
+    edit(&mut content);
+    let packed = zstd::bulk::compress(&content, 19).unwrap();
     let mut edited = [&file[..directory], &packed, &file[rest..]].concat();
     let length = packed.len() as u32;
     edited[104..108].copy_from_slice(&length.to_le_bytes());
     let total = edited.len() as u64;
     edited[88..96].copy_from_slice(&total.to_le_bytes());
-    seal_head(&mut edited);
+    seal_header(&mut edited);
     edited
 }
 
@@ -121,21 +120,21 @@ fn directory_bounds(file: &[u8]) -> [usize; 2] {
     [HEADER_BYTES, end]
 }
 
-/// Checksums of chunks and of the basis, in the directory.
+/// Corrects the checksums of chunks in the directory.
 fn seal_chunks(file: &mut Vec<u8>) {
     let [start, end] = directory_bounds(file);
     let scans = u32_at(file, 100);
-    let Ok(mut plain) = zstd::bulk::decompress(&file[start..end], 1 << 20) else {
+    let Ok(mut content) = zstd::bulk::decompress(&file[start..end], 1 << 20) else {
         return;
     };
-    let Some(entries) = plain
+    let Some(entries) = content
         .len()
         .checked_sub(24 * scans)
         .filter(|n| scans > 0 && n % 12 == 0)
     else {
         return;
     };
-    let (count, index) = (entries / 12, 24 * scans);
+    let (count, tables) = (entries / 12, 24 * scans);
     if count % scans != 0 {
         return;
     }
@@ -146,19 +145,19 @@ fn seal_chunks(file: &mut Vec<u8>) {
             *at = at.saturating_add(length);
             crc32c::crc32c(bytes).to_le_bytes()
         };
-        let basis = u32_at(&plain, 24 * scan + 16);
+        let basis = u32_at(&content, 24 * scan + 16);
         let sum = crc(&mut at, basis);
-        plain[24 * scan + 20..24 * scan + 24].copy_from_slice(&sum);
+        content[24 * scan + 20..24 * scan + 24].copy_from_slice(&sum);
         for i in scan * (count / scans)..(scan + 1) * (count / scans) {
-            let length = u32_at(&plain, index + 4 * i);
+            let length = u32_at(&content, tables + 4 * i);
             let sum = crc(&mut at, length);
-            let place = index + 4 * (2 * count + i);
+            let crc_at = tables + 4 * (2 * count + i);
             if length > 0 {
-                plain[place..place + 4].copy_from_slice(&sum);
+                content[crc_at..crc_at + 4].copy_from_slice(&sum);
             }
         }
     }
-    let Ok(packed) = zstd::bulk::compress(&plain, 19) else {
+    let Ok(packed) = zstd::bulk::compress(&content, 19) else {
         return;
     };
     let grown = packed.len() as i64 - (end - start) as i64;
@@ -169,8 +168,8 @@ fn seal_chunks(file: &mut Vec<u8>) {
     file[88..96].copy_from_slice(&total.to_le_bytes());
 }
 
-/// Checksums of the index's parts, and the header's own.
-fn seal_head(file: &mut [u8]) {
+/// Corrects the checksums in the header.
+fn seal_header(file: &mut [u8]) {
     let mut start = HEADER_BYTES;
     for length_at in [104, 112, 120] {
         let end = start
