@@ -47,12 +47,9 @@ function decodeSrgb(code: number): number {
 }
 
 let context: CanvasRenderingContext2D | null = null;
-const parsed = new Map<string, readonly number[] | null>();
 
 /** Parses with a canvas of one pixel, which supports every colour syntax of the browser. */
 const parseCssColor: CssColorParser = (css) => {
-  const cached = parsed.get(css);
-  if (cached !== undefined) return cached;
   context ??= document.createElement('canvas').getContext('2d', { willReadFrequently: true });
   if (!context) return null;
   const canvas = context;
@@ -62,12 +59,8 @@ const parseCssColor: CssColorParser = (css) => {
     canvas.fillStyle = css;
     return canvas.fillStyle;
   };
-  let rgba: readonly number[] | null = null;
-  if (fillAfter('#000') === fillAfter('#fff')) {
-    canvas.clearRect(0, 0, 1, 1);
-    canvas.fillRect(0, 0, 1, 1);
-    rgba = [...canvas.getImageData(0, 0, 1, 1).data];
-  }
-  parsed.set(css, rgba);
-  return rgba;
+  if (fillAfter('#000') !== fillAfter('#fff')) return null;
+  canvas.clearRect(0, 0, 1, 1);
+  canvas.fillRect(0, 0, 1, 1);
+  return [...canvas.getImageData(0, 0, 1, 1).data];
 };
