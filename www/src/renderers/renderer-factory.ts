@@ -14,7 +14,7 @@ const MAX_WORKERS = 4;
 /** Delay of background loading in browsers without `requestIdleCallback`. */
 const IDLE_DELAY_MS = 1000;
 
-/** `gpu`, `cpu` and `cpuModule` load what is fetched only when it is needed. */
+/** `gpu`, `cpu` and `cpuModule` fetch the parts that not every page needs. */
 export function rendererFactory({
   gpu,
   cpu,

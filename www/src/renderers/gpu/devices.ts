@@ -11,7 +11,7 @@ import { BROWSER_GRAPHICS, type GraphicsBackend, type GraphicsPorts } from './gr
 
 export type LoadGraphics = <N extends GraphicsBackend>(name: N) => Promise<Modules[N]>;
 
-/** A photograph's use of a device. Free what was drawn with it before `release`. */
+/** A photograph's use of a device. Free its relighter before `release`. */
 export interface Lease extends DeviceHandle {
   readonly graphics: GraphicsDevice;
 }
