@@ -1,7 +1,7 @@
 /** Decodes a file from any source on the calling thread. */
 
 import { loadDecoder } from '../engine/core-modules.js';
-import type { Piece } from '../loading/byte-source.js';
+import type { FilePiece } from '../loading/byte-source.js';
 import { tooLong } from '../loading/http-errors.js';
 import { decodePieces, openPhoto } from '../loading/load.js';
 import { createMainThreadDecoder } from '../photo/main-thread-decoder.js';
@@ -72,7 +72,7 @@ export async function decode(
 async function* piecesOf(
   arriving: Iterable<Uint8Array> | AsyncIterable<Uint8Array>,
   decoder: PhotoDecoder,
-): AsyncGenerator<Piece, void> {
+): AsyncGenerator<FilePiece, void> {
   let offset = 0;
   for await (const bytes of arriving) {
     yield { offset, bytes };

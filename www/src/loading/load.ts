@@ -5,7 +5,7 @@ import type { Photograph } from '../photo/photograph.js';
 import { endSentence, hasCode, PhotoError, toPhotoError } from '../shared/errors.js';
 import { linkedController, withTimeout } from '../shared/promises.js';
 import type { ByteRange } from '../shared/values.js';
-import { HttpSource, type Piece } from './byte-source.js';
+import { type FilePiece, HttpSource } from './byte-source.js';
 import { fileName, tooLong } from './http-errors.js';
 
 export interface LoadOptions {
@@ -85,10 +85,10 @@ function withFileName(error: PhotoError, url: string): PhotoError {
 async function* piecesFor(
   decoder: PhotoDecoder,
   source: HttpSource,
-  first: IteratorResult<Piece, void>,
-  firstPieces: AsyncIterable<Piece>,
+  first: IteratorResult<FilePiece, void>,
+  firstPieces: AsyncIterable<FilePiece>,
   signal: AbortSignal,
-): AsyncGenerator<Piece, void> {
+): AsyncGenerator<FilePiece, void> {
   if (!first.done) yield first.value;
   yield* firstPieces;
   let lastBytesFed = -1;
@@ -108,7 +108,7 @@ async function* piecesFor(
 /** Decodes pieces of a file in the order in which they arrive. The caller frees the decoder. */
 export async function decodePieces(
   decoder: PhotoDecoder,
-  pieces: AsyncIterable<Piece>,
+  pieces: AsyncIterable<FilePiece>,
   { signal, onProgress, onPreview }: LoadOptions,
   ports: Pick<LoadPorts, 'now' | 'yieldToPage'>,
 ): Promise<Photograph> {
