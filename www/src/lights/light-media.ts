@@ -20,9 +20,8 @@ export class LightMedia {
     readonly crossOrigin: CrossOrigin,
   ) {
     if (isVideoAddress(address)) {
-      const video = document.createElement('video');
-      Object.assign(video, { muted: true, loop: true, playsInline: true, preload: 'auto' });
-      this.#video = video;
+      const properties = { muted: true, loop: true, playsInline: true, preload: 'auto' } as const;
+      this.#video = Object.assign(document.createElement('video'), properties);
     }
     this.source = this.#video ?? new Image();
     this.source.crossOrigin = crossOrigin;

@@ -50,9 +50,7 @@ export class LightSourceObserver {
   }
 
   #observeImage(image: HTMLImageElement, signal: AbortSignal): void {
-    const fail = () => {
-      this.#fail(`The light image could not be loaded: ${image.currentSrc}`);
-    };
+    const fail = () => this.#fail(`The light image could not be loaded: ${image.currentSrc}`);
     // decode() works off the main thread; the first drawImage would block the page otherwise. It rejects
     // if the image gets another address meanwhile, which fires another load event.
     const decode = () =>
@@ -85,9 +83,7 @@ export class LightSourceObserver {
       video.pause();
       video.srcObject = null;
     });
-    const ended = () => {
-      this.#fail('The light stream has ended, or its device was disconnected.');
-    };
+    const ended = () => this.#fail('The light stream has ended, or its device was disconnected.');
     video.addEventListener('ended', ended, { signal });
     if (stream.active === false) ended();
     video.srcObject = stream;
@@ -152,8 +148,5 @@ function fingerprintOf(picture: LightPicture): string {
 
 /** Browsers play a muted inline video without a click. */
 function createMutedVideo(): HTMLVideoElement {
-  const video = document.createElement('video');
-  video.muted = true;
-  video.playsInline = true;
-  return video;
+  return Object.assign(document.createElement('video'), { muted: true, playsInline: true });
 }

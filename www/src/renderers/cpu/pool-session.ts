@@ -16,11 +16,11 @@ interface PoolSessionEvents {
   ended(): void;
 }
 
-interface WorkerPart {
+/** One worker's rows. */
+interface WorkerPart extends TileRowRange {
   readonly client: RelightClient;
-  readonly range: TileRowRange;
-  /** The light rows that it needs. */
-  lightRows: readonly [first: number, end: number];
+  /** The first light row that it needs, and the end of those rows. */
+  lightRows: Uint32Array;
   /** The light that it has; `null` if none. */
   light: Light | null;
   /** Memory for its pixels; `null` while the worker has it. */
@@ -46,10 +46,9 @@ export class PoolSession implements TileSession {
     this.#width = width;
     this.#parts = ranges.map((range, i) => {
       const client = clients[i] as RelightClient;
-      return { client, range, lightRows: [0, 0], light: null, pixels: null };
+      return { ...range, client, lightRows: new Uint32Array(2), light: null, pixels: null };
     });
-    for (const { client, range } of this.#parts) {
-      const { firstRow, rows } = range;
+    for (const { client, firstRow, rows } of this.#parts) {
       // If this fails, the next request fails too.
       this.#request(client, { kind: 'open', geometry, basis, firstRow, rows }).catch(() => {});
     }
@@ -65,7 +64,7 @@ export class PoolSession implements TileSession {
   }
 
   get tiles(): number[][] {
-    return this.#parts.map(({ range: { firstTile, endTile } }) =>
+    return this.#parts.map(({ firstTile, endTile }) =>
       Array.from({ length: endTile - firstTile }, (_, i) => firstTile + i),
     );
   }
@@ -85,8 +84,7 @@ export class PoolSession implements TileSession {
     await allSettledOrThrow(
       this.#parts.map(async (part) => {
         part.light = null;
-        const rows = new Uint32Array(await this.#request(part.client, { kind: 'plan' }));
-        part.lightRows = [rows[0] ?? 0, rows[1] ?? 0];
+        part.lightRows = new Uint32Array(await this.#request(part.client, { kind: 'plan' }));
       }),
     );
     this.#isPlanned = true;
@@ -105,8 +103,8 @@ export class PoolSession implements TileSession {
   }
 
   async #relightPart(part: WorkerPart, light: Light, settings: FrameSettings): Promise<RowPixels> {
-    const { firstRow, rows } = part.range;
-    const [first, end] = part.lightRows;
+    const { firstRow, rows } = part;
+    const [first = 0, end = 0] = part.lightRows;
     const rgb =
       light === part.light ? null : (light.linearRgb(first, end) as Float32Array<ArrayBuffer>);
     const memory = part.pixels ?? new ArrayBuffer(4 * this.#width * rows);
@@ -141,7 +139,7 @@ export class PoolSession implements TileSession {
   }
 
   #clientOf(tile: number): RelightClient {
-    const part = this.#parts.find(({ range }) => tile < range.endTile) as WorkerPart;
+    const part = this.#parts.find(({ endTile }) => tile < endTile) as WorkerPart;
     return part.client;
   }
 }
