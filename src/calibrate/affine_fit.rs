@@ -3,6 +3,7 @@
 //! Wrong bits of the Gray code put a pixel far off, so weights are iteratively reduced for pixels that disagree (Cauchy
 //! weights).
 
+use crate::linalg;
 use crate::transport::CameraPx;
 
 /// The decoded position of one camera pixel along one axis.
@@ -18,24 +19,31 @@ pub(super) struct DecodedPixel {
 /// Rounds of reweighting; the weights converge within a few.
 const REWEIGHTING_ROUNDS: usize = 10;
 
+/// Smallest pivot, relative to the largest entry of the normal equations, of pixels that do not lie on one line.
+const MIN_PIVOT_RATIO: f64 = 1e-12;
+
 /// The row `a`; `None` if the pixels lie on one line.
 pub(super) fn fit_affine_row(pixels: &[DecodedPixel]) -> Option<[f64; 3]> {
     let row = |p: &DecodedPixel| [f64::from(p.pixel.x) + 0.5, f64::from(p.pixel.y) + 0.5, 1.0];
     let precision = |p: &DecodedPixel| 1.0 / (p.width * p.width);
     let mut weights: Vec<f64> = pixels.iter().map(precision).collect();
-    let mut fit = None;
+    let mut solution = [0.0; 3];
     for _ in 0..REWEIGHTING_ROUNDS {
-        let mut normal = [[0.0; 4]; 3];
+        let mut normal = [0.0; 9];
+        solution = [0.0; 3];
         for (pixel, weight) in pixels.iter().zip(&weights) {
             let row = row(pixel);
-            for i in 0..3 {
-                for j in 0..3 {
-                    normal[i][j] += weight * row[i] * row[j];
-                }
-                normal[i][3] += weight * row[i] * pixel.position;
+            for (i, normal) in normal.chunks_exact_mut(3).enumerate() {
+                linalg::add_scaled(normal, weight * row[i], &row);
+                solution[i] += weight * row[i] * pixel.position;
             }
         }
-        let solution = solve(normal)?;
+        let min_pivot = MIN_PIVOT_RATIO * normal.iter().copied().fold(0.0, f64::max);
+        linalg::cholesky(&mut normal, 3)?;
+        if (0..3).any(|i| normal[4 * i].powi(2) <= min_pivot) {
+            return None;
+        }
+        linalg::cholesky_solve(&normal, &mut solution);
         for (pixel, weight) in pixels.iter().zip(&mut weights) {
             let row = row(pixel);
             let predicted: f64 = row.iter().zip(&solution).map(|(r, a)| r * a).sum();
@@ -43,31 +51,6 @@ pub(super) fn fit_affine_row(pixels: &[DecodedPixel]) -> Option<[f64; 3]> {
             let residual = (pixel.position - predicted) / pixel.width;
             *weight = precision(pixel) / (1.0 + residual * residual);
         }
-        fit = Some(solution);
     }
-    fit
-}
-
-/// Solves three equations, `[A | b]`, by Gaussian elimination with pivoting; `None` if singular.
-fn solve(mut m: [[f64; 4]; 3]) -> Option<[f64; 3]> {
-    let scale = m
-        .iter()
-        .flat_map(|r| &r[..3])
-        .fold(0.0f64, |a, b| a.max(b.abs()));
-    for i in 0..3 {
-        let pivot = (i..3).max_by(|&a, &b| m[a][i].abs().total_cmp(&m[b][i].abs()))?;
-        m.swap(i, pivot);
-        if m[i][i].abs() <= 1e-12 * scale {
-            return None;
-        }
-        for r in 0..3 {
-            if r != i {
-                let factor = m[r][i] / m[i][i];
-                for c in i..4 {
-                    m[r][c] -= factor * m[i][c];
-                }
-            }
-        }
-    }
-    Some(std::array::from_fn(|i| m[i][3] / m[i][i]))
+    Some(solution)
 }

@@ -13,7 +13,7 @@ use crate::capture::{CaptureFolder, Measurements, NoiseModel, RowSet};
 use crate::relight::Light;
 use crate::simulate::{SceneKind, WINDOW_SIDE};
 use crate::study::{
-    self, CaptureTruth, KnownTransport, RelitLight, SNR_PATTERNS, SceneCamera, SceneTruth, Section,
+    self, CaptureTruth, KnownTransport, RelitLight, SNR_PATTERNS, SceneCamera, Section,
 };
 use crate::transport::Extent;
 
@@ -180,7 +180,6 @@ fn study_scene(
 ) -> Result<Vec<Section>> {
     let light = square(PAPER_LIGHT);
     let scene = kind.build(square(PAPER_CAMERA), light)?;
-    let known = SceneTruth(scene.as_ref());
     let scene_camera = SceneCamera {
         scene: scene.as_ref(),
         electrons: ELECTRONS,
@@ -192,7 +191,7 @@ fn study_scene(
     ));
     let measurements = scene_camera.measure(kind.ensemble(), max_patterns, &AllCores)?;
     let lights = study::built_in_lights(light);
-    figures(name, &known, measurements, lights, pixels, progress)
+    figures(name, &scene_camera, measurements, lights, pixels, progress)
 }
 
 /// The paper's figures for a capture with known transport.

@@ -27,9 +27,8 @@ pub(crate) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
             }
             log_det += pivot.ln();
             let inverse = pivot.sqrt().recip();
-            a[k * n + k..k * n + n]
-                .iter_mut()
-                .for_each(|u| *u *= inverse);
+            let row = a[k * n + k..k * n + n].iter_mut();
+            row.for_each(|u| *u *= inverse);
         }
         let (done, rest) = a.split_at_mut(end * n);
         if end - first == BLOCK {
@@ -45,6 +44,21 @@ pub(crate) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
         }
     }
     Some(log_det)
+}
+
+/// Returns the factor of `A + ridge · I` and the logarithm of its determinant. The ridge grows until the sum is positive
+/// definite; `None` if A has a NaN.
+pub(crate) fn cholesky_with_ridge(a: &[f64], n: usize, ridge: f64) -> Option<(Vec<f64>, f64)> {
+    let mut ridge = ridge.max(f64::MIN_POSITIVE);
+    while ridge.is_finite() {
+        let mut u = a.to_vec();
+        (0..n).for_each(|i| u[i * n + i] += ridge);
+        if let Some(log_det) = cholesky(&mut u, n) {
+            return Some((u, log_det));
+        }
+        ridge *= 10.0;
+    }
+    None
 }
 
 /// Replaces `b`, `[n]`, by the solution of `UᵀUx = b`.
@@ -80,10 +94,8 @@ pub(crate) fn cholesky_inverse(u: &[f64], n: usize, scratch: &mut [f64], inverse
     }
     for i in 0..n {
         for j in i..n {
-            inverse[i * n + j] = dot(
-                &scratch[i * n + j..(i + 1) * n],
-                &scratch[j * n + j..(j + 1) * n],
-            );
+            let [row, column] = [i, j].map(|k| &scratch[k * n + j..(k + 1) * n]);
+            inverse[i * n + j] = dot(row, column);
         }
     }
 }

@@ -12,7 +12,7 @@ mod matrix;
 mod vector;
 mod vectorise;
 
-pub(crate) use cholesky::{cholesky, cholesky_inverse, cholesky_solve};
+pub(crate) use cholesky::{cholesky, cholesky_inverse, cholesky_solve, cholesky_with_ridge};
 pub(crate) use eigen::symmetric_eigen;
 pub(crate) use matrix::{mirror_upper, multiply, multiply_vector, transpose};
 pub(crate) use vector::{

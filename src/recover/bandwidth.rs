@@ -15,6 +15,7 @@ use super::error::RecoverError;
 use super::holdout::pattern_ids;
 use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns};
 use super::pooled::PooledMeasurements;
+use super::preparation;
 use super::sampling::{self, PixelsOfWindow};
 use crate::capture::{Measurements, group_count};
 use crate::executor::Executor;
@@ -80,42 +81,29 @@ impl WindowEstimate {
     ) -> Result<Self, RecoverError> {
         let light = measurements.light;
         let max_side = MAX_SIDE.min((light.width.min(light.height) / 2).saturating_sub(1) | 1);
-        let geometry = Geometry {
-            camera: measurements.camera,
-            light,
-            window: Window::new(max_side)?,
-            correspondence: measurements.correspondence,
-            tile_side: Geometry::DEFAULT_TILE_SIDE,
-        }
-        .validate()?;
-        if !sampling::sees_light_plane(&geometry) {
-            return Err(RecoverError::CorrespondenceOffLightPlane);
-        }
+        let geometry = preparation::geometry(measurements, Window::new(max_side)?)?;
         let rings = Rings::new(max_side, group_count(&pattern_ids(&measurements.patterns)));
         let mut squares = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
         // Errors of neighbouring squares are correlated: each part is a strip of the picture.
         squares.sort_by_key(|square| (square.y, square.x));
         executor.check_cancelled()?;
         let parts = executor.map(PARTS, |part| {
-            let mut sums = NormalEquations::zeros(rings.sizes.len());
+            let mut sums = NormalEquations::zeros(rings.count());
             let start = |part: usize| part * squares.len() / PARTS;
             for square in &squares[start(part)..start(part + 1)] {
                 for (origin, pixels) in sampling::pixels_by_window(&geometry, *square) {
                     vectorise(
                         #[inline(always)]
-                        || rings.add_window(&mut sums, measurements, &geometry, (origin, &pixels)),
+                        || rings.add_window(&mut sums, measurements, &geometry, origin, &pixels),
                     );
                 }
             }
             sums
         });
         let tail_fractions_without = |left_out: usize| {
-            let mut total = NormalEquations::zeros(rings.sizes.len());
-            let used = parts
-                .iter()
-                .enumerate()
-                .filter(|(part, _)| *part != left_out);
-            used.for_each(|(_, part)| total.merge(part));
+            let mut total = NormalEquations::zeros(rings.count());
+            let used = (0..PARTS).filter(|&part| part != left_out);
+            used.for_each(|part| total.merge(&parts[part]));
             Some(rings.tail_fractions(&total.solve()?, max_side))
         };
         let Some(tails) = tail_fractions_without(PARTS) else {
@@ -135,18 +123,11 @@ impl WindowEstimate {
 struct Rings {
     /// Side of the centre.
     centre: u32,
-    /// What each slot belongs to.
-    regions: Vec<Region>,
-    /// Number of elements in each ring, from the inside out.
+    /// The region of each slot: the centre's elements are regions by themselves, and come first; then the rings, from
+    /// the inside out.
+    regions: Vec<usize>,
+    /// Number of elements in each region.
     sizes: Vec<f64>,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Region {
-    /// The centre's element of this index.
-    Centre(usize),
-    /// The ring of this index.
-    Ring(usize),
 }
 
 impl Rings {
@@ -155,23 +136,31 @@ impl Rings {
         let centre = CENTRE_SIDES.into_iter().find(fits).unwrap_or(1);
         let half = side / 2;
         let distance = |s: u32| (s / side).abs_diff(half).max((s % side).abs_diff(half));
-        let mut sizes = vec![0.0; (half - centre / 2) as usize];
-        let mut next = 0;
-        let region = |s: u32| match distance(s).checked_sub(centre / 2 + 1) {
-            Some(ring) => {
-                sizes[ring as usize] += 1.0;
-                Region::Ring(ring as usize)
-            }
-            None => {
-                next += 1;
-                Region::Centre(next - 1)
-            }
+        let centre_area = (centre * centre) as usize;
+        let mut sizes = vec![0.0; centre_area + (half - centre / 2) as usize];
+        let mut next = 0..centre_area;
+        let region = |s: u32| {
+            let region = match distance(s).checked_sub(centre / 2 + 1) {
+                Some(ring) => centre_area + ring as usize,
+                None => next.next().unwrap_or(0),
+            };
+            sizes[region] += 1.0;
+            region
         };
         Self {
             centre,
             regions: (0..side * side).map(region).collect(),
             sizes,
         }
+    }
+
+    fn centre_area(&self) -> usize {
+        (self.centre * self.centre) as usize
+    }
+
+    /// Number of rings.
+    fn count(&self) -> usize {
+        self.sizes.len() - self.centre_area()
     }
 
     /// Adds the equations of one window's pixels, for the flux of each ring.
@@ -181,32 +170,29 @@ impl Rings {
         sums: &mut NormalEquations,
         measurements: &Measurements,
         geometry: &Geometry,
-        (origin, pixels): (Element, &PixelsOfWindow),
+        origin: Element,
+        pixels: &PixelsOfWindow,
     ) {
-        let elements = sampling::elements_of_window(geometry, origin);
-        let is_centre = |slot: usize| matches!(self.regions[slot], Region::Centre(_));
-        let centre_area = (self.centre * self.centre) as usize;
-        let centre_elements = elements.iter().filter(|&&(slot, _)| is_centre(slot));
-        if centre_elements.count() < centre_area {
+        let elements: Vec<_> = geometry.elements_of_window(origin).collect();
+        let centre_area = self.centre_area();
+        let is_centre = |&&(slot, _): &&(usize, usize)| self.regions[slot] < centre_area;
+        if elements.iter().filter(is_centre).count() < centre_area {
             return; // The pixel's brightness is unknown.
         }
         let all: Vec<usize> = (0..measurements.patterns.len()).collect();
-        let rings: Vec<usize> = (0..self.sizes.len()).collect();
+        let rings: Vec<usize> = (0..self.count()).collect();
         for (plane, channels) in measurements.planes() {
             let indices = sampling::unsaturated(measurements, &all, pixels, channels.clone());
             let patterns = indices.len();
-            let mut centre = vec![0.0; centre_area * patterns];
-            let mut columns = vec![0.0; rings.len() * patterns];
+            let mut centre = vec![0.0; self.sizes.len() * patterns];
             for (i, &l) in indices.iter().enumerate() {
                 let pattern = measurements.patterns[l].plane(plane);
                 for &(slot, m) in &elements {
-                    let p = f64::from(pattern[m]);
-                    match self.regions[slot] {
-                        Region::Centre(k) => centre[k * patterns + i] += p,
-                        Region::Ring(r) => columns[r * patterns + i] += p / self.sizes[r],
-                    }
+                    let region = self.regions[slot];
+                    centre[region * patterns + i] += f64::from(pattern[m]) / self.sizes[region];
                 }
             }
+            let columns = centre.split_off(centre_area * patterns);
             let weights = EquationWeights::uniform(patterns, CommonMode::EXCLUDED);
             let centre = WeightedColumns::new(centre, weights.clone());
             let mut columns = WeightedColumns::new(columns, weights);
@@ -271,12 +257,10 @@ fn choose_window(
         _ => true, // Nothing is known of light from beyond the last ring.
     };
     // A single small value may be due to chance.
-    let first = (0..rings).find(|&i| is_small(i) && is_small(i + 1));
+    let mut small = (0..rings).filter(|&i| is_small(i) && is_small(i + 1));
     let window = |rings: usize| Window::new(MIN_SIDE.min(max_side) + 2 * rings as u32);
-    if let Some(inside) = first
-        .map(|first| first + MARGIN_RINGS)
-        .filter(|&i| i < rings)
-    {
+    let inside = small.next().map(|first| first + MARGIN_RINGS);
+    if let Some(inside) = inside.filter(|&i| i < rings) {
         return Ok(WindowEstimate {
             window: window(inside)?,
             bandwidth: BandwidthEstimate::Bounded {
@@ -339,8 +323,7 @@ mod tests {
         for (side, patterns, centre) in [(3, 80, 1), (7, 80, 5), (9, 20, 3), (31, 80, 7)] {
             let rings = Rings::new(side, patterns);
             assert_eq!(rings.centre, centre);
-            let elements = rings.sizes.iter().sum::<f64>() + f64::from(centre * centre);
-            assert_eq!(elements, f64::from(side * side));
+            assert_eq!(rings.sizes.iter().sum::<f64>(), f64::from(side * side));
             assert!(rings.sizes.iter().all(|&size| size >= 1.0));
         }
     }

@@ -7,9 +7,9 @@
 
 use super::common_mode::CommonMode;
 use super::normal_equations::{EquationWeights, WeightedColumns};
-use crate::capture::Pattern;
+use crate::capture::Measurements;
 use crate::linalg::{dot, vectorise};
-use crate::transport::{ClippedRect, Element, Extent, Window};
+use crate::transport::{ClippedRect, Element, Extent, Geometry, Window};
 
 /// Largest table of correlations that one thread may have in memory.
 const MAX_TABLE_BYTES: usize = 64 << 20;
@@ -17,14 +17,14 @@ const MAX_TABLE_BYTES: usize = 64 << 20;
 /// The patterns on a region of the light plane, with the correlations that the windows in it share.
 #[derive(Debug)]
 pub(super) struct GramCache {
-    light: Extent,
-    window: Window,
+    geometry: Geometry,
     /// Column and row, on the light plane, of the region's first element.
     first: [usize; 2],
     /// Columns and rows of the region.
     width: usize,
     height: usize,
-    /// Weight of each pattern, `[L]`.
+    /// The patterns, and the weight of each, `[L]`.
+    pattern_indices: Vec<usize>,
     weights: Vec<f64>,
     /// Emissions times the pattern's weight, `[element, L]`.
     emissions: Vec<f64>,
@@ -45,10 +45,11 @@ pub(super) struct WindowEquations {
 }
 
 impl WindowEquations {
-    /// Replaces measurements y, one for each pattern of the equations, by `Wy`.
-    pub fn weight(&self, mut y: Vec<f64>) -> Vec<f64> {
-        self.columns.weights.apply(&mut y);
-        y
+    /// `Wy` for measurements y, one for each pattern of the equations.
+    pub fn weight(&self, y: &[f64]) -> Vec<f64> {
+        let mut weighted = y.to_vec();
+        self.columns.weights.apply(&mut weighted);
+        weighted
     }
 
     /// `(WP̂)ᵀ Wy` for weighted measurements `Wy`, `[k]`.
@@ -70,27 +71,32 @@ impl GramCache {
         table + emissions + window.area().pow(2) * size_of::<f64>()
     }
 
-    /// A cache for `windows` windows, whose origins lie between `first` and `last`. The equations are those of the
-    /// patterns `pattern_indices`, in the colour of `channel`; `weights` has those of all patterns.
+    /// A cache for the windows with these origins. The equations are those of the patterns `pattern_indices`, in the
+    /// colour of `channel`.
     pub fn new(
-        (patterns, weights): (&[Pattern], &[f64]),
+        measurements: &Measurements,
+        geometry: Geometry,
         pattern_indices: &[usize],
         channel: usize,
-        light: Extent,
-        window: Window,
-        [first, last]: [Element; 2],
-        windows: usize,
+        origins: &[Element],
     ) -> Self {
+        let (light, window) = (geometry.light, geometry.window);
+        let us = || origins.iter().map(|origin| origin.u);
+        let vs = || origins.iter().map(|origin| origin.v);
+        let first = Element {
+            v: vs().min().unwrap_or(0),
+            u: us().min().unwrap_or(0),
+        };
         let size = Extent {
-            width: last.u.abs_diff(first.u) + window.side(),
-            height: last.v.abs_diff(first.v) + window.side(),
+            width: us().max().unwrap_or(0).abs_diff(first.u) + window.side(),
+            height: vs().max().unwrap_or(0).abs_diff(first.v) + window.side(),
         };
         let region = ClippedRect::new(first, size, light);
         let (width, height, [u, v]) = (region.columns.len(), region.rows.len(), region.first());
-        let l = pattern_indices.len();
+        let (l, weights) = (pattern_indices.len(), measurements.pattern_weights());
         let mut emissions = vec![0.0; region.area() * l];
         for (i, &index) in pattern_indices.iter().enumerate() {
-            let plane = patterns[index].plane(channel);
+            let plane = measurements.patterns[index].plane(channel);
             for row in 0..height {
                 let start = (v + row) * light.width as usize + u;
                 for (column, &p) in plane[start..start + width].iter().enumerate() {
@@ -99,11 +105,11 @@ impl GramCache {
             }
         }
         let mut cache = Self {
-            light,
-            window,
+            geometry,
             first: [u, v],
             width,
             height,
+            pattern_indices: pattern_indices.to_vec(),
             weights: pattern_indices.iter().map(|&i| weights[i]).collect(),
             emissions,
             correlations: Vec::new(),
@@ -111,8 +117,8 @@ impl GramCache {
         // The table takes an inner product for each pair of elements that any window could hold; a window's own Gram
         // matrix takes one for each pair that it does hold.
         let entries = region.area() * offsets(window).pow(2);
-        if entries * size_of::<f64>() <= MAX_TABLE_BYTES && entries < windows * window.area().pow(2)
-        {
+        let products = origins.len() * window.area().pow(2);
+        if entries * size_of::<f64>() <= MAX_TABLE_BYTES && entries < products {
             cache.correlations = vectorise(
                 #[inline(always)]
                 || cache.correlate(),
@@ -130,8 +136,9 @@ impl GramCache {
 
     #[inline(always)]
     fn correlate(&self) -> Vec<f64> {
-        let (width, height, offsets) = (self.width, self.height, offsets(self.window));
-        let reach = self.window.side() as usize - 1;
+        let window = self.geometry.window;
+        let (width, height, offsets) = (self.width, self.height, offsets(window));
+        let reach = window.side() as usize - 1;
         let mut table = vec![0.0; width * height * offsets * offsets];
         for m in 0..width * height {
             let (u, v) = (m % width, m / width);
@@ -151,20 +158,15 @@ impl GramCache {
         table
     }
 
-    /// The equations of the window that starts at `origin`, without the patterns at the positions `excluded` of the
-    /// cache's.
+    /// The equations of the window that starts at `origin`, from the patterns `pattern_indices` of the cache's.
     pub fn equations(
         &self,
         origin: Element,
         common_mode: CommonMode,
-        excluded: &[usize],
+        pattern_indices: &[usize],
     ) -> WindowEquations {
-        let side = self.window.side() as usize;
-        let size = Extent {
-            width: self.window.side(),
-            height: self.window.side(),
-        };
-        let clipped = ClippedRect::new(origin, size, self.light);
+        let side = self.geometry.window.side() as usize;
+        let clipped = self.geometry.clip_window(origin);
         let first = clipped.first();
         let [left, top] = [first[0] - self.first[0], first[1] - self.first[1]];
         let (mut slots, mut elements) = (Vec::new(), Vec::new());
@@ -174,8 +176,13 @@ impl GramCache {
                 elements.push((top + i) * self.width + left + j);
             }
         }
-        let is_included = |i: &usize| !excluded.contains(i);
-        let included: Vec<usize> = (0..self.weights.len()).filter(is_included).collect();
+        let is_included = |&i: &usize| {
+            pattern_indices
+                .binary_search(&self.pattern_indices[i])
+                .is_ok()
+        };
+        let (included, excluded): (Vec<usize>, Vec<usize>) =
+            (0..self.weights.len()).partition(is_included);
         let weights = included.iter().map(|&i| self.weights[i]).collect();
         let mut emissions = Vec::with_capacity(elements.len() * included.len());
         for &m in &elements {
@@ -192,7 +199,7 @@ impl GramCache {
                 let columns = WeightedColumns::from_weighted(emissions, weights);
                 let gram = match self.correlations.is_empty() {
                     true => columns.gram(),
-                    false => self.look_up(&columns, &elements, clipped.columns.len(), excluded),
+                    false => self.look_up(&columns, &elements, clipped.columns.len(), &excluded),
                 };
                 (columns, gram)
             },
@@ -213,8 +220,8 @@ impl GramCache {
         width: usize,
         excluded: &[usize],
     ) -> Vec<f64> {
-        let (k, offsets) = (elements.len(), offsets(self.window));
-        let reach = self.window.side() as usize - 1;
+        let (k, offsets) = (elements.len(), offsets(self.geometry.window));
+        let reach = self.geometry.window.side() as usize - 1;
         let mut gram = vec![0.0; k * k];
         // (diag(w)P̂)ᵀ diag(w)P̂ of all patterns.
         for (i, row) in gram.chunks_exact_mut(k.max(1)).enumerate() {
@@ -225,11 +232,8 @@ impl GramCache {
             }
         }
         for &pattern in excluded {
-            let emissions: Vec<f64> = elements
-                .iter()
-                .map(|&m| self.emission(m)[pattern])
-                .collect();
-            subtract_outer_product(&mut gram, 1.0, &emissions);
+            let emissions = elements.iter().map(|&m| self.emission(m)[pattern]);
+            subtract_outer_product(&mut gram, 1.0, &emissions.collect::<Vec<_>>());
         }
         // W scales the means: (WP̂)ᵀ(WP̂) = (diag(w)P̂)ᵀ diag(w)P̂ − (1 − ω²) ‖w‖² p̄p̄ᵀ.
         let weights = &columns.weights;
@@ -259,7 +263,10 @@ fn subtract_outer_product(a: &mut [f64], factor: f64, v: &[f64]) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::preparation;
     use super::*;
+    use crate::capture::{NoiseModel, Pattern, RowSet};
+    use crate::transport::{CHANNELS, Correspondence};
 
     const LIGHT: Extent = Extent {
         width: 7,
@@ -267,47 +274,63 @@ mod tests {
     };
     const PATTERNS: usize = 9;
 
-    fn patterns() -> Vec<Pattern> {
+    fn measurements() -> Measurements {
         let emission = |i: usize| (i * 7919 % 1009) as f32 / 1009.0;
-        (0..PATTERNS)
-            .map(|l| Pattern::Grey((0..LIGHT.area()).map(|m| emission(l * 101 + m)).collect()))
-            .collect()
+        let patterns = (0..PATTERNS)
+            .map(|l| Pattern::Grey((0..LIGHT.area()).map(|m| emission(l * 101 + m)).collect()));
+        Measurements {
+            camera: LIGHT,
+            light: LIGHT,
+            correspondence: Correspondence {
+                affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            },
+            patterns: patterns.collect(),
+            full_scale: (0..PATTERNS).map(|l| 0.5 + 0.2 * l as f32).collect(),
+            rows: RowSet::all(LIGHT.height),
+            photos: Vec::new(),
+            noise: NoiseModel {
+                gain: [0.0; CHANNELS],
+                floor: [0.0; CHANNELS],
+            },
+        }
     }
 
     /// Equations from the table are those multiplied out, for windows inside and across the border, with all patterns
     /// and without some.
     #[test]
     fn table_agrees_with_products() {
+        let (measurements, indices) = (measurements(), (0..PATTERNS).collect::<Vec<_>>());
         let window = Window::new(3).unwrap();
-        let (patterns, indices) = (patterns(), (0..PATTERNS).collect::<Vec<_>>());
-        let weights: Vec<f64> = (0..PATTERNS).map(|l| 0.5 + 0.2 * l as f64).collect();
-        let corners = [Element { u: -1, v: -2 }, Element { u: 5, v: 4 }];
-        let cache = |corners, windows| {
-            let all = (&patterns[..], &weights[..]);
-            GramCache::new(all, &indices, 0, LIGHT, window, corners, windows)
-        };
-        let shared = cache(corners, 1000);
+        let geometry = preparation::geometry(&measurements, window).unwrap();
+        let cache =
+            |origins: &[Element]| GramCache::new(&measurements, geometry, &indices, 0, origins);
+        let origins: Vec<Element> = (-2..=4)
+            .flat_map(|v| (-1..=5).map(move |u| Element { v, u }))
+            .collect();
+        let shared = cache(&origins);
         assert!(!shared.correlations.is_empty());
         for origin in [(-1, -2), (2, 1), (5, 4), (0, 0)].map(|(u, v)| Element { u, v }) {
-            let own = cache([origin, origin], 0);
-            assert!(own.correlations.is_empty());
+            let own = cache(&[origin]);
             for excluded in [&[][..], &[3], &[0, 8]] {
+                let mut included = indices.clone();
+                included.retain(|l| !excluded.contains(l));
                 for common_mode in [CommonMode::FULL, CommonMode::POOLED] {
-                    let ours = shared.equations(origin, common_mode, excluded);
-                    let expected = own.equations(origin, common_mode, excluded);
+                    let ours = shared.equations(origin, common_mode, &included);
+                    let expected = own.equations(origin, common_mode, &included);
                     assert_eq!(ours.slots, expected.slots);
                     assert_eq!(ours.columns.columns, expected.columns.columns);
                     assert_eq!(ours.columns.weights.len(), PATTERNS - excluded.len());
-                    for (a, b) in ours.gram.iter().zip(&expected.gram) {
+                    for (a, b) in ours.gram.iter().zip(expected.columns.gram()) {
                         assert!((a - b).abs() < 1e-12, "{a} {b}");
                     }
                 }
             }
         }
         // Slot 0 of the window at (-1, -2) is off the light plane, as all but its last row are.
-        let corner = shared.equations(corners[0], CommonMode::FULL, &[]);
+        let corner = shared.equations(origins[0], CommonMode::FULL, &indices);
         assert_eq!(corner.slots, [7, 8]);
-        let emission = f64::from(patterns[4].plane(0)[1]);
-        assert!((corner.columns.column(1)[4] - weights[4] * emission).abs() < 1e-12);
+        let emission = f64::from(measurements.patterns[4].plane(0)[1]);
+        let weight = measurements.pattern_weights()[4];
+        assert!((corner.columns.column(1)[4] - weight * emission).abs() < 1e-12);
     }
 }

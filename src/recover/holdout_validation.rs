@@ -7,6 +7,7 @@
 
 use super::error::RecoverError;
 use super::holdout::HoldoutSplit;
+use super::preparation::Preparation;
 use super::{prediction, sampling};
 use crate::capture::{Measurements, Pattern};
 use crate::executor::Executor;
@@ -51,12 +52,16 @@ impl HoldoutValidation {
     /// # Errors
     /// If the executor is cancelled.
     pub(super) fn new(
-        measurements: &Measurements,
-        (geometry, basis): (&Geometry, Option<&Basis>),
-        split: &HoldoutSplit,
-        executor: &impl Executor,
+        preparation: &Preparation<impl Executor>,
+        basis: Option<&Basis>,
         recover_from_training: impl Fn(TileRect) -> RecoveredTile + Sync + Send,
     ) -> Result<Option<Self>, RecoverError> {
+        let &Preparation {
+            measurements,
+            geometry,
+            split,
+            executor,
+        } = preparation;
         executor.check_cancelled()?;
         if split.held_out.len() < MIN_HELD_OUT {
             return Ok(None);
@@ -64,20 +69,18 @@ impl HoldoutValidation {
         let rects = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
         let results = executor.map(rects.len(), |i| {
             let tile = recover_from_training(rects[i]);
-            let functions = tile.clone().functions(geometry, basis);
+            let functions = tile.clone().functions(&geometry, basis);
             let square = ValidationSquare {
                 tile,
-                measurements: held_out_measurements(measurements, split, rects[i]),
+                measurements: prediction::samples(measurements, &split.held_out, rects[i]),
             };
             let variances = variances(measurements, split, rects[i]);
             (square, functions, variances)
         });
-        let patterns = split.held_out.iter();
+        let pattern = |&l: &usize| measurements.patterns[l].clone();
         let mut validation = Self {
-            geometry: *geometry,
-            patterns: patterns
-                .map(|&l| measurements.patterns[l].clone())
-                .collect(),
+            geometry,
+            patterns: split.held_out.iter().map(pattern).collect(),
             squares: Vec::with_capacity(rects.len()),
             signal: 0.0,
             noise: 0.0,
@@ -136,27 +139,10 @@ impl HoldoutValidation {
                 let of_channel = |c| residuals.iter().skip(c).step_by(CHANNELS).copied();
                 (0..CHANNELS).map(move |c| variance(of_channel(c)))
             });
-            variances
-                .filter(|variance| variance.is_finite())
-                .sum::<f64>()
+            variances.filter(|v| v.is_finite()).sum::<f64>()
         });
         of_squares.sum()
     }
-}
-
-/// Measurements under the held-out patterns, `[pixel, pattern, channel]`.
-fn held_out_measurements(
-    measurements: &Measurements,
-    split: &HoldoutSplit,
-    rect: TileRect,
-) -> Vec<f64> {
-    let mut samples = Vec::new();
-    for pixel in rect.pixels() {
-        for &l in &split.held_out {
-            samples.extend((0..CHANNELS).map(|c| measurements.sample(l, pixel, c)));
-        }
-    }
-    samples
 }
 
 /// Variances between patterns, summed over the pixels and channels that are nowhere saturated: of the measurements less
@@ -200,17 +186,14 @@ mod tests {
     /// Validates functions that are the true ones times `factor`.
     fn validate(capture: &SyntheticCapture, factor: f64) -> Option<HoldoutValidation> {
         let functions = capture.functions(factor);
-        let split = HoldoutSplit::new(&capture.measurements);
+        let preparation = Preparation {
+            measurements: &capture.measurements,
+            geometry: capture.geometry,
+            split: &HoldoutSplit::new(&capture.measurements),
+            executor: &SequentialExecutor,
+        };
         let recover = |rect| RecoveredTile::Direct(cropped(&functions, rect));
-        let geometry = (&capture.geometry, None);
-        HoldoutValidation::new(
-            &capture.measurements,
-            geometry,
-            &split,
-            &SequentialExecutor,
-            recover,
-        )
-        .ok()?
+        HoldoutValidation::new(&preparation, None, recover).ok()?
     }
 
     fn cropped(functions: &TransportFunctions, rect: TileRect) -> TransportFunctions {

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::bpdn::SparsityBasis;
-use super::learned::LearnedRecovery;
+use super::learned;
 use super::pixelwise::PixelwiseRecovery;
 use super::pooled;
 use crate::transport::Window;
@@ -41,7 +41,7 @@ impl Method {
     /// Upper bound on the memory that preparing a recovery takes beside the measurements, in bytes.
     pub fn preparation_bytes(self, window: Window) -> usize {
         let own = match self {
-            Self::Learned => LearnedRecovery::preparation_bytes(window),
+            Self::Learned => learned::preparation_bytes(window),
             Self::Nnls | Self::Bpdn(_) => 0,
         };
         own.max(pooled::max_bytes(window))
@@ -53,7 +53,7 @@ impl Method {
         let pixelwise = PixelwiseRecovery::max_tile_bytes(window, patterns);
         match self {
             // Tiles may be blended with least squares.
-            Self::Learned => pixelwise.max(LearnedRecovery::tile_bytes(window)),
+            Self::Learned => pixelwise.max(learned::tile_bytes(window)),
             Self::Nnls | Self::Bpdn(_) => pixelwise,
         }
     }
@@ -61,7 +61,7 @@ impl Method {
     /// Largest rank of the basis that factored tiles share.
     pub fn max_rank(self, window: Window) -> usize {
         match self {
-            Self::Learned => LearnedRecovery::max_rank(window),
+            Self::Learned => learned::max_rank(window),
             Self::Nnls | Self::Bpdn(_) => 0,
         }
     }
@@ -69,7 +69,7 @@ impl Method {
     /// Largest distance from a tile, in camera pixels, of measurements that the tile depends on.
     pub fn max_halo(self) -> u32 {
         match self {
-            Self::Learned => LearnedRecovery::MAX_HALO,
+            Self::Learned => learned::MAX_HALO,
             Self::Nnls | Self::Bpdn(_) => 0,
         }
     }

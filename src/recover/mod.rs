@@ -4,7 +4,7 @@
 //! of the pixel's window, and τ `[S]` is its light transport function. L is smaller than S, so something has to be
 //! known of τ beforehand. [`Method::Learned`], the default, learns a Gaussian prior from the measurements of all
 //! pixels. The paper's methods treat each pixel by itself (section 3): non-negative least squares ([`Nnls`], case (a)),
-//! and basis pursuit denoising ([`Homotopy`] and [`InteriorPoint`], case (b)).
+//! and basis pursuit denoising (case (b)).
 //!
 //! Pixels and channels with one window share their normal equations, and windows share the patterns' correlations: that
 //! makes recovery fast. The weight of the patterns' common mode ([`CommonMode`]) makes it accurate. Parameters
@@ -29,13 +29,14 @@ mod pattern_check;
 mod pixelwise;
 mod pooled;
 mod prediction;
+mod preparation;
 mod recovery;
 mod sampling;
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod test_problems;
 
 pub use bandwidth::{BandwidthEstimate, WindowEstimate};
-pub use bpdn::{BpdnConstraint, BpdnSolution, Homotopy, InteriorPoint, SparsityBasis};
+pub use bpdn::{Homotopy, SparsityBasis};
 pub use common_mode::CommonMode;
 pub use error::RecoverError;
 pub use holdout_validation::HoldoutValidation;

@@ -5,56 +5,41 @@
 //! Each candidate recovers a sample of windows, spread over the picture.
 
 use std::collections::BTreeMap;
+use std::slice::from_ref;
 
 use super::bpdn::{SparsityBasis, Tolerance};
 use super::common_mode::CommonMode;
 use super::error::RecoverError;
-use super::gram_cache::GramCache;
+use super::gram_cache::WindowEquations;
 use super::holdout::HoldoutSplit;
-use super::nnls::Nnls;
-use super::pixelwise::{self, PixelProblem, PixelwiseRecovery};
+use super::pixelwise::{PixelProblem, PixelSamples, PixelsByWindow, PixelwiseRecovery};
+use super::preparation::Preparation;
 use super::sampling::{self, MIN_PATTERNS};
 use crate::capture::Measurements;
 use crate::executor::Executor;
-use crate::transport::{CHANNELS, CameraPx, Decibels, Element, Geometry, TransportError};
+use crate::transport::{Decibels, TileRect, TransportError};
 
-/// Size of a sample: enough to tell candidates apart by hundredths of a decibel, and few enough to take seconds.
-#[derive(Clone, Copy, Debug)]
-struct SampleSize {
-    max_windows: usize,
-    pixels_per_window: usize,
-}
-
-/// For least squares each pixel takes as long as the next, so all may have windows of their own.
-const LEAST_SQUARES_SAMPLE: SampleSize = SampleSize {
-    max_windows: 48,
-    pixels_per_window: 1,
-};
-/// Denoising takes longer, and has seven candidates: fewer windows, whose pixels share their equations.
-const DENOISING_SAMPLE: SampleSize = SampleSize {
-    max_windows: 16,
-    pixels_per_window: 4,
-};
+/// Largest number of windows in a sample, and of pixels in each: enough to tell candidates apart by hundredths of a
+/// decibel, and few enough to take seconds. For least squares each pixel takes as long as the next, so all may have
+/// windows of their own. Denoising takes longer, and has seven candidates: fewer windows, whose pixels share their
+/// equations.
+const LEAST_SQUARES_SAMPLE: [usize; 2] = [48, 1];
+const DENOISING_SAMPLE: [usize; 2] = [16, 4];
 
 impl PixelwiseRecovery {
     /// Non-negative least squares, with the best weight of the common mode.
     ///
     /// # Errors
     /// If no pixel in memory sees the light plane, and if the executor is cancelled.
-    pub fn least_squares(
-        measurements: &Measurements,
-        geometry: Geometry,
-        split: &HoldoutSplit,
-        executor: &impl Executor,
-    ) -> Result<Self, RecoverError> {
-        executor.check_cancelled()?;
-        let sample = WindowSample::new(measurements, geometry, split, LEAST_SQUARES_SAMPLE)?;
+    pub fn least_squares(preparation: &Preparation<impl Executor>) -> Result<Self, RecoverError> {
+        preparation.executor.check_cancelled()?;
+        let sample = sample_windows(preparation, LEAST_SQUARES_SAMPLE)?;
         let candidates = CommonMode::CANDIDATES.map(|common_mode| Self {
-            geometry,
+            geometry: preparation.geometry,
             common_mode,
             problem: PixelProblem::LeastSquares,
         });
-        Ok(sample.best_of(candidates, executor))
+        Ok(best_of(candidates, preparation, &sample))
     }
 
     /// Basis pursuit denoising, with the best weight of the common mode and the best tolerance.
@@ -62,152 +47,119 @@ impl PixelwiseRecovery {
     /// # Errors
     /// If no pixel in memory sees the light plane, and if the executor is cancelled.
     pub fn denoising(
-        measurements: &Measurements,
-        geometry: Geometry,
+        preparation: &Preparation<impl Executor>,
         basis: SparsityBasis,
-        split: &HoldoutSplit,
-        executor: &impl Executor,
     ) -> Result<Self, RecoverError> {
-        let least_squares = Self::least_squares(measurements, geometry, split, executor)?;
-        let sample = WindowSample::new(measurements, geometry, split, LEAST_SQUARES_SAMPLE)?;
-        let noise = sample.fit_noise(least_squares.common_mode, executor);
-        executor.check_cancelled()?;
-        let sample = WindowSample::new(measurements, geometry, split, DENOISING_SAMPLE)?;
+        let least_squares = Self::least_squares(preparation)?;
+        let sample = sample_windows(preparation, LEAST_SQUARES_SAMPLE)?;
+        let noise = least_squares.fit_noise(preparation, &sample);
+        preparation.executor.check_cancelled()?;
+        let sample = sample_windows(preparation, DENOISING_SAMPLE)?;
         let candidates = Tolerance::CANDIDATE_SHARES.map(|share| Self {
             problem: PixelProblem::Denoising(basis, Tolerance { share, ..noise }),
             ..least_squares
         });
-        Ok(sample.best_of(candidates, executor))
-    }
-}
-
-/// Windows spread over the picture, with some of their pixels.
-struct WindowSample<'a> {
-    measurements: &'a Measurements,
-    geometry: Geometry,
-    split: &'a HoldoutSplit,
-    windows: Vec<(Element, Vec<CameraPx>)>,
-}
-
-impl<'a> WindowSample<'a> {
-    fn new(
-        measurements: &'a Measurements,
-        geometry: Geometry,
-        split: &'a HoldoutSplit,
-        size: SampleSize,
-    ) -> Result<Self, RecoverError> {
-        let mut windows: BTreeMap<_, Vec<_>> = BTreeMap::new();
-        let covered = geometry.tiles().filter(|&tile| measurements.has_tile(tile));
-        for (origin, pixels) in covered.flat_map(|rect| sampling::pixels_by_window(&geometry, rect))
-        {
-            if !geometry.clip_window(origin).is_empty() {
-                let pixels = pixels.into_iter().take(size.pixels_per_window);
-                windows.insert(origin, pixels.map(|(_, pixel)| pixel).collect());
-            }
-        }
-        if windows.is_empty() {
-            return Err(RecoverError::CorrespondenceOffLightPlane);
-        }
-        let step = windows.len().div_ceil(size.max_windows);
-        Ok(Self {
-            measurements,
-            geometry,
-            split,
-            windows: windows.into_iter().step_by(step).collect(),
-        })
+        Ok(best_of(candidates, preparation, &sample))
     }
 
-    /// The candidate that predicts the held-out patterns best; the first if no pattern is held out.
-    fn best_of<const N: usize>(
-        &self,
-        candidates: [PixelwiseRecovery; N],
-        executor: &impl Executor,
-    ) -> PixelwiseRecovery {
-        let mut best = candidates[0];
-        if self.split.held_out.is_empty() {
-            return best;
-        }
-        let errors = executor.map(self.windows.len(), |i| {
-            candidates.map(|candidate| self.prediction_error(&candidate, &self.windows[i]))
-        });
-        let mut best_snr: Option<Decibels> = None;
-        for (n, candidate) in candidates.into_iter().enumerate() {
-            let mut error = TransportError::default();
-            errors.iter().for_each(|errors| error.merge(errors[n]));
-            if let Some(snr) = error.snr()
-                && best_snr.is_none_or(|best_snr| snr > best_snr)
-            {
-                (best_snr, best) = (Some(snr), candidate);
-            }
-        }
-        best
-    }
-
-    /// Error of a candidate's predictions of one window's measurements under the held-out patterns.
+    /// Error of the predictions of one window's measurements under the held-out patterns.
     fn prediction_error(
         &self,
-        candidate: &PixelwiseRecovery,
-        (origin, pixels): &(Element, Vec<CameraPx>),
+        measurements: &Measurements,
+        split: &HoldoutSplit,
+        window: &PixelsByWindow,
     ) -> TransportError {
         let mut error = TransportError::default();
-        let numbered = pixels.iter().copied().enumerate().collect();
-        let elements = sampling::elements_of_window(&self.geometry, *origin);
-        let mut add = |_, pixel: usize, c: usize, _: &[usize], x: &[f64]| {
-            for &l in &self.split.held_out {
-                let y = self.measurements.sample(l, pixels[pixel], c);
+        let elements: Vec<_> = self.geometry.elements_of_window(window.0).collect();
+        let mut add = |_: &WindowEquations, samples: &PixelSamples, x: &[f64]| {
+            for &l in &split.held_out {
+                let y = measurements.sample(l, samples.pixel, samples.channel);
                 if y.is_finite() {
-                    let plane = self.measurements.patterns[l].plane(c);
+                    let plane = measurements.patterns[l].plane(samples.channel);
                     let terms = elements.iter().zip(x);
                     error.add(y, terms.map(|(&(_, m), &x)| f64::from(plane[m]) * x).sum());
                 }
             }
         };
-        candidate.solve_windows(
-            self.measurements,
-            &BTreeMap::from([(*origin, numbered)]),
-            &self.split.training,
-            &mut add,
-        );
+        self.solve_windows(measurements, from_ref(window), &split.training, &mut add);
         error
     }
 
     /// The noise of the measurements, by the residuals of least squares and the degrees of freedom that it leaves.
-    fn fit_noise(&self, common_mode: CommonMode, executor: &impl Executor) -> Tolerance {
-        let measurements = self.measurements;
-        let all: Vec<usize> = (0..measurements.patterns.len()).collect();
-        let weights = measurements.pattern_weights();
-        let pairs = executor.map(self.windows.len(), |i| {
-            let (origin, pixel) = (self.windows[i].0, self.windows[i].1[0]);
+    fn fit_noise(
+        &self,
+        preparation: &Preparation<impl Executor>,
+        sample: &[PixelsByWindow],
+    ) -> Tolerance {
+        let (measurements, all) = (preparation.measurements, &preparation.split.all);
+        let pairs = preparation.executor.map(sample.len(), |i| {
             let mut pairs = Vec::new();
-            for channel in 0..CHANNELS {
-                let samples = all.iter().map(|&l| measurements.sample(l, pixel, channel));
-                let mut y: Vec<f64> = samples.collect();
-                let saturated: Vec<usize> = (0..y.len()).filter(|&i| !y[i].is_finite()).collect();
-                y.retain(|y| y.is_finite());
-                if y.len() < MIN_PATTERNS {
-                    continue;
+            let mut add = |equations: &WindowEquations, samples: &PixelSamples, x: &[f64]| {
+                let is_finite = |&&l: &&usize| {
+                    let y = measurements.sample(l, samples.pixel, samples.channel);
+                    y.is_finite()
+                };
+                let count = all.iter().filter(is_finite).count();
+                let spare = count as f64 - x.iter().filter(|&&x| x > 0.0).count() as f64;
+                if count >= MIN_PATTERNS && spare >= 1.0 {
+                    let y = equations.weight(&samples.y);
+                    let residual = equations.columns.squared_residual(&y, x);
+                    pairs.push((sampling::mean(&samples.y), residual / spare));
                 }
-                let cache = GramCache::new(
-                    (&measurements.patterns, &weights),
-                    &all,
-                    channel,
-                    self.geometry.light,
-                    self.geometry.window,
-                    [origin, origin],
-                    1,
-                );
-                let equations = cache.equations(origin, common_mode, &saturated);
-                let (mean, y) = (pixelwise::mean(&y), equations.weight(y));
-                let mut nnls = Nnls::new(&equations.gram, equations.slots.len());
-                let x = nnls.solve(&equations.right_hand_side(&y));
-                let spare = y.len() as f64 - nnls.degrees_of_freedom() as f64;
-                if spare >= 1.0 {
-                    let residual = equations.columns.squared_residual(&y, &x);
-                    pairs.push((mean, residual / spare));
-                }
-            }
+            };
+            self.solve_windows(measurements, from_ref(&sample[i]), all, &mut add);
             pairs
         });
         Tolerance::fit(&pairs.concat())
     }
+}
+
+/// Windows spread over the picture, with some of their pixels.
+fn sample_windows(
+    preparation: &Preparation<impl Executor>,
+    [max_windows, max_pixels]: [usize; 2],
+) -> Result<Vec<PixelsByWindow>, RecoverError> {
+    let geometry = &preparation.geometry;
+    let mut windows = BTreeMap::new();
+    let is_covered = |&tile: &TileRect| preparation.measurements.has_tile(tile);
+    for tile in geometry.tiles().filter(is_covered) {
+        for (origin, mut pixels) in sampling::pixels_by_window(geometry, tile) {
+            if !geometry.clip_window(origin).is_empty() {
+                pixels.truncate(max_pixels);
+                windows.insert(origin, pixels);
+            }
+        }
+    }
+    if windows.is_empty() {
+        return Err(RecoverError::CorrespondenceOffLightPlane);
+    }
+    let step = windows.len().div_ceil(max_windows);
+    Ok(windows.into_iter().step_by(step).collect())
+}
+
+/// The candidate that predicts the held-out patterns of the sample best; the first if no pattern is held out.
+fn best_of<const N: usize>(
+    candidates: [PixelwiseRecovery; N],
+    preparation: &Preparation<impl Executor>,
+    sample: &[PixelsByWindow],
+) -> PixelwiseRecovery {
+    let (measurements, split) = (preparation.measurements, preparation.split);
+    let mut best = candidates[0];
+    if split.held_out.is_empty() {
+        return best;
+    }
+    let errors = preparation.executor.map(sample.len(), |i| {
+        candidates.map(|candidate| candidate.prediction_error(measurements, split, &sample[i]))
+    });
+    let mut best_snr: Option<Decibels> = None;
+    for (n, candidate) in candidates.into_iter().enumerate() {
+        let mut error = TransportError::default();
+        errors.iter().for_each(|errors| error.merge(errors[n]));
+        if let Some(snr) = error.snr()
+            && best_snr.is_none_or(|best_snr| snr > best_snr)
+        {
+            (best_snr, best) = (Some(snr), candidate);
+        }
+    }
+    best
 }

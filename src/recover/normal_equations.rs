@@ -69,10 +69,8 @@ impl WeightedColumns {
     #[inline(always)]
     pub fn new(mut columns: Vec<f64>, weights: EquationWeights) -> Self {
         for column in columns.chunks_exact_mut(weights.len().max(1)) {
-            column
-                .iter_mut()
-                .zip(&weights.patterns)
-                .for_each(|(a, w)| *a *= w);
+            let column = column.iter_mut().zip(&weights.patterns);
+            column.for_each(|(a, w)| *a *= w);
         }
         Self::from_weighted(columns, weights)
     }
@@ -81,10 +79,9 @@ impl WeightedColumns {
     #[inline(always)]
     pub fn from_weighted(mut columns: Vec<f64>, weights: EquationWeights) -> Self {
         let means = columns.chunks_exact_mut(weights.len().max(1));
+        let means = means.map(|column| weights.weight_common_mode(column));
         Self {
-            means: means
-                .map(|column| weights.weight_common_mode(column))
-                .collect(),
+            means: means.collect(),
             columns,
             weights,
         }
@@ -126,12 +123,19 @@ impl WeightedColumns {
         self.iter().map(move |column| dot(column, weighted_y))
     }
 
-    /// `‖Wy − WAx‖²` for weighted measurements `Wy`.
-    pub fn squared_residual(&self, weighted_y: &[f64], x: &[f64]) -> f64 {
+    /// `Wy − WAx` for weighted measurements `Wy`, `[L]`.
+    #[inline(always)]
+    pub fn residual(&self, weighted_y: &[f64], x: &[f64]) -> Vec<f64> {
         let mut residual = weighted_y.to_vec();
         for (column, &x) in self.iter().zip(x).filter(|(_, x)| **x != 0.0) {
             add_scaled(&mut residual, -x, column);
         }
+        residual
+    }
+
+    /// `‖Wy − WAx‖²` for weighted measurements `Wy`.
+    pub fn squared_residual(&self, weighted_y: &[f64], x: &[f64]) -> f64 {
+        let residual = self.residual(weighted_y, x);
         residual.iter().map(|r| r * r).sum()
     }
 }

@@ -85,6 +85,13 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         add_scaled_rows(y, self.gram, &self.members, x);
     }
 
+    /// Computes `y −= Gx`, `[k]`, for the values `x` of the members.
+    #[inline(always)]
+    pub fn subtract_product(&self, y: &mut [f64], x: &[f64]) {
+        let negated: Vec<f64> = x.iter().map(|x| -x).collect();
+        self.add_product(y, &negated);
+    }
+
     /// Expands the values of the members to all unknowns, `[k]`, zero outside the set.
     pub fn scatter(&self, values: &[f64]) -> Vec<f64> {
         let mut all = vec![0.0; self.is_member.len()];
@@ -136,11 +143,8 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         self.gather(residual);
         self.multiply_by_inverse();
         let width = self.padded_len();
-        add_scaled_padded(
-            &mut self.solutions[which][..width],
-            1.0,
-            &self.product[..width],
-        );
+        let solution = &mut self.solutions[which][..width];
+        add_scaled_padded(solution, 1.0, &self.product[..width]);
     }
 
     /// Sets `column = b[P]`.
@@ -290,15 +294,11 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     /// Doubles the number of members that the set has memory for.
     #[cold]
     fn grow(&mut self) {
-        let (old, new) = (
-            self.stride,
-            padded_len((2 * self.stride).min(self.is_member.len())),
-        );
+        let old = self.stride;
+        let new = padded_len((2 * old).min(self.is_member.len()));
         let mut inverse = vec![[0.0; LANES]; new * new / LANES];
-        for (to, from) in inverse
-            .chunks_exact_mut(new)
-            .zip(self.inverse.chunks_exact(old.max(1)))
-        {
+        let panels = inverse.chunks_exact_mut(new);
+        for (to, from) in panels.zip(self.inverse.chunks_exact(old.max(1))) {
             to[..old].copy_from_slice(from);
         }
         (self.inverse, self.stride) = (inverse, new);
@@ -326,9 +326,8 @@ fn panels(
     stride: usize,
     width: usize,
 ) -> impl Iterator<Item = &mut [Block]> {
-    let all = inverse.chunks_exact_mut(stride.max(1));
-    all.take(width / LANES)
-        .map(move |panel| &mut panel[..width])
+    let panels = inverse.chunks_exact_mut(stride.max(1)).take(width / LANES);
+    panels.map(move |panel| &mut panel[..width])
 }
 
 #[cfg(all(test, not(target_arch = "wasm32")))]

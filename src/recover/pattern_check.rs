@@ -7,11 +7,10 @@
 //! certainty.
 
 use super::error::RecoverError;
-use super::holdout::HoldoutSplit;
+use super::preparation::Preparation;
 use super::sampling::{self, PixelsOfWindow};
-use crate::capture::Measurements;
 use crate::executor::Executor;
-use crate::transport::{Element, Geometry, TileRect};
+use crate::transport::{Element, TileRect};
 
 /// Smallest slope of a photograph that matches its pattern, relative to [`REFERENCE_PERCENTILE`].
 const MIN_SLOPE_RATIO: f64 = 0.4;
@@ -31,28 +30,18 @@ const MIN_HELD_OUT: usize = 2;
 /// [`RecoverError::MismatchedPatterns`] if some photographs do not match their patterns, and
 /// [`RecoverError::UncorrelatedPatterns`] if most do not, or if the held-out patterns together predict nothing.
 pub(super) fn check_patterns(
-    measurements: &Measurements,
-    geometry: &Geometry,
-    split: &HoldoutSplit,
+    preparation: &Preparation<impl Executor>,
     mean_function: &[f64],
     squares: &[TileRect],
-    executor: &impl Executor,
 ) -> Result<(), RecoverError> {
     if squares.len() < MIN_SQUARES {
         return Ok(());
     }
-    let moments = executor.map(squares.len(), |i| {
+    let split = preparation.split;
+    let moments = preparation.executor.map(squares.len(), |i| {
         let mut moments = vec![Moments::default(); split.all.len()];
-        for (origin, pixels) in sampling::pixels_by_window(geometry, squares[i]) {
-            let window = (origin, &pixels[..]);
-            add_window(
-                &mut moments,
-                measurements,
-                geometry,
-                split,
-                mean_function,
-                window,
-            );
+        for (origin, pixels) in sampling::pixels_by_window(&preparation.geometry, squares[i]) {
+            add_window(&mut moments, preparation, mean_function, origin, &pixels);
         }
         moments
     });
@@ -129,13 +118,13 @@ impl Slope {
 /// Adds one window's pixels to the moments, `[pattern]`.
 fn add_window(
     moments: &mut [Moments],
-    measurements: &Measurements,
-    geometry: &Geometry,
-    split: &HoldoutSplit,
+    preparation: &Preparation<impl Executor>,
     mean_function: &[f64],
-    (origin, pixels): (Element, &PixelsOfWindow),
+    origin: Element,
+    pixels: &PixelsOfWindow,
 ) {
-    let elements = sampling::elements_of_window(geometry, origin);
+    let (measurements, split) = (preparation.measurements, preparation.split);
+    let elements: Vec<_> = preparation.geometry.elements_of_window(origin).collect();
     for (plane, channels) in measurements.planes() {
         let predict = |&l: &usize| {
             let pattern = measurements.patterns[l].plane(plane);
@@ -144,8 +133,8 @@ fn add_window(
             terms.sum::<f64>()
         };
         let predictions: Vec<f64> = split.all.iter().map(predict).collect();
-        let pixels = pixels.iter().map(|&(_, pixel)| pixel);
-        for (pixel, c) in pixels.flat_map(|pixel| channels.clone().map(move |c| (pixel, c))) {
+        let pixels = pixels.iter();
+        for (pixel, c) in pixels.flat_map(|p| channels.clone().map(move |c| (p.1, c))) {
             let sample = |l: usize| measurements.sample(l, pixel, c);
             let known = split.training.iter().filter(|&&l| sample(l).is_finite());
             let [predicted, measured, count] =

@@ -9,15 +9,15 @@ use std::ops::Range;
 
 use super::common_mode::CommonMode;
 use super::error::RecoverError;
-use super::holdout::HoldoutSplit;
 use super::nnls::Nnls;
 use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns};
 use super::pattern_check;
+use super::preparation::Preparation;
 use super::sampling::{self, PixelsOfWindow};
 use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::linalg::{add_scaled, vectorise};
-use crate::transport::{CHANNELS, Element, Geometry, TileRect, Window};
+use crate::transport::{CHANNELS, Element, TileRect, Window};
 
 /// Rounds of brightness and function. A brightness that is a few per cent off, as it is while the function is unknown,
 /// shows as light from far off.
@@ -48,50 +48,34 @@ pub(super) fn sample_squares(measurements: &Measurements) -> Vec<TileRect> {
 /// show their patterns.
 ///
 /// # Errors
-/// If no pixel sees the light plane, if the photographs are dark or overexposed, if they do not match their patterns,
-/// and if the executor is cancelled.
+/// If the photographs are dark or overexposed, if they do not match their patterns, and if the executor is cancelled.
 pub(super) fn mean_function(
-    measurements: &Measurements,
-    geometry: &Geometry,
-    split: &HoldoutSplit,
-    executor: &impl Executor,
+    preparation: &Preparation<impl Executor>,
 ) -> Result<Vec<f64>, RecoverError> {
-    let squares = sample_squares(measurements);
-    if !sampling::sees_light_plane(geometry) {
-        return Err(RecoverError::CorrespondenceOffLightPlane);
-    }
-    let area = geometry.window.area();
+    let squares = sample_squares(preparation.measurements);
+    let area = preparation.geometry.window.area();
     let mut mean = vec![1.0 / area as f64; area];
     for _ in 0..ROUNDS {
-        executor.check_cancelled()?;
-        let function = fit_round(
-            measurements,
-            geometry,
-            &split.training,
-            &squares,
-            &mean,
-            executor,
-        );
+        preparation.executor.check_cancelled()?;
+        let function = fit_round(preparation, &squares, &mean);
         let sum: f64 = function.iter().sum();
         if sum.is_nan() || sum <= 0.0 {
-            return Err(dark_or_overexposed(measurements, &squares));
+            return Err(dark_or_overexposed(preparation.measurements, &squares));
         }
         mean = function.iter().map(|m| m / sum).collect();
     }
-    executor.check_cancelled()?;
-    pattern_check::check_patterns(measurements, geometry, split, &mean, &squares, executor)?;
+    preparation.executor.check_cancelled()?;
+    pattern_check::check_patterns(preparation, &mean, &squares)?;
     Ok(mean)
 }
 
 /// Estimates every pixel's brightness with the function `mean`, then the function of all pixels, `[slot]`.
 fn fit_round(
-    measurements: &Measurements,
-    geometry: &Geometry,
-    pattern_indices: &[usize],
+    preparation: &Preparation<impl Executor>,
     squares: &[TileRect],
     mean: &[f64],
-    executor: &impl Executor,
 ) -> Vec<f64> {
+    let geometry = &preparation.geometry;
     let area = geometry.window.area();
     let is_whole = |origin: Element| geometry.clip_window(origin).area() == area;
     let whole_squares = squares.iter().filter(|square| {
@@ -101,7 +85,7 @@ fn fit_round(
     // Windows across the border say little of the elements off the light plane: they are left out if there are enough
     // others.
     let only_whole = 4 * whole_squares.count() >= squares.len();
-    let jobs = executor.map(JOBS, |job| {
+    let jobs = preparation.executor.map(JOBS, |job| {
         let mut sums = NormalEquations::zeros(area);
         for square in squares.iter().skip(job).step_by(JOBS) {
             for (origin, pixels) in sampling::pixels_by_window(geometry, *square) {
@@ -110,17 +94,7 @@ fn fit_round(
                 }
                 vectorise(
                     #[inline(always)]
-                    || {
-                        let window = (origin, &pixels[..]);
-                        add_window(
-                            &mut sums,
-                            measurements,
-                            geometry,
-                            pattern_indices,
-                            mean,
-                            window,
-                        );
-                    },
+                    || add_window(&mut sums, preparation, mean, origin, &pixels),
                 );
             }
         }
@@ -136,17 +110,16 @@ fn fit_round(
 #[inline(always)]
 fn add_window(
     sums: &mut NormalEquations,
-    measurements: &Measurements,
-    geometry: &Geometry,
-    pattern_indices: &[usize],
+    preparation: &Preparation<impl Executor>,
     mean: &[f64],
-    (origin, pixels): (Element, &PixelsOfWindow),
+    origin: Element,
+    pixels: &PixelsOfWindow,
 ) {
-    let elements = sampling::elements_of_window(geometry, origin);
+    let (measurements, training) = (preparation.measurements, &preparation.split.training);
+    let elements: Vec<_> = preparation.geometry.elements_of_window(origin).collect();
     let slots: Vec<usize> = elements.iter().map(|&(slot, _)| slot).collect();
     for (plane, channels) in measurements.planes() {
-        let indices =
-            sampling::unsaturated(measurements, pattern_indices, pixels, channels.clone());
+        let indices = sampling::unsaturated(measurements, training, pixels, channels.clone());
         let mut columns = vec![0.0; elements.len() * indices.len()];
         for (i, &l) in indices.iter().enumerate() {
             let pattern = measurements.patterns[l].plane(plane);
@@ -192,11 +165,9 @@ impl PooledMeasurements {
         };
         for &(_, pixel) in pixels {
             for c in channels.clone() {
-                let y = pattern_indices
-                    .iter()
-                    .map(|&l| measurements.sample(l, pixel, c));
-                let y: Vec<f64> = y.collect();
-                let mean = y.iter().sum::<f64>() / y.len() as f64;
+                let sample = |&l: &usize| measurements.sample(l, pixel, c);
+                let y: Vec<f64> = pattern_indices.iter().map(sample).collect();
+                let mean = sampling::mean(&y);
                 // The mean is NaN if a sample is saturated.
                 if mean > 0.0 {
                     let brightness = mean / level;
@@ -230,18 +201,18 @@ fn dark_or_overexposed(measurements: &Measurements, squares: &[TileRect]) -> Rec
 
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests {
+    use super::super::holdout::HoldoutSplit;
     use super::super::test_problems::SyntheticCapture;
     use super::*;
     use crate::executor::SequentialExecutor;
 
     fn fit(capture: &SyntheticCapture) -> Result<Vec<f64>, RecoverError> {
-        let split = HoldoutSplit::new(&capture.measurements);
-        mean_function(
-            &capture.measurements,
-            &capture.geometry,
-            &split,
-            &SequentialExecutor,
-        )
+        mean_function(&Preparation {
+            measurements: &capture.measurements,
+            geometry: capture.geometry,
+            split: &HoldoutSplit::new(&capture.measurements),
+            executor: &SequentialExecutor,
+        })
     }
 
     #[test]

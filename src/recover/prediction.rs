@@ -1,9 +1,7 @@
 //! What light transport functions predict of measurements: `y = pT`, restricted to each pixel's window.
 
 use crate::capture::{Measurements, Pattern};
-use crate::transport::{CHANNELS, Geometry, TransportFunctions};
-
-use super::sampling;
+use crate::transport::{CHANNELS, Geometry, TileRect, TransportFunctions};
 
 /// The measurements that the functions of a region predict for `patterns`, `[pixel, pattern, channel]`.
 pub(super) fn predictions<'a>(
@@ -13,12 +11,10 @@ pub(super) fn predictions<'a>(
 ) -> Vec<f64> {
     let (area, patterns) = (geometry.window.area(), patterns.into_iter());
     let mut predictions = Vec::new();
-    for (pixel, tau) in functions
-        .rect
-        .pixels()
-        .zip(functions.tau.chunks_exact(area))
-    {
-        let elements = sampling::elements_of_window(geometry, geometry.window_origin(pixel));
+    let pixels = functions.rect.pixels();
+    for (pixel, tau) in pixels.zip(functions.tau.chunks_exact(area)) {
+        let origin = geometry.window_origin(pixel);
+        let elements: Vec<_> = geometry.elements_of_window(origin).collect();
         for pattern in patterns.clone() {
             let planes = std::array::from_fn::<_, CHANNELS, _>(|c| pattern.plane(c));
             let mut y = [0.0; CHANNELS];
@@ -33,6 +29,21 @@ pub(super) fn predictions<'a>(
     predictions
 }
 
+/// The measurements of a region under the patterns `pattern_indices`, `[pixel, pattern, channel]`; NaN where saturated.
+pub(super) fn samples(
+    measurements: &Measurements,
+    pattern_indices: &[usize],
+    rect: TileRect,
+) -> Vec<f64> {
+    let mut samples = Vec::new();
+    for pixel in rect.pixels() {
+        for &l in pattern_indices {
+            samples.extend((0..CHANNELS).map(|c| measurements.sample(l, pixel, c)));
+        }
+    }
+    samples
+}
+
 /// Measurements less predictions under the patterns `pattern_indices`, `[pixel, pattern, channel]`; NaN where a
 /// measurement is saturated.
 pub(super) fn residuals(
@@ -42,14 +53,7 @@ pub(super) fn residuals(
     functions: &TransportFunctions,
 ) -> Vec<f64> {
     let patterns = pattern_indices.iter().map(|&l| &measurements.patterns[l]);
-    let mut residuals = predictions(geometry, patterns, functions);
-    let pixels = residuals.chunks_exact_mut(pattern_indices.len() * CHANNELS);
-    for (pixel, residuals) in functions.rect.pixels().zip(pixels) {
-        for (residuals, &l) in residuals.chunks_exact_mut(CHANNELS).zip(pattern_indices) {
-            for (c, residual) in residuals.iter_mut().enumerate() {
-                *residual = measurements.sample(l, pixel, c) - *residual;
-            }
-        }
-    }
-    residuals
+    let predicted = predictions(geometry, patterns, functions);
+    let samples = samples(measurements, pattern_indices, functions.rect);
+    samples.iter().zip(predicted).map(|(y, p)| y - p).collect()
 }

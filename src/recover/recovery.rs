@@ -8,6 +8,7 @@ use super::learned::LearnedRecovery;
 use super::method::Method;
 use super::pixelwise::PixelwiseRecovery;
 use super::pooled;
+use super::preparation::{self, Preparation};
 use super::sampling::MIN_PATTERNS;
 use crate::capture::Measurements;
 use crate::executor::Executor;
@@ -27,6 +28,7 @@ pub struct Settings {
 #[derive(Debug)]
 pub struct Recovery {
     geometry: Geometry,
+    split: HoldoutSplit,
     solver: Solver,
     holdout_validation: Option<HoldoutValidation>,
 }
@@ -49,14 +51,7 @@ impl Recovery {
         settings: Settings,
         executor: &impl Executor,
     ) -> Result<Self, RecoverError> {
-        let geometry = Geometry {
-            camera: measurements.camera,
-            light: measurements.light,
-            window: settings.window,
-            correspondence: measurements.correspondence,
-            tile_side: Geometry::DEFAULT_TILE_SIDE,
-        }
-        .validate()?;
+        let geometry = preparation::geometry(measurements, settings.window)?;
         if measurements.patterns.len() < MIN_PATTERNS {
             return Err(RecoverError::TooFewPatterns {
                 count: measurements.patterns.len(),
@@ -64,46 +59,37 @@ impl Recovery {
             });
         }
         let split = HoldoutSplit::new(measurements);
+        let preparation = Preparation {
+            measurements,
+            geometry,
+            split: &split,
+            executor,
+        };
         // Also checks that the photographs match their patterns, for every method.
-        let mean = pooled::mean_function(measurements, &geometry, &split, executor)?;
+        let mean = pooled::mean_function(&preparation)?;
         let solver = match settings.method {
             Method::Learned => {
-                let learned =
-                    LearnedRecovery::new(measurements, geometry, split.clone(), &mean, executor)?;
-                Solver::Learned(Box::new(learned))
+                Solver::Learned(Box::new(LearnedRecovery::new(&preparation, &mean)?))
             }
-            Method::Nnls => Solver::Pixelwise(PixelwiseRecovery::least_squares(
-                measurements,
-                geometry,
-                &split,
-                executor,
-            )?),
-            Method::Bpdn(basis) => Solver::Pixelwise(PixelwiseRecovery::denoising(
-                measurements,
-                geometry,
-                basis,
-                &split,
-                executor,
-            )?),
+            Method::Nnls => Solver::Pixelwise(PixelwiseRecovery::least_squares(&preparation)?),
+            Method::Bpdn(basis) => {
+                Solver::Pixelwise(PixelwiseRecovery::denoising(&preparation, basis)?)
+            }
         };
         let mut recovery = Self {
             geometry,
+            split: split.clone(),
             solver,
             holdout_validation: None,
         };
-        let recover_from_training = |rect: TileRect| match &recovery.solver {
-            Solver::Learned(learned) => learned.training_tile(measurements, rect),
+        let training_tile = |rect: TileRect| match &recovery.solver {
+            Solver::Learned(learned) => learned.training_tile(measurements, &split, rect),
             Solver::Pixelwise(solver) => {
-                RecoveredTile::Direct(solver.tile_from(measurements, &split.training, rect))
+                RecoveredTile::Direct(solver.tile(measurements, &split.training, rect))
             }
         };
-        recovery.holdout_validation = HoldoutValidation::new(
-            measurements,
-            (&geometry, recovery.basis()),
-            &split,
-            executor,
-            recover_from_training,
-        )?;
+        recovery.holdout_validation =
+            HoldoutValidation::new(&preparation, recovery.basis(), training_tile)?;
         Ok(recovery)
     }
 
@@ -145,8 +131,10 @@ impl Recovery {
     /// capture: they cover the tile and [`halo`](Self::halo) rows around it, within the picture.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
         match &self.solver {
-            Solver::Learned(learned) => learned.tile(measurements, rect),
-            Solver::Pixelwise(solver) => RecoveredTile::Direct(solver.tile(measurements, rect)),
+            Solver::Learned(learned) => learned.tile(measurements, &self.split, rect),
+            Solver::Pixelwise(solver) => {
+                RecoveredTile::Direct(solver.tile(measurements, &self.split.all, rect))
+            }
         }
     }
 }

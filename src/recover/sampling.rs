@@ -78,25 +78,6 @@ pub(super) fn pixels_by_window(
     windows
 }
 
-/// The slots of a window that lie on the light plane, each with its light element's index.
-pub(super) fn elements_of_window(geometry: &Geometry, origin: Element) -> Vec<(usize, usize)> {
-    let slots = 0..geometry.window.area();
-    let element = |slot| {
-        let element = geometry.window.element(origin, slot);
-        Some((slot, element.index_in(geometry.light)?))
-    };
-    slots.filter_map(element).collect()
-}
-
-/// Whether any pixel's window reaches the light plane.
-pub(super) fn sees_light_plane(geometry: &Geometry) -> bool {
-    let mut pixels = geometry.tiles().flat_map(TileRect::pixels);
-    pixels.any(|pixel| {
-        let origin = geometry.window_origin(pixel);
-        !geometry.clip_window(origin).is_empty()
-    })
-}
-
 /// The patterns of `pattern_indices` under which none of the pixels and channels is saturated; all of them if those are
 /// fewer than [`MIN_PATTERNS`].
 pub(super) fn unsaturated(
@@ -105,18 +86,38 @@ pub(super) fn unsaturated(
     pixels: &PixelsOfWindow,
     channels: Range<usize>,
 ) -> Vec<usize> {
-    let is_usable = |&l: &usize| {
-        let mut pixels = pixels.iter();
-        pixels.all(|&(_, pixel)| {
-            let mut channels = channels.clone();
-            channels.all(|c| measurements.sample(l, pixel, c).is_finite())
-        })
+    let is_finite = |l, pixel| {
+        let mut channels = channels.clone();
+        channels.all(|c| measurements.sample(l, pixel, c).is_finite())
     };
+    let is_usable = |&l: &usize| pixels.iter().all(|&(_, pixel)| is_finite(l, pixel));
     let usable: Vec<usize> = pattern_indices.iter().copied().filter(is_usable).collect();
     match usable.len() >= MIN_PATTERNS {
         true => usable,
         false => pattern_indices.to_vec(),
     }
+}
+
+/// The patterns that do not saturate a pixel's channel, and its measurements under them. If these patterns are fewer than
+/// [`MIN_PATTERNS`], all patterns; saturated measurements are then white, the least that they can be.
+pub(super) fn usable_samples(
+    measurements: &Measurements,
+    pattern_indices: &[usize],
+    pixel: CameraPx,
+    c: usize,
+) -> (Vec<usize>, Vec<f64>) {
+    let usable = unsaturated(measurements, pattern_indices, &[(0, pixel)], c..c + 1);
+    let sample = |&l: &usize| match measurements.sample(l, pixel, c) {
+        y if y.is_finite() => y,
+        _ => f64::from(measurements.full_scale[l]),
+    };
+    let y = usable.iter().map(sample).collect();
+    (usable, y)
+}
+
+/// The mean of measurements; 0 of none.
+pub(super) fn mean(y: &[f64]) -> f64 {
+    y.iter().sum::<f64>() / y.len().max(1) as f64
 }
 
 /// Mean, over the patterns, of the variance of a measurement `y`. Patterns may differ in exposure.
@@ -126,10 +127,8 @@ pub(super) fn mean_variance(
     c: usize,
     y: f64,
 ) -> f64 {
-    let variances = pattern_indices
-        .iter()
-        .map(|&l| measurements.variance(l, c, y));
-    variances.sum::<f64>() / pattern_indices.len().max(1) as f64
+    let variance = |&l: &usize| measurements.variance(l, c, y);
+    mean(&pattern_indices.iter().map(variance).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

@@ -14,6 +14,8 @@ use crate::transport::{Decibels, TransportError};
 /// SNR and time of a method.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Accuracy {
+    /// Number of photographs that the method uses.
+    pub photographs: usize,
     /// SNR of the whole matrix; `None` if the error is zero.
     pub snr: Option<Decibels>,
     /// Standard error of `snr` in dB, because only a sample of pixels was recovered; 0 if all were.
@@ -58,6 +60,7 @@ pub(super) fn measure_accuracy(
     let (snr, standard_error) = pooled_snr(&errors, pixels as f64 / all as f64);
     let per_pixel = (recovered - prepared) / pixels as f64;
     Ok(Accuracy {
+        photographs: measurements.patterns.len(),
         snr,
         standard_error,
         pixels,

@@ -1,13 +1,12 @@
 //! Line charts with a logarithmic horizontal axis, as SVG.
 
-use std::fmt::Display;
 use std::ops::Range;
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::error::StudyError;
+use super::error::{ChartError, StudyError};
 
 /// Width and height.
 const SIZE_PX: (u32, u32) = (960, 500);
@@ -64,20 +63,17 @@ impl Chart<'_> {
     pub fn svg(&self) -> Result<String, StudyError> {
         let mut svg = String::new();
         let area = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
-        self.draw(&area).map_err(chart_error)?;
-        area.present().map_err(chart_error)?;
+        self.draw(&area)?;
+        area.present()?;
         drop(area);
         Ok(svg)
     }
 
-    fn draw(
-        &self,
-        area: &DrawingArea<SVGBackend, Shift>,
-    ) -> Result<(), Box<dyn std::error::Error + '_>> {
+    fn draw(&self, area: &DrawingArea<SVGBackend, Shift>) -> Result<(), ChartError> {
         let x = self.x_range();
-        area.fill(&WHITE).map_err(boxed)?;
+        area.fill(&WHITE)?;
         let title = TextStyle::from((FONT, 20).into_font()).color(&RGBColor(30, 30, 30));
-        let area = area.titled(self.title, title).map_err(boxed)?;
+        let area = area.titled(self.title, title)?;
         let mut builder = ChartBuilder::on(&area);
         builder
             .margin(12)
@@ -88,24 +84,14 @@ impl Chart<'_> {
             builder.top_x_label_area_size(48);
         }
         let factor = self.top.as_ref().map_or(1.0, |top| top.factor);
-        let top_ticks = self
-            .top
-            .as_ref()
-            .map_or(Vec::new(), |top| top.ticks.clone());
+        let bottom_x = x.clone().log_scale();
+        let bottom_x = bottom_x.with_key_points(self.x_ticks.clone());
+        let top_x = (x.start * factor..x.end * factor).log_scale();
+        let top_ticks = self.top.iter().flat_map(|top| top.ticks.clone());
+        let top_x = top_x.with_key_points(top_ticks.collect());
         let mut chart = builder
-            .build_cartesian_2d(
-                (x.clone())
-                    .log_scale()
-                    .with_key_points(self.x_ticks.clone()),
-                self.y.clone(),
-            )
-            .map_err(boxed)?
-            .set_secondary_coord(
-                (x.start * factor..x.end * factor)
-                    .log_scale()
-                    .with_key_points(top_ticks),
-                self.y.clone(),
-            );
+            .build_cartesian_2d(bottom_x, self.y.clone())?
+            .set_secondary_coord(top_x, self.y.clone());
         let label = (FONT, 14);
         chart
             .configure_mesh()
@@ -120,8 +106,7 @@ impl Chart<'_> {
             .y_label_formatter(&|y| format_number(*y))
             .label_style(label)
             .axis_desc_style((FONT, 16))
-            .draw()
-            .map_err(boxed)?;
+            .draw()?;
         if let Some(top) = &self.top {
             chart
                 .configure_secondary_axes()
@@ -131,38 +116,32 @@ impl Chart<'_> {
                 .label_style(label)
                 .axis_desc_style((FONT, 16))
                 .axis_style(RGBColor(90, 90, 90))
-                .draw()
-                .map_err(boxed)?;
+                .draw()?;
         }
         let left = (area.dim_in_pixel().0 - LEGEND_WIDTH_PX + 16) as i32;
         if let Some((value, name)) = self.reference {
             let grey = RGBColor(120, 120, 120);
             let ends = [(x.start, value), (x.end, value)];
-            chart
-                .draw_series(DashedLineSeries::new(ends, 6, 5, grey.stroke_width(1)))
-                .map_err(boxed)?;
+            chart.draw_series(DashedLineSeries::new(ends, 6, 5, grey.stroke_width(1)))?;
             let y = 72 + 24 * self.series.len() as i32;
             for x in [left, left + 13] {
                 let dash = PathElement::new([(x, y), (x + 8, y)], grey.stroke_width(1));
-                area.draw(&dash).map_err(boxed)?;
+                area.draw(&dash)?;
             }
-            area.draw(&legend_label(name, left, y)).map_err(boxed)?;
+            area.draw(&legend_label(name, left, y))?;
         }
         for (i, series) in self.series.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
             let line = LineSeries::new(series.points.iter().copied(), colour.stroke_width(2));
-            chart.draw_series(line).map_err(boxed)?;
+            chart.draw_series(line)?;
             if series.has_markers {
                 let points = series.points.iter();
-                chart
-                    .draw_series(points.map(|&p| Circle::new(p, 4, colour.filled())))
-                    .map_err(boxed)?;
+                chart.draw_series(points.map(|&p| Circle::new(p, 4, colour.filled())))?;
             }
             let y = 72 + 24 * i as i32;
             let line = PathElement::new([(left, y), (left + 22, y)], colour.stroke_width(3));
-            area.draw(&line).map_err(boxed)?;
-            area.draw(&legend_label(&series.name, left, y))
-                .map_err(boxed)?;
+            area.draw(&line)?;
+            area.draw(&legend_label(&series.name, left, y))?;
         }
         Ok(())
     }
@@ -206,14 +185,6 @@ fn format_number(x: f64) -> String {
         true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
         false => text,
     }
-}
-
-fn boxed<E: std::error::Error + 'static>(error: E) -> Box<dyn std::error::Error> {
-    Box::new(error)
-}
-
-fn chart_error(error: impl Display) -> StudyError {
-    StudyError::Chart(error.to_string())
 }
 
 #[cfg(test)]

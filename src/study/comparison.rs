@@ -3,11 +3,11 @@
 
 use std::time::Instant;
 
-use super::accuracy::{measure_accuracy, pooled_snr};
-use super::chart::{Chart, Series, TopAxis, axis_range};
+use super::accuracy::{Accuracy, measure_accuracy, pooled_snr};
+use super::chart::{Chart, TopAxis, axis_range};
 use super::dense_transport::DenseTransport;
 use super::error::StudyError;
-use super::known_transport::SceneTruth;
+use super::method_curve::MethodCurve;
 use super::methods;
 use super::nystrom::{Nystrom, NystromSamples};
 use super::pixel_sampling;
@@ -15,11 +15,11 @@ use super::scanning;
 use super::scene_camera::{SceneCamera, first_shots};
 use super::section::{ProgressCallback, Section, Table, seconds_cell, snr_cell};
 use super::unwindowed;
-use crate::capture::{LinearPhoto, Measurements};
+use crate::capture::LinearPhoto;
 use crate::executor::Executor;
 use crate::recover::Method;
 use crate::simulate::{Ensemble, LightCodes};
-use crate::transport::{CHANNELS, Decibels, Extent, TransportError};
+use crate::transport::{CHANNELS, Extent, Geometry, TransportError};
 
 /// Numbers of photographs at the points of curves, ascending.
 const PHOTOGRAPH_COUNTS: [usize; 8] = [10, 20, 40, 80, 160, 320, 640, 1024];
@@ -34,18 +34,6 @@ const TARGET_SNR_DB: f64 = 25.0;
 /// Index of the first photograph of a row, so that its noise differs from that of all other photographs.
 const FIRST_ROW_PHOTOGRAPH: u32 = 1 << 20;
 
-/// The SNR of one acquisition method by the number of photographs.
-struct MethodCurve {
-    name: String,
-    points: Vec<ComparisonPoint>,
-}
-
-struct ComparisonPoint {
-    photographs: usize,
-    snr: Option<Decibels>,
-    seconds: f64,
-}
-
 /// Compares the acquisition methods on one scene, named `name`.
 ///
 /// # Errors
@@ -57,111 +45,78 @@ pub fn comparison(
     executor: &impl Executor,
     progress: ProgressCallback,
 ) -> Result<Section, StudyError> {
-    let known = SceneTruth(scene_camera.scene);
-    let (camera, light) = {
-        let geometry = scene_camera.scene.geometry();
-        (geometry.camera, geometry.light)
-    };
-    let truth = DenseTransport::new(&known, executor);
-    let elements = light.area();
+    let geometry = scene_camera.scene.geometry();
+    let truth = DenseTransport::new(&scene_camera, executor);
     let counts = |max: usize| PHOTOGRAPH_COUNTS.into_iter().filter(move |&k| k <= max);
-    let report = |curve: &MethodCurve| {
-        if let Some(last) = curve.points.last() {
+    let mut curves = Vec::new();
+    let mut add_curve = |method: String, points: Vec<Accuracy>| {
+        if let Some(last) = points.last() {
+            let (snr, photographs) = (snr_cell(last.snr), last.photographs);
             progress(&format!(
-                "comparison, {name}: {}: {} dB from {}",
-                curve.name,
-                snr_cell(last.snr),
-                last.photographs
+                "comparison, {name}: {method}: {snr} dB from {photographs}"
             ));
         }
+        curves.push(MethodCurve {
+            name: method,
+            points,
+        });
     };
 
-    let scans = scene_camera.photographs(&single_elements(light), executor)?;
+    let scans = scene_camera.photographs(&single_elements(geometry.light), executor)?;
     let start = Instant::now();
     let scanned = scanning::snr_by_scans(&truth, &scans);
     let seconds = start.elapsed().as_secs_f64();
-    let mut curves = vec![MethodCurve {
-        name: "scanning".to_owned(),
-        points: scanned
-            .into_iter()
-            .enumerate()
-            .map(|(i, snr)| ComparisonPoint {
-                photographs: i + 1,
-                snr,
-                seconds,
-            })
-            .collect(),
-    }];
-    report(&curves[0]);
-
-    let mut nystrom = MethodCurve {
-        name: "kernel Nyström".to_owned(),
-        points: Vec::new(),
-    };
-    for photographs in counts(2 * elements.min(camera.area())) {
-        let (snr, seconds) = run_nystrom(&truth, &scene_camera, &scans, photographs, executor)?;
-        nystrom.points.push(ComparisonPoint {
+    let scanned = scanned
+        .into_iter()
+        .zip(1..)
+        .map(|(snr, photographs)| Accuracy {
             photographs,
             snr,
+            standard_error: 0.0,
+            pixels: truth.pixels(),
             seconds,
         });
-    }
-    report(&nystrom);
-    curves.push(nystrom);
+    add_curve("scanning".to_owned(), scanned.collect());
+
+    let nystrom: Result<_, _> = counts(2 * truth.elements.min(truth.pixels()))
+        .map(|photographs| run_nystrom(&truth, &scene_camera, &scans, photographs, executor))
+        .collect();
+    add_curve("kernel Nyström".to_owned(), nystrom?);
     drop(scans);
 
     let measurements = scene_camera.measure(ensemble, MAX_PATTERNS, executor)?;
-    let mut no_window = MethodCurve {
-        name: "no window, nnls".to_owned(),
-        points: Vec::new(),
-    };
-    for l in counts(MAX_PATTERNS) {
+    let unwindowed = counts(MAX_PATTERNS).map(|l| {
         let measurements = first_shots(&measurements, l);
-        let (errors, seconds) =
-            unwindowed::recover(&truth, &measurements, UNWINDOWED_PIXELS, executor);
-        let share = errors.len() as f64 / truth.pixels() as f64;
-        no_window.points.push(ComparisonPoint {
-            photographs: l,
-            snr: pooled_snr(&errors, share).0,
-            seconds,
-        });
-    }
-    report(&no_window);
-    curves.push(no_window);
+        unwindowed::measure_accuracy(&truth, &measurements, UNWINDOWED_PIXELS, executor)
+    });
+    add_curve("no window, nnls".to_owned(), unwindowed.collect());
 
     for &method in Method::ALL {
-        let mut curve = MethodCurve {
-            name: format!("window, {}", methods::name(method)),
-            points: Vec::new(),
-        };
         // All points of a slow method would take longer than everything else here.
         let is_measured = |l: &usize| !methods::is_slow(method) || SLOW_PATTERN_COUNTS.contains(l);
-        for l in counts(MAX_PATTERNS).filter(is_measured) {
-            let measurements = first_shots(&measurements, l);
-            let accuracy =
-                measure_accuracy(&known, &measurements, method, camera.area(), executor)?;
-            curve.points.push(ComparisonPoint {
-                photographs: l,
-                snr: accuracy.snr,
-                seconds: accuracy.seconds,
-            });
-        }
-        report(&curve);
-        curves.push(curve);
+        let points: Result<_, _> = counts(MAX_PATTERNS)
+            .filter(is_measured)
+            .map(|l| {
+                let measurements = first_shots(&measurements, l);
+                measure_accuracy(
+                    &scene_camera,
+                    &measurements,
+                    method,
+                    truth.pixels(),
+                    executor,
+                )
+            })
+            .collect();
+        add_curve(format!("window, {}", methods::name(method)), points?);
     }
-    section(name, camera, elements, &measurements, &curves)
+    section(name, geometry, &curves)
 }
 
-fn section(
-    name: &str,
-    camera: Extent,
-    elements: usize,
-    measurements: &Measurements,
-    curves: &[MethodCurve],
-) -> Result<Section, StudyError> {
+fn section(name: &str, geometry: &Geometry, curves: &[MethodCurve]) -> Result<Section, StudyError> {
+    let (camera, light, elements) = (geometry.camera, geometry.light, geometry.light.area());
     let mut section = Section::new(&format!("Photographs for {TARGET_SNR_DB} dB, {name}"));
     section.add_paragraph(&format!(
-        "Camera {camera}, light plane {}, the same camera and noise for all methods. Scanning photographs \
+        "Camera {camera}, light plane {light}, the same camera and noise for all methods. Scanning photographs \
          one light element at a time; the elements not yet scanned count as dark. One element gives \
          little light, so that noise limits the SNR. Kernel Nyström photographs as many rows of T as \
          columns. Rows need a second projector at the camera's position and a second camera at the \
@@ -169,18 +124,12 @@ fn section(
          window every light element is an unknown of every pixel; this method is evaluated on \
          {UNWINDOWED_PIXELS} random pixels, and its time is extrapolated to all pixels. The number of \
          photographs for {TARGET_SNR_DB} dB is interpolated between the points of the curve. Times are \
-         computing times without the photographing.",
-        measurements.light,
+         computing times without the photographing."
     ));
-    let mut data = Table::new(&["method", "photographs", "snr_db", "seconds"]);
-    let mut table = Table::new(&[
-        "method",
-        "photographs for 25 dB",
-        "share of M",
-        "dB from 80",
-        "best dB (from)",
-        "seconds there",
-    ]);
+    let mut data = Table::new("method | photographs | snr_db | seconds");
+    let mut table = Table::new(
+        "method | photographs for 25 dB | share of M | dB from 80 | best dB (from) | seconds there",
+    );
     for curve in curves {
         for point in &curve.points {
             data.add_row([
@@ -192,14 +141,13 @@ fn section(
         }
         let needed = photographs_for(TARGET_SNR_DB, &curve.points);
         let max = curve.points.last().map_or(0, |p| p.photographs);
-        let at_80 = curve.points.iter().find(|p| p.photographs == 80);
-        let best = curve
-            .points
-            .iter()
+        let mut points = curve.points.iter();
+        let best = points
+            .clone()
             .max_by(|a, b| snr_db(a).total_cmp(&snr_db(b)));
         // The time at the target SNR, or at the best SNR if the target is not reached.
         let timed = match needed {
-            Some(needed) => curve.points.iter().find(|p| p.photographs >= needed),
+            Some(needed) => points.find(|p| p.photographs >= needed),
             None => best,
         };
         table.add_row([
@@ -208,26 +156,22 @@ fn section(
             needed.map_or(String::new(), |k| {
                 format!("{:.1} %", 100.0 * k as f64 / elements as f64)
             }),
-            snr_cell(at_80.and_then(|p| p.snr)),
+            snr_cell(curve.at(80).and_then(|p| p.snr)),
             best.map_or(String::new(), |p| {
                 format!("{} ({})", snr_cell(p.snr), p.photographs)
             }),
             timed.map_or(String::new(), |p| seconds_cell(p.seconds)),
         ]);
     }
-    let series: Vec<_> = curves
-        .iter()
-        .map(|curve| Series {
-            name: curve.name.clone(),
-            points: curve
-                .points
-                .iter()
-                .filter(|p| p.photographs >= PHOTOGRAPH_COUNTS[0])
-                .filter_map(|p| Some((p.photographs as f64, p.snr?.0)))
-                .collect(),
-            has_markers: curve.points.len() <= PHOTOGRAPH_COUNTS.len(),
-        })
-        .collect();
+    let series = curves.iter().map(|curve| {
+        let has_markers = curve.points.len() <= PHOTOGRAPH_COUNTS.len();
+        let mut series = curve.series(has_markers, |photographs| photographs as f64);
+        series
+            .points
+            .retain(|point| point.0 >= PHOTOGRAPH_COUNTS[0] as f64);
+        series
+    });
+    let series: Vec<_> = series.collect();
     let ticks: Vec<f64> = PHOTOGRAPH_COUNTS.map(|k| k as f64).into();
     let levels = series.iter().flat_map(|s| &s.points).map(|p| p.1);
     let chart = Chart {
@@ -264,14 +208,14 @@ fn single_elements(light: Extent) -> Vec<LightCodes> {
     (0..light.area()).map(single).collect()
 }
 
-/// Kernel Nyström from random columns and rows, half of `photographs` each: its SNR and its computing time in seconds.
+/// Kernel Nyström from random columns and rows, half of `photographs` each.
 fn run_nystrom(
     truth: &DenseTransport,
     scene_camera: &SceneCamera,
     scans: &[LinearPhoto],
     photographs: usize,
     executor: &impl Executor,
-) -> Result<(Option<Decibels>, f64), StudyError> {
+) -> Result<Accuracy, StudyError> {
     let elements = pixel_sampling::random_indices(truth.elements, photographs / 2);
     let pixels = pixel_sampling::random_indices(truth.pixels(), photographs - photographs / 2);
     let black = vec![[0.0; CHANNELS]; truth.elements];
@@ -321,17 +265,23 @@ fn run_nystrom(
             part.merge(error);
         }
     }
-    Ok((pooled_snr(&parts, 1.0).0, start.elapsed().as_secs_f64()))
+    Ok(Accuracy {
+        photographs,
+        snr: pooled_snr(&parts, 1.0).0,
+        standard_error: 0.0,
+        pixels: truth.pixels(),
+        seconds: start.elapsed().as_secs_f64(),
+    })
 }
 
 /// The SNR in dB, infinite without error.
-fn snr_db(point: &ComparisonPoint) -> f64 {
+fn snr_db(point: &Accuracy) -> f64 {
     point.snr.map_or(f64::INFINITY, |snr| snr.0)
 }
 
-/// The number of photographs from which on the SNR is at least `target` dB, interpolated linearly in the
-/// logarithm of the number; `None` if the curve ends below.
-fn photographs_for(target: f64, points: &[ComparisonPoint]) -> Option<usize> {
+/// The number of photographs from which on the SNR is at least `target` dB, interpolated linearly in the logarithm of the
+/// number; `None` if the curve ends below.
+fn photographs_for(target: f64, points: &[Accuracy]) -> Option<usize> {
     let reached = points.iter().rposition(|p| snr_db(p) < target);
     let (below, above) = match reached {
         None => return points.first().map(|p| p.photographs),
@@ -347,11 +297,14 @@ mod tests {
     use super::*;
     use crate::executor::SequentialExecutor;
     use crate::simulate::SceneKind;
+    use crate::transport::Decibels;
 
-    fn point(photographs: usize, db: f64) -> ComparisonPoint {
-        ComparisonPoint {
+    fn point(photographs: usize, db: f64) -> Accuracy {
+        Accuracy {
             photographs,
             snr: Some(Decibels(db)),
+            standard_error: 0.0,
+            pixels: 0,
             seconds: 0.0,
         }
     }

@@ -27,11 +27,8 @@ impl DenseTransport {
             let mut function = vec![[0.0; CHANNELS]; geometry.window.area()];
             known.transport_function(pixel, &mut function);
             let mut column = vec![[0.0; CHANNELS]; elements];
-            let origin = known.origin(pixel);
-            for (s, tau) in function.into_iter().enumerate() {
-                if let Some(m) = geometry.window.element(origin, s).index_in(geometry.light) {
-                    column[m] = tau;
-                }
+            for (s, m) in geometry.elements_of_window(known.origin(pixel)) {
+                column[m] = function[s];
             }
             column
         });

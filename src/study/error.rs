@@ -5,6 +5,9 @@ use thiserror::Error;
 use crate::recover::RecoverError;
 use crate::transport::GeometryError;
 
+/// An error of the drawing library.
+pub(super) type ChartError = plotters::drawing::DrawingAreaErrorKind<std::io::Error>;
+
 /// Why a part of the study fails.
 #[derive(Debug, Error)]
 pub enum StudyError {
@@ -18,8 +21,8 @@ pub enum StudyError {
     #[error("the simulated camera has invalid noise parameters")]
     Noise(#[from] rand_distr::NormalError),
     /// Drawing a chart failed.
-    #[error("a chart cannot be drawn: {0}")]
-    Chart(String),
+    #[error("a chart cannot be drawn")]
+    Chart(#[from] ChartError),
     /// Encoding a picture failed.
     #[error("a picture cannot be encoded")]
     Picture(#[from] image::ImageError),

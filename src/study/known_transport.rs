@@ -2,7 +2,6 @@
 
 use crate::capture::Truth;
 use crate::relight::Light;
-use crate::simulate::SimulatedScene;
 use crate::transport::{
     CHANNELS, CameraPx, Correspondence, Element, Geometry, GeometryError, TileRect, TransportError,
     TransportFunctions,
@@ -20,21 +19,6 @@ pub trait KnownTransport: Sync {
 
     /// Writes the light transport function of one pixel, `[S]`, in units of the measurement.
     fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]);
-}
-
-/// The transport of a simulated scene.
-#[derive(Clone, Copy)]
-pub struct SceneTruth<'a>(pub &'a dyn SimulatedScene);
-
-impl KnownTransport for SceneTruth<'_> {
-    fn geometry(&self) -> &Geometry {
-        self.0.geometry()
-    }
-
-    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
-        tau.fill([0.0; CHANNELS]);
-        self.0.transport_function(pixel, tau);
-    }
 }
 
 /// The transport in a capture's `truth/` folder.
@@ -137,11 +121,9 @@ pub(super) fn relight_pixel(
     light: &Light,
 ) -> [f64; CHANNELS] {
     let mut y = [0.0; CHANNELS];
-    for (s, tau) in tau.iter().enumerate() {
-        if let Some(m) = geometry.window.element(origin, s).index_in(geometry.light) {
-            for c in 0..CHANNELS {
-                y[c] += f64::from(tau[c]) * f64::from(light.elements()[m][c]);
-            }
+    for (s, m) in geometry.elements_of_window(origin) {
+        for c in 0..CHANNELS {
+            y[c] += f64::from(tau[s][c]) * f64::from(light.elements()[m][c]);
         }
     }
     y

@@ -12,6 +12,13 @@ const FAST_FACTOR: usize = 4;
 /// Divisor of the sample size of slow methods.
 const SLOW_DIVISOR: usize = 8;
 
+/// Fewer tiles would give no usable standard error.
+const MIN_TILES: usize = 8;
+/// Side of the squares that other methods are sampled in. With two camera pixels for each light element, the pixels of a
+/// square share a window, so that smaller squares would take longer for each pixel. The errors of neighbours are
+/// correlated, so that larger squares would be less informative.
+const BLOCK_SIDE_PX: u32 = 2;
+
 /// The unique name of a method in tables and legends.
 pub(super) fn name(method: Method) -> &'static str {
     match method {
@@ -22,26 +29,37 @@ pub(super) fn name(method: Method) -> &'static str {
     }
 }
 
+/// The names of all methods, as columns of a table.
+pub(super) fn names() -> String {
+    let names: Vec<&str> = Method::ALL.iter().map(|&method| name(method)).collect();
+    names.join(" | ")
+}
+
 /// Whether `method` takes much longer than the others.
 pub(super) fn is_slow(method: Method) -> bool {
-    matches!(
+    !matches!(
         method,
-        Method::Bpdn(SparsityBasis::Dct | SparsityBasis::Haar)
+        Method::Learned | Method::Nnls | Method::Bpdn(SparsityBasis::Identity)
     )
 }
 
-/// The sample of pixels for `method`, from the nominal sample size `pixels`. Learned recovery decides tile by
-/// tile whether to blend, so that its sample consists of whole tiles.
+/// The sample of pixels for `method`, from the nominal sample size `pixels`. Learned recovery decides tile by tile
+/// whether to blend, so that its sample consists of whole tiles.
 pub(super) fn sample_for(method: Method, geometry: &Geometry, pixels: usize) -> Vec<TileRect> {
-    match method {
-        Method::Learned => {
-            pixel_sampling::random_tiles(geometry, pixels.saturating_mul(FAST_FACTOR))
-        }
-        _ if is_slow(method) => {
-            pixel_sampling::random_blocks(geometry.camera, pixels / SLOW_DIVISOR)
-        }
-        _ => pixel_sampling::random_blocks(geometry.camera, pixels),
-    }
+    let (tile_side, pixels, min_tiles) = match method {
+        Method::Learned => (
+            geometry.tile_side,
+            pixels.saturating_mul(FAST_FACTOR),
+            MIN_TILES,
+        ),
+        _ if is_slow(method) => (BLOCK_SIDE_PX, pixels / SLOW_DIVISOR, 1),
+        _ => (BLOCK_SIDE_PX, pixels, 1),
+    };
+    let tiles = Geometry {
+        tile_side,
+        ..*geometry
+    };
+    pixel_sampling::random_tiles(&tiles, pixels, min_tiles)
 }
 
 #[cfg(test)]

@@ -4,12 +4,12 @@
 //! T ≈ f⁻¹(f(R)ᵀ f(A)⁺ᵀ f(C)),   f(x) = x^γ element by element
 //! ```
 //!
-//! with C the columns of photographs of single elements, R the rows photographed in the other direction, and
-//! A where both cross. Rows need a second projector at the camera's position and a second camera at the
-//! light's. The kernel f compresses the range of values, so that a lower rank suffices.
+//! with C the columns of photographs of single elements, R the rows photographed in the other direction, and A where
+//! both cross. Rows need a second projector at the camera's position and a second camera at the light's. The kernel f
+//! compresses the range of values, so that a lower rank suffices.
 
 use crate::executor::Executor;
-use crate::linalg::{add_scaled, cholesky, cholesky_solve, transpose};
+use crate::linalg::{add_scaled, cholesky_solve, cholesky_with_ridge, transpose};
 
 /// Exponents γ to choose from.
 const EXPONENTS: [f64; 5] = [1.0, 0.7, 0.5, 0.35, 0.25];
@@ -20,7 +20,7 @@ const HOLDOUT_INTERVAL: usize = 5;
 
 /// Photographed rows and columns of one channel of T.
 #[derive(Clone, Debug)]
-pub struct NystromSamples {
+pub(super) struct NystromSamples {
     /// Indices of the photographed light elements.
     pub elements: Vec<usize>,
     /// Their measurements, `[N, r]`.
@@ -35,7 +35,7 @@ pub struct NystromSamples {
 
 /// A transport with low rank under a kernel.
 #[derive(Clone, Debug)]
-pub struct Nystrom {
+pub(super) struct Nystrom {
     exponent: f64,
     /// `f(C)`, `[N, r]`.
     columns: Vec<f64>,
@@ -48,10 +48,8 @@ pub struct Nystrom {
 impl Nystrom {
     /// Chooses the exponent and the ridge with the smallest error on held-out rows, then fits all rows.
     pub fn new(samples: &NystromSamples, executor: &impl Executor) -> Self {
-        let candidates: Vec<(f64, f64)> = EXPONENTS
-            .iter()
-            .flat_map(|&exponent| RIDGES.map(|ridge| (exponent, ridge)))
-            .collect();
+        let with_ridges = |exponent| RIDGES.map(|ridge| (exponent, ridge));
+        let candidates: Vec<(f64, f64)> = EXPONENTS.into_iter().flat_map(with_ridges).collect();
         let (held_out, training): (Vec<usize>, Vec<usize>) =
             (0..samples.pixels.len()).partition(|i| i % HOLDOUT_INTERVAL == HOLDOUT_INTERVAL - 1);
         let errors = executor.map(candidates.len(), |i| {
@@ -74,26 +72,23 @@ impl Nystrom {
     /// Fits the rows `row_indices`.
     fn fit(samples: &NystromSamples, row_indices: &[usize], exponent: f64, ridge: f64) -> Self {
         let (rank, light) = (samples.elements.len(), samples.light);
-        let kernel = |x: f64| x.max(0.0).powf(exponent);
+        let kernel = |x: &f64| x.max(0.0).powf(exponent);
+        let columns: Vec<f64> = samples.columns.iter().map(kernel).collect();
         // Normal equations of f(A)·X = f(R).
         let mut gram = vec![0.0; rank * rank];
         let mut mixing = vec![0.0; rank * light];
         for &i in row_indices {
-            let row: Vec<f64> = samples.rows[i * light..(i + 1) * light]
+            let row: Vec<f64> = samples.rows[i * light..][..light]
                 .iter()
-                .map(|&t| kernel(t))
+                .map(kernel)
                 .collect();
             // Elements of A are photographed twice. The column's photograph is also the one in f(C).
-            let n = samples.pixels[i];
-            let crossing: Vec<f64> = samples.columns[n * rank..(n + 1) * rank]
-                .iter()
-                .map(|&t| kernel(t))
-                .collect();
+            let crossing = &columns[samples.pixels[i] * rank..][..rank];
             for (a, &here) in crossing.iter().enumerate() {
                 if here == 0.0 {
                     continue;
                 }
-                add_scaled(&mut gram[a * rank..(a + 1) * rank], here, &crossing);
+                add_scaled(&mut gram[a * rank..(a + 1) * rank], here, crossing);
                 add_scaled(&mut mixing[a * light..(a + 1) * light], here, &row);
             }
         }
@@ -101,7 +96,7 @@ impl Nystrom {
         let mixing = solve_with_ridge(&gram, &mixing, rank, ridge * mean);
         Self {
             exponent,
-            columns: samples.columns.iter().map(|&t| kernel(t)).collect(),
+            columns,
             mixing,
             rank,
             light,
@@ -122,21 +117,13 @@ impl Nystrom {
     }
 }
 
-/// Solves `(matrix + ridge · I) x = right` for `right`, `[k, width]`. The ridge grows until the matrix,
-/// `[k, k]`, is positive definite.
+/// Solves `(matrix + ridge · I) x = right` for `right`, `[k, width]`, with a matrix `[k, k]`.
 fn solve_with_ridge(matrix: &[f64], right: &[f64], k: usize, ridge: f64) -> Vec<f64> {
-    let mut ridge = ridge.max(f64::MIN_POSITIVE);
-    let factor = loop {
-        let mut factor = matrix.to_vec();
-        (0..k).for_each(|i| factor[i * k + i] += ridge);
-        if cholesky(&mut factor, k).is_some() || !ridge.is_finite() {
-            break factor;
-        }
-        ridge *= 10.0;
-    };
     let mut columns = transpose(right, right.len() / k.max(1));
-    for column in columns.chunks_exact_mut(k.max(1)) {
-        cholesky_solve(&factor, column);
+    if let Some((factor, _)) = cholesky_with_ridge(matrix, k, ridge) {
+        for column in columns.chunks_exact_mut(k.max(1)) {
+            cholesky_solve(&factor, column);
+        }
     }
     transpose(&columns, k)
 }

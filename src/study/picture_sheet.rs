@@ -1,12 +1,10 @@
 //! Labelled pictures in rows and columns, as SVG.
 
-use std::fmt::Write;
-
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
+use image::{ExtendedColorType, ImageEncoder, ImageError};
 
 use super::error::StudyError;
 use crate::relight::srgb;
@@ -41,41 +39,34 @@ impl Panel {
     /// [`StudyError::Picture`] if the encoder fails.
     pub fn png(&self) -> Result<Vec<u8>, StudyError> {
         let mut bytes = Vec::new();
-        PngEncoder::new(&mut bytes).write_image(
-            &self.rgb,
-            self.extent.width,
-            self.extent.height,
-            ExtendedColorType::Rgb8,
-        )?;
+        self.encode(PngEncoder::new(&mut bytes))?;
         Ok(bytes)
+    }
+
+    fn encode(&self, encoder: impl ImageEncoder) -> Result<(), ImageError> {
+        let Extent { width, height } = self.extent;
+        encoder.write_image(&self.rgb, width, height, ExtendedColorType::Rgb8)
     }
 
     /// A data URL: PNG for data, JPEG for a photograph.
     fn data_url(&self) -> Result<String, StudyError> {
+        let mut jpeg = Vec::new();
         let (kind, bytes) = match self.is_data {
             true => ("png", self.png()?),
             false => {
-                let mut bytes = Vec::new();
-                JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY).write_image(
-                    &self.rgb,
-                    self.extent.width,
-                    self.extent.height,
-                    ExtendedColorType::Rgb8,
-                )?;
-                ("jpeg", bytes)
+                self.encode(JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY))?;
+                ("jpeg", jpeg)
             }
         };
-        Ok(format!(
-            "data:image/{kind};base64,{}",
-            STANDARD.encode(bytes)
-        ))
+        let bytes = STANDARD.encode(bytes);
+        Ok(format!("data:image/{kind};base64,{bytes}"))
     }
 }
 
 /// A panel with lines of text below it.
 pub(super) struct CaptionedPanel {
     pub panel: Panel,
-    pub caption: Vec<String>,
+    pub caption: String,
 }
 
 /// Rows of panels, with names on the left of rows and above columns; names may be empty.
@@ -94,19 +85,13 @@ impl PictureSheet {
     pub fn svg(&self) -> Result<String, StudyError> {
         let has_row_names = self.rows.iter().any(|(name, _)| !name.is_empty());
         let has_column_names = self.columns.iter().any(|name| !name.is_empty());
-        let (left, top) = (
-            u32::from(has_row_names) * LINE_HEIGHT_PX,
-            u32::from(has_column_names) * LINE_HEIGHT_PX,
-        );
-        let lines = |row: &[CaptionedPanel]| {
-            let lines = row.iter().map(|p| p.caption.len() as u32).max();
-            lines.unwrap_or(0)
+        let [left, top] =
+            [has_row_names, has_column_names].map(|has| u32::from(has) * LINE_HEIGHT_PX);
+        let height = |(_, row): &(_, Vec<CaptionedPanel>)| {
+            let lines = row.iter().map(|panel| panel.caption.lines().count());
+            self.side_px + lines.max().unwrap_or(0) as u32 * LINE_HEIGHT_PX + GAP_PX
         };
-        let heights: Vec<u32> = self
-            .rows
-            .iter()
-            .map(|(_, row)| self.side_px + lines(row) * LINE_HEIGHT_PX + GAP_PX)
-            .collect();
+        let heights: Vec<u32> = self.rows.iter().map(height).collect();
         let width = left + GAP_PX + self.columns.len() as u32 * (self.side_px + GAP_PX);
         let height = top + GAP_PX + heights.iter().sum::<u32>();
         let mut svg = format!(
@@ -126,28 +111,20 @@ impl PictureSheet {
         for ((name, row), height) in self.rows.iter().zip(&heights) {
             if !name.is_empty() {
                 let (x, middle) = (LINE_HEIGHT_PX - 6, y + self.side_px / 2);
-                let group = format!("<g transform=\"rotate(-90 {x} {middle})\">");
-                svg += &group;
+                svg += &format!("<g transform=\"rotate(-90 {x} {middle})\">");
                 text(&mut svg, x, middle, name);
                 svg += "</g>\n";
             }
             for (i, CaptionedPanel { panel, caption }) in row.iter().enumerate() {
                 let x = column_x(i);
                 let style = if panel.is_data { "pixelated" } else { "auto" };
-                let _ = writeln!(
-                    svg,
-                    "<image x=\"{x}\" y=\"{y}\" width=\"{0}\" height=\"{0}\" \
-                     style=\"image-rendering:{style}\" href=\"{1}\"/>",
-                    self.side_px,
-                    panel.data_url()?
+                let (side, url) = (self.side_px, panel.data_url()?);
+                let place = format!("x=\"{x}\" y=\"{y}\" width=\"{side}\" height=\"{side}\"");
+                svg += &format!(
+                    "<image {place} style=\"image-rendering:{style}\" href=\"{url}\"/>\n\
+                     <rect {place} fill=\"none\" stroke=\"#c8c8c8\"/>\n"
                 );
-                let _ = writeln!(
-                    svg,
-                    "<rect x=\"{x}\" y=\"{y}\" width=\"{0}\" height=\"{0}\" fill=\"none\" \
-                     stroke=\"#c8c8c8\"/>",
-                    self.side_px
-                );
-                for (i, line) in caption.iter().enumerate() {
+                for (i, line) in caption.lines().enumerate() {
                     let below = y + self.side_px + LINE_HEIGHT_PX * (i as u32 + 1) - 5;
                     text(&mut svg, x + self.side_px / 2, below, line);
                 }
@@ -164,8 +141,7 @@ fn text(svg: &mut String, x: u32, y: u32, text: &str) {
         .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;");
-    // Writing to a string does not fail.
-    let _ = writeln!(svg, "<text x=\"{x}\" y=\"{y}\">{escaped}</text>");
+    *svg += &format!("<text x=\"{x}\" y=\"{y}\">{escaped}</text>\n");
 }
 
 #[cfg(test)]
@@ -189,7 +165,7 @@ mod tests {
                 [true, false]
                     .map(|is_data| CaptionedPanel {
                         panel: panel(is_data),
-                        caption: vec!["50 dB".to_owned()],
+                        caption: "50 dB".to_owned(),
                     })
                     .into(),
             )],

@@ -4,35 +4,16 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardUniform};
 
-use crate::transport::{Extent, Geometry, TileRect};
+use crate::transport::{Geometry, TileRect};
 
-/// Side of a block. With two camera pixels for each light element, the pixels of a block share a window, so
-/// that smaller blocks would take longer for each pixel. The errors of neighbours are correlated, so that
-/// larger blocks would be less informative.
-const BLOCK_SIDE_PX: u32 = 2;
 /// Seed of the sample, which is the same in every run.
 const SEED: u64 = 8;
 
-/// Random blocks of about `pixels` pixels together, without replacement; all blocks if these are fewer.
-pub(super) fn random_blocks(camera: Extent, pixels: usize) -> Vec<TileRect> {
-    let mut blocks = all_blocks(camera);
-    let count = pixels
-        .div_ceil((BLOCK_SIDE_PX * BLOCK_SIDE_PX) as usize)
-        .max(1);
-    if blocks.len() > count {
-        let indices = random_indices(blocks.len(), count);
-        blocks = indices.into_iter().map(|i| blocks[i]).collect();
-    }
-    blocks
-}
-
-/// Fewer tiles would give no usable standard error.
-const MIN_TILES: usize = 8;
-
-/// Random tiles of about `pixels` pixels together, but at least [`MIN_TILES`].
-pub(super) fn random_tiles(geometry: &Geometry, pixels: usize) -> Vec<TileRect> {
+/// Random tiles of about `pixels` pixels together, at least `min_tiles`, without replacement; all tiles if these are
+/// fewer.
+pub(super) fn random_tiles(geometry: &Geometry, pixels: usize, min_tiles: usize) -> Vec<TileRect> {
     let count = pixels.div_ceil((geometry.tile_side * geometry.tile_side) as usize);
-    let indices = random_indices(geometry.tile_grid().area(), count.max(MIN_TILES));
+    let indices = random_indices(geometry.tile_grid().area(), count.max(min_tiles));
     indices.into_iter().map(|i| geometry.tile(i)).collect()
 }
 
@@ -50,43 +31,37 @@ pub(super) fn random_indices(len: usize, count: usize) -> Vec<usize> {
     indices
 }
 
-fn all_blocks(camera: Extent) -> Vec<TileRect> {
-    let steps = |side: u32| (0..side).step_by(BLOCK_SIDE_PX as usize);
-    let block = |x, y| TileRect {
-        x,
-        y,
-        extent: Extent {
-            width: BLOCK_SIDE_PX.min(camera.width - x),
-            height: BLOCK_SIDE_PX.min(camera.height - y),
-        },
-    };
-    steps(camera.height)
-        .flat_map(|y| steps(camera.width).map(move |x| block(x, y)))
-        .collect()
-}
-
-/// Number of pixels in `blocks`.
-pub(super) fn count_pixels(blocks: &[TileRect]) -> usize {
-    blocks.iter().map(|b| b.extent.area()).sum()
+/// Number of pixels in `tiles`.
+pub(super) fn count_pixels(tiles: &[TileRect]) -> usize {
+    tiles.iter().map(|tile| tile.extent.area()).sum()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::transport::{Correspondence, Extent, Window};
 
     #[test]
-    fn random_blocks_are_different_and_cover_the_requested_pixels() {
+    fn random_tiles_are_different_and_cover_the_requested_pixels() {
         let camera = Extent {
             width: 100,
             height: 60,
         };
-        assert_eq!(
-            count_pixels(&random_blocks(camera, usize::MAX)),
-            camera.area()
-        );
-        let some = random_blocks(camera, 640);
+        let geometry = Geometry {
+            camera,
+            light: camera,
+            window: Window::new(1).unwrap(),
+            correspondence: Correspondence {
+                affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            },
+            tile_side: 2,
+        };
+        let all = random_tiles(&geometry, usize::MAX, 1);
+        assert_eq!(count_pixels(&all), camera.area());
+        let some = random_tiles(&geometry, 640, 1);
         assert_eq!(some.len(), 160);
         assert!(some.windows(2).all(|b| (b[0].y, b[0].x) < (b[1].y, b[1].x)));
-        assert_eq!(some, random_blocks(camera, 640));
+        assert_eq!(some, random_tiles(&geometry, 640, 1));
+        assert_eq!(random_tiles(&geometry, 4, 8).len(), 8);
     }
 }

@@ -79,31 +79,26 @@ pub fn relit_pictures(
          units of the measurement, over all pixels and channels.",
         methods::name(DEFAULT_METHOD)
     ));
-    let mut table = Table::new(&["light", "psnr_db", "true_mean", "method", "patterns"]);
-    let mut psnr_table = Table::new(&["light", "PSNR (dB)"]);
-    let mut rows = [
-        ("light".to_owned(), Vec::new()),
-        ("true".to_owned(), Vec::new()),
-        ("relit".to_owned(), Vec::new()),
-        (format!("error × {ERROR_GAIN}"), Vec::new()),
-    ];
+    let mut table = Table::new("light | psnr_db | true_mean | method | patterns");
+    let mut psnr_table = Table::new("light | PSNR (dB)");
+    let error_name = format!("error × {ERROR_GAIN}");
+    let mut rows =
+        ["light", "true", "relit", &error_name].map(|name| (name.to_owned(), Vec::new()));
     for (i, light) in lights.iter().enumerate() {
         let psnr = psnr(&truth[i], &relit[i]);
+        let mean = total(&truth[i]) / (camera.area() * CHANNELS) as f64;
         table.add_row([
             light.name.clone(),
             snr_cell(psnr),
-            format!(
-                "{:.4}",
-                total(&truth[i]) / (camera.area() * CHANNELS) as f64
-            ),
+            format!("{mean:.4}"),
             methods::name(DEFAULT_METHOD).to_owned(),
             patterns.to_string(),
         ]);
         psnr_table.add_row([light.name.clone(), snr_cell(psnr)]);
         let emitted = light.light.elements().iter();
         let emitted = emitted.map(|e| [0, 1, 2].map(|c| f64::from(e[c])));
-        let photograph = |picture: &[[f64; CHANNELS]]| {
-            Panel::photograph(camera, picture.iter().map(|y| y.map(|y| y * exposure)))
+        let photograph = |extent, picture: &[[f64; CHANNELS]]| {
+            Panel::photograph(extent, picture.iter().map(|y| y.map(|y| y * exposure)))
         };
         let error: Vec<[f64; CHANNELS]> = truth[i]
             .iter()
@@ -112,11 +107,13 @@ pub fn relit_pictures(
             .collect();
         for (kind, picture) in [("true", &truth[i]), ("relit", &relit[i])] {
             let path = format!("pictures/{name}-{kind}-{}.png", light.name);
-            section.files.push((path, photograph(picture).png()?));
+            section
+                .files
+                .push((path, photograph(camera, picture).png()?));
         }
         let small = |picture: &[[f64; CHANNELS]]| {
             let (extent, picture) = downsample(camera, picture);
-            Panel::photograph(extent, picture.into_iter().map(|y| y.map(|y| y * exposure)))
+            photograph(extent, &picture)
         };
         let panels = [
             Panel {
@@ -128,14 +125,10 @@ pub fn relit_pictures(
             small(&relit[i]),
             small(&error),
         ];
-        for ((_, row), panel) in rows.iter_mut().zip(panels) {
-            row.push(CaptionedPanel {
-                panel,
-                caption: Vec::new(),
-            });
-        }
-        if let Some(relit) = rows[2].1.last_mut() {
-            relit.caption.push(format!("PSNR {} dB", snr_cell(psnr)));
+        let caption = format!("PSNR {} dB", snr_cell(psnr));
+        let captions = [String::new(), String::new(), caption, String::new()];
+        for ((_, row), (panel, caption)) in rows.iter_mut().zip(panels.into_iter().zip(captions)) {
+            row.push(CaptionedPanel { panel, caption });
         }
     }
     let sheet = PictureSheet {
@@ -187,13 +180,11 @@ fn pictures(
                 }
                 None => known_picture(known, rects[i], &light.light),
             };
-            let functions = functions.tau.chunks_exact(area).zip(rects[i].pixels());
-            let relit: Vec<_> = functions
-                .map(|(tau, pixel)| {
-                    relight_pixel(&geometry, geometry.window_origin(pixel), tau, &light.light)
-                })
-                .collect();
-            (truth, relit)
+            let relit = functions.tau.chunks_exact(area).zip(rects[i].pixels());
+            let relit = relit.map(|(tau, pixel)| {
+                relight_pixel(&geometry, geometry.window_origin(pixel), tau, &light.light)
+            });
+            (truth, relit.collect())
         });
         let pictures: Vec<(Vec<_>, Vec<_>)> = pictures.collect();
         let before = done.fetch_add(1, Ordering::Relaxed);
@@ -209,8 +200,7 @@ fn pictures(
         for (i, (tile_truth, tile_relit)) in pictures.into_iter().enumerate() {
             for (p, pixel) in rect.pixels().enumerate() {
                 let n = geometry.camera.index(pixel);
-                truth[i][n] = tile_truth[p];
-                relit[i][n] = tile_relit[p];
+                (truth[i][n], relit[i][n]) = (tile_truth[p], tile_relit[p]);
             }
         }
     }
@@ -251,11 +241,8 @@ fn downsample(extent: Extent, picture: &[[f64; CHANNELS]]) -> (Extent, Vec<[f64;
     };
     let values: Vec<f32> = picture.as_flattened().iter().map(|&v| v as f32).collect();
     let small = area_resample(&values, extent, to);
-    let rgb = small.chunks_exact(CHANNELS);
-    (
-        to,
-        rgb.map(|p| [0, 1, 2].map(|c| f64::from(p[c]))).collect(),
-    )
+    let rgb = small.as_chunks::<CHANNELS>().0.iter();
+    (to, rgb.map(|p| p.map(f64::from)).collect())
 }
 
 #[cfg(test)]

@@ -1,17 +1,18 @@
 //! Simulated photographs of a scene, in memory.
 
 use super::error::StudyError;
+use super::known_transport::KnownTransport;
 use crate::capture::{LinearPhoto, Measurements, NoiseModel, Pattern, RowSet};
 use crate::executor::Executor;
 use crate::simulate::{
     Camera, EmissionMatrix, Ensemble, LightCodes, RandomStream, SimulatedScene, emission,
 };
-use crate::transport::CHANNELS;
+use crate::transport::{CHANNELS, CameraPx, Geometry};
 
 /// Photographs that noise is added to at once; bounds the memory for copies.
 const NOISE_BATCH: usize = 16;
 
-/// A simulated camera in front of a scene.
+/// A simulated camera in front of a scene, whose transport is known.
 #[derive(Clone, Copy)]
 pub struct SceneCamera<'a> {
     /// The scene.
@@ -20,6 +21,17 @@ pub struct SceneCamera<'a> {
     pub electrons: f64,
     /// Seed of patterns and noise.
     pub seed: u64,
+}
+
+impl KnownTransport for SceneCamera<'_> {
+    fn geometry(&self) -> &Geometry {
+        self.scene.geometry()
+    }
+
+    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
+        tau.fill([0.0; CHANNELS]);
+        self.scene.transport_function(pixel, tau);
+    }
 }
 
 impl SceneCamera<'_> {
@@ -44,15 +56,11 @@ impl SceneCamera<'_> {
         executor: &impl Executor,
     ) -> Result<Measurements, StudyError> {
         let geometry = self.scene.geometry();
-        let codes = (0..count)
-            .map(|i| {
-                ensemble.draw(
-                    geometry.light,
-                    &mut RandomStream::Pattern(i as u32).start(self.seed),
-                )
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        let pictures = self.photographs(&codes, executor)?;
+        let draw = |i| {
+            let mut stream = RandomStream::Pattern(i).start(self.seed);
+            ensemble.draw(geometry.light, &mut stream)
+        };
+        let codes = (0..count as u32).map(draw).collect::<Result<Vec<_>, _>>()?;
         let camera = self.camera();
         let code = 1.0 / (camera.white - camera.black);
         let mut measurements = Measurements {
@@ -62,7 +70,7 @@ impl SceneCamera<'_> {
             patterns: codes.iter().map(emitted_pattern).collect(),
             full_scale: vec![1.0; count],
             rows: RowSet::all(geometry.camera.height),
-            photos: pictures,
+            photos: self.photographs(&codes, executor)?,
             noise: NoiseModel::from_dark(&self.dark()?, geometry.camera.width, code),
         };
         measurements.noise = NoiseModel::with_gain_from(&measurements);
@@ -83,12 +91,11 @@ impl SceneCamera<'_> {
     ) -> Result<Vec<LinearPhoto>, StudyError> {
         let mut pictures = self.pictures(lights, executor);
         let dark = self.dark()?;
-        let mut done = 0;
-        for batch in pictures.chunks_mut(NOISE_BATCH) {
+        for (number, batch) in pictures.chunks_mut(NOISE_BATCH).enumerate() {
+            let first = 1 + number * NOISE_BATCH;
             let noisy = executor.map(batch.len(), |i| {
-                self.add_noise(&batch[i], (1 + done + i) as u32)
+                self.add_noise(&batch[i], (first + i) as u32)
             });
-            done += batch.len();
             for (picture, noisy) in batch.iter_mut().zip(noisy) {
                 *picture = noisy?;
                 for (y, dark) in picture.iter_mut().zip(&dark) {
@@ -120,10 +127,9 @@ impl SceneCamera<'_> {
         let geometry = self.scene.geometry();
         let emissions = EmissionMatrix::new(geometry.light, lights);
         let mut pictures = vec![vec![[0.0; CHANNELS]; geometry.camera.area()]; lights.len()];
-        let tiles_per_row = geometry.tile_grid().width as usize;
         let tiles: Vec<_> = geometry.tiles().collect();
         // One row of tiles at a time, to bound the memory.
-        for row in tiles.chunks(tiles_per_row) {
+        for row in tiles.chunks(geometry.tile_grid().width as usize) {
             let tiles = executor.map(row.len(), |i| {
                 emissions.pictures(geometry, &self.scene.tile(row[i]))
             });
@@ -154,14 +160,11 @@ fn emitted_pattern(codes: &LightCodes) -> Pattern {
 pub fn first_shots(measurements: &Measurements, count: usize) -> Measurements {
     let count = count.min(measurements.patterns.len());
     let mut first = Measurements {
-        camera: measurements.camera,
-        light: measurements.light,
-        correspondence: measurements.correspondence,
         patterns: measurements.patterns[..count].to_vec(),
         full_scale: measurements.full_scale[..count].to_vec(),
         rows: measurements.rows.clone(),
         photos: measurements.photos[..count].to_vec(),
-        noise: measurements.noise,
+        ..*measurements
     };
     first.noise = NoiseModel::with_gain_from(&first);
     first

@@ -2,7 +2,6 @@
 
 use super::accuracy::measure_accuracy;
 use super::error::StudyError;
-use super::known_transport::SceneTruth;
 use super::methods::{self, DEFAULT_METHOD};
 use super::scene_camera::SceneCamera;
 use super::section::{ProgressCallback, Section, Table, snr_cell};
@@ -11,56 +10,29 @@ use crate::recover::Method;
 use crate::simulate::{Ensemble, SceneKind};
 use crate::transport::Extent;
 
-/// One row of the table.
-struct SceneSetting {
-    kind: SceneKind,
-    camera: u32,
-    light: u32,
-    ensemble: Ensemble,
-    patterns: usize,
-    electrons: f64,
-    seed: u64,
-}
-
-const fn setting(
-    kind: SceneKind,
-    [camera, light]: [u32; 2],
-    ensemble: Ensemble,
-    patterns: usize,
-    electrons: f64,
-    seed: u64,
-) -> SceneSetting {
-    SceneSetting {
-        kind,
-        camera,
-        light,
-        ensemble,
-        patterns,
-        electrons,
-        seed,
-    }
-}
-
 use Ensemble::{Bernoulli, Gaussian};
 use SceneKind::{Cookies, StainedGlass};
 
-/// Both scenes, both ensembles, few and many photographs, little and much light, one to three camera pixels
-/// for each light element, and a seed for each.
+/// A row of the table: scene, sides of camera and light plane, ensemble, number of patterns, electrons, seed.
+type SceneSetting = (SceneKind, [u32; 2], Ensemble, usize, f64, u64);
+
+/// Both scenes, both ensembles, few and many photographs, little and much light, one to three camera pixels for each
+/// light element, and a seed for each.
 const SETTINGS: [SceneSetting; 14] = [
-    setting(StainedGlass, [128, 64], Gaussian, 80, 4e4, 101),
-    setting(StainedGlass, [128, 64], Bernoulli, 80, 4e4, 102),
-    setting(StainedGlass, [128, 64], Bernoulli, 40, 2e5, 103),
-    setting(StainedGlass, [128, 64], Gaussian, 120, 1e4, 104),
-    setting(StainedGlass, [96, 96], Bernoulli, 60, 1e5, 105),
-    setting(StainedGlass, [144, 48], Bernoulli, 20, 4e4, 106),
-    setting(StainedGlass, [144, 48], Gaussian, 60, 1e5, 107),
-    setting(Cookies, [128, 64], Bernoulli, 80, 4e4, 108),
-    setting(Cookies, [128, 64], Gaussian, 80, 4e4, 109),
-    setting(Cookies, [128, 64], Bernoulli, 40, 2e5, 110),
-    setting(Cookies, [128, 64], Gaussian, 120, 1e4, 111),
-    setting(Cookies, [96, 96], Bernoulli, 60, 1e5, 112),
-    setting(Cookies, [144, 48], Bernoulli, 20, 4e4, 113),
-    setting(Cookies, [144, 48], Gaussian, 60, 1e5, 114),
+    (StainedGlass, [128, 64], Gaussian, 80, 4e4, 101),
+    (StainedGlass, [128, 64], Bernoulli, 80, 4e4, 102),
+    (StainedGlass, [128, 64], Bernoulli, 40, 2e5, 103),
+    (StainedGlass, [128, 64], Gaussian, 120, 1e4, 104),
+    (StainedGlass, [96, 96], Bernoulli, 60, 1e5, 105),
+    (StainedGlass, [144, 48], Bernoulli, 20, 4e4, 106),
+    (StainedGlass, [144, 48], Gaussian, 60, 1e5, 107),
+    (Cookies, [128, 64], Bernoulli, 80, 4e4, 108),
+    (Cookies, [128, 64], Gaussian, 80, 4e4, 109),
+    (Cookies, [128, 64], Bernoulli, 40, 2e5, 110),
+    (Cookies, [128, 64], Gaussian, 120, 1e4, 111),
+    (Cookies, [96, 96], Bernoulli, 60, 1e5, 112),
+    (Cookies, [144, 48], Bernoulli, 20, 4e4, 113),
+    (Cookies, [144, 48], Gaussian, 60, 1e5, 114),
 ];
 
 /// Largest accepted shortfall of the default method against the best other one.
@@ -75,59 +47,49 @@ pub fn scenes_table(
     executor: &impl Executor,
     progress: ProgressCallback,
 ) -> Result<Section, StudyError> {
-    let mut header = vec![
-        "scene",
-        "camera",
-        "light",
-        "ensemble",
-        "patterns",
-        "electrons",
-        "seed",
-    ];
-    header.extend(Method::ALL.iter().map(|&m| methods::name(m)));
-    header.extend(["default", "shortfall"]);
-    let mut table = Table::new(&header);
+    let mut table = Table::new(&format!(
+        "scene | camera | light | ensemble | patterns | electrons | seed | {} | default | shortfall",
+        methods::names()
+    ));
     let mut worst = f64::NEG_INFINITY;
-    for setting in &SETTINGS {
-        let square = |side| Extent {
+    for (kind, sides, ensemble, patterns, electrons, seed) in SETTINGS {
+        let [camera, light] = sides.map(|side| Extent {
             width: side,
             height: side,
-        };
-        let scene = setting
-            .kind
-            .build(square(setting.camera), square(setting.light))?;
+        });
+        let scene = kind.build(camera, light)?;
         let scene_camera = SceneCamera {
             scene: scene.as_ref(),
-            electrons: setting.electrons,
-            seed: setting.seed,
+            electrons,
+            seed,
         };
-        let measurements = scene_camera.measure(setting.ensemble, setting.patterns, executor)?;
+        let measurements = scene_camera.measure(ensemble, patterns, executor)?;
         let mut levels = Vec::new();
         for &method in Method::ALL {
-            let known = SceneTruth(scene.as_ref());
-            levels.push(measure_accuracy(&known, &measurements, method, pixels, executor)?.snr);
+            let accuracy =
+                measure_accuracy(&scene_camera, &measurements, method, pixels, executor)?;
+            levels.push(accuracy.snr);
         }
+        let ensemble = match ensemble {
+            Gaussian => "gaussian",
+            Bernoulli => "bernoulli",
+        };
         let mut row = vec![
-            scene_name(setting.kind).to_owned(),
-            square(setting.camera).to_string(),
-            square(setting.light).to_string(),
-            match setting.ensemble {
-                Gaussian => "gaussian",
-                Bernoulli => "bernoulli",
-            }
-            .to_owned(),
-            setting.patterns.to_string(),
-            setting.electrons.to_string(),
-            setting.seed.to_string(),
+            scene_name(kind).to_owned(),
+            camera.to_string(),
+            light.to_string(),
+            ensemble.to_owned(),
+            patterns.to_string(),
+            electrons.to_string(),
+            seed.to_string(),
         ];
         row.extend(levels.iter().map(|&snr| snr_cell(snr)));
         progress(&format!("scenes: {}", row.join(", ")));
         let best_snr = |is_default: bool| {
             let levels = Method::ALL.iter().zip(&levels);
             let chosen = levels.filter(|(method, _)| (**method == DEFAULT_METHOD) == is_default);
-            chosen
-                .filter_map(|(_, snr)| Some((*snr)?.0))
-                .reduce(f64::max)
+            let levels = chosen.filter_map(|(_, snr)| Some((*snr)?.0));
+            levels.reduce(f64::max)
         };
         let shortfall = best_snr(false)
             .zip(best_snr(true))

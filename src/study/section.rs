@@ -48,16 +48,16 @@ impl Section {
 
 /// A table of text, written as Markdown or CSV.
 #[derive(Clone, Debug)]
-pub struct Table {
-    header: Vec<&'static str>,
+pub(super) struct Table {
+    header: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// An empty table with these columns.
-    pub fn new(header: &[&'static str]) -> Self {
+    /// An empty table with these columns, between ` | `.
+    pub fn new(header: &str) -> Self {
         Self {
-            header: header.to_vec(),
+            header: header.split(" | ").map(str::to_owned).collect(),
             rows: Vec::new(),
         }
     }
@@ -73,8 +73,7 @@ impl Table {
     /// [`StudyError::Table`] if a row has more or fewer cells than the header.
     pub fn csv(&self) -> Result<Vec<u8>, StudyError> {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(&self.header)?;
-        for row in &self.rows {
+        for row in std::iter::once(&self.header).chain(&self.rows) {
             writer.write_record(row)?;
         }
         Ok(writer
@@ -84,22 +83,16 @@ impl Table {
 
     /// The table as Markdown. Columns of numbers are right-aligned.
     pub fn markdown(&self) -> String {
-        let line = |cells: &mut dyn Iterator<Item = &str>| {
-            let cells: Vec<_> = cells.collect();
-            format!("| {} |\n", cells.join(" | "))
-        };
-        let mut text = line(&mut self.header.iter().copied());
         let is_numeric = |i: usize| {
-            self.rows
-                .iter()
-                .all(|row| row.get(i).is_some_and(|cell| is_number(cell)))
+            let mut cells = self.rows.iter().map(|row| row.get(i));
+            cells.all(|cell| cell.is_some_and(|cell| is_number(cell)))
         };
-        text +=
-            &line(&mut (0..self.header.len()).map(|i| if is_numeric(i) { "--:" } else { "---" }));
-        for row in &self.rows {
-            text += &line(&mut row.iter().map(String::as_str));
-        }
-        text
+        let alignment = |i| if is_numeric(i) { "--:" } else { "---" }.to_owned();
+        let alignments: Vec<_> = (0..self.header.len()).map(alignment).collect();
+        let lines = [&self.header, &alignments].into_iter().chain(&self.rows);
+        lines
+            .map(|cells| format!("| {} |\n", cells.join(" | ")))
+            .collect()
     }
 }
 
@@ -125,7 +118,7 @@ mod tests {
 
     #[test]
     fn a_table_has_one_cell_for_each_column() {
-        let mut table = Table::new(&["scene", "snr_db"]);
+        let mut table = Table::new("scene | snr_db");
         table.add_row(["a, b".to_owned(), snr_cell(Some(Decibels(25.0)))]);
         assert_eq!(
             String::from_utf8(table.csv().unwrap()).unwrap(),

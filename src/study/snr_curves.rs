@@ -1,9 +1,10 @@
 //! SNR against undersampling L/M for each method (paper, figures 3a and 3b).
 
-use super::accuracy::{Accuracy, measure_accuracy};
-use super::chart::{Chart, Series, TopAxis, axis_range};
+use super::accuracy::measure_accuracy;
+use super::chart::{Chart, TopAxis, axis_range};
 use super::error::StudyError;
 use super::known_transport::KnownTransport;
+use super::method_curve::MethodCurve;
 use super::methods;
 use super::section::{ProgressCallback, Section, Table, seconds_cell, snr_cell};
 use crate::capture::{Measurements, NoiseModel};
@@ -20,20 +21,14 @@ const TICKS: [usize; 6] = [10, 20, 40, 80, 160, 320];
 /// The paper's SNR in dB with 80 patterns.
 const PAPER_SNR: (f64, &str) = (25.0, "the paper at L = 80");
 
-/// The accuracy of one method with one number of patterns.
-struct CurvePoint {
-    patterns: usize,
-    method: Method,
-    accuracy: Accuracy,
-}
-
 /// All points of the figure, and the extents that it names.
 struct SnrCurves {
     camera: Extent,
     light: Extent,
     /// Numbers of patterns, ascending.
     counts: Vec<usize>,
-    points: Vec<CurvePoint>,
+    /// One for each of [`Method::ALL`].
+    curves: Vec<MethodCurve>,
 }
 
 /// The section of figure 3: recovers from the first L patterns for each L, with samples of about `pixels` pixels.
@@ -73,42 +68,36 @@ impl SnrCurves {
         progress: ProgressCallback,
     ) -> Result<Self, StudyError> {
         let available = measurements.patterns.len();
-        let mut counts: Vec<usize> = SNR_PATTERNS
-            .into_iter()
-            .filter(|&l| l <= available)
-            .collect();
+        let mut counts = SNR_PATTERNS.to_vec();
+        counts.retain(|&l| l <= available);
         if counts.last().is_none_or(|&l| l < available) && available < SNR_PATTERNS[10] {
             counts.push(available);
         }
-        let mut points = Vec::new();
+        let curve = |&method: &Method| MethodCurve {
+            name: methods::name(method).to_owned(),
+            points: Vec::new(),
+        };
+        let mut curves: Vec<MethodCurve> = Method::ALL.iter().map(curve).collect();
         for &l in counts.iter().rev() {
             measurements.patterns.truncate(l);
             measurements.full_scale.truncate(l);
             measurements.photos.truncate(l);
             measurements.noise = NoiseModel::with_gain_from(&measurements);
-            for &method in Method::ALL {
+            for (curve, &method) in curves.iter_mut().zip(Method::ALL) {
                 if methods::is_slow(method) && !SLOW_PATTERN_COUNTS.contains(&l) {
                     continue;
                 }
                 let accuracy = measure_accuracy(known, &measurements, method, pixels, executor)?;
-                progress(&format!(
-                    "{name}: {} from {l} patterns: {} dB",
-                    methods::name(method),
-                    snr_cell(accuracy.snr)
-                ));
-                points.push(CurvePoint {
-                    patterns: l,
-                    method,
-                    accuracy,
-                });
+                let (method, snr) = (&curve.name, snr_cell(accuracy.snr));
+                progress(&format!("{name}: {method} from {l} patterns: {snr} dB"));
+                curve.points.insert(0, accuracy);
             }
         }
-        points.reverse();
         Ok(Self {
             camera: measurements.camera,
             light: measurements.light,
             counts,
-            points,
+            curves,
         })
     }
 
@@ -116,29 +105,17 @@ impl SnrCurves {
         patterns as f64 / self.light.area() as f64
     }
 
-    fn accuracy(&self, patterns: usize, method: Method) -> Option<&Accuracy> {
-        let mut points = self.points.iter();
-        let point = points.find(|p| (p.patterns, p.method) == (patterns, method));
-        point.map(|point| &point.accuracy)
-    }
-
     /// All figures, for the CSV file.
     fn data(&self) -> Table {
-        let mut data = Table::new(&[
-            "method",
-            "patterns",
-            "patterns_per_light_element",
-            "snr_db",
-            "standard_error_db",
-            "pixels_judged",
-            "pixels",
-            "seconds_for_all_pixels",
-        ]);
+        let mut data = Table::new(
+            "method | patterns | patterns_per_light_element | snr_db | standard_error_db | \
+             pixels_judged | pixels | seconds_for_all_pixels",
+        );
         for &l in &self.counts {
-            for &method in Method::ALL {
-                if let Some(accuracy) = self.accuracy(l, method) {
+            for curve in &self.curves {
+                if let Some(accuracy) = curve.at(l) {
                     data.add_row([
-                        methods::name(method).to_owned(),
+                        curve.name.clone(),
                         l.to_string(),
                         format!("{:.6}", self.undersampling(l)),
                         snr_cell(accuracy.snr),
@@ -155,32 +132,20 @@ impl SnrCurves {
 
     /// The SNR by number of patterns and method.
     fn table(&self) -> Table {
-        let mut header = vec!["L", "L/M"];
-        header.extend(Method::ALL.iter().map(|&m| methods::name(m)));
-        let mut table = Table::new(&header);
+        let mut table = Table::new(&format!("L | L/M | {}", methods::names()));
         for &l in &self.counts {
             let mut row = vec![l.to_string(), format!("{:.5}", self.undersampling(l))];
-            row.extend(Method::ALL.iter().map(|&method| {
-                let accuracy = self.accuracy(l, method);
-                accuracy.map_or(String::new(), |accuracy| snr_cell(accuracy.snr))
-            }));
+            let cell = |curve: &MethodCurve| snr_cell(curve.at(l).and_then(|point| point.snr));
+            row.extend(self.curves.iter().map(cell));
             table.add_row(row);
         }
         table
     }
 
     fn chart(&self, name: &str) -> Result<String, StudyError> {
-        let series: Vec<_> = Method::ALL
-            .iter()
-            .map(|&method| Series {
-                name: methods::name(method).to_owned(),
-                points: (self.counts.iter())
-                    .filter_map(|&l| {
-                        Some((self.undersampling(l), self.accuracy(l, method)?.snr?.0))
-                    })
-                    .collect(),
-                has_markers: true,
-            })
+        let curves = self.curves.iter();
+        let series: Vec<_> = curves
+            .map(|curve| curve.series(true, |l| self.undersampling(l)))
             .collect();
         let max_patterns = self.counts.last().copied().unwrap_or(0);
         let ticks: Vec<usize> = TICKS.into_iter().filter(|&l| l <= max_patterns).collect();
@@ -209,19 +174,15 @@ impl SnrCurves {
     /// A sentence about the sample of pixels of each method.
     fn samples(&self) -> String {
         let all = self.camera.area();
-        let sample = |&method: &Method| {
-            let accuracies = || {
-                let points = self.points.iter().filter(move |p| p.method == method);
-                points.map(|p| &p.accuracy)
-            };
-            let pixels = accuracies().map(|a| a.pixels).max()?;
-            let errors = accuracies().map(|a| a.standard_error);
+        let sample = |curve: &MethodCurve| {
+            let pixels = curve.points.iter().map(|point| point.pixels).max()?;
+            let errors = curve.points.iter().map(|point| point.standard_error);
             (pixels < all).then(|| {
-                let (name, error) = (methods::name(method), errors.fold(0.0, f64::max));
+                let (name, error) = (&curve.name, errors.fold(0.0, f64::max));
                 format!("`{name}` {pixels} (standard error at most {error:.2} dB)")
             })
         };
-        let samples: Vec<String> = Method::ALL.iter().filter_map(sample).collect();
+        let samples: Vec<String> = self.curves.iter().filter_map(sample).collect();
         match samples.is_empty() {
             true => "Every camera pixel is evaluated.".to_owned(),
             false => format!(

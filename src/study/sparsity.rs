@@ -21,14 +21,14 @@ const OVERVIEW_SIDE: u32 = 512;
 /// Side of the zoomed part, in camera pixels and light elements.
 const ZOOM_SIDE: u32 = 96;
 
-/// A histogram of the magnitudes of many elements, from which follow the shares of energy (sum of squares) that
-/// the largest elements hold. Classes are so narrow that shares are exact to about 1 % of one element's energy.
+/// A histogram of the magnitudes of many elements that are not zero, from which follow the shares of energy (sum of
+/// squares) that the largest elements hold. Classes are so narrow that shares are exact to about 1 % of one element's
+/// energy.
 #[derive(Clone, Debug)]
-pub struct SparsityProfile {
+struct SparsityProfile {
     /// By class of magnitude, ascending.
     counts: Vec<u64>,
     energies: Vec<f64>,
-    zeros: u64,
 }
 
 impl Default for SparsityProfile {
@@ -36,45 +36,30 @@ impl Default for SparsityProfile {
         Self {
             counts: vec![0; CLASSES],
             energies: vec![0.0; CLASSES],
-            zeros: 0,
         }
     }
 }
 
 impl SparsityProfile {
-    /// Adds one element.
-    pub fn add(&mut self, element: f32) {
-        if element == 0.0 {
-            self.zeros += 1;
-            return;
+    fn add(&mut self, element: f32) {
+        if element != 0.0 {
+            // The bits of a positive float ascend with its value.
+            let class = (element.abs().to_bits() >> IGNORED_BITS) as usize;
+            self.counts[class] += 1;
+            self.energies[class] += f64::from(element).powi(2);
         }
-        // The bits of a positive float ascend with its value.
-        let class = (element.abs().to_bits() >> IGNORED_BITS) as usize;
-        self.counts[class] += 1;
-        self.energies[class] += f64::from(element).powi(2);
     }
 
     /// Adds the elements of another profile.
-    pub fn merge(&mut self, other: &Self) {
+    fn merge(&mut self, other: &Self) {
         for class in 0..CLASSES {
             self.counts[class] += other.counts[class];
             self.energies[class] += other.energies[class];
         }
-        self.zeros += other.zeros;
-    }
-
-    /// Number of elements, zeros included.
-    pub fn len(&self) -> u64 {
-        self.zeros + self.counts.iter().sum::<u64>()
-    }
-
-    /// Whether there are no elements.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// The share of the energy in the `k` largest elements, 0 to 1.
-    pub fn share_of_largest(&self, k: f64) -> f64 {
+    fn share_of_largest(&self, k: f64) -> f64 {
         let total: f64 = self.energies.iter().sum();
         let (mut remaining, mut held) = (k, 0.0);
         for (count, energy) in self.largest_first() {
@@ -88,7 +73,7 @@ impl SparsityProfile {
     }
 
     /// The number of largest elements that hold `share` of the energy.
-    pub fn count_for_share(&self, share: f64) -> f64 {
+    fn count_for_share(&self, share: f64) -> f64 {
         let mut missing = share * self.energies.iter().sum::<f64>();
         let mut counted = 0.0;
         for (count, energy) in self.largest_first() {
@@ -103,9 +88,8 @@ impl SparsityProfile {
 
     fn largest_first(&self) -> impl Iterator<Item = (f64, f64)> {
         let classes = self.counts.iter().zip(&self.energies).rev();
-        classes
-            .filter(|(count, _)| **count > 0)
-            .map(|(&count, &energy)| (count as f64, energy))
+        let classes = classes.filter(|(count, _)| **count > 0);
+        classes.map(|(&count, &energy)| (count as f64, energy))
     }
 }
 
@@ -152,31 +136,24 @@ pub fn sparsity(
         100.0 * geometry.window.area() as f64 / geometry.light.area() as f64,
     ));
     profile_chart(name, geometry, &whole, &example, &mut section)?;
+    let panels = vec![
+        CaptionedPanel {
+            panel: grey_panel(extent(OVERVIEW_SIDE, OVERVIEW_SIDE), &overview),
+            caption: "T: pixels horizontally, light elements\nvertically, maximum of each cell"
+                .to_owned(),
+        },
+        zoomed_part(known),
+        CaptionedPanel {
+            panel: function_panel(side, &tau),
+            caption: format!(
+                "Light transport function of pixel {}, {}:\n{side} x {side} light elements",
+                pixel.x, pixel.y
+            ),
+        },
+    ];
     let sheet = PictureSheet {
         columns: vec![String::new(); 3],
-        rows: vec![(
-            String::new(),
-            vec![
-                CaptionedPanel {
-                    panel: grey_panel(extent(OVERVIEW_SIDE, OVERVIEW_SIDE), &overview),
-                    caption: vec![
-                        "T: pixels horizontally, light elements".to_owned(),
-                        "vertically, maximum of each cell".to_owned(),
-                    ],
-                },
-                zoomed_part(known),
-                CaptionedPanel {
-                    panel: function_panel(side, &tau),
-                    caption: vec![
-                        format!(
-                            "Light transport function of pixel {}, {}:",
-                            pixel.x, pixel.y
-                        ),
-                        format!("{side} x {side} light elements"),
-                    ],
-                },
-            ],
-        )],
+        rows: vec![(String::new(), panels)],
         side_px: 300,
     };
     section.add_picture(
@@ -212,17 +189,14 @@ fn survey_row(known: &impl KnownTransport, y: u32) -> RowSurvey {
         known.transport_function(pixel, &mut tau);
         let origin = known.origin(pixel);
         let column = scale(geometry.camera.index(pixel), geometry.camera.area());
-        let mut energy = 0.0;
-        for (s, tau) in tau.iter().enumerate() {
-            tau.iter().for_each(|&t| row.profile.add(t));
-            energy += tau.iter().map(|t| t * t).sum::<f32>();
-            if let Some(m) = geometry.window.element(origin, s).index_in(geometry.light) {
-                let cell = scale(m, geometry.light.area()) * OVERVIEW_SIDE as usize + column;
-                let maximum = cells.entry(cell).or_insert(0.0f32);
-                *maximum = maximum.max(mean(*tau));
-            }
+        tau.as_flattened().iter().for_each(|&t| row.profile.add(t));
+        row.energies
+            .push(tau.as_flattened().iter().map(|t| t * t).sum());
+        for (s, m) in geometry.elements_of_window(origin) {
+            let cell = scale(m, geometry.light.area()) * OVERVIEW_SIDE as usize + column;
+            let maximum = cells.entry(cell).or_insert(0.0f32);
+            *maximum = maximum.max(mean(tau[s]));
         }
-        row.energies.push(energy);
     }
     row.overview = cells.into_iter().collect();
     row
@@ -237,27 +211,23 @@ fn profile_chart(
 ) -> Result<(), StudyError> {
     let functions = (geometry.camera.area() * CHANNELS) as f64;
     let area = geometry.window.area() as f64;
-    let curve = |profile: &SparsityProfile, functions: f64| -> Vec<(f64, f64)> {
+    let series = |name: &str, profile: &SparsityProfile, functions: f64| {
         let first: f64 = 0.1;
-        (0..=CURVE_POINTS)
+        let points = (0..=CURVE_POINTS)
             .map(|i| first * (area / first).powf(i as f64 / CURVE_POINTS as f64))
-            .map(|k| (k, 100.0 * profile.share_of_largest(k * functions)))
-            .collect()
+            .map(|k| (k, 100.0 * profile.share_of_largest(k * functions)));
+        Series {
+            name: name.to_owned(),
+            points: points.collect(),
+            has_markers: false,
+        }
     };
-    let series = [
-        ("all of T", whole, functions),
-        ("the function below", example, CHANNELS as f64),
-    ]
-    .map(|(name, profile, functions)| Series {
-        name: name.to_owned(),
-        points: curve(profile, functions),
-        has_markers: false,
-    });
-    let mut data = Table::new(&[
-        "largest_elements_per_function",
-        "energy_percent_whole",
-        "energy_percent_one",
-    ]);
+    let series = vec![
+        series("all of T", whole, functions),
+        series("the function below", example, CHANNELS as f64),
+    ];
+    let mut data =
+        Table::new("largest_elements_per_function | energy_percent_whole | energy_percent_one");
     for (whole, example) in series[0].points.iter().zip(&series[1].points) {
         data.add_row([
             format!("{:.4}", whole.0),
@@ -265,11 +235,7 @@ fn profile_chart(
             format!("{:.3}", example.1),
         ]);
     }
-    let mut table = Table::new(&[
-        "energy",
-        "elements per function, all of T",
-        "the function below",
-    ]);
+    let mut table = Table::new("energy | elements per function, all of T | the function below");
     for share in ENERGY_SHARES {
         table.add_row([
             format!("{} %", 100.0 * share),
@@ -288,7 +254,7 @@ fn profile_chart(
         top: None,
         y: 0.0..100.0,
         reference: None,
-        series: series.into(),
+        series,
     };
     section.add_picture(
         &format!("{name}-figure2-profile"),
@@ -300,8 +266,8 @@ fn profile_chart(
     Ok(())
 }
 
-/// A small part of T: consecutive pixels of the camera's middle row, and consecutive elements of the row of
-/// the light plane behind them.
+/// A small part of T: consecutive pixels of the camera's middle row, and consecutive elements of the row of the light
+/// plane behind them.
 fn zoomed_part(known: &impl KnownTransport) -> CaptionedPanel {
     let geometry = known.geometry();
     let half = (geometry.window.side() / 2) as i32;
@@ -311,10 +277,8 @@ fn zoomed_part(known: &impl KnownTransport) -> CaptionedPanel {
         (geometry.camera.width - width) / 2,
         geometry.camera.height / 2,
     );
-    let middle = known.origin(CameraPx {
-        x: left + width / 2,
-        y,
-    });
+    let x = left + width / 2;
+    let middle = known.origin(CameraPx { x, y });
     let row = middle.v + half;
     let max_first = (geometry.light.width - height) as i32;
     let first = (middle.u + half - height as i32 / 2).clamp(0, max_first);
@@ -334,15 +298,14 @@ fn zoomed_part(known: &impl KnownTransport) -> CaptionedPanel {
     }
     CaptionedPanel {
         panel: grey_panel(extent(width, height), &values),
-        caption: vec![
-            format!("Detail: {width} pixels of row {y},"),
-            format!("{height} light elements of row {row}"),
-        ],
+        caption: format!(
+            "Detail: {width} pixels of row {y},\n{height} light elements of row {row}"
+        ),
     }
 }
 
-/// The pixel whose function has the median energy, among those in the centre of the picture, whose windows are
-/// inside the light plane.
+/// The pixel whose function has the median energy, among those in the centre of the picture, whose windows are inside the
+/// light plane.
 fn median_pixel(camera: Extent, energies: &[f32]) -> CameraPx {
     let middle = |side: u32| side / 4..(3 * side).div_ceil(4);
     let mut pixels: Vec<CameraPx> = middle(camera.height)
@@ -356,10 +319,9 @@ fn median_pixel(camera: Extent, energies: &[f32]) -> CameraPx {
 /// One function in colour, scaled to its maximum.
 fn function_panel(side: u32, tau: &[[f32; CHANNELS]]) -> Panel {
     let peak = tau.as_flattened().iter().fold(0.0f32, |a, &b| a.max(b));
-    let scale = if peak > 0.0 {
-        1.0 / f64::from(peak)
-    } else {
-        0.0
+    let scale = match peak > 0.0 {
+        true => 1.0 / f64::from(peak),
+        false => 0.0,
     };
     let linear = tau.iter().map(|t| t.map(|t| f64::from(t) * scale));
     Panel {
@@ -401,7 +363,7 @@ mod tests {
         for element in [2.0, -4.0, 1.0, 0.0, 1.0] {
             profile.add(element);
         }
-        assert_eq!(profile.len(), 5);
+        assert_eq!(profile.counts.iter().sum::<u64>(), 4);
         for (k, energy) in [
             (0.0, 0.0),
             (1.0, 16.0),

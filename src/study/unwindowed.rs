@@ -3,6 +3,7 @@
 
 use std::time::Instant;
 
+use super::accuracy::{Accuracy, pooled_snr};
 use super::dense_transport::DenseTransport;
 use super::pixel_sampling;
 use crate::capture::Measurements;
@@ -10,19 +11,18 @@ use crate::executor::Executor;
 use crate::recover::Nnls;
 use crate::transport::TransportError;
 
-/// Recovers `pixels` random pixels, each by non-negative least squares over all M elements. Returns the error
-/// of each pixel, and the extrapolated time for all pixels in seconds.
+/// Recovers `pixels` random pixels, each by non-negative least squares over all M elements.
 ///
-/// Least squares represents the paper's case (b) with φ = I as well: for τ ≥ 0 the ℓ1 norm is the pixel's
-/// total light, which the measurements determine up to their noise.
+/// Least squares represents the paper's case (b) with φ = I as well: for τ ≥ 0 the ℓ1 norm is the pixel's total light,
+/// which the measurements determine up to their noise.
 ///
 /// Patterns must be grey, and no sample may be saturated.
-pub(super) fn recover(
+pub(super) fn measure_accuracy(
     truth: &DenseTransport,
     measurements: &Measurements,
     pixels: usize,
     executor: &impl Executor,
-) -> (Vec<TransportError>, f64) {
+) -> Accuracy {
     let start = Instant::now();
     let gram = gram(measurements, executor);
     let shared = start.elapsed().as_secs_f64();
@@ -42,7 +42,15 @@ pub(super) fn recover(
         }
         error
     });
-    (errors.collect(), shared + each * truth.pixels() as f64)
+    let errors: Vec<TransportError> = errors.collect();
+    let (snr, standard_error) = pooled_snr(&errors, errors.len() as f64 / truth.pixels() as f64);
+    Accuracy {
+        photographs: measurements.patterns.len(),
+        snr,
+        standard_error,
+        pixels: errors.len(),
+        seconds: shared + each * truth.pixels() as f64,
+    }
 }
 
 /// `PᵀP`, `[M, M]`.
@@ -123,7 +131,7 @@ mod tests {
             patterns: patterns.into_iter().map(Pattern::Grey).collect(),
         };
         let truth = DenseTransport { elements: 16, tau };
-        let (errors, _) = recover(&truth, &measurements, 1, &SequentialExecutor);
-        assert!(errors[0].snr().is_none_or(|snr| snr.0 > 60.0), "{errors:?}");
+        let accuracy = measure_accuracy(&truth, &measurements, 1, &SequentialExecutor);
+        assert!(accuracy.snr.is_none_or(|snr| snr.0 > 60.0), "{accuracy:?}");
     }
 }

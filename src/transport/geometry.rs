@@ -263,6 +263,17 @@ impl Geometry {
         self.window.origin(self.correspondence.at(pixel))
     }
 
+    /// The slots on the light plane of the window that starts at `origin`, each with its light element's index.
+    pub(crate) fn elements_of_window(
+        &self,
+        origin: Element,
+    ) -> impl Iterator<Item = (usize, usize)> {
+        (0..self.window.area()).filter_map(move |slot| {
+            let element = self.window.element(origin, slot);
+            Some((slot, element.index_in(self.light)?))
+        })
+    }
+
     /// The part of the window that starts at `origin` which lies on the light plane.
     pub(crate) fn clip_window(&self, origin: Element) -> ClippedRect {
         let side = self.window.side();

@@ -164,10 +164,10 @@ impl<'a> Homotopy<'a> {
     fn refine(&mut self, h: &[f64], lambda: f64) {
         for _ in 0..2 {
             for (c, h) in self.correlation.iter_mut().zip(h) {
-                *c = lambda - h;
+                *c = h - lambda;
             }
-            self.passive.add_product(&mut self.correlation, &self.x);
-            self.correlation.iter_mut().for_each(|c| *c = -*c);
+            self.passive
+                .subtract_product(&mut self.correlation, &self.x);
             self.passive.set_rhs(ROUNDING_ERROR, &self.correlation);
             add_scaled(&mut self.x, 1.0, self.passive.solution(ROUNDING_ERROR));
         }

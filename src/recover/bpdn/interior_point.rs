@@ -15,80 +15,45 @@ use super::iterate::Iterate;
 use super::newton::NewtonSystem;
 use super::sensing_operator::SensingOperator;
 use super::solution::{BpdnConstraint, BpdnSolution};
-use super::sparsity_basis::SparsityBasis;
 use crate::linalg::{dot, vectorise};
 
 /// Relative duality gap at which a solution is accepted; noise changes the objective by far more.
 const MAX_RELATIVE_GAP: f64 = 2e-3;
 /// The dual bound is computed once the complementarity is at most this many times the accepted gap.
 const DUAL_BOUND_RATIO: f64 = 10.0;
-/// Limit of Newton steps for one right-hand side, several times the usual number.
+/// Limit of Newton steps, several times the usual number.
 const MAX_STEPS: usize = 60;
 
-/// Solver for right-hand sides that share one matrix.
-#[derive(Debug)]
-pub struct InteriorPoint {
-    operator: SensingOperator,
-}
-
-impl InteriorPoint {
-    /// A solver for `Aᵀ = columns`, `[k, rows]`, whose unknowns are the elements `slots` of a window of `side²`.
-    pub fn new(
-        basis: SparsityBasis,
-        columns: &[f64],
-        rows: usize,
-        slots: &[usize],
-        side: usize,
-    ) -> Self {
-        Self {
-            operator: SensingOperator::new(basis, columns, rows, slots, side),
-        }
+/// Minimises `‖φᵀx‖₁`. The solution is non-negative, and `‖y − Ax‖ ≤ epsilon` to rounding; where no x satisfies that,
+/// it is the least-squares solution.
+pub(in crate::recover) fn solve(
+    operator: &SensingOperator,
+    constraint: &BpdnConstraint,
+) -> BpdnSolution {
+    // Zero is the solution if it is feasible.
+    let zero_is_feasible = dot(constraint.y, constraint.y).sqrt() <= constraint.epsilon;
+    let x = match zero_is_feasible {
+        true => vec![0.0; operator.unknowns()],
+        false => constraint.least_squares.to_vec(),
+    };
+    let mut best = BpdnSolution {
+        objective: operator.objective(&x),
+        x,
+        bound: 0.0,
+    };
+    let residual = operator.residual(constraint.least_squares, constraint.y);
+    if !zero_is_feasible && dot(&residual, &residual).sqrt() < constraint.epsilon {
+        vectorise(
+            #[inline(always)]
+            || iterate(operator, constraint, &mut best),
+        );
     }
-
-    /// Solves for any number of right-hand sides. Every `x` is non-negative, and
-    /// `‖y − Ax‖ ≤ epsilon` to rounding; where no x satisfies it, `x` is the least-squares solution.
-    pub fn solve(&self, constraints: &[BpdnConstraint]) -> Vec<BpdnSolution> {
-        let operator = &self.operator;
-        let mut gram = None;
-        let solve_one = |constraint: &BpdnConstraint| {
-            // Zero is the solution if it is feasible.
-            let zero_is_feasible = dot(constraint.y, constraint.y).sqrt() <= constraint.epsilon;
-            let x = match zero_is_feasible {
-                true => vec![0.0; operator.unknowns()],
-                false => constraint.least_squares.to_vec(),
-            };
-            let mut best = BpdnSolution {
-                objective: operator.objective(&x),
-                x,
-                bound: 0.0,
-            };
-            let residual = operator.residual(constraint.least_squares, constraint.y);
-            if !zero_is_feasible && dot(&residual, &residual).sqrt() < constraint.epsilon {
-                let gram = gram.get_or_insert_with(|| {
-                    vectorise(
-                        #[inline(always)]
-                        || operator.gram(),
-                    )
-                });
-                vectorise(
-                    #[inline(always)]
-                    || iterate(operator, gram, constraint, &mut best),
-                );
-            }
-            best
-        };
-        constraints.iter().map(solve_one).collect()
-    }
+    best
 }
 
 /// Improves `best`, which is feasible, until its gap is small enough or a step fails.
 #[inline(always)]
-fn iterate(
-    operator: &SensingOperator,
-    gram: &[f64],
-    constraint: &BpdnConstraint,
-    best: &mut BpdnSolution,
-) {
+fn iterate(operator: &SensingOperator, constraint: &BpdnConstraint, best: &mut BpdnSolution) {
     let Some(mut point) = Iterate::new(operator, constraint) else {
         return;
     };
@@ -99,7 +64,7 @@ fn iterate(
                 return;
             }
         }
-        let Some(system) = NewtonSystem::new(operator, gram, &point) else {
+        let Some(system) = NewtonSystem::new(operator, &point) else {
             break;
         };
         let step = system.predictor_corrector_step();
@@ -117,27 +82,30 @@ mod tests {
 
     use super::*;
     use crate::linalg;
+    use crate::recover::common_mode::CommonMode;
+    use crate::recover::gram_cache::WindowEquations;
+    use crate::recover::normal_equations::{EquationWeights, WeightedColumns};
     use crate::recover::test_problems::Problem;
-    use crate::recover::{Homotopy, Nnls};
+    use crate::recover::{Homotopy, Nnls, SparsityBasis};
 
-    /// A problem and its solver for a window of 5 × 5 elements, of which the first `missing` are outside the
-    /// light plane.
-    fn problem_and_solver(
-        basis: SparsityBasis,
-        rows: usize,
-        missing: usize,
-        seed: u64,
-    ) -> (Problem, InteriorPoint) {
-        let side = 5;
-        let slots: Vec<usize> = (missing..side * side).collect();
+    const SIDE: usize = 5;
+
+    /// A problem for a window of 5 × 5 elements, of which the first `missing` are outside the light plane.
+    fn random_problem(rows: usize, missing: usize, seed: u64) -> (Problem, WindowEquations) {
+        let slots: Vec<usize> = (missing..SIDE * SIDE).collect();
         let problem = Problem::random(slots.len(), rows, seed, 0.5);
         let columns = linalg::transpose(&problem.matrix, slots.len());
-        let solver = InteriorPoint::new(basis, &columns, rows, &slots, side);
-        (problem, solver)
+        let weights = EquationWeights::uniform(rows, CommonMode::FULL);
+        let equations = WindowEquations {
+            slots,
+            columns: WeightedColumns::new(columns, weights),
+            gram: problem.gram(),
+        };
+        (problem, equations)
     }
 
     fn norm_in_basis(basis: SparsityBasis, missing: usize, x: &[f64]) -> f64 {
-        let side = 5;
+        let side = SIDE;
         let b = basis.along_axis(side);
         let mut total = 0.0f64;
         for p in 0..side {
@@ -164,7 +132,8 @@ mod tests {
             share in 0.02f64..1.1,
         ) {
             let basis = if dct { SparsityBasis::Dct } else { SparsityBasis::Haar };
-            let (problem, solver) = problem_and_solver(basis, rows, missing, seed);
+            let (problem, equations) = random_problem(rows, missing, seed);
+            let operator = SensingOperator::new(basis, &equations, SIDE);
             let gram = problem.gram();
             let k = 25 - missing;
             let mut nnls = Nnls::new(&gram, k);
@@ -174,7 +143,7 @@ mod tests {
                 let norm = Problem::energy(y).sqrt();
                 let epsilon = share * norm;
                 let constraint = BpdnConstraint { y, epsilon, least_squares: &least_squares };
-                let solution = solver.solve(&[constraint]).remove(0);
+                let solution = solve(&operator, &constraint);
                 prop_assert!(solution.x.iter().all(|&x| x >= 0.0));
                 let objective = norm_in_basis(basis, missing, &solution.x);
                 prop_assert!((objective - solution.objective).abs() <= 1e-9 * (1.0 + objective));
@@ -195,7 +164,8 @@ mod tests {
         /// With φ = I the homotopy is an independent solver of the same problem.
         #[test]
         fn agrees_with_the_homotopy(rows in 4usize..30, seed in any::<u64>(), share in 0.02f64..0.98) {
-            let (problem, solver) = problem_and_solver(SparsityBasis::Identity, rows, 0, seed);
+            let (problem, equations) = random_problem(rows, 0, seed);
+            let operator = SensingOperator::new(SparsityBasis::Identity, &equations, SIDE);
             let gram = problem.gram();
             for y in &problem.measurements {
                 let h = problem.right_hand_side(y);
@@ -204,7 +174,7 @@ mod tests {
                 let epsilon = least + share * (Problem::energy(y).sqrt() - least);
                 let exact = Homotopy::new(&gram, 25).solve(&h, Problem::energy(y), epsilon);
                 let constraint = BpdnConstraint { y, epsilon, least_squares: &least_squares };
-                let found = solver.solve(&[constraint]).remove(0);
+                let found = solve(&operator, &constraint);
                 let best: f64 = exact.iter().sum();
                 prop_assert!((found.objective - best).abs() <= MAX_RELATIVE_GAP * best + 1e-9);
             }
@@ -213,7 +183,8 @@ mod tests {
 
     #[test]
     fn measurements_within_the_tolerance_give_zero() {
-        let (problem, solver) = problem_and_solver(SparsityBasis::Haar, 30, 0, 7);
+        let (problem, equations) = random_problem(30, 0, 7);
+        let operator = SensingOperator::new(SparsityBasis::Haar, &equations, SIDE);
         let y = &problem.measurements[0];
         let least_squares = Nnls::new(&problem.gram(), 25).solve(&problem.right_hand_side(y));
         let constraint = BpdnConstraint {
@@ -221,13 +192,14 @@ mod tests {
             epsilon: 1.01 * Problem::energy(y).sqrt(),
             least_squares: &least_squares,
         };
-        let solution = solver.solve(&[constraint]).remove(0);
+        let solution = solve(&operator, &constraint);
         assert!(solution.x.iter().all(|&x| x == 0.0) && solution.objective == 0.0);
     }
 
     #[test]
     fn an_infeasible_constraint_gives_least_squares() {
-        let (problem, solver) = problem_and_solver(SparsityBasis::Dct, 30, 0, 7);
+        let (problem, equations) = random_problem(30, 0, 7);
+        let operator = SensingOperator::new(SparsityBasis::Dct, &equations, SIDE);
         let y = &problem.measurements[0];
         let least_squares = Nnls::new(&problem.gram(), 25).solve(&problem.right_hand_side(y));
         let epsilon = 0.5 * problem.residual(&least_squares, y);
@@ -236,7 +208,7 @@ mod tests {
             epsilon,
             least_squares: &least_squares,
         };
-        let solution = solver.solve(&[constraint]).remove(0);
+        let solution = solve(&operator, &constraint);
         for (x, least) in solution.x.iter().zip(&least_squares) {
             assert!((x - least).abs() < 1e-9);
         }

@@ -13,7 +13,7 @@ const STEP_SHARE: f64 = 0.95;
 const MIN_INITIAL_SLACK_SHARE: f64 = 0.5;
 const MAX_HALVINGS: usize = 60;
 
-/// Unknowns and multipliers, with what follows from them.
+/// Unknowns and multipliers, with what follows from them; or their changes.
 pub(super) struct Iterate {
     /// `[k]`.
     pub x: Vec<f64>,
@@ -29,16 +29,8 @@ pub(super) struct Iterate {
     pub slack: f64,
 }
 
-/// Changes of an [`Iterate`].
-pub(super) struct NewtonStep {
-    pub x: Vec<f64>,
-    pub w: Vec<f64>,
-    pub t: Vec<f64>,
-    pub s: Vec<f64>,
-    pub lambda: f64,
-    pub coefficients: Vec<f64>,
-    pub residual: Vec<f64>,
-}
+/// Changes of an iterate, to first order.
+pub(super) type NewtonStep = Iterate;
 
 /// `½(ε² − ‖residual‖²)`.
 #[inline(always)]
@@ -67,8 +59,8 @@ impl Iterate {
                     s: coefficients.iter().zip(&t).map(|(c, t)| c / t).collect(),
                     t,
                     // At most the size of φs's entries, so that steps need not shrink w first.
-                    w: (x.iter())
-                        .map(|x| (mu / x).min(1.0 / operator.side() as f64))
+                    w: x.iter()
+                        .map(|x| (mu / x).min(1.0 / operator.side as f64))
                         .collect(),
                     lambda: mu / slack,
                     coefficients,
@@ -96,6 +88,13 @@ impl Iterate {
         bounds + dot(&self.x, &self.w) + self.lambda * self.slack
     }
 
+    /// t, s and c for each coefficient.
+    #[inline(always)]
+    pub fn bounds(&self) -> impl Iterator<Item = [f64; 3]> {
+        let values = self.t.iter().zip(&self.s).zip(&self.coefficients);
+        values.map(|((t, s), c)| [*t, *s, *c])
+    }
+
     /// Number of inequality constraints.
     pub fn constraints(&self) -> f64 {
         (2 * self.s.len() + self.x.len() + 1) as f64
@@ -114,17 +113,13 @@ impl Iterate {
             primal = primal.min(limit(*x, *dx));
             dual = dual.min(limit(*w, *dw));
         }
-        let values = (self.t.iter().zip(&self.s)).zip(&self.coefficients);
-        let changes = (step.t.iter().zip(&step.s)).zip(&step.coefficients);
-        for (((t, s), c), ((dt, ds), dc)) in values.zip(changes) {
+        for ([t, s, c], [dt, ds, dc]) in self.bounds().zip(step.bounds()) {
             primal = primal.min(limit(t - c, dt - dc)).min(limit(t + c, dt + dc));
-            dual = dual.min(limit(1.0 + s, *ds)).min(limit(1.0 - s, -ds));
+            dual = dual.min(limit(1.0 + s, ds)).min(limit(1.0 - s, -ds));
         }
         // The share at which ‖y − Ax‖ = ε.
-        let (a, b) = (
-            dot(&step.residual, &step.residual),
-            dot(&step.residual, &self.residual),
-        );
+        let a = dot(&step.residual, &step.residual);
+        let b = dot(&step.residual, &self.residual);
         if a > 0.0 {
             primal = primal.min(((b * b + 2.0 * a * self.slack).sqrt() - b) / a);
         }
@@ -135,18 +130,14 @@ impl Iterate {
     #[inline(always)]
     pub fn complementarity_after(&self, step: &NewtonStep, (primal, dual): (f64, f64)) -> f64 {
         let mut sum = 0.0;
-        let values = (self.t.iter().zip(&self.s)).zip(&self.coefficients);
-        let changes = (step.t.iter().zip(&step.s)).zip(&step.coefficients);
-        for (((t, s), c), ((dt, ds), dc)) in values.zip(changes) {
+        for ([t, s, c], [dt, ds, dc]) in self.bounds().zip(step.bounds()) {
             sum += t + primal * dt - (s + dual * ds) * (c + primal * dc);
         }
         for ((x, w), (dx, dw)) in (self.x.iter().zip(&self.w)).zip(step.x.iter().zip(&step.w)) {
             sum += (x + primal * dx) * (w + dual * dw);
         }
-        let (a, b) = (
-            dot(&step.residual, &step.residual),
-            dot(&step.residual, &self.residual),
-        );
+        let a = dot(&step.residual, &step.residual);
+        let b = dot(&step.residual, &self.residual);
         let slack = self.slack - primal * b - 0.5 * primal * primal * a;
         sum + (self.lambda + dual * step.lambda) * slack
     }

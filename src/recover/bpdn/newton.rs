@@ -11,12 +11,11 @@
 
 use super::iterate::{Iterate, NewtonStep};
 use super::sensing_operator::SensingOperator;
-use crate::linalg;
-use crate::linalg::dot;
+use crate::linalg::{self, dot};
 
 /// Newton's system at an iterate, factored.
 pub(super) struct NewtonSystem<'a> {
-    operator: &'a SensingOperator,
+    operator: &'a SensingOperator<'a>,
     point: &'a Iterate,
     /// a, and `φs − w − λa`, `[k]`.
     correlation: Vec<f64>,
@@ -42,20 +41,20 @@ struct ComplementarityProducts {
 impl<'a> NewtonSystem<'a> {
     /// Factors H; `None` if it is singular to rounding.
     #[inline(always)]
-    pub fn new(operator: &'a SensingOperator, gram: &[f64], point: &'a Iterate) -> Option<Self> {
+    pub fn new(operator: &'a SensingOperator, point: &'a Iterate) -> Option<Self> {
         let k = operator.unknowns();
         let correlation = operator.correlate(&point.residual);
         let mut dual_residual = operator.synthesize(&point.s);
         for ((d, w), c) in dual_residual.iter_mut().zip(&point.w).zip(&correlation) {
             *d -= w + point.lambda * c;
         }
-        let values = (point.t.iter().zip(&point.s)).zip(&point.coefficients);
-        let bound_sums: Vec<f64> = values.map(|((t, s), c)| t + s * c).collect();
+        let bound_sums: Vec<f64> = point.bounds().map(|[t, s, c]| t + s * c).collect();
         let diagonal: Vec<f64> = (point.s.iter().zip(&bound_sums))
             .map(|(s, sum)| (1.0 - s) * (1.0 + s) / sum)
             .collect();
         let mut factor = operator.weighted_gram(&diagonal);
-        let rows = factor.chunks_exact_mut(k).zip(gram.chunks_exact(k));
+        let gram = operator.equations.gram.chunks_exact(k);
+        let rows = factor.chunks_exact_mut(k).zip(gram);
         for (i, (row, gram)) in rows.enumerate() {
             let outer = point.lambda / point.slack * correlation[i];
             let others = gram[i..].iter().zip(&correlation[i..]);
@@ -89,16 +88,15 @@ impl<'a> NewtonSystem<'a> {
         let before = point.complementarity();
         let after = point.complementarity_after(&predictor, point.max_step_lengths(&predictor));
         let mu = (after / before).clamp(0.0, 1.0).powi(3) * before / point.constraints();
-        let changes = (predictor.t.iter().zip(&predictor.s)).zip(&predictor.coefficients);
         let bounds = change.upper.iter_mut().zip(&mut change.lower);
-        for ((upper, lower), ((dt, ds), dc)) in bounds.zip(changes) {
+        for ((upper, lower), [dt, ds, dc]) in bounds.zip(predictor.bounds()) {
             *upper += mu - 0.5 * ds * (dt - dc);
             *lower += mu + 0.5 * ds * (dt + dc);
         }
         for ((x, dx), dw) in change.x.iter_mut().zip(&predictor.x).zip(&predictor.w) {
             *x += mu - dx * dw;
         }
-        change.slack += mu - predictor.lambda * dot(&self.correlation, &predictor.x)
+        change.slack += mu - predictor.lambda * predictor.slack
             + 0.5 * point.lambda * dot(&predictor.residual, &predictor.residual);
         self.newton_step(&change)
     }
@@ -107,14 +105,11 @@ impl<'a> NewtonSystem<'a> {
     #[inline(always)]
     fn products(&self) -> ComplementarityProducts {
         let point = self.point;
-        let values = || (point.t.iter().zip(&point.s)).zip(&point.coefficients);
+        let upper = |[t, s, c]: [f64; 3]| 0.5 * (1.0 + s) * (t - c);
+        let lower = |[t, s, c]: [f64; 3]| 0.5 * (1.0 - s) * (t + c);
         ComplementarityProducts {
-            upper: values()
-                .map(|((t, s), c)| 0.5 * (1.0 + s) * (t - c))
-                .collect(),
-            lower: values()
-                .map(|((t, s), c)| 0.5 * (1.0 - s) * (t + c))
-                .collect(),
+            upper: point.bounds().map(upper).collect(),
+            lower: point.bounds().map(lower).collect(),
             x: point.x.iter().zip(&point.w).map(|(x, w)| x * w).collect(),
             slack: point.lambda * point.slack,
         }
@@ -150,9 +145,11 @@ impl<'a> NewtonSystem<'a> {
             .map(|((change, dx), (x, w))| (change - w * dx) / x)
             .collect();
         let zero = vec![0.0; point.residual.len()];
+        let slack = dot(&self.correlation, &x);
         NewtonStep {
             residual: self.operator.residual(&x, &zero),
-            lambda: (change.slack - point.lambda * dot(&self.correlation, &x)) / point.slack,
+            lambda: (change.slack - point.lambda * slack) / point.slack,
+            slack,
             x,
             w,
             t,

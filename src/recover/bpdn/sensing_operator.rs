@@ -1,22 +1,18 @@
 //! The linear maps of one window's problem: Ax and φᵀx, their adjoints and Gram matrices.
 //!
-//! A, `[L, k]`, maps the unknowns, which are the window's elements inside the light plane, to measurements.
-//! φᵀ, `[side², k]`, maps them to coefficients in the sparsity basis. φ is separable, `B ⊗ B` with B,
-//! `[side, side]`, along one axis, so that a product costs O(side³) instead of O(side⁴).
+//! A, `[L, k]`, maps the unknowns, which are the window's elements inside the light plane, to measurements. φᵀ,
+//! `[side², k]`, maps them to coefficients in the sparsity basis. φ is separable, `B ⊗ B` with B, `[side, side]`, along
+//! one axis, so that a product costs O(side³) instead of O(side⁴).
 
 use super::sparsity_basis::SparsityBasis;
-use crate::linalg;
-use crate::linalg::{add_scaled, dot};
+use crate::linalg::{self, dot};
+use crate::recover::gram_cache::WindowEquations;
 
 /// A and φ of one window.
-#[derive(Debug)]
-pub(super) struct SensingOperator {
-    side: usize,
-    rows: usize,
-    /// Slots of the unknowns, `[k]`.
-    slots: Vec<usize>,
-    /// Aᵀ, `[k, L]`.
-    columns: Vec<f64>,
+pub(in crate::recover) struct SensingOperator<'a> {
+    /// A by its columns, its Gram matrix, and the slots of the unknowns.
+    pub equations: &'a WindowEquations,
+    pub side: usize,
     /// φᵀ along one axis, and φ.
     analysis: Vec<f64>,
     synthesis: Vec<f64>,
@@ -27,15 +23,9 @@ pub(super) struct SensingOperator {
     pair_indices: Vec<usize>,
 }
 
-impl SensingOperator {
-    /// An operator with `Aᵀ = columns`, `[k, rows]`, on the elements `slots` of a window of `side²`.
-    pub fn new(
-        basis: SparsityBasis,
-        columns: &[f64],
-        rows: usize,
-        slots: &[usize],
-        side: usize,
-    ) -> Self {
+impl<'a> SensingOperator<'a> {
+    /// The operator of the equations of a window of `side²`.
+    pub fn new(basis: SparsityBasis, equations: &'a WindowEquations, side: usize) -> Self {
         let analysis = basis.along_axis(side);
         let mut products = Vec::with_capacity(side * side * (side + 1) / 2);
         let mut pair_indices = vec![0; side * side];
@@ -47,10 +37,8 @@ impl SensingOperator {
             }
         }
         Self {
+            equations,
             side,
-            rows,
-            slots: slots.to_vec(),
-            columns: columns.to_vec(),
             synthesis: linalg::transpose(&analysis, side),
             analysis,
             transposed_products: linalg::transpose(&products, side),
@@ -59,13 +47,9 @@ impl SensingOperator {
         }
     }
 
-    pub fn side(&self) -> usize {
-        self.side
-    }
-
     /// Number of unknowns, k.
     pub fn unknowns(&self) -> usize {
-        self.slots.len()
+        self.equations.slots.len()
     }
 
     /// `‖φᵀx‖₁`.
@@ -78,7 +62,7 @@ impl SensingOperator {
     #[inline(always)]
     pub fn coefficients(&self, x: &[f64]) -> Vec<f64> {
         let mut window = vec![0.0; self.side * self.side];
-        for (&slot, &x) in self.slots.iter().zip(x) {
+        for (&slot, &x) in self.equations.slots.iter().zip(x) {
             window[slot] = x;
         }
         self.transform(&self.analysis, &window)
@@ -88,7 +72,8 @@ impl SensingOperator {
     #[inline(always)]
     pub fn synthesize(&self, s: &[f64]) -> Vec<f64> {
         let window = self.transform(&self.synthesis, s);
-        self.slots.iter().map(|&slot| window[slot]).collect()
+        let slots = self.equations.slots.iter();
+        slots.map(|&slot| window[slot]).collect()
     }
 
     /// `M X Mᵀ` for a matrix M along one axis and X = `input`, all `[side, side]`.
@@ -104,62 +89,31 @@ impl SensingOperator {
     /// `y − Ax`, `[L]`.
     #[inline(always)]
     pub fn residual(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
-        let mut residual = y.to_vec();
-        for (column, &x) in self.columns().zip(x) {
-            if x != 0.0 {
-                add_scaled(&mut residual, -x, column);
-            }
-        }
-        residual
+        self.equations.columns.residual(y, x)
     }
 
     /// `Aᵀr`, `[k]`.
     #[inline(always)]
     pub fn correlate(&self, r: &[f64]) -> Vec<f64> {
-        self.columns().map(|column| dot(column, r)).collect()
-    }
-
-    /// The upper triangle of `AᵀA`, `[k, k]`.
-    #[inline(always)]
-    pub fn gram(&self) -> Vec<f64> {
-        let k = self.unknowns();
-        let mut gram = vec![0.0; k * k];
-        for (i, (row, a)) in gram
-            .chunks_exact_mut(k.max(1))
-            .zip(self.columns())
-            .enumerate()
-        {
-            for (g, b) in row[i..].iter_mut().zip(self.columns().skip(i)) {
-                *g = dot(a, b);
-            }
-        }
-        gram
+        self.equations.columns.right_hand_side(r).collect()
     }
 
     /// The upper triangle of `φ diag(d) φᵀ` on the unknowns, `[k, k]`.
     #[inline(always)]
     pub fn weighted_gram(&self, d: &[f64]) -> Vec<f64> {
-        let (side, k) = (self.side, self.unknowns());
+        let (side, k, slots) = (self.side, self.unknowns(), &self.equations.slots);
         let pairs = self.products.len() / side;
         // Σ over one axis for each coefficient of the other, then over the other.
         let one_axis = linalg::multiply(d, &self.transposed_products, side, pairs);
         let both_axes = linalg::multiply(&self.products, &one_axis, side, pairs);
         let mut out = vec![0.0; k * k];
         for (i, row) in out.chunks_exact_mut(k.max(1)).enumerate() {
-            let (v, u) = (self.slots[i] / side, self.slots[i] % side);
-            let (pairs_u, pairs_v) = (
-                &self.pair_indices[u * side..],
-                &self.pair_indices[v * side..],
-            );
-            for (out, &slot) in row[i..].iter_mut().zip(&self.slots[i..]) {
+            let [pairs_v, pairs_u] =
+                [slots[i] / side, slots[i] % side].map(|at| &self.pair_indices[at * side..]);
+            for (out, &slot) in row[i..].iter_mut().zip(&slots[i..]) {
                 *out = both_axes[pairs_v[slot / side] * pairs + pairs_u[slot % side]];
             }
         }
         out
-    }
-
-    /// The columns of A.
-    fn columns(&self) -> impl Iterator<Item = &[f64]> {
-        self.columns.chunks_exact(self.rows.max(1))
     }
 }

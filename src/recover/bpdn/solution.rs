@@ -15,9 +15,8 @@ use crate::linalg::dot;
 /// Steps of the ternary search for the best mixture in a bound.
 const SEARCH_STEPS: usize = 40;
 
-/// One right-hand side of a [`super::InteriorPoint`].
-#[derive(Clone, Debug)]
-pub struct BpdnConstraint<'a> {
+/// The constraint `‖y − Ax‖ ≤ ε`.
+pub(in crate::recover) struct BpdnConstraint<'a> {
     /// Measurements, `[L]`.
     pub y: &'a [f64],
     /// Upper bound of `‖y − Ax‖`.
@@ -27,8 +26,7 @@ pub struct BpdnConstraint<'a> {
 }
 
 /// A solution with a bound on its distance from the optimum.
-#[derive(Clone, Debug)]
-pub struct BpdnSolution {
+pub(in crate::recover) struct BpdnSolution {
     /// `x`, `[k]`.
     pub x: Vec<f64>,
     /// `‖φᵀx‖₁`.
@@ -74,11 +72,7 @@ fn feasible_points(
     constraint: &BpdnConstraint,
     x: Vec<f64>,
 ) -> impl Iterator<Item = Vec<f64>> {
-    let &BpdnConstraint {
-        y,
-        epsilon,
-        least_squares,
-    } = constraint;
+    let (y, epsilon, least_squares) = (constraint.y, constraint.epsilon, constraint.least_squares);
     let residual = operator.residual(&x, y);
     // −Ax, the change of the residual along the multiples of x.
     let change: Vec<f64> = residual.iter().zip(y).map(|(r, y)| r - y).collect();
@@ -121,7 +115,7 @@ fn dual_bound(
     let pairs: Vec<_> = (operator.correlate(direction).into_iter())
         .zip(operator.synthesize(s))
         .collect();
-    gain * max_scale(&pairs, 1.0 / operator.side() as f64)
+    gain * max_scale(&pairs, 1.0 / operator.side as f64)
 }
 
 /// The largest scale t with `t p ≤ α q + (1 − α) c` for all pairs (p, q) and some α in [0, 1].

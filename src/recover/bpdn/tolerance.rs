@@ -1,9 +1,11 @@
 //! ε, the largest residual that basis pursuit denoising allows.
 //!
-//! The noise variance of a measurement is `σ² = gain · ȳ + floor`: photon noise, and noise independent of
-//! light. The true function has the squared residual L σ²; a fitted one has about (L − d) σ², where d degrees
-//! of freedom fit noise, so that ε² = L σ² smooths too much. d depends on patterns, scene and basis.
-//! Therefore `ε² = share · L σ²` with a share that is chosen on held-out patterns.
+//! The noise variance of a measurement is `σ² = gain · ȳ + floor`: photon noise, and noise independent of light. The
+//! true function has the squared residual L σ²; a fitted one has about (L − d) σ², where d degrees of freedom fit noise,
+//! so that ε² = L σ² smooths too much. d depends on patterns, scene and basis. Therefore `ε² = share · L σ²` with a
+//! share that is chosen on held-out patterns.
+
+use crate::recover::sampling::mean;
 
 /// Iterations of the reweighted least-squares fit.
 const REWEIGHTINGS: usize = 4;
@@ -26,19 +28,17 @@ impl Tolerance {
     /// sparsity that only harms is not used.
     pub const CANDIDATE_SHARES: [f64; 7] = [1.0, 0.6, 0.35, 0.2, 0.1, 0.04, 0.0];
 
-    /// ε for `count` measurements with mean `mean`.
-    pub fn epsilon(self, count: usize, mean: f64) -> f64 {
-        let variance = (self.gain * mean.max(0.0) + self.floor).max(0.0);
-        (self.share * count as f64 * variance).sqrt()
+    /// ε for the measurements y.
+    pub fn epsilon(self, y: &[f64]) -> f64 {
+        let variance = (self.gain * mean(y).max(0.0) + self.floor).max(0.0);
+        (self.share * y.len() as f64 * variance).sqrt()
     }
 
     /// Fits gain and floor, both at least zero, to pairs of mean and variance by least squares relative to
     /// the expected variance: the uncertainty of a variance is proportional to it.
     pub fn fit(pairs: &[(f64, f64)]) -> Self {
-        let mean = |f: &dyn Fn(&(f64, f64)) -> f64| {
-            pairs.iter().map(f).sum::<f64>() / pairs.len().max(1) as f64
-        };
-        let (level, variance) = (mean(&|p| p.0), mean(&|p| p.1));
+        let (levels, variances): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
+        let (level, variance) = (mean(&levels), mean(&variances));
         let mut fit = Self {
             gain: 0.0,
             floor: variance,
@@ -89,7 +89,7 @@ mod tests {
             .collect();
         let fit = Tolerance::fit(&pairs);
         assert!((fit.gain - 0.02).abs() < 1e-9 && (fit.floor - 0.003).abs() < 1e-9);
-        let epsilon = fit.epsilon(80, 0.5);
+        let epsilon = fit.epsilon(&[0.5; 80]);
         assert!((epsilon - (80.0f64 * 0.013).sqrt()).abs() < 1e-9);
     }
 
@@ -102,7 +102,7 @@ mod tests {
         let fit = Tolerance::fit(&steep);
         assert!(fit.gain > 0.0 && fit.floor == 0.0);
         let one = Tolerance::fit(&[(0.5, 0.1)]);
-        assert!((one.epsilon(1, 0.5) - 0.1f64.sqrt()).abs() < 1e-9);
-        assert_eq!(Tolerance::fit(&[]).epsilon(10, 1.0), 0.0);
+        assert!((one.epsilon(&[0.5]) - 0.1f64.sqrt()).abs() < 1e-9);
+        assert_eq!(Tolerance::fit(&[]).epsilon(&[1.0; 10]), 0.0);
     }
 }

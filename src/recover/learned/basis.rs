@@ -1,9 +1,9 @@
 //! The basis that all light transport functions share, and its responses to the patterns.
 //!
-//! [`LearnedBasis`] holds V, `[S, r]`, orthonormal columns, and the mean light transport function h, `[S]`.
-//! For a window whose elements emit P̂, `[L, S]`, it computes P̂V, `[L, r]`, and P̂h, `[L]`, together.
-//! V and h are interleaved by light element in f32, which is as exact as the measurements, so that a
-//! block of responses stays in vector registers while a pattern is read once.
+//! [`LearnedBasis`] holds V, `[S, r]`, orthonormal columns, and the mean light transport function h, `[S]`. For a window
+//! whose elements emit P̂, `[L, S]`, it computes P̂V, `[L, r]`, and P̂h, `[L]`, together. V and h are interleaved by light
+//! element in f32, which is as exact as the measurements, so that a block of responses stays in vector registers while a
+//! pattern is read once.
 
 use crate::capture::Measurements;
 use crate::linalg::vectorise;
@@ -15,7 +15,7 @@ const MIN_BLOCK_WIDTH: usize = 8;
 /// An orthonormal basis of functions on the window, and the mean light transport function.
 #[derive(Clone, Debug)]
 pub(super) struct LearnedBasis {
-    functions: Basis,
+    pub functions: Basis,
     /// `[element, stride]`: basis functions, the mean function, zeros.
     interleaved: Vec<f32>,
     stride: usize,
@@ -35,11 +35,10 @@ impl LearnedBasis {
             values[rank] = mean[s] as f32;
         }
         let functions = functions.chunks_exact(area);
+        let kernels = functions.map(|v| v.iter().map(|&v| v as f32).collect());
         Self {
             functions: Basis {
-                kernels: functions
-                    .map(|v| v.iter().map(|&v| v as f32).collect())
-                    .collect(),
+                kernels: kernels.collect(),
             },
             interleaved,
             stride,
@@ -48,12 +47,7 @@ impl LearnedBasis {
 
     /// Number of basis functions, r.
     pub fn rank(&self) -> usize {
-        self.functions.kernels.len()
-    }
-
-    /// The basis functions.
-    pub fn functions(&self) -> &Basis {
-        &self.functions
+        self.functions.rank()
     }
 
     /// V, `[element, r]`, and the mean function's peak.

@@ -12,15 +12,16 @@ use crate::recover::error::RecoverError;
 use crate::recover::holdout::HoldoutSplit;
 use crate::recover::pixelwise::PixelwiseRecovery;
 use crate::recover::prediction;
+use crate::recover::preparation::Preparation;
 use crate::transport::{CHANNELS, Extent, TileRect, TransportFunctions};
 
-/// Smallest share of a tile's squared held-out residual that blending must save: a blended tile is
-/// direct and takes ten times the bytes of a factored one.
+/// Smallest share of a tile's squared held-out residual that blending must save: a blended tile is direct and takes ten
+/// times the bytes of a factored one.
 const MIN_TILE_GAIN: f64 = 0.005;
 /// The same over all training regions, for blending to be tried at all: that doubles the time.
 const MIN_PICTURE_GAIN: f64 = 0.02;
 /// Side of the centre of a tile that determines the tile's blend.
-const TILE_CENTRE_SIDE_PX: u32 = 16;
+pub(super) const TILE_CENTRE_SIDE_PX: u32 = 16;
 /// Side of the centre of a training region that counts for [`MIN_PICTURE_GAIN`].
 const REGION_CENTRE_SIDE_PX: u32 = 4;
 
@@ -36,8 +37,8 @@ pub(super) struct ResidualProducts {
 }
 
 impl ResidualProducts {
-    /// The products for a tile's functions that both methods recovered without the held-out patterns.
-    /// Saturated samples do not count.
+    /// The products for a tile's functions that both methods recovered without the held-out patterns. Saturated samples
+    /// do not count.
     pub fn new(
         model: &LearnedModel,
         measurements: &Measurements,
@@ -58,25 +59,8 @@ impl ResidualProducts {
         products
     }
 
-    /// The products on the centre of a tile.
-    pub fn on_tile(
-        model: &LearnedModel,
-        nnls: &PixelwiseRecovery,
-        measurements: &Measurements,
-        split: &HoldoutSplit,
-        tile: TileRect,
-    ) -> Self {
-        Self::recover(
-            model,
-            nnls,
-            measurements,
-            split,
-            centre(tile, TILE_CENTRE_SIDE_PX),
-        )
-    }
-
     /// Recovers `rect` by both methods without the held-out patterns.
-    fn recover(
+    pub fn recover(
         model: &LearnedModel,
         nnls: &PixelwiseRecovery,
         measurements: &Measurements,
@@ -84,7 +68,7 @@ impl ResidualProducts {
         rect: TileRect,
     ) -> Self {
         let learned = model.expand(&model.tile(measurements, &split.training, rect));
-        let alternative = nnls.tile_from(measurements, &split.training, rect);
+        let alternative = nnls.tile(measurements, &split.training, rect);
         Self::new(model, measurements, split, [&learned, &alternative])
     }
 
@@ -93,8 +77,8 @@ impl ResidualProducts {
         self.best_weight(MIN_TILE_GAIN)
     }
 
-    /// The weight of NNLS with the least squared residual; 0 if that saves no more than the share
-    /// `min_gain` of the learned recovery's.
+    /// The weight of NNLS with the least squared residual; 0 if that saves no more than the share `min_gain` of the
+    /// learned recovery's.
     fn best_weight(self, min_gain: f64) -> f32 {
         let squared_distance = self.learned - 2.0 * self.cross + self.nnls;
         if squared_distance.is_nan() || squared_distance <= 0.0 {
@@ -115,22 +99,21 @@ impl ResidualProducts {
 /// Those of [`PixelwiseRecovery::least_squares`].
 pub(super) fn fit_nnls_alternative(
     model: &LearnedModel,
-    measurements: &Measurements,
-    split: &HoldoutSplit,
+    preparation: &Preparation<impl Executor>,
     regions: &[TileRect],
-    executor: &impl Executor,
 ) -> Result<Option<PixelwiseRecovery>, RecoverError> {
-    let nnls = PixelwiseRecovery::least_squares(measurements, model.geometry, split, executor)?;
-    let products = executor.map(regions.len(), |i| {
+    let (measurements, split) = (preparation.measurements, preparation.split);
+    let nnls = PixelwiseRecovery::least_squares(preparation)?;
+    let products = preparation.executor.map(regions.len(), |i| {
         let rect = centre(regions[i], REGION_CENTRE_SIDE_PX);
         ResidualProducts::recover(model, &nnls, measurements, split, rect)
     });
-    let mut total = ResidualProducts::default();
-    for products in products {
-        total.learned += products.learned;
-        total.cross += products.cross;
-        total.nnls += products.nnls;
-    }
+    let sum = |a: ResidualProducts, b: ResidualProducts| ResidualProducts {
+        learned: a.learned + b.learned,
+        cross: a.cross + b.cross,
+        nnls: a.nnls + b.nnls,
+    };
+    let total = products.into_iter().fold(ResidualProducts::default(), sum);
     Ok((total.best_weight(MIN_PICTURE_GAIN) > 0.0).then_some(nnls))
 }
 
@@ -148,7 +131,7 @@ pub(super) fn blend(
 }
 
 /// The central part of a rectangle, at most `side` by `side` pixels.
-fn centre(rect: TileRect, side: u32) -> TileRect {
+pub(super) fn centre(rect: TileRect, side: u32) -> TileRect {
     let extent = Extent {
         width: rect.extent.width.min(side),
         height: rect.extent.height.min(side),

@@ -1,12 +1,11 @@
 //! The measurements of a region as normal equations over the basis.
 //!
-//! An *observation* is one camera pixel in one channel: `y = f B z + noise`, `[L]`, with the pixel's
-//! brightness f, the responses B = P̂V of the basis on the pixel's window, `[L, r]`, and coefficients z,
-//! `[r]`. Inference needs only BᵀB, `[r, r]`, Bᵀy, `[r]`, ‖y‖² and the noise variance. Observations with
-//! the same window and the same unsaturated patterns share BᵀB.
+//! An *observation* is one camera pixel in one channel: `y = f B z + noise`, `[L]`, with the pixel's brightness f, the
+//! responses B = P̂V of the basis on the pixel's window, `[L, r]`, and coefficients z, `[r]`. Inference needs only BᵀB,
+//! `[r, r]`, Bᵀy, `[r]`, ‖y‖² and the noise variance. Observations with the same window and the same unsaturated patterns
+//! share BᵀB.
 //!
-//! B and y are weighted by the patterns' exposures, and the patterns' common mode by
-//! [`CommonMode::POOLED`].
+//! B and y are weighted by the patterns' exposures, and the patterns' common mode by [`CommonMode::POOLED`].
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -16,11 +15,11 @@ use crate::capture::Measurements;
 use crate::linalg::{dot, vectorise};
 use crate::recover::common_mode::CommonMode;
 use crate::recover::normal_equations::{EquationWeights, WeightedColumns};
-use crate::recover::sampling::{MIN_PATTERNS, pixels_by_window};
+use crate::recover::sampling::{PixelsOfWindow, pixels_by_window, usable_samples};
 use crate::transport::{CHANNELS, CameraPx, Extent, Geometry, TileRect};
 
-/// Sub-element positions along one axis. With two camera pixels for each light element, neighbours lie
-/// in different halves of it and see different parts of their window.
+/// Sub-element positions along one axis. With two camera pixels for each light element, neighbours lie in different
+/// halves of it and see different parts of their window.
 const PHASES_PER_AXIS: usize = 2;
 /// Sub-element positions of a camera pixel.
 pub(super) const PHASES: usize = PHASES_PER_AXIS * PHASES_PER_AXIS;
@@ -47,10 +46,10 @@ fn phase(geometry: &Geometry, pixel: CameraPx) -> usize {
 }
 
 /// One channel of one pixel, but for BᵀB and Bᵀy.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Observation {
     /// Index of BᵀB among the region's Gram matrices.
-    gram: usize,
+    pub gram: usize,
     /// Brightness f, in units of the measurement: the response of the mean function under full light.
     pub scale: f64,
     /// Noise variance of one measurement.
@@ -75,9 +74,9 @@ pub(super) struct RegionEquations {
     /// `[pixel, channel]`.
     pub observations: Vec<Observation>,
     /// BᵀB, `[r, r]` each, for each window and set of usable patterns.
-    gram_matrices: Vec<Vec<f64>>,
+    pub gram_matrices: Vec<Vec<f64>>,
     /// Bᵀy, `[pixel, channel, r]`.
-    right_hand_sides: Vec<f64>,
+    pub right_hand_sides: Vec<f64>,
 }
 
 impl RegionEquations {
@@ -89,40 +88,21 @@ impl RegionEquations {
         pattern_indices: &[usize],
         rect: TileRect,
     ) -> Self {
-        let rank = basis.rank();
         let count = rect.extent.area() * CHANNELS;
-        let unknown = Observation {
-            gram: 0,
-            scale: 0.0,
-            variance: 1.0,
-            power: 0.0,
-            count: 0,
-            phase: 0,
-            has_full_window: false,
-        };
         let mut equations = Self {
             rect,
-            rank,
-            observations: vec![unknown; count],
+            rank: basis.rank(),
+            observations: vec![Observation::default(); count],
             gram_matrices: Vec::new(),
-            right_hand_sides: vec![0.0; count * rank],
+            right_hand_sides: vec![0.0; count * basis.rank()],
         };
-        let weights = measurements.pattern_weights();
         for (origin, pixels) in pixels_by_window(geometry, rect) {
             for (plane, channels) in measurements.planes() {
                 let responses = basis.respond(measurements, geometry, origin, plane);
+                let window = (&responses, &pixels[..], channels);
                 vectorise(
                     #[inline(always)]
-                    || {
-                        let window = WindowData {
-                            measurements,
-                            geometry,
-                            responses: &responses,
-                            pattern_indices,
-                            weights: &weights,
-                        };
-                        equations.add_window(&window, &pixels, channels);
-                    },
+                    || equations.add_window(measurements, geometry, pattern_indices, window),
                 );
             }
         }
@@ -136,20 +116,17 @@ impl RegionEquations {
         pattern_indices: &[usize],
         rect: TileRect,
     ) -> usize {
-        let windows = pixels_by_window(geometry, rect);
-        let count_sets = |pixels: &[(usize, CameraPx)], channels: Range<usize>| {
-            let sets: BTreeSet<Vec<usize>> = pixels
-                .iter()
-                .flat_map(|&(_, pixel)| channels.clone().map(move |c| (pixel, c)))
-                .map(|(pixel, c)| usable_patterns(measurements, pattern_indices, pixel, c))
-                .collect();
-            sets.len()
-        };
-        let counts = windows.values().flat_map(|pixels| {
-            let planes = measurements.planes();
-            planes.map(move |(_, channels)| count_sets(pixels, channels))
-        });
-        counts.sum()
+        let mut sets = BTreeSet::new();
+        for (plane, channels) in measurements.planes() {
+            for (pixel, c) in rect
+                .pixels()
+                .flat_map(|p| channels.clone().map(move |c| (p, c)))
+            {
+                let (patterns, _) = usable_samples(measurements, pattern_indices, pixel, c);
+                sets.insert((geometry.window_origin(pixel), plane, patterns));
+            }
+        }
+        sets.len()
     }
 
     /// BᵀB of an observation, `[r, r]`, both triangles.
@@ -170,50 +147,47 @@ impl RegionEquations {
             && observation.scale / observation.variance.sqrt() > MIN_CONTRAST
     }
 
+    /// Adds the observations of a window's pixels in the channels that one plane of the patterns drives.
     #[inline(always)]
     fn add_window(
         &mut self,
-        window: &WindowData<'_>,
-        pixels: &[(usize, CameraPx)],
-        channels: Range<usize>,
+        measurements: &Measurements,
+        geometry: &Geometry,
+        pattern_indices: &[usize],
+        (responses, pixels, channels): (&PatternResponses, &PixelsOfWindow, Range<usize>),
     ) {
-        let measurements = window.measurements;
-        let mut shared: Vec<WeightedResponses<'_>> = Vec::new();
+        let first_gram = self.gram_matrices.len();
+        let mut shared: Vec<WeightedResponses> = Vec::new();
         for &(p, pixel) in pixels {
             for c in channels.clone() {
-                let usable = usable_patterns(measurements, window.pattern_indices, pixel, c);
-                let y = usable.iter().map(|&l| {
-                    let y = measurements.sample(l, pixel, c);
-                    match y.is_finite() {
-                        true => y,
-                        false => f64::from(measurements.full_scale[l]),
-                    }
-                });
-                let y: Vec<f64> = y.collect();
+                let (usable, y) = usable_samples(measurements, pattern_indices, pixel, c);
                 let known = shared.iter().position(|s| s.pattern_indices == usable);
                 let known = known.unwrap_or_else(|| {
-                    let centred = WeightedResponses::new(window, usable, self.gram_matrices.len());
-                    self.gram_matrices.push(centred.columns.gram());
-                    shared.push(centred);
+                    let weighted = WeightedResponses::new(measurements, responses, usable);
+                    self.gram_matrices.push(weighted.columns.gram());
+                    shared.push(weighted);
                     shared.len() - 1
                 });
                 let index = p * CHANNELS + c;
-                let right_hand_side =
-                    &mut self.right_hand_sides[index * self.rank..(index + 1) * self.rank];
-                self.observations[index] = shared[known].observe((pixel, c), &y, right_hand_side);
+                let right_hand_side = &mut self.right_hand_sides[index * self.rank..][..self.rank];
+                self.observations[index] = Observation {
+                    gram: first_gram + known,
+                    phase: phase(geometry, pixel),
+                    has_full_window: responses.has_full_window,
+                    ..shared[known].observe(measurements, c, y, right_hand_side)
+                };
             }
         }
     }
 }
 
-/// The brightness below which observations are left out of training: by channel, a share of what the
-/// brightest 5 % of the observations in `regions` exceed.
+/// The brightness below which observations are left out of training: by channel, a share of what the brightest 5 % of
+/// the observations in `regions` exceed.
 pub(super) fn brightness_thresholds(regions: &[RegionEquations]) -> BrightnessThresholds {
     std::array::from_fn(|c| {
-        let observations = regions
-            .iter()
-            .flat_map(|region| region.observations.iter().skip(c).step_by(CHANNELS));
-        let mut scales: Vec<f64> = observations.map(|o| o.scale).collect();
+        let observations = regions.iter().flat_map(|region| &region.observations);
+        let of_channel = observations.skip(c).step_by(CHANNELS);
+        let mut scales: Vec<f64> = of_channel.map(|observation| observation.scale).collect();
         scales.sort_by(f64::total_cmp);
         let bright = scales.get(scales.len() * BRIGHT_PERCENTILE / 100);
         MIN_RELATIVE_BRIGHTNESS * bright.copied().unwrap_or(0.0)
@@ -239,141 +213,68 @@ pub(super) fn with_margin(measurements: &Measurements, rect: TileRect, margin: u
     }
 }
 
-/// The patterns that do not saturate a pixel's channel; all patterns if those are too few. Then the
-/// saturated samples count as white, the least that they can be.
-#[inline(always)]
-fn usable_patterns(
-    measurements: &Measurements,
-    pattern_indices: &[usize],
-    pixel: CameraPx,
-    c: usize,
-) -> Vec<usize> {
-    let is_finite = |l: &usize| measurements.sample(*l, pixel, c).is_finite();
-    let usable: Vec<usize> = pattern_indices.iter().copied().filter(is_finite).collect();
-    match usable.len() < MIN_PATTERNS {
-        true => pattern_indices.to_vec(),
-        false => usable,
-    }
-}
-
-/// What the equations of one window and colour plane are made from.
-#[derive(Clone, Copy)]
-struct WindowData<'a> {
-    measurements: &'a Measurements,
-    geometry: &'a Geometry,
-    responses: &'a PatternResponses,
-    pattern_indices: &'a [usize],
-    /// Weight of each pattern, `[pattern]`.
-    weights: &'a [f64],
-}
-
-/// The equations of one window and one set of L patterns.
-struct WeightedResponses<'a> {
-    window: WindowData<'a>,
+/// The responses of the basis on one window, weighted, to one set of L patterns.
+struct WeightedResponses {
     pattern_indices: Vec<usize>,
     /// B.
     columns: WeightedColumns,
     /// Mean response of the mean function.
     mean_function: f64,
-    /// Index of BᵀB.
-    gram: usize,
 }
 
-impl<'a> WeightedResponses<'a> {
+impl WeightedResponses {
     #[inline(always)]
-    fn new(window: &WindowData<'a>, pattern_indices: Vec<usize>, gram: usize) -> Self {
-        let (rank, count) = (window.responses.rank, pattern_indices.len());
-        let mut columns = vec![0.0; rank * count];
+    fn new(
+        measurements: &Measurements,
+        responses: &PatternResponses,
+        pattern_indices: Vec<usize>,
+    ) -> Self {
+        let count = pattern_indices.len();
+        let mut columns = vec![0.0; responses.rank * count];
         for (i, &l) in pattern_indices.iter().enumerate() {
-            for (k, &b) in window.responses.row(l).iter().enumerate() {
+            for (k, &b) in responses.row(l).iter().enumerate() {
                 columns[k * count + i] = f64::from(b);
             }
         }
-        let weights = pattern_indices.iter().map(|&l| window.weights[l]).collect();
+        let weights = measurements.pattern_weights();
+        let weights = pattern_indices.iter().map(|&l| weights[l]).collect();
         let weights = EquationWeights::new(weights, CommonMode::POOLED);
         let products = pattern_indices.iter().zip(&weights.patterns);
-        let products = products.map(|(&l, w)| w * w * window.responses.mean(l));
+        let products = products.map(|(&l, w)| w * w * responses.mean(l));
         Self {
-            window: *window,
             mean_function: products.sum::<f64>() / weights.energy,
             columns: WeightedColumns::new(columns, weights),
             pattern_indices,
-            gram,
         }
     }
 
-    /// The observation of measurements `y`, `[L]`; writes Bᵀy to `right_hand_side`, `[r]`.
+    /// Brightness, variance, power and count of channel `c` with measurements y; writes Bᵀy to `right_hand_side`, `[r]`.
     #[inline(always)]
     fn observe(
         &self,
-        (pixel, c): (CameraPx, usize),
-        y: &[f64],
+        measurements: &Measurements,
+        c: usize,
+        mut y: Vec<f64>,
         right_hand_side: &mut [f64],
     ) -> Observation {
-        let measurements = self.window.measurements;
         let weights = &self.columns.weights;
-        let samples = self.pattern_indices.iter().zip(&weights.patterns).zip(y);
+        let samples = self.pattern_indices.iter().zip(&weights.patterns).zip(&y);
         let variances = samples.map(|((&l, w), &y)| w * w * measurements.variance(l, c, y));
         let variance = variances.sum::<f64>() / y.len() as f64;
-        let mut weighted_y = y.to_vec();
-        let mean = weights.apply(&mut weighted_y);
-        let products = self.columns.right_hand_side(&weighted_y);
-        right_hand_side
-            .iter_mut()
-            .zip(products)
-            .for_each(|(right, product)| *right = product);
+        let mean = weights.apply(&mut y);
+        let products = self.columns.right_hand_side(&y);
+        let pairs = right_hand_side.iter_mut().zip(products);
+        pairs.for_each(|(right, product)| *right = product);
         let scale = match self.mean_function > 0.0 {
             true => mean / self.mean_function,
             false => 0.0,
         };
         Observation {
-            gram: self.gram,
             scale: scale.max(0.0),
             variance: variance.max(MIN_VARIANCE),
-            power: dot(&weighted_y, &weighted_y),
+            power: dot(&y, &y),
             count: y.len(),
-            phase: phase(self.window.geometry, pixel),
-            has_full_window: self.window.responses.has_full_window,
-        }
-    }
-}
-
-#[cfg(test)]
-impl RegionEquations {
-    /// Observations of coefficients `z`, `[pixel, channel, r]`, with brightness 1, one diagonal Gram
-    /// matrix, `[r]`, and standard normal numbers `normal` for the noise.
-    pub fn synthetic(
-        rect: TileRect,
-        diagonal: &[f64],
-        z: &[f64],
-        variance: f64,
-        mut normal: impl FnMut() -> f64,
-    ) -> Self {
-        let rank = diagonal.len();
-        let mut gram = vec![0.0; rank * rank];
-        (0..rank).for_each(|k| gram[k * rank + k] = diagonal[k]);
-        let observations = rect.pixels().flat_map(|pixel| {
-            let observation = Observation {
-                gram: 0,
-                scale: 1.0,
-                variance,
-                power: 0.0,
-                count: rank,
-                phase: (pixel.y % 2 * 2 + pixel.x % 2) as usize,
-                has_full_window: true,
-            };
-            [observation; CHANNELS]
-        });
-        let right_hand_sides = z.iter().enumerate().map(|(i, z)| {
-            let g = diagonal[i % rank];
-            g * z + (variance * g).sqrt() * normal()
-        });
-        Self {
-            rect,
-            rank,
-            observations: observations.collect(),
-            gram_matrices: vec![gram],
-            right_hand_sides: right_hand_sides.collect(),
+            ..Observation::default()
         }
     }
 }

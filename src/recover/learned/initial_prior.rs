@@ -12,15 +12,14 @@
 
 use super::prior::Prior;
 use crate::executor::Executor;
-use crate::linalg;
-use crate::linalg::{add_scaled, dot};
+use crate::linalg::{self, add_scaled, dot};
 
 /// Rank of the initial basis; with the mean function a whole number of vector registers.
 pub(super) const MAX_INITIAL_RANK: usize = 95;
 /// Rounds of subspace iteration: the basis needs to span the leading eigenvectors, not to equal them.
 const SUBSPACE_ITERATIONS: usize = 12;
-/// Correlation length, in elements. Twice as much is too smooth for textured glass, and training does
-/// not make up for what the initial basis lacks.
+/// Correlation length, in elements. Twice as much is too smooth for textured glass, and training does not make up for
+/// what the initial basis lacks.
 const CORRELATION_LENGTH: f64 = 1.0;
 /// Variance of the variations, as a share of h².
 const RELATIVE_VARIANCE: f64 = 0.3;
@@ -32,21 +31,14 @@ pub(super) fn smooth(function: &[f64], side: usize) -> Vec<f64> {
     let radius = (3.0 * SMOOTHING_SIGMA).ceil() as i64;
     let tap = |d: i64| (-0.5 * (d as f64 / SMOOTHING_SIGMA).powi(2)).exp();
     let norm: f64 = (-radius..=radius).map(tap).sum();
-    let smooth_axis = |values: &[f64], stride: usize, line_stride: usize| {
-        let mut out = vec![0.0; values.len()];
-        for i in 0..side {
-            for line in 0..side {
-                out[i * stride + line * line_stride] = (-radius..=radius)
-                    .filter_map(|d| {
-                        let j = usize::try_from(i as i64 + d).ok().filter(|&j| j < side)?;
-                        Some(tap(d) / norm * values[j * stride + line * line_stride])
-                    })
-                    .sum();
-            }
-        }
-        out
-    };
-    let smoothed = smooth_axis(&smooth_axis(function, 1, side), side, 1);
+    // Along one axis, `[side, side]`.
+    let blur = (0..side * side).map(|i| match (i / side).abs_diff(i % side) as i64 {
+        distance if distance <= radius => tap(distance) / norm,
+        _ => 0.0,
+    });
+    let blur: Vec<f64> = blur.collect();
+    let rows = linalg::multiply(function, &blur, side, side);
+    let smoothed = linalg::multiply(&blur, &rows, side, side);
     let sum: f64 = smoothed.iter().sum();
     smoothed.iter().map(|m| m / sum).collect()
 }
@@ -76,75 +68,60 @@ pub(super) fn initial_prior(
         products.concat()
     };
     // Cosines of rising frequency times h are near the eigenvectors.
-    let mut functions: Vec<f64> = (0..rank)
-        .flat_map(|k| {
-            let (fv, fu) = frequency_pair(k);
-            let cosine = move |f: usize, x: usize| {
-                (std::f64::consts::PI * f as f64 * (x as f64 + 0.5) / side as f64).cos()
-            };
-            (0..area).map(move |s| cosine(fv, s / side) * cosine(fu, s % side) * mean[s].max(1e-9))
-        })
-        .collect();
+    let frequencies = (0..).flat_map(|sum| (0..=sum).map(move |v| (v, sum - v)));
+    let cosine = |f: usize, x: usize| {
+        (std::f64::consts::PI * f as f64 * (x as f64 + 0.5) / side as f64).cos()
+    };
+    let mut functions: Vec<f64> = Vec::with_capacity(rank * area);
+    for (fv, fu) in frequencies.take(rank) {
+        let value = |s: usize| cosine(fv, s / side) * cosine(fu, s % side) * mean[s].max(1e-9);
+        functions.extend((0..area).map(value));
+    }
     for _ in 0..SUBSPACE_ITERATIONS {
         functions = apply_covariance(&functions);
         orthonormalise(&mut functions, area);
     }
-    let coefficient_covariance = linalg::multiply(
-        &apply_covariance(&functions),
-        &linalg::transpose(&functions, area),
-        area,
-        rank,
-    );
+    let products = apply_covariance(&functions);
+    let transposed = linalg::transpose(&functions, area);
+    let coefficient_covariance = linalg::multiply(&products, &transposed, area, rank);
     let coefficients: Vec<f64> = functions.chunks_exact(area).map(|v| dot(v, mean)).collect();
     (functions, Prior::new(&coefficients, coefficient_covariance))
 }
 
-/// The `k`-th pair of frequencies, by rising sum.
-fn frequency_pair(k: usize) -> (usize, usize) {
-    let (mut sum, mut rest) = (0, k);
-    while rest > sum {
-        rest -= sum + 1;
-        sum += 1;
-    }
-    (rest, sum - rest)
-}
-
-/// Orthonormalises the rows of a `[count, length]` matrix by Gram–Schmidt, twice against rounding. A row
-/// that depends on earlier ones is replaced by a unit vector.
+/// Orthonormalises the rows of a `[count, length]` matrix by Gram–Schmidt, twice against rounding. A row that depends on
+/// earlier ones is replaced by a unit vector.
 fn orthonormalise(rows: &mut [f64], length: usize) {
-    let count = rows.len() / length;
-    for k in 0..count {
+    for k in 0..rows.len() / length {
         let (before, rest) = rows.split_at_mut(k * length);
         let row = &mut rest[..length];
-        let mut next_unit_vector = 0;
-        loop {
-            let norm = dot(row, row).sqrt();
-            if norm > 0.0 {
-                row.iter_mut().for_each(|x| *x /= norm);
-            }
+        for unit_vector in 0..=length {
+            normalise(row);
             for _ in 0..2 {
                 for other in before.chunks_exact(length) {
                     let projection = dot(other, row);
                     add_scaled(row, -projection, other);
                 }
             }
-            let norm = dot(row, row).sqrt();
-            if norm > 1e-8 {
-                row.iter_mut().for_each(|x| *x /= norm);
-                break;
-            }
-            if next_unit_vector == length {
+            if normalise(row) > 1e-8 || unit_vector == length {
                 break;
             }
             row.fill(0.0);
-            row[next_unit_vector] = 1.0;
-            next_unit_vector += 1;
+            row[unit_vector] = 1.0;
         }
     }
 }
 
-/// Keeps the `rank` eigenvectors of the prior's second moment, C + mmᵀ, with the largest eigenvalues:
-/// basis functions, `[rank, area]`, and the prior over them.
+/// Scales a vector other than zero to length 1. Returns its length before.
+fn normalise(x: &mut [f64]) -> f64 {
+    let norm = dot(x, x).sqrt();
+    if norm > 0.0 {
+        x.iter_mut().for_each(|x| *x /= norm);
+    }
+    norm
+}
+
+/// Keeps the `rank` eigenvectors of the prior's second moment, C + mmᵀ, with the largest eigenvalues: basis functions,
+/// `[rank, area]`, and the prior over them.
 pub(super) fn truncate_basis(
     functions: &[f64],
     prior: &Prior,

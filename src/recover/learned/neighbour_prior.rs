@@ -7,36 +7,35 @@
 //! z | neighbours ~ N(m, C),   m_k = w_k0 + Σ_j w_kj z_jk
 //! ```
 //!
-//! with weights w for each class of observations (sub-element position and channel; [`regression`]) and
-//! one covariance C, `[r, r]`, of the prediction error. The prediction fails at an edge of the object.
-//! Therefore the prior is a mixture: with probability π this one, else the pixel prior. By Bayes' rule
-//! an observation's measurements y give it the responsibility q:
+//! with weights w for each class of observations (sub-element position and channel; [`regression`]) and one covariance
+//! C, `[r, r]`, of the prediction error. The prediction fails at an edge of the object. Therefore the prior is a
+//! mixture: with probability π this one, else the pixel prior. By Bayes' rule an observation's measurements y give it
+//! the responsibility q:
 //!
 //! ```text
 //! ln q/(1 − q) = ln π/(1 − π) + ln p(y | neighbours) − ln p(y | pixel prior)
 //! ```
 //!
-//! Expectation–maximisation learns C, π and w: C = Σ q ((ẑ − m)(ẑ − m)ᵀ + P) / Σ q with the posterior mean
-//! ẑ and covariance P, π the mean of q, and w the regression of ẑ on the neighbours.
+//! Expectation–maximisation learns C, π and w: C = Σ q ((ẑ − m)(ẑ − m)ᵀ + P) / Σ q with the posterior mean ẑ and
+//! covariance P, π the mean of q, and w the regression of ẑ on the neighbours.
 //!
 //! [`regression`]: super::regression
 
-use super::equations::{Observation, PHASES};
+use super::equations::PHASES;
 use super::posterior::{PosteriorSolver, PriorPrecision};
-use super::posterior_means::{NeighbourOffset, ObservationLocation, PosteriorMeans};
+use super::posterior_means::{ObservationLocation, PREDICTORS, PosteriorMeans};
 use super::prior::Prior;
 use super::regression::{RegressionSums, add_products, solve_regressions};
 use crate::executor::Executor;
-use crate::linalg;
-use crate::linalg::{add_scaled, vectorise};
+use crate::linalg::{self, add_scaled, vectorise};
 use crate::transport::CHANNELS;
 
 /// Iterations of expectation–maximisation.
 const EM_ITERATIONS: usize = 4;
 /// Groups of regions that sums are formed over. Fixed, so that results do not depend on the executor.
 const PARTS: usize = 8;
-/// Share of the pixel posterior's variance in the first estimate of C, and the observations, one in so
-/// many, whose posterior variance is computed for it.
+/// Share of the pixel posterior's variance in the first estimate of C, and the observations, one in so many, whose
+/// posterior variance is computed for it.
 const POSTERIOR_VARIANCE_SHARE: f64 = 0.5;
 const VARIANCE_SAMPLING: usize = 64;
 /// Range of π.
@@ -47,16 +46,15 @@ const MIN_OBSERVATIONS_PER_WEIGHT: usize = 4;
 /// Classes of observations with regressions of their own.
 const CLASSES: usize = PHASES * CHANNELS;
 
-fn class(observation: &Observation, channel: usize) -> usize {
-    observation.phase * CHANNELS + channel
+fn class(region: &PosteriorMeans<'_>, location: ObservationLocation) -> usize {
+    region.equations.observations[location.index].phase * CHANNELS + location.channel
 }
 
 /// The prior given the neighbours.
 #[derive(Clone, Debug)]
 pub(super) struct NeighbourPrior {
     rank: usize,
-    offsets: Vec<NeighbourOffset>,
-    /// w, `[phase, channel][1 + neighbour, r]`, first the constant.
+    /// w, `[phase, channel][predictor, r]`, first the constant.
     weights: Vec<Vec<f64>>,
     /// C⁻¹.
     precision: PriorPrecision,
@@ -67,7 +65,7 @@ pub(super) struct NeighbourPrior {
 /// Sufficient statistics of one E step.
 #[derive(Debug)]
 struct NeighbourStatistics {
-    /// Σ z_jk ẑ_k by class, `[1 + neighbour, r]`.
+    /// Σ z_jk ẑ_k by class, `[predictor, r]`.
     right_hand_sides: Vec<Vec<f64>>,
     /// Σ q ((ẑ − m)(ẑ − m)ᵀ + P), upper triangle.
     second_moment: Vec<f64>,
@@ -84,21 +82,17 @@ impl NeighbourPrior {
         executor: &impl Executor,
     ) -> Option<Self> {
         let rank = prior.rank;
-        let offsets = NeighbourOffset::all();
         let parts = executor.map(PARTS, |part| {
-            let mut sums = vec![RegressionSums::new(offsets.len(), rank); CLASSES];
+            let mut sums = vec![RegressionSums::new(rank); CLASSES];
             let mut count = 0usize;
             for region in regions.iter().skip(part).step_by(PARTS) {
                 vectorise(
                     #[inline(always)]
                     || {
-                        for location in region.interior_locations() {
-                            if region.is_bright[location.index] {
-                                let observation = &region.equations.observations[location.index];
-                                sums[class(observation, location.channel)]
-                                    .add(region, &offsets, location);
-                                count += 1;
-                            }
+                        for location in region.bright_locations() {
+                            let target = region.mean(location.index);
+                            sums[class(region, location)].add(region, location, target);
+                            count += 1;
                         }
                     },
                 );
@@ -106,15 +100,13 @@ impl NeighbourPrior {
             (sums, count)
         });
         let count: usize = parts.iter().map(|(_, count)| count).sum();
-        let width = 1 + offsets.len();
-        if count < MIN_OBSERVATIONS_PER_WEIGHT * width * CLASSES {
+        if count < MIN_OBSERVATIONS_PER_WEIGHT * PREDICTORS * CLASSES {
             return None;
         }
-        let mut sums = vec![RegressionSums::new(offsets.len(), rank); CLASSES];
+        let mut sums = vec![RegressionSums::new(rank); CLASSES];
         for (part, _) in &parts {
-            sums.iter_mut()
-                .zip(part)
-                .for_each(|(sum, part)| sum.merge(part));
+            let sums = sums.iter_mut().zip(part);
+            sums.for_each(|(sum, part)| sum.merge(part));
         }
         drop(parts);
         let factors = executor.map(CLASSES, |i| sums[i].cholesky_factors());
@@ -127,7 +119,6 @@ impl NeighbourPrior {
         let mut learned = Self {
             rank,
             weights: solve(&sides),
-            offsets,
             precision: prior.precision.clone(),
             mixing_share: 0.5,
         };
@@ -147,25 +138,24 @@ impl NeighbourPrior {
         Some(learned)
     }
 
-    /// The first estimate of C⁻¹: from the prediction errors of the posterior means, and part of the
-    /// variance that these means have themselves.
+    /// The first estimate of C⁻¹: from the prediction errors of the posterior means, and part of the variance that these
+    /// means have themselves.
     fn first_precision(&self, regions: &[PosteriorMeans<'_>], prior: &Prior) -> PriorPrecision {
         let rank = self.rank;
         let mut covariance = vec![0.0; rank * rank];
         let mut variance = vec![0.0; rank];
         let (mut count, mut sampled) = (0.0, 0.0);
         let mut solver = PosteriorSolver::new(rank);
-        let mut mean = vec![0.0; rank];
         for region in regions {
             for (i, location) in region.interior_locations().enumerate() {
                 let index = location.index;
                 if !region.is_bright[index] {
                     continue;
                 }
-                self.predict(region, location, &mut mean);
-                let errors = region.mean(index).iter().zip(&mean);
+                let mean = self.predict(region, location);
+                let errors = region.mean(index).iter().zip(mean);
                 let error: Vec<f64> = errors.map(|(z, m)| z - m).collect();
-                add_outer(&mut covariance, 1.0, &error);
+                add_outer(&mut covariance, &error);
                 count += 1.0;
                 if i % VARIANCE_SAMPLING == 0 {
                     prior.infer(region.equations, index, &mut solver);
@@ -175,9 +165,8 @@ impl NeighbourPrior {
                 }
             }
         }
-        covariance
-            .iter_mut()
-            .for_each(|c| *c /= f64::max(count, 1.0));
+        let count = f64::max(count, 1.0);
+        covariance.iter_mut().for_each(|c| *c /= count);
         for k in 0..rank {
             let mean_variance = variance[k] / f64::max(sampled, 1.0);
             covariance[k * rank + k] += POSTERIOR_VARIANCE_SHARE * mean_variance;
@@ -188,36 +177,31 @@ impl NeighbourPrior {
 
     /// m, the prediction of an observation from its neighbours.
     #[inline(always)]
-    fn predict(&self, means: &PosteriorMeans<'_>, location: ObservationLocation, mean: &mut [f64]) {
-        let observation = &means.equations.observations[location.index];
-        let weights = &self.weights[class(observation, location.channel)];
-        let mut rows = weights.chunks_exact(self.rank);
-        if let Some(constant) = rows.next() {
-            mean.copy_from_slice(constant);
+    fn predict(&self, means: &PosteriorMeans<'_>, location: ObservationLocation) -> Vec<f64> {
+        let rank = self.rank;
+        let weights = &self.weights[class(means, location)];
+        let mut mean = vec![0.0; rank];
+        for (j, z) in means.predictors(location) {
+            add_products(&mut mean, &weights[j * rank..][..rank], z);
         }
-        for (offset, weights) in self.offsets.iter().zip(rows) {
-            if let Some(z) = means.neighbour(location, offset) {
-                add_products(mean, weights, z);
-            }
-        }
+        mean
     }
 
-    /// Leaves the prediction m of an observation in `mean` and its posterior in `solver`; returns its responsibility q.
+    /// Leaves the posterior of an observation in `solver`; returns its responsibility q and its prediction m.
     #[inline(always)]
     pub fn infer(
         &self,
         means: &PosteriorMeans<'_>,
         noise: f64,
         location: ObservationLocation,
-        mean: &mut [f64],
         solver: &mut PosteriorSolver,
-    ) -> f64 {
+    ) -> (f64, Vec<f64>) {
         let index = location.index;
-        self.predict(means, location, mean);
-        let log_evidence = solver.infer(means.equations, index, noise, &self.precision, mean);
+        let mean = self.predict(means, location);
+        let log_evidence = solver.infer(means.equations, index, noise, &self.precision, &mean);
         let prior_log_odds = (self.mixing_share / (1.0 - self.mixing_share)).ln();
         let log_odds = prior_log_odds + log_evidence - means.log_evidence[index];
-        1.0 / (1.0 + (-log_odds).exp())
+        (1.0 / (1.0 + (-log_odds).exp()), mean)
     }
 
     /// The E step over all regions.
@@ -227,9 +211,8 @@ impl NeighbourPrior {
         noise: f64,
         executor: &impl Executor,
     ) -> NeighbourStatistics {
-        let width = 1 + self.offsets.len();
         let parts = executor.map(PARTS, |part| {
-            let mut sums = NeighbourStatistics::new(width, self.rank);
+            let mut sums = NeighbourStatistics::new(self.rank);
             for region in regions.iter().skip(part).step_by(PARTS) {
                 vectorise(
                     #[inline(always)]
@@ -238,7 +221,7 @@ impl NeighbourPrior {
             }
             sums
         });
-        let mut total = NeighbourStatistics::new(width, self.rank);
+        let mut total = NeighbourStatistics::new(self.rank);
         parts.iter().for_each(|part| total.merge(part));
         total
     }
@@ -247,51 +230,34 @@ impl NeighbourPrior {
     fn add_region(&self, region: &PosteriorMeans<'_>, noise: f64, sums: &mut NeighbourStatistics) {
         let rank = self.rank;
         let mut solver = PosteriorSolver::new(rank);
-        let (mut mean, mut error) = (vec![0.0; rank], vec![0.0; rank]);
-        for location in region.interior_locations() {
-            if !region.is_bright[location.index] {
-                continue;
-            }
-            let q = self.infer(region, noise, location, &mut mean, &mut solver);
+        for location in region.bright_locations() {
+            let (q, mean) = self.infer(region, noise, location, &mut solver);
             solver.compute_covariance();
-            for k in 0..rank {
-                error[k] = solver.mean[k] - mean[k];
-            }
-            for i in 0..rank {
-                let row = i * rank + i..(i + 1) * rank;
-                let moment = &mut sums.second_moment[row.clone()];
-                add_scaled(moment, q * error[i], &error[i..]);
-                add_scaled(moment, q, &solver.covariance[row]);
-            }
+            let errors = solver.mean.iter().zip(mean);
+            let error: Vec<f64> = errors.map(|(z, m)| z - m).collect();
+            solver.add_second_moment(&mut sums.second_moment, q, &error);
             sums.responsibility += q;
             sums.count += 1.0;
-            let observation = &region.equations.observations[location.index];
-            let sides = &mut sums.right_hand_sides[class(observation, location.channel)];
-            let mut rows = sides.chunks_exact_mut(rank);
-            if let Some(constant) = rows.next() {
-                add_scaled(constant, 1.0, &solver.mean);
-            }
-            for (offset, row) in self.offsets.iter().zip(rows) {
-                if let Some(z) = region.neighbour(location, offset) {
-                    add_products(row, z, &solver.mean);
-                }
+            let sides = &mut sums.right_hand_sides[class(region, location)];
+            for (j, z) in region.predictors(location) {
+                add_products(&mut sides[j * rank..][..rank], z, &solver.mean);
             }
         }
     }
 }
 
-/// `sum += factor · x xᵀ`, upper triangle.
-fn add_outer(sum: &mut [f64], factor: f64, x: &[f64]) {
+/// `sum += x xᵀ`, upper triangle.
+fn add_outer(sum: &mut [f64], x: &[f64]) {
     let n = x.len();
     for i in 0..n {
-        add_scaled(&mut sum[i * n + i..(i + 1) * n], factor * x[i], &x[i..]);
+        add_scaled(&mut sum[i * n + i..(i + 1) * n], x[i], &x[i..]);
     }
 }
 
 impl NeighbourStatistics {
-    fn new(width: usize, rank: usize) -> Self {
+    fn new(rank: usize) -> Self {
         Self {
-            right_hand_sides: vec![vec![0.0; width * rank]; CLASSES],
+            right_hand_sides: vec![vec![0.0; PREDICTORS * rank]; CLASSES],
             second_moment: vec![0.0; rank * rank],
             responsibility: 0.0,
             count: 0.0,
@@ -299,11 +265,8 @@ impl NeighbourStatistics {
     }
 
     fn merge(&mut self, other: &Self) {
-        for (sum, other) in self
-            .right_hand_sides
-            .iter_mut()
-            .zip(&other.right_hand_sides)
-        {
+        let sides = self.right_hand_sides.iter_mut();
+        for (sum, other) in sides.zip(&other.right_hand_sides) {
             add_scaled(sum, 1.0, other);
         }
         add_scaled(&mut self.second_moment, 1.0, &other.second_moment);
@@ -314,7 +277,7 @@ impl NeighbourStatistics {
 
 #[cfg(test)]
 mod tests {
-    use super::super::equations::RegionEquations;
+    use super::super::tests::synthetic_equations;
     use super::*;
     use crate::executor::SequentialExecutor;
     use crate::transport::{Extent, TileRect};
@@ -371,17 +334,12 @@ mod tests {
     fn neighbours_determine_what_a_pixel_measures_poorly() {
         let rect = region(SIDE);
         let z = coefficients(rect);
-        let equations = RegionEquations::synthetic(rect, &GRAM_DIAGONAL, &z, VARIANCE, normal());
+        let equations = synthetic_equations(rect, &GRAM_DIAGONAL, &z, VARIANCE, normal());
         let prior = unit_prior();
-        let means = [PosteriorMeans::new(
-            &equations,
-            rect,
-            &prior,
-            &[0.0; CHANNELS],
-        )];
+        let means = [PosteriorMeans::new(&equations, rect, &prior, &[0.0; 3])];
         let learned = NeighbourPrior::learn(&means, &prior, &SequentialExecutor).unwrap();
 
-        let (mut solver, mut mean) = (PosteriorSolver::new(2), vec![0.0; 2]);
+        let mut solver = PosteriorSolver::new(2);
         let mut errors = [0.0; 2];
         let (mut smooth, mut outliers) = (Vec::new(), Vec::new());
         for (location, pixel) in means[0]
@@ -389,7 +347,7 @@ mod tests {
             .zip(rect.pixels().flat_map(|pixel| [pixel; CHANNELS]))
         {
             let factor = prior.noise_factor;
-            let q = learned.infer(&means[0], factor, location, &mut mean, &mut solver);
+            let (q, _) = learned.infer(&means[0], factor, location, &mut solver);
             match location.channel == 0 && OUTLIERS.contains(&(pixel.x, pixel.y)) {
                 true => outliers.push(q),
                 false => {
@@ -409,27 +367,19 @@ mod tests {
 
     #[test]
     fn too_few_observations_give_no_neighbour_prior() {
-        let rect = region(16);
-        let z = coefficients(rect);
-        let equations = RegionEquations::synthetic(rect, &GRAM_DIAGONAL, &z, VARIANCE, normal());
         let prior = unit_prior();
-        let means = [PosteriorMeans::new(
-            &equations,
-            rect,
-            &prior,
-            &[0.0; CHANNELS],
-        )];
-        assert!(NeighbourPrior::learn(&means, &prior, &SequentialExecutor).is_none());
-        // Nor do dark ones count.
-        let rect = region(SIDE);
-        let z = coefficients(rect);
-        let equations = RegionEquations::synthetic(rect, &GRAM_DIAGONAL, &z, VARIANCE, normal());
-        let means = [PosteriorMeans::new(
-            &equations,
-            rect,
-            &prior,
-            &[2.0; CHANNELS],
-        )];
-        assert!(NeighbourPrior::learn(&means, &prior, &SequentialExecutor).is_none());
+        // Dark observations do not count.
+        for (side, threshold) in [(16, 0.0), (SIDE, 2.0)] {
+            let rect = region(side);
+            let z = coefficients(rect);
+            let equations = synthetic_equations(rect, &GRAM_DIAGONAL, &z, VARIANCE, normal());
+            let means = [PosteriorMeans::new(
+                &equations,
+                rect,
+                &prior,
+                &[threshold; 3],
+            )];
+            assert!(NeighbourPrior::learn(&means, &prior, &SequentialExecutor).is_none());
+        }
     }
 }

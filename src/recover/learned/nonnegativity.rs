@@ -7,17 +7,16 @@
 //! ½(z − ẑ)ᵀK(z − ẑ) + ½w Σ_s (v_sᵀz)²     over the elements s with v_sᵀẑ < 0
 //! ```
 //!
-//! with the posterior precision K, `[r, r]`, which moves the other coefficients such that z still explains
-//! the measurements, and v_s, `[r]`, the basis at element s. A few steps of conjugate gradients,
-//! preconditioned by K, suffice. A penalty instead of a constraint, because a combination of few basis
-//! functions cannot be zero over most of a window.
+//! with the posterior precision K, `[r, r]`, which moves the other coefficients such that z still explains the
+//! measurements, and v_s, `[r]`, the basis at element s. A few steps of conjugate gradients, preconditioned by K,
+//! suffice. A penalty instead of a constraint, because a combination of few basis functions cannot be zero over most of
+//! a window.
 
 use super::basis::LearnedBasis;
-use crate::linalg;
-use crate::linalg::{add_scaled, dot};
+use crate::linalg::{self, add_scaled, dot};
 
-/// Negative light that costs as much as one standard deviation of the posterior, as a share of the mean
-/// function's peak: w = (share · peak)⁻².
+/// Negative light that costs as much as one standard deviation of the posterior, as a share of the mean function's
+/// peak: w = (share · peak)⁻².
 const TOLERATED_NEGATIVE_SHARE: f64 = 0.003;
 /// Steps of conjugate gradients; more change next to nothing.
 const MAX_STEPS: usize = 5;
@@ -32,35 +31,6 @@ pub(super) struct NonNegativityPenalty {
     elements: Vec<f64>,
     /// w.
     weight: f64,
-}
-
-/// Buffers for [`NonNegativityPenalty::apply`]; vectors are `[r]`.
-#[derive(Debug)]
-pub(super) struct PenaltyWorkspace {
-    /// Elements with negative light.
-    negative: Vec<usize>,
-    /// The negative gradient, and K⁻¹ times it.
-    residual: Vec<f64>,
-    preconditioned: Vec<f64>,
-    direction: Vec<f64>,
-    /// K times the direction, updated by recurrence.
-    k_direction: Vec<f64>,
-    /// The Hessian times the direction.
-    h_direction: Vec<f64>,
-}
-
-impl PenaltyWorkspace {
-    pub fn new(rank: usize) -> Self {
-        let vector = || vec![0.0; rank];
-        Self {
-            negative: Vec::new(),
-            residual: vector(),
-            preconditioned: vector(),
-            direction: vector(),
-            k_direction: vector(),
-            h_direction: vector(),
-        }
-    }
 }
 
 impl NonNegativityPenalty {
@@ -80,45 +50,40 @@ impl NonNegativityPenalty {
 
     /// Moves `z`, the mean of a posterior whose precision has the Cholesky factor `factor`, towards the minimum.
     #[inline(always)]
-    pub fn apply(&self, factor: &[f64], z: &mut [f64], workspace: &mut PenaltyWorkspace) {
-        let PenaltyWorkspace {
-            negative,
-            residual,
-            preconditioned,
-            direction,
-            k_direction,
-            h_direction,
-        } = workspace;
-        negative.clear();
-        residual.fill(0.0);
+    pub fn apply(&self, factor: &[f64], z: &mut [f64]) {
+        let mut negative = Vec::new();
+        // The negative gradient, and K⁻¹ times it.
+        let mut residual = vec![0.0; self.rank];
         for (s, v) in self.elements.chunks_exact(self.rank).enumerate() {
             let light = dot(v, z);
             if light < 0.0 {
                 negative.push(s);
-                add_scaled(residual, -self.weight * light, v);
+                add_scaled(&mut residual, -self.weight * light, v);
             }
         }
-        preconditioned.copy_from_slice(residual);
-        linalg::cholesky_solve(factor, preconditioned);
-        direction.copy_from_slice(preconditioned);
-        k_direction.copy_from_slice(residual);
-        let mut gradient = dot(residual, preconditioned);
+        let mut preconditioned = residual.clone();
+        linalg::cholesky_solve(factor, &mut preconditioned);
+        // The direction, K times it (updated by recurrence), and the Hessian times it.
+        let mut direction = preconditioned.clone();
+        let mut k_direction = residual.clone();
+        let mut h_direction = residual.clone();
+        let mut gradient = dot(&residual, &preconditioned);
         let enough = MIN_RELATIVE_GRADIENT * gradient;
         for _ in 0..MAX_STEPS {
             if gradient.is_nan() || gradient <= enough {
                 break;
             }
-            h_direction.copy_from_slice(k_direction);
-            for &s in negative.iter() {
+            h_direction.copy_from_slice(&k_direction);
+            for &s in &negative {
                 let v = self.element(s);
-                add_scaled(h_direction, self.weight * dot(v, direction), v);
+                add_scaled(&mut h_direction, self.weight * dot(v, &direction), v);
             }
-            let step = gradient / dot(direction, h_direction);
-            add_scaled(z, step, direction);
-            add_scaled(residual, -step, h_direction);
-            preconditioned.copy_from_slice(residual);
-            linalg::cholesky_solve(factor, preconditioned);
-            let next = dot(residual, preconditioned);
+            let step = gradient / dot(&direction, &h_direction);
+            add_scaled(z, step, &direction);
+            add_scaled(&mut residual, -step, &h_direction);
+            preconditioned.copy_from_slice(&residual);
+            linalg::cholesky_solve(factor, &mut preconditioned);
+            let next = dot(&residual, &preconditioned);
             let ratio = next / gradient;
             gradient = next;
             for k in 0..self.rank {
@@ -158,7 +123,7 @@ mod tests {
         linalg::cholesky(&mut factor, rank).unwrap();
         let start: Vec<f64> = (50..50 + rank).map(pseudo_random).collect();
         let mut z = start.clone();
-        penalty.apply(&factor, &mut z, &mut PenaltyWorkspace::new(rank));
+        penalty.apply(&factor, &mut z);
 
         let mut system = precision;
         let mut right = vec![0.0; rank];
@@ -189,7 +154,7 @@ mod tests {
         let functions: Vec<f64> = (0..18).map(|i| 0.1 + pseudo_random(i).abs()).collect();
         let penalty = NonNegativityPenalty::new(&LearnedBasis::new(&functions, &[0.5; 9]));
         let mut z = vec![0.7, 0.2];
-        penalty.apply(&[1.0, 0.0, 0.0, 1.0], &mut z, &mut PenaltyWorkspace::new(2));
+        penalty.apply(&[1.0, 0.0, 0.0, 1.0], &mut z);
         assert_eq!(z, [0.7, 0.2]);
     }
 }

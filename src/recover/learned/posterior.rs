@@ -9,9 +9,7 @@
 //! ```
 
 use super::equations::RegionEquations;
-use super::nonnegativity::{NonNegativityPenalty, PenaltyWorkspace};
-use crate::linalg;
-use crate::linalg::dot;
+use crate::linalg::{self, add_scaled, dot};
 
 /// Smallest variance along any direction, as a share of the mean variance: keeps the inverse finite.
 const MIN_VARIANCE_SHARE: f64 = 1e-9;
@@ -26,30 +24,24 @@ pub(super) struct PriorPrecision {
 }
 
 impl PriorPrecision {
-    /// Inverts a covariance, `[r, r]`. A ridge on its diagonal grows until it is positive definite.
+    /// Inverts a covariance, `[r, r]`, made positive definite by a ridge.
     pub fn new(covariance: &[f64], rank: usize) -> Self {
         let trace: f64 = (0..rank).map(|k| covariance[k * rank + k].abs()).sum();
-        let mut ridge = (trace / rank as f64 * MIN_VARIANCE_SHARE).max(f64::MIN_POSITIVE);
-        loop {
-            let mut u = covariance.to_vec();
-            (0..rank).for_each(|k| u[k * rank + k] += ridge);
-            if let Some(covariance_log_det) = linalg::cholesky(&mut u, rank) {
-                let mut matrix = vec![0.0; rank * rank];
-                linalg::cholesky_inverse(&u, rank, &mut vec![0.0; rank * rank], &mut matrix);
-                linalg::mirror_upper(&mut matrix, rank);
-                return Self {
-                    matrix,
-                    covariance_log_det,
-                };
-            }
-            if !ridge.is_finite() {
-                // The covariance has a NaN: use a prior without information.
-                return Self {
-                    matrix: vec![0.0; rank * rank],
-                    covariance_log_det: f64::INFINITY,
-                };
-            }
-            ridge = (ridge * 10.0).max(1e-300);
+        let ridge = trace / rank as f64 * MIN_VARIANCE_SHARE;
+        let mut matrix = vec![0.0; rank * rank];
+        let Some((u, covariance_log_det)) = linalg::cholesky_with_ridge(covariance, rank, ridge)
+        else {
+            // A prior without information.
+            return Self {
+                matrix,
+                covariance_log_det: f64::INFINITY,
+            };
+        };
+        linalg::cholesky_inverse(&u, rank, &mut vec![0.0; rank * rank], &mut matrix);
+        linalg::mirror_upper(&mut matrix, rank);
+        Self {
+            matrix,
+            covariance_log_det,
         }
     }
 }
@@ -58,14 +50,13 @@ impl PriorPrecision {
 #[derive(Debug)]
 pub(super) struct PosteriorSolver {
     /// Cholesky factor of K, `[r, r]`.
-    factor: Vec<f64>,
+    pub factor: Vec<f64>,
     scratch: Vec<f64>,
     /// K⁻¹, `[r, r]`, upper triangle; valid after [`compute_covariance`](Self::compute_covariance).
     pub covariance: Vec<f64>,
     /// `BᵀB m` or `BᵀB ẑ`, `[r]`.
     product: Vec<f64>,
     gradient: Vec<f64>,
-    penalty: PenaltyWorkspace,
     /// ẑ, `[r]`.
     pub mean: Vec<f64>,
 }
@@ -79,7 +70,6 @@ impl PosteriorSolver {
             covariance: matrix,
             product: vector.clone(),
             gradient: vector.clone(),
-            penalty: PenaltyWorkspace::new(rank),
             mean: vector,
         }
     }
@@ -98,17 +88,14 @@ impl PosteriorSolver {
         let rank = equations.rank;
         let observation = &equations.observations[index];
         let (gram, right) = (equations.gram(index), equations.right_hand_side(index));
-        let variance = observation.variance * noise;
-        let (a, b) = (
-            observation.scale * observation.scale / variance,
-            observation.scale / variance,
-        );
+        let (f, variance) = (observation.scale, observation.variance * noise);
+        let (a, b) = (f * f / variance, f / variance);
         for ((x, p), g) in self.factor.iter_mut().zip(&prior.matrix).zip(gram) {
             *x = p + a * g;
         }
         linalg::multiply_vector(gram, prior_mean, &mut self.product);
         for k in 0..rank {
-            self.gradient[k] = b * (right[k] - observation.scale * self.product[k]);
+            self.gradient[k] = b * (right[k] - f * self.product[k]);
         }
         let quadratic = a * dot(prior_mean, &self.product) - 2.0 * b * dot(prior_mean, right);
         self.mean.copy_from_slice(&self.gradient);
@@ -125,17 +112,23 @@ impl PosteriorSolver {
         -0.5 * (quadratic - explained + log_det + prior.covariance_log_det)
     }
 
-    /// Moves `z`, a point near the mean of the posterior just inferred, by the non-negativity penalty.
-    #[inline(always)]
-    pub fn apply_penalty(&mut self, penalty: &NonNegativityPenalty, z: &mut [f64]) {
-        penalty.apply(&self.factor, z, &mut self.penalty);
-    }
-
     /// Computes the covariance of the posterior just inferred.
     #[inline(always)]
     pub fn compute_covariance(&mut self) {
         let rank = self.mean.len();
         linalg::cholesky_inverse(&self.factor, rank, &mut self.scratch, &mut self.covariance);
+    }
+
+    /// Adds `factor · (xxᵀ + K⁻¹)` to `sum`, `[r, r]`, upper triangle, after
+    /// [`compute_covariance`](Self::compute_covariance).
+    #[inline(always)]
+    pub fn add_second_moment(&self, sum: &mut [f64], factor: f64, x: &[f64]) {
+        let rank = x.len();
+        for i in 0..rank {
+            let row = i * rank + i..(i + 1) * rank;
+            add_scaled(&mut sum[row.clone()], factor * x[i], &x[i..]);
+            add_scaled(&mut sum[row.clone()], factor, &self.covariance[row]);
+        }
     }
 
     /// E‖y − f B z‖² under the posterior just inferred, whose covariance has been computed.

@@ -7,11 +7,17 @@ use crate::linalg::vectorise;
 use crate::transport::{CHANNELS, Extent, TileRect};
 
 /// Largest distance, along each axis, of a neighbour that predicts a pixel.
-pub(super) const NEIGHBOURHOOD_RADIUS: i32 = 2;
+pub(in crate::recover) const NEIGHBOURHOOD_RADIUS: u32 = 2;
+/// Side of the square of neighbours.
+const NEIGHBOURHOOD_SIDE: usize = 2 * NEIGHBOURHOOD_RADIUS as usize + 1;
+/// Predictors of an observation: a constant; in the same channel, all pixels in the square neighbourhood but the pixel
+/// itself; in the other channels, those in the same row or column, and the pixel itself.
+pub(super) const PREDICTORS: usize =
+    NEIGHBOURHOOD_SIDE * NEIGHBOURHOOD_SIDE + (CHANNELS - 1) * (2 * NEIGHBOURHOOD_SIDE - 1);
 
-/// Offset from an observation to one that predicts it.
+/// Offset from an observation to a neighbour that predicts it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct NeighbourOffset {
+struct NeighbourOffset {
     dx: i32,
     dy: i32,
     /// Added to the channel, modulo [`CHANNELS`].
@@ -19,26 +25,18 @@ pub(super) struct NeighbourOffset {
 }
 
 impl NeighbourOffset {
-    /// In the same channel, all pixels in the square neighbourhood; in the other channels, those in
-    /// the same row or column, and the pixel itself.
-    pub fn all() -> Vec<Self> {
-        let mut offsets = Vec::new();
-        let range = -NEIGHBOURHOOD_RADIUS..=NEIGHBOURHOOD_RADIUS;
-        for (dy, dx) in range
+    fn all() -> impl Iterator<Item = Self> {
+        let radius = NEIGHBOURHOOD_RADIUS as i32;
+        let range = -radius..=radius;
+        let places = range
             .clone()
-            .flat_map(|dy| range.clone().map(move |dx| (dy, dx)))
-        {
-            for channel in 0..CHANNELS {
-                let is_predictor = match channel {
-                    0 => (dx, dy) != (0, 0),
-                    _ => dx == 0 || dy == 0,
-                };
-                if is_predictor {
-                    offsets.push(Self { dx, dy, channel });
-                }
-            }
-        }
-        offsets
+            .flat_map(move |dy| range.clone().map(move |dx| (dx, dy)));
+        let offsets =
+            places.flat_map(|(dx, dy)| (0..CHANNELS).map(move |channel| Self { dx, dy, channel }));
+        offsets.filter(|offset| match offset.channel {
+            0 => (offset.dx, offset.dy) != (0, 0),
+            _ => offset.dx == 0 || offset.dy == 0,
+        })
     }
 }
 
@@ -58,15 +56,16 @@ pub(super) struct ObservationLocation {
 pub(super) struct PosteriorMeans<'a> {
     pub equations: &'a RegionEquations,
     /// The pixels whose neighbours all lie in the region, unless the picture ends there.
-    pub interior: TileRect,
+    interior: TileRect,
     /// ẑ, `[pixel, channel, r]`.
-    pub means: Vec<f64>,
-    /// The same, but zero where an observation is not bright: what neighbours see.
-    pub bright_means: Vec<f64>,
+    means: Vec<f64>,
     /// ln p(y) up to a constant, `[pixel, channel]`.
     pub log_evidence: Vec<f64>,
     /// Whether an observation counts in training, `[pixel, channel]`.
     pub is_bright: Vec<bool>,
+    offsets: Vec<NeighbourOffset>,
+    /// The constant predictor, `[r]`.
+    ones: Vec<f64>,
 }
 
 impl<'a> PosteriorMeans<'a> {
@@ -82,9 +81,12 @@ impl<'a> PosteriorMeans<'a> {
             equations,
             interior,
             means: Vec::with_capacity(count * rank),
-            bright_means: Vec::with_capacity(count * rank),
             log_evidence: Vec::with_capacity(count),
-            is_bright: Vec::with_capacity(count),
+            is_bright: (0..count)
+                .map(|i| equations.is_bright(i, thresholds))
+                .collect(),
+            offsets: NeighbourOffset::all().collect(),
+            ones: vec![1.0; rank],
         };
         vectorise(
             #[inline(always)]
@@ -92,13 +94,8 @@ impl<'a> PosteriorMeans<'a> {
                 let mut solver = PosteriorSolver::new(rank);
                 for index in 0..count {
                     let log_evidence = prior.infer(equations, index, &mut solver);
-                    let is_bright = equations.is_bright(index, thresholds);
                     all.means.extend_from_slice(&solver.mean);
-                    let factor = if is_bright { 1.0 } else { 0.0 };
-                    all.bright_means
-                        .extend(solver.mean.iter().map(|z| factor * z));
                     all.log_evidence.push(log_evidence);
-                    all.is_bright.push(is_bright);
                 }
             },
         );
@@ -111,22 +108,42 @@ impl<'a> PosteriorMeans<'a> {
         &self.means[index * rank..(index + 1) * rank]
     }
 
-    /// Posterior mean of a neighbour, `[r]`, zero if it is not bright; `None` outside the region.
+    /// The predictors of an observation, each with its number below [`PREDICTORS`]: a constant 1, and the posterior means
+    /// of its bright neighbours, `[r]`.
     #[inline(always)]
-    pub fn neighbour(
+    pub fn predictors(
         &self,
         location: ObservationLocation,
-        offset: &NeighbourOffset,
-    ) -> Option<&[f64]> {
-        let (rank, Extent { width, height }) = (self.equations.rank, self.equations.rect.extent);
-        let (x, y) = (location.x as i32 + offset.dx, location.y as i32 + offset.dy);
-        let (x, y) = (u32::try_from(x).ok()?, u32::try_from(y).ok()?);
-        if x >= width || y >= height {
-            return None;
-        }
-        let pixel = (y * width + x) as usize;
-        let index = pixel * CHANNELS + (location.channel + offset.channel) % CHANNELS;
-        Some(&self.bright_means[index * rank..(index + 1) * rank])
+    ) -> impl Iterator<Item = (usize, &[f64])> {
+        let neighbours = self
+            .offsets
+            .iter()
+            .zip(1..)
+            .filter_map(move |(offset, j)| Some((j, self.neighbour(location, offset)?)));
+        std::iter::once((0, &self.ones[..])).chain(neighbours)
+    }
+
+    /// Posterior mean of a neighbour, `[r]`; `None` outside the region and if it is not bright.
+    #[inline(always)]
+    fn neighbour(&self, location: ObservationLocation, offset: &NeighbourOffset) -> Option<&[f64]> {
+        let Extent { width, height } = self.equations.rect.extent;
+        let x = location
+            .x
+            .checked_add_signed(offset.dx)
+            .filter(|&x| x < width)?;
+        let y = location
+            .y
+            .checked_add_signed(offset.dy)
+            .filter(|&y| y < height)?;
+        let channel = (location.channel + offset.channel) % CHANNELS;
+        let index = (y * width + x) as usize * CHANNELS + channel;
+        self.is_bright[index].then(|| self.mean(index))
+    }
+
+    /// The bright observations of the interior.
+    pub fn bright_locations(&self) -> impl Iterator<Item = ObservationLocation> {
+        let locations = self.interior_locations();
+        locations.filter(|location| self.is_bright[location.index])
     }
 
     /// The observations of the interior, `[pixel, channel]`.

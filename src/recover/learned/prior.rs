@@ -11,8 +11,7 @@
 use super::equations::{BrightnessThresholds, PHASES, RegionEquations};
 use super::posterior::{PosteriorSolver, PriorPrecision};
 use crate::executor::Executor;
-use crate::linalg;
-use crate::linalg::{add_scaled, vectorise};
+use crate::linalg::{self, add_scaled, vectorise};
 
 /// If at least one in so many observations has a full window, the others are left out.
 const FULL_WINDOW_RATIO: usize = 4;
@@ -81,8 +80,8 @@ impl Prior {
         thresholds: &BrightnessThresholds,
         executor: &impl Executor,
     ) {
-        // An observation whose window is partly outside the light plane determines little of its
-        // function and slows EM down.
+        // An observation whose window is partly outside the light plane determines little of its function and slows EM
+        // down.
         let observations = || regions.iter().flat_map(|region| &region.observations);
         let full = observations().filter(|o| o.has_full_window).count();
         let only_full = FULL_WINDOW_RATIO * full >= observations().count();
@@ -105,9 +104,8 @@ impl Prior {
         thresholds: &BrightnessThresholds,
         only_full: bool,
     ) -> PriorStatistics {
-        let rank = self.rank;
-        let mut sums = PriorStatistics::new(rank);
-        let mut solver = PosteriorSolver::new(rank);
+        let mut sums = PriorStatistics::new(self.rank);
+        let mut solver = PosteriorSolver::new(self.rank);
         for (index, observation) in region.observations.iter().enumerate() {
             if !region.is_bright(index, thresholds) || only_full && !observation.has_full_window {
                 continue;
@@ -116,12 +114,7 @@ impl Prior {
             solver.compute_covariance();
             sums.counts[observation.phase] += 1.0;
             add_scaled(&mut sums.sums[observation.phase], 1.0, &solver.mean);
-            for i in 0..rank {
-                let row = i * rank + i..(i + 1) * rank;
-                let moment = &mut sums.second_moment[row.clone()];
-                add_scaled(moment, solver.mean[i], &solver.mean[i..]);
-                add_scaled(moment, 1.0, &solver.covariance[row]);
-            }
+            solver.add_second_moment(&mut sums.second_moment, 1.0, &solver.mean);
             sums.squared_residual +=
                 solver.expected_squared_residual(region, index) / observation.variance;
             sums.measurements += observation.count as f64;

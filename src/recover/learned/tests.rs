@@ -1,7 +1,7 @@
-//! LearnedRecovery recovery of synthetic objects whose light transport functions are known.
+//! Learned recovery of synthetic objects whose light transport functions are known.
 
 use super::basis::LearnedBasis;
-use super::equations::RegionEquations;
+use super::equations::{Observation, RegionEquations};
 use super::posterior::{PosteriorSolver, PriorPrecision};
 use super::*;
 use crate::capture::{NoiseModel, Pattern, RowSet};
@@ -153,13 +153,64 @@ fn snr(tiles: &[TransportFunctions], tau: &[[f64; CHANNELS]]) -> f64 {
     10.0 * (signal / error).log10()
 }
 
+fn preparation<'a, E: Executor>(
+    measurements: &'a Measurements,
+    split: &'a HoldoutSplit,
+    executor: &'a E,
+) -> Preparation<'a, E> {
+    Preparation {
+        measurements,
+        geometry: geometry(),
+        split,
+        executor,
+    }
+}
+
 fn learn(
     measurements: &Measurements,
     executor: &impl Executor,
 ) -> Result<LearnedRecovery, RecoverError> {
     let split = HoldoutSplit::new(measurements);
-    let mean = pooled::mean_function(measurements, &geometry(), &split, executor)?;
-    LearnedRecovery::new(measurements, geometry(), split, &mean, executor)
+    let preparation = preparation(measurements, &split, executor);
+    let mean = pooled::mean_function(&preparation)?;
+    LearnedRecovery::new(&preparation, &mean)
+}
+
+/// Observations of coefficients `z`, `[pixel, channel, r]`, with brightness 1, one diagonal Gram matrix, `[r]`, and
+/// standard normal numbers `normal` for the noise.
+pub(super) fn synthetic_equations(
+    rect: TileRect,
+    diagonal: &[f64],
+    z: &[f64],
+    variance: f64,
+    mut normal: impl FnMut() -> f64,
+) -> RegionEquations {
+    let rank = diagonal.len();
+    let mut gram = vec![0.0; rank * rank];
+    (0..rank).for_each(|k| gram[k * rank + k] = diagonal[k]);
+    let observations = rect.pixels().flat_map(|pixel| {
+        let observation = Observation {
+            gram: 0,
+            scale: 1.0,
+            variance,
+            power: 0.0,
+            count: rank,
+            phase: (pixel.y % 2 * 2 + pixel.x % 2) as usize,
+            has_full_window: true,
+        };
+        [observation; CHANNELS]
+    });
+    let right_hand_sides = z.iter().enumerate().map(|(i, z)| {
+        let g = diagonal[i % rank];
+        g * z + (variance * g).sqrt() * normal()
+    });
+    RegionEquations {
+        rect,
+        rank,
+        observations: observations.collect(),
+        gram_matrices: vec![gram],
+        right_hand_sides: right_hand_sides.collect(),
+    }
 }
 
 #[test]
@@ -167,23 +218,19 @@ fn learned_recovery_beats_least_squares_with_few_patterns() {
     let geometry = geometry();
     let (measurements, tau) = measurements(20, 7);
     let learned = learn(&measurements, &SequentialExecutor).unwrap();
-    let direct = PixelwiseRecovery::least_squares(
-        &measurements,
-        geometry,
-        &HoldoutSplit::new(&measurements),
-        &SequentialExecutor,
-    )
-    .unwrap();
+    let split = HoldoutSplit::new(&measurements);
+    let preparation = preparation(&measurements, &split, &SequentialExecutor);
+    let direct = PixelwiseRecovery::least_squares(&preparation).unwrap();
     let ours: Vec<_> = geometry
         .tiles()
         .map(|rect| {
-            let tile = learned.tile(&measurements, rect);
+            let tile = learned.tile(&measurements, &split, rect);
             tile.functions(&geometry, Some(learned.basis()))
         })
         .collect();
     let theirs: Vec<_> = geometry
         .tiles()
-        .map(|rect| direct.tile(&measurements, rect))
+        .map(|rect| direct.tile(&measurements, &split.all, rect))
         .collect();
     let (ours, theirs) = (snr(&ours, &tau), snr(&theirs, &tau));
     assert!(ours > theirs + 6.0, "{ours} dB against {theirs} dB");
@@ -207,14 +254,14 @@ fn short_exposures_weigh_less_than_long_ones() {
     let recovered = |measurements: &Measurements| {
         let learned = learn(measurements, &SequentialExecutor).unwrap();
         let split = HoldoutSplit::new(measurements);
-        let direct =
-            PixelwiseRecovery::least_squares(measurements, geometry, &split, &SequentialExecutor)
-                .unwrap();
+        let preparation = preparation(measurements, &split, &SequentialExecutor);
+        let direct = PixelwiseRecovery::least_squares(&preparation).unwrap();
         let learned = geometry.tiles().map(|rect| {
-            let tile = learned.tile(measurements, rect);
+            let tile = learned.tile(measurements, &split, rect);
             tile.functions(&geometry, Some(learned.basis()))
         });
-        let direct = geometry.tiles().map(|rect| direct.tile(measurements, rect));
+        let tiles = geometry.tiles();
+        let direct = tiles.map(|rect| direct.tile(measurements, &split.all, rect));
         [learned.collect::<Vec<_>>(), direct.collect()].map(|tiles| snr(&tiles, &tau))
     };
     let known = recovered(&measurements);
@@ -234,9 +281,10 @@ fn execution_order_does_not_change_the_result() {
     let other = learn(&measurements, &ReverseOrder).unwrap();
     assert_eq!(one.basis(), other.basis());
     let rect = geometry.tile(1);
+    let split = HoldoutSplit::new(&measurements);
     match (
-        one.tile(&measurements, rect),
-        other.tile(&measurements, rect),
+        one.tile(&measurements, &split, rect),
+        other.tile(&measurements, &split, rect),
     ) {
         (RecoveredTile::Factored(a), RecoveredTile::Factored(b)) => assert_eq!(a, b),
         (RecoveredTile::Direct(a), RecoveredTile::Direct(b)) => assert_eq!(a.tau, b.tau),
@@ -255,8 +303,9 @@ fn training_uses_pixels_with_saturated_samples() {
         }
     }
     let learned = learn(&measurements, &SequentialExecutor).unwrap();
+    let split = HoldoutSplit::new(&measurements);
     let tiles = geometry.tiles().map(|rect| {
-        let tile = learned.tile(&measurements, rect);
+        let tile = learned.tile(&measurements, &split, rect);
         tile.functions(&geometry, Some(learned.basis()))
     });
     let snr = snr(&tiles.collect::<Vec<_>>(), &tau);
@@ -296,9 +345,10 @@ fn blending_improves_sparse_unrelated_functions() {
     let measurements = photograph(40, 7, &tau);
     let mut learned = learn(&measurements, &SequentialExecutor).unwrap();
     assert!(learned.nnls.is_some());
+    let split = HoldoutSplit::new(&measurements);
     let recovered = |learned: &LearnedRecovery| -> Vec<_> {
         let tiles = geometry.tiles().map(|rect| {
-            let tile = learned.tile(&measurements, rect);
+            let tile = learned.tile(&measurements, &split, rect);
             tile.functions(&geometry, Some(learned.basis()))
         });
         tiles.collect()

@@ -1,12 +1,12 @@
 //! Training: from all measurements to the learned model.
 //!
-//! 1. [`Training::fit_basis`] starts from smooth variations of the mean function
-//!    ([`initial_prior`](super::initial_prior)), learns the pixel prior over them by
-//!    expectation–maximisation (EM) on small squares spread over the picture, and truncates the basis
-//!    to the smallest candidate rank whose error on held-out patterns is near the least.
-//! 2. [`Training::fit_neighbour_prior`] repeats EM on larger training regions, where neighbours of most
-//!    pixels are known, and learns the neighbour prior there.
-//! 3. [`Training::neighbour_prior_helps`] compares the errors on held-out patterns with and without it.
+//! 1. [`Preparation::fit_basis`] starts from smooth variations of the mean function
+//!    ([`initial_prior`](super::initial_prior)), learns the pixel prior over them by expectation–maximisation (EM) on
+//!    small squares spread over the picture, and truncates the basis to the smallest candidate rank whose error on
+//!    held-out patterns is near the least.
+//! 2. [`Preparation::fit_neighbour_prior`] repeats EM on larger training regions, where neighbours of most pixels are
+//!    known, and learns the neighbour prior there.
+//! 3. [`Preparation::neighbour_prior_helps`] compares the errors on held-out patterns with and without it.
 
 use super::basis::LearnedBasis;
 use super::equations::{RegionEquations, brightness_thresholds, with_margin};
@@ -15,19 +15,18 @@ use super::initial_prior::{MAX_INITIAL_RANK, initial_prior, smooth, truncate_bas
 use super::neighbour_prior::NeighbourPrior;
 use super::nonnegativity::NonNegativityPenalty;
 use super::posterior_means::{NEIGHBOURHOOD_RADIUS, PosteriorMeans};
-use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::recover::error::RecoverError;
-use crate::recover::holdout::HoldoutSplit;
 use crate::recover::pooled;
+use crate::recover::preparation::Preparation;
 use crate::recover::sampling::spread_squares;
-use crate::transport::{Geometry, TileRect, Window};
+use crate::transport::{TileRect, Window};
 
 /// Ranks to choose from; each fills vector registers together with the mean function.
 const CANDIDATE_RANKS: [usize; 3] = [23, 31, 47];
-/// Relative increase of the held-out error up to which a larger rank is preferred. Most of that error is
-/// noise, which tells little of the components that 80 patterns hardly determine. What a smaller basis
-/// cannot represent is lost, but the prior keeps an undetermined component from doing harm.
+/// Relative increase of the held-out error up to which a larger rank is preferred. Most of that error is noise, which
+/// tells little of the components that 80 patterns hardly determine. What a smaller basis cannot represent is lost, but
+/// the prior keeps an undetermined component from doing harm.
 const MAX_ERROR_INCREASE: f64 = 0.02;
 /// EM iterations over the initial basis.
 const INITIAL_EM_ITERATIONS: usize = 20;
@@ -36,44 +35,32 @@ const FINAL_EM_ITERATIONS: usize = 2;
 /// Training regions of the neighbour prior, and their side.
 const MAX_REGIONS: usize = 64;
 const REGION_SIDE_PX: u32 = 16;
-/// Memory for the regions' Gram matrices. Where many windows differ, or saturated samples leave pixels
-/// Gram matrices of their own, there are fewer regions, but at least `MIN_REGIONS`.
+/// Memory for the regions' Gram matrices. Where many windows differ, or saturated samples leave pixels Gram matrices of
+/// their own, there are fewer regions, but at least `MIN_REGIONS`.
 const MAX_GRAM_BYTES: usize = 144 << 20;
 const MIN_REGIONS: usize = 8;
 
 /// The largest rank that training may choose.
-pub(super) fn max_rank(window: Window) -> usize {
-    CANDIDATE_RANKS
-        .into_iter()
-        .fold(0, usize::max)
-        .min(window.area())
+pub(in crate::recover) fn max_rank(window: Window) -> usize {
+    let rank = CANDIDATE_RANKS.into_iter().fold(0, usize::max);
+    rank.min(window.area())
 }
 
-/// Upper estimate of the memory that training takes beside the measurements, in bytes: the equations of
-/// the squares, each pixel and channel with a Gram matrix of its own, or later the regions' Gram matrices
-/// and as much again for the sums of their regressions.
-pub(super) fn max_bytes(window: Window) -> usize {
+/// Upper estimate of the memory that training takes beside the measurements, in bytes: the equations of the squares,
+/// each pixel and channel with a Gram matrix of its own, or later the regions' Gram matrices and as much again for the
+/// sums of their regressions.
+pub(in crate::recover) fn preparation_bytes(window: Window) -> usize {
     let rank = MAX_INITIAL_RANK.min(window.area());
     let squares = pooled::MAX_SAMPLES * rank * rank * size_of::<f64>();
     squares.max(2 * MAX_GRAM_BYTES)
 }
 
-/// What every stage of training uses.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Training<'a, E> {
-    pub measurements: &'a Measurements,
-    pub geometry: Geometry,
-    pub split: &'a HoldoutSplit,
-    pub executor: &'a E,
-}
-
-impl<E: Executor> Training<'_, E> {
+impl<E: Executor> Preparation<'_, E> {
     /// Learns the basis and the pixel prior over it, starting from the mean function, `[S]`.
     ///
     /// # Errors
-    /// [`RecoverError::NoSignal`] where no rank has a finite error, [`RecoverError::Cancelled`] after
-    /// cancellation.
-    pub fn fit_basis(&self, mean_function: &[f64]) -> Result<LearnedModel, RecoverError> {
+    /// [`RecoverError::NoSignal`] where no rank has a finite error, [`RecoverError::Cancelled`] after cancellation.
+    pub(super) fn fit_basis(&self, mean_function: &[f64]) -> Result<LearnedModel, RecoverError> {
         let side = self.geometry.window.side() as usize;
         let mean = smooth(mean_function, side);
         let (functions, mut prior) = initial_prior(&mean, side, self.executor);
@@ -114,13 +101,13 @@ impl<E: Executor> Training<'_, E> {
         chosen.map(|(_, model)| model).ok_or(RecoverError::NoSignal)
     }
 
-    /// The training regions of the neighbour prior, as many as there is memory for, without the border
-    /// that holds their outer neighbours.
-    pub fn regions(&self, rank: usize) -> Vec<TileRect> {
+    /// The training regions of the neighbour prior, as many as there is memory for, without the border that holds their
+    /// outer neighbours.
+    pub(super) fn training_regions(&self, rank: usize) -> Vec<TileRect> {
         let regions = spread_squares(self.measurements, REGION_SIDE_PX, MAX_REGIONS);
         let counts = self.executor.map(regions.len(), |i| {
-            let (geometry, rect) = (&self.geometry, self.with_neighbours(regions[i]));
-            RegionEquations::count_gram_matrices(self.measurements, geometry, &self.split.all, rect)
+            let (all, rect) = (&self.split.all, self.with_neighbours(regions[i]));
+            RegionEquations::count_gram_matrices(self.measurements, &self.geometry, all, rect)
         });
         let bytes = counts.iter().sum::<usize>() * rank * rank * size_of::<f64>();
         match bytes <= MAX_GRAM_BYTES {
@@ -132,9 +119,9 @@ impl<E: Executor> Training<'_, E> {
         }
     }
 
-    /// Continues EM of the pixel prior on `regions` and learns the neighbour prior, both from the
-    /// patterns `pattern_indices`.
-    pub fn fit_neighbour_prior(
+    /// Continues EM of the pixel prior on `regions` and learns the neighbour prior, both from the patterns
+    /// `pattern_indices`.
+    pub(super) fn fit_neighbour_prior(
         &self,
         model: &mut LearnedModel,
         pattern_indices: &[usize],
@@ -155,7 +142,11 @@ impl<E: Executor> Training<'_, E> {
     }
 
     /// Whether the neighbour prior lowers the error on held-out patterns over `regions`.
-    pub fn neighbour_prior_helps(&self, model: &mut LearnedModel, regions: &[TileRect]) -> bool {
+    pub(super) fn neighbour_prior_helps(
+        &self,
+        model: &mut LearnedModel,
+        regions: &[TileRect],
+    ) -> bool {
         let with = self.held_out_error(model, regions);
         let neighbour_prior = model.neighbour_prior.take();
         let without = self.held_out_error(model, regions);
@@ -169,17 +160,12 @@ impl<E: Executor> Training<'_, E> {
         pattern_indices: &[usize],
         rect: TileRect,
     ) -> RegionEquations {
-        RegionEquations::new(
-            self.measurements,
-            &self.geometry,
-            basis,
-            pattern_indices,
-            rect,
-        )
+        let (measurements, geometry) = (self.measurements, &self.geometry);
+        RegionEquations::new(measurements, geometry, basis, pattern_indices, rect)
     }
 
     fn with_neighbours(&self, rect: TileRect) -> TileRect {
-        with_margin(self.measurements, rect, NEIGHBOURHOOD_RADIUS as u32)
+        with_margin(self.measurements, rect, NEIGHBOURHOOD_RADIUS)
     }
 
     fn held_out_error(&self, model: &LearnedModel, rects: &[TileRect]) -> f64 {
