@@ -84,7 +84,7 @@ impl AnimatedPhoto {
             relighter: CpuRelighter::new(Arc::new(transport(side, rank))),
             lights: Vec::new(),
             frame: 0,
-            picture: Rgba8Picture::black(square(side)),
+            picture: Rgba8Picture::filled(square(side), [0, 0, 0, 255]),
         }
     }
 

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::resample::AreaResampler;
-use super::{LightChroma, fire, math};
+use super::{fire, math};
 use crate::transport::{Extent, Geometry, LightPx};
 
 /// The linear emission of every light element, 0 to 1 at full brightness.
@@ -146,11 +146,10 @@ impl Light {
         let mut elements = Vec::with_capacity(extent.area());
         for v in 0..extent.height {
             for u in 0..extent.width {
-                let [r, g, b] = emission(LightPx {
+                elements.push(element(emission(LightPx {
                     u: f64::from(u) + 0.5,
                     v: f64::from(v) + 0.5,
-                });
-                elements.push([r, g, b, 0.0]);
+                })));
             }
         }
         Self { extent, elements }
@@ -169,8 +168,9 @@ impl Light {
                 extent,
             });
         }
-        check_values(values, 0)?;
-        Ok(Self::from_checked(extent, values))
+        Self::from_linear_rows(extent, extent, |y, row| {
+            row.copy_from_slice(&values[y * row.len()..][..row.len()]);
+        })
     }
 
     /// A light from a light image of any extent, resampled by area. `read_row` fills each row in turn with linear RGB
@@ -187,14 +187,17 @@ impl Light {
         let mut row = vec![0.0; 3 * image.width as usize];
         let mut read_checked = |y: usize, row: &mut [f32]| {
             read_row(y, row);
-            check_values(row, y * image.width as usize)
+            match row.iter().position(|v| !v.is_finite() || *v < 0.0) {
+                Some(bad) => Err(LightError::InvalidValue(y * image.width as usize + bad / 3)),
+                None => Ok(()),
+            }
         };
         // Nothing to resample; usual where a page animates its own light.
         if image == extent {
             let mut elements = Vec::with_capacity(extent.area());
             for y in 0..extent.height as usize {
                 read_checked(y, &mut row)?;
-                elements.extend(row.as_chunks().0.iter().map(|[r, g, b]| [*r, *g, *b, 0.0]));
+                elements.extend(row.as_chunks().0.iter().copied().map(element));
             }
             return Ok(Self { extent, elements });
         }
@@ -203,7 +206,8 @@ impl Light {
             read_checked(y, &mut row)?;
             resampler.add_linear_row(&row);
         }
-        Ok(Self::from_checked(extent, &resampler.finish()))
+        let elements = resampler.finish().map(element).collect();
+        Ok(Self { extent, elements })
     }
 
     /// A light from a light image of any extent, resampled by area. `read_row` fills each row in turn with sRGB codes
@@ -223,15 +227,8 @@ impl Light {
             read_row(y, &mut row);
             resampler.add_srgb_row(&row);
         }
-        Ok(Self::from_checked(extent, &resampler.finish()))
-    }
-
-    fn from_checked(extent: Extent, values: &[f32]) -> Self {
-        let elements = values.chunks_exact(3).map(|p| [p[0], p[1], p[2], 0.0]);
-        Self {
-            extent,
-            elements: elements.collect(),
-        }
+        let elements = resampler.finish().map(element).collect();
+        Ok(Self { extent, elements })
     }
 
     /// A warm Gaussian spot.
@@ -251,18 +248,10 @@ impl Light {
         })
     }
 
-    /// Flames along the lower edge, as a function of time in seconds; it does not repeat. A time that is not finite
-    /// counts as 0.
+    /// Flames along the lower edge at a time in seconds, which do not repeat. A time that is not finite counts as 0.
     pub fn fire(extent: Extent, seconds: f64) -> Self {
-        Self {
-            extent,
-            elements: fire::fire_emission(extent, seconds),
-        }
-    }
-
-    /// The ratio between the channels.
-    pub fn chroma(&self) -> LightChroma {
-        LightChroma::of_rows(std::iter::once(&self.elements[..]))
+        let elements = fire::fire_emission(extent, seconds);
+        Self { extent, elements }
     }
 
     /// Extent of the light plane.
@@ -283,12 +272,8 @@ fn check_extent(image: Extent) -> Result<(), LightError> {
     Ok(())
 }
 
-/// Checks the values of the elements from number `first` on.
-fn check_values(values: &[f32], first: usize) -> Result<(), LightError> {
-    match values.iter().position(|v| !v.is_finite() || *v < 0.0) {
-        Some(bad) => Err(LightError::InvalidValue(first + bad / 3)),
-        None => Ok(()),
-    }
+fn element([r, g, b]: [f32; 3]) -> [f32; 4] {
+    [r, g, b, 0.0]
 }
 
 /// A rainbow over 0..=1, red to violet, in linear RGB: a cosine lobe for each channel.

@@ -1,5 +1,4 @@
-//! Elementary functions in double precision. In WebAssembly they are the browser's own, which keeps them out of the
-//! modules.
+//! Elementary functions in double precision. WebAssembly modules use the browser's, which makes them smaller.
 
 #[cfg(target_arch = "wasm32")]
 pub use js_sys::Math::{cos, pow, sin};

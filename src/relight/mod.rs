@@ -32,7 +32,7 @@ pub mod webgpu;
 pub use light::{BuiltinLight, Light, LightError, TorchPose};
 pub use light_chroma::LightChroma;
 pub use output_transform::{Gamut, OutputTransform, ToneCurve};
-pub use picture::{LinearPicture, Rgba8Picture};
+pub use picture::{LinearPicture, Picture, Rgba8Picture};
 pub use resample::area_resample;
 
 /// How many of `total` things a quality of 0 to 1 uses: at least one, if there is one.

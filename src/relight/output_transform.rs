@@ -144,8 +144,7 @@ pub struct OutputEncoder {
 
 /// Codes in units of 1/256, by the square root of the linear value: over the root the curves are so even that
 /// neighbours differ by a quarter of a code at most.
-#[derive(Debug)]
-struct EncodingTable([u16; (INDEX_MASK + 1) as usize]);
+type EncodingTable = [u16; (INDEX_MASK + 1) as usize];
 
 const TABLE_ENTRIES: usize = 4096;
 /// Twice the entries, so that a masked index needs no bounds check; the second half repeats the last entry.
@@ -157,8 +156,8 @@ impl OutputEncoder {
     /// For one output transform.
     pub fn new(output: &OutputTransform) -> Self {
         static TABLES: [LazyLock<EncodingTable>; 2] = [
-            LazyLock::new(|| EncodingTable::new(ToneCurve::Clip)),
-            LazyLock::new(|| EncodingTable::new(ToneCurve::Filmic)),
+            LazyLock::new(|| encoding_table(ToneCurve::Clip)),
+            LazyLock::new(|| encoding_table(ToneCurve::Filmic)),
         ];
         Self {
             table: &TABLES[usize::from(output.curve == ToneCurve::Filmic)],
@@ -211,7 +210,7 @@ impl OutputEncoder {
             let indices = indices.as_chunks::<CHANNELS>().0;
             for (i, (indices, out)) in indices.iter().zip(out).enumerate() {
                 let [r, g, b] = indices.map(|index| {
-                    let encoded = u32::from(self.table.0[index as usize]);
+                    let encoded = u32::from(self.table[index as usize]);
                     ((encoded + thresholds[i % 8]) >> 8) as u8
                 });
                 *out = [r, g, b, 255];
@@ -220,14 +219,12 @@ impl OutputEncoder {
     }
 }
 
-impl EncodingTable {
-    fn new(curve: ToneCurve) -> Self {
-        Self(std::array::from_fn(|i| {
-            let root = i.min(TABLE_ENTRIES) as f64 / TABLE_ENTRIES as f64;
-            let encoded = srgb_encode(curve.apply(f64::from(curve.white()) * root * root));
-            (encoded * 255.0 * 256.0).round() as u16
-        }))
-    }
+fn encoding_table(curve: ToneCurve) -> EncodingTable {
+    std::array::from_fn(|i| {
+        let root = i.min(TABLE_ENTRIES) as f64 / TABLE_ENTRIES as f64;
+        let encoded = srgb_encode(curve.apply(f64::from(curve.white()) * root * root));
+        (encoded * 255.0 * 256.0).round() as u16
+    })
 }
 
 #[cfg(test)]

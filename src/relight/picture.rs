@@ -2,40 +2,25 @@
 
 use crate::transport::Extent;
 
-/// The picture in linear light, in units of the measurement: R, G, B and an unused fourth value.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LinearPicture {
+/// A picture of the camera grid.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture<P> {
     /// Camera grid.
     pub extent: Extent,
     /// Row by row.
-    pub pixels: Vec<[f32; 4]>,
+    pub pixels: Vec<P>,
 }
+
+/// The picture in linear light, in units of the measurement: R, G, B and an unused fourth value.
+pub type LinearPicture = Picture<[f32; 4]>;
 
 /// An opaque 8-bit picture, ready for a canvas or a PNG file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Rgba8Picture {
-    /// Camera grid.
-    pub extent: Extent,
-    /// Row by row.
-    pub pixels: Vec<[u8; 4]>,
-}
+pub type Rgba8Picture = Picture<[u8; 4]>;
 
-impl LinearPicture {
-    /// A black picture.
-    pub fn black(extent: Extent) -> Self {
-        Self {
-            extent,
-            pixels: vec![[0.0; 4]; extent.area()],
-        }
-    }
-}
-
-impl Rgba8Picture {
-    /// A black picture.
-    pub fn black(extent: Extent) -> Self {
-        Self {
-            extent,
-            pixels: vec![[0, 0, 0, 255]; extent.area()],
-        }
+impl<P: Clone> Picture<P> {
+    /// A picture of one colour.
+    pub fn filled(extent: Extent, pixel: P) -> Self {
+        let pixels = vec![pixel; extent.area()];
+        Self { extent, pixels }
     }
 }

@@ -11,47 +11,41 @@ pub fn relight(transport: &Transport, light: &Light) -> Vec<[f64; CHANNELS]> {
     let geometry = transport.geometry;
     assert_eq!(light.extent(), geometry.light, "extent of the light");
     let (area, rank) = (geometry.window.area(), transport.basis.rank());
+    let emission = |element: Element| -> [f64; CHANNELS] {
+        let m = element.index_in(geometry.light);
+        m.map_or([0.0; CHANNELS], |m| {
+            [0, 1, 2].map(|c| f64::from(light.elements()[m][c]))
+        })
+    };
+    let add = |sum: &mut [f64; CHANNELS], factors: [f32; CHANNELS], values: [f64; CHANNELS]| {
+        (0..CHANNELS).for_each(|c| sum[c] += f64::from(factors[c]) * values[c]);
+    };
     let mut picture = vec![[0.0; CHANNELS]; geometry.camera.area()];
-    // The basis response of the last window origin: neighbours often share it.
-    let mut last_response: Option<(Element, Vec<[f64; CHANNELS]>)> = None;
     for tile in transport.tiles.iter().filter(|tile| !tile.is_dark()) {
+        let slots = if tile.functions.is_dark() { 0 } else { area };
+        let components = if tile.coefficients.is_dark() { 0 } else { rank };
+        // The window's light and the basis response at the last origin, which neighbours often share.
+        let (mut last_origin, mut window, mut response) = (None, Vec::new(), Vec::new());
         for (p, pixel) in tile.rect().pixels().enumerate() {
             let origin = geometry.window_origin(pixel);
-            let emission = |s: usize| -> [f64; CHANNELS] {
-                let element = geometry.window.element(origin, s);
-                let m = element.index_in(geometry.light);
-                m.map_or([0.0; CHANNELS], |m| {
-                    [0, 1, 2].map(|c| f64::from(light.elements()[m][c]))
-                })
-            };
+            if last_origin.replace(origin) != Some(origin) {
+                let elements = (0..area).map(|s| geometry.window.element(origin, s));
+                window = elements.map(emission).collect();
+                let correlate = |function: &Vec<f32>| {
+                    let mut sum = [0.0; CHANNELS];
+                    let pairs = function.iter().zip(&window);
+                    pairs.for_each(|(v, light)| add(&mut sum, [*v; CHANNELS], *light));
+                    sum
+                };
+                let functions = transport.basis.kernels[..components].iter();
+                response = functions.map(correlate).collect();
+            }
             let y = &mut picture[geometry.camera.index(pixel)];
-            let slots = if tile.functions.is_dark() { 0 } else { area };
-            for s in 0..slots {
-                let tau = tile.functions.tau(area, p, s).map(f64::from);
-                let emission = emission(s);
-                (0..CHANNELS).for_each(|c| y[c] += tau[c] * emission[c]);
+            for (s, light) in window[..slots].iter().enumerate() {
+                add(y, tile.functions.tau(area, p, s), *light);
             }
-            if tile.coefficients.is_dark() {
-                continue;
-            }
-            let response = match &mut last_response {
-                Some((of, response)) if *of == origin => response,
-                last => {
-                    let light: Vec<_> = (0..area).map(emission).collect();
-                    let correlate = |function: &Vec<f32>| {
-                        let mut sum = [0.0; CHANNELS];
-                        for (v, light) in function.iter().zip(&light) {
-                            (0..CHANNELS).for_each(|c| sum[c] += f64::from(*v) * light[c]);
-                        }
-                        sum
-                    };
-                    let response = transport.basis.kernels.iter().map(correlate).collect();
-                    &mut last.insert((origin, response)).1
-                }
-            };
             for (k, response) in response.iter().enumerate() {
-                let coefficient = tile.coefficients.coefficient(rank, p, k);
-                (0..CHANNELS).for_each(|c| y[c] += f64::from(coefficient[c]) * response[c]);
+                add(y, tile.coefficients.coefficient(rank, p, k), *response);
             }
         }
     }

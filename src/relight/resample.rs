@@ -17,7 +17,7 @@ pub fn area_resample(values: &[f32], from: Extent, to: Extent) -> Vec<f32> {
     for row in values.chunks_exact(3 * from.width as usize) {
         resampler.add_linear_row(row);
     }
-    resampler.finish()
+    resampler.finish().flatten().collect()
 }
 
 /// [`area_resample`] row by row.
@@ -85,10 +85,9 @@ impl AreaResampler {
         self.next_row += 1;
     }
 
-    /// The light, `[height, width, 3]`, once all rows are added.
-    pub(super) fn finish(self) -> Vec<f32> {
-        let values = self.sums.as_flattened();
-        values.iter().map(|mean| *mean as f32).collect()
+    /// Linear RGB of each element, once all rows are added.
+    pub(super) fn finish(self) -> impl Iterator<Item = [f32; 3]> {
+        self.sums.into_iter().map(|rgb| rgb.map(|mean| mean as f32))
     }
 }
 
@@ -196,7 +195,7 @@ mod tests {
             for row in rgba.chunks(28) {
                 resampler.add_srgb_row(row);
             }
-            for (got, want) in resampler.finish().iter().zip(want) {
+            for (got, want) in resampler.finish().flatten().zip(want) {
                 assert!((got - want).abs() <= 1e-6 * want, "{to}: {got}, not {want}");
             }
         }

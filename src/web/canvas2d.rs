@@ -54,7 +54,7 @@ impl Canvas2dBackend {
         Reflect::set(&settings, &"colorSpace".into(), &space).map_err(lost)?;
         Ok(Self {
             relighter: CpuRelighter::new(transport),
-            picture: Rgba8Picture::black(camera),
+            picture: Rgba8Picture::filled(camera, [0, 0, 0, 255]),
             context,
             gamut,
             settings,
@@ -84,10 +84,6 @@ impl Relighter {
 }
 
 impl Backend for Canvas2dBackend {
-    fn name(&self) -> &'static str {
-        "cpu"
-    }
-
     fn kernel(&self) -> String {
         cpu::KERNEL.into()
     }

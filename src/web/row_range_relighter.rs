@@ -5,7 +5,7 @@ use std::ops::Range;
 use js_sys::{Float32Array, Uint8Array};
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::{CodedError, OutputTransform, Photo};
+use super::{CodedError, Photo, WebOutputTransform};
 use crate::executor::SequentialExecutor;
 use crate::relight::cpu::{self, CpuRelighter, STRIP_ROWS};
 use crate::transport::CHANNELS;
@@ -27,8 +27,8 @@ impl RowRangeRelighter {
     pub fn new(photo: &Photo, first: u32, rows: u32) -> Result<Self, CodedError> {
         let height = photo.geometry().camera.height;
         let end = first.checked_add(rows).filter(|end| *end <= height);
-        let end = end
-            .ok_or_else(|| CodedError::new("internal", "the row range lies outside the picture"))?;
+        let end =
+            end.ok_or_else(|| CodedError::internal("the row range lies outside the picture"))?;
         Ok(Self {
             relighter: CpuRelighter::new(photo.transport()),
             rows: first..end,
@@ -51,75 +51,48 @@ impl RowRangeRelighter {
     pub fn relight(
         &mut self,
         light: Option<Float32Array>,
-        output: &OutputTransform,
+        output: &WebOutputTransform,
         quality: f64,
         out: &Uint8Array,
     ) -> Result<(), CodedError> {
         let geometry = self.relighter.transport().geometry;
         let width = geometry.camera.width;
         if u64::from(out.length()) != 4 * self.rows.len() as u64 * u64::from(width) {
-            return Err(CodedError::new(
-                "internal",
+            return Err(CodedError::internal(
                 "the output has not the row range's length",
             ));
         }
         self.relighter.set_quality(quality as f32);
-        match light {
-            Some(values) => {
-                let light_rows = self.relighter.light_rows();
-                let width = geometry.light.width as usize;
-                if values.length() as usize != CHANNELS * width * light_rows.len() {
-                    return Err(CodedError::new(
-                        "internal",
-                        "the light has not the length of its rows",
-                    ));
-                }
-                let rows = LinearRgbRows {
-                    values,
-                    first: light_rows.start,
-                    rgb: vec![[0.0; CHANNELS]; width],
-                    row: vec![[0.0; 4]; width],
-                };
-                self.relighter.relight_rows(rows, &SequentialExecutor);
+        if let Some(values) = light {
+            let light_rows = self.relighter.light_rows();
+            let mut rgb = vec![[0.0; CHANNELS]; geometry.light.width as usize];
+            let length = rgb.as_flattened().len() as u32;
+            if u64::from(values.length()) != u64::from(length) * light_rows.len() as u64 {
+                return Err(CodedError::internal(
+                    "the light has not the length of its rows",
+                ));
             }
-            None => self.relighter.update(&SequentialExecutor),
+            let mut row = Vec::with_capacity(rgb.len());
+            for (i, v) in (0..).zip(light_rows) {
+                let values = values.subarray(i * length, (i + 1) * length);
+                values.copy_to(rgb.as_flattened_mut());
+                row.clear();
+                row.extend(rgb.iter().map(|[r, g, b]| [*r, *g, *b, 0.0]));
+                self.relighter.set_light_row(v, &row);
+            }
         }
-        let output = output.inner();
+        self.relighter.update(&SequentialExecutor);
         let mut strip = vec![[0; 4]; STRIP_ROWS.min(self.rows.len()) * width as usize];
         for first in self.rows.clone().step_by(STRIP_ROWS) {
             let rows = first..self.rows.end.min(first + STRIP_ROWS as u32);
             let pixels = &mut strip[..rows.len() * width as usize];
             self.relighter
-                .encode_rows(&output, rows.clone(), pixels, &SequentialExecutor);
+                .encode_rows(&output.0, rows.clone(), pixels, &SequentialExecutor);
             let [start, end] =
                 [rows.start, rows.end].map(|row| 4 * (row - self.rows.start) * width);
             out.subarray(start, end).copy_from(pixels.as_flattened());
         }
         Ok(())
-    }
-}
-
-/// Rows of a light in a JavaScript array.
-struct LinearRgbRows {
-    /// Linear RGB.
-    values: Float32Array,
-    /// The first row.
-    first: u32,
-    /// One row in this memory.
-    rgb: Vec<[f32; CHANNELS]>,
-    row: Vec<[f32; 4]>,
-}
-
-impl cpu::LightRows for LinearRgbRows {
-    fn row(&mut self, v: u32) -> &[[f32; 4]] {
-        let values = self.rgb.as_flattened_mut();
-        let length = values.len() as u32;
-        let start = (v - self.first) * length;
-        self.values.subarray(start, start + length).copy_to(values);
-        for (element, [r, g, b]) in self.row.iter_mut().zip(&self.rgb) {
-            *element = [*r, *g, *b, 0.0];
-        }
-        &self.row
     }
 }
 

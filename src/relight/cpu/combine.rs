@@ -11,7 +11,6 @@ pub struct BlockResponse<'a> {
     pub texels: &'a [[f32; QUAD]],
     /// Quads of components of each origin and channel: the tiles' first ones.
     pub quads: usize,
-    /// The ratio between the light's channels.
     pub chroma: LightChroma,
 }
 
@@ -89,7 +88,7 @@ fn combine_span<S: Simd, const LIGHT_CHANNELS: usize>(
     }
 }
 
-/// What the inner loop reads and writes for pixels side by side.
+/// Input and output of the inner loop, for pixels side by side.
 struct SpanPointers<'a> {
     /// `[origin, channel, quad]`.
     texels: *const [f32; QUAD],
@@ -124,9 +123,9 @@ impl SpanPointers<'_> {
                 }
             }
         }
-        let mut sums = [simd.zero_quads(); CHANNELS];
+        let mut sums = [simd.zero_texels(); CHANNELS];
         for q in 0..self.quads {
-            let mut responses = [simd.zero_quads(); LIGHT_CHANNELS];
+            let mut responses = [simd.zero_texels(); LIGHT_CHANNELS];
             for c in 0..LIGHT_CHANNELS {
                 let mut texels = origins[c];
                 for texel in &mut texels {
@@ -134,7 +133,7 @@ impl SpanPointers<'_> {
                     *texel = texel.wrapping_add(q);
                 }
                 // SAFETY: the caller vouches for the texels.
-                responses[c] = unsafe { simd.load_quads(texels) };
+                responses[c] = unsafe { simd.load_texels(texels) };
             }
             for (c, sum) in sums.iter_mut().enumerate() {
                 let response = responses[if LIGHT_CHANNELS == 1 { 0 } else { c }];

@@ -20,15 +20,15 @@ const GROUP: usize = 2 * LANES;
 pub struct Correlator {
     fft: Fft,
     /// Window origins along a block's side.
-    block_side: usize,
+    pub block_side: usize,
     /// Light elements along the side of a block's footprint, `block_side + w - 1`.
     footprint: usize,
-    quads: usize,
+    /// Texels of four components that an origin and channel have.
+    pub quads: usize,
     /// Spectra of the mirrored basis functions: `[group, u, v]`.
     spectra: Vec<ComplexLine>,
 }
 
-/// Memory for one correlation.
 #[derive(Debug)]
 pub struct CorrelationScratch {
     fft: FftScratch,
@@ -64,7 +64,7 @@ impl Correlator {
     }
 
     fn add_spectrum(&mut self, functions: &[Vec<f32>], window: usize) {
-        let n = self.fft.side();
+        let n = self.fft.side;
         // 1/n² of the inverse transform; ½, as the light's spectrum comes doubled.
         let scale = 0.5 / (n * n) as f32;
         let mut mirrored = vec![ComplexLine::default(); n * n];
@@ -77,7 +77,7 @@ impl Correlator {
                 part[k % LANES] = value * scale;
             }
         }
-        let mut scratch = FftScratch::new(n);
+        let mut scratch = self.fft.scratch();
         for row in mirrored.chunks_exact_mut(n) {
             let values = row.to_vec();
             self.fft.transform(
@@ -99,21 +99,10 @@ impl Correlator {
         }
     }
 
-    /// Window origins along a block's side.
-    pub fn block_side(&self) -> usize {
-        self.block_side
-    }
-
-    /// Texels of four components that an origin and channel have.
-    pub fn quads(&self) -> usize {
-        self.quads
-    }
-
-    /// Memory for [`correlate`](Self::correlate).
     pub fn scratch(&self) -> CorrelationScratch {
-        let n = self.fft.side();
+        let n = self.fft.side;
         CorrelationScratch {
-            fft: FftScratch::new(n),
+            fft: self.fft.scratch(),
             light: LightSpectrum::new(n),
             columns: vec![ComplexLine::default(); n * self.block_side],
             response: Vec::new(),
@@ -131,7 +120,7 @@ impl Correlator {
         quads: usize,
         scratch: &'s mut CorrelationScratch,
     ) -> &'s [[f32; QUAD]] {
-        let n = self.fft.side();
+        let n = self.fft.side;
         let texels = self.block_side * self.block_side * channels.len() * quads;
         let lines = (texels * size_of::<[f32; QUAD]>()).div_ceil(size_of::<CacheLine>());
         if scratch.response.len() < lines {
@@ -157,7 +146,7 @@ impl Correlator {
         spectra: &[ComplexLine],
         scratch: &mut CorrelationScratch,
     ) {
-        let n = self.fft.side();
+        let n = self.fft.side;
         for first in (0..n).step_by(S::LINES) {
             let functions = &spectra[first * n..][..S::LINES * n];
             let light = &scratch.light.columns_from(first)[..2 * S::LINES * n];
@@ -303,7 +292,7 @@ mod tests {
             };
             let window = Window::new(side as u32).unwrap();
             let correlator = Correlator::new(&basis, window, span, span);
-            let (block_side, quads) = (correlator.block_side(), correlator.quads());
+            let (block_side, quads) = (correlator.block_side, correlator.quads);
             let n = correlator.footprint;
             // One row is dark.
             let element = |i: usize| match i / n {

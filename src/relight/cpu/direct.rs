@@ -2,8 +2,7 @@
 
 use crate::transport::{CHANNELS, DirectTile};
 
-/// The sum for pixel number `p` of a tile, slot by slot. `light` begins with the window's first element and has
-/// `stride` elements from row to row.
+/// The sum for pixel number `p` of a tile. `light` begins with the window's first element; rows are `stride` apart.
 #[inline(always)]
 pub fn windowed_sum(
     tile: &DirectTile,

@@ -17,23 +17,18 @@ use crate::relight::math;
 #[cfg_attr(not(target_arch = "wasm32"), repr(align(64)))] // its size, and a cache line's
 #[cfg_attr(target_arch = "wasm32", repr(align(32)))]
 pub struct ComplexLine {
-    /// Real parts.
     pub re: [f32; LANES],
-    /// Imaginary parts.
     pub im: [f32; LANES],
 }
 
 /// A vector of complex values.
 #[derive(Clone, Copy, Debug)]
 pub struct Complex<V> {
-    /// Real parts.
     pub re: V,
-    /// Imaginary parts.
     pub im: V,
 }
 
 impl<V: Vector> Complex<V> {
-    /// Reads each line from memory.
     #[inline(always)]
     pub fn load<'a, S: Simd<Vector = V>>(simd: S, line: impl Fn(usize) -> &'a ComplexLine) -> Self {
         Self {
@@ -48,14 +43,12 @@ impl<V: Vector> Complex<V> {
         }
     }
 
-    /// Writes line number `line` to memory.
     #[inline(always)]
     pub fn store<S: Simd<Vector = V>>(self, simd: S, line: usize, to: &mut ComplexLine) {
         simd.store(self.re, line, &mut to.re);
         simd.store(self.im, line, &mut to.im);
     }
 
-    /// Reads a spilled vector.
     #[inline(always)]
     pub fn unspill<S: Simd<Vector = V>>(simd: S, [re, im]: &[S::Spilled; 2]) -> Self {
         Self {
@@ -64,7 +57,6 @@ impl<V: Vector> Complex<V> {
         }
     }
 
-    /// Spills the vector.
     #[inline(always)]
     pub fn spill<S: Simd<Vector = V>>(self, simd: S, [re, im]: &mut [S::Spilled; 2]) {
         simd.spill(self.re, re);
@@ -123,7 +115,7 @@ impl<V: Vector> Mul for Complex<V> {
 /// Transforms of `side` values, a power of two of at least 16.
 #[derive(Clone, Debug)]
 pub struct Fft {
-    side: usize,
+    pub side: usize,
     /// Powers 1, 2 and 3 of `e^{-2πip/n}` for each `p` below `n/4`, pass by pass; `n` is the side in the first
     /// pass and a quarter of the last `n` in each further one.
     twiddles: Vec<[[f32; 2]; 3]>,
@@ -148,21 +140,7 @@ impl SpillBuffer {
 }
 
 /// Values between two passes.
-#[derive(Debug)]
-pub struct FftScratch {
-    current: SpillBuffer,
-    next: SpillBuffer,
-}
-
-impl FftScratch {
-    /// For transforms of `side` values.
-    pub fn new(side: usize) -> Self {
-        Self {
-            current: SpillBuffer::new(side),
-            next: SpillBuffer::new(side),
-        }
-    }
-}
+pub type FftScratch = [SpillBuffer; 2];
 
 impl Fft {
     /// Plans transforms of `side` values, a power of two of at least 16.
@@ -182,23 +160,21 @@ impl Fft {
         Self { side, twiddles }
     }
 
-    /// Values that a transform takes.
-    pub fn side(&self) -> usize {
-        self.side
+    /// Memory for transforms.
+    pub fn scratch(&self) -> FftScratch {
+        [(); 2].map(|()| SpillBuffer::new(self.side))
     }
 
-    /// Transforms the values `load(0)` to `load(side - 1)`. Calls `store` once with each `k` and `X(k)`, in any
-    /// order.
+    /// Transforms `load(0)` to `load(side - 1)`. Calls `store` once with each `k` and `X(k)`, in any order.
     #[inline(always)]
     pub fn transform<S: Simd>(
         &self,
         simd: S,
-        scratch: &mut FftScratch,
+        [current, next]: &mut FftScratch,
         load: impl Fn(usize) -> Complex<S::Vector>,
         mut store: impl FnMut(usize, Complex<S::Vector>),
     ) {
-        let mut current = scratch.current.vectors::<S>();
-        let mut next = scratch.next.vectors::<S>();
+        let (mut current, mut next) = (current.vectors::<S>(), next.vectors::<S>());
         let quarter = self.side / 4;
         let (first, mut twiddles) = self.twiddles.split_at(quarter);
         let (out, _) = current[..self.side].as_chunks_mut::<4>();
@@ -335,7 +311,7 @@ mod tests {
     impl SimdKernel for TransformKernel<'_> {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) {
-            let scratch = &mut FftScratch::new(self.values.len());
+            let scratch = &mut self.fft.scratch();
             for first in (0..2).step_by(S::LINES) {
                 let store = |k: usize, value: Complex<S::Vector>| {
                     for line in 0..S::LINES {

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use crate::transport::{CameraPx, Element, Extent, Geometry, Transport};
+use crate::transport::{CameraPx, Element, Extent, Geometry, TileRect, Transport};
 
 /// The side of blocks where no tile is factored.
 pub const DIRECT_BLOCK_SIDE: usize = 64;
@@ -13,9 +13,7 @@ pub const DIRECT_BLOCK_SIDE: usize = 64;
 /// The smallest rectangle of window origins that holds those of all pixels with a window on the light plane.
 #[derive(Clone, Debug, Default)]
 pub struct OriginBounds {
-    /// Along u.
     pub columns: Range<i32>,
-    /// Along v.
     pub rows: Range<i32>,
 }
 
@@ -23,22 +21,19 @@ impl OriginBounds {
     /// Of all pixels, those of dark tiles too: where blocks lie decides how sums are rounded, and workers that
     /// each have a part of the tiles must agree to the bit.
     pub fn new(geometry: &Geometry) -> Self {
-        let mut bounds: Option<Self> = None;
-        for rect in geometry.tiles() {
-            for pixel in rect.pixels() {
-                let origin = geometry.window_origin(pixel);
-                if geometry.clip_window(origin).is_empty() {
-                    continue;
-                }
-                let Element { u, v } = origin;
-                let known = bounds.get_or_insert(Self {
-                    columns: u..u + 1,
-                    rows: v..v + 1,
-                });
-                known.columns = known.columns.start.min(u)..known.columns.end.max(u + 1);
-                known.rows = known.rows.start.min(v)..known.rows.end.max(v + 1);
-            }
-        }
+        let pixels = geometry.tiles().flat_map(TileRect::pixels);
+        let origins = pixels.map(|pixel| geometry.window_origin(pixel));
+        let bounds = origins
+            .filter(|origin| !geometry.clip_window(*origin).is_empty())
+            .map(|Element { u, v }| Self {
+                columns: u..u + 1,
+                rows: v..v + 1,
+            });
+        let join = |a: Range<i32>, b: Range<i32>| a.start.min(b.start)..a.end.max(b.end);
+        let bounds = bounds.reduce(|a, b| Self {
+            columns: join(a.columns, b.columns),
+            rows: join(a.rows, b.rows),
+        });
         bounds.unwrap_or_default()
     }
 }
@@ -46,20 +41,16 @@ impl OriginBounds {
 /// Pixels side by side, of one tile and one block.
 #[derive(Clone, Debug)]
 pub struct PixelSpan {
-    /// Index of the tile.
     pub tile: usize,
     /// Index of the first pixel in the tile.
     pub first: usize,
-    /// The first pixel.
     pub pixel: CameraPx,
     /// Index of the first pixel in the block.
     pub begin: usize,
-    /// Number of pixels.
     pub length: usize,
 }
 
 impl PixelSpan {
-    /// Indices of the pixels in the block.
     pub fn range(&self) -> Range<usize> {
         self.begin..self.begin + self.length
     }
@@ -83,8 +74,8 @@ pub struct LightBlocks {
     pub origin: Element,
     /// Origins along a block's side, at most 256.
     pub side: usize,
-    /// Origins along u and along v, from the first to the last block.
-    extent: [usize; 2],
+    /// Extent of the footprints of all blocks together.
+    pub footprint: Extent,
     /// Blocks with at least one pixel.
     pub blocks: Vec<LightBlock>,
 }
@@ -92,6 +83,7 @@ pub struct LightBlocks {
 impl LightBlocks {
     /// Assigns the pixels to blocks of `side × side` origins.
     pub fn new(transport: &Transport, bounds: &OriginBounds, side: usize) -> Self {
+        let geometry = &transport.geometry;
         let grid = [bounds.columns.len(), bounds.rows.len()].map(|span| span.div_ceil(side));
         // Centred, so that a half of the photograph has half of the blocks.
         let first = |origins: &Range<i32>, blocks: usize| {
@@ -102,12 +94,20 @@ impl LightBlocks {
             v: first(&bounds.rows, grid[1]),
         };
         let mut blocks = vec![LightBlock::default(); grid[0] * grid[1]];
-        for_each_pixel(transport, |tile, p, pixel, Element { u, v }| {
-            let (u, v) = ((u - grid_origin.u) as usize, (v - grid_origin.v) as usize);
-            let block = &mut blocks[v / side * grid[0] + u / side];
-            block.at = [u / side * side, v / side * side];
-            block.add(tile, p, pixel, v % side * side + u % side);
-        });
+        let tiles = transport.tiles.iter().enumerate();
+        for (i, tile) in tiles.filter(|(_, tile)| !tile.is_dark()) {
+            for (p, pixel) in tile.rect().pixels().enumerate() {
+                let origin = geometry.window_origin(pixel);
+                if geometry.clip_window(origin).is_empty() {
+                    continue;
+                }
+                let u = (origin.u - grid_origin.u) as usize;
+                let v = (origin.v - grid_origin.v) as usize;
+                let block = &mut blocks[v / side * grid[0] + u / side];
+                block.at = [u / side * side, v / side * side];
+                block.add(i, p, pixel, v % side * side + u % side);
+            }
+        }
         blocks.retain(|block| !block.offsets.is_empty());
         // The part of the grid that still has blocks.
         let used = |axis: usize| {
@@ -127,15 +127,12 @@ impl LightBlocks {
                 v: grid_origin.v + rows.start as i32,
             },
             side,
-            extent: [columns.len(), rows.len()],
+            footprint: Extent {
+                width: columns.len() as u32 + geometry.window.side() - 1,
+                height: rows.len() as u32 + geometry.window.side() - 1,
+            },
             blocks,
         }
-    }
-
-    /// Extent of the footprints of all blocks together, for windows of side `window`.
-    pub fn footprint(&self, window: usize) -> Extent {
-        let [width, height] = self.extent.map(|origins| (origins + window - 1) as u32);
-        Extent { width, height }
     }
 }
 
@@ -159,22 +156,6 @@ impl LightBlock {
                 begin,
                 length: 1,
             }),
-        }
-    }
-}
-
-/// Calls `visit` with tile index, pixel index, pixel and window origin for each pixel that can be lit.
-fn for_each_pixel(transport: &Transport, mut visit: impl FnMut(usize, usize, CameraPx, Element)) {
-    let geometry = &transport.geometry;
-    for (i, tile) in transport.tiles.iter().enumerate() {
-        if tile.is_dark() {
-            continue;
-        }
-        for (p, pixel) in tile.rect().pixels().enumerate() {
-            let origin = geometry.window_origin(pixel);
-            if !geometry.clip_window(origin).is_empty() {
-                visit(i, p, pixel, origin);
-            }
         }
     }
 }

@@ -25,7 +25,6 @@ pub struct LightSpectrum {
 }
 
 impl LightSpectrum {
-    /// Memory for transforms of side `side`.
     pub fn new(side: usize) -> Self {
         Self {
             side,
@@ -36,8 +35,7 @@ impl LightSpectrum {
         }
     }
 
-    /// Computes the spectrum of a channel of the light, of which `row(v)` has `footprint` elements for each `v`
-    /// below `footprint`.
+    /// Computes the spectrum of a channel of the light. `row(v)` has its elements for each `v` below `footprint`.
     #[inline(always)]
     pub fn compute<'a, S: Simd>(
         &mut self,

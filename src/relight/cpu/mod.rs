@@ -27,7 +27,6 @@ use crate::transport::{CHANNELS, Tile, Transport};
 use combine::{BlockResponse, combine};
 use correlation::{CorrelationScratch, Correlator};
 use light_blocks::{DIRECT_BLOCK_SIDE, LightBlock, LightBlocks, OriginBounds, PixelSpan};
-pub use padded_light::LightRows;
 use padded_light::PaddedLight;
 use simd::{Simd, SimdKernel, SimdLevel};
 
@@ -73,15 +72,16 @@ impl CpuRelighter {
         let (columns, rows) = (bounds.columns.len(), bounds.rows.len());
         let correlator =
             is_factored.then(|| Correlator::new(&transport.basis, geometry.window, columns, rows));
-        let side = correlator
-            .as_ref()
-            .map_or(DIRECT_BLOCK_SIDE, Correlator::block_side);
+        let (side, quads) = match &correlator {
+            Some(correlator) => (correlator.block_side, correlator.quads),
+            None => (DIRECT_BLOCK_SIDE, 0),
+        };
         let blocks = LightBlocks::new(&transport, &bounds, side);
-        let light = PaddedLight::new(geometry.light, blocks.origin, blocks.footprint(window));
+        let light = PaddedLight::new(geometry.light, blocks.origin, blocks.footprint);
         let dark = |block: &LightBlock| RwLock::new(vec![[0.0; CHANNELS]; block.offsets.len()]);
         Self {
             linear: blocks.blocks.iter().map(dark).collect(),
-            quads: correlator.as_ref().map_or(0, Correlator::quads),
+            quads,
             is_stale: false,
             footprint: side + window - 1,
             correlator,
@@ -100,7 +100,10 @@ impl CpuRelighter {
     /// Sets the share of the components in use, 0 to 1, rounded up to quads; at least one quad is used. Takes
     /// effect with the next light or [`update`](Self::update).
     pub fn set_quality(&mut self, quality: f32) {
-        let all = self.correlator.as_ref().map_or(0, Correlator::quads);
+        let all = self
+            .correlator
+            .as_ref()
+            .map_or(0, |correlator| correlator.quads);
         let quads = used_count(all, quality);
         self.is_stale |= quads != self.quads;
         self.quads = quads;
@@ -113,7 +116,11 @@ impl CpuRelighter {
     pub fn relight(&mut self, light: &Light, executor: &impl Executor) {
         let extent = self.transport.geometry.light;
         assert_eq!(light.extent(), extent, "extent of the light");
-        self.relight_rows(light, executor);
+        let width = extent.width as usize;
+        for v in self.light_rows() {
+            self.set_light_row(v, &light.elements()[v as usize * width..][..width]);
+        }
+        self.update(executor);
     }
 
     /// Rows of the light plane that any window covers.
@@ -121,17 +128,15 @@ impl CpuRelighter {
         self.light.light_rows()
     }
 
-    /// [`relight`](Self::relight) under a light that is read row by row: each of the
-    /// [`light_rows`](Self::light_rows) once, from the first on.
+    /// Sets the elements of row `v` of the light, finite and not negative, for the next [`update`](Self::update).
     ///
     /// # Panics
-    /// If a row has another width than the light plane.
-    pub fn relight_rows(&mut self, light: impl LightRows, executor: &impl Executor) {
-        self.light.update(light);
-        self.update(executor);
+    /// If the row has another width than the light plane.
+    pub fn set_light_row(&mut self, v: u32, elements: &[[f32; 4]]) {
+        self.light.set_row(v, elements);
     }
 
-    /// Relights the blocks that are out of date, under the last light.
+    /// Relights the blocks that are out of date.
     pub fn update(&mut self, executor: &impl Executor) {
         let stale: Vec<usize> = (0..self.blocks.blocks.len())
             .filter(|&i| {
@@ -230,7 +235,7 @@ impl CpuRelighter {
     /// The picture in linear light, in units of the measurement.
     pub fn linear(&self) -> LinearPicture {
         let camera = self.transport.geometry.camera;
-        let mut picture = LinearPicture::black(camera);
+        let mut picture = LinearPicture::filled(camera, [0.0; 4]);
         self.for_each_span(0..camera.height, |span, linear| {
             let first = camera.index(span.pixel);
             let pixels = &mut picture.pixels[first..first + span.length];
@@ -243,9 +248,9 @@ impl CpuRelighter {
 
     /// The picture after an output transform.
     pub fn picture(&self, output: &OutputTransform, executor: &impl Executor) -> Rgba8Picture {
-        let mut picture = Rgba8Picture::black(self.transport.geometry.camera);
-        let rows = 0..picture.extent.height;
-        self.encode_rows(output, rows, &mut picture.pixels, executor);
+        let camera = self.transport.geometry.camera;
+        let mut picture = Rgba8Picture::filled(camera, [0, 0, 0, 255]);
+        self.encode_rows(output, 0..camera.height, &mut picture.pixels, executor);
         picture
     }
 
@@ -269,18 +274,14 @@ impl CpuRelighter {
             .map(Mutex::new)
             .collect();
         executor.map(strips.len(), |i| {
+            let out = &mut *lock(&strips[i]);
+            out.fill([0, 0, 0, 255]);
             let first = rows.start + (i * STRIP_ROWS) as u32;
-            self.encode_strip(&encoder, first, &mut lock(&strips[i]));
-        });
-    }
-
-    fn encode_strip(&self, encoder: &OutputEncoder, first: u32, out: &mut [[u8; 4]]) {
-        let width = self.transport.geometry.camera.width as usize;
-        let end = first + (out.len() / width) as u32;
-        out.fill([0, 0, 0, 255]);
-        self.for_each_span(first..end, |span, linear| {
-            let at = (span.pixel.y - first) as usize * width + span.pixel.x as usize;
-            encoder.encode(linear, span.pixel, &mut out[at..at + span.length]);
+            let end = first + (out.len() / width) as u32;
+            self.for_each_span(first..end, |span, linear| {
+                let at = (span.pixel.y - first) as usize * width + span.pixel.x as usize;
+                encoder.encode(linear, span.pixel, &mut out[at..at + span.length]);
+            });
         });
     }
 
@@ -300,7 +301,6 @@ impl CpuRelighter {
     }
 }
 
-/// Relights one block.
 struct BlockKernel<'a> {
     relighter: &'a CpuRelighter,
     block: usize,

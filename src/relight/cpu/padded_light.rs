@@ -1,23 +1,8 @@
-//! The light as all windows see it, with a dark border where they hang over the light plane, and which of its
-//! elements the last light has changed.
+//! The light with a dark border, where windows hang over the light plane, and which elements have changed.
 
 use std::ops::Range;
 
-use crate::relight::Light;
 use crate::transport::{ClippedRect, Element, Extent};
-
-/// A light that is read row by row.
-pub trait LightRows {
-    /// The elements of row `v`, as [`Light::elements`] has them: finite and not negative.
-    fn row(&mut self, v: u32) -> &[[f32; 4]];
-}
-
-impl LightRows for &Light {
-    fn row(&mut self, v: u32) -> &[[f32; 4]] {
-        let width = self.extent().width as usize;
-        &self.elements()[v as usize * width..][..width]
-    }
-}
 
 /// A light with a dark border. Coordinates are columns and rows from its first element.
 #[derive(Clone, Debug)]
@@ -50,41 +35,34 @@ impl PaddedLight {
         first as u32..(first + self.lit.rows.len()) as u32
     }
 
-    /// Replaces the light: reads each of the [`light_rows`](Self::light_rows) once, from the first on.
+    /// Replaces row `v` of the light plane, if it is inside this.
     ///
     /// # Panics
-    /// If a row has another width than the light plane.
-    pub fn update(&mut self, mut light: impl LightRows) {
-        if self.lit.is_empty() {
+    /// If the row has another width than the light plane.
+    pub fn set_row(&mut self, v: u32, elements: &[[f32; 4]]) {
+        assert_eq!(elements.len(), self.light.width as usize, "width of a row");
+        let rows = self.light_rows();
+        if self.lit.is_empty() || !rows.contains(&v) {
             return;
         }
-        let stride = self.stride();
-        let ([first, _], left) = (self.lit.first(), self.lit.columns.start);
-        let width = self.lit.columns.len();
-        for (row, v) in self.lit.rows.clone().zip(self.light_rows()) {
-            let new = light.row(v);
-            assert_eq!(
-                new.len(),
-                self.light.width as usize,
-                "width of a light's row"
-            );
-            let new = &new[first..first + width];
-            let old = &mut self.elements[row * stride + left..][..width];
-            let changed = changed_range(old, new);
-            if changed.is_empty() {
-                continue;
-            }
-            old[changed.clone()].copy_from_slice(&new[changed.clone()]);
-            let (start, end) = (left + changed.start, left + changed.end);
-            let known = &mut self.changes[row];
-            *known = match known.start < known.end {
-                true => known.start.min(start)..known.end.max(end),
-                false => start..end,
-            };
+        let row = self.lit.rows.start + (v - rows.start) as usize;
+        let ([first, _], lit) = (self.lit.first(), self.lit.columns.clone());
+        let new = &elements[first..first + lit.len()];
+        let start = row * self.stride();
+        let old = &mut self.elements[start + lit.start..start + lit.end];
+        let changed = changed_range(old, new);
+        if changed.is_empty() {
+            return;
         }
+        old[changed.clone()].copy_from_slice(&new[changed.clone()]);
+        let (start, end) = (lit.start + changed.start, lit.start + changed.end);
+        let known = &mut self.changes[row];
+        *known = match Range::is_empty(known) {
+            true => start..end,
+            false => known.start.min(start)..known.end.max(end),
+        };
     }
 
-    /// Forgets all changes.
     pub fn clear_changes(&mut self) {
         self.changes.fill(0..0);
     }
@@ -102,7 +80,6 @@ impl PaddedLight {
         &self.elements[row * self.stride() + column..]
     }
 
-    /// Elements from one row to the next.
     #[inline(always)]
     pub fn stride(&self) -> usize {
         self.extent.width as usize
@@ -144,11 +121,12 @@ mod tests {
             height: 17,
         };
         let mut padded = PaddedLight::new(extent, origin, padded_extent);
-        let mut values = vec![0.0; 60 * 3];
+        let mut values = vec![[0.0; 4]; 60];
         let mut set = |padded: &mut PaddedLight, element: usize, value: f32| {
-            values[3 * element] = value;
-            let light = Light::from_linear_rgb(extent, &values).unwrap();
-            padded.update(&light);
+            values[element][0] = value;
+            for (v, row) in (0..).zip(values.chunks(20)) {
+                padded.set_row(v, row);
+            }
         };
         let assert_changed = |padded: &PaddedLight, columns: Range<usize>| {
             assert!(padded.has_changed(columns.clone(), 8..9));

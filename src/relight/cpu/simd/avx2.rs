@@ -39,7 +39,7 @@ impl Simd for Avx2 {
     type Vector = Avx2Vector;
     type Spilled = [f32; LANES];
     const PIXELS: usize = 2;
-    type Quads = Avx2Vector;
+    type TexelVector = Avx2Vector;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Avx2Vector {
@@ -60,12 +60,12 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn zero_quads(self) -> Avx2Vector {
+    fn zero_texels(self) -> Avx2Vector {
         self.splat(0.0)
     }
 
     #[inline(always)]
-    unsafe fn load_quads(self, from: [*const [f32; QUAD]; MAX_PIXELS]) -> Avx2Vector {
+    unsafe fn load_texels(self, from: [*const [f32; QUAD]; MAX_PIXELS]) -> Avx2Vector {
         // SAFETY: the token proves AVX2; the caller vouches for two pointers.
         Avx2Vector(unsafe {
             _mm256_set_m128(_mm_loadu_ps(from[1].cast()), _mm_loadu_ps(from[0].cast()))
@@ -96,7 +96,7 @@ impl Simd for Avx2 {
     ) {
         // SAFETY: the token proves AVX2; the caller vouches for room for six values.
         unsafe {
-            let sums = sum_quads!([red, green, blue]: _mm256_add_ps, _mm256_unpacklo_ps, _mm256_unpackhi_ps, _mm256_shuffle_ps);
+            let sums = sum_lanes!([red, green, blue]: _mm256_add_ps, _mm256_unpacklo_ps, _mm256_unpackhi_ps, _mm256_shuffle_ps);
             let gain = _mm_set_ps(b, b, g, r);
             let pixels = _mm256_mul_ps(sums, _mm256_set_m128(gain, gain));
             let first = _mm256_castps256_ps128(pixels);

@@ -42,7 +42,7 @@ impl Simd for Avx512 {
     type Vector = Avx512Vector;
     type Spilled = [f32; 2 * LANES];
     const PIXELS: usize = 4;
-    type Quads = Avx512Vector;
+    type TexelVector = Avx512Vector;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Avx512Vector {
@@ -93,12 +93,12 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    fn zero_quads(self) -> Avx512Vector {
+    fn zero_texels(self) -> Avx512Vector {
         self.splat(0.0)
     }
 
     #[inline(always)]
-    unsafe fn load_quads(self, [a, b, c, d]: [*const [f32; QUAD]; MAX_PIXELS]) -> Avx512Vector {
+    unsafe fn load_texels(self, [a, b, c, d]: [*const [f32; QUAD]; MAX_PIXELS]) -> Avx512Vector {
         // SAFETY: the token proves AVX-512; the caller vouches for four pointers.
         Avx512Vector(unsafe {
             let quads = _mm512_castps128_ps512(_mm_loadu_ps(a.cast()));
@@ -132,7 +132,7 @@ impl Simd for Avx512 {
     ) {
         // SAFETY: the token proves AVX-512; the caller vouches for room for twelve values.
         unsafe {
-            let sums = sum_quads!([red, green, blue]: _mm512_add_ps, _mm512_unpacklo_ps, _mm512_unpackhi_ps, _mm512_shuffle_ps);
+            let sums = sum_lanes!([red, green, blue]: _mm512_add_ps, _mm512_unpacklo_ps, _mm512_unpackhi_ps, _mm512_shuffle_ps);
             let gain = _mm512_broadcast_f32x4(_mm_set_ps(b, b, g, r));
             let pixels = _mm512_mul_ps(sums, gain);
             // Drops every fourth lane.

@@ -33,7 +33,7 @@ macro_rules! impl_operators {
 
 /// Per pixel, each channel's four lanes summed as `(0 + 2) + (1 + 3)`: red, green, blue, blue.
 #[cfg(target_arch = "x86_64")]
-macro_rules! sum_quads {
+macro_rules! sum_lanes {
     ([$red:ident, $green:ident, $blue:ident]: $add:ident, $low:ident, $high:ident, $shuffle:ident) => {{
         let red_green = $add($low($red.0, $green.0), $high($red.0, $green.0));
         let blue_blue = $add($low($blue.0, $blue.0), $high($blue.0, $blue.0));
@@ -85,16 +85,13 @@ pub trait Simd: Copy {
     type Spilled: Pod;
     /// Pixels that are combined at once, at most [`MAX_PIXELS`].
     const PIXELS: usize;
-    /// Four lanes for each of `PIXELS` pixels.
-    type Quads: Copy;
+    /// A vector of `PIXELS` texels, one for each pixel.
+    type TexelVector: Copy;
 
-    /// The same value in each lane.
     fn splat(self, value: f32) -> Self::Vector;
 
-    /// Reads a spilled vector.
     fn unspill(self, values: &Self::Spilled) -> Self::Vector;
 
-    /// Spills a vector.
     fn spill(self, vector: Self::Vector, to: &mut Self::Spilled);
 
     /// One value for each line.
@@ -118,14 +115,13 @@ pub trait Simd: Copy {
         self.spill(vector, bytemuck::cast_mut(to));
     }
 
-    /// Sums of nothing.
-    fn zero_quads(self) -> Self::Quads;
+    fn zero_texels(self) -> Self::TexelVector;
 
-    /// Reads four lanes for each pixel.
+    /// Reads one texel for each pixel.
     ///
     /// # Safety
     /// The first `PIXELS` pointers are valid to read.
-    unsafe fn load_quads(self, from: [*const [f32; QUAD]; MAX_PIXELS]) -> Self::Quads;
+    unsafe fn load_texels(self, from: [*const [f32; QUAD]; MAX_PIXELS]) -> Self::TexelVector;
 
     /// `sums + codes · factors`.
     ///
@@ -133,10 +129,10 @@ pub trait Simd: Copy {
     /// `codes` is valid to read for `PIXELS` texels.
     unsafe fn add_products(
         self,
-        sums: Self::Quads,
+        sums: Self::TexelVector,
         codes: *const TexelCode,
-        factors: Self::Quads,
-    ) -> Self::Quads;
+        factors: Self::TexelVector,
+    ) -> Self::TexelVector;
 
     /// Writes each pixel's channels: the sum of the channel's four lanes, times its gain.
     ///
@@ -144,7 +140,7 @@ pub trait Simd: Copy {
     /// `to` is valid to write for `PIXELS` pixels.
     unsafe fn store_sums(
         self,
-        channels: [Self::Quads; CHANNELS],
+        channels: [Self::TexelVector; CHANNELS],
         gain: [f32; CHANNELS],
         to: *mut [f32; CHANNELS],
     );
@@ -193,21 +189,6 @@ impl SimdLevel {
         Self::Scalar(Scalar)
     }
 
-    /// All that the CPU has.
-    #[cfg(test)]
-    pub fn available() -> impl Iterator<Item = Self> {
-        let levels = [
-            #[cfg(target_arch = "x86_64")]
-            Avx512::detect().map(Self::Avx512),
-            #[cfg(target_arch = "x86_64")]
-            Avx2::detect().map(Self::Avx2),
-            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-            Some(Self::Simd128(Simd128::detect())),
-            Some(Self::Scalar(Scalar)),
-        ];
-        levels.into_iter().flatten()
-    }
-
     /// Runs a kernel by this instruction set.
     #[inline(always)]
     pub fn run(self, kernel: impl SimdKernel) {
@@ -219,6 +200,27 @@ impl SimdLevel {
             #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
             Self::Simd128(simd) => kernel.run(simd),
             Self::Scalar(simd) => kernel.run(simd),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    impl SimdLevel {
+        /// All that the CPU has.
+        pub fn available() -> impl Iterator<Item = Self> {
+            let levels = [
+                #[cfg(target_arch = "x86_64")]
+                Avx512::detect().map(Self::Avx512),
+                #[cfg(target_arch = "x86_64")]
+                Avx2::detect().map(Self::Avx2),
+                #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+                Some(Self::Simd128(Simd128::detect())),
+                Some(Self::Scalar(Scalar)),
+            ];
+            levels.into_iter().flatten()
         }
     }
 }

@@ -36,7 +36,7 @@ impl Simd for Scalar {
     type Vector = ScalarVector;
     type Spilled = [f32; LANES];
     const PIXELS: usize = 1;
-    type Quads = [f32; QUAD];
+    type TexelVector = [f32; QUAD];
 
     #[inline(always)]
     fn splat(self, value: f32) -> ScalarVector {
@@ -54,12 +54,12 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    fn zero_quads(self) -> [f32; QUAD] {
+    fn zero_texels(self) -> [f32; QUAD] {
         [0.0; QUAD]
     }
 
     #[inline(always)]
-    unsafe fn load_quads(self, from: [*const [f32; QUAD]; MAX_PIXELS]) -> [f32; QUAD] {
+    unsafe fn load_texels(self, from: [*const [f32; QUAD]; MAX_PIXELS]) -> [f32; QUAD] {
         // SAFETY: the caller vouches for one pointer.
         unsafe { *from[0] }
     }

@@ -27,7 +27,7 @@ impl Simd for Simd128 {
     type Vector = Simd128Vector;
     type Spilled = [f32; LANES];
     const PIXELS: usize = 1;
-    type Quads = Simd128Vector;
+    type TexelVector = Simd128Vector;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Simd128Vector {
@@ -47,12 +47,12 @@ impl Simd for Simd128 {
     }
 
     #[inline(always)]
-    fn zero_quads(self) -> Simd128Vector {
+    fn zero_texels(self) -> Simd128Vector {
         self.splat(0.0)
     }
 
     #[inline(always)]
-    unsafe fn load_quads(self, [from]: [*const [f32; QUAD]; MAX_PIXELS]) -> Simd128Vector {
+    unsafe fn load_texels(self, [from]: [*const [f32; QUAD]; MAX_PIXELS]) -> Simd128Vector {
         // SAFETY: the caller vouches for one pointer.
         Simd128Vector(unsafe { v128_load(from.cast()) })
     }
