@@ -34,7 +34,7 @@ const SHADERS: [(&str, &str, ShaderStage, &[&str]); 4] = [
         "relight.frag.glsl",
         "relight",
         ShaderStage::Fragment,
-        &["fullscreen.wgsl", "frame.wgsl", "relight.wgsl"],
+        &["frame.wgsl", "relight.wgsl"],
     ),
 ];
 

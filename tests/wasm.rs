@@ -16,7 +16,7 @@ use relightable_photo::format::{EncodedFile, Limits, Metadata, RateTarget, Reade
 use relightable_photo::relight::{self, BuiltinLight, Rgba8Picture, reference};
 use relightable_photo::transport::{Extent, Geometry, Tile, Transport};
 use relightable_photo::web::{
-    CodedError, Decoder, GraphicsDevice, Light, OutputTransform, Photo, Relighter,
+    CodedError, Decoder, GraphicsDevice, Photo, Relighter, WebLight, WebOutputTransform,
 };
 use wasm_bindgen::convert::TryFromJsValue;
 use wasm_bindgen::{JsCast, JsValue};
@@ -160,17 +160,17 @@ struct DeviceRelighter {
 }
 
 impl DeviceRelighter {
-    fn render(&mut self, light: &Light, exposure: f64) -> Result<(), CodedError> {
+    fn render(&mut self, light: &WebLight, exposure: f64) -> Result<(), CodedError> {
         self.render_in_quality(light, exposure, 1.0)
     }
 
     fn render_in_quality(
         &mut self,
-        light: &Light,
+        light: &WebLight,
         exposure: f64,
         quality: f64,
     ) -> Result<(), CodedError> {
-        let output = OutputTransform::new(exposure, &[1.0; 3], "clip", "srgb")?;
+        let output = WebOutputTransform::new(exposure, &[1.0; 3], "clip", "srgb")?;
         self.relighter.render(light, &output, quality)
     }
 }
@@ -272,7 +272,6 @@ async fn assert_backend_draws_the_reference(backend: &str) {
         let photo = photo(&transport);
         let canvas = new_canvas();
         let mut relighter = open_relighter(backend, &photo, &canvas).await.unwrap();
-        assert_eq!(relighter.relighter.backend(), backend);
         for (j, (name, light)) in relit::lights(geometry.light).into_iter().enumerate() {
             let values: Vec<f32> = light
                 .elements()
@@ -281,7 +280,7 @@ async fn assert_backend_draws_the_reference(backend: &str) {
                 .collect();
             let values = Float32Array::from(&values[..]);
             let Extent { width, height } = geometry.light;
-            let web_light = Light::from_linear(&photo, &values, width, height).unwrap();
+            let web_light = WebLight::from_linear(&photo, &values, width, height).unwrap();
             let exposure = [1.0, 0.4, 2.5][j % 3];
             relighter.render(&web_light, exposure).unwrap();
             let want = reference::picture(&transport, &light, &page_output(exposure));
@@ -321,7 +320,7 @@ async fn lower_quality_is_the_first_components_whatever_came_before() {
         let canvas = new_canvas();
         let mut relighter = open_relighter(backend, &photo, &canvas).await.unwrap();
         for name in ["flood", "spectrum"] {
-            let light = Light::builtin(&photo, name).unwrap();
+            let light = WebLight::builtin(&photo, name).unwrap();
             let native_light = BuiltinLight::from_name(name)
                 .unwrap()
                 .render(transport.geometry.light);
@@ -346,12 +345,12 @@ async fn built_in_lights_are_drawn_by_name() {
     let canvas = new_canvas();
     let mut relighter = open_relighter("cpu", &photo, &canvas).await.unwrap();
     for (name, light) in relit::lights(transport.geometry.light) {
-        match Light::builtin(&photo, name) {
+        match WebLight::builtin(&photo, name) {
             Ok(built_in) => relighter.render(&built_in, 1.0).unwrap(),
             Err(error) => {
-                assert_eq!(error.code(), "light-name");
+                assert_eq!(error.code, "light-name");
                 assert!(["random", "corner"].contains(&name));
-                assert!(error.message().contains("spectrum"), "{}", error.message());
+                assert!(error.message.contains("spectrum"), "{}", error.message);
                 continue;
             }
         }
@@ -373,7 +372,7 @@ async fn the_torch_is_behind_its_point_of_the_picture() {
     let canvas = new_canvas();
     let mut relighter = open_relighter("cpu", &photo, &canvas).await.unwrap();
     for (x, y) in [(0.25, 0.75), (0.5, 0.5), (0.8, 0.2)] {
-        let torch = Light::torch(&photo, x, y, Some(0.1)).unwrap();
+        let torch = WebLight::torch(&photo, x, y, Some(0.1)).unwrap();
         relighter.render(&torch, 1.0).unwrap();
         let picture = read_back(&canvas);
         let (mut centroid, mut total) = ([0.0; 2], 0.0);
@@ -395,7 +394,10 @@ async fn the_torch_is_behind_its_point_of_the_picture() {
         (0.5, 0.5, 0.0),
         (0.5, 0.5, f64::NAN),
     ] {
-        assert_eq!(coded(Light::torch(&photo, x, y, Some(size))), "light-value");
+        assert_eq!(
+            coded(WebLight::torch(&photo, x, y, Some(size))),
+            "light-value"
+        );
     }
 }
 
@@ -445,7 +447,7 @@ async fn a_photo_is_transferred_to_another_module_tile_by_tile() {
     assert_eq!(received.decoded_bytes(), bytes);
     let canvas = new_canvas();
     let mut relighter = open_relighter("cpu", &received, &canvas).await.unwrap();
-    let light = Light::builtin(&received, "spectrum").unwrap();
+    let light = WebLight::builtin(&received, "spectrum").unwrap();
     relighter.render(&light, 1.0).unwrap();
     let (_, light) = relit::lights(transport.geometry.light).swap_remove(4);
     let want = reference::picture(&transport, &light, &page_output(1.0));
@@ -530,10 +532,10 @@ fn each_kind_of_invalid_file_has_its_code() {
 async fn invalid_lights_and_exposures_are_refused() {
     let [one, other] = [0, 1].map(|i| photo(&transport(i)));
     let linear = |values: &[f32], width, height| {
-        Light::from_linear(&one, &Float32Array::from(values), width, height)
+        WebLight::from_linear(&one, &Float32Array::from(values), width, height)
     };
     let srgb =
-        |codes: &[u8], width| Light::from_srgb(&one, &Uint8ClampedArray::from(codes), width, 1);
+        |codes: &[u8], width| WebLight::from_srgb(&one, &Uint8ClampedArray::from(codes), width, 1);
     assert_eq!(coded(linear(&[1.0; 5], 1, 2)), "light-size");
     assert_eq!(coded(linear(&[], 0, 3)), "light-size");
     assert_eq!(coded(linear(&[1.0, -1.0, 1.0], 1, 1)), "light-value");
@@ -541,9 +543,9 @@ async fn invalid_lights_and_exposures_are_refused() {
     assert!(srgb(&[255; 8], 2).is_ok());
     for backend in BACKENDS {
         let mut relighter = open_relighter(backend, &one, &new_canvas()).await.unwrap();
-        let foreign = Light::builtin(&other, "flood").unwrap();
+        let foreign = WebLight::builtin(&other, "flood").unwrap();
         assert_eq!(coded(relighter.render(&foreign, 1.0)), "light-size");
-        let own = Light::builtin(&one, "flood").unwrap();
+        let own = WebLight::builtin(&one, "flood").unwrap();
         for exposure in [f64::NAN, f64::INFINITY, -1.0] {
             assert_eq!(coded(relighter.render(&own, exposure)), "light-value");
         }
@@ -573,7 +575,7 @@ async fn a_photo_can_be_freed_and_replaced() {
             // Each relighter needs a new canvas.
             let canvas = new_canvas();
             let photo = photo(&transport);
-            let light = Light::builtin(&photo, "spectrum").unwrap();
+            let light = WebLight::builtin(&photo, "spectrum").unwrap();
             let mut relighter = open_relighter(backend, &photo, &canvas).await.unwrap();
             drop(photo);
             relighter.render(&light, 1.0).unwrap();
@@ -587,10 +589,10 @@ async fn a_photo_can_be_freed_and_replaced() {
 #[wasm_bindgen_test]
 async fn a_lost_webgl2_context_is_reported() {
     let photo = photo(&transport(0));
-    let light = Light::builtin(&photo, "flood").unwrap();
+    let light = WebLight::builtin(&photo, "flood").unwrap();
     let hidden = new_canvas();
     let device = GraphicsDevice::webgl2(hidden.clone()).unwrap();
-    let output = OutputTransform::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
+    let output = WebOutputTransform::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
     let mut relighter = relighter_on(&device, &photo, &new_canvas(), "srgb")
         .await
         .unwrap();
@@ -611,7 +613,7 @@ async fn a_lost_webgl2_context_is_reported() {
 async fn photographs_share_one_device() {
     for backend in ["webgl2", "webgpu"] {
         let device = open_device(backend).await.unwrap();
-        let output = OutputTransform::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
+        let output = WebOutputTransform::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
         let mut relighters = Vec::new();
         for i in [0, 1, 2, 0] {
             let transport = round_trip(&transport(i));
@@ -625,7 +627,7 @@ async fn photographs_share_one_device() {
             for (i, (relighter, photo, canvas, transport)) in relighters.iter_mut().enumerate() {
                 let (name, light) =
                     relit::lights(transport.geometry.light).swap_remove((i + round) % 6);
-                let web_light = Light::builtin(photo, name).unwrap();
+                let web_light = WebLight::builtin(photo, name).unwrap();
                 relighter.render(&web_light, &output, 1.0).unwrap();
                 let want = reference::picture(transport, &light, &page_output(1.0));
                 let context = format!("{backend}, photo {i}, round {round}, {name}");
@@ -642,7 +644,7 @@ async fn all_output_transforms_match_the_reference() {
     let transport = round_trip(&transport(0));
     let photo = photo(&transport);
     let (name, light) = relit::lights(transport.geometry.light).swap_remove(4);
-    let web_light = Light::builtin(&photo, name).unwrap();
+    let web_light = WebLight::builtin(&photo, name).unwrap();
     let balance = [1.3, 1.0, 0.6];
     for backend in BACKENDS {
         let device = open_device(backend).await;
@@ -655,7 +657,7 @@ async fn all_output_transforms_match_the_reference() {
             assert_eq!(relighter.gamut(), space);
             let curves = [relight::ToneCurve::Clip, relight::ToneCurve::Filmic];
             for (name, curve) in ["clip", "filmic"].into_iter().zip(curves) {
-                let output = OutputTransform::new(1.5, &balance, name, space).unwrap();
+                let output = WebOutputTransform::new(1.5, &balance, name, space).unwrap();
                 relighter.render(&web_light, &output, 1.0).unwrap();
                 let reference_output = relight::OutputTransform {
                     gains: balance.map(|factor| (1.5 * factor) as f32),

@@ -22,7 +22,9 @@ pub struct Frame<'a> {
 #[derive(Clone, Debug, Default)]
 pub struct LightCache {
     /// The uploaded light; `None` for a light image, whose elements only the device has.
-    light: Option<(Light, LightChroma)>,
+    light: Option<Light>,
+    /// The ratio between the light's channels.
+    pub chroma: LightChroma,
     /// The quality of the basis response, once it is computed.
     response_quality: Option<f32>,
 }
@@ -31,21 +33,15 @@ impl LightCache {
     /// A light that was just uploaded.
     pub fn new(light: &Light) -> Self {
         Self {
-            light: Some((light.clone(), light.chroma())),
+            light: Some(light.clone()),
+            chroma: LightChroma::of_rows(std::iter::once(light.elements())),
             response_quality: None,
         }
     }
 
     /// Whether the device holds this light.
     pub fn has(&self, light: &Light) -> bool {
-        self.light.as_ref().is_some_and(|(own, _)| own == light)
-    }
-
-    /// The ratio between the light's channels.
-    pub fn chroma(&self) -> LightChroma {
-        self.light
-            .as_ref()
-            .map_or(LightChroma::Varying, |(_, chroma)| *chroma)
+        self.light.as_ref() == Some(light)
     }
 
     /// Sets the quality of the basis response. Returns whether the response has to be computed again.
@@ -56,9 +52,6 @@ impl LightCache {
 
 /// Draws one relit photograph into one canvas.
 pub trait Backend {
-    /// The backend's name in attributes.
-    fn name(&self) -> &'static str;
-
     /// The graphics device, or the instruction set of the CPU.
     fn kernel(&self) -> String;
 
@@ -92,47 +85,25 @@ pub enum BackendError {
     /// The browser lacks the interface, or it is switched off.
     #[error("this browser does not offer {0}")]
     Missing(&'static str),
-    /// The canvas gives no context.
+    /// The canvas gives no context of an interface, for a reason.
     #[error(
-        "the canvas gives no {api} context: {reason}. A canvas that already has a context of another kind never gives \
-         one; use a new canvas"
+        "the canvas gives no {0} context: {1}. A canvas that already has a context of another kind never gives one; use \
+         a new canvas"
     )]
-    Canvas {
-        /// The interface.
-        api: &'static str,
-        /// The browser's reason.
-        reason: String,
-    },
-    /// The interface finds no device.
-    #[error("{api} finds no usable graphics device: {reason}")]
-    Device {
-        /// The interface.
-        api: &'static str,
-        /// The browser's reason.
-        reason: String,
-    },
+    Canvas(&'static str, String),
+    /// An interface finds no device, for a reason.
+    #[error("{0} finds no usable graphics device: {1}")]
+    Device(&'static str, String),
     /// The photograph exceeds the device's limits.
     #[error("{0}")]
     Layout(#[from] LayoutError),
-    /// The driver rejects a shader.
-    #[error("the graphics driver rejects the {stage}: {log}")]
-    Shader {
-        /// Vertex shader, fragment shader or program.
-        stage: &'static str,
-        /// The driver's log.
-        log: String,
-    },
+    /// The driver rejects a shader, with this log.
+    #[error("the graphics driver rejects a shader: {0}")]
+    Shader(String),
     /// The device rejects textures or buffers.
     #[error("the graphics device cannot hold the photograph: {0}")]
     Upload(String),
     /// The device was lost after it had been working.
     #[error("the graphics device was lost: {0}")]
     Lost(String),
-}
-
-impl BackendError {
-    /// Whether the backend worked before.
-    pub fn is_loss(&self) -> bool {
-        matches!(self, Self::Lost(_))
-    }
 }

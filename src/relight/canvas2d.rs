@@ -13,8 +13,7 @@ use crate::transport::Extent;
 pub enum CanvasStorage {
     /// The browser decides, usually for graphics memory.
     Default,
-    /// Main memory, for pixels that come from the CPU: otherwise a software renderer, if there is no GPU, would
-    /// copy every frame twice.
+    /// Main memory, for pixels that come from the CPU: a software renderer would copy every frame twice.
     MainMemory,
 }
 
@@ -29,10 +28,7 @@ pub fn open_2d(
     gamut: Gamut,
     storage: CanvasStorage,
 ) -> Result<(CanvasRenderingContext2d, Gamut), BackendError> {
-    let error = |reason: &str| BackendError::Canvas {
-        api: "2D",
-        reason: reason.into(),
-    };
+    let error = |reason: &str| BackendError::Canvas("2D", reason.into());
     let thrown = |e| error(&format!("{e:?}"));
     canvas.set_width(extent.width);
     canvas.set_height(extent.height);

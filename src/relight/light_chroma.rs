@@ -1,5 +1,4 @@
-//! The ratio between a light's channels. Where it is the same for all elements, one channel's basis response serves
-//! all three.
+//! The ratio between a light's channels. Where it is uniform, one channel's basis response serves all three.
 
 use crate::transport::CHANNELS;
 
@@ -7,7 +6,7 @@ use crate::transport::CHANNELS;
 const CHROMA_TOLERANCE: f32 = 1e-6;
 
 /// The ratio between the channels of a light.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum LightChroma {
     /// The same for all elements: channel `c` equals `factors[c]` times channel `base`.
     Uniform {
@@ -17,6 +16,7 @@ pub enum LightChroma {
         factors: [f32; CHANNELS],
     },
     /// Not the same for all elements, or unknown.
+    #[default]
     Varying,
 }
 
@@ -57,13 +57,10 @@ impl LightChroma {
 
     /// Whether all elements are zero.
     pub fn is_dark(&self) -> bool {
-        matches!(
-            self,
-            Self::Uniform {
-                factors: [0.0, 0.0, 0.0],
-                ..
-            }
-        )
+        match self {
+            Self::Uniform { factors, .. } => *factors == [0.0; CHANNELS],
+            Self::Varying => false,
+        }
     }
 
     /// The channels whose basis response is needed.

@@ -9,8 +9,10 @@ use crate::relight::backend::BackendError;
 /// An error that becomes a JavaScript `Error` with a property `code`.
 #[derive(Debug)]
 pub struct CodedError {
-    code: &'static str,
-    message: String,
+    /// The kind of failure, in kebab case.
+    pub code: &'static str,
+    /// The cause and the remedy, in English.
+    pub message: String,
 }
 
 impl CodedError {
@@ -21,14 +23,9 @@ impl CodedError {
         }
     }
 
-    /// The kind of failure, in kebab case.
-    pub fn code(&self) -> &'static str {
-        self.code
-    }
-
-    /// The cause and the remedy, in English.
-    pub fn message(&self) -> &str {
-        &self.message
+    /// A fault of the page's scripts, not of its input.
+    pub(super) fn internal(message: &str) -> Self {
+        Self::new("internal", message)
     }
 }
 
@@ -68,10 +65,9 @@ impl From<LightError> for CodedError {
 
 impl From<BackendError> for CodedError {
     fn from(error: BackendError) -> Self {
-        let code = if error.is_loss() {
-            "backend-lost"
-        } else {
-            "backend-unavailable"
+        let code = match error {
+            BackendError::Lost(_) => "backend-lost",
+            _ => "backend-unavailable",
         };
         Self::new(code, error.to_string())
     }

@@ -59,7 +59,7 @@ impl GraphicsDevice {
             #[cfg(feature = "webgpu")]
             DeviceHandle::WebGpu(device) => device.kernel().into(),
             #[cfg(feature = "webgl2")]
-            DeviceHandle::WebGl2(context) => context.kernel().into(),
+            DeviceHandle::WebGl2(context) => context.kernel.clone(),
         }
     }
 

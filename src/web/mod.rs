@@ -26,7 +26,7 @@ mod drawing {
 #[cfg(feature = "decoder")]
 pub use decoder::Decoder;
 #[cfg(feature = "drawing")]
-pub use drawing::{light::Light, output_transform::OutputTransform, relighter::Relighter};
+pub use drawing::{light::WebLight, output_transform::WebOutputTransform, relighter::Relighter};
 pub use error::CodedError;
 #[cfg(any(feature = "webgl2", feature = "webgpu"))]
 pub use graphics_device::GraphicsDevice;

@@ -28,10 +28,7 @@ impl Photo {
 
     fn transport_mut(&mut self) -> Result<&mut Transport, CodedError> {
         Arc::get_mut(&mut self.transport).ok_or_else(|| {
-            CodedError::new(
-                "internal",
-                "a photograph in use by the CPU backend cannot give or take tiles",
-            )
+            CodedError::internal("a photograph in use by the CPU backend cannot give or take tiles")
         })
     }
 }

@@ -21,10 +21,7 @@ struct TileHeader {
 
 /// The error for values that the other module cannot have sent.
 pub fn corrupt() -> CodedError {
-    CodedError::new(
-        "internal",
-        "a photograph was corrupted on its way from its worker",
-    )
+    CodedError::internal("a photograph was corrupted on its way from its worker")
 }
 
 /// Grids, window, tile side and correspondence, as `unpack_transport` reads them.

@@ -5,6 +5,7 @@ precision highp int;
 struct FrameUniforms {
 vec4 output_matrix[3];
 vec4 chroma;
+vec4 base_channel;
 int window;
 int tile_side;
 int used_quads;
@@ -12,7 +13,6 @@ int coefficient_stride;
 int response_stride;
 int filmic;
 int dither;
-int padding;
 };
 struct BasisUniforms {
 vec4 quads[1024];

@@ -2,8 +2,6 @@
 // channels p of the light at once. A workgroup takes 32 × 4 origins and loads the light under them once.
 
 struct DispatchUniforms {
-    // 1 for the base channel of a light of uniform chroma, 0 for the others.
-    channel: vec4<f32>,
     // The first of the two layers that are written.
     layer: i32,
 }
@@ -39,7 +37,7 @@ fn correlate_group(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invoc
                 light_green[i] = emission.g;
                 light_blue[i] = emission.b;
             } else {
-                light_red[i] = dot(emission, dispatch.channel.rgb);
+                light_red[i] = dot(emission, frame.base_channel.rgb);
             }
         }
     }

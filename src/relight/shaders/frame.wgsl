@@ -5,6 +5,8 @@ struct FrameUniforms {
     output_matrix: array<vec4<f32>, 3>,
     // Each channel of a light of uniform chroma, relative to its base channel; else 1.
     chroma: vec4<f32>,
+    // 1 for the base channel of a light of uniform chroma, 0 for the others.
+    base_channel: vec4<f32>,
     // Light elements along a window's side.
     window: i32,
     // Camera pixels along a tile's side.
@@ -19,7 +21,6 @@ struct FrameUniforms {
     filmic: i32,
     // 1 to dither.
     dither: i32,
-    padding: i32,
 }
 
 // Linear emission of each light element.

@@ -2,13 +2,10 @@
 // Translated from WGSL by tests/shaders.rs; do not edit.
 precision highp float;
 precision highp int;
-struct FullscreenVertex {
-vec4 clip;
-vec2 position;
-};
 struct FrameUniforms {
 vec4 output_matrix[3];
 vec4 chroma;
+vec4 base_channel;
 int window;
 int tile_side;
 int used_quads;
@@ -16,7 +13,6 @@ int coefficient_stride;
 int response_stride;
 int filmic;
 int dither;
-int padding;
 };
 uniform highp sampler2D _group_0_binding_5_fs;
 layout(std140) uniform FrameUniforms_block_0Fragment { FrameUniforms _group_0_binding_7_fs; };
@@ -192,22 +188,22 @@ vec3 _e85 = encoded;
 return _e85;
 }
 void main() {
-FullscreenVertex in_ = FullscreenVertex(gl_FragCoord, _vs2fs_location0);
+vec2 position = _vs2fs_location0;
 vec3 linear = vec3(0.0);
 ivec2 camera = ivec2(uvec2(textureSize(_group_0_binding_3_fs, 0).xy));
-ivec2 pixel_3 = min(max(ivec2((in_.position * vec2(camera))), ivec2(0)), (camera - ivec2(1)));
-ivec4 _e16 = texelFetch(_group_0_binding_3_fs, pixel_3, 0);
-ivec2 origin_1 = _e16.xy;
-int _e20 = _group_0_binding_7_fs.tile_side;
-ivec2 tile = (pixel_3 / ivec2(_e20));
-int _e28 = _group_0_binding_7_fs.used_quads;
-if ((_e28 > 0)) {
+ivec2 pixel_3 = min(max(ivec2((position * vec2(camera))), ivec2(0)), (camera - ivec2(1)));
+ivec4 _e15 = texelFetch(_group_0_binding_3_fs, pixel_3, 0);
+ivec2 origin_1 = _e15.xy;
+int _e19 = _group_0_binding_7_fs.tile_side;
+ivec2 tile = (pixel_3 / ivec2(_e19));
+int _e27 = _group_0_binding_7_fs.used_quads;
+if ((_e27 > 0)) {
 vec4 step_ = texelFetch(_group_0_binding_4_fs, tile, 0);
-vec3 _e34 = linear;
-vec4 _e38 = _group_0_binding_7_fs.chroma;
-int _e43 = _group_0_binding_7_fs.window;
-vec3 _e46 = factored_sum(pixel_3, (origin_1 + ivec2(_e43)));
-linear = (_e34 + ((step_.xyz * _e38.xyz) * _e46));
+vec3 _e33 = linear;
+vec4 _e37 = _group_0_binding_7_fs.chroma;
+int _e42 = _group_0_binding_7_fs.window;
+vec3 _e45 = factored_sum(pixel_3, (origin_1 + ivec2(_e42)));
+linear = (_e33 + ((step_.xyz * _e37.xyz) * _e45));
 }
 ivec4 direct = texelFetch(_group_0_binding_6_fs, tile, 0);
 if ((direct.x >= 0)) {
@@ -215,15 +211,15 @@ ivec2 in_tile = (pixel_3 - direct.yz);
 int index = ((in_tile.y * direct.w) + in_tile.x);
 ivec2 below_1 = ivec2(0, (int(uvec2(textureSize(_group_0_binding_4_fs, 0).xy).y) / 2));
 vec4 step_1 = texelFetch(_group_0_binding_4_fs, (tile + below_1), 0);
-int _e77 = _group_0_binding_7_fs.window;
-int _e81 = _group_0_binding_7_fs.window;
-int first_code_1 = (direct.x + ((index * _e77) * _e81));
-vec3 _e84 = linear;
-vec3 _e86 = windowed_sum(origin_1, first_code_1);
-linear = (_e84 + (step_1.xyz * _e86));
+int _e76 = _group_0_binding_7_fs.window;
+int _e80 = _group_0_binding_7_fs.window;
+int first_code_1 = (direct.x + ((index * _e76) * _e80));
+vec3 _e83 = linear;
+vec3 _e85 = windowed_sum(origin_1, first_code_1);
+linear = (_e83 + (step_1.xyz * _e85));
 }
-vec3 _e89 = linear;
-vec3 _e90 = output_transform(_e89, pixel_3);
-_fs2p_location0 = vec4(_e90, 1.0);
+vec3 _e88 = linear;
+vec3 _e89 = output_transform(_e88, pixel_3);
+_fs2p_location0 = vec4(_e89, 1.0);
 return;
 }

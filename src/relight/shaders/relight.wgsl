@@ -15,10 +15,10 @@
 @group(0) @binding(6) var tiles: texture_2d<i32>;
 
 @fragment
-fn relight(in: FullscreenVertex) -> @location(0) vec4<f32> {
+fn relight(@location(0) position: vec2<f32>) -> @location(0) vec4<f32> {
     let camera = vec2<i32>(textureDimensions(origins));
     // A fragment's centre is half a pixel from the nearest edge: rounding cannot reach it.
-    let pixel = clamp(vec2<i32>(in.position * vec2<f32>(camera)), vec2<i32>(0), camera - 1);
+    let pixel = clamp(vec2<i32>(position * vec2<f32>(camera)), vec2<i32>(0), camera - 1);
     let origin = textureLoad(origins, pixel, 0).xy;
     let tile = pixel / frame.tile_side;
     var linear = vec3<f32>(0.0);

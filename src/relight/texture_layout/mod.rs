@@ -25,7 +25,7 @@ use super::used_count;
 use crate::transport::{CHANNELS, Extent, Geometry, QUAD, Transport};
 
 pub use texels::TextureRegion;
-pub use uniforms::{BasisUniforms, CorrelationPass, DispatchUniforms, FrameUniforms};
+pub use uniforms::{BasisUniforms, FrameUniforms};
 
 /// Largest width and height of the codes' texture: every WebGL2 and WebGPU implementation allows it.
 const MAX_FOLD_SIDE: u32 = 2048;
@@ -39,6 +39,21 @@ const MAX_LIGHT_IMAGE_BYTES: u64 = 256 << 20;
 /// Slots of a window that fit the uniforms of a pass: every device allows 16 KiB.
 const MAX_SLOTS: usize = (16 << 10) / (2 * QUAD * size_of::<f32>());
 
+/// Number of a photograph's textures.
+pub const TEXTURES: usize = 7;
+
+/// Bindings of a photograph's textures, in the order of the table above.
+#[allow(missing_docs)]
+pub mod binding {
+    pub const COEFFICIENTS: usize = 0;
+    pub const BASIS_RESPONSE: usize = 1;
+    pub const CODES: usize = 2;
+    pub const ORIGINS: usize = 3;
+    pub const STEPS: usize = 4;
+    pub const LIGHT: usize = 5;
+    pub const TILES: usize = 6;
+}
+
 /// A device's limits on textures.
 #[derive(Clone, Copy, Debug)]
 pub struct TextureLimits {
@@ -48,79 +63,60 @@ pub struct TextureLimits {
     pub max_layers: u32,
 }
 
-/// Extent of a texture array.
+/// The format of a texture or canvas, by WebGPU's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ArrayExtent {
+#[allow(missing_docs)] // the specification has them
+pub enum TextureFormat {
+    Rgba8Unorm,
+    Bgra8Unorm,
+    Rg16Sint,
+    Rgba16Sint,
+    Rgba32Sint,
+    Rgba32Float,
+}
+
+/// A texture to create.
+#[derive(Clone, Debug)]
+pub struct TextureDescriptor {
+    /// The name in graphics debuggers.
+    pub label: &'static str,
+    /// The texels' format.
+    pub format: TextureFormat,
     /// Width and height of a layer.
     pub extent: Extent,
-    /// Number of layers.
-    pub layers: u32,
+    /// `Some` for an array: also one of a single layer is an array in the shader.
+    pub layers: Option<u32>,
+}
+
+impl TextureDescriptor {
+    /// A texture that is no array.
+    pub fn flat(label: &'static str, format: TextureFormat, extent: Extent) -> Self {
+        Self {
+            label,
+            format,
+            extent,
+            layers: None,
+        }
+    }
 }
 
 /// Where the values of one transport lie in textures.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct TextureLayout {
     geometry: Geometry,
     /// Quads of components; 0 if no tile is factored.
     quads: u32,
-    codes: ArrayExtent,
+    /// The photograph's textures, by binding.
+    pub textures: [TextureDescriptor; TEXTURES],
 }
 
 /// A photograph that exceeds a device's limits.
 #[derive(Debug, Error, PartialEq, Eq)]
-pub enum LayoutError {
-    /// A grid is larger than a texture.
-    #[error(
-        "the {grid} is {extent}, more than the graphics device's limit of {limit} along a side"
-    )]
-    GridTooLarge {
-        /// Name of the grid.
-        grid: &'static str,
-        /// Its extent.
-        extent: Extent,
-        /// The device's limit.
-        limit: u32,
-    },
-    /// There are more components than layers.
-    #[error(
-        "the light transport has {need} layers of components, more than the {limit} the graphics device can hold"
-    )]
-    TooManyLayers {
-        /// Layers needed.
-        need: u32,
-        /// Layers allowed.
-        limit: u32,
-    },
-    /// The basis response would take too much memory, and time.
-    #[error(
-        "the basis response needs {need} bytes of graphics memory, more than the limit of {limit}"
-    )]
-    ResponseTooLarge {
-        /// Bytes needed.
-        need: u64,
-        /// Bytes allowed.
-        limit: u64,
-    },
-    /// The window has more slots than fit the uniforms.
-    #[error(
-        "the window of side {side} has more than the {limit} slots that a graphics device correlates"
-    )]
-    WindowTooLarge {
-        /// The window's side.
-        side: u32,
-        /// Slots allowed.
-        limit: usize,
-    },
-    /// The transport functions are larger than a texture array.
-    #[error(
-        "the light transport has {need} values a channel, more than the {limit} the graphics device can hold"
-    )]
-    TooManyCodes {
-        /// Texels needed.
-        need: u64,
-        /// Texels allowed.
-        limit: u64,
-    },
+#[error("the photograph needs {need} {quantity}, more than the graphics device's limit of {limit}")]
+pub struct LayoutError {
+    quantity: &'static str,
+    need: u64,
+    limit: u64,
 }
 
 impl TextureLayout {
@@ -129,92 +125,58 @@ impl TextureLayout {
     /// # Errors
     /// [`LayoutError`] if the transport exceeds the device's limits.
     pub fn new(transport: &Transport, limits: TextureLimits) -> Result<Self, LayoutError> {
-        let geometry = transport.geometry;
-        let tiles = &transport.tiles;
+        use TextureFormat::{Rg16Sint, Rgba16Sint, Rgba32Float, Rgba32Sint};
+        let (geometry, tiles) = (&transport.geometry, &transport.tiles);
+        let Geometry { camera, light, .. } = *geometry;
         let is_factored = tiles.iter().any(|tile| !tile.coefficients.is_dark());
         let quads = match is_factored {
             true => transport.basis.rank().div_ceil(QUAD) as u32,
             false => 0,
         };
-        let response = response_extent(&geometry);
-        let light = match is_factored {
-            true => ("light plane with its border", response),
-            false => ("light plane", geometry.light),
+        let [layers, response_layers] =
+            [quads, quads.next_multiple_of(2)].map(|quads| CHANNELS as u32 * quads);
+        // Window origins with a part of their window on the light plane, and a border of one for all others.
+        let response = Extent {
+            width: light.width + geometry.window.side() + 1,
+            height: light.height + geometry.window.side() + 1,
         };
-        for (grid, extent) in [("camera grid", geometry.camera), light] {
-            let limit = limits.max_side;
-            if extent.width.max(extent.height) > limit {
-                return Err(LayoutError::GridTooLarge {
-                    grid,
-                    extent,
-                    limit,
-                });
-            }
-        }
-        let (need, limit) = (
-            CHANNELS as u32 * quads.next_multiple_of(2),
-            limits.max_layers,
-        );
-        if need > limit {
-            return Err(LayoutError::TooManyLayers { need, limit });
-        }
-        let need = response.area() as u64 * u64::from(need) * size_of::<[f32; 4]>() as u64;
-        if need > MAX_RESPONSE_BYTES {
-            let limit = MAX_RESPONSE_BYTES;
-            return Err(LayoutError::ResponseTooLarge { need, limit });
-        }
-        if is_factored && geometry.window.area() > MAX_SLOTS {
-            return Err(LayoutError::WindowTooLarge {
-                side: geometry.window.side(),
-                limit: MAX_SLOTS,
-            });
+        let max_side = u64::from(limits.max_side);
+        let side = |extent: Extent| u64::from(extent.width.max(extent.height));
+        let light_side = side(if is_factored { response } else { light });
+        check_limit("columns or rows of camera pixels", side(camera), max_side)?;
+        check_limit("columns or rows of light elements", light_side, max_side)?;
+        let max_layers = u64::from(limits.max_layers);
+        check_limit("layers of components", response_layers.into(), max_layers)?;
+        let bytes = response.area() as u64 * u64::from(response_layers) * 16;
+        check_limit("bytes for the basis response", bytes, MAX_RESPONSE_BYTES)?;
+        if is_factored {
+            let slots = geometry.window.area() as u64;
+            check_limit("slots in a window", slots, MAX_SLOTS as u64)?;
         }
         let codes = tiles.iter().map(|tile| tile.functions.codes.len() as u64);
-        let codes = fold(codes.sum(), limits)?;
+        let (fold, fold_layers) = fold(codes.sum(), limits)?;
+
+        let flat = TextureDescriptor::flat;
+        // A single texel where there are no layers.
+        let array = |label, format, extent, layers: u32| TextureDescriptor {
+            layers: Some(layers.max(1)),
+            ..flat(label, format, if layers == 0 { TEXEL } else { extent })
+        };
+        let grid = geometry.tile_grid();
+        let (width, height) = (grid.width, 2 * grid.height);
         Ok(Self {
-            geometry,
+            geometry: *geometry,
             quads,
-            codes,
+            textures: [
+                array("coefficients", Rgba16Sint, camera, layers),
+                array("basis response", Rgba32Float, response, response_layers),
+                array("codes", Rgba16Sint, fold, fold_layers),
+                flat("origins", Rg16Sint, camera),
+                flat("steps", Rgba32Float, Extent { width, height }),
+                flat("light", Rgba32Float, light),
+                flat("tiles", Rgba32Sint, grid),
+            ],
         })
-    }
-
-    /// Extent of the coefficients: one texel where no tile is factored.
-    pub fn coefficients(&self) -> ArrayExtent {
-        layered(self.geometry.camera, self.quads)
-    }
-
-    /// Extent of the basis response: one texel where no tile is factored.
-    pub fn basis_response(&self) -> ArrayExtent {
-        layered(response_extent(&self.geometry), 2 * self.quad_pairs())
-    }
-
-    /// Extent of the codes.
-    pub fn codes(&self) -> ArrayExtent {
-        self.codes
-    }
-
-    /// Extent of the origins.
-    pub fn origins(&self) -> Extent {
-        self.geometry.camera
-    }
-
-    /// Extent of the steps.
-    pub fn steps(&self) -> Extent {
-        let Extent { width, height } = self.geometry.tile_grid();
-        Extent {
-            width,
-            height: 2 * height,
-        }
-    }
-
-    /// Extent of the tiles.
-    pub fn tiles(&self) -> Extent {
-        self.geometry.tile_grid()
-    }
-
-    /// Extent of the light.
-    pub fn light(&self) -> Extent {
-        self.geometry.light
     }
 
     /// Pairs of quads of components.
@@ -239,44 +201,34 @@ impl TextureLayout {
     }
 }
 
-/// Window origins with a part of their window on the light plane, and a border of one for all others.
-fn response_extent(geometry: &Geometry) -> Extent {
-    let Geometry { light, window, .. } = geometry;
-    let span = |side: u32| side + window.side() + 1;
-    Extent {
-        width: span(light.width),
-        height: span(light.height),
+const TEXEL: Extent = Extent {
+    width: 1,
+    height: 1,
+};
+
+fn check_limit(quantity: &'static str, need: u64, limit: u64) -> Result<(), LayoutError> {
+    match need <= limit {
+        true => Ok(()),
+        false => Err(LayoutError {
+            quantity,
+            need,
+            limit,
+        }),
     }
 }
 
-/// Layers for each channel and quad, or a single texel where there are none.
-fn layered(extent: Extent, quads: u32) -> ArrayExtent {
-    let texel = Extent {
-        width: 1,
-        height: 1,
-    };
-    ArrayExtent {
-        extent: if quads == 0 { texel } else { extent },
-        layers: (CHANNELS as u32 * quads).max(1),
-    }
-}
-
-/// The array that holds `need` texels in rows: as few layers as possible, each only as high as needed.
-fn fold(need: u64, limits: TextureLimits) -> Result<ArrayExtent, LayoutError> {
+/// Extent and layers of the array that holds `need` texels in rows: as few and as low layers as possible.
+fn fold(need: u64, limits: TextureLimits) -> Result<(Extent, u32), LayoutError> {
     let side = u64::from(MAX_FOLD_SIDE.min(limits.max_side));
     // The shader counts texels in an i32.
     let limit = (side * side * u64::from(limits.max_layers)).min(i32::MAX as u64);
-    if need > limit {
-        return Err(LayoutError::TooManyCodes { need, limit });
-    }
+    check_limit("transport values in each channel", need, limit)?;
     let width = side.min(need).max(1);
     let rows = need.div_ceil(width).max(1);
     let layers = rows.div_ceil(side);
-    Ok(ArrayExtent {
-        extent: Extent {
-            width: width as u32,
-            height: rows.div_ceil(layers) as u32,
-        },
-        layers: layers as u32,
-    })
+    let extent = Extent {
+        width: width as u32,
+        height: rows.div_ceil(layers) as u32,
+    };
+    Ok((extent, layers as u32))
 }

@@ -1,7 +1,6 @@
 //! Textures checked texel by texel against the rules that the shaders read them by.
 
 use super::*;
-use crate::relight::LightChroma;
 use crate::transport::{Basis, CameraPx, CoefficientTile, Correspondence, Tile, Window};
 
 const WEBGL2_MINIMUM: TextureLimits = TextureLimits {
@@ -68,20 +67,20 @@ fn each_code_is_where_the_shader_reads_it() {
         let geometry = geometry(camera, window);
         let transport = transport(geometry, 0);
         let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
-        let ArrayExtent { extent, layers } = layout.codes();
-        let mut texture = Vec::new();
+        let TextureDescriptor { extent, layers, .. } = layout.textures[binding::CODES];
+        let mut texture: Vec<[i16; 4]> = Vec::new();
         layout
             .for_each_code_region(&transport, |region| {
                 let [column, row, layer] = region.origin;
                 let before = layer as usize * extent.area();
                 assert_eq!(texture.len(), before + (row * extent.width) as usize);
                 assert_eq!((column, region.extent.width), (0, extent.width));
-                assert_eq!(region.texels.len(), region.extent.area());
-                texture.extend_from_slice(region.texels);
+                assert_eq!(region.texels.len(), 8 * region.extent.area());
+                texture.extend_from_slice(bytemuck::cast_slice(region.texels));
                 Ok::<_, ()>(())
             })
             .unwrap();
-        assert_eq!(texture.len(), extent.area() * layers as usize);
+        assert_eq!(texture.len(), extent.area() * layers.unwrap() as usize);
         let origins = layout.origin_texels();
         let tiles = layout.tile_texels(&transport);
         let steps = layout.step_texels(&transport);
@@ -116,13 +115,14 @@ fn each_coefficient_is_where_the_shader_reads_it() {
         let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
         let (quads, pairs) = (rank.div_ceil(4) as u32, rank.div_ceil(8) as u32);
         assert_eq!(layout.quad_pairs(), pairs);
-        let ArrayExtent { extent, layers } = layout.coefficients();
-        assert_eq!((extent, layers), (geometry.camera, 3 * quads));
+        let TextureDescriptor { extent, layers, .. } = layout.textures[binding::COEFFICIENTS];
+        assert_eq!((extent, layers), (geometry.camera, Some(3 * quads)));
         let mut found = 0;
         let Ok(()) = layout.for_each_coefficient_region(&transport, |region| {
             let (channel, quad) = (region.origin[2] / quads, region.origin[2] % quads);
-            assert!(channel < 3 && region.texels.len() == region.extent.area());
-            for (i, texel) in region.texels.iter().enumerate() {
+            let texels: &[[i16; 4]] = bytemuck::cast_slice(region.texels);
+            assert!(channel < 3 && texels.len() == region.extent.area());
+            for (i, texel) in texels.iter().enumerate() {
                 let (x, y) = (
                     i as u32 % region.extent.width,
                     i as u32 / region.extent.width,
@@ -139,22 +139,10 @@ fn each_coefficient_is_where_the_shader_reads_it() {
             .filter(|tile| !tile.coefficients.is_dark());
         let pixels: usize = tiles.map(|tile| tile.rect().extent.area()).sum();
         assert_eq!(found, pixels * 3 * quads as usize);
-        let layers = layout.basis_response().layers;
-        let passes = layout.correlation_passes(LightChroma::Varying, 1.0);
-        let filled: Vec<_> = passes.iter().map(|pass| pass.layer).collect();
-        assert!(filled.iter().copied().eq((0..layers).step_by(2)));
-        let uniform = LightChroma::Uniform {
-            base: 1,
-            factors: [0.5, 1.0, 0.25],
-        };
-        let one = layout.correlation_passes(uniform, 1.0);
-        assert!(one.iter().all(|pass| pass.channel == 1) && one[0].layer == 0);
-        assert_eq!(one.len(), pairs as usize);
-        let less = layout.correlation_passes(LightChroma::Varying, 0.5);
+        let layers = layout.textures[binding::BASIS_RESPONSE].layers;
+        assert_eq!(layers, Some(3 * 2 * pairs));
         let used = rank.div_ceil(4).div_ceil(2).div_ceil(2); // half the quads, in pairs
-        assert_eq!(less.len(), 3 * used);
-        let first: Vec<_> = passes.iter().filter(|pass| pass.pair < used).collect();
-        assert!(less.iter().eq(first));
+        assert_eq!(layout.used_quad_pairs(0.5), used);
     }
 }
 
@@ -177,47 +165,49 @@ fn photographs_beyond_the_limits_are_errors() {
         let transport = transport(geometry(camera, window), rank);
         TextureLayout::new(&transport, limits).unwrap_err()
     };
-    assert!(matches!(
+    let exceeds = |quantity, need, limit| LayoutError {
+        quantity,
+        need,
+        limit,
+    };
+    assert_eq!(
         error((2049, 8), 1, 0, WEBGL2_MINIMUM),
-        LayoutError::GridTooLarge {
-            grid: "camera grid",
-            limit: 2048,
-            ..
-        }
-    ));
+        exceeds("columns or rows of camera pixels", 2049, 2048)
+    );
     let small = TextureLimits {
         max_side: 64,
         max_layers: 2,
     };
     assert_eq!(
         error((64, 64), 3, 0, small),
-        LayoutError::TooManyCodes {
-            need: 11 * 256 * 9,
-            limit: 2 * 64 * 64,
-        }
+        exceeds(
+            "transport values in each channel",
+            11 * 256 * 9,
+            2 * 64 * 64
+        )
     );
     assert_eq!(
         error((8, 8), 1, 1, small),
-        LayoutError::TooManyLayers { need: 6, limit: 2 }
+        exceeds("layers of components", 6, 2)
     );
     let mut wide = transport(geometry((8, 8), 1), 64);
     wide.geometry.light = Extent {
         width: 1500,
         height: 1500,
     };
-    let response = TextureLayout::new(&wide, WEBGL2_MINIMUM).unwrap_err();
-    assert!(
-        matches!(response, LayoutError::ResponseTooLarge { need, .. } if need == 1502 * 1502 * 48 * 16)
-    );
-    let window = error((8, 8), 25, 1, WEBGL2_MINIMUM);
     assert_eq!(
-        window,
-        LayoutError::WindowTooLarge {
-            side: 25,
-            limit: 512
-        }
+        TextureLayout::new(&wide, WEBGL2_MINIMUM).unwrap_err(),
+        exceeds(
+            "bytes for the basis response",
+            1502 * 1502 * 48 * 16,
+            256 << 20
+        )
+    );
+    assert_eq!(
+        error((8, 8), 25, 1, WEBGL2_MINIMUM),
+        exceeds("slots in a window", 625, 512)
     );
     let large = transport(geometry((512, 512), 15), 0);
     let fits = TextureLayout::new(&large, WEBGL2_MINIMUM).unwrap();
-    assert!(fits.codes().layers <= 256);
+    assert!(fits.textures[binding::CODES].layers <= Some(256));
 }

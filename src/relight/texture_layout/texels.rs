@@ -1,6 +1,6 @@
 //! The contents of the textures.
 
-use super::TextureLayout;
+use super::{TextureDescriptor, TextureLayout, binding};
 use crate::transport::{
     CameraPx, CoefficientTile, Element, Extent, Geometry, TexelCode, Tile, TileRect, Transport,
 };
@@ -8,22 +8,49 @@ use crate::transport::{
 /// Rows of codes in one region: up to 4 MiB, which makes uploads few and their copies small.
 const REGION_ROWS: u32 = 256;
 
-/// A rectangle of one layer of coefficients or codes.
+/// A rectangle of texels to write.
 pub struct TextureRegion<'a> {
+    /// The texture's binding.
+    pub binding: usize,
     /// First column and row, and the layer.
     pub origin: [u32; 3],
     /// Columns and rows.
     pub extent: Extent,
     /// The texels, row by row.
-    pub texels: &'a [TexelCode],
+    pub texels: &'a [u8],
 }
 
 impl TextureLayout {
-    /// Calls `write` with each region of coefficients that is not zero.
+    /// Calls `write` with all regions that do not depend on the light and are not zero.
     ///
     /// # Errors
     /// The first error of `write`.
-    pub fn for_each_coefficient_region<E>(
+    pub fn for_each_region<E>(
+        &self,
+        transport: &Transport,
+        mut write: impl FnMut(TextureRegion<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.for_each_coefficient_region(transport, &mut write)?;
+        self.for_each_code_region(transport, &mut write)?;
+        let (origins, tiles) = (self.origin_texels(), self.tile_texels(transport));
+        let steps = self.step_texels(transport);
+        let textures: [(usize, &[u8]); 3] = [
+            (binding::ORIGINS, bytemuck::cast_slice(&origins)),
+            (binding::STEPS, bytemuck::cast_slice(&steps)),
+            (binding::TILES, bytemuck::cast_slice(&tiles)),
+        ];
+        for (binding, texels) in textures {
+            write(TextureRegion {
+                binding,
+                origin: [0; 3],
+                extent: self.textures[binding].extent,
+                texels,
+            })?;
+        }
+        Ok(())
+    }
+
+    fn for_each_coefficient_region<E>(
         &self,
         transport: &Transport,
         mut write: impl FnMut(TextureRegion<'_>) -> Result<(), E>,
@@ -33,29 +60,27 @@ impl TextureLayout {
             let plane = CoefficientTile::plane(coefficients.rect);
             for (layer, texels) in (0..).zip(coefficients.codes.chunks_exact(plane)) {
                 write(TextureRegion {
+                    binding: binding::COEFFICIENTS,
                     origin: [x, y, layer],
                     extent,
-                    texels: &texels[..extent.area()],
+                    texels: bytemuck::cast_slice(&texels[..extent.area()]),
                 })?;
             }
         }
         Ok(())
     }
 
-    /// Calls `write` with regions that cover the codes.
-    ///
-    /// # Errors
-    /// The first error of `write`.
-    pub fn for_each_code_region<E>(
+    fn for_each_code_region<E>(
         &self,
         transport: &Transport,
         mut write: impl FnMut(TextureRegion<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let Extent { width, height } = self.codes.extent;
+        let TextureDescriptor { extent, layers, .. } = self.textures[binding::CODES];
+        let Extent { width, height } = extent;
         let mut tiles = transport.tiles.iter().map(|tile| &tile.functions.codes);
         let mut source: &[TexelCode] = &[];
         let mut texels = Vec::new();
-        for layer in 0..self.codes.layers {
+        for layer in 0..layers.unwrap_or(1) {
             for row in (0..height).step_by(REGION_ROWS as usize) {
                 let rows = REGION_ROWS.min(height - row);
                 let need = (rows * width) as usize;
@@ -73,20 +98,20 @@ impl TextureLayout {
                     source = rest;
                 }
                 write(TextureRegion {
+                    binding: binding::CODES,
                     origin: [0, row, layer],
                     extent: Extent {
                         width,
                         height: rows,
                     },
-                    texels: &texels,
+                    texels: bytemuck::cast_slice(&texels),
                 })?;
             }
         }
         Ok(())
     }
 
-    /// The texels of the origins.
-    pub fn origin_texels(&self) -> Vec<[i16; 2]> {
+    fn origin_texels(&self) -> Vec<[i16; 2]> {
         let Geometry {
             camera,
             light,
@@ -103,8 +128,7 @@ impl TextureLayout {
         pixels.map(origin).collect()
     }
 
-    /// The texels of the tiles.
-    pub fn tile_texels(&self, transport: &Transport) -> Vec<[i32; 4]> {
+    fn tile_texels(&self, transport: &Transport) -> Vec<[i32; 4]> {
         let mut next = 0;
         let texel = |tile: &Tile| {
             let TileRect { x, y, extent } = tile.rect();
@@ -116,8 +140,7 @@ impl TextureLayout {
         transport.tiles.iter().map(texel).collect()
     }
 
-    /// The texels of the steps.
-    pub fn step_texels(&self, transport: &Transport) -> Vec<[f32; 4]> {
+    fn step_texels(&self, transport: &Transport) -> Vec<[f32; 4]> {
         let texel = |[r, g, b]: [f32; 3]| [r, g, b, 0.0];
         let tiles = &transport.tiles;
         let coefficients = tiles.iter().map(|tile| tile.coefficients.step);

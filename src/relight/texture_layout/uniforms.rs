@@ -1,4 +1,4 @@
-//! The shaders' uniforms, field by field as in the WGSL, and the passes that read them.
+//! The shaders' uniforms, field by field as in the WGSL.
 
 use super::{MAX_SLOTS, TextureLayout};
 use crate::relight::{LightChroma, OutputTransform, ToneCurve};
@@ -13,6 +13,7 @@ pub type BasisUniforms = [[[f32; QUAD]; 2]; MAX_SLOTS];
 pub struct FrameUniforms {
     output_matrix: [[f32; 4]; CHANNELS],
     chroma: [f32; 4],
+    base_channel: [f32; 4],
     window: i32,
     tile_side: i32,
     used_quads: i32,
@@ -21,26 +22,6 @@ pub struct FrameUniforms {
     filmic: i32,
     dither: i32,
     padding: i32,
-}
-
-/// `DispatchUniforms` of the WGSL.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct DispatchUniforms {
-    channel: [f32; 4],
-    layer: i32,
-    padding: [i32; 3],
-}
-
-/// A pass of WebGL2 that fills two layers of the basis response.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CorrelationPass {
-    /// The light's channel.
-    pub channel: usize,
-    /// The pair of quads.
-    pub pair: usize,
-    /// The first of the two layers.
-    pub layer: u32,
 }
 
 impl TextureLayout {
@@ -67,30 +48,6 @@ impl TextureLayout {
         pairs.take(count).map(pair).collect()
     }
 
-    /// The uniforms of each dispatch of WebGPU, pair by pair: for a light of uniform chroma with that base channel, and
-    /// with any for a light of varying chroma.
-    pub fn dispatch_uniforms(&self, channel: usize) -> impl Iterator<Item = DispatchUniforms> {
-        (0..self.quad_pairs() as i32).map(move |pair| DispatchUniforms {
-            channel: Self::CHANNEL_WEIGHTS[channel],
-            layer: 2 * pair,
-            padding: [0; 3],
-        })
-    }
-
-    /// The passes of WebGL2 for a light.
-    pub fn correlation_passes(&self, chroma: LightChroma, quality: f32) -> Vec<CorrelationPass> {
-        let channels = (0..).zip(chroma.channels());
-        let (pairs, used) = (self.quad_pairs(), self.used_quad_pairs(quality));
-        let passes = channels.flat_map(|(i, &channel)| {
-            (0..used).map(move |pair| CorrelationPass {
-                channel,
-                pair,
-                layer: 2 * (i * pairs + pair as u32),
-            })
-        });
-        passes.collect()
-    }
-
     /// The uniforms of a frame.
     pub fn frame_uniforms(
         &self,
@@ -107,6 +64,7 @@ impl TextureLayout {
         FrameUniforms {
             output_matrix: output.gamut.from_srgb().map(row),
             chroma: [r, g, b, 0.0],
+            base_channel: Self::CHANNEL_WEIGHTS[chroma.channels()[0]],
             window: self.geometry.window.side() as i32,
             tile_side: self.geometry.tile_side as i32,
             used_quads: self.used_quads(quality) as i32,

@@ -6,12 +6,12 @@ use js_sys::Reflect;
 use wasm_bindgen::JsCast;
 use web_sys::{
     HtmlCanvasElement, WebGl2RenderingContext as Gl, WebGlContextAttributes, WebGlProgram,
-    WebGlShader, WebglLoseContext,
+    WebglLoseContext,
 };
 
 use crate::relight::Gamut;
 use crate::relight::backend::BackendError;
-use crate::relight::texture_layout::TextureLimits;
+use crate::relight::texture_layout::{TEXTURES, TextureLimits, binding};
 use crate::transport::Extent;
 
 /// The interface's name in errors.
@@ -21,22 +21,15 @@ const CORRELATE_SHADER: &str = include_str!("../shaders/correlate.frag.glsl");
 const DOWNSAMPLE_SHADER: &str = include_str!("../shaders/downsample.frag.glsl");
 const RELIGHT_SHADER: &str = include_str!("../shaders/relight.frag.glsl");
 
-/// Texture units: the binding numbers of the WGSL, from which naga names samplers.
-pub(super) const COEFFICIENTS: u32 = 0;
-pub(super) const BASIS_RESPONSE: u32 = 1;
-pub(super) const CODES: u32 = 2;
-pub(super) const ORIGINS: u32 = 3;
-pub(super) const STEPS: u32 = 4;
-pub(super) const LIGHT: u32 = 5;
-pub(super) const TILES: u32 = 6;
+/// The texture unit of light images. Texture units are the binding numbers of the WGSL, from which naga names samplers.
 pub(super) const LIGHT_IMAGE: u32 = 10;
 
-/// Uniform buffer bindings, and naga's names for the uniform blocks.
-const UNIFORMS: [(u32, &str); 4] = [
-    (FRAME, "FrameUniforms_block_0Fragment"),
-    (BASIS, "BasisUniforms_block_1Fragment"),
-    (CHANNEL, "ChannelUniforms_block_2Fragment"),
-    (DOWNSAMPLING, "DownsampleUniforms_block_0Fragment"),
+/// naga's names for the uniform blocks, by uniform buffer binding.
+const UNIFORM_BLOCKS: [&str; 4] = [
+    "FrameUniforms_block_0Fragment",
+    "BasisUniforms_block_1Fragment",
+    "ChannelUniforms_block_2Fragment",
+    "DownsampleUniforms_block_0Fragment",
 ];
 pub(super) const FRAME: u32 = 0;
 pub(super) const BASIS: u32 = 1;
@@ -53,7 +46,8 @@ pub struct Context {
     pub(super) float_programs: Option<FloatPrograms>,
     pub(super) relight: WebGlProgram,
     pub(super) limits: TextureLimits,
-    kernel: String,
+    /// The renderer's name.
+    pub kernel: String,
     /// The gamut of the pixels.
     gamut: Cell<Gamut>,
 }
@@ -63,15 +57,6 @@ pub struct Context {
 pub(super) struct FloatPrograms {
     pub correlate: WebGlProgram,
     pub downsample: WebGlProgram,
-}
-
-impl FloatPrograms {
-    fn link(gl: &Gl) -> Result<Self, BackendError> {
-        Ok(Self {
-            correlate: link(gl, CORRELATE_SHADER, &[LIGHT])?,
-            downsample: link(gl, DOWNSAMPLE_SHADER, &[LIGHT_IMAGE])?,
-        })
-    }
 }
 
 impl Context {
@@ -84,9 +69,6 @@ impl Context {
         attributes.set_alpha(false);
         attributes.set_antialias(false);
         attributes.set_depth(false);
-        attributes.set_stencil(false);
-        // Pictures are copied in the task that draws them.
-        attributes.set_preserve_drawing_buffer(false);
         let gl = canvas
             .get_context_with_context_options("webgl2", &attributes)
             .map_err(|e| canvas_error(&format!("{e:?}")))?
@@ -101,21 +83,17 @@ impl Context {
         if gl.is_context_lost() {
             return Err(canvas_error("the context is lost"));
         }
-        let can_draw_floats = matches!(gl.get_extension("EXT_color_buffer_float"), Ok(Some(_)));
-        let float_programs = can_draw_floats.then(|| FloatPrograms::link(gl));
-        let all = [
-            COEFFICIENTS,
-            BASIS_RESPONSE,
-            CODES,
-            ORIGINS,
-            STEPS,
-            LIGHT,
-            TILES,
-        ];
-        let relight = link(gl, RELIGHT_SHADER, &all)?;
+        let float_programs = match gl.get_extension("EXT_color_buffer_float") {
+            Ok(Some(_)) => Some(FloatPrograms {
+                correlate: link(gl, CORRELATE_SHADER, [binding::LIGHT as u32])?,
+                downsample: link(gl, DOWNSAMPLE_SHADER, [LIGHT_IMAGE])?,
+            }),
+            _ => None,
+        };
+        let relight = link(gl, RELIGHT_SHADER, 0..TEXTURES as u32)?;
         gl.disable(Gl::DITHER); // on by default
         Ok(Self {
-            float_programs: float_programs.transpose()?,
+            float_programs,
             relight,
             limits: limits(gl),
             kernel: describe(gl),
@@ -123,11 +101,6 @@ impl Context {
             gl: gl.clone(),
             canvas: canvas.clone(),
         })
-    }
-
-    /// The renderer's name.
-    pub fn kernel(&self) -> &str {
-        &self.kernel
     }
 
     /// Whether the browser supports a gamut.
@@ -174,18 +147,12 @@ impl Context {
 
     /// Resizes the canvas. Returns whether the drawing buffer follows: browsers give less beyond their limits.
     fn try_resize(&self, extent: Extent) -> bool {
-        let Extent { width, height } = self.size();
-        if extent.width != width {
+        if self.size() != extent {
             self.canvas.set_width(extent.width);
-        }
-        if extent.height != height {
             self.canvas.set_height(extent.height);
         }
-        let actual = [
-            self.gl.drawing_buffer_width(),
-            self.gl.drawing_buffer_height(),
-        ];
-        actual == [extent.width as i32, extent.height as i32]
+        self.gl.drawing_buffer_width() == extent.width as i32
+            && self.gl.drawing_buffer_height() == extent.height as i32
     }
 
     /// Discards errors of earlier calls.
@@ -226,17 +193,11 @@ fn lose_context(gl: &Gl) {
 }
 
 pub(super) fn context_lost() -> BackendError {
-    BackendError::Device {
-        api: API,
-        reason: "the context was lost during set-up".into(),
-    }
+    BackendError::Device(API, "the context was lost during set-up".into())
 }
 
 fn canvas_error(reason: &str) -> BackendError {
-    BackendError::Canvas {
-        api: API,
-        reason: reason.into(),
-    }
+    BackendError::Canvas(API, reason.into())
 }
 
 fn limits(gl: &Gl) -> TextureLimits {
@@ -266,61 +227,46 @@ fn describe(gl: &Gl) -> String {
 }
 
 /// Links a program whose samplers read these texture units.
-fn link(gl: &Gl, fragment: &str, textures: &[u32]) -> Result<WebGlProgram, BackendError> {
-    let shaders = [
-        compile(gl, Gl::VERTEX_SHADER, "vertex shader", VERTEX_SHADER)?,
-        compile(gl, Gl::FRAGMENT_SHADER, "fragment shader", fragment)?,
-    ];
-    let shader_error = |log| BackendError::Shader {
-        stage: "program",
-        log,
+fn link(
+    gl: &Gl,
+    fragment: &str,
+    units: impl IntoIterator<Item = u32>,
+) -> Result<WebGlProgram, BackendError> {
+    let compile = |kind, source| {
+        let shader = gl.create_shader(kind).ok_or_else(context_lost)?;
+        gl.shader_source(&shader, source);
+        gl.compile_shader(&shader);
+        Ok::<_, BackendError>(shader)
     };
+    let vertex = compile(Gl::VERTEX_SHADER, VERTEX_SHADER)?;
+    let shaders = [vertex, compile(Gl::FRAGMENT_SHADER, fragment)?];
     let program = gl.create_program().ok_or_else(context_lost)?;
     for shader in &shaders {
         gl.attach_shader(&program, shader);
     }
     gl.link_program(&program);
+    // Asking earlier whether a shader compiles would wait for it.
+    if gl.get_program_parameter(&program, Gl::LINK_STATUS) != true {
+        let logs = shaders.iter().map(|shader| gl.get_shader_info_log(shader));
+        let logs = logs.chain([gl.get_program_info_log(&program)]);
+        return Err(BackendError::Shader(logs.flatten().collect()));
+    }
     for shader in &shaders {
         gl.delete_shader(Some(shader)); // the program keeps it
     }
-    if gl.get_program_parameter(&program, Gl::LINK_STATUS) != true {
-        return Err(shader_error(
-            gl.get_program_info_log(&program).unwrap_or_default(),
-        ));
-    }
     gl.use_program(Some(&program));
-    for unit in textures {
+    for unit in units {
         let name = format!("_group_0_binding_{unit}_fs");
         let location = gl.get_uniform_location(&program, &name);
-        let location = location.ok_or_else(|| shader_error(format!("{name} is missing")))?;
-        gl.uniform1i(Some(&location), *unit as i32);
+        let location =
+            location.ok_or_else(|| BackendError::Shader(format!("{name} is missing")))?;
+        gl.uniform1i(Some(&location), unit as i32);
     }
-    for (point, name) in UNIFORMS {
+    for (point, name) in (0..).zip(UNIFORM_BLOCKS) {
         let block = gl.get_uniform_block_index(&program, name);
         if block != Gl::INVALID_INDEX {
             gl.uniform_block_binding(&program, block, point);
         }
     }
     Ok(program)
-}
-
-fn compile(
-    gl: &Gl,
-    kind: u32,
-    stage: &'static str,
-    source: &str,
-) -> Result<WebGlShader, BackendError> {
-    let shader_error = |log| BackendError::Shader { stage, log };
-    let shader = gl
-        .create_shader(kind)
-        .ok_or_else(|| shader_error("the context was lost".into()))?;
-    gl.shader_source(&shader, source);
-    gl.compile_shader(&shader);
-    if gl.get_shader_parameter(&shader, Gl::COMPILE_STATUS) == true {
-        Ok(shader)
-    } else {
-        Err(shader_error(
-            gl.get_shader_info_log(&shader).unwrap_or_default(),
-        ))
-    }
 }

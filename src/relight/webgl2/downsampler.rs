@@ -5,98 +5,91 @@ use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{WebGl2RenderingContext as Gl, WebGlProgram};
 
 use super::context::{DOWNSAMPLING, LIGHT_IMAGE};
-use super::resources::{Framebuffer, RGBA8_UNORM, RGBA32_FLOAT, Texture, UniformBuffer};
+use super::resources::{Framebuffer, GlTexture, GlUniformBuffer};
 use crate::relight::backend::BackendError;
+use crate::relight::texture_layout::{TextureDescriptor, TextureFormat};
 use crate::transport::Extent;
 
 /// Textures for light images of one extent.
 #[derive(Debug)]
-pub(super) struct Downsampler {
+pub(super) struct GlDownsampler {
     gl: Gl,
-    extent: Extent,
-    image: Texture,
+    image: GlTexture,
     /// The image resampled along columns.
-    columns: Texture,
+    columns: GlTexture,
     /// Along columns, then along rows.
-    passes: [DownsamplePass; 2],
+    passes: [(Framebuffer, GlUniformBuffer); 2],
 }
 
-#[derive(Debug)]
-struct DownsamplePass {
-    target: Framebuffer,
-    target_extent: Extent,
-    uniforms: UniformBuffer,
-}
-
-impl Downsampler {
+impl GlDownsampler {
     /// From light images of that extent to the light's texture.
     ///
     /// # Errors
     /// [`BackendError::Device`] if the context is lost.
-    pub fn new(
-        gl: &Gl,
-        extent: Extent,
-        light: &Texture,
-        light_extent: Extent,
-    ) -> Result<Self, BackendError> {
-        let columns_extent = Extent {
-            width: light_extent.width,
-            height: extent.height,
+    pub fn new(gl: &Gl, extent: Extent, light: &GlTexture) -> Result<Self, BackendError> {
+        let create = |label, format, extent| {
+            GlTexture::new(
+                gl,
+                LIGHT_IMAGE,
+                TextureDescriptor::flat(label, format, extent),
+            )
         };
-        let texture = |format, extent| Texture::new(gl, LIGHT_IMAGE, format, extent, None);
-        let columns = texture(RGBA32_FLOAT, columns_extent)?;
+        let Extent { width, height } = light.extent();
+        let columns_extent = Extent { width, ..extent };
+        let columns = create(
+            "light image's columns",
+            TextureFormat::Rgba32Float,
+            columns_extent,
+        )?;
         // `DownsampleUniforms` of the WGSL.
-        let pass = |target, target_extent, uniforms: [u32; 4]| {
-            Ok::<_, BackendError>(DownsamplePass {
-                target: Framebuffer::of_texture(gl, target)?,
-                target_extent,
-                uniforms: UniformBuffer::new(gl, bytemuck::cast_slice(&uniforms))?,
-            })
+        let pass = |target, uniforms: [u32; 4]| {
+            let framebuffer = Framebuffer::of_texture(gl, target)?;
+            let uniforms = GlUniformBuffer::new(gl, bytemuck::cast_slice(&uniforms))?;
+            Ok::<_, BackendError>((framebuffer, uniforms))
         };
         Ok(Self {
             gl: gl.clone(),
-            extent,
-            image: texture(RGBA8_UNORM, extent)?,
+            image: create("light image", TextureFormat::Rgba8Unorm, extent)?,
             passes: [
-                pass(&columns, columns_extent, [1, 0, light_extent.width, 0])?,
-                pass(light, light_extent, [0, 1, light_extent.height, 0])?,
+                pass(&columns, [1, 0, width, 0])?,
+                pass(light, [0, 1, height, 0])?,
             ],
             columns,
         })
     }
 
-    /// Extent of the light images.
     pub fn extent(&self) -> Extent {
-        self.extent
+        self.image.extent()
     }
 
-    /// Uploads a light image.
+    /// Uploads a light image and writes it into `light`, the texture of [`new`](Self::new).
     ///
     /// # Errors
     /// What the browser throws, for instance for pictures of another origin.
-    pub fn upload(&self, image: &JsValue) -> Result<(), JsValue> {
+    pub fn downsample(
+        &self,
+        program: &WebGlProgram,
+        image: &JsValue,
+        light: &GlTexture,
+    ) -> Result<(), JsValue> {
+        let gl = &self.gl;
         self.image.bind();
         // Called by name, as web-sys has a method for each kind of picture. By default, pictures are in sRGB with
         // straight alpha.
-        let upload: Function = Reflect::get(&self.gl, &"texSubImage2D".into())?.dyn_into()?;
+        let upload: Function = Reflect::get(gl, &"texSubImage2D".into())?.dyn_into()?;
         let numbers = [Gl::TEXTURE_2D, 0, 0, 0, Gl::RGBA, Gl::UNSIGNED_BYTE];
         let arguments = numbers.iter().map(|number| JsValue::from(*number));
-        upload.apply(&self.gl, &arguments.chain([image.clone()]).collect())?;
-        Ok(())
-    }
-
-    /// Writes the last light image into the light's texture.
-    pub fn downsample(&self, program: &WebGlProgram) {
-        let gl = &self.gl;
+        upload.apply(gl, &arguments.chain([image.clone()]).collect())?;
         gl.use_program(Some(program));
-        for (pass, source) in self.passes.iter().zip([&self.image, &self.columns]) {
+        let textures = [(&self.image, &self.columns), (&self.columns, light)];
+        for ((framebuffer, uniforms), (source, target)) in self.passes.iter().zip(textures) {
             source.bind();
-            pass.uniforms.bind(DOWNSAMPLING);
-            pass.target.bind();
-            let Extent { width, height } = pass.target_extent;
-            gl.viewport(0, 0, width as i32, height as i32);
+            uniforms.bind(DOWNSAMPLING);
+            framebuffer.bind();
+            target.set_viewport();
             gl.draw_arrays(Gl::TRIANGLES, 0, 3);
         }
         gl.bind_framebuffer(Gl::FRAMEBUFFER, None);
+        Ok(())
     }
 }

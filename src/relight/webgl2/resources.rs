@@ -1,56 +1,66 @@
 //! Textures, framebuffers and uniform buffers of a context, freed when they are dropped: the garbage collector does
 //! not know how much of the device's memory they hold.
 
-use js_sys::{Array, Object};
+use js_sys::{Array, Float32Array, Int16Array, Int32Array, Object, Uint8Array};
 use wasm_bindgen::JsValue;
 use web_sys::{WebGl2RenderingContext as Gl, WebGlBuffer, WebGlFramebuffer, WebGlTexture};
 
 use super::context::context_lost;
 use crate::relight::backend::BackendError;
+use crate::relight::texture_layout::{TextureDescriptor, TextureFormat};
 use crate::transport::Extent;
 
-/// A texel's format: WebGL's internal format, format and type.
-#[derive(Clone, Copy)]
-pub(super) struct TexelFormat {
-    internal: u32,
-    format: u32,
-    component: u32,
-}
-
-const fn texel_format(internal: u32, format: u32, component: u32) -> TexelFormat {
-    TexelFormat {
-        internal,
-        format,
-        component,
+/// Internal format, format and type of a texel.
+fn texel_format(format: TextureFormat) -> [u32; 3] {
+    match format {
+        TextureFormat::Rg16Sint => [Gl::RG16I, Gl::RG_INTEGER, Gl::SHORT],
+        TextureFormat::Rgba16Sint => [Gl::RGBA16I, Gl::RGBA_INTEGER, Gl::SHORT],
+        TextureFormat::Rgba32Sint => [Gl::RGBA32I, Gl::RGBA_INTEGER, Gl::INT],
+        TextureFormat::Rgba32Float => [Gl::RGBA32F, Gl::RGBA, Gl::FLOAT],
+        // Only canvases of WebGPU have the other order.
+        TextureFormat::Rgba8Unorm | TextureFormat::Bgra8Unorm => {
+            [Gl::RGBA8, Gl::RGBA, Gl::UNSIGNED_BYTE]
+        }
     }
 }
 
-pub(super) const RGBA16_SINT: TexelFormat = texel_format(Gl::RGBA16I, Gl::RGBA_INTEGER, Gl::SHORT);
-pub(super) const RG16_SINT: TexelFormat = texel_format(Gl::RG16I, Gl::RG_INTEGER, Gl::SHORT);
-pub(super) const RGBA32_SINT: TexelFormat = texel_format(Gl::RGBA32I, Gl::RGBA_INTEGER, Gl::INT);
-pub(super) const RGBA32_FLOAT: TexelFormat = texel_format(Gl::RGBA32F, Gl::RGBA, Gl::FLOAT);
-pub(super) const RGBA8_UNORM: TexelFormat = texel_format(Gl::RGBA8, Gl::RGBA, Gl::UNSIGNED_BYTE);
+/// Memory for texels on their way to the context, kept to save allocations.
+#[derive(Debug, Default)]
+pub(super) struct Staging(Uint8Array);
+
+impl Staging {
+    /// Copies texels. Returns an array of the elements that WebGL requires for their type.
+    fn copy(&mut self, component: u32, texels: &[u8]) -> Object {
+        if self.0.length() as usize != texels.len() {
+            self.0 = Uint8Array::new_with_length(texels.len() as u32);
+        }
+        self.0.copy_from(texels);
+        let buffer = self.0.buffer();
+        match component {
+            Gl::SHORT => Int16Array::new(&buffer).into(),
+            Gl::INT => Int32Array::new(&buffer).into(),
+            _ => Float32Array::new(&buffer).into(),
+        }
+    }
+}
 
 /// A texture, or a texture array.
 #[derive(Debug)]
-pub(super) struct Texture {
+pub(super) struct GlTexture {
     gl: Gl,
     texture: WebGlTexture,
     unit: u32,
     target: u32,
+    descriptor: TextureDescriptor,
 }
 
-impl Texture {
-    /// Creates a texture, an array if it has `layers`, and binds it to a unit.
-    pub fn new(
-        gl: &Gl,
-        unit: u32,
-        format: TexelFormat,
-        extent: Extent,
-        layers: Option<u32>,
-    ) -> Result<Self, BackendError> {
-        let (width, height) = (extent.width as i32, extent.height as i32);
-        let target = match layers {
+impl GlTexture {
+    /// Creates a texture and binds it to a unit.
+    pub fn new(gl: &Gl, unit: u32, descriptor: TextureDescriptor) -> Result<Self, BackendError> {
+        let [internal, ..] = texel_format(descriptor.format);
+        let Extent { width, height } = descriptor.extent;
+        let (width, height) = (width as i32, height as i32);
+        let target = match descriptor.layers {
             Some(_) => Gl::TEXTURE_2D_ARRAY,
             None => Gl::TEXTURE_2D,
         };
@@ -59,11 +69,12 @@ impl Texture {
             texture: gl.create_texture().ok_or_else(context_lost)?,
             unit,
             target,
+            descriptor,
         };
         created.bind();
-        match layers {
-            Some(n) => gl.tex_storage_3d(target, 1, format.internal, width, height, n as i32),
-            None => gl.tex_storage_2d(target, 1, format.internal, width, height),
+        match created.descriptor.layers {
+            Some(n) => gl.tex_storage_3d(target, 1, internal, width, height, n as i32),
+            None => gl.tex_storage_2d(target, 1, internal, width, height),
         }
         // Neither integers nor 32-bit floats can be filtered.
         for filter in [Gl::TEXTURE_MIN_FILTER, Gl::TEXTURE_MAG_FILTER] {
@@ -72,12 +83,18 @@ impl Texture {
         Ok(created)
     }
 
-    /// Binds it to its unit.
+    pub fn extent(&self) -> Extent {
+        self.descriptor.extent
+    }
+
+    pub fn layers(&self) -> u32 {
+        self.descriptor.layers.unwrap_or(1)
+    }
+
     pub fn bind(&self) {
         self.bind_as(Some(&self.texture));
     }
 
-    /// Leaves its unit without a texture.
     pub fn unbind(&self) {
         self.bind_as(None);
     }
@@ -87,56 +104,57 @@ impl Texture {
         self.gl.bind_texture(self.target, texture);
     }
 
-    /// Writes all texels of a 2D texture.
-    pub fn write(
-        &self,
-        format: TexelFormat,
-        extent: Extent,
-        texels: &Object,
-    ) -> Result<(), BackendError> {
-        self.bind();
-        self.gl
-            .tex_sub_image_2d_with_i32_and_i32_and_u32_and_type_and_opt_array_buffer_view(
-                self.target,
-                0,
-                0,
-                0,
-                extent.width as i32,
-                extent.height as i32,
-                format.format,
-                format.component,
-                Some(texels),
-            )
-            .map_err(upload_error)
+    pub fn set_viewport(&self) {
+        let Extent { width, height } = self.extent();
+        self.gl.viewport(0, 0, width as i32, height as i32);
     }
 
-    /// Writes a rectangle of one layer of a bound array, from that column, row and layer on.
-    pub fn write_layer(
+    /// Writes a rectangle of one layer, from that column, row and layer on.
+    pub fn write(
         &self,
-        format: TexelFormat,
-        [x, y, z]: [u32; 3],
+        origin: [u32; 3],
         extent: Extent,
-        texels: &Object,
+        texels: &[u8],
+        staging: &mut Staging,
     ) -> Result<(), BackendError> {
-        self.gl
-            .tex_sub_image_3d_with_opt_array_buffer_view(
+        let [_, format, component] = texel_format(self.descriptor.format);
+        let [x, y, z] = origin.map(|at| at as i32);
+        let [width, height] = [extent.width, extent.height].map(|side| side as i32);
+        let texels = &staging.copy(component, texels);
+        self.bind();
+        let written = match self.descriptor.layers {
+            Some(_) => self.gl.tex_sub_image_3d_with_opt_array_buffer_view(
                 self.target,
                 0,
-                x as i32,
-                y as i32,
-                z as i32,
-                extent.width as i32,
-                extent.height as i32,
+                x,
+                y,
+                z,
+                width,
+                height,
                 1,
-                format.format,
-                format.component,
+                format,
+                component,
                 Some(texels),
-            )
-            .map_err(upload_error)
+            ),
+            None => self
+                .gl
+                .tex_sub_image_2d_with_i32_and_i32_and_u32_and_type_and_opt_array_buffer_view(
+                    self.target,
+                    0,
+                    x,
+                    y,
+                    width,
+                    height,
+                    format,
+                    component,
+                    Some(texels),
+                ),
+        };
+        written.map_err(|thrown| BackendError::Upload(format!("{thrown:?}")))
     }
 }
 
-impl Drop for Texture {
+impl Drop for GlTexture {
     fn drop(&mut self) {
         self.gl.delete_texture(Some(&self.texture));
     }
@@ -151,22 +169,17 @@ pub(super) struct Framebuffer {
 
 impl Framebuffer {
     /// Draws into a 2D texture.
-    pub fn of_texture(gl: &Gl, texture: &Texture) -> Result<Self, BackendError> {
+    pub fn of_texture(gl: &Gl, texture: &GlTexture) -> Result<Self, BackendError> {
         let created = Self::new(gl)?;
         let (target, attachment) = (Gl::FRAMEBUFFER, Gl::COLOR_ATTACHMENT0);
-        gl.framebuffer_texture_2d(
-            target,
-            attachment,
-            texture.target,
-            Some(&texture.texture),
-            0,
-        );
+        let attached = Some(&texture.texture);
+        gl.framebuffer_texture_2d(target, attachment, Gl::TEXTURE_2D, attached, 0);
         gl.bind_framebuffer(Gl::FRAMEBUFFER, None);
         Ok(created)
     }
 
     /// Draws into two layers of a texture array.
-    pub fn of_two_layers(gl: &Gl, array: &Texture, first: u32) -> Result<Self, BackendError> {
+    pub fn of_two_layers(gl: &Gl, array: &GlTexture, first: u32) -> Result<Self, BackendError> {
         let created = Self::new(gl)?;
         let targets = [Gl::COLOR_ATTACHMENT0, Gl::COLOR_ATTACHMENT1];
         for (layer, target) in (first as i32..).zip(targets) {
@@ -192,7 +205,6 @@ impl Framebuffer {
         Ok(created)
     }
 
-    /// Makes it the target of draws.
     pub fn bind(&self) {
         let framebuffer = Some(&self.framebuffer);
         self.gl.bind_framebuffer(Gl::FRAMEBUFFER, framebuffer);
@@ -205,15 +217,13 @@ impl Drop for Framebuffer {
     }
 }
 
-/// A uniform buffer.
 #[derive(Debug)]
-pub(super) struct UniformBuffer {
+pub(super) struct GlUniformBuffer {
     gl: Gl,
     buffer: WebGlBuffer,
 }
 
-impl UniformBuffer {
-    /// Creates a buffer with these bytes.
+impl GlUniformBuffer {
     pub fn new(gl: &Gl, bytes: &[u8]) -> Result<Self, BackendError> {
         let created = Self {
             gl: gl.clone(),
@@ -224,7 +234,6 @@ impl UniformBuffer {
         Ok(created)
     }
 
-    /// Replaces its bytes.
     pub fn write(&self, bytes: &[u8]) {
         let gl = &self.gl;
         gl.bind_buffer(Gl::UNIFORM_BUFFER, Some(&self.buffer));
@@ -239,12 +248,8 @@ impl UniformBuffer {
     }
 }
 
-impl Drop for UniformBuffer {
+impl Drop for GlUniformBuffer {
     fn drop(&mut self) {
         self.gl.delete_buffer(Some(&self.buffer));
     }
-}
-
-fn upload_error(thrown: JsValue) -> BackendError {
-    BackendError::Upload(format!("{thrown:?}"))
 }

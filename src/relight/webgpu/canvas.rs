@@ -7,9 +7,11 @@ use wasm_bindgen::JsValue;
 
 use super::api::{API, CanvasContext};
 use super::device::Device;
+use super::downsampler::Downsampler;
 use super::photo_renderer::PhotoRenderer;
 use crate::relight::Gamut;
-use crate::relight::backend::{Backend, BackendError, Frame};
+use crate::relight::backend::{Backend, BackendError, Frame, LightCache};
+use crate::relight::texture_layout::binding;
 use crate::transport::{Extent, Transport};
 
 impl Device {
@@ -23,7 +25,7 @@ impl Device {
 
     /// A promise of an object with a `message`, which settles when the device is lost.
     pub fn lost(&self) -> Promise {
-        self.gpu.lost()
+        self.gpu.device.lost()
     }
 }
 
@@ -31,6 +33,8 @@ impl Device {
 #[derive(Debug)]
 pub struct WebGpuBackend {
     renderer: PhotoRenderer,
+    /// `None` unless the light is a light image.
+    downsampler: Option<Downsampler>,
     canvas: CanvasContext,
     gamut: Gamut,
 }
@@ -47,7 +51,7 @@ impl WebGpuBackend {
         gamut: Gamut,
     ) -> Result<Self, BackendError> {
         let renderer = PhotoRenderer::new(device.clone(), transport).await?;
-        let canvas_error = |reason| BackendError::Canvas { api: API, reason };
+        let canvas_error = |reason| BackendError::Canvas(API, reason);
         let configured = device.try_upload(|| {
             let camera = transport.geometry.camera;
             canvas.set_width(camera.width);
@@ -64,6 +68,7 @@ impl WebGpuBackend {
         let (canvas, gamut) = configured.await??;
         Ok(Self {
             renderer,
+            downsampler: None,
             canvas,
             gamut,
         })
@@ -71,12 +76,8 @@ impl WebGpuBackend {
 }
 
 impl Backend for WebGpuBackend {
-    fn name(&self) -> &'static str {
-        "webgpu"
-    }
-
     fn kernel(&self) -> String {
-        self.renderer.device().kernel().into()
+        self.renderer.device.kernel().into()
     }
 
     fn gamut(&self) -> Gamut {
@@ -84,13 +85,33 @@ impl Backend for WebGpuBackend {
     }
 
     fn set_light_image(&mut self, image: &JsValue, extent: Extent) -> Result<bool, JsValue> {
-        self.renderer.set_light_image(image, extent)
+        let PhotoRenderer {
+            device,
+            layout,
+            textures,
+            light,
+        } = &mut self.renderer;
+        if !layout.is_light_image_allowed(extent, device.gpu.limits) {
+            return Ok(false);
+        }
+        let fits = |downsampler: &Downsampler| downsampler.extent == extent;
+        let downsampler = match self.downsampler.take().filter(fits) {
+            Some(downsampler) => downsampler,
+            None => Downsampler::new(device, extent, layout.textures[binding::LIGHT].extent),
+        };
+        let downsampler = self.downsampler.insert(downsampler);
+        downsampler.downsample(device, image, textures.light())?;
+        *light = LightCache::default();
+        Ok(true)
     }
 
     fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
-        self.renderer.device().check()?;
+        self.renderer.device.check()?;
         let lost = |reason| BackendError::Lost(format!("the canvas gives no texture: {reason}"));
         let view = self.canvas.view().map_err(lost)?;
+        if frame.light.is_some() {
+            self.downsampler = None;
+        }
         self.renderer.draw(frame, &view);
         Ok(())
     }
@@ -141,6 +162,6 @@ mod tests {
         // The browser reports the loss in another task.
         JsFuture::from(lost).await.unwrap();
         let error = webgpu.render(&frame).unwrap_err();
-        assert!(error.is_loss(), "{error}");
+        assert!(matches!(error, BackendError::Lost(_)), "{error}");
     }
 }

@@ -1,9 +1,9 @@
 //! A graphics device with the pipelines that run on it.
 
-use super::api::{API, ComputePipeline, DeviceQueue, RenderPipeline, TextureFormat};
+use super::api::{API, ComputePipeline, DeviceQueue, RenderPipeline};
 use super::shader::SHADER;
 use crate::relight::backend::BackendError;
-use crate::relight::texture_layout::TextureLimits;
+use crate::relight::texture_layout::TextureFormat;
 
 /// A device that any number of photographs share.
 #[derive(Debug)]
@@ -12,56 +12,47 @@ pub struct Device {
     /// Format of the pictures.
     pub(super) format: TextureFormat,
     pub(super) pipelines: Pipelines,
-    pub(super) limits: TextureLimits,
-    kernel: String,
-    #[cfg(not(target_arch = "wasm32"))]
-    is_software: bool,
 }
 
 impl Device {
     /// The system's preferred device, for pictures of a format.
     pub(super) async fn open(format: TextureFormat) -> Result<Self, BackendError> {
-        let (gpu, adapter) = DeviceQueue::open().await?;
+        let gpu = DeviceQueue::open().await?;
         let pipelines = gpu.catch_errors(|| Pipelines::new(&gpu, format)).await;
         let pipelines = pipelines.map_err(|reason| {
-            gpu.destroy();
-            BackendError::Device { api: API, reason }
+            gpu.device.destroy();
+            BackendError::Device(API, reason)
         })?;
-        let kernel = match adapter.name.trim() {
-            "" => API,
-            name => name,
-        };
         Ok(Self {
-            #[cfg(not(target_arch = "wasm32"))]
-            is_software: adapter.is_software,
-            kernel: kernel.into(),
             gpu,
             format,
             pipelines,
-            limits: adapter.limits,
         })
     }
 
     /// The adapter's name.
     pub fn kernel(&self) -> &str {
-        &self.kernel
+        match self.gpu.name.trim() {
+            "" => API,
+            name => name,
+        }
     }
 
     /// Whether it is a software renderer. In browsers, pages find out themselves.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn is_software(&self) -> bool {
-        self.is_software
+        self.gpu.is_software
     }
 
     /// Frees everything on the device, also for photographs that still use it.
     pub fn destroy(&self) {
-        self.gpu.destroy();
+        self.gpu.device.destroy();
     }
 
     /// Fails once the device is lost.
     pub(super) fn check(&self) -> Result<(), BackendError> {
-        match self.gpu.loss.reason() {
-            Some(reason) => Err(BackendError::Lost(reason.into())),
+        match self.gpu.loss.get() {
+            Some(reason) => Err(BackendError::Lost(reason.clone())),
             None => Ok(()),
         }
     }

@@ -2,16 +2,16 @@
 
 use wasm_bindgen::JsValue;
 
-use super::api::{
-    BindGroup, BindingResource, Texture, TextureDescriptor, TextureFormat, UniformBuffer, usage,
-};
+use super::api::{BindGroup, BindingResource, Texture, UniformBuffer, record_draw, usage};
 use super::device::Device;
+use crate::relight::texture_layout::{TextureDescriptor, TextureFormat};
 use crate::transport::Extent;
 
 /// Textures for light images of one extent.
 #[derive(Debug)]
 pub(super) struct Downsampler {
-    extent: Extent,
+    /// Extent of the light images.
+    pub extent: Extent,
     image: Texture,
     /// The image resampled along columns.
     columns: Texture,
@@ -24,25 +24,19 @@ pub(super) struct Downsampler {
 impl Downsampler {
     /// From light images of extent `image` to a light plane of extent `light`.
     pub fn new(device: &Device, image: Extent, light: Extent) -> Self {
+        use TextureFormat::{Rgba8Unorm, Rgba32Float};
         let Device { gpu, pipelines, .. } = device;
+        let create = |label, format, extent, usage| {
+            let usage = usage | usage::TEXTURE_BINDING | usage::RENDER_ATTACHMENT;
+            gpu.create_texture(&TextureDescriptor::flat(label, format, extent), usage)
+        };
         let extent = image;
-        let image = gpu.create_texture(&TextureDescriptor {
-            label: "light image",
-            extent,
-            layers: None,
-            format: TextureFormat::Rgba8Unorm,
-            usage: usage::TEXTURE_BINDING | usage::COPY_DST | usage::RENDER_ATTACHMENT,
-        });
-        let columns = gpu.create_texture(&TextureDescriptor {
-            label: "columns of the light image",
-            extent: Extent {
-                width: light.width,
-                height: extent.height,
-            },
-            layers: None,
-            format: TextureFormat::Rgba32Float,
-            usage: usage::TEXTURE_BINDING | usage::RENDER_ATTACHMENT,
-        });
+        let columns_extent = Extent {
+            width: light.width,
+            ..extent
+        };
+        let image = create("light image", Rgba8Unorm, extent, usage::COPY_DST);
+        let columns = create("light image's columns", Rgba32Float, columns_extent, 0);
         // `DownsampleUniforms` of the WGSL.
         let uniforms = [[1, 0, light.width, 0], [0, 1, light.height, 0]]
             .map(|uniforms| gpu.create_uniforms(bytemuck::cast_slice(&uniforms)));
@@ -51,7 +45,7 @@ impl Downsampler {
                 (10, BindingResource::Texture(source)),
                 (11, BindingResource::Uniforms(&uniforms[i])),
             ];
-            pipelines.downsample.bind(gpu, &resources)
+            gpu.create_bind_group(&pipelines.downsample.get_bind_group_layout(0), &resources)
         };
         Self {
             extent,
@@ -60,11 +54,6 @@ impl Downsampler {
             columns,
             _uniforms: uniforms,
         }
-    }
-
-    /// Extent of the light images.
-    pub fn extent(&self) -> Extent {
-        self.extent
     }
 
     /// Uploads a light image and writes it into the light's texture.
@@ -79,11 +68,11 @@ impl Downsampler {
     ) -> Result<(), JsValue> {
         let Device { gpu, pipelines, .. } = device;
         gpu.write_image(&self.image, image, self.extent)?;
-        let mut commands = gpu.create_command_encoder();
-        for (bind_group, target) in self.bind_groups.iter().zip([&self.columns, light]) {
-            commands.draw(&pipelines.downsample, bind_group, &target.view);
-        }
-        gpu.submit(commands);
+        gpu.submit(|commands| {
+            for (bind_group, target) in self.bind_groups.iter().zip([&self.columns, light]) {
+                record_draw(commands, &pipelines.downsample, bind_group, &target.view);
+            }
+        });
         Ok(())
     }
 }

@@ -1,7 +1,6 @@
 //! Relighting by WebGPU: in browsers, and natively on the system's graphics devices.
 //!
-//! `api` is the part of WebGPU that is used, with one implementation for browsers and one over wgpu; everything else is
-//! shared.
+//! `api` has one implementation for browsers and one over wgpu; everything else is shared.
 
 mod api;
 #[cfg(target_arch = "wasm32")]

@@ -3,11 +3,12 @@
 use std::rc::Rc;
 use std::time::Instant;
 
-use super::api::{API, DeviceQueue, Texture, TextureDescriptor, TextureFormat, usage};
+use super::api::{API, DeviceQueue, Texture, usage};
 use super::device::Device;
 use super::photo_renderer::PhotoRenderer;
 use crate::relight::Rgba8Picture;
 use crate::relight::backend::{BackendError, Frame};
+use crate::relight::texture_layout::{TextureDescriptor, TextureFormat};
 use crate::transport::{Extent, Transport};
 
 impl Device {
@@ -64,7 +65,6 @@ impl Device {
 #[derive(Debug)]
 pub struct OffscreenRenderer {
     renderer: PhotoRenderer,
-    extent: Extent,
     picture: Texture,
 }
 
@@ -75,22 +75,14 @@ impl OffscreenRenderer {
     /// [`BackendError::Layout`] or [`BackendError::Upload`] if the device cannot hold it.
     pub async fn new(device: Rc<Device>, transport: &Transport) -> Result<Self, BackendError> {
         let renderer = PhotoRenderer::new(device.clone(), transport).await?;
-        let extent = transport.geometry.camera;
         let picture = device.try_upload(|| {
-            device.gpu.create_texture(&TextureDescriptor {
-                label: "picture",
-                extent,
-                layers: None,
-                format: device.format,
-                usage: usage::RENDER_ATTACHMENT | usage::COPY_SRC,
-            })
+            let camera = transport.geometry.camera;
+            let descriptor = TextureDescriptor::flat("picture", device.format, camera);
+            let usage = usage::RENDER_ATTACHMENT | usage::COPY_SRC;
+            device.gpu.create_texture(&descriptor, usage)
         });
         let picture = picture.await?;
-        Ok(Self {
-            renderer,
-            extent,
-            picture,
-        })
+        Ok(Self { renderer, picture })
     }
 
     /// Submits a frame. [`Device::wait`] waits until it is drawn.
@@ -98,7 +90,7 @@ impl OffscreenRenderer {
     /// # Errors
     /// [`BackendError::Lost`] if the device is lost.
     pub fn draw(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
-        self.renderer.device().check()?;
+        self.renderer.device.check()?;
         self.renderer.draw(frame, &self.picture.view);
         Ok(())
     }
@@ -108,9 +100,9 @@ impl OffscreenRenderer {
     /// # Errors
     /// [`BackendError::Lost`] or [`BackendError::Device`] if it cannot be read.
     pub fn read(&self) -> Result<Rgba8Picture, BackendError> {
-        let DeviceQueue { device, queue, .. } = &self.renderer.device().gpu;
+        let DeviceQueue { device, queue, .. } = &self.renderer.device.gpu;
         let picture = &self.picture.texture;
-        let Extent { width, height } = self.extent;
+        let (width, height) = (picture.width(), picture.height());
         // Copies need aligned rows.
         let stride = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = device.create_buffer(&wgpu::BufferDescriptor {
@@ -133,14 +125,14 @@ impl OffscreenRenderer {
             picture.size(),
         );
         queue.submit([encoder.finish()]);
-        let device_error = |reason: String| BackendError::Device { api: API, reason };
+        let device_error = |reason: String| BackendError::Device(API, reason);
         let (sender, receiver) = std::sync::mpsc::channel();
         buffer
             .slice(..)
             .map_async(wgpu::MapMode::Read, move |result| {
                 let _ = sender.send(result);
             });
-        self.renderer.device().wait()?;
+        self.renderer.device.wait()?;
         let mapped = receiver.recv().map_err(|e| device_error(e.to_string()))?;
         mapped.map_err(|e| device_error(e.to_string()))?;
         let bytes = buffer.slice(..).get_mapped_range();
@@ -148,7 +140,7 @@ impl OffscreenRenderer {
         let rows = bytes.chunks_exact(stride as usize);
         let pixels = rows.flat_map(|row| row[..4 * width as usize].as_chunks().0);
         Ok(Rgba8Picture {
-            extent: self.extent,
+            extent: Extent { width, height },
             pixels: pixels.copied().collect(),
         })
     }

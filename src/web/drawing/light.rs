@@ -3,27 +3,21 @@
 use js_sys::{Float32Array, Uint8ClampedArray};
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use crate::relight::{self, BuiltinLight, LightError, TorchPose};
+use crate::relight::{BuiltinLight, Light, LightError, TorchPose};
 use crate::transport::{CHANNELS, Extent};
 use crate::web::{CodedError, Photo};
 
 /// The emission of each element of a photograph's light plane.
-#[wasm_bindgen]
-pub struct Light(relight::Light);
+#[wasm_bindgen(js_name = Light)]
+pub struct WebLight(pub(in crate::web) Light);
 
-impl Light {
-    pub(in crate::web) fn inner(&self) -> &relight::Light {
-        &self.0
-    }
-}
-
-#[wasm_bindgen]
-impl Light {
+#[wasm_bindgen(js_class = Light)]
+impl WebLight {
     /// The built-in light of that name.
     ///
     /// # Errors
     /// Code `light-name` for other names.
-    pub fn builtin(photo: &Photo, name: &str) -> Result<Light, CodedError> {
+    pub fn builtin(photo: &Photo, name: &str) -> Result<WebLight, CodedError> {
         let light = BuiltinLight::from_name(name).ok_or_else(|| {
             let names = BuiltinLight::ALL.map(BuiltinLight::name).join(", ");
             CodedError::new(
@@ -39,7 +33,7 @@ impl Light {
     ///
     /// # Errors
     /// Code `light-value` for values that are out of range.
-    pub fn torch(photo: &Photo, x: f64, y: f64, size: Option<f64>) -> Result<Light, CodedError> {
+    pub fn torch(photo: &Photo, x: f64, y: f64, size: Option<f64>) -> Result<WebLight, CodedError> {
         let size = size.unwrap_or(TorchPose::DEFAULT_RADIUS);
         // Squares of larger distances could overflow.
         const MAX_DISTANCE: f64 = 1e6;
@@ -61,21 +55,21 @@ impl Light {
             radius: size * side,
             ..TorchPose::behind(geometry, x, y)
         };
-        Ok(Self(relight::Light::torch(geometry.light, pose)))
+        Ok(Self(Light::torch(geometry.light, pose)))
     }
 
     /// Flames along the lower edge at a time in seconds. The built-in light `fire` is time 0.
     ///
     /// # Errors
     /// Code `light-value` for a time that is not finite.
-    pub fn fire(photo: &Photo, seconds: f64) -> Result<Light, CodedError> {
+    pub fn fire(photo: &Photo, seconds: f64) -> Result<WebLight, CodedError> {
         if !seconds.is_finite() {
             return Err(CodedError::new(
                 "light-value",
                 "the time of the fire must be a finite number of seconds",
             ));
         }
-        Ok(Self(relight::Light::fire(photo.geometry().light, seconds)))
+        Ok(Self(Light::fire(photo.geometry().light, seconds)))
     }
 
     /// A light image in linear RGB, 0 to 1 at full brightness, row by row. It is resampled by area.
@@ -88,9 +82,9 @@ impl Light {
         values: &Float32Array,
         width: u32,
         height: u32,
-    ) -> Result<Light, CodedError> {
+    ) -> Result<WebLight, CodedError> {
         let image = image_extent(values.length(), 3, width, height)?;
-        let light = relight::Light::from_linear_rows(photo.geometry().light, image, |y, row| {
+        let light = Light::from_linear_rows(photo.geometry().light, image, |y, row| {
             let (first, end) = (y * row.len(), (y + 1) * row.len());
             values.subarray(first as u32, end as u32).copy_to(row);
         })?;
@@ -108,9 +102,9 @@ impl Light {
         rgba: &Uint8ClampedArray,
         width: u32,
         height: u32,
-    ) -> Result<Light, CodedError> {
+    ) -> Result<WebLight, CodedError> {
         let image = image_extent(rgba.length(), 4, width, height)?;
-        let light = relight::Light::from_srgb_rows(photo.geometry().light, image, |y, row| {
+        let light = Light::from_srgb_rows(photo.geometry().light, image, |y, row| {
             let (first, end) = (y * row.len(), (y + 1) * row.len());
             rgba.subarray(first as u32, end as u32).copy_to(row);
         })?;

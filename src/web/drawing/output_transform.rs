@@ -2,23 +2,17 @@
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use crate::relight::{self, Gamut, ToneCurve};
+use crate::relight::{Gamut, OutputTransform, ToneCurve};
 use crate::transport::CHANNELS;
 use crate::web::CodedError;
 
 /// Exposure, white balance, tone curve and gamut, with dither.
-#[wasm_bindgen]
+#[wasm_bindgen(js_name = OutputTransform)]
 #[derive(Clone, Copy, Debug)]
-pub struct OutputTransform(relight::OutputTransform);
+pub struct WebOutputTransform(pub(in crate::web) OutputTransform);
 
-impl OutputTransform {
-    pub(in crate::web) fn inner(&self) -> relight::OutputTransform {
-        self.0
-    }
-}
-
-#[wasm_bindgen]
-impl OutputTransform {
+#[wasm_bindgen(js_class = OutputTransform)]
+impl WebOutputTransform {
     /// `exposure` is a factor on all channels, `balance` one on each of red, green and blue; `gamut` is that of the
     /// canvas.
     ///
@@ -30,7 +24,7 @@ impl OutputTransform {
         balance: &[f64],
         #[wasm_bindgen(unchecked_param_type = "\"clip\" | \"filmic\"")] curve: &str,
         #[wasm_bindgen(unchecked_param_type = "\"srgb\" | \"display-p3\"")] gamut: &str,
-    ) -> Result<OutputTransform, CodedError> {
+    ) -> Result<WebOutputTransform, CodedError> {
         let error = |message: String| CodedError::new("light-value", message);
         let balance: [f64; CHANNELS] = balance.try_into().map_err(|_| {
             error(format!(
@@ -60,7 +54,7 @@ impl OutputTransform {
                 )));
             }
         };
-        Ok(Self(relight::OutputTransform {
+        Ok(Self(OutputTransform {
             gains,
             curve,
             gamut: parse_gamut(gamut)?,

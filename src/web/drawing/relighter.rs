@@ -3,10 +3,10 @@
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::light::Light;
-use super::output_transform::OutputTransform;
-use crate::relight::LightError;
+use super::light::WebLight;
+use super::output_transform::WebOutputTransform;
 use crate::relight::backend::{Backend, Frame};
+use crate::relight::{Light, LightError};
 use crate::transport::Extent;
 use crate::web::CodedError;
 
@@ -26,12 +26,6 @@ impl Relighter {
 
 #[wasm_bindgen]
 impl Relighter {
-    /// The backend's name.
-    #[wasm_bindgen(getter)]
-    pub fn backend(&self) -> String {
-        self.backend.name().into()
-    }
-
     /// The graphics device's name, or `simd128` or `scalar` on the CPU.
     #[wasm_bindgen(getter)]
     pub fn kernel(&self) -> String {
@@ -51,11 +45,11 @@ impl Relighter {
     /// Code `light-size` for a light of another photograph, `backend-lost` if the device is lost.
     pub fn render(
         &mut self,
-        light: &Light,
-        output: &OutputTransform,
+        light: &WebLight,
+        output: &WebOutputTransform,
         quality: f64,
     ) -> Result<(), CodedError> {
-        let light = light.inner();
+        let light = &light.0;
         if light.extent() != self.light {
             return Err(LightError::WrongLength {
                 got: light.elements().len() * 3,
@@ -90,7 +84,7 @@ impl Relighter {
     #[wasm_bindgen(js_name = renderLightImage)]
     pub fn render_light_image(
         &mut self,
-        output: &OutputTransform,
+        output: &WebOutputTransform,
         quality: f64,
     ) -> Result<(), CodedError> {
         self.draw(None, output, quality)
@@ -98,13 +92,13 @@ impl Relighter {
 
     fn draw(
         &mut self,
-        light: Option<&crate::relight::Light>,
-        output: &OutputTransform,
+        light: Option<&Light>,
+        output: &WebOutputTransform,
         quality: f64,
     ) -> Result<(), CodedError> {
         Ok(self.backend.render(&Frame {
             light,
-            output: output.inner(),
+            output: output.0,
             quality: quality as f32,
         })?)
     }

@@ -4,17 +4,18 @@ mod bindings;
 
 use bindings as js;
 use bindings::{Dictionary, dictionary, list};
-use js_sys::Promise;
+pub use bindings::{
+    GpuCommandEncoder as CommandEncoder, GpuPipeline as ComputePipeline,
+    GpuPipeline as RenderPipeline,
+};
 use wasm_bindgen::{JsCast, JsValue, prelude::Closure};
 use wasm_bindgen_futures::{JsFuture, spawn_local};
 use web_sys::HtmlCanvasElement;
 
-use super::{
-    API, AdapterInfo, BindingResource, DeviceLoss, TextureDescriptor, TextureFormat, usage,
-};
+use super::{API, BindingResource, DeviceLoss, usage};
 use crate::relight::Gamut;
 use crate::relight::backend::BackendError;
-use crate::relight::texture_layout::TextureLimits;
+use crate::relight::texture_layout::{TextureDescriptor, TextureFormat, TextureLimits};
 use crate::transport::Extent;
 
 /// `GPUBufferUsage`.
@@ -24,8 +25,11 @@ const COPY_DST: u32 = 8;
 /// A device and its queue.
 #[derive(Debug)]
 pub struct DeviceQueue {
-    device: js::GpuDevice,
+    pub device: js::GpuDevice,
     queue: js::GpuQueue,
+    pub limits: TextureLimits,
+    /// The adapter's description, or vendor and architecture; may be empty.
+    pub name: String,
     pub loss: DeviceLoss,
 }
 
@@ -37,30 +41,12 @@ pub struct Texture {
     pub view: TextureView,
 }
 
-/// A view of a texture.
 pub type TextureView = JsValue;
+pub type BindGroup = JsValue;
 
-/// A uniform buffer.
 #[derive(Debug)]
 pub struct UniformBuffer(js::GpuResource);
 
-/// A compiled shader module.
-pub struct ShaderModule(JsValue);
-
-#[derive(Debug)]
-pub struct Pipeline(js::GpuPipeline);
-
-pub type ComputePipeline = Pipeline;
-pub type RenderPipeline = Pipeline;
-
-/// The resources of a pipeline's bindings.
-#[derive(Debug)]
-pub struct BindGroup(JsValue);
-
-/// Records passes to submit.
-pub struct CommandEncoder(js::GpuCommandEncoder);
-
-/// The WebGPU context of a canvas.
 #[derive(Debug)]
 pub struct CanvasContext(js::GpuCanvasContext);
 
@@ -69,11 +55,8 @@ impl DeviceQueue {
     ///
     /// # Errors
     /// [`BackendError::Missing`] or [`BackendError::Device`] if there is none.
-    pub async fn open() -> Result<(Self, AdapterInfo), BackendError> {
-        let error = |thrown| BackendError::Device {
-            api: API,
-            reason: reason(&thrown),
-        };
+    pub async fn open() -> Result<Self, BackendError> {
+        let error = |thrown| BackendError::Device(API, js::string(&thrown));
         let gpu = js::GPU.with(Option::clone);
         let gpu = gpu.ok_or(BackendError::Missing(API))?;
         let options = dictionary(&[("powerPreference", "high-performance".into())]);
@@ -83,9 +66,10 @@ impl DeviceQueue {
         }
         let adapter: js::GpuAdapter = adapter.unchecked_into();
         let offered = adapter.limits();
+        let limit = |name| offered.get(name).as_f64().unwrap_or_default() as u32;
         let limits = TextureLimits {
-            max_side: offered.max_texture_dimension_2d(),
-            max_layers: offered.max_texture_array_layers(),
+            max_side: limit("maxTextureDimension2D"),
+            max_layers: limit("maxTextureArrayLayers"),
         };
         let required = dictionary(&[
             ("maxTextureDimension2D", limits.max_side.into()),
@@ -95,32 +79,20 @@ impl DeviceQueue {
         let device = adapter.request_device(&descriptor).await.map_err(error)?;
         let device: js::GpuDevice = device.unchecked_into();
         let info = adapter.info();
-        let name = match info.as_ref().and_then(js::GpuAdapterInfo::description) {
+        let field = |name| info.as_ref().and_then(|info| info.get(name).as_string());
+        let name = match field("description") {
             Some(name) if !name.is_empty() => name,
-            _ => {
-                let fields = info
-                    .iter()
-                    .flat_map(|info| [info.vendor(), info.architecture()]);
-                fields.flatten().collect::<Vec<_>>().join(" ")
-            }
+            _ => [field("vendor"), field("architecture")]
+                .map(Option::unwrap_or_default)
+                .join(" "),
         };
-        let adapter = AdapterInfo { limits, name };
-        let gpu = Self {
+        Ok(Self {
             queue: device.queue(),
             loss: watch_loss(&device),
             device,
-        };
-        Ok((gpu, adapter))
-    }
-
-    /// Frees everything on the device, also resources in use.
-    pub fn destroy(&self) {
-        self.device.destroy();
-    }
-
-    /// A promise of an object with a `message`, which settles when the device is lost.
-    pub fn lost(&self) -> Promise {
-        self.device.lost()
+            limits,
+            name,
+        })
     }
 
     /// Runs `work`.
@@ -140,32 +112,27 @@ impl DeviceQueue {
             first = first.or(error.filter(JsValue::is_object));
         }
         match first {
-            Some(error) => Err(error.unchecked_into::<js::GpuErrorInfo>().message()),
+            Some(error) => Err(message(error.unchecked_ref())),
             None => Ok(done),
         }
     }
 
-    pub fn create_shader_module(&self, wgsl: &'static str) -> ShaderModule {
+    pub fn create_shader_module(&self, wgsl: &'static str) -> JsValue {
         let descriptor = dictionary(&[("code", wgsl.into())]);
-        ShaderModule(self.device.create_shader_module(&descriptor))
+        self.device.create_shader_module(&descriptor)
     }
 
-    pub fn create_compute_pipeline(
-        &self,
-        module: &ShaderModule,
-        entry_point: &str,
-    ) -> ComputePipeline {
-        let descriptor = dictionary(&[
+    pub fn create_compute_pipeline(&self, module: &JsValue, entry_point: &str) -> ComputePipeline {
+        self.device.create_compute_pipeline(&dictionary(&[
             ("layout", "auto".into()),
             ("compute", stage(module, entry_point).into()),
-        ]);
-        Pipeline(self.device.create_compute_pipeline(&descriptor))
+        ]))
     }
 
     /// A pipeline of a vertex and a fragment shader, for one target.
     pub fn create_render_pipeline(
         &self,
-        module: &ShaderModule,
+        module: &JsValue,
         vertex: &str,
         fragment: &str,
         format: TextureFormat,
@@ -173,23 +140,21 @@ impl DeviceQueue {
         let target = dictionary(&[("format", name(format).into())]);
         let fragment = stage(module, fragment);
         fragment.set("targets", &list([target.into()]));
-        let descriptor = dictionary(&[
+        self.device.create_render_pipeline(&dictionary(&[
             ("layout", "auto".into()),
             ("vertex", stage(module, vertex).into()),
             ("fragment", fragment.into()),
-        ]);
-        Pipeline(self.device.create_render_pipeline(&descriptor))
+        ]))
     }
 
-    pub fn create_texture(&self, descriptor: &TextureDescriptor) -> Texture {
+    /// Creates a texture for these bits of [`usage`].
+    pub fn create_texture(&self, descriptor: &TextureDescriptor, usage: u32) -> Texture {
+        let layers = descriptor.layers.unwrap_or(1);
         let texture = self.device.create_texture(&dictionary(&[
             ("label", descriptor.label.into()),
-            (
-                "size",
-                size(descriptor.extent, descriptor.layers.unwrap_or(1)),
-            ),
+            ("size", size(descriptor.extent, layers)),
             ("format", name(descriptor.format).into()),
-            ("usage", descriptor.usage.into()),
+            ("usage", usage.into()),
         ]));
         let dimension = match descriptor.layers {
             Some(_) => "2d-array",
@@ -240,17 +205,11 @@ impl DeviceQueue {
         self.queue.write_buffer(&uniforms.0, 0, contents);
     }
 
-    pub fn create_command_encoder(&self) -> CommandEncoder {
-        CommandEncoder(self.device.create_command_encoder())
-    }
-
-    pub fn submit(&self, commands: CommandEncoder) {
-        self.queue.submit(&list([commands.0.finish()]));
-    }
-}
-
-impl Pipeline {
-    pub fn bind(&self, gpu: &DeviceQueue, resources: &[(u32, BindingResource<'_>)]) -> BindGroup {
+    pub fn create_bind_group(
+        &self,
+        layout: &JsValue,
+        resources: &[(u32, BindingResource<'_>)],
+    ) -> BindGroup {
         let entry = |(binding, resource): &(u32, BindingResource<'_>)| {
             let resource = match resource {
                 BindingResource::Texture(texture) => texture.view.clone(),
@@ -260,49 +219,54 @@ impl Pipeline {
             };
             dictionary(&[("binding", (*binding).into()), ("resource", resource)]).into()
         };
-        BindGroup(gpu.device.create_bind_group(&dictionary(&[
-            ("layout", self.0.get_bind_group_layout(0)),
+        self.device.create_bind_group(&dictionary(&[
+            ("layout", layout.clone()),
             ("entries", list(resources.iter().map(entry))),
-        ])))
+        ]))
+    }
+
+    /// Submits the commands that `record` records.
+    pub fn submit(&self, record: impl FnOnce(&mut CommandEncoder)) {
+        let mut commands = self.device.create_command_encoder();
+        record(&mut commands);
+        self.queue.submit(&list([commands.finish()]));
     }
 }
 
-impl CommandEncoder {
-    /// Dispatches a compute pipeline once for each bind group.
-    pub fn dispatch(
-        &mut self,
-        pipeline: &ComputePipeline,
-        bind_groups: &[BindGroup],
-        workgroups: [u32; 2],
-    ) {
-        let pass = self.0.begin_compute_pass();
-        pass.set_pipeline(&pipeline.0);
-        for BindGroup(bind_group) in bind_groups {
-            pass.set_bind_group(0, bind_group);
-            pass.dispatch_workgroups(workgroups[0], workgroups[1]);
-        }
-        pass.end();
+/// Dispatches a compute pipeline once for each bind group.
+pub fn record_dispatches(
+    commands: &mut CommandEncoder,
+    pipeline: &ComputePipeline,
+    bind_groups: &[BindGroup],
+    [columns, rows]: [u32; 2],
+) {
+    let pass = commands.begin_compute_pass();
+    pass.set_pipeline(pipeline);
+    for bind_group in bind_groups {
+        pass.set_bind_group(0, bind_group);
+        pass.dispatch_workgroups(columns, rows);
     }
+    pass.end();
+}
 
-    /// Clears a target and draws one triangle into it.
-    pub fn draw(
-        &mut self,
-        pipeline: &RenderPipeline,
-        bind_group: &BindGroup,
-        target: &TextureView,
-    ) {
-        let attachment = dictionary(&[
-            ("view", target.clone()),
-            ("loadOp", "clear".into()),
-            ("storeOp", "store".into()),
-        ]);
-        let descriptor = dictionary(&[("colorAttachments", list([attachment.into()]))]);
-        let pass = self.0.begin_render_pass(&descriptor);
-        pass.set_pipeline(&pipeline.0);
-        pass.set_bind_group(0, &bind_group.0);
-        pass.draw(3);
-        pass.end();
-    }
+/// Clears a target and draws one triangle into it.
+pub fn record_draw(
+    commands: &mut CommandEncoder,
+    pipeline: &RenderPipeline,
+    bind_group: &BindGroup,
+    target: &TextureView,
+) {
+    let attachment = dictionary(&[
+        ("view", target.clone()),
+        ("loadOp", "clear".into()),
+        ("storeOp", "store".into()),
+    ]);
+    let descriptor = dictionary(&[("colorAttachments", list([attachment.into()]))]);
+    let pass = commands.begin_render_pass(&descriptor);
+    pass.set_pipeline(pipeline);
+    pass.set_bind_group(0, bind_group);
+    pass.draw(3);
+    pass.end();
 }
 
 impl CanvasContext {
@@ -323,7 +287,7 @@ impl CanvasContext {
         match canvas.get_context("webgpu") {
             Ok(Some(context)) => Ok(Self(context.unchecked_into())),
             Ok(None) => Err("getContext returned null".into()),
-            Err(thrown) => Err(reason(&thrown)),
+            Err(thrown) => Err(js::string(&thrown)),
         }
     }
 
@@ -344,7 +308,7 @@ impl CanvasContext {
             ("colorSpace", gamut.color_space().into()),
             ("alphaMode", "opaque".into()),
         ]);
-        self.0.configure(&configuration).map_err(|e| reason(&e))
+        self.0.configure(&configuration).map_err(|e| js::string(&e))
     }
 
     /// The texture that is shown next.
@@ -352,7 +316,7 @@ impl CanvasContext {
     /// # Errors
     /// What the browser throws.
     pub fn view(&self) -> Result<TextureView, String> {
-        let texture = self.0.get_current_texture().map_err(|e| reason(&e))?;
+        let texture = self.0.get_current_texture().map_err(|e| js::string(&e))?;
         Ok(texture.create_view(&dictionary(&[])))
     }
 }
@@ -375,21 +339,25 @@ fn watch_loss(device: &js::GpuDevice) -> DeviceLoss {
     let (recorder, lost) = (loss.clone(), device.lost());
     spawn_local(async move {
         if let Ok(info) = JsFuture::from(lost).await {
-            let info: js::GpuErrorInfo = info.unchecked_into();
-            recorder.record([info.reason().unwrap_or_default(), info.message()].join(" "));
+            let info: Dictionary = info.unchecked_into();
+            let reason = info.get("reason").as_string().unwrap_or_default();
+            let _ = recorder.set([reason, message(&info)].join(" "));
         }
     });
     let recorder = loss.clone();
-    let listener = Closure::<dyn FnMut(js::GpuUncapturedErrorEvent)>::new(
-        move |event: js::GpuUncapturedErrorEvent| {
-            recorder.record(event.error().message());
-        },
-    );
+    let listener = Closure::<dyn FnMut(Dictionary)>::new(move |event: Dictionary| {
+        let _ = recorder.set(message(event.get("error").unchecked_ref()));
+    });
     device.set_onuncapturederror(&listener.into_js_value());
     loss
 }
 
-fn stage(ShaderModule(module): &ShaderModule, entry_point: &str) -> Dictionary {
+/// The message of a `GPUError` or `GPUDeviceLostInfo`.
+fn message(info: &Dictionary) -> String {
+    info.get("message").as_string().unwrap_or_default()
+}
+
+fn stage(module: &JsValue, entry_point: &str) -> Dictionary {
     dictionary(&[
         ("module", module.clone()),
         ("entryPoint", entry_point.into()),
@@ -398,11 +366,6 @@ fn stage(ShaderModule(module): &ShaderModule, entry_point: &str) -> Dictionary {
 
 fn size(extent: Extent, layers: u32) -> JsValue {
     list([extent.width, extent.height, layers].map(JsValue::from))
-}
-
-/// A thrown value as text.
-fn reason(thrown: &JsValue) -> String {
-    js::string(thrown)
 }
 
 fn name(format: TextureFormat) -> &'static str {

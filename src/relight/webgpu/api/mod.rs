@@ -9,9 +9,6 @@ mod native;
 
 use std::sync::{Arc, OnceLock};
 
-use crate::relight::texture_layout::TextureLimits;
-use crate::transport::Extent;
-
 #[cfg(target_arch = "wasm32")]
 use browser as system;
 #[cfg(not(target_arch = "wasm32"))]
@@ -21,32 +18,11 @@ use native as system;
 pub use browser::CanvasContext;
 pub use system::{
     BindGroup, ComputePipeline, DeviceQueue, RenderPipeline, Texture, TextureView, UniformBuffer,
+    record_dispatches, record_draw,
 };
 
 /// The interface's name in errors.
 pub const API: &str = "WebGPU";
-
-/// A device's limits and name.
-pub struct AdapterInfo {
-    pub limits: TextureLimits,
-    /// Name, or vendor and architecture; may be empty.
-    pub name: String,
-    #[cfg(not(target_arch = "wasm32"))]
-    /// Whether the system reports a software renderer.
-    pub is_software: bool,
-}
-
-/// A texture's format.
-#[derive(Clone, Copy, Debug)]
-pub enum TextureFormat {
-    Rgba8Unorm,
-    #[cfg(target_arch = "wasm32")]
-    Bgra8Unorm,
-    Rg16Sint,
-    Rgba16Sint,
-    Rgba32Sint,
-    Rgba32Float,
-}
 
 /// `GPUTextureUsage`.
 pub mod usage {
@@ -58,17 +34,6 @@ pub mod usage {
     pub const RENDER_ATTACHMENT: u32 = 16;
 }
 
-/// A texture to create.
-pub struct TextureDescriptor {
-    pub label: &'static str,
-    pub extent: Extent,
-    /// `Some` for an array: also one of a single layer is an array in the shader.
-    pub layers: Option<u32>,
-    pub format: TextureFormat,
-    /// Bits of [`usage`].
-    pub usage: u32,
-}
-
 /// The resource of a binding.
 pub enum BindingResource<'a> {
     Texture(&'a Texture),
@@ -76,15 +41,4 @@ pub enum BindingResource<'a> {
 }
 
 /// The first reason why a device no longer works, if any.
-#[derive(Clone, Debug, Default)]
-pub struct DeviceLoss(Arc<OnceLock<String>>);
-
-impl DeviceLoss {
-    fn record(&self, reason: String) {
-        let _ = self.0.set(reason);
-    }
-
-    pub fn reason(&self) -> Option<&str> {
-        self.0.get().map(String::as_str)
-    }
-}
+pub type DeviceLoss = Arc<OnceLock<String>>;

@@ -4,9 +4,14 @@ use std::sync::Arc;
 
 use wgpu::util::DeviceExt;
 
-use super::{API, AdapterInfo, BindingResource, DeviceLoss, TextureDescriptor, TextureFormat};
+pub use wgpu::{
+    BindGroup, Buffer as UniformBuffer, CommandEncoder, ComputePipeline, RenderPipeline,
+    TextureView,
+};
+
+use super::{API, BindingResource, DeviceLoss};
 use crate::relight::backend::BackendError;
-use crate::relight::texture_layout::TextureLimits;
+use crate::relight::texture_layout::{TextureDescriptor, TextureFormat, TextureLimits};
 use crate::transport::Extent;
 
 /// A device and its queue.
@@ -14,6 +19,9 @@ use crate::transport::Extent;
 pub struct DeviceQueue {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
+    pub limits: TextureLimits,
+    pub name: String,
+    pub is_software: bool,
     pub loss: DeviceLoss,
 }
 
@@ -24,36 +32,13 @@ pub struct Texture {
     pub view: TextureView,
 }
 
-/// A view of a texture.
-pub type TextureView = wgpu::TextureView;
-
-/// A uniform buffer.
-#[derive(Debug)]
-pub struct UniformBuffer(wgpu::Buffer);
-
-/// A compiled shader module.
-pub struct ShaderModule(wgpu::ShaderModule);
-
-#[derive(Debug)]
-pub struct ComputePipeline(wgpu::ComputePipeline);
-
-#[derive(Debug)]
-pub struct RenderPipeline(wgpu::RenderPipeline);
-
-/// The resources of a pipeline's bindings.
-#[derive(Debug)]
-pub struct BindGroup(wgpu::BindGroup);
-
-/// Records passes to submit.
-pub struct CommandEncoder(wgpu::CommandEncoder);
-
 impl DeviceQueue {
     /// The system's preferred device.
     ///
     /// # Errors
     /// [`BackendError::Device`] if there is none.
-    pub async fn open() -> Result<(Self, AdapterInfo), BackendError> {
-        let error = |reason: String| BackendError::Device { api: API, reason };
+    pub async fn open() -> Result<Self, BackendError> {
+        let error = |reason: String| BackendError::Device(API, reason);
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
             backends: wgpu::Backends::PRIMARY,
             ..wgpu::InstanceDescriptor::new_without_display_handle()
@@ -64,39 +49,33 @@ impl DeviceQueue {
         };
         let adapter = instance.request_adapter(&options).await;
         let adapter = adapter.map_err(|e| error(e.to_string()))?;
-        let offered = adapter.limits();
-        let limits = TextureLimits {
-            max_side: offered.max_texture_dimension_2d,
-            max_layers: offered.max_texture_array_layers,
-        };
+        let wgpu::Limits {
+            max_texture_dimension_2d,
+            max_texture_array_layers,
+            ..
+        } = adapter.limits();
         let descriptor = wgpu::DeviceDescriptor {
             required_limits: wgpu::Limits {
-                max_texture_dimension_2d: limits.max_side,
-                max_texture_array_layers: limits.max_layers,
+                max_texture_dimension_2d,
+                max_texture_array_layers,
                 ..wgpu::Limits::downlevel_defaults()
             },
             ..Default::default()
         };
         let given = adapter.request_device(&descriptor).await;
         let (device, queue) = given.map_err(|e| error(e.to_string()))?;
-        let loss = watch_loss(&device);
         let info = adapter.get_info();
-        let adapter = AdapterInfo {
-            limits,
-            is_software: info.device_type == wgpu::DeviceType::Cpu,
-            name: info.name,
-        };
-        let gpu = Self {
+        Ok(Self {
+            loss: watch_loss(&device),
             device,
             queue,
-            loss,
-        };
-        Ok((gpu, adapter))
-    }
-
-    /// Frees everything on the device, also resources in use.
-    pub fn destroy(&self) {
-        self.device.destroy();
+            limits: TextureLimits {
+                max_side: max_texture_dimension_2d,
+                max_layers: max_texture_array_layers,
+            },
+            is_software: info.device_type == wgpu::DeviceType::Cpu,
+            name: info.name,
+        })
     }
 
     /// Runs `work`.
@@ -116,19 +95,17 @@ impl DeviceQueue {
         }
     }
 
-    pub fn create_shader_module(&self, wgsl: &'static str) -> ShaderModule {
-        ShaderModule(
-            self.device
-                .create_shader_module(wgpu::ShaderModuleDescriptor {
-                    label: None,
-                    source: wgpu::ShaderSource::Wgsl(wgsl.into()),
-                }),
-        )
+    pub fn create_shader_module(&self, wgsl: &'static str) -> wgpu::ShaderModule {
+        self.device
+            .create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: None,
+                source: wgpu::ShaderSource::Wgsl(wgsl.into()),
+            })
     }
 
     pub fn create_compute_pipeline(
         &self,
-        ShaderModule(module): &ShaderModule,
+        module: &wgpu::ShaderModule,
         entry_point: &str,
     ) -> ComputePipeline {
         let descriptor = wgpu::ComputePipelineDescriptor {
@@ -139,13 +116,13 @@ impl DeviceQueue {
             compilation_options: Default::default(),
             cache: None,
         };
-        ComputePipeline(self.device.create_compute_pipeline(&descriptor))
+        self.device.create_compute_pipeline(&descriptor)
     }
 
     /// A pipeline of a vertex and a fragment shader, for one target.
     pub fn create_render_pipeline(
         &self,
-        ShaderModule(module): &ShaderModule,
+        module: &wgpu::ShaderModule,
         vertex: &str,
         fragment: &str,
         format: TextureFormat,
@@ -171,10 +148,11 @@ impl DeviceQueue {
             multiview_mask: None,
             cache: None,
         };
-        RenderPipeline(self.device.create_render_pipeline(&descriptor))
+        self.device.create_render_pipeline(&descriptor)
     }
 
-    pub fn create_texture(&self, descriptor: &TextureDescriptor) -> Texture {
+    /// Creates a texture for these bits of [`usage`](super::usage).
+    pub fn create_texture(&self, descriptor: &TextureDescriptor, usage: u32) -> Texture {
         let texture = self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some(descriptor.label),
             size: size(descriptor.extent, descriptor.layers.unwrap_or(1)),
@@ -182,7 +160,7 @@ impl DeviceQueue {
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format: descriptor.format.into(),
-            usage: wgpu::TextureUsages::from_bits_truncate(descriptor.usage),
+            usage: wgpu::TextureUsages::from_bits_truncate(usage),
             view_formats: &[],
         });
         let dimension = match descriptor.layers {
@@ -225,22 +203,14 @@ impl DeviceQueue {
             contents,
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         };
-        UniformBuffer(self.device.create_buffer_init(&descriptor))
+        self.device.create_buffer_init(&descriptor)
     }
 
     pub fn write_uniforms(&self, uniforms: &UniformBuffer, contents: &[u8]) {
-        self.queue.write_buffer(&uniforms.0, 0, contents);
+        self.queue.write_buffer(uniforms, 0, contents);
     }
 
-    pub fn create_command_encoder(&self) -> CommandEncoder {
-        CommandEncoder(self.device.create_command_encoder(&Default::default()))
-    }
-
-    pub fn submit(&self, commands: CommandEncoder) {
-        self.queue.submit([commands.0.finish()]);
-    }
-
-    fn bind<'a>(
+    pub fn create_bind_group<'a>(
         &self,
         layout: &wgpu::BindGroupLayout,
         resources: &[(u32, BindingResource<'a>)],
@@ -251,71 +221,63 @@ impl DeviceQueue {
                 BindingResource::Texture(texture) => {
                     wgpu::BindingResource::TextureView(&texture.view)
                 }
-                BindingResource::Uniforms(uniforms) => uniforms.0.as_entire_binding(),
+                BindingResource::Uniforms(uniforms) => uniforms.as_entire_binding(),
             },
         };
         let entries: Vec<_> = resources.iter().map(entry).collect();
-        let descriptor = wgpu::BindGroupDescriptor {
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout,
             entries: &entries,
-        };
-        BindGroup(self.device.create_bind_group(&descriptor))
+        })
+    }
+
+    /// Submits the commands that `record` records.
+    pub fn submit(&self, record: impl FnOnce(&mut CommandEncoder)) {
+        let mut commands = self.device.create_command_encoder(&Default::default());
+        record(&mut commands);
+        self.queue.submit([commands.finish()]);
     }
 }
 
-impl ComputePipeline {
-    pub fn bind(&self, gpu: &DeviceQueue, resources: &[(u32, BindingResource<'_>)]) -> BindGroup {
-        gpu.bind(&self.0.get_bind_group_layout(0), resources)
+/// Dispatches a compute pipeline once for each bind group.
+pub fn record_dispatches(
+    commands: &mut CommandEncoder,
+    pipeline: &ComputePipeline,
+    bind_groups: &[BindGroup],
+    [columns, rows]: [u32; 2],
+) {
+    let mut pass = commands.begin_compute_pass(&Default::default());
+    pass.set_pipeline(pipeline);
+    for bind_group in bind_groups {
+        pass.set_bind_group(0, bind_group, &[]);
+        pass.dispatch_workgroups(columns, rows, 1);
     }
 }
 
-impl RenderPipeline {
-    pub fn bind(&self, gpu: &DeviceQueue, resources: &[(u32, BindingResource<'_>)]) -> BindGroup {
-        gpu.bind(&self.0.get_bind_group_layout(0), resources)
-    }
-}
-
-impl CommandEncoder {
-    /// Dispatches a compute pipeline once for each bind group.
-    pub fn dispatch(
-        &mut self,
-        pipeline: &ComputePipeline,
-        bind_groups: &[BindGroup],
-        workgroups: [u32; 2],
-    ) {
-        let mut pass = self.0.begin_compute_pass(&Default::default());
-        pass.set_pipeline(&pipeline.0);
-        for BindGroup(bind_group) in bind_groups {
-            pass.set_bind_group(0, bind_group, &[]);
-            pass.dispatch_workgroups(workgroups[0], workgroups[1], 1);
-        }
-    }
-
-    /// Clears a target and draws one triangle into it.
-    pub fn draw(
-        &mut self,
-        pipeline: &RenderPipeline,
-        bind_group: &BindGroup,
-        target: &TextureView,
-    ) {
-        let attachment = wgpu::RenderPassColorAttachment {
-            view: target,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations {
-                load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                store: wgpu::StoreOp::Store,
-            },
-        };
-        let mut pass = self.0.begin_render_pass(&wgpu::RenderPassDescriptor {
-            color_attachments: &[Some(attachment)],
-            ..Default::default()
-        });
-        pass.set_pipeline(&pipeline.0);
-        pass.set_bind_group(0, &bind_group.0, &[]);
-        pass.draw(0..3, 0..1);
-    }
+/// Clears a target and draws one triangle into it.
+pub fn record_draw(
+    commands: &mut CommandEncoder,
+    pipeline: &RenderPipeline,
+    bind_group: &BindGroup,
+    target: &TextureView,
+) {
+    let attachment = wgpu::RenderPassColorAttachment {
+        view: target,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations {
+            load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+            store: wgpu::StoreOp::Store,
+        },
+    };
+    let mut pass = commands.begin_render_pass(&wgpu::RenderPassDescriptor {
+        color_attachments: &[Some(attachment)],
+        ..Default::default()
+    });
+    pass.set_pipeline(pipeline);
+    pass.set_bind_group(0, bind_group, &[]);
+    pass.draw(0..3, 0..1);
 }
 
 /// Records the loss of a device or its first uncaught error, at which wgpu would panic.
@@ -323,11 +285,11 @@ fn watch_loss(device: &wgpu::Device) -> DeviceLoss {
     let loss = DeviceLoss::default();
     let recorder = loss.clone();
     device.set_device_lost_callback(move |reason, message| {
-        recorder.record(format!("{reason:?} {message}"));
+        let _ = recorder.set(format!("{reason:?} {message}"));
     });
     let recorder = loss.clone();
     device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-        recorder.record(error.to_string());
+        let _ = recorder.set(error.to_string());
     }));
     loss
 }
@@ -344,6 +306,7 @@ impl From<TextureFormat> for wgpu::TextureFormat {
     fn from(format: TextureFormat) -> Self {
         match format {
             TextureFormat::Rgba8Unorm => Self::Rgba8Unorm,
+            TextureFormat::Bgra8Unorm => Self::Bgra8Unorm,
             TextureFormat::Rg16Sint => Self::Rg16Sint,
             TextureFormat::Rgba16Sint => Self::Rgba16Sint,
             TextureFormat::Rgba32Sint => Self::Rgba32Sint,

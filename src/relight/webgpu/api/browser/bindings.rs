@@ -6,39 +6,29 @@ use wasm_bindgen::{JsCast, JsValue};
 
 #[wasm_bindgen]
 extern "C" {
+    /// `GPU`.
     #[derive(Clone)]
-    pub type Gpu;
+    pub type GpuEntryPoint;
     #[wasm_bindgen(thread_local_v2, js_namespace = navigator, js_name = gpu)]
-    pub static GPU: Option<Gpu>;
+    pub static GPU: Option<GpuEntryPoint>;
     #[wasm_bindgen(method, catch, js_name = requestAdapter)]
-    pub async fn request_adapter(this: &Gpu, options: &Dictionary) -> Result<JsValue, JsValue>;
+    pub async fn request_adapter(
+        this: &GpuEntryPoint,
+        options: &Dictionary,
+    ) -> Result<JsValue, JsValue>;
     #[wasm_bindgen(method, js_name = getPreferredCanvasFormat)]
-    pub fn get_preferred_canvas_format(this: &Gpu) -> String;
+    pub fn get_preferred_canvas_format(this: &GpuEntryPoint) -> String;
 
     pub type GpuAdapter;
     #[wasm_bindgen(method, getter)]
-    pub fn limits(this: &GpuAdapter) -> GpuSupportedLimits;
+    pub fn limits(this: &GpuAdapter) -> Dictionary;
     #[wasm_bindgen(method, getter)]
-    pub fn info(this: &GpuAdapter) -> Option<GpuAdapterInfo>;
+    pub fn info(this: &GpuAdapter) -> Option<Dictionary>;
     #[wasm_bindgen(method, catch, js_name = requestDevice)]
     pub async fn request_device(
         this: &GpuAdapter,
         descriptor: &Dictionary,
     ) -> Result<JsValue, JsValue>;
-
-    pub type GpuSupportedLimits;
-    #[wasm_bindgen(method, getter, js_name = maxTextureDimension2D)]
-    pub fn max_texture_dimension_2d(this: &GpuSupportedLimits) -> u32;
-    #[wasm_bindgen(method, getter, js_name = maxTextureArrayLayers)]
-    pub fn max_texture_array_layers(this: &GpuSupportedLimits) -> u32;
-
-    pub type GpuAdapterInfo;
-    #[wasm_bindgen(method, getter)]
-    pub fn description(this: &GpuAdapterInfo) -> Option<String>;
-    #[wasm_bindgen(method, getter)]
-    pub fn vendor(this: &GpuAdapterInfo) -> Option<String>;
-    #[wasm_bindgen(method, getter)]
-    pub fn architecture(this: &GpuAdapterInfo) -> Option<String>;
 
     #[derive(Clone, Debug)]
     pub type GpuDevice;
@@ -133,18 +123,10 @@ extern "C" {
     #[wasm_bindgen(method, catch, js_name = getCurrentTexture)]
     pub fn get_current_texture(this: &GpuCanvasContext) -> Result<GpuResource, JsValue>;
 
-    /// `GPUError` or `GPUDeviceLostInfo`.
-    pub type GpuErrorInfo;
-    #[wasm_bindgen(method, getter)]
-    pub fn reason(this: &GpuErrorInfo) -> Option<String>;
-    #[wasm_bindgen(method, getter)]
-    pub fn message(this: &GpuErrorInfo) -> String;
-
-    pub type GpuUncapturedErrorEvent;
-    #[wasm_bindgen(method, getter)]
-    pub fn error(this: &GpuUncapturedErrorEvent) -> GpuErrorInfo;
-
+    /// An object of options or of read-only values.
     pub type Dictionary;
+    #[wasm_bindgen(method, indexing_getter)]
+    pub fn get(this: &Dictionary, name: &str) -> JsValue;
     #[wasm_bindgen(method, indexing_setter)]
     pub fn set(this: &Dictionary, name: &str, value: &JsValue);
 
