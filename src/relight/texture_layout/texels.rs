@@ -50,7 +50,7 @@ impl TextureLayout {
         Ok(())
     }
 
-    fn for_each_coefficient_region<E>(
+    pub(super) fn for_each_coefficient_region<E>(
         &self,
         transport: &Transport,
         mut write: impl FnMut(TextureRegion<'_>) -> Result<(), E>,
@@ -70,7 +70,7 @@ impl TextureLayout {
         Ok(())
     }
 
-    fn for_each_code_region<E>(
+    pub(super) fn for_each_code_region<E>(
         &self,
         transport: &Transport,
         mut write: impl FnMut(TextureRegion<'_>) -> Result<(), E>,
@@ -111,7 +111,7 @@ impl TextureLayout {
         Ok(())
     }
 
-    fn origin_texels(&self) -> Vec<[i16; 2]> {
+    pub(super) fn origin_texels(&self) -> Vec<[i16; 2]> {
         let Geometry {
             camera,
             light,
@@ -128,7 +128,7 @@ impl TextureLayout {
         pixels.map(origin).collect()
     }
 
-    fn tile_texels(&self, transport: &Transport) -> Vec<[i32; 4]> {
+    pub(super) fn tile_texels(&self, transport: &Transport) -> Vec<[i32; 4]> {
         let mut next = 0;
         let texel = |tile: &Tile| {
             let TileRect { x, y, extent } = tile.rect();
@@ -140,7 +140,7 @@ impl TextureLayout {
         transport.tiles.iter().map(texel).collect()
     }
 
-    fn step_texels(&self, transport: &Transport) -> Vec<[f32; 4]> {
+    pub(super) fn step_texels(&self, transport: &Transport) -> Vec<[f32; 4]> {
         let texel = |[r, g, b]: [f32; 3]| [r, g, b, 0.0];
         let tiles = &transport.tiles;
         let coefficients = tiles.iter().map(|tile| tile.coefficients.step);
