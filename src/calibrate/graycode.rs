@@ -172,10 +172,7 @@ mod tests {
 
     #[test]
     fn a_known_map_is_recovered_sharp_or_blurred() {
-        let camera = Extent {
-            width: 60,
-            height: 40,
-        };
+        let camera = Extent::new(60, 40);
         let affine = [[0.5, 0.02, 1.3], [-0.03, 0.45, 4.0]];
         for blur in [0.0, 0.8, 2.0] {
             let found = photograph(camera, affine, 5, blur).correspondence(camera);
@@ -188,10 +185,7 @@ mod tests {
 
     #[test]
     fn dark_photographs_and_missing_bits_are_errors() {
-        let camera = Extent {
-            width: 20,
-            height: 20,
-        };
+        let camera = Extent::new(20, 20);
         let mut code = photograph(camera, [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]], 4, 0.0);
         for bit in &mut code.y {
             bit.plain.fill([0.0; 3]);

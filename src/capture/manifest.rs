@@ -112,10 +112,7 @@ pub struct AffineSpec {
 impl LightSpec {
     /// Size of the light plane.
     pub fn extent(&self) -> Extent {
-        Extent {
-            width: self.width,
-            height: self.height,
-        }
+        Extent::new(self.width, self.height)
     }
 
     /// Exactly one of gamma and response must be given, and be usable.
@@ -156,10 +153,7 @@ impl LightSpec {
 impl CameraSpec {
     /// Size of the camera grid.
     pub fn extent(&self) -> Extent {
-        Extent {
-            width: self.width,
-            height: self.height,
-        }
+        Extent::new(self.width, self.height)
     }
 
     /// `(code − black) / (white − black) / exposure`. The dark frame shows light, which scales with exposure, and is

@@ -24,10 +24,7 @@ pub fn load(light: &str, plane: Extent) -> Result<Light> {
         .and_then(|reader| Ok(reader.decode()?))
         .with_context(|| format!("--light {light}: is not a readable image"))?
         .into_rgb32f();
-    let extent = Extent {
-        width: picture.width(),
-        height: picture.height(),
-    };
+    let extent = Extent::new(picture.width(), picture.height());
     let linear: Vec<f32> = picture
         .into_raw()
         .into_iter()

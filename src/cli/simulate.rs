@@ -97,10 +97,7 @@ fn parse_extent(text: &str, sides: RangeInclusive<u32>) -> Result<Extent, String
     let (width, height) = text
         .split_once('x')
         .ok_or("give it as WIDTHxHEIGHT, for instance 128x128")?;
-    Ok(Extent {
-        width: side(width)?,
-        height: side(height)?,
-    })
+    Ok(Extent::new(side(width)?, side(height)?))
 }
 
 pub fn run(args: &SimulateArgs) -> Result<()> {
@@ -308,10 +305,7 @@ fn write_transport(plan: &CapturePlan, truth: &Path) -> Result<Vec<Vec<[f32; CHA
         .map(|y| TileRect {
             x: 0,
             y,
-            extent: Extent {
-                width: camera.width,
-                height: STRIP_ROWS.min(camera.height - y),
-            },
+            extent: Extent::new(camera.width, STRIP_ROWS.min(camera.height - y)),
         })
         .collect();
     let bar = progress::bar("computing transport", strips.len());

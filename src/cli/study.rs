@@ -165,10 +165,7 @@ fn study_one(
 }
 
 fn square(side: u32) -> Extent {
-    Extent {
-        width: side,
-        height: side,
-    }
+    Extent::new(side, side)
 }
 
 /// The paper's figures for a built-in scene at the paper's scale.

@@ -123,14 +123,8 @@ impl Header {
                 section: FileSection::Header,
             });
         }
-        let camera = Extent {
-            width: fields.u32(),
-            height: fields.u32(),
-        };
-        let light = Extent {
-            width: fields.u32(),
-            height: fields.u32(),
-        };
+        let camera = Extent::new(fields.u32(), fields.u32());
+        let light = Extent::new(fields.u32(), fields.u32());
         let (window, tile_side) = (fields.u32(), fields.u32());
         let mut affine = [[0.0; 3]; 2];
         for a in affine.iter_mut().flatten() {

@@ -87,10 +87,7 @@ impl GramCache {
             v: vs().min().unwrap_or(0),
             u: us().min().unwrap_or(0),
         };
-        let size = Extent {
-            width: us().max().unwrap_or(0).abs_diff(first.u) + window.side(),
-            height: vs().max().unwrap_or(0).abs_diff(first.v) + window.side(),
-        };
+        let size = Extent::new(us().max().unwrap_or(0).abs_diff(first.u) + window.side(), vs().max().unwrap_or(0).abs_diff(first.v) + window.side());
         let region = ClippedRect::new(first, size, light);
         let (width, height, [u, v]) = (region.columns.len(), region.rows.len(), region.first());
         let (l, weights) = (pattern_indices.len(), measurements.pattern_weights());
@@ -268,10 +265,7 @@ mod tests {
     use crate::capture::{NoiseModel, Pattern, RowSet};
     use crate::transport::{CHANNELS, Correspondence};
 
-    const LIGHT: Extent = Extent {
-        width: 7,
-        height: 6,
-    };
+    const LIGHT: Extent = Extent::new(7, 6);
     const PATTERNS: usize = 9;
 
     fn measurements() -> Measurements {

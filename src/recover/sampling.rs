@@ -29,10 +29,7 @@ fn spread_over(
     max_count: usize,
     is_covered: impl Fn(TileRect) -> bool,
 ) -> Vec<TileRect> {
-    let extent = Extent {
-        width: side.min(camera.width),
-        height: side.min(camera.height),
-    };
+    let extent = Extent::new(side.min(camera.width), side.min(camera.height));
     let square = |column: u32, row: u32| TileRect {
         x: column * extent.width,
         y: row * extent.height,

@@ -90,10 +90,7 @@ pub(super) struct SyntheticCapture {
 
 impl SyntheticCapture {
     pub fn new(patterns: usize) -> Self {
-        let square = |side| Extent {
-            width: side,
-            height: side,
-        };
+        let square = |side| Extent::new(side, side);
         let geometry = Geometry {
             camera: square(32),
             light: square(16),

@@ -236,13 +236,7 @@ mod tests {
 
     fn emission_at(seconds: f64) -> Vec<[f32; 4]> {
         let side = 64;
-        fire_emission(
-            Extent {
-                width: side,
-                height: side,
-            },
-            seconds,
-        )
+        fire_emission(Extent::new(side, side), seconds)
     }
 
     fn mean_change(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
@@ -304,10 +298,7 @@ mod tests {
     #[test]
     fn a_finer_light_plane_shows_the_same_fire() {
         let [coarse, fine] = [60, 240].map(|side| {
-            let extent = Extent {
-                width: side,
-                height: side,
-            };
+            let extent = Extent::new(side, side);
             fire_emission(extent, 3.0)
         });
         for v in 0..60 {

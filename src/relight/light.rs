@@ -290,10 +290,7 @@ fn rainbow(x: f64) -> [f32; 3] {
 mod tests {
     use super::*;
 
-    const PLANE: Extent = Extent {
-        width: 32,
-        height: 16,
-    };
+    const PLANE: Extent = Extent::new(32, 16);
 
     #[test]
     fn built_in_lights_have_names_and_stay_in_range() {

@@ -134,10 +134,7 @@ fn overlaps(from: u32, to: u32) -> Vec<CellOverlap> {
 mod tests {
     use super::*;
 
-    const FROM: Extent = Extent {
-        width: 7,
-        height: 5,
-    };
+    const FROM: Extent = Extent::new(7, 5);
 
     /// Smaller, equal, larger, one element, larger along one axis only.
     fn targets() -> [Extent; 5] {

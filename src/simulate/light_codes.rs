@@ -122,10 +122,7 @@ mod tests {
 
     #[test]
     fn neighbouring_columns_differ_in_one_gray_bit() {
-        let light = Extent {
-            width: 20,
-            height: 3,
-        };
+        let light = Extent::new(20, 3);
         let patterns: Vec<_> = GrayCodePattern::all(light)
             .into_iter()
             .filter(|g| g.columns && !g.inverted)

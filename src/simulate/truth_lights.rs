@@ -100,10 +100,7 @@ mod tests {
 
     #[test]
     fn lights_are_bright_and_different() {
-        let light = Extent {
-            width: 64,
-            height: 48,
-        };
+        let light = Extent::new(64, 48);
         let all = TruthLight::ALL.map(|l| l.codes(light));
         for (i, codes) in all.iter().enumerate() {
             let LightCodes::Rgb(rgb) = codes else {

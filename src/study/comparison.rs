@@ -320,10 +320,7 @@ mod tests {
 
     #[test]
     fn comparison_runs_every_method_on_a_tiny_scene() {
-        let side = |side| Extent {
-            width: side,
-            height: side,
-        };
+        let side = |side| Extent::new(side, side);
         let scene = SceneKind::Cookies.build(side(8), side(4)).unwrap();
         let scene_camera = SceneCamera {
             scene: scene.as_ref(),

@@ -151,10 +151,7 @@ mod tests {
     #[test]
     fn a_sheet_contains_panels_names_and_captions() {
         let panel = |is_data| Panel {
-            extent: Extent {
-                width: 2,
-                height: 2,
-            },
+            extent: Extent::new(2, 2),
             rgb: vec![200; 12],
             is_data,
         };

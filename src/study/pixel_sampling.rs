@@ -43,10 +43,7 @@ mod tests {
 
     #[test]
     fn random_tiles_are_different_and_cover_the_requested_pixels() {
-        let camera = Extent {
-            width: 100,
-            height: 60,
-        };
+        let camera = Extent::new(100, 60);
         let geometry = Geometry {
             camera,
             light: camera,

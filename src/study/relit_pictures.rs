@@ -235,10 +235,10 @@ fn downsample(extent: Extent, picture: &[[f64; CHANNELS]]) -> (Extent, Vec<[f64;
     if longer <= MAX_PANEL_SIDE_PX {
         return (extent, picture.to_vec());
     }
-    let to = Extent {
-        width: (extent.width * MAX_PANEL_SIDE_PX / longer).max(1),
-        height: (extent.height * MAX_PANEL_SIDE_PX / longer).max(1),
-    };
+    let to = Extent::new(
+        (extent.width * MAX_PANEL_SIDE_PX / longer).max(1),
+        (extent.height * MAX_PANEL_SIDE_PX / longer).max(1),
+    );
     let values: Vec<f32> = picture.as_flattened().iter().map(|&v| v as f32).collect();
     let small = area_resample(&values, extent, to);
     let rgb = small.as_chunks::<CHANNELS>().0.iter();

@@ -53,10 +53,7 @@ pub fn scenes_table(
     ));
     let mut worst = f64::NEG_INFINITY;
     for (kind, sides, ensemble, patterns, electrons, seed) in SETTINGS {
-        let [camera, light] = sides.map(|side| Extent {
-            width: side,
-            height: side,
-        });
+        let [camera, light] = sides.map(|side| Extent::new(side, side));
         let scene = kind.build(camera, light)?;
         let scene_camera = SceneCamera {
             scene: scene.as_ref(),

@@ -110,14 +110,8 @@ mod tests {
             vec![[0, 1, 2].map(y)]
         };
         let measurements = Measurements {
-            camera: Extent {
-                width: 1,
-                height: 1,
-            },
-            light: Extent {
-                width: 4,
-                height: 4,
-            },
+            camera: Extent::new(1, 1),
+            light: Extent::new(4, 4),
             correspondence: Correspondence {
                 affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             },

@@ -347,10 +347,7 @@ mod tests {
     #[test]
     #[ignore = "a measurement, not a test: cargo test --release -- --ignored --nocapture expand"]
     fn time_to_expand_a_large_picture() {
-        let extent = |side| Extent {
-            width: side,
-            height: side,
-        };
+        let extent = |side| Extent::new(side, side);
         let geometry = Geometry {
             camera: extent(512),
             light: extent(256),

@@ -24,6 +24,11 @@ pub struct Extent {
 }
 
 impl Extent {
+    /// The extent of a grid with `width` columns and `height` rows.
+    pub const fn new(width: u32, height: u32) -> Self {
+        Self { width, height }
+    }
+
     /// Row-major index of a pixel of this grid.
     pub fn index(self, pixel: CameraPx) -> usize {
         pixel.y as usize * self.width as usize + pixel.x as usize
@@ -228,10 +233,10 @@ impl Geometry {
 
     /// Tiles along a row and down a column.
     pub fn tile_grid(&self) -> Extent {
-        Extent {
-            width: self.camera.width.div_ceil(self.tile_side),
-            height: self.camera.height.div_ceil(self.tile_side),
-        }
+        Extent::new(
+            self.camera.width.div_ceil(self.tile_side),
+            self.camera.height.div_ceil(self.tile_side),
+        )
     }
 
     /// The tiles, row by row.
@@ -251,10 +256,10 @@ impl Geometry {
         TileRect {
             x,
             y,
-            extent: Extent {
-                width: self.tile_side.min(self.camera.width - x),
-                height: self.tile_side.min(self.camera.height - y),
-            },
+            extent: Extent::new(
+                self.tile_side.min(self.camera.width - x),
+                self.tile_side.min(self.camera.height - y),
+            ),
         }
     }
 
@@ -277,10 +282,7 @@ impl Geometry {
     /// The part of the window that starts at `origin` which lies on the light plane.
     pub(crate) fn clip_window(&self, origin: Element) -> ClippedRect {
         let side = self.window.side();
-        let size = Extent {
-            width: side,
-            height: side,
-        };
+        let size = Extent::new(side, side);
         ClippedRect::new(origin, size, self.light)
     }
 
@@ -375,14 +377,8 @@ mod tests {
 
     #[test]
     fn windows_are_clipped_to_the_light_plane() {
-        let light = Extent {
-            width: 6,
-            height: 4,
-        };
-        let size = Extent {
-            width: 5,
-            height: 5,
-        };
+        let light = Extent::new(6, 4);
+        let size = Extent::new(5, 5);
         let clip = |u, v| ClippedRect::new(Element { v, u }, size, light);
         let corner = clip(-2, -1);
         assert_eq!((corner.columns.clone(), corner.rows.clone()), (2..5, 1..5));

@@ -66,10 +66,7 @@ pub fn unpack_transport(geometry: &[f64], basis: &[f32]) -> Result<Transport, Co
     let &[cw, ch, lw, lh, window, tile_side, a, b, c, d, e, f] = geometry else {
         return Err(corrupt());
     };
-    let extent = |width: f64, height: f64| Extent {
-        width: width as u32,
-        height: height as u32,
-    };
+    let extent = |width: f64, height: f64| Extent::new(width as u32, height as u32);
     let geometry = Geometry {
         camera: extent(cw, ch),
         light: extent(lw, lh),

@@ -95,10 +95,7 @@ impl ImageFile {
         let mut decoder = png::Decoder::new(BufReader::with_capacity(READ_BYTES, file));
         decoder.set_transformations(transformations);
         let reader = decoder.read_info().map_err(|e| self.unreadable(e))?;
-        let found = Extent {
-            width: reader.info().width,
-            height: reader.info().height,
-        };
+        let found = Extent::new(reader.info().width, reader.info().height);
         let expected = self.extent;
         match found == expected {
             true => Ok(reader),

@@ -88,10 +88,7 @@ mod tests {
         let rect = TileRect {
             x: 3,
             y: 5,
-            extent: Extent {
-                width: 4,
-                height: 2,
-            },
+            extent: Extent::new(4, 2),
         };
         for size in [1e-30f32, 0.2, 1e20] {
             let value = |i: usize| [0.2, -1.0, 0.01].map(|c| c * size * (i as f32).cos());

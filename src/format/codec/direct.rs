@@ -262,10 +262,7 @@ mod tests {
     use super::*;
     use crate::format::scan::Coding;
 
-    const EXTENT: Extent = Extent {
-        width: 9,
-        height: 4,
-    };
+    const EXTENT: Extent = Extent::new(9, 4);
 
     fn order(side: u32) -> Vec<u16> {
         centre_out_order(Window::new(side).unwrap(), &Budget::unlimited()).unwrap()

@@ -222,10 +222,7 @@ mod tests {
     }
 
     fn tile() -> BandTile {
-        let extent = Extent {
-            width: 6,
-            height: 5,
-        };
+        let extent = Extent::new(6, 5);
         let coefficient = |i: usize| [0.3, 1.0, -0.5].map(|c: f32| c * (i as f32 * 0.7).cos());
         BandTile {
             coefficients: (0..30 * 5).map(coefficient).collect(),

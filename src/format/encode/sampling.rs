@@ -65,10 +65,7 @@ fn lit_part(tile: BandTile, side: u32, hash: usize) -> (BandTile, usize) {
         tile.crop(TileRect {
             x: tile.rect.x + left,
             y: tile.rect.y + top,
-            extent: Extent {
-                width: side.min(width - left),
-                height: side.min(height - top),
-            },
+            extent: Extent::new(side.min(width - left), side.min(height - top)),
         })
     });
     let mut lit_parts: Vec<BandTile> = parts.filter(is_lit).collect();
@@ -97,10 +94,7 @@ mod tests {
         let rect = TileRect {
             x: 32,
             y: 16,
-            extent: Extent {
-                width: 20,
-                height: 13,
-            },
+            extent: Extent::new(20, 13),
         };
         let lit_at = |pixels: &[usize]| {
             let mut tile = BandTile::dark(rect);

@@ -132,10 +132,7 @@ pub(super) fn blend(
 
 /// The central part of a rectangle, at most `side` by `side` pixels.
 pub(super) fn centre(rect: TileRect, side: u32) -> TileRect {
-    let extent = Extent {
-        width: rect.extent.width.min(side),
-        height: rect.extent.height.min(side),
-    };
+    let extent = Extent::new(rect.extent.width.min(side), rect.extent.height.min(side));
     TileRect {
         x: rect.x + (rect.extent.width - extent.width) / 2,
         y: rect.y + (rect.extent.height - extent.height) / 2,

@@ -206,10 +206,10 @@ pub(super) fn with_margin(measurements: &Measurements, rect: TileRect, margin: u
     TileRect {
         x,
         y,
-        extent: Extent {
-            width: (right + margin).min(camera.width) - x,
-            height: bottom + below.count() as u32 - y,
-        },
+        extent: Extent::new(
+            (right + margin).min(camera.width) - x,
+            bottom + below.count() as u32 - y,
+        ),
     }
 }
 

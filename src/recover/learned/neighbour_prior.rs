@@ -303,10 +303,7 @@ mod tests {
         TileRect {
             x: 0,
             y: 0,
-            extent: Extent {
-                width: side,
-                height: side,
-            },
+            extent: Extent::new(side, side),
         }
     }
 

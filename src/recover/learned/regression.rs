@@ -105,18 +105,12 @@ mod tests {
     #[test]
     fn regression_recovers_the_weights_of_a_linear_relation() {
         let random = |i: usize| (i * i * 7919 % 10_007) as f64 / 5003.0 - 1.0;
-        let extent = Extent {
-            width: 34,
-            height: 34,
-        };
+        let extent = Extent::new(34, 34);
         let region = TileRect { x: 6, y: 2, extent };
         let interior = TileRect {
             x: 8,
             y: 4,
-            extent: Extent {
-                width: 30,
-                height: 30,
-            },
+            extent: Extent::new(30, 30),
         };
         let (rank, values) = (2, extent.area() * 3 * 2);
         let neighbours: Vec<f64> = (0..values).map(random).collect();

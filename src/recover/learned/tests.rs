@@ -37,14 +37,8 @@ const WINDOW: u32 = 7;
 
 fn geometry() -> Geometry {
     Geometry {
-        camera: Extent {
-            width: SIDE,
-            height: SIDE,
-        },
-        light: Extent {
-            width: SIDE / 2,
-            height: SIDE / 2,
-        },
+        camera: Extent::new(SIDE, SIDE),
+        light: Extent::new(SIDE / 2, SIDE / 2),
         window: Window::new(WINDOW).unwrap(),
         correspondence: Correspondence {
             affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
@@ -425,10 +419,7 @@ fn two_by_two() -> TileRect {
     TileRect {
         x: 20,
         y: 20,
-        extent: Extent {
-            width: 2,
-            height: 2,
-        },
+        extent: Extent::new(2, 2),
     }
 }
 

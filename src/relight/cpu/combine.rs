@@ -179,10 +179,7 @@ mod tests {
 
     #[test]
     fn pixels_match_the_sums_and_all_simd_levels_agree_to_the_bit() {
-        let extent = Extent {
-            width: 9,
-            height: 3,
-        };
+        let extent = Extent::new(9, 3);
         let rect = TileRect { x: 0, y: 0, extent };
         let test_value = |i: usize| ((i * 7919) % 1009) as f32 / 504.0 - 1.0;
         for (rank, chroma) in [

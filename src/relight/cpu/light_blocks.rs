@@ -127,10 +127,7 @@ impl LightBlocks {
                 v: grid_origin.v + rows.start as i32,
             },
             side,
-            footprint: Extent {
-                width: columns.len() as u32 + geometry.window.side() - 1,
-                height: rows.len() as u32 + geometry.window.side() - 1,
-            },
+            footprint: Extent::new(columns.len() as u32 + geometry.window.side() - 1, rows.len() as u32 + geometry.window.side() - 1),
             blocks,
         }
     }

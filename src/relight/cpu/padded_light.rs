@@ -110,16 +110,10 @@ mod tests {
 
     #[test]
     fn changes_accumulate_until_they_are_cleared() {
-        let extent = Extent {
-            width: 20,
-            height: 3,
-        };
+        let extent = Extent::new(20, 3);
         // A border of seven columns and rows.
         let origin = Element { u: -7, v: -7 };
-        let padded_extent = Extent {
-            width: 34,
-            height: 17,
-        };
+        let padded_extent = Extent::new(34, 17);
         let mut padded = PaddedLight::new(extent, origin, padded_extent);
         let mut values = vec![[0.0; 4]; 60];
         let mut set = |padded: &mut PaddedLight, element: usize, value: f32| {

@@ -136,10 +136,7 @@ impl TextureLayout {
         let [layers, response_layers] =
             [quads, quads.next_multiple_of(2)].map(|quads| CHANNELS as u32 * quads);
         // Window origins with a part of their window on the light plane, and a border of one for all others.
-        let response = Extent {
-            width: light.width + geometry.window.side() + 1,
-            height: light.height + geometry.window.side() + 1,
-        };
+        let response = Extent::new(light.width + geometry.window.side() + 1, light.height + geometry.window.side() + 1);
         let max_side = u64::from(limits.max_side);
         let side = |extent: Extent| u64::from(extent.width.max(extent.height));
         let light_side = side(if is_factored { response } else { light });
@@ -201,10 +198,7 @@ impl TextureLayout {
     }
 }
 
-const TEXEL: Extent = Extent {
-    width: 1,
-    height: 1,
-};
+const TEXEL: Extent = Extent::new(1, 1);
 
 fn check_limit(quantity: &'static str, need: u64, limit: u64) -> Result<(), LayoutError> {
     match need <= limit {
@@ -226,9 +220,6 @@ fn fold(need: u64, limits: TextureLimits) -> Result<(Extent, u32), LayoutError> 
     let width = side.min(need).max(1);
     let rows = need.div_ceil(width).max(1);
     let layers = rows.div_ceil(side);
-    let extent = Extent {
-        width: width as u32,
-        height: rows.div_ceil(layers) as u32,
-    };
+    let extent = Extent::new(width as u32, rows.div_ceil(layers) as u32);
     Ok((extent, layers as u32))
 }

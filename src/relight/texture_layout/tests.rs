@@ -10,14 +10,8 @@ const WEBGL2_MINIMUM: TextureLimits = TextureLimits {
 
 fn geometry(camera: (u32, u32), window: u32) -> Geometry {
     Geometry {
-        camera: Extent {
-            width: camera.0,
-            height: camera.1,
-        },
-        light: Extent {
-            width: 20,
-            height: 10,
-        },
+        camera: Extent::new(camera.0, camera.1),
+        light: Extent::new(20, 10),
         window: Window::new(window).unwrap(),
         correspondence: Correspondence {
             affine: [[0.12, 0.0, -0.75], [0.0, 0.06, 1.0]],
@@ -191,10 +185,7 @@ fn photographs_beyond_the_limits_are_errors() {
         exceeds("layers of components", 6, 2)
     );
     let mut wide = transport(geometry((8, 8), 1), 64);
-    wide.geometry.light = Extent {
-        width: 1500,
-        height: 1500,
-    };
+    wide.geometry.light = Extent::new(1500, 1500);
     assert_eq!(
         TextureLayout::new(&wide, WEBGL2_MINIMUM).unwrap_err(),
         exceeds(

@@ -100,10 +100,7 @@ impl TextureLayout {
                 write(TextureRegion {
                     binding: binding::CODES,
                     origin: [0, row, layer],
-                    extent: Extent {
-                        width,
-                        height: rows,
-                    },
+                    extent: Extent::new(width, rows),
                     texels: bytemuck::cast_slice(&texels),
                 })?;
             }

@@ -116,10 +116,10 @@ impl Context {
         let gl = &self.gl;
         let before = self.size();
         // If possible large enough for all photographs, so that it is rarely resized.
-        let largest = Extent {
-            width: before.width.max(extent.width),
-            height: before.height.max(extent.height),
-        };
+        let largest = Extent::new(
+            before.width.max(extent.width),
+            before.height.max(extent.height),
+        );
         if !self.try_resize(largest) && !self.try_resize(extent) {
             self.try_resize(before);
             return Err(BackendError::Upload(format!(
@@ -139,10 +139,7 @@ impl Context {
     }
 
     fn size(&self) -> Extent {
-        Extent {
-            width: self.canvas.width(),
-            height: self.canvas.height(),
-        }
+        Extent::new(self.canvas.width(), self.canvas.height())
     }
 
     /// Resizes the canvas. Returns whether the drawing buffer follows: browsers give less beyond their limits.

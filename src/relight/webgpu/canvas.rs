@@ -128,10 +128,7 @@ mod tests {
 
     #[wasm_bindgen_test]
     async fn a_lost_device_is_reported() {
-        let extent = Extent {
-            width: 8,
-            height: 8,
-        };
+        let extent = Extent::new(8, 8);
         let geometry = Geometry {
             camera: extent,
             light: extent,

@@ -61,10 +61,10 @@ struct Reflector {
 impl Cookies {
     pub fn new(geometry: Geometry) -> Self {
         let affine = geometry.correspondence.affine;
-        let samples = Extent {
-            width: geometry.camera.width * SAMPLES_PER_SIDE,
-            height: geometry.camera.height * SAMPLES_PER_SIDE,
-        };
+        let samples = Extent::new(
+            geometry.camera.width * SAMPLES_PER_SIDE,
+            geometry.camera.height * SAMPLES_PER_SIDE,
+        );
         let pitch = vec2(affine[0][0], affine[1][1]) * (1.0 / f64::from(SAMPLES_PER_SIDE));
         let surface = SurfaceGrid::new(geometry.light, samples, pitch);
         let element_surface = SurfaceGrid::new(geometry.light, geometry.light, vec2(1.0, 1.0));
@@ -232,10 +232,7 @@ struct WindowAccumulator<'a> {
 impl WindowAccumulator<'_> {
     /// Adds light from `element`; ignores elements outside the light plane or the window.
     fn add(&mut self, element: Element, light: [f64; CHANNELS]) {
-        let window = Extent {
-            width: self.side,
-            height: self.side,
-        };
+        let window = Extent::new(self.side, self.side);
         let within = Element {
             u: element.u - self.origin.u,
             v: element.v - self.origin.v,

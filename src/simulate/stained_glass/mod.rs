@@ -246,10 +246,7 @@ mod tests {
 
     #[test]
     fn lead_is_nearly_black_and_glass_is_not() {
-        let side = |n| Extent {
-            width: n,
-            height: n,
-        };
+        let side = |n| Extent::new(n, n);
         let scene = StainedGlass::new(scene_geometry(side(192), side(96)).unwrap());
         let geometry = scene.geometry();
         let plane = UnitPlane::new(geometry.light);
