@@ -30,7 +30,7 @@ use relightable_photo::capture::{LinearPhoto, Measurements, NoiseModel, Pattern,
 use relightable_photo::executor::{Executor, SequentialExecutor};
 use relightable_photo::recover::{Homotopy, Method, Nnls, Recovery, Settings, SparsityBasis};
 use relightable_photo::simulate::{
-    Camera, EmissionMatrix, Ensemble, LightCodes, RandomStream, SceneKind, emission,
+    Camera, EmissionMatrix, LightCodes, PatternEnsemble, RandomStream, SceneKind, emission,
 };
 use relightable_photo::transport::{
     CHANNELS, CameraPx, Extent, TileRect, TransportError, TransportFunctions, Window,
@@ -62,10 +62,7 @@ fn main() {
 }
 
 fn square(side: u32) -> Extent {
-    Extent {
-        width: side,
-        height: side,
-    }
+    Extent::new(side, side)
 }
 
 /// Stained glass at two camera pixels an element, photographed with noise; and the true transport.
@@ -75,14 +72,11 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
     let codes: Vec<LightCodes> = (0..PATTERNS as u32)
         .map(|i| {
             let mut stream = RandomStream::Pattern(i).start(SEED);
-            Ensemble::Gaussian.draw(light, &mut stream).unwrap()
+            PatternEnsemble::Gaussian.draw(light, &mut stream)
         })
         .collect();
     let sensor = Camera {
-        black: 512.0,
-        white: 60_000.0,
         electrons: 40_000.0,
-        read_noise: 8.0,
     };
     let emissions = EmissionMatrix::new(light, &codes);
     let geometry = *scene.geometry();
@@ -99,11 +93,11 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
             }
         }
     }
-    let code = 1.0 / (sensor.white - sensor.black);
+    let code = 1.0 / (Camera::WHITE - Camera::BLACK);
     let photograph = |seen: &[[f32; CHANNELS]], number: u32| -> LinearPhoto {
         let mut noise = RandomStream::Photograph(number).start(SEED);
-        let photo = sensor.photograph(seen, &mut noise).unwrap();
-        let linear = |value: u16| ((f64::from(value) - sensor.black) * code) as f32;
+        let photo = sensor.photograph(seen, &mut noise);
+        let linear = |value: u16| ((f64::from(value) - Camera::BLACK) * code) as f32;
         photo.iter().map(|codes| codes.map(linear)).collect()
     };
     for (i, picture) in pictures.iter_mut().enumerate() {

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use assert_cmd::Command;
+use relightable_photo::calibrate::Axis;
 use relightable_photo::capture::{CaptureFolder, LinearPhoto, Pattern, RowSet};
 use relightable_photo::simulate::{
     Camera, EmissionMatrix, LightCodes, RandomStream, SceneKind, SimulatedScene,
@@ -85,7 +86,7 @@ fn picture(folder: &CaptureFolder, light: &[[f64; CHANNELS]]) -> Vec<[f64; CHANN
             let origin = truth.window_origin(n);
             let mut y = [0.0; CHANNELS];
             for (s, tau) in truth.tau(n).iter().enumerate() {
-                let element = truth.window().element(origin, s);
+                let element = truth.window.element(origin, s);
                 match element.index_in(manifest.light.extent()) {
                     Some(m) => (0..CHANNELS).for_each(|c| y[c] += tau[c].to_f64() * light[m][c]),
                     None => assert_eq!(
@@ -143,7 +144,7 @@ fn photographs_and_relit_pictures_match_the_known_transport() {
             ["checker", "colour", "fire", "flood", "stripes"]
         );
         for name in truth.lights().unwrap() {
-            let light = truth.light(&name).unwrap();
+            let light = truth.light(&name).unwrap().rgb();
             let light: Vec<_> = light
                 .chunks_exact(3)
                 .map(|l| [l[0], l[1], l[2]].map(f64::from))
@@ -172,7 +173,7 @@ fn gray_code_decodes_to_the_correspondence() {
     let read = |name: &str| image::open(out.join(name)).unwrap().into_rgb16();
     let sum = |p: &image::Rgb<u16>| p.0.iter().map(|&c| u32::from(c)).sum::<u32>();
     let flood = read("photos/flood.png");
-    for (axis, top_bit) in [("x", 4), ("y", 3)] {
+    for (axis, top_bit) in [(Axis::X, 4), (Axis::Y, 3)] {
         let shots: Vec<_> = manifest
             .graycode
             .iter()
@@ -190,7 +191,7 @@ fn gray_code_decodes_to_the_correspondence() {
                 let bit = u32::from(sum(pair[0].get_pixel(x, y)) > sum(pair[1].get_pixel(x, y)));
                 element = element << 1 | (bit ^ element & 1);
             }
-            let at = f64::from(if axis == "x" { x } else { y }) * 0.5;
+            let at = f64::from(if axis == Axis::X { x } else { y }) * 0.5;
             decoded += 1;
             // Parallax displaces it by up to four elements in one direction.
             near += u32::from((-5.5..=1.0).contains(&(f64::from(element) - at)));
@@ -430,16 +431,9 @@ fn height_displaces_direct_light_and_casts_shadows() {
 #[test]
 fn fewer_electrons_are_noisier() {
     let spread = |electrons| {
-        let camera = Camera {
-            black: 512.0,
-            white: 60_000.0,
-            electrons,
-            read_noise: 8.0,
-        };
+        let camera = Camera { electrons };
         let mut noise = RandomStream::Photograph(0).start(1);
-        let codes = camera
-            .photograph(&[[0.5; CHANNELS]; 5000], &mut noise)
-            .unwrap();
+        let codes = camera.photograph(&[[0.5; CHANNELS]; 5000], &mut noise);
         let codes: Vec<f64> = codes.into_iter().flatten().map(f64::from).collect();
         quantile(codes.clone(), 0.84) - quantile(codes, 0.16)
     };

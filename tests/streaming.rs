@@ -305,8 +305,8 @@ fn a_killed_recovery_resumes_and_mismatches_are_named() {
     fs::write(&photo, sound).unwrap();
 
     // A checkpoint of another build, with another learned prior.
-    let prior = 16 + u32::from_le_bytes(kept[8..12].try_into().unwrap()) as usize;
-    assert_eq!(kept[prior..prior + 4], u32::MAX.to_le_bytes());
+    let prior = 20 + u32::from_le_bytes(kept[12..16].try_into().unwrap()) as usize;
+    assert_eq!(kept[prior..prior + 4], (u32::MAX - 1).to_le_bytes());
     let length = u32::from_le_bytes(kept[prior + 4..prior + 8].try_into().unwrap()) as usize;
     let mut other = kept.clone();
     other[prior + 12] ^= 1;

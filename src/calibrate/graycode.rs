@@ -4,6 +4,7 @@
 //! a camera pixel that is brighter under the plain pattern. Scattering objects blur the finest stripes to grey, so
 //! decoding of a pixel stops at its first unclear bit, which leaves a range of light elements instead of one.
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::affine_fit::{DecodedPixel, fit_affine_row};
@@ -18,7 +19,8 @@ const MIN_RELATIVE_BRIGHTNESS: f32 = 0.05;
 const MIN_DECODED_PIXELS: usize = 100;
 
 /// The axis of the light plane that a bit numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Axis {
     /// Columns.
     X,

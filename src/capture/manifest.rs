@@ -4,7 +4,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{CaptureError, FieldProblem};
+use super::error::{CaptureError, CaptureProblem};
+use crate::calibrate::Axis;
 use crate::transport::{Correspondence, Extent, MAX_SIDE};
 
 /// Largest 16-bit code.
@@ -13,7 +14,7 @@ const MAX_CODE: f64 = 65535.0;
 const MAX_GRAY_CODE_BIT: u32 = 15;
 
 /// The manifest, version 1. Paths are relative to its folder. Unknown fields are ignored.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Always 1.
     pub version: u32,
@@ -43,14 +44,14 @@ pub struct Manifest {
     pub graycode: Vec<GrayCodeShot>,
     /// The correspondence; decoded from the Gray code if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub correspondence: Option<AffineSpec>,
+    pub correspondence: Option<Correspondence>,
     /// Paths of unknown fields: misspelt, or of a later version.
     #[serde(skip)]
     pub unknown: Vec<String>,
 }
 
 /// The light plane, and the emission of each code.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LightSpec {
     /// Elements along a row.
     pub width: u32,
@@ -65,7 +66,7 @@ pub struct LightSpec {
 }
 
 /// The camera grid and its range of linear codes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CameraSpec {
     /// Pixels along a row.
     pub width: u32,
@@ -95,18 +96,11 @@ pub struct GrayCodeShot {
     /// 16-bit linear RGB PNG.
     pub photo: String,
     /// `x` or `y`.
-    pub axis: String,
+    pub axis: Axis,
     /// Bit number, 0 the least significant.
     pub bit: u32,
     /// Whether the pattern was shown inverted.
     pub inverted: bool,
-}
-
-/// An affine correspondence.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AffineSpec {
-    /// Maps camera position `(x+½, y+½, 1)` to light plane position `(u, v)`.
-    pub affine: [[f64; 3]; 2],
 }
 
 impl LightSpec {
@@ -116,25 +110,19 @@ impl LightSpec {
     }
 
     /// Exactly one of gamma and response must be given, and be usable.
-    fn check(&self) -> Result<(), (String, FieldProblem)> {
-        let problem = match (&self.response, self.gamma) {
-            (Some(_), Some(_)) => FieldProblem::Conflict {
-                other: "light.gamma",
-            },
-            (Some(table), None) if !is_valid_response(table) => FieldProblem::InvalidResponse,
-            (Some(_), None) => return Ok(()),
+    fn check(&self) -> Result<(), CaptureProblem> {
+        match (&self.response, self.gamma) {
+            (Some(_), Some(_)) => Err(CaptureProblem::ConflictingResponse),
+            (Some(table), None) if !is_valid_response(table) => {
+                Err(CaptureProblem::InvalidResponse)
+            }
+            (Some(_), None) => Ok(()),
             (None, Some(gamma)) => {
-                let allowed = || "between 0.1 and 10".to_owned();
                 let valid = (0.1..=10.0).contains(&gamma);
-                return check_range(valid, "light.gamma", gamma, allowed);
+                check_range(valid, "light.gamma", gamma, "between 0.1 and 10")
             }
-            (None, None) => {
-                let alternative = "light.response";
-                let problem = FieldProblem::Missing { alternative };
-                return Err(("light.gamma".to_owned(), problem));
-            }
-        };
-        Err(("light.response".to_owned(), problem))
+            (None, None) => Err(CaptureProblem::MissingResponse),
+        }
     }
 
     /// Emission at each of the 256 codes, 1 at full brightness.
@@ -163,14 +151,6 @@ impl CameraSpec {
     }
 }
 
-impl From<&AffineSpec> for Correspondence {
-    fn from(spec: &AffineSpec) -> Self {
-        Self {
-            affine: spec.affine,
-        }
-    }
-}
-
 impl Manifest {
     /// Parses and checks `json`, the contents of the file at `path`.
     ///
@@ -178,10 +158,8 @@ impl Manifest {
     /// If it is not JSON, has an unknown version, lacks a field, or a field has an invalid value. The error names
     /// `path` and the field.
     pub fn parse(json: &str, path: &Path) -> Result<Self, CaptureError> {
-        let json_error = |source| CaptureError::Json {
-            path: path.to_owned(),
-            source,
-        };
+        let error = |problem| CaptureError::new(path, problem);
+        let json_error = |reason| error(CaptureProblem::NotAManifest(reason));
         // The version first: another version may differ in any other field.
         #[derive(Deserialize)]
         struct Versioned {
@@ -189,41 +167,29 @@ impl Manifest {
         }
         let Versioned { version } = serde_json::from_str(json).map_err(json_error)?;
         if version != 1 {
-            return Err(CaptureError::UnknownVersion {
-                path: path.to_owned(),
-                version,
-            });
+            return Err(error(CaptureProblem::UnknownVersion(version)));
         }
         let mut source = serde_json::Deserializer::from_str(json);
         let mut unknown = Vec::new();
         let mut add_unknown = |field: serde_ignored::Path| unknown.push(field.to_string());
         let deserializer = serde_ignored::Deserializer::new(&mut source, &mut add_unknown);
         let parsed: Result<Self, _> = serde_path_to_error::deserialize(deserializer);
-        let manifest = parsed.map_err(|error| match error.path() {
-            at if at.iter().next().is_none() => json_error(error.into_inner()),
-            at => CaptureError::FieldType {
-                path: path.to_owned(),
-                field: at.to_string(),
-                source: error.into_inner(),
-            },
+        let manifest = parsed.map_err(|e| match e.path().to_string() {
+            field if e.path().iter().next().is_some() => {
+                error(CaptureProblem::FieldType(field, e.into_inner()))
+            }
+            _ => json_error(e.into_inner()),
         })?;
         source.end().map_err(json_error)?;
-        manifest.check().map_err(|(field, problem)| {
-            let path = path.to_owned();
-            CaptureError::Field {
-                path,
-                field,
-                problem,
-            }
-        })?;
+        manifest.check().map_err(error)?;
         Ok(Self {
             unknown,
             ..manifest
         })
     }
 
-    /// Checks all values; the error is the first invalid field and its problem.
-    fn check(&self) -> Result<(), (String, FieldProblem)> {
+    /// Checks all values; the error is the problem of the first invalid field.
+    fn check(&self) -> Result<(), CaptureProblem> {
         let (light, camera) = (&self.light, &self.camera);
         for (field, side) in [
             ("light.width", light.width),
@@ -231,40 +197,34 @@ impl Manifest {
             ("camera.width", camera.width),
             ("camera.height", camera.height),
         ] {
-            let valid = (1..=MAX_SIDE).contains(&side);
-            check_range(valid, field, side, || format!("between 1 and {MAX_SIDE}"))?;
+            let allowed = format!("between 1 and {MAX_SIDE}");
+            check_range((1..=MAX_SIDE).contains(&side), field, side, &allowed)?;
         }
         let (black, white) = (camera.black, camera.white);
         let valid = (0.0..MAX_CODE).contains(&black);
-        check_range(valid, "camera.black", black, || "a 16-bit code".to_owned())?;
+        check_range(valid, "camera.black", black, "a 16-bit code")?;
+        let allowed = format!("a 16-bit code above \"camera.black\", {black}");
         let valid = white > black && white <= MAX_CODE;
-        check_range(valid, "camera.white", white, || {
-            format!("a 16-bit code above \"camera.black\", {black}")
-        })?;
+        check_range(valid, "camera.white", white, &allowed)?;
         light.check()?;
         if self.shots.is_empty() {
-            return Err(("shots".to_owned(), FieldProblem::Empty));
+            return Err(CaptureProblem::NoShots);
         }
         for (i, shot) in self.shots.iter().enumerate() {
             let exposure = shot.exposure.unwrap_or(1.0);
             let valid = exposure.is_finite() && exposure > 0.0;
-            let field = format!("shots[{i}].exposure");
-            check_range(valid, &field, exposure, || "above 0".to_owned())?;
+            check_range(valid, &format!("shots[{i}].exposure"), exposure, "above 0")?;
         }
-        for (i, GrayCodeShot { axis, bit, .. }) in self.graycode.iter().enumerate() {
-            let (valid, quoted) = (axis == "x" || axis == "y", format!("{axis:?}"));
-            let field = format!("graycode[{i}].axis");
-            check_range(valid, &field, quoted, || "\"x\" or \"y\"".to_owned())?;
+        for (i, GrayCodeShot { bit, .. }) in self.graycode.iter().enumerate() {
             let field = format!("graycode[{i}].bit");
-            let allowed = || format!("between 0 and {MAX_GRAY_CODE_BIT}");
-            check_range(*bit <= MAX_GRAY_CODE_BIT, &field, bit, allowed)?;
+            let allowed = format!("between 0 and {MAX_GRAY_CODE_BIT}");
+            check_range(*bit <= MAX_GRAY_CODE_BIT, &field, bit, &allowed)?;
         }
-        if let Some(AffineSpec { affine }) = &self.correspondence {
+        if let Some(Correspondence { affine }) = &self.correspondence {
             let [[a, b, _], [c, d, _]] = affine;
             let finite = affine.iter().flatten().all(|x| x.is_finite());
             if !finite || a * d - b * c == 0.0 {
-                let field = "correspondence.affine".to_owned();
-                return Err((field, FieldProblem::NotInvertible));
+                return Err(CaptureProblem::NotInvertible);
             }
         }
         Ok(())
@@ -275,16 +235,16 @@ fn check_range(
     is_valid: bool,
     field: &str,
     value: impl ToString,
-    allowed: impl Fn() -> String,
-) -> Result<(), (String, FieldProblem)> {
-    if is_valid {
-        return Ok(());
+    allowed: &str,
+) -> Result<(), CaptureProblem> {
+    match is_valid {
+        true => Ok(()),
+        false => Err(CaptureProblem::OutOfRange {
+            field: field.to_owned(),
+            value: value.to_string(),
+            allowed: allowed.to_owned(),
+        }),
     }
-    let (value, allowed) = (value.to_string(), allowed());
-    Err((
-        field.to_owned(),
-        FieldProblem::OutOfRange { value, allowed },
-    ))
 }
 
 /// Whether codes and emission rise, and reach code 255 with light.
@@ -374,13 +334,13 @@ mod tests {
             assert!(message.contains("x/capture.json"), "{message}");
         }
         let missing = manifest(|j| j["camera"] = serde_json::json!({"width": 8}));
-        let CaptureError::FieldType { source, field, .. } = missing.unwrap_err() else {
+        let CaptureProblem::FieldType(field, reason) = missing.unwrap_err().problem else {
             panic!("a different error")
         };
         assert_eq!(field, "camera");
         assert!(
-            source.to_string().contains("missing field `height`"),
-            "{source}"
+            reason.to_string().contains("missing field `height`"),
+            "{reason}"
         );
     }
 

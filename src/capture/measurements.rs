@@ -24,6 +24,12 @@ impl Pattern {
             Self::Rgb(planes) => &planes[c],
         }
     }
+
+    /// The emission that each camera channel responds to, `[M, 3]`.
+    pub fn rgb(&self) -> Vec<f32> {
+        let element = |m| [0, 1, 2].map(|c| self.plane(c)[m]);
+        (0..self.plane(0).len()).flat_map(element).collect()
+    }
 }
 
 /// Camera rows of a photograph as measurements, `[rows, width]`; NaN where saturated.
@@ -65,10 +71,8 @@ impl Measurements {
     /// pattern is grey.
     pub fn planes(&self) -> impl Iterator<Item = (usize, Range<usize>)> + use<> {
         let grey = self.is_grey();
-        (0..if grey { 1 } else { CHANNELS }).map(move |plane| match grey {
-            true => (plane, 0..CHANNELS),
-            false => (plane, plane..plane + 1),
-        })
+        let channels = move |plane| if grey { 0..CHANNELS } else { plane..plane + 1 };
+        (0..if grey { 1 } else { CHANNELS }).map(move |plane| (plane, channels(plane)))
     }
 
     /// Channel `c` of a pixel under pattern `l`; NaN if saturated or not loaded.
@@ -103,11 +107,9 @@ impl Measurements {
     /// Weight of each pattern's equations, mean square 1: the square root of its exposure, as the variance of photon
     /// noise, the largest part, is inversely proportional to exposure.
     pub fn pattern_weights(&self) -> Vec<f64> {
-        let exposures = || self.full_scale.iter().map(|&full| f64::from(full).recip());
-        let mean = exposures().sum::<f64>() / self.full_scale.len() as f64;
-        exposures()
-            .map(|exposure| (exposure / mean).sqrt())
-            .collect()
+        let exposures = self.full_scale.iter().map(|&full| f64::from(full).recip());
+        let mean = exposures.clone().sum::<f64>() / self.full_scale.len() as f64;
+        exposures.map(|exposure| (exposure / mean).sqrt()).collect()
     }
 
     /// Number of pixels of a tile with fewer than `min_samples` unsaturated samples in some channel.

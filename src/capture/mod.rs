@@ -17,11 +17,11 @@ mod noise_gain;
 mod noise_model;
 mod rows;
 
-pub use error::{CaptureError, FieldProblem, ImageProblem, MANIFEST_NAME};
+pub use error::{CaptureError, CaptureProblem, MANIFEST_NAME};
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
 pub use folder::{CaptureFolder, DarkFrame, PhotoReader, RELIT_FULL_SCALE, Truth};
 pub(crate) use group::{group_count, group_ids};
-pub use manifest::{AffineSpec, CameraSpec, GrayCodeShot, LightSpec, Manifest, Shot};
+pub use manifest::{CameraSpec, GrayCodeShot, LightSpec, Manifest, Shot};
 pub use measurements::{LinearPhoto, Measurements, Pattern};
 pub use noise_model::NoiseModel;
 pub use rows::RowSet;

@@ -7,7 +7,7 @@
 
 use super::measurements::Measurements;
 use super::noise_model::{NoiseModel, quantile};
-use crate::linalg::symmetric_eigen;
+use crate::linalg::{mirror_upper, symmetric_eigen};
 use crate::transport::{CHANNELS, CameraPx};
 
 /// Camera pixels along a side of a block. At two pixels a light element, signal then takes a minority of the ranks.
@@ -22,6 +22,7 @@ const MIN_SHOTS: usize = 4;
 const GAIN_ROUNDS: usize = 4;
 /// Upper bound on the largest eigenvalue of pure noise, relative to its asymptotic value.
 const MAX_NOISE_EIGENVALUE_RATIO: f64 = 1.05;
+
 impl NoiseModel {
     /// Adds the gain to the floor of `measurements.noise`. The gain is zero if all pixels are saturated in too many
     /// shots.
@@ -120,12 +121,6 @@ impl PixelBlock {
         }
     }
 
-    /// Mean measurement of channel `c`.
-    fn mean_measurement(&self, c: usize) -> f64 {
-        let means = self.mean.iter().skip(c).step_by(CHANNELS);
-        means.sum::<f64>() * CHANNELS as f64 / BLOCK_SERIES as f64
-    }
-
     /// Variance of the noise by channel, relative to the `expected` variance of each sample; `None` if the signal takes
     /// too many ranks.
     fn relative_noise(&self, expected: &[f64; BLOCK_SERIES]) -> Option<[f64; CHANNELS]> {
@@ -134,16 +129,12 @@ impl PixelBlock {
         let mut gram = vec![0.0; p * p];
         for row in self.samples.chunks_exact(p) {
             for i in 0..p {
-                for j in 0..=i {
+                for j in i..p {
                     gram[i * p + j] += row[i] * scale[i] * row[j] * scale[j];
                 }
             }
         }
-        for i in 0..p {
-            for j in 0..i {
-                gram[j * p + i] = gram[i * p + j];
-            }
-        }
+        mirror_upper(&mut gram, p);
         let (values, vectors) = symmetric_eigen(gram, p);
         let degrees = self.weights.len() - 1;
         // The signal has the smallest rank for which the rest may be pure noise: noise of variance 1 has eigenvalues up
@@ -174,6 +165,12 @@ impl PixelBlock {
     }
 }
 
+/// Mean of channel `c` over the pixels of a block.
+fn channel_mean(values: &[f64; BLOCK_SERIES], c: usize) -> f64 {
+    let series = values.iter().skip(c).step_by(CHANNELS);
+    series.sum::<f64>() * CHANNELS as f64 / BLOCK_SERIES as f64
+}
+
 /// The gain by channel. Samples are weighted by the `last` estimate, or at first by their measurement.
 fn estimate_gain(
     blocks: &[PixelBlock],
@@ -196,9 +193,8 @@ fn estimate_gain(
             continue;
         };
         for c in 0..CHANNELS {
-            let measurement = block.mean_measurement(c);
-            let series = expected.iter().skip(c).step_by(CHANNELS);
-            let mean = series.sum::<f64>() * CHANNELS as f64 / BLOCK_SERIES as f64;
+            let measurement = channel_mean(&block.mean, c);
+            let mean = channel_mean(&expected, c);
             let photon_noise = relative[c] * mean - floor[c] * block.mean_full_scale;
             if measurement > 0.0 {
                 estimates[c].push((measurement, photon_noise / measurement));
@@ -215,12 +211,14 @@ fn estimate_gain(
     })
 }
 
-#[cfg(test)]
 #[cfg(all(feature = "simulate", not(target_arch = "wasm32")))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::capture::{LinearPhoto, Pattern, RowSet};
-    use crate::simulate::{Camera, EmissionMatrix, Ensemble, LightCodes, RandomStream, SceneKind};
+    use crate::simulate::{
+        Camera, EmissionMatrix, LightCodes, PatternEnsemble, RandomStream, SceneKind,
+    };
     use crate::transport::{Extent, TileRect};
 
     /// Photographs a scene with `electrons` at full scale, every third shot at twice the exposure, and less a dark
@@ -228,15 +226,10 @@ mod tests {
     fn measure(kind: SceneKind, camera: [u32; 2], patterns: u32, electrons: f64) -> Measurements {
         let extent = |[width, height]: [u32; 2]| Extent { width, height };
         let (camera, light) = (extent(camera), extent([24, 24]));
-        let sensor = Camera {
-            black: 512.0,
-            white: 60_000.0,
-            electrons,
-            read_noise: 8.0,
-        };
+        let sensor = Camera { electrons };
         let draw = |i| {
             let mut stream = RandomStream::Pattern(i).start(7);
-            Ensemble::Gaussian.draw(light, &mut stream).unwrap()
+            PatternEnsemble::Gaussian.draw(light, &mut stream)
         };
         let lights: Vec<LightCodes> = std::iter::once(LightCodes::uniform(light, 0))
             .chain((0..patterns).map(draw))
@@ -258,7 +251,7 @@ mod tests {
                 .collect();
             let take = |take: u32| {
                 let mut stream = RandomStream::Photograph(2 * i as u32 + take).start(7);
-                sensor.photograph(&exposed, &mut stream).unwrap()
+                sensor.photograph(&exposed, &mut stream)
             };
             let pairs = take(0).into_iter().zip(take(1));
             let pixel = |(a, b): ([u16; 3], [u16; 3])| {

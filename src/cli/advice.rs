@@ -5,7 +5,7 @@ use std::error::Error;
 use anyhow::Error as AnyError;
 
 use crate::calibrate::CalibrationError;
-use crate::capture::{CaptureError, FieldProblem, ImageProblem};
+use crate::capture::{CaptureError, CaptureProblem};
 use crate::recover::RecoverError;
 
 /// The text of `error` and its causes, followed by the remedy if there is one.
@@ -17,44 +17,36 @@ pub fn error_with_remedy(error: &AnyError) -> String {
 }
 
 fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
-    let capture = error.downcast_ref().and_then(capture_remedy);
-    let calibration = || error.downcast_ref().map(calibration_remedy);
-    let recovery = || error.downcast_ref().and_then(recovery_remedy);
-    capture.or_else(calibration).or_else(recovery)
-}
-
-fn capture_remedy(error: &CaptureError) -> Option<&'static str> {
-    Some(match error {
-        CaptureError::Missing { field: Some(_), .. } => "add it or correct its name",
-        CaptureError::NotACapture { .. } => "give the folder that holds capture.json",
-        CaptureError::UnknownVersion { .. } => "get a newer program",
-        CaptureError::Field { problem, .. } => match problem {
-            FieldProblem::Missing { .. } => {
-                "give the gamma of the monitor or projector, usually about 2.2, or its measured response"
-            }
-            FieldProblem::Conflict { .. } => "remove one of them",
-            FieldProblem::Empty => "list the patterns and their photographs",
-            FieldProblem::MissingGrayCode { .. } => "add it, or give \"correspondence\"",
-            _ => return None,
-        },
-        CaptureError::Image { problem, .. } => match problem {
-            ImageProblem::Unreadable(_) => "export or copy it again",
-            ImageProblem::WrongExtent { .. } => "correct one of them",
-            ImageProblem::PhotoType(_) => "export it again from raw",
-            ImageProblem::PatternType(_) => "convert it",
-            ImageProblem::Interlaced => "save it without interlacing",
-        },
-        _ => return None,
+    if let Some(CaptureError { field, problem, .. }) = error.downcast_ref() {
+        return capture_remedy(field.is_some(), problem);
+    }
+    Some(match error.downcast_ref() {
+        Some(CalibrationError::MissingBits(_)) => "photograph them, or give \"correspondence\"",
+        Some(CalibrationError::TooFewPixels { .. }) => {
+            "photograph the Gray code again with more light, or give \"correspondence\""
+        }
+        None => return error.downcast_ref().and_then(recovery_remedy),
     })
 }
 
-fn calibration_remedy(error: &CalibrationError) -> &'static str {
-    match error {
-        CalibrationError::MissingBits(_) => "photograph them, or give \"correspondence\"",
-        CalibrationError::TooFewPixels { .. } => {
-            "photograph the Gray code again with more light, or give \"correspondence\""
+fn capture_remedy(is_named: bool, problem: &CaptureProblem) -> Option<&'static str> {
+    Some(match problem {
+        CaptureProblem::Missing if is_named => "add it or correct its name",
+        CaptureProblem::NotACapture(_) => "give the folder that holds capture.json",
+        CaptureProblem::UnknownVersion(_) => "get a newer program",
+        CaptureProblem::MissingResponse => {
+            "give the gamma of the monitor or projector, usually about 2.2, or its measured response"
         }
-    }
+        CaptureProblem::ConflictingResponse => "remove one of them",
+        CaptureProblem::NoShots => "list the patterns and their photographs",
+        CaptureProblem::MissingGrayCode { .. } => "add it, or give \"correspondence\"",
+        CaptureProblem::Unreadable(_) => "export or copy it again",
+        CaptureProblem::WrongExtent { .. } => "correct one of them",
+        CaptureProblem::PhotoType(_) => "export it again from raw",
+        CaptureProblem::PatternType(_) => "convert it",
+        CaptureProblem::Interlaced => "save it without interlacing",
+        _ => return None,
+    })
 }
 
 fn recovery_remedy(error: &RecoverError) -> Option<&'static str> {

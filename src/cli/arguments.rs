@@ -39,21 +39,17 @@ impl ByteCount {
         let number: u64 = digits.trim().parse().map_err(|_| {
             format!("{digits:?} is not a whole number; give it like 512M, 4G or 4GiB")
         })?;
-        let bytes = number.checked_mul(unit);
-        bytes.map(Self).ok_or_else(|| "it is too large".to_owned())
+        let bytes = number.checked_mul(unit).ok_or("it is too large")?;
+        Ok(Self(bytes))
     }
 }
 
 impl fmt::Display for ByteCount {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let units = [(30, "G"), (20, "M"), (10, "K")];
-        let unit = units
-            .into_iter()
-            .find(|(shift, _)| self.0 > 0 && self.0.is_multiple_of(1 << shift));
-        match unit {
-            Some((shift, unit)) => write!(f, "{}{unit}", self.0 >> shift),
-            None => write!(f, "{}", self.0),
-        }
+        let units = [(30, "G"), (20, "M"), (10, "K"), (0, "")];
+        let divides = |(shift, _): &(u32, &str)| self.0 > 0 && self.0.is_multiple_of(1 << shift);
+        let (shift, unit) = units.into_iter().find(divides).unwrap_or_default();
+        write!(f, "{}{unit}", self.0 >> shift)
     }
 }
 

@@ -13,10 +13,11 @@ use serde::Serialize;
 use super::ltm_file::{PrefixLength, read_ltm};
 use super::process::AllCores;
 use super::report::{format_bytes, print_json, print_line};
-use crate::capture::{CaptureFolder, DarkFrame, LinearPhoto, Pattern, PhotoReader, RowSet, Truth};
+use crate::capture::{CaptureFolder, LinearPhoto, PhotoReader, RowSet, Truth};
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{BuiltinLight, Light};
-use crate::transport::{CHANNELS, Decibels, Geometry, Transport, TransportError};
+use crate::study::{CaptureTruth, psnr, transport_error};
+use crate::transport::{CHANNELS, Decibels, TransportError};
 
 /// Compare a file with the known transport, the relit pictures and the unused photographs of a capture
 #[derive(Debug, Args)]
@@ -34,7 +35,7 @@ pub struct EvaluateArgs {
     json: bool,
 }
 
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct EvaluateReport {
     /// SNR of the whole matrix against the known transport; null without one.
     snr_db: Option<Decibels>,
@@ -72,155 +73,95 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
         );
     }
     let mut report = EvaluateReport {
-        snr_db: None,
-        relit: BTreeMap::new(),
-        heldout_snr_db: None,
-        heldout_rgb_snr_db: [None; CHANNELS],
-        heldout_shots: 0,
-        flood_snr_db: None,
         file_bytes: header.file_bytes,
         read_bytes: file.bytes,
         read_scans: file.scans,
         scans: file.index.scans.len(),
+        ..EvaluateReport::default()
     };
     let mut relighter = CpuRelighter::new(Arc::new(file.transport));
     if let Some(truth) = folder.truth()? {
-        report.snr_db = transport_error(relighter.transport(), &truth).snr();
-        for name in truth.lights()? {
-            let light = Light::from_linear_rgb(geometry.light, &truth.light(&name)?)?;
-            let psnr = relit_psnr(&mut relighter, &light, &truth.relit(&name)?);
-            report.relit.insert(name, psnr);
-        }
+        report.compare_with_truth(&mut relighter, truth)?;
     }
     let used = file.index.metadata.read()?.shots_used;
-    let heldout: Vec<usize> = (0..manifest.shots.len())
-        .filter(|i| !used.contains(i))
-        .collect();
-    let dark = folder.read_dark()?;
-    let errors = shot_errors(&mut relighter, &folder, &dark, &heldout)?;
-    report.flood_snr_db = flood_snr(&mut relighter, &folder, &dark)?;
-    report.heldout_snr_db = sum(&errors).snr();
-    report.heldout_rgb_snr_db = errors.map(|e| e.snr());
-    report.heldout_shots = heldout.len();
-    if args.json {
-        return print_json(&report);
-    }
-    print(&report)
-}
-
-fn print(report: &EvaluateReport) -> Result<()> {
-    let line = |name: &str, value: &str| print_line(&format!("{name:28} {value}"));
-    let decibels = |name: &str, value: Option<Decibels>| {
-        line(name, &value.map_or("-".to_owned(), |db| db.to_string()))
-    };
-    decibels("SNR of the transport", report.snr_db)?;
-    let heldout = format!("SNR on {} held-out shots", report.heldout_shots);
-    decibels(&heldout, report.heldout_snr_db)?;
-    decibels("SNR on the flood photograph", report.flood_snr_db)?;
-    for (name, psnr) in &report.relit {
-        decibels(&format!("PSNR relit under {name}"), *psnr)?;
-    }
-    match report.read_bytes < report.file_bytes {
-        true => line(
-            "File",
-            &format!(
-                "the first {} of {}: {} of {} scans complete",
-                format_bytes(report.read_bytes),
-                format_bytes(report.file_bytes),
-                report.read_scans,
-                report.scans
-            ),
-        ),
-        false => line("File", &format_bytes(report.file_bytes)),
+    report.compare_with_photographs(&mut relighter, &folder, &used)?;
+    match args.json {
+        true => print_json(&report),
+        false => report.print(),
     }
 }
 
-/// The error over every light element in the window of either transport, for all pixels.
-fn transport_error(transport: &Transport, truth: &Truth) -> TransportError {
-    let geometry = &transport.geometry;
-    let window = geometry.window;
-    let tiles = transport.tiles.par_iter().map(|tile| {
-        let mut sum = TransportError::default();
-        let functions = tile.functions(geometry, &transport.basis).tau;
-        let functions = functions.chunks_exact(window.area());
-        for (pixel, function) in tile.rect().pixels().zip(functions) {
-            let n = geometry.camera.index(pixel);
-            let origin = geometry.window_origin(pixel);
-            let (true_origin, true_window) = (truth.window_origin(n), truth.window());
-            for (s, tau) in truth.tau(n).iter().enumerate() {
-                let slot = window.slot(origin, true_window.element(true_origin, s));
-                let estimate = slot.map_or([0.0; CHANNELS], |s| function[s]);
-                for c in 0..CHANNELS {
-                    sum.add(tau[c].to_f64(), f64::from(estimate[c]));
-                }
-            }
-            for s in 0..window.area() {
-                let element = window.element(origin, s);
-                if true_window.slot(true_origin, element).is_none() {
-                    for estimate in function[s] {
-                        sum.add(0.0, f64::from(estimate));
-                    }
-                }
-            }
+impl EvaluateReport {
+    /// Compares the transport and its pictures with the known ones.
+    fn compare_with_truth(&mut self, relighter: &mut CpuRelighter, truth: Truth) -> Result<()> {
+        let geometry = relighter.transport().geometry;
+        for name in truth.lights()? {
+            let light = Light::from_linear_rgb(geometry.light, &truth.light(&name)?.rgb())?;
+            relighter.relight(&light, &AllCores);
+            let picture = relighter.linear();
+            let pixels = picture.pixels.iter();
+            let relit: Vec<_> = pixels.map(|p| [0, 1, 2].map(|c| f64::from(p[c]))).collect();
+            let psnr = psnr(&truth.relit(&name)?, &relit);
+            self.relit.insert(name, psnr);
         }
-        sum
-    });
-    tiles.reduce(TransportError::default, |mut a, b| {
-        a.merge(b);
-        a
-    })
-}
-
-/// PSNR 10 log10(1 / mean squared error) over all pixels and channels.
-fn relit_psnr(
-    relighter: &mut CpuRelighter,
-    light: &Light,
-    truth: &[[f64; CHANNELS]],
-) -> Option<Decibels> {
-    relighter.relight(light, &AllCores);
-    let picture = relighter.linear();
-    let squares = picture.pixels.iter().zip(truth).flat_map(|(pixel, truth)| {
-        (0..CHANNELS).map(move |c| (f64::from(pixel[c]) - truth[c]).powi(2))
-    });
-    let mse = squares.sum::<f64>() / (truth.len() * CHANNELS) as f64;
-    (mse > 0.0).then(|| Decibels(-10.0 * mse.log10()))
-}
-
-/// Error of the predicted pictures of `shots`, by channel.
-fn shot_errors(
-    relighter: &mut CpuRelighter,
-    folder: &CaptureFolder,
-    dark: &DarkFrame,
-    shots: &[usize],
-) -> Result<[TransportError; CHANNELS]> {
-    let mut errors = [TransportError::default(); CHANNELS];
-    for &i in shots {
-        let light = pattern_light(&relighter.transport().geometry, &folder.read_pattern(i)?)?;
-        add_error(&mut errors, relighter, &light, folder.open_shot(i, dark)?)?;
+        let known = CaptureTruth::new(truth, geometry.correspondence)?;
+        let transport = relighter.transport();
+        let errors = transport.tiles.par_iter().map(|tile| {
+            let functions = tile.functions(&geometry, &transport.basis);
+            transport_error(&known, &geometry, &functions)
+        });
+        self.snr_db = errors.sum::<TransportError>().snr();
+        Ok(())
     }
-    Ok(errors)
-}
 
-/// SNR of the predicted flood photograph, if there is one.
-fn flood_snr(
-    relighter: &mut CpuRelighter,
-    folder: &CaptureFolder,
-    dark: &DarkFrame,
-) -> Result<Option<Decibels>> {
-    let Some(photo) = folder.open_flood(dark)? else {
-        return Ok(None);
-    };
-    let light = BuiltinLight::Flood.render(relighter.transport().geometry.light);
-    let mut errors = [TransportError::default(); CHANNELS];
-    add_error(&mut errors, relighter, &light, photo)?;
-    Ok(sum(&errors).snr())
-}
+    /// Compares predicted pictures with the flood photograph and with those of the shots not in `used`.
+    fn compare_with_photographs(
+        &mut self,
+        relighter: &mut CpuRelighter,
+        folder: &CaptureFolder,
+        used: &[usize],
+    ) -> Result<()> {
+        let plane = relighter.transport().geometry.light;
+        let dark = folder.read_dark()?;
+        let mut errors = [TransportError::default(); CHANNELS];
+        for i in (0..folder.manifest().shots.len()).filter(|i| !used.contains(i)) {
+            let light = Light::from_linear_rgb(plane, &folder.read_pattern(i)?.rgb())?;
+            add_error(&mut errors, relighter, &light, folder.open_shot(i, &dark)?)?;
+            self.heldout_shots += 1;
+        }
+        self.heldout_rgb_snr_db = errors.map(|e| e.snr());
+        self.heldout_snr_db = errors.into_iter().sum::<TransportError>().snr();
+        if let Some(photo) = folder.open_flood(&dark)? {
+            let light = BuiltinLight::Flood.render(plane);
+            let mut errors = [TransportError::default(); CHANNELS];
+            add_error(&mut errors, relighter, &light, photo)?;
+            self.flood_snr_db = errors.into_iter().sum::<TransportError>().snr();
+        }
+        Ok(())
+    }
 
-/// The error over all channels.
-fn sum(errors: &[TransportError; CHANNELS]) -> TransportError {
-    let mut all = TransportError::default();
-    errors.iter().for_each(|&e| all.merge(e));
-    all
+    fn print(&self) -> Result<()> {
+        let line = |name: &str, value: &str| print_line(&format!("{name:28} {value}"));
+        let decibels = |name: &str, value: Option<Decibels>| {
+            line(name, &value.map_or("-".to_owned(), |db| db.to_string()))
+        };
+        decibels("SNR of the transport", self.snr_db)?;
+        let heldout = format!("SNR on {} held-out shots", self.heldout_shots);
+        decibels(&heldout, self.heldout_snr_db)?;
+        decibels("SNR on the flood photograph", self.flood_snr_db)?;
+        for (name, psnr) in &self.relit {
+            decibels(&format!("PSNR relit under {name}"), *psnr)?;
+        }
+        let [read, all] = [self.read_bytes, self.file_bytes].map(format_bytes);
+        let (complete, scans) = (self.read_scans, self.scans);
+        match self.read_bytes < self.file_bytes {
+            true => line(
+                "File",
+                &format!("the first {read} of {all}: {complete} of {scans} scans complete"),
+            ),
+            false => line("File", &all),
+        }
+    }
 }
 
 /// Adds the error of the picture predicted under `light`, without saturated samples.
@@ -243,12 +184,4 @@ fn add_error(
         }
     }
     Ok(())
-}
-
-/// A pattern as a light.
-fn pattern_light(geometry: &Geometry, pattern: &Pattern) -> Result<Light> {
-    let values: Vec<f32> = (0..geometry.light.area())
-        .flat_map(|m| [0, 1, 2].map(|c| pattern.plane(c)[m]))
-        .collect();
-    Ok(Light::from_linear_rgb(geometry.light, &values)?)
 }

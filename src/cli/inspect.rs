@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::ltm_file::open_ltm;
 use super::report::{format_bytes, format_shots, print_json, print_line};
-use crate::format::{ChunkId, Coding, FileIndex, Metadata};
+use crate::format::{Coding, FileIndex, Metadata};
 use crate::transport::Decibels;
 
 /// Show the contents of a relightable photograph; reads its file index only
@@ -111,18 +111,19 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         ),
     }
     let geometry = &index.header.geometry;
-    let chunks: Vec<ChunkId> = index.chunks().filter(|part| part.tile.is_some()).collect();
     // Whether a tile has factored chunks, and direct chunks.
     let mut has_chunks = vec![[false; 2]; index.tiles()];
-    for part in &chunks {
-        if let Some(tile) = part.tile {
-            has_chunks[tile][usize::from(index.scans[part.scan].coding.is_direct())] = true;
+    let mut largest_chunk_bytes = 0;
+    for chunk in index.chunks() {
+        if let Some(tile) = chunk.tile {
+            has_chunks[tile][usize::from(index.scans[chunk.scan].coding.is_direct())] = true;
+            let range = index.range(chunk);
+            largest_chunk_bytes = largest_chunk_bytes.max((range.end - range.start) as u32);
         }
     }
     let count = |is_counted: fn(&[bool; 2]) -> bool| {
         has_chunks.iter().filter(|tile| is_counted(tile)).count()
     };
-    let sizes = chunks.iter().map(|part| index.range(*part));
     let report = InspectReport {
         camera: [geometry.camera.width, geometry.camera.height],
         light: [geometry.light.width, geometry.light.height],
@@ -135,7 +136,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         factored_tiles: count(|tile| tile[0]),
         rank: Some(index.header.rank).filter(|&rank| rank > 0),
         head_bytes: index.header.index_bytes(),
-        largest_chunk_bytes: sizes.map(|r| (r.end - r.start) as u32).max().unwrap_or(0),
+        largest_chunk_bytes,
         scans: (0..index.scans.len())
             .map(|scan| ScanReport::new(&index, scan))
             .collect(),
@@ -152,6 +153,14 @@ fn print(report: &InspectReport) -> Result<()> {
     let [a, b] = report.correspondence;
     let [camera, light] = [report.camera, report.light].map(|[w, h]| format!("{w}x{h}"));
     let metadata = &report.metadata;
+    let tiles = format!(
+        "{} of {1}x{1} pixels: {2} direct, {3} factored, {4} dark",
+        report.tiles,
+        report.tile_side,
+        report.direct_tiles,
+        report.factored_tiles,
+        report.dark_tiles
+    );
     for (name, value) in [
         ("title", metadata.title.clone()),
         ("creator", metadata.creator.clone()),
@@ -160,17 +169,7 @@ fn print(report: &InspectReport) -> Result<()> {
         ("light", light),
         ("window", format!("{0}x{0}", report.window)),
         ("correspondence", format!("u = {a:?}, v = {b:?}")),
-        (
-            "tiles",
-            format!(
-                "{} of {1}x{1} pixels: {2} direct, {3} factored, {4} dark",
-                report.tiles,
-                report.tile_side,
-                report.direct_tiles,
-                report.factored_tiles,
-                report.dark_tiles
-            ),
-        ),
+        ("tiles", tiles),
         (
             "rank",
             report.rank.map_or(String::new(), |rank| rank.to_string()),

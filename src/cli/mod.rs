@@ -7,7 +7,6 @@ mod advice;
 mod arguments;
 mod evaluate;
 mod inspect;
-mod lights;
 mod ltm_file;
 mod output_file;
 mod output_folder;

@@ -27,35 +27,32 @@ pub fn temporary_beside(path: &Path, mode: u32) -> (tempfile::Builder<'static, '
 }
 
 /// A file format that commands write.
-#[derive(Clone, Copy, Debug)]
-pub enum OutputFormat {
-    /// A relightable photograph.
-    Ltm,
-    /// A picture.
-    Png,
+#[derive(Debug)]
+pub struct OutputFormat {
+    /// With its article.
+    name: &'static str,
+    /// The extension that paths must have if they have one.
+    extension: Option<&'static str>,
+    /// Bytes that files as this program writes them have at these offsets.
+    signature: &'static [(usize, &'static [u8])],
 }
 
+/// A relightable photograph.
+pub const LTM: OutputFormat = OutputFormat {
+    name: "an .ltm file",
+    extension: None,
+    signature: &[(0, b"\xABLTM")],
+};
+/// A picture: an 8-bit RGB PNG. Photographs have 16 bits.
+pub const PNG: OutputFormat = OutputFormat {
+    name: "a PNG",
+    extension: Some("png"),
+    signature: &[(0, b"\x89PNG"), (24, &[8, 2])],
+};
+
 impl OutputFormat {
-    /// The first bytes of a file.
-    fn signature(self) -> &'static [u8] {
-        match self {
-            Self::Ltm => b"\xABLTM",
-            Self::Png => b"\x89PNG",
-        }
-    }
-
-    /// Whether the extension of `path` is the format's, or there is none.
-    fn matches_extension(self, path: &Path) -> bool {
-        let extension = match self {
-            Self::Ltm => return true, // any extension will do
-            Self::Png => "png",
-        };
-        path.extension()
-            .is_none_or(|own| own.eq_ignore_ascii_case(extension))
-    }
-
     /// Whether `path` is free, empty, or holds a file of this format as this program writes it.
-    fn may_replace(self, path: &Path) -> io::Result<bool> {
+    fn may_replace(&self, path: &Path) -> io::Result<bool> {
         let file = match File::open(path) {
             Ok(file) => file,
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(true),
@@ -63,22 +60,10 @@ impl OutputFormat {
         };
         let mut start = Vec::new();
         file.take(26).read_to_end(&mut start)?;
-        let is_own = start.starts_with(self.signature())
-            && match self {
-                Self::Ltm => true,
-                // 8-bit RGB: photographs have 16 bits.
-                Self::Png => start.get(24..) == Some(&[8, 2]),
-            };
-        Ok(start.is_empty() || is_own)
-    }
-}
-
-impl std::fmt::Display for OutputFormat {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Ltm => "an .ltm file",
-            Self::Png => "a PNG",
-        })
+        let has = |(at, bytes): &(usize, &[u8])| {
+            start.get(*at..).is_some_and(|rest| rest.starts_with(bytes))
+        };
+        Ok(start.is_empty() || self.signature.iter().all(has))
     }
 }
 
@@ -92,7 +77,8 @@ pub struct OutputFile {
 
 impl OutputFile {
     /// Creates the temporary file, so that a path that cannot be written fails before the work is done.
-    pub fn create(path: &Path, format: OutputFormat) -> Result<Self> {
+    pub fn create(path: &Path, format: &OutputFormat) -> Result<Self> {
+        let name = format.name;
         let create = || -> Result<NamedTempFile> {
             ensure!(
                 !path.exists() || path.is_file(),
@@ -100,11 +86,12 @@ impl OutputFile {
             );
             ensure!(
                 format.may_replace(path).context("cannot be read")?,
-                "exists and is not {format} written by this program; give another name"
+                "exists and is not {name} written by this program; give another name"
             );
+            let extensions = path.extension().zip(format.extension);
             ensure!(
-                format.matches_extension(path),
-                "{format} is written; give a name with its extension"
+                extensions.is_none_or(|(given, own)| given.eq_ignore_ascii_case(own)),
+                "{name} is written; give a name with its extension"
             );
             let (builder, folder) = temporary_beside(path, 0o666);
             builder
@@ -129,15 +116,12 @@ impl OutputFile {
             write(&mut out)?;
             out.flush().context("cannot be written")?;
             drop(out);
+            let file = self.file.as_file();
             // On disk before it replaces another file, and before its checkpoint is deleted.
-            let synced = self.file.as_file().sync_all();
-            synced.context("cannot be written")?;
-            let metadata = self.file.as_file().metadata();
-            let bytes = metadata.context("cannot be read back")?.len();
-            self.file
-                .persist(&self.path)
-                .map_err(|e| e.error)
-                .context("cannot be renamed")?;
+            file.sync_all().context("cannot be written")?;
+            let bytes = file.metadata().context("cannot be read back")?.len();
+            let renamed = self.file.persist(&self.path).map_err(|e| e.error);
+            renamed.context("cannot be renamed")?;
             Ok(bytes)
         };
         finish().with_context(|| self.path.display().to_string())

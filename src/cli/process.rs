@@ -20,20 +20,6 @@ impl Executor for AllCores {
     }
 }
 
-/// Runs jobs on all cores until the process is interrupted.
-#[derive(Clone, Debug)]
-pub struct InterruptibleCores(Interrupt);
-
-impl Executor for InterruptibleCores {
-    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-        AllCores.map(count, work)
-    }
-
-    fn is_cancelled(&self) -> bool {
-        self.0.is_requested()
-    }
-}
-
 /// Peak resident memory of this process in bytes; `None` where the system does not report it.
 pub fn peak_rss_bytes() -> Option<u64> {
     #[cfg(unix)]
@@ -56,15 +42,15 @@ pub const INTERRUPTED_STATUS: u8 = 130;
 #[error("{0}")]
 pub struct Interrupted(pub String);
 
-/// Whether Ctrl-C or SIGTERM asked the process to stop. The second signal ends it at once.
-#[derive(Clone, Debug)]
-pub struct Interrupt {
+/// Runs jobs on all cores until Ctrl-C or SIGTERM asks the process to stop. The second signal ends it at once.
+#[derive(Debug)]
+pub struct InterruptibleCores {
     requested: Arc<AtomicBool>,
     /// Whether the user was told that the request arrived.
-    acknowledged: Arc<AtomicBool>,
+    acknowledged: AtomicBool,
 }
 
-impl Interrupt {
+impl InterruptibleCores {
     /// Installs the signal handlers; once a process.
     pub fn listen() -> Result<Self> {
         let requested = Arc::new(AtomicBool::new(false));
@@ -78,17 +64,18 @@ impl Interrupt {
         }
         Ok(Self {
             requested,
-            acknowledged: Arc::default(),
+            acknowledged: AtomicBool::new(false),
         })
     }
+}
 
-    /// An executor on all cores that is cancelled by the interruption.
-    pub fn cores(&self) -> InterruptibleCores {
-        InterruptibleCores(self.clone())
+impl Executor for InterruptibleCores {
+    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        AllCores.map(count, work)
     }
 
-    /// Whether to stop. The first time it is, tells the user so.
-    pub fn is_requested(&self) -> bool {
+    /// The first time it is cancelled, tells the user so.
+    fn is_cancelled(&self) -> bool {
         let requested = self.requested.load(Ordering::Relaxed);
         if requested && !self.acknowledged.swap(true, Ordering::Relaxed) {
             eprintln!("stopping after the current work; press Ctrl-C again to stop at once");

@@ -1,19 +1,23 @@
 //! `ltm-export relight`: a picture of the object under a light, as a PNG.
 
-use std::path::PathBuf;
+use std::num::ParseFloatError;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder, ImageReader};
 
 use super::arguments::{UsageError, parse_number};
-use super::lights;
 use super::ltm_file::{PrefixLength, read_ltm};
-use super::output_file::{OutputFile, OutputFormat};
+use super::output_file::{OutputFile, PNG};
 use super::process::AllCores;
 use crate::relight::cpu::CpuRelighter;
-use crate::relight::{Light, OutputTransform, TorchPose, reference};
+use crate::relight::{
+    BuiltinLight, Light, OutputTransform, TorchPose, area_resample, reference, srgb,
+};
+use crate::transport::Extent;
 
 /// Relight an object and write the picture as an 8-bit sRGB PNG
 #[derive(Debug, Args)]
@@ -55,12 +59,8 @@ enum BackendName {
 }
 
 fn parse_position(text: &str) -> Result<[f64; 2], String> {
-    let parts: Vec<f64> = text
-        .split(',')
-        .map(|part| part.trim().parse::<f64>())
-        .collect::<Result<_, _>>()
-        .map_err(|e| e.to_string())?;
-    match parts[..] {
+    let parts: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    match parts.map_err(|e: ParseFloatError| e.to_string())?[..] {
         [x, y] if [x, y].iter().all(|a| (0.0..=1.0).contains(a)) => Ok([x, y]),
         _ => Err("expected two numbers from 0 to 1, as in 0.5,0.25".to_owned()),
     }
@@ -80,7 +80,7 @@ pub fn run(args: &RelightArgs) -> Result<()> {
     if args.time.is_some() && args.light != "fire" {
         return Err(UsageError("--time goes with --light fire").into());
     }
-    let output = OutputFile::create(&args.output, OutputFormat::Png)?;
+    let output = OutputFile::create(&args.output, &PNG)?;
     let file = read_ltm(&args.file, args.first)?;
     if args.first.is_some() {
         let scans = file.index.scans.len();
@@ -93,7 +93,7 @@ pub fn run(args: &RelightArgs) -> Result<()> {
     let light = match (args.at, args.time) {
         (Some([x, y]), _) => Light::torch(geometry.light, TorchPose::behind(geometry, x, y)),
         (None, Some(seconds)) => Light::fire(geometry.light, seconds),
-        (None, None) => lights::load(&args.light, geometry.light)?,
+        (None, None) => load_light(&args.light, geometry.light)?,
     };
     let transform = OutputTransform::srgb(args.exposure);
     let picture = match args.backend {
@@ -104,11 +104,8 @@ pub fn run(args: &RelightArgs) -> Result<()> {
         }
         BackendName::Reference => reference::picture(&file.transport, &light, &transform),
     };
-    let rgb: Vec<u8> = picture
-        .pixels
-        .iter()
-        .flat_map(|p| [p[0], p[1], p[2]])
-        .collect();
+    let rgba = picture.pixels.iter();
+    let rgb: Vec<u8> = rgba.flat_map(|p| [p[0], p[1], p[2]]).collect();
     let extent = picture.extent;
     output.finish(|out| {
         PngEncoder::new(out)
@@ -116,4 +113,27 @@ pub fn run(args: &RelightArgs) -> Result<()> {
             .context("cannot be encoded")
     })?;
     Ok(())
+}
+
+/// The built-in light of this name, or the image file at this path, decoded as sRGB and resampled to the light plane.
+fn load_light(light: &str, plane: Extent) -> Result<Light> {
+    if let Some(builtin) = BuiltinLight::from_name(light) {
+        return Ok(builtin.render(plane));
+    }
+    let path = Path::new(light);
+    if !path.exists() {
+        let names = BuiltinLight::ALL.map(BuiltinLight::name).join(", ");
+        bail!("--light {light}: neither a file nor one of {names}");
+    }
+    let read = || ImageReader::open(path)?.with_guessed_format()?.decode();
+    let picture = read()
+        .with_context(|| format!("--light {light}: is not a readable image"))?
+        .into_rgb32f();
+    let extent = Extent::new(picture.width(), picture.height());
+    let codes = picture.into_raw().into_iter();
+    let linear: Vec<f32> = codes
+        .map(|code| srgb::srgb_decode(f64::from(code)) as f32)
+        .collect();
+    let resampled = area_resample(&linear, extent, plane);
+    Ok(Light::from_linear_rgb(plane, &resampled)?)
 }

@@ -1,11 +1,9 @@
 //! Reads patterns and photographs of several shots in parallel; photographs row by row from the top.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Error, Result};
 use rayon::prelude::*;
 
-use crate::capture::{
-    CaptureError, CaptureFolder, DarkFrame, LinearPhoto, Measurements, PhotoReader, RowSet,
-};
+use crate::capture::{CaptureError, CaptureFolder, DarkFrame, Measurements, PhotoReader, RowSet};
 
 /// Reads the patterns of `shots` and the correspondence, by `gray_code_rows` of the Gray code if the manifest does not
 /// give it. The measurements have no camera rows yet.
@@ -15,7 +13,7 @@ pub fn read_patterns(
     shots: &[usize],
     gray_code_rows: &RowSet,
 ) -> Result<Measurements> {
-    let correspondence = match folder.correspondence() {
+    let correspondence = match folder.manifest().correspondence {
         Some(correspondence) => correspondence,
         None => folder
             .read_gray_code(dark, gray_code_rows)?
@@ -46,31 +44,27 @@ impl<'a> ShotReader<'a> {
     }
 
     /// Makes `rows` the loaded rows of `measurements`: keeps those it has, reads the others, which must lie below all
-    /// rows read before. Calls `may_continue` before each photograph, and returns false if any call did.
+    /// rows read before. Calls `check` before each photograph, and stops if it fails.
     pub fn load_rows(
         &mut self,
         measurements: &mut Measurements,
         rows: &RowSet,
-        may_continue: impl Fn() -> bool + Sync,
-    ) -> Result<bool, CaptureError> {
+        check: impl Fn() -> Result<()> + Sync,
+    ) -> Result<()> {
         let width = measurements.camera.width as usize;
         let first = rows.strips().first().map_or(0, |strip| strip.start);
         let obsolete = measurements.rows.iter().take_while(|y| *y < first).count();
-        let load = |reader: &mut PhotoReader, photo: &mut LinearPhoto| {
+        let photos = measurements.photos.par_iter_mut();
+        let shots = self.photos.par_iter_mut().zip(photos);
+        shots.try_for_each(|(reader, photo)| {
+            check()?;
             photo.drain(..obsolete * width);
             // Strips have similar heights, so the first reservation is enough for all.
             photo.reserve_exact((rows.count() * width).saturating_sub(photo.len()));
-            reader.read(rows, photo)
-        };
-        let photos = measurements.photos.par_iter_mut();
-        let shots = self.photos.par_iter_mut().zip(photos);
-        let loaded = shots.map(|(reader, photo)| match may_continue() {
-            true => load(reader, photo).map(|()| true),
-            false => Ok(false),
-        });
-        let loaded = loaded.try_reduce(|| true, |a, b| Ok(a && b))?;
+            Ok::<_, Error>(reader.read(rows, photo)?)
+        })?;
         measurements.rows = rows.clone();
-        Ok(loaded)
+        Ok(())
     }
 
     /// Reads the rest of all files, which checks that they are whole. Returns the number of saturated samples in the

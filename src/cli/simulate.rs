@@ -10,20 +10,19 @@ use clap::{Args, ValueEnum};
 use half::f16;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
-use npyz::WriterBuilder;
+use npyz::{NpyWriter, WriterBuilder};
 use rayon::prelude::*;
 
 use super::report::format_bytes;
 use super::{output_folder, progress};
 use crate::capture::{
-    AffineSpec, CameraSpec, GrayCodeShot, LightSpec, MANIFEST_NAME, Manifest, RELIT_FULL_SCALE,
-    Shot,
+    CameraSpec, GrayCodeShot, LightSpec, MANIFEST_NAME, Manifest, RELIT_FULL_SCALE, Shot,
 };
 use crate::simulate::{
-    self, Camera, EmissionMatrix, GrayCodePattern, LightCodes, MONITOR_GAMMA, RandomStream,
-    SceneKind, SimulatedScene, TruthLight,
+    Camera, EmissionMatrix, GrayCodePattern, LightCodes, MONITOR_GAMMA, PatternEnsemble,
+    RandomStream, SceneKind, SimulatedScene, truth_lights,
 };
-use crate::transport::{CHANNELS, Extent, TileRect, TransportFunctions};
+use crate::transport::{CHANNELS, CameraPx, Extent, TileRect, TransportFunctions};
 
 /// Camera rows whose transport is computed as one job.
 const STRIP_ROWS: u32 = 4;
@@ -35,6 +34,7 @@ const LIGHT_SIDES: RangeInclusive<u32> = 4..=512;
 const MAX_PATTERNS: i64 = 10_000;
 /// All pictures are in memory, as each strip of transport is computed once and exposes all of them.
 const MAX_PICTURE_BYTES: usize = 3 << 30;
+const TAU_ERROR: &str = "truth/tau.npy cannot be written";
 /// With more electrons photon noise is far below a code, and Poisson sampling loses precision.
 const MAX_ELECTRONS: u64 = 1_000_000_000_000;
 
@@ -43,7 +43,7 @@ const MAX_ELECTRONS: u64 = 1_000_000_000_000;
 pub struct SimulateArgs {
     /// Scene
     #[arg(value_enum)]
-    scene: SceneName,
+    scene: SceneKind,
     /// Capture folder to write; must be new or empty
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -59,7 +59,7 @@ pub struct SimulateArgs {
     patterns: u32,
     /// Distribution of the patterns [default: gaussian for stained-glass, bernoulli for cookies]
     #[arg(long, value_enum)]
-    ensemble: Option<EnsembleName>,
+    ensemble: Option<PatternEnsemble>,
     /// Seed of patterns and noise; the same seed writes the same bytes
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -69,30 +69,12 @@ pub struct SimulateArgs {
     electrons: u64,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum SceneName {
-    /// A rose window lit from behind
-    StainedGlass,
-    /// Cookies on a tray under a tilted projector
-    Cookies,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum EnsembleName {
-    /// Clipped Gaussian around half brightness
-    Gaussian,
-    /// Each element on or off
-    Bernoulli,
-}
-
 /// Parses `WxH` with both sides in the range `sides`.
 fn parse_extent(text: &str, sides: RangeInclusive<u32>) -> Result<Extent, String> {
+    let (min, max) = (sides.start(), sides.end());
     let side = |s: &str| {
         let side = s.parse().ok().filter(|n| sides.contains(n));
-        side.ok_or_else(|| {
-            let (min, max) = (sides.start(), sides.end());
-            format!("each side must be between {min} and {max}")
-        })
+        side.ok_or_else(|| format!("each side must be between {min} and {max}"))
     };
     let (width, height) = text
         .split_once('x')
@@ -102,34 +84,32 @@ fn parse_extent(text: &str, sides: RangeInclusive<u32>) -> Result<Extent, String
 
 pub fn run(args: &SimulateArgs) -> Result<()> {
     let plan = CapturePlan::new(args)?;
-    let bytes = plan.lights.len() * args.camera.area() * size_of::<[f32; CHANNELS]>();
+    let (photographs, camera) = (plan.lights.len(), args.camera);
+    let bytes = photographs * camera.area() * size_of::<[f32; CHANNELS]>();
     ensure!(
         bytes <= MAX_PICTURE_BYTES,
-        "{} photographs of {} need {} of memory; use a smaller --camera or fewer --patterns",
-        plan.lights.len(),
-        args.camera,
+        "{photographs} photographs of {camera} need {} of memory; use a smaller --camera or fewer \
+         --patterns",
         format_bytes(bytes as u64),
     );
     output_folder::write_atomically(&args.output, |root| write(&plan, root))?;
+    let scene = args.scene.to_possible_value();
     eprintln!(
-        "{}: {} shots of {}, camera {}, light {}",
+        "{}: {} shots of {}, camera {camera}, light {}",
         args.output.display(),
         args.patterns,
-        args.scene
-            .to_possible_value()
-            .map_or_else(String::new, |v| v.get_name().to_owned()),
-        args.camera,
+        scene.as_ref().map_or("", |value| value.get_name()),
         args.light,
     );
     Ok(())
 }
 
 /// What to write of the object under one light.
-enum Purpose {
-    /// A photograph with noise, to this path.
-    Photograph(String),
+enum PictureKind {
+    /// A photograph with noise, to this path, and the light's codes, if it is a pattern, to another.
+    Photograph(String, Option<String>),
     /// The true picture under a truth light.
-    Truth(TruthLight),
+    Truth(&'static str),
 }
 
 /// Everything to photograph.
@@ -141,33 +121,15 @@ struct CapturePlan {
     /// All lights.
     lights: Vec<LightCodes>,
     /// For each light, what to write.
-    purposes: Vec<Purpose>,
+    kinds: Vec<PictureKind>,
 }
 
 impl CapturePlan {
     fn new(args: &SimulateArgs) -> Result<Self> {
-        let kind = match args.scene {
-            SceneName::StainedGlass => SceneKind::StainedGlass,
-            SceneName::Cookies => SceneKind::Cookies,
-        };
-        let ensemble = args.ensemble.map_or(kind.ensemble(), |name| match name {
-            EnsembleName::Gaussian => simulate::Ensemble::Gaussian,
-            EnsembleName::Bernoulli => simulate::Ensemble::Bernoulli,
-        });
-        let camera = Camera {
-            black: 512.0,
-            white: 60_000.0,
-            electrons: args.electrons as f64,
-            read_noise: 8.0,
-        };
-        let scene = kind.build(args.camera, args.light)?;
+        let scene = args.scene.build(args.camera, args.light)?;
         let mut plan = Self {
             manifest: Manifest {
-                unknown: Vec::new(),
                 version: 1,
-                title: String::new(),
-                creator: String::new(),
-                rights: String::new(),
                 light: LightSpec {
                     width: args.light.width,
                     height: args.light.height,
@@ -177,66 +139,68 @@ impl CapturePlan {
                 camera: CameraSpec {
                     width: args.camera.width,
                     height: args.camera.height,
-                    black: camera.black,
-                    white: camera.white,
+                    black: Camera::BLACK,
+                    white: Camera::WHITE,
                 },
                 dark: Some("photos/dark.png".to_owned()),
                 flood: Some("photos/flood.png".to_owned()),
-                shots: Vec::new(),
-                graycode: Vec::new(),
-                correspondence: Some(AffineSpec {
-                    affine: scene.geometry().correspondence.affine,
-                }),
+                correspondence: Some(scene.geometry().correspondence),
+                ..Manifest::default()
             },
             scene,
-            camera,
+            camera: Camera {
+                electrons: args.electrons as f64,
+            },
             seed: args.seed,
             lights: Vec::new(),
-            purposes: Vec::new(),
+            kinds: Vec::new(),
         };
-        plan.add_calibration(args.light);
+        // Calibration first, so that the noise of a shot does not depend on the number of shots.
+        for (name, code) in [("dark", 0), ("flood", 255)] {
+            let codes = LightCodes::uniform(args.light, code);
+            plan.add(
+                codes,
+                PictureKind::Photograph(format!("photos/{name}.png"), None),
+            );
+        }
+        for code in GrayCodePattern::all(args.light) {
+            let sign = if code.inverted { 'n' } else { 'p' };
+            let photo = format!("graycode/{}{}{sign}.png", code.axis, code.bit);
+            plan.add(
+                code.codes(args.light),
+                PictureKind::Photograph(photo.clone(), None),
+            );
+            plan.manifest.graycode.push(GrayCodeShot {
+                photo,
+                axis: code.axis,
+                bit: code.bit,
+                inverted: code.inverted,
+            });
+        }
+        let ensemble = args.ensemble.unwrap_or(args.scene.ensemble());
         for i in 0..args.patterns {
             let mut stream = RandomStream::Pattern(i).start(args.seed);
+            let codes = ensemble.draw(args.light, &mut stream);
             let (pattern, photo) = (format!("patterns/{i:04}.png"), format!("photos/{i:04}.png"));
-            let codes = ensemble.draw(args.light, &mut stream)?;
-            plan.add_photograph(codes, photo.clone());
+            plan.add(
+                codes,
+                PictureKind::Photograph(photo.clone(), Some(pattern.clone())),
+            );
             plan.manifest.shots.push(Shot {
                 pattern,
                 photo,
                 exposure: None,
             });
         }
-        for light in TruthLight::ALL {
-            plan.lights.push(light.codes(args.light));
-            plan.purposes.push(Purpose::Truth(light));
+        for (name, codes) in truth_lights(args.light) {
+            plan.add(codes, PictureKind::Truth(name));
         }
         Ok(plan)
     }
 
-    /// Adds dark, flood and Gray code. They come first, so that the noise of a shot does not depend on the number of
-    /// shots.
-    fn add_calibration(&mut self, light: Extent) {
-        self.add_photograph(LightCodes::uniform(light, 0), "photos/dark.png".to_owned());
-        self.add_photograph(
-            LightCodes::uniform(light, 255),
-            "photos/flood.png".to_owned(),
-        );
-        for code in GrayCodePattern::all(light) {
-            let sign = if code.inverted { 'n' } else { 'p' };
-            let photo = format!("graycode/{}{}{sign}.png", code.axis(), code.bit);
-            self.add_photograph(code.codes(light), photo.clone());
-            self.manifest.graycode.push(GrayCodeShot {
-                photo,
-                axis: code.axis().to_owned(),
-                bit: code.bit,
-                inverted: code.inverted,
-            });
-        }
-    }
-
-    fn add_photograph(&mut self, codes: LightCodes, path: String) {
+    fn add(&mut self, codes: LightCodes, kind: PictureKind) {
         self.lights.push(codes);
-        self.purposes.push(Purpose::Photograph(path));
+        self.kinds.push(kind);
     }
 }
 
@@ -247,48 +211,34 @@ fn write(plan: &CapturePlan, root: &Path) -> Result<()> {
     }
     let json = serde_json::to_string_pretty(&plan.manifest)?;
     std::fs::write(root.join(MANIFEST_NAME), json + "\n").context(MANIFEST_NAME)?;
-    let light = plan.manifest.light.extent();
-    let shot_lights = plan
-        .lights
-        .iter()
-        .zip(&plan.purposes)
-        .filter_map(|(codes, p)| match p {
-            Purpose::Photograph(path) => Some((codes, path)),
-            Purpose::Truth(_) => None,
-        });
-    for shot in &plan.manifest.shots {
-        let mut lights = shot_lights.clone();
-        if let Some((codes, _)) = lights.find(|(_, path)| **path == shot.photo) {
-            write_codes(&root.join(&shot.pattern), light, codes)?;
-        }
-    }
+    let (camera, light) = (plan.manifest.camera.extent(), plan.manifest.light.extent());
     let pictures = write_transport(plan, &root.join("truth"))?;
     let bar = progress::bar("photographing", pictures.len());
-    plan.purposes
-        .par_iter()
-        .zip(&pictures)
-        .enumerate()
-        .try_for_each(|(i, (purpose, picture))| -> Result<()> {
-            let camera = plan.manifest.camera.extent();
-            match purpose {
-                Purpose::Photograph(path) => {
-                    let mut noise = RandomStream::Photograph(i as u32).start(plan.seed);
-                    let codes = plan.camera.photograph(picture, &mut noise)?;
-                    write_rgb16(&root.join(path), camera, &codes)?;
-                }
-                Purpose::Truth(truth) => {
-                    let named = |kind| root.join(format!("truth/{kind}_{}.png", truth.name()));
-                    let code = |y: f32| (f64::from(y) * RELIT_FULL_SCALE).round() as u16;
-                    let codes: Vec<_> = picture.iter().map(|y| y.map(code)).collect();
-                    write_rgb16(&named("relit"), camera, &codes)?;
-                    write_codes(&named("light"), light, &plan.lights[i])?;
+    let write_picture = |i: usize| -> Result<()> {
+        let (picture, codes) = (&pictures[i], &plan.lights[i]);
+        match &plan.kinds[i] {
+            PictureKind::Photograph(photo, pattern) => {
+                let mut noise = RandomStream::Photograph(i as u32).start(plan.seed);
+                let photographed = plan.camera.photograph(picture, &mut noise);
+                write_rgb16(&root.join(photo), camera, &photographed)?;
+                if let Some(pattern) = pattern {
+                    write_codes(&root.join(pattern), light, codes)?;
                 }
             }
-            bar.inc(1);
-            Ok(())
-        })?;
-    bar.finish_and_clear();
-    Ok(())
+            PictureKind::Truth(name) => {
+                let path = |kind| root.join(format!("truth/{kind}_{name}.png"));
+                let code = |y: f32| (f64::from(y) * RELIT_FULL_SCALE).round() as u16;
+                let relit: Vec<_> = picture.iter().map(|y| y.map(code)).collect();
+                write_rgb16(&path("relit"), camera, &relit)?;
+                write_codes(&path("light"), light, codes)?;
+            }
+        }
+        bar.inc(1);
+        Ok(())
+    };
+    (0..pictures.len())
+        .into_par_iter()
+        .try_for_each(write_picture)
 }
 
 /// Writes `tau.npy` and `uv.npy`, and returns the picture under each of the plan's lights.
@@ -298,91 +248,73 @@ fn write_transport(plan: &CapturePlan, truth: &Path) -> Result<Vec<Vec<[f32; CHA
     let emissions = EmissionMatrix::new(geometry.light, &plan.lights);
     let mut pictures = vec![Vec::with_capacity(camera.area()); plan.lights.len()];
     let n = camera.area() as u64;
-    let mut tau_file =
-        create_npy::<f16>(&truth.join("tau.npy"), &[n, side, side, CHANNELS as u64])?;
+    let tau_shape = [n, side, side, CHANNELS as u64];
+    let mut tau_file = create_npy::<f16>(&truth.join("tau.npy"), &tau_shape)?;
+    let strip = |y| TileRect {
+        x: 0,
+        y,
+        extent: Extent::new(camera.width, STRIP_ROWS.min(camera.height - y)),
+    };
     let strips: Vec<_> = (0..camera.height)
         .step_by(STRIP_ROWS as usize)
-        .map(|y| TileRect {
-            x: 0,
-            y,
-            extent: Extent::new(camera.width, STRIP_ROWS.min(camera.height - y)),
-        })
+        .map(strip)
         .collect();
     let bar = progress::bar("computing transport", strips.len());
     // A few strips for each thread bound the memory; they are written in order.
     for strips in strips.chunks(2 * rayon::current_num_threads()) {
-        let computed: Vec<_> = strips
-            .par_iter()
-            .map(|&rect| {
-                let mut functions = plan.scene.tile(rect);
-                let rounded = round_to_f16(&mut functions);
-                (rounded, emissions.pictures(geometry, &functions))
-            })
-            .collect();
-        for (tau, exposed) in computed {
-            tau_file
-                .write_all(&tau)
-                .context("truth/tau.npy cannot be written")?;
+        let computed = strips.par_iter().map(|&rect| {
+            let mut functions = plan.scene.tile(rect);
+            let rounded = round_to_f16(&mut functions);
+            (rounded, emissions.pictures(geometry, &functions))
+        });
+        for (tau, exposed) in computed.collect::<Vec<_>>() {
+            tau_file.extend(tau).context(TAU_ERROR)?;
             for (picture, strip) in pictures.iter_mut().zip(exposed) {
                 picture.extend(strip);
             }
             bar.inc(1);
         }
     }
-    tau_file
-        .flush()
-        .context("truth/tau.npy cannot be written")?;
-    bar.finish_and_clear();
+    tau_file.finish().context(TAU_ERROR)?;
     let mut uv_file = create_npy::<f32>(&truth.join("uv.npy"), &[n, 2])?;
-    let whole = TileRect {
-        x: 0,
-        y: 0,
-        extent: camera,
-    };
-    for pixel in whole.pixels() {
-        let at = geometry.correspondence.at(pixel);
-        for x in [at.u as f32, at.v as f32] {
-            uv_file.write_all(&x.to_le_bytes())?;
-        }
-    }
-    uv_file.flush().context("truth/uv.npy cannot be written")?;
+    let written = uv_file.extend(camera.cells().flat_map(|(x, y)| {
+        let at = geometry.correspondence.at(CameraPx { x, y });
+        [at.u as f32, at.v as f32]
+    }));
+    written
+        .and_then(|()| uv_file.finish())
+        .context("truth/uv.npy cannot be written")?;
     Ok(pictures)
 }
 
-/// Rounds τ to float16, the precision of `tau.npy`, so that the pictures follow exactly from the file. Returns its
-/// bytes.
-fn round_to_f16(functions: &mut TransportFunctions) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(functions.tau.len() * CHANNELS * size_of::<f16>());
-    for value in functions.tau.iter_mut().flatten() {
+/// Rounds τ to float16, the precision of `tau.npy`, so that the pictures follow exactly from the file. Returns the
+/// rounded values.
+fn round_to_f16(functions: &mut TransportFunctions) -> Vec<f16> {
+    let round = |value: &mut f32| {
         let rounded = f16::from_f32(*value);
         *value = rounded.to_f32();
-        bytes.extend(rounded.to_le_bytes());
-    }
-    bytes
+        rounded
+    };
+    functions.tau.iter_mut().flatten().map(round).collect()
 }
 
-/// Creates a little-endian NumPy file and writes its header.
-fn create_npy<T: npyz::AutoSerialize>(path: &Path, shape: &[u64]) -> Result<BufWriter<File>> {
-    let start = || -> Result<BufWriter<File>> {
-        let mut file = BufWriter::with_capacity(1 << 20, File::create(path)?);
-        npyz::WriteOptions::new_header_only()
-            .dtype(T::default_dtype())
-            .shape(shape)
-            .writer(&mut file)
-            .write_header_only()?;
-        Ok(file)
+/// Creates a NumPy file and writes its header.
+fn create_npy<T: npyz::AutoSerialize>(
+    path: &Path,
+    shape: &[u64],
+) -> Result<NpyWriter<T, BufWriter<File>>> {
+    let create = || {
+        let file = BufWriter::with_capacity(1 << 20, File::create(path)?);
+        let options = npyz::WriteOptions::new().default_dtype().shape(shape);
+        options.writer(file).begin_nd()
     };
-    start().with_context(|| path.display().to_string())
+    create().with_context(|| path.display().to_string())
 }
 
 fn write_rgb16(path: &Path, extent: Extent, codes: &[[u16; CHANNELS]]) -> Result<()> {
     // The encoder expects native-endian samples.
-    write_png(
-        path,
-        extent,
-        bytemuck::cast_slice(codes),
-        ExtendedColorType::Rgb16,
-    )
+    let bytes = bytemuck::cast_slice(codes);
+    write_png(path, extent, bytes, ExtendedColorType::Rgb16)
 }
 
 fn write_codes(path: &Path, extent: Extent, codes: &LightCodes) -> Result<()> {

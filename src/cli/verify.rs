@@ -30,18 +30,22 @@ struct VerifyReport {
     error: Option<String>,
     /// The first bad part, and how many there are.
     #[serde(skip_serializing_if = "Option::is_none")]
-    bad: Option<BadPart>,
+    bad: Option<DamagedChunk>,
     bad_parts: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    tiles: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    scans: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    file_bytes: Option<u64>,
+    /// By the file index, if it can be read.
+    #[serde(flatten)]
+    contents: Option<FileContents>,
 }
 
 #[derive(Serialize)]
-struct BadPart {
+struct FileContents {
+    tiles: usize,
+    scans: usize,
+    file_bytes: u64,
+}
+
+#[derive(Serialize)]
+struct DamagedChunk {
     scan: usize,
     /// None for the basis functions of the scan.
     tile: Option<usize>,
@@ -54,17 +58,18 @@ pub fn run(args: &VerifyArgs) -> Result<()> {
     let result = verify(args, &mut report);
     report.ok = result.is_ok();
     report.error = result.as_ref().err().map(|e| format!("{e:#}"));
-    if args.json {
-        print_json(&report)?;
-    } else if let (Some(tiles), Some(scans), Some(bytes)) =
-        (report.tiles, report.scans, report.file_bytes)
-        && report.ok
-    {
-        print_line(&format!(
+    match report.contents {
+        _ if args.json => print_json(&report)?,
+        Some(FileContents {
+            tiles,
+            scans,
+            file_bytes,
+        }) if report.ok => print_line(&format!(
             "{}: intact, {tiles} tiles in {scans} scans, {}",
             args.file.display(),
-            format_bytes(bytes)
-        ))?;
+            format_bytes(file_bytes)
+        ))?,
+        _ => {}
     }
     result
 }
@@ -74,9 +79,11 @@ fn verify(args: &VerifyArgs, report: &mut VerifyReport) -> Result<()> {
     let (mut file, index) = open_ltm(&args.file)?;
     let name = || args.file.display().to_string();
     let end = index.header.file_bytes;
-    report.tiles = Some(index.tiles());
-    report.scans = Some(index.scans.len());
-    report.file_bytes = Some(end);
+    report.contents = Some(FileContents {
+        tiles: index.tiles(),
+        scans: index.scans.len(),
+        file_bytes: end,
+    });
     let mut first = None;
     for part in index.chunks() {
         let bytes = read_range(&mut file, index.range(part)).with_context(name)?;
@@ -92,14 +99,11 @@ fn verify(args: &VerifyArgs, report: &mut VerifyReport) -> Result<()> {
             "{bad} of {parts} parts are bad, the first at bytes {} to {}",
             bytes.start, bytes.end
         );
-        report.bad = Some(BadPart { scan, tile, bytes });
+        report.bad = Some(DamagedChunk { scan, tile, bytes });
         return Err(anyhow::Error::new(error).context(at).context(name()));
     }
-    let length = file
-        .metadata()
-        .context("cannot be read")
-        .with_context(name)?
-        .len();
+    let metadata = file.metadata().context("cannot be read");
+    let length = metadata.with_context(name)?.len();
     match length > end {
         true => Err(FormatError::TrailingBytes { end }).with_context(name),
         false => Ok(()),

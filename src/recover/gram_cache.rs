@@ -87,7 +87,10 @@ impl GramCache {
             v: vs().min().unwrap_or(0),
             u: us().min().unwrap_or(0),
         };
-        let size = Extent::new(us().max().unwrap_or(0).abs_diff(first.u) + window.side(), vs().max().unwrap_or(0).abs_diff(first.v) + window.side());
+        let size = Extent::new(
+            us().max().unwrap_or(0).abs_diff(first.u) + window.side(),
+            vs().max().unwrap_or(0).abs_diff(first.v) + window.side(),
+        );
         let region = ClippedRect::new(first, size, light);
         let (width, height, [u, v]) = (region.columns.len(), region.rows.len(), region.first());
         let (l, weights) = (pattern_indices.len(), measurements.pattern_weights());

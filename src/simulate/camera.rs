@@ -2,21 +2,15 @@
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, Normal, NormalError, Poisson};
+use rand_distr::{Distribution, Poisson, StandardNormal};
 
 use crate::transport::CHANNELS;
 
 /// A camera with linear 16-bit codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Code of the measurement 0.
-    pub black: f64,
-    /// Code of the measurement 1.
-    pub white: f64,
     /// Electrons of the measurement 1.
     pub electrons: f64,
-    /// Standard deviation of the read noise, in electrons.
-    pub read_noise: f64,
 }
 
 /// One of a capture's independent random sequences. A seed and a stream determine its numbers, whatever
@@ -42,26 +36,30 @@ impl RandomStream {
 }
 
 impl Camera {
+    /// Code of the measurement 0.
+    pub const BLACK: f64 = 512.0;
+    /// Code of the measurement 1.
+    pub const WHITE: f64 = 60_000.0;
+    /// Standard deviation of the read noise, in electrons.
+    const READ_NOISE: f64 = 8.0;
+
     /// Photographs `picture`, in units of the measurement, with shot noise (Poisson) and read noise (Gaussian).
     /// Returns codes; too much light saturates.
-    ///
-    /// # Errors
-    /// [`NormalError`] if the read noise is negative or not finite.
     pub fn photograph(
-        &self,
+        self,
         picture: &[[f32; CHANNELS]],
         noise: &mut ChaCha8Rng,
-    ) -> Result<Vec<[u16; CHANNELS]>, NormalError> {
-        let read = Normal::new(0.0, self.read_noise)?;
-        let code_per_electron = (self.white - self.black) / self.electrons;
+    ) -> Vec<[u16; CHANNELS]> {
+        let code_per_electron = (Self::WHITE - Self::BLACK) / self.electrons;
         let mut code = |measurement: f32| {
             let mean = f64::from(measurement) * self.electrons;
             // `new` refuses a mean of zero, with which no electron arrives.
             let photoelectrons = Poisson::new(mean).map_or(0.0, |p| p.sample(noise));
-            let electrons = photoelectrons + read.sample(noise);
-            (self.black + electrons * code_per_electron).round() as u16 // `as` saturates
+            let read: f64 = StandardNormal.sample(noise);
+            let electrons = photoelectrons + Self::READ_NOISE * read;
+            (Self::BLACK + electrons * code_per_electron).round() as u16 // `as` saturates
         };
-        Ok(picture.iter().map(|pixel| pixel.map(&mut code)).collect())
+        picture.iter().map(|pixel| pixel.map(&mut code)).collect()
     }
 }
 
@@ -70,19 +68,14 @@ mod tests {
     use super::*;
 
     const CAMERA: Camera = Camera {
-        black: 512.0,
-        white: 60000.0,
-        electrons: 40000.0,
-        read_noise: 8.0,
+        electrons: 40_000.0,
     };
 
     #[test]
     fn noise_has_the_mean_and_variance_of_shot_and_read_noise() {
         for measurement in [0.0f32, 0.0001, 0.02, 0.7] {
             let mut rng = RandomStream::Photograph(3).start(1);
-            let codes = CAMERA
-                .photograph(&[[measurement; 3]; 40_000], &mut rng)
-                .unwrap();
+            let codes = CAMERA.photograph(&[[measurement; 3]; 40_000], &mut rng);
             let gain = (60000.0 - 512.0) / 40000.0;
             let electrons: Vec<f64> = codes
                 .iter()
@@ -110,7 +103,7 @@ mod tests {
     fn streams_differ_and_repeat() {
         let draw = |stream: RandomStream, seed| {
             let mut rng = stream.start(seed);
-            CAMERA.photograph(&[[0.5; 3]; 8], &mut rng).unwrap()
+            CAMERA.photograph(&[[0.5; 3]; 8], &mut rng)
         };
         let first = draw(RandomStream::Photograph(0), 1);
         assert_eq!(first, draw(RandomStream::Photograph(0), 1));
@@ -122,7 +115,7 @@ mod tests {
     #[test]
     fn too_much_light_saturates() {
         let mut rng = RandomStream::Photograph(0).start(1);
-        let codes = CAMERA.photograph(&[[9.0; 3]], &mut rng).unwrap();
+        let codes = CAMERA.photograph(&[[9.0; 3]], &mut rng);
         assert_eq!(codes, [[u16::MAX; 3]]);
     }
 }

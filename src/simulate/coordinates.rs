@@ -36,6 +36,12 @@ impl Vec2 {
     }
 }
 
+impl From<LightPx> for Vec2 {
+    fn from(p: LightPx) -> Self {
+        vec2(p.u, p.v)
+    }
+}
+
 impl Add for Vec2 {
     type Output = Self;
     fn add(self, o: Self) -> Self {
@@ -74,8 +80,8 @@ impl UnitPlane {
     }
 
     /// The unit coordinates of a position in light elements.
-    pub fn at(&self, p: LightPx) -> Vec2 {
-        (vec2(p.u, p.v) - self.centre) * (1.0 / self.half)
+    pub fn at(&self, p: Vec2) -> Vec2 {
+        (p - self.centre) * (1.0 / self.half)
     }
 }
 

@@ -1,8 +1,9 @@
 //! The 8-bit codes that the monitor shows: random patterns and Gray code.
 
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, Normal, NormalError, StandardUniform};
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
+use crate::calibrate::Axis;
 use crate::transport::Extent;
 
 /// The monitor emits `(code / 255)^MONITOR_GAMMA`.
@@ -34,45 +35,40 @@ impl LightCodes {
     }
 }
 
-/// A distribution of random patterns.
+/// A distribution of random patterns. The command line shows the variants' descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ensemble {
-    /// Emissions from N(0.5, 0.17²), clipped to 0..=1.
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+pub enum PatternEnsemble {
+    /// Clipped Gaussian around half brightness
     Gaussian,
-    /// Each element on or off with equal probability.
+    /// Each element on or off
     Bernoulli,
 }
 
-impl Ensemble {
+impl PatternEnsemble {
     /// A random pattern from the numbers of `stream`.
-    ///
-    /// # Errors
-    /// Never: the distribution's parameters are constants. [`NormalError`] is its constructor's type.
-    pub fn draw(self, light: Extent, stream: &mut ChaCha8Rng) -> Result<LightCodes, NormalError> {
-        let codes = match self {
-            Self::Gaussian => {
-                // 0.3 % of the elements are clipped.
-                let emissions = Normal::new(0.5, 0.17)?;
-                let code = |_| code_for(emissions.sample(stream));
-                (0..light.area()).map(code).collect()
-            }
-            Self::Bernoulli => {
-                let code = |_| match StandardUniform.sample(stream) {
-                    true => 255,
-                    false => 0,
-                };
-                (0..light.area()).map(code).collect()
-            }
-        };
-        Ok(LightCodes::Grey(codes))
+    pub fn draw(self, light: Extent, stream: &mut ChaCha8Rng) -> LightCodes {
+        let mut codes = vec![0; light.area()];
+        match self {
+            // N(0.5, 0.17²): 0.3 % of the elements are clipped.
+            Self::Gaussian => codes.fill_with(|| {
+                let deviation: f64 = StandardNormal.sample(stream);
+                code_for(0.5 + 0.17 * deviation)
+            }),
+            Self::Bernoulli => codes.fill_with(|| match StandardUniform.sample(stream) {
+                true => 255,
+                false => 0,
+            }),
+        }
+        LightCodes::Grey(codes)
     }
 }
 
 /// One pattern of the Gray code of all columns or of all rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GrayCodePattern {
-    /// Whether it codes columns (axis x) or rows (axis y).
-    pub columns: bool,
+    /// Whether it codes columns or rows.
+    pub axis: Axis,
     /// Index of the bit, 0 for the least significant.
     pub bit: u32,
     /// Whether dark and bright are exchanged.
@@ -82,37 +78,30 @@ pub struct GrayCodePattern {
 impl GrayCodePattern {
     /// All patterns of a light plane: columns, then rows, most significant bit first, each followed by its inverse.
     pub fn all(light: Extent) -> Vec<Self> {
-        let axis = |columns, side: u32| {
-            let bits = u32::BITS - (side - 1).leading_zeros();
-            (0..bits).rev().flat_map(move |bit| {
-                [false, true].map(|inverted| Self {
-                    columns,
+        let mut patterns = Vec::new();
+        for (axis, side) in [(Axis::X, light.width), (Axis::Y, light.height)] {
+            for bit in (0..u32::BITS - (side - 1).leading_zeros()).rev() {
+                patterns.extend([false, true].map(|inverted| Self {
+                    axis,
                     bit,
                     inverted,
-                })
-            })
-        };
-        axis(true, light.width)
-            .chain(axis(false, light.height))
-            .collect()
-    }
-
-    /// The name of the axis in the capture's manifest.
-    pub fn axis(self) -> &'static str {
-        if self.columns { "x" } else { "y" }
+                }));
+            }
+        }
+        patterns
     }
 
     /// The codes of the pattern.
     pub fn codes(self, light: Extent) -> LightCodes {
-        let mut codes = Vec::with_capacity(light.area());
-        for v in 0..light.height {
-            for u in 0..light.width {
-                let n = if self.columns { u } else { v };
-                let on = (n ^ (n >> 1)) >> self.bit & 1 == 1;
-                codes.push(if on != self.inverted { 255 } else { 0 });
-            }
-        }
-        LightCodes::Grey(codes)
+        let code = |(u, v): (u32, u32)| {
+            let n = match self.axis {
+                Axis::X => u,
+                Axis::Y => v,
+            };
+            let on = (n ^ (n >> 1)) >> self.bit & 1 == 1;
+            if on != self.inverted { 255 } else { 0 }
+        };
+        LightCodes::Grey(light.cells().map(code).collect())
     }
 }
 
@@ -125,7 +114,7 @@ mod tests {
         let light = Extent::new(20, 3);
         let patterns: Vec<_> = GrayCodePattern::all(light)
             .into_iter()
-            .filter(|g| g.columns && !g.inverted)
+            .filter(|g| g.axis == Axis::X && !g.inverted)
             .collect();
         assert_eq!(
             patterns.iter().map(|g| g.bit).collect::<Vec<_>>(),

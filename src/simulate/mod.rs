@@ -22,7 +22,7 @@ mod truth_lights;
 
 pub use camera::{Camera, RandomStream};
 pub use emission_matrix::EmissionMatrix;
-pub use light_codes::{Ensemble, GrayCodePattern, LightCodes, MONITOR_GAMMA, emission};
+pub use light_codes::{GrayCodePattern, LightCodes, MONITOR_GAMMA, PatternEnsemble, emission};
 pub use scene::{SimulatedScene, WINDOW_SIDE};
 pub use scene_kind::SceneKind;
-pub use truth_lights::TruthLight;
+pub use truth_lights::truth_lights;

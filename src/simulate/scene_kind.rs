@@ -1,17 +1,18 @@
 //! The built-in scenes by name.
 
 use super::cookies::Cookies;
-use super::light_codes::Ensemble;
+use super::light_codes::PatternEnsemble;
 use super::scene::{SimulatedScene, scene_geometry};
 use super::stained_glass::StainedGlass;
 use crate::transport::{Extent, GeometryError};
 
-/// The built-in scenes.
+/// The built-in scenes. The command line shows the variants' descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum SceneKind {
-    /// A rose window of coloured glass and lead, lit from behind.
+    /// A rose window lit from behind
     StainedGlass,
-    /// Cookies on a tray, lit by a projector at an angle.
+    /// Cookies on a tray under a tilted projector
     Cookies,
 }
 
@@ -34,10 +35,10 @@ impl SceneKind {
 
     /// The default ensemble: Gaussian for glass, as in the paper; Bernoulli for cookies, as its higher
     /// contrast helps sparse transport.
-    pub fn ensemble(self) -> Ensemble {
+    pub fn ensemble(self) -> PatternEnsemble {
         match self {
-            Self::StainedGlass => Ensemble::Gaussian,
-            Self::Cookies => Ensemble::Bernoulli,
+            Self::StainedGlass => PatternEnsemble::Gaussian,
+            Self::Cookies => PatternEnsemble::Bernoulli,
         }
     }
 }

@@ -6,72 +6,36 @@ use super::gradient_noise::layered_noise;
 use super::light_codes::{LightCodes, code_for};
 use crate::transport::Extent;
 
-/// The light in `truth/light_NAME.png`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TruthLight {
-    /// All elements at full brightness.
-    Flood,
-    /// Black and white squares, sixteen along the shorter side.
-    Checker,
-    /// Vertical black and white stripes, sixteen periods across.
-    Stripes,
-    /// A gradient between four coloured corners.
-    Colour,
-    /// A flame.
-    Fire,
+/// The lights by their names NAME in `light_NAME.png` and `relit_NAME.png`; all RGB.
+pub fn truth_lights(light: Extent) -> [(&'static str, LightCodes); 5] {
+    let white = |on: bool| [if on { 255 } else { 0 }; 3];
+    // Sixteen squares along the shorter side, and sixteen periods across.
+    let square = (light.width.min(light.height) / 16).max(1);
+    let checker = |u: u32, v: u32| white((u / square + v / square) % 2 == 1);
+    let stripe = (light.width / 32).max(1);
+    let codes = |code: &dyn Fn(u32, u32) -> [u8; 3]| {
+        LightCodes::Rgb(light.cells().map(|(u, v)| code(u, v)).collect())
+    };
+    let centre = |u: u32, v: u32| {
+        vec2(
+            (f64::from(u) + 0.5) / f64::from(light.width),
+            (f64::from(v) + 0.5) / f64::from(light.height),
+        )
+    };
+    [
+        ("flood", codes(&|_, _| white(true))),
+        ("checker", codes(&checker)),
+        ("stripes", codes(&|u, _| white(u / stripe % 2 == 1))),
+        ("colour", codes(&|u, v| corners(centre(u, v)).map(code_for))),
+        ("fire", codes(&|u, v| flame(centre(u, v)).map(code_for))),
+    ]
 }
 
-impl TruthLight {
-    /// All lights.
-    pub const ALL: [Self; 5] = [
-        Self::Flood,
-        Self::Checker,
-        Self::Stripes,
-        Self::Colour,
-        Self::Fire,
-    ];
-
-    /// NAME in `light_NAME.png` and `relit_NAME.png`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Flood => "flood",
-            Self::Checker => "checker",
-            Self::Stripes => "stripes",
-            Self::Colour => "colour",
-            Self::Fire => "fire",
-        }
-    }
-
-    /// The codes of the light, always RGB.
-    pub fn codes(self, light: Extent) -> LightCodes {
-        let shorter = light.width.min(light.height);
-        let white = |on: bool| [if on { 255 } else { 0 }; 3];
-        let mut codes = Vec::with_capacity(light.area());
-        for v in 0..light.height {
-            for u in 0..light.width {
-                let x = (f64::from(u) + 0.5) / f64::from(light.width);
-                let y = (f64::from(v) + 0.5) / f64::from(light.height);
-                codes.push(match self {
-                    Self::Flood => white(true),
-                    Self::Checker => {
-                        let square = (shorter / 16).max(1);
-                        white((u / square + v / square) % 2 == 1)
-                    }
-                    Self::Stripes => white(u / (light.width / 32).max(1) % 2 == 1),
-                    Self::Colour => corners(x, y).map(code_for),
-                    Self::Fire => flame(vec2(x, y)).map(code_for),
-                });
-            }
-        }
-        LightCodes::Rgb(codes)
-    }
-}
-
-/// Linear RGB, bilinear between four corners.
-fn corners(x: f64, y: f64) -> [f64; 3] {
-    let top = mix3([0.02, 0.0, 1.0], [1.0, 0.0, 0.08], x);
-    let bottom = mix3([0.0, 1.0, 1.0], [1.0, 0.9, 0.0], x);
-    mix3(top, bottom, y)
+/// Linear RGB on the unit square, bilinear between four corners.
+fn corners(p: Vec2) -> [f64; 3] {
+    let top = mix3([0.02, 0.0, 1.0], [1.0, 0.0, 0.08], p.x);
+    let bottom = mix3([0.0, 1.0, 1.0], [1.0, 0.9, 0.0], p.x);
+    mix3(top, bottom, p.y)
 }
 
 /// The linear RGB of a flame on the unit square: glowing gas that cools as it rises.
@@ -101,15 +65,15 @@ mod tests {
     #[test]
     fn lights_are_bright_and_different() {
         let light = Extent::new(64, 48);
-        let all = TruthLight::ALL.map(|l| l.codes(light));
-        for (i, codes) in all.iter().enumerate() {
+        let all = truth_lights(light);
+        for (i, (name, codes)) in all.iter().enumerate() {
             let LightCodes::Rgb(rgb) = codes else {
                 panic!("a truth light is always RGB")
             };
             assert_eq!(rgb.len(), light.area());
             let brightest = rgb.iter().flatten().max();
-            assert!(brightest > Some(&200), "{:?} is dim", TruthLight::ALL[i]);
-            assert!(all[..i].iter().all(|other| other != codes));
+            assert!(brightest > Some(&200), "{name} is dim");
+            assert!(all[..i].iter().all(|(_, other)| other != codes));
         }
     }
 }

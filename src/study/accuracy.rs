@@ -71,8 +71,7 @@ pub(super) fn measure_accuracy(
 /// SNR over all `parts`, and its standard error in dB if they are a random sample that covers a `share` of the
 /// picture: that of a ratio of two sums (Cochran 1977, section 6.4).
 pub(super) fn pooled_snr(parts: &[TransportError], share: f64) -> (Option<Decibels>, f64) {
-    let mut sum = TransportError::default();
-    parts.iter().for_each(|&part| sum.merge(part));
+    let sum: TransportError = parts.iter().copied().sum();
     let n = parts.len() as f64;
     let (signal, error) = (sum.signal(), sum.error());
     if parts.len() < 2 || signal == 0.0 || error == 0.0 {

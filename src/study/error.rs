@@ -17,9 +17,6 @@ pub enum StudyError {
     /// The geometry of a scene is invalid.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
-    /// A random distribution has invalid parameters.
-    #[error("the simulated camera has invalid noise parameters")]
-    Noise(#[from] rand_distr::NormalError),
     /// Drawing a chart failed.
     #[error("a chart cannot be drawn")]
     Chart(#[from] ChartError),

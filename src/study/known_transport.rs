@@ -35,9 +35,9 @@ impl CaptureTruth {
     /// [`GeometryError`] if the extents and the window do not fit together.
     pub fn new(truth: Truth, correspondence: Correspondence) -> Result<Self, GeometryError> {
         let geometry = Geometry {
-            camera: truth.camera(),
-            light: truth.light_plane(),
-            window: truth.window(),
+            camera: truth.camera,
+            light: truth.light_plane,
+            window: truth.window,
             correspondence,
             tile_side: Geometry::DEFAULT_TILE_SIDE,
         }
@@ -64,7 +64,7 @@ impl KnownTransport for CaptureTruth {
 }
 
 /// Error of recovered functions, whose windows are those of `geometry`, over the elements of both windows.
-pub(super) fn transport_error(
+pub fn transport_error(
     known: &impl KnownTransport,
     geometry: &Geometry,
     functions: &TransportFunctions,

@@ -26,8 +26,8 @@ mod unwindowed;
 
 pub use comparison::comparison;
 pub use error::StudyError;
-pub use known_transport::{CaptureTruth, KnownTransport};
-pub use relit_pictures::{RelitLight, built_in_lights, relit_pictures};
+pub use known_transport::{CaptureTruth, KnownTransport, transport_error};
+pub use relit_pictures::{RelitLight, built_in_lights, psnr, relit_pictures};
 pub use scene_camera::{SceneCamera, first_shots};
 pub use scenes::scenes_table;
 pub use section::{ProgressCallback, Section};

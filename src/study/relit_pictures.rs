@@ -211,8 +211,8 @@ fn total(picture: &[[f64; CHANNELS]]) -> f64 {
     picture.as_flattened().iter().sum()
 }
 
-/// 10 log10(1 / mean squared error); `None` if the error is zero.
-fn psnr(truth: &[[f64; CHANNELS]], relit: &[[f64; CHANNELS]]) -> Option<Decibels> {
+/// PSNR of a relit picture with a peak of 1: 10 log10(1 / mean squared error); `None` if the error is zero.
+pub fn psnr(truth: &[[f64; CHANNELS]], relit: &[[f64; CHANNELS]]) -> Option<Decibels> {
     let pairs = truth.as_flattened().iter().zip(relit.as_flattened());
     let squares: f64 = pairs.map(|(t, r)| (t - r).powi(2)).sum();
     let mse = squares / (truth.len() * CHANNELS) as f64;

@@ -27,16 +27,12 @@ pub(super) fn snr_by_scans(
             column
         })
         .collect();
-    let snr = |errors: &mut dyn Iterator<Item = TransportError>| {
-        let mut sum = TransportError::default();
-        errors.for_each(|error| sum.merge(error));
-        sum.snr()
-    };
     (1..=columns.len())
         .map(|scanned| {
             let (scanned, unscanned) = columns.split_at(scanned);
             let scanned = scanned.iter().map(|c| c.0);
-            snr(&mut scanned.chain(unscanned.iter().map(|c| c.1)))
+            let errors = scanned.chain(unscanned.iter().map(|c| c.1));
+            errors.sum::<TransportError>().snr()
         })
         .collect()
 }

@@ -1,11 +1,10 @@
 //! Simulated photographs of a scene, in memory.
 
-use super::error::StudyError;
 use super::known_transport::KnownTransport;
 use crate::capture::{LinearPhoto, Measurements, NoiseModel, Pattern, RowSet};
 use crate::executor::Executor;
 use crate::simulate::{
-    Camera, EmissionMatrix, Ensemble, LightCodes, RandomStream, SimulatedScene, emission,
+    Camera, EmissionMatrix, LightCodes, PatternEnsemble, RandomStream, SimulatedScene, emission,
 };
 use crate::transport::{CHANNELS, CameraPx, Geometry};
 
@@ -35,34 +34,20 @@ impl KnownTransport for SceneCamera<'_> {
 }
 
 impl SceneCamera<'_> {
-    /// The camera of `ltm-export simulate`.
-    pub(super) fn camera(&self) -> Camera {
-        Camera {
-            black: 512.0,
-            white: 60_000.0,
-            electrons: self.electrons,
-            read_noise: 8.0,
-        }
-    }
-
     /// Photographs the scene under `count` random patterns.
-    ///
-    /// # Errors
-    /// [`StudyError::Noise`] if `electrons` is not a valid noise parameter.
     pub fn measure(
         &self,
-        ensemble: Ensemble,
+        ensemble: PatternEnsemble,
         count: usize,
         executor: &impl Executor,
-    ) -> Result<Measurements, StudyError> {
+    ) -> Measurements {
         let geometry = self.scene.geometry();
         let draw = |i| {
             let mut stream = RandomStream::Pattern(i).start(self.seed);
             ensemble.draw(geometry.light, &mut stream)
         };
-        let codes = (0..count as u32).map(draw).collect::<Result<Vec<_>, _>>()?;
-        let camera = self.camera();
-        let code = 1.0 / (camera.white - camera.black);
+        let codes: Vec<_> = (0..count as u32).map(draw).collect();
+        let code = 1.0 / (Camera::WHITE - Camera::BLACK);
         let mut measurements = Measurements {
             camera: geometry.camera,
             light: geometry.light,
@@ -70,15 +55,15 @@ impl SceneCamera<'_> {
             patterns: codes.iter().map(emitted_pattern).collect(),
             full_scale: vec![1.0; count],
             rows: RowSet::all(geometry.camera.height),
-            photos: self.photographs(&codes, executor)?,
-            noise: NoiseModel::from_dark(&self.dark()?, geometry.camera.width, code),
+            photos: self.photographs(&codes, executor),
+            noise: NoiseModel::from_dark(&self.dark(), geometry.camera.width, code),
         };
         measurements.noise = NoiseModel::with_gain_from(&measurements);
-        Ok(measurements)
+        measurements
     }
 
     /// A photograph without light.
-    fn dark(&self) -> Result<LinearPhoto, StudyError> {
+    fn dark(&self) -> LinearPhoto {
         let black = vec![[0.0; CHANNELS]; self.scene.geometry().camera.area()];
         self.add_noise(&black, 0)
     }
@@ -88,38 +73,34 @@ impl SceneCamera<'_> {
         &self,
         lights: &[LightCodes],
         executor: &impl Executor,
-    ) -> Result<Vec<LinearPhoto>, StudyError> {
+    ) -> Vec<LinearPhoto> {
         let mut pictures = self.pictures(lights, executor);
-        let dark = self.dark()?;
+        let dark = self.dark();
         for (number, batch) in pictures.chunks_mut(NOISE_BATCH).enumerate() {
             let first = 1 + number * NOISE_BATCH;
             let noisy = executor.map(batch.len(), |i| {
                 self.add_noise(&batch[i], (first + i) as u32)
             });
             for (picture, noisy) in batch.iter_mut().zip(noisy) {
-                *picture = noisy?;
+                *picture = noisy;
                 for (y, dark) in picture.iter_mut().zip(&dark) {
                     *y = std::array::from_fn(|c| y[c] - dark[c]);
                 }
             }
         }
-        Ok(pictures)
+        pictures
     }
 
     /// A photograph of `picture` with the noise of the photograph number `index`.
-    pub(super) fn add_noise(
-        &self,
-        picture: &LinearPhoto,
-        index: u32,
-    ) -> Result<LinearPhoto, StudyError> {
-        let camera = self.camera();
+    pub(super) fn add_noise(&self, picture: &LinearPhoto, index: u32) -> LinearPhoto {
         let mut noise = RandomStream::Photograph(index).start(self.seed);
-        let codes = camera.photograph(picture, &mut noise)?;
-        let linear = |code: u16| match f64::from(code) >= camera.white {
-            true => f32::NAN,
-            false => ((f64::from(code) - camera.black) / (camera.white - camera.black)) as f32,
+        let electrons = self.electrons;
+        let codes = Camera { electrons }.photograph(picture, &mut noise);
+        let linear = |code: u16| match f64::from(code) - Camera::BLACK {
+            light if light >= Camera::WHITE - Camera::BLACK => f32::NAN,
+            light => (light / (Camera::WHITE - Camera::BLACK)) as f32,
         };
-        Ok(codes.into_iter().map(|codes| codes.map(linear)).collect())
+        codes.into_iter().map(|codes| codes.map(linear)).collect()
     }
 
     /// The pictures of the scene under each light, without noise.

@@ -7,14 +7,14 @@ use super::scene_camera::SceneCamera;
 use super::section::{ProgressCallback, Section, Table, snr_cell};
 use crate::executor::Executor;
 use crate::recover::Method;
-use crate::simulate::{Ensemble, SceneKind};
+use crate::simulate::{PatternEnsemble, SceneKind};
 use crate::transport::Extent;
 
-use Ensemble::{Bernoulli, Gaussian};
+use PatternEnsemble::{Bernoulli, Gaussian};
 use SceneKind::{Cookies, StainedGlass};
 
 /// A row of the table: scene, sides of camera and light plane, ensemble, number of patterns, electrons, seed.
-type SceneSetting = (SceneKind, [u32; 2], Ensemble, usize, f64, u64);
+type SceneSetting = (SceneKind, [u32; 2], PatternEnsemble, usize, f64, u64);
 
 /// Both scenes, both ensembles, few and many photographs, little and much light, one to three camera pixels for each
 /// light element, and a seed for each.
@@ -60,7 +60,7 @@ pub fn scenes_table(
             electrons,
             seed,
         };
-        let measurements = scene_camera.measure(ensemble, patterns, executor)?;
+        let measurements = scene_camera.measure(ensemble, patterns, executor);
         let mut levels = Vec::new();
         for &method in Method::ALL {
             let accuracy =

@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Camera channels: red, green, blue.
@@ -32,6 +33,11 @@ impl Extent {
     /// Row-major index of a pixel of this grid.
     pub fn index(self, pixel: CameraPx) -> usize {
         pixel.y as usize * self.width as usize + pixel.x as usize
+    }
+
+    /// Column and row of each cell, row by row.
+    pub fn cells(self) -> impl Iterator<Item = (u32, u32)> {
+        (0..self.height).flat_map(move |y| (0..self.width).map(move |x| (x, y)))
     }
 
     /// Number of cells.
@@ -82,7 +88,7 @@ impl Element {
 }
 
 /// The affine map from camera positions to the light plane positions behind them.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Correspondence {
     /// `u = a·(x+½, y+½, 1)` in row 0, `v` likewise in row 1.
     pub affine: [[f64; 3]; 2],

@@ -1,6 +1,7 @@
 //! The distance of two transports as a signal-to-noise ratio.
 
 use std::fmt;
+use std::iter::Sum;
 
 /// A ratio in decibels: 20 log10 of a ratio of amplitudes.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, serde::Serialize)]
@@ -48,6 +49,14 @@ impl TransportError {
     pub fn snr(&self) -> Option<Decibels> {
         (self.signal > 0.0 && self.error > 0.0)
             .then(|| Decibels(10.0 * (self.signal / self.error).log10()))
+    }
+}
+
+impl Sum for TransportError {
+    fn sum<I: Iterator<Item = Self>>(errors: I) -> Self {
+        let mut sum = Self::default();
+        errors.for_each(|error| sum.merge(error));
+        sum
     }
 }
 

@@ -65,7 +65,7 @@ pub fn measurements() -> Measurements {
     let mut measurements = Measurements {
         camera: camera.extent(),
         light: manifest.light.extent(),
-        correspondence: manifest.correspondence.as_ref().unwrap().into(),
+        correspondence: manifest.correspondence.unwrap(),
         patterns: SHOTS.iter().map(|(png, _)| pattern(png)).collect(),
         full_scale: vec![1.0; SHOTS.len()],
         rows: RowSet::all(camera.height),

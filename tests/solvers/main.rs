@@ -160,7 +160,7 @@ fn embedded_fixture_equals_its_folder() {
     let embedded = glass_s::measurements();
     let shots: Vec<usize> = (0..folder.manifest().shots.len()).collect();
     let patterns = shots.iter().map(|&i| folder.read_pattern(i).unwrap());
-    let correspondence = folder.correspondence().unwrap();
+    let correspondence = folder.manifest().correspondence.unwrap();
     let mut read = folder.empty_measurements(&shots, patterns.collect(), correspondence, &dark);
     read.rows = RowSet::all(read.camera.height);
     let whole = |mut photo: PhotoReader| {
@@ -182,15 +182,15 @@ fn embedded_fixture_equals_its_folder() {
     assert_eq!(embedded.noise, read.noise);
 
     let truth = folder.truth().unwrap().unwrap();
-    assert_eq!(truth.window(), glass_s::true_window());
+    assert_eq!(truth.window, glass_s::true_window());
     let functions = glass_s::true_functions();
-    let area = truth.window().area();
+    let area = truth.window.area();
     for n in 0..embedded.camera.area() {
         let pixel = relightable_photo::transport::CameraPx {
             x: n as u32 % embedded.camera.width,
             y: n as u32 / embedded.camera.width,
         };
-        let origin = truth.window().origin(embedded.correspondence.at(pixel));
+        let origin = truth.window.origin(embedded.correspondence.at(pixel));
         assert_eq!(truth.window_origin(n), origin);
         let ours = &functions[n * area..(n + 1) * area];
         let theirs = truth.tau(n).iter().map(|t| t.map(|t| t.to_f64()));

@@ -6,11 +6,12 @@
 use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use png::{BitDepth, ColorType, Transformations};
 
-use crate::capture::error::{CaptureError, ImageProblem};
+use crate::capture::error::{CaptureError, CaptureProblem};
+use crate::capture::measurements::Pattern;
 use crate::transport::{CHANNELS, Extent};
 
 /// Bytes read from a file at a time.
@@ -20,36 +21,39 @@ type PngReader = png::Reader<BufReader<ReopenedFile>>;
 
 /// A PNG and what the manifest says of it.
 pub(super) struct ImageFile {
-    path: PathBuf,
-    extent: Extent,
-    field: Option<String>,
+    pub path: PathBuf,
+    /// The size it must have.
+    pub extent: Extent,
+    /// The field of the manifest that names it, for messages.
+    pub field: Option<String>,
 }
 
 impl ImageFile {
-    /// The file at `path`, which must be of size `extent`. `field` is the field of the manifest that names it, for
-    /// messages.
-    pub fn new(path: PathBuf, extent: Extent, field: Option<String>) -> Self {
-        Self {
-            path,
-            extent,
-            field,
-        }
-    }
-
-    /// The codes of an 8-bit pattern: one plane if grey, three if RGB.
-    pub fn read_pattern(&self) -> Result<Vec<Vec<u8>>, CaptureError> {
+    /// Reads an 8-bit pattern; `emission` is that of each code.
+    pub fn read_pattern(&self, emission: &[f64; 256]) -> Result<Pattern, CaptureError> {
         // Some programs store black and white in one bit, or in a palette.
         let mut reader = self.open(Transformations::EXPAND)?;
         let channels = match reader.output_color_type() {
             (ColorType::Grayscale, BitDepth::Eight) => 1,
             (ColorType::Rgb, BitDepth::Eight) => CHANNELS,
-            other => return Err(self.error(ImageProblem::PatternType(sample_type(other)))),
+            other => return Err(self.error(CaptureProblem::PatternType(sample_type(other)))),
         };
         let mut codes = vec![0; channels * self.extent.area()];
         let decoded = reader.next_frame(&mut codes);
         decoded.map_err(|e| self.unreadable(e))?;
-        let plane = |c| codes.iter().copied().skip(c).step_by(channels).collect();
-        Ok((0..channels).map(plane).collect())
+        let emitted = |code: &u8| emission[usize::from(*code)] as f32;
+        let plane = |c| {
+            codes
+                .iter()
+                .skip(c)
+                .step_by(channels)
+                .map(emitted)
+                .collect()
+        };
+        Ok(match channels {
+            1 => Pattern::Grey(plane(0)),
+            _ => Pattern::Rgb(std::array::from_fn(plane)),
+        })
     }
 
     /// The codes of a 16-bit photograph, row by row.
@@ -69,28 +73,18 @@ impl ImageFile {
         let info = reader.info();
         let found = (info.color_type, info.bit_depth);
         if found != (ColorType::Rgb, BitDepth::Sixteen) {
-            return Err(self.error(ImageProblem::PhotoType(sample_type(found))));
+            return Err(self.error(CaptureProblem::PhotoType(sample_type(found))));
         }
         if info.interlaced {
-            return Err(self.error(ImageProblem::Interlaced));
+            return Err(self.error(CaptureProblem::Interlaced));
         }
-        Ok(Rgb16Rows {
-            rows_left: self.extent.height,
-            reader,
-            file: self,
-        })
+        Ok(Rgb16Rows { reader, file: self })
     }
 
     fn open(&self, transformations: Transformations) -> Result<PngReader, CaptureError> {
-        let file = ReopenedFile::open(&self.path).map_err(|source| match source.kind() {
-            ErrorKind::NotFound => CaptureError::Missing {
-                path: self.path.clone(),
-                field: self.field.clone(),
-            },
-            _ => CaptureError::Io {
-                path: self.path.clone(),
-                source,
-            },
+        let file = ReopenedFile::open(&self.path).map_err(|e| match e.kind() {
+            ErrorKind::NotFound => self.error(CaptureProblem::Missing),
+            _ => self.error(CaptureProblem::Io(e)),
         })?;
         let mut decoder = png::Decoder::new(BufReader::with_capacity(READ_BYTES, file));
         decoder.set_transformations(transformations);
@@ -99,19 +93,19 @@ impl ImageFile {
         let expected = self.extent;
         match found == expected {
             true => Ok(reader),
-            false => Err(self.error(ImageProblem::WrongExtent { found, expected })),
+            false => Err(self.error(CaptureProblem::WrongExtent { found, expected })),
         }
     }
 
     fn unreadable(&self, reason: impl Display) -> CaptureError {
         let reason = reason.to_string();
-        self.error(ImageProblem::Unreadable(
+        self.error(CaptureProblem::Unreadable(
             reason.trim_end_matches('.').to_owned(),
         ))
     }
 
-    fn error(&self, problem: ImageProblem) -> CaptureError {
-        CaptureError::Image {
+    fn error(&self, problem: CaptureProblem) -> CaptureError {
+        CaptureError {
             path: self.path.clone(),
             field: self.field.clone(),
             problem,
@@ -135,26 +129,20 @@ fn sample_type((color, depth): (ColorType, BitDepth)) -> String {
 pub(super) struct Rgb16Rows {
     file: ImageFile,
     reader: PngReader,
-    rows_left: u32,
 }
 
 impl Rgb16Rows {
     /// The codes of the next row; `None` after the last.
     pub fn next(&mut self) -> Result<Option<impl Iterator<Item = [u16; CHANNELS]>>, CaptureError> {
-        if self.rows_left == 0 {
-            return Ok(None);
-        }
         let row = self.reader.next_row();
         let row = row.map_err(|e| self.file.unreadable(e))?;
-        let Some(row) = row else {
-            return Err(self.file.unreadable("it ends too soon"));
-        };
-        self.rows_left -= 1;
-        let code = |bytes: &[u8]| u16::from_be_bytes([bytes[0], bytes[1]]);
-        let pixels = row.data().chunks_exact(2 * CHANNELS);
-        Ok(Some(pixels.map(move |p| {
-            [code(&p[..2]), code(&p[2..4]), code(&p[4..])]
-        })))
+        Ok(row.map(|row| {
+            let (pixels, _) = row.data().as_chunks();
+            let codes = |&[r, s, g, h, b, c]: &[u8; 2 * CHANNELS]| {
+                [[r, s], [g, h], [b, c]].map(u16::from_be_bytes)
+            };
+            pixels.iter().map(codes)
+        }))
     }
 
     /// Checks the rest of the file, once all rows are read.
@@ -172,7 +160,7 @@ struct ReopenedFile {
 }
 
 impl ReopenedFile {
-    fn open(path: &std::path::Path) -> io::Result<Self> {
+    fn open(path: &Path) -> io::Result<Self> {
         Ok(Self {
             path: path.to_owned(),
             position: 0,

@@ -3,25 +3,23 @@
 //! The manifest is checked when the folder is opened; patterns and photographs are read one by one, so that callers may
 //! read them in parallel.
 
-mod dark_frame;
 mod image_file;
 mod photo_reader;
 mod truth;
 
 use std::path::{Path, PathBuf};
 
-pub use self::dark_frame::DarkFrame;
-pub use self::photo_reader::PhotoReader;
+pub use self::photo_reader::{DarkFrame, PhotoReader};
 pub use self::truth::{RELIT_FULL_SCALE, Truth};
 
 use self::image_file::ImageFile;
-use super::error::{CaptureError, FieldProblem, MANIFEST_NAME};
+use super::error::{CaptureError, CaptureProblem, MANIFEST_NAME};
 use super::manifest::Manifest;
 use super::measurements::{LinearPhoto, Measurements, Pattern};
 use super::noise_model::NoiseModel;
 use super::rows::RowSet;
-use crate::calibrate::{BitPair, GrayCodePhotos};
-use crate::transport::{CHANNELS, Correspondence};
+use crate::calibrate::{Axis, BitPair, GrayCodePhotos};
+use crate::transport::{CHANNELS, Correspondence, Extent};
 
 /// A capture folder with its checked manifest.
 #[derive(Debug)]
@@ -45,15 +43,11 @@ impl CaptureFolder {
             _ => None,
         };
         if let Some(problem) = problem {
-            return Err(CaptureError::NotACapture {
-                path: root.to_owned(),
-                problem,
-            });
+            let problem = CaptureProblem::NotACapture(problem);
+            return Err(CaptureError::new(root, problem));
         }
-        let text = std::fs::read_to_string(&path).map_err(|source| CaptureError::Io {
-            path: path.clone(),
-            source,
-        })?;
+        let text = std::fs::read_to_string(&path)
+            .map_err(|e| CaptureError::new(&path, CaptureProblem::Io(e)))?;
         // Some editors write a byte order mark, which is not JSON.
         let json = text.strip_prefix('\u{feff}').unwrap_or(&text);
         let manifest = Manifest::parse(json, &path)?;
@@ -76,19 +70,21 @@ impl CaptureFolder {
 
     /// Names and paths of all files that recovery from `shots` reads.
     pub fn files(&self, shots: &[usize]) -> Vec<(&str, PathBuf)> {
-        let manifest = &self.manifest;
-        let shots = shots.iter().map(|&i| &manifest.shots[i]);
-        let shots = shots.flat_map(|shot| [&shot.pattern, &shot.photo]);
-        let gray_code = match manifest.correspondence {
-            Some(_) => &[][..],
-            None => &manifest.graycode,
-        };
-        let gray_code = gray_code.iter().map(|shot| &shot.photo);
-        let names = manifest.dark.iter().chain(shots).chain(gray_code);
-        std::iter::once(MANIFEST_NAME)
-            .chain(names.map(String::as_str))
-            .map(|name| (name, self.root.join(name)))
-            .collect()
+        let Manifest {
+            dark,
+            correspondence,
+            graycode,
+            ..
+        } = &self.manifest;
+        let shots = shots.iter().map(|&i| &self.manifest.shots[i]);
+        let mut names = vec![MANIFEST_NAME];
+        names.extend(dark.as_deref());
+        names.extend(shots.flat_map(|shot| [shot.pattern.as_str(), &shot.photo]));
+        if correspondence.is_none() {
+            names.extend(graycode.iter().map(|shot| shot.photo.as_str()));
+        }
+        let path = |name| (name, self.root.join(name));
+        names.into_iter().map(path).collect()
     }
 
     /// The known transport, if the folder has any.
@@ -97,11 +93,6 @@ impl CaptureFolder {
     /// If its files cannot be read or have the wrong shape.
     pub fn truth(&self) -> Result<Option<Truth>, CaptureError> {
         Truth::open(&self.root.join("truth"), &self.manifest)
-    }
-
-    /// The correspondence, if the manifest gives it.
-    pub fn correspondence(&self) -> Option<Correspondence> {
-        self.manifest.correspondence.as_ref().map(Into::into)
     }
 
     /// Reads `rows` of the Gray code photographs.
@@ -115,8 +106,8 @@ impl CaptureFolder {
     ) -> Result<GrayCodePhotos, CaptureError> {
         let light = &self.manifest.light;
         Ok(GrayCodePhotos {
-            x: self.read_bits("x", light.width, dark, rows)?,
-            y: self.read_bits("y", light.height, dark, rows)?,
+            x: self.read_bits(Axis::X, light.width, dark, rows)?,
+            y: self.read_bits(Axis::Y, light.height, dark, rows)?,
             rows: rows.iter().collect(),
         })
     }
@@ -125,7 +116,7 @@ impl CaptureFolder {
     /// the bits below it.
     fn read_bits(
         &self,
-        axis: &'static str,
+        axis: Axis,
         side: u32,
         dark: &DarkFrame,
         rows: &RowSet,
@@ -136,15 +127,12 @@ impl CaptureFolder {
                 shot.axis == axis && shot.bit == bit && shot.inverted == inverted
             });
             let Some((i, shot)) = shot else {
-                return Err(CaptureError::Field {
-                    path: self.manifest_path(),
-                    field: "graycode".to_owned(),
-                    problem: FieldProblem::MissingGrayCode {
-                        axis,
-                        bit,
-                        inverted,
-                    },
-                });
+                let problem = CaptureProblem::MissingGrayCode {
+                    axis,
+                    bit,
+                    inverted,
+                };
+                return Err(CaptureError::new(self.manifest_path(), problem));
             };
             let field = format!("graycode[{i}].photo");
             let mut reader = self.open_photo(&shot.photo, field, 1.0, dark)?;
@@ -172,12 +160,10 @@ impl CaptureFolder {
         let light = match &self.manifest.dark {
             None => vec![[0.0; CHANNELS]; camera.extent().area()],
             Some(name) => {
-                let field = Some("dark".to_owned());
-                let file = ImageFile::new(self.root.join(name), camera.extent(), field);
+                let file = self.image_file(name, camera.extent(), "dark".to_owned());
                 let codes = file.read_rgb16()?.into_iter();
-                codes
-                    .map(|codes| codes.map(|code| camera.linear(code, 1.0)))
-                    .collect()
+                let linear = |code| camera.linear(code, 1.0);
+                codes.map(|codes| codes.map(linear)).collect()
             }
         };
         let code = 1.0 / (camera.white - camera.black);
@@ -223,17 +209,10 @@ impl CaptureFolder {
     /// # Panics
     /// If there is no such shot.
     pub fn read_pattern(&self, i: usize) -> Result<Pattern, CaptureError> {
-        let path = self.root.join(&self.manifest.shots[i].pattern);
-        let field = Some(format!("shots[{i}].pattern"));
-        let planes = ImageFile::new(path, self.manifest.light.extent(), field).read_pattern()?;
-        let emitted = |code: u8| self.emission[usize::from(code)] as f32;
-        let mut planes = planes
-            .into_iter()
-            .map(|codes| codes.into_iter().map(emitted).collect::<Vec<_>>());
-        Ok(match (planes.next(), planes.next(), planes.next()) {
-            (Some(r), Some(g), Some(b)) => Pattern::Rgb([r, g, b]),
-            (grey, ..) => Pattern::Grey(grey.unwrap_or_default()),
-        })
+        let name = &self.manifest.shots[i].pattern;
+        let field = format!("shots[{i}].pattern");
+        let file = self.image_file(name, self.manifest.light.extent(), field);
+        file.read_pattern(&self.emission)
     }
 
     /// Measurements of `shots` without any camera rows yet. Their noise has only its floor.
@@ -270,7 +249,22 @@ impl CaptureFolder {
         dark: &'a DarkFrame,
     ) -> Result<PhotoReader<'a>, CaptureError> {
         let camera = &self.manifest.camera;
-        let file = ImageFile::new(self.root.join(name), camera.extent(), Some(field));
-        Ok(PhotoReader::new(camera, dark, exposure, file.open_rgb16()?))
+        let file = self.image_file(name, camera.extent(), field);
+        Ok(PhotoReader {
+            camera,
+            dark,
+            exposure,
+            codes: file.open_rgb16()?,
+            next_row: 0,
+            saturated_samples: 0,
+        })
+    }
+
+    fn image_file(&self, name: &str, extent: Extent, field: String) -> ImageFile {
+        ImageFile {
+            path: self.root.join(name),
+            extent,
+            field: Some(field),
+        }
     }
 }

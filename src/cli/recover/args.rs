@@ -33,7 +33,7 @@ pub struct RecoverArgs {
     method: MethodName,
     /// Basis in which --method bpdn finds sparse light transport functions [default: identity]
     #[arg(long, value_enum)]
-    basis: Option<BasisName>,
+    basis: Option<SparsityBasis>,
     /// Side of the window of light elements around each camera pixel's correspondence: an odd number, or "auto" to
     /// estimate it
     #[arg(long, value_name = "W", default_value = "15", value_parser = parse_window)]
@@ -60,11 +60,7 @@ impl RecoverArgs {
         match self.method {
             MethodName::Learned => Method::Learned,
             MethodName::Nnls => Method::Nnls,
-            MethodName::Bpdn => Method::Bpdn(match self.basis {
-                Some(BasisName::Identity) | None => SparsityBasis::Identity,
-                Some(BasisName::Dct) => SparsityBasis::Dct,
-                Some(BasisName::Haar) => SparsityBasis::Haar,
-            }),
+            MethodName::Bpdn => Method::Bpdn(self.basis.unwrap_or(SparsityBasis::Identity)),
         }
     }
 
@@ -160,17 +156,6 @@ enum MethodName {
     Nnls,
     /// Basis pursuit denoising: the sparsest function that explains the photographs
     Bpdn,
-}
-
-/// Values of `--basis`.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum BasisName {
-    /// The light elements themselves, for opaque objects
-    Identity,
-    /// Discrete cosine transform, for translucent objects
-    Dct,
-    /// Haar wavelets
-    Haar,
 }
 
 #[cfg(test)]

@@ -1,125 +1,139 @@
 //! The checkpoint of a recovery: the tiles recovered so far, to resume from after an interruption.
 //!
-//! An append-only file beside the output, little-endian:
+//! An append-only file beside the output: the 8 bytes `LTMPART2`, then records. A record has its number, the length of
+//! its content, the CRC-32C of these two and the content (4 bytes each, little-endian), and the content:
 //!
-//! | bytes | content |
+//! | number | content |
 //! |---|---|
-//! | 8 | `LTMPART\n` |
-//! | 4, 4 | length and CRC-32C of the key |
-//! | … | the [`RunKey`] as JSON |
-//! | records | tile number, length, CRC-32C of these two and the content (4 bytes each), content |
+//! | `u32::MAX` | the [`RunKey`] as JSON; the first record |
+//! | `u32::MAX - 1` | the [fingerprint](super::run_key) of the prepared recovery; the second record |
+//! | index of a tile | the [tile](super::tile_record); in the order of completion |
 //!
-//! The first record has the number `u32::MAX` and holds the [fingerprint](super::run_key) of the prepared recovery; one
-//! record for each tile follows, in the order of completion. When the process ends, only the last record can be
-//! incomplete; it is then ignored.
+//! When the process ends, only the last record can be incomplete; it is then ignored.
 
 use std::ffi::OsString;
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, TryLockError};
 use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Error, Result, bail, ensure};
 
 use super::run_key::RunKey;
+use crate::cli::process::Interrupted;
 
 /// The first bytes of a checkpoint.
-const MAGIC: [u8; 8] = *b"LTMPART\n";
-/// Bytes before the key: magic, length, checksum.
-const PREAMBLE_BYTES: usize = 16;
-/// Bytes before the content of a record: tile number, length, checksum.
+const MAGIC: [u8; 8] = *b"LTMPART2";
+/// Bytes before the content of a record: number, length, checksum.
 const RECORD_HEAD_BYTES: usize = 12;
-/// Stands for the tile number in the record of the fingerprint.
-const FINGERPRINT: u32 = u32::MAX;
-/// The key names every file of the capture; thousands of shots take far less.
-const MAX_KEY_BYTES: u32 = 64 << 20;
+/// Number of the key's record.
+const KEY: u32 = u32::MAX;
+/// Number of the fingerprint's record.
+const FINGERPRINT: u32 = u32::MAX - 1;
 
-/// The checkpoint of the running recovery. Its file is deleted on drop if it holds no tile, and by
-/// [`delete`](Self::delete).
+/// The checkpoint of the running recovery. Its file is deleted on drop if it holds no tile, or after
+/// [`discard`](Self::discard).
 pub struct Checkpoint {
     path: PathBuf,
     file: File,
-    /// Offset and length of each tile's record content.
-    records: Vec<Option<(u64, u32)>>,
+    /// The range of each tile's content.
+    tiles: Vec<Option<Range<u64>>>,
     /// End of the last complete record.
     end: u64,
     fingerprint: Option<Vec<u8>>,
     delete_on_drop: bool,
-    existed: bool,
+}
+
+/// A record read from the file.
+struct Record {
+    number: u32,
+    content: Vec<u8>,
+    range: Range<u64>,
+    is_intact: bool,
+}
+
+/// Locks a checkpoint that threads share.
+pub fn lock(checkpoint: &Mutex<Checkpoint>) -> MutexGuard<'_, Checkpoint> {
+    checkpoint.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Checkpoint {
     /// Creates the checkpoint of the recovery to `output`, or opens an existing one if `resume` is set.
     pub fn open(output: &Path, key: &RunKey, resume: bool) -> Result<Self> {
-        let mut name = OsString::from(output);
-        name.push(".checkpoint");
-        let path = PathBuf::from(name);
-        let open = || -> Result<Self> {
-            let mut options = OpenOptions::new();
-            let options = options.read(true).write(true).create(true).truncate(false);
-            let file = options
-                .open(&path)
-                .context("cannot be created; does its folder exist, and may you write there?")?;
-            // A file system without locks is no reason to fail.
-            if let Err(TryLockError::WouldBlock) = file.try_lock() {
-                bail!("is in use: another process recovers to the same output; let it finish");
-            }
-            let mut checkpoint = Self {
-                path: path.clone(),
-                file,
-                records: vec![None; key.tiles],
-                end: 0,
-                fingerprint: None,
-                delete_on_drop: false,
-                existed: false,
-            };
-            if !checkpoint.load(key, resume)? {
-                checkpoint.begin(key)?;
-            }
-            Ok(checkpoint)
-        };
-        let checkpoint = open().with_context(|| path.display().to_string())?;
-        checkpoint.announce(resume);
-        Ok(checkpoint)
+        let mut path = OsString::from(output);
+        path.push(".checkpoint");
+        let path = PathBuf::from(path);
+        Self::create_or_load(&path, key, resume).with_context(|| path.display().to_string())
     }
 
-    /// Tells the user what the recovery resumes from.
-    fn announce(&self, resume: bool) {
-        match (self.count(), resume, self.existed) {
-            (0, false, _) => {}
-            (0, true, true) => eprintln!(
-                "note: the checkpoint is damaged or has no tile yet; starting from the beginning"
-            ),
-            (0, true, false) => {
-                eprintln!(
-                    "note: there is no checkpoint to resume from; starting from the beginning"
-                );
-            }
-            (count, ..) => eprintln!("resuming with {count} of {} tiles", self.records.len()),
+    fn create_or_load(path: &Path, key: &RunKey, resume: bool) -> Result<Self> {
+        let mut options = File::options();
+        let options = options.read(true).write(true).create(true).truncate(false);
+        let file = options
+            .open(path)
+            .context("cannot be created; does its folder exist, and may you write there?")?;
+        // A file system without locks is no reason to fail.
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            bail!("is in use: another process recovers to the same output; let it finish");
         }
+        let bytes = file.metadata()?.len();
+        let mut checkpoint = Self {
+            path: path.to_owned(),
+            file,
+            tiles: vec![None; key.tiles],
+            end: 0,
+            fingerprint: None,
+            delete_on_drop: false,
+        };
+        if checkpoint.load(key, resume, bytes)? {
+            eprintln!(
+                "resuming with {} of {} tiles",
+                checkpoint.count(),
+                key.tiles
+            );
+            return Ok(checkpoint);
+        }
+        if resume {
+            let reason = match bytes {
+                0 => "there is no checkpoint to resume from",
+                _ => "the checkpoint is damaged or has no tile yet",
+            };
+            eprintln!("note: {reason}; starting from the beginning");
+        }
+        checkpoint.tiles = vec![None; key.tiles];
+        checkpoint.fingerprint = None;
+        let bytes = [&MAGIC[..], &encode_record(KEY, &serde_json::to_vec(key)?)?].concat();
+        checkpoint.file.set_len(0)?;
+        checkpoint.file.rewind()?;
+        checkpoint.file.write_all(&bytes)?;
+        checkpoint.end = bytes.len() as u64;
+        checkpoint.delete_on_drop = true;
+        Ok(checkpoint)
     }
 
     /// Number of tiles in the checkpoint.
     pub fn count(&self) -> usize {
-        self.records.iter().flatten().count()
+        self.tiles.iter().flatten().count()
     }
 
     /// Whether tile `i` is in the checkpoint.
     pub fn has(&self, i: usize) -> bool {
-        self.records[i].is_some()
+        self.tiles[i].is_some()
     }
 
-    /// Flushes the tiles to disk, and returns a message for a recovery that was interrupted.
-    pub fn sync_after_interruption(&self) -> Result<String> {
-        let (count, tiles, path) = (self.count(), self.records.len(), self.path.display());
-        if count == 0 {
-            return Ok("interrupted before the first tile: nothing is kept".to_owned());
-        }
-        let synced = self.file.sync_data();
-        synced.with_context(|| format!("{path}: cannot be written"))?;
-        Ok(format!(
-            "interrupted: {count} of {tiles} tiles are kept in {path}; to continue, give the same command \
-             with --resume; to discard them, delete that file"
-        ))
+    /// Flushes the tiles to disk, and returns the error of a recovery that was interrupted.
+    pub fn interrupted(&self) -> Error {
+        let (count, tiles, path) = (self.count(), self.tiles.len(), self.path.display());
+        let message = match (count, self.file.sync_data()) {
+            (0, _) => "interrupted before the first tile: nothing is kept".to_owned(),
+            (_, Ok(())) => format!(
+                "interrupted: {count} of {tiles} tiles are kept in {path}; to continue, give the same \
+                 command with --resume; to discard them, delete that file"
+            ),
+            (_, Err(e)) => return Error::new(e).context(format!("{path}: cannot be written")),
+        };
+        Interrupted(message).into()
     }
 
     /// Records the fingerprint of the prepared recovery, or compares it with that of the tiles in the checkpoint, which
@@ -133,65 +147,92 @@ impl Checkpoint {
                  there, or delete it to start from the beginning",
                 self.path.display()
             ),
-            _ => {
-                self.append(FINGERPRINT, &fingerprint)?;
-                self.fingerprint = Some(fingerprint.to_vec());
-                Ok(())
-            }
+            _ => self.append(FINGERPRINT, &fingerprint).map(drop),
         }
     }
 
     /// Appends tile `i` with `content`, encoded by [`tile_record`](super::tile_record).
     pub fn add(&mut self, i: usize, content: &[u8]) -> Result<()> {
-        self.records[i] = Some(self.append(i as u32, content)?);
+        self.tiles[i] = Some(self.append(i as u32, content)?);
         self.delete_on_drop = false;
         Ok(())
     }
 
     /// Reads the content of tile `i`'s record.
     pub fn read(&mut self, i: usize) -> io::Result<Vec<u8>> {
-        let (start, length) = self.records[i].ok_or(ErrorKind::NotFound)?;
-        let mut content = vec![0; length as usize];
-        self.file.seek(SeekFrom::Start(start))?;
+        let range = self.tiles[i].clone().ok_or(ErrorKind::NotFound)?;
+        let mut content = vec![0; (range.end - range.start) as usize];
+        self.file.seek(SeekFrom::Start(range.start))?;
         self.file.read_exact(&mut content)?;
         Ok(content)
     }
 
-    /// Deletes the checkpoint, once the output is written.
-    pub fn delete(mut self) {
+    /// Has the file deleted on drop, once the output is written.
+    pub fn discard(&mut self) {
         self.delete_on_drop = true;
     }
 
-    /// Appends a record; returns the offset and length of its content.
-    fn append(&mut self, number: u32, content: &[u8]) -> Result<(u64, u32)> {
-        let mut append = || -> Result<(u64, u32)> {
-            let mut bytes = Vec::with_capacity(RECORD_HEAD_BYTES + content.len());
-            let length = u32::try_from(content.len()).context("a tile is too large")?;
-            bytes.extend(number.to_le_bytes());
-            bytes.extend(length.to_le_bytes());
-            let crc = crc32c::crc32c_append(crc32c::crc32c(&bytes), content);
-            bytes.extend(crc.to_le_bytes());
-            bytes.extend(content);
-            self.file.seek(SeekFrom::Start(self.end))?;
-            self.file.write_all(&bytes)?;
-            let start = self.end + RECORD_HEAD_BYTES as u64;
-            self.end += bytes.len() as u64;
-            Ok((start, length))
-        };
-        append().with_context(|| format!("{}: cannot be written", self.path.display()))
+    /// Appends a record; returns the range of its content.
+    fn append(&mut self, number: u32, content: &[u8]) -> Result<Range<u64>> {
+        let bytes = encode_record(number, content)?;
+        let start = self.end;
+        let written = self.file.seek(SeekFrom::Start(start));
+        written
+            .and_then(|_| self.file.write_all(&bytes))
+            .with_context(|| format!("{}: cannot be written", self.path.display()))?;
+        self.end += bytes.len() as u64;
+        Ok(start + RECORD_HEAD_BYTES as u64..self.end)
     }
 
-    /// Loads the records of an existing checkpoint. Returns false if it holds no tile.
-    fn load(&mut self, key: &RunKey, resume: bool) -> Result<bool> {
-        let bytes = self.file.metadata()?.len();
-        self.existed = bytes > 0;
-        let Some(recorded) = self.read_key(bytes)? else {
+    /// Loads the records of an existing checkpoint of so many bytes. Returns false if it holds no tile.
+    fn load(&mut self, key: &RunKey, resume: bool, bytes: u64) -> Result<bool> {
+        let mut reader = BufReader::with_capacity(1 << 18, self.file.try_clone()?);
+        let mut magic = Vec::new();
+        reader
+            .by_ref()
+            .take(MAGIC.len() as u64)
+            .read_to_end(&mut magic)?;
+        ensure!(
+            MAGIC.starts_with(&magic),
+            "exists and is not a checkpoint; move it away"
+        );
+        self.end = MAGIC.len() as u64;
+        let Some(first) = self.read_record(&mut reader, bytes)? else {
             return Ok(false);
         };
-        self.records = self.read_records(bytes, recorded.tiles)?;
+        ensure!(
+            first.number == KEY && first.is_intact,
+            "is damaged; delete it to start from the beginning"
+        );
+        let recorded: RunKey = serde_json::from_slice(&first.content).context(
+            "was written by another version of this program; use that version, or delete it to start from \
+             the beginning",
+        )?;
+        self.end = first.range.end;
+        self.tiles = vec![None; recorded.tiles];
+        while let Some(record) = self.read_record(&mut reader, bytes)? {
+            if !record.is_intact {
+                // A crash may leave a last record of the right length without its bytes.
+                if record.range.end < bytes {
+                    eprintln!(
+                        "warning: {} is damaged after {} tiles; the others are recovered again",
+                        self.path.display(),
+                        self.count()
+                    );
+                }
+                break;
+            }
+            self.end = record.range.end;
+            match record.number {
+                FINGERPRINT => self.fingerprint = Some(record.content),
+                tile if (tile as usize) < recorded.tiles => {
+                    self.tiles[tile as usize] = Some(record.range);
+                }
+                _ => break,
+            }
+        }
         let (count, tiles) = (self.count(), recorded.tiles);
         if count == 0 {
-            self.records = vec![None; key.tiles];
             return Ok(false);
         }
         ensure!(
@@ -210,90 +251,40 @@ impl Checkpoint {
         Ok(true)
     }
 
-    /// Reads the key; `None` if the file ends before its end.
-    fn read_key(&mut self, bytes: u64) -> Result<Option<RunKey>> {
-        let mut preamble = [0; PREAMBLE_BYTES];
-        let present = bytes.min(PREAMBLE_BYTES as u64) as usize;
-        self.file.read_exact(&mut preamble[..present])?;
-        let magic = present.min(MAGIC.len());
-        if preamble[..magic] != MAGIC[..magic] {
-            bail!("exists and is not a checkpoint; move it away");
-        }
-        let [length, crc] = [8, 12].map(|at| u32_at(&preamble, at));
-        self.end = PREAMBLE_BYTES as u64 + u64::from(length);
-        if present < PREAMBLE_BYTES || (length <= MAX_KEY_BYTES && bytes < self.end) {
+    /// Reads the record after the last complete one; `None` if the file of so many bytes ends before its end.
+    fn read_record(&self, reader: &mut impl Read, bytes: u64) -> io::Result<Option<Record>> {
+        let start = self.end + RECORD_HEAD_BYTES as u64;
+        if bytes < start {
             return Ok(None);
         }
-        let mut json = vec![0; length.min(MAX_KEY_BYTES) as usize];
-        self.file.read_exact(&mut json)?;
-        ensure!(
-            length <= MAX_KEY_BYTES && crc32c::crc32c(&json) == crc,
-            "is damaged; delete it to start from the beginning"
-        );
-        let key = serde_json::from_slice(&json).context(
-            "was written by another version of this program; use that version, or delete it to start from \
-             the beginning",
-        )?;
-        Ok(Some(key))
-    }
-
-    /// Reads all complete records, from the end of the key.
-    fn read_records(&mut self, bytes: u64, tiles: usize) -> Result<Vec<Option<(u64, u32)>>> {
-        let mut records = vec![None; tiles];
-        let mut reader = BufReader::with_capacity(1 << 18, &self.file);
-        loop {
-            let mut head = [0; RECORD_HEAD_BYTES];
-            if bytes.saturating_sub(self.end) < RECORD_HEAD_BYTES as u64 {
-                break;
-            }
-            reader.read_exact(&mut head)?;
-            let [number, length, crc] = [0, 4, 8].map(|at| u32_at(&head, at));
-            let start = self.end + RECORD_HEAD_BYTES as u64;
-            if bytes - start < u64::from(length) {
-                break;
-            }
-            let mut content = vec![0; length as usize];
-            reader.read_exact(&mut content)?;
-            let end = start + u64::from(length);
-            if crc32c::crc32c_append(crc32c::crc32c(&head[..8]), &content) != crc {
-                // A crash may leave a last record of the right length without its bytes.
-                if end < bytes {
-                    eprintln!(
-                        "warning: {} is damaged after {} tiles; the others are recovered again",
-                        self.path.display(),
-                        records.iter().flatten().count()
-                    );
-                }
-                break;
-            }
-            match number {
-                FINGERPRINT => self.fingerprint = Some(content),
-                tile if (tile as usize) < tiles => records[tile as usize] = Some((start, length)),
-                _ => break,
-            }
-            self.end = end;
+        let mut head = [0; RECORD_HEAD_BYTES];
+        reader.read_exact(&mut head)?;
+        let (words, _) = head.as_chunks();
+        let [number, length, crc] = [0, 1, 2].map(|i| u32::from_le_bytes(words[i]));
+        let end = start + u64::from(length);
+        if bytes < end {
+            return Ok(None);
         }
-        Ok(records)
+        let mut content = vec![0; length as usize];
+        reader.read_exact(&mut content)?;
+        let computed_crc = crc32c::crc32c_append(crc32c::crc32c(&head[..8]), &content);
+        Ok(Some(Record {
+            number,
+            content,
+            range: start..end,
+            is_intact: computed_crc == crc,
+        }))
     }
+}
 
-    /// Writes the key of a new checkpoint.
-    fn begin(&mut self, key: &RunKey) -> Result<()> {
-        let json = serde_json::to_vec(key)?;
-        let length = u32::try_from(json.len()).ok();
-        let length = length.filter(|length| *length <= MAX_KEY_BYTES);
-        let length = length.context("the capture has too many files")?;
-        self.fingerprint = None;
-        self.file.set_len(0)?;
-        self.file.rewind()?;
-        let mut bytes = MAGIC.to_vec();
-        bytes.extend(length.to_le_bytes());
-        bytes.extend(crc32c::crc32c(&json).to_le_bytes());
-        bytes.extend(json);
-        self.file.write_all(&bytes)?;
-        self.end = bytes.len() as u64;
-        self.delete_on_drop = true;
-        Ok(())
-    }
+/// The bytes of a record.
+fn encode_record(number: u32, content: &[u8]) -> Result<Vec<u8>> {
+    let length = u32::try_from(content.len()).context("a record is too large")?;
+    let mut bytes = [number, length].map(u32::to_le_bytes).concat();
+    let crc = crc32c::crc32c_append(crc32c::crc32c(&bytes), content);
+    bytes.extend(crc.to_le_bytes());
+    bytes.extend(content);
+    Ok(bytes)
 }
 
 impl Drop for Checkpoint {
@@ -303,9 +294,4 @@ impl Drop for Checkpoint {
             let _ = std::fs::remove_file(&self.path);
         }
     }
-}
-
-/// The little-endian number at offset `at`.
-fn u32_at(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }

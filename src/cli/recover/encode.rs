@@ -2,32 +2,31 @@
 
 use std::io::{self, ErrorKind};
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 use super::args::QualityArgs;
-use super::checkpoint::Checkpoint;
+use super::checkpoint::{Checkpoint, lock};
 use super::memory_plan::FILE_TILE_SIDE;
 use super::tile_record;
-use crate::cli::process::Interrupt;
+use crate::cli::process::InterruptibleCores;
+use crate::executor::Executor;
 use crate::format::{DistortionMetric, EncodedFile, FormatError, Metadata, Source};
 use crate::recover::{HoldoutValidation, Recovery};
 use crate::transport::{BandTile, Basis, Decibels, Geometry, RecoveredTile, TransportFunctions};
 
-/// Distortion metric: the loss of SNR on held-out patterns.
-struct HoldoutMetric<'a>(&'a HoldoutValidation);
-
-impl DistortionMetric for HoldoutMetric<'_> {
+/// The loss of SNR on held-out patterns.
+impl DistortionMetric for HoldoutValidation {
     fn tiles(&self) -> Vec<BandTile> {
         let to_band_tile = |recovered: &RecoveredTile| {
             let mut tile = BandTile::dark(recovered.rect());
             tile.insert(recovered.clone());
             tile
         };
-        self.0.tiles().map(to_band_tile).collect()
+        self.tiles().map(to_band_tile).collect()
     }
 
     fn loss(&self, functions: &[TransportFunctions]) -> Decibels {
-        self.0.loss(functions)
+        self.loss(functions)
     }
 }
 
@@ -38,7 +37,7 @@ pub fn encode_file(
     checkpoint: &Mutex<Checkpoint>,
     recovery: &Recovery,
     metadata: Metadata,
-    interrupt: &Interrupt,
+    cores: &InterruptibleCores,
 ) -> Result<EncodedFile, FormatError> {
     let (recovered, basis) = (recovery.geometry(), recovery.basis());
     let geometry = Geometry {
@@ -47,7 +46,7 @@ pub fn encode_file(
     };
     let (rank, area) = (basis.map_or(0, Basis::rank), recovered.window.area());
     let tile = |i: usize| -> io::Result<BandTile> {
-        if interrupt.is_requested() {
+        if cores.is_cancelled() {
             return Err(ErrorKind::Interrupted.into());
         }
         let rect = geometry.tile(i);
@@ -56,8 +55,7 @@ pub fn encode_file(
         let rows = tile_indices(rect.y, rect.extent.height, recovered.tile_side);
         for (x, y) in columns.flat_map(|x| rows.clone().map(move |y| (x, y))) {
             let i = (y * recovered.tile_grid().width + x) as usize;
-            let checkpoint = checkpoint.lock();
-            let record = checkpoint.unwrap_or_else(PoisonError::into_inner).read(i)?;
+            let record = lock(checkpoint).read(i)?;
             tile.insert(tile_record::decode(recovered.tile(i), rank, area, &record)?);
         }
         Ok(tile)
@@ -69,16 +67,9 @@ pub fn encode_file(
         metadata,
         extensions: Vec::new(),
     };
-    let metric = recovery.holdout_validation().map(HoldoutMetric);
-    EncodedFile::new(
-        source,
-        args.quality(
-            metric
-                .as_ref()
-                .map(|metric| metric as &dyn DistortionMetric),
-        ),
-        &interrupt.cores(),
-    )
+    let metric = recovery.holdout_validation();
+    let metric = metric.map(|validation| validation as &dyn DistortionMetric);
+    EncodedFile::new(source, args.quality(metric), cores)
 }
 
 /// Columns or rows of the recovered tiles that cover `length` pixels from `start`.

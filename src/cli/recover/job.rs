@@ -1,30 +1,31 @@
 //! One recovery: from the photographs to the file.
 
 use std::io::ErrorKind;
-use std::sync::PoisonError;
+use std::sync::Mutex;
+use std::time::Instant;
 
 use anyhow::{Context, Error, Result, bail};
+use rayon::prelude::*;
 
 use super::args::{RecoverArgs, WindowChoice};
-use super::checkpoint::Checkpoint;
+use super::checkpoint::{Checkpoint, lock};
 use super::encode::encode_file;
 use super::memory_plan::MemoryPlan;
 use super::report::RecoverReport;
 use super::run_key::{PROGRAM, RunKey, recovery_fingerprint};
-use super::shots;
-use super::tiles::{self, TileRecovery};
-use crate::capture::{
-    CaptureFolder, DarkFrame, Measurements, NoiseModel, RowSet, group_count, group_ids,
-};
-use crate::cli::output_file::{OutputFile, OutputFormat};
-use crate::cli::process::Interrupt;
+use super::{shots, tile_record};
+use crate::capture::{CaptureFolder, DarkFrame, Measurements, NoiseModel, group_count, group_ids};
+use crate::cli::output_file::{LTM, OutputFile};
+use crate::cli::process::{InterruptibleCores, peak_rss_bytes};
 use crate::cli::progress;
 use crate::cli::shot_reader::{ShotReader, read_patterns};
+use crate::executor::{Cancelled, Executor};
 use crate::format::{CaptureNote, EncodedFile, FormatError, Metadata};
 use crate::recover::{
-    BandwidthEstimate, HoldoutValidation, RecoverError, Recovery, Settings, WindowEstimate,
+    BandwidthEstimate, HoldoutValidation, MIN_PATTERNS, RecoverError, Recovery, Settings,
+    WindowEstimate,
 };
-use crate::transport::{Basis, Decibels};
+use crate::transport::{Basis, Decibels, Window};
 
 /// SNR on held-out patterns below which the photographs are probably at fault.
 const MIN_PLAUSIBLE_SNR: Decibels = Decibels(13.0);
@@ -35,78 +36,78 @@ const UNITS: &str =
 
 /// A recovery with its arguments and inputs.
 pub struct RecoverJob<'a> {
+    pub start: Instant,
     pub args: &'a RecoverArgs,
     pub folder: &'a CaptureFolder,
     /// Indices of the shots to recover from.
     pub shots: &'a [usize],
     pub plan: &'a MemoryPlan,
-    pub interrupt: &'a Interrupt,
-}
-
-/// The window, and how it was found.
-struct ChosenWindow {
-    settings: Settings,
-    /// Estimated share of light from outside the window.
-    tail_fraction: Option<f64>,
+    pub cores: &'a InterruptibleCores,
 }
 
 impl RecoverJob<'_> {
-    /// Recovers all tiles and writes the file. Leaves time and memory of the report to the caller.
+    /// Recovers all tiles and writes the file.
     pub fn run(&self) -> Result<RecoverReport> {
         let dark = self.folder.read_dark()?;
         self.folder.open_flood(&dark)?; // `evaluate` needs it: fail early if it is missing
-        let gray_code_rows = self
-            .plan
-            .gray_code_rows(self.folder.manifest().graycode.len());
+        let gray_code_shots = self.folder.manifest().graycode.len();
+        let gray_code_rows = self.plan.gray_code_rows(gray_code_shots);
         let mut measurements = read_patterns(self.folder, &dark, self.shots, &gray_code_rows)?;
         let reader = ShotReader::open(self.folder, &dark, self.shots)?;
-        let key = RunKey::new(
-            self.args,
-            self.folder,
-            self.shots,
-            self.plan,
-            self.interrupt,
-        )?;
+        let key = RunKey::new(self.args, self.folder, self.shots, self.plan, self.cores)?;
         // Before the long work, so that a checkpoint that does not match fails early.
-        let mut checkpoint = Checkpoint::open(&self.args.output, &key, self.args.resume)?;
-        let saturated = self.load_sample(&mut measurements, reader, &checkpoint)?;
-        let window = self.choose_window(&measurements, &checkpoint)?;
-        let recovery = self.prepare(&measurements, window.settings, &checkpoint)?;
+        let checkpoint = Checkpoint::open(&self.args.output, &key, self.args.resume)?;
+        let checkpoint = Mutex::new(checkpoint);
+        let saturated = self.load_sample(&mut measurements, reader);
+        let report = saturated.and_then(|n| self.recover(measurements, dark, n, &checkpoint));
+        match &report {
+            Ok(_) => lock(&checkpoint).discard(),
+            Err(error) if error.is::<Cancelled>() => return Err(lock(&checkpoint).interrupted()),
+            Err(_) => {}
+        }
+        report
+    }
+
+    /// Recovers into the checkpoint and writes the file. An interruption is reported as [`Cancelled`].
+    fn recover(
+        &self,
+        measurements: Measurements,
+        dark: DarkFrame,
+        saturated: usize,
+        checkpoint: &Mutex<Checkpoint>,
+    ) -> Result<RecoverReport> {
+        let (window, tail_fraction) = self.choose_window(&measurements)?;
+        let method = self.args.method();
+        let recovery = self.prepare(&measurements, Settings { method, window })?;
         let rank = recovery.basis().map(Basis::rank);
-        let encoders = self
-            .plan
-            .tiles_encoded_at_once(window.settings.window, rank.unwrap_or(0))?;
-        checkpoint.set_fingerprint(recovery_fingerprint(&recovery))?;
-        let tiles = TileRecovery::new(self.interrupt, &recovery, checkpoint);
+        let encoders = self.plan.tiles_encoded_at_once(window, rank.unwrap_or(0))?;
+        lock(checkpoint).set_fingerprint(recovery_fingerprint(&recovery))?;
         let noise = measurements.noise;
-        let strips = self.plan.strips(recovery.halo());
         let overexposed =
-            self.recover_strips(measurements, &dark, &tiles, &strips, saturated > 0)?;
-        drop(dark);
-        let patterns = self.count_patterns();
-        let metadata = self.metadata(window.settings, patterns);
-        let file = thread_pool(encoders)?.install(|| self.encode(&tiles, &recovery, metadata))?;
-        let output = OutputFile::create(&self.args.output, OutputFormat::Ltm)?;
+            self.recover_tiles(measurements, dark, &recovery, checkpoint, saturated > 0)?;
+        let listed = &self.folder.manifest().shots;
+        let patterns = self.shots.iter().map(|&i| &listed[i].pattern);
+        let patterns = group_count(&group_ids(patterns));
+        let file = thread_pool(encoders)?
+            .install(|| self.encode(checkpoint, &recovery, self.metadata(patterns)))?;
+        let output = OutputFile::create(&self.args.output, &LTM)?;
         let file_bytes = output.finish(|out| Ok(file.write(out)?))?;
-        let checkpoint = tiles.checkpoint.into_inner();
-        checkpoint.unwrap_or_else(PoisonError::into_inner).delete();
+        let validation = recovery.holdout_validation();
         Ok(RecoverReport {
-            seconds: 0.0,
-            peak_rss_bytes: None,
-            method: window.settings.method,
-            basis: window.settings.method.basis(),
-            window: window.settings.window.side(),
-            leak: window.tail_fraction,
+            seconds: self.start.elapsed().as_secs_f64(),
+            peak_rss_bytes: peak_rss_bytes(),
+            method,
+            basis: method.basis(),
+            window: window.side(),
+            leak: tail_fraction,
             rank,
             patterns,
             photographs: self.shots.len(),
-            expected_snr_db: recovery
-                .holdout_validation()
-                .and_then(HoldoutValidation::snr),
+            expected_snr_db: validation.and_then(HoldoutValidation::snr),
             file_snr_db: file.snr(),
             common_mode: recovery.common_mode(),
             noise,
-            strips: strips.len(),
+            strips: self.plan.strips(recovery.halo()).len(),
             saturated_samples: saturated,
             overexposed_pixels: overexposed,
             file_bytes,
@@ -119,75 +120,49 @@ impl RecoverJob<'_> {
         &self,
         measurements: &mut Measurements,
         mut reader: ShotReader,
-        checkpoint: &Checkpoint,
     ) -> Result<usize> {
         let bar = progress::bar("reading", self.shots.len());
-        let loaded = reader.load_rows(measurements, &self.plan.sample_rows(), || {
+        reader.load_rows(measurements, &self.plan.sample_rows(), || {
             bar.inc(1);
-            !self.interrupt.is_requested()
+            Ok(self.cores.check_cancelled()?)
         })?;
-        bar.finish_and_clear();
-        if !loaded {
-            return Err(tiles::interrupted(checkpoint));
-        }
+        drop(bar);
         let saturated = reader.finish()?;
         measurements.noise = NoiseModel::with_gain_from(measurements);
         shots::warn_of_saturation(saturated, measurements);
         Ok(saturated)
     }
 
-    /// The window given, or the estimated one.
-    fn choose_window(
-        &self,
-        measurements: &Measurements,
-        checkpoint: &Checkpoint,
-    ) -> Result<ChosenWindow> {
-        let (window, tail_fraction) = match self.args.window {
-            WindowChoice::Fixed(window) => (window, None),
-            WindowChoice::Auto => {
-                let estimate =
-                    WindowEstimate::from_measurements(measurements, &self.interrupt.cores());
-                let WindowEstimate { window, bandwidth } =
-                    estimate.map_err(|error| self.recover_error(error, checkpoint))?;
-                let side = window.side();
-                match bandwidth {
-                    BandwidthEstimate::Bounded { tail_fraction } => (window, Some(tail_fraction)),
-                    BandwidthEstimate::Unbounded => {
-                        eprintln!(
-                            "warning: the band is at least as wide as the largest window tried, \
-                             {side}x{side} light elements; a larger one can be given by --window"
-                        );
-                        (window, None)
-                    }
-                    BandwidthEstimate::Undetermined => {
-                        eprintln!(
-                            "warning: the photographs do not show how wide the band is; a window of \
-                             {side}x{side} light elements is used, another can be given by --window"
-                        );
-                        (window, None)
-                    }
-                }
+    /// The window given or estimated; if estimated, with the share of light from outside the window.
+    fn choose_window(&self, measurements: &Measurements) -> Result<(Window, Option<f64>)> {
+        if let WindowChoice::Fixed(window) = self.args.window {
+            return Ok((window, None));
+        }
+        let estimate = WindowEstimate::from_measurements(measurements, self.cores);
+        let WindowEstimate { window, bandwidth } = estimate.map_err(|e| self.recover_error(e))?;
+        let side = window.side();
+        match bandwidth {
+            BandwidthEstimate::Bounded { tail_fraction } => {
+                return Ok((window, Some(tail_fraction)));
             }
-        };
-        let method = self.args.method();
-        let settings = Settings { method, window };
-        Ok(ChosenWindow {
-            settings,
-            tail_fraction,
-        })
+            BandwidthEstimate::Unbounded => eprintln!(
+                "warning: the band is at least as wide as the largest window tried, {side}x{side} light \
+                 elements; a larger one can be given by --window"
+            ),
+            BandwidthEstimate::Undetermined => eprintln!(
+                "warning: the photographs do not show how wide the band is; a window of {side}x{side} \
+                 light elements is used, another can be given by --window"
+            ),
+        }
+        Ok((window, None))
     }
 
     /// Learns or chooses what the method needs. Refuses photographs without a signal.
-    fn prepare(
-        &self,
-        measurements: &Measurements,
-        settings: Settings,
-        checkpoint: &Checkpoint,
-    ) -> Result<Recovery> {
+    fn prepare(&self, measurements: &Measurements, settings: Settings) -> Result<Recovery> {
         let spinner = progress::spinner("learning");
-        let recovery = Recovery::prepare(measurements, settings, &self.interrupt.cores());
-        spinner.finish_and_clear();
-        let recovery = recovery.map_err(|error| self.recover_error(error, checkpoint))?;
+        let recovery = Recovery::prepare(measurements, settings, self.cores);
+        drop(spinner);
+        let recovery = recovery.map_err(|error| self.recover_error(error))?;
         let Some(validation) = recovery.holdout_validation() else {
             return Ok(recovery);
         };
@@ -208,31 +183,52 @@ impl RecoverJob<'_> {
         Ok(recovery)
     }
 
-    /// Recovers all tiles, strip by strip. Returns the number of overexposed pixels.
-    fn recover_strips(
+    /// Recovers the tiles that the checkpoint lacks, strip by strip. Returns the number of overexposed pixels, which is
+    /// zero without `has_saturation`.
+    fn recover_tiles(
         &self,
         mut measurements: Measurements,
-        dark: &DarkFrame,
-        tiles: &TileRecovery,
-        strips: &[(std::ops::Range<u32>, RowSet)],
+        dark: DarkFrame,
+        recovery: &Recovery,
+        checkpoint: &Mutex<Checkpoint>,
         has_saturation: bool,
     ) -> Result<usize> {
+        let geometry = recovery.geometry();
+        let grid = geometry.tile_grid();
+        let bar = progress::bar("recovering", grid.area());
+        bar.set_position(lock(checkpoint).count() as u64);
+        bar.reset_eta(); // these tiles took no time
         let mut reader = None;
         if !self.plan.fits_photographs() {
-            reader = Some(ShotReader::open(self.folder, dark, self.shots)?);
+            reader = Some(ShotReader::open(self.folder, &dark, self.shots)?);
             measurements.clear_rows();
         }
-        let may_continue = || !self.interrupt.is_requested();
         let mut overexposed = 0;
-        for (tile_rows, rows) in strips {
-            if let Some(reader) = &mut reader
-                && !reader.load_rows(&mut measurements, rows, may_continue)?
-            {
-                return Err(tiles.interrupted());
+        for (tile_rows, rows) in self.plan.strips(recovery.halo()) {
+            if let Some(reader) = &mut reader {
+                let check = || Ok(self.cores.check_cancelled()?);
+                reader.load_rows(&mut measurements, &rows, check)?;
             }
-            overexposed += tiles.recover_rows(&measurements, tile_rows.clone(), has_saturation)?;
+            let recover_tile = |i: u32| -> Result<usize> {
+                let (i, rect) = (i as usize, geometry.tile(i as usize));
+                if !lock(checkpoint).has(i) {
+                    self.cores.check_cancelled()?;
+                    let tile = recovery.tile(&measurements, rect);
+                    let record =
+                        tile_record::encode(&tile).context("a tile cannot be compressed")?;
+                    lock(checkpoint).add(i, &record)?;
+                    bar.inc(1);
+                }
+                Ok(match has_saturation {
+                    true => measurements.count_overexposed_pixels(rect, MIN_PATTERNS),
+                    false => 0,
+                })
+            };
+            let tiles = tile_rows.start * grid.width..tile_rows.end * grid.width;
+            let counts = tiles.into_par_iter().map(recover_tile);
+            overexposed += counts.try_reduce(|| 0, |a, b| Ok(a + b))?;
         }
-        tiles.finish();
+        drop(bar);
         if overexposed > 0 {
             eprintln!(
                 "warning: {overexposed} pixels are saturated in nearly all photographs and will be white \
@@ -245,18 +241,22 @@ impl RecoverJob<'_> {
     /// Encodes the recovered tiles.
     fn encode(
         &self,
-        tiles: &TileRecovery,
+        checkpoint: &Mutex<Checkpoint>,
         recovery: &Recovery,
         metadata: Metadata,
     ) -> Result<EncodedFile> {
-        let spinner = progress::spinner("compressing");
-        let (quality, checkpoint) = (&self.args.quality, &tiles.checkpoint);
-        let file = encode_file(quality, checkpoint, recovery, metadata, self.interrupt);
-        spinner.finish_and_clear();
+        let _spinner = progress::spinner("compressing");
+        let file = encode_file(
+            &self.args.quality,
+            checkpoint,
+            recovery,
+            metadata,
+            self.cores,
+        );
         file.map_err(|error| {
             let output = self.args.output.display();
             match error {
-                FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => tiles.interrupted(),
+                FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
                 FormatError::TooLarge { .. } => Error::new(error).context(format!(
                     "{output}: cannot be written; the recovered tiles are kept: give the same command \
                      with --resume and a larger --max-bytes, or without --max-bytes"
@@ -266,7 +266,7 @@ impl RecoverJob<'_> {
         })
     }
 
-    fn metadata(&self, settings: Settings, patterns: usize) -> Metadata {
+    fn metadata(&self, patterns: usize) -> Metadata {
         let manifest = self.folder.manifest();
         Metadata {
             title: manifest.title.clone(),
@@ -277,23 +277,16 @@ impl RecoverJob<'_> {
                 photographs: self.shots.len(),
             },
             writer: PROGRAM.to_owned(),
-            method: settings.method.name().to_owned(),
+            method: self.args.method().name().to_owned(),
             units: UNITS.to_owned(),
             shots_used: self.shots.to_vec(),
         }
     }
 
-    /// Number of different patterns among the shots.
-    fn count_patterns(&self) -> usize {
-        let shots = &self.folder.manifest().shots;
-        let patterns = self.shots.iter().map(|&i| &shots[i].pattern);
-        group_count(&group_ids(patterns))
-    }
-
     /// Names the capture, or the shots, that an error of the recovery is about.
-    fn recover_error(&self, error: RecoverError, checkpoint: &Checkpoint) -> Error {
+    fn recover_error(&self, error: RecoverError) -> Error {
         match error {
-            RecoverError::Cancelled(_) => tiles::interrupted(checkpoint),
+            RecoverError::Cancelled(cancelled) => cancelled.into(),
             RecoverError::MismatchedPatterns { pattern_indices } => {
                 let shots = pattern_indices.iter().map(|&l| self.shots[l]);
                 shots::mismatched_shots(self.folder, shots)

@@ -11,11 +11,15 @@ use anyhow::{Result, ensure};
 use crate::capture::{Manifest, RowSet};
 use crate::cli::arguments::ByteCount;
 use crate::recover::Method;
-use crate::transport::{CHANNELS, Geometry, Window};
+use crate::transport::{CHANNELS, Extent, Geometry, Window};
 
 /// Camera pixels along a side of a tile in the file. Larger tiles than those of the recovery compress better; these are
 /// still small enough to load only the visible ones.
 pub const FILE_TILE_SIDE: u32 = 128;
+/// Camera pixels along a side of a recovered tile.
+const TILE_SIDE: u32 = Geometry::DEFAULT_TILE_SIDE;
+/// All channels of one camera pixel or light element.
+const PIXEL_BYTES: u64 = (CHANNELS * size_of::<f32>()) as u64;
 /// The program itself, its buffers, and what the allocator retains.
 const PROGRAM_BYTES: u64 = 32 << 20;
 /// Reading one photograph, beside its rows: a buffer and the decompressor's window.
@@ -35,9 +39,7 @@ pub struct MemoryPlan {
     photograph_bytes: u64,
     /// Bytes of one camera row of all photographs.
     row_bytes: u64,
-    height: u32,
-    width: u32,
-    tile_side: u32,
+    camera: Extent,
     /// Number of tiles recovered at once.
     pub tiles_at_once: usize,
     threads: usize,
@@ -57,39 +59,35 @@ impl MemoryPlan {
         threads: usize,
     ) -> Result<Self> {
         let (camera, light) = (manifest.camera.extent(), manifest.light.extent());
-        let tile_side = Geometry::DEFAULT_TILE_SIDE;
-        let pixel = (CHANNELS * size_of::<f32>()) as u64;
         let photographs = shots as u64;
         let width = u64::from(camera.width);
         let fixed_bytes = PROGRAM_BYTES
             + method.preparation_bytes(window) as u64
-            + pixel * camera.area() as u64 // the dark frame
-            + pixel * (shots * light.area()) as u64 // patterns, of any colour
+            + PIXEL_BYTES * camera.area() as u64 // the dark frame
+            + PIXEL_BYTES * (shots * light.area()) as u64 // patterns, of any colour
             + photographs * (READER_BYTES + 4 * 2 * CHANNELS as u64 * width);
         // The functions of a tile as real numbers, as codes, and as byte planes to compress.
-        let element = pixel + 8 + 2 * CHANNELS as u64;
+        let element = PIXEL_BYTES + 8 + 2 * CHANNELS as u64;
         let tile = COMPRESSOR_BYTES
             + method.tile_bytes(window, shots) as u64
-            + element * u64::from(tile_side * tile_side) * window.area() as u64;
+            + element * u64::from(TILE_SIDE * TILE_SIDE) * window.area() as u64;
         let mut plan = Self {
             photograph_bytes: 0,
-            row_bytes: photographs * pixel * width,
-            height: camera.height,
-            width: camera.width,
-            tile_side,
+            row_bytes: photographs * PIXEL_BYTES * width,
+            camera,
             tiles_at_once: 0,
             threads,
             limit,
             fixed_bytes,
         };
-        let rows =
-            plan.row_bytes * u64::from((tile_side + 2 * method.max_halo()).min(camera.height));
-        plan.ensure_limit(fixed_bytes + tile + rows)?;
+        let min_rows = (TILE_SIDE + 2 * method.max_halo()).min(camera.height);
+        let min_bytes = plan.row_bytes * u64::from(min_rows);
+        plan.ensure_limit(fixed_bytes + tile + min_bytes)?;
         let free = limit.0 - fixed_bytes;
-        let all = plan.row_bytes * u64::from(plan.height);
+        let all = plan.row_bytes * u64::from(camera.height);
         plan.photograph_bytes = match all <= free - tile {
             true => all,
-            false => (free / 2).clamp(rows, free - tile),
+            false => (free / 2).clamp(min_bytes, free - tile),
         };
         plan.tiles_at_once = threads.min(((free - plan.photograph_bytes) / tile) as usize);
         Ok(plan)
@@ -98,7 +96,7 @@ impl MemoryPlan {
     /// Number of tiles of the file encoded at once, after the photographs are unloaded, for `rank` components and
     /// functions of `window`. The encoded file is not included. Fails if the limit is too low for one tile.
     pub fn tiles_encoded_at_once(&self, window: Window, rank: usize) -> Result<usize> {
-        let pixels = u64::from(self.width) * u64::from(self.height);
+        let pixels = self.camera.area() as u64;
         let value = ENCODED_VALUE_BYTES * (window.area() + rank) as u64;
         let tile = value * pixels.min(u64::from(FILE_TILE_SIDE).pow(2));
         let fixed = PROGRAM_BYTES + RATE_CONTROL_BYTES.min(value * pixels);
@@ -118,13 +116,16 @@ impl MemoryPlan {
 
     /// Number of tiles.
     pub fn tiles(&self) -> usize {
-        let along = |side: u32| side.div_ceil(self.tile_side) as usize;
-        along(self.width) * along(self.height)
+        (self.tile_rows() * self.camera.width.div_ceil(TILE_SIDE)) as usize
+    }
+
+    fn tile_rows(&self) -> u32 {
+        self.camera.height.div_ceil(TILE_SIDE)
     }
 
     /// Whether all photographs fit in memory whole.
     pub fn fits_photographs(&self) -> bool {
-        self.max_rows() >= self.height
+        self.max_rows() >= self.camera.height
     }
 
     fn max_rows(&self) -> u32 {
@@ -135,10 +136,10 @@ impl MemoryPlan {
     /// picture.
     pub fn sample_rows(&self) -> RowSet {
         if self.fits_photographs() {
-            return RowSet::all(self.height);
+            return RowSet::all(self.camera.height);
         }
-        let tile_rows = self.height.div_ceil(self.tile_side);
-        let count = (self.max_rows() / self.tile_side).clamp(1, tile_rows);
+        let tile_rows = self.tile_rows();
+        let count = (self.max_rows() / TILE_SIDE).clamp(1, tile_rows);
         // The middles of `count` equal parts.
         let middle = |i: u32| ((2 * i + 1) * tile_rows) / (2 * count);
         RowSet::from_strips((0..count).map(|i| self.pixel_rows(middle(i)..middle(i) + 1, 0)))
@@ -147,38 +148,38 @@ impl MemoryPlan {
     /// Strips of tile rows from the top down, each with the camera rows to load for it: its own and `halo` more on
     /// either side.
     pub fn strips(&self, halo: u32) -> Vec<(Range<u32>, RowSet)> {
-        let tile_rows = self.height.div_ceil(self.tile_side);
+        let tile_rows = self.tile_rows();
         if self.fits_photographs() {
-            return vec![(0..tile_rows, RowSet::all(self.height))];
+            return vec![(0..tile_rows, RowSet::all(self.camera.height))];
         }
-        let count = self.max_rows().saturating_sub(2 * halo) / self.tile_side;
-        let strips = (0..tile_rows).step_by(count.max(1) as usize).map(|first| {
-            let strip = first..(first + count.max(1)).min(tile_rows);
+        let count = (self.max_rows().saturating_sub(2 * halo) / TILE_SIDE).max(1);
+        let strip = |first: u32| {
+            let strip = first..(first + count).min(tile_rows);
             let rows = self.pixel_rows(strip.clone(), halo);
             (strip, RowSet::from_strips([rows]))
-        });
-        strips.collect()
+        };
+        (0..tile_rows).step_by(count as usize).map(strip).collect()
     }
 
     /// Whether so many Gray code photographs fit in memory whole.
     pub fn fits_gray_code(&self, photographs: usize) -> bool {
-        self.gray_code_rows(photographs).count() == self.height as usize
+        self.gray_code_rows(photographs).count() == self.camera.height as usize
     }
 
     /// The camera rows to decode of so many Gray code photographs: all if they fit, otherwise rows spread evenly over
     /// the picture.
     pub fn gray_code_rows(&self, photographs: usize) -> RowSet {
         // The samples of a pixel and its decoded position.
-        let pixel = photographs as u64 * (CHANNELS * size_of::<f32>()) as u64 + 64;
-        let max_rows = (self.limit.0 - self.fixed_bytes) / (pixel * u64::from(self.width));
-        let interval = u64::from(self.height).div_ceil(max_rows.max(1));
-        let rows = (0..self.height).step_by(interval as usize);
+        let pixel = photographs as u64 * PIXEL_BYTES + 64;
+        let max_rows = (self.limit.0 - self.fixed_bytes) / (pixel * u64::from(self.camera.width));
+        let interval = u64::from(self.camera.height).div_ceil(max_rows.max(1));
+        let rows = (0..self.camera.height).step_by(interval as usize);
         RowSet::from_strips(rows.map(|y| y..y + 1))
     }
 
     fn pixel_rows(&self, tile_rows: Range<u32>, halo: u32) -> Range<u32> {
-        let start = (tile_rows.start * self.tile_side).saturating_sub(halo);
-        start..(tile_rows.end * self.tile_side + halo).min(self.height)
+        let start = (tile_rows.start * TILE_SIDE).saturating_sub(halo);
+        start..(tile_rows.end * TILE_SIDE + halo).min(self.camera.height)
     }
 }
 
@@ -193,15 +194,8 @@ mod tests {
                 "shots": [{"pattern": "a.png", "photo": "b.png"}]}"#,
             std::path::Path::new("capture.json"),
         );
-        let window = Window::new(9).unwrap();
-        MemoryPlan::new(
-            ByteCount(megabytes << 20),
-            &manifest.unwrap(),
-            80,
-            Method::Nnls,
-            window,
-            threads,
-        )
+        let (limit, window) = (ByteCount(megabytes << 20), Window::new(9).unwrap());
+        MemoryPlan::new(limit, &manifest.unwrap(), 80, Method::Nnls, window, threads)
     }
 
     #[test]
@@ -235,7 +229,7 @@ mod tests {
         for photographs in [12, 44, 2000] {
             let plan = plan(4000, 2).unwrap();
             let rows = plan.gray_code_rows(photographs).count() as u64;
-            let bytes = rows * 500 * photographs as u64 * (CHANNELS * size_of::<f32>()) as u64;
+            let bytes = rows * 500 * photographs as u64 * PIXEL_BYTES;
             assert!(bytes < 4000 << 20);
             assert!(rows == 300 || photographs == 2000);
         }

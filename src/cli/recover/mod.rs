@@ -12,7 +12,6 @@ mod report;
 mod run_key;
 mod shots;
 mod tile_record;
-mod tiles;
 
 use std::time::Instant;
 
@@ -24,8 +23,8 @@ use self::args::WindowChoice;
 use self::job::{RecoverJob, thread_pool};
 use self::memory_plan::MemoryPlan;
 use super::arguments::UsageError;
-use super::output_file::{OutputFile, OutputFormat};
-use super::process::{Interrupt, peak_rss_bytes};
+use super::output_file::{LTM, OutputFile};
+use super::process::InterruptibleCores;
 use super::report::print_json;
 use crate::capture::CaptureFolder;
 use crate::recover::{MIN_PATTERNS, RecoverError};
@@ -36,9 +35,9 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     if args.has_unused_basis() {
         bail!(UsageError("--basis is for --method bpdn"));
     }
-    let interrupt = Interrupt::listen()?;
+    let cores = InterruptibleCores::listen()?;
     // An output that cannot be written fails before the work.
-    drop(OutputFile::create(&args.output, OutputFormat::Ltm)?);
+    drop(OutputFile::create(&args.output, &LTM)?);
     let folder = CaptureFolder::open(&args.capture)?;
     let manifest = folder.manifest();
     shots::warn_of_unknown_fields(&folder);
@@ -61,15 +60,14 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         plan.tiles_encoded_at_once(window, method.max_rank(window))?;
     }
     let job = RecoverJob {
+        start,
         args,
         folder: &folder,
         shots: &shots,
         plan: &plan,
-        interrupt: &interrupt,
+        cores: &cores,
     };
-    let mut report = thread_pool(plan.tiles_at_once)?.install(|| job.run())?;
-    report.seconds = start.elapsed().as_secs_f64();
-    report.peak_rss_bytes = peak_rss_bytes();
+    let report = thread_pool(plan.tiles_at_once)?.install(|| job.run())?;
     match args.json {
         true => print_json(&report),
         false => report.print(args, manifest),

@@ -2,21 +2,20 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, ErrorKind, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
+use crc32c::Crc32cReader;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::args::RecoverArgs;
 use super::memory_plan::MemoryPlan;
 use crate::capture::CaptureFolder;
-use crate::cli::process::{Interrupt, Interrupted};
+use crate::cli::process::{Interrupted, InterruptibleCores};
+use crate::executor::Executor;
 use crate::recover::{HoldoutValidation, Recovery};
-
-/// Bytes of a file hashed at a time.
-const READ_BYTES: usize = 1 << 18;
 
 /// Name and version of this program.
 pub const PROGRAM: &str = concat!("ltm-export ", env!("CARGO_PKG_VERSION"));
@@ -49,14 +48,11 @@ impl RunKey {
         folder: &CaptureFolder,
         shots: &[usize],
         plan: &MemoryPlan,
-        interrupt: &Interrupt,
+        cores: &InterruptibleCores,
     ) -> Result<Self> {
         let digest = |(name, path): (&str, PathBuf)| -> Result<(String, FileDigest)> {
-            if interrupt.is_requested() {
-                bail!(Interrupted(
-                    "interrupted before anything was read".to_owned()
-                ));
-            }
+            let interrupted = || Interrupted("interrupted before anything was read".to_owned());
+            ensure!(!cores.is_cancelled(), interrupted());
             let digest = FileDigest::of(&path).with_context(|| path.display().to_string())?;
             Ok((name.to_owned(), digest))
         };
@@ -122,20 +118,10 @@ pub struct FileDigest {
 impl FileDigest {
     /// Reads the whole file.
     pub fn of(path: &Path) -> io::Result<Self> {
-        let mut file = File::open(path)?;
-        let mut buffer = vec![0; READ_BYTES];
-        let mut digest = Self { bytes: 0, crc: 0 };
-        loop {
-            match file.read(&mut buffer) {
-                Ok(0) => return Ok(digest),
-                Ok(n) => {
-                    digest.bytes += n as u64;
-                    digest.crc = crc32c::crc32c_append(digest.crc, &buffer[..n]);
-                }
-                Err(e) if e.kind() == ErrorKind::Interrupted => {}
-                Err(e) => return Err(e),
-            }
-        }
+        let mut reader = Crc32cReader::new(File::open(path)?);
+        let bytes = io::copy(&mut reader, &mut io::sink())?;
+        let crc = reader.crc32c();
+        Ok(Self { bytes, crc })
     }
 }
 

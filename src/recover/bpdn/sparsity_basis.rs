@@ -2,15 +2,19 @@
 
 use std::f64::consts::PI;
 
-/// φ, in which a light transport function has few large coefficients.
+/// φ, in which a light transport function has few large coefficients. The command line shows the variants' descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[cfg_attr(
+    all(feature = "cli", not(target_arch = "wasm32")),
+    derive(clap::ValueEnum)
+)]
 #[serde(rename_all = "lowercase")]
 pub enum SparsityBasis {
-    /// The identity, for opaque objects, which reflect or refract few directions.
+    /// The light elements themselves, for opaque objects
     Identity,
-    /// The 2-D discrete cosine transform (DCT-II), for translucent objects, which scatter smoothly.
+    /// Discrete cosine transform, for translucent objects
     Dct,
-    /// 2-D Haar wavelets, for piecewise smooth functions.
+    /// Haar wavelets
     Haar,
 }
 

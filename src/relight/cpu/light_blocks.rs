@@ -127,7 +127,10 @@ impl LightBlocks {
                 v: grid_origin.v + rows.start as i32,
             },
             side,
-            footprint: Extent::new(columns.len() as u32 + geometry.window.side() - 1, rows.len() as u32 + geometry.window.side() - 1),
+            footprint: Extent::new(
+                columns.len() as u32 + geometry.window.side() - 1,
+                rows.len() as u32 + geometry.window.side() - 1,
+            ),
             blocks,
         }
     }

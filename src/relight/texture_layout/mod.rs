@@ -136,7 +136,10 @@ impl TextureLayout {
         let [layers, response_layers] =
             [quads, quads.next_multiple_of(2)].map(|quads| CHANNELS as u32 * quads);
         // Window origins with a part of their window on the light plane, and a border of one for all others.
-        let response = Extent::new(light.width + geometry.window.side() + 1, light.height + geometry.window.side() + 1);
+        let response = Extent::new(
+            light.width + geometry.window.side() + 1,
+            light.height + geometry.window.side() + 1,
+        );
         let max_side = u64::from(limits.max_side);
         let side = |extent: Extent| u64::from(extent.width.max(extent.height));
         let light_side = side(if is_factored { response } else { light });

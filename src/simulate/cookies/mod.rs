@@ -14,7 +14,7 @@ use surface_grid::{SurfaceGrid, SurfacePoint};
 
 use super::coordinates::{Vec2, vec2};
 use super::scene::SimulatedScene;
-use crate::transport::{CHANNELS, CameraPx, Element, Extent, Geometry, LightPx};
+use crate::transport::{CHANNELS, CameraPx, Element, Extent, Geometry, Window};
 
 /// Samples along each side of a camera pixel.
 const SAMPLES_PER_SIDE: u32 = 3;
@@ -69,22 +69,17 @@ impl Cookies {
         let surface = SurfaceGrid::new(geometry.light, samples, pitch);
         let element_surface = SurfaceGrid::new(geometry.light, geometry.light, vec2(1.0, 1.0));
         let scale = max_height_elements();
-        let reflectors = (0..geometry.light.height)
-            .flat_map(|v| (0..geometry.light.width).map(move |u| (u, v)))
-            .map(|(u, v)| {
-                let point = element_surface.point(u, v);
-                let beam = beam_origin(point.at, point.height);
-                Reflector {
-                    height: point.height * scale,
-                    slope: element_surface.slope(u, v) * scale,
-                    radiosity: reflected(&element_surface, &point).diffuse,
-                    light_element: Element {
-                        u: beam.u.floor() as i32,
-                        v: beam.v.floor() as i32,
-                    },
-                }
-            })
-            .collect();
+        let reflector = |(u, v)| {
+            let point = element_surface.point(u, v);
+            let beam = beam_origin(&point);
+            Reflector {
+                height: point.surface.height * scale,
+                slope: element_surface.slope(u, v) * scale,
+                radiosity: reflected(&element_surface, &point).diffuse,
+                light_element: element_at(beam),
+            }
+        };
+        let reflectors = geometry.light.cells().map(reflector).collect();
         Self {
             geometry,
             surface,
@@ -99,30 +94,22 @@ impl Cookies {
         albedo: [f64; CHANNELS],
         window: &mut WindowAccumulator,
     ) {
-        let middle = SAMPLES_PER_SIDE / 2;
-        let (i, j) = (
-            pixel.x * SAMPLES_PER_SIDE + middle,
-            pixel.y * SAMPLES_PER_SIDE + middle,
-        );
+        let [i, j] = [pixel.x, pixel.y].map(|x| x * SAMPLES_PER_SIDE + SAMPLES_PER_SIDE / 2);
         let scale = max_height_elements();
         let point = self.surface.point(i, j);
-        let (height, slope) = (point.height * scale, self.surface.slope(i, j) * scale);
-        let radius = (window.side / 2) as i32;
-        let (u, v) = (point.at.u.floor() as i32, point.at.v.floor() as i32);
-        for dv in -radius..=radius {
-            for du in -radius..=radius {
-                let Some(m) = (Element {
-                    u: u + du,
-                    v: v + dv,
-                })
-                .index_in(self.geometry.light) else {
+        let (height, slope) = (
+            point.surface.height * scale,
+            self.surface.slope(i, j) * scale,
+        );
+        let radius = (window.window.side() / 2) as i32;
+        let Element { u, v } = element_at(point.at);
+        for v in v - radius..=v + radius {
+            for u in u - radius..=u + radius {
+                let Some(m) = (Element { u, v }).index_in(self.geometry.light) else {
                     continue;
                 };
                 let reflector = &self.reflectors[m];
-                let offset = vec2(
-                    f64::from(u + du) + 0.5 - point.at.u,
-                    f64::from(v + dv) + 0.5 - point.at.v,
-                );
+                let offset = vec2(f64::from(u) + 0.5, f64::from(v) + 0.5) - point.at;
                 let rise = reflector.height - height;
                 // Each surface must face the other. Normals are (-slope, 1) over their length.
                 let here = rise - slope.dot(offset);
@@ -152,25 +139,24 @@ impl SimulatedScene for Cookies {
     fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
         let mut window = WindowAccumulator {
             origin: self.geometry.window_origin(pixel),
-            side: self.geometry.window.side(),
+            window: self.geometry.window,
             light: self.geometry.light,
             tau,
         };
         let weight = EXPOSURE / f64::from(SAMPLES_PER_SIDE * SAMPLES_PER_SIDE);
-        let footprint = self.surface.pitch() + vec2(BLUR, BLUR);
+        let footprint = self.surface.pitch + vec2(BLUR, BLUR);
         let mut albedo = [0.0; CHANNELS];
-        for j in 0..SAMPLES_PER_SIDE {
-            for i in 0..SAMPLES_PER_SIDE {
-                let point = self.surface.point(
-                    pixel.x * SAMPLES_PER_SIDE + i,
-                    pixel.y * SAMPLES_PER_SIDE + j,
-                );
-                let light = reflected(&self.surface, &point);
-                let measured = light.diffuse.map(|d| (d + light.highlight) * weight);
-                window.add_box(beam_origin(point.at, point.height), footprint, measured);
-                for c in 0..CHANNELS {
-                    albedo[c] += point.albedo[c] * weight;
-                }
+        for (i, j) in Extent::new(SAMPLES_PER_SIDE, SAMPLES_PER_SIDE).cells() {
+            let (i, j) = (
+                pixel.x * SAMPLES_PER_SIDE + i,
+                pixel.y * SAMPLES_PER_SIDE + j,
+            );
+            let point = self.surface.point(i, j);
+            let light = reflected(&self.surface, &point);
+            let measured = light.diffuse.map(|d| (d + light.highlight) * weight);
+            window.add_box(beam_origin(&point), footprint, measured);
+            for c in 0..CHANNELS {
+                albedo[c] += point.surface.albedo[c] * weight;
             }
         }
         self.add_interreflections(pixel, albedo, &mut window);
@@ -182,15 +168,21 @@ fn max_height_elements() -> f64 {
     TILT.length() / TAN_TILT
 }
 
-/// Where the beam that hits the point `at` at `height` starts on the light plane.
-fn beam_origin(at: LightPx, height: f64) -> LightPx {
-    LightPx {
-        u: at.u - TILT.x * height,
-        v: at.v - TILT.y * height,
+/// Where the beam that hits `point` starts on the light plane.
+fn beam_origin(point: &SurfacePoint) -> Vec2 {
+    point.at - TILT * point.surface.height
+}
+
+/// The light element at a position.
+fn element_at(p: Vec2) -> Element {
+    Element {
+        u: p.x.floor() as i32,
+        v: p.y.floor() as i32,
     }
 }
 
 /// Direct light that a point reflects, as a fraction of what a white tray reflects.
+#[derive(Default)]
 struct ReflectedLight {
     /// In all directions.
     diffuse: [f64; CHANNELS],
@@ -201,10 +193,7 @@ struct ReflectedLight {
 /// The direct light that `point` reflects: none in shadow, more if its slope faces the projector.
 fn reflected(surface: &SurfaceGrid, point: &SurfacePoint) -> ReflectedLight {
     if surface.is_shaded(point, TILT) {
-        return ReflectedLight {
-            diffuse: [0.0; CHANNELS],
-            highlight: 0.0,
-        };
+        return ReflectedLight::default();
     }
     let slope = point.unit_slope * (max_height_elements() / SHADING_HALF_SIDE);
     // The normal is (-slope, 1) over its length; (-rake, 1) points to the projector.
@@ -216,15 +205,15 @@ fn reflected(surface: &SurfaceGrid, point: &SurfacePoint) -> ReflectedLight {
     let half = rake * (1.0 / (1.0 + to_projector));
     let aligned = (1.0 + slope.dot(half)) / (normal * (1.0 + half.dot(half)).sqrt());
     ReflectedLight {
-        diffuse: point.albedo.map(|a| a * facing),
-        highlight: point.gloss * HIGHLIGHT * aligned.max(0.0).powf(SHININESS),
+        diffuse: point.surface.albedo.map(|a| a * facing),
+        highlight: point.surface.gloss * HIGHLIGHT * aligned.max(0.0).powf(SHININESS),
     }
 }
 
 /// Sums one pixel's light transport function.
 struct WindowAccumulator<'a> {
     origin: Element,
-    side: u32,
+    window: Window,
     light: Extent,
     tau: &'a mut [[f32; CHANNELS]],
 }
@@ -232,12 +221,8 @@ struct WindowAccumulator<'a> {
 impl WindowAccumulator<'_> {
     /// Adds light from `element`; ignores elements outside the light plane or the window.
     fn add(&mut self, element: Element, light: [f64; CHANNELS]) {
-        let window = Extent::new(self.side, self.side);
-        let within = Element {
-            u: element.u - self.origin.u,
-            v: element.v - self.origin.v,
-        };
-        if let (Some(s), Some(_)) = (within.index_in(window), element.index_in(self.light)) {
+        let slot = self.window.slot(self.origin, element);
+        if let (Some(s), Some(_)) = (slot, element.index_in(self.light)) {
             for c in 0..CHANNELS {
                 self.tau[s][c] += light[c] as f32;
             }
@@ -245,15 +230,14 @@ impl WindowAccumulator<'_> {
     }
 
     /// Adds light that comes uniformly from the box of extent `size` around `centre`.
-    fn add_box(&mut self, centre: LightPx, size: Vec2, light: [f64; CHANNELS]) {
-        let (u0, u1) = (centre.u - size.x / 2.0, centre.u + size.x / 2.0);
-        let (v0, v1) = (centre.v - size.y / 2.0, centre.v + size.y / 2.0);
+    fn add_box(&mut self, centre: Vec2, size: Vec2, light: [f64; CHANNELS]) {
+        let (first, last) = (centre - size * 0.5, centre + size * 0.5);
         let overlap = |from: f64, to: f64, m: i32| {
             (to.min(f64::from(m) + 1.0) - from.max(f64::from(m))) / (to - from)
         };
-        for v in v0.floor() as i32..=v1.floor() as i32 {
-            for u in u0.floor() as i32..=u1.floor() as i32 {
-                let share = overlap(u0, u1, u) * overlap(v0, v1, v);
+        for v in first.y.floor() as i32..=last.y.floor() as i32 {
+            for u in first.x.floor() as i32..=last.x.floor() as i32 {
+                let share = overlap(first.x, last.x, u) * overlap(first.y, last.y, v);
                 if share > 0.0 {
                     self.add(Element { u, v }, light.map(|l| l * share));
                 }

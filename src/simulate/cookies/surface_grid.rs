@@ -1,8 +1,8 @@
 //! The surface of the tray and the cookies, sampled on a grid for fast ray marching.
 
-use super::tray::surface_at;
+use super::tray::{Surface, surface_at};
 use crate::simulate::coordinates::{UnitPlane, Vec2, vec2};
-use crate::transport::{CHANNELS, Extent, LightPx};
+use crate::transport::{CHANNELS, Extent};
 
 /// Distance of the finite differences for shading, in unit coordinates: the same at every resolution, so that
 /// the picture does not depend on it.
@@ -14,23 +14,24 @@ pub(super) struct SurfaceGrid {
     plane: UnitPlane,
     extent: Extent,
     /// Light elements from one sample to the next.
-    pitch: Vec2,
-    heights: Vec<f32>,
-    albedos: Vec<[f32; CHANNELS]>,
-    glosses: Vec<f32>,
+    pub pitch: Vec2,
+    samples: Vec<Sample>,
+}
+
+/// [`Surface`] in single precision.
+#[derive(Debug)]
+struct Sample {
+    height: f32,
+    albedo: [f32; CHANNELS],
+    gloss: f32,
 }
 
 /// The surface at one sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SurfacePoint {
-    /// Position on the light plane.
-    pub at: LightPx,
-    /// Height; the tallest cookie has 1.
-    pub height: f64,
-    /// Diffuse albedo.
-    pub albedo: [f64; CHANNELS],
-    /// Strength of the highlight.
-    pub gloss: f64,
+    /// Position on the light plane, in light elements.
+    pub at: Vec2,
+    pub surface: Surface,
     /// Gradient of the height, by unit coordinates.
     pub unit_slope: Vec2,
 }
@@ -39,43 +40,39 @@ impl SurfaceGrid {
     /// Samples the surface at `extent` points, `pitch` light elements apart.
     pub fn new(light: Extent, extent: Extent, pitch: Vec2) -> Self {
         let plane = UnitPlane::new(light);
-        let mut heights = Vec::with_capacity(extent.area());
-        let mut albedos = Vec::with_capacity(extent.area());
-        let mut glosses = Vec::with_capacity(extent.area());
-        for j in 0..extent.height {
-            for i in 0..extent.width {
-                let surface = surface_at(plane.at(sample_position(pitch, i, j)));
-                heights.push(surface.height as f32);
-                albedos.push(surface.albedo.map(|a| a as f32));
-                glosses.push(surface.gloss as f32);
+        let sample = |(i, j)| {
+            let Surface {
+                height,
+                albedo,
+                gloss,
+            } = surface_at(plane.at(sample_position(pitch, i, j)));
+            Sample {
+                height: height as f32,
+                albedo: albedo.map(|a| a as f32),
+                gloss: gloss as f32,
             }
-        }
+        };
         Self {
             plane,
             extent,
             pitch,
-            heights,
-            albedos,
-            glosses,
+            samples: extent.cells().map(sample).collect(),
         }
-    }
-
-    /// Light elements from one sample to the next.
-    pub fn pitch(&self) -> Vec2 {
-        self.pitch
     }
 
     /// The surface at sample `(i, j)`.
     pub fn point(&self, i: u32, j: u32) -> SurfacePoint {
         let at = sample_position(self.pitch, i, j);
-        let n = (j * self.extent.width + i) as usize;
+        let sample = &self.samples[(j * self.extent.width + i) as usize];
         let p = self.plane.at(at);
         let step = |d: Vec2| surface_at(p + d).height - surface_at(p - d).height;
         SurfacePoint {
             at,
-            height: f64::from(self.heights[n]),
-            albedo: self.albedos[n].map(f64::from),
-            gloss: f64::from(self.glosses[n]),
+            surface: Surface {
+                height: f64::from(sample.height),
+                albedo: sample.albedo.map(f64::from),
+                gloss: f64::from(sample.gloss),
+            },
             unit_slope: vec2(step(vec2(SLOPE_STEP, 0.0)), step(vec2(0.0, SLOPE_STEP)))
                 * (0.5 / SLOPE_STEP),
         }
@@ -93,28 +90,28 @@ impl SurfaceGrid {
 
     /// Whether the surface blocks the beam to `point`. A beam moves by `tilt` light elements while it descends by 1.
     pub fn is_shaded(&self, point: &SurfacePoint, tilt: Vec2) -> bool {
-        let max_rise = 1.0 - point.height;
+        let height = point.surface.height;
+        let max_rise = 1.0 - height;
         let tilt_samples = vec2(tilt.x / self.pitch.x, tilt.y / self.pitch.y);
         // One step for each sample along the longer axis.
-        let steps = (max_rise * tilt_samples.x.abs().max(tilt_samples.y.abs()))
-            .ceil()
-            .max(1.0);
+        let longer = tilt_samples.x.abs().max(tilt_samples.y.abs());
+        let steps = (max_rise * longer).ceil().max(1.0);
         let start = vec2(
-            point.at.u / self.pitch.x - 0.5,
-            point.at.v / self.pitch.y - 0.5,
+            point.at.x / self.pitch.x - 0.5,
+            point.at.y / self.pitch.y - 0.5,
         );
         // Against self-shadowing where the interpolated height exceeds the sample.
         const BIAS: f64 = 0.004;
         (1..=steps as u32).any(|k| {
             let rise = max_rise * f64::from(k) / steps;
-            self.interpolated(start - tilt_samples * rise) > point.height + rise + BIAS
+            self.interpolated(start - tilt_samples * rise) > height + rise + BIAS
         })
     }
 
     fn height_at(&self, i: i32, j: i32) -> f64 {
         let i = i.clamp(0, self.extent.width as i32 - 1) as u32;
         let j = j.clamp(0, self.extent.height as i32 - 1) as u32;
-        f64::from(self.heights[(j * self.extent.width + i) as usize])
+        f64::from(self.samples[(j * self.extent.width + i) as usize].height)
     }
 
     /// Height at a position in samples, by bilinear interpolation.
@@ -129,10 +126,10 @@ impl SurfaceGrid {
     }
 }
 
-/// The position of sample `(i, j)` on the light plane.
-fn sample_position(pitch: Vec2, i: u32, j: u32) -> LightPx {
-    LightPx {
-        u: (f64::from(i) + 0.5) * pitch.x,
-        v: (f64::from(j) + 0.5) * pitch.y,
-    }
+/// The position of sample `(i, j)` on the light plane, in light elements.
+fn sample_position(pitch: Vec2, i: u32, j: u32) -> Vec2 {
+    vec2(
+        (f64::from(i) + 0.5) * pitch.x,
+        (f64::from(j) + 0.5) * pitch.y,
+    )
 }

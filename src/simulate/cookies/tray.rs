@@ -32,37 +32,21 @@ enum CookieKind {
     Leaf,
 }
 
-/// One cookie, rotated by `angle` radians.
-struct Cookie {
-    kind: CookieKind,
-    middle: Vec2,
-    size: f64,
-    angle: f64,
-}
-
-const fn cookie(kind: CookieKind, x: f64, y: f64, size: f64, angle: f64) -> Cookie {
-    Cookie {
-        kind,
-        middle: vec2(x, y),
-        size,
-        angle,
-    }
-}
-
-const COOKIES: [Cookie; 13] = [
-    cookie(CookieKind::ChocolateChip, -0.56, -0.57, 0.31, 0.0),
-    cookie(CookieKind::Star, 0.08, -0.62, 0.30, 0.2),
-    cookie(CookieKind::JamHeart, 0.62, -0.60, 0.29, -0.25),
-    cookie(CookieKind::Ring, -0.63, 0.10, 0.25, 0.5),
-    cookie(CookieKind::Gingerbread, -0.02, 0.16, 0.46, 0.12),
-    cookie(CookieKind::DarkChocolate, 0.62, 0.04, 0.28, 1.0),
-    cookie(CookieKind::JamFlower, -0.55, 0.66, 0.27, 0.3),
-    cookie(CookieKind::Pinwheel, 0.60, 0.63, 0.29, 2.2),
-    cookie(CookieKind::SmallStar, 0.09, 0.80, 0.13, -0.3),
-    cookie(CookieKind::Leaf, -0.20, -0.30, 0.13, 0.7),
-    cookie(CookieKind::Leaf, 0.33, -0.27, 0.11, 2.5),
-    cookie(CookieKind::SmallStar, 0.31, 0.33, 0.085, 0.5),
-    cookie(CookieKind::SmallStar, -0.17, 0.83, 0.085, 1.1),
+/// The cookies: kind, middle, size, and rotation in radians.
+const COOKIES: [(CookieKind, Vec2, f64, f64); 13] = [
+    (CookieKind::ChocolateChip, vec2(-0.56, -0.57), 0.31, 0.0),
+    (CookieKind::Star, vec2(0.08, -0.62), 0.30, 0.2),
+    (CookieKind::JamHeart, vec2(0.62, -0.60), 0.29, -0.25),
+    (CookieKind::Ring, vec2(-0.63, 0.10), 0.25, 0.5),
+    (CookieKind::Gingerbread, vec2(-0.02, 0.16), 0.46, 0.12),
+    (CookieKind::DarkChocolate, vec2(0.62, 0.04), 0.28, 1.0),
+    (CookieKind::JamFlower, vec2(-0.55, 0.66), 0.27, 0.3),
+    (CookieKind::Pinwheel, vec2(0.60, 0.63), 0.29, 2.2),
+    (CookieKind::SmallStar, vec2(0.09, 0.80), 0.13, -0.3),
+    (CookieKind::Leaf, vec2(-0.20, -0.30), 0.13, 0.7),
+    (CookieKind::Leaf, vec2(0.33, -0.27), 0.11, 2.5),
+    (CookieKind::SmallStar, vec2(0.31, 0.33), 0.085, 0.5),
+    (CookieKind::SmallStar, vec2(-0.17, 0.83), 0.085, 1.1),
 ];
 
 const TRAY: [f64; 3] = [0.23, 0.38, 0.44];
@@ -79,11 +63,11 @@ const APRICOT: [f64; 3] = [0.93, 0.46, 0.08];
 /// The surface at `p`.
 pub(super) fn surface_at(p: Vec2) -> Surface {
     let mut surface = tray(p);
-    for cookie in &COOKIES {
-        let q = p - cookie.middle;
+    for (kind, middle, size, angle) in COOKIES {
+        let q = p - middle;
         // No outline exceeds 1.25 times the nominal size.
-        if q.length() < 1.25 * cookie.size
-            && let Some(cookie) = cookie_surface(cookie, q.rotated(-cookie.angle), p)
+        if q.length() < 1.25 * size
+            && let Some(cookie) = cookie_surface(kind, size, q.rotated(-angle), p)
             && cookie.height > surface.height
         {
             surface = cookie;
@@ -151,10 +135,9 @@ impl Surface {
     }
 }
 
-/// The cookie at `q`, in its own coordinates; `p` is the same point on the tray. `None` beside the cookie.
-fn cookie_surface(cookie: &Cookie, q: Vec2, p: Vec2) -> Option<Surface> {
-    let s = cookie.size;
-    let surface = match cookie.kind {
+/// A cookie of size `s` at `q`, in its own coordinates; `p` is the same point on the tray. `None` beside the cookie.
+fn cookie_surface(kind: CookieKind, s: f64, q: Vec2, p: Vec2) -> Option<Surface> {
+    let surface = match kind {
         CookieKind::ChocolateChip => {
             let d = circle(q, s) + 0.02 * layered_noise(q * 6.0, 2, 75);
             chips(dough(d, 0.12, 0.72, BROWN, p), q, s, CHIP)

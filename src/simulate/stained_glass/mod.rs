@@ -19,10 +19,11 @@ use rose::{GlassPoint, glass_at};
 use super::coordinates::{UnitPlane, Vec2, mix, smoothstep, vec2};
 use super::gradient_noise::{noise, unit_hash};
 use super::scene::SimulatedScene;
-use crate::transport::{CHANNELS, CameraPx, Element, Geometry, LightPx};
+use crate::transport::{CHANNELS, CameraPx, Extent, Geometry};
 
 /// Samples along each side of a pixel or element, for averages over its area.
 const SAMPLES_PER_SIDE: u32 = 4;
+const SAMPLES: f64 = (SAMPLES_PER_SIDE * SAMPLES_PER_SIDE) as f64;
 /// Transmittance of lead: a little stray light.
 const LEAD_TRANSMITTANCE: [f64; CHANNELS] = [0.0030, 0.0029, 0.0027];
 /// Visible share of an element that lead hides completely: the window is at a distance from the monitor, so
@@ -50,16 +51,13 @@ pub(super) struct StainedGlass {
 impl StainedGlass {
     pub fn new(geometry: Geometry) -> Self {
         let plane = UnitPlane::new(geometry.light);
-        let mut visible = Vec::with_capacity(geometry.light.area());
-        for v in 0..geometry.light.height {
-            for u in 0..geometry.light.width {
-                let corner = vec2(f64::from(u), f64::from(v));
-                let hidden = mean_over(corner, vec2(1.0, 1.0), |p| {
-                    f64::from(u8::from(glass_at(plane.at(p)).clearance < 0.0))
-                });
-                visible.push(mix(1.0, BEHIND_LEAD_SHARE, hidden) as f32);
-            }
-        }
+        let is_hidden = |p| f64::from(u8::from(glass_at(plane.at(p)).clearance < 0.0));
+        let visible = |(u, v)| {
+            let corner = vec2(f64::from(u), f64::from(v));
+            let hidden: f64 = samples(corner, vec2(1.0, 1.0)).map(is_hidden).sum();
+            mix(1.0, BEHIND_LEAD_SHARE, hidden / SAMPLES) as f32
+        };
+        let visible = geometry.light.cells().map(visible).collect();
         let affine = geometry.correspondence.affine;
         Self {
             geometry,
@@ -72,23 +70,19 @@ impl StainedGlass {
     /// The mean transmittance over a pixel's area.
     fn attenuation(&self, centre: Vec2) -> [f64; CHANNELS] {
         let mut sum = [0.0; CHANNELS];
-        let corner = centre - self.pitch * 0.5;
-        for_each_sample(corner, self.pitch, |p| {
+        for p in samples(centre - self.pitch * 0.5, self.pitch) {
             let p = self.plane.at(p);
             let point = transmittance_at(&glass_at(p), p);
             for c in 0..CHANNELS {
                 sum[c] += point[c];
             }
-        });
-        sum.map(|s| s / f64::from(SAMPLES_PER_SIDE * SAMPLES_PER_SIDE))
+        }
+        sum.map(|s| s / SAMPLES)
     }
 
     /// Displacement by refraction at the point `centre`; both in light elements.
     fn displacement(&self, optics: &Optics, piece: u32, centre: Vec2) -> Vec2 {
-        let p = self.plane.at(LightPx {
-            u: centre.x,
-            v: centre.y,
-        });
+        let p = self.plane.at(centre);
         // Each piece is another part of the sheet.
         let offset = vec2(unit_hash(piece, 61), unit_hash(piece, 62)) * 90.0;
         // The gradient of the noise has a root mean square of about 0.9 along each axis.
@@ -97,12 +91,7 @@ impl StainedGlass {
         let roughness = 1.0 + 0.9 * noise(p * 2.3, 64).0;
         let warp = noise(p * 1.7, 65).1;
         let d = faces * (optics.ripple * roughness / 0.9) + warp * 0.35;
-        let length = d.length();
-        if length > MAX_DISPLACEMENT {
-            d * (MAX_DISPLACEMENT / length)
-        } else {
-            d
-        }
+        d * (MAX_DISPLACEMENT / d.length()).min(1.0)
     }
 }
 
@@ -112,9 +101,8 @@ impl SimulatedScene for StainedGlass {
     }
 
     fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
-        let at = self.geometry.correspondence.at(pixel);
-        let centre = vec2(at.u, at.v);
-        let GlassPoint { piece, glass, .. } = glass_at(self.plane.at(at));
+        let centre = Vec2::from(self.geometry.correspondence.at(pixel));
+        let GlassPoint { piece, glass, .. } = glass_at(self.plane.at(centre));
         let optics = glass.optics();
         let displacement = self.displacement(&optics, piece, centre);
         // The gradient of the displacement stretches the pixel's footprint.
@@ -148,18 +136,15 @@ impl SimulatedScene for StainedGlass {
                 (0.55 * scattered, &wide),
             ];
             for (s, tau) in tau.iter_mut().enumerate() {
-                let (i, j) = (s % side, s / side);
-                let element = Element {
-                    u: origin.u + i as i32,
-                    v: origin.v + j as i32,
-                };
+                let element = self.geometry.window.element(origin, s);
                 let Some(m) = element.index_in(self.geometry.light) else {
                     continue;
                 };
-                let share: f64 = parts
-                    .iter()
-                    .map(|(w, b)| w * b.along_u[i] * b.along_v[j])
-                    .sum();
+                let (i, j) = (s % side, s / side);
+                let part = |(weight, gaussian): &(f64, &SeparableGaussian)| {
+                    weight * gaussian.along_u[i] * gaussian.along_v[j]
+                };
+                let share: f64 = parts.iter().map(part).sum();
                 tau[c] = (share * attenuation[c]) as f32 * self.visible[m];
             }
         }
@@ -205,30 +190,17 @@ impl SeparableGaussian {
     }
 }
 
-/// Calls `f` at the cell centres of a grid over the box from `corner` of extent `size`.
-fn for_each_sample(corner: Vec2, size: Vec2, mut f: impl FnMut(LightPx)) {
+/// The centres of the cells of a grid over the box from `corner` of extent `size`.
+fn samples(corner: Vec2, size: Vec2) -> impl Iterator<Item = Vec2> {
     let at = |i: u32| (f64::from(i) + 0.5) / f64::from(SAMPLES_PER_SIDE);
-    for j in 0..SAMPLES_PER_SIDE {
-        for i in 0..SAMPLES_PER_SIDE {
-            f(LightPx {
-                u: corner.x + at(i) * size.x,
-                v: corner.y + at(j) * size.y,
-            });
-        }
-    }
-}
-
-fn mean_over(corner: Vec2, size: Vec2, f: impl Fn(LightPx) -> f64) -> f64 {
-    let mut sum = 0.0;
-    for_each_sample(corner, size, |p| sum += f(p));
-    sum / f64::from(SAMPLES_PER_SIDE * SAMPLES_PER_SIDE)
+    let cells = Extent::new(SAMPLES_PER_SIDE, SAMPLES_PER_SIDE).cells();
+    cells.map(move |(i, j)| corner + vec2(at(i) * size.x, at(j) * size.y))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::simulate::scene::scene_geometry;
-    use crate::transport::Extent;
 
     #[test]
     fn gaussian_has_unit_weight_and_its_centre() {
@@ -256,7 +228,8 @@ mod tests {
             let area = geometry.window.area();
             for (pixel, tau) in rect.pixels().zip(functions.tau.chunks_exact(area)) {
                 let flood: f32 = tau.iter().flatten().sum::<f32>() / 3.0;
-                let clearance = glass_at(plane.at(geometry.correspondence.at(pixel))).clearance;
+                let at = geometry.correspondence.at(pixel).into();
+                let clearance = glass_at(plane.at(at)).clearance;
                 if is_covered(&plane, geometry, pixel) {
                     lead += 1;
                     assert!(flood < 0.004, "lead at {pixel:?} sends {flood}");
@@ -271,13 +244,9 @@ mod tests {
 
     /// Whether lead covers all of a pixel.
     fn is_covered(plane: &UnitPlane, geometry: &Geometry, pixel: CameraPx) -> bool {
-        let at = geometry.correspondence.at(pixel);
+        let at = Vec2::from(geometry.correspondence.at(pixel));
         let affine = geometry.correspondence.affine;
         let pitch = vec2(affine[0][0], affine[1][1]);
-        let mut covered = true;
-        for_each_sample(vec2(at.u, at.v) - pitch * 0.5, pitch, |p| {
-            covered &= glass_at(plane.at(p)).clearance < 0.0;
-        });
-        covered
+        samples(at - pitch * 0.5, pitch).all(|p| glass_at(plane.at(p)).clearance < 0.0)
     }
 }

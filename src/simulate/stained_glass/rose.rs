@@ -6,7 +6,9 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
-use super::glass::Glass;
+use super::glass::Glass::{
+    self, Amber, Aqua, Azure, Cobalt, Emerald, Gold, Moss, Opal, Pale, Rose, Ruby, Violet,
+};
 use crate::simulate::coordinates::{Vec2, smoothstep, vec2};
 use crate::simulate::gradient_noise::{cell_hash, noise};
 use crate::simulate::shapes::{circle, fold, segment, smooth_union, star, vesica};
@@ -66,6 +68,11 @@ impl GlassPoint {
     fn painted(mut self, density: f64) -> Self {
         self.paint = self.paint.max(density.clamp(0.0, 1.0));
         self
+    }
+
+    /// Adds paint of the given density inside the shape with signed distance `d`.
+    fn painted_inside(self, d: f64, density: f64) -> Self {
+        if d < 0.0 { self.painted(density) } else { self }
     }
 }
 
@@ -135,14 +142,14 @@ fn sun(p: Vec2) -> GlassPoint {
     let rays = star(vec2(p.y, -p.x), 12, 0.146, 0.082);
     let (petal, l) = fold(p, 6, PI / 6.0);
     let petals = vesica(l - vec2(0.046, 0.0), 0.026, 0.017);
-    let glass = [Glass::Amber, Glass::Gold][(k % 2) as usize];
-    GlassPoint::new(10 + gap, Glass::Cobalt)
+    let glass = [Amber, Gold][(k % 2) as usize];
+    GlassPoint::new(10 + gap, Cobalt)
         .inlay(rays, FINE_HALF_WIDTH, 30 + k, glass)
         .painted(0.5 * stroke(q.y, 0.0028) * smoothstep(0.0, 0.01, -rays))
-        .inlay(circle(p, 0.080), FINE_HALF_WIDTH, 50, Glass::Ruby)
-        .inlay(petals, 0.7 * FINE_HALF_WIDTH, 60 + petal, Glass::Opal)
+        .inlay(circle(p, 0.080), FINE_HALF_WIDTH, 50, Ruby)
+        .inlay(petals, 0.7 * FINE_HALF_WIDTH, 60 + petal, Opal)
         .painted(0.5 * stroke(l.y, 0.002) * smoothstep(0.0, 0.006, -petals))
-        .inlay(circle(p, 0.022), 0.8 * FINE_HALF_WIDTH, 51, Glass::Gold)
+        .inlay(circle(p, 0.022), 0.8 * FINE_HALF_WIDTH, 51, Gold)
 }
 
 /// Signed distance to the opening of a lancet between stone bars. Its sides are radial, at the angle
@@ -162,9 +169,9 @@ fn lancet(q: Vec2, half_angle: f64, head: f64, foot: f64) -> f64 {
 fn eyelet(p: Vec2, radius: f64, [ground, disc]: [u32; 2], glass: Glass) -> GlassPoint {
     let ring = stroke(circle(p, 0.45 * radius), 0.003);
     let edge = circle(p, radius);
-    GlassPoint::new(ground, Glass::Pale)
+    GlassPoint::new(ground, Pale)
         .inlay(edge, FINE_HALF_WIDTH, disc, glass)
-        .painted(if edge < 0.0 { 0.5 * ring } else { 0.0 })
+        .painted_inside(edge, 0.5 * ring)
 }
 
 fn first_lancets(p: Vec2) -> GlassPoint {
@@ -174,17 +181,13 @@ fn first_lancets(p: Vec2) -> GlassPoint {
     let light = lancet(q, PI / 12.0, HEAD, SUN_RADIUS);
     if light > 0.0 {
         let eye = g - vec2(0.505, 0.0);
-        let glass = [Glass::Amber, Glass::Ruby][(gap % 2) as usize];
+        let glass = [Amber, Ruby][(gap % 2) as usize];
         return eyelet(eye, 0.024, [200 + gap, 212 + gap], glass)
             .within(2.0 * STONE_HALF_WIDTH - light)
             .lead(p.length() - FIRST_LANCETS_RADIUS, STONE_HALF_WIDTH);
     }
     let even = k % 2 == 0;
-    let (ground, edge) = if even {
-        (Glass::Cobalt, Glass::Ruby)
-    } else {
-        (Glass::Ruby, Glass::Cobalt)
-    };
+    let (ground, edge) = if even { (Cobalt, Ruby) } else { (Ruby, Cobalt) };
     let c = q - vec2(HEAD, 0.0);
     // A narrow border of alternating colours.
     let step = (q.x / 0.058).floor();
@@ -192,36 +195,27 @@ fn first_lancets(p: Vec2) -> GlassPoint {
     let border = if step.rem_euclid(2.0) < 1.0 {
         edge
     } else {
-        Glass::Pale
+        Pale
     };
+    let joint = (q.x / 0.058 - (q.x / 0.058).round()) * 0.058;
     let border = GlassPoint::new(220 + 40 * k + 2 * (step as u32) + side, border)
-        .lead(
-            (q.x / 0.058 - (q.x / 0.058).round()) * 0.058,
-            0.7 * FINE_HALF_WIDTH,
-        )
+        .lead(joint, 0.7 * FINE_HALF_WIDTH)
         .lead(q.y, 0.7 * FINE_HALF_WIDTH);
     let field = light + 0.021;
     let mut spot = border.inlay(field, FINE_HALF_WIDTH, 800 + k, ground);
     if field < 0.0 {
-        spot = spot.painted(diaper(q, 0.020));
         // A stem of leaves below the roundel.
-        let stem = vesica(q - vec2(0.290, 0.0), 0.080, 0.030);
-        let leaves = [Glass::Emerald, Glass::Moss][usize::from(even)];
-        spot = spot.lead(
-            segment(q, vec2(0.2, 0.0), vec2(0.35, 0.0)),
-            0.6 * FINE_HALF_WIDTH,
-        );
-        spot = spot.inlay(stem, 0.9 * FINE_HALF_WIDTH, 820 + k, leaves);
-        if stem < 0.0 {
-            spot = spot.painted(foliage(q - vec2(0.22, 0.0), 0.026));
-        }
+        let stem = segment(q, vec2(0.2, 0.0), vec2(0.35, 0.0));
+        let leaves = vesica(q - vec2(0.290, 0.0), 0.080, 0.030);
+        let glass = [Emerald, Moss][usize::from(even)];
+        spot = spot
+            .painted(diaper(q, 0.020))
+            .lead(stem, 0.6 * FINE_HALF_WIDTH)
+            .inlay(leaves, 0.9 * FINE_HALF_WIDTH, 820 + k, glass)
+            .painted_inside(leaves, foliage(q - vec2(0.22, 0.0), 0.026));
     }
     let medallion = circle(c, 0.070);
-    let (rim, flower) = if even {
-        (Glass::Violet, Glass::Opal)
-    } else {
-        (Glass::Azure, Glass::Amber)
-    };
+    let (rim, flower) = if even { (Violet, Opal) } else { (Azure, Amber) };
     spot = spot.inlay(medallion, 0.8 * BOLD_HALF_WIDTH, 840 + k, rim);
     if medallion > 0.0 {
         return spot.within(light);
@@ -230,10 +224,10 @@ fn first_lancets(p: Vec2) -> GlassPoint {
     let (petal, l) = fold(c, 6, 0.0);
     let (figure, piece, heart) = if even {
         let petals = vesica(l - vec2(0.037, 0.0), 0.026, 0.0185);
-        (petals, 1000 + 10 * k + petal, Glass::Gold)
+        (petals, 1000 + 10 * k + petal, Gold)
     } else {
         let tips = star(c, 8, 0.059, 0.033);
-        (tips, 880 + k, Glass::Ruby)
+        (tips, 880 + k, Ruby)
     };
     spot.painted(0.45 * stroke(circle(c, 0.056), 0.0022))
         .inlay(figure, 0.7 * FINE_HALF_WIDTH, piece, flower)
@@ -249,15 +243,15 @@ fn second_lancets(p: Vec2) -> GlassPoint {
     let light = lancet(q, PI / 24.0, HEAD, FIRST_LANCETS_RADIUS);
     if light > 0.0 {
         let eye = g - vec2(0.830, 0.0);
-        let glass = [Glass::Ruby, Glass::Cobalt, Glass::Emerald][(gap % 3) as usize];
+        let glass = [Ruby, Cobalt, Emerald][(gap % 3) as usize];
         return eyelet(eye, 0.020, [1200 + gap, 1600 + gap], glass)
             .within(2.0 * STONE_HALF_WIDTH - light);
     }
     let (ground, bar) = [
-        (Glass::Cobalt, Glass::Ruby),
-        (Glass::Azure, Glass::Amber),
-        (Glass::Cobalt, Glass::Emerald),
-        (Glass::Azure, Glass::Violet),
+        (Cobalt, Ruby),
+        (Azure, Amber),
+        (Cobalt, Emerald),
+        (Azure, Violet),
     ][(k % 4) as usize];
     // Three panels along the radius, with leads between them.
     let panel = (((q.x - 0.562) / 0.0600).floor().clamp(0.0, 2.0)) as u32;
@@ -270,13 +264,9 @@ fn second_lancets(p: Vec2) -> GlassPoint {
     let l = q - vec2(middle, 0.0);
     let lozenge = (l.x.abs() + 0.62 * l.y.abs() - 0.0280) * 0.81;
     let spot = if panel < 2 {
-        let glass = if panel == 0 { bar } else { Glass::Pale };
+        let glass = if panel == 0 { bar } else { Pale };
         foot.inlay(lozenge, 0.8 * FINE_HALF_WIDTH, 1340 + 2 * k + panel, glass)
-            .painted(if lozenge < 0.0 {
-                0.55 * stroke(circle(l, 0.007), 0.0026)
-            } else {
-                0.0
-            })
+            .painted_inside(lozenge, 0.55 * stroke(circle(l, 0.007), 0.0026))
     } else {
         foot
     };
@@ -289,15 +279,12 @@ fn second_lancets(p: Vec2) -> GlassPoint {
     let (_, l) = fold(c, 4, 0.0);
     let (_, rays) = fold(c, 16, PI / 16.0);
     let figure = circle(l - vec2(0.0310, 0.0), 0.0270).min(circle(c, 0.030));
-    let glass = [Glass::Opal, Glass::Gold, Glass::Rose, Glass::Pale][(k % 4) as usize];
-    let heart = [Glass::Cobalt, Glass::Ruby][(k % 2) as usize];
+    let glass = [Opal, Gold, Rose, Pale][(k % 4) as usize];
+    let heart = [Cobalt, Ruby][(k % 2) as usize];
+    let ring = stroke(circle(l - vec2(0.035, 0.0), 0.011), 0.0022);
     spot.painted(0.45 * stroke(rays.y, 0.0022))
         .inlay(figure, 0.8 * FINE_HALF_WIDTH, 1430 + k, glass)
-        .painted(if figure < 0.0 {
-            0.5 * stroke(circle(l - vec2(0.035, 0.0), 0.011), 0.0022)
-        } else {
-            0.0
-        })
+        .painted_inside(figure, 0.5 * ring)
         .inlay(circle(c, 0.0155), 0.6 * FINE_HALF_WIDTH, 1460 + k, heart)
         .within(light)
 }
@@ -306,81 +293,61 @@ fn pearls(p: Vec2, r: f64) -> GlassPoint {
     const MIDDLE: f64 = 0.5 * (PEARLS_RADIUS + SECOND_LANCETS_RADIUS) + 0.002;
     let (k, q) = fold(p, 36, 0.0);
     let (gap, g) = fold(p, 36, PI / 36.0);
-    let glass = [Glass::Ruby, Glass::Cobalt][(gap % 2) as usize];
+    let glass = [Ruby, Cobalt][(gap % 2) as usize];
     let leaf = stroke(vesica(vec2(g.y, r - MIDDLE), 0.028, 0.008), 0.0028);
+    let pearl = circle(q - vec2(MIDDLE, 0.0), 0.0185);
     GlassPoint::new(1500 + gap, glass)
         .painted(0.5 * leaf)
         .lead(q.y, 0.8 * FINE_HALF_WIDTH)
-        .inlay(
-            circle(q - vec2(MIDDLE, 0.0), 0.0185),
-            0.7 * FINE_HALF_WIDTH,
-            1540 + k,
-            Glass::Opal,
-        )
+        .inlay(pearl, 0.7 * FINE_HALF_WIDTH, 1540 + k, Opal)
 }
 
 fn corner(p: Vec2) -> GlassPoint {
     let place = u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0);
     let q = vec2(p.x.abs(), p.y.abs());
-    let side = u32::from(q.x > q.y);
-    let side_place = 2 * place + side;
+    let half = 2 * place + u32::from(q.x > q.y);
     // Coordinates in one half of the corner.
     let h = vec2(q.x.min(q.y), q.x.max(q.y));
     // A great circle that touches the rose and the frame, and a small one on each side of it.
     let c = q - vec2(0.7715, 0.7715);
     let small = h - vec2(0.537, 0.857);
     let great = circle(c, 0.158);
-    let ground = GlassPoint::new(1860 + side_place, Glass::Cobalt)
-        .lead(q.x - q.y, FINE_HALF_WIDTH)
-        .lead(h.x, FINE_HALF_WIDTH);
-    let stars = star(h - vec2(0.645, 0.917), 4, 0.017, 0.006);
-    let ground = ground.painted(diaper(q, 0.024)).inlay(
-        stars,
-        0.6 * FINE_HALF_WIDTH,
-        1870 + side_place,
-        Glass::Pale,
-    );
     // Foliage between the small circle and the axis, with a jewel.
     let tail = h.x - 0.40;
     let jewel = h - vec2(0.345, 0.896);
+    let stars = star(h - vec2(0.645, 0.917), 4, 0.017, 0.006);
     let ground = if tail < 0.0 {
-        GlassPoint::new(1880 + side_place, Glass::Gold)
+        GlassPoint::new(1880 + half, Gold)
             .painted(foliage(vec2(h.x, h.y - 0.920), 0.036))
             .lead(h.x, FINE_HALF_WIDTH)
             .inlay(
                 circle(jewel, 0.029),
                 0.8 * FINE_HALF_WIDTH,
-                1890 + side_place,
-                Glass::Ruby,
+                1890 + half,
+                Ruby,
             )
             .painted(0.55 * stroke(circle(jewel, 0.014), 0.003))
     } else {
-        ground
-    }
-    .lead(tail, FINE_HALF_WIDTH);
-
-    let rim = circle(small, 0.068);
-    let (petal, l) = fold(small, 5, 0.3);
-    let petals = circle(l - vec2(0.038, 0.0), 0.0225);
-    let ground = ground.inlay(rim, BOLD_HALF_WIDTH, 1640 + side_place, Glass::Violet);
-    let ground = if rim < 0.0 {
-        ground
-            .inlay(
-                petals,
-                0.7 * FINE_HALF_WIDTH,
-                1660 + 5 * side_place + petal,
-                Glass::Opal,
-            )
-            .painted(0.5 * stroke(l.y, 0.002) * smoothstep(0.0, 0.008, -petals))
-            .inlay(
-                circle(small, 0.017),
-                0.7 * FINE_HALF_WIDTH,
-                1710 + side_place,
-                Glass::Gold,
-            )
-    } else {
-        ground
+        GlassPoint::new(1860 + half, Cobalt)
+            .lead(q.x - q.y, FINE_HALF_WIDTH)
+            .lead(h.x, FINE_HALF_WIDTH)
+            .painted(diaper(q, 0.024))
+            .inlay(stars, 0.6 * FINE_HALF_WIDTH, 1870 + half, Pale)
     };
+    let rim = circle(small, 0.068);
+    let mut ground =
+        ground
+            .lead(tail, FINE_HALF_WIDTH)
+            .inlay(rim, BOLD_HALF_WIDTH, 1640 + half, Violet);
+    if rim < 0.0 {
+        let (petal, l) = fold(small, 5, 0.3);
+        let petals = circle(l - vec2(0.038, 0.0), 0.0225);
+        let heart = circle(small, 0.017);
+        ground = ground
+            .inlay(petals, 0.7 * FINE_HALF_WIDTH, 1660 + 5 * half + petal, Opal)
+            .painted(0.5 * stroke(l.y, 0.002) * smoothstep(0.0, 0.008, -petals))
+            .inlay(heart, 0.7 * FINE_HALF_WIDTH, 1710 + half, Gold);
+    }
     if great > BOLD_HALF_WIDTH {
         return ground.lead(great, BOLD_HALF_WIDTH);
     }
@@ -389,35 +356,22 @@ fn corner(p: Vec2) -> GlassPoint {
     let opening = circle(l - vec2(0.074, 0.0), 0.072)
         .max(great + 2.0 * BOLD_HALF_WIDTH)
         .min(circle(c, 0.056));
-    let leaf = vesica(l - vec2(0.092, 0.0), 0.046, 0.025);
-    let number = 4 * place + foil;
     if opening > 0.0 {
         // Between the foils.
         let (between, _) = fold(c, 4, PI / 4.0);
-        return GlassPoint::new(1800 + 4 * place + between, Glass::Azure)
+        return GlassPoint::new(1800 + 4 * place + between, Azure)
             .within((2.0 * BOLD_HALF_WIDTH - opening).max(great + BOLD_HALF_WIDTH));
     }
-    GlassPoint::new(1730 + number, Glass::Ruby)
+    let leaf = vesica(l - vec2(0.092, 0.0), 0.046, 0.025);
+    let (medallion, rays) = (circle(c, 0.050), star(c, 8, 0.040, 0.022));
+    let number = 4 * place + foil;
+    GlassPoint::new(1730 + number, Ruby)
         .lead((l.y.abs() - l.x) * FRAC_1_SQRT_2, FINE_HALF_WIDTH)
         .painted(diaper(c, 0.018))
-        .inlay(leaf, 0.8 * FINE_HALF_WIDTH, 1750 + number, Glass::Emerald)
-        .painted(if leaf < 0.0 {
-            foliage(l - vec2(0.05, 0.0), 0.018)
-        } else {
-            0.0
-        })
-        .inlay(
-            circle(c, 0.050),
-            0.8 * BOLD_HALF_WIDTH,
-            1770 + place,
-            Glass::Cobalt,
-        )
-        .inlay(
-            star(c, 8, 0.040, 0.022),
-            0.6 * FINE_HALF_WIDTH,
-            1780 + place,
-            Glass::Gold,
-        )
+        .inlay(leaf, 0.8 * FINE_HALF_WIDTH, 1750 + number, Emerald)
+        .painted_inside(leaf, foliage(l - vec2(0.05, 0.0), 0.018))
+        .inlay(medallion, 0.8 * BOLD_HALF_WIDTH, 1770 + place, Cobalt)
+        .inlay(rays, 0.6 * FINE_HALF_WIDTH, 1780 + place, Gold)
         .within(opening)
 }
 
@@ -429,7 +383,7 @@ fn frame(p: Vec2) -> GlassPoint {
     };
     if along.abs() > FRAME_HALF_SIDE {
         let place = u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0);
-        return GlassPoint::new(700 + place, Glass::Ruby)
+        return GlassPoint::new(700 + place, Ruby)
             .lead(along.abs() - FRAME_HALF_SIDE, FINE_HALF_WIDTH);
     }
     // Long stones in two blues, with short golden ones between them.
@@ -440,10 +394,10 @@ fn frame(p: Vec2) -> GlassPoint {
     let from_joint = (t - t.round()) * length;
     if short < 0.0 {
         let dot = 0.55 * stroke(circle(vec2(from_joint, middle), 0.008), 0.003);
-        GlassPoint::new(2000 + 20 * side + t.round() as u32, Glass::Gold).painted(dot)
+        GlassPoint::new(2000 + 20 * side + t.round() as u32, Gold).painted(dot)
     } else {
         let stone = (t.floor() as u32).min(STONES as u32 - 1);
-        let glass = [Glass::Cobalt, Glass::Azure][(stone % 2) as usize];
+        let glass = [Cobalt, Azure][(stone % 2) as usize];
         let centre = (t - t.floor() - 0.5) * length;
         let leaf = stroke(vesica(vec2(centre, middle), 0.045, 0.013), 0.0028);
         GlassPoint::new(710 + 20 * side + stone, glass).painted(0.5 * leaf)
@@ -460,10 +414,10 @@ fn quarries(p: Vec2) -> GlassPoint {
     let (i, j) = (a.floor(), b.floor());
     let pick = cell_hash(i as i32, j as i32, 51);
     let glass = match (pick * 10.0) as u32 {
-        0 => Glass::Azure,
-        1 => Glass::Gold,
-        2 => Glass::Aqua,
-        _ => Glass::Pale,
+        0 => Azure,
+        1 => Gold,
+        2 => Aqua,
+        _ => Pale,
     };
     let piece = 1000 + (pick * f64::from(u16::MAX)) as u32;
     let line = |t: f64| (t - t.round()) * SIDE;
