@@ -24,10 +24,10 @@ use std::time::Instant;
 use npyz::WriterBuilder;
 use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{
-    ChunkId, EncodedFile, FileIndex, HEADER_BYTES, Limits, Metadata, RateTarget, Reader, Source,
+    ChunkId, EncodedFile, FileIndex, HEADER_BYTES, Limits, LtmReader, Metadata, RateTarget, Source,
     decode_basis, decode_tile,
 };
-use relightable_photo::transport::{BandTile, Basis, CHANNELS, Decibels, TransportError};
+use relightable_photo::transport::{Basis, CHANNELS, Decibels, FloatTile, TransportError};
 use serde_json::{Value, json};
 
 use figures::Figures;
@@ -120,12 +120,12 @@ fn prefix(files: &Files, capture: &Path, figures: &mut Figures) {
 struct Decoded {
     index: FileIndex,
     basis: Basis,
-    tiles: Vec<BandTile>,
+    tiles: Vec<FloatTile>,
 }
 
 fn decode(path: &Path) -> Decoded {
     let bytes = fs::read(path).unwrap();
-    let mut reader = Reader::new(Limits::default());
+    let mut reader = LtmReader::new(Limits::default());
     reader.feed(0, &bytes[..HEADER_BYTES]).unwrap();
     let index = reader.index_bytes().unwrap() as usize;
     reader.feed(0, &bytes[..index]).unwrap();
@@ -168,8 +168,8 @@ fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
     let mut origins = vec![0i32; 2 * camera.area()];
     let mut error = TransportError::default();
     for (tile, coded) in given.tiles.iter().zip(&ours.tiles) {
-        let functions = tile.clone().functions(&geometry, &given.basis);
-        let coded = coded.clone().functions(&geometry, &ours.basis);
+        let functions = tile.functions(&geometry, Some(&given.basis));
+        let coded = coded.functions(&geometry, Some(&ours.basis));
         for (p, pixel) in tile.rect.pixels().enumerate() {
             let n = camera.index(pixel);
             let origin = geometry.window_origin(pixel);

@@ -14,12 +14,12 @@ use std::sync::Once;
 use common::{Noise, functions, tiled};
 use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{
-    self, CaptureNote, ChunkId, EncodedFile, Extension, FileIndex, FormatError, Limits, Metadata,
-    RateTarget, Reader, Source,
+    self, CaptureNote, ChunkId, EncodedFile, Extension, FileIndex, FormatError, Limits, LtmReader,
+    Metadata, RateTarget, Source,
 };
 use relightable_photo::relight::{Light, OutputTransform, reference};
 use relightable_photo::transport::{
-    BandTile, Basis, CHANNELS, CameraPx, Decibels, Geometry, Tile, TileRect,
+    Basis, CHANNELS, CameraPx, Decibels, FloatTile, Geometry, Tile, TileRect,
 };
 
 /// The files, as appendix G of `docs/format.md` lists them.
@@ -57,7 +57,7 @@ fn fixture(name: &str, extension: &str) -> Vec<u8> {
 struct Synthetic {
     geometry: Geometry,
     basis: Option<Basis>,
-    tiles: Vec<BandTile>,
+    tiles: Vec<FloatTile>,
 }
 
 impl Synthetic {
@@ -71,7 +71,7 @@ impl Synthetic {
         let basis = Basis {
             kernels: (0..rank).map(kernel).collect(),
         };
-        let mut tiles: Vec<BandTile> = geometry.tiles().map(BandTile::dark).collect();
+        let mut tiles: Vec<FloatTile> = geometry.tiles().map(FloatTile::dark).collect();
         for &i in lit {
             tiles[i].coefficients = coefficients(tiles[i].rect, rank, &mut noise);
         }
@@ -243,8 +243,8 @@ fn extended(synthetic: &Synthetic) -> Vec<u8> {
     })
 }
 
-fn read(file: &[u8]) -> Reader {
-    let mut reader = Reader::new(Limits::default());
+fn read(file: &[u8]) -> LtmReader {
+    let mut reader = LtmReader::new(Limits::default());
     reader.feed(0, file).unwrap();
     reader
 }
@@ -383,7 +383,7 @@ fn the_specification_shows_windows_light_transport_functions_and_a_picture() {
     };
     let basis = format::decode_basis(&index, &fetch).unwrap();
     let tile = format::decode_tile(&index, 3, &fetch).unwrap();
-    let tau = tile.functions(&geometry, &basis).tau;
+    let tau = tile.functions(&geometry, Some(&basis)).tau;
     for slot in [2, 3, 14] {
         let tau = tau[5 * window.area() + slot];
         assert_specified(&format!("      τ                 {}\n", numbers(&tau)));

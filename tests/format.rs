@@ -8,11 +8,11 @@ use proptest::prelude::*;
 use relightable_photo::executor::{Executor, SequentialExecutor};
 use relightable_photo::format::{
     self, ChunkId, Coding, DistortionMetric, EncodedFile, Extension, FileSection, FormatError,
-    HEADER_BYTES, Interest, Limits, Metadata, RateTarget, Reader, Source, TextDamage,
+    HEADER_BYTES, Interest, Limits, LtmReader, Metadata, RateTarget, Source, TextDamage,
 };
 use relightable_photo::transport::{
-    BandTile, Basis, CHANNELS, Decibels, FactoredTile, Geometry, RecoveredTile, Tile, Transport,
-    TransportError, TransportFunctions,
+    Basis, CHANNELS, Decibels, FloatTile, Geometry, Tile, Transport, TransportError,
+    TransportFunctions,
 };
 
 /// A recovered light transport.
@@ -20,7 +20,7 @@ use relightable_photo::transport::{
 struct Recovered {
     geometry: Geometry,
     basis: Option<Basis>,
-    tiles: Vec<BandTile>,
+    tiles: Vec<FloatTile>,
 }
 
 // Brief, for the messages of failed cases.
@@ -34,11 +34,7 @@ impl std::fmt::Debug for Recovered {
 impl Recovered {
     /// Direct tiles; the first is dark.
     fn direct(geometry: Geometry, seed: u64) -> Self {
-        let tiles = functions(geometry, seed).into_iter().map(|functions| {
-            let mut tile = BandTile::dark(functions.rect);
-            tile.insert(RecoveredTile::Direct(functions));
-            tile
-        });
+        let tiles = functions(geometry, seed).into_iter().map(FloatTile::from);
         Self {
             geometry,
             basis: None,
@@ -70,12 +66,10 @@ impl Recovered {
                 };
                 [1.0, 0.5, 2.0].map(|c| c * size * (noise.next() as f32 - 0.3))
             };
-            let mut tile = BandTile::dark(rect);
-            tile.insert(RecoveredTile::Factored(FactoredTile {
-                rect,
+            recovered.tiles[i] = FloatTile {
                 coefficients: (0..rect.extent.area() * rank).map(coefficient).collect(),
-            }));
-            recovered.tiles[i] = tile;
+                ..FloatTile::dark(rect)
+            };
         }
         recovered
     }
@@ -106,8 +100,7 @@ impl Recovered {
 
     /// Light transport functions of tile `i`.
     fn functions(&self, i: usize) -> TransportFunctions {
-        let basis = self.basis.clone().unwrap_or_default();
-        self.tiles[i].clone().functions(&self.geometry, &basis)
+        self.tiles[i].functions(&self.geometry, self.basis.as_ref())
     }
 
     /// The share of all windows' slots that lie on the light plane.
@@ -147,8 +140,8 @@ fn bytes(file: &EncodedFile) -> Vec<u8> {
     bytes
 }
 
-fn read(file: &[u8], piece: usize) -> Result<Reader, FormatError> {
-    let mut reader = Reader::new(Limits::default());
+fn read(file: &[u8], piece: usize) -> Result<LtmReader, FormatError> {
+    let mut reader = LtmReader::new(Limits::default());
     let mut offset = 0;
     for piece in file.chunks(piece.max(1)) {
         reader.feed(offset, piece)?;
@@ -238,7 +231,7 @@ proptest! {
     fn chunks_may_come_in_any_order(recovered in any_recovered(), seed in any::<u64>()) {
         let file = recovered.file(QUALITY);
         let want = decode(&file, file.len()).unwrap();
-        let mut reader = Reader::new(Limits::default());
+        let mut reader = LtmReader::new(Limits::default());
         let mut noise = Noise(seed);
         while let Some(ranges) = Some(reader.wants(&Interest::default())).filter(|r| !r.is_empty()) {
             let range = ranges[(noise.next() * ranges.len() as f64) as usize].clone();
@@ -381,18 +374,18 @@ fn files_stay_within_the_target_size() {
 struct KnownTransportMetric<'a> {
     geometry: Geometry,
     basis: &'a Basis,
-    tiles: Vec<BandTile>,
+    tiles: Vec<FloatTile>,
 }
 
 impl DistortionMetric for KnownTransportMetric<'_> {
-    fn tiles(&self) -> Vec<BandTile> {
+    fn tiles(&self) -> Vec<FloatTile> {
         self.tiles.clone()
     }
 
     fn loss(&self, functions: &[TransportFunctions]) -> Decibels {
         let mut error = TransportError::default();
         for (got, tile) in functions.iter().zip(self.tiles()) {
-            let want = tile.functions(&self.geometry, self.basis);
+            let want = tile.functions(&self.geometry, Some(self.basis));
             for (got, want) in got.tau.iter().zip(&want.tau) {
                 (0..CHANNELS).for_each(|c| error.add(f64::from(want[c]), f64::from(got[c])));
             }
@@ -405,10 +398,10 @@ impl DistortionMetric for KnownTransportMetric<'_> {
 fn a_metric_may_have_tiles_of_another_kind_than_the_file() {
     let mixed = Recovered::mixed(small_geometry(), 4, 3);
     let basis = mixed.basis.as_ref().unwrap();
-    let only = |kind: &dyn Fn(&BandTile) -> bool| -> Vec<BandTile> {
-        let of_kind = |tile: &BandTile| match kind(tile) {
+    let only = |kind: &dyn Fn(&FloatTile) -> bool| -> Vec<FloatTile> {
+        let of_kind = |tile: &FloatTile| match kind(tile) {
             true => tile.clone(),
-            false => BandTile::dark(tile.rect),
+            false => FloatTile::dark(tile.rect),
         };
         mixed.tiles.iter().map(of_kind).collect()
     };
@@ -435,7 +428,7 @@ fn a_metric_may_have_tiles_of_another_kind_than_the_file() {
 fn only_visible_tiles_are_wanted() {
     let geometry = geometry([64, 48], [32, 24], 5, [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]);
     let file = Recovered::mixed(geometry, 6, 2).file(QUALITY);
-    let mut reader = Reader::new(Limits::default());
+    let mut reader = LtmReader::new(Limits::default());
     let first = reader.wants(&Interest::default());
     assert_eq!((first.len(), &first[0]), (1, &(0..format::FIRST_BYTES)));
     let index_bytes = read(&file, file.len()).unwrap().index_bytes().unwrap();
@@ -494,7 +487,7 @@ fn dark_tiles_take_no_bytes() {
     );
     let mut recovered = Recovered::direct(geometry, 1);
     for tile in &mut recovered.tiles[2..] {
-        *tile = BandTile::dark(tile.rect);
+        *tile = FloatTile::dark(tile.rect);
     }
     let file = recovered.file(QUALITY);
     let mut one = recovered.clone();
@@ -511,7 +504,7 @@ fn dark_tiles_take_no_bytes() {
     let (transport, _) = decode(&file, 999).unwrap();
     assert!(transport.tiles[2..].iter().all(Tile::is_dark));
     for tile in &mut recovered.tiles {
-        *tile = BandTile::dark(tile.rect);
+        *tile = FloatTile::dark(tile.rect);
     }
     for quality in [QUALITY, RateTarget::Bytes(1000), RateTarget::Lossless] {
         let (transport, _) = decode(&recovered.file(quality), 7).unwrap();
@@ -526,7 +519,7 @@ fn a_transport_with_one_lit_tile_reaches_the_target_snr() {
     let mut recovered = Recovered::mixed(geometry, 4, 9);
     let dark = recovered.tiles.len() - 1;
     for tile in &mut recovered.tiles[..dark] {
-        *tile = BandTile::dark(tile.rect);
+        *tile = FloatTile::dark(tile.rect);
     }
     let file = recovered.file(QUALITY);
     let decoded = decode(&file, 500).unwrap().0;
@@ -556,7 +549,7 @@ fn tiles_have_no_seams() {
         tiles: Vec::new(),
     };
     for rect in geometry.tiles() {
-        let mut tile = BandTile::dark(rect);
+        let mut tile = FloatTile::dark(rect);
         let coefficients = rect.pixels().flat_map(|pixel| {
             let (x, y) = (pixel.x as f32 / 20.0, pixel.y as f32 / 27.0);
             let value =
@@ -662,7 +655,7 @@ fn ten_thousand_mutations_give_errors_or_finite_values() {
             }
         }
         let file = sealed(file, |_| {});
-        let mut reader = Reader::new(limits);
+        let mut reader = LtmReader::new(limits);
         let result = reader.feed(0, &file).and_then(|()| reader.finish());
         if let Ok((transport, _)) = &result {
             assert!(steps(transport).all(f32::is_finite), "round {round}");
@@ -739,7 +732,7 @@ fn other_minor_versions_and_unknown_extensions_are_read_unless_they_must_be_unde
     assert!(decode(&newer, 100).unwrap() == plain);
     let error = decode(&encode(vec![extension(true)]), 100).unwrap_err();
     assert!(
-        matches!(error, FormatError::UnknownExtension { tag } if &tag == b"TEST"),
+        matches!(error, FormatError::UnknownExtension(tag) if &tag == b"TEST"),
         "{error}"
     );
 }
@@ -769,13 +762,22 @@ fn a_crafted_file_is_refused_with_its_fault() {
     };
     let error = header(field::RANK, u32::MAX);
     assert!(
-        matches!(error, FormatError::RankTooLarge(0xFFFF_FFFF)),
+        matches!(
+            error,
+            FormatError::TooMany {
+                value: u32::MAX,
+                ..
+            }
+        ),
         "{error}"
     );
     let error = header(field::RANK, 3);
     assert!(matches!(error, FormatError::InvalidScan { .. }), "{error}");
     let error = header(field::SCANS, 5000);
-    assert!(matches!(error, FormatError::TooManyScans(5000)), "{error}");
+    assert!(
+        matches!(error, FormatError::TooMany { value: 5000, .. }),
+        "{error}"
+    );
     let error = header(field::SCANS, 2);
     assert!(
         error.to_string().contains("directory does not decompress"),
@@ -785,11 +787,26 @@ fn a_crafted_file_is_refused_with_its_fault() {
     assert!(matches!(error, FormatError::Truncated { .. }), "{error}");
     let error = header(field::EXTENSION_BYTES, 1 << 30);
     assert!(
-        matches!(error, FormatError::ExtensionsTooLong(_)),
+        matches!(
+            error,
+            FormatError::TooMany {
+                quantity: "bytes of extensions",
+                ..
+            }
+        ),
         "{error}"
     );
     let error = header(field::METADATA_BYTES, 1 << 30);
-    assert!(matches!(error, FormatError::MetadataTooLong(_)), "{error}");
+    assert!(
+        matches!(
+            error,
+            FormatError::TooMany {
+                quantity: "bytes of metadata",
+                ..
+            }
+        ),
+        "{error}"
+    );
 
     // Arrays in place of objects.
     for json in [&b"[\"a\"]"[..], b"{\"capture\":[5,80]}"] {
@@ -826,7 +843,7 @@ fn a_crafted_file_is_refused_with_its_fault() {
     ] {
         let error = directory(at, value);
         assert!(
-            matches!(error, FormatError::InvalidScan { scan: 0 }),
+            matches!(error, FormatError::InvalidScan(0)),
             "{at}: {error}"
         );
     }
@@ -843,13 +860,22 @@ fn a_crafted_file_is_refused_with_its_fault() {
     ] {
         let error = directory(at, &value.to_le_bytes());
         assert!(
-            matches!(error, FormatError::InvalidChunkEntry { scan: 0, .. }),
+            matches!(
+                error,
+                FormatError::InvalidChunkEntry(ChunkId { scan: 0, .. })
+            ),
             "{at}: {error}"
         );
     }
     let error = directory(lengths, &1u32.to_le_bytes());
     assert!(
-        matches!(error, FormatError::InvalidChunkEntry { scan: 0, tile: 0 }),
+        matches!(
+            error,
+            FormatError::InvalidChunkEntry(ChunkId {
+                scan: 0,
+                tile: Some(0)
+            })
+        ),
         "{error}"
     );
     let longer = |d: &mut Vec<u8>| d[lengths + 4] += 1;
@@ -872,7 +898,7 @@ fn checking_chunks_one_by_one_agrees_with_reading() {
             damaged[bytes.len() / 2] ^= 1;
             let error = format::check(&index, chunk, &damaged).unwrap_err();
             assert!(
-                matches!(error, FormatError::ChecksumMismatch { section } if section == FileSection::Chunk(chunk))
+                matches!(error, FormatError::ChecksumMismatch(section) if section == FileSection::Chunk(chunk))
             );
             assert!(format::check(&index, chunk, &bytes[1..]).is_err());
         }
@@ -929,7 +955,7 @@ fn values_that_are_not_finite_become_zero() {
 #[test]
 fn a_file_that_needs_too_much_memory_is_refused_before_allocation() {
     let file = mixed().file(QUALITY);
-    let mut reader = Reader::new(Limits {
+    let mut reader = LtmReader::new(Limits {
         decoded_bytes: 12_000,
     });
     let error = reader.feed(0, &file).unwrap_err();
@@ -941,7 +967,7 @@ fn a_file_that_needs_too_much_memory_is_refused_before_allocation() {
 fn smallest_limit(file: &[u8]) -> u64 {
     let mut decoded_bytes = 0;
     loop {
-        match Reader::new(Limits { decoded_bytes }).feed(0, file) {
+        match LtmReader::new(Limits { decoded_bytes }).feed(0, file) {
             Err(FormatError::Limit { need, .. }) if need > decoded_bytes => decoded_bytes = need,
             result => {
                 result.unwrap();
@@ -965,7 +991,7 @@ fn a_preview_stays_within_the_memory_limit() {
         // A prefix with most components.
         let prefix = index.scan_range(index.scans.len() - 2).end as usize;
         for (decoded_bytes, has_preview) in [(limit, false), (2 * limit, true)] {
-            let mut reader = Reader::new(Limits { decoded_bytes });
+            let mut reader = LtmReader::new(Limits { decoded_bytes });
             reader.feed(0, &file[..prefix]).unwrap();
             assert_eq!(reader.preview().unwrap().is_some(), has_preview);
             reader.feed(prefix as u64, &file[prefix..]).unwrap();
@@ -1017,7 +1043,7 @@ fn scans_keep_their_shares_of_the_file() {
 #[test]
 fn bytes_after_a_gap_are_refused() {
     let file = mixed().file(QUALITY);
-    let mut reader = Reader::new(Limits::default());
+    let mut reader = LtmReader::new(Limits::default());
     let error = reader.feed(3, &[0]).unwrap_err();
     assert!(matches!(
         error,

@@ -9,10 +9,10 @@
 mod common;
 
 use common::relit::{self, TileContents};
-use common::{band_tile, tiled};
+use common::tiled;
 use js_sys::{Float32Array, Object, Reflect, Uint8ClampedArray};
 use relightable_photo::executor::SequentialExecutor;
-use relightable_photo::format::{EncodedFile, Limits, Metadata, RateTarget, Reader, Source};
+use relightable_photo::format::{EncodedFile, Limits, LtmReader, Metadata, RateTarget, Source};
 use relightable_photo::relight::{self, BuiltinLight, Rgba8Picture, reference};
 use relightable_photo::transport::{Extent, Geometry, Tile, Transport};
 use relightable_photo::web::{
@@ -103,7 +103,7 @@ async fn next_task() {
 
 fn file(transport: &Transport, metadata: &Metadata) -> Vec<u8> {
     let geometry = transport.geometry;
-    let tile = |i: usize| Ok(band_tile(&transport.tiles[i], &geometry, &transport.basis));
+    let tile = |i: usize| Ok(transport.tiles[i].dequantise(&geometry, &transport.basis));
     let factored = transport
         .tiles
         .iter()
@@ -135,7 +135,7 @@ fn photo(transport: &Transport) -> Photo {
 
 /// The transport after encoding and decoding, which rounds it to half precision.
 fn round_trip(transport: &Transport) -> Transport {
-    let mut reader = Reader::new(Limits::default());
+    let mut reader = LtmReader::new(Limits::default());
     reader
         .feed(0, &file(transport, &Metadata::default()))
         .unwrap();

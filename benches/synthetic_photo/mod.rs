@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 use relightable_photo::executor::Executor;
 use relightable_photo::transport::{
-    BandTile, Basis, CHANNELS, Correspondence, Extent, Geometry, QUAD, TexelCode, Window,
+    Basis, CHANNELS, Correspondence, Extent, FloatTile, Geometry, TEXEL_COMPONENTS, TexelCode,
+    Window,
 };
 
 const WINDOW: u32 = 15;
@@ -54,8 +55,8 @@ pub fn basis(geometry: &Geometry, rank: usize) -> Basis {
 }
 
 /// The tile of this index.
-pub fn tile(geometry: &Geometry, rank: usize, index: usize) -> BandTile {
-    let mut tile = BandTile::dark(geometry.tile(index));
+pub fn tile(geometry: &Geometry, rank: usize, index: usize) -> FloatTile {
+    let mut tile = FloatTile::dark(geometry.tile(index));
     let values = tile.rect.extent.area() * rank;
     let coefficient = |i| [0, 1, 2].map(|c| (noise(3 * (i + index * values) + c) - 0.3) * 0.02);
     tile.coefficients = (0..values).map(coefficient).collect();
@@ -64,7 +65,7 @@ pub fn tile(geometry: &Geometry, rank: usize, index: usize) -> BandTile {
 
 /// Bytes of a frame: the codes that it reads, and the picture that it writes.
 pub fn bytes(side: u32, rank: usize) -> usize {
-    let codes = CHANNELS * rank.div_ceil(QUAD) * size_of::<TexelCode>();
+    let codes = CHANNELS * rank.div_ceil(TEXEL_COMPONENTS) * size_of::<TexelCode>();
     square(side).area() * (codes + size_of::<[u8; 4]>())
 }
 

@@ -9,7 +9,7 @@ use fuzzing::source::EncoderInput;
 use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{Metadata, RateTarget};
 use relightable_photo::transport::{
-    BandTile, Basis, Correspondence, Decibels, Extent, Geometry, Window,
+    Basis, Correspondence, Decibels, Extent, FloatTile, Geometry, Window,
 };
 
 /// Two tiles of at most 8 x 8 pixels: the first factored if `rank` is not 0, the other direct.
@@ -37,7 +37,7 @@ fn input(rank: usize) -> EncoderInput {
     };
     let area = geometry.window.area();
     let tiles = geometry.tiles().enumerate().map(|(i, rect)| {
-        let (pixels, mut tile) = (rect.extent.area(), BandTile::dark(rect));
+        let (pixels, mut tile) = (rect.extent.area(), FloatTile::dark(rect));
         match i < 1 && rank > 0 {
             true => tile.coefficients = colours(pixels * rank),
             false => tile.functions = colours(pixels * area),

@@ -425,14 +425,7 @@ fn assemble(
         HEADER_BYTES + sections.iter().map(|section| section.len()).sum::<usize>() + chunk_bytes;
 
     let mut file = b"\xABLTM 10\xBB\r\n\x1A\n\x01\0\0\0".to_vec();
-    for side in [
-        geometry.camera.width,
-        geometry.camera.height,
-        geometry.light.width,
-        geometry.light.height,
-        geometry.window.side(),
-        geometry.tile_side,
-    ] {
+    for side in geometry.sides() {
         file.extend(side.to_le_bytes());
     }
     for a in geometry.correspondence.affine.iter().flatten() {

@@ -1,6 +1,6 @@
 //! Reading a file in pieces.
 
-use relightable_photo::format::{FileIndex, Interest, Reader};
+use relightable_photo::format::{FileIndex, Interest, LtmReader};
 use relightable_photo::transport::Decibels;
 
 use crate::choices::Choices;
@@ -12,7 +12,7 @@ use crate::reading::{self, LIMITS, Read, check_transport};
 /// # Panics
 /// If the reader wants bytes that it has, or still wants bytes at the end.
 pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
-    let mut reader = Reader::new(LIMITS);
+    let mut reader = LtmReader::new(LIMITS);
     let mut failed = None;
     // Each iteration feeds at least one new byte.
     for _ in 0..=2 * file.len() {
@@ -23,7 +23,7 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
             },
             false => Interest::default(),
         };
-        let wanted_in_file = |reader: &Reader, interest: &Interest| -> Vec<_> {
+        let wanted_in_file = |reader: &LtmReader, interest: &Interest| -> Vec<_> {
             let wanted = reader.wants(interest).into_iter();
             wanted
                 .filter(|range| range.start < file.len() as u64)

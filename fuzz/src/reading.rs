@@ -1,9 +1,10 @@
 //! All ways of reading a file, and the properties that must hold.
 
 use relightable_photo::format::{
-    self, FIRST_BYTES, FileIndex, FormatError, HEADER_BYTES, Interest, Limits, MetadataJson, Reader,
+    self, FIRST_BYTES, FileIndex, FormatError, HEADER_BYTES, Interest, Limits, LtmReader,
+    MetadataJson,
 };
-use relightable_photo::transport::{CHANNELS, CoefficientTile, Decibels, Tile, Transport};
+use relightable_photo::transport::{CHANNELS, Decibels, Tile, Transport};
 
 use crate::choices::Choices;
 use crate::heap::with_peak_bytes;
@@ -21,14 +22,14 @@ pub type Read = Result<(Transport, MetadataJson), FormatError>;
 
 /// Reads the whole file in one piece.
 pub fn whole(file: &[u8]) -> Read {
-    let mut reader = Reader::new(LIMITS);
+    let mut reader = LtmReader::new(LIMITS);
     reader.feed(0, file)?;
     reader.finish()
 }
 
 /// The file index, if it is valid and complete.
 pub fn index(file: &[u8]) -> Option<FileIndex> {
-    let mut reader = Reader::new(LIMITS);
+    let mut reader = LtmReader::new(LIMITS);
     reader.feed(0, &file[..file.len().min(HEADER_BYTES)]).ok()?;
     let end = usize::try_from(reader.index_bytes()?).ok()?;
     reader.feed(0, file.get(..end)?).ok()?;
@@ -40,7 +41,7 @@ pub fn index(file: &[u8]) -> Option<FileIndex> {
 /// # Panics
 /// If one does not hold.
 pub fn check_index(file: &[u8], choices: &mut Choices<'_>) {
-    let mut reader = Reader::new(LIMITS);
+    let mut reader = LtmReader::new(LIMITS);
     assert_eq!(reader.wants(&Interest::default()), [0..FIRST_BYTES]);
     if reader
         .feed(0, &file[..file.len().min(HEADER_BYTES)])
@@ -80,7 +81,7 @@ pub fn check_index(file: &[u8], choices: &mut Choices<'_>) {
     for scan in &index.scans {
         assert!(scan.step > 0.0 && scan.step.is_finite());
     }
-    let mut reader = Reader::new(LIMITS);
+    let mut reader = LtmReader::new(LIMITS);
     if reader.feed(0, &file[..end as usize]).is_err() {
         return;
     }
@@ -140,7 +141,7 @@ pub fn check_transport(transport: &Transport) {
                 .into_iter()
                 .all(|step| step.is_normal() && *step > 0.0)
         );
-        let texels = CoefficientTile::texels(rect, rank);
+        let texels = Tile::texels(rect, rank);
         assert!(coefficients.is_dark() || coefficients.codes.len() == texels);
         let codes = rect.extent.area() * area;
         assert!(functions.is_dark() || functions.codes.len() == codes);
@@ -220,7 +221,7 @@ pub fn check_previews(file: &[u8]) {
         .chain(ends)
         .collect();
     let (previews, peak) = with_peak_bytes(|| -> Result<(), FormatError> {
-        let mut reader = Reader::new(LIMITS);
+        let mut reader = LtmReader::new(LIMITS);
         let mut start = 0;
         for end in ends {
             let Some(bytes) = file.get(start as usize..end as usize) else {
@@ -247,7 +248,7 @@ pub fn check_early(file: &[u8]) {
         return;
     };
     let index_bytes = index.header.index_bytes() as usize;
-    let mut reader = Reader::new(LIMITS);
+    let mut reader = LtmReader::new(LIMITS);
     let chunk_bytes = file.len() - index_bytes;
     if reader
         .feed(0, &file[..index_bytes + chunk_bytes / 2])

@@ -7,7 +7,7 @@ use relightable_photo::format::{
     DistortionMetric, EncodedFile, Extension, FormatError, Metadata, RateTarget, Source,
 };
 use relightable_photo::transport::{
-    BandTile, Basis, CHANNELS, Correspondence, Decibels, Extent, Geometry, TileRect,
+    Basis, CHANNELS, Correspondence, Decibels, Extent, FloatTile, Geometry, TileRect,
     TransportFunctions, Window,
 };
 
@@ -70,7 +70,7 @@ pub fn geometry(choices: &mut Choices<'_>) -> Geometry {
 pub struct EncoderInput {
     pub geometry: Geometry,
     pub basis: Option<Basis>,
-    pub tiles: Vec<BandTile>,
+    pub tiles: Vec<FloatTile>,
     pub metadata: Metadata,
     pub extensions: Vec<Extension>,
     /// Whether all values are 0 or of moderate magnitude, and not all 0.
@@ -132,8 +132,8 @@ impl EncoderInput {
         rect: TileRect,
         rank: usize,
         area: usize,
-    ) -> BandTile {
-        let mut tile = BandTile::dark(rect);
+    ) -> FloatTile {
+        let mut tile = FloatTile::dark(rect);
         let pixels = rect.extent.area();
         let parts = choices.below(8);
         let colours = |values: Vec<f32>| {
@@ -219,17 +219,17 @@ impl EncoderInput {
 
     /// Light transport functions of tile `i`.
     pub fn functions(&self, i: usize) -> TransportFunctions {
-        let basis = self.basis.clone().unwrap_or_default();
-        self.tiles[i].clone().functions(&self.geometry, &basis)
+        self.tiles[i].functions(&self.geometry, self.basis.as_ref())
     }
 
     /// The energy of tile `i`: of its coefficients and of its direct functions separately, as the encoder codes both
     /// even where they cancel.
     pub fn energy(&self, i: usize) -> f64 {
-        let basis = self.basis.clone().unwrap_or_default();
         let mut coefficients = self.tiles[i].clone();
         let functions = std::mem::take(&mut coefficients.functions);
-        let factored = coefficients.functions(&self.geometry, &basis).tau;
+        let factored = coefficients
+            .functions(&self.geometry, self.basis.as_ref())
+            .tau;
         let values = factored.iter().chain(&functions).flatten();
         values.map(|v| f64::from(*v).powi(2)).sum()
     }
@@ -309,7 +309,7 @@ struct ArbitraryMetric<'a> {
 }
 
 impl DistortionMetric for ArbitraryMetric<'_> {
-    fn tiles(&self) -> Vec<BandTile> {
+    fn tiles(&self) -> Vec<FloatTile> {
         let tiles = self.input.tiles.iter().step_by(3);
         tiles.take(3).cloned().collect()
     }

@@ -8,7 +8,9 @@ use std::path::Path;
 use anyhow::{Context, Result, anyhow, ensure};
 
 use super::arguments::ByteCount;
-use crate::format::{FileIndex, FileSection, FormatError, HEADER_BYTES, Interest, Limits, Reader};
+use crate::format::{
+    FileIndex, FileSection, FormatError, HEADER_BYTES, Interest, Limits, LtmReader,
+};
 use crate::transport::Transport;
 
 /// Bytes read at a time.
@@ -34,7 +36,7 @@ pub fn read_ltm(path: &Path, first: Option<PrefixLength>) -> Result<LtmFile> {
         let file = open(path)?;
         let length = file.metadata().context("cannot be read")?.len();
         let max_bytes = first.map_or(u64::MAX, |first| first.bytes_of(length));
-        let mut reader = Reader::new(LIMITS);
+        let mut reader = LtmReader::new(LIMITS);
         let fed = feed_all(&mut reader, file.take(max_bytes));
         let Some(index) = reader.index().cloned() else {
             fed?;
@@ -66,7 +68,7 @@ pub fn read_ltm(path: &Path, first: Option<PrefixLength>) -> Result<LtmFile> {
 }
 
 /// Feeds the whole of `file` to `reader`.
-fn feed_all(reader: &mut Reader, mut file: impl Read) -> Result<()> {
+fn feed_all(reader: &mut LtmReader, mut file: impl Read) -> Result<()> {
     let mut buffer = vec![0; READ_BYTES];
     let mut offset = 0;
     loop {
@@ -83,9 +85,7 @@ fn feed_all(reader: &mut Reader, mut file: impl Read) -> Result<()> {
 fn intact_bytes(index: &FileIndex, error: &anyhow::Error) -> Option<u64> {
     match error.downcast_ref::<FormatError>()? {
         FormatError::Truncated { got, .. } => Some(*got),
-        FormatError::ChecksumMismatch {
-            section: FileSection::Chunk(chunk),
-        }
+        FormatError::ChecksumMismatch(FileSection::Chunk(chunk))
         | FormatError::DamagedSection {
             section: FileSection::Chunk(chunk),
             ..
@@ -98,7 +98,7 @@ fn intact_bytes(index: &FileIndex, error: &anyhow::Error) -> Option<u64> {
 pub fn open_ltm(path: &Path) -> Result<(File, FileIndex)> {
     let read = || -> Result<(File, FileIndex)> {
         let mut file = open(path)?;
-        let mut reader = Reader::new(LIMITS);
+        let mut reader = LtmReader::new(LIMITS);
         loop {
             if let Some(index) = reader.index() {
                 return Ok((file, index.clone()));

@@ -105,7 +105,7 @@ fn verify(args: &VerifyArgs, report: &mut VerifyReport) -> Result<()> {
     let metadata = file.metadata().context("cannot be read");
     let length = metadata.with_context(name)?.len();
     match length > end {
-        true => Err(FormatError::TrailingBytes { end }).with_context(name),
+        true => Err(FormatError::TrailingBytes(end)).with_context(name),
         false => Ok(()),
     }
 }

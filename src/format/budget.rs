@@ -1,9 +1,8 @@
 //! The reader's memory budget: every allocation of the reader is reserved here first.
 //!
-//! Lengths in a file are claims, so a reservation fails before memory is taken
-//! ([`FormatError::Limit`]), and an allocation that the system refuses is an error too
-//! ([`FormatError::Memory`]): a WebAssembly module must not abort. Tables of zstd (about 160 kB) and
-//! error messages are not counted.
+//! Lengths in a file are claims, so a reservation fails before memory is taken ([`FormatError::Limit`]), and an
+//! allocation that the system refuses is an error too ([`FormatError::Memory`]): a WebAssembly module must not abort.
+//! Tables of zstd (about 160 kB) and error messages are not counted.
 
 use std::cell::Cell;
 
@@ -29,7 +28,8 @@ impl Default for Limits {
     }
 }
 
-/// Bytes that a reader may still reserve, and the fallible allocations that reserve them.
+/// Bytes that a reader may still reserve, and the fallible allocations that reserve them. They fail with
+/// [`FormatError::Limit`] beyond the limit, and with [`FormatError::Memory`] if the system refuses memory.
 #[derive(Debug)]
 pub struct Budget {
     limit: u64,
@@ -45,39 +45,28 @@ impl Budget {
         }
     }
 
-    /// A budget for files whose index has passed the limits of a [`Reader`](super::Reader).
+    /// A budget for files whose index has passed the limits of a [`LtmReader`](super::LtmReader).
     pub fn unlimited() -> Self {
         Self::new(Limits {
             decoded_bytes: u64::MAX,
         })
     }
 
-    /// Reserves `bytes`.
-    ///
-    /// # Errors
-    /// [`FormatError::Limit`] if the budget has fewer bytes left.
-    pub fn reserve(&self, bytes: u64) -> Result<(), FormatError> {
+    pub(super) fn reserve(&self, bytes: u64) -> Result<(), FormatError> {
         let need = self.reserved.get().saturating_add(bytes);
         self.check(need)?;
         self.reserved.set(need);
         Ok(())
     }
 
-    /// Whether the whole budget covers `need` bytes.
-    ///
-    /// # Errors
-    /// [`FormatError::Limit`] if it does not.
-    pub fn check(&self, need: u64) -> Result<(), FormatError> {
-        match need <= self.limit {
-            true => Ok(()),
-            false => Err(FormatError::Limit {
-                need,
-                limit: self.limit,
-            }),
+    /// Checks that the whole budget covers `need` bytes.
+    pub(super) fn check(&self, need: u64) -> Result<(), FormatError> {
+        match self.limit {
+            limit if need > limit => Err(FormatError::Limit { need, limit }),
+            _ => Ok(()),
         }
     }
 
-    /// Releases `bytes`.
     pub fn release(&self, bytes: u64) {
         self.reserved.set(self.reserved.get().saturating_sub(bytes));
     }
@@ -96,40 +85,38 @@ impl Budget {
     }
 
     /// An empty vector with room for `length` values.
-    ///
-    /// # Errors
-    /// [`FormatError::Limit`] or [`FormatError::Memory`].
-    pub fn try_with_capacity<T>(&self, length: usize) -> Result<Vec<T>, FormatError> {
+    pub(super) fn try_with_capacity<T>(&self, length: usize) -> Result<Vec<T>, FormatError> {
         let mut values = Vec::new();
         self.try_grow(&mut values, length)?;
         Ok(values)
     }
 
-    /// `length` zeros.
-    ///
-    /// # Errors
-    /// [`FormatError::Limit`] or [`FormatError::Memory`].
-    pub fn try_zeroed<T: Zeroable + Clone>(&self, length: usize) -> Result<Vec<T>, FormatError> {
+    pub(super) fn try_zeroed<T: Zeroable + Clone>(
+        &self,
+        length: usize,
+    ) -> Result<Vec<T>, FormatError> {
         let mut values = self.try_with_capacity(length)?;
         values.resize(length, T::zeroed());
         Ok(values)
     }
 
-    /// A copy of `values`.
-    ///
-    /// # Errors
-    /// [`FormatError::Limit`] or [`FormatError::Memory`].
-    pub fn try_copy<T: Copy>(&self, values: &[T]) -> Result<Vec<T>, FormatError> {
+    pub(super) fn try_copy<T: Copy>(&self, values: &[T]) -> Result<Vec<T>, FormatError> {
         let mut copy = self.try_with_capacity(values.len())?;
         copy.extend_from_slice(values);
         Ok(copy)
     }
 
+    /// Appends a value, with twice the capacity when `values` is full.
+    pub(super) fn try_push<T>(&self, values: &mut Vec<T>, value: T) -> Result<(), FormatError> {
+        if values.len() == values.capacity() {
+            self.try_grow(values, 2 * values.len() + 1)?;
+        }
+        values.push(value);
+        Ok(())
+    }
+
     /// Appends `more` to `values`, whose capacity at least doubles when it grows, up to `final_length`.
-    ///
-    /// # Errors
-    /// [`FormatError::Limit`] or [`FormatError::Memory`].
-    pub fn try_extend(
+    pub(super) fn try_extend(
         &self,
         values: &mut Vec<u8>,
         more: &[u8],
@@ -152,9 +139,7 @@ impl Budget {
         self.reserve(need)?;
         let reserved = values.try_reserve_exact(capacity - values.len());
         self.release(if reserved.is_ok() { before } else { need });
-        reserved.map_err(|_| FormatError::Memory {
-            need: usize::try_from(need).unwrap_or(usize::MAX),
-        })
+        reserved.map_err(|_| FormatError::Memory(need))
     }
 }
 

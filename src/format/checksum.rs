@@ -1,5 +1,7 @@
 //! CRC-32C (RFC 3720, appendix B.4).
 
+use super::error::{FileSection, FormatError};
+
 /// The checksum of `bytes`.
 #[cfg(not(target_arch = "wasm32"))]
 pub fn checksum(bytes: &[u8]) -> u32 {
@@ -14,7 +16,13 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes)
 }
 
-/// Whether `bytes` have the checksum `crc`. Fuzzing ignores checksums, to reach the code behind them.
-pub fn crc_matches(bytes: &[u8], crc: u32) -> bool {
-    cfg!(fuzzing) || checksum(bytes) == crc
+/// Checks that the bytes of `section` have the checksum `crc`. Fuzzing ignores checksums, to reach the code behind them.
+///
+/// # Errors
+/// [`FormatError::ChecksumMismatch`].
+pub fn check_crc(bytes: &[u8], crc: u32, section: FileSection) -> Result<(), FormatError> {
+    match cfg!(fuzzing) || checksum(bytes) == crc {
+        true => Ok(()),
+        false => Err(FormatError::ChecksumMismatch(section)),
+    }
 }

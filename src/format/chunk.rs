@@ -9,21 +9,6 @@ pub struct ChunkId {
     pub tile: Option<usize>,
 }
 
-impl ChunkId {
-    /// The chunk of a tile.
-    pub fn of_tile(scan: usize, tile: usize) -> Self {
-        Self {
-            scan,
-            tile: Some(tile),
-        }
-    }
-
-    /// The chunk of a scan's basis functions.
-    pub fn of_basis(scan: usize) -> Self {
-        Self { scan, tile: None }
-    }
-}
-
 impl std::fmt::Display for ChunkId {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let scan = self.scan;
@@ -45,11 +30,9 @@ pub struct ChunkEntry {
     pub crc: u32,
 }
 
-/// A tile chunk as the encoder makes it.
-#[derive(Clone, Debug, PartialEq)]
+/// A tile chunk as the encoder makes it, with the [`ChunkEntry::content_bytes`]; empty if all values are zero.
+#[derive(Clone, Debug, Default)]
 pub struct EncodedChunk {
-    /// Bytes in the file.
     pub bytes: Vec<u8>,
-    /// Bytes of the contents of its zstd frames.
     pub content_bytes: u32,
 }

@@ -1,5 +1,4 @@
-//! The state of a [`Reader`](super::Reader) that has the index: which chunks have come, and the tiles so
-//! far.
+//! The state of a [`LtmReader`](super::LtmReader) that has the index: which chunks have come, and the tiles so far.
 //!
 //! Tiles decode their chunks in the order of scans. A chunk that comes early waits for those before it.
 
@@ -7,15 +6,25 @@ use std::ops::Range;
 
 use super::budget::Budget;
 use super::chunk::ChunkId;
-use super::codec::{basis, direct};
+use super::codec::direct;
 use super::error::FormatError;
 use super::index::FileIndex;
 use super::metadata::MetadataJson;
-use super::tile_decoder::TileDecoder;
-use crate::transport::{Basis, CoefficientTile, Decibels, DirectTile, Tile, Transport};
+use super::scan::Scan;
+use super::tile_decoder::{TileDecoder, decode_basis_chunk};
+use crate::transport::{Basis, Decibels, Tile, TileCodes, Transport};
 
 /// Maximum number of ranges that [`DecoderState::wants`] returns.
 const MAX_RANGES: usize = 1024;
+
+/// Which chunks of a file to fetch: all by default.
+#[derive(Clone, Debug, Default)]
+pub struct Interest {
+    /// Columns and rows of visible camera pixels; all if `None`.
+    pub viewport: Option<(Range<u32>, Range<u32>)>,
+    /// SNR that is sufficient.
+    pub snr: Option<Decibels>,
+}
 
 /// The chunks and tiles of a file.
 #[derive(Debug)]
@@ -32,7 +41,7 @@ pub(super) struct DecoderState {
     missing: Vec<usize>,
 }
 
-/// What has come of a chunk.
+/// The bytes of a chunk so far.
 #[derive(Debug)]
 enum ChunkState {
     /// Its first bytes, or none.
@@ -43,7 +52,7 @@ enum ChunkState {
     Decoded,
 }
 
-/// What has come of a tile.
+/// A tile so far.
 #[derive(Debug)]
 enum TileState {
     Partial(TileDecoder),
@@ -53,26 +62,22 @@ enum TileState {
 impl DecoderState {
     pub fn new(index: FileIndex, budget: &Budget) -> Result<Self, FormatError> {
         let (tiles, scans) = (index.tiles(), index.scans.len());
-        let window = index.header.geometry.window;
         let mut state = Self {
             basis: Basis {
-                kernels: basis::try_zeroed(index.header.rank.into(), window.area(), budget)?,
+                kernels: index.try_zeroed_basis(budget)?,
             },
-            order: direct::centre_out_order(window, budget)?,
+            order: direct::centre_out_order(index.header.geometry.window, budget)?,
             tiles: budget.try_with_capacity(tiles)?,
             chunks: budget.try_with_capacity(scans * (tiles + 1))?,
             missing: budget.try_zeroed(scans)?,
             index,
         };
-        state
-            .tiles
-            .resize_with(tiles, || TileState::Partial(TileDecoder::default()));
-        state
-            .chunks
-            .resize_with(scans * (tiles + 1), || ChunkState::Decoded);
+        let partial = |tile| TileState::Partial(TileDecoder::new(tile));
+        state.tiles.extend((0..tiles).map(partial));
+        let empty = || ChunkState::Decoded;
+        state.chunks.resize_with(scans * (tiles + 1), empty);
         for chunk in state.index.chunks() {
-            let at = state.index.chunk_number(chunk);
-            state.chunks[at] = ChunkState::Partial(Vec::new());
+            state.chunks[state.index.chunk_number(chunk)] = ChunkState::Partial(Vec::new());
             state.missing[chunk.scan] += 1;
         }
         // Dark tiles are complete from the beginning.
@@ -92,31 +97,25 @@ impl DecoderState {
         incomplete.unwrap_or(self.missing.len())
     }
 
-    /// Number of complete tiles.
     pub fn complete_tiles(&self) -> usize {
         let is_complete = |tile: &&TileState| matches!(tile, TileState::Complete(_));
         self.tiles.iter().filter(is_complete).count()
     }
 
-    /// Whether all chunks have come.
     pub fn is_complete(&self) -> bool {
         self.complete_scans() == self.missing.len()
     }
 
-    /// Byte ranges to fetch, in file order: of tiles that `viewport` shows, and of scans up to the first
-    /// with an SNR of `snr`.
-    pub fn wants(
-        &self,
-        viewport: Option<&(Range<u32>, Range<u32>)>,
-        snr: Option<Decibels>,
-    ) -> Vec<Range<u64>> {
-        let sufficient = snr.and_then(|snr| {
-            let scans = &self.index.scans;
-            scans.iter().position(|scan| scan.snr.0 >= snr.0)
-        });
-        let scans = sufficient.map_or(self.index.scans.len(), |last| last + 1);
+    /// Byte ranges to fetch, in file order: of visible tiles, and of scans up to the first with a sufficient SNR.
+    pub fn wants(&self, interest: &Interest) -> Vec<Range<u64>> {
+        let scans = &self.index.scans;
+        let is_sufficient = |scan: &Scan| interest.snr.is_some_and(|snr| scan.snr.0 >= snr.0);
+        let scans = scans
+            .iter()
+            .position(is_sufficient)
+            .map_or(scans.len(), |last| last + 1);
         let geometry = &self.index.header.geometry;
-        let is_visible = |chunk: &ChunkId| match (viewport, chunk.tile) {
+        let is_visible = |chunk: &ChunkId| match (&interest.viewport, chunk.tile) {
             (Some((x, y)), Some(tile)) => {
                 let (rect, side) = (geometry.tile(tile), geometry.tile_side);
                 rect.x < x.end
@@ -162,7 +161,7 @@ impl DecoderState {
         }
         while !bytes.is_empty() {
             if offset >= end {
-                return Err(FormatError::TrailingBytes { end });
+                return Err(FormatError::TrailingBytes(end));
             }
             let chunk = self.index.chunk_at(offset);
             let range = self.index.range(chunk);
@@ -214,7 +213,6 @@ impl DecoderState {
         Ok(new.len() as u64)
     }
 
-    /// Takes a complete chunk.
     fn take_chunk(
         &mut self,
         chunk: ChunkId,
@@ -223,76 +221,61 @@ impl DecoderState {
     ) -> Result<(), FormatError> {
         self.index.check_crc(chunk, bytes)?;
         let number = self.index.chunk_number(chunk);
-        self.chunks[number] = match chunk.tile {
-            Some(tile) if !self.is_next(chunk.scan, tile) => {
+        let decoder = chunk.tile.and_then(|tile| match &mut self.tiles[tile] {
+            TileState::Partial(decoder) => Some(decoder),
+            TileState::Complete(_) => None,
+        });
+        self.chunks[number] = match &decoder {
+            Some(decoder) if decoder.scans < chunk.scan => {
                 ChunkState::Waiting(budget.try_copy(bytes)?)
             }
             _ => ChunkState::Decoded,
         };
         self.missing[chunk.scan] -= 1;
         let Some(tile) = chunk.tile else {
-            let functions = &mut self.basis.kernels[self.index.new_basis_functions(chunk.scan)];
-            let area = self.index.header.geometry.window.area();
-            let _scratch = budget.scratch();
-            return basis::decode(bytes, functions, area, budget)
-                .map_err(|error| error.in_chunk(chunk));
+            let kernels = &mut self.basis.kernels;
+            return decode_basis_chunk(&self.index, chunk.scan, bytes, kernels, budget);
         };
-        if self.is_next(chunk.scan, tile) {
-            self.decode_chunk(tile, bytes, budget)?;
+        if let Some(decoder) = decoder.filter(|decoder| decoder.scans == chunk.scan) {
+            decoder.add(&self.index, &self.order, bytes, budget)?;
             self.advance_tile(tile, budget)?;
         }
         Ok(())
-    }
-
-    /// Whether the tile decodes its chunk of `scan` next.
-    fn is_next(&self, scan: usize, tile: usize) -> bool {
-        matches!(&self.tiles[tile], TileState::Partial(decoder) if decoder.scans == scan)
-    }
-
-    /// Decodes the next chunk of a tile.
-    fn decode_chunk(
-        &mut self,
-        tile: usize,
-        bytes: &[u8],
-        budget: &Budget,
-    ) -> Result<(), FormatError> {
-        match &mut self.tiles[tile] {
-            TileState::Partial(decoder) => {
-                decoder.add(&self.index, &self.order, tile, bytes, budget)
-            }
-            TileState::Complete(_) => Ok(()),
-        }
     }
 
     /// Skips scans that have no chunk for the tile, decodes chunks that waited, and turns the tile into codes
     /// after its last scan.
     fn advance_tile(&mut self, tile: usize, budget: &Budget) -> Result<(), FormatError> {
         while let TileState::Partial(decoder) = &mut self.tiles[tile] {
-            if decoder.scans == self.index.scans.len() {
-                let quantised = decoder.quantise(&self.index, tile, self.basis.rank(), budget)?;
+            let scan = decoder.scans;
+            if scan == self.index.scans.len() {
+                let quantised = decoder.quantise(&self.index, self.basis.rank(), budget)?;
                 budget.release(decoder.bytes());
                 self.tiles[tile] = TileState::Complete(quantised);
                 break;
             }
-            let chunk = ChunkId::of_tile(decoder.scans, tile);
-            if self.index.entry(chunk.scan, tile).bytes == 0 {
+            if self.index.entry(scan, tile).bytes == 0 {
                 decoder.scans += 1;
                 continue;
             }
-            let number = self.index.chunk_number(chunk);
-            let ChunkState::Waiting(bytes) = &mut self.chunks[number] else {
+            let chunk = ChunkId {
+                scan,
+                tile: Some(tile),
+            };
+            let state = &mut self.chunks[self.index.chunk_number(chunk)];
+            let ChunkState::Waiting(bytes) = state else {
                 break;
             };
             let bytes = std::mem::take(bytes);
-            self.chunks[number] = ChunkState::Decoded;
-            let decoded = self.decode_chunk(tile, &bytes, budget);
+            *state = ChunkState::Decoded;
+            let decoded = decoder.add(&self.index, &self.order, &bytes, budget);
             budget.release_vec(bytes);
             decoded?;
         }
         Ok(())
     }
 
-    /// The transport by the components of complete scans, as [`Reader::preview`](super::Reader::preview)
+    /// The transport by the components of complete scans, as [`LtmReader::preview`](super::LtmReader::preview)
     /// says. Its memory is reserved while it is made, and is the caller's afterwards.
     pub fn preview(&self, budget: &Budget) -> Result<Option<Transport>, FormatError> {
         let scans = self.complete_scans();
@@ -313,9 +296,9 @@ impl DecoderState {
             kernels.push(budget.try_copy(kernel)?);
         }
         let mut tiles = budget.try_with_capacity(self.tiles.len())?;
-        for (i, tile) in self.tiles.iter().enumerate() {
+        for tile in &self.tiles {
             tiles.push(match tile {
-                TileState::Partial(decoder) => decoder.quantise(&self.index, i, rank, budget)?,
+                TileState::Partial(decoder) => decoder.quantise(&self.index, rank, budget)?,
                 TileState::Complete(tile) => self.copy_components(tile, rank, budget)?,
             });
         }
@@ -333,17 +316,17 @@ impl DecoderState {
         rank: usize,
         budget: &Budget,
     ) -> Result<Tile, FormatError> {
-        let CoefficientTile {
-            rect, ref codes, ..
-        } = tile.coefficients;
-        let texels = codes.len().min(CoefficientTile::texels(rect, rank));
-        let codes = budget.try_with_capacity(texels)?;
+        let Tile {
+            coefficients,
+            functions,
+        } = tile;
+        let texels = Tile::texels(tile.rect(), rank);
+        let codes = budget.try_with_capacity(coefficients.codes.len().min(texels))?;
         Ok(Tile {
-            coefficients: (tile.coefficients).first_components(self.basis.rank(), rank, codes),
-            functions: DirectTile {
-                codes: budget.try_copy(&tile.functions.codes)?,
-                rect,
-                step: tile.functions.step,
+            coefficients: coefficients.first_components(self.basis.rank(), rank, codes),
+            functions: TileCodes {
+                codes: budget.try_copy(&functions.codes)?,
+                ..*functions
             },
         })
     }
@@ -352,11 +335,11 @@ impl DecoderState {
     pub fn finish(self, budget: &Budget) -> Result<(Transport, MetadataJson), FormatError> {
         let rank = self.basis.rank();
         let mut tiles = budget.try_with_capacity(self.tiles.len())?;
-        for (i, tile) in self.tiles.into_iter().enumerate() {
+        for tile in self.tiles {
             tiles.push(match tile {
                 TileState::Complete(tile) => tile,
                 TileState::Partial(decoder) => {
-                    let tile = decoder.quantise(&self.index, i, rank, budget)?;
+                    let tile = decoder.quantise(&self.index, rank, budget)?;
                     budget.release(decoder.bytes());
                     tile
                 }

@@ -4,17 +4,14 @@
 //! bytes, checksums. Equal fields stand together, as that compresses better.
 
 use super::budget::Budget;
-use super::chunk::ChunkEntry;
+use super::chunk::{ChunkEntry, ChunkId};
 use super::codec::zstd_frame::compressed_bound;
-use super::codec::{basis, direct, halves, transform};
+use super::codec::{basis, direct, halves, tokens, transform};
 use super::constants::{CHUNK_ENTRY_BYTES, MAX_CONTENT_BYTES, SCAN_RECORD_BYTES};
 use super::error::FormatError;
 use super::header::Header;
 use super::scan::{Coding, Scan};
 use crate::transport::{CHANNELS, Extent};
-
-/// The records of a directory.
-pub(super) type Directory = (Vec<Scan>, Vec<ChunkEntry>);
 
 /// Bytes of the directory before compression. At most 1024 · (24 + 12 · 2^24): no overflow.
 pub(super) fn content_bytes(header: &Header) -> u64 {
@@ -33,15 +30,11 @@ pub(super) fn encode(scans: &[Scan], entries: &[ChunkEntry]) -> Vec<u8> {
 }
 
 /// Reads a decompressed directory of [`content_bytes`].
-///
-/// # Errors
-/// [`FormatError::InvalidScan`] or [`FormatError::InvalidChunkEntry`] if a record breaks the rules, and
-/// the errors of `budget`.
 pub(super) fn decode(
     header: &Header,
     bytes: &[u8],
     budget: &Budget,
-) -> Result<Directory, FormatError> {
+) -> Result<(Vec<Scan>, Vec<ChunkEntry>), FormatError> {
     let scans = decode_scans(header, bytes, budget)?;
     let geometry = &header.geometry;
     let tiles = geometry.tile_grid().area();
@@ -58,7 +51,8 @@ pub(super) fn decode(
                 crc: field(2 * count + i),
             };
             if !is_valid_entry(record, geometry.tile(tile).extent, entry) {
-                return Err(FormatError::InvalidChunkEntry { scan, tile });
+                let tile = Some(tile);
+                return Err(FormatError::InvalidChunkEntry(ChunkId { scan, tile }));
             }
             entries.push(entry);
         }
@@ -72,7 +66,7 @@ fn decode_scans(header: &Header, bytes: &[u8], budget: &Budget) -> Result<Vec<Sc
     let records = bytes.as_chunks().0.iter().take(header.scans as usize);
     for (scan, record) in records.enumerate() {
         let record = Scan::decode(record).filter(|record| is_valid_scan(header, record, known));
-        let record = record.ok_or(FormatError::InvalidScan { scan })?;
+        let record = record.ok_or(FormatError::InvalidScan(scan))?;
         known += record.new_basis_functions(known);
         scans.push(record);
     }
@@ -80,7 +74,7 @@ fn decode_scans(header: &Header, bytes: &[u8], budget: &Budget) -> Result<Vec<Sc
     let is_mixed = has(Coding::Transform) && has(Coding::Halves)
         || has(Coding::Direct) && has(Coding::DirectHalves);
     match is_mixed || known != usize::from(header.rank) {
-        true => Err(FormatError::InvalidScan { scan: scans.len() }),
+        true => Err(FormatError::InvalidScan(scans.len())),
         false => Ok(scans),
     }
 }
@@ -111,16 +105,14 @@ fn is_valid_entry(scan: &Scan, extent: Extent, entry: ChunkEntry) -> bool {
     }
     let values = extent.area() * CHANNELS * usize::from(scan.count);
     let (min_content, max_content, max_bytes) = match scan.coding {
-        Coding::Transform => (
-            1,
-            transform::max_tokens(extent, scan.count),
-            transform::max_bytes(content),
-        ),
-        Coding::Direct => (
-            1,
-            direct::max_tokens(extent, scan.count),
-            direct::max_bytes(content),
-        ),
+        Coding::Transform => {
+            let max_tokens = transform::max_tokens(extent, scan.count);
+            (1, max_tokens, transform::max_bytes(content))
+        }
+        Coding::Direct => {
+            let max_tokens = direct::max_tokens(extent, scan.count);
+            (1, max_tokens, tokens::max_bytes(content))
+        }
         Coding::Halves | Coding::DirectHalves => {
             let exact = halves::content_bytes(values) as u64;
             (exact, exact, compressed_bound(content))

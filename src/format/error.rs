@@ -3,7 +3,6 @@
 use thiserror::Error;
 
 use super::chunk::ChunkId;
-use super::constants::{MAX_EXTENSION_BYTES, MAX_METADATA_BYTES, MAX_RANK, MAX_SCANS};
 use crate::transport::GeometryError;
 
 /// Why bytes are not a readable `.ltm` file, or a file cannot be written.
@@ -12,12 +11,9 @@ pub enum FormatError {
     /// The file does not begin with the magic number.
     #[error(
         "this is not an .ltm file: it {}; check that it is the right file",
-        describe_beginning(found)
+        describe_beginning(.0)
     )]
-    UnknownMagic {
-        /// First bytes found.
-        found: Vec<u8>,
-    },
+    UnknownMagic(Vec<u8>),
     /// A transfer in text mode damaged the magic number.
     #[error("{0} in this .ltm file, as a transfer in text mode does; transfer it again as binary")]
     TextModeTransfer(TextDamage),
@@ -32,35 +28,31 @@ pub enum FormatError {
         minor: u16,
     },
     /// Bytes do not match their checksum.
-    #[error("the {section} is damaged: its checksum does not match; copy or export the file again")]
-    ChecksumMismatch {
-        /// Where.
-        section: FileSection,
-    },
+    #[error("the {0} is damaged: its checksum does not match; copy or export the file again")]
+    ChecksumMismatch(FileSection),
     /// The header has an invalid geometry.
     #[error("the header is invalid: {0}")]
     InvalidGeometry(GeometryError),
-    /// The directory has an invalid scan record.
+    /// The directory has an invalid record of this scan; the number of scans if they are invalid together.
     #[error(
-        "the directory is invalid: scan {scan} has an unknown coding, or components, a step or a length outside its range; export the file again"
+        "the directory is invalid: scan {0} has an unknown coding, or components, a step or a length outside its range; export the file again"
     )]
-    InvalidScan {
-        /// Scan number; the number of scans if they are invalid together.
-        scan: usize,
+    InvalidScan(usize),
+    /// The header declares more of something than this version allows.
+    #[error("the file has {value} {quantity}, more than the {limit} allowed")]
+    TooMany {
+        /// The unit.
+        quantity: &'static str,
+        /// The number in the header.
+        value: u32,
+        /// The largest number allowed.
+        limit: u32,
     },
-    /// The header declares too many scans.
-    #[error("the file has {0} scans, more than the {MAX_SCANS} allowed")]
-    TooManyScans(u32),
     /// The directory has an invalid chunk entry.
     #[error(
-        "the directory is invalid: scan {scan} of tile {tile} has a length outside its range; export the file again"
+        "the directory is invalid: the {0} has a length outside its range; export the file again"
     )]
-    InvalidChunkEntry {
-        /// Scan number.
-        scan: usize,
-        /// Tile number.
-        tile: usize,
-    },
+    InvalidChunkEntry(ChunkId),
     /// The lengths of the chunks do not add up to the length of the file.
     #[error(
         "the directory is invalid: its chunks end at byte {end}, and the file at byte {file_bytes}; export the file again"
@@ -71,29 +63,14 @@ pub enum FormatError {
         /// Length in the header.
         file_bytes: u64,
     },
-    /// The extensions are too long.
-    #[error("the file has {0} bytes of extensions, more than the {MAX_EXTENSION_BYTES} allowed")]
-    ExtensionsTooLong(u32),
     /// The reader does not know an extension that it must understand.
     #[error(
-        "the file needs a reader that knows its extension \"{}\": get a newer one", tag.escape_ascii()
+        "the file needs a reader that knows its extension \"{}\": get a newer one", .0.escape_ascii()
     )]
-    UnknownExtension {
-        /// Its name.
-        tag: [u8; 4],
-    },
-    /// The basis is too large.
-    #[error("the basis has {0} functions, more than the {MAX_RANK} allowed")]
-    RankTooLarge(u64),
-    /// The metadata is too long.
-    #[error("the file has {0} bytes of metadata, more than the {MAX_METADATA_BYTES} allowed")]
-    MetadataTooLong(u64),
-    /// The metadata is not JSON of the expected form.
+    UnknownExtension([u8; 4]),
+    /// The metadata is not JSON of the expected form, in UTF-8.
     #[error("the metadata is invalid: {0}")]
     InvalidMetadata(String),
-    /// The metadata is not UTF-8.
-    #[error("the metadata is invalid: {0}")]
-    InvalidMetadataText(std::str::Utf8Error),
     /// A section does not decode.
     #[error("the {section} does not decompress: {reason}; copy or export the file again")]
     DamagedSection {
@@ -112,14 +89,11 @@ pub enum FormatError {
         /// Bytes allowed.
         limit: u64,
     },
-    /// The system refuses memory.
+    /// The system refuses so many bytes of memory.
     #[error(
-        "there is no memory for {need} more bytes of light transport; close other programs or tabs, or use a smaller file"
+        "there is no memory for {0} more bytes of light transport; close other programs or tabs, or use a smaller file"
     )]
-    Memory {
-        /// Bytes asked for.
-        need: usize,
-    },
+    Memory(u64),
     /// The file ends early.
     #[error(
         "the file is cut short: it ends after {got} of {need} bytes; copy or download it again"
@@ -139,11 +113,8 @@ pub enum FormatError {
         expected: u64,
     },
     /// Bytes follow the end that the header declares.
-    #[error("the file goes on after its end at byte {end}; copy or export it again")]
-    TrailingBytes {
-        /// Length in the header.
-        end: u64,
-    },
+    #[error("the file goes on after its end at byte {0}; copy or export it again")]
+    TrailingBytes(u64),
     /// Writing: zstd fails.
     #[error("light transport does not compress: {0}")]
     Compress(std::io::Error),
@@ -188,45 +159,30 @@ fn describe_beginning(found: &[u8]) -> String {
         (b"\x1F\x8B", "was compressed by gzip"),
         (b"<", "begins like a web page"),
     ];
-    let kind = known.iter().find(|(start, _)| found.starts_with(start));
-    kind.map_or_else(
-        || format!("begins with {found:02x?}"),
-        |(_, kind)| (*kind).to_owned(),
-    )
-}
-
-// Not `#[from]`: the message holds the whole source, and a chain of causes would repeat it.
-impl From<GeometryError> for FormatError {
-    fn from(error: GeometryError) -> Self {
-        Self::InvalidGeometry(error)
+    match known.iter().find(|(start, _)| found.starts_with(start)) {
+        Some((_, kind)) => (*kind).to_owned(),
+        None => format!("begins with {found:02x?}"),
     }
 }
 
 /// A section of the file, for messages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum FileSection {
     /// The fixed header.
+    #[error("header")]
     Header,
     /// The directory.
+    #[error("directory")]
     Directory,
     /// The extensions.
+    #[error("list of extensions")]
     Extensions,
     /// The JSON metadata.
+    #[error("metadata")]
     Metadata,
     /// A basis chunk or a tile chunk.
+    #[error("{0}")]
     Chunk(ChunkId),
-}
-
-impl std::fmt::Display for FileSection {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Header => f.write_str("header"),
-            Self::Directory => f.write_str("directory"),
-            Self::Extensions => f.write_str("list of extensions"),
-            Self::Metadata => f.write_str("metadata"),
-            Self::Chunk(chunk) => chunk.fmt(f),
-        }
-    }
 }
 
 /// Why the bytes of a section cannot be decoded, before the section is named.

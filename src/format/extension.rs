@@ -33,44 +33,26 @@ pub(super) fn encode(extensions: &[Extension]) -> Vec<u8> {
     bytes
 }
 
-/// Reads the records in `bytes`.
 pub(super) fn decode(bytes: &[u8], budget: &Budget) -> Result<Vec<Extension>, FormatError> {
-    let mut count = 0;
-    for_records(bytes, |_, _| {
-        count += 1;
-        Ok(())
-    })?;
-    let mut extensions = budget.try_with_capacity(count)?;
-    for_records(bytes, |tag, data| {
-        extensions.push(Extension {
-            tag,
-            must_understand: false,
-            data: budget.try_copy(data)?,
-        });
-        Ok(())
-    })?;
-    Ok(extensions)
-}
-
-/// Calls `visit` with the tag and data of each record.
-fn for_records(
-    bytes: &[u8],
-    mut visit: impl FnMut([u8; 4], &[u8]) -> Result<(), FormatError>,
-) -> Result<(), FormatError> {
     let cut = || FormatError::DamagedSection {
         section: FileSection::Extensions,
         reason: "the last one is cut".to_owned(),
     };
-    let mut fields = FieldReader(bytes);
+    let (mut fields, mut extensions) = (FieldReader(bytes), Vec::new());
     while !fields.0.is_empty() {
         let header = fields.try_bytes(RECORD_HEADER_BYTES).ok_or_else(cut)?;
         let tag = [header[0], header[1], header[2], header[3]];
-        let mut lengths = FieldReader(&header[4..]);
-        if lengths.u32() & MUST_UNDERSTAND != 0 {
-            return Err(FormatError::UnknownExtension { tag });
+        let [flags, length] = FieldReader(&header[4..]).u32s();
+        if flags & MUST_UNDERSTAND != 0 {
+            return Err(FormatError::UnknownExtension(tag));
         }
-        let data = fields.try_bytes(lengths.u32() as usize).ok_or_else(cut)?;
-        visit(tag, data)?;
+        let data = fields.try_bytes(length as usize).ok_or_else(cut)?;
+        let extension = Extension {
+            tag,
+            must_understand: false,
+            data: budget.try_copy(data)?,
+        };
+        budget.try_push(&mut extensions, extension)?;
     }
-    Ok(())
+    Ok(extensions)
 }

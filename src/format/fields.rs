@@ -26,23 +26,19 @@ impl<'a> FieldReader<'a> {
         std::array::from_fn(|i| field[i])
     }
 
-    pub fn u16(&mut self) -> u16 {
-        u16::from_le_bytes(self.take())
+    pub fn u16s<const K: usize>(&mut self) -> [u16; K] {
+        std::array::from_fn(|_| u16::from_le_bytes(self.take()))
     }
 
-    pub fn u32(&mut self) -> u32 {
-        u32::from_le_bytes(self.take())
+    pub fn u32s<const K: usize>(&mut self) -> [u32; K] {
+        std::array::from_fn(|_| u32::from_le_bytes(self.take()))
     }
 
     pub fn u64(&mut self) -> u64 {
         u64::from_le_bytes(self.take())
     }
 
-    pub fn f32(&mut self) -> f32 {
-        f32::from_le_bytes(self.take())
-    }
-
     pub fn f64(&mut self) -> f64 {
-        f64::from_le_bytes(self.take())
+        f64::from_bits(self.u64())
     }
 }

@@ -1,12 +1,12 @@
 //! The fixed header: 144 bytes, little endian.
 
-use super::checksum::{checksum, crc_matches};
+use super::checksum::{check_crc, checksum};
 use super::constants::{
     HEADER_BYTES, MAX_EXTENSION_BYTES, MAX_METADATA_BYTES, MAX_RANK, MAX_SCANS,
 };
 use super::error::{FileSection, FormatError, TextDamage};
 use super::fields::FieldReader;
-use crate::transport::{Correspondence, Extent, Geometry, Window};
+use crate::transport::{Correspondence, Geometry};
 
 /// Version of written files. A reader accepts other minor versions and refuses other major ones.
 const MAJOR: u16 = 1;
@@ -30,74 +30,54 @@ pub struct Header {
     pub rank: u16,
     /// Number of scans.
     pub scans: u32,
-    /// Bytes of the compressed directory, which follows the header.
-    pub directory_bytes: u32,
-    pub(super) directory_crc: u32,
-    /// Bytes of the extensions, which follow the directory.
-    pub extension_bytes: u32,
-    pub(super) extension_crc: u32,
-    /// Bytes of the metadata, which follows the extensions.
-    pub metadata_bytes: u32,
-    pub(super) metadata_crc: u32,
+    /// The sections that follow the header, in this order.
+    pub(super) directory: SectionEntry,
+    pub(super) extensions: SectionEntry,
+    pub(super) metadata: SectionEntry,
+}
+
+/// The header's entry for a section of the index.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SectionEntry {
+    /// Bytes in the file.
+    pub bytes: u32,
+    pub crc: u32,
+}
+
+impl SectionEntry {
+    pub fn new(section: &[u8]) -> Self {
+        Self {
+            bytes: u32::try_from(section.len()).unwrap_or(u32::MAX), // more than a header may have
+            crc: checksum(section),
+        }
+    }
 }
 
 impl Header {
-    /// A header for `geometry`; the encoder of the index sets lengths and checksums.
-    pub(super) fn new(geometry: Geometry, rank: u16) -> Self {
-        Self {
-            geometry,
-            file_bytes: 0,
-            rank,
-            scans: 0,
-            directory_bytes: 0,
-            directory_crc: 0,
-            extension_bytes: 0,
-            extension_crc: 0,
-            metadata_bytes: 0,
-            metadata_crc: 0,
-        }
-    }
-
     /// Bytes before the first scan.
     pub fn index_bytes(&self) -> u64 {
-        HEADER_BYTES as u64
-            + u64::from(self.directory_bytes)
-            + u64::from(self.extension_bytes)
-            + u64::from(self.metadata_bytes)
+        let sections = [self.directory, self.extensions, self.metadata];
+        let bytes = sections.map(|section| u64::from(section.bytes));
+        HEADER_BYTES as u64 + bytes.iter().sum::<u64>()
     }
 
     /// The header's bytes, with their checksum.
     pub(super) fn encode(&self) -> [u8; HEADER_BYTES] {
-        let g = &self.geometry;
         let mut out = Vec::with_capacity(HEADER_BYTES);
         out.extend(MAGIC);
-        out.extend(MAJOR.to_le_bytes());
-        out.extend(MINOR.to_le_bytes());
-        for side in [
-            g.camera.width,
-            g.camera.height,
-            g.light.width,
-            g.light.height,
-            g.window.side(),
-            g.tile_side,
-        ] {
-            out.extend(side.to_le_bytes());
-        }
-        for a in g.correspondence.affine.iter().flatten() {
+        out.extend([MAJOR, MINOR].map(u16::to_le_bytes).as_flattened());
+        out.extend(self.geometry.sides().map(u32::to_le_bytes).as_flattened());
+        for a in self.geometry.correspondence.affine.as_flattened() {
             out.extend(a.to_le_bytes());
         }
         out.extend(self.file_bytes.to_le_bytes());
-        for field in [
-            u32::from(self.rank),
-            self.scans,
-            self.directory_bytes,
-            self.directory_crc,
-            self.extension_bytes,
-            self.extension_crc,
-            self.metadata_bytes,
-            self.metadata_crc,
-        ] {
-            out.extend(field.to_le_bytes());
+        out.extend(
+            [self.rank.into(), self.scans]
+                .map(u32::to_le_bytes)
+                .as_flattened(),
+        );
+        for SectionEntry { bytes, crc } in [self.directory, self.extensions, self.metadata] {
+            out.extend([bytes, crc].map(u32::to_le_bytes).as_flattened());
         }
         out.extend([0; 12]); // reserved
         out.extend(checksum(&out).to_le_bytes());
@@ -106,80 +86,69 @@ impl Header {
         header
     }
 
-    /// Reads the bytes of a header.
-    ///
-    /// # Errors
-    /// The [`FormatError`] of the first field that is out of its range.
     pub(super) fn decode(bytes: &[u8; HEADER_BYTES]) -> Result<Self, FormatError> {
         check_magic(bytes)?;
         let mut fields = FieldReader(&bytes[MAGIC.len()..]);
-        let (major, minor) = (fields.u16(), fields.u16());
+        let [major, minor] = fields.u16s();
         if major != MAJOR {
             return Err(FormatError::UnsupportedVersion { major, minor });
         }
         let (fixed, crc) = bytes.split_at(HEADER_BYTES - 4);
-        if !crc_matches(fixed, FieldReader(crc).u32()) {
-            return Err(FormatError::ChecksumMismatch {
-                section: FileSection::Header,
-            });
-        }
-        let camera = Extent::new(fields.u32(), fields.u32());
-        let light = Extent::new(fields.u32(), fields.u32());
-        let (window, tile_side) = (fields.u32(), fields.u32());
-        let mut affine = [[0.0; 3]; 2];
-        for a in affine.iter_mut().flatten() {
-            *a = fields.f64();
-        }
+        let [crc] = FieldReader(crc).u32s();
+        check_crc(fixed, crc, FileSection::Header)?;
+        let sides = fields.u32s();
+        let affine = std::array::from_fn(|_| std::array::from_fn(|_| fields.f64()));
         let file_bytes = fields.u64();
-        let rank = fields.u32();
-        let rank = u16::try_from(rank)
-            .ok()
-            .filter(|rank| *rank <= MAX_RANK)
-            .ok_or(FormatError::RankTooLarge(rank.into()))?;
-        let header = Self {
-            geometry: Geometry {
-                camera,
-                light,
-                window: Window::new(window)?,
-                correspondence: Correspondence { affine },
-                tile_side,
-            }
-            .validate()?,
-            file_bytes,
-            rank,
-            scans: fields.u32(),
-            directory_bytes: fields.u32(),
-            directory_crc: fields.u32(),
-            extension_bytes: fields.u32(),
-            extension_crc: fields.u32(),
-            metadata_bytes: fields.u32(),
-            metadata_crc: fields.u32(),
+        let [rank, scans] = fields.u32s();
+        let mut section = || {
+            let [bytes, crc] = fields.u32s();
+            SectionEntry { bytes, crc }
         };
-        if header.scans > MAX_SCANS {
-            return Err(FormatError::TooManyScans(header.scans));
+        let header = Self {
+            geometry: Geometry::from_sides(sides, Correspondence { affine })
+                .map_err(FormatError::InvalidGeometry)?,
+            file_bytes,
+            rank: rank as u16, // checked below
+            scans,
+            directory: section(),
+            extensions: section(),
+            metadata: section(),
+        };
+        for (quantity, value, limit) in [
+            ("basis functions", rank, MAX_RANK.into()),
+            ("scans", scans, MAX_SCANS),
+            (
+                "bytes of extensions",
+                header.extensions.bytes,
+                MAX_EXTENSION_BYTES,
+            ),
+            (
+                "bytes of metadata",
+                header.metadata.bytes,
+                MAX_METADATA_BYTES,
+            ),
+        ] {
+            if value > limit {
+                return Err(FormatError::TooMany {
+                    quantity,
+                    value,
+                    limit,
+                });
+            }
         }
-        if header.extension_bytes > MAX_EXTENSION_BYTES {
-            return Err(FormatError::ExtensionsTooLong(header.extension_bytes));
-        }
-        if header.metadata_bytes > MAX_METADATA_BYTES {
-            return Err(FormatError::MetadataTooLong(header.metadata_bytes.into()));
-        }
-        if file_bytes < header.index_bytes() {
-            return Err(FormatError::Truncated {
+        let need = header.index_bytes();
+        match file_bytes < need {
+            true => Err(FormatError::Truncated {
                 got: file_bytes,
-                need: header.index_bytes(),
-            });
+                need,
+            }),
+            false => Ok(header),
         }
-        Ok(header)
     }
 }
 
 /// Checks the first bytes of a file, however few have come. Four bytes identify a file of another kind and a
 /// transfer in text mode.
-///
-/// # Errors
-/// [`FormatError::UnknownMagic`], [`FormatError::UnsupportedVersion`] or
-/// [`FormatError::TextModeTransfer`].
 pub(super) fn check_magic(bytes: &[u8]) -> Result<(), FormatError> {
     let name = MAGIC_VERSION.start;
     if let Some(digits @ &[b'0'..=b'9', b'0'..=b'9']) = bytes.get(MAGIC_VERSION)
@@ -203,8 +172,8 @@ pub(super) fn check_magic(bytes: &[u8]) -> Result<(), FormatError> {
         None => Ok(()),
         // After the name only the line ends can differ.
         Some(8..) => Err(FormatError::TextModeTransfer(TextDamage::LineEnds)),
-        Some(_) => Err(FormatError::UnknownMagic {
-            found: bytes[..bytes.len().min(MAGIC.len())].to_vec(),
-        }),
+        Some(_) => Err(FormatError::UnknownMagic(
+            bytes[..bytes.len().min(MAGIC.len())].to_vec(),
+        )),
     }
 }

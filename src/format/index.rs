@@ -3,16 +3,17 @@
 use std::ops::Range;
 
 use super::budget::Budget;
-use super::checksum::{checksum, crc_matches};
+use super::checksum::check_crc;
 use super::chunk::{ChunkEntry, ChunkId};
 use super::codec::zstd_frame::{compress, decompress};
 use super::constants::HEADER_BYTES;
 use super::directory;
 use super::error::{FileSection, FormatError};
 use super::extension::{self, Extension};
-use super::header::Header;
+use super::header::{Header, SectionEntry};
 use super::metadata::{Metadata, MetadataJson};
-use super::scan::{Coding, Scan};
+use super::scan::{Coding, Scan, rank_of};
+use crate::transport::Geometry;
 
 /// Everything that precedes the first scan.
 #[derive(Clone, Debug)]
@@ -27,45 +28,26 @@ pub struct FileIndex {
     pub metadata: MetadataJson,
     /// `[scan, tile]`.
     entries: Vec<ChunkEntry>,
-    /// Where each chunk begins, and where the last ends: of each scan the basis chunk, then a tile chunk
-    /// for each tile.
+    /// Where each chunk begins, and where the last ends: of each scan the basis chunk, then a tile chunk for each tile.
     offsets: Vec<u64>,
 }
 
 impl FileIndex {
     /// Reads the [`index_bytes`](Header::index_bytes) of a file whose header is `header`.
-    ///
-    /// # Errors
-    /// A [`FormatError`] if a section breaks a rule, or if the index needs more memory than `budget` has.
     pub(super) fn decode(
         header: Header,
         bytes: &[u8],
         budget: &Budget,
     ) -> Result<Self, FormatError> {
         let mut rest = &bytes[HEADER_BYTES..];
-        let mut take = |length: u32, crc: u32, section: FileSection| {
-            let (taken, after) = rest.split_at(length as usize);
+        let mut take = |SectionEntry { bytes, crc }, section: FileSection| {
+            let (taken, after) = rest.split_at(bytes as usize);
             rest = after;
-            match crc_matches(taken, crc) {
-                true => Ok(taken),
-                false => Err(FormatError::ChecksumMismatch { section }),
-            }
+            check_crc(taken, crc, section).map(|()| taken)
         };
-        let frame = take(
-            header.directory_bytes,
-            header.directory_crc,
-            FileSection::Directory,
-        )?;
-        let extensions = take(
-            header.extension_bytes,
-            header.extension_crc,
-            FileSection::Extensions,
-        )?;
-        let metadata = take(
-            header.metadata_bytes,
-            header.metadata_crc,
-            FileSection::Metadata,
-        )?;
+        let frame = take(header.directory, FileSection::Directory)?;
+        let extensions = take(header.extensions, FileSection::Extensions)?;
+        let metadata = take(header.metadata, FileSection::Metadata)?;
         let extensions = extension::decode(extensions, budget)?;
         let content_bytes = usize::try_from(directory::content_bytes(&header));
         let records = decompress(frame, content_bytes.unwrap_or(usize::MAX), budget)
@@ -80,43 +62,37 @@ impl FileIndex {
             extensions,
             metadata: MetadataJson::decode(metadata, budget)?,
         };
-        let (end, file_bytes) = (index.end(), header.file_bytes);
-        if end != file_bytes {
-            return Err(FormatError::LengthMismatch { end, file_bytes });
+        let (end, file_bytes) = (index.offsets[index.offsets.len() - 1], header.file_bytes);
+        match end == file_bytes {
+            true => Ok(index),
+            false => Err(FormatError::LengthMismatch { end, file_bytes }),
         }
-        Ok(index)
     }
 
-    /// Assembles the index of a file, and its bytes. Sets the lengths and checksums of `header`.
-    ///
-    /// # Errors
-    /// [`FormatError::Compress`], and the errors of [`Header::decode`] if a length is too large.
-    ///
-    /// # Panics
-    /// If there is not one entry for each scan and tile.
+    /// Assembles the index of a file, and its bytes. There is an entry for each scan and tile.
     pub(super) fn encode(
-        mut header: Header,
+        geometry: Geometry,
         scans: Vec<Scan>,
         entries: Vec<ChunkEntry>,
         extensions: Vec<Extension>,
         metadata: &Metadata,
     ) -> Result<(Self, Vec<u8>), FormatError> {
-        let tiles = header.geometry.tile_grid().area();
-        assert_eq!(entries.len(), scans.len() * tiles, "one entry of each");
         let directory = compress(&directory::encode(&scans, &entries))?;
         let extension_bytes = extension::encode(&extensions);
         let metadata = MetadataJson::encode(metadata)?;
         let json = metadata.text().as_bytes();
-        let length = |bytes: &[u8]| u32::try_from(bytes.len()).unwrap_or(u32::MAX);
-        header.scans = scans.len() as u32; // the header's check bounds it
-        header.directory_bytes = length(&directory);
-        header.directory_crc = checksum(&directory);
-        header.extension_bytes = length(&extension_bytes);
-        header.extension_crc = checksum(&extension_bytes);
-        header.metadata_bytes = length(json);
-        header.metadata_crc = checksum(json);
+        let mut header = Header {
+            geometry,
+            file_bytes: 0,
+            // The check below bounds both.
+            rank: u16::try_from(rank_of(&scans)).unwrap_or(u16::MAX),
+            scans: scans.len() as u32,
+            directory: SectionEntry::new(&directory),
+            extensions: SectionEntry::new(&extension_bytes),
+            metadata: SectionEntry::new(json),
+        };
         let offsets = offsets(&header, &scans, &entries, &Budget::unlimited())?;
-        header.file_bytes = offsets.last().copied().unwrap_or(header.index_bytes());
+        header.file_bytes = offsets[offsets.len() - 1];
         let fixed = header.encode();
         // Refuses what a reader would refuse.
         Header::decode(&fixed)?;
@@ -160,49 +136,42 @@ impl FileIndex {
         chunks.filter(|&chunk| !self.range(chunk).is_empty())
     }
 
-    /// Whether a tile's chunk of a scan begins with the tile's colour KLT: its first chunk with component 0
-    /// does.
+    /// Whether a tile's chunk of a scan begins with the tile's colour KLT: its first chunk with component 0 does.
     pub(super) fn has_colour_klt(&self, scan: usize, tile: usize) -> bool {
-        let has = |scan: usize| self.scans[scan].first == 0 && self.entry(scan, tile).bytes > 0;
-        let first =
-            (0..scan).find(|&before| self.scans[before].coding == Coding::Transform && has(before));
-        has(scan) && first.is_none()
+        let has_first = |scan: usize| {
+            let Scan { coding, first, .. } = self.scans[scan];
+            coding == Coding::Transform && first == 0 && self.entry(scan, tile).bytes > 0
+        };
+        has_first(scan) && !(0..scan).any(has_first)
     }
 
-    /// Checks the bytes of a chunk.
-    ///
-    /// # Errors
-    /// [`FormatError::ChecksumMismatch`].
     pub(super) fn check_crc(&self, chunk: ChunkId, bytes: &[u8]) -> Result<(), FormatError> {
         let crc = match chunk.tile {
             None => self.scans[chunk.scan].basis_crc,
             Some(tile) => self.entry(chunk.scan, tile).crc,
         };
-        match crc_matches(bytes, crc) {
-            true => Ok(()),
-            false => Err(FormatError::ChecksumMismatch {
-                section: FileSection::Chunk(chunk),
-            }),
-        }
+        check_crc(bytes, crc, FileSection::Chunk(chunk))
     }
 
     /// The basis functions in the basis chunk of a scan.
     pub(super) fn new_basis_functions(&self, scan: usize) -> Range<usize> {
-        let known = self.scans[..scan]
-            .iter()
-            .fold(0, |known, scan| known + scan.new_basis_functions(known));
-        known..known + self.scans[scan].new_basis_functions(known)
+        rank_of(&self.scans[..scan])..rank_of(&self.scans[..=scan])
+    }
+
+    /// All basis functions, zero.
+    pub(super) fn try_zeroed_basis(&self, budget: &Budget) -> Result<Vec<Vec<f32>>, FormatError> {
+        let (rank, area) = (self.header.rank.into(), self.header.geometry.window.area());
+        let mut kernels = budget.try_with_capacity(rank)?;
+        for _ in 0..rank {
+            kernels.push(budget.try_zeroed(area)?);
+        }
+        Ok(kernels)
     }
 
     /// The chunk that holds the byte at `offset`.
     pub(super) fn chunk_at(&self, offset: u64) -> ChunkId {
         let at = self.offsets.partition_point(|&start| start <= offset);
         self.chunk_id(at.saturating_sub(1))
-    }
-
-    /// Where the last chunk ends.
-    fn end(&self) -> u64 {
-        self.offsets.last().copied().unwrap_or(0)
     }
 
     /// The chunk's number in file order, empty chunks counted.
@@ -219,8 +188,7 @@ impl FileIndex {
     }
 }
 
-/// Chunk offsets, from the end of the index on. There are at most 2^34 chunks of less than 2^25 bytes:
-/// no overflow.
+/// Chunk offsets, from the end of the index on. There are at most 2^34 chunks of less than 2^25 bytes: no overflow.
 fn offsets(
     header: &Header,
     scans: &[Scan],

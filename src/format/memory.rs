@@ -9,7 +9,7 @@ use super::directory;
 use super::header::Header;
 use super::index::FileIndex;
 use super::scan::Scan;
-use crate::transport::{CHANNELS, CoefficientTile, TexelCode};
+use crate::transport::{CHANNELS, TexelCode, Tile};
 
 /// Bytes that the state of a chunk and of a tile take.
 const STATE_BYTES: u64 = 32;
@@ -54,7 +54,7 @@ pub(super) fn file_bytes(index: &FileIndex) -> u64 {
     for (i, rect) in geometry.tiles().enumerate() {
         let pixels = rect.extent.area() as u64;
         // A tile is kept as decoded values until it is complete, and then as codes.
-        let codes = (CoefficientTile::texels(rect, rank) * size_of::<TexelCode>()) as u64;
+        let codes = (Tile::texels(rect, rank) * size_of::<TexelCode>()) as u64;
         let coefficients = pixels * rank as u64 * value;
         let functions = pixels * area * value;
         let [factored, direct] = [false, true].map(|direct| u64::from(has_chunk(i, direct)));

@@ -15,8 +15,7 @@ use super::error::FormatError;
 #[cfg(not(target_arch = "wasm32"))]
 const PARSED_BYTES_PER_TEXT_BYTE: u64 = 16;
 
-/// Metadata. Readers ignore unknown fields, so that later writers may add some; writers leave out empty
-/// fields.
+/// Metadata. Readers ignore unknown fields, so that later writers may add some; writers leave out empty fields.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Metadata {
@@ -59,23 +58,15 @@ pub struct MetadataJson(String);
 
 impl MetadataJson {
     /// The JSON of `metadata`.
-    ///
-    /// # Errors
-    /// [`FormatError::InvalidMetadata`] if serde fails.
     pub(super) fn encode(metadata: &Metadata) -> Result<Self, FormatError> {
         let json = serde_json::to_string(metadata).map_err(invalid)?;
         Ok(Self(json))
     }
 
-    /// Takes the bytes of a file. In browsers the page parses the JSON: a parser here would be a tenth of
-    /// the decoder.
-    ///
-    /// # Errors
-    /// [`FormatError::InvalidMetadataText`], outside browsers [`FormatError::InvalidMetadata`], and the
-    /// errors of `budget`.
+    /// Takes the bytes of a file. In browsers the page parses the JSON: a parser here would be a tenth of the decoder.
     pub(super) fn decode(json: &[u8], budget: &Budget) -> Result<Self, FormatError> {
         // The parser does not check the strings of unknown fields.
-        str::from_utf8(json).map_err(FormatError::InvalidMetadataText)?;
+        str::from_utf8(json).map_err(invalid)?;
         let text = String::from_utf8(budget.try_copy(json)?);
         let json = Self(text.unwrap_or_default());
         #[cfg(not(target_arch = "wasm32"))]
@@ -98,25 +89,22 @@ impl MetadataJson {
     /// [`FormatError::InvalidMetadata`] if the text is not JSON of the expected form. Outside browsers a
     /// reader has checked that already.
     pub fn read(&self) -> Result<Metadata, FormatError> {
-        let read = || {
-            let mut json = serde_json::Deserializer::from_str(&self.0);
-            let metadata = object(&mut json)?;
-            json.end()?;
-            Ok(metadata)
-        };
-        read().map_err(invalid)
+        let mut json = serde_json::Deserializer::from_str(&self.0);
+        let metadata = object(&mut json).map_err(invalid)?;
+        json.end().map_err(invalid)?;
+        Ok(metadata)
     }
 }
 
 /// The error as text, which keeps serde's type out of the WebAssembly module.
-fn invalid(error: serde_json::Error) -> FormatError {
+fn invalid(error: impl fmt::Display) -> FormatError {
     FormatError::InvalidMetadata(error.to_string())
 }
 
 /// Reads an object. serde takes an array too, whose fields have no names.
 fn object<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<T, D::Error> {
-    struct Object<T>(PhantomData<T>);
-    impl<'de, T: Deserialize<'de>> Visitor<'de> for Object<T> {
+    struct JsonObjectVisitor<T>(PhantomData<T>);
+    impl<'de, T: Deserialize<'de>> Visitor<'de> for JsonObjectVisitor<T> {
         type Value = T;
 
         fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -127,7 +115,7 @@ fn object<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<T, 
             T::deserialize(MapAccessDeserializer::new(map))
         }
     }
-    from.deserialize_map(Object(PhantomData))
+    from.deserialize_map(JsonObjectVisitor(PhantomData))
 }
 
 #[cfg(all(test, not(target_arch = "wasm32")))]

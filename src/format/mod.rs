@@ -11,7 +11,7 @@
 //! A scan is a pass over all tiles: the first gives a coarse picture under any light, each later one
 //! a better picture. Every prefix of a file relights.
 //!
-//! [`Reader`] does no I/O: it is fed bytes in any pieces and lists the byte ranges that it needs.
+//! [`LtmReader`] does no I/O: it is fed bytes in any pieces and lists the byte ranges that it needs.
 //! [`EncodedFile`] is the inverse.
 
 mod budget;
@@ -32,18 +32,17 @@ mod metadata;
 mod reader;
 mod scan;
 mod tile_decoder;
-mod verify;
 
 pub use budget::Limits;
 pub use chunk::{ChunkEntry, ChunkId};
 pub use constants::{FIRST_BYTES, HEADER_BYTES};
+pub use decoder_state::Interest;
 pub use encode::{DistortionMetric, EncodedFile, RateTarget, Source};
 pub use error::{FileSection, FormatError, TextDamage};
 pub use extension::Extension;
 pub use header::Header;
 pub use index::FileIndex;
 pub use metadata::{CaptureNote, Metadata, MetadataJson};
-pub use reader::{Interest, Progress, Reader};
+pub use reader::{LtmReader, Progress};
 pub use scan::{Coding, Scan};
-pub use tile_decoder::{decode_basis, decode_tile};
-pub use verify::check;
+pub use tile_decoder::{check, decode_basis, decode_tile};

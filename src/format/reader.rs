@@ -4,17 +4,16 @@ use std::ops::Range;
 
 use super::budget::{Budget, Limits};
 use super::constants::{FIRST_BYTES, HEADER_BYTES};
-use super::decoder_state::DecoderState;
+use super::decoder_state::{DecoderState, Interest};
 use super::error::FormatError;
 use super::header::{self, Header};
 use super::index::FileIndex;
 use super::memory;
 use super::metadata::MetadataJson;
-use crate::transport::{Decibels, Transport};
+use crate::transport::Transport;
 
-/// An incremental reader. [`wants`](Self::wants) lists the byte ranges to fetch, and
-/// [`feed`](Self::feed) takes bytes in pieces of any size and checks and decodes each chunk when it is
-/// complete.
+/// An incremental reader. [`wants`](Self::wants) lists the byte ranges to fetch, and [`feed`](Self::feed) takes bytes
+/// in pieces of any size and checks and decodes each chunk when it is complete.
 ///
 /// ```text
 ///           144 bytes            index_bytes           all chunks of scan 0          all chunks
@@ -30,9 +29,9 @@ use crate::transport::{Decibels, Transport};
 /// [`FormatError::Limit`], and one whose system refuses memory [`FormatError::Memory`].
 ///
 /// ```
-/// use relightable_photo::format::{Interest, Limits, Reader};
+/// use relightable_photo::format::{Interest, Limits, LtmReader};
 /// # fn open(file: &[u8]) -> Result<(), relightable_photo::format::FormatError> {
-/// let mut reader = Reader::new(Limits::default());
+/// let mut reader = LtmReader::new(Limits::default());
 /// loop {
 ///     let wanted = reader.wants(&Interest::default());
 ///     let Some(range) = wanted.first() else { break };
@@ -43,22 +42,13 @@ use crate::transport::{Decibels, Transport};
 /// # Ok(()) }
 /// ```
 #[derive(Debug)]
-pub struct Reader {
+pub struct LtmReader {
     budget: Budget,
     /// The first bytes of the index, until it is complete.
     gathered: Vec<u8>,
     header: Option<Header>,
     state: Option<DecoderState>,
     received_bytes: u64,
-}
-
-/// Which chunks of a file to fetch: all by default.
-#[derive(Clone, Debug, Default)]
-pub struct Interest {
-    /// Columns and rows of visible camera pixels; all if `None`.
-    pub viewport: Option<(Range<u32>, Range<u32>)>,
-    /// SNR that is sufficient.
-    pub snr: Option<Decibels>,
 }
 
 /// How much of a file has been read.
@@ -74,7 +64,7 @@ pub struct Progress {
     pub tiles: usize,
 }
 
-impl Reader {
+impl LtmReader {
     /// A reader that has no bytes yet.
     pub fn new(limits: Limits) -> Self {
         Self {
@@ -95,7 +85,7 @@ impl Reader {
             let end = self.index_bytes().unwrap_or(FIRST_BYTES);
             return std::iter::once(have..end).collect();
         };
-        state.wants(interest.viewport.as_ref(), interest.snr)
+        state.wants(interest)
     }
 
     /// How much has been read.

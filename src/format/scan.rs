@@ -1,14 +1,17 @@
 //! Scans: passes over all tiles. Each adds components or slots, or makes them more precise.
 
+use std::ops::Range;
+
 use super::constants::SCAN_RECORD_BYTES;
 use super::fields::FieldReader;
 use crate::transport::Decibels;
 
 /// How a scan's values are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u16)]
 pub enum Coding {
     /// Coefficients: colour transform, cosine transform, quantisation.
-    Transform,
+    Transform = 1,
     /// Coefficients as half-precision floats.
     Halves,
     /// Direct functions: luma and chroma, quantisation.
@@ -18,17 +21,16 @@ pub enum Coding {
 }
 
 impl Coding {
-    const ALL: [Self; 4] = [
-        Self::Transform,
-        Self::Halves,
-        Self::Direct,
-        Self::DirectHalves,
-    ];
-
     /// Whether chunks hold slots of direct functions, not coefficients.
     pub fn is_direct(self) -> bool {
         matches!(self, Self::Direct | Self::DirectHalves)
     }
+}
+
+/// Number of basis functions in the basis chunks of `scans`.
+pub(super) fn rank_of(scans: &[Scan]) -> usize {
+    let coefficients = scans.iter().filter(|scan| !scan.coding.is_direct());
+    coefficients.map(Scan::end).max().unwrap_or(0)
 }
 
 /// One pass over all tiles. A decoded value is the sum of what its scans bring.
@@ -69,6 +71,11 @@ impl Scan {
         usize::from(self.first) + usize::from(self.count)
     }
 
+    /// The components or slots.
+    pub(super) fn items(&self) -> Range<usize> {
+        self.first.into()..self.end()
+    }
+
     /// Number of basis functions in the scan's basis chunk, if earlier scans have brought `known`.
     pub(super) fn new_basis_functions(&self, known: usize) -> usize {
         match self.coding.is_direct() {
@@ -78,35 +85,36 @@ impl Scan {
     }
 
     /// The record in the directory.
-    pub(super) fn encode(&self) -> [u8; SCAN_RECORD_BYTES] {
-        let coding = Coding::ALL.iter().position(|coding| *coding == self.coding);
-        let mut record = [0; SCAN_RECORD_BYTES];
-        record[..2].copy_from_slice(&(coding.unwrap_or(0) as u16 + 1).to_le_bytes());
-        record[2..4].copy_from_slice(&self.first.to_le_bytes());
-        record[4..6].copy_from_slice(&self.count.to_le_bytes());
-        record[8..12].copy_from_slice(&self.step.to_le_bytes());
-        record[12..16].copy_from_slice(&(self.snr.0 as f32).to_le_bytes());
-        record[16..20].copy_from_slice(&self.basis_bytes.to_le_bytes());
-        record[20..].copy_from_slice(&self.basis_crc.to_le_bytes());
-        record
+    pub(super) fn encode(&self) -> Vec<u8> {
+        let [step, snr] = [self.step, self.snr.0 as f32].map(f32::to_bits);
+        let shorts = [self.coding as u16, self.first, self.count, 0].map(u16::to_le_bytes);
+        let words = [step, snr, self.basis_bytes, self.basis_crc].map(u32::to_le_bytes);
+        [shorts.as_flattened(), words.as_flattened()].concat()
     }
 
     /// Reads a record; `None` if the coding is unknown, the reserved field is not 0, the count is 0,
     /// or the step is not positive and finite.
     pub(super) fn decode(record: &[u8; SCAN_RECORD_BYTES]) -> Option<Self> {
         let mut fields = FieldReader(record);
-        let coding = usize::from(fields.u16()).checked_sub(1)?;
-        let (first, count, reserved) = (fields.u16(), fields.u16(), fields.u16());
-        let scan = Self {
-            coding: *Coding::ALL.get(coding)?,
+        let [coding, first, count, reserved] = fields.u16s();
+        let [step, snr, basis_bytes, basis_crc] = fields.u32s();
+        let (step, snr) = (f32::from_bits(step), f32::from_bits(snr));
+        let coding = match coding {
+            1 => Coding::Transform,
+            2 => Coding::Halves,
+            3 => Coding::Direct,
+            4 => Coding::DirectHalves,
+            _ => return None,
+        };
+        let is_valid = reserved == 0 && count > 0 && step > 0.0 && step.is_finite();
+        is_valid.then_some(Self {
+            coding,
             first,
             count,
-            step: fields.f32(),
-            snr: Decibels(f64::from(fields.f32())),
-            basis_bytes: fields.u32(),
-            basis_crc: fields.u32(),
-        };
-        let is_valid = reserved == 0 && count > 0 && scan.step > 0.0 && scan.step.is_finite();
-        is_valid.then_some(scan)
+            step,
+            snr: Decibels(snr.into()),
+            basis_bytes,
+            basis_crc,
+        })
     }
 }

@@ -7,11 +7,13 @@ use super::codec::{basis, direct, halves};
 use super::error::{FormatError, SectionError};
 use super::index::FileIndex;
 use super::scan::Coding;
-use crate::transport::{BandTile, Basis, CHANNELS, CoefficientTile, DirectTile, Tile};
+use crate::transport::{Basis, CHANNELS, FloatTile, Tile, TileCodes};
 
 /// A tile as the sum of its chunks so far.
 #[derive(Debug, Default)]
 pub(super) struct TileDecoder {
+    /// Number of the tile.
+    tile: usize,
     /// Number of scans that are decoded or have no chunk for the tile.
     pub scans: usize,
     /// Of coding 1.
@@ -23,6 +25,13 @@ pub(super) struct TileDecoder {
 }
 
 impl TileDecoder {
+    pub fn new(tile: usize) -> Self {
+        Self {
+            tile,
+            ..Self::default()
+        }
+    }
+
     /// Bytes allocated.
     pub fn bytes(&self) -> u64 {
         self.planes.bytes() + vec_bytes(&self.coefficients) + vec_bytes(&self.functions)
@@ -31,78 +40,62 @@ impl TileDecoder {
     /// Adds the tile's chunk of the next scan. `order` is the centre-out order.
     ///
     /// # Errors
-    /// [`FormatError::DamagedSection`], and the errors of `budget`, which keeps only [`bytes`](Self::bytes)
-    /// reserved.
+    /// [`FormatError::DamagedSection`], and the errors of `budget`, which keeps only [`bytes`](Self::bytes) reserved.
     pub fn add(
         &mut self,
         index: &FileIndex,
         order: &[u16],
-        tile: usize,
         bytes: &[u8],
         budget: &Budget,
     ) -> Result<(), FormatError> {
-        let chunk = ChunkId::of_tile(self.scans, tile);
+        let chunk = ChunkId {
+            scan: self.scans,
+            tile: Some(self.tile),
+        };
         let (scratch, before) = (budget.scratch(), self.bytes());
-        let decoded = self.decode(index, order, tile, bytes, budget);
-        scratch.keep(self.bytes() - before);
-        decoded.map_err(|error| error.in_chunk(chunk))?;
-        self.scans += 1;
-        Ok(())
-    }
-
-    fn decode(
-        &mut self,
-        index: &FileIndex,
-        order: &[u16],
-        tile: usize,
-        bytes: &[u8],
-        budget: &Budget,
-    ) -> Result<(), SectionError> {
-        let geometry = &index.header.geometry;
         let scan = &index.scans[self.scans];
-        let content_bytes = index.entry(self.scans, tile).content_bytes;
-        let (extent, area) = (geometry.tile(tile).extent, geometry.window.area());
-        let rank = usize::from(index.header.rank);
+        let tokens = index.entry(self.scans, self.tile).content_bytes;
+        let extent = index.header.geometry.tile(self.tile).extent;
+        let (rank, area) = (usize::from(index.header.rank), order.len());
         let allocate = |values: &mut Vec<[f32; CHANNELS]>, columns: usize| {
             if values.is_empty() {
                 *values = budget.try_zeroed(extent.area() * columns)?;
             }
             Ok::<_, FormatError>(())
         };
-        match scan.coding {
-            Coding::Transform => self.planes.add(extent, scan, bytes, content_bytes, budget),
-            Coding::Direct => {
-                allocate(&mut self.functions, area)?;
-                direct::add(
-                    &mut self.functions,
-                    order,
-                    scan,
-                    bytes,
-                    content_bytes,
-                    budget,
-                )
+        let mut decode = || -> Result<(), SectionError> {
+            match scan.coding {
+                Coding::Transform => self.planes.add(extent, scan, bytes, tokens, budget),
+                Coding::Direct => {
+                    allocate(&mut self.functions, area)?;
+                    direct::add(&mut self.functions, order, scan, bytes, tokens, budget)
+                }
+                Coding::Halves => {
+                    allocate(&mut self.coefficients, rank)?;
+                    halves::add(&mut self.coefficients, rank, scan, None, bytes, budget)
+                }
+                Coding::DirectHalves => {
+                    allocate(&mut self.functions, area)?;
+                    halves::add(&mut self.functions, area, scan, Some(order), bytes, budget)
+                }
             }
-            Coding::Halves => {
-                allocate(&mut self.coefficients, rank)?;
-                halves::add(&mut self.coefficients, rank, scan, None, bytes, budget)
-            }
-            Coding::DirectHalves => {
-                allocate(&mut self.functions, area)?;
-                halves::add(&mut self.functions, area, scan, Some(order), bytes, budget)
-            }
-        }
+        };
+        let decoded = decode();
+        scratch.keep(self.bytes() - before);
+        decoded.map_err(|error| error.in_chunk(chunk))?;
+        self.scans += 1;
+        Ok(())
     }
 
     /// The first `rank` components of the coefficients, `[pixel, component]`; empty if all are zero.
     fn coefficients(
         &self,
         index: &FileIndex,
-        tile: usize,
         rank: usize,
         budget: &Budget,
     ) -> Result<Vec<[f32; CHANNELS]>, FormatError> {
         if !self.planes.is_dark() {
-            let extent = index.header.geometry.tile(tile).extent;
+            let extent = index.header.geometry.tile(self.tile).extent;
             return self.planes.coefficients(extent, rank, budget);
         }
         let file_rank = usize::from(index.header.rank).max(1);
@@ -121,26 +114,39 @@ impl TileDecoder {
     pub fn quantise(
         &self,
         index: &FileIndex,
-        tile: usize,
         rank: usize,
         budget: &Budget,
     ) -> Result<Tile, FormatError> {
-        let rect = index.header.geometry.tile(tile);
+        let rect = index.header.geometry.tile(self.tile);
         let mut quantised = Tile::dark(rect);
         let scratch = budget.scratch();
-        let coefficients = self.coefficients(index, tile, rank, budget)?;
+        let coefficients = self.coefficients(index, rank, budget)?;
         if !coefficients.is_empty() {
-            let codes = budget.try_zeroed(CoefficientTile::texels(rect, rank))?;
-            quantised.coefficients =
-                CoefficientTile::quantise_into(rect, &coefficients, rank, codes);
+            let codes = budget.try_zeroed(Tile::texels(rect, rank))?;
+            quantised.coefficients = TileCodes::of_coefficients(rect, &coefficients, rank, codes);
         }
         if !self.functions.is_empty() {
             let codes = budget.try_with_capacity(self.functions.len())?;
-            quantised.functions = DirectTile::quantise_into(rect, &self.functions, codes);
+            quantised.functions = TileCodes::of_functions(rect, &self.functions, codes);
         }
         scratch.keep(quantised.bytes() as u64);
         Ok(quantised)
     }
+}
+
+/// Decodes the basis chunk of a scan into `kernels`, which are those of the whole file.
+pub(super) fn decode_basis_chunk(
+    index: &FileIndex,
+    scan: usize,
+    bytes: &[u8],
+    kernels: &mut [Vec<f32>],
+    budget: &Budget,
+) -> Result<(), FormatError> {
+    let functions = &mut kernels[index.new_basis_functions(scan)];
+    let area = index.header.geometry.window.area();
+    let _scratch = budget.scratch();
+    let decoded = basis::decode(bytes, functions, area, budget);
+    decoded.map_err(|error| error.in_chunk(ChunkId { scan, tile: None }))
 }
 
 /// Decodes one tile of a file by itself; `fetch` gives the bytes of its chunks.
@@ -151,24 +157,26 @@ pub fn decode_tile<E: From<FormatError>>(
     index: &FileIndex,
     tile: usize,
     mut fetch: impl FnMut(ChunkId) -> Result<Vec<u8>, E>,
-) -> Result<BandTile, E> {
+) -> Result<FloatTile, E> {
     let budget = Budget::unlimited();
     let order = direct::centre_out_order(index.header.geometry.window, &budget)?;
-    let mut decoder = TileDecoder::default();
+    let mut decoder = TileDecoder::new(tile);
     for scan in 0..index.scans.len() {
-        let chunk = ChunkId::of_tile(scan, tile);
         if index.entry(scan, tile).bytes == 0 {
             decoder.scans += 1;
             continue;
         }
+        let chunk = ChunkId {
+            scan,
+            tile: Some(tile),
+        };
         let bytes = fetch(chunk)?;
         index.check_crc(chunk, &bytes)?;
-        decoder.add(index, &order, tile, &bytes, &budget)?;
+        decoder.add(index, &order, &bytes, &budget)?;
     }
-    let rank = index.header.rank.into();
-    Ok(BandTile {
+    Ok(FloatTile {
         rect: index.header.geometry.tile(tile),
-        coefficients: decoder.coefficients(index, tile, rank, &budget)?,
+        coefficients: decoder.coefficients(index, index.header.rank.into(), &budget)?,
         functions: decoder.functions,
     })
 }
@@ -182,17 +190,40 @@ pub fn decode_basis<E: From<FormatError>>(
     mut fetch: impl FnMut(ChunkId) -> Result<Vec<u8>, E>,
 ) -> Result<Basis, E> {
     let budget = Budget::unlimited();
-    let area = index.header.geometry.window.area();
-    let mut kernels = basis::try_zeroed(index.header.rank.into(), area, &budget)?;
-    for scan in 0..index.scans.len() {
-        let functions = index.new_basis_functions(scan);
-        if !functions.is_empty() {
-            let chunk = ChunkId::of_basis(scan);
-            let bytes = fetch(chunk)?;
-            index.check_crc(chunk, &bytes)?;
-            basis::decode(&bytes, &mut kernels[functions], area, &budget)
-                .map_err(|error| error.in_chunk(chunk))?;
-        }
+    let mut kernels = index.try_zeroed_basis(&budget)?;
+    for chunk in index.chunks().filter(|chunk| chunk.tile.is_none()) {
+        let bytes = fetch(chunk)?;
+        index.check_crc(chunk, &bytes)?;
+        decode_basis_chunk(index, chunk.scan, &bytes, &mut kernels, &budget)?;
     }
     Ok(Basis { kernels })
+}
+
+/// Checks one chunk of a file by itself: its length, its checksum, and that it decodes.
+///
+/// # Errors
+/// The [`FormatError`] that a reader would report.
+pub fn check(index: &FileIndex, chunk: ChunkId, bytes: &[u8]) -> Result<(), FormatError> {
+    let range = index.range(chunk);
+    if bytes.len() as u64 != range.end - range.start {
+        return Err(FormatError::Truncated {
+            got: range.start + bytes.len() as u64,
+            need: index.header.file_bytes,
+        });
+    }
+    index.check_crc(chunk, bytes)?;
+    let (ChunkId { scan, tile }, budget) = (chunk, Budget::unlimited());
+    let Some(tile) = tile else {
+        let mut kernels = index.try_zeroed_basis(&budget)?;
+        return decode_basis_chunk(index, scan, bytes, &mut kernels, &budget);
+    };
+    let mut decoder = TileDecoder {
+        scans: scan,
+        ..TileDecoder::new(tile)
+    };
+    if !index.has_colour_klt(scan, tile) {
+        decoder.planes = Planes::with_klt();
+    }
+    let order = direct::centre_out_order(index.header.geometry.window, &budget)?;
+    decoder.add(index, &order, bytes, &budget)
 }

@@ -12,7 +12,7 @@ use super::{prediction, sampling};
 use crate::capture::{Measurements, Pattern};
 use crate::executor::Executor;
 use crate::transport::{
-    Basis, CHANNELS, Decibels, Geometry, RecoveredTile, TileRect, TransportFunctions,
+    Basis, CHANNELS, Decibels, FloatTile, Geometry, TileRect, TransportFunctions,
 };
 
 /// Squares of the picture that are validated.
@@ -40,7 +40,7 @@ pub struct HoldoutValidation {
 
 #[derive(Clone, Debug)]
 struct ValidationSquare {
-    tile: RecoveredTile,
+    tile: FloatTile,
     /// Under the held-out patterns, `[pixel, pattern, channel]`.
     measurements: Vec<f64>,
 }
@@ -54,7 +54,7 @@ impl HoldoutValidation {
     pub(super) fn new(
         preparation: &Preparation<impl Executor>,
         basis: Option<&Basis>,
-        recover_from_training: impl Fn(TileRect) -> RecoveredTile + Sync + Send,
+        recover_from_training: impl Fn(TileRect) -> FloatTile + Sync + Send,
     ) -> Result<Option<Self>, RecoverError> {
         let &Preparation {
             measurements,
@@ -69,7 +69,7 @@ impl HoldoutValidation {
         let rects = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
         let results = executor.map(rects.len(), |i| {
             let tile = recover_from_training(rects[i]);
-            let functions = tile.clone().functions(&geometry, basis);
+            let functions = tile.functions(&geometry, basis);
             let square = ValidationSquare {
                 tile,
                 measurements: prediction::samples(measurements, &split.held_out, rects[i]),
@@ -109,7 +109,7 @@ impl HoldoutValidation {
     }
 
     /// The recovered squares.
-    pub fn tiles(&self) -> impl ExactSizeIterator<Item = &RecoveredTile> {
+    pub fn tiles(&self) -> impl ExactSizeIterator<Item = &FloatTile> {
         self.squares.iter().map(|square| &square.tile)
     }
 
@@ -192,7 +192,7 @@ mod tests {
             split: &HoldoutSplit::new(&capture.measurements),
             executor: &SequentialExecutor,
         };
-        let recover = |rect| RecoveredTile::Direct(cropped(&functions, rect));
+        let recover = |rect| FloatTile::from(cropped(&functions, rect));
         HoldoutValidation::new(&preparation, None, recover).ok()?
     }
 
@@ -233,10 +233,9 @@ mod tests {
         let validation = validate(&capture, 1.05).unwrap();
         let loss = |factor| {
             let functions = capture.functions(factor);
-            let squares = validation.tiles().map(|tile| match tile {
-                RecoveredTile::Direct(tile) => cropped(&functions, tile.rect),
-                RecoveredTile::Factored(_) => unreachable!("all tiles are direct"),
-            });
+            let squares = validation
+                .tiles()
+                .map(|tile| cropped(&functions, tile.rect));
             validation.loss(&squares.collect::<Vec<_>>()).0
         };
         assert!(loss(1.05).abs() < 1e-9);

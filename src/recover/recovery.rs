@@ -12,7 +12,7 @@ use super::preparation::{self, Preparation};
 use super::sampling::MIN_PATTERNS;
 use crate::capture::Measurements;
 use crate::executor::Executor;
-use crate::transport::{Basis, Geometry, RecoveredTile, TileRect, Window};
+use crate::transport::{Basis, FloatTile, Geometry, TileRect, Window};
 
 /// The options of a recovery.
 #[derive(Clone, Copy, Debug)]
@@ -85,7 +85,7 @@ impl Recovery {
         let training_tile = |rect: TileRect| match &recovery.solver {
             Solver::Learned(learned) => learned.training_tile(measurements, &split, rect),
             Solver::Pixelwise(solver) => {
-                RecoveredTile::Direct(solver.tile(measurements, &split.training, rect))
+                FloatTile::from(solver.tile(measurements, &split.training, rect))
             }
         };
         recovery.holdout_validation =
@@ -129,11 +129,11 @@ impl Recovery {
 
     /// Recovers one tile. `measurements` are those that the recovery was prepared from, or other rows of the same
     /// capture: they cover the tile and [`halo`](Self::halo) rows around it, within the picture.
-    pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> RecoveredTile {
+    pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> FloatTile {
         match &self.solver {
             Solver::Learned(learned) => learned.tile(measurements, &self.split, rect),
             Solver::Pixelwise(solver) => {
-                RecoveredTile::Direct(solver.tile(measurements, &self.split.all, rect))
+                FloatTile::from(solver.tile(measurements, &self.split.all, rect))
             }
         }
     }

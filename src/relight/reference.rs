@@ -42,10 +42,10 @@ pub fn relight(transport: &Transport, light: &Light) -> Vec<[f64; CHANNELS]> {
             }
             let y = &mut picture[geometry.camera.index(pixel)];
             for (s, light) in window[..slots].iter().enumerate() {
-                add(y, tile.functions.tau(area, p, s), *light);
+                add(y, tile.tau(area, p, s), *light);
             }
             for (k, response) in response.iter().enumerate() {
-                add(y, tile.coefficients.coefficient(rank, p, k), *response);
+                add(y, tile.coefficient(rank, p, k), *response);
             }
         }
     }

@@ -73,13 +73,13 @@ pub(super) fn measure_accuracy(
 pub(super) fn pooled_snr(parts: &[TransportError], share: f64) -> (Option<Decibels>, f64) {
     let sum: TransportError = parts.iter().copied().sum();
     let n = parts.len() as f64;
-    let (signal, error) = (sum.signal(), sum.error());
+    let TransportError { signal, error } = sum;
     if parts.len() < 2 || signal == 0.0 || error == 0.0 {
         return (sum.snr(), 0.0);
     }
     let squares = parts
         .iter()
-        .map(|part| (part.signal() / signal - part.error() / error).powi(2));
+        .map(|part| (part.signal / signal - part.error / error).powi(2));
     let variance = squares.sum::<f64>() * n / (n - 1.0) * (1.0 - share).max(0.0);
     (sum.snr(), 10.0 / std::f64::consts::LN_10 * variance.sqrt())
 }

@@ -11,7 +11,7 @@ use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::recover::{Recovery, Settings};
 use crate::relight::{BuiltinLight, Light, area_resample};
-use crate::transport::{BandTile, CHANNELS, Decibels, Extent, Tile};
+use crate::transport::{CHANNELS, Decibels, Extent, Tile};
 
 /// Largest width and height of a picture on the sheet.
 const MAX_PANEL_SIDE_PX: u32 = 200;
@@ -168,8 +168,7 @@ fn pictures(
     let rects: Vec<_> = geometry.tiles().collect();
     let done = AtomicUsize::new(0);
     let tiles = executor.map(rects.len(), |i| {
-        let mut tile = BandTile::dark(rects[i]);
-        tile.insert(recovery.tile(measurements, rects[i]));
+        let tile = recovery.tile(measurements, rects[i]);
         // Quantised as in a file.
         let functions = Tile::quantise(&tile, basis.rank()).functions(&geometry, &basis);
         let pictures = lights.iter().map(|light| {

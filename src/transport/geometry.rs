@@ -212,29 +212,64 @@ impl Geometry {
     /// # Errors
     /// If a field is out of range; the error names it.
     pub fn validate(self) -> Result<Self, GeometryError> {
-        let side = |name, value: u32| match value {
-            1..=MAX_SIDE => Ok(()),
-            _ => Err(GeometryError::Side { name, value }),
-        };
-        side("camera width", self.camera.width)?;
-        side("camera height", self.camera.height)?;
-        side("light width", self.light.width)?;
-        side("light height", self.light.height)?;
-        Window::new(self.window.side)?;
+        let names = [
+            "camera width",
+            "camera height",
+            "light width",
+            "light height",
+        ];
+        for (name, value) in names.into_iter().zip(self.sides()) {
+            if !(1..=MAX_SIDE).contains(&value) {
+                return Err(GeometryError::Side { name, value });
+            }
+        }
         if !(8..=256).contains(&self.tile_side) {
             return Err(GeometryError::TileSide(self.tile_side));
         }
-        if self
-            .correspondence
-            .affine
-            .iter()
-            .flatten()
-            .all(|a| a.is_finite())
-        {
-            Ok(self)
-        } else {
-            Err(GeometryError::Correspondence)
+        let affine = self.correspondence.affine.as_flattened();
+        match affine.iter().all(|a| a.is_finite()) {
+            true => Ok(self),
+            false => Err(GeometryError::Correspondence),
         }
+    }
+
+    /// Width and height of the camera grid and of the light plane, and the sides of a window and of a tile.
+    pub fn sides(&self) -> [u32; 6] {
+        let Self { camera, light, .. } = self;
+        let [window, tile] = [self.window.side, self.tile_side];
+        [
+            camera.width,
+            camera.height,
+            light.width,
+            light.height,
+            window,
+            tile,
+        ]
+    }
+
+    /// The geometry with these [`sides`](Self::sides), [checked](Self::validate).
+    ///
+    /// # Errors
+    /// If a field is out of range; the error names it.
+    pub fn from_sides(
+        [
+            camera_width,
+            camera_height,
+            light_width,
+            light_height,
+            window,
+            tile_side,
+        ]: [u32; 6],
+        correspondence: Correspondence,
+    ) -> Result<Self, GeometryError> {
+        let geometry = Self {
+            camera: Extent::new(camera_width, camera_height),
+            light: Extent::new(light_width, light_height),
+            window: Window::new(window)?,
+            correspondence,
+            tile_side,
+        };
+        geometry.validate()
     }
 
     /// Tiles along a row and down a column.
@@ -254,11 +289,7 @@ impl Geometry {
     /// Tile number `index` in row-major order.
     pub fn tile(&self, index: usize) -> TileRect {
         let across = self.tile_grid().width;
-        let index = index as u32;
-        let (x, y) = (
-            index % across * self.tile_side,
-            index / across * self.tile_side,
-        );
+        let [x, y] = [index as u32 % across, index as u32 / across].map(|at| at * self.tile_side);
         TileRect {
             x,
             y,
@@ -297,12 +328,12 @@ impl Geometry {
         let ClippedRect { columns, rows, .. } = self.clip_window(origin);
         let side = self.window.side() as usize;
         for (v, row) in slots.chunks_exact_mut(side).enumerate() {
-            if rows.contains(&v) {
-                row[..columns.start].fill(T::default());
-                row[columns.end..].fill(T::default());
-            } else {
-                row.fill(T::default());
-            }
+            let (before, after) = match rows.contains(&v) {
+                true => (columns.start, columns.end),
+                false => (side, side),
+            };
+            row[..before].fill(T::default());
+            row[after..].fill(T::default());
         }
     }
 }

@@ -5,21 +5,19 @@
 //! it is the light transport function `τ_n` (Thanikachalam et al. 2014, section 3).
 //!
 //! `recover`, `format` and `relight` share this module: the positions of pixels, windows and tiles ([`Geometry`]), the
-//! values of a tile as real numbers ([`BandTile`]) and as codes ([`Tile`]), and the distance of two transports
+//! values of a tile as real numbers ([`FloatTile`]) and as codes ([`Tile`]), and the distance of two transports
 //! ([`TransportError`]).
 
-mod factored;
-mod functions;
+mod float_tile;
 mod geometry;
 mod snr;
 mod tile;
 
-pub use factored::{BandTile, Basis, FactoredTile, RecoveredTile};
-pub use functions::TransportFunctions;
+pub use float_tile::{Basis, FloatTile, TransportFunctions};
 pub(crate) use geometry::ClippedRect;
 pub use geometry::{
     CHANNELS, CameraPx, Correspondence, Element, Extent, Geometry, GeometryError, LightPx,
     MAX_SIDE, MAX_WINDOW, TileRect, Window,
 };
 pub use snr::{Decibels, TransportError};
-pub use tile::{CoefficientTile, DirectTile, QUAD, TexelCode, Tile, Transport};
+pub use tile::{TEXEL_COMPONENTS, TexelCode, Tile, TileCodes, Transport};

@@ -14,12 +14,14 @@ impl fmt::Display for Decibels {
     }
 }
 
-/// Sums for SNR(T, T̂) = 20 log10(‖T‖_F / ‖T − T̂‖_F) (paper, section 4) over all entries of both matrices, in any
-/// order.
+/// Sums of squares for SNR(T, T̂) = 20 log10(‖T‖_F / ‖T − T̂‖_F) (paper, section 4) over all entries of both matrices,
+/// in any order.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TransportError {
-    signal: f64,
-    error: f64,
+    /// Of the true values.
+    pub signal: f64,
+    /// Of the differences.
+    pub error: f64,
 }
 
 impl TransportError {
@@ -35,20 +37,14 @@ impl TransportError {
         self.error += other.error;
     }
 
-    /// Sum of squares of the true values added.
-    pub fn signal(&self) -> f64 {
-        self.signal
-    }
-
-    /// Sum of squared differences.
-    pub fn error(&self) -> f64 {
-        self.error
-    }
-
     /// The SNR; `None` if the error or the signal is zero, as the ratio then has no finite logarithm.
     pub fn snr(&self) -> Option<Decibels> {
-        (self.signal > 0.0 && self.error > 0.0)
-            .then(|| Decibels(10.0 * (self.signal / self.error).log10()))
+        (self.signal > 0.0 && self.error > 0.0).then(|| self.finite_snr())
+    }
+
+    /// The SNR, finite if the error is zero.
+    pub(crate) fn finite_snr(&self) -> Decibels {
+        Decibels(10.0 * (self.signal / self.error.max(f64::MIN_POSITIVE)).log10())
     }
 }
 

@@ -1,10 +1,8 @@
 //! Tiles as 16-bit codes, the form in which the CPU and the GPU relight them.
 //!
-//! `τ_n = Σ_k c_nk v_k + d_n`: coefficients `c` ([`CoefficientTile`]) over the basis of the transport, and direct
-//! functions `d` ([`DirectTile`]). Each channel of a tile has one quantisation step.
+//! `τ_n = Σ_k c_nk v_k + d_n`: coefficients `c` over the basis of the transport, and direct functions `d`.
 
-use super::factored::{BandTile, Basis, FactoredTile};
-use super::functions::TransportFunctions;
+use super::float_tile::{Basis, FloatTile, TransportFunctions};
 use super::geometry::{CHANNELS, Geometry, TileRect};
 
 /// Four codes: a texel of an `rgba16sint` texture, and one SIMD load. They are signed, as a truncated sum of basis
@@ -12,52 +10,25 @@ use super::geometry::{CHANNELS, Geometry, TileRect};
 pub type TexelCode = [i16; 4];
 
 /// Components in one texel of coefficients: a quad.
-pub const QUAD: usize = 4;
+pub const TEXEL_COMPONENTS: usize = 4;
 
-/// Largest code of a direct tile. With 12 bits the quantisation noise of a pixel whose function is not sparse (S = 225,
-/// error step/√12 in each slot) is about 60 dB below the signal, less than the noise of any photograph.
+/// Largest code of direct functions. With 12 bits the quantisation noise of a pixel whose function is not sparse (S =
+/// 225, error step/√12 in each slot) is about 60 dB below the signal, less than the noise of any photograph.
 const MAX_DIRECT_CODE: f32 = 4095.0;
 
-/// A tile with the value of every slot of every pixel: `d = code · step`.
+/// One part of a tile as codes: `value = code · step`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DirectTile {
+pub struct TileCodes {
     /// The pixels of the tile.
     pub rect: TileRect,
-    /// Value of one code, per channel.
+    /// Value of one code, per channel: the largest value of the channel has the largest code.
     pub step: [f32; CHANNELS],
-    /// `[pixel, slot]`, both row by row; empty if all are zero.
+    /// Empty if all values are zero.
     pub codes: Vec<TexelCode>,
 }
 
-impl DirectTile {
-    /// Rounds functions, `[pixel, slot, channel]`, to codes. The largest value of each channel sets its step; values
-    /// that are not finite become zero.
-    pub fn quantise(rect: TileRect, functions: &[[f32; CHANNELS]]) -> Self {
-        Self::quantise_into(rect, functions, Vec::new())
-    }
-
-    /// [`quantise`](Self::quantise) into the memory of an empty vector.
-    pub(crate) fn quantise_into(
-        rect: TileRect,
-        functions: &[[f32; CHANNELS]],
-        mut codes: Vec<TexelCode>,
-    ) -> Self {
-        let Some(step) = steps(functions, MAX_DIRECT_CODE) else {
-            return Self::dark(rect);
-        };
-        let codes_of = |t: &[f32; CHANNELS]| {
-            [
-                code(t[0], step[0]),
-                code(t[1], step[1]),
-                code(t[2], step[2]),
-                0,
-            ]
-        };
-        codes.extend(functions.iter().map(codes_of));
-        Self { rect, step, codes }
-    }
-
-    /// A tile that is dark under every light.
+impl TileCodes {
+    /// All values zero.
     pub fn dark(rect: TileRect) -> Self {
         Self {
             rect,
@@ -66,15 +37,71 @@ impl DirectTile {
         }
     }
 
+    /// Rounds coefficients, `[pixel, component]`, to codes. Values that are not finite become zero. `codes` are
+    /// [`Tile::texels`] zeros.
+    pub(crate) fn of_coefficients(
+        rect: TileRect,
+        coefficients: &[[f32; CHANNELS]],
+        rank: usize,
+        mut codes: Vec<TexelCode>,
+    ) -> Self {
+        let Some(step) = steps(coefficients, i16::MAX.into()).filter(|_| rank > 0) else {
+            return Self::dark(rect);
+        };
+        let (plane, quads) = (Tile::plane(rect), rank.div_ceil(TEXEL_COMPONENTS));
+        for (p, coefficients) in coefficients.chunks_exact(rank).enumerate() {
+            for (k, value) in coefficients.iter().enumerate() {
+                for c in 0..CHANNELS {
+                    let texel = (c * quads + k / TEXEL_COMPONENTS) * plane + p;
+                    codes[texel][k % TEXEL_COMPONENTS] = code(value[c], step[c]);
+                }
+            }
+        }
+        Self { rect, step, codes }
+    }
+
+    /// Rounds direct functions, `[pixel, slot]`, to codes. Values that are not finite become zero. `codes` is empty.
+    pub(crate) fn of_functions(
+        rect: TileRect,
+        functions: &[[f32; CHANNELS]],
+        mut codes: Vec<TexelCode>,
+    ) -> Self {
+        let Some(step) = steps(functions, MAX_DIRECT_CODE) else {
+            return Self::dark(rect);
+        };
+        let [r, g, b] = step;
+        let texel = |t: &[f32; CHANNELS]| [code(t[0], r), code(t[1], g), code(t[2], b), 0];
+        codes.extend(functions.iter().map(texel));
+        Self { rect, step, codes }
+    }
+
+    /// The first `rank` components of coefficients over a basis of `all` functions, in `codes`: an empty vector with
+    /// room for them.
+    pub(crate) fn first_components(
+        &self,
+        all: usize,
+        rank: usize,
+        mut codes: Vec<TexelCode>,
+    ) -> Self {
+        let (plane, quads) = (Tile::plane(self.rect), rank.div_ceil(TEXEL_COMPONENTS));
+        let all_quads = all.div_ceil(TEXEL_COMPONENTS).max(1);
+        for channel in self.codes.chunks_exact(all_quads * plane) {
+            codes.extend_from_slice(&channel[..quads * plane]);
+            let last = match rank % TEXEL_COMPONENTS {
+                0 => codes.len(),
+                _ => codes.len() - plane,
+            };
+            for texel in &mut codes[last..] {
+                texel[rank % TEXEL_COMPONENTS..].fill(0);
+            }
+        }
+        let (rect, step) = (self.rect, self.step);
+        Self { rect, step, codes }
+    }
+
     /// Whether all values are zero, and so not stored.
     pub fn is_dark(&self) -> bool {
         self.codes.is_empty()
-    }
-
-    /// Value of slot `s` of pixel `p` of the tile, for windows of `area` slots.
-    pub fn tau(&self, area: usize, p: usize, s: usize) -> [f32; CHANNELS] {
-        let code = self.codes.get(p * area + s).unwrap_or(&[0; 4]);
-        std::array::from_fn(|c| f32::from(code[c]) * self.step[c])
     }
 }
 
@@ -103,139 +130,33 @@ fn code(value: f32, step: f32) -> i16 {
     }
 }
 
-/// A tile as coefficients over the basis of the transport: `c = code · step`.
-///
-/// All components share a step: each contributes to the brightness of a pixel in proportion to its coefficient, so
-/// equal errors of weak and strong components are equally visible.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CoefficientTile {
-    /// The pixels of the tile.
-    pub rect: TileRect,
-    /// Value of one code, per channel.
-    pub step: [f32; CHANNELS],
-    /// `[channel, quad, pixel]`: texels with the codes of [`QUAD`] components, zero beyond the last, in planes of
-    /// [`plane`](Self::plane) texels with pixels row by row. Empty if all are zero.
-    pub codes: Vec<TexelCode>,
-}
-
-impl CoefficientTile {
-    /// Rounds coefficients, `[pixel, component, channel]`, to codes. Non-finite ones become zero.
-    pub fn quantise(rect: TileRect, coefficients: &[[f32; CHANNELS]], rank: usize) -> Self {
-        let codes = vec![[0; 4]; Self::texels(rect, rank)];
-        Self::quantise_into(rect, coefficients, rank, codes)
-    }
-
-    /// [`quantise`](Self::quantise) into a vector of [`texels`](Self::texels) zeros.
-    pub(crate) fn quantise_into(
-        rect: TileRect,
-        coefficients: &[[f32; CHANNELS]],
-        rank: usize,
-        mut codes: Vec<TexelCode>,
-    ) -> Self {
-        let Some(step) = steps(coefficients, i16::MAX.into()).filter(|_| rank > 0) else {
-            return Self::dark(rect);
-        };
-        let (plane, quads) = (Self::plane(rect), rank.div_ceil(QUAD));
-        for (p, coefficients) in coefficients.chunks_exact(rank).enumerate() {
-            for (k, value) in coefficients.iter().enumerate() {
-                for c in 0..CHANNELS {
-                    let texel = (c * quads + k / QUAD) * plane + p;
-                    codes[texel][k % QUAD] = code(value[c], step[c]);
-                }
-            }
-        }
-        Self { rect, step, codes }
-    }
-
-    /// A tile with all coefficients zero.
-    pub fn dark(rect: TileRect) -> Self {
-        Self {
-            rect,
-            step: [1.0; CHANNELS],
-            codes: Vec::new(),
-        }
-    }
-
-    /// Whether all coefficients are zero, and so not stored.
-    pub fn is_dark(&self) -> bool {
-        self.codes.is_empty()
-    }
-
-    /// Distance of two planes in texels: the number of pixels, rounded up to whole cache lines, and one line more.
-    /// Planes at a distance of a power of two would compete for the same lines of the cache.
-    pub fn plane(rect: TileRect) -> usize {
-        const LINE: usize = 64 / size_of::<TexelCode>();
-        rect.extent.area().next_multiple_of(LINE) + LINE
-    }
-
-    /// Number of texels of a tile over a basis of `rank` functions.
-    pub fn texels(rect: TileRect, rank: usize) -> usize {
-        CHANNELS * rank.div_ceil(QUAD) * Self::plane(rect)
-    }
-
-    /// The first `rank` components of this tile over a basis of `all` functions, in `codes`: an empty vector
-    /// with room for them.
-    pub(crate) fn first_components(
-        &self,
-        all: usize,
-        rank: usize,
-        mut codes: Vec<TexelCode>,
-    ) -> Self {
-        let (plane, quads) = (Self::plane(self.rect), rank.div_ceil(QUAD));
-        for channel in self.codes.chunks_exact(all.div_ceil(QUAD).max(1) * plane) {
-            codes.extend_from_slice(&channel[..quads * plane]);
-            let last = match rank % QUAD {
-                0 => codes.len(),
-                _ => codes.len() - plane,
-            };
-            for texel in &mut codes[last..] {
-                texel[rank % QUAD..].fill(0);
-            }
-        }
-        Self {
-            rect: self.rect,
-            step: self.step,
-            codes,
-        }
-    }
-
-    /// Coefficient `k` of pixel `p` of the tile, for a basis of `rank` functions.
-    pub fn coefficient(&self, rank: usize, p: usize, k: usize) -> [f32; CHANNELS] {
-        let (plane, quads) = (Self::plane(self.rect), rank.div_ceil(QUAD));
-        std::array::from_fn(|c| {
-            let texel = self.codes.get((c * quads + k / QUAD) * plane + p);
-            texel.map_or(0.0, |texel| f32::from(texel[k % QUAD]) * self.step[c])
-        })
-    }
-}
-
 /// A tile as codes: `τ_n = Σ_k c_nk v_k + d_n`. Either part may be dark.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
-    /// `c_nk`.
-    pub coefficients: CoefficientTile,
-    /// `d_n`.
-    pub functions: DirectTile,
+    /// `c_nk` as `[channel, quad, pixel]`: texels with the codes of [`TEXEL_COMPONENTS`] components, zero beyond the
+    /// last, in planes of [`plane`](Self::plane) texels with pixels row by row. All components share a step: each
+    /// contributes to the brightness of a pixel in proportion to its coefficient, so equal errors of weak and strong
+    /// components are equally visible.
+    pub coefficients: TileCodes,
+    /// `d_n` as `[pixel, slot]`, both row by row.
+    pub functions: TileCodes,
 }
 
 impl Tile {
     /// Rounds a tile over a basis of `rank` functions to codes.
-    pub fn quantise(tile: &BandTile, rank: usize) -> Self {
-        let functions = match tile.functions.is_empty() {
-            true => DirectTile::dark(tile.rect),
-            false => DirectTile::quantise(tile.rect, &tile.functions),
-        };
+    pub fn quantise(tile: &FloatTile, rank: usize) -> Self {
+        let codes = vec![[0; 4]; Self::texels(tile.rect, rank)];
         Self {
-            coefficients: CoefficientTile::quantise(tile.rect, &tile.coefficients, rank),
-            functions,
+            coefficients: TileCodes::of_coefficients(tile.rect, &tile.coefficients, rank, codes),
+            functions: TileCodes::of_functions(tile.rect, &tile.functions, Vec::new()),
         }
     }
 
     /// A tile that is dark under every light.
     pub fn dark(rect: TileRect) -> Self {
         Self {
-            coefficients: CoefficientTile::dark(rect),
-            functions: DirectTile::dark(rect),
+            coefficients: TileCodes::dark(rect),
+            functions: TileCodes::dark(rect),
         }
     }
 
@@ -249,25 +170,56 @@ impl Tile {
         self.coefficients.is_dark() && self.functions.is_dark()
     }
 
+    /// Distance of two planes of coefficients in texels: the number of pixels, rounded up to whole cache lines, and one
+    /// line more. Planes at a distance of a power of two would compete for the same lines of the cache.
+    pub fn plane(rect: TileRect) -> usize {
+        const LINE: usize = 64 / size_of::<TexelCode>();
+        rect.extent.area().next_multiple_of(LINE) + LINE
+    }
+
+    /// Number of texels of coefficients over a basis of `rank` functions.
+    pub fn texels(rect: TileRect, rank: usize) -> usize {
+        CHANNELS * rank.div_ceil(TEXEL_COMPONENTS) * Self::plane(rect)
+    }
+
+    /// Coefficient `k` of pixel `p` of the tile, for a basis of `rank` functions.
+    pub fn coefficient(&self, rank: usize, p: usize, k: usize) -> [f32; CHANNELS] {
+        let TileCodes { rect, step, codes } = &self.coefficients;
+        let (plane, quads) = (Self::plane(*rect), rank.div_ceil(TEXEL_COMPONENTS));
+        std::array::from_fn(|c| {
+            let texel = codes.get((c * quads + k / TEXEL_COMPONENTS) * plane + p);
+            texel.map_or(0.0, |texel| {
+                f32::from(texel[k % TEXEL_COMPONENTS]) * step[c]
+            })
+        })
+    }
+
+    /// Direct value of slot `s` of pixel `p` of the tile, for windows of `area` slots.
+    pub fn tau(&self, area: usize, p: usize, s: usize) -> [f32; CHANNELS] {
+        let TileCodes { step, codes, .. } = &self.functions;
+        let code = codes.get(p * area + s).unwrap_or(&[0; 4]);
+        std::array::from_fn(|c| f32::from(code[c]) * step[c])
+    }
+
+    /// The tile's values.
+    pub fn dequantise(&self, geometry: &Geometry, basis: &Basis) -> FloatTile {
+        let (rank, area) = (basis.rank(), geometry.window.area());
+        let (pixels, mut tile) = (self.rect().extent.area(), FloatTile::dark(self.rect()));
+        if !self.coefficients.is_dark() {
+            let coefficient = |i: usize| self.coefficient(rank, i / rank, i % rank);
+            tile.coefficients = (0..pixels * rank).map(coefficient).collect();
+        }
+        if !self.functions.is_dark() {
+            let tau = |i: usize| self.tau(area, i / area, i % area);
+            tile.functions = (0..pixels * area).map(tau).collect();
+        }
+        tile
+    }
+
     /// The light transport functions.
     pub fn functions(&self, geometry: &Geometry, basis: &Basis) -> TransportFunctions {
-        let (rect, area) = (self.rect(), geometry.window.area());
-        let mut functions = TransportFunctions::zeros(rect, area);
-        if !self.functions.is_dark() {
-            for (i, tau) in functions.tau.iter_mut().enumerate() {
-                *tau = self.functions.tau(area, i / area, i % area);
-            }
-        }
-        if !self.coefficients.is_dark() {
-            let rank = basis.rank();
-            let coefficient = |i: usize| self.coefficients.coefficient(rank, i / rank, i % rank);
-            let tile = FactoredTile {
-                rect,
-                coefficients: (0..rect.extent.area() * rank).map(coefficient).collect(),
-            };
-            tile.expand_into(geometry, basis, &mut functions.tau);
-        }
-        functions
+        self.dequantise(geometry, basis)
+            .functions(geometry, Some(basis))
     }
 
     /// Size of the codes in bytes.

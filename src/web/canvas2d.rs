@@ -76,10 +76,10 @@ impl Relighter {
     ) -> Result<Relighter, CodedError> {
         let gamut = parse_gamut(gamut)?;
         let backend = Canvas2dBackend::new(photo.transport(), &canvas, gamut)?;
-        Ok(Self::from_backend(
-            Box::new(backend),
-            photo.geometry().light,
-        ))
+        Ok(Self {
+            backend: Box::new(backend),
+            light: photo.geometry().light,
+        })
     }
 }
 

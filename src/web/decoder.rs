@@ -3,11 +3,11 @@
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{CodedError, Photo};
-use crate::format::{Interest, Limits, Reader};
+use crate::format::{Interest, Limits, LtmReader};
 
 /// Names the byte ranges of an `.ltm` file that it needs, takes them in pieces of any size, and makes a [`Photo`].
 #[wasm_bindgen]
-pub struct Decoder(Reader);
+pub struct Decoder(LtmReader);
 
 #[wasm_bindgen]
 impl Decoder {
@@ -17,7 +17,7 @@ impl Decoder {
         let limits = max_decoded_bytes.map_or_else(Limits::default, |bytes| Limits {
             decoded_bytes: bytes as u64, // saturates; 0 for NaN
         });
-        Self(Reader::new(limits))
+        Self(LtmReader::new(limits))
     }
 
     /// The missing byte ranges, the most important first: start and end of the first, then of the second, and so on. The

@@ -104,7 +104,7 @@ impl GraphicsDevice {
                 }
             };
             let backend = backend.map_err(CodedError::from)?;
-            Ok(JsValue::from(Relighter::from_backend(backend, light)))
+            Ok(JsValue::from(Relighter { backend, light }))
         })
     }
 }

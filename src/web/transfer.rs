@@ -3,10 +3,7 @@
 
 use super::CodedError;
 #[cfg(feature = "drawing")]
-use crate::transport::{
-    Basis, CoefficientTile, Correspondence, DirectTile, Extent, TexelCode, TileRect, Transport,
-    Window,
-};
+use crate::transport::{Basis, Correspondence, TexelCode, TileRect, Transport};
 use crate::transport::{CHANNELS, Geometry, Tile};
 
 /// The first bytes of a packed tile.
@@ -27,23 +24,8 @@ pub fn corrupt() -> CodedError {
 /// Grids, window, tile side and correspondence, as `unpack_transport` reads them.
 #[cfg(feature = "decoder")]
 pub fn pack_geometry(geometry: &Geometry) -> Vec<f64> {
-    let Geometry {
-        camera,
-        light,
-        window,
-        correspondence,
-        tile_side,
-    } = geometry;
-    let numbers = [
-        camera.width,
-        camera.height,
-        light.width,
-        light.height,
-        window.side(),
-        *tile_side,
-    ];
-    let affine = correspondence.affine.concat();
-    numbers.into_iter().map(f64::from).chain(affine).collect()
+    let sides = geometry.sides().map(f64::from);
+    [&sides[..], geometry.correspondence.affine.as_flattened()].concat()
 }
 
 /// A header, the coefficients' codes and the functions' codes.
@@ -63,20 +45,13 @@ pub fn pack_tile(tile: &Tile) -> Vec<u8> {
 /// [`corrupt`] if the values describe no transport.
 #[cfg(feature = "drawing")]
 pub fn unpack_transport(geometry: &[f64], basis: &[f32]) -> Result<Transport, CodedError> {
-    let &[cw, ch, lw, lh, window, tile_side, a, b, c, d, e, f] = geometry else {
+    let (sides, affine) = geometry.split_first_chunk().ok_or_else(corrupt)?;
+    let (&[u, v], []) = affine.as_chunks() else {
         return Err(corrupt());
     };
-    let extent = |width: f64, height: f64| Extent::new(width as u32, height as u32);
-    let geometry = Geometry {
-        camera: extent(cw, ch),
-        light: extent(lw, lh),
-        window: Window::new(window as u32).map_err(|_| corrupt())?,
-        correspondence: Correspondence {
-            affine: [[a, b, c], [d, e, f]],
-        },
-        tile_side: tile_side as u32,
-    };
-    let geometry = geometry.validate().map_err(|_| corrupt())?;
+    let (sides, affine) = (sides.map(|side| side as u32), [u, v]);
+    let geometry = Geometry::from_sides(sides, Correspondence { affine });
+    let geometry = geometry.map_err(|_| corrupt())?;
     let functions = basis.chunks_exact(geometry.window.area());
     if !functions.remainder().is_empty() {
         return Err(corrupt());
@@ -110,10 +85,7 @@ pub fn unpack_tile(
         return Err(corrupt());
     };
     let texels = texels.map(|texels| texels as usize);
-    let full = [
-        CoefficientTile::texels(rect, rank),
-        rect.extent.area() * area,
-    ];
+    let full = [Tile::texels(rect, rank), rect.extent.area() * area];
     let is_complete = (0..2).all(|i| texels[i] == 0 || texels[i] == full[i]);
     if !is_complete || codes.len() != texels[0] + texels[1] {
         return Err(corrupt());
@@ -129,16 +101,8 @@ pub fn unpack_tile(
         Ok::<_, CodedError>(copy)
     };
     let (coefficients, functions) = codes.split_at(texels[0]);
-    Ok(Tile {
-        coefficients: CoefficientTile {
-            rect,
-            step: steps[0],
-            codes: try_copy(coefficients)?,
-        },
-        functions: DirectTile {
-            rect,
-            step: steps[1],
-            codes: try_copy(functions)?,
-        },
-    })
+    let mut tile = Tile::dark(rect);
+    (tile.coefficients.step, tile.coefficients.codes) = (steps[0], try_copy(coefficients)?);
+    (tile.functions.step, tile.functions.codes) = (steps[1], try_copy(functions)?);
+    Ok(tile)
 }

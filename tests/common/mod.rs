@@ -5,9 +5,7 @@
 pub mod relit;
 
 use relightable_photo::format::HEADER_BYTES;
-use relightable_photo::transport::{
-    BandTile, Basis, Correspondence, Extent, Geometry, Tile, TransportFunctions, Window,
-};
+use relightable_photo::transport::{Correspondence, Extent, Geometry, TransportFunctions, Window};
 
 /// A reproducible stream of numbers in 0..1.
 pub struct Noise(pub u64);
@@ -66,23 +64,6 @@ pub fn functions(geometry: Geometry, seed: u64) -> Vec<TransportFunctions> {
         functions
     });
     tiles.collect()
-}
-
-/// The values of a quantised tile.
-pub fn band_tile(tile: &Tile, geometry: &Geometry, basis: &Basis) -> BandTile {
-    let (rank, area) = (basis.rank(), geometry.window.area());
-    let pixels = tile.rect().extent.area();
-    let mut band = BandTile::dark(tile.rect());
-    if !tile.coefficients.is_dark() {
-        let values =
-            (0..pixels * rank).map(|i| tile.coefficients.coefficient(rank, i / rank, i % rank));
-        band.coefficients = values.collect();
-    }
-    if !tile.functions.is_dark() {
-        let values = (0..pixels * area).map(|i| tile.functions.tau(area, i / area, i % area));
-        band.functions = values.collect();
-    }
-    band
 }
 
 /// A file after an edit of its header or chunks, with correct checksums as far as the file's lengths are valid.

@@ -3,7 +3,7 @@
 use relightable_photo::relight::{
     BuiltinLight, Gamut, Light, OutputTransform, Rgba8Picture, ToneCurve,
 };
-use relightable_photo::transport::{BandTile, Basis, Extent, Geometry, Tile, Transport};
+use relightable_photo::transport::{Basis, Extent, FloatTile, Geometry, Tile, Transport};
 
 use super::Noise;
 
@@ -42,7 +42,7 @@ pub fn asymmetric_transport(geometry: Geometry, contents: TileContents, seed: u6
             TileContents::Factored => [false, true],
             TileContents::Mixed => [i % 3 < 2, i % 4 > 0],
         };
-        let mut tile = BandTile::dark(rect);
+        let mut tile = FloatTile::dark(rect);
         for pixel in rect.pixels() {
             let across = (pixel.x as f32 + 1.0) / geometry.camera.width as f32;
             let down = (pixel.y as f32 + 1.0) / geometry.camera.height as f32;

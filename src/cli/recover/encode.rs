@@ -12,17 +12,12 @@ use crate::cli::process::InterruptibleCores;
 use crate::executor::Executor;
 use crate::format::{DistortionMetric, EncodedFile, FormatError, Metadata, Source};
 use crate::recover::{HoldoutValidation, Recovery};
-use crate::transport::{BandTile, Basis, Decibels, Geometry, RecoveredTile, TransportFunctions};
+use crate::transport::{Basis, Decibels, FloatTile, Geometry, TransportFunctions};
 
 /// The loss of SNR on held-out patterns.
 impl DistortionMetric for HoldoutValidation {
-    fn tiles(&self) -> Vec<BandTile> {
-        let to_band_tile = |recovered: &RecoveredTile| {
-            let mut tile = BandTile::dark(recovered.rect());
-            tile.insert(recovered.clone());
-            tile
-        };
-        self.tiles().map(to_band_tile).collect()
+    fn tiles(&self) -> Vec<FloatTile> {
+        self.tiles().cloned().collect()
     }
 
     fn loss(&self, functions: &[TransportFunctions]) -> Decibels {
@@ -45,18 +40,23 @@ pub fn encode_file(
         ..*recovered
     };
     let (rank, area) = (basis.map_or(0, Basis::rank), recovered.window.area());
-    let tile = |i: usize| -> io::Result<BandTile> {
+    let tile = |i: usize| -> io::Result<FloatTile> {
         if cores.is_cancelled() {
             return Err(ErrorKind::Interrupted.into());
         }
         let rect = geometry.tile(i);
-        let mut tile = BandTile::dark(rect);
+        let mut tile = FloatTile::dark(rect);
         let columns = tile_indices(rect.x, rect.extent.width, recovered.tile_side);
         let rows = tile_indices(rect.y, rect.extent.height, recovered.tile_side);
         for (x, y) in columns.flat_map(|x| rows.clone().map(move |y| (x, y))) {
             let i = (y * recovered.tile_grid().width + x) as usize;
             let record = lock(checkpoint).read(i)?;
-            tile.insert(tile_record::decode(recovered.tile(i), rank, area, &record)?);
+            tile.insert(&tile_record::decode(
+                recovered.tile(i),
+                rank,
+                area,
+                &record,
+            )?);
         }
         Ok(tile)
     };

@@ -7,7 +7,7 @@ use std::io::{self, ErrorKind};
 
 use half::f16;
 
-use crate::transport::{CHANNELS, FactoredTile, RecoveredTile, TileRect, TransportFunctions};
+use crate::transport::{CHANNELS, FloatTile, TileRect};
 
 /// Level of zstd: the fastest, as a checkpoint is read once and then deleted.
 const ZSTD_LEVEL: i32 = 1;
@@ -17,10 +17,10 @@ const DIRECT: u8 = 1;
 const FACTORED: u8 = 2;
 
 /// Encodes a tile.
-pub fn encode(tile: &RecoveredTile) -> io::Result<Vec<u8>> {
-    let (kind, values) = match tile {
-        RecoveredTile::Direct(tile) => (DIRECT, &tile.tau),
-        RecoveredTile::Factored(tile) => (FACTORED, &tile.coefficients),
+pub fn encode(tile: &FloatTile) -> io::Result<Vec<u8>> {
+    let (kind, values) = match tile.functions.is_empty() {
+        true => (FACTORED, &tile.coefficients),
+        false => (DIRECT, &tile.functions),
     };
     let values = values.as_flattened();
     let finite = values.iter().filter(|v| v.is_finite());
@@ -41,12 +41,7 @@ pub fn encode(tile: &RecoveredTile) -> io::Result<Vec<u8>> {
 }
 
 /// Decodes the tile at `rect`: `rank` coefficients or `area` elements a pixel and channel.
-pub fn decode(
-    rect: TileRect,
-    rank: usize,
-    area: usize,
-    record: &[u8],
-) -> io::Result<RecoveredTile> {
+pub fn decode(rect: TileRect, rank: usize, area: usize, record: &[u8]) -> io::Result<FloatTile> {
     let damaged = || io::Error::from(ErrorKind::InvalidData);
     let (&[kind, a, b, c, d], frame) = record
         .split_first_chunk::<HEAD_BYTES>()
@@ -69,13 +64,12 @@ pub fn decode(
         .map(|(&l, &h)| f16::from_le_bytes([l, h]));
     let values: Vec<f32> = halves.map(|half| half.to_f32() * step).collect();
     let values = values.as_chunks().0.to_vec();
-    Ok(match kind {
-        DIRECT => RecoveredTile::Direct(TransportFunctions { rect, tau: values }),
-        _ => RecoveredTile::Factored(FactoredTile {
-            rect,
-            coefficients: values,
-        }),
-    })
+    let mut tile = FloatTile::dark(rect);
+    match kind {
+        DIRECT => tile.functions = values,
+        _ => tile.coefficients = values,
+    }
+    Ok(tile)
 }
 
 #[cfg(test)]
@@ -93,25 +87,20 @@ mod tests {
         for size in [1e-30f32, 0.2, 1e20] {
             let value = |i: usize| [0.2, -1.0, 0.01].map(|c| c * size * (i as f32).cos());
             let values = |each: usize| -> Vec<_> { (0..8 * each).map(value).collect() };
-            let direct = RecoveredTile::Direct(TransportFunctions {
-                rect,
-                tau: values(9),
-            });
-            let factored = RecoveredTile::Factored(FactoredTile {
-                rect,
-                coefficients: values(5),
-            });
+            let (mut direct, mut factored) = (FloatTile::dark(rect), FloatTile::dark(rect));
+            direct.functions = values(9);
+            factored.coefficients = values(5);
             for tile in [direct, factored] {
                 let record = encode(&tile).unwrap();
-                let (got, want) = match (decode(rect, 5, 9, &record).unwrap(), tile) {
-                    (RecoveredTile::Direct(a), RecoveredTile::Direct(b)) => (a.tau, b.tau),
-                    (RecoveredTile::Factored(a), RecoveredTile::Factored(b)) => {
-                        (a.coefficients, b.coefficients)
+                let got = decode(rect, 5, 9, &record).unwrap();
+                for (got, want) in [
+                    (got.coefficients, tile.coefficients),
+                    (got.functions, tile.functions),
+                ] {
+                    assert_eq!(got.len(), want.len());
+                    for (got, want) in got.as_flattened().iter().zip(want.as_flattened()) {
+                        assert!((got - want).abs() <= want.abs() / 2048.0 + size * 1e-7);
                     }
-                    _ => panic!("a different variant"),
-                };
-                for (got, want) in got.as_flattened().iter().zip(want.as_flattened()) {
-                    assert!((got - want).abs() <= want.abs() / 2048.0 + size * 1e-7);
                 }
                 assert!(decode(rect, 6, 10, &record).is_err());
                 for cut in 0..record.len() {

@@ -43,18 +43,10 @@ impl QuantisedBasis {
     pub fn error(&self, k: usize, function: &[f32]) -> f64 {
         let codes = self.codes.chunks_exact(function.len()).nth(k);
         let pairs = codes.unwrap_or_default().iter().zip(function);
-        let error =
-            |(&code, v): (&i16, &f32)| f64::from(value(code, self.exponents[k])) - f64::from(*v);
-        pairs.map(|pair| error(pair).powi(2)).sum()
-    }
-
-    /// The functions as a reader decodes them.
-    #[cfg(test)]
-    pub fn functions(&self, area: usize) -> Vec<Vec<f32>> {
-        let codes = self.codes.chunks_exact(area).zip(&self.exponents);
-        codes
-            .map(|(codes, &exponent)| codes.iter().map(|&code| value(code, exponent)).collect())
-            .collect()
+        let square = |(&code, v): (&i16, &f32)| {
+            (f64::from(value(code, self.exponents[k])) - f64::from(*v)).powi(2)
+        };
+        pairs.map(square).sum()
     }
 
     /// The basis chunk of functions `from` to `from + count - 1`.
@@ -97,18 +89,6 @@ pub fn decode(
     Ok(())
 }
 
-/// `rank` functions of zeros.
-///
-/// # Errors
-/// The errors of `budget`.
-pub fn try_zeroed(rank: usize, area: usize, budget: &Budget) -> Result<Vec<Vec<f32>>, FormatError> {
-    let mut functions = budget.try_with_capacity(rank)?;
-    for _ in 0..rank {
-        functions.push(budget.try_zeroed(area)?);
-    }
-    Ok(functions)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -119,14 +99,18 @@ mod tests {
         let functions: Vec<Vec<f32>> = (0..4).map(function).collect();
         let steps = [1e-4, 1e-3, 1e-2, 1e-9];
         let quantised = QuantisedBasis::new(&functions, &steps);
-        let want = quantised.functions(25);
+        let codes = quantised.codes.chunks_exact(25);
+        let functions_of = |(codes, &exponent): (&[i16], &u8)| -> Vec<f32> {
+            codes.iter().map(|&code| value(code, exponent)).collect()
+        };
+        let want: Vec<_> = codes.zip(&quantised.exponents).map(functions_of).collect();
         let frames = [
             quantised.encode(0, 1, 25).unwrap(),
             quantised.encode(1, 3, 25).unwrap(),
         ];
         let decode = |frame: &[u8], count: usize| {
             let budget = Budget::unlimited();
-            let mut functions = try_zeroed(count, 25, &budget).unwrap();
+            let mut functions = vec![vec![0.0; 25]; count];
             decode(frame, &mut functions, 25, &budget).map(|()| functions)
         };
         let got = [

@@ -41,21 +41,16 @@ impl ColourKlt {
 
     /// The bytes in a file.
     pub fn to_bytes(self) -> [u8; Self::BYTES] {
-        let mut bytes = [0; Self::BYTES];
-        for (bytes, entry) in bytes.chunks_exact_mut(2).zip(self.0.iter().flatten()) {
-            bytes.copy_from_slice(&entry.to_le_bytes());
-        }
-        bytes
+        let entries = self.0.as_flattened();
+        std::array::from_fn(|i| entries[i / 2].to_le_bytes()[i % 2])
     }
 
     /// Reads [`BYTES`](Self::BYTES) bytes.
     pub fn from_bytes(bytes: &[u8]) -> Self {
-        let mut matrix = [[0; CHANNELS]; CHANNELS];
-        let entries = matrix.iter_mut().flatten();
-        for (entry, bytes) in entries.zip(bytes.chunks_exact(2)) {
-            *entry = i16::from_le_bytes([bytes[0], bytes[1]]);
-        }
-        Self(matrix)
+        let (entries, _) = bytes.as_chunks();
+        Self(std::array::from_fn(|axis| {
+            std::array::from_fn(|c| i16::from_le_bytes(entries[axis * CHANNELS + c]))
+        }))
     }
 
     fn axes(&self) -> [Pixel; CHANNELS] {
@@ -90,16 +85,11 @@ impl HouseholderReflection {
         let length = dot(colour, colour).sqrt();
         let normal = [colour[0] - length, colour[1], colour[2]];
         let square = dot(normal, normal);
-        match square.is_normal() {
-            true => Self {
-                normal,
-                factor: 2.0 / square,
-            },
-            false => Self {
-                normal: [0.0; CHANNELS],
-                factor: 0.0,
-            },
-        }
+        let (normal, factor) = match square.is_normal() {
+            true => (normal, 2.0 / square),
+            false => ([0.0; CHANNELS], 0.0),
+        };
+        Self { normal, factor }
     }
 
     /// Reflects a pixel. The reflection is its own inverse.
@@ -107,6 +97,11 @@ impl HouseholderReflection {
         let scale = self.factor * dot(self.normal, pixel);
         std::array::from_fn(|c| pixel[c] - scale * self.normal[c])
     }
+}
+
+/// The pixel with 0 for values that are not finite.
+pub fn finite(pixel: Pixel) -> Pixel {
+    pixel.map(|c| if c.is_finite() { c } else { 0.0 })
 }
 
 fn dot(a: Pixel, b: Pixel) -> f32 {

@@ -7,8 +7,8 @@
 
 use std::ops::Range;
 
-use super::colour::{Pixel, ycocg_forward, ycocg_inverse};
-use super::tokens::{self, ItemRuns, MAX_MAGNITUDE, QuantisedRun, TokenReader, TokenWriter};
+use super::colour::{Pixel, finite, ycocg_forward, ycocg_inverse};
+use super::tokens::{ItemRuns, MAX_MAGNITUDE, QuantisedRun, TokenReader, TokenWriter};
 use crate::format::budget::{Budget, vec_bytes};
 use crate::format::chunk::EncodedChunk;
 use crate::format::constants::MAX_CONTENT_BYTES;
@@ -53,11 +53,6 @@ pub fn max_tokens(extent: Extent, count: u16) -> u64 {
     (extent.area() * CHANNELS) as u64 * u64::from(count)
 }
 
-/// Maximum bytes of a chunk of `tokens` tokens.
-pub fn max_bytes(tokens: u64) -> u64 {
-    tokens::max_bytes(tokens)
-}
-
 /// Number of slots whose values fit into one chunk of any tile, in coding 3 and coding 4.
 pub fn max_slots(tile_side: u32) -> u64 {
     MAX_CONTENT_BYTES / (2 * CHANNELS as u64 * u64::from(tile_side).pow(2))
@@ -84,7 +79,7 @@ pub fn add(
     if reader.tokens() < tokens as usize {
         return Err(damaged("it has fewer tokens than its entry says"));
     }
-    let slots = &order[usize::from(scan.first)..scan.end()];
+    let slots = &order[scan.items()];
     let mut numbers: Vec<i32> = budget.try_zeroed(slots.len() * CHANNELS)?;
     for function in functions.chunks_exact_mut(order.len()) {
         let end = reader.read_run(&mut numbers)?;
@@ -125,7 +120,7 @@ impl OrderedFunctions {
 }
 
 impl ItemRuns for OrderedFunctions {
-    fn for_runs(&self, items: Range<usize>, step: f32, mut visit: impl FnMut(QuantisedRun<'_>)) {
+    fn for_runs(&self, items: Range<usize>, step: f32, visit: &mut dyn FnMut(QuantisedRun<'_>)) {
         let (mut residuals, mut numbers) = (Vec::new(), Vec::new());
         for function in self.values.chunks_exact(self.slots) {
             residuals.clear();
@@ -151,11 +146,9 @@ impl ItemRuns for OrderedFunctions {
 /// The direct functions of a tile, quantised scan by scan.
 #[derive(Clone, Debug)]
 pub struct QuantisedFunctions {
-    /// `[scan]`, then `[pixel, item, Y Co Cg]`.
-    scans: Vec<Vec<i32>>,
-    /// Sum of squared values.
-    pub energy: f64,
-    /// Sum of squared errors after each scan.
+    /// `[scan]`, then `[pixel, item, Y Co Cg]`; empty for scans of coefficients.
+    numbers: Vec<Vec<i32>>,
+    /// Sum of squared values, and of squared errors after each scan.
     pub errors: Vec<f64>,
     /// The error after the last scan, `[pixel, centre-out index]`.
     residual: Vec<Pixel>,
@@ -163,37 +156,28 @@ pub struct QuantisedFunctions {
 
 impl QuantisedFunctions {
     /// Quantises functions, `[pixel, slot]`, by `scans`.
-    pub fn new(functions: &[Pixel], order: &[u16], scans: &[&Scan]) -> Self {
+    pub fn new(functions: &[Pixel], order: &[u16], scans: &[Scan]) -> Self {
         let mut residual = OrderedFunctions::new(functions, order).values;
         let square = |residual: &[Pixel]| {
-            let all = residual.iter().flatten();
+            let all = residual.as_flattened().iter();
             all.map(|t| f64::from(*t).powi(2)).sum::<f64>()
         };
-        let mut quantised = Self {
-            scans: Vec::new(),
-            energy: square(&residual),
-            errors: Vec::new(),
-            residual: Vec::new(),
-        };
+        let (mut numbers, mut errors) = (Vec::new(), vec![square(&residual)]);
         for (s, scan) in scans.iter().enumerate() {
-            let slots = usize::from(scan.first)..scan.end();
-            let is_last = |k: usize| {
-                let covers = |later: &&Scan| usize::from(later.first) <= k && k < later.end();
-                !scans[s + 1..].iter().any(covers)
-            };
-            let offsets: Vec<f32> = slots
-                .clone()
-                .map(|k| {
-                    if is_last(k) {
-                        ROUNDING_OFFSET
-                    } else {
-                        COARSE_ROUNDING_OFFSET
-                    }
-                })
-                .collect();
             let mut own = Vec::new();
+            if !scan.coding.is_direct() {
+                errors.push(errors[s]);
+                numbers.push(own);
+                continue;
+            }
+            let later = scans[s + 1..].iter().filter(|scan| scan.coding.is_direct());
+            let offset = |k: usize| match later.clone().any(|later| later.items().contains(&k)) {
+                true => COARSE_ROUNDING_OFFSET,
+                false => ROUNDING_OFFSET,
+            };
+            let offsets: Vec<f32> = scan.items().map(offset).collect();
             for function in residual.chunks_exact_mut(order.len()) {
-                for (tau, offset) in function[slots.clone()].iter_mut().zip(&offsets) {
+                for (tau, offset) in function[scan.items()].iter_mut().zip(&offsets) {
                     let rgb = tau.map(|t| round(t, scan.step, *offset));
                     for (t, number) in tau.iter_mut().zip(rgb) {
                         *t -= number as f32 * scan.step;
@@ -201,11 +185,14 @@ impl QuantisedFunctions {
                     own.extend(ycocg_forward(rgb));
                 }
             }
-            quantised.scans.push(own);
-            quantised.errors.push(square(&residual));
+            numbers.push(own);
+            errors.push(square(&residual));
         }
-        quantised.residual = residual;
-        quantised
+        Self {
+            numbers,
+            errors,
+            residual,
+        }
     }
 
     /// The functions as a reader decodes them, of the `functions` that were quantised.
@@ -222,33 +209,23 @@ impl QuantisedFunctions {
         decoded
     }
 
-    /// The chunks, `None` where all numbers are zero.
+    /// The chunks of all scans.
     ///
     /// # Errors
     /// [`FormatError::Compress`].
-    pub fn chunks(&self, scans: &[&Scan]) -> Result<Vec<Option<EncodedChunk>>, FormatError> {
-        let each = self.scans.iter().zip(scans);
-        each.map(|(numbers, scan)| {
+    pub fn chunks(&self, scans: &[Scan]) -> Result<Vec<EncodedChunk>, FormatError> {
+        let chunks = self.numbers.iter().zip(scans).map(|(numbers, scan)| {
             if numbers.iter().all(|number| *number == 0) {
-                return Ok(None);
+                return Ok(EncodedChunk::default());
             }
             let mut writer = TokenWriter::default();
-            for function in numbers.chunks_exact(usize::from(scan.count) * CHANNELS) {
+            for function in numbers.chunks_exact(scan.items().len() * CHANNELS) {
                 writer.write_run(function);
             }
-            let (bytes, content_bytes) = writer.finish()?;
-            Ok(Some(EncodedChunk {
-                bytes,
-                content_bytes,
-            }))
-        })
-        .collect()
+            writer.finish()
+        });
+        chunks.collect()
     }
-}
-
-/// Values that are not finite count as zero.
-fn finite(tau: Pixel) -> Pixel {
-    tau.map(|t| if t.is_finite() { t } else { 0.0 })
 }
 
 fn round(x: f32, step: f32, offset: f32) -> i32 {
@@ -259,6 +236,7 @@ fn round(x: f32, step: f32, offset: f32) -> i32 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tokens;
     use super::*;
     use crate::format::scan::Coding;
 
@@ -291,18 +269,18 @@ mod tests {
                 Scan::new(Coding::Direct, 0, 10, step),
                 Scan::new(Coding::Direct, 10, 15, step),
             ];
-            let scans: Vec<&Scan> = scans.iter().collect();
             let quantised = QuantisedFunctions::new(&functions, &order, &scans);
             let mut got = vec![[0.0; CHANNELS]; functions.len()];
             let chunks = quantised.chunks(&scans).unwrap();
-            for ((scan, chunk), error) in scans.iter().zip(chunks).zip(&quantised.errors) {
-                if let Some(chunk) = chunk {
+            for ((scan, chunk), error) in scans.iter().zip(chunks).zip(&quantised.errors[1..]) {
+                if !chunk.bytes.is_empty() {
                     let add_to = |functions: &mut [Pixel], bytes: &[u8]| {
                         let budget = Budget::unlimited();
                         add(functions, &order, scan, bytes, chunk.content_bytes, &budget)
                     };
                     assert!(u64::from(chunk.content_bytes) <= max_tokens(EXTENT, scan.count));
-                    assert!(chunk.bytes.len() as u64 <= max_bytes(chunk.content_bytes.into()));
+                    let max_bytes = tokens::max_bytes(chunk.content_bytes.into());
+                    assert!(chunk.bytes.len() as u64 <= max_bytes);
                     add_to(&mut got, &chunk.bytes).unwrap();
                     for cut in 0..chunk.bytes.len() {
                         let cut = &chunk.bytes[..cut];
@@ -322,8 +300,8 @@ mod tests {
         let order = order(1);
         let scan = Scan::new(Coding::Direct, 0, 1, 1e-6);
         let functions = [[1.0, -1.0, f32::NAN]];
-        let quantised = QuantisedFunctions::new(&functions, &order, &[&scan]);
-        let chunk = quantised.chunks(&[&scan]).unwrap().pop().unwrap().unwrap();
+        let quantised = QuantisedFunctions::new(&functions, &order, &[scan]);
+        let chunk = quantised.chunks(&[scan]).unwrap().remove(0);
         let mut got = [[0.0; CHANNELS]];
         let (tokens, budget) = (chunk.content_bytes, Budget::unlimited());
         add(&mut got, &order, &scan, &chunk.bytes, tokens, &budget).unwrap();

@@ -61,8 +61,7 @@ fn column(scan: &Scan, order: Option<&[u16]>, item: usize) -> usize {
 /// Adds the values of a chunk to `values`, `[pixel, column]` of `columns` columns.
 ///
 /// # Errors
-/// [`SectionError`] if the chunk is damaged or holds a value that is not finite, or the budget refuses
-/// memory.
+/// [`SectionError`] if the chunk is damaged or holds a value that is not finite, or the budget refuses memory.
 pub fn add(
     values: &mut [Pixel],
     columns: usize,

@@ -4,14 +4,14 @@
 //! number of bits of its magnitude. The sign and the bits below the highest are close to random and go
 //! into a bit stream. `0` ends a run; `0xF0` stands for sixteen zeros.
 //!
-//! The distribution of a token depends on the token before it. A token string has one stream for all
-//! tokens or one for each of three contexts: the first token of a run, a token after 0xF0 or a one-bit
-//! number, and any other.
+//! The distribution of a token depends on the token before it. A token string has one stream for all tokens or one for
+//! each of three contexts: the first token of a run, a token after 0xF0 or a one-bit number, and any other.
 
 use std::ops::Range;
 
 use super::zstd_frame::{compress, compressed_bound, decompress};
 use crate::format::budget::Budget;
+use crate::format::chunk::EncodedChunk;
 use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::fields::FieldReader;
 
@@ -54,7 +54,7 @@ pub struct QuantisedRun<'a> {
 /// Values that a codec writes as runs.
 pub trait ItemRuns {
     /// Calls `visit` with each run of `items`, quantised to `step`.
-    fn for_runs(&self, items: Range<usize>, step: f32, visit: impl FnMut(QuantisedRun<'_>));
+    fn for_runs(&self, items: Range<usize>, step: f32, visit: &mut dyn FnMut(QuantisedRun<'_>));
 
     /// Bytes of the token strings of `items`.
     ///
@@ -62,14 +62,11 @@ pub trait ItemRuns {
     /// [`FormatError::Compress`].
     fn compressed_bytes(&self, items: Range<usize>, step: f32) -> Result<usize, FormatError> {
         let mut strings = [TokenWriter::default(), TokenWriter::default()];
-        self.for_runs(items, step, |run| {
-            strings[run.string].write_run(run.numbers)
+        self.for_runs(items, step, &mut |run| {
+            strings[run.string].write_run(run.numbers);
         });
-        let mut bytes = 0;
-        for string in strings {
-            bytes += string.finish()?.0.len();
-        }
-        Ok(bytes)
+        let [main, side] = strings.map(TokenWriter::finish);
+        Ok(main?.bytes.len() + side?.bytes.len())
     }
 }
 
@@ -133,22 +130,25 @@ impl TokenWriter {
         });
     }
 
-    /// The token string, and its number of tokens.
+    /// The token string.
     ///
     /// # Errors
     /// [`FormatError::Compress`].
-    pub fn finish(mut self) -> Result<(Vec<u8>, u32), FormatError> {
+    pub fn finish(mut self) -> Result<EncodedChunk, FormatError> {
         if self.pending_count > 0 {
             self.bits.push(self.pending as u8);
         }
-        let count = self.tokens.len() as u32; // a chunk has less than 2^23
+        let content_bytes = self.tokens.len() as u32; // a chunk has less than 2^23
         let (three, one) = (pack(&self.streams)?, pack(&[self.tokens])?);
         let mut bytes = match one.len() <= three.len() {
             true => one,
             false => three,
         };
         bytes.extend(self.bits);
-        Ok((bytes, count))
+        Ok(EncodedChunk {
+            bytes,
+            content_bytes,
+        })
     }
 }
 
@@ -296,7 +296,8 @@ mod tests {
     fn round_trip(runs: &[Vec<i32>]) {
         let mut writer = TokenWriter::default();
         runs.iter().for_each(|run| writer.write_run(run));
-        let (bytes, tokens) = writer.finish().unwrap();
+        let chunk = writer.finish().unwrap();
+        let (bytes, tokens) = (chunk.bytes, chunk.content_bytes);
         assert!(bytes.len() as u64 <= max_bytes(tokens.into()));
         let read = |bytes: &[u8]| {
             let mut reader = TokenReader::new(bytes, tokens as usize, &Budget::unlimited())?;
@@ -361,6 +362,6 @@ mod tests {
         let runs: Vec<_> = (0..600).map(|_| run()).collect();
         let mut writer = TokenWriter::default();
         runs.iter().for_each(|run| writer.write_run(run));
-        assert_eq!(writer.finish().unwrap().0[0], 3);
+        assert_eq!(writer.finish().unwrap().bytes[0], 3);
     }
 }

@@ -173,8 +173,7 @@ pub fn max_bytes(tokens: u64) -> u64 {
 
 /// Number of components whose tokens fit into one chunk of any tile.
 pub fn max_components(tile_side: u32) -> u64 {
-    let extent = Extent::new(tile_side, tile_side);
-    MAX_CONTENT_BYTES / max_tokens(extent, 1)
+    MAX_CONTENT_BYTES / max_tokens(Extent::new(tile_side, tile_side), 1)
 }
 
 /// Upper bound on the ratio of a block's energy with its padding, which repeats the last column and row of

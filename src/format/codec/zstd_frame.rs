@@ -38,8 +38,7 @@ pub fn decompress(frame: &[u8], length: usize, budget: &Budget) -> Result<Vec<u8
     }
 }
 
-/// Checks that the bytes are one frame, with a window that every decoder must support (RFC 8878, section
-/// 3.1.1).
+/// Checks that the bytes are one frame, with a window that every decoder must support (RFC 8878, section 3.1.1).
 fn check_frame(frame: &[u8]) -> Result<(), SectionError> {
     let &[0x28, 0xB5, 0x2F, 0xFD, descriptor, window, ..] = frame else {
         return Err(damaged("it is not a zstd frame"));

@@ -4,7 +4,6 @@ use std::io::Write;
 
 use super::basis_rotation::BasisRotation;
 use super::encoder::{Encoder, for_tiles};
-use super::quantisation_error::QuantisationError;
 use super::scan_plan::SHARES;
 use crate::executor::Executor;
 use crate::format::checksum::checksum;
@@ -14,10 +13,9 @@ use crate::format::codec::direct::{self, QuantisedFunctions};
 use crate::format::codec::halves;
 use crate::format::codec::transform_encoder::QuantisedCoefficients;
 use crate::format::error::FormatError;
-use crate::format::header::Header;
 use crate::format::index::FileIndex;
 use crate::format::scan::{Coding, Scan};
-use crate::transport::{BandTile, Decibels};
+use crate::transport::{Basis, Decibels, FloatTile, TransportError};
 
 /// Share of the error that the rounding of the basis may add.
 const BASIS_ERROR_SHARE: f64 = 0.02;
@@ -71,45 +69,49 @@ pub struct QuantisedTile {
 /// A tile's chunks `[scan]`, and its squared error after each scan.
 #[derive(Default)]
 struct EncodedTile {
-    chunks: Vec<Option<EncodedChunk>>,
+    chunks: Vec<EncodedChunk>,
     errors: Vec<f64>,
 }
 
 impl QuantisedTile {
     /// Quantises a tile; `keep_decoded` says whether [`decoded`](Self::decoded) will be called.
-    pub fn new(encoder: &Encoder<'_>, tile: &BandTile, scans: &[Scan], keep_decoded: bool) -> Self {
-        let (transform_scans, direct_scans) = (scans_of(scans, false), scans_of(scans, true));
-        let has_functions = !tile.functions.is_empty() && !direct_scans.is_empty();
+    pub fn new(
+        encoder: &Encoder<'_, impl Executor>,
+        tile: &FloatTile,
+        scans: &[Scan],
+        keep_decoded: bool,
+    ) -> Self {
+        let coefficients = encoder.rotated(tile).map(|coefficients| {
+            QuantisedCoefficients::new(tile.rect.extent, &coefficients, scans, keep_decoded)
+        });
+        let functions = encoder.direct(tile);
         Self {
-            coefficients: encoder
-                .rotated(tile)
-                .map(|tile| QuantisedCoefficients::new(&tile, &transform_scans, keep_decoded)),
-            functions: has_functions
-                .then(|| QuantisedFunctions::new(&tile.functions, &encoder.order, &direct_scans)),
+            coefficients,
+            functions: functions.map(|tau| QuantisedFunctions::new(tau, &encoder.order, scans)),
         }
     }
 
-    /// The error after the last scan.
-    pub fn error(&self) -> QuantisationError {
-        let last = |errors: &[f64]| errors.last().copied().unwrap_or(0.0);
-        let coefficients = self.coefficients.as_ref().map(|q| QuantisationError {
-            energy: q.energy,
-            error: last(&q.errors),
-        });
-        let functions = self.functions.as_ref().map(|q| QuantisationError {
-            energy: q.energy,
-            error: last(&q.errors),
-        });
-        let coefficients = coefficients.unwrap_or_default();
-        coefficients.plus(functions.unwrap_or_default())
+    /// The squared error after so many scans, without the error of the KLT.
+    fn error_after(&self, scans: usize) -> f64 {
+        let coefficients = self.coefficients.iter().map(|q| q.errors[scans]);
+        let functions = self.functions.iter().map(|q| q.errors[scans]);
+        coefficients.chain(functions).sum()
+    }
+
+    /// The error after `scans` scans.
+    pub fn error(&self, scans: usize) -> TransportError {
+        TransportError {
+            signal: self.error_after(0),
+            error: self.error_after(scans),
+        }
     }
 
     /// The tile as a reader decodes it, over the file's basis.
-    pub fn decoded(&self, tile: &BandTile, order: &[u16]) -> BandTile {
+    pub fn decoded(&self, tile: &FloatTile, order: &[u16]) -> FloatTile {
         let extent = tile.rect.extent;
         let coefficients = self.coefficients.as_ref().map(|q| q.decoded(extent));
         let functions = self.functions.as_ref();
-        BandTile {
+        FloatTile {
             rect: tile.rect,
             coefficients: coefficients.and_then(Result::ok).unwrap_or_default(),
             functions: functions.map_or(Vec::new(), |q| q.decoded(&tile.functions, order)),
@@ -117,39 +119,23 @@ impl QuantisedTile {
     }
 
     fn encode(&self, scans: &[Scan]) -> Result<EncodedTile, FormatError> {
-        let (mut encoded, mut errors) = ([Vec::new(), Vec::new()], [0.0; 2]);
-        if let Some(quantised) = &self.coefficients {
-            let chunks = quantised.chunks(&scans_of(scans, false))?.into_iter();
-            encoded[0] = chunks.zip(quantised.errors.iter().copied()).collect();
-            errors[0] = quantised.energy;
-        }
-        if let Some(quantised) = &self.functions {
-            let chunks = quantised.chunks(&scans_of(scans, true))?.into_iter();
-            encoded[1] = chunks.zip(quantised.errors.iter().copied()).collect();
-            errors[1] = quantised.energy;
-        }
-        let mut encoded = encoded.map(Vec::into_iter);
-        let klt_error = self.coefficients.as_ref().map_or(0.0, |q| q.klt_error);
-        let mut tile = EncodedTile::default();
-        for scan in scans {
-            let kind = usize::from(scan.coding.is_direct());
-            let mut chunk = None;
-            if let Some(next) = encoded[kind].next() {
-                (chunk, errors[kind]) = next;
+        let coefficients = self.coefficients.as_ref().map(|q| q.chunks(scans));
+        let functions = self.functions.as_ref().map(|q| q.chunks(scans));
+        let mut chunks = vec![EncodedChunk::default(); scans.len()];
+        for part in [coefficients, functions].into_iter().flatten() {
+            for (chunk, own) in chunks.iter_mut().zip(part?) {
+                if !own.bytes.is_empty() {
+                    *chunk = own;
+                }
             }
-            tile.chunks.push(chunk);
-            tile.errors.push(errors.iter().sum::<f64>() + klt_error);
         }
-        Ok(tile)
+        let klt_error = self.coefficients.as_ref().map_or(0.0, |q| q.klt_error);
+        let errors = (1..=scans.len()).map(|scans| self.error_after(scans) + klt_error);
+        Ok(EncodedTile {
+            chunks,
+            errors: errors.collect(),
+        })
     }
-}
-
-/// The scans of direct functions, or of coefficients.
-fn scans_of(scans: &[Scan], is_direct: bool) -> Vec<&Scan> {
-    let of_kind = scans.iter();
-    of_kind
-        .filter(|scan| scan.coding.is_direct() == is_direct)
-        .collect()
 }
 
 /// Encodes all tiles by quantising scans.
@@ -157,25 +143,21 @@ fn scans_of(scans: &[Scan], is_direct: bool) -> Vec<&Scan> {
 /// # Errors
 /// As [`EncodedFile::new`].
 pub fn encode_quantised(
-    encoder: &Encoder<'_>,
+    encoder: &Encoder<'_, impl Executor>,
     scans: Vec<Scan>,
-    executor: &impl Executor,
 ) -> Result<EncodedFile, FormatError> {
-    let encode = |tile: BandTile| QuantisedTile::new(encoder, &tile, &scans, false).encode(&scans);
-    assemble(encoder, scans.clone(), encode, executor)
+    let encode = |tile: FloatTile| QuantisedTile::new(encoder, &tile, &scans, false).encode(&scans);
+    assemble(encoder, scans.clone(), encode)
 }
 
 /// Encodes all tiles as half-precision floats.
 ///
 /// # Errors
 /// As [`EncodedFile::new`].
-pub fn encode_lossless(
-    encoder: &Encoder<'_>,
-    executor: &impl Executor,
-) -> Result<EncodedFile, FormatError> {
+pub fn encode_lossless(encoder: &Encoder<'_, impl Executor>) -> Result<EncodedFile, FormatError> {
     // A rotated coefficient is at most the norm of the input coefficients.
     let gains = (0..encoder.rank()).filter_map(|k| Some(encoder.rotation.as_ref()?.gain(k)));
-    let input_rank = encoder.source.basis.map_or(0, |basis| basis.rank());
+    let input_rank = encoder.source.basis.map_or(0, Basis::rank);
     let gain = gains.fold((input_rank as f64).sqrt(), f64::max) as f32;
     let peak = (encoder.coefficient_peak * gain).max(encoder.function_peak);
     let step = halves::step_for(peak);
@@ -188,49 +170,43 @@ pub fn encode_lossless(
     for (coding, items) in [(Coding::Halves, rank), (Coding::DirectHalves, slots)] {
         let mut first = 0;
         while first < items {
-            let is_first_layer = scans.is_empty();
-            let planned = share(if is_first_layer {
-                SHARES.first
-            } else {
-                SHARES.scan
-            });
-            let count = planned.min(items - first);
+            let planned = match scans.is_empty() {
+                true => SHARES.first,
+                false => SHARES.scan,
+            };
+            let count = share(planned).min(items - first);
             // Ranks and slots are below 2^12.
             scans.push(Scan::new(coding, first as u16, count as u16, step));
             first += count;
         }
     }
-    let encode = |tile: BandTile| encode_halves(encoder, &tile, &scans);
-    assemble(encoder, scans.clone(), encode, executor)
+    let encode = |tile: FloatTile| encode_halves(encoder, &tile, &scans);
+    assemble(encoder, scans.clone(), encode)
 }
 
 fn encode_halves(
-    encoder: &Encoder<'_>,
-    tile: &BandTile,
+    encoder: &Encoder<'_, impl Executor>,
+    tile: &FloatTile,
     scans: &[Scan],
 ) -> Result<EncodedTile, FormatError> {
-    let coefficients = encoder.rotated(tile).map(|tile| tile.coefficients);
-    let coefficients = coefficients.unwrap_or_default();
+    let coefficients = encoder.rotated(tile).unwrap_or_default();
     let mut encoded = EncodedTile::default();
-    let mut energies = Vec::with_capacity(scans.len());
-    let mut errors = Vec::with_capacity(scans.len());
+    let (mut energies, mut errors) = (Vec::new(), Vec::new());
     for scan in scans {
+        let order = &encoder.order;
         let values = match scan.coding.is_direct() {
-            true => {
-                let order = &encoder.order;
-                halves::gather(&tile.functions, order.len(), scan, Some(order))
-            }
+            true => halves::gather(&tile.functions, order.len(), scan, Some(order)),
             false => halves::gather(&coefficients, encoder.rank(), scan, None),
         };
         let energy = values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
         energies.push(energy);
         errors.push(halves::error(&values, scan.step).max(HALVES_ERROR_RATIO * energy));
         encoded.chunks.push(match values.iter().all(|v| *v == 0.0) {
-            true => None,
-            false => Some(EncodedChunk {
+            true => EncodedChunk::default(),
+            false => EncodedChunk {
                 content_bytes: halves::content_bytes(values.len()) as u32,
                 bytes: halves::encode(&values, scan.step)?,
-            }),
+            },
         });
     }
     let (mut error, mut missing) = (0.0, energies.iter().sum::<f64>());
@@ -247,24 +223,23 @@ fn quantise_basis(rotation: &BasisRotation, area: usize, error: f64) -> Quantise
         let error = BASIS_ERROR_SHARE * error / rotation.rank() as f64;
         (12.0 * error / (area as f64 * energy.max(f64::MIN_POSITIVE))).sqrt() as f32
     });
-    QuantisedBasis::new(&rotation.functions, &steps.collect::<Vec<_>>())
+    QuantisedBasis::new(&rotation.basis.kernels, &steps.collect::<Vec<_>>())
 }
 
 /// Encodes all tiles by `encode`, and puts the file together.
 fn assemble(
-    encoder: &Encoder<'_>,
+    encoder: &Encoder<'_, impl Executor>,
     mut scans: Vec<Scan>,
-    encode: impl Fn(BandTile) -> Result<EncodedTile, FormatError> + Sync + Send,
-    executor: &impl Executor,
+    encode: impl Fn(FloatTile) -> Result<EncodedTile, FormatError> + Sync + Send,
 ) -> Result<EncodedFile, FormatError> {
     let (source, rotation) = (&encoder.source, encoder.rotation.as_ref());
     let geometry = source.geometry;
     let (tiles, area) = (geometry.tile_grid().area(), geometry.window.area());
-    let mut chunks: Vec<Vec<Option<EncodedChunk>>> = vec![Vec::with_capacity(tiles); scans.len()];
+    let mut chunks = vec![Vec::with_capacity(tiles); scans.len()];
     // Every prefix lacks the dropped components.
     let kept = rotation.map_or(0.0, BasisRotation::energy);
     let mut errors = vec![(encoder.coefficient_energy - kept).max(0.0); scans.len()];
-    for_tiles(source, executor, encode, |_, tile| {
+    for_tiles(source, encoder.executor, encode, |_, tile| {
         let tile = tile?;
         for (sum, error) in errors.iter_mut().zip(&tile.errors) {
             *sum += error;
@@ -286,34 +261,31 @@ fn assemble(
         {
             let bytes = quantised.encode(known, functions, area)?;
             for k in known..known + functions {
-                basis_error += rotation.energies[k] * quantised.error(k, &rotation.functions[k]);
+                basis_error +=
+                    rotation.energies[k] * quantised.error(k, &rotation.basis.kernels[k]);
             }
             known += functions;
             scan.basis_bytes = bytes.len() as u32; // below 2^24
             scan.basis_crc = checksum(&bytes);
             in_file.push(bytes);
         }
-        let error = QuantisationError {
-            energy: encoder.energy,
+        let error = TransportError {
+            signal: encoder.energy,
             error: error + basis_error,
         };
-        scan.snr = Decibels(f64::from(error.snr().0 as f32));
+        scan.snr = Decibels(f64::from(error.finite_snr().0 as f32));
         for chunk in chunks {
-            let entry = chunk.as_ref().map(|chunk| ChunkEntry {
+            entries.push(ChunkEntry {
                 bytes: chunk.bytes.len() as u32, // below 2^25
                 content_bytes: chunk.content_bytes,
                 crc: checksum(&chunk.bytes),
             });
-            entries.push(entry.unwrap_or_default());
-            in_file.extend(chunk.map(|chunk| chunk.bytes));
+            in_file.push(chunk.bytes);
         }
     }
-    let rank = u16::try_from(known).map_err(|_| FormatError::RankTooLarge(known as u64))?;
-    let header = Header::new(geometry, rank);
     let extensions = source.extensions.clone();
     let (index, index_bytes) =
-        FileIndex::encode(header, scans, entries, extensions, &source.metadata)?;
-    debug_assert!(index.chunks().count() == in_file.len());
+        FileIndex::encode(geometry, scans, entries, extensions, &source.metadata)?;
     Ok(EncodedFile {
         index,
         index_bytes,

@@ -2,20 +2,18 @@
 //! responds to a flat light, and whose others are the principal components of the coefficients.
 
 use crate::linalg::{mirror_upper, multiply, symmetric_eigen, transpose};
-use crate::transport::{BandTile, Basis, CHANNELS};
+use crate::transport::{Basis, CHANNELS, FloatTile};
 
 /// Smallest eigenvalue of the Gram matrix, relative to the largest, of a direction of the span.
 const MIN_EIGENVALUE_RATIO: f64 = 1e-9;
 
 /// An orthonormal basis, and the rotation of coefficients to it.
 ///
-/// Function 0 is the projection of the constant function on the span: a flat light sees component 0 and no
-/// other, so that errors of the others do not show under it. The other functions are principal components,
-/// the strongest first.
+/// Function 0 is the projection of the constant function on the span: a flat light sees component 0 and no other, so
+/// that errors of the others do not show under it. The other functions are principal components, the strongest first.
 #[derive(Clone, Debug)]
 pub struct BasisRotation {
-    /// `[component, slot]`.
-    pub functions: Vec<Vec<f32>>,
+    pub basis: Basis,
     /// Sum of squared coefficients of each component.
     pub energies: Vec<f64>,
     /// `[input component, component]`.
@@ -24,36 +22,24 @@ pub struct BasisRotation {
 }
 
 impl BasisRotation {
-    /// The rotation for a basis whose coefficients have the given [moments](coefficient_moments).
-    pub fn new(basis: &Basis, moment: &[f64]) -> Self {
+    /// The rotation for a basis whose coefficients have the given [moments](coefficient_moments); `None` if all its
+    /// functions are zero.
+    pub fn new(basis: &Basis, moment: &[f64]) -> Option<Self> {
         let input_rank = basis.rank();
         let area = basis.kernels.first().map_or(0, Vec::len);
-        let dot = |a: &[f32], b: &[f32]| -> f64 {
-            a.iter()
-                .zip(b)
-                .map(|(a, b)| f64::from(*a) * f64::from(*b))
-                .sum()
+        let dot = |i: usize| -> f64 {
+            let [a, b] = [i / input_rank, i % input_rank].map(|k| &basis.kernels[k]);
+            let products = a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b));
+            products.sum()
         };
-        let gram = (0..input_rank * input_rank)
-            .map(|i| {
-                dot(
-                    &basis.kernels[i / input_rank],
-                    &basis.kernels[i % input_rank],
-                )
-            })
-            .collect();
+        let gram = (0..input_rank * input_rank).map(dot).collect();
         let (values, vectors) = symmetric_eigen(gram, input_rank);
         let rank = values
             .iter()
             .take_while(|v| **v > MIN_EIGENVALUE_RATIO * values[0])
             .count();
         if rank == 0 {
-            return Self {
-                functions: Vec::new(),
-                energies: Vec::new(),
-                matrix: Vec::new(),
-                input_rank,
-            };
+            return None;
         }
         // Input coefficients to coefficients over orthonormal functions.
         let mut to_orthonormal = vec![0.0; input_rank * rank];
@@ -71,27 +57,26 @@ impl BasisRotation {
         let moment = congruence(moment, &to_orthonormal, input_rank, rank);
         let sums: Vec<f64> = orthonormal.iter().map(|q| q.iter().sum()).collect();
         let (rotated, energies) = flat_first(&moment, &sums, rank);
-        let functions = (0..rank)
-            .map(|j| {
-                let element = |s: usize| -> f64 {
-                    (0..rank)
-                        .map(|i| rotated[i * rank + j] * orthonormal[i][s])
-                        .sum()
-                };
-                (0..area).map(|s| element(s) as f32).collect()
-            })
-            .collect();
-        Self {
-            functions,
+        let function = |j: usize| {
+            let element = |s: usize| -> f64 {
+                let terms = (0..rank).map(|i| rotated[i * rank + j] * orthonormal[i][s]);
+                terms.sum()
+            };
+            (0..area).map(|s| element(s) as f32).collect()
+        };
+        Some(Self {
+            basis: Basis {
+                kernels: (0..rank).map(function).collect(),
+            },
             energies,
             matrix: multiply(&to_orthonormal, &rotated, rank, rank),
             input_rank,
-        }
+        })
     }
 
     /// Number of functions.
     pub fn rank(&self) -> usize {
-        self.functions.len()
+        self.basis.rank()
     }
 
     /// Sum of squared coefficients of all components.
@@ -109,19 +94,17 @@ impl BasisRotation {
     /// Drops all but the first `rank` components.
     pub fn truncate(&mut self, rank: usize) {
         let old_rank = self.rank();
-        self.functions.truncate(rank);
+        self.basis.kernels.truncate(rank);
         self.energies.truncate(rank);
         let rows = self.matrix.chunks_exact(old_rank);
         self.matrix = rows.flat_map(|row| &row[..rank]).copied().collect();
     }
 
     /// A tile's coefficients over this basis, `[pixel, component]`; empty if it has none.
-    pub fn coefficients(&self, tile: &BandTile) -> Vec<[f32; CHANNELS]> {
+    pub fn coefficients(&self, tile: &FloatTile) -> Vec<[f32; CHANNELS]> {
         let rank = self.rank();
-        if tile.coefficients.is_empty() {
-            return Vec::new();
-        }
-        let mut rotated = vec![[0.0f32; CHANNELS]; tile.rect.extent.area() * rank];
+        let mut rotated =
+            vec![[0.0f32; CHANNELS]; tile.coefficients.len() / self.input_rank * rank];
         let matrix: Vec<f32> = self.matrix.iter().map(|r| *r as f32).collect();
         let pixels = tile.coefficients.chunks_exact(self.input_rank);
         for (input, rotated) in pixels.zip(rotated.chunks_exact_mut(rank)) {
@@ -139,7 +122,7 @@ impl BasisRotation {
 
 /// Second moments of a tile's coefficients: Σ c cᵀ over pixels and channels, `[rank, rank]`. Values that are
 /// not finite count as zero.
-pub fn coefficient_moments(tile: &BandTile, rank: usize) -> Vec<f64> {
+pub fn coefficient_moments(tile: &FloatTile, rank: usize) -> Vec<f64> {
     let mut moment = vec![0.0f64; rank * rank];
     let mut values = vec![0.0f64; rank];
     for pixel in tile.coefficients.chunks_exact(rank.max(1)) {
@@ -221,19 +204,19 @@ mod tests {
         Basis { kernels }
     }
 
-    fn tile() -> BandTile {
+    fn tile() -> FloatTile {
         let extent = Extent::new(6, 5);
         let coefficient = |i: usize| [0.3, 1.0, -0.5].map(|c: f32| c * (i as f32 * 0.7).cos());
-        BandTile {
+        FloatTile {
             coefficients: (0..30 * 5).map(coefficient).collect(),
-            ..BandTile::dark(TileRect { x: 0, y: 0, extent })
+            ..FloatTile::dark(TileRect { x: 0, y: 0, extent })
         }
     }
 
     #[test]
     fn the_rotated_basis_is_orthonormal_flat_first_and_gives_the_same_functions() {
         let (basis, tile) = (basis(), tile());
-        let rotation = BasisRotation::new(&basis, &coefficient_moments(&tile, 5));
+        let rotation = BasisRotation::new(&basis, &coefficient_moments(&tile, 5)).unwrap();
         assert_eq!(rotation.rank(), 4);
         let rotated = rotation.coefficients(&tile);
         for p in 0..30 {
@@ -244,13 +227,13 @@ mod tests {
                         terms.map(|(a, v)| a[c] * v[s]).sum()
                     };
                     let want = sum(&tile.coefficients[p * 5..][..5], &basis.kernels);
-                    let got = sum(&rotated[p * 4..][..4], &rotation.functions);
+                    let got = sum(&rotated[p * 4..][..4], &rotation.basis.kernels);
                     assert!((got - want).abs() < 1e-4, "{got} {want}");
                 }
             }
         }
-        for (j, a) in rotation.functions.iter().enumerate() {
-            for (i, b) in rotation.functions.iter().enumerate() {
+        for (j, a) in rotation.basis.kernels.iter().enumerate() {
+            for (i, b) in rotation.basis.kernels.iter().enumerate() {
                 let dot: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
                 assert!((dot - f32::from(u8::from(i == j))).abs() < 1e-5);
             }
@@ -279,7 +262,7 @@ mod tests {
     #[test]
     fn truncation_drops_the_last_components() {
         let (basis, tile) = (basis(), tile());
-        let whole = BasisRotation::new(&basis, &coefficient_moments(&tile, 5));
+        let whole = BasisRotation::new(&basis, &coefficient_moments(&tile, 5)).unwrap();
         let mut truncated = whole.clone();
         truncated.truncate(2);
         let (all, first) = (whole.coefficients(&tile), truncated.coefficients(&tile));

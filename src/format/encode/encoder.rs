@@ -6,14 +6,15 @@ use crate::executor::Executor;
 use crate::format::budget::Budget;
 use crate::format::codec::{direct, transform};
 use crate::format::error::FormatError;
-use crate::transport::{BandTile, Basis, CHANNELS, FactoredTile};
+use crate::transport::{Basis, CHANNELS, FloatTile};
 
 /// Number of tiles that are encoded at a time.
 const BATCH_TILES: usize = 64;
 
 /// A source whose tiles have been analysed.
-pub struct Encoder<'a> {
+pub struct Encoder<'a, E> {
     pub source: Source<'a>,
+    pub executor: &'a E,
     /// The rotation to the file's basis; `None` if there are no coefficients.
     pub rotation: Option<BasisRotation>,
     pub has_functions: bool,
@@ -38,7 +39,7 @@ struct TileAnalysis {
 }
 
 impl TileAnalysis {
-    fn new(tile: &BandTile, rank: usize, area: usize) -> Self {
+    fn new(tile: &FloatTile, rank: usize, area: usize) -> Self {
         let pixels = tile.rect.extent.area();
         let fits = |length: usize, columns: usize| length == 0 || length == pixels * columns;
         assert!(
@@ -60,7 +61,7 @@ fn peak(values: &[[f32; CHANNELS]]) -> f32 {
     finite.fold(0.0, |peak, v| peak.max(v.abs()))
 }
 
-impl<'a> Encoder<'a> {
+impl<'a, E: Executor> Encoder<'a, E> {
     /// Analyses all tiles of a source.
     ///
     /// # Errors
@@ -68,7 +69,7 @@ impl<'a> Encoder<'a> {
     ///
     /// # Panics
     /// If a tile or a basis function has the wrong length.
-    pub fn new(source: Source<'a>, executor: &impl Executor) -> Result<Self, FormatError> {
+    pub fn new(source: Source<'a>, executor: &'a E) -> Result<Self, FormatError> {
         let rank = source.basis.map_or(0, Basis::rank);
         let area = source.geometry.window.area();
         if let Some(basis) = source.basis {
@@ -78,7 +79,7 @@ impl<'a> Encoder<'a> {
         let mut moments = vec![0.0; rank * rank];
         let (mut function_energy, mut coefficient_peak, mut function_peak) = (0.0, 0.0f32, 0.0f32);
         let mut lit_tiles = Vec::new();
-        let analyse = |tile: BandTile| TileAnalysis::new(&tile, rank, area);
+        let analyse = |tile: FloatTile| TileAnalysis::new(&tile, rank, area);
         for_tiles(&source, executor, analyse, |i, tile| {
             if tile.coefficient_peak.max(tile.function_peak) > 0.0 {
                 lit_tiles.push(i);
@@ -92,8 +93,7 @@ impl<'a> Encoder<'a> {
             Ok(())
         })?;
         let basis = source.basis.filter(|_| moments.iter().any(|m| *m != 0.0));
-        let rotation = basis.map(|basis| BasisRotation::new(basis, &moments));
-        let rotation = rotation.filter(|rotation| rotation.rank() > 0);
+        let rotation = basis.and_then(|basis| BasisRotation::new(basis, &moments));
         let coefficient_energy = rotation.as_ref().map_or(0.0, BasisRotation::energy);
         Ok(Self {
             order: direct::centre_out_order(source.geometry.window, &Budget::unlimited())?,
@@ -103,6 +103,7 @@ impl<'a> Encoder<'a> {
             coefficient_peak,
             function_peak,
             source,
+            executor,
             rotation,
             lit_tiles,
         })
@@ -119,12 +120,14 @@ impl<'a> Encoder<'a> {
     }
 
     /// A tile's coefficients over the file's basis; `None` if there are none.
-    pub fn rotated(&self, tile: &BandTile) -> Option<FactoredTile> {
+    pub fn rotated(&self, tile: &FloatTile) -> Option<Vec<[f32; CHANNELS]>> {
         let coefficients = self.rotation.as_ref()?.coefficients(tile);
-        (!coefficients.is_empty()).then_some(FactoredTile {
-            rect: tile.rect,
-            coefficients,
-        })
+        (!coefficients.is_empty()).then_some(coefficients)
+    }
+
+    /// A tile's direct functions; `None` if there are none, or the file has none.
+    pub fn direct<'t>(&self, tile: &'t FloatTile) -> Option<&'t [[f32; CHANNELS]]> {
+        (self.has_functions && !tile.functions.is_empty()).then_some(&tile.functions)
     }
 
     /// The finest step of component `k` whose numbers do not overflow: from the largest coefficient there can
@@ -145,7 +148,7 @@ impl<'a> Encoder<'a> {
 pub fn for_tiles<T: Send>(
     source: &Source<'_>,
     executor: &impl Executor,
-    work: impl Fn(BandTile) -> T + Sync + Send,
+    work: impl Fn(FloatTile) -> T + Sync + Send,
     mut take: impl FnMut(usize, T) -> Result<(), FormatError>,
 ) -> Result<(), FormatError> {
     let count = source.geometry.tile_grid().area();

@@ -5,17 +5,16 @@
 
 use super::assembly::{self, EncodedFile, QuantisedTile};
 use super::encoder::Encoder;
-use super::quantisation_error::QuantisationError;
 use super::sampling::{SampledPart, sample};
 use super::scan_costs::CostModel;
 use super::scan_plan::{self, MAX_SHARES, SHARES, ScanPlan, Shares};
-use super::source::{DistortionMetric, RateTarget};
+use super::source::{DistortionMetric, RateTarget, Source};
 use crate::bisect::bisect;
 use crate::executor::Executor;
 use crate::format::constants::FIRST_BYTES;
 use crate::format::error::FormatError;
 use crate::format::scan::Scan;
-use crate::transport::{BandTile, Basis, Decibels, TransportFunctions};
+use crate::transport::{Decibels, FloatTile, TransportError, TransportFunctions};
 
 /// Energy of the dropped components, relative to the quantisation error.
 const DROPPED_ENERGY_RATIO: f64 = 0.01;
@@ -37,147 +36,172 @@ const MAX_STEP_RATIO: f32 = 1.05;
 /// Factors of the planned shares in new plans for a file that exceeds [`MAX_SHARES`].
 const RETRY_SHARE_FACTORS: [f64; 2] = [0.75, 0.5];
 
-/// Encodes the source for a target.
-///
-/// # Errors
-/// As [`EncodedFile::new`].
-pub fn encode(
-    mut encoder: Encoder<'_>,
-    target: RateTarget<'_>,
-    executor: &impl Executor,
-) -> Result<EncodedFile, FormatError> {
-    match target {
-        RateTarget::Lossless => assembly::encode_lossless(&encoder, executor),
-        RateTarget::Bytes(limit) => encode_to_size(encoder, limit, executor),
-        RateTarget::Snr(snr) => {
-            let sample = sample(&encoder)?;
-            encode_to_snr(&mut encoder, snr, &sample, executor)
+impl EncodedFile {
+    /// Encodes a whole file. The result does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// [`FormatError::Source`] if a tile cannot be read, [`FormatError::TooLarge`] if even the coarsest file is larger than
+    /// the target, and the errors of writing extensions and metadata.
+    ///
+    /// # Panics
+    /// If a tile or a basis function does not have the length that geometry and basis give it.
+    pub fn new(
+        source: Source<'_>,
+        target: RateTarget<'_>,
+        executor: &impl Executor,
+    ) -> Result<Self, FormatError> {
+        let encoder = Encoder::new(source, executor)?;
+        match target {
+            RateTarget::Snr(snr) => RateControl::new(encoder)?.encode_to_snr(snr),
+            RateTarget::Bytes(limit) => RateControl::new(encoder)?.encode_to_size(limit),
+            RateTarget::Loss(loss, metric) => {
+                RateControl::new(encoder)?.encode_to_loss(loss, metric)
+            }
+            RateTarget::Lossless => assembly::encode_lossless(&encoder),
         }
-        RateTarget::Loss(loss, metric) => encode_to_loss(encoder, loss, metric, executor),
     }
 }
 
-fn encode_to_snr(
-    encoder: &mut Encoder<'_>,
-    snr: Decibels,
-    sample: &[SampledPart],
-    executor: &impl Executor,
-) -> Result<EncodedFile, FormatError> {
-    let step = step_for(snr, |step| {
-        error_of(encoder, sample, &scan_plan::trial(encoder, step), executor)
-    });
-    encode_with_step(encoder, step, sample, executor)
+/// The search for a file's step and rank.
+struct RateControl<'a, E> {
+    encoder: Encoder<'a, E>,
+    sample: Vec<SampledPart>,
 }
 
-fn encode_to_loss(
-    mut encoder: Encoder<'_>,
-    max_loss: Decibels,
-    metric: &dyn DistortionMetric,
-    executor: &impl Executor,
-) -> Result<EncodedFile, FormatError> {
-    let sample = sample(&encoder)?;
-    let pixels = encoder.source.geometry.camera.area() as f64;
-    // The step at which nothing is left.
-    let coarsest = 16.0 * (encoder.energy / pixels).sqrt();
-    if !(coarsest as f32).is_normal() {
-        return encode_with_step(&mut encoder, None, &sample, executor);
+impl<'a, E: Executor> RateControl<'a, E> {
+    fn new(encoder: Encoder<'a, E>) -> Result<Self, FormatError> {
+        let sample = sample(&encoder)?;
+        Ok(Self { encoder, sample })
     }
-    let tiles = codable(&encoder, metric.tiles());
-    // The metric may have direct functions where the file has none.
-    let has_functions = encoder.has_functions;
-    encoder.has_functions |= tiles.iter().any(|tile| !tile.functions.is_empty());
-    let [exponent, _] = bisect(LOSS_EXPONENTS, LOSS_HALVINGS, |exponent| {
-        let scans = scan_plan::trial(&encoder, (coarsest * exponent.exp2()) as f32);
-        let decoded = executor.map(tiles.len(), |i| decoded(&encoder, &tiles[i], &scans));
-        metric.loss(&decoded).0 <= max_loss.0
-    });
-    encoder.has_functions = has_functions;
-    let step = (coarsest * exponent.exp2()) as f32;
-    encode_with_step(&mut encoder, Some(step), &sample, executor)
-}
 
-fn encode_to_size(
-    mut encoder: Encoder<'_>,
-    limit: u64,
-    executor: &impl Executor,
-) -> Result<EncodedFile, FormatError> {
-    let sample = sample(&encoder)?;
-    let rotation = encoder.rotation.clone();
-    let mut try_snr = |snr: f64| {
-        encoder.rotation.clone_from(&rotation);
-        encode_to_snr(&mut encoder, Decibels(snr), &sample, executor)
-    };
-    let mut best = try_snr(SIZE_SNRS[0])?;
-    if best.bytes() > limit {
-        return Err(FormatError::TooLarge {
-            limit,
-            smallest: best.bytes(),
+    fn encode_to_snr(&mut self, snr: Decibels) -> Result<EncodedFile, FormatError> {
+        self.encode_with_step(step_for(snr, |step| self.trial_error(step)))
+    }
+
+    fn encode_to_loss(
+        &mut self,
+        max_loss: Decibels,
+        metric: &dyn DistortionMetric,
+    ) -> Result<EncodedFile, FormatError> {
+        let encoder = &mut self.encoder;
+        let pixels = encoder.source.geometry.camera.area() as f64;
+        // The step at which nothing is left.
+        let coarsest = 16.0 * (encoder.energy / pixels).sqrt();
+        if !(coarsest as f32).is_normal() {
+            return self.encode_with_step(None);
+        }
+        let tiles = codable(encoder, metric.tiles());
+        // The metric may have direct functions where the file has none.
+        let has_functions = encoder.has_functions;
+        encoder.has_functions |= tiles.iter().any(|tile| !tile.functions.is_empty());
+        let [exponent, _] = bisect(LOSS_EXPONENTS, LOSS_HALVINGS, |exponent| {
+            let scans = scan_plan::trial(encoder, (coarsest * exponent.exp2()) as f32);
+            let decoded = |i: usize| decoded(encoder, &tiles[i], &scans);
+            metric.loss(&encoder.executor.map(tiles.len(), decoded)).0 <= max_loss.0
         });
+        encoder.has_functions = has_functions;
+        self.encode_with_step(Some((coarsest * exponent.exp2()) as f32))
     }
-    let mut failed = None;
-    bisect(SIZE_SNRS, SIZE_HALVINGS, |snr| match try_snr(snr) {
-        Ok(file) if file.bytes() <= limit => {
-            best = file;
-            true
-        }
-        Ok(_) => false,
-        Err(error) => {
-            failed = Some(error);
-            false
-        }
-    });
-    failed.map_or(Ok(best), Err)
-}
 
-/// Encodes all tiles; without a step there is no light. Plans anew with smaller shares if the file exceeds
-/// [`MAX_SHARES`]: predictions from samples may err.
-fn encode_with_step(
-    encoder: &mut Encoder<'_>,
-    step: Option<f32>,
-    sample: &[SampledPart],
-    executor: &impl Executor,
-) -> Result<EncodedFile, FormatError> {
-    let Some(step) = step else {
-        return assembly::encode_quantised(encoder, Vec::new(), executor);
-    };
-    let expected = error_of(encoder, sample, &scan_plan::trial(encoder, step), executor);
-    drop_weak_components(encoder, expected);
-    let model = CostModel::new(encoder, sample, executor);
-    let plan = |factor: f64| {
+    fn encode_to_size(&mut self, limit: u64) -> Result<EncodedFile, FormatError> {
+        let rotation = self.encoder.rotation.clone();
+        let mut try_snr = |snr: f64| {
+            self.encoder.rotation.clone_from(&rotation);
+            self.encode_to_snr(Decibels(snr))
+        };
+        let mut best = try_snr(SIZE_SNRS[0])?;
+        let smallest = best.bytes();
+        if smallest > limit {
+            return Err(FormatError::TooLarge { limit, smallest });
+        }
+        let mut failed = None;
+        bisect(SIZE_SNRS, SIZE_HALVINGS, |snr| match try_snr(snr) {
+            Ok(file) if file.bytes() <= limit => {
+                best = file;
+                true
+            }
+            Ok(_) => false,
+            Err(error) => {
+                failed = Some(error);
+                false
+            }
+        });
+        failed.map_or(Ok(best), Err)
+    }
+
+    /// Encodes all tiles; without a step there is no light. Plans anew with smaller shares if the file exceeds
+    /// [`MAX_SHARES`]: predictions from samples may err.
+    fn encode_with_step(&mut self, step: Option<f32>) -> Result<EncodedFile, FormatError> {
+        let Some(step) = step else {
+            return assembly::encode_quantised(&self.encoder, Vec::new());
+        };
+        let expected = self.trial_error(step);
+        drop_weak_components(&mut self.encoder, expected);
+        let model = CostModel::new(&self.encoder, &self.sample);
+        let encode = |factor: f64| {
+            let ScanPlan { scans, first_scans } =
+                self.plan(&model, step, expected.error, factor)?;
+            let file = assembly::encode_quantised(&self.encoder, scans)?;
+            let is_within = is_within_shares(&file, first_scans);
+            Ok::<_, FormatError>((file, is_within))
+        };
+        let (mut file, mut is_within) = encode(1.0)?;
+        for factor in RETRY_SHARE_FACTORS {
+            // A reader fetches small files at once.
+            if is_within || file.bytes() <= FIRST_BYTES {
+                break;
+            }
+            (file, is_within) = encode(factor)?;
+        }
+        Ok(file)
+    }
+
+    /// The plan for `factor` of the planned shares, with a step near `step` at which its error is `expected_error`: the
+    /// plan's layers change the error a little.
+    fn plan(
+        &self,
+        model: &CostModel,
+        mut step: f32,
+        expected_error: f64,
+        factor: f64,
+    ) -> Result<ScanPlan, FormatError> {
         let shares = Shares {
             first: SHARES.first * factor,
             scan: SHARES.scan * factor,
         };
-        let plan = |step: f32| scan_plan::plan(encoder, &model, step, shares, executor);
-        // The plan's layers change the error a little.
-        let (mut step, mut planned) = (step, plan(step)?);
+        let mut plan = scan_plan::plan(&self.encoder, model, step, shares)?;
         for correction in 0..STEP_CORRECTIONS {
-            let error = error_of(encoder, sample, &planned.scans, executor).error;
-            let ratio = (expected.error / error.max(f64::MIN_POSITIVE)).sqrt() as f32;
+            let error = self.error_of(&plan.scans).error;
+            let ratio = (expected_error / error.max(f64::MIN_POSITIVE)).sqrt() as f32;
             // Only the first correction makes the step coarser, so that the others converge.
             if ratio >= MIN_STEP_RATIO && (ratio <= MAX_STEP_RATIO || correction > 0) {
                 break;
             }
             step *= 0.99 * ratio.clamp(MAX_STEP_CORRECTION.recip(), MAX_STEP_CORRECTION);
-            planned = plan(step)?;
+            plan = scan_plan::plan(&self.encoder, model, step, shares)?;
         }
-        Ok::<_, FormatError>(planned)
-    };
-    let encode = |factor: f64| {
-        let ScanPlan { scans, first_scans } = plan(factor)?;
-        let file = assembly::encode_quantised(encoder, scans, executor)?;
-        let is_within = is_within_shares(&file, first_scans);
-        Ok::<_, FormatError>((file, is_within))
-    };
-    let (mut file, mut is_within) = encode(1.0)?;
-    for factor in RETRY_SHARE_FACTORS {
-        // A reader fetches small files at once.
-        if is_within || file.bytes() <= FIRST_BYTES {
-            break;
-        }
-        (file, is_within) = encode(factor)?;
+        Ok(plan)
     }
-    Ok(file)
+
+    fn trial_error(&self, step: f32) -> TransportError {
+        self.error_of(&scan_plan::trial(&self.encoder, step))
+    }
+
+    /// The quantisation error of some scans, predicted from the sample.
+    fn error_of(&self, scans: &[Scan]) -> TransportError {
+        let errors = self.encoder.executor.map(self.sample.len(), |i| {
+            let SampledPart { tile, weight } = &self.sample[i];
+            let error = QuantisedTile::new(&self.encoder, tile, scans, false).error(scans.len());
+            TransportError {
+                signal: error.signal * weight,
+                error: error.error * weight,
+            }
+        });
+        let mut sum = TransportError::default();
+        // In order, so that the sum does not depend on threads.
+        errors.into_iter().for_each(|error| sum.merge(error));
+        sum
+    }
 }
 
 /// Whether the index with the first `first_scans` scans, and every later scan, keep [`MAX_SHARES`].
@@ -192,55 +216,33 @@ fn is_within_shares(file: &EncodedFile, first_scans: usize) -> bool {
 }
 
 /// The metric's tiles in the file's coding: as direct functions where the file has no components.
-fn codable(encoder: &Encoder<'_>, mut tiles: Vec<BandTile>) -> Vec<BandTile> {
+fn codable(encoder: &Encoder<'_, impl Executor>, mut tiles: Vec<FloatTile>) -> Vec<FloatTile> {
     if encoder.rotation.is_none()
         && let Some(basis) = encoder.source.basis
     {
         for tile in &mut tiles {
-            let functions = std::mem::replace(tile, BandTile::dark(tile.rect))
-                .functions(&encoder.source.geometry, basis);
-            tile.functions = functions.tau;
+            *tile = tile.functions(&encoder.source.geometry, Some(basis)).into();
         }
     }
     tiles
 }
 
 /// The functions of a tile as a reader decodes them.
-fn decoded(encoder: &Encoder<'_>, tile: &BandTile, scans: &[Scan]) -> TransportFunctions {
-    let quantised = QuantisedTile::new(encoder, tile, scans, true);
-    let kernels = encoder
-        .rotation
-        .as_ref()
-        .map_or(Vec::new(), |rotation| rotation.functions.clone());
-    quantised
-        .decoded(tile, &encoder.order)
-        .functions(&encoder.source.geometry, &Basis { kernels })
-}
-
-/// The quantisation error of some scans, predicted from the sample.
-fn error_of(
-    encoder: &Encoder<'_>,
-    sample: &[SampledPart],
+fn decoded(
+    encoder: &Encoder<'_, impl Executor>,
+    tile: &FloatTile,
     scans: &[Scan],
-    executor: &impl Executor,
-) -> QuantisationError {
-    let errors = executor.map(sample.len(), |i| {
-        let SampledPart { tile, weight } = &sample[i];
-        let quantised = QuantisedTile::new(encoder, tile, scans, false);
-        quantised.error().times(*weight)
-    });
-    // In order, so that the sum does not depend on threads.
-    errors
-        .into_iter()
-        .fold(QuantisationError::default(), QuantisationError::plus)
+) -> TransportFunctions {
+    let quantised = QuantisedTile::new(encoder, tile, scans, true);
+    let decoded = quantised.decoded(tile, &encoder.order);
+    let basis = encoder.rotation.as_ref().map(|rotation| &rotation.basis);
+    decoded.functions(&encoder.source.geometry, basis)
 }
 
 /// Drops the last components, as far as their energy is small against the quantisation error.
-fn drop_weak_components(
-    encoder: &mut Encoder<'_>,
-    QuantisationError { energy, error }: QuantisationError,
-) {
-    let allowed = DROPPED_ENERGY_RATIO * encoder.energy * error / energy.max(f64::MIN_POSITIVE);
+fn drop_weak_components(encoder: &mut Encoder<'_, impl Executor>, error: TransportError) {
+    let TransportError { signal, error } = error;
+    let allowed = DROPPED_ENERGY_RATIO * encoder.energy * error / signal.max(f64::MIN_POSITIVE);
     if let Some(rotation) = &mut encoder.rotation {
         let mut dropped = 0.0;
         let weak = rotation.energies.iter().rev().take_while(|energy| {
@@ -252,17 +254,16 @@ fn drop_weak_components(
     }
 }
 
-/// The coarsest step with the given SNR, where `error` gives the error of a step. `None` if all values are
-/// zero.
-fn step_for(snr: Decibels, error: impl Fn(f32) -> QuantisationError) -> Option<f32> {
-    let norm = error(1.0).energy.sqrt() as f32;
+/// The coarsest step with the given SNR, where `error` gives the error of a step. `None` if all values are zero.
+fn step_for(snr: Decibels, error: impl Fn(f32) -> TransportError) -> Option<f32> {
+    let norm = error(1.0).signal.sqrt() as f32;
     if !norm.is_normal() {
         return None;
     }
     // Even a value as large as the norm is zero at twice that step.
     let step = |exponent: f64| 2.0 * norm * exponent.exp2() as f32;
     let [exponent, _] = bisect(SNR_EXPONENTS, SNR_HALVINGS, |exponent| {
-        error(step(exponent)).snr().0 >= snr.0
+        error(step(exponent)).finite_snr().0 >= snr.0
     });
     Some(step(exponent))
 }
@@ -274,8 +275,8 @@ mod tests {
     #[test]
     fn the_step_is_the_coarsest_with_the_snr() {
         // The error of values that are large against the step.
-        let error = |step: f32| QuantisationError {
-            energy: 1e4,
+        let error = |step: f32| TransportError {
+            signal: 1e4,
             error: f64::from(step).powi(2),
         };
         for target in [10.0, 34.0, 60.0] {
@@ -283,6 +284,6 @@ mod tests {
             let snr = 10.0 * (1e4 / f64::from(step).powi(2)).log10();
             assert!((0.0..0.1).contains(&(snr - target)), "{snr} dB");
         }
-        assert!(step_for(Decibels(30.0), |_| QuantisationError::default()).is_none());
+        assert!(step_for(Decibels(30.0), |_| TransportError::default()).is_none());
     }
 }

@@ -3,8 +3,9 @@
 use std::io;
 
 use super::encoder::Encoder;
+use crate::executor::Executor;
 use crate::format::error::FormatError;
-use crate::transport::{BandTile, CHANNELS, Extent, TileRect};
+use crate::transport::{CHANNELS, Extent, FloatTile, TileRect};
 
 /// Maximum number of sampled tiles, and maximum memory of their values.
 const MAX_SAMPLED_TILES: usize = 64;
@@ -14,7 +15,7 @@ const PART_SIDE: u32 = 8;
 
 /// A part of a tile.
 pub struct SampledPart {
-    pub tile: BandTile,
+    pub tile: FloatTile,
     /// Number of parts that it represents.
     pub weight: f64,
 }
@@ -23,7 +24,7 @@ pub struct SampledPart {
 ///
 /// # Errors
 /// [`FormatError::Source`] if a tile cannot be read.
-pub fn sample(encoder: &Encoder<'_>) -> Result<Vec<SampledPart>, FormatError> {
+pub fn sample(encoder: &Encoder<'_, impl Executor>) -> Result<Vec<SampledPart>, FormatError> {
     let lit_tiles = &encoder.lit_tiles;
     let pixel_bytes = ((encoder.rank() + encoder.slots()) * CHANNELS * size_of::<f32>()).max(1);
     let smallest_part = PART_SIDE.pow(2) as usize * pixel_bytes;
@@ -54,7 +55,7 @@ pub fn sample(encoder: &Encoder<'_>) -> Result<Vec<SampledPart>, FormatError> {
 
 /// Cuts a tile into squares of `side`. Returns one of those that are not dark, chosen by `hash`, and the number
 /// of these.
-fn lit_part(tile: BandTile, side: u32, hash: usize) -> (BandTile, usize) {
+fn lit_part(tile: FloatTile, side: u32, hash: usize) -> (FloatTile, usize) {
     let Extent { width, height } = tile.rect.extent;
     let (columns, rows) = (width.div_ceil(side), height.div_ceil(side));
     if columns * rows == 1 {
@@ -68,14 +69,14 @@ fn lit_part(tile: BandTile, side: u32, hash: usize) -> (BandTile, usize) {
             extent: Extent::new(side.min(width - left), side.min(height - top)),
         })
     });
-    let mut lit_parts: Vec<BandTile> = parts.filter(is_lit).collect();
+    let mut lit_parts: Vec<FloatTile> = parts.filter(is_lit).collect();
     match lit_parts.len() {
-        0 => (BandTile::dark(tile.rect), 0),
+        0 => (FloatTile::dark(tile.rect), 0),
         count => (lit_parts.swap_remove(hash % count), count),
     }
 }
 
-fn is_lit(tile: &BandTile) -> bool {
+fn is_lit(tile: &FloatTile) -> bool {
     let mut values = tile.coefficients.iter().chain(&tile.functions).flatten();
     values.any(|v| v.is_finite() && *v != 0.0)
 }
@@ -97,7 +98,7 @@ mod tests {
             extent: Extent::new(20, 13),
         };
         let lit_at = |pixels: &[usize]| {
-            let mut tile = BandTile::dark(rect);
+            let mut tile = FloatTile::dark(rect);
             tile.functions = vec![[0.0; CHANNELS]; rect.extent.area() * 9];
             for p in pixels {
                 tile.functions[p * 9 + 4][1] = 1.0;

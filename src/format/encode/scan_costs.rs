@@ -10,7 +10,7 @@ use crate::format::codec::direct::OrderedFunctions;
 use crate::format::codec::tokens::{CONTEXTS, ItemRuns, for_tokens};
 use crate::format::codec::transform_encoder::TransformedTile;
 use crate::format::error::FormatError;
-use crate::format::scan::Scan;
+use crate::format::scan::{Coding, Scan};
 
 /// Bytes and squared error of one item at one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,8 +24,6 @@ pub struct ItemCost {
 
 /// The sample's values as the codecs quantise them.
 pub struct CostModel {
-    rank: usize,
-    slots: usize,
     parts: Vec<ModelPart>,
 }
 
@@ -42,42 +40,18 @@ struct ItemToken {
     token: u8,
 }
 
-/// Tokens and errors of the items of one part.
-struct PartCosts {
-    tokens: Vec<ItemToken>,
-    energies: Vec<f64>,
-    errors: Vec<f64>,
-}
-
 impl CostModel {
-    pub fn new(encoder: &Encoder<'_>, sample: &[SampledPart], executor: &impl Executor) -> Self {
-        let parts = executor.map(sample.len(), |i| {
+    pub fn new(encoder: &Encoder<'_, impl Executor>, sample: &[SampledPart]) -> Self {
+        let parts = encoder.executor.map(sample.len(), |i| {
             let SampledPart { tile, weight } = &sample[i];
-            let has_functions = encoder.slots() > 0 && !tile.functions.is_empty();
+            let (coefficients, functions) = (encoder.rotated(tile), encoder.direct(tile));
             ModelPart {
                 weight: *weight,
-                coefficients: encoder
-                    .rotated(tile)
-                    .map(|tile| TransformedTile::new(&tile)),
-                functions: has_functions
-                    .then(|| OrderedFunctions::new(&tile.functions, &encoder.order)),
+                coefficients: coefficients.map(|c| TransformedTile::new(tile.rect.extent, &c)),
+                functions: functions.map(|tau| OrderedFunctions::new(tau, &encoder.order)),
             }
         });
-        Self {
-            rank: encoder.rank(),
-            slots: encoder.slots(),
-            parts,
-        }
-    }
-
-    /// The costs of each component at `step`.
-    pub fn components(&self, step: f32, executor: &impl Executor) -> Vec<ItemCost> {
-        self.costs(self.rank, |part| part.coefficients.as_ref(), step, executor)
-    }
-
-    /// The costs of each slot at `step`.
-    pub fn slots(&self, step: f32, executor: &impl Executor) -> Vec<ItemCost> {
-        self.costs(self.slots, |part| part.functions.as_ref(), step, executor)
+        Self { parts }
     }
 
     /// Compressed bytes of a scan.
@@ -89,40 +63,32 @@ impl CostModel {
         scan: &Scan,
         executor: &impl Executor,
     ) -> Result<f64, FormatError> {
-        let items = usize::from(scan.first)..scan.end();
         let bytes = executor.map(self.parts.len(), |i| {
-            let part = &self.parts[i];
-            let items = items.clone();
-            let bytes = match (scan.coding.is_direct(), &part.coefficients, &part.functions) {
-                (false, Some(runs), _) => runs.compressed_bytes(items, scan.step),
-                (true, _, Some(runs)) => runs.compressed_bytes(items, scan.step),
-                _ => Ok(0),
-            };
-            Ok(part.weight * bytes? as f64)
+            let runs = self.parts[i].runs(scan.coding);
+            let bytes = runs.map_or(Ok(0), |runs| runs.compressed_bytes(scan.items(), scan.step));
+            Ok(self.parts[i].weight * bytes? as f64)
         });
         bytes.into_iter().sum()
     }
 
-    fn costs<R: ItemRuns + Sync>(
+    /// The costs at `step` of each of `count` components or slots, by the coding.
+    pub fn costs(
         &self,
-        items: usize,
-        runs: impl Fn(&ModelPart) -> Option<&R> + Sync + Send,
+        coding: Coding,
+        count: usize,
         step: f32,
         executor: &impl Executor,
     ) -> Vec<ItemCost> {
-        if items == 0 {
-            return Vec::new();
-        }
         let parts = executor.map(self.parts.len(), |i| {
-            runs(&self.parts[i]).map(|runs| PartCosts::new(runs, items, step))
+            let runs = self.parts[i].runs(coding);
+            let (tokens, costs) = runs
+                .map(|runs| part_costs(runs, count, step))
+                .unwrap_or_default();
+            (tokens, costs, self.parts[i].weight)
         });
-        let weighted = || {
-            let parts = parts.iter().zip(&self.parts);
-            parts.filter_map(|(costs, part)| Some((costs.as_ref()?, part.weight)))
-        };
         let mut counts = [[0.0; 256]; CONTEXTS];
-        for (part, weight) in weighted() {
-            for token in &part.tokens {
+        for (tokens, _, weight) in &parts {
+            for token in tokens {
                 counts[usize::from(token.context)][usize::from(token.token)] += weight;
             }
         }
@@ -133,45 +99,47 @@ impl CostModel {
                 (all / counts[token].max(1.0)).log2() + (token % 16) as f64
             })
         });
-        let mut costs = vec![ItemCost::default(); items];
-        for (part, weight) in weighted() {
-            for token in &part.tokens {
+        let mut sums = vec![ItemCost::default(); count];
+        for (tokens, costs, weight) in parts {
+            for token in tokens {
                 let bits = bits[usize::from(token.context)][usize::from(token.token)];
-                costs[usize::from(token.item)].bytes += weight * bits / 8.0;
+                sums[usize::from(token.item)].bytes += weight * bits / 8.0;
             }
-            let errors = part.energies.iter().zip(&part.errors);
-            for (cost, (energy, error)) in costs.iter_mut().zip(errors) {
-                cost.energy += weight * energy;
-                cost.error += weight * error;
+            for (sum, cost) in sums.iter_mut().zip(costs) {
+                sum.energy += weight * cost.energy;
+                sum.error += weight * cost.error;
             }
         }
-        costs
+        sums
     }
 }
 
-impl PartCosts {
-    fn new(runs: &impl ItemRuns, items: usize, step: f32) -> Self {
-        let mut costs = Self {
-            tokens: Vec::new(),
-            energies: vec![0.0; items],
-            errors: vec![0.0; items],
-        };
-        let square = |v: f32| f64::from(v).powi(2);
-        runs.for_runs(0..items, step, |run| {
-            // Ranks and slots are below 2^12.
-            let item = |i: usize| run.first_item + i / run.values_per_item;
-            for (i, (value, residual)) in run.values.iter().zip(run.residuals).enumerate() {
-                costs.energies[item(i)] += square(*value);
-                costs.errors[item(i)] += square(*residual);
-            }
-            for_tokens(run.numbers, |i, context, token, _| {
-                costs.tokens.push(ItemToken {
-                    item: item(i) as u16,
-                    context: context as u8,
-                    token,
-                });
+impl ModelPart {
+    fn runs(&self, coding: Coding) -> Option<&dyn ItemRuns> {
+        match coding.is_direct() {
+            true => self.functions.as_ref().map(|runs| runs as _),
+            false => self.coefficients.as_ref().map(|runs| runs as _),
+        }
+    }
+}
+
+/// The tokens of `count` items, and their squared values and errors.
+fn part_costs(runs: &dyn ItemRuns, count: usize, step: f32) -> (Vec<ItemToken>, Vec<ItemCost>) {
+    let (mut tokens, mut costs) = (Vec::new(), vec![ItemCost::default(); count]);
+    let square = |v: f32| f64::from(v).powi(2);
+    runs.for_runs(0..count, step, &mut |run| {
+        let item = |i: usize| run.first_item + i / run.values_per_item;
+        for (i, (value, residual)) in run.values.iter().zip(run.residuals).enumerate() {
+            costs[item(i)].energy += square(*value);
+            costs[item(i)].error += square(*residual);
+        }
+        for_tokens(run.numbers, |i, context, token, _| {
+            tokens.push(ItemToken {
+                item: item(i) as u16, // ranks and slots are below 2^12
+                context: context as u8,
+                token,
             });
         });
-        costs
-    }
+    });
+    (tokens, costs)
 }

@@ -18,7 +18,7 @@ use crate::executor::Executor;
 use crate::format::codec::{direct, transform};
 use crate::format::constants::FIRST_BYTES;
 use crate::format::error::FormatError;
-use crate::format::scan::{Coding, Scan};
+use crate::format::scan::{Coding, Scan, rank_of};
 
 /// The shares that a plan aims for. Predictions err; files keep [`MAX_SHARES`].
 pub const SHARES: Shares = Shares {
@@ -41,8 +41,7 @@ const FIRST_FLAT_STEP_RATIO: f32 = 0.15;
 const LAST_FLAT_STEP_RATIO: f32 = 0.5;
 /// Ratio of the steps of two scans that refine the same item.
 const PASS_STEP_RATIO: f32 = 4.0;
-/// Ratio of the first step to the last, and the inverse share of items in the first layer, in a plan for
-/// measuring.
+/// Ratio of the first step to the last, and the inverse share of items in the first layer, in a plan for measuring.
 const TRIAL_FIRST_STEP_RATIO: f32 = 16.0;
 const TRIAL_FIRST_ITEMS: usize = 5;
 /// Largest ratio of the first step to the last, as a power of two, and trials of the search.
@@ -69,74 +68,75 @@ pub struct Shares {
 }
 
 /// Components, or slots.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Items {
     coding: Coding,
-    count: usize,
     /// Maximum number in one scan.
     max_per_scan: usize,
+    /// `[item]`: the finest step at which its numbers do not overflow.
+    finest_steps: Vec<f32>,
 }
 
 impl Items {
     /// Components and slots of a source, where there are some.
-    fn of(encoder: &Encoder<'_>) -> Vec<Self> {
+    fn of(encoder: &Encoder<'_, impl Executor>) -> Vec<Self> {
         let side = encoder.source.geometry.tile_side;
         let components = Self {
             coding: Coding::Transform,
-            count: encoder.rank(),
             max_per_scan: transform::max_components(side) as usize,
+            finest_steps: (0..encoder.rank())
+                .map(|k| encoder.finest_step(k))
+                .collect(),
         };
         let slots = Self {
             coding: Coding::Direct,
-            count: encoder.slots(),
             max_per_scan: direct::max_slots(side) as usize,
+            finest_steps: vec![direct::finest_step(encoder.function_peak); encoder.slots()],
         };
         let mut kinds = Vec::from([components, slots]);
-        kinds.retain(|items| items.count > 0);
+        kinds.retain(|items| items.count() > 0);
         kinds
     }
 
+    fn count(&self) -> usize {
+        self.finest_steps.len()
+    }
+
     /// The finest step at which no number of `items` overflows.
-    fn finest_step(&self, encoder: &Encoder<'_>, items: Range<usize>) -> f32 {
-        match self.coding.is_direct() {
-            true => direct::finest_step(encoder.function_peak),
-            false => items.map(|k| encoder.finest_step(k)).fold(0.0, f32::max),
-        }
+    fn finest_step(&self, items: Range<usize>) -> f32 {
+        self.finest_steps[items].iter().copied().fold(0.0, f32::max)
     }
 
     /// Codes the first `count` items at `step`, or at the finest step that does not overflow.
-    fn first_layer(&self, encoder: &Encoder<'_>, count: usize, step: f32, scans: &mut Vec<Scan>) {
-        let flat_step = (step * FIRST_FLAT_STEP_RATIO).max(self.finest_step(encoder, 0..1));
-        let others = usize::from(!self.coding.is_direct())..self.count;
-        let step = step.max(self.finest_step(encoder, others));
-        self.layer(0, vec![0.0; count], [flat_step, step], f64::INFINITY, scans);
-    }
-
-    /// Codes items `from` and later before they are refined, if they would overflow at `step`.
-    fn overflow_layer(&self, encoder: &Encoder<'_>, from: usize, step: f32, scans: &mut Vec<Scan>) {
-        let finest = self.finest_step(encoder, from..self.count);
-        if finest > step && from < self.count {
-            let bytes = vec![0.0; self.count - from];
-            self.layer(from, bytes, [finest; 2], f64::INFINITY, scans);
-        }
-    }
-
-    /// Codes all items at `step`, in scans of at most `max_bytes`.
-    fn last_layer(&self, bytes: Vec<f64>, step: f32, max_bytes: f64, scans: &mut Vec<Scan>) {
+    fn first_layer(&self, count: usize, step: f32, scans: &mut Vec<Scan>) {
+        let flat_step = (step * FIRST_FLAT_STEP_RATIO).max(self.finest_step(0..1));
+        let others = usize::from(!self.coding.is_direct())..self.count();
+        let step = step.max(self.finest_step(others));
         self.layer(
             0,
-            bytes,
-            [step * LAST_FLAT_STEP_RATIO, step],
-            max_bytes,
+            &vec![0.0; count],
+            [flat_step, step],
+            f64::INFINITY,
             scans,
         );
     }
 
-    fn costs(&self, model: &CostModel, step: f32, executor: &impl Executor) -> Vec<ItemCost> {
-        match self.coding.is_direct() {
-            true => model.slots(step, executor),
-            false => model.components(step, executor),
+    /// Codes all items, of the given bytes, at `step`, in scans of at most `max_bytes`. Items from `coded` on, which no
+    /// scan has coded yet, get a coarser scan before if they would overflow.
+    fn last_layer(
+        &self,
+        coded: usize,
+        bytes: &[f64],
+        step: f32,
+        max_bytes: f64,
+        scans: &mut Vec<Scan>,
+    ) {
+        let finest = self.finest_step(coded..self.count());
+        if finest > step {
+            self.layer(coded, &bytes[coded..], [finest; 2], f64::INFINITY, scans);
         }
+        let steps = [step * LAST_FLAT_STEP_RATIO, step];
+        self.layer(0, bytes, steps, max_bytes, scans);
     }
 
     /// Codes the items from `first` on, of the given bytes, at `step`, in scans of at most `max_bytes`.
@@ -144,23 +144,18 @@ impl Items {
     fn layer(
         &self,
         first: usize,
-        bytes: Vec<f64>,
+        bytes: &[f64],
         [flat_step, step]: [f32; 2],
         max_bytes: f64,
         scans: &mut Vec<Scan>,
     ) {
         let is_flat = |item: usize| item == 0 && !self.coding.is_direct();
         let mut push = |first: usize, end: usize, step: f32| {
-            // Ranks and slots are below 2^12.
-            scans.push(Scan::new(
-                self.coding,
-                first as u16,
-                (end - first) as u16,
-                step,
-            ));
+            let (first, count) = (first as u16, (end - first) as u16); // below 2^12
+            scans.push(Scan::new(self.coding, first, count, step));
         };
         let (mut start, mut scan_bytes) = (first, 0.0);
-        for (item, item_bytes) in (first..).zip(&bytes) {
+        for (item, item_bytes) in (first..).zip(bytes) {
             let is_full = scan_bytes + item_bytes > max_bytes || item - start == self.max_per_scan;
             if item > start && (is_full || is_flat(start)) {
                 push(start, item, if is_flat(start) { flat_step } else { step });
@@ -179,13 +174,13 @@ impl Items {
 }
 
 /// A plan without shares, by which the rate control measures a step.
-pub fn trial(encoder: &Encoder<'_>, step: f32) -> Vec<Scan> {
+pub fn trial(encoder: &Encoder<'_, impl Executor>, step: f32) -> Vec<Scan> {
     let mut scans = Vec::new();
     for items in Items::of(encoder) {
-        let count = items.count.div_ceil(TRIAL_FIRST_ITEMS);
-        items.first_layer(encoder, count, TRIAL_FIRST_STEP_RATIO * step, &mut scans);
-        items.overflow_layer(encoder, count, step, &mut scans);
-        items.last_layer(vec![0.0; items.count], step, f64::INFINITY, &mut scans);
+        let count = items.count().div_ceil(TRIAL_FIRST_ITEMS);
+        items.first_layer(count, TRIAL_FIRST_STEP_RATIO * step, &mut scans);
+        let bytes = vec![0.0; items.count()];
+        items.last_layer(count, &bytes, step, f64::INFINITY, &mut scans);
     }
     scans
 }
@@ -195,16 +190,16 @@ pub fn trial(encoder: &Encoder<'_>, step: f32) -> Vec<Scan> {
 /// # Errors
 /// [`FormatError::Compress`].
 pub fn plan(
-    encoder: &Encoder<'_>,
+    encoder: &Encoder<'_, impl Executor>,
     model: &CostModel,
     step: f32,
     shares: Shares,
-    executor: &impl Executor,
 ) -> Result<ScanPlan, FormatError> {
+    let executor = encoder.executor;
     let area = encoder.order.len() as f64;
     let kinds = Items::of(encoder);
-    let costs = kinds.iter().map(|items| items.costs(model, step, executor));
-    let last: Vec<Vec<ItemCost>> = costs.collect();
+    let costs = |items: &Items, step| model.costs(items.coding, items.count(), step, executor);
+    let last: Vec<Vec<ItemCost>> = kinds.iter().map(|items| costs(items, step)).collect();
     let basis_bytes = BASIS_BYTES_PER_SLOT * area;
     let file_bytes = basis_bytes * encoder.rank() as f64
         + last.iter().flatten().map(|cost| cost.bytes).sum::<f64>();
@@ -216,11 +211,11 @@ pub fn plan(
     let first_layer = |step: f32| {
         let mut scans = Vec::new();
         for items in &kinds {
-            let mut costs = items.costs(model, step, executor);
+            let mut costs = costs(items, step);
             let of_basis = f64::from(u8::from(!items.coding.is_direct())) * basis_bytes;
             costs.iter_mut().for_each(|cost| cost.bytes += of_basis);
             let count = worthwhile(&costs, step).max(1);
-            items.first_layer(encoder, count, step, &mut scans);
+            items.first_layer(count, step, &mut scans);
         }
         scans
     };
@@ -234,9 +229,7 @@ pub fn plan(
                 Err(error) => failed = Some(error),
             }
         }
-        let components = scans.iter().filter(|scan| !scan.coding.is_direct());
-        let functions = components.map(Scan::end).max().unwrap_or(0);
-        bytes + basis_bytes * functions as f64 > shares.first * file_bytes
+        bytes + basis_bytes * rank_of(&scans) as f64 > shares.first * file_bytes
     };
     let [_, exponent] = bisect([0.0, MAX_FIRST_STEP_EXPONENT], FIRST_STEP_TRIALS, exceeds);
     if let Some(error) = failed {
@@ -248,9 +241,8 @@ pub fn plan(
     for (items, last) in kinds.iter().zip(&last) {
         let of_kind = scans.iter().filter(|scan| scan.coding == items.coding);
         let coded = of_kind.map(Scan::end).max().unwrap_or(0);
-        items.overflow_layer(encoder, coded, step, &mut scans);
-        let bytes = last.iter().map(|cost| cost.bytes).collect();
-        items.last_layer(bytes, step, max_bytes, &mut scans);
+        let bytes: Vec<f64> = last.iter().map(|cost| cost.bytes).collect();
+        items.last_layer(coded, &bytes, step, max_bytes, &mut scans);
     }
     Ok(ScanPlan { scans, first_scans })
 }

@@ -5,7 +5,7 @@ use std::io;
 
 use crate::format::extension::Extension;
 use crate::format::metadata::Metadata;
-use crate::transport::{BandTile, Basis, Decibels, Geometry, TransportFunctions};
+use crate::transport::{Basis, Decibels, FloatTile, Geometry, TransportFunctions};
 
 /// The light transport of a file.
 pub struct Source<'a> {
@@ -14,7 +14,7 @@ pub struct Source<'a> {
     /// The basis of the coefficients, if a tile has any.
     pub basis: Option<&'a Basis>,
     /// Returns a tile by its number. The encoder calls it several times for each tile.
-    pub tile: &'a (dyn Fn(usize) -> io::Result<BandTile> + Sync),
+    pub tile: &'a (dyn Fn(usize) -> io::Result<FloatTile> + Sync),
     /// Origin of the file.
     pub metadata: Metadata,
     /// Extensions of the file.
@@ -26,14 +26,14 @@ pub struct Source<'a> {
 pub trait DistortionMetric: Sync {
     /// The tiles that the metric compares, at any position and of any size. Their coefficients are over the
     /// source's basis.
-    fn tiles(&self) -> Vec<BandTile>;
+    fn tiles(&self) -> Vec<FloatTile>;
 
     /// Estimated loss of SNR against the object's light transport if `functions` replace the tiles.
     fn loss(&self, functions: &[TransportFunctions]) -> Decibels;
 }
 
 /// The target of the rate control.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub enum RateTarget<'a> {
     /// The smallest file whose loss, by a metric, is at most this.
     Loss(Decibels, &'a dyn DistortionMetric),
@@ -45,13 +45,8 @@ pub enum RateTarget<'a> {
     Lossless,
 }
 
-impl fmt::Debug for RateTarget<'_> {
+impl fmt::Debug for dyn DistortionMetric + '_ {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Loss(loss, _) => write!(f, "Loss({loss})"),
-            Self::Snr(snr) => write!(f, "Snr({snr})"),
-            Self::Bytes(bytes) => write!(f, "Bytes({bytes})"),
-            Self::Lossless => f.write_str("Lossless"),
-        }
+        f.write_str("a distortion metric")
     }
 }

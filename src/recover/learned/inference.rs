@@ -15,7 +15,7 @@ use crate::capture::Measurements;
 use crate::linalg::vectorise;
 use crate::recover::holdout::HoldoutSplit;
 use crate::recover::prediction;
-use crate::transport::{CHANNELS, FactoredTile, Geometry, TileRect, TransportFunctions};
+use crate::transport::{CHANNELS, FloatTile, Geometry, TileRect, TransportFunctions};
 
 /// Everything that training learns.
 #[derive(Debug)]
@@ -44,7 +44,7 @@ impl LearnedModel {
         measurements: &Measurements,
         pattern_indices: &[usize],
         rect: TileRect,
-    ) -> FactoredTile {
+    ) -> FloatTile {
         let region = with_margin(measurements, rect, self.halo());
         let (geometry, basis) = (&self.geometry, &self.basis);
         let equations =
@@ -66,7 +66,10 @@ impl LearnedModel {
                 }
             },
         );
-        FactoredTile { rect, coefficients }
+        FloatTile {
+            coefficients,
+            ..FloatTile::dark(rect)
+        }
     }
 
     /// ẑ of one observation, `[r]`.
@@ -95,8 +98,8 @@ impl LearnedModel {
     }
 
     /// The light transport functions of a tile.
-    pub fn expand(&self, tile: &FactoredTile) -> TransportFunctions {
-        tile.expand(&self.geometry, &self.basis.functions)
+    pub fn expand(&self, tile: &FloatTile) -> TransportFunctions {
+        tile.functions(&self.geometry, Some(&self.basis.functions))
     }
 
     /// Squared residual, over `rect`, of the held-out patterns as predicted from the others. Saturated samples do not

@@ -41,7 +41,7 @@ use super::preparation::Preparation;
 use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::transport::{
-    Basis, CHANNELS, FactoredTile, Geometry, RecoveredTile, TileRect, TransportFunctions, Window,
+    Basis, CHANNELS, FloatTile, Geometry, TileRect, TransportFunctions, Window,
 };
 use blending::{ResidualProducts, TILE_CENTRE_SIDE_PX, blend, fit_nnls_alternative};
 use inference::LearnedModel;
@@ -117,10 +117,10 @@ impl LearnedRecovery {
         measurements: &Measurements,
         split: &HoldoutSplit,
         rect: TileRect,
-    ) -> RecoveredTile {
+    ) -> FloatTile {
         let tile = self.model.tile(measurements, &split.all, rect);
         let Some(nnls) = &self.nnls else {
-            return RecoveredTile::Factored(tile);
+            return tile;
         };
         // The prior was trained on the held-out patterns, too, but has few parameters to fit to them; the pixels' own
         // measurements in this comparison are those under the other patterns only.
@@ -136,10 +136,10 @@ impl LearnedRecovery {
         measurements: &Measurements,
         split: &HoldoutSplit,
         rect: TileRect,
-    ) -> RecoveredTile {
+    ) -> FloatTile {
         let tile = self.model.tile(measurements, &split.training, rect);
         let Some(nnls) = &self.nnls else {
-            return RecoveredTile::Factored(tile);
+            return tile;
         };
         let learned = self.model.expand(&tile);
         let alternative = nnls.tile(measurements, &split.training, rect);
@@ -151,16 +151,16 @@ impl LearnedRecovery {
     /// `tile`, or its blend with the `alternative` if the products of their residuals say that blending pays.
     fn blended_tile(
         &self,
-        tile: FactoredTile,
+        tile: FloatTile,
         products: ResidualProducts,
         alternative: impl FnOnce() -> TransportFunctions,
-    ) -> RecoveredTile {
+    ) -> FloatTile {
         let weight = products.tile_weight();
         if weight == 0.0 {
-            return RecoveredTile::Factored(tile);
+            return tile;
         }
         let mut functions = self.model.expand(&tile);
         blend(&mut functions, &alternative(), weight);
-        RecoveredTile::Direct(functions)
+        FloatTile::from(functions)
     }
 }

@@ -2,13 +2,13 @@
 
 use super::simd::{MAX_PIXELS, Scalar, Simd};
 use crate::relight::LightChroma;
-use crate::transport::{CHANNELS, CoefficientTile, QUAD, TexelCode};
+use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode, Tile, TileCodes};
 
 /// The basis response of a light block, `C`.
 #[derive(Clone, Copy, Debug)]
 pub struct BlockResponse<'a> {
     /// `[origin, channel, quad]`; one channel where the light has a uniform chroma.
-    pub texels: &'a [[f32; QUAD]],
+    pub texels: &'a [[f32; TEXEL_COMPONENTS]],
     /// Quads of components of each origin and channel: the tiles' first ones.
     pub quads: usize,
     pub chroma: LightChroma,
@@ -18,7 +18,7 @@ pub struct BlockResponse<'a> {
 #[inline(always)]
 pub fn combine<S: Simd>(
     simd: S,
-    tile: &CoefficientTile,
+    tile: &TileCodes,
     first: usize,
     offsets: &[u16],
     response: BlockResponse<'_>,
@@ -41,7 +41,7 @@ pub fn combine<S: Simd>(
 #[inline(always)]
 fn combine_span<S: Simd, const LIGHT_CHANNELS: usize>(
     simd: S,
-    tile: &CoefficientTile,
+    tile: &TileCodes,
     first: usize,
     offsets: &[u16],
     BlockResponse { texels, quads, .. }: BlockResponse<'_>,
@@ -55,7 +55,7 @@ fn combine_span<S: Simd, const LIGHT_CHANNELS: usize>(
         return;
     };
     assert!((usize::from(largest) + 1) * LIGHT_CHANNELS * quads <= texels.len());
-    let quad_stride = CoefficientTile::plane(tile.rect);
+    let quad_stride = Tile::plane(tile.rect);
     let channel_stride = tile.codes.len() / CHANNELS;
     let last_quad = (CHANNELS - 1) * channel_stride + quads.saturating_sub(1) * quad_stride;
     assert!(last_quad + first + pixels <= tile.codes.len());
@@ -91,7 +91,7 @@ fn combine_span<S: Simd, const LIGHT_CHANNELS: usize>(
 /// Input and output of the inner loop, for pixels side by side.
 struct SpanPointers<'a> {
     /// `[origin, channel, quad]`.
-    texels: *const [f32; QUAD],
+    texels: *const [f32; TEXEL_COMPONENTS],
     quads: usize,
     /// Each pixel's origin.
     offsets: &'a [u16],
@@ -153,10 +153,10 @@ impl SpanPointers<'_> {
 mod tests {
     use super::*;
     use crate::relight::cpu::simd::{SimdKernel, SimdLevel};
-    use crate::transport::{Extent, TileRect};
+    use crate::transport::{Extent, FloatTile, TileRect};
 
     struct CombineKernel<'a> {
-        tile: &'a CoefficientTile,
+        tile: &'a TileCodes,
         first: usize,
         offsets: &'a [u16],
         response: BlockResponse<'a>,
@@ -193,11 +193,15 @@ mod tests {
                 },
             ),
         ] {
-            let quads = rank.div_ceil(QUAD);
+            let quads = rank.div_ceil(TEXEL_COMPONENTS);
             let values: Vec<_> = (0..27 * rank)
                 .map(|i| [0, 1, 2].map(|c| test_value(3 * i + c)))
                 .collect();
-            let tile = CoefficientTile::quantise(rect, &values, rank);
+            let tile = FloatTile {
+                coefficients: values,
+                ..FloatTile::dark(rect)
+            };
+            let tile = Tile::quantise(&tile, rank);
             let texels: Vec<_> = (0..20 * 3 * quads)
                 .map(|i| [0, 1, 2, 3].map(|l| test_value(4 * i + l + 5)))
                 .collect();
@@ -213,7 +217,7 @@ mod tests {
                         // The pixels on either side must stay as they are.
                         let mut out = vec![[7.0; CHANNELS]; count + 2];
                         level.run(CombineKernel {
-                            tile: &tile,
+                            tile: &tile.coefficients,
                             first,
                             offsets: &offsets,
                             response,
@@ -233,9 +237,12 @@ mod tests {
                                 LightChroma::Varying => (3, c, 1.0),
                             };
                             let at = (usize::from(offsets[i]) * channels + channel) * used;
-                            let products = (0..rank.min(QUAD * used)).map(|k| {
+                            let products = (0..rank.min(TEXEL_COMPONENTS * used)).map(|k| {
                                 let coefficient = tile.coefficient(rank, first + i, k)[c];
-                                f64::from(coefficient * texels[at + k / QUAD][k % QUAD])
+                                f64::from(
+                                    coefficient
+                                        * texels[at + k / TEXEL_COMPONENTS][k % TEXEL_COMPONENTS],
+                                )
                             });
                             let want = products.sum::<f64>() * f64::from(gain);
                             assert!((f64::from(got[c]) - want).abs() < 1e-4, "{got:?}: {want}");

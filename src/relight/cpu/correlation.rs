@@ -10,7 +10,7 @@ use super::block_size::{even_block_side, fft_side};
 use super::fft::{Complex, ComplexLine, Fft, FftScratch};
 use super::light_spectrum::LightSpectrum;
 use super::simd::{LANES, Scalar, Simd};
-use crate::transport::{Basis, QUAD, Window};
+use crate::transport::{Basis, TEXEL_COMPONENTS, Window};
 
 /// Basis functions in one transform: one in the real part and one in the imaginary part of each lane.
 const GROUP: usize = 2 * LANES;
@@ -54,7 +54,7 @@ impl Correlator {
             fft: Fft::new(n),
             block_side,
             footprint: block_side + window - 1,
-            quads: basis.rank().div_ceil(QUAD),
+            quads: basis.rank().div_ceil(TEXEL_COMPONENTS),
             spectra: Vec::new(),
         };
         for functions in basis.kernels.chunks(GROUP) {
@@ -119,10 +119,11 @@ impl Correlator {
         channels: &[usize],
         quads: usize,
         scratch: &'s mut CorrelationScratch,
-    ) -> &'s [[f32; QUAD]] {
+    ) -> &'s [[f32; TEXEL_COMPONENTS]] {
         let n = self.fft.side;
         let texels = self.block_side * self.block_side * channels.len() * quads;
-        let lines = (texels * size_of::<[f32; QUAD]>()).div_ceil(size_of::<CacheLine>());
+        let lines =
+            (texels * size_of::<[f32; TEXEL_COMPONENTS]>()).div_ceil(size_of::<CacheLine>());
         if scratch.response.len() < lines {
             scratch.response.resize(lines, CacheLine::default());
         }
@@ -130,7 +131,10 @@ impl Correlator {
             let CorrelationScratch { fft, light, .. } = scratch;
             light.compute(simd, &self.fft, fft, &row, self.footprint, *channel);
             let groups = self.spectra.chunks_exact(n * n);
-            for (group, spectra) in groups.take(quads.div_ceil(GROUP / QUAD)).enumerate() {
+            for (group, spectra) in groups
+                .take(quads.div_ceil(GROUP / TEXEL_COMPONENTS))
+                .enumerate()
+            {
                 self.invert_along_v(simd, spectra, scratch);
                 self.invert_along_u(simd, group, quads, (i, channels.len()), scratch);
             }
@@ -196,11 +200,12 @@ impl Correlator {
         (channel, channels): (usize, usize),
         scratch: &mut CorrelationScratch,
     ) {
-        let first_quad = group * GROUP / QUAD;
+        let first_quad = group * GROUP / TEXEL_COMPONENTS;
         let texels_an_origin = channels * quads;
         let offset = channel * quads + first_quad;
-        let quads = (quads - first_quad).min(GROUP / QUAD);
-        let response: &mut [[f32; QUAD]] = bytemuck::cast_slice_mut(&mut scratch.response);
+        let quads = (quads - first_quad).min(GROUP / TEXEL_COMPONENTS);
+        let response: &mut [[f32; TEXEL_COMPONENTS]] =
+            bytemuck::cast_slice_mut(&mut scratch.response);
         let columns = &scratch.columns;
         let last = self.block_side - 1;
         for first in (0..self.block_side).step_by(S::LINES) {
@@ -254,7 +259,7 @@ mod tests {
         correlator: &'a Correlator,
         quads: usize,
         light: &'a [[f32; 4]],
-        response: &'a mut Vec<[f32; QUAD]>,
+        response: &'a mut Vec<[f32; TEXEL_COMPONENTS]>,
     }
 
     impl SimdKernel for CorrelateKernel<'_> {
@@ -337,7 +342,8 @@ mod tests {
                                 f64::from(basis.kernels[k][s]) * f64::from(light[at][c])
                             })
                             .sum();
-                        let got = out[(o * CHANNELS + c) * quads + k / QUAD][k % QUAD];
+                        let got = out[(o * CHANNELS + c) * quads + k / TEXEL_COMPONENTS]
+                            [k % TEXEL_COMPONENTS];
                         let error = (f64::from(got) - want).abs();
                         assert!(error < 1e-5, "window {side}, origin {o}, {c}, {k}: {error}");
                     }

@@ -1,11 +1,11 @@
 //! Direct pixels: `y_n = Σ_s τ_n(s) p(o_n + s)` over the window, in each channel.
 
-use crate::transport::{CHANNELS, DirectTile};
+use crate::transport::{CHANNELS, TileCodes};
 
 /// The sum for pixel number `p` of a tile. `light` begins with the window's first element; rows are `stride` apart.
 #[inline(always)]
 pub fn windowed_sum(
-    tile: &DirectTile,
+    tile: &TileCodes,
     p: usize,
     light: &[[f32; 4]],
     window: usize,

@@ -22,7 +22,7 @@ mod uniforms;
 use thiserror::Error;
 
 use super::used_count;
-use crate::transport::{CHANNELS, Extent, Geometry, QUAD, Transport};
+use crate::transport::{CHANNELS, Extent, Geometry, TEXEL_COMPONENTS, Transport};
 
 pub use texels::TextureRegion;
 pub use uniforms::{BasisUniforms, FrameUniforms};
@@ -37,7 +37,7 @@ const MAX_RESPONSE_BYTES: u64 = 256 << 20;
 const MAX_LIGHT_IMAGE_BYTES: u64 = 256 << 20;
 
 /// Slots of a window that fit the uniforms of a pass: every device allows 16 KiB.
-const MAX_SLOTS: usize = (16 << 10) / (2 * QUAD * size_of::<f32>());
+const MAX_SLOTS: usize = (16 << 10) / (2 * TEXEL_COMPONENTS * size_of::<f32>());
 
 /// Number of a photograph's textures.
 pub const TEXTURES: usize = 7;
@@ -130,7 +130,7 @@ impl TextureLayout {
         let Geometry { camera, light, .. } = *geometry;
         let is_factored = tiles.iter().any(|tile| !tile.coefficients.is_dark());
         let quads = match is_factored {
-            true => transport.basis.rank().div_ceil(QUAD) as u32,
+            true => transport.basis.rank().div_ceil(TEXEL_COMPONENTS) as u32,
             false => 0,
         };
         let [layers, response_layers] =

@@ -1,7 +1,7 @@
 //! Textures checked texel by texel against the rules that the shaders read them by.
 
 use super::*;
-use crate::transport::{Basis, CameraPx, CoefficientTile, Correspondence, Tile, Window};
+use crate::transport::{Basis, CameraPx, Correspondence, Tile, Window};
 
 const WEBGL2_MINIMUM: TextureLimits = TextureLimits {
     max_side: 2048,
@@ -34,8 +34,8 @@ fn transport(geometry: Geometry, rank: usize) -> Transport {
             tile.functions.codes = codes.collect();
         }
         if i % 4 != 3 && rank > 0 {
-            let plane = CoefficientTile::plane(rect);
-            let mut codes = vec![[0; 4]; CoefficientTile::texels(rect, rank)];
+            let plane = Tile::plane(rect);
+            let mut codes = vec![[0; 4]; Tile::texels(rect, rank)];
             for (i, codes) in codes.chunks_exact_mut(plane).enumerate() {
                 for (p, code) in rect.pixels().zip(codes) {
                     *code = [p.x as i16, p.y as i16, i as i16, 7];

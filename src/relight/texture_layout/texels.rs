@@ -1,9 +1,7 @@
 //! The contents of the textures.
 
 use super::{TextureDescriptor, TextureLayout, binding};
-use crate::transport::{
-    CameraPx, CoefficientTile, Element, Extent, Geometry, TexelCode, Tile, TileRect, Transport,
-};
+use crate::transport::{CameraPx, Element, Extent, Geometry, TexelCode, Tile, TileRect, Transport};
 
 /// Rows of codes in one region: up to 4 MiB, which makes uploads few and their copies small.
 const REGION_ROWS: u32 = 256;
@@ -57,7 +55,7 @@ impl TextureLayout {
     ) -> Result<(), E> {
         for Tile { coefficients, .. } in &transport.tiles {
             let TileRect { x, y, extent } = coefficients.rect;
-            let plane = CoefficientTile::plane(coefficients.rect);
+            let plane = Tile::plane(coefficients.rect);
             for (layer, texels) in (0..).zip(coefficients.codes.chunks_exact(plane)) {
                 write(TextureRegion {
                     binding: binding::COEFFICIENTS,

@@ -2,10 +2,10 @@
 
 use super::{MAX_SLOTS, TextureLayout};
 use crate::relight::{LightChroma, OutputTransform, ToneCurve};
-use crate::transport::{Basis, CHANNELS, QUAD};
+use crate::transport::{Basis, CHANNELS, TEXEL_COMPONENTS};
 
 /// `BasisUniforms` of the WGSL: a pair of quads of basis functions, slot by slot.
-pub type BasisUniforms = [[[f32; QUAD]; 2]; MAX_SLOTS];
+pub type BasisUniforms = [[[f32; TEXEL_COMPONENTS]; 2]; MAX_SLOTS];
 
 /// `FrameUniforms` of the WGSL.
 #[repr(C)]
@@ -35,15 +35,15 @@ impl TextureLayout {
     /// The basis, pair by pair.
     pub fn basis_uniforms(&self, basis: &Basis) -> Vec<BasisUniforms> {
         let pair = |functions: &[Vec<f32>]| {
-            let mut pair = [[[0.0; QUAD]; 2]; MAX_SLOTS];
+            let mut pair = [[[0.0; TEXEL_COMPONENTS]; 2]; MAX_SLOTS];
             for (k, function) in functions.iter().enumerate() {
                 for (slot, value) in pair.iter_mut().zip(function) {
-                    slot[k / QUAD][k % QUAD] = *value;
+                    slot[k / TEXEL_COMPONENTS][k % TEXEL_COMPONENTS] = *value;
                 }
             }
             pair
         };
-        let pairs = basis.kernels.chunks(2 * QUAD);
+        let pairs = basis.kernels.chunks(2 * TEXEL_COMPONENTS);
         let count = self.quad_pairs() as usize;
         pairs.take(count).map(pair).collect()
     }

@@ -13,15 +13,9 @@ use crate::web::CodedError;
 /// Draws a photograph into a canvas by one backend.
 #[wasm_bindgen]
 pub struct Relighter {
-    backend: Box<dyn Backend>,
+    pub(in crate::web) backend: Box<dyn Backend>,
     /// Extent of the light plane.
-    light: Extent,
-}
-
-impl Relighter {
-    pub(in crate::web) fn from_backend(backend: Box<dyn Backend>, light: Extent) -> Self {
-        Self { backend, light }
-    }
+    pub(in crate::web) light: Extent,
 }
 
 #[wasm_bindgen]

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::{LANES, MAX_PIXELS, Simd, SimdKernel};
-use crate::transport::{CHANNELS, QUAD, TexelCode};
+use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode};
 
 /// Proves that the CPU has AVX2.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +65,7 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn load_texels(self, from: [*const [f32; QUAD]; MAX_PIXELS]) -> Avx2Vector {
+    unsafe fn load_texels(self, from: [*const [f32; TEXEL_COMPONENTS]; MAX_PIXELS]) -> Avx2Vector {
         // SAFETY: the token proves AVX2; the caller vouches for two pointers.
         Avx2Vector(unsafe {
             _mm256_set_m128(_mm_loadu_ps(from[1].cast()), _mm_loadu_ps(from[0].cast()))

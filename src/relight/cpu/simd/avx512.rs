@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::{LANES, MAX_PIXELS, Simd, SimdKernel};
-use crate::transport::{CHANNELS, QUAD, TexelCode};
+use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode};
 
 /// Proves that the CPU has AVX-512 F, DQ and VL, which include AVX2.
 #[derive(Clone, Copy, Debug)]
@@ -98,7 +98,10 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn load_texels(self, [a, b, c, d]: [*const [f32; QUAD]; MAX_PIXELS]) -> Avx512Vector {
+    unsafe fn load_texels(
+        self,
+        [a, b, c, d]: [*const [f32; TEXEL_COMPONENTS]; MAX_PIXELS],
+    ) -> Avx512Vector {
         // SAFETY: the token proves AVX-512; the caller vouches for four pointers.
         Avx512Vector(unsafe {
             let quads = _mm512_castps128_ps512(_mm_loadu_ps(a.cast()));

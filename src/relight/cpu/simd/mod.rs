@@ -9,7 +9,7 @@ use std::ops::{Add, Mul, Sub};
 
 use bytemuck::Pod;
 
-use crate::transport::{CHANNELS, QUAD, TexelCode};
+use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode};
 
 /// Lane-wise `+`, `-` and `*` of a vector by intrinsics.
 #[cfg(any(
@@ -121,7 +121,10 @@ pub trait Simd: Copy {
     ///
     /// # Safety
     /// The first `PIXELS` pointers are valid to read.
-    unsafe fn load_texels(self, from: [*const [f32; QUAD]; MAX_PIXELS]) -> Self::TexelVector;
+    unsafe fn load_texels(
+        self,
+        from: [*const [f32; TEXEL_COMPONENTS]; MAX_PIXELS],
+    ) -> Self::TexelVector;
 
     /// `sums + codes · factors`.
     ///

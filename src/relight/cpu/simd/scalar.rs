@@ -3,7 +3,7 @@
 use std::ops::{Add, Mul, Sub};
 
 use super::{LANES, MAX_PIXELS, Simd};
-use crate::transport::{CHANNELS, QUAD, TexelCode};
+use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode};
 
 /// The token of the baseline, which every CPU has.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +36,7 @@ impl Simd for Scalar {
     type Vector = ScalarVector;
     type Spilled = [f32; LANES];
     const PIXELS: usize = 1;
-    type TexelVector = [f32; QUAD];
+    type TexelVector = [f32; TEXEL_COMPONENTS];
 
     #[inline(always)]
     fn splat(self, value: f32) -> ScalarVector {
@@ -54,12 +54,15 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    fn zero_texels(self) -> [f32; QUAD] {
-        [0.0; QUAD]
+    fn zero_texels(self) -> [f32; TEXEL_COMPONENTS] {
+        [0.0; TEXEL_COMPONENTS]
     }
 
     #[inline(always)]
-    unsafe fn load_texels(self, from: [*const [f32; QUAD]; MAX_PIXELS]) -> [f32; QUAD] {
+    unsafe fn load_texels(
+        self,
+        from: [*const [f32; TEXEL_COMPONENTS]; MAX_PIXELS],
+    ) -> [f32; TEXEL_COMPONENTS] {
         // SAFETY: the caller vouches for one pointer.
         unsafe { *from[0] }
     }
@@ -67,13 +70,13 @@ impl Simd for Scalar {
     #[inline(always)]
     unsafe fn add_products(
         self,
-        mut sums: [f32; QUAD],
+        mut sums: [f32; TEXEL_COMPONENTS],
         codes: *const TexelCode,
-        factors: [f32; QUAD],
-    ) -> [f32; QUAD] {
+        factors: [f32; TEXEL_COMPONENTS],
+    ) -> [f32; TEXEL_COMPONENTS] {
         // SAFETY: the caller vouches for one texel.
         let codes = unsafe { *codes };
-        for lane in 0..QUAD {
+        for lane in 0..TEXEL_COMPONENTS {
             sums[lane] += f32::from(codes[lane]) * factors[lane];
         }
         sums
@@ -82,7 +85,7 @@ impl Simd for Scalar {
     #[inline(always)]
     unsafe fn store_sums(
         self,
-        channels: [[f32; QUAD]; CHANNELS],
+        channels: [[f32; TEXEL_COMPONENTS]; CHANNELS],
         gain: [f32; CHANNELS],
         to: *mut [f32; CHANNELS],
     ) {

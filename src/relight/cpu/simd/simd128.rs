@@ -3,7 +3,7 @@
 use std::arch::wasm32::*;
 
 use super::{LANES, MAX_PIXELS, Simd};
-use crate::transport::{CHANNELS, QUAD, TexelCode};
+use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode};
 
 /// Proves that the module was compiled with simd128: a browser without it does not load the module.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +52,10 @@ impl Simd for Simd128 {
     }
 
     #[inline(always)]
-    unsafe fn load_texels(self, [from]: [*const [f32; QUAD]; MAX_PIXELS]) -> Simd128Vector {
+    unsafe fn load_texels(
+        self,
+        [from]: [*const [f32; TEXEL_COMPONENTS]; MAX_PIXELS],
+    ) -> Simd128Vector {
         // SAFETY: the caller vouches for one pointer.
         Simd128Vector(unsafe { v128_load(from.cast()) })
     }

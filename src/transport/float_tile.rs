@@ -1,15 +1,12 @@
-//! Tiles as real numbers: coefficients over a shared basis, direct functions, or both.
-//!
-//! A factored tile has `τ_n = Σ_k c_nk v_k` with coefficients `c_nk` for each pixel `n`, component `k` and channel; all
-//! tiles share the basis functions `v_k` of `S` values.
+//! Tiles as real numbers: `τ_n = Σ_k c_nk v_k + d_n`, coefficients over a basis that all tiles share, and direct
+//! functions.
 
-use super::functions::TransportFunctions;
 use super::geometry::{CHANNELS, Geometry, TileRect};
 
-/// The basis functions `v_k` of a factored transport, `τ_n ≈ Σ_k c_nk v_k`.
+/// The basis functions `v_k` of a factored transport, `S` values each.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Basis {
-    /// `v_k` as `[rank, slot]`, the most important first.
+    /// `v_k` as `[component, slot]`, the most important first.
     pub kernels: Vec<Vec<f32>>,
 }
 
@@ -20,81 +17,30 @@ impl Basis {
     }
 }
 
-/// A tile as coefficients over a [`Basis`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct FactoredTile {
+/// The light transport functions of the pixels of a tile, before quantisation.
+#[derive(Clone, Debug)]
+pub struct TransportFunctions {
     /// The pixels of the tile.
     pub rect: TileRect,
-    /// `c_nk` as `[pixel, component, channel]`, pixels row by row; in units of the measurement.
-    pub coefficients: Vec<[f32; CHANNELS]>,
+    /// τ as `[pixel, slot, channel]`, pixels and slots row by row, in units of the measurement for a light element at
+    /// full emission.
+    pub tau: Vec<[f32; CHANNELS]>,
 }
 
-/// Slots computed together. The sums of three channels take nine of sixteen four-lane registers, which leaves enough
-/// for the basis function and the coefficients.
-const BLOCK_SLOTS: usize = 12;
-
-impl FactoredTile {
-    /// The light transport functions, zero at elements off the light plane. Negative values of the sum are kept:
-    /// pictures would be too bright without them.
-    pub fn expand(&self, geometry: &Geometry, basis: &Basis) -> TransportFunctions {
-        let mut functions = TransportFunctions::zeros(self.rect, geometry.window.area());
-        self.expand_into(geometry, basis, &mut functions.tau);
-        functions
-    }
-
-    /// Adds the functions to `tau`, `[pixel, slot, channel]`, and zeroes elements off the light plane.
-    pub(crate) fn expand_into(
-        &self,
-        geometry: &Geometry,
-        basis: &Basis,
-        tau: &mut [[f32; CHANNELS]],
-    ) {
-        let (area, rank) = (geometry.window.area(), basis.rank());
-        if rank == 0 {
-            return;
-        }
-        // `[block, component, slot]`, so that the inner loop reads consecutive values.
-        let mut kernels = vec![[0.0; BLOCK_SLOTS]; area.div_ceil(BLOCK_SLOTS) * rank];
-        for (k, kernel) in basis.kernels.iter().enumerate() {
-            for (b, slots) in kernel.chunks(BLOCK_SLOTS).enumerate() {
-                kernels[b * rank + k][..slots.len()].copy_from_slice(slots);
-            }
-        }
-        let pixels = self.rect.pixels().zip(tau.chunks_exact_mut(area));
-        for ((pixel, tau), coefficients) in pixels.zip(self.coefficients.chunks_exact(rank)) {
-            for (tau, kernels) in tau.chunks_mut(BLOCK_SLOTS).zip(kernels.chunks_exact(rank)) {
-                let sums = combine(coefficients, kernels);
-                for (s, tau) in tau.iter_mut().enumerate() {
-                    (0..CHANNELS).for_each(|c| tau[c] += sums[c][s]);
-                }
-            }
-            geometry.zero_off_light_plane(geometry.window_origin(pixel), tau);
+impl TransportFunctions {
+    /// Zeros for `rect` and windows of `area` slots.
+    pub fn zeros(rect: TileRect, area: usize) -> Self {
+        Self {
+            rect,
+            tau: vec![[0.0; CHANNELS]; rect.extent.area() * area],
         }
     }
 }
 
-/// `Σ_k c_k v_k` on one block of slots by channel. Sums run over `k` in order, so that results do not depend on the
-/// size of blocks.
-fn combine(
-    coefficients: &[[f32; CHANNELS]],
-    kernels: &[[f32; BLOCK_SLOTS]],
-) -> [[f32; BLOCK_SLOTS]; CHANNELS] {
-    // Three variables instead of an array, which the compiler would keep in memory.
-    let (mut red, mut green, mut blue) =
-        ([0.0; BLOCK_SLOTS], [0.0; BLOCK_SLOTS], [0.0; BLOCK_SLOTS]);
-    for ([r, g, b], kernel) in coefficients.iter().zip(kernels) {
-        for (s, v) in kernel.iter().enumerate() {
-            red[s] += r * v;
-            green[s] += g * v;
-            blue[s] += b * v;
-        }
-    }
-    [red, green, blue]
-}
-
-/// A tile of a file, before quantisation: `τ_n = Σ_k c_nk v_k + d_n`. Either part may be zero.
+/// A tile before quantisation, in units of the measurement: `τ_n = Σ_k c_nk v_k + d_n`. Either part may be zero; a
+/// recovered tile has one of both.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BandTile {
+pub struct FloatTile {
     /// The pixels of the tile.
     pub rect: TileRect,
     /// `c_nk` as `[pixel, component, channel]`; empty if all are zero.
@@ -103,7 +49,7 @@ pub struct BandTile {
     pub functions: Vec<[f32; CHANNELS]>,
 }
 
-impl BandTile {
+impl FloatTile {
     /// A tile that is dark under every light.
     pub fn dark(rect: TileRect) -> Self {
         Self {
@@ -118,27 +64,28 @@ impl BandTile {
         self.coefficients.is_empty() && self.functions.is_empty()
     }
 
-    /// Copies a recovered tile into this tile.
+    /// Copies another tile into this tile.
     ///
     /// # Panics
     /// If `part` is not within the tile.
-    pub fn insert(&mut self, part: RecoveredTile) {
-        let (values, rect, part_values) = match part {
-            RecoveredTile::Direct(part) => (&mut self.functions, part.rect, part.tau),
-            RecoveredTile::Factored(part) => (&mut self.coefficients, part.rect, part.coefficients),
-        };
-        let values_per_pixel = part_values.len() / rect.extent.area();
-        if values.is_empty() {
-            values.resize(self.rect.extent.area() * values_per_pixel, [0.0; CHANNELS]);
-        }
-        let width = rect.extent.width as usize * values_per_pixel;
-        for (row, y) in part_values
-            .chunks_exact(width.max(1))
-            .zip(rect.y - self.rect.y..)
-        {
-            let at = y as usize * self.rect.extent.width as usize;
-            let at = (at + (rect.x - self.rect.x) as usize) * values_per_pixel;
-            values[at..at + width].copy_from_slice(row);
+    pub fn insert(&mut self, part: &Self) {
+        let (left, top) = (
+            (part.rect.x - self.rect.x) as usize,
+            (part.rect.y - self.rect.y) as usize,
+        );
+        for (values, part_values) in [
+            (&mut self.coefficients, &part.coefficients),
+            (&mut self.functions, &part.functions),
+        ] {
+            let values_per_pixel = part_values.len() / part.rect.extent.area();
+            if values.is_empty() {
+                values.resize(self.rect.extent.area() * values_per_pixel, [0.0; CHANNELS]);
+            }
+            let width = part.rect.extent.width as usize * values_per_pixel;
+            for (y, row) in (top..).zip(part_values.chunks_exact(width.max(1))) {
+                let at = (y * self.rect.extent.width as usize + left) * values_per_pixel;
+                values[at..at + width].copy_from_slice(row);
+            }
         }
     }
 
@@ -166,60 +113,87 @@ impl BandTile {
         }
     }
 
-    /// The light transport functions.
-    pub fn functions(self, geometry: &Geometry, basis: &Basis) -> TransportFunctions {
-        let mut functions = match self.functions.is_empty() {
-            true => TransportFunctions::zeros(self.rect, geometry.window.area()),
-            false => TransportFunctions {
-                rect: self.rect,
-                tau: self.functions,
-            },
-        };
-        if !self.coefficients.is_empty() {
-            let tile = FactoredTile {
-                rect: self.rect,
-                coefficients: self.coefficients,
-            };
-            tile.expand_into(geometry, basis, &mut functions.tau);
+    /// The light transport functions, zero at elements off the light plane. Coefficients need the `basis`. Negative
+    /// values of the sum are kept: pictures would be too bright without them.
+    pub fn functions(&self, geometry: &Geometry, basis: Option<&Basis>) -> TransportFunctions {
+        let mut functions = TransportFunctions::zeros(self.rect, geometry.window.area());
+        if !self.functions.is_empty() {
+            functions.tau.copy_from_slice(&self.functions);
+        }
+        if let Some(basis) = basis.filter(|basis| basis.rank() > 0)
+            && !self.coefficients.is_empty()
+        {
+            let tau = &mut functions.tau;
+            add_expansion(tau, &self.coefficients, self.rect, geometry, basis);
         }
         functions
     }
 }
 
-/// A tile as a recovery yields it.
-#[derive(Clone, Debug)]
-pub enum RecoveredTile {
-    /// The value of every slot.
-    Direct(TransportFunctions),
-    /// Coefficients over the basis of the recovery.
-    Factored(FactoredTile),
+impl From<TransportFunctions> for FloatTile {
+    fn from(TransportFunctions { rect, tau }: TransportFunctions) -> Self {
+        Self {
+            functions: tau,
+            ..Self::dark(rect)
+        }
+    }
 }
 
-impl RecoveredTile {
-    /// The pixels of the tile.
-    pub fn rect(&self) -> TileRect {
-        match self {
-            Self::Direct(tile) => tile.rect,
-            Self::Factored(tile) => tile.rect,
+/// Slots computed together. The sums of three channels take nine of sixteen four-lane registers, which leaves enough
+/// for the basis function and the coefficients.
+const BLOCK_SLOTS: usize = 12;
+
+/// Adds `Σ_k c_k v_k` to `tau`, `[pixel, slot]`, and zeroes elements off the light plane.
+fn add_expansion(
+    tau: &mut [[f32; CHANNELS]],
+    coefficients: &[[f32; CHANNELS]],
+    rect: TileRect,
+    geometry: &Geometry,
+    basis: &Basis,
+) {
+    let (area, rank) = (geometry.window.area(), basis.rank());
+    // `[block, component, slot]`, so that the inner loop reads consecutive values.
+    let mut kernels = vec![[0.0; BLOCK_SLOTS]; area.div_ceil(BLOCK_SLOTS) * rank];
+    for (k, kernel) in basis.kernels.iter().enumerate() {
+        for (b, slots) in kernel.chunks(BLOCK_SLOTS).enumerate() {
+            kernels[b * rank + k][..slots.len()].copy_from_slice(slots);
         }
     }
-
-    /// The light transport functions. A factored tile needs its `basis`.
-    pub fn functions(self, geometry: &Geometry, basis: Option<&Basis>) -> TransportFunctions {
-        match (self, basis) {
-            (Self::Direct(functions), _) => functions,
-            (Self::Factored(tile), Some(basis)) => tile.expand(geometry, basis),
-            (Self::Factored(tile), None) => {
-                TransportFunctions::zeros(tile.rect, geometry.window.area())
+    let pixels = rect.pixels().zip(tau.chunks_exact_mut(area));
+    for ((pixel, tau), coefficients) in pixels.zip(coefficients.chunks_exact(rank)) {
+        for (tau, kernels) in tau.chunks_mut(BLOCK_SLOTS).zip(kernels.chunks_exact(rank)) {
+            let sums = combine(coefficients, kernels);
+            for (s, tau) in tau.iter_mut().enumerate() {
+                (0..CHANNELS).for_each(|c| tau[c] += sums[c][s]);
             }
         }
+        geometry.zero_off_light_plane(geometry.window_origin(pixel), tau);
     }
+}
+
+/// `Σ_k c_k v_k` on one block of slots by channel. Sums run over `k` in order, so that results do not depend on the
+/// size of blocks.
+fn combine(
+    coefficients: &[[f32; CHANNELS]],
+    kernels: &[[f32; BLOCK_SLOTS]],
+) -> [[f32; BLOCK_SLOTS]; CHANNELS] {
+    // Three variables instead of an array, which the compiler would keep in memory.
+    let (mut red, mut green, mut blue) =
+        ([0.0; BLOCK_SLOTS], [0.0; BLOCK_SLOTS], [0.0; BLOCK_SLOTS]);
+    for ([r, g, b], kernel) in coefficients.iter().zip(kernels) {
+        for (s, v) in kernel.iter().enumerate() {
+            red[s] += r * v;
+            green[s] += g * v;
+            blue[s] += b * v;
+        }
+    }
+    [red, green, blue]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::transport::{Correspondence, Extent, Window};
+    use crate::transport::{Correspondence, Extent, TileCodes, Window};
 
     fn wave(i: usize) -> f32 {
         ((i * 7919 % 1009) as f32 / 504.0 - 1.0) * 0.3
@@ -246,11 +220,11 @@ mod tests {
         for rect in geometry.tiles() {
             let n = rect.extent.area() * rank;
             let coefficient = |i| [0, 1, 2].map(|c| wave(i * 3 + c + rect.x as usize));
-            let tile = FactoredTile {
-                rect,
+            let tile = FloatTile {
                 coefficients: (0..n).map(coefficient).collect(),
+                ..FloatTile::dark(rect)
             };
-            let functions = tile.expand(&geometry, &basis);
+            let functions = tile.functions(&geometry, Some(&basis));
             for (p, pixel) in rect.pixels().enumerate() {
                 let origin = geometry.window_origin(pixel);
                 for s in 0..area {
@@ -301,19 +275,19 @@ mod tests {
                 .map(|i| [0, 1, 2].map(|c| wave(from + 3 * i + c)))
                 .collect()
         };
-        let band = BandTile {
+        let whole = FloatTile {
             rect: tile,
             coefficients: values(rank, 0),
             functions: values(area, 500),
         };
-        let functions = band.clone().functions(&geometry, &basis);
+        let functions = whole.functions(&geometry, Some(&basis));
         for (p, tau) in functions.tau.chunks_exact(area).enumerate() {
             for (s, tau) in tau.iter().enumerate() {
                 for c in 0..CHANNELS {
                     let combined: f32 = (0..rank)
-                        .map(|k| band.coefficients[p * rank + k][c] * basis.kernels[k][s])
+                        .map(|k| whole.coefficients[p * rank + k][c] * basis.kernels[k][s])
                         .sum();
-                    let want = combined + band.functions[p * area + s][c];
+                    let want = combined + whole.functions[p * area + s][c];
                     assert!((tau[c] - want).abs() < 1e-6);
                 }
             }
@@ -324,7 +298,7 @@ mod tests {
             rect(21, 12, 4, 8),
             rect(10, 19, 15, 1),
         ] {
-            let cropped = band.crop(part);
+            let cropped = whole.crop(part);
             assert_eq!(cropped.rect, part);
             for (p, pixel) in part.pixels().enumerate() {
                 let at = (pixel.y - tile.y) * tile.extent.width + pixel.x - tile.x;
@@ -334,11 +308,11 @@ mod tests {
                 let at = at as usize;
                 assert_eq!(
                     of(&cropped.coefficients, rank, p),
-                    of(&band.coefficients, rank, at)
+                    of(&whole.coefficients, rank, at)
                 );
                 assert_eq!(
                     of(&cropped.functions, area, p),
-                    of(&band.functions, area, at)
+                    of(&whole.functions, area, at)
                 );
             }
         }
@@ -364,15 +338,16 @@ mod tests {
         };
         let (mut expanding, mut quantising) = (0.0, 0.0);
         for rect in geometry.tiles() {
-            let tile = FactoredTile {
-                rect,
+            let tile = FloatTile {
                 coefficients: (0..rect.extent.area() * 48).map(|i| [wave(i); 3]).collect(),
+                ..FloatTile::dark(rect)
             };
             let start = std::time::Instant::now();
-            let functions = tile.expand(&geometry, &basis);
+            let functions = tile.functions(&geometry, Some(&basis));
             expanding += start.elapsed().as_secs_f64();
             let start = std::time::Instant::now();
-            std::hint::black_box(crate::transport::DirectTile::quantise(rect, &functions.tau));
+            let codes = TileCodes::of_functions(rect, &functions.tau, Vec::new());
+            std::hint::black_box(codes);
             quantising += start.elapsed().as_secs_f64();
         }
         println!("expand {expanding:.2} s, quantise {quantising:.2} s");
