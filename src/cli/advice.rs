@@ -51,7 +51,7 @@ fn capture_remedy(is_named: bool, problem: &CaptureProblem) -> Option<&'static s
 
 fn recovery_remedy(error: &RecoverError) -> Option<&'static str> {
     Some(match error {
-        RecoverError::TooFewPatterns { .. } => {
+        RecoverError::TooFewPatterns(_) => {
             "photograph the object under more patterns, about 80 for a good result"
         }
         RecoverError::CorrespondenceOffLightPlane => {

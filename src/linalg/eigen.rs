@@ -10,9 +10,7 @@ const CONVERGED_ENERGY: f64 = 1e-24;
 /// `[n, n]` matrix.
 pub(crate) fn symmetric_eigen(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut vectors = vec![0.0; n * n];
-    for i in 0..n {
-        vectors[i * n + i] = 1.0;
-    }
+    (0..n).for_each(|i| vectors[i * n + i] = 1.0);
     let total: f64 = a.iter().map(|x| x * x).sum();
     for _ in 0..MAX_SWEEPS {
         let off_diagonal: f64 = (0..n)
@@ -45,18 +43,14 @@ fn rotate(a: &mut [f64], vectors: &mut [f64], n: usize, p: usize, q: usize) {
     let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
     let c = 1.0 / t.hypot(1.0);
     let s = t * c;
+    let rotate = |m: &mut [f64], i: usize, j: usize| {
+        let (x, y) = (m[i], m[j]);
+        (m[i], m[j]) = (c * x - s * y, s * x + c * y);
+    };
+    (0..n).for_each(|i| rotate(a, i * n + p, i * n + q));
     for i in 0..n {
-        let (x, y) = (a[i * n + p], a[i * n + q]);
-        a[i * n + p] = c * x - s * y;
-        a[i * n + q] = s * x + c * y;
-    }
-    for i in 0..n {
-        let (x, y) = (a[p * n + i], a[q * n + i]);
-        a[p * n + i] = c * x - s * y;
-        a[q * n + i] = s * x + c * y;
-        let (x, y) = (vectors[p * n + i], vectors[q * n + i]);
-        vectors[p * n + i] = c * x - s * y;
-        vectors[q * n + i] = s * x + c * y;
+        rotate(a, p * n + i, q * n + i);
+        rotate(vectors, p * n + i, q * n + i);
     }
 }
 

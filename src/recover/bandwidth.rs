@@ -31,7 +31,6 @@ const DEFAULT_SIDE: u32 = 15;
 /// Sides of the middle of the window, which differs from pixel to pixel. The largest one is used whose number of
 /// elements is at most three quarters of the number of patterns.
 const CENTRE_SIDES: [u32; 4] = [7, 5, 3, 1];
-/// Largest tail fraction of the chosen window.
 const MAX_TAIL_FRACTION: f64 = 0.01;
 /// Rings added to the window found: the mean function is narrower than the widest ones.
 const MARGIN_RINGS: usize = 1;
@@ -121,12 +120,10 @@ impl WindowEstimate {
 
 /// The division of the widest window into a centre and rings around it.
 struct Rings {
-    /// Side of the centre.
     centre: u32,
     /// The region of each slot: the centre's elements are regions by themselves, and come first; then the rings, from
     /// the inside out.
     regions: Vec<usize>,
-    /// Number of elements in each region.
     sizes: Vec<f64>,
 }
 
@@ -158,7 +155,6 @@ impl Rings {
         (self.centre * self.centre) as usize
     }
 
-    /// Number of rings.
     fn count(&self) -> usize {
         self.sizes.len() - self.centre_area()
     }

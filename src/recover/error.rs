@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::sampling::MIN_PATTERNS;
 use crate::executor::Cancelled;
 use crate::transport::GeometryError;
 
@@ -9,13 +10,8 @@ use crate::transport::GeometryError;
 #[derive(Debug, Error)]
 pub enum RecoverError {
     /// There are fewer patterns than recovery makes sense with.
-    #[error("{count} patterns are too few; recovery needs at least {min}")]
-    TooFewPatterns {
-        /// Number of patterns.
-        count: usize,
-        /// Number needed.
-        min: usize,
-    },
+    #[error("{0} patterns are too few; recovery needs at least {MIN_PATTERNS}")]
+    TooFewPatterns(usize),
     /// The window, the grids or the correspondence are out of range.
     #[error(transparent)]
     Geometry(#[from] GeometryError),

@@ -18,11 +18,7 @@ const MAX_TABLE_BYTES: usize = 64 << 20;
 #[derive(Debug)]
 pub(super) struct GramCache {
     geometry: Geometry,
-    /// Column and row, on the light plane, of the region's first element.
-    first: [usize; 2],
-    /// Columns and rows of the region.
-    width: usize,
-    height: usize,
+    region: ClippedRect,
     /// The patterns, and the weight of each, `[L]`.
     pattern_indices: Vec<usize>,
     weights: Vec<f64>,
@@ -106,9 +102,7 @@ impl GramCache {
         }
         let mut cache = Self {
             geometry,
-            first: [u, v],
-            width,
-            height,
+            region,
             pattern_indices: pattern_indices.to_vec(),
             weights: pattern_indices.iter().map(|&i| weights[i]).collect(),
             emissions,
@@ -116,7 +110,7 @@ impl GramCache {
         };
         // The table takes an inner product for each pair of elements that any window could hold; a window's own Gram
         // matrix takes one for each pair that it does hold.
-        let entries = region.area() * offsets(window).pow(2);
+        let entries = cache.region.area() * offsets(window).pow(2);
         let products = origins.len() * window.area().pow(2);
         if entries * size_of::<f64>() <= MAX_TABLE_BYTES && entries < products {
             cache.correlations = vectorise(
@@ -137,7 +131,8 @@ impl GramCache {
     #[inline(always)]
     fn correlate(&self) -> Vec<f64> {
         let window = self.geometry.window;
-        let (width, height, offsets) = (self.width, self.height, offsets(window));
+        let (width, height) = (self.region.columns.len(), self.region.rows.len());
+        let offsets = offsets(window);
         let reach = window.side() as usize - 1;
         let mut table = vec![0.0; width * height * offsets * offsets];
         for m in 0..width * height {
@@ -165,22 +160,19 @@ impl GramCache {
         common_mode: CommonMode,
         pattern_indices: &[usize],
     ) -> WindowEquations {
-        let side = self.geometry.window.side() as usize;
-        let clipped = self.geometry.clip_window(origin);
-        let first = clipped.first();
-        let [left, top] = [first[0] - self.first[0], first[1] - self.first[1]];
-        let (mut slots, mut elements) = (Vec::new(), Vec::new());
-        for (i, row) in clipped.rows.clone().enumerate() {
-            for (j, column) in clipped.columns.clone().enumerate() {
-                slots.push(row * side + column);
-                elements.push((top + i) * self.width + left + j);
-            }
-        }
-        let is_included = |&i: &usize| {
-            pattern_indices
-                .binary_search(&self.pattern_indices[i])
-                .is_ok()
-        };
+        let columns = self.geometry.clip_window(origin).columns.len();
+        let (light_width, width) = (
+            self.geometry.light.width as usize,
+            self.region.columns.len(),
+        );
+        let [left, top] = self.region.first();
+        let in_region = |m: usize| (m / light_width - top) * width + m % light_width - left;
+        let elements = self.geometry.elements_of_window(origin);
+        let (slots, elements): (Vec<usize>, Vec<usize>) =
+            elements.map(|(slot, m)| (slot, in_region(m))).unzip();
+        // Pattern indices rise.
+        let position = |i: usize| pattern_indices.binary_search(&self.pattern_indices[i]);
+        let is_included = |&i: &usize| position(i).is_ok();
         let (included, excluded): (Vec<usize>, Vec<usize>) =
             (0..self.weights.len()).partition(is_included);
         let weights = included.iter().map(|&i| self.weights[i]).collect();
@@ -196,12 +188,12 @@ impl GramCache {
             #[inline(always)]
             || {
                 let weights = EquationWeights::new(weights, common_mode);
-                let columns = WeightedColumns::from_weighted(emissions, weights);
+                let weighted = WeightedColumns::from_weighted(emissions, weights);
                 let gram = match self.correlations.is_empty() {
-                    true => columns.gram(),
-                    false => self.look_up(&columns, &elements, clipped.columns.len(), &excluded),
+                    true => weighted.gram(),
+                    false => self.look_up(&weighted, &elements, columns, &excluded),
                 };
-                (columns, gram)
+                (weighted, gram)
             },
         );
         WindowEquations {
@@ -245,7 +237,6 @@ impl GramCache {
     }
 }
 
-/// Number of offsets, along an axis, between two elements of a window.
 fn offsets(window: Window) -> usize {
     2 * window.side() as usize - 1
 }

@@ -1,7 +1,7 @@
 //! Divides the patterns into training patterns, which recoveries use, and held-out ones, which choose between recoveries.
 
 use super::sampling::MIN_PATTERNS;
-use crate::capture::{self, Measurements, Pattern};
+use crate::capture::{self, Pattern};
 use crate::transport::CHANNELS;
 
 /// One in so many distinct patterns is held out.
@@ -21,26 +21,19 @@ pub(super) struct HoldoutSplit {
 impl HoldoutSplit {
     /// Holds out every tenth distinct pattern. Shots of one pattern at several exposures stay together: a pattern that
     /// is in both parts would measure memory, not prediction.
-    pub fn new(measurements: &Measurements) -> Self {
-        Self::of_patterns(&measurements.patterns)
-    }
-
-    fn of_patterns(patterns: &[Pattern]) -> Self {
+    pub fn new(patterns: &[Pattern]) -> Self {
         let all: Vec<usize> = (0..patterns.len()).collect();
         let ids = pattern_ids(patterns);
         let is_held_out = |l: &&usize| ids[**l] % HELD_OUT_EVERY == HELD_OUT_EVERY / 2;
-        let (held_out, training): (Vec<usize>, Vec<usize>) = all.iter().partition(is_held_out);
-        match training.len() >= MIN_PATTERNS && !held_out.is_empty() {
-            true => Self {
-                all,
-                training,
-                held_out,
-            },
-            false => Self {
-                training: all.clone(),
-                all,
-                held_out: Vec::new(),
-            },
+        let (mut held_out, mut training): (Vec<usize>, Vec<usize>) =
+            all.iter().partition(is_held_out);
+        if training.len() < MIN_PATTERNS || held_out.is_empty() {
+            (held_out, training) = (Vec::new(), all.clone());
+        }
+        Self {
+            all,
+            training,
+            held_out,
         }
     }
 }
@@ -79,7 +72,7 @@ mod tests {
     #[test]
     fn every_tenth_distinct_pattern_is_held_out() {
         let distinct: Vec<Pattern> = (0..25u8).map(|i| grey(f32::from(i))).collect();
-        let split = HoldoutSplit::of_patterns(&distinct);
+        let split = HoldoutSplit::new(&distinct);
         assert_eq!(split.held_out, [5, 15]);
         assert_eq!(split.training.len(), 23);
         assert!(!split.training.contains(&5) && !split.training.contains(&15));
@@ -90,7 +83,7 @@ mod tests {
     fn exposures_of_a_pattern_stay_together() {
         // Each pattern twice, once after the other.
         let twice: Vec<Pattern> = (0..24u8).map(|i| grey(f32::from(i / 2))).collect();
-        let split = HoldoutSplit::of_patterns(&twice);
+        let split = HoldoutSplit::new(&twice);
         assert_eq!(split.held_out, [10, 11]);
         let ids = pattern_ids(&twice);
         for l in &split.training {
@@ -102,7 +95,7 @@ mod tests {
     fn few_patterns_are_all_for_training() {
         for count in [0u8, 4, 5] {
             let patterns: Vec<Pattern> = (0..count).map(|i| grey(f32::from(i))).collect();
-            let split = HoldoutSplit::of_patterns(&patterns);
+            let split = HoldoutSplit::new(&patterns);
             assert!(split.held_out.is_empty());
             assert_eq!(
                 (split.training.len(), split.all.len()),
@@ -111,6 +104,6 @@ mod tests {
         }
         // Six patterns are the fewest of which one can be held out.
         let six: Vec<Pattern> = (0..6u8).map(|i| grey(f32::from(i))).collect();
-        assert_eq!(HoldoutSplit::of_patterns(&six).held_out, [5]);
+        assert_eq!(HoldoutSplit::new(&six).held_out, [5]);
     }
 }

@@ -189,7 +189,7 @@ mod tests {
         let preparation = Preparation {
             measurements: &capture.measurements,
             geometry: capture.geometry,
-            split: &HoldoutSplit::new(&capture.measurements),
+            split: &HoldoutSplit::new(&capture.measurements.patterns),
             executor: &SequentialExecutor,
         };
         let recover = |rect| FloatTile::from(cropped(&functions, rect));

@@ -38,40 +38,36 @@ impl Method {
         Self::Bpdn(SparsityBasis::Haar),
     ];
 
+    /// `bound` for [`Learned`](Self::Learned), zero for the others.
+    fn if_learned<T: Default>(self, bound: T) -> T {
+        match self {
+            Self::Learned => bound,
+            Self::Nnls | Self::Bpdn(_) => T::default(),
+        }
+    }
+
     /// Upper bound on the memory that preparing a recovery takes beside the measurements, in bytes.
     pub fn preparation_bytes(self, window: Window) -> usize {
-        let own = match self {
-            Self::Learned => learned::preparation_bytes(window),
-            Self::Nnls | Self::Bpdn(_) => 0,
-        };
-        own.max(pooled::max_bytes(window))
+        let learned = self.if_learned(learned::preparation_bytes(window));
+        learned.max(pooled::max_bytes(window))
     }
 
     /// Upper bound on the memory that recovering a tile takes beside the measurements and the tile's functions, in
     /// bytes.
     pub fn tile_bytes(self, window: Window, patterns: usize) -> usize {
-        let pixelwise = PixelwiseRecovery::max_tile_bytes(window, patterns);
-        match self {
-            // Tiles may be blended with least squares.
-            Self::Learned => pixelwise.max(learned::tile_bytes(window)),
-            Self::Nnls | Self::Bpdn(_) => pixelwise,
-        }
+        // Learned tiles may be blended with least squares.
+        let learned = self.if_learned(learned::tile_bytes(window));
+        learned.max(PixelwiseRecovery::max_tile_bytes(window, patterns))
     }
 
     /// Largest rank of the basis that factored tiles share.
     pub fn max_rank(self, window: Window) -> usize {
-        match self {
-            Self::Learned => learned::max_rank(window),
-            Self::Nnls | Self::Bpdn(_) => 0,
-        }
+        self.if_learned(learned::max_rank(window))
     }
 
     /// Largest distance from a tile, in camera pixels, of measurements that the tile depends on.
     pub fn max_halo(self) -> u32 {
-        match self {
-            Self::Learned => learned::MAX_HALO,
-            Self::Nnls | Self::Bpdn(_) => 0,
-        }
+        self.if_learned(learned::MAX_HALO)
     }
 
     /// The basis of [`Bpdn`](Self::Bpdn).

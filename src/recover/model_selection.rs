@@ -100,11 +100,11 @@ impl PixelwiseRecovery {
                     y.is_finite()
                 };
                 let count = all.iter().filter(is_finite).count();
-                let spare = count as f64 - x.iter().filter(|&&x| x > 0.0).count() as f64;
-                if count >= MIN_PATTERNS && spare >= 1.0 {
+                let residual_freedom = count as f64 - x.iter().filter(|&&x| x > 0.0).count() as f64;
+                if count >= MIN_PATTERNS && residual_freedom >= 1.0 {
                     let y = equations.weight(&samples.y);
                     let residual = equations.columns.squared_residual(&y, x);
-                    pairs.push((sampling::mean(&samples.y), residual / spare));
+                    pairs.push((sampling::mean(&samples.y), residual / residual_freedom));
                 }
             };
             self.solve_windows(measurements, from_ref(&sample[i]), all, &mut add);

@@ -27,12 +27,10 @@ impl EquationWeights {
         }
     }
 
-    /// The same weight for each of `patterns`.
     pub fn uniform(patterns: usize, common_mode: CommonMode) -> Self {
         Self::new(vec![1.0; patterns], common_mode)
     }
 
-    /// Number of patterns, L.
     pub fn len(&self) -> usize {
         self.patterns.len()
     }
@@ -87,7 +85,6 @@ impl WeightedColumns {
         }
     }
 
-    /// Number of unknowns, k.
     pub fn unknowns(&self) -> usize {
         self.means.len()
     }
@@ -176,7 +173,6 @@ impl NormalEquations {
         }
     }
 
-    /// Adds the sums of other pixels.
     pub fn merge(&mut self, other: &Self) {
         add_scaled(&mut self.gram, 1.0, &other.gram);
         add_scaled(&mut self.right, 1.0, &other.right);

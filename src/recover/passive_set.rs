@@ -101,7 +101,6 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         all
     }
 
-    /// Removes all members.
     #[inline(always)]
     pub fn clear(&mut self) {
         let width = self.padded_len();

@@ -115,7 +115,6 @@ impl Slope {
     }
 }
 
-/// Adds one window's pixels to the moments, `[pattern]`.
 fn add_window(
     moments: &mut [Moments],
     preparation: &Preparation<impl Executor>,

@@ -39,7 +39,6 @@ pub(super) fn max_bytes(window: Window) -> usize {
     (JOBS + 2) * window.area() * window.area() * size_of::<f64>()
 }
 
-/// The squares of the picture that are used.
 pub(super) fn sample_squares(measurements: &Measurements) -> Vec<TileRect> {
     sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES)
 }
@@ -106,7 +105,6 @@ fn fit_round(
     Nnls::new(&gram, area).solve(&right)
 }
 
-/// Adds the equations of one window's pixels.
 #[inline(always)]
 fn add_window(
     sums: &mut NormalEquations,
@@ -182,17 +180,11 @@ impl PooledMeasurements {
     }
 }
 
-/// Why `squares` have no function.
 fn dark_or_overexposed(measurements: &Measurements, squares: &[TileRect]) -> RecoverError {
-    let is_saturated = |pixel| {
-        let mut samples = (0..measurements.patterns.len())
-            .flat_map(|l| (0..CHANNELS).map(move |c| measurements.sample(l, pixel, c)));
-        samples.any(f64::is_nan)
-    };
-    let pixels = squares.iter().flat_map(|square| square.pixels());
-    let [all, saturated] = pixels.fold([0, 0], |[all, saturated], pixel| {
-        [all + 1, saturated + usize::from(is_saturated(pixel))]
-    });
+    let patterns = measurements.patterns.len();
+    let saturated = |&square| measurements.count_overexposed_pixels(square, patterns);
+    let saturated: usize = squares.iter().map(saturated).sum();
+    let all: usize = squares.iter().map(|square| square.extent.area()).sum();
     match 2 * saturated > all {
         true => RecoverError::Overexposed,
         false => RecoverError::NoSignal,
@@ -210,7 +202,7 @@ mod tests {
         mean_function(&Preparation {
             measurements: &capture.measurements,
             geometry: capture.geometry,
-            split: &HoldoutSplit::new(&capture.measurements),
+            split: &HoldoutSplit::new(&capture.measurements.patterns),
             executor: &SequentialExecutor,
         })
     }

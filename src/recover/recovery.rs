@@ -52,13 +52,11 @@ impl Recovery {
         executor: &impl Executor,
     ) -> Result<Self, RecoverError> {
         let geometry = preparation::geometry(measurements, settings.window)?;
-        if measurements.patterns.len() < MIN_PATTERNS {
-            return Err(RecoverError::TooFewPatterns {
-                count: measurements.patterns.len(),
-                min: MIN_PATTERNS,
-            });
+        let patterns = measurements.patterns.len();
+        if patterns < MIN_PATTERNS {
+            return Err(RecoverError::TooFewPatterns(patterns));
         }
-        let split = HoldoutSplit::new(measurements);
+        let split = HoldoutSplit::new(&measurements.patterns);
         let preparation = Preparation {
             measurements,
             geometry,

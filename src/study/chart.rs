@@ -8,7 +8,6 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::error::{ChartError, StudyError};
 
-/// Width and height.
 const SIZE_PX: (u32, u32) = (960, 500);
 /// Width of the legend, to the right of the plot.
 const LEGEND_WIDTH_PX: u32 = 210;
@@ -25,7 +24,6 @@ const COLOURS: [RGBColor; 8] = [
 ];
 const FONT: &str = "Helvetica, Arial, sans-serif";
 
-/// One line.
 pub(super) struct Series {
     pub name: String,
     /// By ascending x; every x is positive.
@@ -38,7 +36,6 @@ pub(super) struct Series {
 pub(super) struct TopAxis {
     pub label: &'static str,
     pub factor: f64,
-    /// Values of the ticks.
     pub ticks: Vec<f64>,
 }
 

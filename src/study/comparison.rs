@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::accuracy::{Accuracy, measure_accuracy, pooled_snr};
 use super::chart::{Chart, TopAxis, axis_range};
-use super::dense_transport::DenseTransport;
+use super::dense_transport::{DenseTransport, dense_transport};
 use super::error::StudyError;
 use super::method_curve::MethodCurve;
 use super::methods;
@@ -27,9 +27,7 @@ const PHOTOGRAPH_COUNTS: [usize; 8] = [10, 20, 40, 80, 160, 320, 640, 1024];
 const MAX_PATTERNS: usize = 640;
 /// Numbers of patterns for slow methods.
 const SLOW_PATTERN_COUNTS: [usize; 4] = [20, 80, 160, 320];
-/// Sample size of recovery without a window.
 const UNWINDOWED_PIXELS: usize = 96;
-/// The SNR to reach.
 const TARGET_SNR_DB: f64 = 25.0;
 /// Index of the first photograph of a row, so that its noise differs from that of all other photographs.
 const FIRST_ROW_PHOTOGRAPH: u32 = 1 << 20;
@@ -46,7 +44,7 @@ pub fn comparison(
     progress: ProgressCallback,
 ) -> Result<Section, StudyError> {
     let geometry = scene_camera.scene.geometry();
-    let truth = DenseTransport::new(&scene_camera, executor);
+    let truth = dense_transport(&scene_camera, executor);
     let counts = |max: usize| PHOTOGRAPH_COUNTS.into_iter().filter(move |&k| k <= max);
     let mut curves = Vec::new();
     let mut add_curve = |method: String, points: Vec<Accuracy>| {
@@ -66,19 +64,17 @@ pub fn comparison(
     let start = Instant::now();
     let scanned = scanning::snr_by_scans(&truth, &scans);
     let seconds = start.elapsed().as_secs_f64();
-    let scanned = scanned
-        .into_iter()
-        .zip(1..)
-        .map(|(snr, photographs)| Accuracy {
-            photographs,
-            snr,
-            standard_error: 0.0,
-            pixels: truth.pixels(),
-            seconds,
-        });
-    add_curve("scanning".to_owned(), scanned.collect());
+    let point = |(snr, photographs)| Accuracy {
+        photographs,
+        snr,
+        standard_error: 0.0,
+        pixels: truth.len(),
+        seconds,
+    };
+    let points = scanned.into_iter().zip(1..).map(point);
+    add_curve("scanning".to_owned(), points.collect());
 
-    let nystrom = counts(2 * truth.elements.min(truth.pixels()))
+    let nystrom = counts(2 * geometry.light.area().min(truth.len()))
         .map(|photographs| run_nystrom(&truth, &scene_camera, &scans, photographs, executor));
     add_curve("kernel Nyström".to_owned(), nystrom.collect());
     drop(scans);
@@ -97,13 +93,7 @@ pub fn comparison(
             .filter(is_measured)
             .map(|l| {
                 let measurements = first_shots(&measurements, l);
-                measure_accuracy(
-                    &scene_camera,
-                    &measurements,
-                    method,
-                    truth.pixels(),
-                    executor,
-                )
+                measure_accuracy(&scene_camera, &measurements, method, truth.len(), executor)
             })
             .collect();
         add_curve(format!("window, {}", methods::name(method)), points?);
@@ -215,19 +205,20 @@ fn run_nystrom(
     photographs: usize,
     executor: &impl Executor,
 ) -> Accuracy {
-    let elements = pixel_sampling::random_indices(truth.elements, photographs / 2);
-    let pixels = pixel_sampling::random_indices(truth.pixels(), photographs - photographs / 2);
-    let black = vec![[0.0; CHANNELS]; truth.elements];
+    let light = scans.len();
+    let elements = pixel_sampling::random_indices(light, photographs / 2);
+    let pixels = pixel_sampling::random_indices(truth.len(), photographs - photographs / 2);
+    let black = vec![[0.0; CHANNELS]; light];
     let dark = scene_camera.add_noise(&black, FIRST_ROW_PHOTOGRAPH);
     let rows = executor.map(pixels.len(), |i| {
-        let row = truth.pixel(pixels[i]).to_vec();
-        scene_camera.add_noise(&row, FIRST_ROW_PHOTOGRAPH + 1 + pixels[i] as u32)
+        let number = FIRST_ROW_PHOTOGRAPH + 1 + pixels[i] as u32;
+        scene_camera.add_noise(&truth[pixels[i]], number)
     });
     let start = Instant::now();
-    let mut parts = vec![TransportError::default(); truth.pixels()];
+    let mut parts = vec![TransportError::default(); truth.len()];
     for c in 0..CHANNELS {
-        let columns = (0..truth.pixels())
-            .flat_map(|n| elements.iter().map(move |&m| f64::from(scans[m][n][c])));
+        let columns =
+            (0..truth.len()).flat_map(|n| elements.iter().map(move |&m| f64::from(scans[m][n][c])));
         let sampled = rows.iter().flat_map(|row| {
             let less_dark = row.iter().zip(&dark);
             less_dark.map(|(y, dark)| f64::from(y[c] - dark[c]))
@@ -238,11 +229,11 @@ fn run_nystrom(
                 rows: sampled.collect(),
                 elements: elements.clone(),
                 pixels: pixels.clone(),
-                light: truth.elements,
+                light,
             },
             executor,
         );
-        let errors = executor.map(truth.pixels(), |n| {
+        let errors = executor.map(truth.len(), |n| {
             let mut estimate = nystrom.pixel(n);
             // Photographed columns and rows replace their predictions.
             for &m in &elements {
@@ -254,7 +245,7 @@ fn run_nystrom(
                 }
             }
             let mut error = TransportError::default();
-            for (truth, estimate) in truth.pixel(n).iter().zip(estimate) {
+            for (truth, estimate) in truth[n].iter().zip(estimate) {
                 error.add(f64::from(truth[c]), estimate);
             }
             error
@@ -267,7 +258,7 @@ fn run_nystrom(
         photographs,
         snr: pooled_snr(&parts, 1.0).0,
         standard_error: 0.0,
-        pixels: truth.pixels(),
+        pixels: truth.len(),
         seconds: start.elapsed().as_secs_f64(),
     }
 }

@@ -7,9 +7,7 @@ use crate::transport::{Geometry, TileRect};
 /// The default method of `ltm-export recover`.
 pub(super) const DEFAULT_METHOD: Method = Method::Learned;
 
-/// Factor on the sample size of fast methods.
 const FAST_FACTOR: usize = 4;
-/// Divisor of the sample size of slow methods.
 const SLOW_DIVISOR: usize = 8;
 
 /// Fewer tiles would give no usable standard error.

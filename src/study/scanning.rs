@@ -16,7 +16,7 @@ pub(super) fn snr_by_scans(
         .map(|(m, photograph)| {
             let mut column = <(TransportError, TransportError)>::default();
             for (n, y) in photograph.iter().enumerate() {
-                let tau = truth.pixel(n)[m];
+                let tau = truth[n][m];
                 for c in 0..CHANNELS {
                     // Noise makes measurements negative.
                     let estimate = f64::from(y[c].max(0.0));
@@ -43,11 +43,8 @@ mod tests {
 
     #[test]
     fn a_complete_scan_without_noise_is_exact() {
-        let truth = DenseTransport {
-            elements: 2,
-            tau: vec![[0.3; 3], [0.4; 3], [0.0; 3], [0.5; 3]],
-        };
-        let photograph = |m: usize| vec![truth.pixel(0)[m], truth.pixel(1)[m]];
+        let truth = vec![vec![[0.3; 3], [0.4; 3]], vec![[0.0; 3], [0.5; 3]]];
+        let photograph = |m: usize| vec![truth[0][m], truth[1][m]];
         let snr = snr_by_scans(&truth, &[photograph(0), photograph(1)]);
         let half = 10.0 * (0.5f64 / 0.41).log10();
         assert!((snr[0].unwrap().0 - half).abs() < 1e-4);

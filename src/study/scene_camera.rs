@@ -62,7 +62,6 @@ impl SceneCamera<'_> {
         measurements
     }
 
-    /// A photograph without light.
     fn dark(&self) -> LinearPhoto {
         let black = vec![[0.0; CHANNELS]; self.scene.geometry().camera.area()];
         self.add_noise(&black, 0)

@@ -61,11 +61,11 @@ pub fn scenes_table(
             seed,
         };
         let measurements = scene_camera.measure(ensemble, patterns, executor);
-        let mut levels = Vec::new();
+        let mut snrs = Vec::new();
         for &method in Method::ALL {
             let accuracy =
                 measure_accuracy(&scene_camera, &measurements, method, pixels, executor)?;
-            levels.push(accuracy.snr);
+            snrs.push(accuracy.snr);
         }
         let ensemble = match ensemble {
             Gaussian => "gaussian",
@@ -80,13 +80,13 @@ pub fn scenes_table(
             electrons.to_string(),
             seed.to_string(),
         ];
-        row.extend(levels.iter().map(|&snr| snr_cell(snr)));
+        row.extend(snrs.iter().map(|&snr| snr_cell(snr)));
         progress(&format!("scenes: {}", row.join(", ")));
         let best_snr = |is_default: bool| {
-            let levels = Method::ALL.iter().zip(&levels);
-            let chosen = levels.filter(|(method, _)| (**method == DEFAULT_METHOD) == is_default);
-            let levels = chosen.filter_map(|(_, snr)| Some((*snr)?.0));
-            levels.reduce(f64::max)
+            let snrs = Method::ALL.iter().zip(&snrs);
+            let chosen = snrs.filter(|(method, _)| (**method == DEFAULT_METHOD) == is_default);
+            let snrs = chosen.filter_map(|(_, snr)| Some((*snr)?.0));
+            snrs.reduce(f64::max)
         };
         let shortfall = best_snr(false)
             .zip(best_snr(true))
@@ -112,7 +112,6 @@ pub fn scenes_table(
     Ok(section)
 }
 
-/// The name of a scene on the command line.
 fn scene_name(kind: SceneKind) -> &'static str {
     match kind {
         StainedGlass => "stained-glass",

@@ -24,7 +24,6 @@ impl Section {
         }
     }
 
-    /// Adds a paragraph.
     pub(super) fn add_paragraph(&mut self, text: &str) {
         self.markdown += &format!("\n{}\n", text.trim_end());
     }
@@ -36,10 +35,6 @@ impl Section {
         self.files.push((path, svg.into_bytes()));
     }
 
-    /// Adds a table as a CSV file.
-    ///
-    /// # Errors
-    /// Those of [`Table::csv`].
     pub(super) fn add_csv(&mut self, name: &str, table: &Table) -> Result<(), StudyError> {
         self.files.push((format!("{name}.csv"), table.csv()?));
         Ok(())

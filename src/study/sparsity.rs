@@ -12,9 +12,7 @@ use crate::transport::{CHANNELS, CameraPx, Extent, Geometry};
 /// Ignored low bits of the mantissa: elements within 1/64 of each other are in one class.
 const IGNORED_BITS: u32 = 17;
 const CLASSES: usize = 1 << (31 - IGNORED_BITS);
-/// Points of a profile's curve.
 const CURVE_POINTS: usize = 120;
-/// Shares of the energy in the table.
 const ENERGY_SHARES: [f64; 4] = [0.5, 0.9, 0.99, 0.999];
 /// Side of the overview of the whole matrix, in cells.
 const OVERVIEW_SIDE: u32 = 512;
@@ -50,7 +48,6 @@ impl SparsityProfile {
         }
     }
 
-    /// Adds the elements of another profile.
     fn merge(&mut self, other: &Self) {
         for class in 0..CLASSES {
             self.counts[class] += other.counts[class];

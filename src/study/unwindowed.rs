@@ -26,30 +26,30 @@ pub(super) fn measure_accuracy(
     let start = Instant::now();
     let gram = gram(measurements, executor);
     let shared = start.elapsed().as_secs_f64();
-    let indices = pixel_sampling::random_indices(truth.pixels(), pixels);
+    let indices = pixel_sampling::random_indices(truth.len(), pixels);
     let start = Instant::now();
     let functions = executor.map(indices.len(), |i| {
-        let mut solver = Nnls::new(&gram, truth.elements);
+        let mut solver = Nnls::new(&gram, measurements.light.area());
         [0, 1, 2].map(|c| solver.solve(&right_hand_side(measurements, indices[i], c)))
     });
     let each = start.elapsed().as_secs_f64() / indices.len() as f64;
     let errors = functions.iter().zip(indices).map(|(function, n)| {
         let mut error = TransportError::default();
         for (c, tau) in function.iter().enumerate() {
-            for (truth, &tau) in truth.pixel(n).iter().zip(tau) {
+            for (truth, &tau) in truth[n].iter().zip(tau) {
                 error.add(f64::from(truth[c]), tau);
             }
         }
         error
     });
     let errors: Vec<TransportError> = errors.collect();
-    let (snr, standard_error) = pooled_snr(&errors, errors.len() as f64 / truth.pixels() as f64);
+    let (snr, standard_error) = pooled_snr(&errors, errors.len() as f64 / truth.len() as f64);
     Accuracy {
         photographs: measurements.patterns.len(),
         snr,
         standard_error,
         pixels: errors.len(),
-        seconds: shared + each * truth.pixels() as f64,
+        seconds: shared + each * truth.len() as f64,
     }
 }
 
@@ -124,7 +124,7 @@ mod tests {
             },
             patterns: patterns.into_iter().map(Pattern::Grey).collect(),
         };
-        let truth = DenseTransport { elements: 16, tau };
+        let truth = vec![tau];
         let accuracy = measure_accuracy(&truth, &measurements, 1, &SequentialExecutor);
         assert!(accuracy.snr.is_none_or(|snr| snr.0 > 60.0), "{accuracy:?}");
     }

@@ -44,8 +44,7 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     let shots = shots::choose_shots(&manifest.shots, args.patterns)?;
     if shots.len() < MIN_PATTERNS {
         let manifest = folder.manifest_path().display().to_string();
-        let (count, min) = (shots.len(), MIN_PATTERNS);
-        return Err(RecoverError::TooFewPatterns { count, min }).context(manifest);
+        return Err(RecoverError::TooFewPatterns(shots.len())).context(manifest);
     }
     let method = args.method();
     let plan = MemoryPlan::new(

@@ -101,7 +101,6 @@ impl<'a> NewtonSystem<'a> {
         self.newton_step(&change)
     }
 
-    /// The products of slacks and multipliers.
     #[inline(always)]
     fn products(&self) -> ComplementarityProducts {
         let point = self.point;

@@ -47,7 +47,6 @@ impl<'a> SensingOperator<'a> {
         }
     }
 
-    /// Number of unknowns, k.
     pub fn unknowns(&self) -> usize {
         self.equations.slots.len()
     }

@@ -58,10 +58,8 @@ impl Tolerance {
                 wxy += weight * x * y;
             }
             let determinant = w * wxx - wx * wx;
-            let (gain, floor) = (
-                (w * wxy - wx * wy) / determinant,
-                (wxx * wy - wx * wxy) / determinant,
-            );
+            let gain = (w * wxy - wx * wy) / determinant;
+            let floor = (wxx * wy - wx * wxy) / determinant;
             (fit.gain, fit.floor) = if determinant <= 1e-9 * w * wxx || gain < 0.0 {
                 (0.0, wy / w)
             } else if floor < 0.0 {

@@ -50,18 +50,6 @@ impl LearnedBasis {
         self.functions.rank()
     }
 
-    /// V, `[element, r]`, and the mean function's peak.
-    pub fn by_element(&self) -> (Vec<f64>, f64) {
-        let rank = self.rank();
-        let mut elements = Vec::with_capacity(self.interleaved.len());
-        let mut peak = 0.0f64;
-        for row in self.interleaved.chunks_exact(self.stride) {
-            elements.extend(row[..rank].iter().map(|&v| f64::from(v)));
-            peak = peak.max(f64::from(row[rank]));
-        }
-        (elements, peak)
-    }
-
     /// The responses to every pattern, in the colour of channel `plane`, of the window at `origin`.
     pub fn respond(
         &self,

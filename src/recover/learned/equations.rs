@@ -21,7 +21,6 @@ use crate::transport::{CHANNELS, CameraPx, Extent, Geometry, TileRect};
 /// Sub-element positions along one axis. With two camera pixels for each light element, neighbours lie in different
 /// halves of it and see different parts of their window.
 const PHASES_PER_AXIS: usize = 2;
-/// Sub-element positions of a camera pixel.
 pub(super) const PHASES: usize = PHASES_PER_AXIS * PHASES_PER_AXIS;
 
 /// Rounding variance of a 16-bit photograph, the least that a measurement has.
@@ -51,14 +50,13 @@ pub(super) struct Observation {
     /// Index of BᵀB among the region's Gram matrices.
     pub gram: usize,
     /// Brightness f, in units of the measurement: the response of the mean function under full light.
-    pub scale: f64,
+    pub brightness: f64,
     /// Noise variance of one measurement.
     pub variance: f64,
     /// ‖y‖².
-    pub power: f64,
+    pub energy: f64,
     /// Number of measurements; 0 if none is usable.
     pub count: usize,
-    /// Sub-element position.
     pub phase: usize,
     /// Whether all of its window is inside the light plane.
     pub has_full_window: bool,
@@ -67,9 +65,7 @@ pub(super) struct Observation {
 /// The normal equations of all observations of a region.
 #[derive(Debug)]
 pub(super) struct RegionEquations {
-    /// The pixels.
     pub rect: TileRect,
-    /// Number of basis functions, r.
     pub rank: usize,
     /// `[pixel, channel]`.
     pub observations: Vec<Observation>,
@@ -109,7 +105,6 @@ impl RegionEquations {
         equations
     }
 
-    /// Number of Gram matrices that the equations of `rect` have.
     pub fn count_gram_matrices(
         measurements: &Measurements,
         geometry: &Geometry,
@@ -143,8 +138,8 @@ impl RegionEquations {
     pub fn is_bright(&self, index: usize, thresholds: &BrightnessThresholds) -> bool {
         let observation = &self.observations[index];
         observation.count > 0
-            && observation.scale > thresholds[index % CHANNELS]
-            && observation.scale / observation.variance.sqrt() > MIN_CONTRAST
+            && observation.brightness > thresholds[index % CHANNELS]
+            && observation.brightness / observation.variance.sqrt() > MIN_CONTRAST
     }
 
     /// Adds the observations of a window's pixels in the channels that one plane of the patterns drives.
@@ -187,9 +182,11 @@ pub(super) fn brightness_thresholds(regions: &[RegionEquations]) -> BrightnessTh
     std::array::from_fn(|c| {
         let observations = regions.iter().flat_map(|region| &region.observations);
         let of_channel = observations.skip(c).step_by(CHANNELS);
-        let mut scales: Vec<f64> = of_channel.map(|observation| observation.scale).collect();
-        scales.sort_by(f64::total_cmp);
-        let bright = scales.get(scales.len() * BRIGHT_PERCENTILE / 100);
+        let mut brightnesses: Vec<f64> = of_channel
+            .map(|observation| observation.brightness)
+            .collect();
+        brightnesses.sort_by(f64::total_cmp);
+        let bright = brightnesses.get(brightnesses.len() * BRIGHT_PERCENTILE / 100);
         MIN_RELATIVE_BRIGHTNESS * bright.copied().unwrap_or(0.0)
     })
 }
@@ -219,7 +216,7 @@ struct WeightedResponses {
     /// B.
     columns: WeightedColumns,
     /// Mean response of the mean function.
-    mean_function: f64,
+    mean_response: f64,
 }
 
 impl WeightedResponses {
@@ -242,13 +239,13 @@ impl WeightedResponses {
         let products = pattern_indices.iter().zip(&weights.patterns);
         let products = products.map(|(&l, w)| w * w * responses.mean(l));
         Self {
-            mean_function: products.sum::<f64>() / weights.energy,
+            mean_response: products.sum::<f64>() / weights.energy,
             columns: WeightedColumns::new(columns, weights),
             pattern_indices,
         }
     }
 
-    /// Brightness, variance, power and count of channel `c` with measurements y; writes Bᵀy to `right_hand_side`, `[r]`.
+    /// Brightness, variance, energy and count of channel `c` with measurements y; writes Bᵀy to `right_hand_side`, `[r]`.
     #[inline(always)]
     fn observe(
         &self,
@@ -265,14 +262,14 @@ impl WeightedResponses {
         let products = self.columns.right_hand_side(&y);
         let pairs = right_hand_side.iter_mut().zip(products);
         pairs.for_each(|(right, product)| *right = product);
-        let scale = match self.mean_function > 0.0 {
-            true => mean / self.mean_function,
+        let brightness = match self.mean_response > 0.0 {
+            true => mean / self.mean_response,
             false => 0.0,
         };
         Observation {
-            scale: scale.max(0.0),
+            brightness: brightness.max(0.0),
             variance: variance.max(MIN_VARIANCE),
-            power: dot(&y, &y),
+            energy: dot(&y, &y),
             count: y.len(),
             ..Observation::default()
         }

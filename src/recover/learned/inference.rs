@@ -57,11 +57,11 @@ impl LearnedModel {
             || {
                 let mut solver = PosteriorSolver::new(rank);
                 for (i, location) in means.interior_locations().enumerate() {
-                    let scale = equations.observations[location.index].scale;
+                    let brightness = equations.observations[location.index].brightness;
                     let pixel = &mut coefficients[i / CHANNELS * rank..][..rank];
                     let z = self.estimate(&means, location, &mut solver);
                     for (coefficient, z) in pixel.iter_mut().zip(z) {
-                        coefficient[location.channel] = (scale * z) as f32;
+                        coefficient[location.channel] = (brightness * z) as f32;
                     }
                 }
             },
@@ -97,7 +97,6 @@ impl LearnedModel {
         estimate
     }
 
-    /// The light transport functions of a tile.
     pub fn expand(&self, tile: &FloatTile) -> TransportFunctions {
         tile.functions(&self.geometry, Some(&self.basis.functions))
     }

@@ -30,7 +30,6 @@ use crate::executor::Executor;
 use crate::linalg::{self, add_scaled, vectorise};
 use crate::transport::CHANNELS;
 
-/// Iterations of expectation–maximisation.
 const EM_ITERATIONS: usize = 4;
 /// Groups of regions that sums are formed over. Fixed, so that results do not depend on the executor.
 const PARTS: usize = 8;
@@ -84,7 +83,6 @@ impl NeighbourPrior {
         let rank = prior.rank;
         let parts = executor.map(PARTS, |part| {
             let mut sums = vec![RegressionSums::new(rank); CLASSES];
-            let mut count = 0usize;
             for region in regions.iter().skip(part).step_by(PARTS) {
                 vectorise(
                     #[inline(always)]
@@ -92,23 +90,21 @@ impl NeighbourPrior {
                         for location in region.bright_locations() {
                             let target = region.mean(location.index);
                             sums[class(region, location)].add(region, location, target);
-                            count += 1;
                         }
                     },
                 );
             }
-            (sums, count)
+            sums
         });
-        let count: usize = parts.iter().map(|(_, count)| count).sum();
-        if count < MIN_OBSERVATIONS_PER_WEIGHT * PREDICTORS * CLASSES {
+        let sums = parts.into_iter().reduce(|mut sums, part| {
+            let pairs = sums.iter_mut().zip(&part);
+            pairs.for_each(|(sum, part)| sum.merge(part));
+            sums
+        })?;
+        let count: f64 = sums.iter().map(RegressionSums::count).sum();
+        if count < (MIN_OBSERVATIONS_PER_WEIGHT * PREDICTORS * CLASSES) as f64 {
             return None;
         }
-        let mut sums = vec![RegressionSums::new(rank); CLASSES];
-        for (part, _) in &parts {
-            let sums = sums.iter_mut().zip(part);
-            sums.for_each(|(sum, part)| sum.merge(part));
-        }
-        drop(parts);
         let factors = executor.map(CLASSES, |i| sums[i].cholesky_factors());
         let solve = |right_hand_sides: &[Vec<f64>]| {
             executor.map(CLASSES, |i| {
@@ -122,7 +118,7 @@ impl NeighbourPrior {
             precision: prior.precision.clone(),
             mixing_share: 0.5,
         };
-        learned.precision = learned.first_precision(regions, prior);
+        learned.precision = learned.initial_precision(regions, prior);
         for _ in 0..EM_ITERATIONS {
             let statistics = learned.expectation(regions, prior.noise_factor, executor);
             let [low, high] = MIXING_SHARE_RANGE;
@@ -140,7 +136,7 @@ impl NeighbourPrior {
 
     /// The first estimate of C⁻¹: from the prediction errors of the posterior means, and part of the variance that these
     /// means have themselves.
-    fn first_precision(&self, regions: &[PosteriorMeans<'_>], prior: &Prior) -> PriorPrecision {
+    fn initial_precision(&self, regions: &[PosteriorMeans<'_>], prior: &Prior) -> PriorPrecision {
         let rank = self.rank;
         let mut covariance = vec![0.0; rank * rank];
         let mut variance = vec![0.0; rank];
@@ -204,7 +200,6 @@ impl NeighbourPrior {
         (1.0 / (1.0 + (-log_odds).exp()), mean)
     }
 
-    /// The E step over all regions.
     fn expectation(
         &self,
         regions: &[PosteriorMeans<'_>],

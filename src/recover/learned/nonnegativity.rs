@@ -12,7 +12,6 @@
 //! suffice. A penalty instead of a constraint, because a combination of few basis functions cannot be zero over most of
 //! a window.
 
-use super::basis::LearnedBasis;
 use crate::linalg::{self, add_scaled, dot};
 
 /// Negative light that costs as much as one standard deviation of the posterior, as a share of the mean function's
@@ -34,11 +33,12 @@ pub(super) struct NonNegativityPenalty {
 }
 
 impl NonNegativityPenalty {
-    pub fn new(basis: &LearnedBasis) -> Self {
-        let (elements, peak) = basis.by_element();
+    /// `functions` are the basis, `[r, element]`; `mean` is the mean function, `[element]`.
+    pub fn new(functions: &[f64], mean: &[f64]) -> Self {
+        let peak = mean.iter().copied().fold(0.0, f64::max);
         Self {
-            rank: basis.rank(),
-            elements,
+            rank: functions.len() / mean.len(),
+            elements: linalg::transpose(functions, mean.len()),
             weight: (TOLERATED_NEGATIVE_SHARE * peak).powi(-2),
         }
     }
@@ -110,7 +110,7 @@ mod tests {
         let mean = vec![0.5; area];
         let penalty = NonNegativityPenalty {
             weight: 3.0,
-            ..NonNegativityPenalty::new(&LearnedBasis::new(&functions, &mean))
+            ..NonNegativityPenalty::new(&functions, &mean)
         };
         let mut precision = vec![0.0; rank * rank];
         for i in 0..rank {
@@ -152,7 +152,7 @@ mod tests {
     #[test]
     fn non_negative_functions_do_not_change() {
         let functions: Vec<f64> = (0..18).map(|i| 0.1 + pseudo_random(i).abs()).collect();
-        let penalty = NonNegativityPenalty::new(&LearnedBasis::new(&functions, &[0.5; 9]));
+        let penalty = NonNegativityPenalty::new(&functions, &[0.5; 9]);
         let mut z = vec![0.7, 0.2];
         penalty.apply(&[1.0, 0.0, 0.0, 1.0], &mut z);
         assert_eq!(z, [0.7, 0.2]);

@@ -88,7 +88,7 @@ impl PosteriorSolver {
         let rank = equations.rank;
         let observation = &equations.observations[index];
         let (gram, right) = (equations.gram(index), equations.right_hand_side(index));
-        let (f, variance) = (observation.scale, observation.variance * noise);
+        let (f, variance) = (observation.brightness, observation.variance * noise);
         let (a, b) = (f * f / variance, f / variance);
         for ((x, p), g) in self.factor.iter_mut().zip(&prior.matrix).zip(gram) {
             *x = p + a * g;
@@ -112,7 +112,6 @@ impl PosteriorSolver {
         -0.5 * (quadratic - explained + log_det + prior.covariance_log_det)
     }
 
-    /// Computes the covariance of the posterior just inferred.
     #[inline(always)]
     pub fn compute_covariance(&mut self) {
         let rank = self.mean.len();
@@ -145,8 +144,8 @@ impl PosteriorSolver {
             let (g, p) = (&gram[row.clone()], &self.covariance[row]);
             trace += 2.0 * dot(g, p) - g[0] * p[0];
         }
-        let f = observation.scale;
-        observation.power - 2.0 * f * dot(&self.mean, equations.right_hand_side(index))
+        let f = observation.brightness;
+        observation.energy - 2.0 * f * dot(&self.mean, equations.right_hand_side(index))
             + f * f * (dot(&self.mean, &self.product) + trace)
     }
 }

@@ -8,7 +8,6 @@ use crate::transport::{CHANNELS, Extent, TileRect};
 
 /// Largest distance, along each axis, of a neighbour that predicts a pixel.
 pub(in crate::recover) const NEIGHBOURHOOD_RADIUS: u32 = 2;
-/// Side of the square of neighbours.
 const NEIGHBOURHOOD_SIDE: usize = 2 * NEIGHBOURHOOD_RADIUS as usize + 1;
 /// Predictors of an observation: a constant; in the same channel, all pixels in the square neighbourhood but the pixel
 /// itself; in the other channels, those in the same row or column, and the pixel itself.
@@ -69,7 +68,6 @@ pub(super) struct PosteriorMeans<'a> {
 }
 
 impl<'a> PosteriorMeans<'a> {
-    /// Computes the posterior mean of every observation of `equations`.
     pub fn new(
         equations: &'a RegionEquations,
         interior: TileRect,

@@ -17,7 +17,6 @@ use crate::linalg::{self, add_scaled, vectorise};
 const FULL_WINDOW_RATIO: usize = 4;
 /// Weight of the pooled mean in the mean of a sub-element position, in observations.
 const POOLED_MEAN_WEIGHT: f64 = 20.0;
-/// Smallest noise factor.
 const MIN_NOISE_FACTOR: f64 = 0.1;
 
 /// The prior of one observation.
@@ -96,7 +95,6 @@ impl Prior {
         self.maximisation(total);
     }
 
-    /// The E step over one region.
     #[inline(always)]
     fn expectation(
         &self,

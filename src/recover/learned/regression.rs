@@ -47,6 +47,11 @@ impl RegressionSums {
         }
     }
 
+    /// Number of observations: the constant's product with itself.
+    pub fn count(&self) -> f64 {
+        self.gram[0]
+    }
+
     /// Adds sums over other observations.
     pub fn merge(&mut self, other: &Self) {
         add_scaled(&mut self.gram, 1.0, &other.gram);

@@ -164,7 +164,7 @@ fn learn(
     measurements: &Measurements,
     executor: &impl Executor,
 ) -> Result<LearnedRecovery, RecoverError> {
-    let split = HoldoutSplit::new(measurements);
+    let split = HoldoutSplit::new(&measurements.patterns);
     let preparation = preparation(measurements, &split, executor);
     let mean = pooled::mean_function(&preparation)?;
     LearnedRecovery::new(&preparation, &mean)
@@ -185,9 +185,9 @@ pub(super) fn synthetic_equations(
     let observations = rect.pixels().flat_map(|pixel| {
         let observation = Observation {
             gram: 0,
-            scale: 1.0,
+            brightness: 1.0,
             variance,
-            power: 0.0,
+            energy: 0.0,
             count: rank,
             phase: (pixel.y % 2 * 2 + pixel.x % 2) as usize,
             has_full_window: true,
@@ -212,7 +212,7 @@ fn learned_recovery_beats_least_squares_with_few_patterns() {
     let geometry = geometry();
     let (measurements, tau) = measurements(20, 7);
     let learned = learn(&measurements, &SequentialExecutor).unwrap();
-    let split = HoldoutSplit::new(&measurements);
+    let split = HoldoutSplit::new(&measurements.patterns);
     let preparation = preparation(&measurements, &split, &SequentialExecutor);
     let direct = PixelwiseRecovery::least_squares(&preparation).unwrap();
     let ours: Vec<_> = geometry
@@ -247,7 +247,7 @@ fn short_exposures_weigh_less_than_long_ones() {
     let geometry = geometry();
     let recovered = |measurements: &Measurements| {
         let learned = learn(measurements, &SequentialExecutor).unwrap();
-        let split = HoldoutSplit::new(measurements);
+        let split = HoldoutSplit::new(&measurements.patterns);
         let preparation = preparation(measurements, &split, &SequentialExecutor);
         let direct = PixelwiseRecovery::least_squares(&preparation).unwrap();
         let learned = geometry.tiles().map(|rect| {
@@ -275,7 +275,7 @@ fn execution_order_does_not_change_the_result() {
     let other = learn(&measurements, &ReverseOrder).unwrap();
     assert_eq!(one.basis(), other.basis());
     let rect = geometry.tile(1);
-    let split = HoldoutSplit::new(&measurements);
+    let split = HoldoutSplit::new(&measurements.patterns);
     assert_eq!(
         one.tile(&measurements, &split, rect),
         other.tile(&measurements, &split, rect)
@@ -293,7 +293,7 @@ fn training_uses_pixels_with_saturated_samples() {
         }
     }
     let learned = learn(&measurements, &SequentialExecutor).unwrap();
-    let split = HoldoutSplit::new(&measurements);
+    let split = HoldoutSplit::new(&measurements.patterns);
     let tiles = geometry.tiles().map(|rect| {
         let tile = learned.tile(&measurements, &split, rect);
         tile.functions(&geometry, Some(learned.basis()))
@@ -335,7 +335,7 @@ fn blending_improves_sparse_unrelated_functions() {
     let measurements = photograph(40, 7, &tau);
     let mut learned = learn(&measurements, &SequentialExecutor).unwrap();
     assert!(learned.nnls.is_some());
-    let split = HoldoutSplit::new(&measurements);
+    let split = HoldoutSplit::new(&measurements.patterns);
     let recovered = |learned: &LearnedRecovery| -> Vec<_> {
         let tiles = geometry.tiles().map(|rect| {
             let tile = learned.tile(&measurements, &split, rect);
@@ -439,8 +439,8 @@ fn posterior_mean_minimises_the_negative_log_posterior() {
         let residual: Vec<f64> = (0..3)
             .map(|k| {
                 let product: f64 = (0..3).map(|j| gram[k * 3 + j] * solver.mean[j]).sum();
-                observation.scale
-                    * (equations.right_hand_side(index)[k] - observation.scale * product)
+                observation.brightness
+                    * (equations.right_hand_side(index)[k] - observation.brightness * product)
                     / variance
             })
             .collect();
@@ -469,8 +469,8 @@ fn a_saturated_sample_counts_as_missing() {
             clean.right_hand_side(index)
         );
         assert_eq!(
-            saturated.observations[index].scale,
-            clean.observations[index].scale
+            saturated.observations[index].brightness,
+            clean.observations[index].brightness
         );
         assert_eq!(saturated.observations[index].count, 9);
     }
@@ -492,6 +492,9 @@ fn rgb_patterns_with_equal_channels_equal_grey_patterns() {
     for index in 0..12 {
         assert_eq!(a.gram(index), b.gram(index));
         assert_eq!(a.right_hand_side(index), b.right_hand_side(index));
-        assert_eq!(a.observations[index].scale, b.observations[index].scale);
+        assert_eq!(
+            a.observations[index].brightness,
+            b.observations[index].brightness
+        );
     }
 }

@@ -83,11 +83,10 @@ impl<E: Executor> Preparation<'_, E> {
         for rank in ranks {
             self.executor.check_cancelled()?;
             let (functions, prior) = truncate_basis(&functions, &prior, rank, mean.len());
-            let basis = LearnedBasis::new(&functions, &mean);
             let model = LearnedModel {
                 geometry: self.geometry,
-                penalty: NonNegativityPenalty::new(&basis),
-                basis,
+                basis: LearnedBasis::new(&functions, &mean),
+                penalty: NonNegativityPenalty::new(&functions, &mean),
                 prior,
                 neighbour_prior: None,
                 thresholds,
