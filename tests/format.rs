@@ -7,8 +7,8 @@ use common::{Noise, functions, geometry, sealed};
 use proptest::prelude::*;
 use relightable_photo::executor::{Executor, SequentialExecutor};
 use relightable_photo::format::{
-    self, ChunkId, Coding, DistortionMetric, EncodedFile, Extension, FileSection, FormatError,
-    HEADER_BYTES, Interest, Limits, LtmReader, Metadata, RateTarget, Source, TextDamage,
+    self, ChunkId, ChunkSelection, Coding, DistortionMetric, EncodedFile, Extension, FileSection,
+    FormatError, HEADER_BYTES, Limits, LtmReader, Metadata, RateTarget, Source, TextDamage,
 };
 use relightable_photo::transport::{
     Basis, CHANNELS, Decibels, FloatTile, Geometry, Tile, Transport, TransportError,
@@ -233,7 +233,7 @@ proptest! {
         let want = decode(&file, file.len()).unwrap();
         let mut reader = LtmReader::new(Limits::default());
         let mut noise = Noise(seed);
-        while let Some(ranges) = Some(reader.wants(&Interest::default())).filter(|r| !r.is_empty()) {
+        while let Some(ranges) = Some(reader.wants(&ChunkSelection::default())).filter(|r| !r.is_empty()) {
             let range = ranges[(noise.next() * ranges.len() as f64) as usize].clone();
             let mut range = range.start as usize..file.len().min(range.end as usize);
             if let Some(index) = reader.index() && noise.next() < 0.7 {
@@ -304,11 +304,11 @@ fn every_scan_raises_the_snr_as_declared() {
             assert!(reader.progress().scans > s); // later scans may have no chunks
             assert!(
                 reader
-                    .wants(&Interest::default())
+                    .wants(&ChunkSelection::default())
                     .iter()
                     .all(|r| r.start >= end as u64)
             );
-            let enough = Interest {
+            let enough = ChunkSelection {
                 snr: Some(Decibels(scan.snr.0)),
                 viewport: None,
             };
@@ -429,21 +429,21 @@ fn only_visible_tiles_are_wanted() {
     let geometry = geometry([64, 48], [32, 24], 5, [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]);
     let file = Recovered::mixed(geometry, 6, 2).file(QUALITY);
     let mut reader = LtmReader::new(Limits::default());
-    let first = reader.wants(&Interest::default());
+    let first = reader.wants(&ChunkSelection::default());
     assert_eq!((first.len(), &first[0]), (1, &(0..format::FIRST_BYTES)));
     let index_bytes = read(&file, file.len()).unwrap().index_bytes().unwrap();
     reader.feed(0, &file[..200]).unwrap();
-    let then = reader.wants(&Interest::default());
+    let then = reader.wants(&ChunkSelection::default());
     assert_eq!((then.len(), &then[0]), (1, &(200..index_bytes)));
     reader.feed(200, &file[200..index_bytes as usize]).unwrap();
-    let interest = Interest {
+    let selection = ChunkSelection {
         viewport: Some((20..33, 9..16)),
         snr: None,
     };
     // Tiles 2, 3 and 4 of the second row of eight.
     let index = reader.index().unwrap().clone();
     let visible = [10, 11, 12];
-    for range in reader.wants(&interest) {
+    for range in reader.wants(&selection) {
         let chunk = index
             .chunks()
             .find(|chunk| index.range(*chunk).start == range.start)
@@ -456,9 +456,9 @@ fn only_visible_tiles_are_wanted() {
             .feed(range.start, &file[range.start as usize..range.end as usize])
             .unwrap();
     }
-    assert!(reader.wants(&interest).is_empty());
+    assert!(reader.wants(&selection).is_empty());
     let rest: u64 = reader
-        .wants(&Interest::default())
+        .wants(&ChunkSelection::default())
         .iter()
         .map(|r| r.end - r.start)
         .sum();

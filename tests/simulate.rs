@@ -11,7 +11,7 @@ use relightable_photo::capture::{CaptureFolder, LinearPhoto, Pattern, RowSet};
 use relightable_photo::simulate::{
     Camera, EmissionMatrix, LightCodes, RandomStream, SceneKind, SimulatedScene,
 };
-use relightable_photo::transport::{CHANNELS, Element, Extent, TileRect, TransportFunctions};
+use relightable_photo::transport::{CHANNELS, Extent, LightElement, TileRect, TransportFunctions};
 
 fn simulate(out: &Path, args: &[&str]) -> Command {
     let mut command = Command::cargo_bin("ltm-export").unwrap();
@@ -293,7 +293,7 @@ fn transport_is_finite_non_negative_and_inside_the_window() {
                 for (s, tau) in tau.iter().enumerate() {
                     let (i, j) = (s % side, s / side);
                     assert!(tau.iter().all(|t| t.is_finite() && *t >= 0.0));
-                    let element = Element {
+                    let element = LightElement {
                         u: origin.u + i as i32,
                         v: origin.v + j as i32,
                     };

@@ -1,6 +1,6 @@
 //! Reading a file in pieces.
 
-use relightable_photo::format::{FileIndex, Interest, LtmReader};
+use relightable_photo::format::{ChunkSelection, FileIndex, LtmReader};
 use relightable_photo::transport::Decibels;
 
 use crate::choices::Choices;
@@ -16,22 +16,22 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
     let mut failed = None;
     // Each iteration feeds at least one new byte.
     for _ in 0..=2 * file.len() {
-        let interest = match choices.chance(64) && reader.index().is_some() {
-            true => Interest {
+        let selection = match choices.chance(64) && reader.index().is_some() {
+            true => ChunkSelection {
                 viewport: Some((0..choices.byte().into(), 0..choices.byte().into())),
                 snr: choices.chance(128).then(|| Decibels(choices.byte().into())),
             },
-            false => Interest::default(),
+            false => ChunkSelection::default(),
         };
-        let wanted_in_file = |reader: &LtmReader, interest: &Interest| -> Vec<_> {
-            let wanted = reader.wants(interest).into_iter();
+        let wanted_in_file = |reader: &LtmReader, selection: &ChunkSelection| -> Vec<_> {
+            let wanted = reader.wants(selection).into_iter();
             wanted
                 .filter(|range| range.start < file.len() as u64)
                 .collect()
         };
-        let mut ranges = wanted_in_file(&reader, &interest);
+        let mut ranges = wanted_in_file(&reader, &selection);
         if ranges.is_empty() {
-            ranges = wanted_in_file(&reader, &Interest::default());
+            ranges = wanted_in_file(&reader, &ChunkSelection::default());
         }
         if ranges.is_empty() {
             break;
@@ -52,7 +52,7 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
         let before = reader.progress().bytes;
         if choices.chance(32) {
             // Also some of the bytes that the reader already has before the range.
-            let wanted = reader.wants(&Interest::default());
+            let wanted = reader.wants(&ChunkSelection::default());
             let ends = wanted.iter().map(|range| range.end as usize);
             let known = ends.filter(|end| *end <= range.start).max().unwrap_or(0);
             if wanted
@@ -74,7 +74,7 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
     let Some(error) = failed else {
         assert!(
             reader
-                .wants(&Interest::default())
+                .wants(&ChunkSelection::default())
                 .iter()
                 .all(|range| range.start >= file.len() as u64),
             "the reader wants more of a file that it has"
@@ -88,7 +88,7 @@ pub fn read(file: &[u8], choices: &mut Choices<'_>) -> Read {
         let _ = reader.feed(at as u64, &file[at..end]);
         at = end;
     }
-    let _ = reader.wants(&Interest::default());
+    let _ = reader.wants(&ChunkSelection::default());
     if let Ok((transport, _)) = reader.finish_early() {
         check_transport(&transport);
     }

@@ -1,7 +1,7 @@
 //! All ways of reading a file, and the properties that must hold.
 
 use relightable_photo::format::{
-    self, FIRST_BYTES, FileIndex, FormatError, HEADER_BYTES, Interest, Limits, LtmReader,
+    self, ChunkSelection, FIRST_BYTES, FileIndex, FormatError, HEADER_BYTES, Limits, LtmReader,
     MetadataJson,
 };
 use relightable_photo::transport::{CHANNELS, Decibels, Tile, Transport};
@@ -42,7 +42,7 @@ pub fn index(file: &[u8]) -> Option<FileIndex> {
 /// If one does not hold.
 pub fn check_index(file: &[u8], choices: &mut Choices<'_>) {
     let mut reader = LtmReader::new(LIMITS);
-    assert_eq!(reader.wants(&Interest::default()), [0..FIRST_BYTES]);
+    assert_eq!(reader.wants(&ChunkSelection::default()), [0..FIRST_BYTES]);
     if reader
         .feed(0, &file[..file.len().min(HEADER_BYTES)])
         .is_err()
@@ -59,7 +59,7 @@ pub fn check_index(file: &[u8], choices: &mut Choices<'_>) {
         "the index has {end} bytes, but the limits allow {max_bytes}"
     );
     assert_eq!(
-        reader.wants(&Interest::default()),
+        reader.wants(&ChunkSelection::default()),
         [file.len().min(HEADER_BYTES) as u64..end]
     );
     let Some(index) = index(file) else {
@@ -85,21 +85,21 @@ pub fn check_index(file: &[u8], choices: &mut Choices<'_>) {
     if reader.feed(0, &file[..end as usize]).is_err() {
         return;
     }
-    let all = reader.wants(&Interest::default());
+    let all = reader.wants(&ChunkSelection::default());
     let sum: u64 = all.iter().map(|range| range.end - range.start).sum();
     assert_eq!(
         sum,
         index.header.file_bytes - end,
         "the reader does not want all chunks"
     );
-    let interest = Interest {
+    let selection = ChunkSelection {
         viewport: Some((
             choices.u32()..choices.u32(),
             choices.u16().into()..choices.u16().into(),
         )),
         snr: Some(Decibels(choices.f64())),
     };
-    for range in reader.wants(&interest) {
+    for range in reader.wants(&selection) {
         let inside = all
             .iter()
             .any(|all| all.start <= range.start && range.end <= all.end);

@@ -19,7 +19,7 @@ mod rows;
 
 pub use error::{CaptureError, CaptureProblem, MANIFEST_NAME};
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
-pub use folder::{CaptureFolder, DarkFrame, PhotoReader, RELIT_FULL_SCALE, Truth};
+pub use folder::{CaptureFolder, DarkFrame, GroundTruth, PhotoReader, RELIT_FULL_SCALE};
 pub(crate) use group::{group_count, group_ids};
 pub use manifest::{CameraSpec, GrayCodeShot, LightSpec, Manifest, Shot};
 pub use measurements::{LinearPhoto, Measurements, Pattern};

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::ltm_file::{PrefixLength, read_ltm};
 use super::process::AllCores;
 use super::report::{format_bytes, print_json, print_line};
-use crate::capture::{CaptureFolder, LinearPhoto, PhotoReader, RowSet, Truth};
+use crate::capture::{CaptureFolder, GroundTruth, LinearPhoto, PhotoReader, RowSet};
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{BuiltinLight, Light};
 use crate::study::{CaptureTruth, psnr, transport_error};
@@ -93,7 +93,11 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
 
 impl EvaluateReport {
     /// Compares the transport and its pictures with the known ones.
-    fn compare_with_truth(&mut self, relighter: &mut CpuRelighter, truth: Truth) -> Result<()> {
+    fn compare_with_truth(
+        &mut self,
+        relighter: &mut CpuRelighter,
+        truth: GroundTruth,
+    ) -> Result<()> {
         let geometry = relighter.transport().geometry;
         for name in truth.lights()? {
             let light = Light::from_linear_rgb(geometry.light, &truth.light(&name)?.rgb())?;

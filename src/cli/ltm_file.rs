@@ -9,7 +9,7 @@ use anyhow::{Context, Result, anyhow, ensure};
 
 use super::arguments::ByteCount;
 use crate::format::{
-    FileIndex, FileSection, FormatError, HEADER_BYTES, Interest, Limits, LtmReader,
+    ChunkSelection, FileIndex, FileSection, FormatError, HEADER_BYTES, Limits, LtmReader,
 };
 use crate::transport::Transport;
 
@@ -103,7 +103,7 @@ pub fn open_ltm(path: &Path) -> Result<(File, FileIndex)> {
             if let Some(index) = reader.index() {
                 return Ok((file, index.clone()));
             }
-            let range = reader.wants(&Interest::default()).into_iter().next();
+            let range = reader.wants(&ChunkSelection::default()).into_iter().next();
             let range = range.unwrap_or_default();
             let bytes = read_range(&mut file, range.clone())?;
             if bytes.is_empty() {

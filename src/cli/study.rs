@@ -13,8 +13,8 @@ use crate::capture::{CaptureFolder, Measurements, NoiseModel, RowSet};
 use crate::relight::Light;
 use crate::simulate::{SceneKind, SimulatedScene, WINDOW_SIDE};
 use crate::study::{
-    self, CaptureTruth, KnownTransport, ProgressCallback, RelitLight, SNR_PATTERNS, SceneCamera,
-    Section,
+    self, CaptureTruth, KnownTransport, ProgressCallback, RelitLight, ReportSection, SNR_PATTERNS,
+    SceneCamera,
 };
 use crate::transport::Extent;
 
@@ -60,9 +60,9 @@ pub fn run(args: &StudyArgs) -> Result<()> {
     let start = Instant::now();
     let progress = |text: &str| eprintln!("[{:7.1} s] {text}", start.elapsed().as_secs_f64());
     // Errors are found before the work, which may take an hour.
-    let mut subjects: Vec<Subject> = Vec::new();
+    let mut subjects: Vec<StudySubject> = Vec::new();
     for path in &args.subjects {
-        let subject = Subject::new(path, args.pixels as usize, &progress)?;
+        let subject = StudySubject::new(path, args.pixels as usize, &progress)?;
         let name = &subject.name;
         ensure!(
             subjects.iter().all(|other| other.name != *name),
@@ -105,7 +105,7 @@ pub fn run(args: &StudyArgs) -> Result<()> {
 }
 
 /// A part of the study, or a capture to study.
-struct Subject<'a> {
+struct StudySubject<'a> {
     /// The name of a part, or the path of a capture folder; of one named like a part, for instance `./cookies`.
     path: &'a Path,
     is_part: bool,
@@ -116,7 +116,7 @@ struct Subject<'a> {
     progress: ProgressCallback<'a>,
 }
 
-impl<'a> Subject<'a> {
+impl<'a> StudySubject<'a> {
     fn new(path: &'a Path, pixels: usize, progress: ProgressCallback<'a>) -> Result<Self> {
         let is_part = PARTS.iter().any(|part| Path::new(part) == path);
         let folder = match is_part {
@@ -139,7 +139,7 @@ impl<'a> Subject<'a> {
         })
     }
 
-    fn study(&self) -> Result<Vec<Section>> {
+    fn study(&self) -> Result<Vec<ReportSection>> {
         if !self.is_part {
             let sections = self.study_capture();
             return sections.with_context(|| self.path.display().to_string());
@@ -172,7 +172,7 @@ impl<'a> Subject<'a> {
     }
 
     /// The paper's figures for a built-in scene at the paper's scale.
-    fn study_scene(&self, kind: SceneKind) -> Result<Vec<Section>> {
+    fn study_scene(&self, kind: SceneKind) -> Result<Vec<ReportSection>> {
         let scene = kind.build(PAPER_CAMERA, PAPER_LIGHT)?;
         let max_patterns = SNR_PATTERNS[SNR_PATTERNS.len() - 1];
         (self.progress)(&format!(
@@ -186,7 +186,7 @@ impl<'a> Subject<'a> {
     }
 
     /// The paper's figures for a capture with known transport.
-    fn study_capture(&self) -> Result<Vec<Section>> {
+    fn study_capture(&self) -> Result<Vec<ReportSection>> {
         let folder = CaptureFolder::open(self.path)?;
         let truth = folder
             .truth()?
@@ -212,7 +212,7 @@ impl<'a> Subject<'a> {
         known: &impl KnownTransport,
         measurements: Measurements,
         lights: Vec<RelitLight>,
-    ) -> Result<Vec<Section>> {
+    ) -> Result<Vec<ReportSection>> {
         let (name, progress) = (&self.name, self.progress);
         let sparsity = study::sparsity(name, known, &AllCores, progress)?;
         let relit_from = study::first_shots(&measurements, RELIT_PATTERNS);

@@ -31,12 +31,12 @@ impl Default for Limits {
 /// Bytes that a reader may still reserve, and the fallible allocations that reserve them. They fail with
 /// [`FormatError::Limit`] beyond the limit, and with [`FormatError::Memory`] if the system refuses memory.
 #[derive(Debug)]
-pub struct Budget {
+pub struct MemoryBudget {
     limit: u64,
     reserved: Cell<u64>,
 }
 
-impl Budget {
+impl MemoryBudget {
     /// A budget with nothing reserved.
     pub fn new(limits: Limits) -> Self {
         Self {
@@ -143,10 +143,10 @@ impl Budget {
     }
 }
 
-/// Releases on drop all bytes reserved since [`Budget::scratch`], except those that [`keep`](Self::keep) names.
+/// Releases on drop all bytes reserved since [`MemoryBudget::scratch`], except those that [`keep`](Self::keep) names.
 #[derive(Debug)]
 pub struct Scratch<'a> {
-    budget: &'a Budget,
+    budget: &'a MemoryBudget,
     reserved_after: u64,
 }
 
@@ -172,8 +172,8 @@ pub fn vec_bytes<T>(values: &Vec<T>) -> u64 {
 mod tests {
     use super::*;
 
-    fn budget(decoded_bytes: u64) -> Budget {
-        Budget::new(Limits { decoded_bytes })
+    fn budget(decoded_bytes: u64) -> MemoryBudget {
+        MemoryBudget::new(Limits { decoded_bytes })
     }
 
     #[test]

@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use super::budget::Budget;
+use super::budget::MemoryBudget;
 use super::chunk::ChunkId;
 use super::codec::direct;
 use super::error::FormatError;
@@ -19,7 +19,7 @@ const MAX_RANGES: usize = 1024;
 
 /// Which chunks of a file to fetch: all by default.
 #[derive(Clone, Debug, Default)]
-pub struct Interest {
+pub struct ChunkSelection {
     /// Columns and rows of visible camera pixels; all if `None`.
     pub viewport: Option<(Range<u32>, Range<u32>)>,
     /// SNR that is sufficient.
@@ -60,7 +60,7 @@ enum TileState {
 }
 
 impl DecoderState {
-    pub fn new(index: FileIndex, budget: &Budget) -> Result<Self, FormatError> {
+    pub fn new(index: FileIndex, budget: &MemoryBudget) -> Result<Self, FormatError> {
         let (tiles, scans) = (index.tiles(), index.scans.len());
         let mut state = Self {
             basis: Basis {
@@ -107,15 +107,15 @@ impl DecoderState {
     }
 
     /// Byte ranges to fetch, in file order: of visible tiles, and of scans up to the first with a sufficient SNR.
-    pub fn wants(&self, interest: &Interest) -> Vec<Range<u64>> {
+    pub fn wants(&self, selection: &ChunkSelection) -> Vec<Range<u64>> {
         let scans = &self.index.scans;
-        let is_sufficient = |scan: &Scan| interest.snr.is_some_and(|snr| scan.snr.0 >= snr.0);
+        let is_sufficient = |scan: &Scan| selection.snr.is_some_and(|snr| scan.snr.0 >= snr.0);
         let scans = scans
             .iter()
             .position(is_sufficient)
             .map_or(scans.len(), |last| last + 1);
         let geometry = &self.index.header.geometry;
-        let is_visible = |chunk: &ChunkId| match (&interest.viewport, chunk.tile) {
+        let is_visible = |chunk: &ChunkId| match (&selection.viewport, chunk.tile) {
             (Some((x, y)), Some(tile)) => {
                 let (rect, side) = (geometry.tile(tile), geometry.tile_side);
                 rect.x < x.end
@@ -148,7 +148,7 @@ impl DecoderState {
         &mut self,
         mut offset: u64,
         mut bytes: &[u8],
-        budget: &Budget,
+        budget: &MemoryBudget,
     ) -> Result<u64, FormatError> {
         let end = self.index.header.file_bytes;
         let mut new_bytes = 0;
@@ -181,7 +181,7 @@ impl DecoderState {
         range: Range<u64>,
         offset: u64,
         bytes: &[u8],
-        budget: &Budget,
+        budget: &MemoryBudget,
     ) -> Result<u64, FormatError> {
         let number = self.index.chunk_number(chunk);
         let ChunkState::Partial(partial) = &mut self.chunks[number] else {
@@ -217,7 +217,7 @@ impl DecoderState {
         &mut self,
         chunk: ChunkId,
         bytes: &[u8],
-        budget: &Budget,
+        budget: &MemoryBudget,
     ) -> Result<(), FormatError> {
         self.index.check_crc(chunk, bytes)?;
         let number = self.index.chunk_number(chunk);
@@ -245,7 +245,7 @@ impl DecoderState {
 
     /// Skips scans that have no chunk for the tile, decodes chunks that waited, and turns the tile into codes
     /// after its last scan.
-    fn advance_tile(&mut self, tile: usize, budget: &Budget) -> Result<(), FormatError> {
+    fn advance_tile(&mut self, tile: usize, budget: &MemoryBudget) -> Result<(), FormatError> {
         while let TileState::Partial(decoder) = &mut self.tiles[tile] {
             let scan = decoder.scans;
             if scan == self.index.scans.len() {
@@ -277,7 +277,7 @@ impl DecoderState {
 
     /// The transport by the components of complete scans, as [`LtmReader::preview`](super::LtmReader::preview)
     /// says. Its memory is reserved while it is made, and is the caller's afterwards.
-    pub fn preview(&self, budget: &Budget) -> Result<Option<Transport>, FormatError> {
+    pub fn preview(&self, budget: &MemoryBudget) -> Result<Option<Transport>, FormatError> {
         let scans = self.complete_scans();
         if scans == 0 || scans == self.missing.len() {
             return Ok(None);
@@ -290,7 +290,7 @@ impl DecoderState {
         }
     }
 
-    fn transport(&self, rank: usize, budget: &Budget) -> Result<Transport, FormatError> {
+    fn transport(&self, rank: usize, budget: &MemoryBudget) -> Result<Transport, FormatError> {
         let mut kernels = budget.try_with_capacity(rank)?;
         for kernel in &self.basis.kernels[..rank] {
             kernels.push(budget.try_copy(kernel)?);
@@ -314,7 +314,7 @@ impl DecoderState {
         &self,
         tile: &Tile,
         rank: usize,
-        budget: &Budget,
+        budget: &MemoryBudget,
     ) -> Result<Tile, FormatError> {
         let Tile {
             coefficients,
@@ -332,7 +332,7 @@ impl DecoderState {
     }
 
     /// The transport of all chunks so far.
-    pub fn finish(self, budget: &Budget) -> Result<(Transport, MetadataJson), FormatError> {
+    pub fn finish(self, budget: &MemoryBudget) -> Result<(Transport, MetadataJson), FormatError> {
         let rank = self.basis.rank();
         let mut tiles = budget.try_with_capacity(self.tiles.len())?;
         for tile in self.tiles {

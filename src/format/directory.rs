@@ -3,7 +3,7 @@
 //! Decompressed it is `scan record [scan]`, then three tables of `u32 [scan, tile]`: bytes, content
 //! bytes, checksums. Equal fields stand together, as that compresses better.
 
-use super::budget::Budget;
+use super::budget::MemoryBudget;
 use super::chunk::{ChunkEntry, ChunkId};
 use super::codec::zstd_frame::compressed_bound;
 use super::codec::{basis, direct, halves, tokens, transform};
@@ -33,7 +33,7 @@ pub(super) fn encode(scans: &[Scan], entries: &[ChunkEntry]) -> Vec<u8> {
 pub(super) fn decode(
     header: &Header,
     bytes: &[u8],
-    budget: &Budget,
+    budget: &MemoryBudget,
 ) -> Result<(Vec<Scan>, Vec<ChunkEntry>), FormatError> {
     let scans = decode_scans(header, bytes, budget)?;
     let geometry = &header.geometry;
@@ -60,7 +60,11 @@ pub(super) fn decode(
     Ok((scans, entries))
 }
 
-fn decode_scans(header: &Header, bytes: &[u8], budget: &Budget) -> Result<Vec<Scan>, FormatError> {
+fn decode_scans(
+    header: &Header,
+    bytes: &[u8],
+    budget: &MemoryBudget,
+) -> Result<Vec<Scan>, FormatError> {
     let mut scans = budget.try_with_capacity(header.scans as usize)?;
     let mut known = 0;
     let records = bytes.as_chunks().0.iter().take(header.scans as usize);

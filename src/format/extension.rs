@@ -1,6 +1,6 @@
 //! Extensions: blocks of data that later versions and other programs add to a file.
 
-use super::budget::Budget;
+use super::budget::MemoryBudget;
 use super::error::{FileSection, FormatError};
 use super::fields::FieldReader;
 
@@ -33,7 +33,7 @@ pub(super) fn encode(extensions: &[Extension]) -> Vec<u8> {
     bytes
 }
 
-pub(super) fn decode(bytes: &[u8], budget: &Budget) -> Result<Vec<Extension>, FormatError> {
+pub(super) fn decode(bytes: &[u8], budget: &MemoryBudget) -> Result<Vec<Extension>, FormatError> {
     let cut = || FormatError::DamagedSection {
         section: FileSection::Extensions,
         reason: "the last one is cut".to_owned(),

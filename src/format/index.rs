@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::budget::Budget;
+use super::budget::MemoryBudget;
 use super::checksum::check_crc;
 use super::chunk::{ChunkEntry, ChunkId};
 use super::codec::zstd_frame::{compress, decompress};
@@ -37,7 +37,7 @@ impl FileIndex {
     pub(super) fn decode(
         header: Header,
         bytes: &[u8],
-        budget: &Budget,
+        budget: &MemoryBudget,
     ) -> Result<Self, FormatError> {
         let mut rest = &bytes[HEADER_BYTES..];
         let mut take = |SectionEntry { bytes, crc }, section: FileSection| {
@@ -91,7 +91,7 @@ impl FileIndex {
             extensions: SectionEntry::new(&extension_bytes),
             metadata: SectionEntry::new(json),
         };
-        let offsets = offsets(&header, &scans, &entries, &Budget::unlimited())?;
+        let offsets = offsets(&header, &scans, &entries, &MemoryBudget::unlimited())?;
         header.file_bytes = offsets[offsets.len() - 1];
         let fixed = header.encode();
         // Refuses what a reader would refuse.
@@ -159,7 +159,10 @@ impl FileIndex {
     }
 
     /// All basis functions, zero.
-    pub(super) fn try_zeroed_basis(&self, budget: &Budget) -> Result<Vec<Vec<f32>>, FormatError> {
+    pub(super) fn try_zeroed_basis(
+        &self,
+        budget: &MemoryBudget,
+    ) -> Result<Vec<Vec<f32>>, FormatError> {
         let (rank, area) = (self.header.rank.into(), self.header.geometry.window.area());
         let mut kernels = budget.try_with_capacity(rank)?;
         for _ in 0..rank {
@@ -193,7 +196,7 @@ fn offsets(
     header: &Header,
     scans: &[Scan],
     entries: &[ChunkEntry],
-    budget: &Budget,
+    budget: &MemoryBudget,
 ) -> Result<Vec<u64>, FormatError> {
     let mut offsets = budget.try_with_capacity(scans.len() + entries.len() + 1)?;
     let mut next = header.index_bytes();

@@ -7,7 +7,7 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::budget::Budget;
+use super::budget::MemoryBudget;
 use super::error::FormatError;
 
 /// Bytes of parsed JSON for each byte of its text, at most: an array grows to twice its length, of eight
@@ -64,7 +64,7 @@ impl MetadataJson {
     }
 
     /// Takes the bytes of a file. In browsers the page parses the JSON: a parser here would be a tenth of the decoder.
-    pub(super) fn decode(json: &[u8], budget: &Budget) -> Result<Self, FormatError> {
+    pub(super) fn decode(json: &[u8], budget: &MemoryBudget) -> Result<Self, FormatError> {
         // The parser does not check the strings of unknown fields.
         str::from_utf8(json).map_err(invalid)?;
         let text = String::from_utf8(budget.try_copy(json)?);
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn metadata_is_one_json_object_in_utf8() {
-        let decode = |bytes: &[u8]| MetadataJson::decode(bytes, &Budget::unlimited());
+        let decode = |bytes: &[u8]| MetadataJson::decode(bytes, &MemoryBudget::unlimited());
         let json = decode(br#"{"title": "A", "other": ["B"]}"#).unwrap();
         let title = json.read().unwrap().title;
         assert_eq!(title, "A");

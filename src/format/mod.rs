@@ -36,7 +36,7 @@ mod tile_decoder;
 pub use budget::Limits;
 pub use chunk::{ChunkEntry, ChunkId};
 pub use constants::{FIRST_BYTES, HEADER_BYTES};
-pub use decoder_state::Interest;
+pub use decoder_state::ChunkSelection;
 pub use encode::{DistortionMetric, EncodedFile, RateTarget, Source};
 pub use error::{FileSection, FormatError, TextDamage};
 pub use extension::Extension;

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::budget::{Budget, Limits};
+use super::budget::{Limits, MemoryBudget};
 use super::constants::{FIRST_BYTES, HEADER_BYTES};
-use super::decoder_state::{DecoderState, Interest};
+use super::decoder_state::{ChunkSelection, DecoderState};
 use super::error::FormatError;
 use super::header::{self, Header};
 use super::index::FileIndex;
@@ -43,7 +43,7 @@ use crate::transport::Transport;
 /// ```
 #[derive(Debug)]
 pub struct LtmReader {
-    budget: Budget,
+    budget: MemoryBudget,
     /// The first bytes of the index, until it is complete.
     gathered: Vec<u8>,
     header: Option<Header>,
@@ -68,7 +68,7 @@ impl LtmReader {
     /// A reader that has no bytes yet.
     pub fn new(limits: Limits) -> Self {
         Self {
-            budget: Budget::new(limits),
+            budget: MemoryBudget::new(limits),
             gathered: Vec::new(),
             header: None,
             state: None,
@@ -76,16 +76,16 @@ impl LtmReader {
         }
     }
 
-    /// Byte ranges to fetch, the most important first: the index, and then each scan as far as `interest`
+    /// Byte ranges to fetch, the most important first: the index, and then each scan as far as `selection`
     /// goes, without the bytes received. The first range may reach beyond the end of a small file. Returns
     /// at most 1,024 ranges; empty when nothing is missing.
-    pub fn wants(&self, interest: &Interest) -> Vec<Range<u64>> {
+    pub fn wants(&self, selection: &ChunkSelection) -> Vec<Range<u64>> {
         let Some(state) = &self.state else {
             let have = self.gathered.len() as u64;
             let end = self.index_bytes().unwrap_or(FIRST_BYTES);
             return std::iter::once(have..end).collect();
         };
-        state.wants(interest)
+        state.wants(selection)
     }
 
     /// How much has been read.

@@ -1,8 +1,8 @@
 //! Decoding one tile: chunks in the order of scans to coefficients c and direct functions d.
 
-use super::budget::{Budget, vec_bytes};
+use super::budget::{MemoryBudget, vec_bytes};
 use super::chunk::ChunkId;
-use super::codec::transform::Planes;
+use super::codec::transform::CoefficientPlanes;
 use super::codec::{basis, direct, halves};
 use super::error::{FormatError, SectionError};
 use super::index::FileIndex;
@@ -17,7 +17,7 @@ pub(super) struct TileDecoder {
     /// Number of scans that are decoded or have no chunk for the tile.
     pub scans: usize,
     /// Of coding 1.
-    planes: Planes,
+    planes: CoefficientPlanes,
     /// Of coding 2, `[pixel, component]`.
     coefficients: Vec<[f32; CHANNELS]>,
     /// `[pixel, slot]`.
@@ -46,7 +46,7 @@ impl TileDecoder {
         index: &FileIndex,
         order: &[u16],
         bytes: &[u8],
-        budget: &Budget,
+        budget: &MemoryBudget,
     ) -> Result<(), FormatError> {
         let chunk = ChunkId {
             scan: self.scans,
@@ -92,7 +92,7 @@ impl TileDecoder {
         &self,
         index: &FileIndex,
         rank: usize,
-        budget: &Budget,
+        budget: &MemoryBudget,
     ) -> Result<Vec<[f32; CHANNELS]>, FormatError> {
         if !self.planes.is_dark() {
             let extent = index.header.geometry.tile(self.tile).extent;
@@ -115,7 +115,7 @@ impl TileDecoder {
         &self,
         index: &FileIndex,
         rank: usize,
-        budget: &Budget,
+        budget: &MemoryBudget,
     ) -> Result<Tile, FormatError> {
         let rect = index.header.geometry.tile(self.tile);
         let mut quantised = Tile::dark(rect);
@@ -140,7 +140,7 @@ pub(super) fn decode_basis_chunk(
     scan: usize,
     bytes: &[u8],
     kernels: &mut [Vec<f32>],
-    budget: &Budget,
+    budget: &MemoryBudget,
 ) -> Result<(), FormatError> {
     let functions = &mut kernels[index.new_basis_functions(scan)];
     let area = index.header.geometry.window.area();
@@ -158,7 +158,7 @@ pub fn decode_tile<E: From<FormatError>>(
     tile: usize,
     mut fetch: impl FnMut(ChunkId) -> Result<Vec<u8>, E>,
 ) -> Result<FloatTile, E> {
-    let budget = Budget::unlimited();
+    let budget = MemoryBudget::unlimited();
     let order = direct::centre_out_order(index.header.geometry.window, &budget)?;
     let mut decoder = TileDecoder::new(tile);
     for scan in 0..index.scans.len() {
@@ -189,7 +189,7 @@ pub fn decode_basis<E: From<FormatError>>(
     index: &FileIndex,
     mut fetch: impl FnMut(ChunkId) -> Result<Vec<u8>, E>,
 ) -> Result<Basis, E> {
-    let budget = Budget::unlimited();
+    let budget = MemoryBudget::unlimited();
     let mut kernels = index.try_zeroed_basis(&budget)?;
     for chunk in index.chunks().filter(|chunk| chunk.tile.is_none()) {
         let bytes = fetch(chunk)?;
@@ -212,7 +212,7 @@ pub fn check(index: &FileIndex, chunk: ChunkId, bytes: &[u8]) -> Result<(), Form
         });
     }
     index.check_crc(chunk, bytes)?;
-    let (ChunkId { scan, tile }, budget) = (chunk, Budget::unlimited());
+    let (ChunkId { scan, tile }, budget) = (chunk, MemoryBudget::unlimited());
     let Some(tile) = tile else {
         let mut kernels = index.try_zeroed_basis(&budget)?;
         return decode_basis_chunk(index, scan, bytes, &mut kernels, &budget);
@@ -222,7 +222,7 @@ pub fn check(index: &FileIndex, chunk: ChunkId, bytes: &[u8]) -> Result<(), Form
         ..TileDecoder::new(tile)
     };
     if !index.has_colour_klt(scan, tile) {
-        decoder.planes = Planes::with_klt();
+        decoder.planes = CoefficientPlanes::with_klt();
     }
     let order = direct::centre_out_order(index.header.geometry.window, &budget)?;
     decoder.add(index, &order, bytes, &budget)

@@ -20,7 +20,7 @@ use super::sampling::{self, PixelsOfWindow};
 use crate::capture::{Measurements, group_count};
 use crate::executor::Executor;
 use crate::linalg::{self, add_scaled, vectorise};
-use crate::transport::{Element, Geometry, Window};
+use crate::transport::{Geometry, LightElement, Window};
 
 /// Side of the widest window that is searched.
 const MAX_SIDE: u32 = 31;
@@ -166,7 +166,7 @@ impl Rings {
         sums: &mut NormalEquations,
         measurements: &Measurements,
         geometry: &Geometry,
-        origin: Element,
+        origin: LightElement,
         pixels: &PixelsOfWindow,
     ) {
         let elements: Vec<_> = geometry.elements_of_window(origin).collect();

@@ -9,7 +9,7 @@ use super::common_mode::CommonMode;
 use super::normal_equations::{EquationWeights, WeightedColumns};
 use crate::capture::Measurements;
 use crate::linalg::{dot, vectorise};
-use crate::transport::{ClippedRect, Element, Extent, Geometry, Window};
+use crate::transport::{ClippedRect, Extent, Geometry, LightElement, Window};
 
 /// Largest table of correlations that one thread may have in memory.
 const MAX_TABLE_BYTES: usize = 64 << 20;
@@ -74,12 +74,12 @@ impl GramCache {
         geometry: Geometry,
         pattern_indices: &[usize],
         channel: usize,
-        origins: &[Element],
+        origins: &[LightElement],
     ) -> Self {
         let (light, window) = (geometry.light, geometry.window);
         let us = || origins.iter().map(|origin| origin.u);
         let vs = || origins.iter().map(|origin| origin.v);
-        let first = Element {
+        let first = LightElement {
             v: vs().min().unwrap_or(0),
             u: us().min().unwrap_or(0),
         };
@@ -156,7 +156,7 @@ impl GramCache {
     /// The equations of the window that starts at `origin`, from the patterns `pattern_indices` of the cache's.
     pub fn equations(
         &self,
-        origin: Element,
+        origin: LightElement,
         common_mode: CommonMode,
         pattern_indices: &[usize],
     ) -> WindowEquations {
@@ -290,14 +290,15 @@ mod tests {
         let (measurements, indices) = (measurements(), (0..PATTERNS).collect::<Vec<_>>());
         let window = Window::new(3).unwrap();
         let geometry = preparation::geometry(&measurements, window).unwrap();
-        let cache =
-            |origins: &[Element]| GramCache::new(&measurements, geometry, &indices, 0, origins);
-        let origins: Vec<Element> = (-2..=4)
-            .flat_map(|v| (-1..=5).map(move |u| Element { v, u }))
+        let cache = |origins: &[LightElement]| {
+            GramCache::new(&measurements, geometry, &indices, 0, origins)
+        };
+        let origins: Vec<LightElement> = (-2..=4)
+            .flat_map(|v| (-1..=5).map(move |u| LightElement { v, u }))
             .collect();
         let shared = cache(&origins);
         assert!(!shared.correlations.is_empty());
-        for origin in [(-1, -2), (2, 1), (5, 4), (0, 0)].map(|(u, v)| Element { u, v }) {
+        for origin in [(-1, -2), (2, 1), (5, 4), (0, 0)].map(|(u, v)| LightElement { u, v }) {
             let own = cache(&[origin]);
             for excluded in [&[][..], &[3], &[0, 8]] {
                 let mut included = indices.clone();

@@ -11,7 +11,7 @@
 use crate::linalg::{LANES, add_scaled_padded, add_scaled_rows, dot_padded, padded_len};
 
 /// The values of one vector register, or of a few.
-type Block = [f64; LANES];
+type LaneBlock = [f64; LANES];
 
 /// Smallest pivot, relative to its diagonal entry, of an unknown whose column is linearly independent of the passive
 /// ones, to the precision of the Gram matrix. Another unknown would not lower the residual.
@@ -32,7 +32,7 @@ pub(super) struct PassiveSet<'a, const N: usize> {
     is_member: Vec<bool>,
     /// `H`, `[stride, stride]`, zero beyond the members' rows and columns, in panels of [`LANES`] columns: the part of
     /// a vector that belongs to a panel stays in registers.
-    inverse: Vec<Block>,
+    inverse: Vec<LaneBlock>,
     /// Length of the vectors below, a multiple of [`LANES`]. They are zero beyond the members.
     stride: usize,
     solutions: [Vec<f64>; N],
@@ -178,7 +178,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
 
     /// Evaluates unknown `j`, with its entries `b` of the right-hand sides, as a candidate for the set.
     #[inline(always)]
-    pub fn evaluate(&mut self, j: usize, b: [f64; N]) -> Candidate<N> {
+    pub fn evaluate(&mut self, j: usize, b: [f64; N]) -> InsertionCandidate<N> {
         let row = self.row(j);
         self.gather(row);
         let column = &self.column[..self.padded_len()];
@@ -186,7 +186,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         for (residual, z) in residual.iter_mut().zip(&self.solutions) {
             *residual -= dot_padded(column, &z[..column.len()]);
         }
-        Candidate {
+        InsertionCandidate {
             j,
             diagonal: row[j],
             residual,
@@ -203,7 +203,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
 
     /// Inserts the candidate that was evaluated last. Returns false if its column depends linearly on those of the set.
     #[inline(always)]
-    pub fn insert(&mut self, candidate: Candidate<N>) -> bool {
+    pub fn insert(&mut self, candidate: InsertionCandidate<N>) -> bool {
         self.multiply_by_inverse();
         let (n, before) = (self.members.len(), self.padded_len());
         let explained = dot_padded(&self.column[..before], &self.product[..before]);
@@ -310,7 +310,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
 
 /// An unknown that may be inserted.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Candidate<const N: usize> {
+pub(super) struct InsertionCandidate<const N: usize> {
     j: usize,
     /// `G[j, j]`.
     diagonal: f64,
@@ -321,10 +321,10 @@ pub(super) struct Candidate<const N: usize> {
 /// The panels of the first `width` columns of `H`, `width` rows each.
 #[inline(always)]
 fn panels(
-    inverse: &mut [Block],
+    inverse: &mut [LaneBlock],
     stride: usize,
     width: usize,
-) -> impl Iterator<Item = &mut [Block]> {
+) -> impl Iterator<Item = &mut [LaneBlock]> {
     let panels = inverse.chunks_exact_mut(stride.max(1)).take(width / LANES);
     panels.map(move |panel| &mut panel[..width])
 }

@@ -10,7 +10,7 @@ use super::error::RecoverError;
 use super::preparation::Preparation;
 use super::sampling::{self, PixelsOfWindow};
 use crate::executor::Executor;
-use crate::transport::{Element, TileRect};
+use crate::transport::{LightElement, TileRect};
 
 /// Smallest slope of a photograph that matches its pattern, relative to [`REFERENCE_PERCENTILE`].
 const MIN_SLOPE_RATIO: f64 = 0.4;
@@ -39,14 +39,14 @@ pub(super) fn check_patterns(
     }
     let split = preparation.split;
     let moments = preparation.executor.map(squares.len(), |i| {
-        let mut moments = vec![Moments::default(); split.all.len()];
+        let mut moments = vec![RegressionMoments::default(); split.all.len()];
         for (origin, pixels) in sampling::pixels_by_window(&preparation.geometry, squares[i]) {
             add_window(&mut moments, preparation, mean_function, origin, &pixels);
         }
         moments
     });
-    let slopes: Vec<Option<Slope>> = (0..split.all.len())
-        .map(|l| Slope::fit(&moments, &[l]))
+    let slopes: Vec<Option<RegressionSlope>> = (0..split.all.len())
+        .map(|l| RegressionSlope::fit(&moments, &[l]))
         .collect();
     let mut values: Vec<f64> = slopes.iter().flatten().map(|slope| slope.value).collect();
     values.sort_by(f64::total_cmp);
@@ -57,7 +57,7 @@ pub(super) fn check_patterns(
     let held_out = split.held_out.iter().copied();
     let held_out: Vec<usize> = held_out.filter(|l| !mismatched.contains(l)).collect();
     let is_uncorrelated = split.held_out.len() >= MIN_HELD_OUT
-        && Slope::fit(&moments, &held_out).is_some_and(Slope::may_be_zero);
+        && RegressionSlope::fit(&moments, &held_out).is_some_and(RegressionSlope::may_be_zero);
     if is_uncorrelated || 2 * mismatched.len() > split.all.len() {
         return Err(RecoverError::UncorrelatedPatterns);
     }
@@ -71,29 +71,29 @@ pub(super) fn check_patterns(
 
 /// Sums over pixels, both centred over the patterns: of squared predictions, and of predictions times measurements.
 #[derive(Clone, Copy, Debug, Default)]
-struct Moments {
+struct RegressionMoments {
     prediction: f64,
     cross: f64,
 }
 
 /// A regression slope of measurements on predictions.
 #[derive(Clone, Copy, Debug)]
-struct Slope {
+struct RegressionSlope {
     value: f64,
     standard_error: f64,
 }
 
-impl Slope {
+impl RegressionSlope {
     /// The common slope of `patterns`, from moments `[square][pattern]`; `None` if the predictions do not vary.
-    fn fit(moments: &[Vec<Moments>], patterns: &[usize]) -> Option<Self> {
+    fn fit(moments: &[Vec<RegressionMoments>], patterns: &[usize]) -> Option<Self> {
         let squares = moments.iter().map(|square| {
             let of_patterns = patterns.iter().map(|&l| square[l]);
-            of_patterns.fold(Moments::default(), |a, b| Moments {
+            of_patterns.fold(RegressionMoments::default(), |a, b| RegressionMoments {
                 prediction: a.prediction + b.prediction,
                 cross: a.cross + b.cross,
             })
         });
-        let squares: Vec<Moments> = squares.collect();
+        let squares: Vec<RegressionMoments> = squares.collect();
         let prediction: f64 = squares.iter().map(|m| m.prediction).sum();
         let value = squares.iter().map(|m| m.cross).sum::<f64>() / prediction;
         let residuals = squares
@@ -116,10 +116,10 @@ impl Slope {
 }
 
 fn add_window(
-    moments: &mut [Moments],
+    moments: &mut [RegressionMoments],
     preparation: &Preparation<impl Executor>,
     mean_function: &[f64],
-    origin: Element,
+    origin: LightElement,
     pixels: &PixelsOfWindow,
 ) {
     let (measurements, split) = (preparation.measurements, preparation.split);
@@ -163,11 +163,11 @@ fn add_window(
 mod tests {
     use super::*;
 
-    fn slope(squares: &[(f64, f64)]) -> Option<Slope> {
+    fn slope(squares: &[(f64, f64)]) -> Option<RegressionSlope> {
         let moments = squares
             .iter()
-            .map(|&(prediction, cross)| vec![Moments { prediction, cross }]);
-        Slope::fit(&moments.collect::<Vec<_>>(), &[0])
+            .map(|&(prediction, cross)| vec![RegressionMoments { prediction, cross }]);
+        RegressionSlope::fit(&moments.collect::<Vec<_>>(), &[0])
     }
 
     #[test]

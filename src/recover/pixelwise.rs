@@ -15,7 +15,7 @@ use super::gram_cache::{GramCache, WindowEquations};
 use super::nnls::Nnls;
 use super::sampling;
 use crate::capture::Measurements;
-use crate::transport::{CameraPx, Element, Geometry, TileRect, TransportFunctions, Window};
+use crate::transport::{CameraPx, Geometry, LightElement, TileRect, TransportFunctions, Window};
 
 /// Side, in light elements, of the squares of window origins that share a [`GramCache`]: a default tile has one, at two
 /// camera pixels an element.
@@ -42,7 +42,7 @@ pub(super) struct PixelwiseRecovery {
 }
 
 /// Pixels that share a window, by its origin.
-pub(super) type PixelsByWindow = (Element, Vec<(usize, CameraPx)>);
+pub(super) type PixelsByWindow = (LightElement, Vec<(usize, CameraPx)>);
 
 /// The measurements of a pixel and channel, one for each pattern of its equations.
 pub(super) struct PixelSamples {
@@ -98,7 +98,7 @@ impl PixelwiseRecovery {
         pattern_indices: &[usize],
         on_solution: &mut SolutionCallback<'_>,
     ) {
-        let origins: Vec<Element> = windows.iter().map(|window| window.0).collect();
+        let origins: Vec<LightElement> = windows.iter().map(|window| window.0).collect();
         // Grey patterns drive all channels alike: one set of equations for all of them.
         for (plane, channels) in measurements.planes() {
             let geometry = self.geometry;

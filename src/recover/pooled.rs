@@ -17,7 +17,7 @@ use super::sampling::{self, PixelsOfWindow};
 use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::linalg::{add_scaled, vectorise};
-use crate::transport::{CHANNELS, Element, TileRect, Window};
+use crate::transport::{CHANNELS, LightElement, TileRect, Window};
 
 /// Rounds of brightness and function. A brightness that is a few per cent off, as it is while the function is unknown,
 /// shows as light from far off.
@@ -76,7 +76,7 @@ fn fit_round(
 ) -> Vec<f64> {
     let geometry = &preparation.geometry;
     let area = geometry.window.area();
-    let is_whole = |origin: Element| geometry.clip_window(origin).area() == area;
+    let is_whole = |origin: LightElement| geometry.clip_window(origin).area() == area;
     let whole_squares = squares.iter().filter(|square| {
         let mut pixels = square.pixels();
         pixels.all(|pixel| is_whole(geometry.window_origin(pixel)))
@@ -110,7 +110,7 @@ fn add_window(
     sums: &mut NormalEquations,
     preparation: &Preparation<impl Executor>,
     mean: &[f64],
-    origin: Element,
+    origin: LightElement,
     pixels: &PixelsOfWindow,
 ) {
     let (measurements, training) = (preparation.measurements, &preparation.split.training);
@@ -223,7 +223,7 @@ mod tests {
         capture.measurements.noise.floor = [4e-4; CHANNELS];
         let pixels: Vec<_> =
             sampling::pixels_by_window(&capture.geometry, capture.functions(1.0).rect)
-                .remove(&Element { u: 3, v: 3 })
+                .remove(&LightElement { u: 3, v: 3 })
                 .unwrap();
         let (all, level) = ((0..8).collect::<Vec<_>>(), 0.5);
         let pooled =

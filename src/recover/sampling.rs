@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::capture::Measurements;
-use crate::transport::{CameraPx, Element, Extent, Geometry, TileRect};
+use crate::transport::{CameraPx, Extent, Geometry, LightElement, TileRect};
 
 /// Fewest patterns that recovery makes sense with.
 pub const MIN_PATTERNS: usize = 4;
@@ -66,7 +66,7 @@ fn spread_over(
 pub(super) fn pixels_by_window(
     geometry: &Geometry,
     rect: TileRect,
-) -> BTreeMap<Element, Vec<(usize, CameraPx)>> {
+) -> BTreeMap<LightElement, Vec<(usize, CameraPx)>> {
     let mut windows: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for (p, pixel) in rect.pixels().enumerate() {
         let origin = geometry.window_origin(pixel);

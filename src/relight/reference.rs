@@ -1,7 +1,7 @@
 //! Relighting in double precision, term by term as in the equations: the standard for all backends.
 
 use super::{Light, OutputTransform, Rgba8Picture};
-use crate::transport::{CHANNELS, CameraPx, Element, Transport};
+use crate::transport::{CHANNELS, CameraPx, LightElement, Transport};
 
 /// `y = pT`: RGB of each of the `N` camera pixels, in units of the measurement.
 ///
@@ -11,7 +11,7 @@ pub fn relight(transport: &Transport, light: &Light) -> Vec<[f64; CHANNELS]> {
     let geometry = transport.geometry;
     assert_eq!(light.extent(), geometry.light, "extent of the light");
     let (area, rank) = (geometry.window.area(), transport.basis.rank());
-    let emission = |element: Element| -> [f64; CHANNELS] {
+    let emission = |element: LightElement| -> [f64; CHANNELS] {
         let m = element.index_in(geometry.light);
         m.map_or([0.0; CHANNELS], |m| {
             [0, 1, 2].map(|c| f64::from(light.elements()[m][c]))

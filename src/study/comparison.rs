@@ -13,7 +13,7 @@ use super::nystrom::{Nystrom, NystromSamples};
 use super::pixel_sampling;
 use super::scanning;
 use super::scene_camera::{SceneCamera, first_shots};
-use super::section::{ProgressCallback, Section, Table, seconds_cell, snr_cell};
+use super::section::{MarkdownTable, ProgressCallback, ReportSection, seconds_cell, snr_cell};
 use super::unwindowed;
 use crate::capture::LinearPhoto;
 use crate::executor::Executor;
@@ -42,7 +42,7 @@ pub fn comparison(
     ensemble: PatternEnsemble,
     executor: &impl Executor,
     progress: ProgressCallback,
-) -> Result<Section, StudyError> {
+) -> Result<ReportSection, StudyError> {
     let geometry = scene_camera.scene.geometry();
     let truth = dense_transport(&scene_camera, executor);
     let counts = |max: usize| PHOTOGRAPH_COUNTS.into_iter().filter(move |&k| k <= max);
@@ -101,9 +101,13 @@ pub fn comparison(
     section(name, geometry, &curves)
 }
 
-fn section(name: &str, geometry: &Geometry, curves: &[MethodCurve]) -> Result<Section, StudyError> {
+fn section(
+    name: &str,
+    geometry: &Geometry,
+    curves: &[MethodCurve],
+) -> Result<ReportSection, StudyError> {
     let (camera, light, elements) = (geometry.camera, geometry.light, geometry.light.area());
-    let mut section = Section::new(&format!("Photographs for {TARGET_SNR_DB} dB, {name}"));
+    let mut section = ReportSection::new(&format!("Photographs for {TARGET_SNR_DB} dB, {name}"));
     section.add_paragraph(&format!(
         "Camera {camera}, light plane {light}, the same camera and noise for all methods. Scanning photographs \
          one light element at a time; the elements not yet scanned count as dark. One element gives \
@@ -115,8 +119,8 @@ fn section(name: &str, geometry: &Geometry, curves: &[MethodCurve]) -> Result<Se
          photographs for {TARGET_SNR_DB} dB is interpolated between the points of the curve. Times are \
          computing times without the photographing."
     ));
-    let mut data = Table::new("method | photographs | snr_db | seconds");
-    let mut table = Table::new(
+    let mut data = MarkdownTable::new("method | photographs | snr_db | seconds");
+    let mut table = MarkdownTable::new(
         "method | photographs for 25 dB | share of M | dB from 80 | best dB (from) | seconds there",
     );
     for curve in curves {

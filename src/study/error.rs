@@ -25,5 +25,5 @@ pub enum StudyError {
     Picture(#[from] image::ImageError),
     /// Writing a table as CSV failed.
     #[error("a table cannot be written as CSV")]
-    Table(#[from] csv::Error),
+    MarkdownTable(#[from] csv::Error),
 }

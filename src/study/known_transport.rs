@@ -1,10 +1,10 @@
 //! Known light transport, from a simulated scene or from a capture's `truth/` folder.
 
-use crate::capture::Truth;
+use crate::capture::GroundTruth;
 use crate::relight::Light;
 use crate::transport::{
-    CHANNELS, CameraPx, Correspondence, Element, Geometry, GeometryError, TileRect, TransportError,
-    TransportFunctions,
+    CHANNELS, CameraPx, Correspondence, Geometry, GeometryError, LightElement, TileRect,
+    TransportError, TransportFunctions,
 };
 
 /// A light transport matrix whose columns are known.
@@ -13,7 +13,7 @@ pub trait KnownTransport: Sync {
     fn geometry(&self) -> &Geometry;
 
     /// Origin of a pixel's window.
-    fn origin(&self, pixel: CameraPx) -> Element {
+    fn origin(&self, pixel: CameraPx) -> LightElement {
         self.geometry().window_origin(pixel)
     }
 
@@ -24,7 +24,7 @@ pub trait KnownTransport: Sync {
 /// The transport in a capture's `truth/` folder.
 #[derive(Debug)]
 pub struct CaptureTruth {
-    truth: Truth,
+    truth: GroundTruth,
     geometry: Geometry,
 }
 
@@ -33,7 +33,7 @@ impl CaptureTruth {
     ///
     /// # Errors
     /// [`GeometryError`] if the extents and the window do not fit together.
-    pub fn new(truth: Truth, correspondence: Correspondence) -> Result<Self, GeometryError> {
+    pub fn new(truth: GroundTruth, correspondence: Correspondence) -> Result<Self, GeometryError> {
         let geometry = Geometry {
             camera: truth.camera,
             light: truth.light_plane,
@@ -51,7 +51,7 @@ impl KnownTransport for CaptureTruth {
         &self.geometry
     }
 
-    fn origin(&self, pixel: CameraPx) -> Element {
+    fn origin(&self, pixel: CameraPx) -> LightElement {
         self.truth.window_origin(self.geometry.camera.index(pixel))
     }
 
@@ -116,7 +116,7 @@ pub(super) fn known_picture(
 /// y = pτ of one pixel.
 pub(super) fn relight_pixel(
     geometry: &Geometry,
-    origin: Element,
+    origin: LightElement,
     tau: &[[f32; CHANNELS]],
     light: &Light,
 ) -> [f64; CHANNELS] {

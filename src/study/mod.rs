@@ -1,7 +1,7 @@
 //! Evaluation of recovery on known light transport: the figures of the paper (Thanikachalam et al. 2014), its
 //! comparison with other acquisition methods, and a table of scenes.
 //!
-//! Each part takes a [`KnownTransport`] and measurements of it and returns a [`Section`]: text, tables and
+//! Each part takes a [`KnownTransport`] and measurements of it and returns a [`ReportSection`]: text, tables and
 //! pictures in memory. The caller writes them to files.
 
 mod accuracy;
@@ -30,6 +30,6 @@ pub use known_transport::{CaptureTruth, KnownTransport, transport_error};
 pub use relit_pictures::{RelitLight, built_in_lights, psnr, relit_pictures};
 pub use scene_camera::{SceneCamera, first_shots};
 pub use scenes::scenes_table;
-pub use section::{ProgressCallback, Section};
+pub use section::{ProgressCallback, ReportSection};
 pub use snr_curves::{SNR_PATTERNS, snr_curves};
 pub use sparsity::sparsity;

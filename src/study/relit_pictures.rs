@@ -6,7 +6,7 @@ use super::error::StudyError;
 use super::known_transport::{KnownTransport, known_picture, relight_pixel};
 use super::methods::{self, DEFAULT_METHOD};
 use super::picture_sheet::{CaptionedPanel, Panel, PictureSheet};
-use super::section::{ProgressCallback, Section, Table, snr_cell};
+use super::section::{MarkdownTable, ProgressCallback, ReportSection, snr_cell};
 use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::recover::{Recovery, Settings};
@@ -58,7 +58,7 @@ pub fn relit_pictures(
     lights: Vec<RelitLight>,
     executor: &impl Executor,
     progress: ProgressCallback,
-) -> Result<Section, StudyError> {
+) -> Result<ReportSection, StudyError> {
     let patterns = measurements.patterns.len();
     progress(&format!(
         "{name}: relighting, recovered by {} from {patterns} patterns",
@@ -73,14 +73,14 @@ pub fn relit_pictures(
         .map_or(Vec::new(), |brightest| brightest.as_flattened().to_vec());
     let exposure = exposure_for(flood);
 
-    let mut section = Section::new(&format!("Figures 4 and 5: relit pictures, {name}"));
+    let mut section = ReportSection::new(&format!("Figures 4 and 5: relit pictures, {name}"));
     section.add_paragraph(&format!(
         "Recovered by `{}` from {patterns} patterns. PSNR is against the true pictures, peak 1 in \
          units of the measurement, over all pixels and channels.",
         methods::name(DEFAULT_METHOD)
     ));
-    let mut table = Table::new("light | psnr_db | true_mean | method | patterns");
-    let mut psnr_table = Table::new("light | PSNR (dB)");
+    let mut table = MarkdownTable::new("light | psnr_db | true_mean | method | patterns");
+    let mut psnr_table = MarkdownTable::new("light | PSNR (dB)");
     let error_name = format!("error × {ERROR_GAIN}");
     let mut rows =
         ["light", "true", "relit", &error_name].map(|name| (name.to_owned(), Vec::new()));

@@ -4,7 +4,7 @@ use super::accuracy::measure_accuracy;
 use super::error::StudyError;
 use super::methods::{self, DEFAULT_METHOD};
 use super::scene_camera::SceneCamera;
-use super::section::{ProgressCallback, Section, Table, snr_cell};
+use super::section::{MarkdownTable, ProgressCallback, ReportSection, snr_cell};
 use crate::executor::Executor;
 use crate::recover::Method;
 use crate::simulate::{PatternEnsemble, SceneKind};
@@ -46,8 +46,8 @@ pub fn scenes_table(
     pixels: usize,
     executor: &impl Executor,
     progress: ProgressCallback,
-) -> Result<Section, StudyError> {
-    let mut table = Table::new(&format!(
+) -> Result<ReportSection, StudyError> {
+    let mut table = MarkdownTable::new(&format!(
         "scene | camera | light | ensemble | patterns | electrons | seed | {} | default | shortfall",
         methods::names()
     ));
@@ -96,7 +96,7 @@ pub fn scenes_table(
         row.push(shortfall.map_or(String::new(), |db| format!("{db:.2}")));
         table.add_row(row);
     }
-    let mut section = Section::new("Scenes");
+    let mut section = ReportSection::new("Scenes");
     section.add_paragraph(
         "SNR of T in dB by method, and the shortfall of the default method against the best other one \
          in dB (negative if the default is the best). No parameter of any method was chosen on these \

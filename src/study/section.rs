@@ -8,14 +8,14 @@ pub type ProgressCallback<'a> = &'a (dyn Fn(&str) + Sync);
 
 /// A section of the report.
 #[derive(Debug, Default)]
-pub struct Section {
+pub struct ReportSection {
     /// Markdown text. Its links are the paths in `files`.
     pub markdown: String,
     /// Path, with forward slashes, and content of every file.
     pub files: Vec<(String, Vec<u8>)>,
 }
 
-impl Section {
+impl ReportSection {
     /// A section with a heading of the second level.
     pub(super) fn new(heading: &str) -> Self {
         Self {
@@ -35,7 +35,7 @@ impl Section {
         self.files.push((path, svg.into_bytes()));
     }
 
-    pub(super) fn add_csv(&mut self, name: &str, table: &Table) -> Result<(), StudyError> {
+    pub(super) fn add_csv(&mut self, name: &str, table: &MarkdownTable) -> Result<(), StudyError> {
         self.files.push((format!("{name}.csv"), table.csv()?));
         Ok(())
     }
@@ -43,12 +43,12 @@ impl Section {
 
 /// A table of text, written as Markdown or CSV.
 #[derive(Clone, Debug)]
-pub(super) struct Table {
+pub(super) struct MarkdownTable {
     header: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
-impl Table {
+impl MarkdownTable {
     /// An empty table with these columns, between ` | `.
     pub fn new(header: &str) -> Self {
         Self {
@@ -65,7 +65,7 @@ impl Table {
     /// The table as CSV, the header first.
     ///
     /// # Errors
-    /// [`StudyError::Table`] if a row has more or fewer cells than the header.
+    /// [`StudyError::MarkdownTable`] if a row has more or fewer cells than the header.
     pub fn csv(&self) -> Result<Vec<u8>, StudyError> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         for row in std::iter::once(&self.header).chain(&self.rows) {
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_table_has_one_cell_for_each_column() {
-        let mut table = Table::new("scene | snr_db");
+        let mut table = MarkdownTable::new("scene | snr_db");
         table.add_row(["a, b".to_owned(), snr_cell(Some(Decibels(25.0)))]);
         assert_eq!(
             String::from_utf8(table.csv().unwrap()).unwrap(),

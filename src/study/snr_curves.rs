@@ -6,7 +6,7 @@ use super::error::StudyError;
 use super::known_transport::KnownTransport;
 use super::method_curve::MethodCurve;
 use super::methods;
-use super::section::{ProgressCallback, Section, Table, seconds_cell, snr_cell};
+use super::section::{MarkdownTable, ProgressCallback, ReportSection, seconds_cell, snr_cell};
 use crate::capture::{Measurements, NoiseModel};
 use crate::executor::Executor;
 use crate::recover::Method;
@@ -44,9 +44,9 @@ pub fn snr_curves(
     pixels: usize,
     executor: &impl Executor,
     progress: ProgressCallback,
-) -> Result<Section, StudyError> {
+) -> Result<ReportSection, StudyError> {
     let curves = SnrCurves::measure(name, known, measurements, pixels, executor, progress)?;
-    let mut section = Section::new(&format!("Figure 3: SNR against undersampling, {name}"));
+    let mut section = ReportSection::new(&format!("Figure 3: SNR against undersampling, {name}"));
     section.add_paragraph(&curves.samples());
     section.add_picture(
         &format!("{name}-figure3"),
@@ -106,8 +106,8 @@ impl SnrCurves {
     }
 
     /// All figures, for the CSV file.
-    fn data(&self) -> Table {
-        let mut data = Table::new(
+    fn data(&self) -> MarkdownTable {
+        let mut data = MarkdownTable::new(
             "method | patterns | patterns_per_light_element | snr_db | standard_error_db | \
              pixels_judged | pixels | seconds_for_all_pixels",
         );
@@ -131,8 +131,8 @@ impl SnrCurves {
     }
 
     /// The SNR by number of patterns and method.
-    fn table(&self) -> Table {
-        let mut table = Table::new(&format!("L | L/M | {}", methods::names()));
+    fn table(&self) -> MarkdownTable {
+        let mut table = MarkdownTable::new(&format!("L | L/M | {}", methods::names()));
         for &l in &self.counts {
             let mut row = vec![l.to_string(), format!("{:.5}", self.undersampling(l))];
             let cell = |curve: &MethodCurve| snr_cell(curve.at(l).and_then(|point| point.snr));

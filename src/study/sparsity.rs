@@ -5,7 +5,7 @@ use super::chart::{Chart, Series};
 use super::error::StudyError;
 use super::known_transport::KnownTransport;
 use super::picture_sheet::{CaptionedPanel, Panel, PictureSheet};
-use super::section::{ProgressCallback, Section, Table};
+use super::section::{MarkdownTable, ProgressCallback, ReportSection};
 use crate::executor::Executor;
 use crate::transport::{CHANNELS, CameraPx, Extent, Geometry};
 
@@ -99,7 +99,7 @@ pub fn sparsity(
     known: &impl KnownTransport,
     executor: &impl Executor,
     progress: ProgressCallback,
-) -> Result<Section, StudyError> {
+) -> Result<ReportSection, StudyError> {
     progress(&format!("{name}: structure of the transport"));
     let geometry = known.geometry();
     let rows = executor.map(geometry.camera.height as usize, |y| {
@@ -121,7 +121,7 @@ pub fn sparsity(
     let mut example = SparsityProfile::default();
     tau.as_flattened().iter().for_each(|&t| example.add(t));
 
-    let mut section = Section::new(&format!("Figure 2: structure of the transport, {name}"));
+    let mut section = ReportSection::new(&format!("Figure 2: structure of the transport, {name}"));
     let side = geometry.window.side();
     section.add_paragraph(&format!(
         "Camera {}, light {}, window {side}x{side}: {} of the matrix's {:.1e} elements lie in the \
@@ -204,7 +204,7 @@ fn profile_chart(
     geometry: &Geometry,
     whole: &SparsityProfile,
     example: &SparsityProfile,
-    section: &mut Section,
+    section: &mut ReportSection,
 ) -> Result<(), StudyError> {
     let functions = (geometry.camera.area() * CHANNELS) as f64;
     let area = geometry.window.area() as f64;
@@ -223,8 +223,9 @@ fn profile_chart(
         series("all of T", whole, functions),
         series("the function below", example, CHANNELS as f64),
     ];
-    let mut data =
-        Table::new("largest_elements_per_function | energy_percent_whole | energy_percent_one");
+    let mut data = MarkdownTable::new(
+        "largest_elements_per_function | energy_percent_whole | energy_percent_one",
+    );
     for (whole, example) in series[0].points.iter().zip(&series[1].points) {
         data.add_row([
             format!("{:.4}", whole.0),
@@ -232,7 +233,8 @@ fn profile_chart(
             format!("{:.3}", example.1),
         ]);
     }
-    let mut table = Table::new("energy | elements per function, all of T | the function below");
+    let mut table =
+        MarkdownTable::new("energy | elements per function, all of T | the function below");
     for share in ENERGY_SHARES {
         table.add_row([
             format!("{} %", 100.0 * share),

@@ -72,14 +72,14 @@ pub struct LightPx {
 
 /// A light element by column and row. It may lie off the light plane, where there is no emission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Element {
+pub struct LightElement {
     /// Row; the first field, so that elements sort row by row.
     pub v: i32,
     /// Column.
     pub u: i32,
 }
 
-impl Element {
+impl LightElement {
     /// Row-major index on a light plane of this extent, or `None` off it.
     pub fn index_in(self, light: Extent) -> Option<usize> {
         let (u, v) = (u32::try_from(self.u).ok()?, u32::try_from(self.v).ok()?);
@@ -140,26 +140,26 @@ impl Window {
     }
 
     /// Window origin: the top left element of the window around `floor(centre)`.
-    pub fn origin(self, centre: LightPx) -> Element {
+    pub fn origin(self, centre: LightPx) -> LightElement {
         let half = (self.side / 2) as i32;
         // Positions far off the light plane saturate; their windows are off it as well.
-        Element {
+        LightElement {
             u: (centre.u.floor() as i32).saturating_sub(half),
             v: (centre.v.floor() as i32).saturating_sub(half),
         }
     }
 
     /// Element of slot `slot`, 0 to S - 1, in the window with this origin.
-    pub fn element(self, origin: Element, slot: usize) -> Element {
+    pub fn element(self, origin: LightElement, slot: usize) -> LightElement {
         let side = self.side as usize;
-        Element {
+        LightElement {
             u: origin.u.saturating_add((slot % side) as i32),
             v: origin.v.saturating_add((slot / side) as i32),
         }
     }
 
     /// Slot of an element in the window with this origin, or `None` outside it.
-    pub fn slot(self, origin: Element, element: Element) -> Option<usize> {
+    pub fn slot(self, origin: LightElement, element: LightElement) -> Option<usize> {
         let side = i64::from(self.side);
         let u = i64::from(element.u) - i64::from(origin.u);
         let v = i64::from(element.v) - i64::from(origin.v);
@@ -301,14 +301,14 @@ impl Geometry {
     }
 
     /// Window origin of a pixel.
-    pub fn window_origin(&self, pixel: CameraPx) -> Element {
+    pub fn window_origin(&self, pixel: CameraPx) -> LightElement {
         self.window.origin(self.correspondence.at(pixel))
     }
 
     /// The slots on the light plane of the window that starts at `origin`, each with its light element's index.
     pub(crate) fn elements_of_window(
         &self,
-        origin: Element,
+        origin: LightElement,
     ) -> impl Iterator<Item = (usize, usize)> {
         (0..self.window.area()).filter_map(move |slot| {
             let element = self.window.element(origin, slot);
@@ -317,14 +317,18 @@ impl Geometry {
     }
 
     /// The part of the window that starts at `origin` which lies on the light plane.
-    pub(crate) fn clip_window(&self, origin: Element) -> ClippedRect {
+    pub(crate) fn clip_window(&self, origin: LightElement) -> ClippedRect {
         let side = self.window.side();
         let size = Extent::new(side, side);
         ClippedRect::new(origin, size, self.light)
     }
 
     /// Zeroes the slots off the light plane, for the window that starts at `origin`.
-    pub(crate) fn zero_off_light_plane<T: Copy + Default>(&self, origin: Element, slots: &mut [T]) {
+    pub(crate) fn zero_off_light_plane<T: Copy + Default>(
+        &self,
+        origin: LightElement,
+        slots: &mut [T],
+    ) {
         let ClippedRect { columns, rows, .. } = self.clip_window(origin);
         let side = self.window.side() as usize;
         for (v, row) in slots.chunks_exact_mut(side).enumerate() {
@@ -342,7 +346,7 @@ impl Geometry {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ClippedRect {
     /// The rectangle's first element, which may lie off the light plane.
-    origin: Element,
+    origin: LightElement,
     /// Columns on the light plane, counted from the rectangle's first.
     pub columns: Range<usize>,
     /// Rows on the light plane, counted from the rectangle's first.
@@ -351,7 +355,7 @@ pub(crate) struct ClippedRect {
 
 impl ClippedRect {
     /// Clips the rectangle of this size that starts at `origin`.
-    pub fn new(origin: Element, size: Extent, light: Extent) -> Self {
+    pub fn new(origin: LightElement, size: Extent, light: Extent) -> Self {
         let clip = |origin: i32, size: u32, light: u32| {
             let clamp = |at: i64| at.clamp(0, i64::from(size)) as usize;
             let start = clamp(-i64::from(origin));
@@ -416,7 +420,7 @@ mod tests {
     fn windows_are_clipped_to_the_light_plane() {
         let light = Extent::new(6, 4);
         let size = Extent::new(5, 5);
-        let clip = |u, v| ClippedRect::new(Element { v, u }, size, light);
+        let clip = |u, v| ClippedRect::new(LightElement { v, u }, size, light);
         let corner = clip(-2, -1);
         assert_eq!((corner.columns.clone(), corner.rows.clone()), (2..5, 1..5));
         assert_eq!((corner.first(), corner.area()), ([0, 0], 12));

@@ -16,7 +16,7 @@ mod tile;
 pub use float_tile::{Basis, FloatTile, TransportFunctions};
 pub(crate) use geometry::ClippedRect;
 pub use geometry::{
-    CHANNELS, CameraPx, Correspondence, Element, Extent, Geometry, GeometryError, LightPx,
+    CHANNELS, CameraPx, Correspondence, Extent, Geometry, GeometryError, LightElement, LightPx,
     MAX_SIDE, MAX_WINDOW, TileRect, Window,
 };
 pub use snr::{Decibels, TransportError};

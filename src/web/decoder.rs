@@ -3,7 +3,7 @@
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{CodedError, Photo};
-use crate::format::{Interest, Limits, LtmReader};
+use crate::format::{ChunkSelection, Limits, LtmReader};
 
 /// Names the byte ranges of an `.ltm` file that it needs, takes them in pieces of any size, and makes a [`Photo`].
 #[wasm_bindgen]
@@ -23,7 +23,7 @@ impl Decoder {
     /// The missing byte ranges, the most important first: start and end of the first, then of the second, and so on. The
     /// first may end beyond a small file. Empty once the file is complete.
     pub fn wants(&self) -> Vec<f64> {
-        let ranges = self.0.wants(&Interest::default());
+        let ranges = self.0.wants(&ChunkSelection::default());
         let bounds = ranges
             .into_iter()
             .flat_map(|range| [range.start, range.end]);

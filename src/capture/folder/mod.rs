@@ -10,7 +10,7 @@ mod truth;
 use std::path::{Path, PathBuf};
 
 pub use self::photo_reader::{DarkFrame, PhotoReader};
-pub use self::truth::{RELIT_FULL_SCALE, Truth};
+pub use self::truth::{GroundTruth, RELIT_FULL_SCALE};
 
 use self::image_file::ImageFile;
 use super::error::{CaptureError, CaptureProblem, MANIFEST_NAME};
@@ -91,8 +91,8 @@ impl CaptureFolder {
     ///
     /// # Errors
     /// If its files cannot be read or have the wrong shape.
-    pub fn truth(&self) -> Result<Option<Truth>, CaptureError> {
-        Truth::open(&self.root.join("truth"), &self.manifest)
+    pub fn truth(&self) -> Result<Option<GroundTruth>, CaptureError> {
+        GroundTruth::open(&self.root.join("truth"), &self.manifest)
     }
 
     /// Reads `rows` of the Gray code photographs.

@@ -13,14 +13,14 @@ use super::image_file::ImageFile;
 use crate::capture::error::{CaptureError, CaptureProblem};
 use crate::capture::manifest::Manifest;
 use crate::capture::measurements::Pattern;
-use crate::transport::{CHANNELS, Element, Extent, LightPx, Window};
+use crate::transport::{CHANNELS, Extent, LightElement, LightPx, Window};
 
 /// Code in `relit_NAME.png` for a measurement of 1.
 pub const RELIT_FULL_SCALE: f64 = 0.9 * 65535.0;
 
 /// Known transport, and pictures under lights that recovery does not use.
 #[derive(Debug)]
-pub struct Truth {
+pub struct GroundTruth {
     root: PathBuf,
     emission: [f64; 256],
     /// Camera grid.
@@ -29,11 +29,11 @@ pub struct Truth {
     pub light_plane: Extent,
     /// The window of τ.
     pub window: Window,
-    origins: Vec<Element>,
+    origins: Vec<LightElement>,
     tau: Vec<[f16; CHANNELS]>,
 }
 
-impl Truth {
+impl GroundTruth {
     /// Reads `tau.npy` and `uv.npy` from the folder `root`; `None` where there is no such folder.
     pub(super) fn open(root: &Path, manifest: &Manifest) -> Result<Option<Self>, CaptureError> {
         if !root.is_dir() {
@@ -76,7 +76,7 @@ impl Truth {
     }
 
     /// Window origin of pixel `n`.
-    pub fn window_origin(&self, n: usize) -> Element {
+    pub fn window_origin(&self, n: usize) -> LightElement {
         self.origins[n]
     }
 

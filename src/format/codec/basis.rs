@@ -4,7 +4,7 @@
 
 use super::byte_planes::{join, split, unzigzag, zigzag};
 use super::zstd_frame::{compress, decompress};
-use crate::format::budget::Budget;
+use crate::format::budget::MemoryBudget;
 use crate::format::error::{FormatError, SectionError, damaged};
 
 /// Largest exponent: values are multiples of `2⁻³⁰` or coarser.
@@ -73,7 +73,7 @@ pub fn decode(
     frame: &[u8],
     functions: &mut [Vec<f32>],
     area: usize,
-    budget: &Budget,
+    budget: &MemoryBudget,
 ) -> Result<(), SectionError> {
     let content = decompress(frame, content_bytes(functions.len(), area), budget)?;
     let (exponents, planes) = content.split_at(functions.len());
@@ -109,7 +109,7 @@ mod tests {
             quantised.encode(1, 3, 25).unwrap(),
         ];
         let decode = |frame: &[u8], count: usize| {
-            let budget = Budget::unlimited();
+            let budget = MemoryBudget::unlimited();
             let mut functions = vec![vec![0.0; 25]; count];
             decode(frame, &mut functions, 25, &budget).map(|()| functions)
         };

@@ -6,7 +6,7 @@ pub const SIDE: usize = 8;
 pub const AREA: usize = SIDE * SIDE;
 
 /// A block's pixels, or its coefficients, row by row.
-pub type Block = [f32; AREA];
+pub type DctBlock = [f32; AREA];
 
 /// `cos(i π / 16)` for i from 0 to 8, as f32.
 const COSINES: [f32; 9] = [
@@ -69,7 +69,7 @@ const fn zigzag() -> [u8; AREA] {
 }
 
 /// The coefficients of a block's pixels.
-pub fn forward(pixels: &Block) -> Block {
+pub fn forward(pixels: &DctBlock) -> DctBlock {
     let mut rows = [0.0; AREA];
     for y in 0..SIDE {
         for u in 0..SIDE {
@@ -86,7 +86,7 @@ pub fn forward(pixels: &Block) -> Block {
 }
 
 /// The pixels of a block's coefficients: columns first, then rows, each sum from frequency 0 upwards.
-pub fn inverse(coefficients: &Block) -> Block {
+pub fn inverse(coefficients: &DctBlock) -> DctBlock {
     let mut columns = [0.0f32; AREA];
     for v in 0..SIDE {
         let row = &coefficients[v * SIDE..(v + 1) * SIDE];
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn the_inverse_gives_the_pixels_back() {
-        let pixels: Block = std::array::from_fn(|i| ((i * i) as f32 * 0.37).sin());
+        let pixels: DctBlock = std::array::from_fn(|i| ((i * i) as f32 * 0.37).sin());
         let back = inverse(&forward(&pixels));
         for (a, b) in back.iter().zip(&pixels) {
             assert!((a - b).abs() < 1e-5);

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::colour::{Pixel, finite, ycocg_forward, ycocg_inverse};
 use super::tokens::{ItemRuns, MAX_MAGNITUDE, QuantisedRun, TokenReader, TokenWriter};
-use crate::format::budget::{Budget, vec_bytes};
+use crate::format::budget::{MemoryBudget, vec_bytes};
 use crate::format::chunk::EncodedChunk;
 use crate::format::constants::MAX_CONTENT_BYTES;
 use crate::format::error::{FormatError, SectionError, damaged};
@@ -26,7 +26,7 @@ const COARSE_ROUNDING_OFFSET: f32 = 0.3;
 ///
 /// # Errors
 /// The errors of `budget`.
-pub fn centre_out_order(window: Window, budget: &Budget) -> Result<Vec<u16>, FormatError> {
+pub fn centre_out_order(window: Window, budget: &MemoryBudget) -> Result<Vec<u16>, FormatError> {
     let side = window.side() as i32;
     let distance = |slot: i32| (slot % side - side / 2).pow(2) + (slot / side - side / 2).pow(2);
     let scratch = budget.scratch();
@@ -73,7 +73,7 @@ pub fn add(
     scan: &Scan,
     bytes: &[u8],
     tokens: u32,
-    budget: &Budget,
+    budget: &MemoryBudget,
 ) -> Result<(), SectionError> {
     let mut reader = TokenReader::new(bytes, tokens as usize, budget)?;
     if reader.tokens() < tokens as usize {
@@ -243,7 +243,7 @@ mod tests {
     const EXTENT: Extent = Extent::new(9, 4);
 
     fn order(side: u32) -> Vec<u16> {
-        centre_out_order(Window::new(side).unwrap(), &Budget::unlimited()).unwrap()
+        centre_out_order(Window::new(side).unwrap(), &MemoryBudget::unlimited()).unwrap()
     }
 
     fn functions(area: usize) -> Vec<Pixel> {
@@ -275,7 +275,7 @@ mod tests {
             for ((scan, chunk), error) in scans.iter().zip(chunks).zip(&quantised.errors[1..]) {
                 if !chunk.bytes.is_empty() {
                     let add_to = |functions: &mut [Pixel], bytes: &[u8]| {
-                        let budget = Budget::unlimited();
+                        let budget = MemoryBudget::unlimited();
                         add(functions, &order, scan, bytes, chunk.content_bytes, &budget)
                     };
                     assert!(u64::from(chunk.content_bytes) <= max_tokens(EXTENT, scan.count));
@@ -303,7 +303,7 @@ mod tests {
         let quantised = QuantisedFunctions::new(&functions, &order, &[scan]);
         let chunk = quantised.chunks(&[scan]).unwrap().remove(0);
         let mut got = [[0.0; CHANNELS]];
-        let (tokens, budget) = (chunk.content_bytes, Budget::unlimited());
+        let (tokens, budget) = (chunk.content_bytes, MemoryBudget::unlimited());
         add(&mut got, &order, &scan, &chunk.bytes, tokens, &budget).unwrap();
         let max = (MAX_MAGNITUDE / 2) as f32 * 1e-6;
         assert_eq!(got, [[max, -max, 0.0]]);

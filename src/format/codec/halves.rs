@@ -8,7 +8,7 @@ use half::f16;
 use super::byte_planes::{join, split};
 use super::colour::Pixel;
 use super::zstd_frame::{compress, decompress};
-use crate::format::budget::Budget;
+use crate::format::budget::MemoryBudget;
 use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::scan::Scan;
 use crate::transport::CHANNELS;
@@ -68,7 +68,7 @@ pub fn add(
     scan: &Scan,
     order: Option<&[u16]>,
     frame: &[u8],
-    budget: &Budget,
+    budget: &MemoryBudget,
 ) -> Result<(), SectionError> {
     let count = usize::from(scan.count);
     let length = content_bytes(values.len() / columns * count * CHANNELS);
@@ -124,7 +124,15 @@ mod tests {
             for scan in [scan(0, 2, step), scan(2, 3, step)] {
                 let gathered = gather(&values, 5, &scan, order);
                 let frame = encode(&gathered, step).unwrap();
-                add(&mut got, 5, &scan, order, &frame, &Budget::unlimited()).unwrap();
+                add(
+                    &mut got,
+                    5,
+                    &scan,
+                    order,
+                    &frame,
+                    &MemoryBudget::unlimited(),
+                )
+                .unwrap();
                 claimed += error(&gathered, step);
             }
             let square = |(got, want): (&f32, &f32)| f64::from(got - want).powi(2);
@@ -146,7 +154,7 @@ mod tests {
         let frame = encode(&[f32::NAN, f32::INFINITY, f32::MAX], 1.0).unwrap();
         let mut add = |frame: &[u8]| {
             let scan = scan(0, 1, 1.0);
-            add(&mut got, 1, &scan, None, frame, &Budget::unlimited()).map(|()| got)
+            add(&mut got, 1, &scan, None, frame, &MemoryBudget::unlimited()).map(|()| got)
         };
         assert_eq!(add(&frame).unwrap(), [[1.0, 1.0, 65505.0]]);
         assert!(add(&compress(&[0, 0, 0, 0, 0, 0x7C]).unwrap()).is_err());

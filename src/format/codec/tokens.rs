@@ -10,7 +10,7 @@
 use std::ops::Range;
 
 use super::zstd_frame::{compress, compressed_bound, decompress};
-use crate::format::budget::Budget;
+use crate::format::budget::MemoryBudget;
 use crate::format::chunk::EncodedChunk;
 use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::fields::FieldReader;
@@ -187,7 +187,11 @@ impl<'a> TokenReader<'a> {
     ///
     /// # Errors
     /// [`SectionError`] if the string is damaged, or the budget refuses memory.
-    pub fn new(bytes: &'a [u8], max_tokens: usize, budget: &Budget) -> Result<Self, SectionError> {
+    pub fn new(
+        bytes: &'a [u8],
+        max_tokens: usize,
+        budget: &MemoryBudget,
+    ) -> Result<Self, SectionError> {
         let mut fields = FieldReader(bytes);
         let count = match fields.try_bytes(1) {
             Some([1]) => 1,
@@ -300,7 +304,7 @@ mod tests {
         let (bytes, tokens) = (chunk.bytes, chunk.content_bytes);
         assert!(bytes.len() as u64 <= max_bytes(tokens.into()));
         let read = |bytes: &[u8]| {
-            let mut reader = TokenReader::new(bytes, tokens as usize, &Budget::unlimited())?;
+            let mut reader = TokenReader::new(bytes, tokens as usize, &MemoryBudget::unlimited())?;
             assert_eq!(reader.tokens(), tokens as usize);
             for run in runs {
                 let mut read = vec![0; run.len()];
@@ -316,7 +320,7 @@ mod tests {
             assert!(read(&bytes[..length]).is_err());
         }
         assert!(read(&[&bytes[..], &[0]].concat()).is_err());
-        assert!(TokenReader::new(&bytes, tokens as usize - 1, &Budget::unlimited()).is_err());
+        assert!(TokenReader::new(&bytes, tokens as usize - 1, &MemoryBudget::unlimited()).is_err());
     }
 
     fn sparse(every: usize, length: usize) -> Vec<i32> {

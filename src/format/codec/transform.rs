@@ -17,9 +17,9 @@
 //! token string (axes 1 and 2 interleaved, a run of 128).
 
 use super::colour::{ColourKlt, HouseholderReflection, Pixel};
-use super::dct::{self, AREA, Block, SIDE, ZIGZAG};
+use super::dct::{self, AREA, DctBlock, SIDE, ZIGZAG};
 use super::tokens::{self, MAX_MAGNITUDE, TokenReader};
-use crate::format::budget::{Budget, vec_bytes};
+use crate::format::budget::{MemoryBudget, vec_bytes};
 use crate::format::constants::MAX_CONTENT_BYTES;
 use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::fields::FieldReader;
@@ -27,16 +27,16 @@ use crate::format::scan::Scan;
 use crate::transport::{CHANNELS, Extent, Geometry};
 
 /// The axes of one component of a tile, `[axis, pixel]`; empty if all are zero.
-pub type Plane = Vec<f32>;
+pub type CoefficientPlane = Vec<f32>;
 
 /// Coefficients of a tile on their transformed axes: the sum of its scans so far.
 #[derive(Clone, Debug, Default)]
-pub struct Planes {
+pub struct CoefficientPlanes {
     pub klt: Option<ColourKlt>,
-    pub components: Vec<Plane>,
+    pub components: Vec<CoefficientPlane>,
 }
 
-impl Planes {
+impl CoefficientPlanes {
     /// Planes to which one of a tile's later chunks, without a KLT, can be added.
     pub fn with_klt() -> Self {
         Self {
@@ -63,7 +63,7 @@ impl Planes {
         &self,
         extent: Extent,
         rank: usize,
-        budget: &Budget,
+        budget: &MemoryBudget,
     ) -> Result<Vec<Pixel>, FormatError> {
         let pixels = extent.area();
         let mut coefficients: Vec<Pixel> = budget.try_zeroed(pixels * rank)?;
@@ -100,7 +100,7 @@ impl Planes {
         scan: &Scan,
         bytes: &[u8],
         tokens: u32,
-        budget: &Budget,
+        budget: &MemoryBudget,
     ) -> Result<(), SectionError> {
         let too_short = || damaged("it is shorter than it says");
         let mut fields = FieldReader(bytes);
@@ -120,7 +120,7 @@ impl Planes {
         if self.components.len() < components.end {
             let mut grown = budget.try_with_capacity(components.end)?;
             grown.append(&mut self.components);
-            grown.resize(components.end, Plane::new());
+            grown.resize(components.end, CoefficientPlane::new());
             self.components = grown;
         }
         let planes = &mut self.components[components];
@@ -220,10 +220,10 @@ fn axis_values(plane: &[f32], pixels: usize, p: usize) -> Pixel {
 /// # Errors
 /// The errors of `budget`.
 pub fn try_axis<'a>(
-    plane: &'a mut Plane,
+    plane: &'a mut CoefficientPlane,
     extent: Extent,
     axis: usize,
-    budget: &Budget,
+    budget: &MemoryBudget,
 ) -> Result<&'a mut [f32], FormatError> {
     let pixels = extent.area();
     if plane.is_empty() {
@@ -233,7 +233,7 @@ pub fn try_axis<'a>(
 }
 
 /// The pixels of a block of numbers in zigzag order.
-pub fn dequantise(numbers: &[i32], step: f32) -> Block {
+pub fn dequantise(numbers: &[i32], step: f32) -> DctBlock {
     let mut block = [0.0; AREA];
     for (number, i) in numbers.iter().zip(ZIGZAG) {
         block[usize::from(i)] = *number as f32 * step;
@@ -242,7 +242,7 @@ pub fn dequantise(numbers: &[i32], step: f32) -> Block {
 }
 
 /// Adds a block's pixels to the axis of a tile, cut at the tile's edges.
-pub fn add_block(axis: &mut [f32], extent: Extent, corner: (usize, usize), block: &Block) {
+pub fn add_block(axis: &mut [f32], extent: Extent, corner: (usize, usize), block: &DctBlock) {
     let (width, height) = (extent.width as usize, extent.height as usize);
     let (left, top) = corner;
     let columns = SIDE.min(width - left);

@@ -6,12 +6,13 @@ use std::array::from_fn;
 use std::ops::Range;
 
 use super::colour::{ColourKlt, HouseholderReflection, Pixel, finite};
-use super::dct::{self, AREA, Block, SIDE, ZIGZAG};
+use super::dct::{self, AREA, DctBlock, SIDE, ZIGZAG};
 use super::tokens::{ItemRuns, MAX_MAGNITUDE, QuantisedRun, TokenWriter};
 use super::transform::{
-    Plane, Planes, add_block, block_corners, block_count, dequantise, try_axis,
+    CoefficientPlane, CoefficientPlanes, add_block, block_corners, block_count, dequantise,
+    try_axis,
 };
-use crate::format::budget::Budget;
+use crate::format::budget::MemoryBudget;
 use crate::format::chunk::EncodedChunk;
 use crate::format::error::FormatError;
 use crate::format::scan::Scan;
@@ -109,7 +110,7 @@ pub struct QuantisedCoefficients {
     /// Squared error of component 0 from the rounding of the KLT, which no step reduces.
     pub klt_error: f64,
     /// The planes as a reader decodes them: component 0, and the others if they were kept.
-    planes: Planes,
+    planes: CoefficientPlanes,
 }
 
 impl QuantisedCoefficients {
@@ -129,9 +130,9 @@ impl QuantisedCoefficients {
             numbers: scans.iter().map(zeros).collect(),
             errors: vec![0.0; 1 + scans.len()],
             klt_error: 0.0,
-            planes: Planes::default(),
+            planes: CoefficientPlanes::default(),
         };
-        let mut planes = Planes {
+        let mut planes = CoefficientPlanes {
             klt: Some(quantised.klt),
             components: vec![Vec::new()],
         };
@@ -146,7 +147,7 @@ impl QuantisedCoefficients {
         let first = Some(&mut planes.components[0]);
         quantised.quantise_component(0, &component, extent, scans, first);
         // The colours that a reader knows after the last scan.
-        let colours = planes.coefficients(extent, 1, &Budget::unlimited());
+        let colours = planes.coefficients(extent, 1, &MemoryBudget::unlimited());
         let colours = colours.unwrap_or_else(|_| vec![[0.0; CHANNELS]; pixels]);
         let reflections = colours.into_iter().map(HouseholderReflection::of_colour);
         let reflections: Vec<_> = reflections.collect();
@@ -154,7 +155,7 @@ impl QuantisedCoefficients {
             for (p, pixel) in component.iter_mut().enumerate() {
                 *pixel = reflections[p].apply(of(p, k));
             }
-            let mut plane = Plane::new();
+            let mut plane = CoefficientPlane::new();
             let kept = keep_decoded.then_some(&mut plane);
             quantised.quantise_component(k, &component, extent, scans, kept);
             planes.components.push(plane);
@@ -169,7 +170,8 @@ impl QuantisedCoefficients {
     /// [`FormatError::Memory`].
     pub fn decoded(&self, extent: Extent) -> Result<Vec<Pixel>, FormatError> {
         let rank = self.planes.components.len();
-        self.planes.coefficients(extent, rank, &Budget::unlimited())
+        self.planes
+            .coefficients(extent, rank, &MemoryBudget::unlimited())
     }
 
     /// Quantises component `k`, and adds its decoded values to `decoded`.
@@ -179,7 +181,7 @@ impl QuantisedCoefficients {
         pixels: &[Pixel],
         extent: Extent,
         scans: &[Scan],
-        mut decoded: Option<&mut Plane>,
+        mut decoded: Option<&mut CoefficientPlane>,
     ) {
         let covers = |scan: &Scan| !scan.coding.is_direct() && scan.items().contains(&k);
         let last = scans.iter().rposition(covers);
@@ -209,7 +211,7 @@ impl QuantisedCoefficients {
                         error = squared_pixels(&residual, inside);
                         if let Some(plane) = &mut decoded
                             && numbers.iter().any(|number| *number != 0)
-                            && let Ok(axis) = try_axis(plane, extent, a, &Budget::unlimited())
+                            && let Ok(axis) = try_axis(plane, extent, a, &MemoryBudget::unlimited())
                         {
                             add_block(axis, extent, (left, top), &dequantise(numbers, scan.step));
                         }
@@ -270,10 +272,10 @@ fn transformed(
     extent: Extent,
     (left, top): (usize, usize),
     axis: usize,
-) -> Block {
+) -> DctBlock {
     let (width, height) = (extent.width as usize, extent.height as usize);
     // Beyond its edges the tile repeats its last column and row.
-    let block: Block = from_fn(|i| {
+    let block: DctBlock = from_fn(|i| {
         let x = (left + i % SIDE).min(width - 1);
         let y = (top + i / SIDE).min(height - 1);
         pixels[y * width + x][axis]
@@ -301,7 +303,7 @@ fn round(block: &[f32], step: f32, offset: impl Fn(usize) -> f32, numbers: &mut 
 }
 
 /// Sum of squared pixels of a block in zigzag order, over the columns and rows inside the tile.
-fn squared_pixels(zigzag: &Block, (columns, rows): (usize, usize)) -> f64 {
+fn squared_pixels(zigzag: &DctBlock, (columns, rows): (usize, usize)) -> f64 {
     let sum = |values: &[f32]| values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
     if (columns, rows) == (SIDE, SIDE) {
         return sum(zigzag);
@@ -345,13 +347,18 @@ mod tests {
         Scan::new(Coding::Transform, first, count, step)
     }
 
-    fn decoded(planes: &Planes, extent: Extent, rank: usize) -> Vec<Pixel> {
+    fn decoded(planes: &CoefficientPlanes, extent: Extent, rank: usize) -> Vec<Pixel> {
         planes
-            .coefficients(extent, rank, &Budget::unlimited())
+            .coefficients(extent, rank, &MemoryBudget::unlimited())
             .unwrap()
     }
 
-    fn squared_error(planes: &Planes, extent: Extent, tile: &[Pixel], rank: usize) -> f64 {
+    fn squared_error(
+        planes: &CoefficientPlanes,
+        extent: Extent,
+        tile: &[Pixel],
+        rank: usize,
+    ) -> f64 {
         let decoded = decoded(planes, extent, rank);
         let pairs = decoded.iter().zip(tile);
         let errors = pairs.flat_map(|(a, b)| (0..CHANNELS).map(move |c| f64::from(a[c] - b[c])));
@@ -372,14 +379,14 @@ mod tests {
                     scan(2, 4, step),
                 ];
                 let quantised = QuantisedCoefficients::new(extent, &tile, &scans, true);
-                let mut planes = Planes::default();
+                let mut planes = CoefficientPlanes::default();
                 let chunks = quantised.chunks(&scans).unwrap();
                 for ((scan, chunk), error) in scans.iter().zip(chunks).zip(&quantised.errors[1..]) {
                     if !chunk.bytes.is_empty() {
                         let tokens = chunk.content_bytes;
                         assert!(u64::from(tokens) <= max_tokens(extent, scan.count));
                         assert!(chunk.bytes.len() as u64 <= max_bytes(tokens.into()));
-                        let budget = Budget::unlimited();
+                        let budget = MemoryBudget::unlimited();
                         planes
                             .add(extent, scan, &chunk.bytes, tokens, &budget)
                             .unwrap();
@@ -416,7 +423,13 @@ mod tests {
         assert!(chunk(&dark).bytes.is_empty());
         let chunk = chunk(&tile);
         let decode = |bytes: &[u8], tokens: u32| {
-            Planes::default().add(extent, &scan, bytes, tokens, &Budget::unlimited())
+            CoefficientPlanes::default().add(
+                extent,
+                &scan,
+                bytes,
+                tokens,
+                &MemoryBudget::unlimited(),
+            )
         };
         let tokens = chunk.content_bytes;
         decode(&chunk.bytes, tokens).unwrap();

@@ -2,7 +2,7 @@
 
 use zstd::zstd_safe;
 
-use crate::format::budget::Budget;
+use crate::format::budget::MemoryBudget;
 use crate::format::constants::MAX_CONTENT_BYTES;
 use crate::format::error::{FormatError, SectionError, damaged};
 
@@ -27,7 +27,11 @@ pub fn compress(content: &[u8]) -> Result<Vec<u8>, FormatError> {
 ///
 /// # Errors
 /// [`SectionError`] if `frame` is not one frame of this content, or the budget refuses memory.
-pub fn decompress(frame: &[u8], length: usize, budget: &Budget) -> Result<Vec<u8>, SectionError> {
+pub fn decompress(
+    frame: &[u8],
+    length: usize,
+    budget: &MemoryBudget,
+) -> Result<Vec<u8>, SectionError> {
     check_frame(frame)?;
     let mut content = budget.try_zeroed(length)?;
     let got = zstd_safe::decompress(&mut content[..], frame)

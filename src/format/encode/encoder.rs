@@ -3,7 +3,7 @@
 use super::basis_rotation::{BasisRotation, coefficient_moments};
 use super::source::Source;
 use crate::executor::Executor;
-use crate::format::budget::Budget;
+use crate::format::budget::MemoryBudget;
 use crate::format::codec::{direct, transform};
 use crate::format::error::FormatError;
 use crate::transport::{Basis, CHANNELS, FloatTile};
@@ -96,7 +96,7 @@ impl<'a, E: Executor> Encoder<'a, E> {
         let rotation = basis.and_then(|basis| BasisRotation::new(basis, &moments));
         let coefficient_energy = rotation.as_ref().map_or(0.0, BasisRotation::energy);
         Ok(Self {
-            order: direct::centre_out_order(source.geometry.window, &Budget::unlimited())?,
+            order: direct::centre_out_order(source.geometry.window, &MemoryBudget::unlimited())?,
             energy: coefficient_energy + function_energy,
             coefficient_energy,
             has_functions: function_energy > 0.0,

@@ -5,9 +5,9 @@
 
 use super::assembly::{self, EncodedFile, QuantisedTile};
 use super::encoder::Encoder;
-use super::sampling::{SampledPart, sample};
+use super::sampling::{SampledTilePart, sample};
 use super::scan_costs::CostModel;
-use super::scan_plan::{self, MAX_SHARES, SHARES, ScanPlan, Shares};
+use super::scan_plan::{self, MAX_SHARES, SHARES, ScanPlan, ScanShares};
 use super::source::{DistortionMetric, RateTarget, Source};
 use crate::bisect::bisect;
 use crate::executor::Executor;
@@ -65,7 +65,7 @@ impl EncodedFile {
 /// The search for a file's step and rank.
 struct RateControl<'a, E> {
     encoder: Encoder<'a, E>,
-    sample: Vec<SampledPart>,
+    sample: Vec<SampledTilePart>,
 }
 
 impl<'a, E: Executor> RateControl<'a, E> {
@@ -165,7 +165,7 @@ impl<'a, E: Executor> RateControl<'a, E> {
         expected_error: f64,
         factor: f64,
     ) -> Result<ScanPlan, FormatError> {
-        let shares = Shares {
+        let shares = ScanShares {
             first: SHARES.first * factor,
             scan: SHARES.scan * factor,
         };
@@ -190,7 +190,7 @@ impl<'a, E: Executor> RateControl<'a, E> {
     /// The quantisation error of some scans, predicted from the sample.
     fn error_of(&self, scans: &[Scan]) -> TransportError {
         let errors = self.encoder.executor.map(self.sample.len(), |i| {
-            let SampledPart { tile, weight } = &self.sample[i];
+            let SampledTilePart { tile, weight } = &self.sample[i];
             let error = QuantisedTile::new(&self.encoder, tile, scans, false).error(scans.len());
             TransportError {
                 signal: error.signal * weight,

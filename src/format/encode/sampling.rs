@@ -14,7 +14,7 @@ const MAX_SAMPLE_BYTES: usize = 48 << 20;
 const PART_SIDE: u32 = 8;
 
 /// A part of a tile.
-pub struct SampledPart {
+pub struct SampledTilePart {
     pub tile: FloatTile,
     /// Number of parts that it represents.
     pub weight: f64,
@@ -24,7 +24,7 @@ pub struct SampledPart {
 ///
 /// # Errors
 /// [`FormatError::Source`] if a tile cannot be read.
-pub fn sample(encoder: &Encoder<'_, impl Executor>) -> Result<Vec<SampledPart>, FormatError> {
+pub fn sample(encoder: &Encoder<'_, impl Executor>) -> Result<Vec<SampledTilePart>, FormatError> {
     let lit_tiles = &encoder.lit_tiles;
     let pixel_bytes = ((encoder.rank() + encoder.slots()) * CHANNELS * size_of::<f32>()).max(1);
     let smallest_part = PART_SIDE.pow(2) as usize * pixel_bytes;
@@ -38,13 +38,13 @@ pub fn sample(encoder: &Encoder<'_, impl Executor>) -> Result<Vec<SampledPart>, 
         true => tile_side,
         false => (side / PART_SIDE * PART_SIDE).max(PART_SIDE),
     };
-    let part = |n: usize| -> io::Result<SampledPart> {
+    let part = |n: usize| -> io::Result<SampledTilePart> {
         // One of each of `count` equal groups, at a pseudo-random place that follows no grid.
         let [from, to] = [n, n + 1].map(|n| n * lit_tiles.len() / count);
         let tile = lit_tiles[from + hash(n) % (to - from)];
         let tile = (encoder.source.tile)(tile)?;
         let (tile, lit_parts) = lit_part(tile, side, hash(n + MAX_SAMPLED_TILES));
-        Ok(SampledPart {
+        Ok(SampledTilePart {
             tile,
             weight: (lit_parts * (to - from)) as f64,
         })

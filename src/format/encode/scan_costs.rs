@@ -4,7 +4,7 @@
 //! squared errors are told apart by item: by component, or by slot in centre-out order.
 
 use super::encoder::Encoder;
-use super::sampling::SampledPart;
+use super::sampling::SampledTilePart;
 use crate::executor::Executor;
 use crate::format::codec::direct::OrderedFunctions;
 use crate::format::codec::tokens::{CONTEXTS, ItemRuns, for_tokens};
@@ -24,10 +24,10 @@ pub struct ItemCost {
 
 /// The sample's values as the codecs quantise them.
 pub struct CostModel {
-    parts: Vec<ModelPart>,
+    parts: Vec<TransformedSample>,
 }
 
-struct ModelPart {
+struct TransformedSample {
     weight: f64,
     coefficients: Option<TransformedTile>,
     functions: Option<OrderedFunctions>,
@@ -41,11 +41,11 @@ struct ItemToken {
 }
 
 impl CostModel {
-    pub fn new(encoder: &Encoder<'_, impl Executor>, sample: &[SampledPart]) -> Self {
+    pub fn new(encoder: &Encoder<'_, impl Executor>, sample: &[SampledTilePart]) -> Self {
         let parts = encoder.executor.map(sample.len(), |i| {
-            let SampledPart { tile, weight } = &sample[i];
+            let SampledTilePart { tile, weight } = &sample[i];
             let (coefficients, functions) = (encoder.rotated(tile), encoder.direct(tile));
-            ModelPart {
+            TransformedSample {
                 weight: *weight,
                 coefficients: coefficients.map(|c| TransformedTile::new(tile.rect.extent, &c)),
                 functions: functions.map(|tau| OrderedFunctions::new(tau, &encoder.order)),
@@ -114,7 +114,7 @@ impl CostModel {
     }
 }
 
-impl ModelPart {
+impl TransformedSample {
     fn runs(&self, coding: Coding) -> Option<&dyn ItemRuns> {
         match coding.is_direct() {
             true => self.functions.as_ref().map(|runs| runs as _),

@@ -21,17 +21,17 @@ use crate::format::error::FormatError;
 use crate::format::scan::{Coding, Scan, rank_of};
 
 /// The shares that a plan aims for. Predictions err; files keep [`MAX_SHARES`].
-pub const SHARES: Shares = Shares {
+pub const SHARES: ScanShares = ScanShares {
     first: 0.08,
     scan: 0.18,
 };
 /// The shares of files that fit into a reader's first request, where many scans cost more than they give.
-const SMALL_FILE_SHARES: Shares = Shares {
+const SMALL_FILE_SHARES: ScanShares = ScanShares {
     first: 0.3,
     scan: f64::INFINITY,
 };
 /// The shares that files keep: a tenth and a quarter.
-pub const MAX_SHARES: Shares = Shares {
+pub const MAX_SHARES: ScanShares = ScanShares {
     first: 0.1,
     scan: 0.25,
 };
@@ -60,7 +60,7 @@ pub struct ScanPlan {
 
 /// Bounds on the parts of a file, as shares of its bytes.
 #[derive(Clone, Copy, Debug)]
-pub struct Shares {
+pub struct ScanShares {
     /// Of the index and the first layer.
     pub first: f64,
     /// Of any later scan.
@@ -69,7 +69,7 @@ pub struct Shares {
 
 /// Components, or slots.
 #[derive(Clone, Debug)]
-struct Items {
+struct CodedItems {
     coding: Coding,
     /// Maximum number in one scan.
     max_per_scan: usize,
@@ -77,7 +77,7 @@ struct Items {
     finest_steps: Vec<f32>,
 }
 
-impl Items {
+impl CodedItems {
     /// Components and slots of a source, where there are some.
     fn of(encoder: &Encoder<'_, impl Executor>) -> Vec<Self> {
         let side = encoder.source.geometry.tile_side;
@@ -176,7 +176,7 @@ impl Items {
 /// A plan without shares, by which the rate control measures a step.
 pub fn trial(encoder: &Encoder<'_, impl Executor>, step: f32) -> Vec<Scan> {
     let mut scans = Vec::new();
-    for items in Items::of(encoder) {
+    for items in CodedItems::of(encoder) {
         let count = items.count().div_ceil(TRIAL_FIRST_ITEMS);
         items.first_layer(count, TRIAL_FIRST_STEP_RATIO * step, &mut scans);
         let bytes = vec![0.0; items.count()];
@@ -193,12 +193,12 @@ pub fn plan(
     encoder: &Encoder<'_, impl Executor>,
     model: &CostModel,
     step: f32,
-    shares: Shares,
+    shares: ScanShares,
 ) -> Result<ScanPlan, FormatError> {
     let executor = encoder.executor;
     let area = encoder.order.len() as f64;
-    let kinds = Items::of(encoder);
-    let costs = |items: &Items, step| model.costs(items.coding, items.count(), step, executor);
+    let kinds = CodedItems::of(encoder);
+    let costs = |items: &CodedItems, step| model.costs(items.coding, items.count(), step, executor);
     let last: Vec<Vec<ItemCost>> = kinds.iter().map(|items| costs(items, step)).collect();
     let basis_bytes = BASIS_BYTES_PER_SLOT * area;
     let file_bytes = basis_bytes * encoder.rank() as f64

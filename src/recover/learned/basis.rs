@@ -7,7 +7,7 @@
 
 use crate::capture::Measurements;
 use crate::linalg::vectorise;
-use crate::transport::{Basis, Element, Geometry};
+use crate::transport::{Basis, Geometry, LightElement};
 
 /// Responses computed together at least: two vector registers of f32 on the narrowest machine of note.
 const MIN_BLOCK_WIDTH: usize = 8;
@@ -55,7 +55,7 @@ impl LearnedBasis {
         &self,
         measurements: &Measurements,
         geometry: &Geometry,
-        origin: Element,
+        origin: LightElement,
         plane: usize,
     ) -> PatternResponses {
         let side = geometry.window.side() as usize;

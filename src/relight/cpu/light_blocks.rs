@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use crate::transport::{CameraPx, Element, Extent, Geometry, TileRect, Transport};
+use crate::transport::{CameraPx, Extent, Geometry, LightElement, TileRect, Transport};
 
 /// The side of blocks where no tile is factored.
 pub const DIRECT_BLOCK_SIDE: usize = 64;
@@ -25,7 +25,7 @@ impl OriginBounds {
         let origins = pixels.map(|pixel| geometry.window_origin(pixel));
         let bounds = origins
             .filter(|origin| !geometry.clip_window(*origin).is_empty())
-            .map(|Element { u, v }| Self {
+            .map(|LightElement { u, v }| Self {
                 columns: u..u + 1,
                 rows: v..v + 1,
             });
@@ -71,7 +71,7 @@ pub struct LightBlock {
 #[derive(Clone, Debug)]
 pub struct LightBlocks {
     /// The first origin of the first block.
-    pub origin: Element,
+    pub origin: LightElement,
     /// Origins along a block's side, at most 256.
     pub side: usize,
     /// Extent of the footprints of all blocks together.
@@ -89,7 +89,7 @@ impl LightBlocks {
         let first = |origins: &Range<i32>, blocks: usize| {
             origins.start - ((blocks * side - origins.len()) / 2) as i32
         };
-        let grid_origin = Element {
+        let grid_origin = LightElement {
             u: first(&bounds.columns, grid[0]),
             v: first(&bounds.rows, grid[1]),
         };
@@ -122,7 +122,7 @@ impl LightBlocks {
             block.offsets.shrink_to_fit();
         }
         Self {
-            origin: Element {
+            origin: LightElement {
                 u: grid_origin.u + columns.start as i32,
                 v: grid_origin.v + rows.start as i32,
             },

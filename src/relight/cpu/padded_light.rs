@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::transport::{ClippedRect, Element, Extent};
+use crate::transport::{ClippedRect, Extent, LightElement};
 
 /// A light with a dark border. Coordinates are columns and rows from its first element.
 #[derive(Clone, Debug)]
@@ -19,7 +19,7 @@ pub struct PaddedLight {
 
 impl PaddedLight {
     /// A dark light, for a light plane of extent `light`: `extent` elements from `origin` on.
-    pub fn new(light: Extent, origin: Element, extent: Extent) -> Self {
+    pub fn new(light: Extent, origin: LightElement, extent: Extent) -> Self {
         Self {
             extent,
             light,
@@ -112,7 +112,7 @@ mod tests {
     fn changes_accumulate_until_they_are_cleared() {
         let extent = Extent::new(20, 3);
         // A border of seven columns and rows.
-        let origin = Element { u: -7, v: -7 };
+        let origin = LightElement { u: -7, v: -7 };
         let padded_extent = Extent::new(34, 17);
         let mut padded = PaddedLight::new(extent, origin, padded_extent);
         let mut values = vec![[0.0; 4]; 60];

@@ -1,7 +1,9 @@
 //! The contents of the textures.
 
 use super::{TextureDescriptor, TextureLayout, binding};
-use crate::transport::{CameraPx, Element, Extent, Geometry, TexelCode, Tile, TileRect, Transport};
+use crate::transport::{
+    CameraPx, Extent, Geometry, LightElement, TexelCode, Tile, TileRect, Transport,
+};
 
 /// Rows of codes in one region: up to 4 MiB, which makes uploads few and their copies small.
 const REGION_ROWS: u32 = 256;
@@ -117,7 +119,7 @@ impl TextureLayout {
         let clamp = |at: i32, side: u32| at.clamp(-(window.side() as i32), side as i32) as i16;
         let pixels = (0..camera.height).flat_map(|y| (0..camera.width).map(move |x| (x, y)));
         let origin = |(x, y)| {
-            let Element { u, v } = self.geometry.window_origin(CameraPx { x, y });
+            let LightElement { u, v } = self.geometry.window_origin(CameraPx { x, y });
             [clamp(u, light.width), clamp(v, light.height)]
         };
         pixels.map(origin).collect()

@@ -14,7 +14,7 @@ use surface_grid::{SurfaceGrid, SurfacePoint};
 
 use super::coordinates::{Vec2, vec2};
 use super::scene::SimulatedScene;
-use crate::transport::{CHANNELS, CameraPx, Element, Extent, Geometry, Window};
+use crate::transport::{CHANNELS, CameraPx, Extent, Geometry, LightElement, Window};
 
 /// Samples along each side of a camera pixel.
 const SAMPLES_PER_SIDE: u32 = 3;
@@ -55,7 +55,7 @@ struct Reflector {
     /// Reflected light, as a fraction of the flood.
     radiosity: [f64; CHANNELS],
     /// The element that lights it.
-    light_element: Element,
+    light_element: LightElement,
 }
 
 impl Cookies {
@@ -102,10 +102,10 @@ impl Cookies {
             self.surface.slope(i, j) * scale,
         );
         let radius = (window.window.side() / 2) as i32;
-        let Element { u, v } = element_at(point.at);
+        let LightElement { u, v } = element_at(point.at);
         for v in v - radius..=v + radius {
             for u in u - radius..=u + radius {
-                let Some(m) = (Element { u, v }).index_in(self.geometry.light) else {
+                let Some(m) = (LightElement { u, v }).index_in(self.geometry.light) else {
                     continue;
                 };
                 let reflector = &self.reflectors[m];
@@ -174,8 +174,8 @@ fn beam_origin(point: &SurfacePoint) -> Vec2 {
 }
 
 /// The light element at a position.
-fn element_at(p: Vec2) -> Element {
-    Element {
+fn element_at(p: Vec2) -> LightElement {
+    LightElement {
         u: p.x.floor() as i32,
         v: p.y.floor() as i32,
     }
@@ -212,7 +212,7 @@ fn reflected(surface: &SurfaceGrid, point: &SurfacePoint) -> ReflectedLight {
 
 /// Sums one pixel's light transport function.
 struct WindowAccumulator<'a> {
-    origin: Element,
+    origin: LightElement,
     window: Window,
     light: Extent,
     tau: &'a mut [[f32; CHANNELS]],
@@ -220,7 +220,7 @@ struct WindowAccumulator<'a> {
 
 impl WindowAccumulator<'_> {
     /// Adds light from `element`; ignores elements outside the light plane or the window.
-    fn add(&mut self, element: Element, light: [f64; CHANNELS]) {
+    fn add(&mut self, element: LightElement, light: [f64; CHANNELS]) {
         let slot = self.window.slot(self.origin, element);
         if let (Some(s), Some(_)) = (slot, element.index_in(self.light)) {
             for c in 0..CHANNELS {
@@ -239,7 +239,7 @@ impl WindowAccumulator<'_> {
             for u in first.x.floor() as i32..=last.x.floor() as i32 {
                 let share = overlap(first.x, last.x, u) * overlap(first.y, last.y, v);
                 if share > 0.0 {
-                    self.add(Element { u, v }, light.map(|l| l * share));
+                    self.add(LightElement { u, v }, light.map(|l| l * share));
                 }
             }
         }
