@@ -40,7 +40,7 @@ struct InspectReport {
     /// Number of basis functions; none without factored tiles.
     rank: Option<u16>,
     /// Bytes before the first scan.
-    head_bytes: u64,
+    index_bytes: u64,
     largest_chunk_bytes: u32,
     scans: Vec<ScanReport>,
     file_bytes: u64,
@@ -135,7 +135,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         direct_tiles: count(|tile| tile[1]),
         factored_tiles: count(|tile| tile[0]),
         rank: Some(index.header.rank).filter(|&rank| rank > 0),
-        head_bytes: index.header.index_bytes(),
+        index_bytes: index.header.index_bytes(),
         largest_chunk_bytes,
         scans: (0..index.scans.len())
             .map(|scan| ScanReport::new(&index, scan))
@@ -176,7 +176,7 @@ fn print(report: &InspectReport) -> Result<()> {
         ),
         ("recovered", format_recovery(metadata)),
         ("written by", metadata.writer.clone()),
-        ("file index", format_bytes(report.head_bytes)),
+        ("file index", format_bytes(report.index_bytes)),
     ] {
         if !value.is_empty() {
             print_line(&format!("{name:15} {value}"))?;

@@ -58,8 +58,7 @@ pub trait Backend {
     /// The gamut of the canvas.
     fn gamut(&self) -> Gamut;
 
-    /// Uploads a picture of the browser's as the light of frames without one. Returns `false` if the backend
-    /// cannot.
+    /// Uploads a picture of the browser's as the light of frames without one. Returns `false` if the backend cannot.
     ///
     /// # Errors
     /// What the browser throws, for instance for pictures of another origin. The last light stays.
