@@ -28,7 +28,9 @@ use std::time::Instant;
 use rayon::prelude::*;
 use relightable_photo::capture::{LinearPhoto, Measurements, NoiseModel, Pattern, RowSet};
 use relightable_photo::executor::{Executor, SequentialExecutor};
-use relightable_photo::recover::{Homotopy, Method, Nnls, Recovery, Settings, SparsityBasis};
+use relightable_photo::recover::{
+    Homotopy, Method, Nnls, Recovery, RecoverySettings, SparsityBasis,
+};
 use relightable_photo::simulate::{
     Camera, EmissionMatrix, LightCodes, PatternEnsemble, RandomStream, SceneKind, emission,
 };
@@ -128,7 +130,7 @@ fn prepare(measurements: &Measurements, method: Method) -> Recovery {
     let window = Window::new(WINDOW).unwrap();
     Recovery::prepare(
         measurements,
-        Settings { method, window },
+        RecoverySettings { method, window },
         &SequentialExecutor,
     )
     .unwrap()

@@ -7,8 +7,9 @@ use common::{Noise, functions, geometry, sealed};
 use proptest::prelude::*;
 use relightable_photo::executor::{Executor, SequentialExecutor};
 use relightable_photo::format::{
-    self, ChunkId, ChunkSelection, Coding, DistortionMetric, EncodedFile, Extension, FileSection,
-    FormatError, HEADER_BYTES, Limits, LtmReader, Metadata, RateTarget, Source, TextDamage,
+    self, ChunkId, ChunkSelection, DistortionMetric, EncodedFile, Extension, FileSection,
+    FormatError, HEADER_BYTES, Limits, LtmReader, Metadata, RateTarget, ScanCoding, Source,
+    TextModeDamage,
 };
 use relightable_photo::transport::{
     Basis, CHANNELS, Decibels, FloatTile, Geometry, Tile, Transport, TransportError,
@@ -690,7 +691,7 @@ fn error_messages_name_the_fault() {
     assert!(message(&|f| f[..4].copy_from_slice(b"\x89PNG")).contains("PNG picture"));
     let mangled = [&file[..8], b"\n\x1A\n"].concat();
     let error = decode(&mangled, 1).unwrap_err();
-    let line_ends = FormatError::TextModeTransfer(TextDamage::LineEnds);
+    let line_ends = FormatError::TextModeTransfer(TextModeDamage::LineEnds);
     assert_eq!(error.to_string(), line_ends.to_string());
     // Versions in the magic number and in the field.
     assert!(message(&|f| f[5..7].copy_from_slice(b"01")).contains("version 0.1"));
@@ -1070,5 +1071,5 @@ fn bytes_after_a_gap_are_refused() {
         .feed(start + 5, &file[start as usize + 5..start as usize + 7])
         .unwrap_err();
     assert!(matches!(error, FormatError::Gap { expected, .. } if expected == start + 3));
-    assert_eq!(index.scans[0].coding, Coding::Transform);
+    assert_eq!(index.scans[0].coding, ScanCoding::Transform);
 }

@@ -3,13 +3,13 @@
 
 use std::cell::RefCell;
 
-use relightable_photo::format::{Coding, HEADER_BYTES};
+use relightable_photo::format::{HEADER_BYTES, ScanCoding};
 use relightable_photo::transport::{CHANNELS, Extent, Geometry};
 
 use crate::choices::Choices;
 use crate::source;
 
-/// Pixels along a side of a block of [`Coding::Transform`].
+/// Pixels along a side of a block of [`ScanCoding::Transform`].
 const BLOCK_SIDE: u32 = 8;
 const END_OF_RUN: u8 = 0;
 const SIXTEEN_ZEROS: u8 = 0xF0;
@@ -17,7 +17,7 @@ const KLT_BYTES: usize = 2 * CHANNELS * CHANNELS;
 
 /// A scan and its chunks, each with its content bytes.
 struct Scan {
-    coding: Coding,
+    coding: ScanCoding,
     first: u16,
     count: u16,
     step: f32,
@@ -27,7 +27,7 @@ struct Scan {
 }
 
 impl Scan {
-    fn new(coding: Coding, first: u16, count: u16, choices: &mut Choices<'_>) -> Self {
+    fn new(coding: ScanCoding, first: u16, count: u16, choices: &mut Choices<'_>) -> Self {
         let step = match choices.below(8) {
             0 | 1 => 1.0,
             2 => 0.01,
@@ -94,12 +94,12 @@ pub fn file(choices: &mut Choices<'_>) -> Vec<u8> {
 fn scans(choices: &mut Choices<'_>, geometry: &Geometry, rank: usize) -> Vec<Scan> {
     let area = geometry.window.area();
     let coefficients = match choices.chance(64) {
-        true => Coding::Halves,
-        false => Coding::Transform,
+        true => ScanCoding::Halves,
+        false => ScanCoding::Transform,
     };
     let functions = match choices.chance(64) {
-        true => Coding::DirectHalves,
-        false => Coding::Direct,
+        true => ScanCoding::DirectHalves,
+        false => ScanCoding::Direct,
     };
     let (mut scans, mut known) = (Vec::new(), 0);
     for _ in 0..choices.below(7) {
@@ -116,10 +116,10 @@ fn scans(choices: &mut Choices<'_>, geometry: &Geometry, rank: usize) -> Vec<Sca
         if choices.rarely() {
             (scan.first, scan.count) = (choices.u16(), choices.u16());
             scan.coding = choices.of([
-                Coding::Transform,
-                Coding::Halves,
-                Coding::Direct,
-                Coding::DirectHalves,
+                ScanCoding::Transform,
+                ScanCoding::Halves,
+                ScanCoding::Direct,
+                ScanCoding::DirectHalves,
             ]);
         }
         known += scan.new_functions(known);
@@ -159,7 +159,7 @@ fn chunk(
 ) -> (Vec<u8>, u32) {
     let count = usize::from(scan.count);
     match scan.coding {
-        Coding::Halves | Coding::DirectHalves => {
+        ScanCoding::Halves | ScanCoding::DirectHalves => {
             let numbers = extent.area() * CHANNELS * count.min(area.max(40));
             let mut content = choices.fill(2 * numbers);
             if !choices.rarely() {
@@ -171,11 +171,11 @@ fn chunk(
             let bytes = frame(choices, &content);
             (bytes, content.len() as u32)
         }
-        Coding::Direct => {
+        ScanCoding::Direct => {
             let runs = std::iter::repeat_n(count.min(area) * CHANNELS, extent.area());
             token_string(choices, runs)
         }
-        Coding::Transform => {
+        ScanCoding::Transform => {
             let mut bytes = Vec::new();
             if scan.first == 0 && !*has_klt {
                 *has_klt = true;
@@ -372,10 +372,10 @@ fn assemble(
     let mut directory = Vec::new();
     for scan in scans {
         let coding = match scan.coding {
-            Coding::Transform => 1u16,
-            Coding::Halves => 2,
-            Coding::Direct => 3,
-            Coding::DirectHalves => 4,
+            ScanCoding::Transform => 1u16,
+            ScanCoding::Halves => 2,
+            ScanCoding::Direct => 3,
+            ScanCoding::DirectHalves => 4,
         };
         for field in [coding, scan.first, scan.count, 0] {
             directory.extend(field.to_le_bytes());

@@ -21,14 +21,14 @@ const MIN_DECODED_PIXELS: usize = 100;
 /// The axis of the light plane that a bit numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Axis {
+pub enum LightPlaneAxis {
     /// Columns.
     X,
     /// Rows.
     Y,
 }
 
-impl std::fmt::Display for Axis {
+impl std::fmt::Display for LightPlaneAxis {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::X => "x",
@@ -51,7 +51,7 @@ pub struct BitPair {
 pub enum CalibrationError {
     /// The Gray code has no bits for an axis.
     #[error("\"graycode\" has no photographs for axis {0}")]
-    MissingBits(Axis),
+    MissingBits(LightPlaneAxis),
     /// Too few pixels have clear bits.
     #[error(
         "only {decoded} camera pixels show clear Gray code along axis {axis}; at least {MIN_DECODED_PIXELS} are needed"
@@ -60,7 +60,7 @@ pub enum CalibrationError {
         /// Number of decoded pixels.
         decoded: usize,
         /// The axis.
-        axis: Axis,
+        axis: LightPlaneAxis,
     },
 }
 
@@ -92,7 +92,10 @@ impl GrayCodePhotos {
                 .ok_or(CalibrationError::TooFewPixels { decoded, axis })
         };
         Ok(Correspondence {
-            affine: [axis(&self.x, Axis::X)?, axis(&self.y, Axis::Y)?],
+            affine: [
+                axis(&self.x, LightPlaneAxis::X)?,
+                axis(&self.y, LightPlaneAxis::Y)?,
+            ],
         })
     }
 }
@@ -144,12 +147,16 @@ mod tests {
     /// Ideal photographs of Gray code through a known map, blurred over `blur` elements.
     fn photograph(camera: Extent, affine: [[f64; 3]; 2], bits: u32, blur: f64) -> GrayCodePhotos {
         let map = Correspondence { affine };
-        let axis = |along: Axis| {
+        let axis = |along: LightPlaneAxis| {
             let bit = |b: u32| {
                 let brightness = |n: usize| -> f32 {
                     let (x, y) = (n as u32 % camera.width, n as u32 / camera.width);
                     let at = map.at(CameraPx { x, y });
-                    let centre = if along == Axis::X { at.u } else { at.v };
+                    let centre = if along == LightPlaneAxis::X {
+                        at.u
+                    } else {
+                        at.v
+                    };
                     let taps = (-8..=8).map(|i| centre + blur * f64::from(i) / 8.0);
                     let lit = taps.filter(|t| {
                         let m = t.floor().max(0.0) as u32;
@@ -166,8 +173,8 @@ mod tests {
             (0..bits).rev().map(bit).collect()
         };
         GrayCodePhotos {
-            x: axis(Axis::X),
-            y: axis(Axis::Y),
+            x: axis(LightPlaneAxis::X),
+            y: axis(LightPlaneAxis::Y),
             rows: (0..camera.height).collect(),
         }
     }
@@ -198,12 +205,12 @@ mod tests {
             error,
             Err(CalibrationError::TooFewPixels {
                 decoded: 0,
-                axis: Axis::Y
+                axis: LightPlaneAxis::Y
             })
         );
         assert_eq!(
             GrayCodePhotos::default().correspondence(camera),
-            Err(CalibrationError::MissingBits(Axis::X))
+            Err(CalibrationError::MissingBits(LightPlaneAxis::X))
         );
     }
 }

@@ -3,4 +3,4 @@
 mod affine_fit;
 mod graycode;
 
-pub use graycode::{Axis, BitPair, CalibrationError, GrayCodePhotos};
+pub use graycode::{BitPair, CalibrationError, GrayCodePhotos, LightPlaneAxis};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::calibrate::Axis;
+use crate::calibrate::LightPlaneAxis;
 use crate::transport::Extent;
 
 /// The manifest's file name.
@@ -84,7 +84,7 @@ pub enum CaptureProblem {
     #[error("\"graycode\" has no photograph of axis {axis}, bit {bit}, inverted {inverted}")]
     MissingGrayCode {
         /// The axis of the light plane.
-        axis: Axis,
+        axis: LightPlaneAxis,
         /// Number of the bit, 0 the least significant.
         bit: u32,
         /// Whether the missing photograph is that of the inverted pattern.

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::error::{CaptureError, CaptureProblem};
-use crate::calibrate::Axis;
+use crate::calibrate::LightPlaneAxis;
 use crate::transport::{Correspondence, Extent, MAX_SIDE};
 
 /// Largest 16-bit code.
@@ -96,7 +96,7 @@ pub struct GrayCodeShot {
     /// 16-bit linear RGB PNG.
     pub photo: String,
     /// `x` or `y`.
-    pub axis: Axis,
+    pub axis: LightPlaneAxis,
     /// Bit number, 0 the least significant.
     pub bit: u32,
     /// Whether the pattern was shown inverted.

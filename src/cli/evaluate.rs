@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::ltm_file::{PrefixLength, read_ltm};
-use super::process::AllCores;
+use super::process::AllCoresExecutor;
 use super::report::{format_bytes, print_json, print_line};
 use crate::capture::{CaptureFolder, GroundTruth, LinearPhoto, PhotoReader, RowSet};
 use crate::relight::cpu::CpuRelighter;
@@ -101,7 +101,7 @@ impl EvaluateReport {
         let geometry = relighter.transport().geometry;
         for name in truth.lights()? {
             let light = Light::from_linear_rgb(geometry.light, &truth.light(&name)?.rgb())?;
-            relighter.relight(&light, &AllCores);
+            relighter.relight(&light, &AllCoresExecutor);
             let picture = relighter.linear();
             let pixels = picture.pixels.iter();
             let relit: Vec<_> = pixels.map(|p| [0, 1, 2].map(|c| f64::from(p[c]))).collect();
@@ -175,7 +175,7 @@ fn add_error(
     light: &Light,
     mut reader: PhotoReader,
 ) -> Result<()> {
-    relighter.relight(light, &AllCores);
+    relighter.relight(light, &AllCoresExecutor);
     let picture = relighter.linear();
     let mut photo = LinearPhoto::new();
     reader.read(&RowSet::all(picture.extent.height), &mut photo)?;

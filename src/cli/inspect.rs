@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::ltm_file::open_ltm;
 use super::report::{format_bytes, format_shots, print_json, print_line};
-use crate::format::{Coding, FileIndex, Metadata};
+use crate::format::{FileIndex, Metadata, ScanCoding};
 use crate::transport::Decibels;
 
 /// Show the contents of a relightable photograph; reads its file index only
@@ -68,10 +68,10 @@ impl ScanReport {
         let scan = &index.scans[scan];
         Self {
             coding: match scan.coding {
-                Coding::Transform => "transform",
-                Coding::Halves => "halves",
-                Coding::Direct => "direct",
-                Coding::DirectHalves => "direct-halves",
+                ScanCoding::Transform => "transform",
+                ScanCoding::Halves => "halves",
+                ScanCoding::Direct => "direct",
+                ScanCoding::DirectHalves => "direct-halves",
             },
             items: scan.first..scan.end() as u16, // components and slots are below 2^12
             step: scan.step,

@@ -12,9 +12,9 @@ use crate::executor::Executor;
 
 /// Runs jobs on all cores of rayon's current pool.
 #[derive(Clone, Copy, Debug)]
-pub struct AllCores;
+pub struct AllCoresExecutor;
 
-impl Executor for AllCores {
+impl Executor for AllCoresExecutor {
     fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         (0..count).into_par_iter().map(work).collect()
     }
@@ -71,7 +71,7 @@ impl InterruptibleCores {
 
 impl Executor for InterruptibleCores {
     fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-        AllCores.map(count, work)
+        AllCoresExecutor.map(count, work)
     }
 
     /// The first time it is cancelled, tells the user so.

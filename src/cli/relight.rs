@@ -12,7 +12,7 @@ use image::{ExtendedColorType, ImageEncoder, ImageReader};
 use super::arguments::{UsageError, parse_number};
 use super::ltm_file::{PrefixLength, read_ltm};
 use super::output_file::{OutputFile, PNG};
-use super::process::AllCores;
+use super::process::AllCoresExecutor;
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{
     BuiltinLight, Light, OutputTransform, TorchPose, area_resample, reference, srgb,
@@ -99,8 +99,8 @@ pub fn run(args: &RelightArgs) -> Result<()> {
     let picture = match args.backend {
         BackendName::Cpu => {
             let mut relighter = CpuRelighter::new(Arc::new(file.transport));
-            relighter.relight(&light, &AllCores);
-            relighter.picture(&transform, &AllCores)
+            relighter.relight(&light, &AllCoresExecutor);
+            relighter.picture(&transform, &AllCoresExecutor)
         }
         BackendName::Reference => reference::picture(&file.transport, &light, &transform),
     };

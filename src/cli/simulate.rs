@@ -105,7 +105,7 @@ pub fn run(args: &SimulateArgs) -> Result<()> {
 }
 
 /// What to write of the object under one light.
-enum PictureKind {
+enum SimulatedPicture {
     /// A photograph with noise, to this path, and the light's codes, if it is a pattern, to another.
     Photograph(String, Option<String>),
     /// The true picture under a truth light.
@@ -121,7 +121,7 @@ struct CapturePlan {
     /// All lights.
     lights: Vec<LightCodes>,
     /// For each light, what to write.
-    kinds: Vec<PictureKind>,
+    kinds: Vec<SimulatedPicture>,
 }
 
 impl CapturePlan {
@@ -160,7 +160,7 @@ impl CapturePlan {
             let codes = LightCodes::uniform(args.light, code);
             plan.add(
                 codes,
-                PictureKind::Photograph(format!("photos/{name}.png"), None),
+                SimulatedPicture::Photograph(format!("photos/{name}.png"), None),
             );
         }
         for code in GrayCodePattern::all(args.light) {
@@ -168,7 +168,7 @@ impl CapturePlan {
             let photo = format!("graycode/{}{}{sign}.png", code.axis, code.bit);
             plan.add(
                 code.codes(args.light),
-                PictureKind::Photograph(photo.clone(), None),
+                SimulatedPicture::Photograph(photo.clone(), None),
             );
             plan.manifest.graycode.push(GrayCodeShot {
                 photo,
@@ -184,7 +184,7 @@ impl CapturePlan {
             let (pattern, photo) = (format!("patterns/{i:04}.png"), format!("photos/{i:04}.png"));
             plan.add(
                 codes,
-                PictureKind::Photograph(photo.clone(), Some(pattern.clone())),
+                SimulatedPicture::Photograph(photo.clone(), Some(pattern.clone())),
             );
             plan.manifest.shots.push(Shot {
                 pattern,
@@ -193,12 +193,12 @@ impl CapturePlan {
             });
         }
         for (name, codes) in truth_lights(args.light) {
-            plan.add(codes, PictureKind::Truth(name));
+            plan.add(codes, SimulatedPicture::Truth(name));
         }
         Ok(plan)
     }
 
-    fn add(&mut self, codes: LightCodes, kind: PictureKind) {
+    fn add(&mut self, codes: LightCodes, kind: SimulatedPicture) {
         self.lights.push(codes);
         self.kinds.push(kind);
     }
@@ -217,7 +217,7 @@ fn write(plan: &CapturePlan, root: &Path) -> Result<()> {
     let write_picture = |i: usize| -> Result<()> {
         let (picture, codes) = (&pictures[i], &plan.lights[i]);
         match &plan.kinds[i] {
-            PictureKind::Photograph(photo, pattern) => {
+            SimulatedPicture::Photograph(photo, pattern) => {
                 let mut noise = RandomStream::Photograph(i as u32).start(plan.seed);
                 let photographed = plan.camera.photograph(picture, &mut noise);
                 write_rgb16(&root.join(photo), camera, &photographed)?;
@@ -225,7 +225,7 @@ fn write(plan: &CapturePlan, root: &Path) -> Result<()> {
                     write_codes(&root.join(pattern), light, codes)?;
                 }
             }
-            PictureKind::Truth(name) => {
+            SimulatedPicture::Truth(name) => {
                 let path = |kind| root.join(format!("truth/{kind}_{name}.png"));
                 let code = |y: f32| (f64::from(y) * RELIT_FULL_SCALE).round() as u16;
                 let relit: Vec<_> = picture.iter().map(|y| y.map(code)).collect();

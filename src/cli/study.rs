@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 
-use super::process::AllCores;
+use super::process::AllCoresExecutor;
 use super::shot_reader::{ShotReader, read_patterns};
 use super::{output_folder, progress};
 use crate::capture::{CaptureFolder, Measurements, NoiseModel, RowSet};
@@ -158,14 +158,14 @@ impl<'a> StudySubject<'a> {
                         name,
                         camera,
                         ensemble,
-                        &AllCores,
+                        &AllCoresExecutor,
                         self.progress,
                     )?)
                 })
                 .collect(),
             _ => Ok(vec![study::scenes_table(
                 self.pixels,
-                &AllCores,
+                &AllCoresExecutor,
                 self.progress,
             )?]),
         }
@@ -180,7 +180,7 @@ impl<'a> StudySubject<'a> {
             self.name
         ));
         let camera = scene_camera(scene.as_ref());
-        let measurements = camera.measure(kind.ensemble(), max_patterns, &AllCores);
+        let measurements = camera.measure(kind.ensemble(), max_patterns, &AllCoresExecutor);
         let lights = study::built_in_lights(PAPER_LIGHT);
         self.figures(&camera, measurements, lights)
     }
@@ -214,12 +214,26 @@ impl<'a> StudySubject<'a> {
         lights: Vec<RelitLight>,
     ) -> Result<Vec<ReportSection>> {
         let (name, progress) = (&self.name, self.progress);
-        let sparsity = study::sparsity(name, known, &AllCores, progress)?;
+        let sparsity = study::sparsity(name, known, &AllCoresExecutor, progress)?;
         let relit_from = study::first_shots(&measurements, RELIT_PATTERNS);
-        let relit = study::relit_pictures(name, known, &relit_from, lights, &AllCores, progress)?;
+        let relit = study::relit_pictures(
+            name,
+            known,
+            &relit_from,
+            lights,
+            &AllCoresExecutor,
+            progress,
+        )?;
         drop(relit_from);
         let pixels = self.pixels;
-        let curves = study::snr_curves(name, known, measurements, pixels, &AllCores, progress)?;
+        let curves = study::snr_curves(
+            name,
+            known,
+            measurements,
+            pixels,
+            &AllCoresExecutor,
+            progress,
+        )?;
         Ok(vec![sparsity, curves, relit])
     }
 }

@@ -77,8 +77,8 @@ impl MemoryBudget {
     }
 
     /// Starts a scope: dropping the guard releases all bytes reserved since.
-    pub fn scratch(&self) -> Scratch<'_> {
-        Scratch {
+    pub fn scratch(&self) -> ScratchReservation<'_> {
+        ScratchReservation {
             budget: self,
             reserved_after: self.reserved.get(),
         }
@@ -145,19 +145,19 @@ impl MemoryBudget {
 
 /// Releases on drop all bytes reserved since [`MemoryBudget::scratch`], except those that [`keep`](Self::keep) names.
 #[derive(Debug)]
-pub struct Scratch<'a> {
+pub struct ScratchReservation<'a> {
     budget: &'a MemoryBudget,
     reserved_after: u64,
 }
 
-impl Scratch<'_> {
+impl ScratchReservation<'_> {
     /// Ends the scope; `bytes` stay reserved.
     pub fn keep(mut self, bytes: u64) {
         self.reserved_after += bytes;
     }
 }
 
-impl Drop for Scratch<'_> {
+impl Drop for ScratchReservation<'_> {
     fn drop(&mut self) {
         self.budget.reserved.set(self.reserved_after);
     }

@@ -10,7 +10,7 @@ use super::codec::{basis, direct, halves, tokens, transform};
 use super::constants::{CHUNK_ENTRY_BYTES, MAX_CONTENT_BYTES, SCAN_RECORD_BYTES};
 use super::error::FormatError;
 use super::header::Header;
-use super::scan::{Coding, Scan};
+use super::scan::{Scan, ScanCoding};
 use crate::transport::{CHANNELS, Extent};
 
 /// Bytes of the directory before compression. At most 1024 · (24 + 12 · 2^24): no overflow.
@@ -75,8 +75,8 @@ fn decode_scans(
         scans.push(record);
     }
     let has = |coding| scans.iter().any(|scan: &Scan| scan.coding == coding);
-    let is_mixed = has(Coding::Transform) && has(Coding::Halves)
-        || has(Coding::Direct) && has(Coding::DirectHalves);
+    let is_mixed = has(ScanCoding::Transform) && has(ScanCoding::Halves)
+        || has(ScanCoding::Direct) && has(ScanCoding::DirectHalves);
     match is_mixed || known != usize::from(header.rank) {
         true => Err(FormatError::InvalidScan(scans.len())),
         false => Ok(scans),
@@ -109,15 +109,15 @@ fn is_valid_entry(scan: &Scan, extent: Extent, entry: ChunkEntry) -> bool {
     }
     let values = extent.area() * CHANNELS * usize::from(scan.count);
     let (min_content, max_content, max_bytes) = match scan.coding {
-        Coding::Transform => {
+        ScanCoding::Transform => {
             let max_tokens = transform::max_tokens(extent, scan.count);
             (1, max_tokens, transform::max_bytes(content))
         }
-        Coding::Direct => {
+        ScanCoding::Direct => {
             let max_tokens = direct::max_tokens(extent, scan.count);
             (1, max_tokens, tokens::max_bytes(content))
         }
-        Coding::Halves | Coding::DirectHalves => {
+        ScanCoding::Halves | ScanCoding::DirectHalves => {
             let exact = halves::content_bytes(values) as u64;
             (exact, exact, compressed_bound(content))
         }

@@ -16,7 +16,7 @@ pub enum FormatError {
     UnknownMagic(Vec<u8>),
     /// A transfer in text mode damaged the magic number.
     #[error("{0} in this .ltm file, as a transfer in text mode does; transfer it again as binary")]
-    TextModeTransfer(TextDamage),
+    TextModeTransfer(TextModeDamage),
     /// This reader does not know the version.
     #[error(
         "the file has format version {major}.{minor}, which this reader does not know: get the reader for it, or export the file again; if it is damaged, copy it again"
@@ -136,7 +136,7 @@ pub enum FormatError {
 
 /// How a transfer in text mode changed a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum TextDamage {
+pub enum TextModeDamage {
     /// CR LF became LF, or LF CR LF.
     #[error("line ends were converted")]
     LineEnds,

@@ -4,7 +4,7 @@ use super::checksum::{check_crc, checksum};
 use super::constants::{
     HEADER_BYTES, MAX_EXTENSION_BYTES, MAX_METADATA_BYTES, MAX_RANK, MAX_SCANS,
 };
-use super::error::{FileSection, FormatError, TextDamage};
+use super::error::{FileSection, FormatError, TextModeDamage};
 use super::fields::FieldReader;
 use crate::transport::{Correspondence, Geometry};
 
@@ -163,15 +163,15 @@ pub(super) fn check_magic(bytes: &[u8]) -> Result<(), FormatError> {
     }
     let looks_like = |damaged: &[u8]| bytes[..MAGIC_NAME_BYTES] == damaged[..MAGIC_NAME_BYTES];
     if looks_like(&MAGIC.map(|byte| byte & 0x7F)) {
-        return Err(FormatError::TextModeTransfer(TextDamage::HighBit));
+        return Err(FormatError::TextModeTransfer(TextModeDamage::HighBit));
     }
     if looks_like(b"\xC2\xABLT") || looks_like(b"\xEF\xBF\xBDL") {
-        return Err(FormatError::TextModeTransfer(TextDamage::Utf8));
+        return Err(FormatError::TextModeTransfer(TextModeDamage::Utf8));
     }
     match bytes.iter().zip(&MAGIC).position(|(a, b)| a != b) {
         None => Ok(()),
         // After the name only the line ends can differ.
-        Some(8..) => Err(FormatError::TextModeTransfer(TextDamage::LineEnds)),
+        Some(8..) => Err(FormatError::TextModeTransfer(TextModeDamage::LineEnds)),
         Some(_) => Err(FormatError::UnknownMagic(
             bytes[..bytes.len().min(MAGIC.len())].to_vec(),
         )),

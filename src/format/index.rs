@@ -12,7 +12,7 @@ use super::error::{FileSection, FormatError};
 use super::extension::{self, Extension};
 use super::header::{Header, SectionEntry};
 use super::metadata::{Metadata, MetadataJson};
-use super::scan::{Coding, Scan, rank_of};
+use super::scan::{Scan, ScanCoding, rank_of};
 use crate::transport::Geometry;
 
 /// Everything that precedes the first scan.
@@ -140,7 +140,7 @@ impl FileIndex {
     pub(super) fn has_colour_klt(&self, scan: usize, tile: usize) -> bool {
         let has_first = |scan: usize| {
             let Scan { coding, first, .. } = self.scans[scan];
-            coding == Coding::Transform && first == 0 && self.entry(scan, tile).bytes > 0
+            coding == ScanCoding::Transform && first == 0 && self.entry(scan, tile).bytes > 0
         };
         has_first(scan) && !(0..scan).any(has_first)
     }

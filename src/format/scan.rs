@@ -9,7 +9,7 @@ use crate::transport::Decibels;
 /// How a scan's values are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
-pub enum Coding {
+pub enum ScanCoding {
     /// Coefficients: colour transform, cosine transform, quantisation.
     Transform = 1,
     /// Coefficients as half-precision floats.
@@ -20,7 +20,7 @@ pub enum Coding {
     DirectHalves,
 }
 
-impl Coding {
+impl ScanCoding {
     /// Whether chunks hold slots of direct functions, not coefficients.
     pub fn is_direct(self) -> bool {
         matches!(self, Self::Direct | Self::DirectHalves)
@@ -37,7 +37,7 @@ pub(super) fn rank_of(scans: &[Scan]) -> usize {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scan {
     /// How its values are written.
-    pub coding: Coding,
+    pub coding: ScanCoding,
     /// First component, or for direct codings the first slot by centre-out index.
     pub first: u16,
     /// Number of components or slots.
@@ -53,7 +53,7 @@ pub struct Scan {
 
 impl Scan {
     /// A scan whose chunks are not encoded yet.
-    pub(super) fn new(coding: Coding, first: u16, count: u16, step: f32) -> Self {
+    pub(super) fn new(coding: ScanCoding, first: u16, count: u16, step: f32) -> Self {
         Self {
             coding,
             first,
@@ -100,10 +100,10 @@ impl Scan {
         let [step, snr, basis_bytes, basis_crc] = fields.u32s();
         let (step, snr) = (f32::from_bits(step), f32::from_bits(snr));
         let coding = match coding {
-            1 => Coding::Transform,
-            2 => Coding::Halves,
-            3 => Coding::Direct,
-            4 => Coding::DirectHalves,
+            1 => ScanCoding::Transform,
+            2 => ScanCoding::Halves,
+            3 => ScanCoding::Direct,
+            4 => ScanCoding::DirectHalves,
             _ => return None,
         };
         let is_valid = reserved == 0 && count > 0 && step > 0.0 && step.is_finite();

@@ -6,7 +6,7 @@ use super::codec::transform::CoefficientPlanes;
 use super::codec::{basis, direct, halves};
 use super::error::{FormatError, SectionError};
 use super::index::FileIndex;
-use super::scan::Coding;
+use super::scan::ScanCoding;
 use crate::transport::{Basis, CHANNELS, FloatTile, Tile, TileCodes};
 
 /// A tile as the sum of its chunks so far.
@@ -65,16 +65,16 @@ impl TileDecoder {
         };
         let mut decode = || -> Result<(), SectionError> {
             match scan.coding {
-                Coding::Transform => self.planes.add(extent, scan, bytes, tokens, budget),
-                Coding::Direct => {
+                ScanCoding::Transform => self.planes.add(extent, scan, bytes, tokens, budget),
+                ScanCoding::Direct => {
                     allocate(&mut self.functions, area)?;
                     direct::add(&mut self.functions, order, scan, bytes, tokens, budget)
                 }
-                Coding::Halves => {
+                ScanCoding::Halves => {
                     allocate(&mut self.coefficients, rank)?;
                     halves::add(&mut self.coefficients, rank, scan, None, bytes, budget)
                 }
-                Coding::DirectHalves => {
+                ScanCoding::DirectHalves => {
                     allocate(&mut self.functions, area)?;
                     halves::add(&mut self.functions, area, scan, Some(order), bytes, budget)
                 }

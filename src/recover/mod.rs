@@ -42,5 +42,5 @@ pub use error::RecoverError;
 pub use holdout_validation::HoldoutValidation;
 pub use method::Method;
 pub use nnls::Nnls;
-pub use recovery::{Recovery, Settings};
+pub use recovery::{Recovery, RecoverySettings};
 pub use sampling::MIN_PATTERNS;

@@ -16,7 +16,7 @@ use crate::transport::{Basis, FloatTile, Geometry, TileRect, Window};
 
 /// The options of a recovery.
 #[derive(Clone, Copy, Debug)]
-pub struct Settings {
+pub struct RecoverySettings {
     /// How light transport functions are recovered.
     pub method: Method,
     /// The light elements around a pixel's correspondence that may light it.
@@ -29,12 +29,12 @@ pub struct Settings {
 pub struct Recovery {
     geometry: Geometry,
     split: HoldoutSplit,
-    solver: Solver,
+    solver: TileSolver,
     holdout_validation: Option<HoldoutValidation>,
 }
 
 #[derive(Debug)]
-enum Solver {
+enum TileSolver {
     Learned(Box<LearnedRecovery>),
     Pixelwise(PixelwiseRecovery),
 }
@@ -48,7 +48,7 @@ impl Recovery {
     /// photographs are dark, overexposed or do not match their patterns, and if the executor is cancelled.
     pub fn prepare(
         measurements: &Measurements,
-        settings: Settings,
+        settings: RecoverySettings,
         executor: &impl Executor,
     ) -> Result<Self, RecoverError> {
         let geometry = preparation::geometry(measurements, settings.window)?;
@@ -67,11 +67,11 @@ impl Recovery {
         let mean = pooled::mean_function(&preparation)?;
         let solver = match settings.method {
             Method::Learned => {
-                Solver::Learned(Box::new(LearnedRecovery::new(&preparation, &mean)?))
+                TileSolver::Learned(Box::new(LearnedRecovery::new(&preparation, &mean)?))
             }
-            Method::Nnls => Solver::Pixelwise(PixelwiseRecovery::least_squares(&preparation)?),
+            Method::Nnls => TileSolver::Pixelwise(PixelwiseRecovery::least_squares(&preparation)?),
             Method::Bpdn(basis) => {
-                Solver::Pixelwise(PixelwiseRecovery::denoising(&preparation, basis)?)
+                TileSolver::Pixelwise(PixelwiseRecovery::denoising(&preparation, basis)?)
             }
         };
         let mut recovery = Self {
@@ -81,8 +81,8 @@ impl Recovery {
             holdout_validation: None,
         };
         let training_tile = |rect: TileRect| match &recovery.solver {
-            Solver::Learned(learned) => learned.training_tile(measurements, &split, rect),
-            Solver::Pixelwise(solver) => {
+            TileSolver::Learned(learned) => learned.training_tile(measurements, &split, rect),
+            TileSolver::Pixelwise(solver) => {
                 FloatTile::from(solver.tile(measurements, &split.training, rect))
             }
         };
@@ -99,16 +99,16 @@ impl Recovery {
     /// The basis functions that factored tiles share, if there are such tiles.
     pub fn basis(&self) -> Option<&Basis> {
         match &self.solver {
-            Solver::Learned(learned) => Some(learned.basis()),
-            Solver::Pixelwise(_) => None,
+            TileSolver::Learned(learned) => Some(learned.basis()),
+            TileSolver::Pixelwise(_) => None,
         }
     }
 
     /// The weight of the patterns' common mode in least squares or denoising, if tiles depend on either.
     pub fn common_mode(&self) -> Option<CommonMode> {
         match &self.solver {
-            Solver::Learned(learned) => learned.common_mode(),
-            Solver::Pixelwise(solver) => Some(solver.common_mode),
+            TileSolver::Learned(learned) => learned.common_mode(),
+            TileSolver::Pixelwise(solver) => Some(solver.common_mode),
         }
     }
 
@@ -120,8 +120,8 @@ impl Recovery {
     /// Distance from a tile, in camera pixels, of the measurements that the tile depends on.
     pub fn halo(&self) -> u32 {
         match &self.solver {
-            Solver::Learned(learned) => learned.halo(),
-            Solver::Pixelwise(_) => 0,
+            TileSolver::Learned(learned) => learned.halo(),
+            TileSolver::Pixelwise(_) => 0,
         }
     }
 
@@ -129,8 +129,8 @@ impl Recovery {
     /// capture: they cover the tile and [`halo`](Self::halo) rows around it, within the picture.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> FloatTile {
         match &self.solver {
-            Solver::Learned(learned) => learned.tile(measurements, &self.split, rect),
-            Solver::Pixelwise(solver) => {
+            TileSolver::Learned(learned) => learned.tile(measurements, &self.split, rect),
+            TileSolver::Pixelwise(solver) => {
                 FloatTile::from(solver.tile(measurements, &self.split.all, rect))
             }
         }

@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
-use crate::calibrate::Axis;
+use crate::calibrate::LightPlaneAxis;
 use crate::transport::Extent;
 
 /// The monitor emits `(code / 255)^MONITOR_GAMMA`.
@@ -68,7 +68,7 @@ impl PatternEnsemble {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GrayCodePattern {
     /// Whether it codes columns or rows.
-    pub axis: Axis,
+    pub axis: LightPlaneAxis,
     /// Index of the bit, 0 for the least significant.
     pub bit: u32,
     /// Whether dark and bright are exchanged.
@@ -79,7 +79,10 @@ impl GrayCodePattern {
     /// All patterns of a light plane: columns, then rows, most significant bit first, each followed by its inverse.
     pub fn all(light: Extent) -> Vec<Self> {
         let mut patterns = Vec::new();
-        for (axis, side) in [(Axis::X, light.width), (Axis::Y, light.height)] {
+        for (axis, side) in [
+            (LightPlaneAxis::X, light.width),
+            (LightPlaneAxis::Y, light.height),
+        ] {
             for bit in (0..u32::BITS - (side - 1).leading_zeros()).rev() {
                 patterns.extend([false, true].map(|inverted| Self {
                     axis,
@@ -95,8 +98,8 @@ impl GrayCodePattern {
     pub fn codes(self, light: Extent) -> LightCodes {
         let code = |(u, v): (u32, u32)| {
             let n = match self.axis {
-                Axis::X => u,
-                Axis::Y => v,
+                LightPlaneAxis::X => u,
+                LightPlaneAxis::Y => v,
             };
             let on = (n ^ (n >> 1)) >> self.bit & 1 == 1;
             if on != self.inverted { 255 } else { 0 }
@@ -114,7 +117,7 @@ mod tests {
         let light = Extent::new(20, 3);
         let patterns: Vec<_> = GrayCodePattern::all(light)
             .into_iter()
-            .filter(|g| g.axis == Axis::X && !g.inverted)
+            .filter(|g| g.axis == LightPlaneAxis::X && !g.inverted)
             .collect();
         assert_eq!(
             patterns.iter().map(|g| g.bit).collect::<Vec<_>>(),

@@ -8,12 +8,12 @@ use super::methods::sample_for;
 use super::pixel_sampling;
 use crate::capture::Measurements;
 use crate::executor::Executor;
-use crate::recover::{Method, Recovery, Settings};
+use crate::recover::{Method, Recovery, RecoverySettings};
 use crate::transport::{Decibels, TransportError};
 
 /// SNR and time of a method.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Accuracy {
+pub(super) struct AccuracyPoint {
     /// Number of photographs that the method uses.
     pub photographs: usize,
     /// SNR of the whole matrix; `None` if the error is zero.
@@ -37,9 +37,9 @@ pub(super) fn measure_accuracy(
     method: Method,
     pixels: usize,
     executor: &impl Executor,
-) -> Result<Accuracy, StudyError> {
+) -> Result<AccuracyPoint, StudyError> {
     let start = Instant::now();
-    let settings = Settings {
+    let settings = RecoverySettings {
         method,
         window: known.geometry().window,
     };
@@ -59,7 +59,7 @@ pub(super) fn measure_accuracy(
     let all = geometry.camera.area();
     let (snr, standard_error) = pooled_snr(&errors, pixels as f64 / all as f64);
     let per_pixel = (recovered - prepared) / pixels as f64;
-    Ok(Accuracy {
+    Ok(AccuracyPoint {
         photographs: measurements.patterns.len(),
         snr,
         standard_error,

@@ -24,7 +24,7 @@ const COLOURS: [RGBColor; 8] = [
 ];
 const FONT: &str = "Helvetica, Arial, sans-serif";
 
-pub(super) struct Series {
+pub(super) struct ChartSeries {
     pub name: String,
     /// By ascending x; every x is positive.
     pub points: Vec<(f64, f64)>,
@@ -49,7 +49,7 @@ pub(super) struct Chart<'a> {
     pub y: Range<f64>,
     /// A reference value on the y axis, and its name.
     pub reference: Option<(f64, &'a str)>,
-    pub series: Vec<Series>,
+    pub series: Vec<ChartSeries>,
 }
 
 impl Chart<'_> {
@@ -216,7 +216,7 @@ mod tests {
             }),
             y: axis_range([-3.0, 31.0].into_iter(), 25.0),
             reference: Some((25.0, "25 dB")),
-            series: vec![Series {
+            series: vec![ChartSeries {
                 name: "nnls".to_owned(),
                 points: vec![(1.0, -3.0), (10.0, 31.0)],
                 has_markers: true,

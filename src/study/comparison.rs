@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use super::accuracy::{Accuracy, measure_accuracy, pooled_snr};
+use super::accuracy::{AccuracyPoint, measure_accuracy, pooled_snr};
 use super::chart::{Chart, TopAxis, axis_range};
 use super::dense_transport::{DenseTransport, dense_transport};
 use super::error::StudyError;
@@ -47,7 +47,7 @@ pub fn comparison(
     let truth = dense_transport(&scene_camera, executor);
     let counts = |max: usize| PHOTOGRAPH_COUNTS.into_iter().filter(move |&k| k <= max);
     let mut curves = Vec::new();
-    let mut add_curve = |method: String, points: Vec<Accuracy>| {
+    let mut add_curve = |method: String, points: Vec<AccuracyPoint>| {
         if let Some(last) = points.last() {
             let (snr, photographs) = (snr_cell(last.snr), last.photographs);
             progress(&format!(
@@ -64,7 +64,7 @@ pub fn comparison(
     let start = Instant::now();
     let scanned = scanning::snr_by_scans(&truth, &scans);
     let seconds = start.elapsed().as_secs_f64();
-    let point = |(snr, photographs)| Accuracy {
+    let point = |(snr, photographs)| AccuracyPoint {
         photographs,
         snr,
         standard_error: 0.0,
@@ -208,7 +208,7 @@ fn run_nystrom(
     scans: &[LinearPhoto],
     photographs: usize,
     executor: &impl Executor,
-) -> Accuracy {
+) -> AccuracyPoint {
     let light = scans.len();
     let elements = pixel_sampling::random_indices(light, photographs / 2);
     let pixels = pixel_sampling::random_indices(truth.len(), photographs - photographs / 2);
@@ -258,7 +258,7 @@ fn run_nystrom(
             part.merge(error);
         }
     }
-    Accuracy {
+    AccuracyPoint {
         photographs,
         snr: pooled_snr(&parts, 1.0).0,
         standard_error: 0.0,
@@ -268,13 +268,13 @@ fn run_nystrom(
 }
 
 /// The SNR in dB, infinite without error.
-fn snr_db(point: &Accuracy) -> f64 {
+fn snr_db(point: &AccuracyPoint) -> f64 {
     point.snr.map_or(f64::INFINITY, |snr| snr.0)
 }
 
 /// The number of photographs from which on the SNR is at least `target` dB, interpolated linearly in the logarithm of the
 /// number; `None` if the curve ends below.
-fn photographs_for(target: f64, points: &[Accuracy]) -> Option<usize> {
+fn photographs_for(target: f64, points: &[AccuracyPoint]) -> Option<usize> {
     let reached = points.iter().rposition(|p| snr_db(p) < target);
     let (below, above) = match reached {
         None => return points.first().map(|p| p.photographs),
@@ -292,8 +292,8 @@ mod tests {
     use crate::simulate::SceneKind;
     use crate::transport::Decibels;
 
-    fn point(photographs: usize, db: f64) -> Accuracy {
-        Accuracy {
+    fn point(photographs: usize, db: f64) -> AccuracyPoint {
+        AccuracyPoint {
             photographs,
             snr: Some(Decibels(db)),
             standard_error: 0.0,

@@ -9,7 +9,7 @@ use super::picture_sheet::{CaptionedPanel, Panel, PictureSheet};
 use super::section::{MarkdownTable, ProgressCallback, ReportSection, snr_cell};
 use crate::capture::Measurements;
 use crate::executor::Executor;
-use crate::recover::{Recovery, Settings};
+use crate::recover::{Recovery, RecoverySettings};
 use crate::relight::{BuiltinLight, Light, area_resample};
 use crate::transport::{CHANNELS, Decibels, Extent, Tile};
 
@@ -157,7 +157,7 @@ fn pictures(
     executor: &impl Executor,
     report_tenths: &(impl Fn(usize) + Sync),
 ) -> Result<(PictureSet, PictureSet), StudyError> {
-    let settings = Settings {
+    let settings = RecoverySettings {
         method: DEFAULT_METHOD,
         window: known.geometry().window,
     };

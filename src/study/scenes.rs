@@ -14,11 +14,11 @@ use PatternEnsemble::{Bernoulli, Gaussian};
 use SceneKind::{Cookies, StainedGlass};
 
 /// A row of the table: scene, sides of camera and light plane, ensemble, number of patterns, electrons, seed.
-type SceneSetting = (SceneKind, [u32; 2], PatternEnsemble, usize, f64, u64);
+type SceneTableRow = (SceneKind, [u32; 2], PatternEnsemble, usize, f64, u64);
 
 /// Both scenes, both ensembles, few and many photographs, little and much light, one to three camera pixels for each
 /// light element, and a seed for each.
-const SETTINGS: [SceneSetting; 14] = [
+const SETTINGS: [SceneTableRow; 14] = [
     (StainedGlass, [128, 64], Gaussian, 80, 4e4, 101),
     (StainedGlass, [128, 64], Bernoulli, 80, 4e4, 102),
     (StainedGlass, [128, 64], Bernoulli, 40, 2e5, 103),

@@ -1,7 +1,7 @@
 //! The structure of a light transport matrix (paper, figure 2): how few elements hold its energy (the sparsity
 //! profile), where they are in the matrix, and one light transport function.
 
-use super::chart::{Chart, Series};
+use super::chart::{Chart, ChartSeries};
 use super::error::StudyError;
 use super::known_transport::KnownTransport;
 use super::picture_sheet::{CaptionedPanel, Panel, PictureSheet};
@@ -213,7 +213,7 @@ fn profile_chart(
         let points = (0..=CURVE_POINTS)
             .map(|i| first * (area / first).powf(i as f64 / CURVE_POINTS as f64))
             .map(|k| (k, 100.0 * profile.share_of_largest(k * functions)));
-        Series {
+        ChartSeries {
             name: name.to_owned(),
             points: points.collect(),
             has_markers: false,

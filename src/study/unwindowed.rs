@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use super::accuracy::{Accuracy, pooled_snr};
+use super::accuracy::{AccuracyPoint, pooled_snr};
 use super::dense_transport::DenseTransport;
 use super::pixel_sampling;
 use crate::capture::Measurements;
@@ -22,7 +22,7 @@ pub(super) fn measure_accuracy(
     measurements: &Measurements,
     pixels: usize,
     executor: &impl Executor,
-) -> Accuracy {
+) -> AccuracyPoint {
     let start = Instant::now();
     let gram = gram(measurements, executor);
     let shared = start.elapsed().as_secs_f64();
@@ -44,7 +44,7 @@ pub(super) fn measure_accuracy(
     });
     let errors: Vec<TransportError> = errors.collect();
     let (snr, standard_error) = pooled_snr(&errors, errors.len() as f64 / truth.len() as f64);
-    Accuracy {
+    AccuracyPoint {
         photographs: measurements.patterns.len(),
         snr,
         standard_error,

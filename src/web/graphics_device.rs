@@ -12,7 +12,7 @@ use super::drawing::output_transform::parse_gamut;
 use super::{CodedError, Photo, Relighter};
 use crate::relight::backend::Backend;
 #[cfg(feature = "webgl2")]
-use crate::relight::webgl2::{Context, WebGl2Backend};
+use crate::relight::webgl2::{GlContext, WebGl2Backend};
 #[cfg(feature = "webgpu")]
 use crate::relight::webgpu::{Device, WebGpuBackend};
 
@@ -27,7 +27,7 @@ enum DeviceHandle {
     #[cfg(feature = "webgpu")]
     WebGpu(Rc<Device>),
     #[cfg(feature = "webgl2")]
-    WebGl2(Rc<Context>),
+    WebGl2(Rc<GlContext>),
 }
 
 #[wasm_bindgen]
@@ -49,7 +49,7 @@ impl GraphicsDevice {
     /// Code `backend-unavailable`.
     #[cfg(feature = "webgl2")]
     pub fn webgl2(canvas: HtmlCanvasElement) -> Result<GraphicsDevice, CodedError> {
-        Ok(Self(DeviceHandle::WebGl2(Rc::new(Context::new(canvas)?))))
+        Ok(Self(DeviceHandle::WebGl2(Rc::new(GlContext::new(canvas)?))))
     }
 
     /// The device's name.

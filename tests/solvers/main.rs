@@ -10,7 +10,7 @@ mod glass_s;
 
 use relightable_photo::capture::Measurements;
 use relightable_photo::executor::SequentialExecutor;
-use relightable_photo::recover::{Method, Recovery, Settings, SparsityBasis};
+use relightable_photo::recover::{Method, Recovery, RecoverySettings, SparsityBasis};
 use relightable_photo::transport::{Extent, Geometry, TileRect, TransportError};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::{wasm_bindgen_test, wasm_bindgen_test_configure};
@@ -107,7 +107,7 @@ fn regions(method: Method, geometry: &Geometry) -> Vec<TileRect> {
 /// Recovers by `method` and returns the error against the true functions.
 fn recover(measurements: &Measurements, method: Method, truth: &[[f64; 3]]) -> TransportError {
     let window = glass_s::true_window();
-    let settings = Settings { method, window };
+    let settings = RecoverySettings { method, window };
     let recovery = Recovery::prepare(measurements, settings, &SequentialExecutor).unwrap();
     let (geometry, area) = (recovery.geometry(), window.area());
     let mut error = TransportError::default();

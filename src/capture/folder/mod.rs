@@ -18,7 +18,7 @@ use super::manifest::Manifest;
 use super::measurements::{LinearPhoto, Measurements, Pattern};
 use super::noise_model::NoiseModel;
 use super::rows::RowSet;
-use crate::calibrate::{Axis, BitPair, GrayCodePhotos};
+use crate::calibrate::{BitPair, GrayCodePhotos, LightPlaneAxis};
 use crate::transport::{CHANNELS, Correspondence, Extent};
 
 /// A capture folder with its checked manifest.
@@ -106,8 +106,8 @@ impl CaptureFolder {
     ) -> Result<GrayCodePhotos, CaptureError> {
         let light = &self.manifest.light;
         Ok(GrayCodePhotos {
-            x: self.read_bits(Axis::X, light.width, dark, rows)?,
-            y: self.read_bits(Axis::Y, light.height, dark, rows)?,
+            x: self.read_bits(LightPlaneAxis::X, light.width, dark, rows)?,
+            y: self.read_bits(LightPlaneAxis::Y, light.height, dark, rows)?,
             rows: rows.iter().collect(),
         })
     }
@@ -116,7 +116,7 @@ impl CaptureFolder {
     /// the bits below it.
     fn read_bits(
         &self,
-        axis: Axis,
+        axis: LightPlaneAxis,
         side: u32,
         dark: &DarkFrame,
         rows: &RowSet,

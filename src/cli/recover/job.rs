@@ -22,7 +22,7 @@ use crate::cli::shot_reader::{ShotReader, read_patterns};
 use crate::executor::{Cancelled, Executor};
 use crate::format::{CaptureNote, EncodedFile, FormatError, Metadata};
 use crate::recover::{
-    BandwidthEstimate, HoldoutValidation, MIN_PATTERNS, RecoverError, Recovery, Settings,
+    BandwidthEstimate, HoldoutValidation, MIN_PATTERNS, RecoverError, Recovery, RecoverySettings,
     WindowEstimate,
 };
 use crate::transport::{Basis, Decibels, Window};
@@ -78,7 +78,7 @@ impl RecoverJob<'_> {
     ) -> Result<RecoverReport> {
         let (window, tail_fraction) = self.choose_window(&measurements)?;
         let method = self.args.method();
-        let recovery = self.prepare(&measurements, Settings { method, window })?;
+        let recovery = self.prepare(&measurements, RecoverySettings { method, window })?;
         let rank = recovery.basis().map(Basis::rank);
         let encoders = self.plan.tiles_encoded_at_once(window, rank.unwrap_or(0))?;
         lock(checkpoint).set_fingerprint(recovery_fingerprint(&recovery))?;
@@ -158,7 +158,7 @@ impl RecoverJob<'_> {
     }
 
     /// Learns or chooses what the method needs. Refuses photographs without a signal.
-    fn prepare(&self, measurements: &Measurements, settings: Settings) -> Result<Recovery> {
+    fn prepare(&self, measurements: &Measurements, settings: RecoverySettings) -> Result<Recovery> {
         let spinner = progress::spinner("learning");
         let recovery = Recovery::prepare(measurements, settings, self.cores);
         drop(spinner);

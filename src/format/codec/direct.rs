@@ -238,7 +238,7 @@ fn round(x: f32, step: f32, offset: f32) -> i32 {
 mod tests {
     use super::super::tokens;
     use super::*;
-    use crate::format::scan::Coding;
+    use crate::format::scan::ScanCoding;
 
     const EXTENT: Extent = Extent::new(9, 4);
 
@@ -265,9 +265,9 @@ mod tests {
         let functions = functions(25);
         for step in [1e-4, 1e-2] {
             let scans = [
-                Scan::new(Coding::Direct, 0, 25, 8.0 * step),
-                Scan::new(Coding::Direct, 0, 10, step),
-                Scan::new(Coding::Direct, 10, 15, step),
+                Scan::new(ScanCoding::Direct, 0, 25, 8.0 * step),
+                Scan::new(ScanCoding::Direct, 0, 10, step),
+                Scan::new(ScanCoding::Direct, 10, 15, step),
             ];
             let quantised = QuantisedFunctions::new(&functions, &order, &scans);
             let mut got = vec![[0.0; CHANNELS]; functions.len()];
@@ -298,7 +298,7 @@ mod tests {
     #[test]
     fn numbers_saturate() {
         let order = order(1);
-        let scan = Scan::new(Coding::Direct, 0, 1, 1e-6);
+        let scan = Scan::new(ScanCoding::Direct, 0, 1, 1e-6);
         let functions = [[1.0, -1.0, f32::NAN]];
         let quantised = QuantisedFunctions::new(&functions, &order, &[scan]);
         let chunk = quantised.chunks(&[scan]).unwrap().remove(0);

@@ -106,10 +106,10 @@ pub fn gather(values: &[Pixel], columns: usize, scan: &Scan, order: Option<&[u16
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::scan::Coding;
+    use crate::format::scan::ScanCoding;
 
     fn scan(first: u16, count: u16, step: f32) -> Scan {
-        Scan::new(Coding::DirectHalves, first, count, step)
+        Scan::new(ScanCoding::DirectHalves, first, count, step)
     }
 
     #[test]

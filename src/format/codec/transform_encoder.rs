@@ -321,7 +321,7 @@ fn squared_pixels(zigzag: &DctBlock, (columns, rows): (usize, usize)) -> f64 {
 mod tests {
     use super::super::transform::{max_bytes, max_tokens};
     use super::*;
-    use crate::format::scan::Coding;
+    use crate::format::scan::ScanCoding;
     use crate::transport::TileRect;
 
     /// Coefficients that fall off from one component to the next, smooth in space, of a few colours.
@@ -344,7 +344,7 @@ mod tests {
     }
 
     fn scan(first: u16, count: u16, step: f32) -> Scan {
-        Scan::new(Coding::Transform, first, count, step)
+        Scan::new(ScanCoding::Transform, first, count, step)
     }
 
     fn decoded(planes: &CoefficientPlanes, extent: Extent, rank: usize) -> Vec<Pixel> {

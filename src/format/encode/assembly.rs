@@ -14,7 +14,7 @@ use crate::format::codec::halves;
 use crate::format::codec::transform_encoder::QuantisedCoefficients;
 use crate::format::error::FormatError;
 use crate::format::index::FileIndex;
-use crate::format::scan::{Coding, Scan};
+use crate::format::scan::{Scan, ScanCoding};
 use crate::transport::{Basis, Decibels, FloatTile, TransportError};
 
 /// Share of the error that the rounding of the basis may add.
@@ -167,7 +167,10 @@ pub fn encode_lossless(encoder: &Encoder<'_, impl Executor>) -> Result<EncodedFi
     // All items have the same bytes.
     let share = |share: f64| ((share * (rank + slots) as f64) as usize).clamp(1, max_per_scan);
     let mut scans = Vec::new();
-    for (coding, items) in [(Coding::Halves, rank), (Coding::DirectHalves, slots)] {
+    for (coding, items) in [
+        (ScanCoding::Halves, rank),
+        (ScanCoding::DirectHalves, slots),
+    ] {
         let mut first = 0;
         while first < items {
             let planned = match scans.is_empty() {

@@ -10,7 +10,7 @@ use crate::format::codec::direct::OrderedFunctions;
 use crate::format::codec::tokens::{CONTEXTS, ItemRuns, for_tokens};
 use crate::format::codec::transform_encoder::TransformedTile;
 use crate::format::error::FormatError;
-use crate::format::scan::{Coding, Scan};
+use crate::format::scan::{Scan, ScanCoding};
 
 /// Bytes and squared error of one item at one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -74,7 +74,7 @@ impl CostModel {
     /// The costs at `step` of each of `count` components or slots, by the coding.
     pub fn costs(
         &self,
-        coding: Coding,
+        coding: ScanCoding,
         count: usize,
         step: f32,
         executor: &impl Executor,
@@ -115,7 +115,7 @@ impl CostModel {
 }
 
 impl TransformedSample {
-    fn runs(&self, coding: Coding) -> Option<&dyn ItemRuns> {
+    fn runs(&self, coding: ScanCoding) -> Option<&dyn ItemRuns> {
         match coding.is_direct() {
             true => self.functions.as_ref().map(|runs| runs as _),
             false => self.coefficients.as_ref().map(|runs| runs as _),

@@ -18,7 +18,7 @@ use crate::executor::Executor;
 use crate::format::codec::{direct, transform};
 use crate::format::constants::FIRST_BYTES;
 use crate::format::error::FormatError;
-use crate::format::scan::{Coding, Scan, rank_of};
+use crate::format::scan::{Scan, ScanCoding, rank_of};
 
 /// The shares that a plan aims for. Predictions err; files keep [`MAX_SHARES`].
 pub const SHARES: ScanShares = ScanShares {
@@ -70,7 +70,7 @@ pub struct ScanShares {
 /// Components, or slots.
 #[derive(Clone, Debug)]
 struct CodedItems {
-    coding: Coding,
+    coding: ScanCoding,
     /// Maximum number in one scan.
     max_per_scan: usize,
     /// `[item]`: the finest step at which its numbers do not overflow.
@@ -82,14 +82,14 @@ impl CodedItems {
     fn of(encoder: &Encoder<'_, impl Executor>) -> Vec<Self> {
         let side = encoder.source.geometry.tile_side;
         let components = Self {
-            coding: Coding::Transform,
+            coding: ScanCoding::Transform,
             max_per_scan: transform::max_components(side) as usize,
             finest_steps: (0..encoder.rank())
                 .map(|k| encoder.finest_step(k))
                 .collect(),
         };
         let slots = Self {
-            coding: Coding::Direct,
+            coding: ScanCoding::Direct,
             max_per_scan: direct::max_slots(side) as usize,
             finest_steps: vec![direct::finest_step(encoder.function_peak); encoder.slots()],
         };

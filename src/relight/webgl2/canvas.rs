@@ -5,7 +5,7 @@ use std::rc::Rc;
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{CanvasRenderingContext2d, HtmlCanvasElement, WebGl2RenderingContext as Gl};
 
-use super::context::{API, Context};
+use super::context::{API, GlContext};
 use super::downsampler::GlDownsampler;
 use super::photo_resources::PhotoResources;
 use super::resources::Staging;
@@ -18,7 +18,7 @@ use crate::transport::{Extent, Transport};
 /// Draws one photograph into one canvas: the basis response where the light or the quality has changed, then the picture.
 #[derive(Debug)]
 pub struct WebGl2Backend {
-    context: Rc<Context>,
+    context: Rc<GlContext>,
     layout: TextureLayout,
     resources: PhotoResources,
     /// For the light's elements.
@@ -36,7 +36,7 @@ impl WebGl2Backend {
     /// # Errors
     /// [`BackendError`] if the device cannot hold the transport or the canvas gives no context.
     pub fn new(
-        context: Rc<Context>,
+        context: Rc<GlContext>,
         transport: &Transport,
         canvas: &HtmlCanvasElement,
         gamut: Gamut,

@@ -39,7 +39,7 @@ pub(super) const DOWNSAMPLING: u32 = 3;
 /// A context that any number of photographs share. Browsers limit the contexts of a page, in Chromium to sixteen; a
 /// further one makes them drop the oldest.
 #[derive(Debug)]
-pub struct Context {
+pub struct GlContext {
     pub(super) gl: Gl,
     pub(super) canvas: HtmlCanvasElement,
     /// `None` where the device cannot draw into floating-point textures.
@@ -59,7 +59,7 @@ pub(super) struct FloatPrograms {
     pub downsample: WebGlProgram,
 }
 
-impl Context {
+impl GlContext {
     /// Creates the context on a canvas of its own.
     ///
     /// # Errors
@@ -171,7 +171,7 @@ impl Context {
     }
 }
 
-impl Drop for Context {
+impl Drop for GlContext {
     fn drop(&mut self) {
         lose_context(&self.gl);
     }

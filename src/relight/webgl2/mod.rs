@@ -10,4 +10,4 @@ mod photo_resources;
 mod resources;
 
 pub use canvas::WebGl2Backend;
-pub use context::Context;
+pub use context::GlContext;

@@ -2,7 +2,7 @@
 
 use web_sys::{WebGl2RenderingContext as Gl, WebGlProgram};
 
-use super::context::{BASIS, CHANNEL, Context, FRAME};
+use super::context::{BASIS, CHANNEL, FRAME, GlContext};
 use super::resources::{Framebuffer, GlTexture, GlUniformBuffer, Staging};
 use crate::relight::backend::BackendError;
 use crate::relight::texture_layout::{FrameUniforms, TextureLayout, TextureRegion, binding};
@@ -24,7 +24,7 @@ pub(super) struct PhotoResources {
 impl PhotoResources {
     /// Creates everything, and fills all textures that do not depend on the light.
     pub fn new(
-        context: &Context,
+        context: &GlContext,
         layout: &TextureLayout,
         transport: &Transport,
     ) -> Result<Self, BackendError> {

@@ -16,7 +16,7 @@ const Base = globalThis.HTMLElement ?? (class {} as unknown as typeof HTMLElemen
 export type { PhotoInfo } from '../shared/values.js';
 
 /** Options of `toBlob`. */
-export interface BlobOptions {
+export interface ToBlobOptions {
   /** MIME type; `image/png`, which is lossless, by default. */
   readonly type?: string;
   /** Quality of lossy types, 0 to 1. */
@@ -210,7 +210,7 @@ export class RelightablePhoto extends Base {
    * Draws the current picture in full detail and encodes it. Rejects with `not-loaded` if there is no photograph, or
    * if another one replaces it meanwhile.
    */
-  async toBlob({ type = 'image/png', quality, scale = 1 }: BlobOptions = {}): Promise<Blob> {
+  async toBlob({ type = 'image/png', quality, scale = 1 }: ToBlobOptions = {}): Promise<Blob> {
     if (!(scale > 0 && scale <= MAX_SCALE)) {
       throw new RangeError(`scale must be more than 0 and at most ${MAX_SCALE}`);
     }

@@ -7,7 +7,7 @@ import { setModuleFolder } from '../engine/wasm-loader.js';
 import { fetchStrings, isPending } from '../i18n/strings.js';
 import { InteractionController } from '../input/interaction.js';
 import { reducedMotion } from '../input/reduced-motion.js';
-import type { FrameResult } from '../lights/light-cache.js';
+import type { FrameLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
 import { BROWSER_PORTS } from '../player/browser-ports.js';
@@ -219,7 +219,7 @@ export class PhotoController {
     });
   }
 
-  #frameDrawn({ lightApplied, lightError }: FrameResult, drawn: LightSetting): void {
+  #frameDrawn({ lightApplied, lightError }: FrameLightStatus, drawn: LightSetting): void {
     const { reveal, light } = this.state;
     if (!reveal.isDrawn) this.schedule();
     reveal.isDrawn = true;

@@ -22,9 +22,9 @@ const LIGHT_STEP = 0.05;
 const FINE_LIGHT_STEP = 0.01;
 const PAN_STEP = 0.15;
 
-type Vector = readonly [x: number, y: number];
+type ArrowDirection = readonly [x: number, y: number];
 
-const ARROWS: Readonly<Record<string, Vector>> = {
+const ARROWS: Readonly<Record<string, ArrowDirection>> = {
   ArrowLeft: [-1, 0],
   ArrowRight: [1, 0],
   ArrowUp: [0, -1],
@@ -32,7 +32,7 @@ const ARROWS: Readonly<Record<string, Vector>> = {
 };
 
 /** Physical keys, which form the same cross on every layout. */
-const PAN_CODES: Readonly<Record<string, Vector>> = {
+const PAN_CODES: Readonly<Record<string, ArrowDirection>> = {
   KeyA: [-1, 0],
   KeyD: [1, 0],
   KeyW: [0, -1],
@@ -40,7 +40,7 @@ const PAN_CODES: Readonly<Record<string, Vector>> = {
 };
 
 /** Larger moves of the light; a whole picture reaches the edge. */
-const LIGHT_MOVES: Readonly<Record<string, Vector>> = {
+const LIGHT_MOVES: Readonly<Record<string, ArrowDirection>> = {
   PageUp: [0, -0.2],
   PageDown: [0, 0.2],
   Home: [-1, 0],
@@ -75,6 +75,6 @@ function pictureAction({ key, code, shiftKey }: KeyPress, focus: FocusTarget): K
   return vector ? move('move-light', vector, 1) : null;
 }
 
-function move(kind: 'move-light' | 'pan', [x, y]: Vector, step: number): KeyAction {
+function move(kind: 'move-light' | 'pan', [x, y]: ArrowDirection, step: number): KeyAction {
   return { kind, dx: step * x, dy: step * y };
 }

@@ -5,7 +5,7 @@ import { type PhotoError, toPhotoError } from '../shared/errors.js';
 import { createBuiltinLight, type LightSetting } from './light-setting.js';
 
 /** Whether a frame has the requested light. */
-export interface FrameResult {
+export interface FrameLightStatus {
   /** False if the frame shows the last light, because the requested one has no picture (yet). */
   readonly lightApplied: boolean;
   /** Why the requested light is unavailable; `null` if it is not, or is only loading. */
@@ -13,7 +13,7 @@ export interface FrameResult {
 }
 
 /** The light of a frame. */
-export interface FrameLight extends FrameResult {
+export interface FrameLight extends FrameLightStatus {
   /** Owned by the cache. The same object as last time if and only if its content is unchanged. */
   readonly light: Light;
 }

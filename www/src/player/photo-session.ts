@@ -10,7 +10,7 @@
  */
 
 import type { Backend } from '../engine/types.js';
-import type { FrameResult } from '../lights/light-cache.js';
+import type { FrameLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { Photograph } from '../photo/photograph.js';
 import type { Renderer } from '../renderers/types.js';
@@ -264,7 +264,7 @@ export class PhotoSession {
   #measure(
     { qualityController }: ActiveBackend,
     startMs: number,
-    frame: FrameResult | Promise<FrameResult>,
+    frame: FrameLightStatus | Promise<FrameLightStatus>,
   ): void {
     const record = () => qualityController.recordFrame(startMs, this.ports.now());
     if (frame instanceof Promise) frame.then(record, () => {});
@@ -276,7 +276,7 @@ export class PhotoSession {
 
   #report(
     active: ActiveBackend,
-    frame: FrameResult,
+    frame: FrameLightStatus,
     light: LightSetting,
     frameQuality: number,
   ): void {

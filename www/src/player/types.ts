@@ -2,7 +2,7 @@
 
 import type { OutputSettings } from '../engine/output-settings.js';
 import type { Backend } from '../engine/types.js';
-import type { FrameResult } from '../lights/light-cache.js';
+import type { FrameLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LoadOptions } from '../loading/load.js';
 import type { Photograph } from '../photo/photograph.js';
@@ -42,7 +42,7 @@ export interface SessionListener {
   /** A new renderer has drawn its first frame: its canvas replaces the last one. */
   rendererChanged(renderer: Renderer): void;
   /** A frame was drawn; `light` is the light that was requested for it. */
-  frameDrawn(frame: FrameResult, light: LightSetting): void;
+  frameDrawn(frame: FrameLightStatus, light: LightSetting): void;
   /** That frame has another quality than the last one. The first frame is compared with 1. */
   qualityChanged(quality: number): void;
   /** The whole photograph was drawn for the first time since it was fetched. */

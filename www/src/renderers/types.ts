@@ -2,7 +2,7 @@
 
 import type { OutputSettings } from '../engine/output-settings.js';
 import type { Backend, Freeable, Gamut } from '../engine/types.js';
-import type { FrameResult } from '../lights/light-cache.js';
+import type { FrameLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { Photograph } from '../photo/photograph.js';
 
@@ -24,14 +24,14 @@ export interface Renderer extends Freeable {
   readonly warning?: string;
   /**
    * Draws one frame with a share of the components (`quality`, 0 to 1). Call it again only after the last promise has
-   * settled. If the light is unavailable, the last available one is used and `FrameResult` has the error. Throws or
+   * settled. If the light is unavailable, the last available one is used and `FrameLightStatus` has the error. Throws or
    * rejects with `backend-lost`, or with `photo-lost` if parts of the photograph are lost.
    */
   render(
     light: LightSetting,
     output: OutputSettings,
     quality: number,
-  ): FrameResult | Promise<FrameResult>;
+  ): FrameLightStatus | Promise<FrameLightStatus>;
 }
 
 /**

@@ -14,11 +14,11 @@ const GAMUTS = ['srgb', 'display-p3'] as const;
 export const MAX_EXPOSURE = 1e30;
 const MAX_WHITE_BALANCE = 1000;
 
-type Parser<T> = (value: string | null) => T;
+type AttributeParser<T> = (value: string | null) => T;
 
-export const parseLight: Parser<LightName> = (value) => parseName(value, LIGHTS, 'light');
-export const parseTone: Parser<ToneCurve> = (value) => parseName(value, TONES, 'tone');
-export const parseGamut: Parser<Gamut> = (value) => parseName(value, GAMUTS, 'gamut');
+export const parseLight: AttributeParser<LightName> = (value) => parseName(value, LIGHTS, 'light');
+export const parseTone: AttributeParser<ToneCurve> = (value) => parseName(value, TONES, 'tone');
+export const parseGamut: AttributeParser<Gamut> = (value) => parseName(value, GAMUTS, 'gamut');
 
 /** A factor on the light's brightness. */
 export function parseExposure(value: string | null): number {

@@ -26,7 +26,7 @@ export interface LightStateListener extends LightSourceListener {
 }
 
 /** An item of the light menu: a built-in light, or the page's source. */
-export type LightItem = LightName | 'projection';
+export type LightMenuItem = LightName | 'projection';
 
 const fetchSourceSupport = (): Promise<typeof SourceSupport> =>
   import('../lights/light-sources.js');
@@ -121,14 +121,14 @@ export class LightState {
     this.override(NO_OVERRIDES);
   }
 
-  get items(): readonly LightItem[] {
+  get items(): readonly LightMenuItem[] {
     return this.#hasSource ? ['projection', ...LIGHTS] : LIGHTS;
   }
 
-  get item(): LightItem {
+  get item(): LightMenuItem {
     return this.#usesSource ? 'projection' : this.name;
   }
-  set item(item: LightItem) {
+  set item(item: LightMenuItem) {
     this.override({ name: item === 'projection' ? null : item });
   }
 

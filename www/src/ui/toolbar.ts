@@ -1,14 +1,14 @@
 /** The toolbar, a single tab stop whose buttons the arrow keys focus, and the light menu. It is a separate script. */
 
 import type { StringKey } from '../i18n/strings.js';
-import type { LightItem } from '../state/light-state.js';
+import type { LightMenuItem } from '../state/light-state.js';
 import type { ViewerState } from '../state/viewer-state.js';
 import { createElement, updateAttribute, updateText } from './dom-helpers.js';
 import { createIcon, LIGHT_ICON, setIcon } from './icons.js';
 import TOOLBAR_CSS from './toolbar.css';
 
 export interface ToolbarActions {
-  selectLight(item: LightItem): void;
+  selectLight(item: LightMenuItem): void;
   play(): void;
   zoom(by: 1 | -1): void;
   reset(): void;
@@ -78,7 +78,7 @@ export class Toolbar {
     this.bar.addEventListener('keydown', (event) => this.#moveFocus(event));
     this.bar.addEventListener('focusin', ({ target }) => this.#setTabStop(target));
     this.menu.addEventListener('change', ({ target }) => {
-      if (target instanceof HTMLInputElement) actions.selectLight(target.value as LightItem);
+      if (target instanceof HTMLInputElement) actions.selectLight(target.value as LightMenuItem);
     });
     this.menu.addEventListener('keydown', (event) => {
       if (event.key !== 'Escape') return;
@@ -163,7 +163,7 @@ export class Toolbar {
     if (isOpen) this.menu.querySelector<HTMLInputElement>('input:checked')?.focus();
   }
 
-  #updateMenu(items: readonly LightItem[], texts: readonly string[]): void {
+  #updateMenu(items: readonly LightMenuItem[], texts: readonly string[]): void {
     if (String(texts) === this.#menuTexts) return;
     this.#menuTexts = String(texts);
     const labels = items.map((item, index) => {

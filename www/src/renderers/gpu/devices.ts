@@ -12,7 +12,7 @@ import { BROWSER_GRAPHICS, type GraphicsBackend, type GraphicsPorts } from './gr
 export type LoadGraphics = <N extends GraphicsBackend>(name: N) => Promise<Modules[N]>;
 
 /** A photograph's use of a device. Free its relighter before `release`. */
-export interface Lease extends DeviceHandle {
+export interface DeviceLease extends DeviceHandle {
   readonly graphics: GraphicsDevice;
 }
 
@@ -54,7 +54,7 @@ export class Devices {
     backend: GraphicsBackend,
     software: boolean,
     onLost: (reason: string) => void,
-  ): Promise<Lease> {
+  ): Promise<DeviceLease> {
     if (backend === 'webgpu' && this.#silence) throw this.#silence;
     this.#checkLosses(backend);
     const name = await this.#nameOf(backend);
