@@ -766,6 +766,7 @@ fn a_crafted_file_is_refused_with_its_fault() {
         matches!(
             error,
             FormatError::TooMany {
+                quantity: "basis functions",
                 value: u32::MAX,
                 ..
             }
@@ -776,7 +777,14 @@ fn a_crafted_file_is_refused_with_its_fault() {
     assert!(matches!(error, FormatError::InvalidScan { .. }), "{error}");
     let error = header(field::SCANS, 5000);
     assert!(
-        matches!(error, FormatError::TooMany { value: 5000, .. }),
+        matches!(
+            error,
+            FormatError::TooMany {
+                quantity: "scans",
+                value: 5000,
+                ..
+            }
+        ),
         "{error}"
     );
     let error = header(field::SCANS, 2);

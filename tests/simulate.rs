@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use assert_cmd::Command;
-use relightable_photo::calibrate::Axis;
+use relightable_photo::calibrate::LightPlaneAxis;
 use relightable_photo::capture::{CaptureFolder, LinearPhoto, Pattern, RowSet};
 use relightable_photo::simulate::{
     Camera, EmissionMatrix, LightCodes, RandomStream, SceneKind, SimulatedScene,
@@ -173,7 +173,7 @@ fn gray_code_decodes_to_the_correspondence() {
     let read = |name: &str| image::open(out.join(name)).unwrap().into_rgb16();
     let sum = |p: &image::Rgb<u16>| p.0.iter().map(|&c| u32::from(c)).sum::<u32>();
     let flood = read("photos/flood.png");
-    for (axis, top_bit) in [(Axis::X, 4), (Axis::Y, 3)] {
+    for (axis, top_bit) in [(LightPlaneAxis::X, 4), (LightPlaneAxis::Y, 3)] {
         let shots: Vec<_> = manifest
             .graycode
             .iter()
@@ -191,7 +191,7 @@ fn gray_code_decodes_to_the_correspondence() {
                 let bit = u32::from(sum(pair[0].get_pixel(x, y)) > sum(pair[1].get_pixel(x, y)));
                 element = element << 1 | (bit ^ element & 1);
             }
-            let at = f64::from(if axis == Axis::X { x } else { y }) * 0.5;
+            let at = f64::from(if axis == LightPlaneAxis::X { x } else { y }) * 0.5;
             decoded += 1;
             // Parallax displaces it by up to four elements in one direction.
             near += u32::from((-5.5..=1.0).contains(&(f64::from(element) - at)));

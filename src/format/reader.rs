@@ -29,11 +29,11 @@ use crate::transport::Transport;
 /// [`FormatError::Limit`], and one whose system refuses memory [`FormatError::Memory`].
 ///
 /// ```
-/// use relightable_photo::format::{Interest, Limits, LtmReader};
+/// use relightable_photo::format::{ChunkSelection, Limits, LtmReader};
 /// # fn open(file: &[u8]) -> Result<(), relightable_photo::format::FormatError> {
 /// let mut reader = LtmReader::new(Limits::default());
 /// loop {
-///     let wanted = reader.wants(&Interest::default());
+///     let wanted = reader.wants(&ChunkSelection::default());
 ///     let Some(range) = wanted.first() else { break };
 ///     let end = file.len().min(range.end as usize);
 ///     reader.feed(range.start, &file[range.start as usize..end])?;

@@ -6,7 +6,7 @@ use super::codec::transform::CoefficientPlanes;
 use super::codec::{basis, direct, halves};
 use super::error::{FormatError, SectionError};
 use super::index::FileIndex;
-use super::scan::ScanCoding;
+use super::scan::{Scan, ScanCoding};
 use crate::transport::{Basis, CHANNELS, FloatTile, Tile, TileCodes};
 
 /// A tile as the sum of its chunks so far.
@@ -217,6 +217,19 @@ pub fn check(index: &FileIndex, chunk: ChunkId, bytes: &[u8]) -> Result<(), Form
         let mut kernels = index.try_zeroed_basis(&budget)?;
         return decode_basis_chunk(index, scan, bytes, &mut kernels, &budget);
     };
+    let record = &index.scans[scan];
+    if matches!(record.coding, ScanCoding::Halves | ScanCoding::DirectHalves) {
+        // The scan's columns alone: lossless files have many scans, and all columns of a tile can be a gigabyte.
+        let columns = usize::from(record.count);
+        let pixels = index.header.geometry.tile(tile).extent.area();
+        let mut values = budget.try_zeroed(pixels * columns)?;
+        let alone = Scan {
+            first: 0,
+            ..*record
+        };
+        return halves::add(&mut values, columns, &alone, None, bytes, &budget)
+            .map_err(|error| error.in_chunk(chunk));
+    }
     let mut decoder = TileDecoder {
         scans: scan,
         ..TileDecoder::new(tile)

@@ -25,5 +25,5 @@ pub enum StudyError {
     Picture(#[from] image::ImageError),
     /// Writing a table as CSV failed.
     #[error("a table cannot be written as CSV")]
-    MarkdownTable(#[from] csv::Error),
+    Csv(#[from] csv::Error),
 }

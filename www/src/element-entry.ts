@@ -1,7 +1,7 @@
 /** The element's class, its events and its types. Importing this module has no side effects. */
 
 export { defineRelightablePhoto, TAG } from './element/define.js';
-export type { ToBlobOptions, PhotoInfo } from './element/element.js';
+export type { PhotoInfo, ToBlobOptions } from './element/element.js';
 export { RelightablePhoto } from './element/element.js';
 export type { RelightablePhotoEventMap } from './element/events.js';
 export {

@@ -42,23 +42,20 @@ impl GroundTruth {
         let camera = manifest.camera.extent();
         let n = camera.area() as u64;
         let tau_path = root.join("tau.npy");
-        let (shape, tau) = read_npy::<f16>(&tau_path)?;
-        let window = match shape[..] {
-            [pixels, h, w, 3] if pixels == n && h == w => {
-                u32::try_from(w).ok().and_then(|w| Window::new(w).ok())
-            }
-            _ => None,
-        };
-        let Some(window) = window else {
-            let problem = format!("has shape {shape:?}, not [{n}, w, w, 3] with w odd");
-            return Err(truth_error(&tau_path, problem));
-        };
+        let (window, tau) = read_npy::<f16, _>(&tau_path, |shape| {
+            let window = match *shape {
+                [pixels, h, w, 3] if pixels == n && h == w => {
+                    u32::try_from(w).ok().and_then(|w| Window::new(w).ok())
+                }
+                _ => None,
+            };
+            window.ok_or_else(|| format!("has shape {shape:?}, not [{n}, w, w, 3] with w odd"))
+        })?;
         let uv_path = root.join("uv.npy");
-        let (shape, uv) = read_npy::<f32>(&uv_path)?;
-        if shape != [n, 2] {
-            let problem = format!("has shape {shape:?}, not [{n}, 2]");
-            return Err(truth_error(&uv_path, problem));
-        }
+        let ((), uv) = read_npy::<f32, _>(&uv_path, |shape| match shape == [n, 2] {
+            true => Ok(()),
+            false => Err(format!("has shape {shape:?}, not [{n}, 2]")),
+        })?;
         let (uv, _) = uv.as_chunks();
         let origin = |uv: &[f32; 2]| {
             let [u, v] = uv.map(f64::from);
@@ -137,8 +134,11 @@ fn truth_error(path: &Path, problem: String) -> CaptureError {
     CaptureError::new(path, CaptureProblem::InvalidTruth(problem))
 }
 
-/// Shape and values of a NumPy file.
-fn read_npy<T: npyz::Deserialize>(path: &Path) -> Result<(Vec<u64>, Vec<T>), CaptureError> {
+/// Reads a NumPy file: what `check` makes of its shape, before the values are read, and the values.
+fn read_npy<T: npyz::Deserialize, S>(
+    path: &Path,
+    check: impl FnOnce(&[u64]) -> Result<S, String>,
+) -> Result<(S, Vec<T>), CaptureError> {
     let file = File::open(path).map_err(|e| CaptureError::new(path, CaptureProblem::Io(e)))?;
     let read = || {
         let npy = NpyFile::new(BufReader::new(file))?;
@@ -146,7 +146,8 @@ fn read_npy<T: npyz::Deserialize>(path: &Path) -> Result<(Vec<u64>, Vec<T>), Cap
             let problem = "is in Fortran order; C order is needed";
             return Err(io::Error::other(problem));
         }
-        Ok((npy.shape().to_vec(), npy.into_vec()?))
+        let shape = check(npy.shape()).map_err(io::Error::other)?;
+        Ok((shape, npy.into_vec()?))
     };
     read().map_err(|e| truth_error(path, e.to_string()))
 }

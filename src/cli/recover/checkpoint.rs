@@ -25,6 +25,13 @@ use crate::cli::process::Interrupted;
 
 /// The first bytes of a checkpoint.
 const MAGIC: [u8; 8] = *b"LTMPART2";
+/// What the magics of all versions begin with.
+const MAGIC_OF_ANY_VERSION: &[u8] = b"LTMPART";
+const DAMAGED: &str = "is damaged; delete it to start from the beginning";
+const OTHER_VERSION: &str = "was written by another version of this program; use that version, or delete it to start \
+                             from the beginning";
+/// Maximum length of a key. Tens of thousands of photographs need a few megabytes.
+const MAX_KEY_BYTES: u32 = 64 << 20;
 /// Bytes before the content of a record: number, length, checksum.
 const RECORD_HEAD_BYTES: usize = 12;
 /// Number of the key's record.
@@ -193,6 +200,10 @@ impl Checkpoint {
             .take(MAGIC.len() as u64)
             .read_to_end(&mut magic)?;
         ensure!(
+            MAGIC.starts_with(&magic) || !magic.starts_with(MAGIC_OF_ANY_VERSION),
+            OTHER_VERSION
+        );
+        ensure!(
             MAGIC.starts_with(&magic),
             "exists and is not a checkpoint; move it away"
         );
@@ -200,14 +211,8 @@ impl Checkpoint {
         let Some(first) = self.read_record(&mut reader, bytes)? else {
             return Ok(false);
         };
-        ensure!(
-            first.number == KEY && first.is_intact,
-            "is damaged; delete it to start from the beginning"
-        );
-        let recorded: RunKey = serde_json::from_slice(&first.content).context(
-            "was written by another version of this program; use that version, or delete it to start from \
-             the beginning",
-        )?;
+        ensure!(first.is_intact, DAMAGED);
+        let recorded: RunKey = serde_json::from_slice(&first.content).context(OTHER_VERSION)?;
         self.end = first.range.end;
         self.tiles = vec![None; recorded.tiles];
         while let Some(record) = self.read_record(&mut reader, bytes)? {
@@ -222,7 +227,7 @@ impl Checkpoint {
                 }
                 break;
             }
-            self.end = record.range.end;
+            let end = record.range.end;
             match record.number {
                 FINGERPRINT => self.fingerprint = Some(record.content),
                 tile if (tile as usize) < recorded.tiles => {
@@ -230,6 +235,7 @@ impl Checkpoint {
                 }
                 _ => break,
             }
+            self.end = end;
         }
         let (count, tiles) = (self.count(), recorded.tiles);
         if count == 0 {
@@ -252,7 +258,7 @@ impl Checkpoint {
     }
 
     /// Reads the record after the last complete one; `None` if the file of so many bytes ends before its end.
-    fn read_record(&self, reader: &mut impl Read, bytes: u64) -> io::Result<Option<Record>> {
+    fn read_record(&self, reader: &mut impl Read, bytes: u64) -> Result<Option<Record>> {
         let start = self.end + RECORD_HEAD_BYTES as u64;
         if bytes < start {
             return Ok(None);
@@ -262,6 +268,12 @@ impl Checkpoint {
         let (words, _) = head.as_chunks();
         let [number, length, crc] = [0, 1, 2].map(|i| u32::from_le_bytes(words[i]));
         let end = start + u64::from(length);
+        // A key of a damaged length must not look cut off: tiles may follow it.
+        let is_first = self.end == MAGIC.len() as u64;
+        ensure!(
+            !is_first || (number == KEY && length <= MAX_KEY_BYTES),
+            DAMAGED
+        );
         if bytes < end {
             return Ok(None);
         }

@@ -189,6 +189,18 @@ impl TextureLayout {
         self.used_quads(quality).div_ceil(2)
     }
 
+    /// The passes that compute the basis response of `channels` at a quality: the channel, the pair of quads, and the
+    /// pair of layers that the pass fills.
+    pub fn correlation_passes(
+        &self,
+        channels: &[usize],
+        quality: f32,
+    ) -> impl Iterator<Item = [usize; 3]> {
+        let (used, pairs) = (self.used_quad_pairs(quality), self.quad_pairs() as usize);
+        let passes = channels.iter().enumerate();
+        passes.flat_map(move |(n, &channel)| (0..used).map(move |i| [channel, i, n * pairs + i]))
+    }
+
     fn used_quads(&self, quality: f32) -> usize {
         used_count(self.quads as usize, quality)
     }

@@ -136,7 +136,15 @@ fn each_coefficient_is_where_the_shader_reads_it() {
         let layers = layout.textures[binding::BASIS_RESPONSE].layers;
         assert_eq!(layers, Some(3 * 2 * pairs));
         let used = rank.div_ceil(4).div_ceil(2).div_ceil(2); // half the quads, in pairs
-        assert_eq!(layout.used_quad_pairs(0.5), used);
+        let pairs = pairs as usize;
+        let passes: Vec<_> = layout.correlation_passes(&[0, 1, 2], 1.0).collect();
+        let filled = passes.iter().map(|&[_, _, layers]| layers);
+        assert!(filled.eq(0..3 * pairs));
+        let one = layout.correlation_passes(&[1], 1.0);
+        assert!(one.eq((0..pairs).map(|i| [1, i, i])));
+        let first = passes.iter().filter(|&&[_, pair, _]| pair < used);
+        let less: Vec<_> = layout.correlation_passes(&[0, 1, 2], 0.5).collect();
+        assert!(less.len() == 3 * used && less.iter().eq(first));
     }
 }
 

@@ -96,9 +96,10 @@ impl WebGl2Backend {
         if self.light.set_quality(frame.quality)
             && let Some(programs) = &self.context.float_programs
         {
-            let pairs = self.layout.used_quad_pairs(frame.quality);
-            self.resources
-                .correlate(&programs.correlate, chroma.channels(), pairs);
+            let passes = self
+                .layout
+                .correlation_passes(chroma.channels(), frame.quality);
+            self.resources.correlate(&programs.correlate, passes);
         }
         self.context.set_target(self.camera, self.gamut)?;
         gl.use_program(Some(&self.context.relight));

@@ -144,8 +144,11 @@ impl GlContext {
 
     /// Resizes the canvas. Returns whether the drawing buffer follows: browsers give less beyond their limits.
     fn try_resize(&self, extent: Extent) -> bool {
-        if self.size() != extent {
+        // Each assignment allocates the drawing buffer anew.
+        if self.canvas.width() != extent.width {
             self.canvas.set_width(extent.width);
+        }
+        if self.canvas.height() != extent.height {
             self.canvas.set_height(extent.height);
         }
         self.gl.drawing_buffer_width() == extent.width as i32
@@ -245,8 +248,14 @@ fn link(
     // Asking earlier whether a shader compiles would wait for it.
     if gl.get_program_parameter(&program, Gl::LINK_STATUS) != true {
         let logs = shaders.iter().map(|shader| gl.get_shader_info_log(shader));
-        let logs = logs.chain([gl.get_program_info_log(&program)]);
-        return Err(BackendError::Shader(logs.flatten().collect()));
+        let logs: Vec<_> = logs
+            .chain([gl.get_program_info_log(&program)])
+            .flatten()
+            .collect();
+        return Err(match gl.is_context_lost() {
+            true => context_lost(),
+            false => BackendError::Shader(logs.join("\n")),
+        });
     }
     for shader in &shaders {
         gl.delete_shader(Some(shader)); // the program keeps it

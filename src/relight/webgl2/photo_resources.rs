@@ -73,21 +73,18 @@ impl PhotoResources {
         self.frame.bind(FRAME);
     }
 
-    /// Computes the basis response of the light: for these channels and the first pairs of quads.
-    pub fn correlate(&self, program: &WebGlProgram, channels: &[usize], used_pairs: usize) {
+    /// Computes the basis response of the light, by [`TextureLayout::correlation_passes`].
+    pub fn correlate(&self, program: &WebGlProgram, passes: impl Iterator<Item = [usize; 3]>) {
         let (gl, response) = (&self.gl, &self.textures[binding::BASIS_RESPONSE]);
         gl.use_program(Some(program));
         response.set_viewport();
         // A texture must not be bound while it is drawn into.
         response.unbind();
-        let framebuffers = self.framebuffers.chunks(self.basis.len().max(1));
-        for (channel, framebuffers) in channels.iter().zip(framebuffers) {
-            self.channels[*channel].bind(CHANNEL);
-            for (framebuffer, basis) in framebuffers.iter().zip(&self.basis).take(used_pairs) {
-                framebuffer.bind();
-                basis.bind(BASIS);
-                gl.draw_arrays(Gl::TRIANGLES, 0, 3);
-            }
+        for [channel, pair, layers] in passes {
+            self.channels[channel].bind(CHANNEL);
+            self.basis[pair].bind(BASIS);
+            self.framebuffers[layers].bind();
+            gl.draw_arrays(Gl::TRIANGLES, 0, 3);
         }
         gl.bind_framebuffer(Gl::FRAMEBUFFER, None);
         response.bind();

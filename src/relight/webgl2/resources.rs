@@ -39,7 +39,8 @@ impl Staging {
         match component {
             Gl::SHORT => Int16Array::new(&buffer).into(),
             Gl::INT => Int32Array::new(&buffer).into(),
-            _ => Float32Array::new(&buffer).into(),
+            Gl::FLOAT => Float32Array::new(&buffer).into(),
+            _ => self.0.clone().into(),
         }
     }
 }

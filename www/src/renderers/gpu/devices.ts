@@ -92,11 +92,10 @@ export class Devices {
     const graphics = backend === 'webgpu' ? this.#openWebGpu(load) : this.#openWebGl2(load, lose);
     const device: SharedDevice = { graphics, holders: new Set(), isClosed: false };
     this.#devices.set(backend, device);
-    graphics
-      .then(({ lost }) =>
-        lost?.then(({ message }) => lose(message || 'the graphics device is gone.')),
-      )
-      .catch(() => {}); // `lease` rejects with it
+    graphics.then(
+      ({ lost }) => lost?.then(({ message }) => lose(message || 'the graphics device is gone.')),
+      () => {}, // `lease` rejects with it
+    );
     return device;
   }
 
@@ -159,7 +158,10 @@ export class Devices {
     if (device.isClosed) return;
     device.isClosed = true;
     if (this.#devices.get(backend) === device) this.#devices.delete(backend);
-    device.graphics.then((graphics) => graphics.free()).catch(() => {});
+    device.graphics.then(
+      (graphics) => graphics.free(),
+      () => {},
+    );
   }
 }
 
