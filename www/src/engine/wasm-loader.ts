@@ -3,7 +3,6 @@
 import { withPolicyErrors } from '../shared/content-security-policy.js';
 import { messageOf, PhotoError } from '../shared/errors.js';
 import type { WasmModuleName } from '../shared/names.js';
-import type { Modules } from './types.js';
 
 /** The bytes of a module, or the response that brings them. */
 type WasmSource = ArrayBuffer | ArrayBufferView<ArrayBuffer> | Response;
@@ -42,14 +41,14 @@ export function setModuleFolder(url: string | null): void {
  * Makes the function that loads a module once per page. After a failure, the next call tries again. `task` is what the
  * module does, for error messages: "decodes photographs".
  */
-export function createLoader<N extends WasmModuleName>(
-  name: N,
+export function createLoader<Module>(
+  name: WasmModuleName,
   task: string,
   builds: WasmBuilds,
-): (fetchModule?: FetchWasm) => Promise<Modules[N]> {
-  let loading: Promise<Modules[N]> | undefined;
+): (fetchModule?: FetchWasm) => Promise<Module> {
+  let loading: Promise<Module> | undefined;
   return (fetchModule = fetchWasm) => {
-    const start = () => startModule(name, builds, fetchModule);
+    const start = () => startModule<Module>(name, builds, fetchModule);
     loading ??= withPolicyErrors(start, /^script-src/, wasmForbidden).catch((cause: unknown) => {
       loading = undefined;
       if (cause instanceof PhotoError) throw cause;
@@ -71,11 +70,11 @@ function wasmForbidden(_: string, cause: unknown): PhotoError {
   return new PhotoError('csp-wasm', message, cause);
 }
 
-async function startModule<N extends WasmModuleName>(
-  name: N,
+async function startModule<Module>(
+  name: WasmModuleName,
   { glue, simd, scalar }: WasmBuilds,
   fetchModule: FetchWasm,
-): Promise<Modules[N]> {
+): Promise<Module> {
   // Without SIMD support, a SIMD build does not even compile.
   const scalarBuild = scalar && !WebAssembly.validate(SIMD_PROBE) ? scalar : null;
   const url =
@@ -87,5 +86,5 @@ async function startModule<N extends WasmModuleName>(
   source.catch(() => {});
   const module = await glue();
   await module.default({ module_or_path: await source });
-  return module as unknown as Modules[N];
+  return module as unknown as Module;
 }
