@@ -1,15 +1,14 @@
 /** The element's class, its events and its types. Importing this module has no side effects. */
 
 export { defineRelightablePhoto, TAG } from './element/define.js';
-export type { PhotoInfo, ToBlobOptions } from './element/element.js';
-export { RelightablePhoto } from './element/element.js';
-export type { RelightablePhotoEventMap } from './element/events.js';
+export { type PhotoInfo, RelightablePhoto, type ToBlobOptions } from './element/element.js';
 export {
   BackendChangeEvent,
   ContextLostEvent,
   LightChangeEvent,
   PhotoErrorEvent,
   QualityChangeEvent,
+  type RelightablePhotoEventMap,
   ViewChangeEvent,
 } from './element/events.js';
 export type { Reflected } from './element/reflect.js';

@@ -11,10 +11,7 @@ import { DecodedPhotograph } from './decoded-photo.js';
 import type { CorePhotograph } from './types.js';
 import { fetchCoreWasm, readFile } from './wasm-code.js';
 
-/**
- * A `.ltm` file: its bytes, a stream of its bytes, or its address. In a page, the address may be relative; in Node, it
- * may be a `file:` URL.
- */
+/** A `.ltm` file: its bytes, a stream of them, or its address, which may be relative in a page and `file:` in Node. */
 export type PhotoFile =
   | string
   | URL
@@ -68,7 +65,6 @@ export async function decode(
   return new DecodedPhotograph(await openPhoto(url, options, ports));
 }
 
-/** The pieces of a file whose bytes arrive in order. */
 async function* piecesOf(
   arriving: Iterable<Uint8Array> | AsyncIterable<Uint8Array>,
   decoder: PhotoDecoder,
@@ -82,9 +78,7 @@ async function* piecesOf(
   }
 }
 
-function arrivingBytes(
-  file: Exclude<PhotoFile, string | URL>,
-): Iterable<Uint8Array> | AsyncIterable<Uint8Array> {
+function arrivingBytes(file: Exclude<PhotoFile, string | URL>) {
   if (file instanceof ArrayBuffer) return [new Uint8Array(file)];
   if (ArrayBuffer.isView(file)) {
     return [new Uint8Array(file.buffer, file.byteOffset, file.byteLength)];
@@ -116,11 +110,8 @@ function absoluteUrl(file: string | URL): string {
   try {
     return new URL(file, globalThis.location?.href).href;
   } catch (cause) {
-    throw new PhotoError(
-      'src-missing',
-      `“${file}” is not a URL. Outside of a page, use an absolute URL with https: or file:.`,
-      cause,
-    );
+    const remedy = 'Outside of a page, use an absolute URL with https: or file:.';
+    throw new PhotoError('src-missing', `“${file}” is not a URL. ${remedy}`, cause);
   }
 }
 

@@ -5,10 +5,7 @@ import { PhotoError } from '../shared/errors.js';
 
 type DrawnPicture = Pick<Renderer, 'canvas' | 'gamut'>;
 
-/**
- * The picture as a file of the MIME type `type`, `scale` times as wide and as high; `quality` is that of
- * `HTMLCanvasElement.toBlob`. Reads the canvas at once: that of a GPU keeps its content only until the next frame.
- */
+/** Reads the canvas at once: that of a GPU keeps its content only until the next frame. */
 export function encodePicture(
   picture: DrawnPicture,
   type: string,

@@ -82,7 +82,6 @@ export class PhotoController {
     });
   }
 
-  /** Brings everything up to date with the attributes and the viewer's state. */
   update(): void {
     this.#isUpdateScheduled = false;
     if (!this.host.isConnected) {
@@ -140,7 +139,6 @@ export class PhotoController {
     this.schedule();
   }
 
-  /** Returns light and view to the options. */
   reset(): void {
     this.interaction.reset();
     this.state.reset();

@@ -94,11 +94,7 @@ const REFLECTED: { readonly [P in keyof Reflected]: Reflection<Reflected[P]> } =
   crossOrigin: { ...parsed('crossorigin'), set: (value) => value },
 };
 
-/** The names of the attributes, for `observedAttributes`. */
-export const ATTRIBUTES: readonly string[] = Object.values(REFLECTED).map(
-  ({ attribute }) => attribute,
-);
-
+export const ATTRIBUTES = Object.values(REFLECTED).map(({ attribute }) => attribute);
 export const PROPERTIES = Object.keys(REFLECTED) as readonly (keyof Reflected)[];
 
 /** Defines the properties on the prototype of an element class. */

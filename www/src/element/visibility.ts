@@ -7,10 +7,7 @@ export type Visibility = keyof Pick<RevealState, 'isNear' | 'isVisible'>;
 /** How far outside of the viewport counts: drawing begins shortly before an element becomes visible. */
 const ROOT_MARGINS = { isVisible: '64px', isNear: '100%' } as const;
 
-/**
- * Calls back soon for the first time, and then at each change, until `signal` is aborted. Without browser support, all
- * elements are visible.
- */
+/** Calls back soon, and then at each change, until `signal` is aborted. Without support, all elements are visible. */
 export function observeVisibility(
   element: Element,
   callback: (visibility: Visibility, isTrue: boolean) => void,

@@ -64,7 +64,6 @@ export interface Decoder extends Freeable {
   finish(): DecodedPhoto;
 }
 
-/** An output transform. */
 export interface OutputTransform extends Freeable {}
 
 /** A graphics device, which photographs share. */
@@ -140,19 +139,10 @@ export interface CpuModule extends RelightModule {
   Relighter: { new (photo: ReceivedPhoto, canvas: HTMLCanvasElement, gamut: Gamut): Relighter };
 }
 
-export interface WebGpuModule extends RelightModule {
-  GraphicsDevice: { webgpu(): Promise<GraphicsDevice> };
-}
-
-export interface WebGl2Module extends RelightModule {
-  /** The device uses the canvas alone. */
-  GraphicsDevice: { webgl2(canvas: HTMLCanvasElement): GraphicsDevice };
-}
-
-/** All modules by name. */
+/** All modules by name. A WebGL2 device uses its canvas alone. */
 export interface Modules extends Record<WasmModuleName, unknown> {
   decoder: DecoderModule;
   cpu: CpuModule;
-  webgl2: WebGl2Module;
-  webgpu: WebGpuModule;
+  webgl2: RelightModule & { GraphicsDevice: { webgl2(canvas: HTMLCanvasElement): GraphicsDevice } };
+  webgpu: RelightModule & { GraphicsDevice: { webgpu(): Promise<GraphicsDevice> } };
 }

@@ -37,10 +37,7 @@ export function setModuleFolder(url: string | null): void {
   moduleFolder = url;
 }
 
-/**
- * Makes the function that loads a module once per page. After a failure, the next call tries again. `task` is what the
- * module does, for error messages: "decodes photographs".
- */
+/** Loads a module once per page, and again after a failure. `task`, for error messages, says what the module does. */
 export function createLoader<Module>(
   name: WasmModuleName,
   task: string,
@@ -52,13 +49,11 @@ export function createLoader<Module>(
     loading ??= withPolicyErrors(start, /^script-src/, wasmForbidden).catch((cause: unknown) => {
       loading = undefined;
       if (cause instanceof PhotoError) throw cause;
-      throw new PhotoError(
-        'wasm-unavailable',
+      const message =
         `The module that ${task} could not be started. The wasm folder must lie beside the script or ` +
-          'where wasm-url says, and a content security policy must allow its address in connect-src. ' +
-          `The browser says: ${messageOf(cause)}`,
-        cause,
-      );
+        'where wasm-url says, and a content security policy must allow its address in connect-src. ' +
+        `The browser says: ${messageOf(cause)}`;
+      throw new PhotoError('wasm-unavailable', message, cause);
     });
     return loading;
   };

@@ -4,11 +4,6 @@ import { messageOf } from '../shared/errors.js';
 import { START_ID, type WorkerRequest, type WorkerResponse } from '../shared/worker-client.js';
 import { moduleFolder, setModuleFolder } from './wasm-loader.js';
 
-interface StartMessage {
-  /** The folder of the WebAssembly modules; `null` if they lie beside the worker. */
-  readonly modules: string | null;
-}
-
 export interface WorkerService<Task, Ready, Result> {
   /** Sent to the page with the news that the worker has started. */
   readonly ready: Ready;
@@ -16,20 +11,11 @@ export interface WorkerService<Task, Ready, Result> {
   handle(task: Task): readonly [Result, Transferable[]];
 }
 
-/** The part of a worker's global scope that is used; the compiler knows only that of pages. */
-interface WorkerScope {
-  onmessage: ((event: MessageEvent) => void) | null;
-  postMessage(message: unknown, transfer?: Transferable[]): void;
-}
-
-/**
- * Starts a worker; `null` if the page may not have it. `create` calls `new Worker` itself, with the address written
- * out, because bundlers look for exactly that form.
- */
+/** `null` if the page may not have workers. `create` calls `new Worker` with a literal address, for bundlers. */
 export function startWorker(create: () => Worker): Worker | null {
   try {
     const worker = create();
-    worker.postMessage({ modules: moduleFolder } satisfies StartMessage);
+    worker.postMessage(moduleFolder);
     return worker;
   } catch {
     return null;
@@ -40,7 +26,8 @@ export function startWorker(create: () => Worker): Worker | null {
 export function serve<Task, Ready, Result>(
   setUp: () => Promise<WorkerService<Task, Ready, Result>>,
 ): void {
-  const scope = globalThis as unknown as WorkerScope;
+  // The compiler knows only the global scope of pages; that of a worker is also a message port.
+  const scope = globalThis as unknown as Pick<MessagePort, 'onmessage' | 'postMessage'>;
   const send = (message: WorkerResponse<Ready, Result>, transfer: Transferable[] = []): void =>
     scope.postMessage(message, transfer);
   const orReport = async (work: () => void | Promise<void>): Promise<void> => {
@@ -50,7 +37,7 @@ export function serve<Task, Ready, Result>(
       send({ kind: 'failed', message: messageOf(thrown) });
     }
   };
-  const start = async ({ modules }: StartMessage): Promise<void> => {
+  const start = async (modules: typeof moduleFolder): Promise<void> => {
     setModuleFolder(modules);
     const service = await setUp();
     const answer = ({ id, task }: WorkerRequest<Task>): void => {

@@ -18,12 +18,12 @@ export interface GesturePermissions {
   readonly isZoomed: boolean;
 }
 
-/** All coordinates and distances are in viewport pixels. */
+/** All coordinates and distances are in viewport pixels, velocities in pixels per second. */
 export interface GestureListener {
   moveLight(x: number, y: number): void;
   /** The gesture has become a pinch: the light returns to where it was before. */
   restoreLight(): void;
-  /** The light was released in motion; the velocity is in pixels per second. */
+  /** The light was released in motion. */
   throwLight(velocity: Velocity): void;
   pan(dx: number, dy: number): void;
   /** Magnify by `factor` around a point. Returns whether the view has changed. */
@@ -140,10 +140,8 @@ export class GestureRecognizer {
 
   #tap(x: number, y: number, time: number, { zooms }: GesturePermissions): void {
     const last = this.#lastTap;
-    const isDouble =
-      last &&
-      time - last.time <= DOUBLE_TAP_MS &&
-      Math.hypot(x - last.x, y - last.y) <= 2 * MAX_TAP_PIXELS;
+    const isNear = last && Math.hypot(x - last.x, y - last.y) <= 2 * MAX_TAP_PIXELS;
+    const isDouble = isNear && time - last.time <= DOUBLE_TAP_MS;
     this.#lastTap = isDouble ? null : { x, y, time };
     if (isDouble && zooms) this.listener.doubleTap(x, y);
   }

@@ -2,13 +2,6 @@
 
 import type { callLater } from '../shared/promises.js';
 
-export interface IdleListener {
-  /** No input for `REST_MS`. */
-  rested(): void;
-  /** No input for the kiosk's time, once after each activity. */
-  expired(): void;
-}
-
 /** The torch wanders again after this time. */
 export const REST_MS = 8000;
 
@@ -18,9 +11,10 @@ export class IdleTimer {
   #cancelRest = (): void => {};
   #cancelKiosk = (): void => {};
 
+  /** Calls `rested` after `REST_MS` without input, and `expired` after the kiosk's time, once after each activity. */
   constructor(
     private readonly later: typeof callLater,
-    private readonly listener: IdleListener,
+    private readonly listener: { rested(): void; expired(): void },
   ) {}
 
   /** 0 is never. */

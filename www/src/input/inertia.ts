@@ -34,10 +34,7 @@ export class VelocityTracker {
 }
 
 /** The distance travelled in `seconds`, and the velocity afterwards. */
-export function glide(
-  { x, y }: Velocity,
-  seconds: number,
-): { moved: { x: number; y: number }; velocity: Velocity } {
+export function glide({ x, y }: Velocity, seconds: number) {
   const decay = Math.exp(-seconds / DECAY_SECONDS);
   const travel = DECAY_SECONDS * (1 - decay);
   return { moved: { x: x * travel, y: y * travel }, velocity: { x: x * decay, y: y * decay } };

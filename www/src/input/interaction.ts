@@ -83,7 +83,6 @@ export class InteractionController {
     });
   }
 
-  /** Records an input. */
   markActive(byKeyboard = false): void {
     this.#isActive = true;
     this.#idle.restart();
@@ -96,15 +95,11 @@ export class InteractionController {
   }
 
   toggleTilt(): void {
-    if (!this.#tilt.isActive) {
-      void this.requestTilt();
-      return;
-    }
-    this.reset();
+    if (this.#tilt.isActive) this.reset();
+    else void this.requestTilt();
     this.listener.changed();
   }
 
-  /** Resolves to whether permission was granted. */
   async requestTilt(): Promise<boolean> {
     const isGranted = await this.#tilt.request();
     this.listener.changed();
@@ -156,7 +151,7 @@ export class InteractionController {
       },
       pan: (dx, dy) => {
         const moved = toUnits(dx, dy);
-        this.#pan(moved.x, moved.y);
+        this.#setView(pan(state.view, moved.x, moved.y));
       },
       zoom: (factor, x, y) => this.#zoomAt(factor, toUnits(x, y)),
       doubleTap: (x, y) =>
@@ -200,10 +195,6 @@ export class InteractionController {
     return this.#setView(zoomAt(view, factor, at, options.maxZoom));
   }
 
-  #pan(dx: number, dy: number): boolean {
-    return this.#setView(pan(this.state.view, dx, dy));
-  }
-
   /** Sets the nearest view inside the picture. Returns whether the view has changed. */
   #setView(view: PhotoView): boolean {
     const last = this.state.view;
@@ -239,14 +230,14 @@ export class InteractionController {
 
   /** Returns whether the key was used. */
   #perform(action: KeyAction): boolean {
-    const { light, options } = this.state;
+    const { light, options, view } = this.state;
     const torch = light.torch ?? CENTRE;
     switch (action.kind) {
       case 'move-light':
         this.#moveTorch({ x: torch.x + action.dx, y: torch.y + action.dy });
         return true;
       case 'pan':
-        return this.#pan(action.dx, action.dy);
+        return this.#setView(pan(view, action.dx, action.dy));
       case 'zoom':
         if (options.maxZoom > 1) this.zoom(action.by);
         return options.maxZoom > 1;

@@ -7,12 +7,9 @@ export type KeyPress = Pick<
 
 /** Distances are fractions of the picture for the light, and of the viewport for panning. */
 export type KeyAction =
-  | { readonly kind: 'move-light'; readonly dx: number; readonly dy: number }
-  | { readonly kind: 'pan'; readonly dx: number; readonly dy: number }
-  | { readonly kind: 'zoom'; readonly by: 1 | -1 }
-  | { readonly kind: 'reset-view' }
-  | { readonly kind: 'select-light'; readonly by: 1 | -1 }
-  | { readonly kind: 'escape' };
+  | { readonly kind: 'move-light' | 'pan'; readonly dx: number; readonly dy: number }
+  | { readonly kind: 'zoom' | 'select-light'; readonly by: 1 | -1 }
+  | { readonly kind: 'reset-view' | 'escape' };
 
 /** The focused part: the torch handle, the picture (if no light can be moved), or the controls. */
 export type FocusTarget = 'light' | 'picture' | 'controls';

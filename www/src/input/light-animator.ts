@@ -9,11 +9,9 @@ import { wander } from './wander.js';
 /** A glide ends below this speed, in pictures per second. */
 const MIN_GLIDE_SPEED = 0.02;
 
-type AnimatedLight = Pick<LightState, 'advanceFire' | 'torch' | 'isTorch'>;
-
 export class LightAnimator {
   constructor(
-    private readonly light: AnimatedLight,
+    private readonly light: Pick<LightState, 'advanceFire' | 'torch' | 'isTorch'>,
     private readonly loop: AnimationLoop,
     private readonly changed: () => void,
   ) {}

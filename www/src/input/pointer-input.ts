@@ -29,10 +29,13 @@ export function listenToPointer(viewport: HTMLElement, listener: PointerInputLis
     const isOnButton = target instanceof Element && target.closest('button') !== null;
     return (movesLight || zooms) && !isOnButton;
   };
-  const sampleOf = ({ pointerId, pointerType, clientX, clientY, timeStamp }: PointerEvent) => {
+  const positionOf = ({ clientX, clientY }: MouseEvent) => {
     const { left, top } = viewport.getBoundingClientRect();
-    const isTouch = pointerType === 'touch';
-    return { id: pointerId, isTouch, x: clientX - left, y: clientY - top, time: timeStamp };
+    return { x: clientX - left, y: clientY - top };
+  };
+  const sampleOf = (event: PointerEvent) => {
+    const { pointerId: id, pointerType, timeStamp: time } = event;
+    return { id, isTouch: pointerType === 'touch', time, ...positionOf(event) };
   };
   viewport.addEventListener('pointermove', (event) => {
     if (!isForPicture(event)) return;
@@ -77,12 +80,11 @@ export function listenToPointer(viewport: HTMLElement, listener: PointerInputLis
       listener.zoomIgnored('wheel');
       return;
     }
-    const { left, top } = viewport.getBoundingClientRect();
+    const { x, y } = positionOf(event);
     const delta = isPinch ? PINCH_WHEEL_GAIN * event.deltaY : event.deltaY;
     listener.active();
     // At the smallest and largest zoom the page scrolls on, so that the picture does not trap the wheel.
-    const factor = wheelFactor(delta, event.deltaMode);
-    const hasZoomed = listener.zoom(factor, event.clientX - left, event.clientY - top);
+    const hasZoomed = listener.zoom(wheelFactor(delta, event.deltaMode), x, y);
     if (hasZoomed || isPinch) event.preventDefault();
   };
   viewport.addEventListener('wheel', zoomByWheel, { passive: false });

@@ -12,10 +12,7 @@ import {
 
 type Size = Pick<ImageData, 'width' | 'height'>;
 
-/**
- * The browser scales larger images down, which take a second to read. It averages sRGB codes and not linear light, but
- * with so many pixels for each light element the error hardly shows.
- */
+/** The browser scales larger images down, for speed. It averages sRGB codes; at this size the error hardly shows. */
 const MAX_PIXELS = 1 << 22;
 
 let sharedContext: CanvasRenderingContext2D | null = null;
@@ -38,10 +35,7 @@ export function toImageLight(image: LightPicture): ImageLight {
   };
 }
 
-/**
- * The current pixels in sRGB with straight alpha; `null` while nothing is loaded. Throws `light-tainted`, `light-size`
- * or `light-source`.
- */
+/** The current sRGB pixels; `null` while nothing is loaded. Throws `light-tainted`, `light-size` or `light-source`. */
 function readPixels(image: BrowserPicture): ImageData | null {
   const size = imageSize(image);
   if (!size) return null;
@@ -114,10 +108,8 @@ function emptyContext(width: number, height: number): CanvasRenderingContext2D {
 }
 
 function taintedError(cause: unknown): PhotoError {
-  return new PhotoError(
-    'light-tainted',
+  const message =
     'The light image comes from another origin, and this page may not read it. Load it with ' +
-      'crossorigin="anonymous" from a server that sends Access-Control-Allow-Origin.',
-    cause,
-  );
+    'crossorigin="anonymous" from a server that sends Access-Control-Allow-Origin.';
+  return new PhotoError('light-tainted', message, cause);
 }

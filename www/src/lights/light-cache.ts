@@ -12,12 +12,6 @@ export interface FrameLightStatus {
   readonly lightError: PhotoError | null;
 }
 
-/** The light of a frame. */
-export interface FrameLight extends FrameLightStatus {
-  /** Owned by the cache. The same object as last time if and only if its content is unchanged. */
-  readonly light: Light;
-}
-
 export class LightCache implements Freeable {
   #light: Light | null = null;
   /** The setting of `#light`; `null` for an image, whose content may change. */
@@ -29,8 +23,11 @@ export class LightCache implements Freeable {
     private readonly lightPlane: ReceivedPhoto,
   ) {}
 
-  /** While a setting's image cannot be read, the last light replaces it, or, if there is none, the built-in light. */
-  get(setting: LightSetting): FrameLight {
+  /**
+   * The light of a frame, owned by the cache: the same object as last time if and only if its content is unchanged.
+   * While a setting's image cannot be read, the last light replaces it, or, if there is none, the built-in light.
+   */
+  get(setting: LightSetting): FrameLightStatus & { readonly light: Light } {
     let lightApplied = true;
     let lightError: PhotoError | null = null;
     if (setting.image) {

@@ -1,7 +1,4 @@
-/**
- * The colour of a light. The light transport matrix keeps channels apart, so a colour multiplies the picture's
- * channels, as part of the white balance.
- */
+/** The colour of a light. It is a part of the white balance: the light transport matrix keeps channels apart. */
 
 import { PhotoError } from '../shared/errors.js';
 import type { RgbFactors } from '../shared/values.js';
@@ -16,10 +13,7 @@ export interface LightColor {
 export type CssColorParser = (css: string) => readonly number[] | null;
 
 /** The attribute `light-color`; `null`, for white, if it is empty. Alpha scales the brightness. Throws `attribute`. */
-export function parseLightColor(
-  value: string | null,
-  parse: CssColorParser = parseCssColor,
-): LightColor | null {
+export function parseLightColor(value: string | null, parse = parseCssColor): LightColor | null {
   const css = value?.trim();
   if (!css) return null;
   const rgba = parse(css);

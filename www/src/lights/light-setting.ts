@@ -24,10 +24,7 @@ export interface ImageLight {
     readonly width: number;
     readonly height: number;
   } | null;
-  /**
-   * The current content as a light of a WebAssembly module; `null` while nothing is loaded. Throws `light-tainted`,
-   * `light-size`, `light-value` or `light-source`.
-   */
+  /** `null` while nothing is loaded. Throws `light-tainted`, `light-size`, `light-value` or `light-source`. */
   createLight(module: Pick<RelightModule, 'Light'>, photo: ReceivedPhoto): Light | null;
 }
 

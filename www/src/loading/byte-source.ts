@@ -152,17 +152,12 @@ export class HttpSource {
     }
   }
 
-  async #request(
-    { usesRange, position, end }: RangeTransfer,
-    signal: AbortSignal,
-  ): Promise<Response> {
+  #request({ usesRange, position, end }: RangeTransfer, signal: AbortSignal): Promise<Response> {
     // Range is the only header here that needs no permission of another origin.
     const headers = { Range: `bytes=${position}-${end - 1}` };
     const { fetch } = this.#ports; // The browser's `fetch` cannot be called as a method.
     const response = (async () => fetch(this.url, { signal, ...(usesRange && { headers }) }))();
-    return await this.#untilStalled(response, signal, (cause) =>
-      errors.unreachable(this.url, cause),
-    );
+    return this.#untilStalled(response, signal, (cause) => errors.unreachable(this.url, cause));
   }
 
   /** Handles status 416: the file ends before the requested range. */
@@ -181,10 +176,8 @@ export class HttpSource {
     if (isOtherVersion(known, version) || (this.size ?? size) !== (size ?? this.size)) {
       throw errors.changed(this.url);
     }
-    this.#version = {
-      etag: known.etag ?? version.etag,
-      modified: known.modified ?? version.modified,
-    };
+    const { etag = version.etag, modified = version.modified } = known;
+    this.#version = { etag, modified };
     this.size ??= size;
   }
 

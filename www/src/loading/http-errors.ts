@@ -27,9 +27,8 @@ export function badStatus(url: string, response: Response): PhotoError {
 }
 
 export function unreachable(url: string, cause: unknown): RetryableError {
-  const reason =
-    'the server cannot be reached, or its CORS headers do not allow this page to read the file';
-  return retryable('http-network', url, `could not be fetched: ${reason}.`, cause);
+  const why = 'cannot be reached, or its CORS headers do not allow this page to read the file';
+  return retryable('http-network', url, `could not be fetched: the server ${why}.`, cause);
 }
 
 export function forbiddenByPolicy(url: string, directive: string, cause: unknown): PhotoError {
@@ -44,12 +43,7 @@ export function stalled(url: string, ms: number): RetryableError {
 }
 
 /** The transfer ended at byte `at` of the file, but should have reached `end`. */
-export function endedEarly(
-  url: string,
-  at: number,
-  end: number | undefined,
-  cause?: unknown,
-): RetryableError {
+export function endedEarly(url: string, at: number, end: number | undefined, cause?: unknown) {
   const before = end === undefined ? '' : `, before byte ${end}`;
   const why = cause === undefined ? '' : ` (${messageOf(cause)})`;
   const text = `is incomplete: the transfer ended at byte ${at}${before}${why}.`;
@@ -57,8 +51,8 @@ export function endedEarly(
 }
 
 export function webPage(url: string, type: string): PhotoError {
-  const text = `could not be loaded: the server sent a web page (${type}) instead.`;
-  return fileError('http-type', url, text);
+  const sent = `the server sent a web page (${type}) instead`;
+  return fileError('http-type', url, `could not be loaded: ${sent}.`);
 }
 
 export function compressed(url: string, encoding: string): PhotoError {

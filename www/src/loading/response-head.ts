@@ -14,7 +14,6 @@ export interface ResponseHead {
   readonly version: FileVersion;
 }
 
-/** Identifies the version of the file on the server. */
 export interface FileVersion {
   /** A strong entity tag. */
   readonly etag?: string | undefined;

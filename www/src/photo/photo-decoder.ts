@@ -11,10 +11,7 @@ export interface DecoderState extends Pick<Decoder, 'bytesFed' | 'fileBytes' | '
 
 export interface PhotoDecoder {
   readonly state: DecoderState;
-  /**
-   * Feeds bytes of the file that begin at `offset`. Bytes of one range must come in order. `yieldToPage` lets the page
-   * draw and handle input; it throws if the load was cancelled meanwhile.
-   */
+  /** As `Decoder.feed`. `yieldToPage` lets the page draw; it throws if the load was cancelled meanwhile. */
   feed(offset: number, bytes: Uint8Array, yieldToPage: () => Promise<void>): Promise<void>;
   /** A coarser photograph from the bytes so far; `null` if they do not suffice. */
   preview(): Promise<Photograph | null>;

@@ -44,10 +44,7 @@ export class Photograph implements Freeable {
   /** Settles after the last use that was requested. */
   #lastUse: Promise<unknown> = Promise.resolve();
 
-  /**
-   * A photograph whose tiles are on the page. `completeness` is the share of the file that it was decoded from, 0 to 1.
-   * Throws `format-invalid`.
-   */
+  /** Its tiles are on the page. `completeness` is the decoded share of the file, 0 to 1. Throws `format-invalid`. */
   constructor(
     readonly descriptor: PhotoDescriptor,
     tiles: TileBytes[],
@@ -102,10 +99,7 @@ export class Photograph implements Freeable {
     });
   }
 
-  /**
-   * Moves all tiles to workers, always the same ones, and calls `use`. Rejects with `worker-unavailable` if there are
-   * no workers; the photograph is unchanged then.
-   */
+  /** Moves all tiles to workers and calls `use`. Rejects with `worker-unavailable`, moving nothing, without workers. */
   withWorkers<S extends TileSession, T>(
     workers: TileWorkers<S>,
     use: (session: S) => T | Promise<T>,
@@ -153,9 +147,7 @@ export class Photograph implements Freeable {
     return this.#fault;
   }
 
-  async #moveToModule(
-    module: RelightModule,
-  ): Promise<TileStore & { readonly photo: ReceivedPhoto }> {
+  async #moveToModule(module: RelightModule) {
     const session = this.#session;
     if (session) {
       await forEachTile(session, async (index) => {
@@ -246,10 +238,7 @@ export class Photograph implements Freeable {
 }
 
 /** Moves tile after tile, so that few are in memory twice, but with all workers at once. */
-async function forEachTile(
-  session: TileSession,
-  move: (index: number) => Promise<void>,
-): Promise<void> {
+async function forEachTile(session: TileSession, move: (index: number) => Promise<void>) {
   await allSettledOrThrow(
     session.tiles.map(async (tiles) => {
       for (const index of tiles) await move(index);
@@ -266,8 +255,6 @@ function parseMetadata(json: string): unknown {
   } catch {
     // Not JSON.
   }
-  throw new PhotoError(
-    'format-invalid',
-    "The file's metadata is not a JSON object. Export it again.",
-  );
+  const message = "The file's metadata is not a JSON object. Export it again.";
+  throw new PhotoError('format-invalid', message);
 }

@@ -51,10 +51,7 @@ export class BackendSelector {
     return this.#search?.promise ?? null;
   }
 
-  /**
-   * Puts the first of `options.backends` that works in the place of the backend `previous`. `reason` says why that one
-   * is replaced; empty if only the options have changed.
-   */
+  /** Replaces the backend `previous` by the first that works. `reason` is empty if only the options have changed. */
   async select(
     photo: RefCounted<Photograph>,
     options: RenderOptions,
@@ -206,15 +203,11 @@ export class BackendSelector {
   }
 }
 
-function meets(
-  active: ActiveBackend,
-  backend: Backend,
-  { gamut, software }: RenderOptions,
-): boolean {
+function meets(active: ActiveBackend, backend: Backend, options: RenderOptions): boolean {
   return (
     active.backend === backend &&
-    active.options.gamut === gamut &&
+    active.options.gamut === options.gamut &&
     // A device that was allowed to be a software renderer may be one.
-    (backend === 'cpu' || software || !active.options.software)
+    (backend === 'cpu' || options.software || !active.options.software)
   );
 }

@@ -23,8 +23,7 @@ export async function firstWorking<T>(
   let cause: unknown;
   for (const backend of backends) {
     try {
-      const value = await attempt(backend);
-      return { value, reason: failures.join(' ') };
+      return { value: await attempt(backend), reason: failures.join(' ') };
     } catch (thrown) {
       signal.throwIfAborted();
       if (hasCode(thrown, 'csp-wasm')) throw thrown;
@@ -32,12 +31,8 @@ export async function firstWorking<T>(
       failures.push(`${BACKEND_TITLES[backend]}: ${endSentence(messageOf(thrown))}`);
     }
   }
-  const remedy = backends.includes('cpu')
-    ? ''
-    : ' Remove the backend attribute, so that the CPU is tried too.';
-  throw new PhotoError(
-    'backend-unavailable',
-    `This browser cannot draw the photograph. ${failures.join(' ')}${remedy}`,
-    cause,
-  );
+  const remedy = 'Remove the backend attribute, so that the CPU is tried too.';
+  if (!backends.includes('cpu')) failures.push(remedy);
+  const message = `This browser cannot draw the photograph. ${failures.join(' ')}`;
+  throw new PhotoError('backend-unavailable', message, cause);
 }

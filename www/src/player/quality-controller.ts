@@ -8,10 +8,7 @@ const MIN_QUALITY = 1 / 4;
 const FRAME_BUDGET_MS = 1000 / 30;
 /** Longer frames are slow. Above the budget, because a display of 30 Hz shows no frame sooner. */
 const SLOW_FRAME_MS = 1.2 * FRAME_BUDGET_MS;
-/**
- * Quality rises if frames are expected to take at most this long. Two frames of a 60 Hz display must fit, because such
- * a display shows no frame sooner.
- */
+/** Quality rises if frames are expected to take at most this long, in which two frames of a 60 Hz display must fit. */
 const MAX_EXPECTED_MS = 1.1 * FRAME_BUDGET_MS;
 /** Frames per decision, which uses their median: up to half of them may be outliers. */
 const WINDOW_FRAMES = 7;

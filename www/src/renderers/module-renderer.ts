@@ -6,22 +6,16 @@ import { LightCache } from '../lights/light-cache.js';
 import type { ImageLight } from '../lights/light-setting.js';
 import type { Photograph } from '../photo/photograph.js';
 import { toPhotoError } from '../shared/errors.js';
+import type { DeviceLease } from './gpu/devices.js';
 import type { Renderer } from './types.js';
 
-/** The graphics device that a renderer shares with others. */
-export interface DeviceHandle {
-  /** Reports that the device does not work. */
-  fail(reason: string): void;
-  release(): void;
-}
-
-/** A renderer with a module's relighter, which is freed with it; `device` is released. */
+/** A renderer with a module's relighter. Its `free` frees the relighter and releases the lease of a device. */
 export function createModuleRenderer(
   module: RelightModule,
   photograph: Photograph,
   relighter: Relighter,
   canvas: HTMLCanvasElement,
-  device: DeviceHandle | null = null,
+  lease: DeviceLease | null = null,
 ): Renderer {
   const { kernel, gamut } = relighter;
   const lights = new LightCache(module, photograph.createLightPlane(module));
@@ -47,7 +41,7 @@ export function createModuleRenderer(
         return { lightApplied, lightError };
       } catch (thrown) {
         const { code, message } = toPhotoError(thrown);
-        if (code === 'backend-lost') device?.fail(message);
+        if (code === 'backend-lost') lease?.fail(message);
         throw thrown;
       } finally {
         transform.free();
@@ -55,7 +49,7 @@ export function createModuleRenderer(
     },
     free() {
       relighter.free();
-      device?.release();
+      lease?.release();
       lights.free();
     },
   };

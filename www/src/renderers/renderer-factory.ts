@@ -89,11 +89,9 @@ function loadOnce<T>(load: () => Promise<T>): () => Promise<T> {
   return () => {
     loading ??= load().catch((cause: unknown) => {
       loading = null;
-      throw new PhotoError(
-        'backend-unavailable',
-        `its script could not be loaded (${messageOf(cause)}). It must lie beside the element's script`,
-        cause,
-      );
+      const failure = `its script could not be loaded (${messageOf(cause)})`;
+      const remedy = "It must lie beside the element's script";
+      throw new PhotoError('backend-unavailable', `${failure}. ${remedy}`, cause);
     });
     return loading;
   };

@@ -53,7 +53,6 @@ export class PhotoError extends Error {
   }
 }
 
-/** The message of anything thrown. */
 export function messageOf(thrown: unknown): string {
   return thrown instanceof Error ? thrown.message : String(thrown);
 }

@@ -1,7 +1,6 @@
 /**
  * Parsers of the settings that the element's attributes and the core's options have in common. `null` or an empty text
- * gives the default. Each parser throws a `PhotoError` with the code `attribute` whose message names the accepted
- * values.
+ * gives the default. Each throws a `PhotoError` with the code `attribute` whose message names the accepted values.
  */
 
 import { PhotoError } from './errors.js';
@@ -20,7 +19,6 @@ export const parseLight: AttributeParser<LightName> = (value) => parseName(value
 export const parseTone: AttributeParser<ToneCurve> = (value) => parseName(value, TONES, 'tone');
 export const parseGamut: AttributeParser<Gamut> = (value) => parseName(value, GAMUTS, 'gamut');
 
-/** A factor on the light's brightness. */
 export function parseExposure(value: string | null): number {
   const hint = '1 shows the photograph as taken';
   return parseNumber(value, 'exposure', 0, MAX_EXPOSURE, hint) ?? 1;
@@ -34,11 +32,10 @@ export function parseWhiteBalance(value: string | null): RgbFactors {
     .map(Number);
   const inRange = (factor: number) => factor >= 0 && factor <= MAX_WHITE_BALANCE;
   if (factors.length === 3 && factors.every(inRange)) return factors as unknown as RgbFactors;
-  throw new PhotoError(
-    'attribute',
-    `The white balance “${value}” is not three numbers from 0 to ${MAX_WHITE_BALANCE}, for red, green and ` +
-      'blue; “1 1 1” shows the photograph as taken.',
-  );
+  const message =
+    `The white balance “${value}” is not three numbers from 0 to ${MAX_WHITE_BALANCE}, for red, ` +
+    'green and blue; “1 1 1” shows the photograph as taken.';
+  throw new PhotoError('attribute', message);
 }
 
 /** A number from `min` to `max`; `null` for an empty value. `hint` ends the error message. */
@@ -52,10 +49,8 @@ export function parseNumber(
   if (!value?.trim()) return null;
   const number = Number(value);
   if (number >= min && number <= max) return number;
-  throw new PhotoError(
-    'attribute',
-    `The ${label} “${value}” is not a number from ${min} to ${max}; ${hint}.`,
-  );
+  const message = `The ${label} “${value}” is not a number from ${min} to ${max}; ${hint}.`;
+  throw new PhotoError('attribute', message);
 }
 
 /** One of `names`; the first is the default. */
@@ -67,8 +62,6 @@ export function parseName<N extends string>(
   const name = value?.trim() || names[0];
   const known = names.find((known) => known === name);
   if (known) return known;
-  throw new PhotoError(
-    'attribute',
-    `There is no ${label} named “${name}”. Known names: ${names.join(', ')}.`,
-  );
+  const message = `There is no ${label} named “${name}”. Known names: ${names.join(', ')}.`;
+  throw new PhotoError('attribute', message);
 }

@@ -9,7 +9,6 @@ export async function allSettledOrThrow<T>(promises: readonly Promise<T>[]): Pro
   });
 }
 
-/** A promise with its resolver. */
 export class Deferred {
   resolve = (): void => {};
   readonly promise = new Promise<void>((resolve) => {
@@ -30,10 +29,7 @@ export function linkedController(signal: AbortSignal): AbortController {
   return linked;
 }
 
-/**
- * Waits for a promise. Rejects with the signal's reason once it is aborted; after `ms` milliseconds, the result of
- * `onTimeout` takes the promise's place.
- */
+/** Rejects with the signal's reason once it is aborted; after `ms` milliseconds, `onTimeout` gives the result. */
 export function withTimeout<T>(
   promise: Promise<T>,
   limits: { signal?: AbortSignal; ms?: number; onTimeout?: () => T | Promise<T> },

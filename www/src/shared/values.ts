@@ -32,7 +32,6 @@ export const CENTRE: PicturePoint = { x: 0.5, y: 0.5 };
 
 export type RgbFactors = readonly [red: number, green: number, blue: number];
 
-/** The nearest point on the picture. */
 export function clampToPicture({ x, y }: PicturePoint): PicturePoint {
   return { x: clampAndRound(x, 0, 1), y: clampAndRound(y, 0, 1) };
 }

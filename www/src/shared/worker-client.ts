@@ -6,10 +6,7 @@ import { joinSentences, PhotoError } from './errors.js';
 export interface WatchdogLimits {
   /** Time between two checks, in milliseconds. */
   readonly intervalMs: number;
-  /**
-   * Checks without an answer after which a worker counts as dead. The watchdog counts checks and not time, because a
-   * page that sleeps checks no more often than its workers work.
-   */
+  /** A worker counts as dead after this many checks without an answer; time would also pass while the page sleeps. */
   readonly maxChecks: number;
   /** The same for a worker that still starts, which includes a download and a compilation. */
   readonly maxStartChecks: number;
@@ -20,7 +17,6 @@ export interface WorkerRequest<Task> {
   readonly task: Task;
 }
 
-/** A message from the worker. */
 export type WorkerResponse<Ready, Result> =
   /** The result of a task; that of `START_ID` says that the worker has started. */
   | { readonly kind: 'done'; readonly id: number; readonly result: Ready | Result }
@@ -53,7 +49,6 @@ interface PendingRequest<Result> {
   readonly reject: (error: PhotoError) => void;
 }
 
-/** Sends requests to a worker, and reports a worker that stops or falls silent. */
 export class WorkerClient<Task, Ready, Result> {
   /** Settles when the worker has started, or cannot. */
   readonly ready: Promise<Ready>;
@@ -98,7 +93,7 @@ export class WorkerClient<Task, Ready, Result> {
     });
   }
 
-  /** Ends the worker and rejects everything that is pending. */
+  /** Rejects everything that is pending. */
   terminate(): void {
     this.#fail('It was ended.', false);
   }
@@ -116,7 +111,6 @@ export class WorkerClient<Task, Ready, Result> {
     else clearInterval(this.#watchdog);
   }
 
-  /** Starts the watchdog's count, or starts it again. */
   #watch(maxChecks: number): void {
     clearInterval(this.#watchdog);
     let checks = 0;

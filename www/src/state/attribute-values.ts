@@ -73,9 +73,7 @@ export const PARSERS = {
 
 export type ParsedValue<K extends keyof typeof PARSERS> = ReturnType<(typeof PARSERS)[K]>;
 
-export function parserOf<K extends keyof typeof PARSERS>(
-  name: K,
-): (text: AttributeText) => ParsedValue<K> {
+export function parserOf<K extends keyof typeof PARSERS>(name: K) {
   return PARSERS[name] as (text: AttributeText) => ParsedValue<K>;
 }
 

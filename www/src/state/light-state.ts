@@ -28,9 +28,6 @@ export interface LightStateListener extends LightSourceListener {
 /** An item of the light menu: a built-in light, or the page's source. */
 export type LightMenuItem = LightName | 'projection';
 
-const fetchSourceSupport = (): Promise<typeof SourceSupport> =>
-  import('../lights/light-sources.js');
-
 const NO_OVERRIDES: LightOverrides = { name: null, torch: null, size: null, color: null };
 const DEFAULTS: LightOptions = { ...NO_OVERRIDES, name: 'flood', src: null, crossOrigin: null };
 const FIRE_FRAME_SECONDS = 1 / 30;
@@ -57,7 +54,8 @@ export class LightState {
 
   constructor(
     private readonly listener: LightStateListener,
-    private readonly fetchSupport = fetchSourceSupport,
+    private readonly fetchSupport = (): Promise<typeof SourceSupport> =>
+      import('../lights/light-sources.js'),
   ) {}
 
   setOptions(options: LightOptions): void {

@@ -14,10 +14,10 @@ export class RevealState {
   /** A visitor pressed the poster, or a script called `dismissPoster()`. */
   isDismissed = false;
 
-  mayFetch({ loading, reveal }: RevealOptions): boolean {
-    if (loading === 'eager') return true;
-    if (reveal === 'interaction' && !this.isDismissed) return false;
-    return loading === 'lazy' ? this.isVisible : this.isNear;
+  mayFetch(options: RevealOptions): boolean {
+    if (options.loading === 'eager') return true;
+    if (this.needsPress(options)) return false;
+    return options.loading === 'lazy' ? this.isVisible : this.isNear;
   }
 
   isPosterShown({ reveal }: RevealOptions): boolean {

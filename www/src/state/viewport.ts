@@ -40,12 +40,7 @@ export function toViewport(view: PhotoView, { x, y }: PicturePoint): PicturePoin
 }
 
 /** Magnifies by `factor`. The picture stays fixed at the viewport point `at`; the centre may lie beyond the edges. */
-export function zoomAt(
-  view: PhotoView,
-  factor: number,
-  at: PicturePoint,
-  maxZoom: number,
-): PhotoView {
+export function zoomAt(view: PhotoView, factor: number, at: PicturePoint, maxZoom: number) {
   const fixed = toPicture(view, at);
   const zoom = Math.min(maxZoom, Math.max(1, view.zoom * factor));
   const x = fixed.x - (at.x - 0.5) / zoom;

@@ -18,7 +18,7 @@ export interface PresenterListener extends ToolbarActions {
 export class Presenter {
   /** `null` until it is needed. */
   toolbar: Toolbar | null = null;
-  #isToolbarRequested = false;
+  #toolbarFetch: Promise<void> | null = null;
 
   constructor(
     private readonly host: Element,
@@ -43,10 +43,9 @@ export class Presenter {
     const touchAction = capturesTouch ? 'none' : hasHandle || zooms ? 'pan-y' : 'auto';
     this.dom.updateLayout(hasHandle, zooms && !hasHandle, touchAction, language);
     this.dom.updateView(view, torch, describeLight(torch, language));
-    const { poster, crossOrigin } = options;
-    this.dom.updatePoster(poster, crossOrigin, !isPictureShown, reveal.needsPress(options));
+    this.dom.updatePoster(options, !isPictureShown, reveal.needsPress(options));
     const hasToolbar = options.controls && isPictureShown;
-    if (hasToolbar && !this.#isToolbarRequested) void this.#fetchToolbar();
+    if (hasToolbar) this.#toolbarFetch ??= this.#fetchToolbar();
     if (hasToolbar) this.toolbar?.update((key) => t(key, language), isPaused, isTilting);
     else this.toolbar?.hide();
   }
@@ -70,7 +69,6 @@ export class Presenter {
     this.dom.showHint(this.#t(by === 'wheel' ? 'wheelHint' : 'touchHint', key));
   }
 
-  /** Has a screen reader read a change of the state. */
   announce(change: 'loaded' | 'light' | 'zoomed'): void {
     const { light, view } = this.state;
     const zoom = view.zoom.toLocaleString(this.language, { maximumFractionDigits: 1 });
@@ -80,7 +78,6 @@ export class Presenter {
 
   /** The toolbar is a separate script, fetched when the `controls` attribute is used for the first time. */
   async #fetchToolbar(): Promise<void> {
-    this.#isToolbarRequested = true;
     try {
       const { Toolbar } = await import('./toolbar.js');
       const toolbar = new Toolbar(this.host, this.state, this.listener);

@@ -2,6 +2,7 @@
 
 import { type Language, t } from '../i18n/strings.js';
 import type { PicturePoint } from '../shared/values.js';
+import type { ElementOptions } from '../state/options.js';
 import { type PhotoView, toViewport } from '../state/viewport.js';
 import { adoptStyles } from './adopted-styles.js';
 import { createElement, createSlot, updateAttribute, updateText } from './dom-helpers.js';
@@ -34,53 +35,24 @@ export class ShadowDom {
   );
   readonly #picture = createElement('div', { part: 'picture' });
   readonly #posterImage = createElement('img', { part: 'poster', alt: '', hidden: '' });
-  readonly #poster = createElement(
-    'div',
-    { class: 'poster' },
-    createSlot('poster', this.#posterImage),
-  );
+  readonly #poster = createElement('div', { class: 'poster' });
   readonly #hint = createElement('div', { class: 'hint panel', part: 'hint', hidden: '' });
   /** The box that shows the picture and receives pointer events. */
-  readonly viewport = createElement(
-    'div',
-    { class: 'viewport' },
-    this.#picture,
-    this.#poster,
-    this.handle,
-    this.revealButton,
-    this.#hint,
-  );
+  readonly viewport = createElement('div', { class: 'viewport' });
   readonly #controls = createSlot('controls');
   readonly #progressBar = createElement('div', { class: 'progress-bar', role: 'progressbar' });
-  readonly #progress = createElement(
-    'div',
-    { class: 'progress', part: 'progress', hidden: '' },
-    createSlot('progress', this.#progressBar),
-  );
+  readonly #progress = createElement('div', { class: 'progress', part: 'progress', hidden: '' });
   readonly #errorSummary = createElement('p');
   readonly #detailsLabel = createElement('summary');
   readonly #errorDetails = createElement('p');
-  readonly #message = createElement(
-    'div',
-    { class: 'message', part: 'message', role: 'alert', hidden: '' },
-    createSlot(
-      'error',
-      this.#errorSummary,
-      createElement('details', {}, this.#detailsLabel, this.#errorDetails),
-    ),
-  );
-  readonly #footer = createElement(
-    'div',
-    { class: 'footer' },
-    createElement('div', { class: 'controls' }, this.#controls),
-    this.#progress,
-    this.#message,
-  );
-  readonly #status = createElement('div', {
-    class: 'visually-hidden',
-    part: 'status',
-    role: 'status',
+  readonly #message = createElement('div', {
+    class: 'message',
+    part: 'message',
+    role: 'alert',
+    hidden: '',
   });
+  readonly #footer = createElement('div', { class: 'footer' });
+  readonly #status = createElement('div', { part: 'status', role: 'status' });
   #canvas: HTMLCanvasElement | null = null;
   #announceTimer: ReturnType<typeof setTimeout> | undefined;
   #hintTimer: ReturnType<typeof setTimeout> | undefined;
@@ -88,11 +60,20 @@ export class ShadowDom {
   constructor(host: Element) {
     this.root = host.attachShadow({ mode: 'open' });
     adoptStyles(this.root, ELEMENT_CSS);
-    this.#posterImage.addEventListener('load', () => this.viewport.classList.add('has-poster'));
-    this.#posterImage.addEventListener('error', () => {
-      this.#posterImage.hidden = true;
+    const { viewport, handle, revealButton } = this;
+    const image = this.#posterImage;
+    image.addEventListener('load', () => viewport.classList.add('has-poster'));
+    image.addEventListener('error', () => {
+      image.hidden = true;
     });
-    this.root.append(this.viewport, this.#footer, this.#status);
+    this.#poster.append(createSlot('poster', image));
+    viewport.append(this.#picture, this.#poster, handle, revealButton, this.#hint);
+    const controls = createElement('div', { class: 'controls' }, this.#controls);
+    this.#progress.append(createSlot('progress', this.#progressBar));
+    const details = createElement('details', {}, this.#detailsLabel, this.#errorDetails);
+    this.#message.append(createSlot('error', this.#errorSummary, details));
+    this.#footer.append(controls, this.#progress, this.#message);
+    this.root.append(viewport, this.#footer, this.#status);
   }
 
   /** Adds the built-in controls, which a page's own `controls` slot replaces. */
@@ -116,10 +97,7 @@ export class ShadowDom {
     updateText(this.#detailsLabel, t('details', language));
   }
 
-  /**
-   * Updates the handle, the focus and the browser's own gestures for single fingers. When the handle disappears, its
-   * focus moves to the viewport, which may be focusable itself without a handle.
-   */
+  /** When the handle disappears, its focus moves to the viewport, which may be focusable itself without a handle. */
   updateLayout(
     hasHandle: boolean,
     isFocusable: boolean,
@@ -176,17 +154,14 @@ export class ShadowDom {
   }
 
   /** `needsPress` shows the button that dismisses the poster. */
-  updatePoster(
-    src: string | null,
-    crossOrigin: string | null,
-    isShown: boolean,
-    needsPress: boolean,
-  ): void {
-    if (this.#posterImage.getAttribute('src') !== src) {
+  updatePoster(options: ElementOptions, isShown: boolean, needsPress: boolean): void {
+    const image = this.#posterImage;
+    const { poster, crossOrigin } = options;
+    if (image.getAttribute('src') !== poster) {
       this.viewport.classList.remove('has-poster');
-      this.#posterImage.hidden = src === null;
-      updateAttribute(this.#posterImage, 'crossorigin', crossOrigin);
-      updateAttribute(this.#posterImage, 'src', src);
+      image.hidden = poster === null;
+      updateAttribute(image, 'crossorigin', crossOrigin);
+      updateAttribute(image, 'src', poster);
     }
     this.#poster.classList.toggle('hidden', !isShown);
     this.revealButton.hidden = !needsPress;

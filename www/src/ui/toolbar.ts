@@ -63,17 +63,10 @@ export class Toolbar {
     };
     this.#buttons.light.append(this.#lightName);
     updateAttribute(this.#buttons.light, 'aria-controls', 'lights');
-    this.bar = createElement(
-      'div',
-      { class: 'toolbar panel', part: 'controls', role: 'toolbar' },
-      ...Object.values(this.#buttons),
-    );
-    this.menu = createElement('div', {
-      class: 'menu panel',
-      part: 'menu',
-      role: 'radiogroup',
-      id: 'lights',
-    });
+    const barAttributes = { class: 'toolbar panel', part: 'controls', role: 'toolbar' };
+    this.bar = createElement('div', barAttributes, ...Object.values(this.#buttons));
+    const menuAttributes = { class: 'menu panel', part: 'menu', role: 'radiogroup', id: 'lights' };
+    this.menu = createElement('div', menuAttributes);
     this.closeMenu();
     this.bar.addEventListener('keydown', (event) => this.#moveFocus(event));
     this.bar.addEventListener('focusin', ({ target }) => this.#setTabStop(target));
@@ -193,11 +186,8 @@ export class Toolbar {
 }
 
 function createButton(iconName: IconName, onPress: () => void): HTMLButtonElement {
-  const button = createElement(
-    'button',
-    { part: 'button', type: 'button' },
-    createIcon(ICONS[iconName]),
-  );
+  const attributes = { part: 'button', type: 'button' };
+  const button = createElement('button', attributes, createIcon(ICONS[iconName]));
   button.addEventListener('click', () => {
     if (button.getAttribute('aria-disabled') !== 'true') onPress();
   });

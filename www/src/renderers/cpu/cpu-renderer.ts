@@ -1,7 +1,4 @@
-/**
- * Creates renderers for the CPU: in the page's worker pool, or on the page's thread if there are no workers. It is a
- * separate script, which has its own copies of shared code.
- */
+/** Creates renderers for the CPU, with or without workers: a separate script with its own copies of shared code. */
 
 import type { CpuModule, Gamut } from '../../engine/types.js';
 import type { Photograph } from '../../photo/photograph.js';

@@ -11,11 +11,6 @@ export interface RowPixels extends RowRange {
   readonly pixels: ArrayBuffer;
 }
 
-interface PoolSessionEvents {
-  frameDrawn(): void;
-  ended(): void;
-}
-
 /** One worker's rows. */
 interface WorkerPart extends TileRowRange {
   readonly client: RelightClient;
@@ -41,7 +36,7 @@ export class PoolSession implements TileSession {
     clients: readonly RelightClient[],
     ranges: readonly TileRowRange[],
     readonly kernel: string,
-    private readonly events: PoolSessionEvents,
+    private readonly events: { frameDrawn(): void; ended(): void },
   ) {
     this.#width = width;
     this.#parts = ranges.map((range, i) => {

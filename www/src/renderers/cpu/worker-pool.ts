@@ -16,7 +16,7 @@ const REMEDY =
 const WARM_WORKERS = 2;
 
 /** A worker, and how many photographs have rows in it. */
-export interface PoolWorker {
+interface PoolWorker {
   readonly client: RelightClient;
   photos: number;
 }

@@ -6,14 +6,16 @@
 import type { GraphicsDevice, Modules } from '../../engine/types.js';
 import { PhotoError } from '../../shared/errors.js';
 import { withTimeout } from '../../shared/promises.js';
-import type { DeviceHandle } from '../module-renderer.js';
 import { BROWSER_GRAPHICS, type GraphicsBackend, type GraphicsPorts } from './graphics-ports.js';
 
 export type LoadGraphics = <N extends GraphicsBackend>(name: N) => Promise<Modules[N]>;
 
 /** A photograph's use of a device. Free its relighter before `release`. */
-export interface DeviceLease extends DeviceHandle {
+export interface DeviceLease {
   readonly graphics: GraphicsDevice;
+  /** Reports that the device does not work. */
+  fail(reason: string): void;
+  release(): void;
 }
 
 /** A device that is open or being opened. */
@@ -45,10 +47,7 @@ export class Devices {
     private readonly maxAnswerMs = MAX_ANSWER_MS,
   ) {}
 
-  /**
-   * Leases the device of a backend; `software` allows a software renderer. `onLost` is called at most once. Rejects
-   * with `backend-unavailable`.
-   */
+  /** `software` allows a software renderer; `onLost` is called at most once. Rejects with `backend-unavailable`. */
   async lease(
     load: LoadGraphics,
     backend: GraphicsBackend,
