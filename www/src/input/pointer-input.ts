@@ -26,8 +26,7 @@ export function listenToPointer(viewport: HTMLElement, listener: PointerInputLis
   /** Whether the event is for the picture. The poster's button over it handles its own events. */
   const isForPicture = ({ target }: Event) => {
     const { movesLight, zooms } = listener.permissions();
-    const isOnButton = target instanceof Element && target.closest('button') !== null;
-    return (movesLight || zooms) && !isOnButton;
+    return (movesLight || zooms) && !(target as Element).closest('button');
   };
   const positionOf = ({ clientX, clientY }: MouseEvent) => {
     const { left, top } = viewport.getBoundingClientRect();
