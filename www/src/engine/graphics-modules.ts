@@ -1,10 +1,10 @@
 /** Loads the modules of the graphics backends, apart from the core's: bundlers keep the files that a script imports. */
 
-import type { Modules } from './types.js';
+import type { GraphicsModules } from './types.js';
 import { createLoader } from './wasm-loader.js';
 
 export const GRAPHICS_LOADERS: {
-  readonly [N in 'webgl2' | 'webgpu']: () => Promise<Modules[N]>;
+  readonly [N in keyof GraphicsModules]: () => Promise<GraphicsModules[N]>;
 } = {
   webgl2: createLoader('webgl2', 'relights with WebGL2', {
     glue: () => import('./wasm/webgl2.js'),

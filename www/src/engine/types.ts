@@ -3,7 +3,7 @@
  * descriptor and tiles. `tests/browser/engine-contract.ts` compares these types with those of wasm-bindgen.
  */
 
-import type { Gamut, ToneCurve, WasmModuleName } from '../shared/names.js';
+import type { Gamut, ToneCurve } from '../shared/names.js';
 import type { PhotoInfo } from '../shared/values.js';
 
 export type { Backend, Gamut, ToneCurve } from '../shared/names.js';
@@ -139,10 +139,8 @@ export interface CpuModule extends RelightModule {
   Relighter: { new (photo: ReceivedPhoto, canvas: HTMLCanvasElement, gamut: Gamut): Relighter };
 }
 
-/** All modules by name. A WebGL2 device uses its canvas alone. */
-export interface Modules extends Record<WasmModuleName, unknown> {
-  decoder: DecoderModule;
-  cpu: CpuModule;
+/** The modules of the graphics backends. A WebGL2 device uses its canvas alone. */
+export interface GraphicsModules {
   webgl2: RelightModule & { GraphicsDevice: { webgl2(canvas: HTMLCanvasElement): GraphicsDevice } };
   webgpu: RelightModule & { GraphicsDevice: { webgpu(): Promise<GraphicsDevice> } };
 }

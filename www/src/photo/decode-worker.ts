@@ -25,10 +25,8 @@ function answer(decoder: Decoder, task: DecodeTask): DecodeResult {
 /** Moves a photograph out of the module's memory. */
 function takeOut(photo: DecodedPhoto): TransferredPhoto {
   const descriptor = describePhoto(photo);
-  const tiles = Array.from(
-    { length: descriptor.tiles },
-    (_, index) => photo.takeTile(index) as TileBytes,
-  );
+  const takeTile = (_: unknown, index: number) => photo.takeTile(index) as TileBytes;
+  const tiles = Array.from({ length: descriptor.tiles }, takeTile);
   photo.free();
   return { descriptor, tiles };
 }

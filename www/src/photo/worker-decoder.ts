@@ -31,12 +31,8 @@ const LIMITS: WatchdogLimits = { intervalMs: 1000, maxChecks: 30, maxStartChecks
 
 /** Waits until the worker has started. Rejects with `worker-unavailable` if it does not. */
 export async function startWorkerDecoder(worker: DecodeWorker, limits = LIMITS) {
-  const remedy = 'Load the photograph again.';
-  const client: WorkerClient<DecodeTask, DecoderState, DecodeResult> = new WorkerClient(worker, {
-    name: 'decoding worker',
-    limits,
-    remedy,
-  });
+  const options = { name: 'decoding worker', limits, remedy: 'Load the photograph again.' };
+  const client = new WorkerClient<DecodeTask, DecoderState, DecodeResult>(worker, options);
   /** The state after the last task. */
   let state = await client.ready;
 

@@ -66,11 +66,8 @@ export class BackendSelector {
     // An attempt reads the photograph until it ends, even after the search was cancelled.
     photo.retain();
     try {
-      const working = await firstWorking(
-        options.backends,
-        (backend) => this.#attempt(backend, options, photo, signal),
-        signal,
-      );
+      const attempt = (backend: Backend) => this.#attempt(backend, options, photo, signal);
+      const working = await firstWorking(options.backends, attempt, signal);
       signal.throwIfAborted();
       this.#search = null;
       this.#use(working.value, options, previous, [reason, working.reason]);

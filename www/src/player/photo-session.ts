@@ -261,12 +261,8 @@ export class PhotoSession {
   }
 
   /** Measures a frame of an animation for the choice of the next one's quality. */
-  #measure(
-    { qualityController }: ActiveBackend,
-    startMs: number,
-    frame: FrameLightStatus | Promise<FrameLightStatus>,
-  ): void {
-    const record = () => qualityController.recordFrame(startMs, this.ports.now());
+  #measure(active: ActiveBackend, startMs: number, frame: ReturnType<Renderer['render']>): void {
+    const record = () => active.qualityController.recordFrame(startMs, this.ports.now());
     if (frame instanceof Promise) frame.then(record, () => {});
     // A graphics device still works on the frame, which delays the browser's next one.
     else this.ports.nextFrame(record);

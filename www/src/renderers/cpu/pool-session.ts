@@ -90,9 +90,8 @@ export class PoolSession implements TileSession {
    * memory of the pixels. `light` may be freed at once. The same object is not sent to the workers twice.
    */
   async relight(light: Light, settings: FrameSettings): Promise<RowPixels[]> {
-    const picture = await allSettledOrThrow(
-      this.#parts.map((part) => this.#relightPart(part, light, settings)),
-    );
+    const rowPixels = this.#parts.map((part) => this.#relightPart(part, light, settings));
+    const picture = await allSettledOrThrow(rowPixels);
     this.events.frameDrawn();
     return picture;
   }

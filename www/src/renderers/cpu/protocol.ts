@@ -2,6 +2,7 @@
 
 import type { OutputSettings } from '../../engine/output-settings.js';
 import type { Gamut } from '../../engine/types.js';
+import type { PhotoDescriptor } from '../../photo/types.js';
 import type { WorkerClient, WorkerLike } from '../../shared/worker-client.js';
 
 export interface FrameSettings {
@@ -20,11 +21,7 @@ export interface RowRange {
 /** What a worker does with the row range that it has of a photograph. */
 export type RowTask =
   /** Allocates the row range. Its tiles follow. */
-  | ({
-      readonly kind: 'open';
-      readonly geometry: Float64Array;
-      readonly basis: Float32Array;
-    } & RowRange)
+  | ({ readonly kind: 'open' } & Pick<PhotoDescriptor, 'geometry' | 'basis'> & RowRange)
   | { readonly kind: 'put'; readonly index: number; readonly bytes: Uint8Array<ArrayBuffer> }
   /** Gives a tile back: the result is its bytes. */
   | { readonly kind: 'take'; readonly index: number }

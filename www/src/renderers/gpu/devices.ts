@@ -3,12 +3,12 @@
  * next lease after a loss gets a new device, unless losses are frequent.
  */
 
-import type { GraphicsDevice, Modules } from '../../engine/types.js';
+import type { GraphicsDevice, GraphicsModules } from '../../engine/types.js';
 import { PhotoError } from '../../shared/errors.js';
 import { withTimeout } from '../../shared/promises.js';
 import { BROWSER_GRAPHICS, type GraphicsBackend, type GraphicsPorts } from './graphics-ports.js';
 
-export type LoadGraphics = <N extends GraphicsBackend>(name: N) => Promise<Modules[N]>;
+export type LoadGraphics = <N extends GraphicsBackend>(name: N) => Promise<GraphicsModules[N]>;
 
 /** A photograph's use of a device. Free its relighter before `release`. */
 export interface DeviceLease {
