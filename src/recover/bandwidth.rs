@@ -105,10 +105,8 @@ impl WindowEstimate {
             used.for_each(|part| total.merge(&parts[part]));
             Some(rings.tail_fractions(&total.solve()?, max_side))
         };
-        let Some(tails) = tail_fractions_without(PARTS) else {
-            // Too few measurements, or dark photographs, which the recovery reports.
-            return undetermined(max_side);
-        };
+        // None from too few measurements, or from dark photographs, which the recovery reports.
+        let tails = tail_fractions_without(PARTS).unwrap_or_default();
         let without_part: Option<Vec<_>> = (0..PARTS).map(tail_fractions_without).collect();
         let errors = match without_part {
             Some(without_part) => jackknife_errors(&without_part, &tails),
@@ -254,31 +252,21 @@ fn choose_window(
     };
     // A single small value may be due to chance.
     let mut small = (0..rings).filter(|&i| is_small(i) && is_small(i + 1));
-    let window = |rings: usize| Window::new(MIN_SIDE.min(max_side) + 2 * rings as u32);
+    let side = |rings: usize| MIN_SIDE.min(max_side) + 2 * rings as u32;
     let inside = small.next().map(|first| first + MARGIN_RINGS);
-    if let Some(inside) = inside.filter(|&i| i < rings) {
-        return Ok(WindowEstimate {
-            window: window(inside)?,
-            bandwidth: BandwidthEstimate::Bounded {
-                tail_fraction: tails[inside].max(0.0),
-            },
-        });
-    }
     // The last ring may be dark: the band then ends with the widest window.
     let mut but_last = tails.iter().zip(errors).take(rings.saturating_sub(1));
-    match rings > 1 && but_last.all(|(tail, error)| *tail > MAX_TAIL_FRACTION + 2.0 * error) {
-        true => Ok(WindowEstimate {
-            window: window(rings)?,
-            bandwidth: BandwidthEstimate::Unbounded,
-        }),
-        false => undetermined(max_side),
-    }
-}
-
-fn undetermined(max_side: u32) -> Result<WindowEstimate, RecoverError> {
+    let (side, bandwidth) = if let Some(inside) = inside.filter(|&i| i < rings) {
+        let tail_fraction = tails[inside].max(0.0);
+        (side(inside), BandwidthEstimate::Bounded { tail_fraction })
+    } else if rings > 1 && but_last.all(|(tail, error)| *tail > MAX_TAIL_FRACTION + 2.0 * error) {
+        (side(rings), BandwidthEstimate::Unbounded)
+    } else {
+        (DEFAULT_SIDE.min(max_side), BandwidthEstimate::Undetermined)
+    };
     Ok(WindowEstimate {
-        window: Window::new(DEFAULT_SIDE.min(max_side))?,
-        bandwidth: BandwidthEstimate::Undetermined,
+        window: Window::new(side)?,
+        bandwidth,
     })
 }
 

@@ -79,15 +79,12 @@ impl GramCache {
         let (light, window) = (geometry.light, geometry.window);
         let us = || origins.iter().map(|origin| origin.u);
         let vs = || origins.iter().map(|origin| origin.v);
-        let first = LightElement {
-            v: vs().min().unwrap_or(0),
-            u: us().min().unwrap_or(0),
-        };
+        let (v, u) = (vs().min().unwrap_or(0), us().min().unwrap_or(0));
         let size = Extent::new(
-            us().max().unwrap_or(0).abs_diff(first.u) + window.side(),
-            vs().max().unwrap_or(0).abs_diff(first.v) + window.side(),
+            us().max().unwrap_or(0).abs_diff(u) + window.side(),
+            vs().max().unwrap_or(0).abs_diff(v) + window.side(),
         );
-        let region = ClippedRect::new(first, size, light);
+        let region = ClippedRect::new(LightElement { v, u }, size, light);
         let (width, height, [u, v]) = (region.columns.len(), region.rows.len(), region.first());
         let (l, weights) = (pattern_indices.len(), measurements.pattern_weights());
         let mut emissions = vec![0.0; region.area() * l];
@@ -161,10 +158,8 @@ impl GramCache {
         pattern_indices: &[usize],
     ) -> WindowEquations {
         let columns = self.geometry.clip_window(origin).columns.len();
-        let (light_width, width) = (
-            self.geometry.light.width as usize,
-            self.region.columns.len(),
-        );
+        let light_width = self.geometry.light.width as usize;
+        let width = self.region.columns.len();
         let [left, top] = self.region.first();
         let in_region = |m: usize| (m / light_width - top) * width + m % light_width - left;
         let elements = self.geometry.elements_of_window(origin);

@@ -67,32 +67,22 @@ impl HoldoutValidation {
             return Ok(None);
         }
         let rects = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
-        let results = executor.map(rects.len(), |i| {
-            let tile = recover_from_training(rects[i]);
-            let functions = tile.functions(&geometry, basis);
-            let square = ValidationSquare {
-                tile,
-                measurements: prediction::samples(measurements, &split.held_out, rects[i]),
-            };
-            let variances = variances(measurements, split, rects[i]);
-            (square, functions, variances)
+        let squares = executor.map(rects.len(), |i| ValidationSquare {
+            tile: recover_from_training(rects[i]),
+            measurements: prediction::samples(measurements, &split.held_out, rects[i]),
         });
+        let functions = |i: usize| squares[i].tile.functions(&geometry, basis);
+        let recovered = executor.map(rects.len(), functions);
+        let variances = executor.map(rects.len(), |i| variances(measurements, split, rects[i]));
         let pattern = |&l: &usize| measurements.patterns[l].clone();
         let mut validation = Self {
             geometry,
             patterns: split.held_out.iter().map(pattern).collect(),
-            squares: Vec::with_capacity(rects.len()),
-            signal: 0.0,
-            noise: 0.0,
+            squares,
+            signal: variances.iter().map(|(signal, _)| signal).sum(),
+            noise: variances.iter().map(|(_, noise)| noise).sum(),
             residual: 0.0,
         };
-        let mut recovered = Vec::with_capacity(rects.len());
-        for (square, functions, (signal, noise)) in results {
-            validation.squares.push(square);
-            validation.signal += signal;
-            validation.noise += noise;
-            recovered.push(functions);
-        }
         validation.residual = validation.residual_variance(&recovered);
         Ok(Some(validation))
     }

@@ -10,7 +10,7 @@ use crate::transport::Window;
 
 /// How light transport functions are recovered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(into = "&'static str")]
+#[serde(rename_all = "lowercase")]
 pub enum Method {
     /// Posterior mean under a Gaussian prior that is learned from the measurements; blended with least squares in tiles
     /// where the blend predicts held-out patterns better.
@@ -19,13 +19,7 @@ pub enum Method {
     Nnls,
     /// Basis pursuit denoising: of all functions that explain a pixel's measurements to within the noise, the sparsest
     /// one in this basis (paper, section 3, case (b)).
-    Bpdn(SparsityBasis),
-}
-
-impl From<Method> for &'static str {
-    fn from(method: Method) -> Self {
-        method.name()
-    }
+    Bpdn(#[serde(skip_serializing)] SparsityBasis),
 }
 
 impl Method {

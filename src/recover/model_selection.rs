@@ -95,11 +95,8 @@ impl PixelwiseRecovery {
         let pairs = preparation.executor.map(sample.len(), |i| {
             let mut pairs = Vec::new();
             let mut add = |equations: &WindowEquations, samples: &PixelSamples, x: &[f64]| {
-                let is_finite = |&&l: &&usize| {
-                    let y = measurements.sample(l, samples.pixel, samples.channel);
-                    y.is_finite()
-                };
-                let count = all.iter().filter(is_finite).count();
+                let sample = |&l: &usize| measurements.sample(l, samples.pixel, samples.channel);
+                let count = all.iter().map(sample).filter(|y| y.is_finite()).count();
                 let residual_freedom = count as f64 - x.iter().filter(|&&x| x > 0.0).count() as f64;
                 if count >= MIN_PATTERNS && residual_freedom >= 1.0 {
                     let y = equations.weight(&samples.y);
@@ -153,8 +150,7 @@ fn best_of<const N: usize>(
     });
     let mut best_snr: Option<Decibels> = None;
     for (n, candidate) in candidates.into_iter().enumerate() {
-        let mut error = TransportError::default();
-        errors.iter().for_each(|errors| error.merge(errors[n]));
+        let error: TransportError = errors.iter().map(|errors| errors[n]).sum();
         if let Some(snr) = error.snr()
             && best_snr.is_none_or(|best_snr| snr > best_snr)
         {

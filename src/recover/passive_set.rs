@@ -61,7 +61,6 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         }
     }
 
-    /// The unknowns in the set, in the order of all vectors over it.
     #[inline(always)]
     pub fn members(&self) -> &[usize] {
         &self.members
@@ -74,7 +73,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
 
     /// An unknown's row of the Gram matrix.
     #[inline(always)]
-    pub fn row(&self, j: usize) -> &'a [f64] {
+    fn row(&self, j: usize) -> &'a [f64] {
         let k = self.is_member.len();
         &self.gram[j * k..(j + 1) * k]
     }

@@ -45,9 +45,8 @@ pub(super) fn check_patterns(
         }
         moments
     });
-    let slopes: Vec<Option<RegressionSlope>> = (0..split.all.len())
-        .map(|l| RegressionSlope::fit(&moments, &[l]))
-        .collect();
+    let slope = |&l: &usize| RegressionSlope::fit(&moments, &[l]);
+    let slopes: Vec<Option<RegressionSlope>> = split.all.iter().map(slope).collect();
     let mut values: Vec<f64> = slopes.iter().flatten().map(|slope| slope.value).collect();
     values.sort_by(f64::total_cmp);
     let reference = values.get(values.len() * REFERENCE_PERCENTILE / 100);
@@ -61,12 +60,11 @@ pub(super) fn check_patterns(
     if is_uncorrelated || 2 * mismatched.len() > split.all.len() {
         return Err(RecoverError::UncorrelatedPatterns);
     }
-    match mismatched.is_empty() {
-        true => Ok(()),
-        false => Err(RecoverError::MismatchedPatterns {
-            pattern_indices: mismatched,
-        }),
+    if !mismatched.is_empty() {
+        let pattern_indices = mismatched;
+        return Err(RecoverError::MismatchedPatterns { pattern_indices });
     }
+    Ok(())
 }
 
 /// Sums over pixels, both centred over the patterns: of squared predictions, and of predictions times measurements.
@@ -96,9 +94,8 @@ impl RegressionSlope {
         let squares: Vec<RegressionMoments> = squares.collect();
         let prediction: f64 = squares.iter().map(|m| m.prediction).sum();
         let value = squares.iter().map(|m| m.cross).sum::<f64>() / prediction;
-        let residuals = squares
-            .iter()
-            .map(|m| (m.cross - value * m.prediction).powi(2));
+        let residual = |m: &RegressionMoments| (m.cross - value * m.prediction).powi(2);
+        let residuals = squares.iter().map(residual);
         let standard_error = residuals.sum::<f64>().sqrt() / prediction;
         (value.is_finite() && standard_error.is_finite()).then_some(Self {
             value,
@@ -127,23 +124,19 @@ fn add_window(
     for (plane, channels) in measurements.planes() {
         let predict = |&l: &usize| {
             let pattern = measurements.patterns[l].plane(plane);
-            let terms = elements.iter();
-            let terms = terms.map(|&(slot, m)| mean_function[slot] * f64::from(pattern[m]));
-            terms.sum::<f64>()
+            let term = |&(slot, m): &(usize, usize)| mean_function[slot] * f64::from(pattern[m]);
+            elements.iter().map(term).sum::<f64>()
         };
         let predictions: Vec<f64> = split.all.iter().map(predict).collect();
         let pixels = pixels.iter();
         for (pixel, c) in pixels.flat_map(|p| channels.clone().map(move |c| (p.1, c))) {
             let sample = |l: usize| measurements.sample(l, pixel, c);
-            let known = split.training.iter().filter(|&&l| sample(l).is_finite());
-            let [predicted, measured, count] =
-                known.fold([0.0; 3], |[predicted, measured, count], &l| {
-                    [
-                        predicted + predictions[l],
-                        measured + sample(l),
-                        count + 1.0,
-                    ]
-                });
+            let [mut predicted, mut measured, mut count] = [0.0; 3];
+            for &l in split.training.iter().filter(|&&l| sample(l).is_finite()) {
+                predicted += predictions[l];
+                measured += sample(l);
+                count += 1.0;
+            }
             if !(predicted > 0.0 && measured > 0.0) {
                 continue;
             }

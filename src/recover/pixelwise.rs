@@ -33,7 +33,6 @@ pub(super) enum PixelProblem {
     Denoising(SparsityBasis, Tolerance),
 }
 
-/// Recovers each pixel and channel by itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelwiseRecovery {
     pub geometry: Geometry,
@@ -56,6 +55,9 @@ pub(super) struct PixelSamples {
 /// Receives the equations and the measurements of a pixel and channel, and the light transport function that solves
 /// them, on the equations' slots.
 type SolutionCallback<'a> = dyn FnMut(&WindowEquations, &PixelSamples, &[f64]) + 'a;
+
+/// Solves a pixel's equations, given its weighted measurements, their right-hand side, and the measurements.
+type PixelSolver<'a> = Box<dyn FnMut(&[f64], &[f64], &[f64]) -> Vec<f64> + 'a>;
 
 impl PixelwiseRecovery {
     /// Upper bound on the memory that recovering a tile takes beside its functions, in bytes.
@@ -135,46 +137,41 @@ impl PixelwiseRecovery {
     ) {
         let unknowns = equations.slots.len();
         let mut nnls = Nnls::new(&equations.gram, unknowns);
-        match self.problem {
-            PixelProblem::LeastSquares => {
-                for samples in samples {
-                    let y = equations.weight(&samples.y);
-                    let x = nnls.solve(&equations.right_hand_side(&y));
-                    on_solution(equations, samples, &x);
-                }
-            }
+        let mut solve: PixelSolver<'_> = match self.problem {
+            PixelProblem::LeastSquares => Box::new(move |_, h, _| nnls.solve(h)),
             PixelProblem::Denoising(SparsityBasis::Identity, tolerance) => {
                 let mut homotopy = Homotopy::new(&equations.gram, unknowns);
-                for samples in samples {
-                    let epsilon = tolerance.epsilon(&samples.y);
-                    let y = equations.weight(&samples.y);
-                    let energy: f64 = y.iter().map(|y| y * y).sum();
-                    let h = equations.right_hand_side(&y);
-                    let mut x = homotopy.solve(&h, energy, epsilon);
+                Box::new(move |weighted_y, h, y| {
+                    let epsilon = tolerance.epsilon(y);
+                    let energy: f64 = weighted_y.iter().map(|y| y * y).sum();
+                    let x = homotopy.solve(h, energy, epsilon);
                     // With no more patterns than elements on the path its equations may be singular to rounding, and
                     // the path leads elsewhere.
-                    let residual = equations.columns.squared_residual(&y, &x);
+                    let residual = equations.columns.squared_residual(weighted_y, &x);
                     let max_residual = epsilon * epsilon + MAX_EXCESS_RESIDUAL * energy;
-                    if residual.is_nan() || residual > max_residual {
-                        x = nnls.solve(&h);
+                    match residual <= max_residual {
+                        true => x,
+                        false => nnls.solve(h),
                     }
-                    on_solution(equations, samples, &x);
-                }
+                })
             }
             PixelProblem::Denoising(basis, tolerance) => {
                 let side = self.geometry.window.side() as usize;
                 let operator = SensingOperator::new(basis, equations, side);
-                for samples in samples {
-                    let y = equations.weight(&samples.y);
+                Box::new(move |weighted_y, h, y| {
                     let constraint = BpdnConstraint {
-                        epsilon: tolerance.epsilon(&samples.y),
-                        least_squares: &nnls.solve(&equations.right_hand_side(&y)),
-                        y: &y,
+                        y: weighted_y,
+                        epsilon: tolerance.epsilon(y),
+                        least_squares: &nnls.solve(h),
                     };
-                    let solution = interior_point::solve(&operator, &constraint);
-                    on_solution(equations, samples, &solution.x);
-                }
+                    interior_point::solve(&operator, &constraint).x
+                })
             }
+        };
+        for samples in samples {
+            let weighted_y = equations.weight(&samples.y);
+            let h = equations.right_hand_side(&weighted_y);
+            on_solution(equations, samples, &solve(&weighted_y, &h, &samples.y));
         }
     }
 }

@@ -169,8 +169,10 @@ impl PooledMeasurements {
                 // The mean is NaN if a sample is saturated.
                 if mean > 0.0 {
                     let brightness = mean / level;
-                    let noise = sampling::mean_variance(measurements, pattern_indices, c, mean);
-                    let variance = MODEL_DEVIATION.powi(2) + noise / brightness.powi(2);
+                    let noise = |&l: &usize| measurements.variance(l, c, mean);
+                    let noise: Vec<f64> = pattern_indices.iter().map(noise).collect();
+                    let relative_noise = sampling::mean(&noise) / brightness.powi(2);
+                    let variance = MODEL_DEVIATION.powi(2) + relative_noise;
                     pooled.certainty += 1.0 / variance;
                     add_scaled(&mut pooled.y, 1.0 / (variance * brightness), &y);
                 }

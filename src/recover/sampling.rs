@@ -117,17 +117,6 @@ pub(super) fn mean(y: &[f64]) -> f64 {
     y.iter().sum::<f64>() / y.len().max(1) as f64
 }
 
-/// Mean, over the patterns, of the variance of a measurement `y`. Patterns may differ in exposure.
-pub(super) fn mean_variance(
-    measurements: &Measurements,
-    pattern_indices: &[usize],
-    c: usize,
-    y: f64,
-) -> f64 {
-    let variance = |&l: &usize| measurements.variance(l, c, y);
-    mean(&pattern_indices.iter().map(variance).collect::<Vec<_>>())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

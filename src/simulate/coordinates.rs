@@ -4,7 +4,6 @@ use std::ops::{Add, Mul, Sub};
 
 use crate::transport::{Extent, LightPx};
 
-/// A vector of the plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Vec2 {
     pub x: f64,
@@ -28,11 +27,6 @@ impl Vec2 {
     pub fn rotated(self, angle: f64) -> Self {
         let (s, c) = angle.sin_cos();
         vec2(c * self.x - s * self.y, s * self.x + c * self.y)
-    }
-
-    /// Reflected such that x >= 0.
-    pub fn mirrored(self) -> Self {
-        vec2(self.x.abs(), self.y)
     }
 }
 

@@ -31,13 +31,12 @@ impl EmissionMatrix {
         for (codes, channels) in lights.iter().zip(&channels) {
             for m in 0..light.area() {
                 let row = &mut emissions[m * columns..(m + 1) * columns];
-                match codes {
-                    LightCodes::Grey(grey) => row[channels[0]] = table[usize::from(grey[m])],
-                    LightCodes::Rgb(rgb) => {
-                        for (column, code) in channels.iter().zip(rgb[m]) {
-                            row[*column] = table[usize::from(code)];
-                        }
-                    }
+                let codes = match codes {
+                    LightCodes::Grey(grey) => [grey[m]; CHANNELS],
+                    LightCodes::Rgb(rgb) => rgb[m],
+                };
+                for (column, code) in channels.iter().zip(codes) {
+                    row[*column] = table[usize::from(code)];
                 }
             }
         }

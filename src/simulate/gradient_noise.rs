@@ -2,25 +2,20 @@
 
 use super::coordinates::{Vec2, mix, vec2};
 
-/// A hash of a lattice point and a seed.
-fn hash(x: i32, y: i32, seed: u32) -> u32 {
+/// A hash of a lattice point and a seed in 0..1.
+pub(super) fn cell_hash(x: i32, y: i32, seed: u32) -> f64 {
     let mut h = seed ^ 0x9e37_79b9;
     for k in [x as u32, y as u32] {
         h = (h ^ k).wrapping_mul(0x85eb_ca6b);
         h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
         h ^= h >> 16;
     }
-    h
+    f64::from(h) / 4_294_967_296.0
 }
 
 /// A hash of `key` and `seed` in 0..1.
 pub(super) fn unit_hash(key: u32, seed: u32) -> f64 {
-    f64::from(hash(key as i32, 0, seed)) / 4_294_967_296.0
-}
-
-/// A hash of a lattice cell and `seed` in 0..1.
-pub(super) fn cell_hash(x: i32, y: i32, seed: u32) -> f64 {
-    f64::from(hash(x, y, seed)) / 4_294_967_296.0
+    cell_hash(key as i32, 0, seed)
 }
 
 /// Gradient noise on the unit lattice, and its gradient. Values are within ±0.71, mostly within ±0.4.
@@ -28,8 +23,8 @@ pub(super) fn noise(p: Vec2, seed: u32) -> (f64, Vec2) {
     let (x0, y0) = (p.x.floor(), p.y.floor());
     let (fx, fy) = (p.x - x0, p.y - y0);
     let corner = |i: i32, j: i32| {
-        let angle = f64::from(hash(x0 as i32 + i, y0 as i32 + j, seed)) / 4_294_967_296.0;
-        let gradient = vec2(1.0, 0.0).rotated(angle * std::f64::consts::TAU);
+        let turns = cell_hash(x0 as i32 + i, y0 as i32 + j, seed);
+        let gradient = vec2(1.0, 0.0).rotated(turns * std::f64::consts::TAU);
         let value = gradient.dot(vec2(fx - f64::from(i), fy - f64::from(j)));
         (value, gradient)
     };
@@ -41,12 +36,9 @@ pub(super) fn noise(p: Vec2, seed: u32) -> (f64, Vec2) {
     let (top, bottom) = (mix(a, b, sx), mix(c, d, sx));
     let (left, right) = (mix(a, c, sy), mix(b, d, sy));
     let slope = (ga * (1.0 - sx) + gb * sx) * (1.0 - sy) + (gc * (1.0 - sx) + gd * sx) * sy;
-    let slope = slope
-        + vec2(
-            fade_slope(fx) * (right - left),
-            fade_slope(fy) * (bottom - top),
-        );
-    (mix(top, bottom, sy), slope)
+    let across = fade_slope(fx) * (right - left);
+    let down = fade_slope(fy) * (bottom - top);
+    (mix(top, bottom, sy), slope + vec2(across, down))
 }
 
 /// The sum of `octaves` layers of noise, each with twice the frequency and half the amplitude of the last.

@@ -17,10 +17,8 @@ pub fn truth_lights(light: Extent) -> [(&'static str, LightCodes); 5] {
         LightCodes::Rgb(light.cells().map(|(u, v)| code(u, v)).collect())
     };
     let centre = |u: u32, v: u32| {
-        vec2(
-            (f64::from(u) + 0.5) / f64::from(light.width),
-            (f64::from(v) + 0.5) / f64::from(light.height),
-        )
+        let share = |x: u32, side: u32| (f64::from(x) + 0.5) / f64::from(side);
+        vec2(share(u, light.width), share(v, light.height))
     };
     [
         ("flood", codes(&|_, _| white(true))),

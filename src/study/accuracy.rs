@@ -1,7 +1,8 @@
-//! The SNR and the time of one method on one set of measurements, against the known transport.
+//! The SNR and the time of one method against the known transport, by the number of photographs.
 
 use std::time::Instant;
 
+use super::chart::ChartSeries;
 use super::error::StudyError;
 use super::known_transport::{KnownTransport, transport_error};
 use super::methods::sample_for;
@@ -26,11 +27,32 @@ pub(super) struct AccuracyPoint {
     pub seconds: f64,
 }
 
+/// The points of one method, by ascending number of photographs.
+pub(super) struct MethodCurve {
+    pub name: String,
+    pub points: Vec<AccuracyPoint>,
+}
+
+impl MethodCurve {
+    /// The accuracy with this number of photographs.
+    pub fn at(&self, photographs: usize) -> Option<&AccuracyPoint> {
+        let mut points = self.points.iter();
+        points.find(|point| point.photographs == photographs)
+    }
+
+    /// The line of the curve in a chart of SNR by `x(photographs)`.
+    pub fn series(&self, x: impl Fn(usize) -> f64) -> ChartSeries {
+        let points = self.points.iter();
+        let points = points.filter_map(|p| Some((x(p.photographs), p.snr?.0)));
+        ChartSeries {
+            name: self.name.clone(),
+            points: points.collect(),
+        }
+    }
+}
+
 /// Recovers a sample of about `pixels` pixels, scaled by the method's speed ([`sample_for`]), and compares it
-/// with the known transport.
-///
-/// # Errors
-/// Those of [`Recovery::prepare`].
+/// with the known transport. Errors are those of [`Recovery::prepare`].
 pub(super) fn measure_accuracy(
     known: &impl KnownTransport,
     measurements: &Measurements,
@@ -52,9 +74,8 @@ pub(super) fn measure_accuracy(
         tile.functions(&geometry, recovery.basis())
     });
     let recovered = start.elapsed().as_secs_f64();
-    let errors = executor.map(functions.len(), |i| {
-        transport_error(known, &geometry, &functions[i])
-    });
+    let error = |i: usize| transport_error(known, &geometry, &functions[i]);
+    let errors = executor.map(functions.len(), error);
     let pixels = pixel_sampling::count_pixels(&rects);
     let all = geometry.camera.area();
     let (snr, standard_error) = pooled_snr(&errors, pixels as f64 / all as f64);

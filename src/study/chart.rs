@@ -23,29 +23,22 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(190, 180, 20),
 ];
 const FONT: &str = "Helvetica, Arial, sans-serif";
+/// Points of a line that has a marker at each.
+const MAX_MARKERS: usize = 16;
 
 pub(super) struct ChartSeries {
     pub name: String,
     /// By ascending x; every x is positive.
     pub points: Vec<(f64, f64)>,
-    /// Whether points have markers.
-    pub has_markers: bool,
 }
 
-/// A second horizontal axis at the top, with the values `x · factor`.
-pub(super) struct TopAxis {
-    pub label: &'static str,
-    pub factor: f64,
-    pub ticks: Vec<f64>,
-}
-
-/// A chart with a logarithmic horizontal axis.
 pub(super) struct Chart<'a> {
     pub title: &'a str,
     pub x_label: &'a str,
     pub y_label: &'a str,
     pub x_ticks: Vec<f64>,
-    pub top: Option<TopAxis>,
+    /// Label and factor of a second horizontal axis at the top, with the values `x · factor`.
+    pub top: Option<(&'a str, f64)>,
     pub y: Range<f64>,
     /// A reference value on the y axis, and its name.
     pub reference: Option<(f64, &'a str)>,
@@ -53,10 +46,6 @@ pub(super) struct Chart<'a> {
 }
 
 impl Chart<'_> {
-    /// Draws the chart as SVG.
-    ///
-    /// # Errors
-    /// [`StudyError::Chart`] if the drawing library fails.
     pub fn svg(&self) -> Result<String, StudyError> {
         let mut svg = String::new();
         let area = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
@@ -80,12 +69,11 @@ impl Chart<'_> {
         if self.top.is_some() {
             builder.top_x_label_area_size(48);
         }
-        let factor = self.top.as_ref().map_or(1.0, |top| top.factor);
+        let factor = self.top.map_or(1.0, |(_, factor)| factor);
         let bottom_x = x.clone().log_scale();
         let bottom_x = bottom_x.with_key_points(self.x_ticks.clone());
         let top_x = (x.start * factor..x.end * factor).log_scale();
-        let top_ticks = self.top.iter().flat_map(|top| top.ticks.clone());
-        let top_x = top_x.with_key_points(top_ticks.collect());
+        let top_x = top_x.with_key_points(self.x_ticks.iter().map(|x| x * factor).collect());
         let mut chart = builder
             .build_cartesian_2d(bottom_x, self.y.clone())?
             .set_secondary_coord(top_x, self.y.clone());
@@ -104,11 +92,11 @@ impl Chart<'_> {
             .label_style(label)
             .axis_desc_style((FONT, 16))
             .draw()?;
-        if let Some(top) = &self.top {
+        if let Some((top_label, _)) = self.top {
             chart
                 .configure_secondary_axes()
-                .x_labels(top.ticks.len())
-                .x_desc(top.label)
+                .x_labels(self.x_ticks.len())
+                .x_desc(top_label)
                 .x_label_formatter(&|x| format_number(*x))
                 .label_style(label)
                 .axis_desc_style((FONT, 16))
@@ -131,7 +119,7 @@ impl Chart<'_> {
             let colour = COLOURS[i % COLOURS.len()];
             let line = LineSeries::new(series.points.iter().copied(), colour.stroke_width(2));
             chart.draw_series(line)?;
-            if series.has_markers {
+            if series.points.len() <= MAX_MARKERS {
                 let points = series.points.iter();
                 chart.draw_series(points.map(|&p| Circle::new(p, 4, colour.filled())))?;
             }
@@ -163,10 +151,9 @@ fn legend_label(name: &str, left: i32, y: i32) -> Text<'static, (i32, i32), Stri
 
 /// A range that contains zero, `min_top` and `values`, and ends on multiples of 5.
 pub(super) fn axis_range(values: impl Iterator<Item = f64>, min_top: f64) -> Range<f64> {
-    let (mut low, mut high) = (0.0f64, min_top);
-    for value in values {
-        (low, high) = (low.min(value), high.max(value));
-    }
+    let (low, high) = values.fold((0.0f64, min_top), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
     let step = 5.0;
     (low / step).floor() * step..(high / step).ceil() * step
 }
@@ -209,17 +196,12 @@ mod tests {
             x_label: "across",
             y_label: "up (dB)",
             x_ticks: vec![1.0, 10.0],
-            top: Some(TopAxis {
-                label: "twice",
-                factor: 2.0,
-                ticks: vec![2.0, 20.0],
-            }),
+            top: Some(("twice", 2.0)),
             y: axis_range([-3.0, 31.0].into_iter(), 25.0),
             reference: Some((25.0, "25 dB")),
             series: vec![ChartSeries {
                 name: "nnls".to_owned(),
                 points: vec![(1.0, -3.0), (10.0, 31.0)],
-                has_markers: true,
             }],
         };
         assert_eq!(chart.y, -5.0..35.0);

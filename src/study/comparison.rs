@@ -3,11 +3,10 @@
 
 use std::time::Instant;
 
-use super::accuracy::{AccuracyPoint, measure_accuracy, pooled_snr};
-use super::chart::{Chart, TopAxis, axis_range};
-use super::dense_transport::{DenseTransport, dense_transport};
+use super::accuracy::{AccuracyPoint, MethodCurve, measure_accuracy, pooled_snr};
+use super::chart::{Chart, axis_range};
 use super::error::StudyError;
-use super::method_curve::MethodCurve;
+use super::known_transport::{DenseTransport, dense_transport};
 use super::methods;
 use super::nystrom::{Nystrom, NystromSamples};
 use super::pixel_sampling;
@@ -133,11 +132,11 @@ fn section(
             ]);
         }
         let needed = photographs_for(TARGET_SNR_DB, &curve.points);
+        let share = needed.map(|k| k as f64 / elements as f64);
         let max = curve.points.last().map_or(0, |p| p.photographs);
         let mut points = curve.points.iter();
-        let best = points
-            .clone()
-            .max_by(|a, b| snr_db(a).total_cmp(&snr_db(b)));
+        let by_snr = |a: &&AccuracyPoint, b: &&AccuracyPoint| snr_db(a).total_cmp(&snr_db(b));
+        let best = points.clone().max_by(by_snr);
         // The time at the target SNR, or at the best SNR if the target is not reached.
         let timed = match needed {
             Some(needed) => points.find(|p| p.photographs >= needed),
@@ -146,9 +145,7 @@ fn section(
         table.add_row([
             curve.name.clone(),
             needed.map_or(format!("more than {max}"), |k| k.to_string()),
-            needed.map_or(String::new(), |k| {
-                format!("{:.1} %", 100.0 * k as f64 / elements as f64)
-            }),
+            share.map_or(String::new(), |share| format!("{:.1} %", 100.0 * share)),
             snr_cell(curve.at(80).and_then(|p| p.snr)),
             best.map_or(String::new(), |p| {
                 format!("{} ({})", snr_cell(p.snr), p.photographs)
@@ -157,26 +154,19 @@ fn section(
         ]);
     }
     let series = curves.iter().map(|curve| {
-        let has_markers = curve.points.len() <= PHOTOGRAPH_COUNTS.len();
-        let mut series = curve.series(has_markers, |photographs| photographs as f64);
-        series
-            .points
-            .retain(|point| point.0 >= PHOTOGRAPH_COUNTS[0] as f64);
+        let mut series = curve.series(|photographs| photographs as f64);
+        let min_photographs = PHOTOGRAPH_COUNTS[0] as f64;
+        series.points.retain(|point| point.0 >= min_photographs);
         series
     });
     let series: Vec<_> = series.collect();
-    let ticks: Vec<f64> = PHOTOGRAPH_COUNTS.map(|k| k as f64).into();
     let levels = series.iter().flat_map(|s| &s.points).map(|p| p.1);
     let chart = Chart {
         title: &format!("{name}, N = {}, M = {elements}", camera.area()),
         x_label: "photographs",
         y_label: "SNR of T (dB)",
-        top: Some(TopAxis {
-            label: "photographs / M",
-            factor: 1.0 / elements as f64,
-            ticks: ticks.iter().map(|k| k / elements as f64).collect(),
-        }),
-        x_ticks: ticks,
+        x_ticks: PHOTOGRAPH_COUNTS.map(|k| k as f64).into(),
+        top: Some(("photographs / M", 1.0 / elements as f64)),
         y: axis_range(levels, 35.0),
         reference: Some((TARGET_SNR_DB, "25 dB")),
         series,

@@ -1,6 +1,7 @@
 //! Known light transport, from a simulated scene or from a capture's `truth/` folder.
 
 use crate::capture::GroundTruth;
+use crate::executor::Executor;
 use crate::relight::Light;
 use crate::transport::{
     CHANNELS, CameraPx, Correspondence, Geometry, GeometryError, LightElement, TileRect,
@@ -63,6 +64,29 @@ impl KnownTransport for CaptureTruth {
     }
 }
 
+/// A light transport matrix, column by column, `[N][M]`.
+pub(super) type DenseTransport = Vec<Vec<[f32; CHANNELS]>>;
+
+/// Computes every column of `known`.
+pub(super) fn dense_transport(
+    known: &impl KnownTransport,
+    executor: &impl Executor,
+) -> DenseTransport {
+    let geometry = known.geometry();
+    executor.map(geometry.camera.area(), |n| {
+        let width = geometry.camera.width;
+        let (x, y) = (n as u32 % width, n as u32 / width);
+        let pixel = CameraPx { x, y };
+        let mut function = vec![[0.0; CHANNELS]; geometry.window.area()];
+        known.transport_function(pixel, &mut function);
+        let mut column = vec![[0.0; CHANNELS]; geometry.light.area()];
+        for (s, m) in geometry.elements_of_window(known.origin(pixel)) {
+            column[m] = function[s];
+        }
+        column
+    })
+}
+
 /// Error of recovered functions, whose windows are those of `geometry`, over the elements of both windows.
 pub fn transport_error(
     known: &impl KnownTransport,
@@ -87,10 +111,8 @@ pub fn transport_error(
             continue;
         }
         for (s, estimate) in estimate.iter().enumerate() {
-            if known_window
-                .slot(known_origin, window.element(origin, s))
-                .is_none()
-            {
+            let element = window.element(origin, s);
+            if known_window.slot(known_origin, element).is_none() {
                 estimate.iter().for_each(|&e| sum.add(0.0, f64::from(e)));
             }
         }

@@ -45,11 +45,10 @@ pub(super) fn is_slow(method: Method) -> bool {
 /// whether to blend, so that its sample consists of whole tiles.
 pub(super) fn sample_for(method: Method, geometry: &Geometry, pixels: usize) -> Vec<TileRect> {
     let (tile_side, pixels, min_tiles) = match method {
-        Method::Learned => (
-            geometry.tile_side,
-            pixels.saturating_mul(FAST_FACTOR),
-            MIN_TILES,
-        ),
+        Method::Learned => {
+            let pixels = pixels.saturating_mul(FAST_FACTOR);
+            (geometry.tile_side, pixels, MIN_TILES)
+        }
         _ if is_slow(method) => (BLOCK_SIDE_PX, pixels / SLOW_DIVISOR, 1),
         _ => (BLOCK_SIDE_PX, pixels, 1),
     };

@@ -7,10 +7,8 @@
 mod accuracy;
 mod chart;
 mod comparison;
-mod dense_transport;
 mod error;
 mod known_transport;
-mod method_curve;
 mod methods;
 mod nystrom;
 mod picture_sheet;

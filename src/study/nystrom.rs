@@ -78,10 +78,8 @@ impl Nystrom {
         let mut gram = vec![0.0; rank * rank];
         let mut mixing = vec![0.0; rank * light];
         for &i in row_indices {
-            let row: Vec<f64> = samples.rows[i * light..][..light]
-                .iter()
-                .map(kernel)
-                .collect();
+            let row = samples.rows[i * light..][..light].iter();
+            let row: Vec<f64> = row.map(kernel).collect();
             // Elements of A are photographed twice. The column's photograph is also the one in f(C).
             let crossing = &columns[samples.pixels[i] * rank..][..rank];
             for (a, &here) in crossing.iter().enumerate() {

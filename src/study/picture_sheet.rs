@@ -33,10 +33,6 @@ impl Panel {
         }
     }
 
-    /// The panel as PNG.
-    ///
-    /// # Errors
-    /// [`StudyError::Picture`] if the encoder fails.
     pub fn png(&self) -> Result<Vec<u8>, StudyError> {
         let mut bytes = Vec::new();
         self.encode(PngEncoder::new(&mut bytes))?;
@@ -78,10 +74,6 @@ pub(super) struct PictureSheet {
 }
 
 impl PictureSheet {
-    /// The sheet as SVG.
-    ///
-    /// # Errors
-    /// [`StudyError::Picture`] if encoding a panel fails.
     pub fn svg(&self) -> Result<String, StudyError> {
         let has_row_names = self.rows.iter().any(|(name, _)| !name.is_empty());
         let has_column_names = self.columns.iter().any(|name| !name.is_empty());

@@ -107,27 +107,25 @@ pub fn relit_pictures(
             .collect();
         for (kind, picture) in [("true", &truth[i]), ("relit", &relit[i])] {
             let path = format!("pictures/{name}-{kind}-{}.png", light.name);
-            section
-                .files
-                .push((path, photograph(camera, picture).png()?));
+            let png = photograph(camera, picture).png()?;
+            section.files.push((path, png));
         }
         let small = |picture: &[[f64; CHANNELS]]| {
             let (extent, picture) = downsample(camera, picture);
             photograph(extent, &picture)
         };
+        let light_panel = Panel {
+            // Light elements of a small light plane are visible squares.
+            is_data: light.light.extent().width <= MAX_PANEL_SIDE_PX / 2,
+            ..Panel::photograph(light.light.extent(), emitted)
+        };
         let panels = [
-            Panel {
-                // Light elements of a small light plane are visible squares.
-                is_data: light.light.extent().width <= MAX_PANEL_SIDE_PX / 2,
-                ..Panel::photograph(light.light.extent(), emitted)
-            },
-            small(&truth[i]),
-            small(&relit[i]),
-            small(&error),
+            (light_panel, String::new()),
+            (small(&truth[i]), String::new()),
+            (small(&relit[i]), format!("PSNR {} dB", snr_cell(psnr))),
+            (small(&error), String::new()),
         ];
-        let caption = format!("PSNR {} dB", snr_cell(psnr));
-        let captions = [String::new(), String::new(), caption, String::new()];
-        for ((_, row), (panel, caption)) in rows.iter_mut().zip(panels.into_iter().zip(captions)) {
+        for ((_, row), (panel, caption)) in rows.iter_mut().zip(panels) {
             row.push(CaptionedPanel { panel, caption });
         }
     }

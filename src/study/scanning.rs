@@ -1,6 +1,6 @@
 //! Acquisition by scanning: one photograph for each light element, without computation.
 
-use super::dense_transport::DenseTransport;
+use super::known_transport::DenseTransport;
 use crate::capture::LinearPhoto;
 use crate::transport::{CHANNELS, Decibels, TransportError};
 

@@ -67,15 +67,19 @@ pub fn scenes_table(
                 measure_accuracy(&scene_camera, &measurements, method, pixels, executor)?;
             snrs.push(accuracy.snr);
         }
-        let ensemble = match ensemble {
+        let scene_name = match kind {
+            StainedGlass => "stained-glass",
+            Cookies => "cookies",
+        };
+        let ensemble_name = match ensemble {
             Gaussian => "gaussian",
             Bernoulli => "bernoulli",
         };
         let mut row = vec![
-            scene_name(kind).to_owned(),
+            scene_name.to_owned(),
             camera.to_string(),
             light.to_string(),
-            ensemble.to_owned(),
+            ensemble_name.to_owned(),
             patterns.to_string(),
             electrons.to_string(),
             seed.to_string(),
@@ -88,9 +92,8 @@ pub fn scenes_table(
             let snrs = chosen.filter_map(|(_, snr)| Some((*snr)?.0));
             snrs.reduce(f64::max)
         };
-        let shortfall = best_snr(false)
-            .zip(best_snr(true))
-            .map(|(other, default)| other - default);
+        let best_snrs = best_snr(false).zip(best_snr(true));
+        let shortfall = best_snrs.map(|(other, default)| other - default);
         worst = worst.max(shortfall.unwrap_or(worst));
         row.push(methods::name(DEFAULT_METHOD).to_owned());
         row.push(shortfall.map_or(String::new(), |db| format!("{db:.2}")));
@@ -110,11 +113,4 @@ pub fn scenes_table(
     }
     section.add_csv("scenes", &table)?;
     Ok(section)
-}
-
-fn scene_name(kind: SceneKind) -> &'static str {
-    match kind {
-        StainedGlass => "stained-glass",
-        Cookies => "cookies",
-    }
 }

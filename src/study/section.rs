@@ -62,10 +62,7 @@ impl MarkdownTable {
         self.rows.push(cells.into_iter().collect());
     }
 
-    /// The table as CSV, the header first.
-    ///
-    /// # Errors
-    /// [`StudyError::MarkdownTable`] if a row has more or fewer cells than the header.
+    /// The table as CSV, the header first; fails if a row has more or fewer cells than the header.
     pub fn csv(&self) -> Result<Vec<u8>, StudyError> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         for row in std::iter::once(&self.header).chain(&self.rows) {

@@ -1,10 +1,9 @@
 //! SNR against undersampling L/M for each method (paper, figures 3a and 3b).
 
-use super::accuracy::measure_accuracy;
-use super::chart::{Chart, TopAxis, axis_range};
+use super::accuracy::{MethodCurve, measure_accuracy};
+use super::chart::{Chart, axis_range};
 use super::error::StudyError;
 use super::known_transport::KnownTransport;
-use super::method_curve::MethodCurve;
 use super::methods;
 use super::section::{MarkdownTable, ProgressCallback, ReportSection, seconds_cell, snr_cell};
 use crate::capture::{Measurements, NoiseModel};
@@ -53,8 +52,9 @@ pub fn snr_curves(
         &format!("SNR of the transport of {name} against the number of patterns, by method"),
         curves.chart(name)?,
     );
-    section.add_paragraph(&curves.table().markdown());
-    section.add_csv(&format!("{name}-figure3"), &curves.data())?;
+    let (data, table) = curves.tables();
+    section.add_paragraph(&table.markdown());
+    section.add_csv(&format!("{name}-figure3"), &data)?;
     Ok(section)
 }
 
@@ -105,15 +105,19 @@ impl SnrCurves {
         patterns as f64 / self.light.area() as f64
     }
 
-    /// All figures, for the CSV file.
-    fn data(&self) -> MarkdownTable {
+    /// All figures, for the CSV file; and the SNR by number of patterns and method.
+    fn tables(&self) -> (MarkdownTable, MarkdownTable) {
         let mut data = MarkdownTable::new(
             "method | patterns | patterns_per_light_element | snr_db | standard_error_db | \
              pixels_judged | pixels | seconds_for_all_pixels",
         );
+        let mut table = MarkdownTable::new(&format!("L | L/M | {}", methods::names()));
         for &l in &self.counts {
+            let mut row = vec![l.to_string(), format!("{:.5}", self.undersampling(l))];
             for curve in &self.curves {
-                if let Some(accuracy) = curve.at(l) {
+                let accuracy = curve.at(l);
+                row.push(snr_cell(accuracy.and_then(|point| point.snr)));
+                if let Some(accuracy) = accuracy {
                     data.add_row([
                         curve.name.clone(),
                         l.to_string(),
@@ -126,44 +130,26 @@ impl SnrCurves {
                     ]);
                 }
             }
-        }
-        data
-    }
-
-    /// The SNR by number of patterns and method.
-    fn table(&self) -> MarkdownTable {
-        let mut table = MarkdownTable::new(&format!("L | L/M | {}", methods::names()));
-        for &l in &self.counts {
-            let mut row = vec![l.to_string(), format!("{:.5}", self.undersampling(l))];
-            let cell = |curve: &MethodCurve| snr_cell(curve.at(l).and_then(|point| point.snr));
-            row.extend(self.curves.iter().map(cell));
             table.add_row(row);
         }
-        table
+        (data, table)
     }
 
     fn chart(&self, name: &str) -> Result<String, StudyError> {
         let curves = self.curves.iter();
         let series: Vec<_> = curves
-            .map(|curve| curve.series(true, |l| self.undersampling(l)))
+            .map(|curve| curve.series(|l| self.undersampling(l)))
             .collect();
+        let elements = self.light.area();
         let max_patterns = self.counts.last().copied().unwrap_or(0);
-        let ticks: Vec<usize> = TICKS.into_iter().filter(|&l| l <= max_patterns).collect();
+        let ticks = TICKS.into_iter().filter(|&l| l <= max_patterns);
         let levels = series.iter().flat_map(|s| &s.points).map(|p| p.1);
         let chart = Chart {
-            title: &format!(
-                "{name}, N = {}, M = {}",
-                self.camera.area(),
-                self.light.area()
-            ),
+            title: &format!("{name}, N = {}, M = {elements}", self.camera.area()),
             x_label: "undersampling L/M",
             y_label: "SNR of T (dB)",
-            x_ticks: ticks.iter().map(|&l| self.undersampling(l)).collect(),
-            top: Some(TopAxis {
-                label: "patterns L",
-                factor: self.light.area() as f64,
-                ticks: ticks.iter().map(|&l| l as f64).collect(),
-            }),
+            x_ticks: ticks.map(|l| self.undersampling(l)).collect(),
+            top: Some(("patterns L", elements as f64)),
             y: axis_range(levels, 30.0),
             reference: Some(PAPER_SNR),
             series,

@@ -1,6 +1,8 @@
 //! The structure of a light transport matrix (paper, figure 2): how few elements hold its energy (the sparsity
 //! profile), where they are in the matrix, and one light transport function.
 
+use std::collections::BTreeMap;
+
 use super::chart::{Chart, ChartSeries};
 use super::error::StudyError;
 use super::known_transport::KnownTransport;
@@ -24,16 +26,14 @@ const ZOOM_SIDE: u32 = 96;
 /// energy.
 #[derive(Clone, Debug)]
 struct SparsityProfile {
-    /// By class of magnitude, ascending.
-    counts: Vec<u64>,
-    energies: Vec<f64>,
+    /// Number and energy of the elements in each class of magnitude, ascending.
+    classes: Vec<(u64, f64)>,
 }
 
 impl Default for SparsityProfile {
     fn default() -> Self {
         Self {
-            counts: vec![0; CLASSES],
-            energies: vec![0.0; CLASSES],
+            classes: vec![(0, 0.0); CLASSES],
         }
     }
 }
@@ -42,22 +42,26 @@ impl SparsityProfile {
     fn add(&mut self, element: f32) {
         if element != 0.0 {
             // The bits of a positive float ascend with its value.
-            let class = (element.abs().to_bits() >> IGNORED_BITS) as usize;
-            self.counts[class] += 1;
-            self.energies[class] += f64::from(element).powi(2);
+            let class = &mut self.classes[(element.abs().to_bits() >> IGNORED_BITS) as usize];
+            class.0 += 1;
+            class.1 += f64::from(element).powi(2);
         }
     }
 
     fn merge(&mut self, other: &Self) {
-        for class in 0..CLASSES {
-            self.counts[class] += other.counts[class];
-            self.energies[class] += other.energies[class];
+        for (class, other) in self.classes.iter_mut().zip(&other.classes) {
+            class.0 += other.0;
+            class.1 += other.1;
         }
+    }
+
+    fn energy(&self) -> f64 {
+        self.classes.iter().map(|(_, energy)| energy).sum()
     }
 
     /// The share of the energy in the `k` largest elements, 0 to 1.
     fn share_of_largest(&self, k: f64) -> f64 {
-        let total: f64 = self.energies.iter().sum();
+        let total = self.energy();
         let (mut remaining, mut held) = (k, 0.0);
         for (count, energy) in self.largest_first() {
             held += (remaining / count).min(1.0) * energy;
@@ -71,7 +75,7 @@ impl SparsityProfile {
 
     /// The number of largest elements that hold `share` of the energy.
     fn count_for_share(&self, share: f64) -> f64 {
-        let mut missing = share * self.energies.iter().sum::<f64>();
+        let mut missing = share * self.energy();
         let mut counted = 0.0;
         for (count, energy) in self.largest_first() {
             if energy >= missing {
@@ -84,9 +88,8 @@ impl SparsityProfile {
     }
 
     fn largest_first(&self) -> impl Iterator<Item = (f64, f64)> {
-        let classes = self.counts.iter().zip(&self.energies).rev();
-        let classes = classes.filter(|(count, _)| **count > 0);
-        classes.map(|(&count, &energy)| (count as f64, energy))
+        let classes = self.classes.iter().rev().filter(|(count, _)| *count > 0);
+        classes.map(|&(count, energy)| (count as f64, energy))
     }
 }
 
@@ -135,7 +138,7 @@ pub fn sparsity(
     profile_chart(name, geometry, &whole, &example, &mut section)?;
     let panels = vec![
         CaptionedPanel {
-            panel: grey_panel(extent(OVERVIEW_SIDE, OVERVIEW_SIDE), &overview),
+            panel: grey_panel(Extent::new(OVERVIEW_SIDE, OVERVIEW_SIDE), &overview),
             caption: "T: pixels horizontally, light elements\nvertically, maximum of each cell"
                 .to_owned(),
         },
@@ -164,38 +167,32 @@ pub fn sparsity(
 }
 
 /// The statistics of one row of camera pixels.
+#[derive(Default)]
 struct RowSurvey {
     profile: SparsityProfile,
-    /// Cells of the overview and their largest elements.
-    overview: Vec<(usize, f32)>,
+    /// The largest element in each cell of the overview.
+    overview: BTreeMap<usize, f32>,
     energies: Vec<f32>,
 }
 
 fn survey_row(known: &impl KnownTransport, y: u32) -> RowSurvey {
     let geometry = known.geometry();
-    let mut row = RowSurvey {
-        profile: SparsityProfile::default(),
-        overview: Vec::new(),
-        energies: Vec::new(),
-    };
+    let mut row = RowSurvey::default();
     let mut tau = vec![[0.0; CHANNELS]; geometry.window.area()];
     let scale = |i: usize, of: usize| i * OVERVIEW_SIDE as usize / of;
-    let mut cells = std::collections::BTreeMap::new();
     for x in 0..geometry.camera.width {
         let pixel = CameraPx { x, y };
         known.transport_function(pixel, &mut tau);
-        let origin = known.origin(pixel);
         let column = scale(geometry.camera.index(pixel), geometry.camera.area());
-        tau.as_flattened().iter().for_each(|&t| row.profile.add(t));
-        row.energies
-            .push(tau.as_flattened().iter().map(|t| t * t).sum());
-        for (s, m) in geometry.elements_of_window(origin) {
+        let elements = tau.as_flattened().iter();
+        row.energies.push(elements.clone().map(|t| t * t).sum());
+        elements.for_each(|&t| row.profile.add(t));
+        for (s, m) in geometry.elements_of_window(known.origin(pixel)) {
             let cell = scale(m, geometry.light.area()) * OVERVIEW_SIDE as usize + column;
-            let maximum = cells.entry(cell).or_insert(0.0f32);
+            let maximum = row.overview.entry(cell).or_insert(0.0f32);
             *maximum = maximum.max(mean(tau[s]));
         }
     }
-    row.overview = cells.into_iter().collect();
     row
 }
 
@@ -216,7 +213,6 @@ fn profile_chart(
         ChartSeries {
             name: name.to_owned(),
             points: points.collect(),
-            has_markers: false,
         }
     };
     let series = vec![
@@ -242,14 +238,12 @@ fn profile_chart(
             format!("{:.1}", example.count_for_share(share) / CHANNELS as f64),
         ]);
     }
+    let ticks = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0].into_iter();
     let chart = Chart {
         title: &format!("Sparsity profile of T, {name}"),
         x_label: "largest elements kept, per light transport function and channel",
         y_label: "energy held (%)",
-        x_ticks: [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0]
-            .into_iter()
-            .filter(|tick| *tick <= area)
-            .collect(),
+        x_ticks: ticks.filter(|tick| *tick <= area).collect(),
         top: None,
         y: 0.0..100.0,
         reference: None,
@@ -272,10 +266,8 @@ fn zoomed_part(known: &impl KnownTransport) -> CaptionedPanel {
     let half = (geometry.window.side() / 2) as i32;
     let width = geometry.camera.width.min(ZOOM_SIDE);
     let height = geometry.light.width.min(ZOOM_SIDE);
-    let (left, y) = (
-        (geometry.camera.width - width) / 2,
-        geometry.camera.height / 2,
-    );
+    let left = (geometry.camera.width - width) / 2;
+    let y = geometry.camera.height / 2;
     let x = left + width / 2;
     let middle = known.origin(CameraPx { x, y });
     let row = middle.v + half;
@@ -295,21 +287,18 @@ fn zoomed_part(known: &impl KnownTransport) -> CaptionedPanel {
             }
         }
     }
-    CaptionedPanel {
-        panel: grey_panel(extent(width, height), &values),
-        caption: format!(
-            "Detail: {width} pixels of row {y},\n{height} light elements of row {row}"
-        ),
-    }
+    let caption =
+        format!("Detail: {width} pixels of row {y},\n{height} light elements of row {row}");
+    let panel = grey_panel(Extent::new(width, height), &values);
+    CaptionedPanel { panel, caption }
 }
 
 /// The pixel whose function has the median energy, among those in the centre of the picture, whose windows are inside the
 /// light plane.
 fn median_pixel(camera: Extent, energies: &[f32]) -> CameraPx {
     let middle = |side: u32| side / 4..(3 * side).div_ceil(4);
-    let mut pixels: Vec<CameraPx> = middle(camera.height)
-        .flat_map(|y| middle(camera.width).map(move |x| CameraPx { x, y }))
-        .collect();
+    let row = |y: u32| middle(camera.width).map(move |x| CameraPx { x, y });
+    let mut pixels: Vec<CameraPx> = middle(camera.height).flat_map(row).collect();
     let energy = |pixel: &CameraPx| energies[camera.index(*pixel)];
     pixels.sort_by(|a, b| energy(a).total_cmp(&energy(b)));
     pixels[pixels.len() / 2]
@@ -318,14 +307,11 @@ fn median_pixel(camera: Extent, energies: &[f32]) -> CameraPx {
 /// One function in colour, scaled to its maximum.
 fn function_panel(side: u32, tau: &[[f32; CHANNELS]]) -> Panel {
     let peak = tau.as_flattened().iter().fold(0.0f32, |a, &b| a.max(b));
-    let scale = match peak > 0.0 {
-        true => 1.0 / f64::from(peak),
-        false => 0.0,
-    };
+    let scale = 1.0 / f64::from(peak.max(f32::MIN_POSITIVE));
     let linear = tau.iter().map(|t| t.map(|t| f64::from(t) * scale));
     Panel {
         is_data: true,
-        ..Panel::photograph(extent(side, side), linear)
+        ..Panel::photograph(Extent::new(side, side), linear)
     }
 }
 
@@ -343,10 +329,6 @@ fn grey_panel(extent: Extent, values: &[f32]) -> Panel {
     }
 }
 
-fn extent(width: u32, height: u32) -> Extent {
-    Extent { width, height }
-}
-
 fn mean(tau: [f32; CHANNELS]) -> f32 {
     tau.iter().sum::<f32>() / CHANNELS as f32
 }
@@ -362,7 +344,7 @@ mod tests {
         for element in [2.0, -4.0, 1.0, 0.0, 1.0] {
             profile.add(element);
         }
-        assert_eq!(profile.counts.iter().sum::<u64>(), 4);
+        assert_eq!(profile.classes.iter().map(|class| class.0).sum::<u64>(), 4);
         for (k, energy) in [
             (0.0, 0.0),
             (1.0, 16.0),

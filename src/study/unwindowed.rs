@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use super::accuracy::{AccuracyPoint, pooled_snr};
-use super::dense_transport::DenseTransport;
+use super::known_transport::DenseTransport;
 use super::pixel_sampling;
 use crate::capture::Measurements;
 use crate::executor::Executor;

@@ -135,10 +135,7 @@ impl<'a> Homotopy<'a> {
         // With s = 1ᵀG[P, P]⁻¹1 the squared residual falls by 2γλs − γ²s over a step γ.
         let direction = self.passive.solution(ONES);
         let root = lambda * lambda - excess / direction.iter().sum::<f64>();
-        let mut step = match root > 0.0 {
-            true => lambda - root.sqrt(),
-            false => lambda,
-        };
+        let mut step = lambda - root.max(0.0).sqrt();
         let mut event = PathEvent::End;
         for (i, (&x, &d)) in self.x.iter().zip(direction).enumerate() {
             if d < 0.0 && x < -d * step {

@@ -27,14 +27,14 @@ pub(super) struct NewtonSystem<'a> {
     factor: Vec<f64>,
 }
 
-/// A value, or its wanted change, for each product of a slack and its multiplier.
-struct ComplementarityProducts {
-    /// `½(1 + s)(t − c)` and `½(1 − s)(t + c)`, `[side²]`.
+/// The wanted change of each product of a slack and its multiplier.
+struct ComplementarityChange {
+    /// Of `½(1 + s)(t − c)` and `½(1 − s)(t + c)`, `[side²]`.
     upper: Vec<f64>,
     lower: Vec<f64>,
-    /// `w x`, `[k]`.
+    /// Of `w x`, `[k]`.
     x: Vec<f64>,
-    /// `λ` times the residual's slack.
+    /// Of `λ` times the residual's slack.
     slack: f64,
 }
 
@@ -80,10 +80,14 @@ impl<'a> NewtonSystem<'a> {
     #[inline(always)]
     pub fn predictor_corrector_step(&self) -> NewtonStep {
         let point = self.point;
-        let mut change = self.products();
-        let bounds = change.upper.iter_mut().chain(&mut change.lower);
-        bounds.chain(&mut change.x).for_each(|p| *p = -*p);
-        change.slack = -change.slack;
+        let upper = |[t, s, c]: [f64; 3]| -0.5 * (1.0 + s) * (t - c);
+        let lower = |[t, s, c]: [f64; 3]| -0.5 * (1.0 - s) * (t + c);
+        let mut change = ComplementarityChange {
+            upper: point.bounds().map(upper).collect(),
+            lower: point.bounds().map(lower).collect(),
+            x: point.x.iter().zip(&point.w).map(|(x, w)| -x * w).collect(),
+            slack: -point.lambda * point.slack,
+        };
         let predictor = self.newton_step(&change);
         let before = point.complementarity();
         let after = point.complementarity_after(&predictor, point.max_step_lengths(&predictor));
@@ -101,22 +105,9 @@ impl<'a> NewtonSystem<'a> {
         self.newton_step(&change)
     }
 
-    #[inline(always)]
-    fn products(&self) -> ComplementarityProducts {
-        let point = self.point;
-        let upper = |[t, s, c]: [f64; 3]| 0.5 * (1.0 + s) * (t - c);
-        let lower = |[t, s, c]: [f64; 3]| 0.5 * (1.0 - s) * (t + c);
-        ComplementarityProducts {
-            upper: point.bounds().map(upper).collect(),
-            lower: point.bounds().map(lower).collect(),
-            x: point.x.iter().zip(&point.w).map(|(x, w)| x * w).collect(),
-            slack: point.lambda * point.slack,
-        }
-    }
-
     /// The step that, to first order, changes the products by `change` and makes the dual residual zero.
     #[inline(always)]
-    fn newton_step(&self, change: &ComplementarityProducts) -> NewtonStep {
+    fn newton_step(&self, change: &ComplementarityChange) -> NewtonStep {
         let point = self.point;
         // ds for dx = 0.
         let mut s: Vec<f64> = (change.upper.iter().zip(&change.lower))

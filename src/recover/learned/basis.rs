@@ -45,7 +45,6 @@ impl LearnedBasis {
         }
     }
 
-    /// Number of basis functions, r.
     pub fn rank(&self) -> usize {
         self.functions.rank()
     }

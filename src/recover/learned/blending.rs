@@ -13,11 +13,11 @@ use crate::recover::holdout::HoldoutSplit;
 use crate::recover::pixelwise::PixelwiseRecovery;
 use crate::recover::prediction;
 use crate::recover::preparation::Preparation;
-use crate::transport::{CHANNELS, Extent, TileRect, TransportFunctions};
+use crate::transport::{Extent, TileRect, TransportFunctions};
 
 /// Smallest share of a tile's squared held-out residual that blending must save: a blended tile is direct and takes ten
 /// times the bytes of a factored one.
-const MIN_TILE_GAIN: f64 = 0.005;
+pub(super) const MIN_TILE_GAIN: f64 = 0.005;
 /// The same over all training regions, for blending to be tried at all: that doubles the time.
 const MIN_PICTURE_GAIN: f64 = 0.02;
 /// Side of the centre of a tile that determines the tile's blend.
@@ -72,14 +72,9 @@ impl ResidualProducts {
         Self::new(model, measurements, split, [&learned, &alternative])
     }
 
-    /// The weight of NNLS for a tile; 0 where a direct tile does not pay.
-    pub fn tile_weight(self) -> f32 {
-        self.best_weight(MIN_TILE_GAIN)
-    }
-
     /// The weight of NNLS with the least squared residual; 0 if that saves no more than the share `min_gain` of the
     /// learned recovery's.
-    fn best_weight(self, min_gain: f64) -> f32 {
+    pub fn best_weight(self, min_gain: f64) -> f32 {
         let squared_distance = self.learned - 2.0 * self.cross + self.nnls;
         if squared_distance.is_nan() || squared_distance <= 0.0 {
             return 0.0;
@@ -93,10 +88,7 @@ impl ResidualProducts {
     }
 }
 
-/// NNLS, if blending with it pays over all of `regions`.
-///
-/// # Errors
-/// Those of [`PixelwiseRecovery::least_squares`].
+/// NNLS, if blending with it pays over all of `regions`. Errors are those of [`PixelwiseRecovery::least_squares`].
 pub(super) fn fit_nnls_alternative(
     model: &LearnedModel,
     preparation: &Preparation<impl Executor>,
@@ -115,19 +107,6 @@ pub(super) fn fit_nnls_alternative(
     };
     let total = products.into_iter().fold(ResidualProducts::default(), sum);
     Ok((total.best_weight(MIN_PICTURE_GAIN) > 0.0).then_some(nnls))
-}
-
-/// Moves `functions` by `weight` of the way to `alternative`.
-pub(super) fn blend(
-    functions: &mut TransportFunctions,
-    alternative: &TransportFunctions,
-    weight: f32,
-) {
-    for (tau, alternative) in functions.tau.iter_mut().zip(&alternative.tau) {
-        for c in 0..CHANNELS {
-            tau[c] += weight * (alternative[c] - tau[c]);
-        }
-    }
 }
 
 /// The central part of a rectangle, at most `side` by `side` pixels.
@@ -152,7 +131,7 @@ mod tests {
                 cross,
                 nnls,
             };
-            products.tile_weight()
+            products.best_weight(MIN_TILE_GAIN)
         };
         assert_eq!(weight(1.0, 0.0, 1.0), 0.5); // uncorrelated residuals of one size
         assert!((weight(1.0, 0.0, 3.0) - 0.25).abs() < 1e-6);

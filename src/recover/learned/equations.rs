@@ -113,10 +113,8 @@ impl RegionEquations {
     ) -> usize {
         let mut sets = BTreeSet::new();
         for (plane, channels) in measurements.planes() {
-            for (pixel, c) in rect
-                .pixels()
-                .flat_map(|p| channels.clone().map(move |c| (p, c)))
-            {
+            let samples = rect.pixels();
+            for (pixel, c) in samples.flat_map(|p| channels.clone().map(move |c| (p, c))) {
                 let (patterns, _) = usable_samples(measurements, pattern_indices, pixel, c);
                 sets.insert((geometry.window_origin(pixel), plane, patterns));
             }
@@ -182,9 +180,7 @@ pub(super) fn brightness_thresholds(regions: &[RegionEquations]) -> BrightnessTh
     std::array::from_fn(|c| {
         let observations = regions.iter().flat_map(|region| &region.observations);
         let of_channel = observations.skip(c).step_by(CHANNELS);
-        let mut brightnesses: Vec<f64> = of_channel
-            .map(|observation| observation.brightness)
-            .collect();
+        let mut brightnesses: Vec<f64> = of_channel.map(|o| o.brightness).collect();
         brightnesses.sort_by(f64::total_cmp);
         let bright = brightnesses.get(brightnesses.len() * BRIGHT_PERCENTILE / 100);
         MIN_RELATIVE_BRIGHTNESS * bright.copied().unwrap_or(0.0)

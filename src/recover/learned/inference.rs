@@ -32,10 +32,8 @@ pub(super) struct LearnedModel {
 impl LearnedModel {
     /// Width, in camera pixels, of the border around a tile whose measurements affect the tile.
     pub fn halo(&self) -> u32 {
-        match self.neighbour_prior {
-            Some(_) => NEIGHBOURHOOD_RADIUS,
-            None => 0,
-        }
+        let prior = self.neighbour_prior.as_ref();
+        prior.map_or(0, |_| NEIGHBOURHOOD_RADIUS)
     }
 
     /// Recovers one tile from the patterns `pattern_indices`.

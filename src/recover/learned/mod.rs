@@ -43,7 +43,7 @@ use crate::executor::Executor;
 use crate::transport::{
     Basis, CHANNELS, FloatTile, Geometry, TileRect, TransportFunctions, Window,
 };
-use blending::{ResidualProducts, TILE_CENTRE_SIDE_PX, blend, fit_nnls_alternative};
+use blending::{MIN_TILE_GAIN, ResidualProducts, TILE_CENTRE_SIDE_PX, fit_nnls_alternative};
 use inference::LearnedModel;
 pub(super) use posterior_means::NEIGHBOURHOOD_RADIUS as MAX_HALO;
 pub(super) use training::{max_rank, preparation_bytes};
@@ -80,10 +80,7 @@ impl LearnedRecovery {
         preparation.fit_neighbour_prior(&mut model, &split.training, &regions);
         let mut nnls = None;
         if !split.held_out.is_empty() {
-            let helps = preparation.neighbour_prior_helps(&mut model, &regions);
-            if !helps {
-                model.neighbour_prior = None;
-            }
+            let helps = preparation.select_neighbour_prior(&mut model, &regions);
             executor.check_cancelled()?;
             nnls = fit_nnls_alternative(&model, preparation, &regions)?;
             // All choices are made: train on the held-out patterns, too.
@@ -148,19 +145,24 @@ impl LearnedRecovery {
         self.blended_tile(tile, products, || alternative)
     }
 
-    /// `tile`, or its blend with the `alternative` if the products of their residuals say that blending pays.
+    /// `tile`, moved towards the `alternative` by the best weight for the products of their residuals.
     fn blended_tile(
         &self,
         tile: FloatTile,
         products: ResidualProducts,
         alternative: impl FnOnce() -> TransportFunctions,
     ) -> FloatTile {
-        let weight = products.tile_weight();
+        let weight = products.best_weight(MIN_TILE_GAIN);
         if weight == 0.0 {
             return tile;
         }
         let mut functions = self.model.expand(&tile);
-        blend(&mut functions, &alternative(), weight);
+        let nnls = alternative();
+        for (tau, nnls) in functions.tau.iter_mut().zip(&nnls.tau) {
+            for c in 0..CHANNELS {
+                tau[c] += weight * (nnls[c] - tau[c]);
+            }
+        }
         FloatTile::from(functions)
     }
 }

@@ -49,7 +49,6 @@ fn class(region: &PosteriorMeans<'_>, location: ObservationLocation) -> usize {
     region.equations.observations[location.index].phase * CHANNELS + location.channel
 }
 
-/// The prior given the neighbours.
 #[derive(Clone, Debug)]
 pub(super) struct NeighbourPrior {
     rank: usize,
@@ -107,9 +106,8 @@ impl NeighbourPrior {
         }
         let factors = executor.map(CLASSES, |i| sums[i].cholesky_factors());
         let solve = |right_hand_sides: &[Vec<f64>]| {
-            executor.map(CLASSES, |i| {
-                solve_regressions(&factors[i], &right_hand_sides[i], rank)
-            })
+            let solve = |i: usize| solve_regressions(&factors[i], &right_hand_sides[i], rank);
+            executor.map(CLASSES, solve)
         };
         let sides: Vec<Vec<f64>> = sums.into_iter().map(|s| s.right_hand_side).collect();
         let mut learned = Self {
@@ -151,7 +149,9 @@ impl NeighbourPrior {
                 let mean = self.predict(region, location);
                 let errors = region.mean(index).iter().zip(mean);
                 let error: Vec<f64> = errors.map(|(z, m)| z - m).collect();
-                add_outer(&mut covariance, &error);
+                for (row, k) in covariance.chunks_exact_mut(rank).zip(0..) {
+                    add_scaled(&mut row[k..], error[k], &error[k..]);
+                }
                 count += 1.0;
                 if i % VARIANCE_SAMPLING == 0 {
                     prior.infer(region.equations, index, &mut solver);
@@ -238,14 +238,6 @@ impl NeighbourPrior {
                 add_products(&mut sides[j * rank..][..rank], z, &solver.mean);
             }
         }
-    }
-}
-
-/// `sum += x xᵀ`, upper triangle.
-fn add_outer(sum: &mut [f64], x: &[f64]) {
-    let n = x.len();
-    for i in 0..n {
-        add_scaled(&mut sum[i * n + i..(i + 1) * n], x[i], &x[i..]);
     }
 }
 

@@ -28,21 +28,18 @@ impl PriorPrecision {
     pub fn new(covariance: &[f64], rank: usize) -> Self {
         let trace: f64 = (0..rank).map(|k| covariance[k * rank + k].abs()).sum();
         let ridge = trace / rank as f64 * MIN_VARIANCE_SHARE;
-        let mut matrix = vec![0.0; rank * rank];
-        let Some((u, covariance_log_det)) = linalg::cholesky_with_ridge(covariance, rank, ridge)
-        else {
-            // A prior without information.
-            return Self {
-                matrix,
-                covariance_log_det: f64::INFINITY,
-            };
+        // A covariance without a factor leaves a prior without information.
+        let mut precision = Self {
+            matrix: vec![0.0; rank * rank],
+            covariance_log_det: f64::INFINITY,
         };
-        linalg::cholesky_inverse(&u, rank, &mut vec![0.0; rank * rank], &mut matrix);
-        linalg::mirror_upper(&mut matrix, rank);
-        Self {
-            matrix,
-            covariance_log_det,
+        if let Some((u, log_det)) = linalg::cholesky_with_ridge(covariance, rank, ridge) {
+            let (matrix, mut scratch) = (&mut precision.matrix, vec![0.0; rank * rank]);
+            linalg::cholesky_inverse(&u, rank, &mut scratch, matrix);
+            linalg::mirror_upper(matrix, rank);
+            precision.covariance_log_det = log_det;
         }
+        precision
     }
 }
 

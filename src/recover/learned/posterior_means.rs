@@ -26,10 +26,8 @@ struct NeighbourOffset {
 impl NeighbourOffset {
     fn all() -> impl Iterator<Item = Self> {
         let radius = NEIGHBOURHOOD_RADIUS as i32;
-        let range = -radius..=radius;
-        let places = range
-            .clone()
-            .flat_map(move |dy| range.clone().map(move |dx| (dx, dy)));
+        let row = move |dy| (-radius..=radius).map(move |dx| (dx, dy));
+        let places = (-radius..=radius).flat_map(row);
         let offsets =
             places.flat_map(|(dx, dy)| (0..CHANNELS).map(move |channel| Self { dx, dy, channel }));
         offsets.filter(|offset| match offset.channel {
@@ -75,14 +73,13 @@ impl<'a> PosteriorMeans<'a> {
         thresholds: &BrightnessThresholds,
     ) -> Self {
         let (rank, count) = (equations.rank, equations.observations.len());
+        let is_bright = (0..count).map(|i| equations.is_bright(i, thresholds));
         let mut all = Self {
             equations,
             interior,
             means: Vec::with_capacity(count * rank),
             log_evidence: Vec::with_capacity(count),
-            is_bright: (0..count)
-                .map(|i| equations.is_bright(i, thresholds))
-                .collect(),
+            is_bright: is_bright.collect(),
             offsets: NeighbourOffset::all().collect(),
             ones: vec![1.0; rank],
         };
@@ -113,11 +110,9 @@ impl<'a> PosteriorMeans<'a> {
         &self,
         location: ObservationLocation,
     ) -> impl Iterator<Item = (usize, &[f64])> {
-        let neighbours = self
-            .offsets
-            .iter()
-            .zip(1..)
-            .filter_map(move |(offset, j)| Some((j, self.neighbour(location, offset)?)));
+        let neighbours = self.offsets.iter().zip(1..);
+        let neighbours =
+            neighbours.filter_map(move |(offset, j)| Some((j, self.neighbour(location, offset)?)));
         std::iter::once((0, &self.ones[..])).chain(neighbours)
     }
 
@@ -125,14 +120,11 @@ impl<'a> PosteriorMeans<'a> {
     #[inline(always)]
     fn neighbour(&self, location: ObservationLocation, offset: &NeighbourOffset) -> Option<&[f64]> {
         let Extent { width, height } = self.equations.rect.extent;
-        let x = location
-            .x
-            .checked_add_signed(offset.dx)
-            .filter(|&x| x < width)?;
-        let y = location
-            .y
-            .checked_add_signed(offset.dy)
-            .filter(|&y| y < height)?;
+        let x = location.x.checked_add_signed(offset.dx)?;
+        let y = location.y.checked_add_signed(offset.dy)?;
+        if x >= width || y >= height {
+            return None;
+        }
         let channel = (location.channel + offset.channel) % CHANNELS;
         let index = (y * width + x) as usize * CHANNELS + channel;
         self.is_bright[index].then(|| self.mean(index))

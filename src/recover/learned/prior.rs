@@ -19,7 +19,6 @@ const FULL_WINDOW_RATIO: usize = 4;
 const POOLED_MEAN_WEIGHT: f64 = 20.0;
 const MIN_NOISE_FACTOR: f64 = 0.1;
 
-/// The prior of one observation.
 #[derive(Clone, Debug)]
 pub(super) struct Prior {
     pub rank: usize,

@@ -52,7 +52,6 @@ impl RegressionSums {
         self.gram[0]
     }
 
-    /// Adds sums over other observations.
     pub fn merge(&mut self, other: &Self) {
         add_scaled(&mut self.gram, 1.0, &other.gram);
         add_scaled(&mut self.right_hand_side, 1.0, &other.right_hand_side);
@@ -83,9 +82,8 @@ impl RegressionSums {
 pub(super) fn solve_regressions(factors: &[f64], right_hand_side: &[f64], rank: usize) -> Vec<f64> {
     let mut weights = vec![0.0; PREDICTORS * rank];
     for (k, factor) in factors.chunks_exact(PREDICTORS * PREDICTORS).enumerate() {
-        let mut b: Vec<f64> = (0..PREDICTORS)
-            .map(|j| right_hand_side[j * rank + k])
-            .collect();
+        let component = right_hand_side.iter().skip(k).step_by(rank);
+        let mut b: Vec<f64> = component.copied().collect();
         linalg::cholesky_solve(factor, &mut b);
         (0..PREDICTORS).for_each(|j| weights[j * rank + k] = b[j]);
     }

@@ -6,7 +6,7 @@
 //!    held-out patterns is near the least.
 //! 2. [`Preparation::fit_neighbour_prior`] repeats EM on larger training regions, where neighbours of most pixels are
 //!    known, and learns the neighbour prior there.
-//! 3. [`Preparation::neighbour_prior_helps`] compares the errors on held-out patterns with and without it.
+//! 3. [`Preparation::select_neighbour_prior`] compares the errors on held-out patterns with and without it.
 
 use super::basis::LearnedBasis;
 use super::equations::{RegionEquations, brightness_thresholds, with_margin};
@@ -109,13 +109,11 @@ impl<E: Executor> Preparation<'_, E> {
             RegionEquations::count_gram_matrices(self.measurements, &self.geometry, all, rect)
         });
         let bytes = counts.iter().sum::<usize>() * rank * rank * size_of::<f64>();
-        match bytes <= MAX_GRAM_BYTES {
-            true => regions,
-            false => {
-                let fit = MAX_GRAM_BYTES / (bytes / regions.len()).max(1);
-                spread_squares(self.measurements, REGION_SIDE_PX, fit.max(MIN_REGIONS))
-            }
+        if bytes <= MAX_GRAM_BYTES {
+            return regions;
         }
+        let fit = MAX_GRAM_BYTES / (bytes / regions.len()).max(1);
+        spread_squares(self.measurements, REGION_SIDE_PX, fit.max(MIN_REGIONS))
     }
 
     /// Continues EM of the pixel prior on `regions` and learns the neighbour prior, both from the patterns
@@ -140,8 +138,9 @@ impl<E: Executor> Preparation<'_, E> {
         model.neighbour_prior = NeighbourPrior::learn(&means, prior, self.executor);
     }
 
-    /// Whether the neighbour prior lowers the error on held-out patterns over `regions`.
-    pub(super) fn neighbour_prior_helps(
+    /// Removes the neighbour prior unless it lowers the error on held-out patterns over `regions`. Returns whether it
+    /// does.
+    pub(super) fn select_neighbour_prior(
         &self,
         model: &mut LearnedModel,
         regions: &[TileRect],
@@ -149,8 +148,8 @@ impl<E: Executor> Preparation<'_, E> {
         let with = self.held_out_error(model, regions);
         let neighbour_prior = model.neighbour_prior.take();
         let without = self.held_out_error(model, regions);
-        model.neighbour_prior = neighbour_prior;
-        model.neighbour_prior.is_some() && with < without
+        model.neighbour_prior = neighbour_prior.filter(|_| with < without);
+        model.neighbour_prior.is_some()
     }
 
     fn equations(

@@ -14,7 +14,7 @@ use surface_grid::{SurfaceGrid, SurfacePoint};
 
 use super::coordinates::{Vec2, vec2};
 use super::scene::SimulatedScene;
-use crate::transport::{CHANNELS, CameraPx, Extent, Geometry, LightElement, Window};
+use crate::transport::{CHANNELS, CameraPx, Extent, Geometry, LightElement};
 
 /// Samples along each side of a camera pixel.
 const SAMPLES_PER_SIDE: u32 = 3;
@@ -35,7 +35,6 @@ const SHININESS: f64 = 50.0;
 /// plane true parallax would need a wider band: parallax there is that of a steeper projector, shading stays the same.
 const SHADING_HALF_SIDE: f64 = 32.0;
 
-/// The cookies scene.
 #[derive(Debug)]
 pub(super) struct Cookies {
     geometry: Geometry,
@@ -71,12 +70,11 @@ impl Cookies {
         let scale = max_height_elements();
         let reflector = |(u, v)| {
             let point = element_surface.point(u, v);
-            let beam = beam_origin(&point);
             Reflector {
                 height: point.surface.height * scale,
                 slope: element_surface.slope(u, v) * scale,
                 radiosity: reflected(&element_surface, &point).diffuse,
-                light_element: element_at(beam),
+                light_element: element_at(beam_origin(&point)),
             }
         };
         let reflectors = geometry.light.cells().map(reflector).collect();
@@ -97,11 +95,9 @@ impl Cookies {
         let [i, j] = [pixel.x, pixel.y].map(|x| x * SAMPLES_PER_SIDE + SAMPLES_PER_SIDE / 2);
         let scale = max_height_elements();
         let point = self.surface.point(i, j);
-        let (height, slope) = (
-            point.surface.height * scale,
-            self.surface.slope(i, j) * scale,
-        );
-        let radius = (window.window.side() / 2) as i32;
+        let height = point.surface.height * scale;
+        let slope = self.surface.slope(i, j) * scale;
+        let radius = (self.geometry.window.side() / 2) as i32;
         let LightElement { u, v } = element_at(point.at);
         for v in v - radius..=v + radius {
             for u in u - radius..=u + radius {
@@ -139,19 +135,15 @@ impl SimulatedScene for Cookies {
     fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
         let mut window = WindowAccumulator {
             origin: self.geometry.window_origin(pixel),
-            window: self.geometry.window,
-            light: self.geometry.light,
+            geometry: &self.geometry,
             tau,
         };
         let weight = EXPOSURE / f64::from(SAMPLES_PER_SIDE * SAMPLES_PER_SIDE);
         let footprint = self.surface.pitch + vec2(BLUR, BLUR);
         let mut albedo = [0.0; CHANNELS];
         for (i, j) in Extent::new(SAMPLES_PER_SIDE, SAMPLES_PER_SIDE).cells() {
-            let (i, j) = (
-                pixel.x * SAMPLES_PER_SIDE + i,
-                pixel.y * SAMPLES_PER_SIDE + j,
-            );
-            let point = self.surface.point(i, j);
+            let [x, y] = [pixel.x, pixel.y].map(|first| first * SAMPLES_PER_SIDE);
+            let point = self.surface.point(x + i, y + j);
             let light = reflected(&self.surface, &point);
             let measured = light.diffuse.map(|d| (d + light.highlight) * weight);
             window.add_box(beam_origin(&point), footprint, measured);
@@ -213,16 +205,15 @@ fn reflected(surface: &SurfaceGrid, point: &SurfacePoint) -> ReflectedLight {
 /// Sums one pixel's light transport function.
 struct WindowAccumulator<'a> {
     origin: LightElement,
-    window: Window,
-    light: Extent,
+    geometry: &'a Geometry,
     tau: &'a mut [[f32; CHANNELS]],
 }
 
 impl WindowAccumulator<'_> {
     /// Adds light from `element`; ignores elements outside the light plane or the window.
     fn add(&mut self, element: LightElement, light: [f64; CHANNELS]) {
-        let slot = self.window.slot(self.origin, element);
-        if let (Some(s), Some(_)) = (slot, element.index_in(self.light)) {
+        let slot = self.geometry.window.slot(self.origin, element);
+        if let (Some(s), Some(_)) = (slot, element.index_in(self.geometry.light)) {
             for c in 0..CHANNELS {
                 self.tau[s][c] += light[c] as f32;
             }

@@ -82,24 +82,20 @@ impl SurfaceGrid {
     pub fn slope(&self, i: u32, j: u32) -> Vec2 {
         let (i, j) = (i as i32, j as i32);
         let difference = |di, dj| self.height_at(i + di, j + dj) - self.height_at(i - di, j - dj);
-        vec2(
-            difference(1, 0) * 0.5 / self.pitch.x,
-            difference(0, 1) * 0.5 / self.pitch.y,
-        )
+        let along_u = difference(1, 0) * 0.5 / self.pitch.x;
+        vec2(along_u, difference(0, 1) * 0.5 / self.pitch.y)
     }
 
     /// Whether the surface blocks the beam to `point`. A beam moves by `tilt` light elements while it descends by 1.
     pub fn is_shaded(&self, point: &SurfacePoint, tilt: Vec2) -> bool {
         let height = point.surface.height;
         let max_rise = 1.0 - height;
-        let tilt_samples = vec2(tilt.x / self.pitch.x, tilt.y / self.pitch.y);
+        let in_samples = |p: Vec2| vec2(p.x / self.pitch.x, p.y / self.pitch.y);
+        let tilt_samples = in_samples(tilt);
         // One step for each sample along the longer axis.
         let longer = tilt_samples.x.abs().max(tilt_samples.y.abs());
         let steps = (max_rise * longer).ceil().max(1.0);
-        let start = vec2(
-            point.at.x / self.pitch.x - 0.5,
-            point.at.y / self.pitch.y - 0.5,
-        );
+        let start = in_samples(point.at) - vec2(0.5, 0.5);
         // Against self-shadowing where the interpolated height exceeds the sample.
         const BIAS: f64 = 0.004;
         (1..=steps as u32).any(|k| {
@@ -128,8 +124,6 @@ impl SurfaceGrid {
 
 /// The position of sample `(i, j)` on the light plane, in light elements.
 fn sample_position(pitch: Vec2, i: u32, j: u32) -> Vec2 {
-    vec2(
-        (f64::from(i) + 0.5) * pitch.x,
-        (f64::from(j) + 0.5) * pitch.y,
-    )
+    let at = |i: u32, pitch: f64| (f64::from(i) + 0.5) * pitch;
+    vec2(at(i, pitch.x), at(j, pitch.y))
 }

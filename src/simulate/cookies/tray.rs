@@ -84,10 +84,9 @@ fn tray(p: Vec2) -> Surface {
     let speckled = if speck > 0.975 { 1.35 } else { 1.0 };
     let worn = 1.0 + 0.25 * layered_noise(p * 3.0, 4, 72);
     let line = 1.0 - smoothstep(0.006, 0.012, (edge - 0.90).abs());
-    let base = mix3(TRAY.map(|a| a * speckled * worn), RIM, rim.max(0.8 * line));
     Surface {
         height: 0.22 * rim,
-        albedo: base,
+        albedo: mix3(TRAY.map(|a| a * speckled * worn), RIM, rim.max(0.8 * line)),
         gloss: 0.0,
     }
 }
@@ -152,8 +151,7 @@ fn cookie_surface(kind: CookieKind, s: f64, q: Vec2, p: Vec2) -> Option<Surface>
         }
         CookieKind::SmallStar => {
             let d = star(q, 5, s, 0.50 * s) - 0.010;
-            let iced = d + 0.016;
-            dough(d, 0.04, 0.42, BROWN, p).topped(iced, 0.08, ICING)
+            dough(d, 0.04, 0.42, BROWN, p).topped(d + 0.016, 0.08, ICING)
         }
         CookieKind::JamHeart => {
             let d = scalloped(q, s, 16);
@@ -201,11 +199,8 @@ fn cookie_surface(kind: CookieKind, s: f64, q: Vec2, p: Vec2) -> Option<Surface>
 fn scalloped(q: Vec2, size: f64, lobes: u32) -> f64 {
     let (_, l) = fold(q, lobes, 0.0);
     let lobe = size * (PI / f64::from(lobes)).sin() * 1.05;
-    smooth_union(
-        circle(q, size - lobe),
-        circle(l - vec2(size - lobe, 0.0), lobe),
-        0.02,
-    )
+    let scallops = circle(l - vec2(size - lobe, 0.0), lobe);
+    smooth_union(circle(q, size - lobe), scallops, 0.02)
 }
 
 /// Replaces the dough inside the outline at signed distance `d` by jam.
@@ -233,15 +228,13 @@ fn chips(dough: Surface, q: Vec2, size: f64, colour: [f64; 3]) -> Surface {
                 (f64::from(j) + 0.25 + 0.5 * random(82)) * CELL,
             );
             let radius = 0.027 + 0.014 * random(83);
-            if random(84) < 0.93 && middle.length() < size - 0.065 {
-                let d = (q - middle).length() - radius;
-                if d < 0.0 {
-                    topped = Surface {
-                        height: dough.height + 0.26 * rounded(d, radius),
-                        albedo: mix3(dough.albedo, colour, smoothstep(0.0, 0.004, -d)),
-                        gloss: 0.35,
-                    };
-                }
+            let d = (q - middle).length() - radius;
+            if random(84) < 0.93 && middle.length() < size - 0.065 && d < 0.0 {
+                topped = Surface {
+                    height: dough.height + 0.26 * rounded(d, radius),
+                    albedo: mix3(dough.albedo, colour, smoothstep(0.0, 0.004, -d)),
+                    gloss: 0.35,
+                };
             }
         }
     }
@@ -270,16 +263,13 @@ fn sprinkled(iced: Surface, q: Vec2, icing: f64) -> Surface {
 
 /// A gingerbread man of unit size, scaled by `s`.
 fn gingerbread(g: Vec2, s: f64, p: Vec2) -> Option<Surface> {
-    let m = g.mirrored();
+    let m = vec2(g.x.abs(), g.y);
     let head = circle(m - vec2(0.0, -0.60), 0.30);
     let arm = segment(m, vec2(0.0, -0.12), vec2(0.52, -0.24)) - 0.155;
     let body = segment(m, vec2(0.0, -0.15), vec2(0.0, 0.25)) - 0.24;
     let leg = segment(m, vec2(0.08, 0.25), vec2(0.30, 0.78)) - 0.17;
-    let d = smooth_union(
-        smooth_union(smooth_union(body, arm, 0.12), leg, 0.12),
-        head,
-        0.14,
-    ) * s;
+    let limbs = smooth_union(smooth_union(body, arm, 0.12), leg, 0.12);
+    let d = smooth_union(limbs, head, 0.14) * s;
     if d >= 0.0 {
         return None;
     }

@@ -3,7 +3,6 @@
 use crate::simulate::coordinates::{Vec2, smoothstep, vec2};
 use crate::simulate::gradient_noise::{cell_hash, layered_noise, unit_hash};
 
-/// A kind of glass sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Glass {
     Cobalt,
@@ -20,7 +19,6 @@ pub(super) enum Glass {
     Opal,
 }
 
-/// Optical properties of a sheet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Optics {
     /// Transmittance at the nominal thickness, RGB.
@@ -100,12 +98,9 @@ fn bubble_rim(p: Vec2) -> f64 {
         return 0.0;
     }
     let radius = CELL * (0.07 + 0.10 * random(42));
-    let centre = vec2(
-        (i + 0.3 + 0.4 * random(43)) * CELL,
-        (j + 0.3 + 0.4 * random(44)) * CELL,
-    );
+    let place = |i: f64, seed| (i + 0.3 + 0.4 * random(seed)) * CELL;
     // Bubbles are elongated along the drawing direction.
-    let q = p - centre;
+    let q = p - vec2(place(i, 43), place(j, 44));
     let distance = vec2(q.x / 1.6, q.y).length() / radius;
     smoothstep(0.35, 0.85, distance) * (1.0 - smoothstep(0.95, 1.25, distance))
 }

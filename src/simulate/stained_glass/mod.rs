@@ -37,7 +37,6 @@ const MAX_DISPLACEMENT: f64 = 4.0;
 /// light that travels far.
 const RELATIVE_TAIL_WIDTH: [f64; CHANNELS] = [1.14, 1.0, 0.88];
 
-/// The stained-glass scene.
 #[derive(Debug)]
 pub(super) struct StainedGlass {
     geometry: Geometry,
@@ -106,9 +105,9 @@ impl SimulatedScene for StainedGlass {
         let optics = glass.optics();
         let displacement = self.displacement(&optics, piece, centre);
         // The gradient of the displacement stretches the pixel's footprint.
-        let difference = |d: Vec2| self.displacement(&optics, piece, centre + d) - displacement;
-        let right = difference(vec2(self.pitch.x, 0.0)) + vec2(self.pitch.x, 0.0);
-        let down = difference(vec2(0.0, self.pitch.y)) + vec2(0.0, self.pitch.y);
+        let moved = |d: Vec2| self.displacement(&optics, piece, centre + d) - displacement + d;
+        let right = moved(vec2(self.pitch.x, 0.0));
+        let down = moved(vec2(0.0, self.pitch.y));
         // A box has the variance side² / 12. The footprint's effect is limited.
         let width = |dx: f64, dy: f64| {
             let footprint = (dx * dx + dy * dy) / 12.0;
@@ -124,12 +123,12 @@ impl SimulatedScene for StainedGlass {
         let tail_centre = from_origin + displacement * 0.5;
         let thickness = 0.85 + 0.3 * unit_hash(piece, 66);
         let ballistic = SeparableGaussian::new(side, from_origin + displacement, peak);
+        let ballistic_share = optics.ballistic.powf(thickness);
+        let scattered = 1.0 - ballistic_share;
         for c in 0..CHANNELS {
             let wide = optics.tail * RELATIVE_TAIL_WIDTH[c] * thickness.sqrt();
             let narrow = SeparableGaussian::new(side, tail_centre, vec2(0.5, 0.5) * wide);
             let wide = SeparableGaussian::new(side, tail_centre, vec2(1.0, 1.0) * wide);
-            let ballistic_share = optics.ballistic.powf(thickness);
-            let scattered = 1.0 - ballistic_share;
             let parts = [
                 (ballistic_share, &ballistic),
                 (0.45 * scattered, &narrow),

@@ -25,7 +25,6 @@ const SOLDER_RADIUS: f64 = 0.005;
 pub(super) struct GlassPoint {
     /// Identifier of the piece of glass.
     pub piece: u32,
-    /// The kind of glass.
     pub glass: Glass,
     /// Signed distance to the nearest edge of lead; negative within lead.
     pub clearance: f64,
@@ -192,11 +191,7 @@ fn first_lancets(p: Vec2) -> GlassPoint {
     // A narrow border of alternating colours.
     let step = (q.x / 0.058).floor();
     let side = u32::from(q.y > 0.0);
-    let border = if step.rem_euclid(2.0) < 1.0 {
-        edge
-    } else {
-        Pale
-    };
+    let border = [edge, Pale][step.rem_euclid(2.0) as usize];
     let joint = (q.x / 0.058 - (q.x / 0.058).round()) * 0.058;
     let border = GlassPoint::new(220 + 40 * k + 2 * (step as u32) + side, border)
         .lead(joint, 0.7 * FINE_HALF_WIDTH)
@@ -222,12 +217,10 @@ fn first_lancets(p: Vec2) -> GlassPoint {
     }
     // Six petals, or a star with eight points.
     let (petal, l) = fold(c, 6, 0.0);
-    let (figure, piece, heart) = if even {
-        let petals = vesica(l - vec2(0.037, 0.0), 0.026, 0.0185);
-        (petals, 1000 + 10 * k + petal, Gold)
-    } else {
-        let tips = star(c, 8, 0.059, 0.033);
-        (tips, 880 + k, Ruby)
+    let petals = vesica(l - vec2(0.037, 0.0), 0.026, 0.0185);
+    let (figure, piece, heart) = match even {
+        true => (petals, 1000 + 10 * k + petal, Gold),
+        false => (star(c, 8, 0.059, 0.033), 880 + k, Ruby),
     };
     spot.painted(0.45 * stroke(circle(c, 0.056), 0.0022))
         .inlay(figure, 0.7 * FINE_HALF_WIDTH, piece, flower)
@@ -315,17 +308,13 @@ fn corner(p: Vec2) -> GlassPoint {
     // Foliage between the small circle and the axis, with a jewel.
     let tail = h.x - 0.40;
     let jewel = h - vec2(0.345, 0.896);
+    let gem = circle(jewel, 0.029);
     let stars = star(h - vec2(0.645, 0.917), 4, 0.017, 0.006);
     let ground = if tail < 0.0 {
         GlassPoint::new(1880 + half, Gold)
             .painted(foliage(vec2(h.x, h.y - 0.920), 0.036))
             .lead(h.x, FINE_HALF_WIDTH)
-            .inlay(
-                circle(jewel, 0.029),
-                0.8 * FINE_HALF_WIDTH,
-                1890 + half,
-                Ruby,
-            )
+            .inlay(gem, 0.8 * FINE_HALF_WIDTH, 1890 + half, Ruby)
             .painted(0.55 * stroke(circle(jewel, 0.014), 0.003))
     } else {
         GlassPoint::new(1860 + half, Cobalt)
@@ -335,10 +324,8 @@ fn corner(p: Vec2) -> GlassPoint {
             .inlay(stars, 0.6 * FINE_HALF_WIDTH, 1870 + half, Pale)
     };
     let rim = circle(small, 0.068);
-    let mut ground =
-        ground
-            .lead(tail, FINE_HALF_WIDTH)
-            .inlay(rim, BOLD_HALF_WIDTH, 1640 + half, Violet);
+    let ground = ground.lead(tail, FINE_HALF_WIDTH);
+    let mut ground = ground.inlay(rim, BOLD_HALF_WIDTH, 1640 + half, Violet);
     if rim < 0.0 {
         let (petal, l) = fold(small, 5, 0.3);
         let petals = circle(l - vec2(0.038, 0.0), 0.0225);
@@ -389,9 +376,9 @@ fn frame(p: Vec2) -> GlassPoint {
     // Long stones in two blues, with short golden ones between them.
     let length = 2.0 * FRAME_HALF_SIDE / STONES;
     let t = (along + FRAME_HALF_SIDE) / length;
-    let short = ((t - t.round()) * length).abs() - 0.030;
-    let middle = p.x.abs().max(p.y.abs()) - 0.5 * (1.0 + FRAME_HALF_SIDE);
     let from_joint = (t - t.round()) * length;
+    let short = from_joint.abs() - 0.030;
+    let middle = p.x.abs().max(p.y.abs()) - 0.5 * (1.0 + FRAME_HALF_SIDE);
     if short < 0.0 {
         let dot = 0.55 * stroke(circle(vec2(from_joint, middle), 0.008), 0.003);
         GlassPoint::new(2000 + 20 * side + t.round() as u32, Gold).painted(dot)
@@ -407,10 +394,7 @@ fn frame(p: Vec2) -> GlassPoint {
 
 fn quarries(p: Vec2) -> GlassPoint {
     const SIDE: f64 = 0.2;
-    let (a, b) = (
-        (p.x + p.y) * FRAC_1_SQRT_2 / SIDE,
-        (p.x - p.y) * FRAC_1_SQRT_2 / SIDE,
-    );
+    let [a, b] = [p.x + p.y, p.x - p.y].map(|x| x * FRAC_1_SQRT_2 / SIDE);
     let (i, j) = (a.floor(), b.floor());
     let pick = cell_hash(i as i32, j as i32, 51);
     let glass = match (pick * 10.0) as u32 {
