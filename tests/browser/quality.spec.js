@@ -39,7 +39,7 @@ const slowDownWorkers = () => {
   globalThis.Worker = class extends Worker {
     /** @override @param {any} message @param {any} transfer */
     postMessage(message, transfer) {
-      const task = message.task?.task;
+      const task = message?.task?.task;
       if (task?.kind !== 'relight') return super.postMessage(message, transfer);
       const { quality } = task.settings;
       relit.push(quality);

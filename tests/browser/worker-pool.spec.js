@@ -45,7 +45,7 @@ const recordWorkers = () => {
     /** @override @param {any} message @param {any} transfer */
     postMessage(message, transfer) {
       const { failing } = /** @type {any} */ (globalThis);
-      if (failing && message.task?.task?.kind === 'relight') {
+      if (failing && message?.task?.task?.kind === 'relight') {
         super.postMessage({ id: 0, task: { photo: -1, task: { kind: 'plan' } } });
       }
       super.postMessage(message, transfer);
