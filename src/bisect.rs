@@ -1,18 +1,18 @@
 //! Bisection.
 
 /// Halves `[low, high]` as often as `halvings` says, so that `is_low` still holds of the first and not of the
-/// second end, if it does at the beginning.
-pub(crate) fn bisect(
+/// second end, if it does at the beginning. Ends with the first error of `is_low`.
+pub(crate) fn bisect<E>(
     [mut low, mut high]: [f64; 2],
     halvings: usize,
-    mut is_low: impl FnMut(f64) -> bool,
-) -> [f64; 2] {
+    mut is_low: impl FnMut(f64) -> Result<bool, E>,
+) -> Result<[f64; 2], E> {
     for _ in 0..halvings {
         let middle = 0.5 * (low + high);
-        match is_low(middle) {
+        match is_low(middle)? {
             true => low = middle,
             false => high = middle,
         }
     }
-    [low, high]
+    Ok([low, high])
 }

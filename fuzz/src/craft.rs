@@ -425,7 +425,7 @@ fn assemble(
         HEADER_BYTES + sections.iter().map(|section| section.len()).sum::<usize>() + chunk_bytes;
 
     let mut file = b"\xABLTM 10\xBB\r\n\x1A\n\x01\0\0\0".to_vec();
-    for side in geometry.sides() {
+    for side in geometry.sides().as_flattened() {
         file.extend(side.to_le_bytes());
     }
     for a in geometry.correspondence.affine.iter().flatten() {

@@ -122,7 +122,7 @@ fn load_light(light: &str, plane: Extent) -> Result<Light> {
     }
     let path = Path::new(light);
     if !path.exists() {
-        let names = BuiltinLight::ALL.map(BuiltinLight::name).join(", ");
+        let names = BuiltinLight::BY_NAME.map(|(name, _)| name).join(", ");
         bail!("--light {light}: neither a file nor one of {names}");
     }
     let read = || ImageReader::open(path)?.with_guessed_format()?.decode();

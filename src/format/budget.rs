@@ -47,9 +47,8 @@ impl MemoryBudget {
 
     /// A budget for files whose index has passed the limits of a [`LtmReader`](super::LtmReader).
     pub fn unlimited() -> Self {
-        Self::new(Limits {
-            decoded_bytes: u64::MAX,
-        })
+        let decoded_bytes = u64::MAX;
+        Self::new(Limits { decoded_bytes })
     }
 
     pub(super) fn reserve(&self, bytes: u64) -> Result<(), FormatError> {

@@ -66,7 +66,9 @@ impl Header {
         let mut out = Vec::with_capacity(HEADER_BYTES);
         out.extend(MAGIC);
         out.extend([MAJOR, MINOR].map(u16::to_le_bytes).as_flattened());
-        out.extend(self.geometry.sides().map(u32::to_le_bytes).as_flattened());
+        for side in self.geometry.sides().as_flattened() {
+            out.extend(side.to_le_bytes());
+        }
         for a in self.geometry.correspondence.affine.as_flattened() {
             out.extend(a.to_le_bytes());
         }
@@ -81,9 +83,7 @@ impl Header {
         }
         out.extend([0; 12]); // reserved
         out.extend(checksum(&out).to_le_bytes());
-        let mut header = [0; HEADER_BYTES];
-        header.copy_from_slice(&out);
-        header
+        std::array::from_fn(|i| out[i])
     }
 
     pub(super) fn decode(bytes: &[u8; HEADER_BYTES]) -> Result<Self, FormatError> {
@@ -96,7 +96,7 @@ impl Header {
         let (fixed, crc) = bytes.split_at(HEADER_BYTES - 4);
         let [crc] = FieldReader(crc).u32s();
         check_crc(fixed, crc, FileSection::Header)?;
-        let sides = fields.u32s();
+        let sides = std::array::from_fn(|_| fields.u32s());
         let affine = std::array::from_fn(|_| std::array::from_fn(|_| fields.f64()));
         let file_bytes = fields.u64();
         let [rank, scans] = fields.u32s();
@@ -114,19 +114,12 @@ impl Header {
             extensions: section(),
             metadata: section(),
         };
+        let (extensions, metadata) = (header.extensions.bytes, header.metadata.bytes);
         for (quantity, value, limit) in [
             ("basis functions", rank, MAX_RANK.into()),
             ("scans", scans, MAX_SCANS),
-            (
-                "bytes of extensions",
-                header.extensions.bytes,
-                MAX_EXTENSION_BYTES,
-            ),
-            (
-                "bytes of metadata",
-                header.metadata.bytes,
-                MAX_METADATA_BYTES,
-            ),
+            ("bytes of extensions", extensions, MAX_EXTENSION_BYTES),
+            ("bytes of metadata", metadata, MAX_METADATA_BYTES),
         ] {
             if value > limit {
                 return Err(FormatError::TooMany {

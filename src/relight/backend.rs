@@ -52,9 +52,6 @@ impl LightCache {
 
 /// Draws one relit photograph into one canvas.
 pub trait Backend {
-    /// The graphics device, or the instruction set of the CPU.
-    fn kernel(&self) -> String;
-
     /// The gamut of the canvas.
     fn gamut(&self) -> Gamut;
 

@@ -68,31 +68,20 @@ pub enum BuiltinLight {
 }
 
 impl BuiltinLight {
-    /// All built-in lights, in the order of menus.
-    pub const ALL: [Self; 6] = [
-        Self::Flood,
-        Self::Torch,
-        Self::Checkerboard,
-        Self::Stripes,
-        Self::Spectrum,
-        Self::Fire,
+    /// All built-in lights by their names in attributes and on the command line, in the order of menus.
+    pub const BY_NAME: [(&str, Self); 6] = [
+        ("flood", Self::Flood),
+        ("torch", Self::Torch),
+        ("checkerboard", Self::Checkerboard),
+        ("stripes", Self::Stripes),
+        ("spectrum", Self::Spectrum),
+        ("fire", Self::Fire),
     ];
-
-    /// The name in attributes and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Flood => "flood",
-            Self::Torch => "torch",
-            Self::Checkerboard => "checkerboard",
-            Self::Stripes => "stripes",
-            Self::Spectrum => "spectrum",
-            Self::Fire => "fire",
-        }
-    }
 
     /// The built-in light of that name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|l| l.name() == name)
+        let mut lights = Self::BY_NAME.into_iter();
+        lights.find_map(|(known, light)| (known == name).then_some(light))
     }
 
     /// The light on a light plane of that extent.
@@ -142,15 +131,11 @@ pub enum LightError {
 
 impl Light {
     /// A light from the emission at each element's centre, which must be finite and not negative.
-    fn from_fn(extent: Extent, mut emission: impl FnMut(LightPx) -> [f32; 3]) -> Self {
+    fn from_fn(extent: Extent, emission: impl Fn(LightPx) -> [f32; 3]) -> Self {
         let mut elements = Vec::with_capacity(extent.area());
-        for v in 0..extent.height {
-            for u in 0..extent.width {
-                elements.push(element(emission(LightPx {
-                    u: f64::from(u) + 0.5,
-                    v: f64::from(v) + 0.5,
-                })));
-            }
+        for (u, v) in extent.cells() {
+            let [u, v] = [u, v].map(|at| f64::from(at) + 0.5);
+            elements.push(element(emission(LightPx { u, v })));
         }
         Self { extent, elements }
     }
@@ -294,12 +279,12 @@ mod tests {
 
     #[test]
     fn built_in_lights_have_names_and_stay_in_range() {
-        for light in BuiltinLight::ALL {
-            assert_eq!(BuiltinLight::from_name(light.name()), Some(light));
+        for (name, light) in BuiltinLight::BY_NAME {
+            assert_eq!(BuiltinLight::from_name(name), Some(light));
             let lit = light.render(PLANE);
             assert_eq!(lit.elements().len(), PLANE.area());
             for e in lit.elements().iter().flatten() {
-                assert!((0.0..=1.0).contains(e), "{} emits {e}", light.name());
+                assert!((0.0..=1.0).contains(e), "{name} emits {e}");
             }
         }
         assert_eq!(BuiltinLight::from_name("moon"), None);

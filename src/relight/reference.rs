@@ -59,13 +59,10 @@ pub fn relight(transport: &Transport, light: &Light) -> Vec<[f64; CHANNELS]> {
 pub fn picture(transport: &Transport, light: &Light, output: &OutputTransform) -> Rgba8Picture {
     let extent = transport.geometry.camera;
     let linear = relight(transport, light);
-    let pixels = (0..extent.height)
-        .flat_map(|y| (0..extent.width).map(move |x| CameraPx { x, y }))
-        .zip(linear)
-        .map(|(at, linear)| {
-            let [r, g, b] = output.codes(linear, at);
-            [r, g, b, 255]
-        });
+    let pixels = extent.cells().zip(linear).map(|((x, y), linear)| {
+        let [r, g, b] = output.codes(linear, CameraPx { x, y });
+        [r, g, b, 255]
+    });
     Rgba8Picture {
         extent,
         pixels: pixels.collect(),

@@ -32,19 +32,14 @@ pub struct RelitLight {
 
 /// The five built-in lights that correspond to the paper's.
 pub fn built_in_lights(light: Extent) -> Vec<RelitLight> {
-    [
-        BuiltinLight::Flood,
-        BuiltinLight::Checkerboard,
-        BuiltinLight::Stripes,
-        BuiltinLight::Spectrum,
-        BuiltinLight::Fire,
-    ]
-    .map(|builtin| RelitLight {
-        name: builtin.name().to_owned(),
+    let lights = BuiltinLight::BY_NAME.into_iter();
+    let of_paper = lights.filter(|(_, builtin)| *builtin != BuiltinLight::Torch);
+    let relit = of_paper.map(|(name, builtin)| RelitLight {
+        name: name.to_owned(),
         light: builtin.render(light),
         photographed: None,
-    })
-    .into()
+    });
+    relit.collect()
 }
 
 /// The section of figures 4 and 5: recovers the transport by the default method and relights it.

@@ -218,7 +218,7 @@ impl Geometry {
             "light width",
             "light height",
         ];
-        for (name, value) in names.into_iter().zip(self.sides()) {
+        for (name, &value) in names.into_iter().zip(self.sides().as_flattened()) {
             if !(1..=MAX_SIDE).contains(&value) {
                 return Err(GeometryError::Side { name, value });
             }
@@ -234,17 +234,9 @@ impl Geometry {
     }
 
     /// Width and height of the camera grid and of the light plane, and the sides of a window and of a tile.
-    pub fn sides(&self) -> [u32; 6] {
-        let Self { camera, light, .. } = self;
-        let [window, tile] = [self.window.side, self.tile_side];
-        [
-            camera.width,
-            camera.height,
-            light.width,
-            light.height,
-            window,
-            tile,
-        ]
+    pub fn sides(&self) -> [[u32; 2]; 3] {
+        let [camera, light] = [self.camera, self.light].map(|grid| [grid.width, grid.height]);
+        [camera, light, [self.window.side, self.tile_side]]
     }
 
     /// The geometry with these [`sides`](Self::sides), [checked](Self::validate).
@@ -252,19 +244,13 @@ impl Geometry {
     /// # Errors
     /// If a field is out of range; the error names it.
     pub fn from_sides(
-        [
-            camera_width,
-            camera_height,
-            light_width,
-            light_height,
-            window,
-            tile_side,
-        ]: [u32; 6],
+        [camera, light, [window, tile_side]]: [[u32; 2]; 3],
         correspondence: Correspondence,
     ) -> Result<Self, GeometryError> {
+        let [camera, light] = [camera, light].map(|[width, height]| Extent { width, height });
         let geometry = Self {
-            camera: Extent::new(camera_width, camera_height),
-            light: Extent::new(light_width, light_height),
+            camera,
+            light,
             window: Window::new(window)?,
             correspondence,
             tile_side,

@@ -78,16 +78,13 @@ impl Relighter {
         let backend = Canvas2dBackend::new(photo.transport(), &canvas, gamut)?;
         Ok(Self {
             backend: Box::new(backend),
+            kernel: cpu::KERNEL.into(),
             light: photo.geometry().light,
         })
     }
 }
 
 impl Backend for Canvas2dBackend {
-    fn kernel(&self) -> String {
-        cpu::KERNEL.into()
-    }
-
     fn gamut(&self) -> Gamut {
         self.gamut
     }

@@ -23,11 +23,9 @@ impl Decoder {
     /// The missing byte ranges, the most important first: start and end of the first, then of the second, and so on. The
     /// first may end beyond a small file. Empty once the file is complete.
     pub fn wants(&self) -> Vec<f64> {
-        let ranges = self.0.wants(&ChunkSelection::default());
-        let bounds = ranges
-            .into_iter()
-            .flat_map(|range| [range.start, range.end]);
-        bounds.map(|bound| bound as f64).collect()
+        let ranges = self.0.wants(&ChunkSelection::default()).into_iter();
+        let bounds = ranges.flat_map(|range| [range.start as f64, range.end as f64]);
+        bounds.collect()
     }
 
     /// Takes the file's bytes from `offset` on. The bytes of one range must come in order; bytes that came before are

@@ -86,7 +86,7 @@ impl GraphicsDevice {
         canvas: HtmlCanvasElement,
         #[wasm_bindgen(unchecked_param_type = "\"srgb\" | \"display-p3\"")] gamut: String,
     ) -> Promise {
-        let (device, transport) = (self.0.clone(), photo.transport());
+        let (device, transport, kernel) = (self.0.clone(), photo.transport(), self.kernel());
         future_to_promise(async move {
             let gamut = parse_gamut(&gamut)?;
             let light = transport.geometry.light;
@@ -104,7 +104,11 @@ impl GraphicsDevice {
                 }
             };
             let backend = backend.map_err(CodedError::from)?;
-            Ok(JsValue::from(Relighter { backend, light }))
+            Ok(JsValue::from(Relighter {
+                backend,
+                kernel,
+                light,
+            }))
         })
     }
 }

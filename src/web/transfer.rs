@@ -24,8 +24,9 @@ pub fn corrupt() -> CodedError {
 /// Grids, window, tile side and correspondence, as `unpack_transport` reads them.
 #[cfg(feature = "decoder")]
 pub fn pack_geometry(geometry: &Geometry) -> Vec<f64> {
-    let sides = geometry.sides().map(f64::from);
-    [&sides[..], geometry.correspondence.affine.as_flattened()].concat()
+    let sides = geometry.sides().into_iter().flatten().map(f64::from);
+    let affine = geometry.correspondence.affine.into_iter().flatten();
+    sides.chain(affine).collect()
 }
 
 /// A header, the coefficients' codes and the functions' codes.
@@ -45,11 +46,11 @@ pub fn pack_tile(tile: &Tile) -> Vec<u8> {
 /// [`corrupt`] if the values describe no transport.
 #[cfg(feature = "drawing")]
 pub fn unpack_transport(geometry: &[f64], basis: &[f32]) -> Result<Transport, CodedError> {
-    let (sides, affine) = geometry.split_first_chunk().ok_or_else(corrupt)?;
+    let (sides, affine) = geometry.split_first_chunk::<6>().ok_or_else(corrupt)?;
     let (&[u, v], []) = affine.as_chunks() else {
         return Err(corrupt());
     };
-    let (sides, affine) = (sides.map(|side| side as u32), [u, v]);
+    let (sides, affine) = (bytemuck::cast(sides.map(|side| side as u32)), [u, v]);
     let geometry = Geometry::from_sides(sides, Correspondence { affine });
     let geometry = geometry.map_err(|_| corrupt())?;
     let functions = basis.chunks_exact(geometry.window.area());

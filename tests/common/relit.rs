@@ -72,8 +72,8 @@ pub fn asymmetric_transport(geometry: Geometry, contents: TileContents, seed: u6
 
 /// All built-in lights; `random`, brighter, with varying chroma; and `corner`, with uniform chroma.
 pub fn lights(extent: Extent) -> Vec<(&'static str, Light)> {
-    let mut lights: Vec<_> = BuiltinLight::ALL
-        .map(|light| (light.name(), light.render(extent)))
+    let mut lights: Vec<_> = BuiltinLight::BY_NAME
+        .map(|(name, light)| (name, light.render(extent)))
         .into();
     let mut noise = Noise(7);
     let values: Vec<f32> = (0..3 * extent.area())

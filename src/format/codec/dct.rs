@@ -47,26 +47,11 @@ const fn basis() -> [[f32; SIDE]; SIDE] {
 }
 
 /// JPEG's order of coefficients: by the sum of their frequencies, diagonals in alternating direction.
-pub const ZIGZAG: [u8; AREA] = zigzag();
-
-const fn zigzag() -> [u8; AREA] {
-    let mut order = [0; AREA];
-    let (mut at, mut sum) = (0, 0);
-    while sum < 2 * SIDE - 1 {
-        let mut step = 0;
-        while step <= sum {
-            let row = if sum % 2 == 0 { sum - step } else { step };
-            let column = sum - row;
-            if row < SIDE && column < SIDE {
-                order[at] = (row * SIDE + column) as u8;
-                at += 1;
-            }
-            step += 1;
-        }
-        sum += 1;
-    }
-    order
-}
+pub const ZIGZAG: [u8; AREA] = [
+    0, 1, 8, 16, 9, 2, 3, 10, 17, 24, 32, 25, 18, 11, 4, 5, 12, 19, 26, 33, 40, 48, 41, 34, 27, 20,
+    13, 6, 7, 14, 21, 28, 35, 42, 49, 56, 57, 50, 43, 36, 29, 22, 15, 23, 30, 37, 44, 51, 58, 59,
+    52, 45, 38, 31, 39, 46, 53, 60, 61, 54, 47, 55, 62, 63,
+];
 
 /// The coefficients of a block's pixels.
 pub fn forward(pixels: &DctBlock) -> DctBlock {

@@ -91,19 +91,15 @@ impl QuantisedTile {
         }
     }
 
-    /// The squared error after so many scans, without the error of the KLT.
-    fn error_after(&self, scans: usize) -> f64 {
-        let coefficients = self.coefficients.iter().map(|q| q.errors[scans]);
-        let functions = self.functions.iter().map(|q| q.errors[scans]);
-        coefficients.chain(functions).sum()
-    }
-
-    /// The error after `scans` scans.
+    /// The error after `scans` scans, without that of the KLT.
     pub fn error(&self, scans: usize) -> TransportError {
-        TransportError {
-            signal: self.error_after(0),
-            error: self.error_after(scans),
-        }
+        let coefficients = self.coefficients.iter().map(|q| &q.errors);
+        let parts = coefficients.chain(self.functions.iter().map(|q| &q.errors));
+        let errors = parts.map(|errors| TransportError {
+            signal: errors[0],
+            error: errors[scans],
+        });
+        errors.sum()
     }
 
     /// The tile as a reader decodes it, over the file's basis.
@@ -130,7 +126,7 @@ impl QuantisedTile {
             }
         }
         let klt_error = self.coefficients.as_ref().map_or(0.0, |q| q.klt_error);
-        let errors = (1..=scans.len()).map(|scans| self.error_after(scans) + klt_error);
+        let errors = (1..=scans.len()).map(|scans| self.error(scans).error + klt_error);
         Ok(EncodedTile {
             chunks,
             errors: errors.collect(),

@@ -3,6 +3,8 @@
 //! Both are found by bisection on a sample. Components whose energy is far below the quantisation error
 //! are then dropped.
 
+use std::convert::Infallible;
+
 use super::assembly::{self, EncodedFile, QuantisedTile};
 use super::encoder::Encoder;
 use super::sampling::{SampledTilePart, sample};
@@ -97,8 +99,9 @@ impl<'a, E: Executor> RateControl<'a, E> {
         let [exponent, _] = bisect(LOSS_EXPONENTS, LOSS_HALVINGS, |exponent| {
             let scans = scan_plan::trial(encoder, (coarsest * exponent.exp2()) as f32);
             let decoded = |i: usize| decoded(encoder, &tiles[i], &scans);
-            metric.loss(&encoder.executor.map(tiles.len(), decoded)).0 <= max_loss.0
-        });
+            let loss = metric.loss(&encoder.executor.map(tiles.len(), decoded));
+            Ok::<_, FormatError>(loss.0 <= max_loss.0)
+        })?;
         encoder.has_functions = has_functions;
         self.encode_with_step(Some((coarsest * exponent.exp2()) as f32))
     }
@@ -114,19 +117,15 @@ impl<'a, E: Executor> RateControl<'a, E> {
         if smallest > limit {
             return Err(FormatError::TooLarge { limit, smallest });
         }
-        let mut failed = None;
-        bisect(SIZE_SNRS, SIZE_HALVINGS, |snr| match try_snr(snr) {
-            Ok(file) if file.bytes() <= limit => {
+        bisect(SIZE_SNRS, SIZE_HALVINGS, |snr| {
+            let file = try_snr(snr)?;
+            let fits = file.bytes() <= limit;
+            if fits {
                 best = file;
-                true
             }
-            Ok(_) => false,
-            Err(error) => {
-                failed = Some(error);
-                false
-            }
-        });
-        failed.map_or(Ok(best), Err)
+            Ok::<_, FormatError>(fits)
+        })?;
+        Ok(best)
     }
 
     /// Encodes all tiles; without a step there is no light. Plans anew with smaller shares if the file exceeds
@@ -197,10 +196,8 @@ impl<'a, E: Executor> RateControl<'a, E> {
                 error: error.error * weight,
             }
         });
-        let mut sum = TransportError::default();
         // In order, so that the sum does not depend on threads.
-        errors.into_iter().for_each(|error| sum.merge(error));
-        sum
+        errors.into_iter().sum()
     }
 }
 
@@ -262,8 +259,8 @@ fn step_for(snr: Decibels, error: impl Fn(f32) -> TransportError) -> Option<f32>
     }
     // Even a value as large as the norm is zero at twice that step.
     let step = |exponent: f64| 2.0 * norm * exponent.exp2() as f32;
-    let [exponent, _] = bisect(SNR_EXPONENTS, SNR_HALVINGS, |exponent| {
-        error(step(exponent)).finite_snr().0 >= snr.0
+    let Ok([exponent, _]) = bisect(SNR_EXPONENTS, SNR_HALVINGS, |exponent| {
+        Ok::<_, Infallible>(error(step(exponent)).finite_snr().0 >= snr.0)
     });
     Some(step(exponent))
 }

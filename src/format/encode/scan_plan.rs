@@ -219,22 +219,17 @@ pub fn plan(
         }
         scans
     };
-    let mut failed = None;
     let exceeds = |exponent: f64| {
         let scans = first_layer(step * exponent.exp2() as f32);
-        let mut bytes = 0.0;
-        for scan in &scans {
-            match model.compressed_bytes(scan, executor) {
-                Ok(scan_bytes) => bytes += scan_bytes,
-                Err(error) => failed = Some(error),
-            }
-        }
-        bytes + basis_bytes * rank_of(&scans) as f64 > shares.first * file_bytes
+        let compressed = |scan| model.compressed_bytes(scan, executor);
+        let chunks = scans
+            .iter()
+            .map(compressed)
+            .sum::<Result<f64, FormatError>>()?;
+        let bytes = chunks + basis_bytes * rank_of(&scans) as f64;
+        Ok::<_, FormatError>(bytes > shares.first * file_bytes)
     };
-    let [_, exponent] = bisect([0.0, MAX_FIRST_STEP_EXPONENT], FIRST_STEP_TRIALS, exceeds);
-    if let Some(error) = failed {
-        return Err(error);
-    }
+    let [_, exponent] = bisect([0.0, MAX_FIRST_STEP_EXPONENT], FIRST_STEP_TRIALS, exceeds)?;
     let mut scans = first_layer(step * exponent.exp2() as f32);
     let first_scans = scans.len();
     let max_bytes = shares.scan * file_bytes;

@@ -137,11 +137,10 @@ impl SpanPointers<'_> {
             }
             for (c, sum) in sums.iter_mut().enumerate() {
                 let response = responses[if LIGHT_CHANNELS == 1 { 0 } else { c }];
+                let at = c * self.channel_stride + q * self.quad_stride + first;
                 // SAFETY: the caller vouches for the codes.
-                *sum = unsafe {
-                    let at = c * self.channel_stride + q * self.quad_stride + first;
-                    simd.add_products(*sum, self.codes.add(at), response)
-                };
+                let codes = unsafe { simd.load_codes(self.codes.add(at)) };
+                *sum = *sum + codes * response;
             }
         }
         // SAFETY: the caller vouches for the pixels.

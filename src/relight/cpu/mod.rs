@@ -3,14 +3,13 @@
 //! Pixels are grouped by *light block* ([`light_blocks`]), a square of window origins. Where the light under a
 //! block has changed, the block's basis response is computed ([`correlation`]) and combined with the pixels'
 //! coefficients while it is in the cache ([`combine`]); the functions of direct tiles are summed slot by slot
-//! ([`direct`]). Other blocks keep their pixels. Blocks are independent, so threads share them.
+//! ([`windowed_sum`]). Other blocks keep their pixels. Blocks are independent, so threads share them.
 //!
 //! A basis response is exact to about a millionth of the block's brightest element.
 
 mod block_size;
 mod combine;
 mod correlation;
-mod direct;
 mod fft;
 mod light_blocks;
 mod light_spectrum;
@@ -23,7 +22,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use super::output_transform::OutputEncoder;
 use super::{Light, LightChroma, LinearPicture, OutputTransform, Rgba8Picture, used_count};
 use crate::executor::Executor;
-use crate::transport::{CHANNELS, Tile, Transport};
+use crate::transport::{CHANNELS, Tile, TileCodes, Transport};
 use combine::{BlockResponse, combine};
 use correlation::{CorrelationScratch, Correlator};
 use light_blocks::{DIRECT_BLOCK_SIDE, LightBlock, LightBlocks, OriginBounds, PixelSpan};
@@ -221,7 +220,7 @@ impl CpuRelighter {
                 let (column, row) = (offset % self.blocks.side, offset / self.blocks.side);
                 let light = self.light.elements_from(u + column, v + row);
                 let stride = self.light.stride();
-                let sum = direct::windowed_sum(tile, span.first + i, light, window, stride);
+                let sum = windowed_sum(tile, span.first + i, light, window, stride);
                 let y = &mut linear[span.begin + i];
                 (0..CHANNELS).for_each(|c| y[c] += sum[c]);
             }
@@ -312,6 +311,29 @@ impl SimdKernel for BlockKernel<'_> {
     fn run<S: Simd>(self, simd: S) {
         self.relighter.relight_block(simd, self.block, self.scratch);
     }
+}
+
+/// A direct pixel's `y_n = Σ_s τ_n(s) p(o_n + s)` over the window, in each channel, for pixel number `p` of a tile.
+/// `light` begins with the window's first element; rows are `stride` apart.
+#[inline(always)]
+fn windowed_sum(
+    tile: &TileCodes,
+    p: usize,
+    light: &[[f32; 4]],
+    window: usize,
+    stride: usize,
+) -> [f32; CHANNELS] {
+    let codes = &tile.codes[p * window * window..(p + 1) * window * window];
+    let mut sum = [0.0f32; 4];
+    for (row, codes) in codes.chunks_exact(window).enumerate() {
+        let elements = &light[row * stride..row * stride + window];
+        for (code, element) in codes.iter().zip(elements) {
+            for c in 0..4 {
+                sum[c] += f32::from(code[c]) * element[c];
+            }
+        }
+    }
+    std::array::from_fn(|c| sum[c] * tile.step[c])
 }
 
 fn is_factored(tile: &Tile) -> bool {

@@ -117,12 +117,11 @@ impl TextureLayout {
         } = self.geometry;
         // All windows off the light plane are dark alike; clamped, their origins fit 16 bits.
         let clamp = |at: i32, side: u32| at.clamp(-(window.side() as i32), side as i32) as i16;
-        let pixels = (0..camera.height).flat_map(|y| (0..camera.width).map(move |x| (x, y)));
         let origin = |(x, y)| {
             let LightElement { u, v } = self.geometry.window_origin(CameraPx { x, y });
             [clamp(u, light.width), clamp(v, light.height)]
         };
-        pixels.map(origin).collect()
+        camera.cells().map(origin).collect()
     }
 
     pub(super) fn tile_texels(&self, transport: &Transport) -> Vec<[i32; 4]> {

@@ -109,10 +109,6 @@ impl WebGl2Backend {
 }
 
 impl Backend for WebGl2Backend {
-    fn kernel(&self) -> String {
-        self.context.kernel.clone()
-    }
-
     fn gamut(&self) -> Gamut {
         self.gamut
     }

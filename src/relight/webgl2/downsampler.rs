@@ -27,20 +27,14 @@ impl GlDownsampler {
     /// # Errors
     /// [`BackendError::Device`] if the context is lost.
     pub fn new(gl: &Gl, extent: Extent, light: &GlTexture) -> Result<Self, BackendError> {
+        use TextureFormat::{Rgba8Unorm, Rgba32Float};
         let create = |label, format, extent| {
-            GlTexture::new(
-                gl,
-                LIGHT_IMAGE,
-                TextureDescriptor::flat(label, format, extent),
-            )
+            let descriptor = TextureDescriptor::flat(label, format, extent);
+            GlTexture::new(gl, LIGHT_IMAGE, descriptor)
         };
         let Extent { width, height } = light.extent();
         let columns_extent = Extent { width, ..extent };
-        let columns = create(
-            "light image's columns",
-            TextureFormat::Rgba32Float,
-            columns_extent,
-        )?;
+        let columns = create("light image's columns", Rgba32Float, columns_extent)?;
         // `DownsampleUniforms` of the WGSL.
         let pass = |target, uniforms: [u32; 4]| {
             let framebuffer = Framebuffer::of_texture(gl, target)?;
@@ -49,7 +43,7 @@ impl GlDownsampler {
         };
         Ok(Self {
             gl: gl.clone(),
-            image: create("light image", TextureFormat::Rgba8Unorm, extent)?,
+            image: create("light image", Rgba8Unorm, extent)?,
             passes: [
                 pass(&columns, [1, 0, width, 0])?,
                 pass(light, [0, 1, height, 0])?,

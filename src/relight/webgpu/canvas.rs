@@ -76,10 +76,6 @@ impl WebGpuBackend {
 }
 
 impl Backend for WebGpuBackend {
-    fn kernel(&self) -> String {
-        self.renderer.device.kernel().into()
-    }
-
     fn gamut(&self) -> Gamut {
         self.gamut
     }

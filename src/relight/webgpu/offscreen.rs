@@ -1,7 +1,6 @@
 //! Draws into a texture, on a device of the system, for tests and benchmarks.
 
 use std::rc::Rc;
-use std::time::Instant;
 
 use super::api::{API, DeviceQueue, Texture, usage};
 use super::device::Device;
@@ -30,34 +29,9 @@ impl Device {
         self.check()
     }
 
-    /// Seconds to copy so many bytes within the device's memory, in the fastest of five runs: what benchmarks compare
-    /// relighting with.
-    ///
-    /// # Errors
-    /// [`BackendError::Lost`] if the device is lost.
-    pub fn copy_seconds(&self, bytes: u64) -> Result<f64, BackendError> {
-        const COPIES: u32 = 8;
-        let buffer = || {
-            self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("copy"),
-                size: bytes,
-                usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        };
-        let buffers = [buffer(), buffer()];
-        let mut best = f64::INFINITY;
-        for _ in 0..5 {
-            let start = Instant::now();
-            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-            for _ in 0..COPIES {
-                encoder.copy_buffer_to_buffer(&buffers[0], 0, &buffers[1], 0, bytes);
-            }
-            self.gpu.queue.submit([encoder.finish()]);
-            self.wait()?;
-            best = best.min(start.elapsed().as_secs_f64() / f64::from(COPIES));
-        }
-        Ok(best)
+    /// The device of wgpu, and its queue.
+    pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
+        (&self.gpu.device, &self.gpu.queue)
     }
 }
 

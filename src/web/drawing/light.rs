@@ -19,7 +19,7 @@ impl WebLight {
     /// Code `light-name` for other names.
     pub fn builtin(photo: &Photo, name: &str) -> Result<WebLight, CodedError> {
         let light = BuiltinLight::from_name(name).ok_or_else(|| {
-            let names = BuiltinLight::ALL.map(BuiltinLight::name).join(", ");
+            let names = BuiltinLight::BY_NAME.map(|(name, _)| name).join(", ");
             CodedError::new(
                 "light-name",
                 format!("unknown built-in light '{name}'; use one of {names}"),

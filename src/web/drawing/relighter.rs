@@ -14,6 +14,8 @@ use crate::web::CodedError;
 #[wasm_bindgen]
 pub struct Relighter {
     pub(in crate::web) backend: Box<dyn Backend>,
+    /// The graphics device, or the instruction set of the CPU.
+    pub(in crate::web) kernel: String,
     /// Extent of the light plane.
     pub(in crate::web) light: Extent,
 }
@@ -23,7 +25,7 @@ impl Relighter {
     /// The graphics device's name, or `simd128` or `scalar` on the CPU.
     #[wasm_bindgen(getter)]
     pub fn kernel(&self) -> String {
-        self.backend.kernel()
+        self.kernel.clone()
     }
 
     /// The canvas's gamut: the one asked for, if the browser supports it.

@@ -73,18 +73,11 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn add_products(
-        self,
-        sums: Avx2Vector,
-        codes: *const TexelCode,
-        factors: Avx2Vector,
-    ) -> Avx2Vector {
+    unsafe fn load_codes(self, codes: *const TexelCode) -> Avx2Vector {
         // SAFETY: the token proves AVX2; the caller vouches for two texels.
-        let codes = unsafe {
-            let codes = _mm256_cvtepi16_epi32(_mm_loadu_si128(codes.cast()));
-            Avx2Vector(_mm256_cvtepi32_ps(codes))
-        };
-        sums + codes * factors
+        Avx2Vector(unsafe {
+            _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(codes.cast())))
+        })
     }
 
     #[inline(always)]

@@ -112,18 +112,11 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn add_products(
-        self,
-        sums: Avx512Vector,
-        codes: *const TexelCode,
-        factors: Avx512Vector,
-    ) -> Avx512Vector {
+    unsafe fn load_codes(self, codes: *const TexelCode) -> Avx512Vector {
         // SAFETY: the token proves AVX-512; the caller vouches for four texels.
-        let codes = unsafe {
-            let codes = _mm512_cvtepi16_epi32(_mm256_loadu_si256(codes.cast()));
-            Avx512Vector(_mm512_cvtepi32_ps(codes))
-        };
-        sums + codes * factors
+        Avx512Vector(unsafe {
+            _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(codes.cast())))
+        })
     }
 
     #[inline(always)]

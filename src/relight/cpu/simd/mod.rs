@@ -86,7 +86,7 @@ pub trait Simd: Copy {
     /// Pixels that are combined at once, at most [`MAX_PIXELS`].
     const PIXELS: usize;
     /// A vector of `PIXELS` texels, one for each pixel.
-    type TexelVector: Copy;
+    type TexelVector: Vector;
 
     fn splat(self, value: f32) -> Self::Vector;
 
@@ -126,16 +126,11 @@ pub trait Simd: Copy {
         from: [*const [f32; TEXEL_COMPONENTS]; MAX_PIXELS],
     ) -> Self::TexelVector;
 
-    /// `sums + codes · factors`.
+    /// Reads the codes of each pixel's texel.
     ///
     /// # Safety
     /// `codes` is valid to read for `PIXELS` texels.
-    unsafe fn add_products(
-        self,
-        sums: Self::TexelVector,
-        codes: *const TexelCode,
-        factors: Self::TexelVector,
-    ) -> Self::TexelVector;
+    unsafe fn load_codes(self, codes: *const TexelCode) -> Self::TexelVector;
 
     /// Writes each pixel's channels: the sum of the channel's four lanes, times its gain.
     ///

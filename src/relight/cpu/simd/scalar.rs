@@ -9,18 +9,20 @@ use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode};
 #[derive(Clone, Copy, Debug)]
 pub struct Scalar;
 
-/// One line.
+/// A line, or a texel.
 #[derive(Clone, Copy, Debug)]
-pub struct ScalarVector([f32; LANES]);
+pub struct ScalarVector<const N: usize>([f32; N]);
+
+type ScalarTexel = ScalarVector<TEXEL_COMPONENTS>;
 
 macro_rules! impl_lanewise {
     ($($operator:ident $method:ident $symbol:tt),*) => {$(
-        impl $operator for ScalarVector {
+        impl<const N: usize> $operator for ScalarVector<N> {
             type Output = Self;
 
             #[inline(always)]
             fn $method(mut self, other: Self) -> Self {
-                for i in 0..LANES {
+                for i in 0..N {
                     self.0[i] $symbol other.0[i];
                 }
                 self
@@ -33,65 +35,54 @@ impl_lanewise!(Add add +=, Sub sub -=, Mul mul *=);
 
 impl Simd for Scalar {
     const LINES: usize = 1;
-    type Vector = ScalarVector;
+    type Vector = ScalarVector<LANES>;
     type Spilled = [f32; LANES];
     const PIXELS: usize = 1;
-    type TexelVector = [f32; TEXEL_COMPONENTS];
+    type TexelVector = ScalarTexel;
 
     #[inline(always)]
-    fn splat(self, value: f32) -> ScalarVector {
+    fn splat(self, value: f32) -> Self::Vector {
         ScalarVector([value; LANES])
     }
 
     #[inline(always)]
-    fn unspill(self, values: &[f32; LANES]) -> ScalarVector {
+    fn unspill(self, values: &[f32; LANES]) -> Self::Vector {
         ScalarVector(*values)
     }
 
     #[inline(always)]
-    fn spill(self, vector: ScalarVector, to: &mut [f32; LANES]) {
+    fn spill(self, vector: Self::Vector, to: &mut [f32; LANES]) {
         *to = vector.0;
     }
 
     #[inline(always)]
-    fn zero_texels(self) -> [f32; TEXEL_COMPONENTS] {
-        [0.0; TEXEL_COMPONENTS]
+    fn zero_texels(self) -> ScalarTexel {
+        ScalarVector([0.0; TEXEL_COMPONENTS])
     }
 
     #[inline(always)]
-    unsafe fn load_texels(
-        self,
-        from: [*const [f32; TEXEL_COMPONENTS]; MAX_PIXELS],
-    ) -> [f32; TEXEL_COMPONENTS] {
+    unsafe fn load_texels(self, from: [*const [f32; TEXEL_COMPONENTS]; MAX_PIXELS]) -> ScalarTexel {
         // SAFETY: the caller vouches for one pointer.
-        unsafe { *from[0] }
+        ScalarVector(unsafe { *from[0] })
     }
 
     #[inline(always)]
-    unsafe fn add_products(
-        self,
-        mut sums: [f32; TEXEL_COMPONENTS],
-        codes: *const TexelCode,
-        factors: [f32; TEXEL_COMPONENTS],
-    ) -> [f32; TEXEL_COMPONENTS] {
+    unsafe fn load_codes(self, codes: *const TexelCode) -> ScalarTexel {
         // SAFETY: the caller vouches for one texel.
-        let codes = unsafe { *codes };
-        for lane in 0..TEXEL_COMPONENTS {
-            sums[lane] += f32::from(codes[lane]) * factors[lane];
-        }
-        sums
+        let [a, b, c, d] = unsafe { *codes };
+        ScalarVector([a.into(), b.into(), c.into(), d.into()])
     }
 
     #[inline(always)]
     unsafe fn store_sums(
         self,
-        channels: [[f32; TEXEL_COMPONENTS]; CHANNELS],
+        channels: [ScalarTexel; CHANNELS],
         gain: [f32; CHANNELS],
         to: *mut [f32; CHANNELS],
     ) {
         let mut sums = [0.0; CHANNELS];
         for c in 0..CHANNELS {
-            let [first, second, third, fourth] = channels[c];
+            let [first, second, third, fourth] = channels[c].0;
             sums[c] = ((first + third) + (second + fourth)) * gain[c];
         }
         // SAFETY: the caller vouches for room for one pixel.

@@ -61,15 +61,10 @@ impl Simd for Simd128 {
     }
 
     #[inline(always)]
-    unsafe fn add_products(
-        self,
-        sums: Simd128Vector,
-        codes: *const TexelCode,
-        factors: Simd128Vector,
-    ) -> Simd128Vector {
+    unsafe fn load_codes(self, codes: *const TexelCode) -> Simd128Vector {
         // SAFETY: the caller vouches for one texel.
         let codes = unsafe { i32x4_load_extend_i16x4(codes.cast()) };
-        sums + Simd128Vector(f32x4_convert_i32x4(codes)) * factors
+        Simd128Vector(f32x4_convert_i32x4(codes))
     }
 
     #[inline(always)]

@@ -146,9 +146,5 @@ pub fn dictionary(fields: &[(&str, JsValue)]) -> Dictionary {
 
 /// A JavaScript array.
 pub fn list(values: impl IntoIterator<Item = JsValue>) -> JsValue {
-    let list = Array::new();
-    for value in values {
-        list.push(&value);
-    }
-    list.into()
+    Array::from_iter(values).into()
 }
