@@ -117,8 +117,6 @@ pub enum CaptureProblem {
 
 /// Where the manifest names a file, in brackets.
 fn named_by(field: &Option<String>) -> String {
-    let field = field.as_ref();
-    field.map_or_else(String::new, |field| {
-        format!(" ({field} in {MANIFEST_NAME})")
-    })
+    let name = |field: &String| format!(" ({field} in {MANIFEST_NAME})");
+    field.as_ref().map(name).unwrap_or_default()
 }

@@ -127,14 +127,12 @@ impl LightSpec {
 
     /// Emission at each of the 256 codes, 1 at full brightness.
     pub fn emission(&self) -> [f64; 256] {
-        let full = self
-            .response
-            .as_ref()
-            .map_or(1.0, |table| interpolate(table, 255.0));
-        std::array::from_fn(|code| match (&self.response, self.gamma) {
-            (Some(table), _) => interpolate(table, code as f64) / full,
-            (None, gamma) => (code as f64 / 255.0).powf(gamma.unwrap_or(1.0)),
-        })
+        let Some(table) = &self.response else {
+            let gamma = self.gamma.unwrap_or(1.0);
+            return std::array::from_fn(|code| (code as f64 / 255.0).powf(gamma));
+        };
+        let full = interpolate(table, 255.0);
+        std::array::from_fn(|code| interpolate(table, code as f64) / full)
     }
 }
 

@@ -49,9 +49,8 @@ struct EvaluateReport {
     /// SNR of the predicted picture against the flood photograph, which the recovery does not use; null without one.
     flood_snr_db: Option<Decibels>,
     file_bytes: u64,
-    /// Bytes read.
     read_bytes: u64,
-    /// Scans that are complete in them.
+    /// Scans that are complete in the bytes read.
     read_scans: usize,
     scans: usize,
 }
@@ -74,8 +73,8 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
     }
     let mut report = EvaluateReport {
         file_bytes: header.file_bytes,
-        read_bytes: file.bytes,
-        read_scans: file.scans,
+        read_bytes: file.progress.bytes,
+        read_scans: file.progress.scans,
         scans: file.index.scans.len(),
         ..EvaluateReport::default()
     };
@@ -92,7 +91,6 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
 }
 
 impl EvaluateReport {
-    /// Compares the transport and its pictures with the known ones.
     fn compare_with_truth(
         &mut self,
         relighter: &mut CpuRelighter,
@@ -158,13 +156,9 @@ impl EvaluateReport {
         }
         let [read, all] = [self.read_bytes, self.file_bytes].map(format_bytes);
         let (complete, scans) = (self.read_scans, self.scans);
-        match self.read_bytes < self.file_bytes {
-            true => line(
-                "File",
-                &format!("the first {read} of {all}: {complete} of {scans} scans complete"),
-            ),
-            false => line("File", &all),
-        }
+        let part = format!("the first {read} of {all}: {complete} of {scans} scans complete");
+        let is_part = self.read_bytes < self.file_bytes;
+        line("File", if is_part { &part } else { &all })
     }
 }
 

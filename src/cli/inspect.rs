@@ -1,6 +1,5 @@
 //! `ltm-export inspect`: the file index of an `.ltm` file.
 
-use std::cmp::Ordering;
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -100,15 +99,15 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     let declared = index.header.file_bytes;
     let length = file.metadata().map_or(declared, |file| file.len());
     let name = args.file.display();
-    match length.cmp(&declared) {
-        Ordering::Less => eprintln!(
+    if length < declared {
+        eprintln!(
             "warning: {name}: is cut short after {length} of {declared} bytes; copy or download it again"
-        ),
-        Ordering::Equal => {}
-        Ordering::Greater => eprintln!(
+        );
+    } else if length > declared {
+        eprintln!(
             "warning: {name}: has {length} bytes, but the photograph ends after {declared}; the rest is \
              ignored"
-        ),
+        );
     }
     let geometry = &index.header.geometry;
     // Whether a tile has factored chunks, and direct chunks.
@@ -121,9 +120,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
             largest_chunk_bytes = largest_chunk_bytes.max((range.end - range.start) as u32);
         }
     }
-    let count = |is_counted: fn(&[bool; 2]) -> bool| {
-        has_chunks.iter().filter(|tile| is_counted(tile)).count()
-    };
+    let count = |is_counted: fn(&&[bool; 2]) -> bool| has_chunks.iter().filter(is_counted).count();
     let report = InspectReport {
         camera: [geometry.camera.width, geometry.camera.height],
         light: [geometry.light.width, geometry.light.height],
@@ -131,7 +128,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         correspondence: geometry.correspondence.affine,
         tile_side: geometry.tile_side,
         tiles: index.tiles(),
-        dark_tiles: count(|tile| *tile == [false; 2]),
+        dark_tiles: count(|tile| **tile == [false; 2]),
         direct_tiles: count(|tile| tile[1]),
         factored_tiles: count(|tile| tile[0]),
         rank: Some(index.header.rank).filter(|&rank| rank > 0),
@@ -143,15 +140,17 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         file_bytes: index.header.file_bytes,
         metadata: index.metadata.read()?,
     };
-    if args.json {
-        return print_json(&report);
+    match args.json {
+        true => print_json(&report),
+        false => print(&report),
     }
-    print(&report)
 }
 
 fn print(report: &InspectReport) -> Result<()> {
+    let line = |name: &str, value: &str| print_line(&format!("{name:15} {value}"));
     let [a, b] = report.correspondence;
     let [camera, light] = [report.camera, report.light].map(|[w, h]| format!("{w}x{h}"));
+    let rank = report.rank.map(|rank| rank.to_string());
     let metadata = &report.metadata;
     let tiles = format!(
         "{} of {1}x{1} pixels: {2} direct, {3} factored, {4} dark",
@@ -170,16 +169,13 @@ fn print(report: &InspectReport) -> Result<()> {
         ("window", format!("{0}x{0}", report.window)),
         ("correspondence", format!("u = {a:?}, v = {b:?}")),
         ("tiles", tiles),
-        (
-            "rank",
-            report.rank.map_or(String::new(), |rank| rank.to_string()),
-        ),
+        ("rank", rank.unwrap_or_default()),
         ("recovered", format_recovery(metadata)),
         ("written by", metadata.writer.clone()),
         ("file index", format_bytes(report.index_bytes)),
     ] {
         if !value.is_empty() {
-            print_line(&format!("{name:15} {value}"))?;
+            line(name, &value)?;
         }
     }
     if !report.scans.is_empty() {
@@ -189,11 +185,7 @@ fn print(report: &InspectReport) -> Result<()> {
         ))?;
     }
     report.scans.iter().try_for_each(ScanReport::print)?;
-    print_line(&format!(
-        "{:15} {}",
-        "file",
-        format_bytes(report.file_bytes)
-    ))
+    line("file", &format_bytes(report.file_bytes))
 }
 
 /// For instance "learned from 54 patterns".

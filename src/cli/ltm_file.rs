@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
+use std::num::ParseFloatError;
 use std::ops::Range;
 use std::path::Path;
 
@@ -9,11 +10,10 @@ use anyhow::{Context, Result, anyhow, ensure};
 
 use super::arguments::ByteCount;
 use crate::format::{
-    ChunkSelection, FileIndex, FileSection, FormatError, HEADER_BYTES, Limits, LtmReader,
+    ChunkSelection, FileIndex, FileSection, FormatError, HEADER_BYTES, Limits, LtmReader, Progress,
 };
 use crate::transport::Transport;
 
-/// Bytes read at a time.
 const READ_BYTES: usize = 1 << 20;
 /// More than in browsers, as a workstation has more memory than a tab.
 const LIMITS: Limits = Limits {
@@ -24,10 +24,7 @@ const LIMITS: Limits = Limits {
 pub struct LtmFile {
     pub index: FileIndex,
     pub transport: Transport,
-    /// Bytes read.
-    pub bytes: u64,
-    /// Scans read completely, for all tiles.
-    pub scans: usize,
+    pub progress: Progress,
 }
 
 /// Reads and checks an `.ltm` file, or its prefix `first`.
@@ -60,14 +57,12 @@ pub fn read_ltm(path: &Path, first: Option<PrefixLength>) -> Result<LtmFile> {
         Ok(LtmFile {
             index,
             transport,
-            bytes: progress.bytes,
-            scans: progress.scans,
+            progress,
         })
     };
     read().with_context(|| path.display().to_string())
 }
 
-/// Feeds the whole of `file` to `reader`.
 fn feed_all(reader: &mut LtmReader, mut file: impl Read) -> Result<()> {
     let mut buffer = vec![0; READ_BYTES];
     let mut offset = 0;
@@ -143,15 +138,12 @@ pub enum PrefixLength {
 impl PrefixLength {
     /// Parses `20000`, `20K` or `10%`.
     pub fn parse(text: &str) -> Result<Self, String> {
-        match text.strip_suffix('%') {
-            Some(number) => {
-                let percent = number.parse::<f64>().map_err(|e| e.to_string())?;
-                match (0.0..=100.0).contains(&percent) {
-                    true => Ok(Self::Percent(percent)),
-                    false => Err("give a number from 0% to 100%".to_owned()),
-                }
-            }
-            None => Ok(Self::Bytes(ByteCount::parse(text)?.0)),
+        let Some(number) = text.strip_suffix('%') else {
+            return Ok(Self::Bytes(ByteCount::parse(text)?.0));
+        };
+        match number.parse().map_err(|e: ParseFloatError| e.to_string())? {
+            percent if (0.0..=100.0).contains(&percent) => Ok(Self::Percent(percent)),
+            _ => Err("give a number from 0% to 100%".to_owned()),
         }
     }
 

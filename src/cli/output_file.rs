@@ -26,7 +26,6 @@ pub fn temporary_beside(path: &Path, mode: u32) -> (tempfile::Builder<'static, '
     (builder, folder)
 }
 
-/// A file format that commands write.
 #[derive(Debug)]
 pub struct OutputFormat {
     /// With its article.
@@ -37,7 +36,6 @@ pub struct OutputFormat {
     signature: &'static [(usize, &'static [u8])],
 }
 
-/// A relightable photograph.
 pub const LTM: OutputFormat = OutputFormat {
     name: "an .ltm file",
     extension: None,

@@ -6,15 +6,16 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::output_file::temporary_beside;
 
+const CANNOT_CREATE: &str =
+    "cannot be created; does its parent folder exist, and may you write there?";
+
 /// Calls `fill` with a temporary folder beside `path` and renames it to `path` when `fill` succeeds. `path` must not
 /// exist or be an empty folder.
 pub fn write_atomically(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let write = || -> Result<()> {
         ensure_free(path)?;
         let (builder, parent) = temporary_beside(path, 0o777);
-        let folder = builder
-            .tempdir_in(parent)
-            .context("cannot be created; does its parent folder exist, and may you write there?")?;
+        let folder = builder.tempdir_in(parent).context(CANNOT_CREATE)?;
         fill(folder.path())?;
         // Checked again, as filling takes a while. `remove_dir` refuses a folder that is not empty.
         ensure_free(path)?;
@@ -32,16 +33,14 @@ pub fn write_atomically(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> 
 /// Creates the folder `path`, or takes an empty one, and calls `fill` with it. If `fill` fails, the files it wrote
 /// stay: the results of hours may be among them.
 pub fn write_in_place(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    ensure_free(path)
-        .and_then(|()| {
-            if path.is_dir() {
-                return Ok(());
-            }
-            std::fs::create_dir(path).context(
-                "cannot be created; does its parent folder exist, and may you write there?",
-            )
-        })
-        .with_context(|| path.display().to_string())?;
+    let create = || -> Result<()> {
+        ensure_free(path)?;
+        if !path.is_dir() {
+            std::fs::create_dir(path).context(CANNOT_CREATE)?;
+        }
+        Ok(())
+    };
+    create().with_context(|| path.display().to_string())?;
     fill(path)
 }
 

@@ -6,11 +6,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 /// A spinner for work of unknown length.
 pub fn spinner(task: &'static str) -> ProgressBar {
-    let bar = styled(
-        ProgressBar::new_spinner(),
-        task,
-        "{msg:12} {spinner} {elapsed}",
-    );
+    let template = "{msg:12} {spinner} {elapsed}";
+    let bar = styled(ProgressBar::new_spinner(), task, template);
     bar.enable_steady_tick(Duration::from_millis(100));
     bar
 }

@@ -49,7 +49,6 @@ pub struct RelightArgs {
     output: PathBuf,
 }
 
-/// Values of `--backend`.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum BackendName {
     /// Single precision, fast
@@ -83,11 +82,9 @@ pub fn run(args: &RelightArgs) -> Result<()> {
     let output = OutputFile::create(&args.output, &PNG)?;
     let file = read_ltm(&args.file, args.first)?;
     if args.first.is_some() {
+        let (bytes, complete) = (file.progress.bytes, file.progress.scans);
         let scans = file.index.scans.len();
-        eprintln!(
-            "note: {} of {scans} scans are complete in these {} bytes",
-            file.scans, file.bytes
-        );
+        eprintln!("note: {complete} of {scans} scans are complete in these {bytes} bytes");
     }
     let geometry = &file.index.header.geometry;
     let light = match (args.at, args.time) {

@@ -3,7 +3,11 @@
 use anyhow::{Context, Error, Result};
 use rayon::prelude::*;
 
-use crate::capture::{CaptureError, CaptureFolder, DarkFrame, Measurements, PhotoReader, RowSet};
+use super::progress;
+use crate::capture::{
+    CaptureError, CaptureFolder, DarkFrame, Measurements, NoiseModel, PhotoReader, RowSet,
+};
+use crate::executor::Executor;
 
 /// Reads the patterns of `shots` and the correspondence, by `gray_code_rows` of the Gray code if the manifest does not
 /// give it. The measurements have no camera rows yet.
@@ -67,10 +71,23 @@ impl<'a> ShotReader<'a> {
         Ok(())
     }
 
-    /// Reads the rest of all files, which checks that they are whole. Returns the number of saturated samples in the
-    /// photographs.
-    pub fn finish(self) -> Result<usize, CaptureError> {
+    /// Loads `rows`, estimates the noise from them, and reads the rest of all files, which checks that they are whole.
+    /// Returns the number of saturated samples in the photographs.
+    pub fn read_sample(
+        mut self,
+        measurements: &mut Measurements,
+        rows: &RowSet,
+        executor: &impl Executor,
+    ) -> Result<usize> {
+        let bar = progress::bar("reading", self.photos.len());
+        self.load_rows(measurements, rows, || {
+            bar.inc(1);
+            Ok(executor.check_cancelled()?)
+        })?;
+        drop(bar);
         let saturated = self.photos.into_par_iter().map(PhotoReader::finish);
-        saturated.try_reduce(|| 0, |a, b| Ok(a + b))
+        let saturated = saturated.try_reduce(|| 0, |a, b| Ok(a + b))?;
+        measurements.noise = NoiseModel::with_gain_from(measurements);
+        Ok(saturated)
     }
 }

@@ -26,9 +26,7 @@ use crate::transport::{CHANNELS, CameraPx, Extent, TileRect, TransportFunctions}
 
 /// Camera rows whose transport is computed as one job.
 const STRIP_ROWS: u32 = 4;
-/// Range of the sides of the camera grid.
 const CAMERA_SIDES: RangeInclusive<u32> = 8..=1024;
-/// Range of the sides of the light plane.
 const LIGHT_SIDES: RangeInclusive<u32> = 4..=512;
 /// File names have four digits.
 const MAX_PATTERNS: i64 = 10_000;
@@ -104,30 +102,29 @@ pub fn run(args: &SimulateArgs) -> Result<()> {
     Ok(())
 }
 
-/// What to write of the object under one light.
-enum SimulatedPicture {
-    /// A photograph with noise, to this path, and the light's codes, if it is a pattern, to another.
-    Photograph(String, Option<String>),
-    /// The true picture under a truth light.
-    Truth(&'static str),
-}
-
-/// Everything to photograph.
-struct CapturePlan {
+struct CapturePlan<'a> {
+    args: &'a SimulateArgs,
     scene: Box<dyn SimulatedScene>,
-    camera: Camera,
-    seed: u64,
     manifest: Manifest,
-    /// All lights.
     lights: Vec<LightCodes>,
-    /// For each light, what to write.
-    kinds: Vec<SimulatedPicture>,
+    /// One for each light.
+    pictures: Vec<PictureFiles>,
 }
 
-impl CapturePlan {
-    fn new(args: &SimulateArgs) -> Result<Self> {
+/// The files to write of the object under one light.
+struct PictureFiles {
+    /// The true picture under a truth light, or else a photograph with noise.
+    picture: String,
+    is_true: bool,
+    /// The codes of a pattern or truth light.
+    codes: Option<String>,
+}
+
+impl<'a> CapturePlan<'a> {
+    fn new(args: &'a SimulateArgs) -> Result<Self> {
         let scene = args.scene.build(args.camera, args.light)?;
         let mut plan = Self {
+            args,
             manifest: Manifest {
                 version: 1,
                 light: LightSpec {
@@ -148,28 +145,18 @@ impl CapturePlan {
                 ..Manifest::default()
             },
             scene,
-            camera: Camera {
-                electrons: args.electrons as f64,
-            },
-            seed: args.seed,
             lights: Vec::new(),
-            kinds: Vec::new(),
+            pictures: Vec::new(),
         };
         // Calibration first, so that the noise of a shot does not depend on the number of shots.
         for (name, code) in [("dark", 0), ("flood", 255)] {
             let codes = LightCodes::uniform(args.light, code);
-            plan.add(
-                codes,
-                SimulatedPicture::Photograph(format!("photos/{name}.png"), None),
-            );
+            plan.photograph(codes, format!("photos/{name}.png"), None);
         }
         for code in GrayCodePattern::all(args.light) {
             let sign = if code.inverted { 'n' } else { 'p' };
             let photo = format!("graycode/{}{}{sign}.png", code.axis, code.bit);
-            plan.add(
-                code.codes(args.light),
-                SimulatedPicture::Photograph(photo.clone(), None),
-            );
+            plan.photograph(code.codes(args.light), photo.clone(), None);
             plan.manifest.graycode.push(GrayCodeShot {
                 photo,
                 axis: code.axis,
@@ -182,10 +169,7 @@ impl CapturePlan {
             let mut stream = RandomStream::Pattern(i).start(args.seed);
             let codes = ensemble.draw(args.light, &mut stream);
             let (pattern, photo) = (format!("patterns/{i:04}.png"), format!("photos/{i:04}.png"));
-            plan.add(
-                codes,
-                SimulatedPicture::Photograph(photo.clone(), Some(pattern.clone())),
-            );
+            plan.photograph(codes, photo.clone(), Some(pattern.clone()));
             plan.manifest.shots.push(Shot {
                 pattern,
                 photo,
@@ -193,14 +177,23 @@ impl CapturePlan {
             });
         }
         for (name, codes) in truth_lights(args.light) {
-            plan.add(codes, SimulatedPicture::Truth(name));
+            plan.lights.push(codes);
+            plan.pictures.push(PictureFiles {
+                picture: format!("truth/relit_{name}.png"),
+                is_true: true,
+                codes: Some(format!("truth/light_{name}.png")),
+            });
         }
         Ok(plan)
     }
 
-    fn add(&mut self, codes: LightCodes, kind: SimulatedPicture) {
-        self.lights.push(codes);
-        self.kinds.push(kind);
+    fn photograph(&mut self, light: LightCodes, picture: String, codes: Option<String>) {
+        self.lights.push(light);
+        self.pictures.push(PictureFiles {
+            picture,
+            is_true: false,
+            codes,
+        });
     }
 }
 
@@ -211,27 +204,30 @@ fn write(plan: &CapturePlan, root: &Path) -> Result<()> {
     }
     let json = serde_json::to_string_pretty(&plan.manifest)?;
     std::fs::write(root.join(MANIFEST_NAME), json + "\n").context(MANIFEST_NAME)?;
-    let (camera, light) = (plan.manifest.camera.extent(), plan.manifest.light.extent());
+    let (camera, light) = (plan.args.camera, plan.args.light);
+    let sensor = Camera {
+        electrons: plan.args.electrons as f64,
+    };
     let pictures = write_transport(plan, &root.join("truth"))?;
     let bar = progress::bar("photographing", pictures.len());
     let write_picture = |i: usize| -> Result<()> {
-        let (picture, codes) = (&pictures[i], &plan.lights[i]);
-        match &plan.kinds[i] {
-            SimulatedPicture::Photograph(photo, pattern) => {
-                let mut noise = RandomStream::Photograph(i as u32).start(plan.seed);
-                let photographed = plan.camera.photograph(picture, &mut noise);
-                write_rgb16(&root.join(photo), camera, &photographed)?;
-                if let Some(pattern) = pattern {
-                    write_codes(&root.join(pattern), light, codes)?;
-                }
-            }
-            SimulatedPicture::Truth(name) => {
-                let path = |kind| root.join(format!("truth/{kind}_{name}.png"));
-                let code = |y: f32| (f64::from(y) * RELIT_FULL_SCALE).round() as u16;
-                let relit: Vec<_> = picture.iter().map(|y| y.map(code)).collect();
-                write_rgb16(&path("relit"), camera, &relit)?;
-                write_codes(&path("light"), light, codes)?;
-            }
+        let (picture, files) = (&pictures[i], &plan.pictures[i]);
+        let samples: Vec<_> = if files.is_true {
+            let code = |y: f32| (f64::from(y) * RELIT_FULL_SCALE).round() as u16;
+            picture.iter().map(|y| y.map(code)).collect()
+        } else {
+            let mut noise = RandomStream::Photograph(i as u32).start(plan.args.seed);
+            sensor.photograph(picture, &mut noise)
+        };
+        // The encoder expects native-endian samples.
+        let (path, bytes) = (root.join(&files.picture), bytemuck::cast_slice(&samples));
+        write_png(&path, camera, bytes, ExtendedColorType::Rgb16)?;
+        if let Some(path) = &files.codes {
+            let (bytes, color) = match &plan.lights[i] {
+                LightCodes::Grey(codes) => (&codes[..], ExtendedColorType::L8),
+                LightCodes::Rgb(codes) => (codes.as_flattened(), ExtendedColorType::Rgb8),
+            };
+            write_png(&root.join(path), light, bytes, color)?;
         }
         bar.inc(1);
         Ok(())
@@ -298,7 +294,6 @@ fn round_to_f16(functions: &mut TransportFunctions) -> Vec<f16> {
     functions.tau.iter_mut().flatten().map(round).collect()
 }
 
-/// Creates a NumPy file and writes its header.
 fn create_npy<T: npyz::AutoSerialize>(
     path: &Path,
     shape: &[u64],
@@ -311,27 +306,12 @@ fn create_npy<T: npyz::AutoSerialize>(
     create().with_context(|| path.display().to_string())
 }
 
-fn write_rgb16(path: &Path, extent: Extent, codes: &[[u16; CHANNELS]]) -> Result<()> {
-    // The encoder expects native-endian samples.
-    let bytes = bytemuck::cast_slice(codes);
-    write_png(path, extent, bytes, ExtendedColorType::Rgb16)
-}
-
-fn write_codes(path: &Path, extent: Extent, codes: &LightCodes) -> Result<()> {
-    match codes {
-        LightCodes::Grey(codes) => write_png(path, extent, codes, ExtendedColorType::L8),
-        LightCodes::Rgb(codes) => {
-            write_png(path, extent, codes.as_flattened(), ExtendedColorType::Rgb8)
-        }
-    }
-}
-
-fn write_png(path: &Path, extent: Extent, bytes: &[u8], kind: ExtendedColorType) -> Result<()> {
+fn write_png(path: &Path, extent: Extent, bytes: &[u8], color: ExtendedColorType) -> Result<()> {
     let write = || -> Result<()> {
         let mut file = BufWriter::new(File::create(path)?);
         // Photographs are mostly noise, which no level compresses well.
         PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Sub)
-            .write_image(bytes, extent.width, extent.height, kind)?;
+            .write_image(bytes, extent.width, extent.height, color)?;
         Ok(file.flush()?)
     };
     write().with_context(|| path.display().to_string())

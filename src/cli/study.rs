@@ -6,10 +6,10 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 
+use super::output_folder;
 use super::process::AllCoresExecutor;
 use super::shot_reader::{ShotReader, read_patterns};
-use super::{output_folder, progress};
-use crate::capture::{CaptureFolder, Measurements, NoiseModel, RowSet};
+use crate::capture::{CaptureFolder, Measurements, RowSet};
 use crate::relight::Light;
 use crate::simulate::{SceneKind, SimulatedScene, WINDOW_SIDE};
 use crate::study::{
@@ -18,7 +18,6 @@ use crate::study::{
 };
 use crate::transport::Extent;
 
-/// The built-in parts of the study.
 const PARTS: [&str; 4] = ["stained-glass", "cookies", "comparison", "scenes"];
 /// The paper's scale for glass: N = 262,144 and M = 65,536.
 const PAPER_CAMERA: Extent = Extent::new(512, 512);
@@ -32,6 +31,7 @@ const RELIT_PATTERNS: usize = 80;
 const DEFAULT_PIXELS: usize = 8192;
 const ELECTRONS: f64 = 40_000.0;
 const SEED: u64 = 2014;
+const CORES: &AllCoresExecutor = &AllCoresExecutor;
 
 const INTRODUCTION: &str = "# Results\n\n\
     SNR is 20 log10(‖T‖ / ‖T − T̂‖) over the whole matrix, with Frobenius norms; elements outside the \
@@ -79,16 +79,13 @@ pub fn run(args: &StudyArgs) -> Result<()> {
                 DEFAULT_PIXELS => String::new(),
                 other => format!(" --pixels {other}"),
             };
-            text += &format!(
-                "\nFrom `ltm-export study {} -o DIR{option}`:\n",
-                subject.name
-            );
+            let name = &subject.name;
+            text += &format!("\nFrom `ltm-export study {name} -o DIR{option}`:\n");
             for section in subject.study()? {
                 for (path, bytes) in &section.files {
                     write(&root.join(path), bytes)?;
                 }
-                text += "\n";
-                text += &section.markdown;
+                text += &format!("\n{}", section.markdown);
             }
             text += &format!(
                 "\nThis took {:.0} s on {} threads.\n",
@@ -104,14 +101,12 @@ pub fn run(args: &StudyArgs) -> Result<()> {
     Ok(())
 }
 
-/// A part of the study, or a capture to study.
+/// A built-in part of the study, or a capture to study.
 struct StudySubject<'a> {
     /// The name of a part, or the path of a capture folder; of one named like a part, for instance `./cookies`.
     path: &'a Path,
     is_part: bool,
-    /// Name of its results.
     name: String,
-    /// `--pixels`.
     pixels: usize,
     progress: ProgressCallback<'a>,
 }
@@ -147,27 +142,20 @@ impl<'a> StudySubject<'a> {
         match self.name.as_str() {
             "stained-glass" => self.study_scene(SceneKind::StainedGlass),
             "cookies" => self.study_scene(SceneKind::Cookies),
-            "comparison" => [SceneKind::StainedGlass, SceneKind::Cookies]
-                .into_iter()
-                .zip(PARTS)
-                .map(|(kind, name)| {
+            "comparison" => {
+                let kinds = [SceneKind::StainedGlass, SceneKind::Cookies].into_iter();
+                let compare = |(kind, name): (SceneKind, &str)| {
                     let scene = kind.build(COMPARISON_CAMERA, COMPARISON_LIGHT)?;
-                    let camera = scene_camera(scene.as_ref());
-                    let ensemble = kind.ensemble();
-                    Ok(study::comparison(
-                        name,
-                        camera,
-                        ensemble,
-                        &AllCoresExecutor,
-                        self.progress,
-                    )?)
-                })
-                .collect(),
-            _ => Ok(vec![study::scenes_table(
-                self.pixels,
-                &AllCoresExecutor,
-                self.progress,
-            )?]),
+                    let (camera, ensemble) = (scene_camera(scene.as_ref()), kind.ensemble());
+                    let section = study::comparison(name, camera, ensemble, CORES, self.progress)?;
+                    Ok(section)
+                };
+                kinds.zip(PARTS).map(compare).collect()
+            }
+            _ => {
+                let section = study::scenes_table(self.pixels, CORES, self.progress)?;
+                Ok(vec![section])
+            }
         }
     }
 
@@ -180,7 +168,7 @@ impl<'a> StudySubject<'a> {
             self.name
         ));
         let camera = scene_camera(scene.as_ref());
-        let measurements = camera.measure(kind.ensemble(), max_patterns, &AllCoresExecutor);
+        let measurements = camera.measure(kind.ensemble(), max_patterns, CORES);
         let lights = study::built_in_lights(PAPER_LIGHT);
         self.figures(&camera, measurements, lights)
     }
@@ -206,34 +194,18 @@ impl<'a> StudySubject<'a> {
         self.figures(&known, measurements, lights)
     }
 
-    /// All figures for one scene or capture.
     fn figures(
         &self,
         known: &impl KnownTransport,
         measurements: Measurements,
         lights: Vec<RelitLight>,
     ) -> Result<Vec<ReportSection>> {
-        let (name, progress) = (&self.name, self.progress);
-        let sparsity = study::sparsity(name, known, &AllCoresExecutor, progress)?;
-        let relit_from = study::first_shots(&measurements, RELIT_PATTERNS);
-        let relit = study::relit_pictures(
-            name,
-            known,
-            &relit_from,
-            lights,
-            &AllCoresExecutor,
-            progress,
-        )?;
-        drop(relit_from);
-        let pixels = self.pixels;
-        let curves = study::snr_curves(
-            name,
-            known,
-            measurements,
-            pixels,
-            &AllCoresExecutor,
-            progress,
-        )?;
+        let (name, pixels, progress) = (&self.name, self.pixels, self.progress);
+        let sparsity = study::sparsity(name, known, CORES, progress)?;
+        let first = study::first_shots(&measurements, RELIT_PATTERNS);
+        let relit = study::relit_pictures(name, known, &first, lights, CORES, progress)?;
+        drop(first);
+        let curves = study::snr_curves(name, known, measurements, pixels, CORES, progress)?;
         Ok(vec![sparsity, curves, relit])
     }
 }
@@ -246,21 +218,13 @@ fn scene_camera(scene: &dyn SimulatedScene) -> SceneCamera<'_> {
     }
 }
 
-/// Reads all rows of all shots.
 fn read_measurements(folder: &CaptureFolder) -> Result<Measurements> {
     let shots: Vec<usize> = (0..folder.manifest().shots.len()).collect();
     let rows = RowSet::all(folder.manifest().camera.height);
     let dark = folder.read_dark()?;
     let mut measurements = read_patterns(folder, &dark, &shots, &rows)?;
-    let mut reader = ShotReader::open(folder, &dark, &shots)?;
-    let bar = progress::bar("reading", shots.len());
-    reader.load_rows(&mut measurements, &rows, || {
-        bar.inc(1);
-        Ok(())
-    })?;
-    drop(bar);
-    reader.finish()?;
-    measurements.noise = NoiseModel::with_gain_from(&measurements);
+    let reader = ShotReader::open(folder, &dark, &shots)?;
+    reader.read_sample(&mut measurements, &rows, CORES)?;
     Ok(measurements)
 }
 

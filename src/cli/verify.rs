@@ -25,7 +25,6 @@ pub struct VerifyArgs {
 #[derive(Default, Serialize)]
 struct VerifyReport {
     ok: bool,
-    /// The first error.
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
     /// The first bad part, and how many there are.
@@ -58,18 +57,13 @@ pub fn run(args: &VerifyArgs) -> Result<()> {
     let result = verify(args, &mut report);
     report.ok = result.is_ok();
     report.error = result.as_ref().err().map(|e| format!("{e:#}"));
-    match report.contents {
-        _ if args.json => print_json(&report)?,
-        Some(FileContents {
-            tiles,
-            scans,
-            file_bytes,
-        }) if report.ok => print_line(&format!(
-            "{}: intact, {tiles} tiles in {scans} scans, {}",
-            args.file.display(),
-            format_bytes(file_bytes)
-        ))?,
-        _ => {}
+    if args.json {
+        print_json(&report)?;
+    } else if let (true, Some(contents)) = (report.ok, &report.contents) {
+        let (tiles, scans) = (contents.tiles, contents.scans);
+        let (file, bytes) = (args.file.display(), format_bytes(contents.file_bytes));
+        let text = format!("{file}: intact, {tiles} tiles in {scans} scans, {bytes}");
+        print_line(&text)?;
     }
     result
 }
@@ -92,13 +86,12 @@ fn verify(args: &VerifyArgs, report: &mut VerifyReport) -> Result<()> {
             first.get_or_insert((part, error));
         }
     }
-    if let Some((ChunkId { scan, tile }, error)) = first {
-        let bytes = index.range(ChunkId { scan, tile });
+    if let Some((chunk, error)) = first {
+        let bytes = index.range(chunk);
         let (bad, parts) = (report.bad_parts, index.chunks().count());
-        let at = format!(
-            "{bad} of {parts} parts are bad, the first at bytes {} to {}",
-            bytes.start, bytes.end
-        );
+        let Range { start, end } = bytes;
+        let at = format!("{bad} of {parts} parts are bad, the first at bytes {start} to {end}");
+        let ChunkId { scan, tile } = chunk;
         report.bad = Some(DamagedChunk { scan, tile, bytes });
         return Err(anyhow::Error::new(error).context(at).context(name()));
     }

@@ -21,14 +21,22 @@ type PngReader = png::Reader<BufReader<ReopenedFile>>;
 
 /// A PNG and what the manifest says of it.
 pub(super) struct ImageFile {
-    pub path: PathBuf,
+    path: PathBuf,
     /// The size it must have.
-    pub extent: Extent,
+    extent: Extent,
     /// The field of the manifest that names it, for messages.
-    pub field: Option<String>,
+    field: Option<String>,
 }
 
 impl ImageFile {
+    pub fn new(path: PathBuf, extent: Extent, field: Option<String>) -> Self {
+        Self {
+            path,
+            extent,
+            field,
+        }
+    }
+
     /// Reads an 8-bit pattern; `emission` is that of each code.
     pub fn read_pattern(&self, emission: &[f64; 256]) -> Result<Pattern, CaptureError> {
         // Some programs store black and white in one bit, or in a palette.
@@ -41,15 +49,8 @@ impl ImageFile {
         let mut codes = vec![0; channels * self.extent.area()];
         let decoded = reader.next_frame(&mut codes);
         decoded.map_err(|e| self.unreadable(e))?;
-        let emitted = |code: &u8| emission[usize::from(*code)] as f32;
-        let plane = |c| {
-            codes
-                .iter()
-                .skip(c)
-                .step_by(channels)
-                .map(emitted)
-                .collect()
-        };
+        let emit = |code: &u8| emission[usize::from(*code)] as f32;
+        let plane = |c| codes.iter().skip(c).step_by(channels).map(emit).collect();
         Ok(match channels {
             1 => Pattern::Grey(plane(0)),
             _ => Pattern::Rgb(std::array::from_fn(plane)),
@@ -98,10 +99,8 @@ impl ImageFile {
     }
 
     fn unreadable(&self, reason: impl Display) -> CaptureError {
-        let reason = reason.to_string();
-        self.error(CaptureProblem::Unreadable(
-            reason.trim_end_matches('.').to_owned(),
-        ))
+        let reason = reason.to_string().trim_end_matches('.').to_owned();
+        self.error(CaptureProblem::Unreadable(reason))
     }
 
     fn error(&self, problem: CaptureProblem) -> CaptureError {

@@ -14,12 +14,12 @@ pub use self::truth::{GroundTruth, RELIT_FULL_SCALE};
 
 use self::image_file::ImageFile;
 use super::error::{CaptureError, CaptureProblem, MANIFEST_NAME};
-use super::manifest::Manifest;
+use super::manifest::{GrayCodeShot, Manifest};
 use super::measurements::{LinearPhoto, Measurements, Pattern};
 use super::noise_model::NoiseModel;
 use super::rows::RowSet;
 use crate::calibrate::{BitPair, GrayCodePhotos, LightPlaneAxis};
-use crate::transport::{CHANNELS, Correspondence, Extent};
+use crate::transport::{CHANNELS, Correspondence};
 
 /// A capture folder with its checked manifest.
 #[derive(Debug)]
@@ -70,18 +70,13 @@ impl CaptureFolder {
 
     /// Names and paths of all files that recovery from `shots` reads.
     pub fn files(&self, shots: &[usize]) -> Vec<(&str, PathBuf)> {
-        let Manifest {
-            dark,
-            correspondence,
-            graycode,
-            ..
-        } = &self.manifest;
-        let shots = shots.iter().map(|&i| &self.manifest.shots[i]);
+        let manifest = &self.manifest;
+        let shots = shots.iter().map(|&i| &manifest.shots[i]);
         let mut names = vec![MANIFEST_NAME];
-        names.extend(dark.as_deref());
+        names.extend(manifest.dark.as_deref());
         names.extend(shots.flat_map(|shot| [shot.pattern.as_str(), &shot.photo]));
-        if correspondence.is_none() {
-            names.extend(graycode.iter().map(|shot| shot.photo.as_str()));
+        if manifest.correspondence.is_none() {
+            names.extend(manifest.graycode.iter().map(|shot| shot.photo.as_str()));
         }
         let path = |name| (name, self.root.join(name));
         names.into_iter().map(path).collect()
@@ -123,10 +118,9 @@ impl CaptureFolder {
     ) -> Result<Vec<BitPair>, CaptureError> {
         let read = |bit, inverted| {
             let mut shots = self.manifest.graycode.iter().enumerate();
-            let shot = shots.find(|(_, shot)| {
-                shot.axis == axis && shot.bit == bit && shot.inverted == inverted
-            });
-            let Some((i, shot)) = shot else {
+            let bit_of = |shot: &GrayCodeShot| (shot.axis, shot.bit, shot.inverted);
+            let found = shots.find(|(_, shot)| bit_of(shot) == (axis, bit, inverted));
+            let Some((i, shot)) = found else {
                 let problem = CaptureProblem::MissingGrayCode {
                     axis,
                     bit,
@@ -160,7 +154,8 @@ impl CaptureFolder {
         let light = match &self.manifest.dark {
             None => vec![[0.0; CHANNELS]; camera.extent().area()],
             Some(name) => {
-                let file = self.image_file(name, camera.extent(), "dark".to_owned());
+                let (path, field) = (self.root.join(name), Some("dark".to_owned()));
+                let file = ImageFile::new(path, camera.extent(), field);
                 let codes = file.read_rgb16()?.into_iter();
                 let linear = |code| camera.linear(code, 1.0);
                 codes.map(|codes| codes.map(linear)).collect()
@@ -209,10 +204,9 @@ impl CaptureFolder {
     /// # Panics
     /// If there is no such shot.
     pub fn read_pattern(&self, i: usize) -> Result<Pattern, CaptureError> {
-        let name = &self.manifest.shots[i].pattern;
-        let field = format!("shots[{i}].pattern");
-        let file = self.image_file(name, self.manifest.light.extent(), field);
-        file.read_pattern(&self.emission)
+        let path = self.root.join(&self.manifest.shots[i].pattern);
+        let (light, field) = (self.manifest.light.extent(), format!("shots[{i}].pattern"));
+        ImageFile::new(path, light, Some(field)).read_pattern(&self.emission)
     }
 
     /// Measurements of `shots` without any camera rows yet. Their noise has only its floor.
@@ -249,7 +243,7 @@ impl CaptureFolder {
         dark: &'a DarkFrame,
     ) -> Result<PhotoReader<'a>, CaptureError> {
         let camera = &self.manifest.camera;
-        let file = self.image_file(name, camera.extent(), field);
+        let file = ImageFile::new(self.root.join(name), camera.extent(), Some(field));
         Ok(PhotoReader {
             camera,
             dark,
@@ -258,13 +252,5 @@ impl CaptureFolder {
             next_row: 0,
             saturated_samples: 0,
         })
-    }
-
-    fn image_file(&self, name: &str, extent: Extent, field: String) -> ImageFile {
-        ImageFile {
-            path: self.root.join(name),
-            extent,
-            field: Some(field),
-        }
     }
 }

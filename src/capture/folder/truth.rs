@@ -106,8 +106,8 @@ impl GroundTruth {
     /// # Errors
     /// If its picture cannot be read.
     pub fn light(&self, name: &str) -> Result<Pattern, CaptureError> {
-        let file = self.picture(format!("light_{name}.png"), self.light_plane);
-        file.read_pattern(&self.emission)
+        let path = self.root.join(format!("light_{name}.png"));
+        ImageFile::new(path, self.light_plane, None).read_pattern(&self.emission)
     }
 
     /// The true picture under light `name`, `[N]`, in units of the measurement.
@@ -115,18 +115,11 @@ impl GroundTruth {
     /// # Errors
     /// If it cannot be read.
     pub fn relit(&self, name: &str) -> Result<Vec<[f64; CHANNELS]>, CaptureError> {
-        let file = self.picture(format!("relit_{name}.png"), self.camera);
-        let linear = |code| f64::from(code) / RELIT_FULL_SCALE;
+        let path = self.root.join(format!("relit_{name}.png"));
+        let file = ImageFile::new(path, self.camera, None);
         let codes = file.read_rgb16()?.into_iter();
+        let linear = |code| f64::from(code) / RELIT_FULL_SCALE;
         Ok(codes.map(|codes| codes.map(linear)).collect())
-    }
-
-    fn picture(&self, name: String, extent: Extent) -> ImageFile {
-        ImageFile {
-            path: self.root.join(name),
-            extent,
-            field: None,
-        }
     }
 }
 

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use crate::cli::arguments::{ByteCount, parse_number};
 use crate::format::{DistortionMetric, HEADER_BYTES, RateTarget};
-use crate::recover::{Method, SparsityBasis, WindowEstimate};
+use crate::recover::{Method, SparsityBasis};
 use crate::transport::{Decibels, Window};
 
 /// Enough for about ten megapixels under 80 patterns. A constant, not a share of the machine's memory, so that the same
@@ -33,7 +33,7 @@ pub struct RecoverArgs {
     method: MethodName,
     /// Basis in which --method bpdn finds sparse light transport functions [default: identity]
     #[arg(long, value_enum)]
-    basis: Option<SparsityBasis>,
+    pub basis: Option<SparsityBasis>,
     /// Side of the window of light elements around each camera pixel's correspondence: an odd number, or "auto" to
     /// estimate it
     #[arg(long, value_name = "W", default_value = "15", value_parser = parse_window)]
@@ -41,8 +41,16 @@ pub struct RecoverArgs {
     /// Use the first K shots only [default: all but every tenth, which are held out]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     pub patterns: Option<u32>,
-    #[command(flatten)]
-    pub quality: QualityArgs,
+    /// SNR of the file relative to the recovered light transport, in dB; more is larger [default: as much as the noise
+    /// of the photographs justifies]
+    #[arg(long, value_name = "DB", group = "rate", value_parser = |text: &str| parse_number(text, 5.0, 75.0))]
+    quality: Option<f32>,
+    /// Write the best file of at most this size: 500kB, 2MB (kB and MB are powers of 1000, KiB and MiB of 1024)
+    #[arg(long, value_name = "BYTES", group = "rate", value_parser = parse_max_bytes)]
+    max_bytes: Option<ByteCount>,
+    /// Store eleven bits of every coefficient, for archives; many times larger
+    #[arg(long, group = "rate")]
+    lossless: bool,
     /// Limit on memory; photographs that do not fit are read in strips
     #[arg(long, value_name = "BYTES", default_value = DEFAULT_MEMORY, value_parser = ByteCount::parse)]
     pub memory: ByteCount,
@@ -55,7 +63,6 @@ pub struct RecoverArgs {
 }
 
 impl RecoverArgs {
-    /// The method with its basis.
     pub fn method(&self) -> Method {
         match self.method {
             MethodName::Learned => Method::Learned,
@@ -64,42 +71,8 @@ impl RecoverArgs {
         }
     }
 
-    /// Whether `--basis` is given with a method that has none.
-    pub fn has_unused_basis(&self) -> bool {
-        self.basis.is_some() && self.method().basis().is_none()
-    }
-}
-
-/// Quality or size of the file.
-#[derive(Debug, Args)]
-#[group(multiple = false)]
-pub struct QualityArgs {
-    /// SNR of the file relative to the recovered light transport, in dB; more is larger [default: as much as the noise
-    /// of the photographs justifies]
-    #[arg(long, value_name = "DB", value_parser = |text: &str| parse_number(text, 5.0, 75.0))]
-    quality: Option<f32>,
-    /// Write the best file of at most this size: 500kB, 2MB (kB and MB are powers of 1000, KiB and MiB of 1024)
-    #[arg(long, value_name = "BYTES", value_parser = parse_max_bytes)]
-    max_bytes: Option<ByteCount>,
-    /// Store eleven bits of every coefficient, for archives; many times larger
-    #[arg(long)]
-    lossless: bool,
-}
-
-/// Parses a size larger than that of the header.
-fn parse_max_bytes(text: &str) -> Result<ByteCount, String> {
-    let max_bytes = ByteCount::parse(text)?;
-    match max_bytes.0 > HEADER_BYTES as u64 {
-        true => Ok(max_bytes),
-        false => Err(format!(
-            "the header of a file alone has {HEADER_BYTES} bytes; give more"
-        )),
-    }
-}
-
-impl QualityArgs {
-    /// The quality asked for, or the default, which needs a distortion metric.
-    pub fn quality<'a>(&self, metric: Option<&'a dyn DistortionMetric>) -> RateTarget<'a> {
+    /// The quality or size asked for, or the default quality, which needs a distortion metric.
+    pub fn rate_target<'a>(&self, metric: Option<&'a dyn DistortionMetric>) -> RateTarget<'a> {
         match (self.quality, self.max_bytes, metric) {
             (Some(snr), ..) => RateTarget::Snr(Decibels(f64::from(snr))),
             (_, Some(max_bytes), _) => RateTarget::Bytes(max_bytes.0),
@@ -110,44 +83,29 @@ impl QualityArgs {
     }
 }
 
-/// The window asked for.
-#[derive(Clone, Copy, Debug)]
-pub enum WindowChoice {
-    /// Estimated from the photographs.
-    Auto,
-    /// Given.
-    Fixed(Window),
-}
-
-impl WindowChoice {
-    /// The largest window that may be chosen.
-    pub fn max(self) -> Window {
-        match self {
-            Self::Auto => WindowEstimate::MAX_WINDOW,
-            Self::Fixed(window) => window,
-        }
-    }
-
-    /// The argument as given.
-    pub fn name(self) -> String {
-        match self {
-            Self::Auto => "auto".to_owned(),
-            Self::Fixed(window) => window.side().to_string(),
-        }
+fn parse_max_bytes(text: &str) -> Result<ByteCount, String> {
+    let max_bytes = ByteCount::parse(text)?;
+    match max_bytes.0 > HEADER_BYTES as u64 {
+        true => Ok(max_bytes),
+        false => Err(format!(
+            "the header of a file alone has {HEADER_BYTES} bytes; give more"
+        )),
     }
 }
+
+/// The value of `--window`; `None` for "auto". The alias hides the `Option` from clap, which would take it as an
+/// argument without a default.
+type WindowChoice = Option<Window>;
 
 fn parse_window(text: &str) -> Result<WindowChoice, String> {
     if text == "auto" {
-        return Ok(WindowChoice::Auto);
+        return Ok(None);
     }
     let hint = "give an odd number of light elements, or auto";
     let side = text.parse::<u32>().map_err(|e| format!("{e}; {hint}"))?;
-    let window = Window::new(side).map_err(|e| e.to_string())?;
-    Ok(WindowChoice::Fixed(window))
+    Window::new(side).map(Some).map_err(|e| e.to_string())
 }
 
-/// Values of `--method`.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum MethodName {
     /// A prior learned from the photographs themselves

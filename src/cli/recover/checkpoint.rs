@@ -23,7 +23,6 @@ use anyhow::{Context, Error, Result, bail, ensure};
 use super::run_key::RunKey;
 use crate::cli::process::Interrupted;
 
-/// The first bytes of a checkpoint.
 const MAGIC: [u8; 8] = *b"LTMPART2";
 /// What the magics of all versions begin with.
 const MAGIC_OF_ANY_VERSION: &[u8] = b"LTMPART";
@@ -34,13 +33,10 @@ const OTHER_VERSION: &str = "was written by another version of this program; use
 const MAX_KEY_BYTES: u32 = 64 << 20;
 /// Bytes before the content of a record: number, length, checksum.
 const RECORD_HEAD_BYTES: usize = 12;
-/// Number of the key's record.
 const KEY: u32 = u32::MAX;
-/// Number of the fingerprint's record.
 const FINGERPRINT: u32 = u32::MAX - 1;
 
-/// The checkpoint of the running recovery. Its file is deleted on drop if it holds no tile, or after
-/// [`discard`](Self::discard).
+/// The checkpoint of the running recovery.
 pub struct Checkpoint {
     path: PathBuf,
     file: File,
@@ -49,10 +45,10 @@ pub struct Checkpoint {
     /// End of the last complete record.
     end: u64,
     fingerprint: Option<Vec<u8>>,
-    delete_on_drop: bool,
+    /// While it holds no tile, and once the output is written.
+    pub delete_on_drop: bool,
 }
 
-/// A record read from the file.
 struct Record {
     number: u32,
     content: Vec<u8>,
@@ -94,11 +90,8 @@ impl Checkpoint {
             delete_on_drop: false,
         };
         if checkpoint.load(key, resume, bytes)? {
-            eprintln!(
-                "resuming with {} of {} tiles",
-                checkpoint.count(),
-                key.tiles
-            );
+            let (count, tiles) = (checkpoint.count(), key.tiles);
+            eprintln!("resuming with {count} of {tiles} tiles");
             return Ok(checkpoint);
         }
         if resume {
@@ -119,12 +112,11 @@ impl Checkpoint {
         Ok(checkpoint)
     }
 
-    /// Number of tiles in the checkpoint.
+    /// Number of tiles.
     pub fn count(&self) -> usize {
         self.tiles.iter().flatten().count()
     }
 
-    /// Whether tile `i` is in the checkpoint.
     pub fn has(&self, i: usize) -> bool {
         self.tiles[i].is_some()
     }
@@ -174,11 +166,6 @@ impl Checkpoint {
         Ok(content)
     }
 
-    /// Has the file deleted on drop, once the output is written.
-    pub fn discard(&mut self) {
-        self.delete_on_drop = true;
-    }
-
     /// Appends a record; returns the range of its content.
     fn append(&mut self, number: u32, content: &[u8]) -> Result<Range<u64>> {
         let bytes = encode_record(number, content)?;
@@ -195,10 +182,8 @@ impl Checkpoint {
     fn load(&mut self, key: &RunKey, resume: bool, bytes: u64) -> Result<bool> {
         let mut reader = BufReader::with_capacity(1 << 18, self.file.try_clone()?);
         let mut magic = Vec::new();
-        reader
-            .by_ref()
-            .take(MAGIC.len() as u64)
-            .read_to_end(&mut magic)?;
+        let mut start = reader.by_ref().take(MAGIC.len() as u64);
+        start.read_to_end(&mut magic)?;
         ensure!(
             MAGIC.starts_with(&magic) || !magic.starts_with(MAGIC_OF_ANY_VERSION),
             OTHER_VERSION
@@ -219,10 +204,9 @@ impl Checkpoint {
             if !record.is_intact {
                 // A crash may leave a last record of the right length without its bytes.
                 if record.range.end < bytes {
+                    let (path, count) = (self.path.display(), self.count());
                     eprintln!(
-                        "warning: {} is damaged after {} tiles; the others are recovered again",
-                        self.path.display(),
-                        self.count()
+                        "warning: {path} is damaged after {count} tiles; the others are recovered again"
                     );
                 }
                 break;
@@ -289,7 +273,6 @@ impl Checkpoint {
     }
 }
 
-/// The bytes of a record.
 fn encode_record(number: u32, content: &[u8]) -> Result<Vec<u8>> {
     let length = u32::try_from(content.len()).context("a record is too large")?;
     let mut bytes = [number, length].map(u32::to_le_bytes).concat();

@@ -4,12 +4,15 @@ use std::io::{self, ErrorKind};
 use std::ops::Range;
 use std::sync::Mutex;
 
-use super::args::QualityArgs;
+use anyhow::{Error, Result};
+
+use super::args::RecoverArgs;
 use super::checkpoint::{Checkpoint, lock};
 use super::memory_plan::FILE_TILE_SIDE;
 use super::tile_record;
 use crate::cli::process::InterruptibleCores;
-use crate::executor::Executor;
+use crate::cli::progress;
+use crate::executor::{Cancelled, Executor};
 use crate::format::{DistortionMetric, EncodedFile, FormatError, Metadata, Source};
 use crate::recover::{HoldoutValidation, Recovery};
 use crate::transport::{Basis, Decibels, FloatTile, Geometry, TransportFunctions};
@@ -25,15 +28,15 @@ impl DistortionMetric for HoldoutValidation {
     }
 }
 
-/// Encodes the tiles in `checkpoint` of `recovery`. An interruption is reported as [`FormatError::Source`] with
-/// [`ErrorKind::Interrupted`].
+/// Encodes the tiles in `checkpoint` of `recovery`. An interruption is reported as [`Cancelled`].
 pub fn encode_file(
-    args: &QualityArgs,
+    args: &RecoverArgs,
     checkpoint: &Mutex<Checkpoint>,
     recovery: &Recovery,
     metadata: Metadata,
     cores: &InterruptibleCores,
-) -> Result<EncodedFile, FormatError> {
+) -> Result<EncodedFile> {
+    let _spinner = progress::spinner("compressing");
     let (recovered, basis) = (recovery.geometry(), recovery.basis());
     let geometry = Geometry {
         tile_side: FILE_TILE_SIDE,
@@ -51,12 +54,8 @@ pub fn encode_file(
         for (x, y) in columns.flat_map(|x| rows.clone().map(move |y| (x, y))) {
             let i = (y * recovered.tile_grid().width + x) as usize;
             let record = lock(checkpoint).read(i)?;
-            tile.insert(&tile_record::decode(
-                recovered.tile(i),
-                rank,
-                area,
-                &record,
-            )?);
+            let recovered = tile_record::decode(recovered.tile(i), rank, area, &record)?;
+            tile.insert(&recovered);
         }
         Ok(tile)
     };
@@ -69,7 +68,18 @@ pub fn encode_file(
     };
     let metric = recovery.holdout_validation();
     let metric = metric.map(|validation| validation as &dyn DistortionMetric);
-    EncodedFile::new(source, args.quality(metric), cores)
+    let file = EncodedFile::new(source, args.rate_target(metric), cores);
+    file.map_err(|error| {
+        let output = args.output.display();
+        match error {
+            FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
+            FormatError::TooLarge { .. } => Error::new(error).context(format!(
+                "{output}: cannot be written; the recovered tiles are kept: give the same command with \
+                 --resume and a larger --max-bytes, or without --max-bytes"
+            )),
+            other => Error::new(other).context(output.to_string()),
+        }
+    })
 }
 
 /// Columns or rows of the recovered tiles that cover `length` pixels from `start`.

@@ -1,26 +1,25 @@
 //! One recovery: from the photographs to the file.
 
-use std::io::ErrorKind;
 use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context, Error, Result, bail};
 use rayon::prelude::*;
 
-use super::args::{RecoverArgs, WindowChoice};
+use super::args::RecoverArgs;
 use super::checkpoint::{Checkpoint, lock};
 use super::encode::encode_file;
 use super::memory_plan::MemoryPlan;
 use super::report::RecoverReport;
 use super::run_key::{PROGRAM, RunKey, recovery_fingerprint};
 use super::{shots, tile_record};
-use crate::capture::{CaptureFolder, DarkFrame, Measurements, NoiseModel, group_count, group_ids};
+use crate::capture::{CaptureFolder, DarkFrame, Measurements, group_count, group_ids};
 use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process::{InterruptibleCores, peak_rss_bytes};
 use crate::cli::progress;
 use crate::cli::shot_reader::{ShotReader, read_patterns};
 use crate::executor::{Cancelled, Executor};
-use crate::format::{CaptureNote, EncodedFile, FormatError, Metadata};
+use crate::format::{CaptureNote, Metadata};
 use crate::recover::{
     BandwidthEstimate, HoldoutValidation, MIN_PATTERNS, RecoverError, Recovery, RecoverySettings,
     WindowEstimate,
@@ -34,7 +33,6 @@ const MIN_PLAUSIBLE_SNR: Decibels = Decibels(13.0);
 const UNITS: &str =
     "camera value where camera.black is 0 and camera.white is 1, per light element at full code";
 
-/// A recovery with its arguments and inputs.
 pub struct RecoverJob<'a> {
     pub start: Instant,
     pub args: &'a RecoverArgs,
@@ -58,10 +56,11 @@ impl RecoverJob<'_> {
         // Before the long work, so that a checkpoint that does not match fails early.
         let checkpoint = Checkpoint::open(&self.args.output, &key, self.args.resume)?;
         let checkpoint = Mutex::new(checkpoint);
-        let saturated = self.load_sample(&mut measurements, reader);
+        let rows = self.plan.sample_rows();
+        let saturated = reader.read_sample(&mut measurements, &rows, self.cores);
         let report = saturated.and_then(|n| self.recover(measurements, dark, n, &checkpoint));
         match &report {
-            Ok(_) => lock(&checkpoint).discard(),
+            Ok(_) => lock(&checkpoint).delete_on_drop = true,
             Err(error) if error.is::<Cancelled>() => return Err(lock(&checkpoint).interrupted()),
             Err(_) => {}
         }
@@ -76,6 +75,7 @@ impl RecoverJob<'_> {
         saturated: usize,
         checkpoint: &Mutex<Checkpoint>,
     ) -> Result<RecoverReport> {
+        shots::warn_of_saturation(saturated, &measurements);
         let (window, tail_fraction) = self.choose_window(&measurements)?;
         let method = self.args.method();
         let recovery = self.prepare(&measurements, RecoverySettings { method, window })?;
@@ -88,8 +88,9 @@ impl RecoverJob<'_> {
         let listed = &self.folder.manifest().shots;
         let patterns = self.shots.iter().map(|&i| &listed[i].pattern);
         let patterns = group_count(&group_ids(patterns));
-        let file = thread_pool(encoders)?
-            .install(|| self.encode(checkpoint, &recovery, self.metadata(patterns)))?;
+        let metadata = self.metadata(patterns);
+        let encode = || encode_file(self.args, checkpoint, &recovery, metadata, self.cores);
+        let file = thread_pool(encoders)?.install(encode)?;
         let output = OutputFile::create(&self.args.output, &LTM)?;
         let file_bytes = output.finish(|out| Ok(file.write(out)?))?;
         let validation = recovery.holdout_validation();
@@ -114,28 +115,9 @@ impl RecoverJob<'_> {
         })
     }
 
-    /// Loads the rows to prepare the recovery from, and estimates the noise. Returns the number of saturated samples in
-    /// all photographs.
-    fn load_sample(
-        &self,
-        measurements: &mut Measurements,
-        mut reader: ShotReader,
-    ) -> Result<usize> {
-        let bar = progress::bar("reading", self.shots.len());
-        reader.load_rows(measurements, &self.plan.sample_rows(), || {
-            bar.inc(1);
-            Ok(self.cores.check_cancelled()?)
-        })?;
-        drop(bar);
-        let saturated = reader.finish()?;
-        measurements.noise = NoiseModel::with_gain_from(measurements);
-        shots::warn_of_saturation(saturated, measurements);
-        Ok(saturated)
-    }
-
     /// The window given or estimated; if estimated, with the share of light from outside the window.
     fn choose_window(&self, measurements: &Measurements) -> Result<(Window, Option<f64>)> {
-        if let WindowChoice::Fixed(window) = self.args.window {
+        if let Some(window) = self.args.window {
             return Ok((window, None));
         }
         let estimate = WindowEstimate::from_measurements(measurements, self.cores);
@@ -238,34 +220,6 @@ impl RecoverJob<'_> {
         Ok(overexposed)
     }
 
-    /// Encodes the recovered tiles.
-    fn encode(
-        &self,
-        checkpoint: &Mutex<Checkpoint>,
-        recovery: &Recovery,
-        metadata: Metadata,
-    ) -> Result<EncodedFile> {
-        let _spinner = progress::spinner("compressing");
-        let file = encode_file(
-            &self.args.quality,
-            checkpoint,
-            recovery,
-            metadata,
-            self.cores,
-        );
-        file.map_err(|error| {
-            let output = self.args.output.display();
-            match error {
-                FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
-                FormatError::TooLarge { .. } => Error::new(error).context(format!(
-                    "{output}: cannot be written; the recovered tiles are kept: give the same command \
-                     with --resume and a larger --max-bytes, or without --max-bytes"
-                )),
-                other => Error::new(other).context(output.to_string()),
-            }
-        })
-    }
-
     fn metadata(&self, patterns: usize) -> Metadata {
         let manifest = self.folder.manifest();
         Metadata {
@@ -296,7 +250,6 @@ impl RecoverJob<'_> {
     }
 }
 
-/// A pool of `threads` threads.
 pub fn thread_pool(threads: usize) -> Result<rayon::ThreadPool> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     pool.context("threads cannot be started")

@@ -114,7 +114,6 @@ impl MemoryPlan {
         Ok(())
     }
 
-    /// Number of tiles.
     pub fn tiles(&self) -> usize {
         (self.tile_rows() * self.camera.width.div_ceil(TILE_SIDE)) as usize
     }
@@ -123,7 +122,6 @@ impl MemoryPlan {
         self.camera.height.div_ceil(TILE_SIDE)
     }
 
-    /// Whether all photographs fit in memory whole.
     pub fn fits_photographs(&self) -> bool {
         self.max_rows() >= self.camera.height
     }

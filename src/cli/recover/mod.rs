@@ -19,7 +19,6 @@ use anyhow::{Context, Result, bail};
 
 pub use self::args::RecoverArgs;
 
-use self::args::WindowChoice;
 use self::job::{RecoverJob, thread_pool};
 use self::memory_plan::MemoryPlan;
 use super::arguments::UsageError;
@@ -27,12 +26,11 @@ use super::output_file::{LTM, OutputFile};
 use super::process::InterruptibleCores;
 use super::report::print_json;
 use crate::capture::CaptureFolder;
-use crate::recover::{MIN_PATTERNS, RecoverError};
+use crate::recover::{MIN_PATTERNS, RecoverError, WindowEstimate};
 
-/// Runs the command.
 pub fn run(args: &RecoverArgs) -> Result<()> {
     let start = Instant::now();
-    if args.has_unused_basis() {
+    if args.basis.is_some() && args.method().basis().is_none() {
         bail!(UsageError("--basis is for --method bpdn"));
     }
     let cores = InterruptibleCores::listen()?;
@@ -47,15 +45,10 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         return Err(RecoverError::TooFewPatterns(shots.len())).context(manifest);
     }
     let method = args.method();
-    let plan = MemoryPlan::new(
-        args.memory,
-        manifest,
-        shots.len(),
-        method,
-        args.window.max(),
-        rayon::current_num_threads(),
-    )?;
-    if let WindowChoice::Fixed(window) = args.window {
+    let max_window = args.window.unwrap_or(WindowEstimate::MAX_WINDOW);
+    let (limit, threads) = (args.memory, rayon::current_num_threads());
+    let plan = MemoryPlan::new(limit, manifest, shots.len(), method, max_window, threads)?;
+    if let Some(window) = args.window {
         plan.tiles_encoded_at_once(window, method.max_rank(window))?;
     }
     let job = RecoverJob {

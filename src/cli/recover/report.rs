@@ -40,7 +40,6 @@ pub struct RecoverReport {
 }
 
 impl RecoverReport {
-    /// Prints the report as text.
     pub fn print(&self, args: &RecoverArgs, manifest: &Manifest) -> Result<()> {
         print_line(&format!(
             "{}: {} camera pixels, {} light elements, window {}, from {} in {:.1} s, {}",

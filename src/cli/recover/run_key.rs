@@ -16,6 +16,7 @@ use crate::capture::CaptureFolder;
 use crate::cli::process::{Interrupted, InterruptibleCores};
 use crate::executor::Executor;
 use crate::recover::{HoldoutValidation, Recovery};
+use crate::transport::Window;
 
 /// Name and version of this program.
 pub const PROGRAM: &str = concat!("ltm-export ", env!("CARGO_PKG_VERSION"));
@@ -29,8 +30,8 @@ pub struct RunKey {
     pub method: String,
     /// `--basis`; of bpdn only.
     pub basis: Option<String>,
-    /// `--window`.
-    pub window: String,
+    /// `--window`; `None` for "auto".
+    pub window: Option<u32>,
     /// `--patterns`, if given.
     pub patterns: Option<u32>,
     /// `--memory`, unless all photographs fit in it.
@@ -63,7 +64,7 @@ impl RunKey {
             program: PROGRAM.to_owned(),
             method: method.name().to_owned(),
             basis: method.basis().map(|basis| basis.name().to_owned()),
-            window: args.window.name(),
+            window: args.window.map(Window::side),
             patterns: args.patterns,
             memory_bytes: (!(plan.fits_photographs() && fits)).then_some(args.memory.0),
             files: files.collect::<Result<_>>()?,
@@ -77,33 +78,31 @@ impl RunKey {
             let (was, is) = (&self.program, &present.program);
             return Some(format!("it was written by {was}, and this is {is}"));
         }
-        let changed = self.options().into_iter().zip(present.options());
-        for ((name, was), (_, is)) in changed {
-            if was != is {
-                return Some(format!("{name} was {was}, and is {is} now"));
-            }
+        let mut options = self.options().into_iter().zip(present.options());
+        if let Some(((name, was), (_, is))) = options.find(|(was, is)| was != is) {
+            return Some(format!("{name} was {was}, and is {is} now"));
         }
         let mut names = self.files.keys().chain(present.files.keys());
-        let changed = names.find(|name| self.files.get(*name) != present.files.get(*name));
-        let tiles = || (self.tiles != present.tiles).then(|| "the tiles differ".to_owned());
-        changed
-            .map(|name| format!("{name} in the capture has changed since"))
-            .or_else(tiles)
+        if let Some(name) = names.find(|&name| self.files.get(name) != present.files.get(name)) {
+            return Some(format!("{name} in the capture has changed since"));
+        }
+        (self.tiles != present.tiles).then(|| "the tiles differ".to_owned())
     }
 
     /// Names and values of the options.
     fn options(&self) -> [(&'static str, String); 5] {
-        let or_none = |value: Option<String>| value.unwrap_or_else(|| "not given".to_owned());
-        let memory = self.memory_bytes.map(|bytes| bytes.to_string());
+        let text = |value: Option<String>, none: &str| value.unwrap_or_else(|| none.to_owned());
+        let number = |value: Option<u64>, none| text(value.map(|value| value.to_string()), none);
+        let memory = number(self.memory_bytes, "enough for all photographs");
         [
             ("--method", self.method.clone()),
-            ("--basis", or_none(self.basis.clone())),
-            ("--window", self.window.clone()),
-            ("--patterns", or_none(self.patterns.map(|k| k.to_string()))),
+            ("--basis", text(self.basis.clone(), "not given")),
+            ("--window", number(self.window.map(u64::from), "auto")),
             (
-                "--memory",
-                memory.unwrap_or_else(|| "enough for all photographs".to_owned()),
+                "--patterns",
+                number(self.patterns.map(u64::from), "not given"),
             ),
+            ("--memory", memory),
         ]
     }
 }
@@ -130,23 +129,16 @@ impl FileDigest {
 /// fit.
 pub fn recovery_fingerprint(recovery: &Recovery) -> u32 {
     let geometry = recovery.geometry();
-    let grids = [
-        geometry.camera.width,
-        geometry.camera.height,
-        geometry.light.width,
-        geometry.light.height,
-        geometry.window.side(),
-        geometry.tile_side,
-    ];
     let affine = geometry.correspondence.affine.into_iter().flatten();
     let common_mode = recovery.common_mode().map(|mode| mode.weight());
-    let snr = recovery
-        .holdout_validation()
-        .and_then(HoldoutValidation::snr);
+    let validation = recovery.holdout_validation();
+    let snr = validation.and_then(HoldoutValidation::snr);
     let chosen = [common_mode, snr.map(|snr| snr.0)].map(|value| value.unwrap_or(f64::NAN));
     let basis = recovery.basis().into_iter().flat_map(|b| b.kernels.iter());
-    let bytes: Vec<u8> = grids
+    let bytes: Vec<u8> = geometry
+        .sides()
         .into_iter()
+        .flatten()
         .flat_map(u32::to_le_bytes)
         .chain(affine.chain(chosen).flat_map(f64::to_le_bytes))
         .chain(basis.flatten().flat_map(|value| value.to_le_bytes()))

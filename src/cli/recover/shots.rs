@@ -29,7 +29,6 @@ pub fn choose_shots(shots: &[Shot], count: Option<u32>) -> Result<Vec<usize>> {
     }
 }
 
-/// Notes the fields of the manifest that are ignored.
 pub fn warn_of_unknown_fields(folder: &CaptureFolder) {
     let unknown = &folder.manifest().unknown;
     if !unknown.is_empty() {

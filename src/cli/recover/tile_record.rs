@@ -16,7 +16,6 @@ const HEAD_BYTES: usize = 5;
 const DIRECT: u8 = 1;
 const FACTORED: u8 = 2;
 
-/// Encodes a tile.
 pub fn encode(tile: &FloatTile) -> io::Result<Vec<u8>> {
     let (kind, values) = match tile.functions.is_empty() {
         true => (FACTORED, &tile.coefficients),
@@ -26,17 +25,16 @@ pub fn encode(tile: &FloatTile) -> io::Result<Vec<u8>> {
     let finite = values.iter().filter(|v| v.is_finite());
     let peak = finite.fold(f32::MIN_POSITIVE, |peak, v| peak.max(v.abs()));
     let step = (peak.log2().ceil() - 15.0).clamp(-120.0, 110.0).exp2();
-    let (mut low, mut high) = (Vec::new(), Vec::new());
-    for value in values {
+    let halves = values.iter().map(|value| {
         let value = if value.is_finite() { value / step } else { 0.0 };
-        let [l, h] = f16::from_f32(value).to_bits().to_le_bytes();
-        low.push(l);
-        high.push(h);
-    }
-    low.extend(high);
+        let [low, high] = f16::from_f32(value).to_le_bytes();
+        (low, high)
+    });
+    let (mut planes, high): (Vec<u8>, Vec<u8>) = halves.unzip();
+    planes.extend(high);
     let mut record = vec![kind];
     record.extend(step.to_le_bytes());
-    record.extend(zstd::bulk::compress(&low, ZSTD_LEVEL)?);
+    record.extend(zstd::bulk::compress(&planes, ZSTD_LEVEL)?);
     Ok(record)
 }
 
@@ -58,11 +56,8 @@ pub fn decode(rect: TileRect, rank: usize, area: usize, record: &[u8]) -> io::Re
         return Err(damaged());
     }
     let (low, high) = planes.split_at(count);
-    let halves = low
-        .iter()
-        .zip(high)
-        .map(|(&l, &h)| f16::from_le_bytes([l, h]));
-    let values: Vec<f32> = halves.map(|half| half.to_f32() * step).collect();
+    let value = |(&low, &high)| f16::from_le_bytes([low, high]).to_f32() * step;
+    let values: Vec<f32> = low.iter().zip(high).map(value).collect();
     let values = values.as_chunks().0.to_vec();
     let mut tile = FloatTile::dark(rect);
     match kind {
