@@ -313,15 +313,24 @@ fn a_killed_recovery_resumes_and_mismatches_are_named() {
     let crc = crc32c::crc32c(&other[prior..prior + 8]);
     let crc = crc32c::crc32c_append(crc, &other[prior + 12..prior + 12 + length]);
     other[prior + 8..prior + 12].copy_from_slice(&crc.to_le_bytes());
-    // A damaged run key.
-    let mut damaged = kept.clone();
-    damaged[20] ^= 1;
-    for (bytes, words) in [(other, "another build"), (damaged, "is damaged; delete it")] {
+    // A damaged run key: its number, its length, and its content.
+    let damaged = [(8, 1), (14, 0x80), (15, 0x80), (20, 1)].map(|(at, bit)| {
+        let mut damaged = kept.clone();
+        damaged[at] ^= bit;
+        (damaged, "is damaged; delete it")
+    });
+    let mut older = kept.clone();
+    older[7] = b'1';
+    let others = [
+        (other, "another build"),
+        (older, "written by another version"),
+    ];
+    for (bytes, words) in others.into_iter().chain(damaged) {
         fs::write(&checkpoint, &bytes).unwrap();
         for more in [&["--resume"][..], &[]] {
             let output = recovery.recover("killed.ltm", more).output().unwrap();
             assert_eq!(output.status.code(), Some(1), "{}", stderr_text(&output));
-            if words.contains("damaged") || !more.is_empty() {
+            if !words.contains("another build") || !more.is_empty() {
                 assert!(
                     stderr_text(&output).contains(words),
                     "{}",

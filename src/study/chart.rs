@@ -23,7 +23,7 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(190, 180, 20),
 ];
 const FONT: &str = "Helvetica, Arial, sans-serif";
-/// Points of a line that has a marker at each.
+/// A line with at most so many points has a marker at each.
 const MAX_MARKERS: usize = 16;
 
 pub(super) struct ChartSeries {

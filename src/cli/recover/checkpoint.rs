@@ -252,12 +252,10 @@ impl Checkpoint {
         let (words, _) = head.as_chunks();
         let [number, length, crc] = [0, 1, 2].map(|i| u32::from_le_bytes(words[i]));
         let end = start + u64::from(length);
-        // A key of a damaged length must not look cut off: tiles may follow it.
+        // A key whose length is damaged must not look cut off: tiles may follow it.
         let is_first = self.end == MAGIC.len() as u64;
-        ensure!(
-            !is_first || (number == KEY && length <= MAX_KEY_BYTES),
-            DAMAGED
-        );
+        let is_key = number == KEY && length <= MAX_KEY_BYTES && end <= bytes;
+        ensure!(is_key || !is_first, DAMAGED);
         if bytes < end {
             return Ok(None);
         }

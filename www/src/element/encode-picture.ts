@@ -5,7 +5,10 @@ import { PhotoError } from '../shared/errors.js';
 
 type DrawnPicture = Pick<Renderer, 'canvas' | 'gamut'>;
 
-/** Reads the canvas at once: that of a GPU keeps its content only until the next frame. */
+/**
+ * Reads the canvas at once: that of a GPU keeps its content only until the next frame. `quality` is that of
+ * `HTMLCanvasElement.toBlob`.
+ */
 export function encodePicture(
   picture: DrawnPicture,
   type: string,

@@ -26,7 +26,7 @@ export function startWorker(create: () => Worker): Worker | null {
 export function serve<Task, Ready, Result>(
   setUp: () => Promise<WorkerService<Task, Ready, Result>>,
 ): void {
-  // The compiler knows only the global scope of pages; that of a worker is also a message port.
+  // The compiler knows only the global scope of pages; that of a worker has these two members of a message port.
   const scope = globalThis as unknown as Pick<MessagePort, 'onmessage' | 'postMessage'>;
   const send = (message: WorkerResponse<Ready, Result>, transfer: Transferable[] = []): void =>
     scope.postMessage(message, transfer);

@@ -29,7 +29,10 @@ export interface LoadPorts {
 const FIRST_RANGE: ByteRange = { start: 0, end: 1 << 14 };
 const MIN_PREVIEW_INTERVAL_MS = 400;
 
-/** Starts once more if the file is replaced meanwhile. Throws a `PhotoError` or the signal's reason without a leak. */
+/**
+ * Loads a photograph; starts once more if the file is replaced meanwhile. Throws a `PhotoError`, or the signal's reason
+ * if it is aborted; nothing remains allocated then.
+ */
 export async function openPhoto(url: string, options: LoadOptions, ports: LoadPorts) {
   try {
     return await open(url, options, ports);

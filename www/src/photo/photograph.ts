@@ -99,7 +99,10 @@ export class Photograph implements Freeable {
     });
   }
 
-  /** Moves all tiles to workers and calls `use`. Rejects with `worker-unavailable`, moving nothing, without workers. */
+  /**
+   * Moves all tiles to workers, always the same ones, and calls `use`. Rejects with `worker-unavailable` if there are
+   * none; the photograph is unchanged then.
+   */
   withWorkers<S extends TileSession, T>(
     workers: TileWorkers<S>,
     use: (session: S) => T | Promise<T>,
