@@ -24,10 +24,10 @@ use std::time::Instant;
 use npyz::WriterBuilder;
 use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{
-    ChunkId, EncodedFile, FileIndex, HEADER_BYTES, Limits, LtmReader, Metadata, RateTarget, Source,
-    decode_basis, decode_tile,
+    ChunkId, EncodedFile, EncoderInput, FileIndex, HEADER_BYTES, Limits, LtmReader, Metadata,
+    RateTarget, decode_basis, decode_tile,
 };
-use relightable_photo::transport::{Basis, CHANNELS, Decibels, FloatTile, TransportError};
+use relightable_photo::transport::{Basis, CHANNELS, Decibels, FloatTile, SnrAccumulator};
 use serde_json::{Value, json};
 
 use figures::Figures;
@@ -166,7 +166,7 @@ fn against_peers(folder: &Path, files: &Files, figures: &mut Figures) {
     let mut band = vec![0.0f32; camera.area() * area * CHANNELS];
     let mut planes = vec![0.0f32; rank * CHANNELS * camera.area()];
     let mut origins = vec![0i32; 2 * camera.area()];
-    let mut error = TransportError::default();
+    let mut error = SnrAccumulator::default();
     for (tile, coded) in given.tiles.iter().zip(&ours.tiles) {
         let functions = tile.functions(&geometry, Some(&given.basis));
         let coded = coded.functions(&geometry, Some(&ours.basis));
@@ -273,7 +273,7 @@ fn rates(files: &Files, figures: &mut Figures) {
             .sum();
         (values * CHANNELS * size_of::<f32>()) as f64 / 1e6
     };
-    let source = Source {
+    let source = EncoderInput {
         geometry: given.index.header.geometry,
         basis: Some(&given.basis),
         tile: &|i| Ok(given.tiles[i].clone()),

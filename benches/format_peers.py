@@ -407,10 +407,10 @@ def zfp(problem):
 
 
 def save_jpeg(picture, quality):
-    from PIL import ImageFile
+    from PIL import CapturePng
 
     # The whole file must fit into one block; Pillow's default may be too small.
-    ImageFile.MAXBLOCK = 8 * picture.width * picture.height + 65536
+    CapturePng.MAXBLOCK = 8 * picture.width * picture.height + 65536
     files = []
     for progressive in [False, True]:
         file = io.BytesIO()

@@ -10,7 +10,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::Command;
 
-use relightable_photo::format::{EncodedFile, Metadata, RateTarget, Source};
+use relightable_photo::format::{EncodedFile, EncoderInput, Metadata, RateTarget};
 use serde_json::{Value, json};
 
 use figures::Figures;
@@ -59,7 +59,7 @@ fn is_up_to_date(path: &Path) -> bool {
 fn write_file(path: &Path, side: u32, rank: usize) {
     let geometry = synthetic_photo::geometry(side);
     let basis = synthetic_photo::basis(&geometry, rank);
-    let source = Source {
+    let source = EncoderInput {
         geometry,
         basis: Some(&basis),
         tile: &|i| Ok(synthetic_photo::tile(&geometry, rank, i)),

@@ -32,10 +32,10 @@ use relightable_photo::recover::{
     Homotopy, Method, Nnls, Recovery, RecoverySettings, SparsityBasis,
 };
 use relightable_photo::simulate::{
-    Camera, EmissionMatrix, LightCodes, PatternEnsemble, RandomStream, SceneKind, emission,
+    Camera, PatternEnsemble, PatternImage, PatternMatrix, RandomStreamId, SceneKind, emission,
 };
 use relightable_photo::transport::{
-    CHANNELS, CameraPx, Extent, TileRect, TransportError, TransportFunctions, Window,
+    CHANNELS, CameraPx, Extent, SnrAccumulator, TileFunctions, TileRect, Window,
 };
 use serde_json::Value;
 
@@ -68,19 +68,19 @@ fn square(side: u32) -> Extent {
 }
 
 /// Stained glass at two camera pixels an element, photographed with noise; and the true transport.
-fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
+fn photograph(camera: Extent) -> (Measurements, Vec<TileFunctions>) {
     let light = square(camera.width / 2);
     let scene = SceneKind::StainedGlass.build(camera, light).unwrap();
-    let codes: Vec<LightCodes> = (0..PATTERNS as u32)
+    let codes: Vec<PatternImage> = (0..PATTERNS as u32)
         .map(|i| {
-            let mut stream = RandomStream::Pattern(i).start(SEED);
+            let mut stream = RandomStreamId::Pattern(i).start(SEED);
             PatternEnsemble::Gaussian.draw(light, &mut stream)
         })
         .collect();
     let sensor = Camera {
         electrons: 40_000.0,
     };
-    let emissions = EmissionMatrix::new(light, &codes);
+    let emissions = PatternMatrix::new(light, &codes);
     let geometry = *scene.geometry();
     let truth: Vec<_> = (0..geometry.tile_grid().area())
         .into_par_iter()
@@ -97,7 +97,7 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
     }
     let code = 1.0 / (Camera::WHITE - Camera::BLACK);
     let photograph = |seen: &[[f32; CHANNELS]], number: u32| -> LinearPhoto {
-        let mut noise = RandomStream::Photograph(number).start(SEED);
+        let mut noise = RandomStreamId::Photograph(number).start(SEED);
         let photo = sensor.photograph(seen, &mut noise);
         let linear = |value: u16| ((f64::from(value) - Camera::BLACK) * code) as f32;
         photo.iter().map(|codes| codes.map(linear)).collect()
@@ -107,10 +107,10 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TransportFunctions>) {
     }
     let dark = photograph(&vec![[0.0; CHANNELS]; camera.area()], PATTERNS as u32);
     let patterns = codes.iter().map(|codes| match codes {
-        LightCodes::Grey(codes) => {
+        PatternImage::Grey(codes) => {
             Pattern::Grey(codes.iter().map(|&c| emission(c) as f32).collect())
         }
-        LightCodes::Rgb(_) => unreachable!("this ensemble is grey"),
+        PatternImage::Rgb(_) => unreachable!("this ensemble is grey"),
     });
     let mut measurements = Measurements {
         camera,
@@ -136,7 +136,7 @@ fn prepare(measurements: &Measurements, method: Method) -> Recovery {
     .unwrap()
 }
 
-fn tile(recovery: &Recovery, measurements: &Measurements, rect: TileRect) -> TransportFunctions {
+fn tile(recovery: &Recovery, measurements: &Measurements, rect: TileRect) -> TileFunctions {
     recovery
         .tile(measurements, rect)
         .functions(recovery.geometry(), recovery.basis())
@@ -152,8 +152,8 @@ fn fastest(runs: usize, mut work: impl FnMut()) -> f64 {
     times.fold(f64::INFINITY, f64::min)
 }
 
-fn snr(recovered: &[TransportFunctions], truth: &[TransportFunctions]) -> f64 {
-    let mut error = TransportError::default();
+fn snr(recovered: &[TileFunctions], truth: &[TileFunctions]) -> f64 {
+    let mut error = SnrAccumulator::default();
     for (recovered, truth) in recovered.iter().zip(truth) {
         // The truth's tile may be larger.
         let area = recovered.tau.len() / recovered.rect.extent.area();
@@ -325,7 +325,7 @@ impl WindowEquations {
     fn of_windows(
         measurements: &Measurements,
         recovery: &Recovery,
-        truth: &[TransportFunctions],
+        truth: &[TileFunctions],
     ) -> Vec<Self> {
         let common_mode = recovery.common_mode().expect("least squares chooses it");
         let weigh = |mut values: Vec<f64>| {
@@ -344,7 +344,7 @@ impl WindowEquations {
     fn new(
         measurements: &Measurements,
         recovery: &Recovery,
-        functions: &TransportFunctions,
+        functions: &TileFunctions,
         n: u32,
         weigh: &impl Fn(Vec<f64>) -> Vec<f64>,
     ) -> Self {

@@ -14,8 +14,8 @@ use std::sync::Once;
 use common::{Noise, functions, tiled};
 use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{
-    self, CaptureNote, ChunkId, EncodedFile, Extension, FileIndex, FormatError, Limits, LtmReader,
-    Metadata, RateTarget, Source,
+    self, CaptureSummary, ChunkId, EncodedFile, EncoderInput, Extension, FileIndex, FormatError,
+    Limits, LtmReader, Metadata, RateTarget,
 };
 use relightable_photo::relight::{Light, OutputTransform, reference};
 use relightable_photo::transport::{
@@ -120,7 +120,7 @@ impl Synthetic {
         metadata: Metadata,
         extensions: Vec<Extension>,
     ) -> Vec<u8> {
-        let source = Source {
+        let source = EncoderInput {
             geometry: self.geometry,
             basis: self.basis.as_ref(),
             tile: &|i| Ok(self.tiles[i].clone()),
@@ -218,7 +218,7 @@ fn extended(synthetic: &Synthetic) -> Vec<u8> {
         title: "Rosace nord – «la Création» · 北の薔薇窓 🌹".to_owned(),
         creator: "Zoë Ångström".to_owned(),
         rights: "© Łódź, CC BY 4.0".to_owned(),
-        capture: CaptureNote {
+        capture: CaptureSummary {
             patterns: 80,
             photographs: 83,
         },

@@ -7,13 +7,12 @@ use common::{Noise, functions, geometry, sealed};
 use proptest::prelude::*;
 use relightable_photo::executor::{Executor, SequentialExecutor};
 use relightable_photo::format::{
-    self, ChunkId, ChunkSelection, DistortionMetric, EncodedFile, Extension, FileSection,
-    FormatError, HEADER_BYTES, Limits, LtmReader, Metadata, RateTarget, ScanCoding, Source,
+    self, ChunkId, ChunkSelection, DistortionMetric, EncodedFile, EncoderInput, Extension,
+    FormatError, HEADER_BYTES, Limits, LtmReader, Metadata, RateTarget, ScanCoding, SectionName,
     TextModeDamage,
 };
 use relightable_photo::transport::{
-    Basis, CHANNELS, Decibels, FloatTile, Geometry, Tile, Transport, TransportError,
-    TransportFunctions,
+    Basis, CHANNELS, Decibels, FloatTile, Geometry, SnrAccumulator, Tile, TileFunctions, Transport,
 };
 
 /// A recovered light transport.
@@ -85,7 +84,7 @@ impl Recovered {
         executor: &impl Executor,
         extensions: Vec<Extension>,
     ) -> Result<EncodedFile, FormatError> {
-        let source = Source {
+        let source = EncoderInput {
             geometry: self.geometry,
             basis: self.basis.as_ref(),
             tile: &|i| Ok(self.tiles[i].clone()),
@@ -100,7 +99,7 @@ impl Recovered {
     }
 
     /// Light transport functions of tile `i`.
-    fn functions(&self, i: usize) -> TransportFunctions {
+    fn functions(&self, i: usize) -> TileFunctions {
         self.tiles[i].functions(&self.geometry, self.basis.as_ref())
     }
 
@@ -120,8 +119,8 @@ impl Recovered {
     }
 
     /// The error of a decoded transport against this one.
-    fn error(&self, decoded: &Transport) -> TransportError {
-        let mut error = TransportError::default();
+    fn error(&self, decoded: &Transport) -> SnrAccumulator {
+        let mut error = SnrAccumulator::default();
         for (i, tile) in decoded.tiles.iter().enumerate() {
             let got = tile.functions(&decoded.geometry, &decoded.basis).tau;
             for (got, want) in got.iter().zip(self.functions(i).tau) {
@@ -383,8 +382,8 @@ impl DistortionMetric for KnownTransportMetric<'_> {
         self.tiles.clone()
     }
 
-    fn loss(&self, functions: &[TransportFunctions]) -> Decibels {
-        let mut error = TransportError::default();
+    fn loss(&self, functions: &[TileFunctions]) -> Decibels {
+        let mut error = SnrAccumulator::default();
         for (got, tile) in functions.iter().zip(self.tiles()) {
             let want = tile.functions(&self.geometry, Some(self.basis));
             for (got, want) in got.tau.iter().zip(&want.tau) {
@@ -907,7 +906,7 @@ fn checking_chunks_one_by_one_agrees_with_reading() {
             damaged[bytes.len() / 2] ^= 1;
             let error = format::check(&index, chunk, &damaged).unwrap_err();
             assert!(
-                matches!(error, FormatError::ChecksumMismatch(section) if section == FileSection::Chunk(chunk))
+                matches!(error, FormatError::ChecksumMismatch(section) if section == SectionName::Chunk(chunk))
             );
             assert!(format::check(&index, chunk, &bytes[1..]).is_err());
         }

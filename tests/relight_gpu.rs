@@ -10,7 +10,7 @@ use std::rc::Rc;
 use common::relit::{self, TileContents};
 use common::tiled;
 use pollster::block_on;
-use relightable_photo::relight::backend::{BackendError, Frame};
+use relightable_photo::relight::backend::{BackendError, FrameRequest};
 use relightable_photo::relight::webgpu::{Device, OffscreenRenderer};
 use relightable_photo::relight::{Light, OutputTransform, reference};
 use relightable_photo::transport::Transport;
@@ -19,8 +19,8 @@ fn device() -> Rc<Device> {
     Rc::new(block_on(Device::offscreen()).expect("a graphics device, if only in software"))
 }
 
-fn frame(light: &Light, output: OutputTransform) -> Frame<'_> {
-    Frame {
+fn frame(light: &Light, output: OutputTransform) -> FrameRequest<'_> {
+    FrameRequest {
         light: Some(light),
         output,
         quality: 1.0,
@@ -78,7 +78,7 @@ fn a_picture_does_not_depend_on_the_frames_before() {
     let mut draw = |i: usize, quality: f32| {
         let light = &lights[i].1;
         photo
-            .draw(&Frame {
+            .draw(&FrameRequest {
                 light: Some(light),
                 output: OutputTransform::srgb(1.0),
                 quality,
@@ -105,7 +105,7 @@ fn lower_quality_is_the_first_components() {
             for (quality, quads) in [(0.0, 1), (0.2, 1), (0.5, 2)] {
                 let output = OutputTransform::srgb(1.0);
                 photo
-                    .draw(&Frame {
+                    .draw(&FrameRequest {
                         light: Some(light),
                         output,
                         quality,

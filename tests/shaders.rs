@@ -22,7 +22,11 @@ const SHADERS: [(&str, &str, ShaderStage, &[&str]); 4] = [
         "correlate.frag.glsl",
         "correlate",
         ShaderStage::Fragment,
-        &["frame.wgsl", "basis.wgsl", "correlate_fragment.wgsl"],
+        &[
+            "frame_uniforms.wgsl",
+            "basis_uniforms.wgsl",
+            "correlate_fragment.wgsl",
+        ],
     ),
     (
         "downsample.frag.glsl",
@@ -34,7 +38,7 @@ const SHADERS: [(&str, &str, ShaderStage, &[&str]); 4] = [
         "relight.frag.glsl",
         "relight",
         ShaderStage::Fragment,
-        &["frame.wgsl", "relight.wgsl"],
+        &["frame_uniforms.wgsl", "relight.wgsl"],
     ),
 ];
 

@@ -9,9 +9,9 @@ use assert_cmd::Command;
 use relightable_photo::calibrate::LightPlaneAxis;
 use relightable_photo::capture::{CaptureFolder, LinearPhoto, Pattern, RowSet};
 use relightable_photo::simulate::{
-    Camera, EmissionMatrix, LightCodes, RandomStream, SceneKind, SimulatedScene,
+    Camera, PatternImage, PatternMatrix, RandomStreamId, SceneKind, SimulatedScene,
 };
-use relightable_photo::transport::{CHANNELS, Extent, LightElement, TileRect, TransportFunctions};
+use relightable_photo::transport::{CHANNELS, Extent, LightElement, TileFunctions, TileRect};
 
 fn simulate(out: &Path, args: &[&str]) -> Command {
     let mut command = Command::cargo_bin("ltm-export").unwrap();
@@ -257,7 +257,7 @@ const fn extent(width: u32, height: u32) -> Extent {
 }
 
 /// The functions of all pixels.
-fn all_functions(scene: &dyn SimulatedScene) -> TransportFunctions {
+fn all_functions(scene: &dyn SimulatedScene) -> TileFunctions {
     scene.tile(TileRect {
         x: 0,
         y: 0,
@@ -268,7 +268,7 @@ fn all_functions(scene: &dyn SimulatedScene) -> TransportFunctions {
 /// The scene's picture under flood light without noise, `[N]`.
 fn flood(scene: &dyn SimulatedScene) -> Vec<[f32; CHANNELS]> {
     let light = scene.geometry().light;
-    let emissions = EmissionMatrix::new(light, &[LightCodes::uniform(light, 255)]);
+    let emissions = PatternMatrix::new(light, &[PatternImage::uniform(light, 255)]);
     emissions
         .pictures(scene.geometry(), &all_functions(scene))
         .remove(0)
@@ -432,7 +432,7 @@ fn height_displaces_direct_light_and_casts_shadows() {
 fn fewer_electrons_are_noisier() {
     let spread = |electrons| {
         let camera = Camera { electrons };
-        let mut noise = RandomStream::Photograph(0).start(1);
+        let mut noise = RandomStreamId::Photograph(0).start(1);
         let codes = camera.photograph(&[[0.5; CHANNELS]; 5000], &mut noise);
         let codes: Vec<f64> = codes.into_iter().flatten().map(f64::from).collect();
         quantile(codes.clone(), 0.84) - quantile(codes, 0.16)

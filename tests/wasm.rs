@@ -12,7 +12,9 @@ use common::relit::{self, TileContents};
 use common::tiled;
 use js_sys::{Float32Array, Object, Reflect, Uint8ClampedArray};
 use relightable_photo::executor::SequentialExecutor;
-use relightable_photo::format::{EncodedFile, Limits, LtmReader, Metadata, RateTarget, Source};
+use relightable_photo::format::{
+    EncodedFile, EncoderInput, Limits, LtmReader, Metadata, RateTarget,
+};
 use relightable_photo::relight::{self, BuiltinLight, Rgba8Picture, reference};
 use relightable_photo::transport::{Extent, Geometry, Tile, Transport};
 use relightable_photo::web::{
@@ -108,7 +110,7 @@ fn file(transport: &Transport, metadata: &Metadata) -> Vec<u8> {
         .tiles
         .iter()
         .any(|tile| !tile.coefficients.is_dark());
-    let source = Source {
+    let source = EncoderInput {
         geometry,
         basis: factored.then_some(&transport.basis),
         tile: &tile,

@@ -4,7 +4,7 @@ use std::rc::Rc;
 use std::time::Instant;
 
 use pollster::block_on;
-use relightable_photo::relight::backend::Frame;
+use relightable_photo::relight::backend::FrameRequest;
 use relightable_photo::relight::webgpu::{Device, OffscreenRenderer};
 use relightable_photo::relight::{Light, OutputTransform};
 
@@ -70,7 +70,7 @@ pub fn frames(figures: &mut Figures) {
 }
 
 fn draw(photo: &mut OffscreenRenderer, light: &Light, exposure: f32) {
-    let frame = Frame {
+    let frame = FrameRequest {
         light: Some(light),
         output: OutputTransform::srgb(exposure),
         quality: 1.0,

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use relightable_photo::executor::Executor;
 use relightable_photo::transport::{
-    Basis, CHANNELS, Correspondence, Extent, FloatTile, Geometry, TEXEL_COMPONENTS, TexelCode,
+    Basis, CHANNELS, Correspondence, Extent, FloatTile, Geometry, TEXEL_COMPONENTS, TexelCodes,
     Window,
 };
 
@@ -65,7 +65,7 @@ pub fn tile(geometry: &Geometry, rank: usize, index: usize) -> FloatTile {
 
 /// Bytes of a frame: the codes that it reads, and the picture that it writes.
 pub fn bytes(side: u32, rank: usize) -> usize {
-    let codes = CHANNELS * rank.div_ceil(TEXEL_COMPONENTS) * size_of::<TexelCode>();
+    let codes = CHANNELS * rank.div_ceil(TEXEL_COMPONENTS) * size_of::<TexelCodes>();
     square(side).area() * (codes + size_of::<[u8; 4]>())
 }
 

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use fuzzing::choices::Choices;
-use fuzzing::source::EncoderInput;
+use fuzzing::source::ArbitraryInput;
 use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{Metadata, RateTarget};
 use relightable_photo::transport::{
@@ -13,7 +13,7 @@ use relightable_photo::transport::{
 };
 
 /// Two tiles of at most 8 x 8 pixels: the first factored if `rank` is not 0, the other direct.
-fn input(rank: usize) -> EncoderInput {
+fn input(rank: usize) -> ArbitraryInput {
     let geometry = Geometry {
         camera: Extent {
             width: 10,
@@ -45,7 +45,7 @@ fn input(rank: usize) -> EncoderInput {
         tile
     });
     let kernel = |k: usize| (0..area).map(|s| ((s * k) as f32).cos()).collect();
-    EncoderInput {
+    ArbitraryInput {
         geometry,
         tiles: tiles.collect(),
         basis: (rank > 0).then(|| Basis {

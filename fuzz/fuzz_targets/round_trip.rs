@@ -2,7 +2,7 @@
 #![no_main]
 
 use fuzzing::choices::Choices;
-use fuzzing::source::{EncoderInput, ReversedExecutor, TargetChoice};
+use fuzzing::source::{ArbitraryInput, ReversedExecutor, TargetChoice};
 use fuzzing::{reading, seal};
 use libfuzzer_sys::fuzz_target;
 use relightable_photo::format::{EncodedFile, FormatError, RateTarget};
@@ -15,7 +15,7 @@ fuzz_target!(|data: &[u8]| {
         TargetChoice::Loss(_) => choices.bytes(),
         _ => [0; 9],
     };
-    let input = EncoderInput::new(&mut choices);
+    let input = ArbitraryInput::new(&mut choices);
     let encoded = match target.encode(&input, &losses) {
         Ok(encoded) => encoded,
         Err(FormatError::TooLarge { smallest, limit })

@@ -8,7 +8,7 @@ use relightable_photo::transport::{CHANNELS, Decibels, Tile, Transport};
 
 use crate::choices::Choices;
 use crate::heap::with_peak_bytes;
-use crate::source::{EncoderInput, TargetChoice};
+use crate::source::{ArbitraryInput, TargetChoice};
 
 /// The memory budget of fuzzed readers.
 pub const LIMITS: Limits = Limits {
@@ -267,7 +267,7 @@ pub fn check_early(file: &[u8]) {
 /// # Panics
 /// If it exceeds the error that the file declares and that of rounding to codes.
 pub fn check_error(
-    input: &EncoderInput,
+    input: &ArbitraryInput,
     transport: &Transport,
     declared: Option<Decibels>,
     target: TargetChoice,

@@ -4,11 +4,11 @@ use std::ops::RangeInclusive;
 
 use relightable_photo::executor::{Executor, SequentialExecutor};
 use relightable_photo::format::{
-    DistortionMetric, EncodedFile, Extension, FormatError, Metadata, RateTarget, Source,
+    DistortionMetric, EncodedFile, EncoderInput, Extension, FormatError, Metadata, RateTarget,
 };
 use relightable_photo::transport::{
-    Basis, CHANNELS, Correspondence, Decibels, Extent, FloatTile, Geometry, TileRect,
-    TransportFunctions, Window,
+    Basis, CHANNELS, Correspondence, Decibels, Extent, FloatTile, Geometry, TileFunctions,
+    TileRect, Window,
 };
 
 use crate::choices::Choices;
@@ -67,7 +67,7 @@ pub fn geometry(choices: &mut Choices<'_>) -> Geometry {
 }
 
 /// The input of the encoder.
-pub struct EncoderInput {
+pub struct ArbitraryInput {
     pub geometry: Geometry,
     pub basis: Option<Basis>,
     pub tiles: Vec<FloatTile>,
@@ -77,7 +77,7 @@ pub struct EncoderInput {
     pub is_moderate: bool,
 }
 
-impl std::fmt::Debug for EncoderInput {
+impl std::fmt::Debug for ArbitraryInput {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let rank = self.basis.as_ref().map(Basis::rank);
         write!(
@@ -88,7 +88,7 @@ impl std::fmt::Debug for EncoderInput {
     }
 }
 
-impl EncoderInput {
+impl ArbitraryInput {
     pub fn new(choices: &mut Choices<'_>) -> Self {
         let mut input = Self {
             geometry: geometry(choices),
@@ -207,7 +207,7 @@ impl EncoderInput {
         target: RateTarget<'_>,
         executor: &impl Executor,
     ) -> Result<EncodedFile, FormatError> {
-        let source = Source {
+        let source = EncoderInput {
             geometry: self.geometry,
             basis: self.basis.as_ref(),
             tile: &|i| Ok(self.tiles[i].clone()),
@@ -218,7 +218,7 @@ impl EncoderInput {
     }
 
     /// Light transport functions of tile `i`.
-    pub fn functions(&self, i: usize) -> TransportFunctions {
+    pub fn functions(&self, i: usize) -> TileFunctions {
         self.tiles[i].functions(&self.geometry, self.basis.as_ref())
     }
 
@@ -285,7 +285,7 @@ impl TargetChoice {
     ///
     /// # Errors
     /// The errors of the encoder.
-    pub fn encode(self, input: &EncoderInput, losses: &[u8]) -> Result<EncodedFile, FormatError> {
+    pub fn encode(self, input: &ArbitraryInput, losses: &[u8]) -> Result<EncodedFile, FormatError> {
         let metric = ArbitraryMetric {
             input,
             losses,
@@ -303,7 +303,7 @@ impl TargetChoice {
 
 /// A distortion metric with arbitrary results.
 struct ArbitraryMetric<'a> {
-    input: &'a EncoderInput,
+    input: &'a ArbitraryInput,
     losses: &'a [u8],
     calls: std::sync::atomic::AtomicUsize,
 }
@@ -314,7 +314,7 @@ impl DistortionMetric for ArbitraryMetric<'_> {
         tiles.take(3).cloned().collect()
     }
 
-    fn loss(&self, functions: &[TransportFunctions]) -> Decibels {
+    fn loss(&self, functions: &[TileFunctions]) -> Decibels {
         for (functions, tile) in functions.iter().zip(self.tiles()) {
             assert_eq!(functions.rect, tile.rect);
             let area = self.input.geometry.window.area();

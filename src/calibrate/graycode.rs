@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::affine_fit::{DecodedPixel, fit_affine_row};
+use super::affine_fit::{DecodedPosition, fit_affine_row};
 use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent};
 
 /// Least contrast `|p − n| / (p + n)` of a clear bit. Scattering lowers the contrast; at the edge of a stripe it passes
@@ -101,7 +101,7 @@ impl GrayCodePhotos {
 }
 
 /// Positions along one axis of the pixels with at least half of their bits clear.
-fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<DecodedPixel> {
+fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<DecodedPosition> {
     let pixels = rows.len() * width as usize;
     // A saturated sample is at least white, which is 1.
     let value = |v: &f32| if v.is_nan() { 1.0 } else { *v };
@@ -130,7 +130,7 @@ fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<DecodedPixel> {
         (2 * clear >= bits.len() && clear > 0).then(|| {
             let range = f64::from(1u32 << unclear.min(31));
             let (x, y) = (n as u32 % width, rows[n / width as usize]);
-            DecodedPixel {
+            DecodedPosition {
                 pixel: CameraPx { x, y },
                 position: (f64::from(code) + 0.5) * range,
                 width: range,

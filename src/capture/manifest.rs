@@ -28,9 +28,9 @@ pub struct Manifest {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub rights: String,
     /// The light plane: a monitor or projector.
-    pub light: LightSpec,
+    pub light: ManifestLight,
     /// The camera.
-    pub camera: CameraSpec,
+    pub camera: ManifestCamera,
     /// Photograph under no light.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dark: Option<String>,
@@ -52,7 +52,7 @@ pub struct Manifest {
 
 /// The light plane, and the emission of each code.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct LightSpec {
+pub struct ManifestLight {
     /// Elements along a row.
     pub width: u32,
     /// Elements down a column.
@@ -67,7 +67,7 @@ pub struct LightSpec {
 
 /// The camera grid and its range of linear codes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct CameraSpec {
+pub struct ManifestCamera {
     /// Pixels along a row.
     pub width: u32,
     /// Pixels down a column.
@@ -103,7 +103,7 @@ pub struct GrayCodeShot {
     pub inverted: bool,
 }
 
-impl LightSpec {
+impl ManifestLight {
     /// Size of the light plane.
     pub fn extent(&self) -> Extent {
         Extent::new(self.width, self.height)
@@ -136,7 +136,7 @@ impl LightSpec {
     }
 }
 
-impl CameraSpec {
+impl ManifestCamera {
     /// Size of the camera grid.
     pub fn extent(&self) -> Extent {
         Extent::new(self.width, self.height)
@@ -160,10 +160,10 @@ impl Manifest {
         let json_error = |reason| error(CaptureProblem::NotAManifest(reason));
         // The version first: another version may differ in any other field.
         #[derive(Deserialize)]
-        struct Versioned {
+        struct VersionOnly {
             version: u64,
         }
-        let Versioned { version } = serde_json::from_str(json).map_err(json_error)?;
+        let VersionOnly { version } = serde_json::from_str(json).map_err(json_error)?;
         if version != 1 {
             return Err(error(CaptureProblem::UnknownVersion(version)));
         }

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use super::noise_model::NoiseModel;
-use super::rows::RowSet;
+use super::row_set::RowSet;
 use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent, TileRect};
 
 /// The emission of each light element during one shot, `[M]`, row by row.

@@ -10,18 +10,18 @@
 mod error;
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
 mod folder;
-mod group;
+mod group_ids;
 mod manifest;
 mod measurements;
-mod noise_gain;
+mod noise_estimate;
 mod noise_model;
-mod rows;
+mod row_set;
 
 pub use error::{CaptureError, CaptureProblem, MANIFEST_NAME};
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
-pub use folder::{CaptureFolder, DarkFrame, GroundTruth, PhotoReader, RELIT_FULL_SCALE};
-pub(crate) use group::{group_count, group_ids};
-pub use manifest::{CameraSpec, GrayCodeShot, LightSpec, Manifest, Shot};
+pub use folder::{CameraRowReader, CaptureFolder, DarkFrame, GroundTruth, RELIT_FULL_SCALE};
+pub(crate) use group_ids::{group_count, group_ids};
+pub use manifest::{GrayCodeShot, Manifest, ManifestCamera, ManifestLight, Shot};
 pub use measurements::{LinearPhoto, Measurements, Pattern};
 pub use noise_model::NoiseModel;
-pub use rows::RowSet;
+pub use row_set::RowSet;

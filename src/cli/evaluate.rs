@@ -13,11 +13,11 @@ use serde::Serialize;
 use super::ltm_file::{PrefixLength, read_ltm};
 use super::process::AllCoresExecutor;
 use super::report::{format_bytes, print_json, print_line};
-use crate::capture::{CaptureFolder, GroundTruth, LinearPhoto, PhotoReader, RowSet};
+use crate::capture::{CameraRowReader, CaptureFolder, GroundTruth, LinearPhoto, RowSet};
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{BuiltinLight, Light};
 use crate::study::{CaptureTruth, psnr, transport_error};
-use crate::transport::{CHANNELS, Decibels, TransportError};
+use crate::transport::{CHANNELS, Decibels, SnrAccumulator};
 
 /// Compare a file with the known transport, the relit pictures and the unused photographs of a capture
 #[derive(Debug, Args)]
@@ -112,7 +112,7 @@ impl EvaluateReport {
             let functions = tile.functions(&geometry, &transport.basis);
             transport_error(&known, &geometry, &functions)
         });
-        self.snr_db = errors.sum::<TransportError>().snr();
+        self.snr_db = errors.sum::<SnrAccumulator>().snr();
         Ok(())
     }
 
@@ -125,19 +125,19 @@ impl EvaluateReport {
     ) -> Result<()> {
         let plane = relighter.transport().geometry.light;
         let dark = folder.read_dark()?;
-        let mut errors = [TransportError::default(); CHANNELS];
+        let mut errors = [SnrAccumulator::default(); CHANNELS];
         for i in (0..folder.manifest().shots.len()).filter(|i| !used.contains(i)) {
             let light = Light::from_linear_rgb(plane, &folder.read_pattern(i)?.rgb())?;
             add_error(&mut errors, relighter, &light, folder.open_shot(i, &dark)?)?;
             self.heldout_shots += 1;
         }
         self.heldout_rgb_snr_db = errors.map(|e| e.snr());
-        self.heldout_snr_db = errors.into_iter().sum::<TransportError>().snr();
+        self.heldout_snr_db = errors.into_iter().sum::<SnrAccumulator>().snr();
         if let Some(photo) = folder.open_flood(&dark)? {
             let light = BuiltinLight::Flood.render(plane);
-            let mut errors = [TransportError::default(); CHANNELS];
+            let mut errors = [SnrAccumulator::default(); CHANNELS];
             add_error(&mut errors, relighter, &light, photo)?;
-            self.flood_snr_db = errors.into_iter().sum::<TransportError>().snr();
+            self.flood_snr_db = errors.into_iter().sum::<SnrAccumulator>().snr();
         }
         Ok(())
     }
@@ -164,10 +164,10 @@ impl EvaluateReport {
 
 /// Adds the error of the picture predicted under `light`, without saturated samples.
 fn add_error(
-    errors: &mut [TransportError; CHANNELS],
+    errors: &mut [SnrAccumulator; CHANNELS],
     relighter: &mut CpuRelighter,
     light: &Light,
-    mut reader: PhotoReader,
+    mut reader: CameraRowReader,
 ) -> Result<()> {
     relighter.relight(light, &AllCoresExecutor);
     let picture = relighter.linear();

@@ -8,9 +8,9 @@ use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, ensure};
 
-use super::arguments::ByteCount;
+use super::value_parsers::ByteCount;
 use crate::format::{
-    ChunkSelection, FileIndex, FileSection, FormatError, HEADER_BYTES, Limits, LtmReader, Progress,
+    ChunkSelection, FileIndex, FormatError, HEADER_BYTES, Limits, LtmReader, Progress, SectionName,
 };
 use crate::transport::Transport;
 
@@ -80,9 +80,9 @@ fn feed_all(reader: &mut LtmReader, mut file: impl Read) -> Result<()> {
 fn intact_bytes(index: &FileIndex, error: &anyhow::Error) -> Option<u64> {
     match error.downcast_ref::<FormatError>()? {
         FormatError::Truncated { got, .. } => Some(*got),
-        FormatError::ChecksumMismatch(FileSection::Chunk(chunk))
+        FormatError::ChecksumMismatch(SectionName::Chunk(chunk))
         | FormatError::DamagedSection {
-            section: FileSection::Chunk(chunk),
+            section: SectionName::Chunk(chunk),
             ..
         } => Some(index.range(*chunk).start),
         _ => None,

@@ -4,7 +4,6 @@
 //! [`advice`] adds the remedy.
 
 mod advice;
-mod arguments;
 mod evaluate;
 mod inspect;
 mod ltm_file;
@@ -18,6 +17,7 @@ mod report;
 mod shot_reader;
 mod simulate;
 mod study;
+mod value_parsers;
 mod verify;
 
 use std::process::ExitCode;
@@ -63,7 +63,7 @@ pub fn main() -> ExitCode {
         return ExitCode::from(process::INTERRUPTED_STATUS);
     }
     eprintln!("error: {}", advice::error_with_remedy(&error));
-    match error.is::<arguments::UsageError>() {
+    match error.is::<value_parsers::UsageError>() {
         true => ExitCode::from(2),
         false => ExitCode::FAILURE,
     }

@@ -9,10 +9,10 @@ use clap::{Args, ValueEnum};
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder, ImageReader};
 
-use super::arguments::{UsageError, parse_number};
 use super::ltm_file::{PrefixLength, read_ltm};
 use super::output_file::{OutputFile, PNG};
 use super::process::AllCoresExecutor;
+use super::value_parsers::{UsageError, parse_number};
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{
     BuiltinLight, Light, OutputTransform, TorchPose, area_resample, reference, srgb,
@@ -42,15 +42,15 @@ pub struct RelightArgs {
     #[arg(long, value_name = "BYTES|PERCENT", value_parser = PrefixLength::parse)]
     first: Option<PrefixLength>,
     /// Implementation that computes the picture
-    #[arg(long, value_enum, default_value_t = BackendName::Cpu)]
-    backend: BackendName,
+    #[arg(long, value_enum, default_value_t = CliBackend::Cpu)]
+    backend: CliBackend,
     /// PNG to write
     #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum BackendName {
+enum CliBackend {
     /// Single precision, fast
     Cpu,
     /// Double precision, by the definition; slow
@@ -94,12 +94,12 @@ pub fn run(args: &RelightArgs) -> Result<()> {
     };
     let transform = OutputTransform::srgb(args.exposure);
     let picture = match args.backend {
-        BackendName::Cpu => {
+        CliBackend::Cpu => {
             let mut relighter = CpuRelighter::new(Arc::new(file.transport));
             relighter.relight(&light, &AllCoresExecutor);
             relighter.picture(&transform, &AllCoresExecutor)
         }
-        BackendName::Reference => reference::picture(&file.transport, &light, &transform),
+        CliBackend::Reference => reference::picture(&file.transport, &light, &transform),
     };
     let rgba = picture.pixels.iter();
     let rgb: Vec<u8> = rgba.flat_map(|p| [p[0], p[1], p[2]]).collect();

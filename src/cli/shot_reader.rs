@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::progress;
 use crate::capture::{
-    CaptureError, CaptureFolder, DarkFrame, Measurements, NoiseModel, PhotoReader, RowSet,
+    CameraRowReader, CaptureError, CaptureFolder, DarkFrame, Measurements, NoiseModel, RowSet,
 };
 use crate::executor::Executor;
 
@@ -31,7 +31,7 @@ pub fn read_patterns(
 
 /// The opened photographs of some shots.
 pub struct ShotReader<'a> {
-    photos: Vec<PhotoReader<'a>>,
+    photos: Vec<CameraRowReader<'a>>,
 }
 
 impl<'a> ShotReader<'a> {
@@ -85,7 +85,7 @@ impl<'a> ShotReader<'a> {
             Ok(executor.check_cancelled()?)
         })?;
         drop(bar);
-        let saturated = self.photos.into_par_iter().map(PhotoReader::finish);
+        let saturated = self.photos.into_par_iter().map(CameraRowReader::finish);
         let saturated = saturated.try_reduce(|| 0, |a, b| Ok(a + b))?;
         measurements.noise = NoiseModel::with_gain_from(measurements);
         Ok(saturated)

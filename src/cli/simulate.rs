@@ -16,13 +16,13 @@ use rayon::prelude::*;
 use super::report::format_bytes;
 use super::{output_folder, progress};
 use crate::capture::{
-    CameraSpec, GrayCodeShot, LightSpec, MANIFEST_NAME, Manifest, RELIT_FULL_SCALE, Shot,
+    GrayCodeShot, MANIFEST_NAME, Manifest, ManifestCamera, ManifestLight, RELIT_FULL_SCALE, Shot,
 };
 use crate::simulate::{
-    Camera, EmissionMatrix, GrayCodePattern, LightCodes, MONITOR_GAMMA, PatternEnsemble,
-    RandomStream, SceneKind, SimulatedScene, truth_lights,
+    Camera, GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage, PatternMatrix,
+    RandomStreamId, SceneKind, SimulatedScene, truth_lights,
 };
-use crate::transport::{CHANNELS, CameraPx, Extent, TileRect, TransportFunctions};
+use crate::transport::{CHANNELS, CameraPx, Extent, TileFunctions, TileRect};
 
 /// Camera rows whose transport is computed as one job.
 const STRIP_ROWS: u32 = 4;
@@ -81,7 +81,7 @@ fn parse_extent(text: &str, sides: RangeInclusive<u32>) -> Result<Extent, String
 }
 
 pub fn run(args: &SimulateArgs) -> Result<()> {
-    let plan = CapturePlan::new(args)?;
+    let plan = SimulationPlan::new(args)?;
     let (photographs, camera) = (plan.lights.len(), args.camera);
     let bytes = photographs * camera.area() * size_of::<[f32; CHANNELS]>();
     ensure!(
@@ -102,11 +102,11 @@ pub fn run(args: &SimulateArgs) -> Result<()> {
     Ok(())
 }
 
-struct CapturePlan<'a> {
+struct SimulationPlan<'a> {
     args: &'a SimulateArgs,
     scene: Box<dyn SimulatedScene>,
     manifest: Manifest,
-    lights: Vec<LightCodes>,
+    lights: Vec<PatternImage>,
     /// One for each light.
     pictures: Vec<PictureFiles>,
 }
@@ -120,20 +120,20 @@ struct PictureFiles {
     codes: Option<String>,
 }
 
-impl<'a> CapturePlan<'a> {
+impl<'a> SimulationPlan<'a> {
     fn new(args: &'a SimulateArgs) -> Result<Self> {
         let scene = args.scene.build(args.camera, args.light)?;
         let mut plan = Self {
             args,
             manifest: Manifest {
                 version: 1,
-                light: LightSpec {
+                light: ManifestLight {
                     width: args.light.width,
                     height: args.light.height,
                     gamma: Some(MONITOR_GAMMA),
                     response: None,
                 },
-                camera: CameraSpec {
+                camera: ManifestCamera {
                     width: args.camera.width,
                     height: args.camera.height,
                     black: Camera::BLACK,
@@ -150,7 +150,7 @@ impl<'a> CapturePlan<'a> {
         };
         // Calibration first, so that the noise of a shot does not depend on the number of shots.
         for (name, code) in [("dark", 0), ("flood", 255)] {
-            let codes = LightCodes::uniform(args.light, code);
+            let codes = PatternImage::uniform(args.light, code);
             plan.photograph(codes, format!("photos/{name}.png"), None);
         }
         for code in GrayCodePattern::all(args.light) {
@@ -166,7 +166,7 @@ impl<'a> CapturePlan<'a> {
         }
         let ensemble = args.ensemble.unwrap_or(args.scene.ensemble());
         for i in 0..args.patterns {
-            let mut stream = RandomStream::Pattern(i).start(args.seed);
+            let mut stream = RandomStreamId::Pattern(i).start(args.seed);
             let codes = ensemble.draw(args.light, &mut stream);
             let (pattern, photo) = (format!("patterns/{i:04}.png"), format!("photos/{i:04}.png"));
             plan.photograph(codes, photo.clone(), Some(pattern.clone()));
@@ -187,7 +187,7 @@ impl<'a> CapturePlan<'a> {
         Ok(plan)
     }
 
-    fn photograph(&mut self, light: LightCodes, picture: String, codes: Option<String>) {
+    fn photograph(&mut self, light: PatternImage, picture: String, codes: Option<String>) {
         self.lights.push(light);
         self.pictures.push(PictureFiles {
             picture,
@@ -198,7 +198,7 @@ impl<'a> CapturePlan<'a> {
 }
 
 /// Computes everything and writes it into the folder `root`.
-fn write(plan: &CapturePlan, root: &Path) -> Result<()> {
+fn write(plan: &SimulationPlan, root: &Path) -> Result<()> {
     for folder in ["patterns", "photos", "graycode", "truth"] {
         std::fs::create_dir(root.join(folder)).context(folder)?;
     }
@@ -216,7 +216,7 @@ fn write(plan: &CapturePlan, root: &Path) -> Result<()> {
             let code = |y: f32| (f64::from(y) * RELIT_FULL_SCALE).round() as u16;
             picture.iter().map(|y| y.map(code)).collect()
         } else {
-            let mut noise = RandomStream::Photograph(i as u32).start(plan.args.seed);
+            let mut noise = RandomStreamId::Photograph(i as u32).start(plan.args.seed);
             sensor.photograph(picture, &mut noise)
         };
         // The encoder expects native-endian samples.
@@ -224,8 +224,8 @@ fn write(plan: &CapturePlan, root: &Path) -> Result<()> {
         write_png(&path, camera, bytes, ExtendedColorType::Rgb16)?;
         if let Some(path) = &files.codes {
             let (bytes, color) = match &plan.lights[i] {
-                LightCodes::Grey(codes) => (&codes[..], ExtendedColorType::L8),
-                LightCodes::Rgb(codes) => (codes.as_flattened(), ExtendedColorType::Rgb8),
+                PatternImage::Grey(codes) => (&codes[..], ExtendedColorType::L8),
+                PatternImage::Rgb(codes) => (codes.as_flattened(), ExtendedColorType::Rgb8),
             };
             write_png(&root.join(path), light, bytes, color)?;
         }
@@ -238,10 +238,10 @@ fn write(plan: &CapturePlan, root: &Path) -> Result<()> {
 }
 
 /// Writes `tau.npy` and `uv.npy`, and returns the picture under each of the plan's lights.
-fn write_transport(plan: &CapturePlan, truth: &Path) -> Result<Vec<Vec<[f32; CHANNELS]>>> {
+fn write_transport(plan: &SimulationPlan, truth: &Path) -> Result<Vec<Vec<[f32; CHANNELS]>>> {
     let geometry = plan.scene.geometry();
     let (camera, side) = (geometry.camera, u64::from(geometry.window.side()));
-    let emissions = EmissionMatrix::new(geometry.light, &plan.lights);
+    let emissions = PatternMatrix::new(geometry.light, &plan.lights);
     let mut pictures = vec![Vec::with_capacity(camera.area()); plan.lights.len()];
     let n = camera.area() as u64;
     let tau_shape = [n, side, side, CHANNELS as u64];
@@ -285,7 +285,7 @@ fn write_transport(plan: &CapturePlan, truth: &Path) -> Result<Vec<Vec<[f32; CHA
 
 /// Rounds τ to float16, the precision of `tau.npy`, so that the pictures follow exactly from the file. Returns the
 /// rounded values.
-fn round_to_f16(functions: &mut TransportFunctions) -> Vec<f16> {
+fn round_to_f16(functions: &mut TileFunctions) -> Vec<f16> {
     let round = |value: &mut f32| {
         let rounded = f16::from_f32(*value);
         *value = rounded.to_f32();

@@ -13,8 +13,8 @@ use crate::capture::{CaptureFolder, Measurements, RowSet};
 use crate::relight::Light;
 use crate::simulate::{SceneKind, SimulatedScene, WINDOW_SIDE};
 use crate::study::{
-    self, CaptureTruth, KnownTransport, ProgressCallback, RelitLight, ReportSection, SNR_PATTERNS,
-    SceneCamera,
+    self, CaptureTruth, EvaluationLight, KnownTransport, ProgressCallback, ReportSection,
+    SNR_PATTERNS, SimulatedCapture,
 };
 use crate::transport::Extent;
 
@@ -146,7 +146,7 @@ impl<'a> StudySubject<'a> {
                 let kinds = [SceneKind::StainedGlass, SceneKind::Cookies].into_iter();
                 let compare = |(kind, name): (SceneKind, &str)| {
                     let scene = kind.build(COMPARISON_CAMERA, COMPARISON_LIGHT)?;
-                    let (camera, ensemble) = (scene_camera(scene.as_ref()), kind.ensemble());
+                    let (camera, ensemble) = (simulated_capture(scene.as_ref()), kind.ensemble());
                     let section = study::comparison(name, camera, ensemble, CORES, self.progress)?;
                     Ok(section)
                 };
@@ -167,7 +167,7 @@ impl<'a> StudySubject<'a> {
             "{}: photographing under {max_patterns} patterns, window {WINDOW_SIDE}",
             self.name
         ));
-        let camera = scene_camera(scene.as_ref());
+        let camera = simulated_capture(scene.as_ref());
         let measurements = camera.measure(kind.ensemble(), max_patterns, CORES);
         let lights = study::built_in_lights(PAPER_LIGHT);
         self.figures(&camera, measurements, lights)
@@ -181,7 +181,7 @@ impl<'a> StudySubject<'a> {
             .context("has no truth/ folder, so its transport is unknown; use evaluate instead")?;
         let mut lights = Vec::new();
         for name in truth.lights()? {
-            lights.push(RelitLight {
+            lights.push(EvaluationLight {
                 light: Light::from_linear_rgb(truth.light_plane, &truth.light(&name)?.rgb())?,
                 photographed: Some(truth.relit(&name)?),
                 name,
@@ -198,7 +198,7 @@ impl<'a> StudySubject<'a> {
         &self,
         known: &impl KnownTransport,
         measurements: Measurements,
-        lights: Vec<RelitLight>,
+        lights: Vec<EvaluationLight>,
     ) -> Result<Vec<ReportSection>> {
         let (name, pixels, progress) = (&self.name, self.pixels, self.progress);
         let sparsity = study::sparsity(name, known, CORES, progress)?;
@@ -210,8 +210,8 @@ impl<'a> StudySubject<'a> {
     }
 }
 
-fn scene_camera(scene: &dyn SimulatedScene) -> SceneCamera<'_> {
-    SceneCamera {
+fn simulated_capture(scene: &dyn SimulatedScene) -> SimulatedCapture<'_> {
+    SimulatedCapture {
         scene,
         electrons: ELECTRONS,
         seed: SEED,

@@ -33,11 +33,11 @@ struct VerifyReport {
     bad_parts: usize,
     /// By the file index, if it can be read.
     #[serde(flatten)]
-    contents: Option<FileContents>,
+    contents: Option<FileTotals>,
 }
 
 #[derive(Serialize)]
-struct FileContents {
+struct FileTotals {
     tiles: usize,
     scans: usize,
     file_bytes: u64,
@@ -73,7 +73,7 @@ fn verify(args: &VerifyArgs, report: &mut VerifyReport) -> Result<()> {
     let (mut file, index) = open_ltm(&args.file)?;
     let name = || args.file.display().to_string();
     let end = index.header.file_bytes;
-    report.contents = Some(FileContents {
+    report.contents = Some(FileTotals {
         tiles: index.tiles(),
         scans: index.scans.len(),
         file_bytes: end,

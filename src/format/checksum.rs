@@ -1,6 +1,6 @@
 //! CRC-32C (RFC 3720, appendix B.4).
 
-use super::error::{FileSection, FormatError};
+use super::error::{FormatError, SectionName};
 
 /// The checksum of `bytes`.
 #[cfg(not(target_arch = "wasm32"))]
@@ -20,7 +20,7 @@ pub fn checksum(bytes: &[u8]) -> u32 {
 ///
 /// # Errors
 /// [`FormatError::ChecksumMismatch`].
-pub fn check_crc(bytes: &[u8], crc: u32, section: FileSection) -> Result<(), FormatError> {
+pub fn check_crc(bytes: &[u8], crc: u32, section: SectionName) -> Result<(), FormatError> {
     match cfg!(fuzzing) || checksum(bytes) == crc {
         true => Ok(()),
         false => Err(FormatError::ChecksumMismatch(section)),

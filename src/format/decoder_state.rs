@@ -4,11 +4,11 @@
 
 use std::ops::Range;
 
-use super::budget::MemoryBudget;
 use super::chunk::ChunkId;
-use super::codec::direct;
+use super::codec::direct_functions;
 use super::error::FormatError;
 use super::index::FileIndex;
+use super::memory_budget::MemoryBudget;
 use super::metadata::MetadataJson;
 use super::scan::Scan;
 use super::tile_decoder::{TileDecoder, decode_basis_chunk};
@@ -66,7 +66,7 @@ impl DecoderState {
             basis: Basis {
                 kernels: index.try_zeroed_basis(budget)?,
             },
-            order: direct::centre_out_order(index.header.geometry.window, budget)?,
+            order: direct_functions::centre_out_order(index.header.geometry.window, budget)?,
             tiles: budget.try_with_capacity(tiles)?,
             chunks: budget.try_with_capacity(scans * (tiles + 1))?,
             missing: budget.try_zeroed(scans)?,

@@ -3,13 +3,13 @@
 //! Decompressed it is `scan record [scan]`, then three tables of `u32 [scan, tile]`: bytes, content
 //! bytes, checksums. Equal fields stand together, as that compresses better.
 
-use super::budget::MemoryBudget;
 use super::chunk::{ChunkEntry, ChunkId};
 use super::codec::zstd_frame::compressed_bound;
-use super::codec::{basis, direct, halves, tokens, transform};
+use super::codec::{basis_chunk, direct_functions, halves, tokens, transform};
 use super::constants::{CHUNK_ENTRY_BYTES, MAX_CONTENT_BYTES, SCAN_RECORD_BYTES};
 use super::error::FormatError;
 use super::header::Header;
+use super::memory_budget::MemoryBudget;
 use super::scan::{Scan, ScanCoding};
 use crate::transport::{CHANNELS, Extent};
 
@@ -95,7 +95,7 @@ fn is_valid_scan(header: &Header, scan: &Scan, known: usize) -> bool {
         && match scan.new_basis_functions(known) {
             0 => basis_bytes == 0,
             functions => {
-                let content = basis::content_bytes(functions, area) as u64;
+                let content = basis_chunk::content_bytes(functions, area) as u64;
                 (1..=compressed_bound(content)).contains(&basis_bytes)
             }
         }
@@ -114,7 +114,7 @@ fn is_valid_entry(scan: &Scan, extent: Extent, entry: ChunkEntry) -> bool {
             (1, max_tokens, transform::max_bytes(content))
         }
         ScanCoding::Direct => {
-            let max_tokens = direct::max_tokens(extent, scan.count);
+            let max_tokens = direct_functions::max_tokens(extent, scan.count);
             (1, max_tokens, tokens::max_bytes(content))
         }
         ScanCoding::Halves | ScanCoding::DirectHalves => {

@@ -29,7 +29,7 @@ pub enum FormatError {
     },
     /// Bytes do not match their checksum.
     #[error("the {0} is damaged: its checksum does not match; copy or export the file again")]
-    ChecksumMismatch(FileSection),
+    ChecksumMismatch(SectionName),
     /// The header has an invalid geometry.
     #[error("the header is invalid: {0}")]
     InvalidGeometry(GeometryError),
@@ -75,7 +75,7 @@ pub enum FormatError {
     #[error("the {section} does not decompress: {reason}; copy or export the file again")]
     DamagedSection {
         /// Where.
-        section: FileSection,
+        section: SectionName,
         /// zstd's message, or the rule that is broken.
         reason: String,
     },
@@ -167,7 +167,7 @@ fn describe_beginning(found: &[u8]) -> String {
 
 /// A section of the file, for messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum FileSection {
+pub enum SectionName {
     /// The fixed header.
     #[error("header")]
     Header,
@@ -196,7 +196,7 @@ pub(super) enum SectionError {
 
 impl SectionError {
     /// The error with the section's name.
-    pub fn in_section(self, section: FileSection) -> FormatError {
+    pub fn in_section(self, section: SectionName) -> FormatError {
         match self {
             Self::Damaged(reason) => FormatError::DamagedSection { section, reason },
             Self::NoMemory(error) => error,
@@ -205,7 +205,7 @@ impl SectionError {
 
     /// The error with the chunk's name.
     pub fn in_chunk(self, chunk: ChunkId) -> FormatError {
-        self.in_section(FileSection::Chunk(chunk))
+        self.in_section(SectionName::Chunk(chunk))
     }
 }
 

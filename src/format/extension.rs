@@ -1,8 +1,8 @@
 //! Extensions: blocks of data that later versions and other programs add to a file.
 
-use super::budget::MemoryBudget;
-use super::error::{FileSection, FormatError};
+use super::error::{FormatError, SectionName};
 use super::fields::FieldReader;
+use super::memory_budget::MemoryBudget;
 
 /// Bytes of a record before its data: tag, flags, length.
 const RECORD_HEADER_BYTES: usize = 12;
@@ -35,7 +35,7 @@ pub(super) fn encode(extensions: &[Extension]) -> Vec<u8> {
 
 pub(super) fn decode(bytes: &[u8], budget: &MemoryBudget) -> Result<Vec<Extension>, FormatError> {
     let cut = || FormatError::DamagedSection {
-        section: FileSection::Extensions,
+        section: SectionName::Extensions,
         reason: "the last one is cut".to_owned(),
     };
     let (mut fields, mut extensions) = (FieldReader(bytes), Vec::new());

@@ -4,7 +4,7 @@ use super::checksum::{check_crc, checksum};
 use super::constants::{
     HEADER_BYTES, MAX_EXTENSION_BYTES, MAX_METADATA_BYTES, MAX_RANK, MAX_SCANS,
 };
-use super::error::{FileSection, FormatError, TextModeDamage};
+use super::error::{FormatError, SectionName, TextModeDamage};
 use super::fields::FieldReader;
 use crate::transport::{Correspondence, Geometry};
 
@@ -95,7 +95,7 @@ impl Header {
         }
         let (fixed, crc) = bytes.split_at(HEADER_BYTES - 4);
         let [crc] = FieldReader(crc).u32s();
-        check_crc(fixed, crc, FileSection::Header)?;
+        check_crc(fixed, crc, SectionName::Header)?;
         let sides = std::array::from_fn(|_| fields.u32s());
         let affine = std::array::from_fn(|_| std::array::from_fn(|_| fields.f64()));
         let file_bytes = fields.u64();

@@ -2,15 +2,15 @@
 
 use std::ops::Range;
 
-use super::budget::MemoryBudget;
 use super::checksum::check_crc;
 use super::chunk::{ChunkEntry, ChunkId};
 use super::codec::zstd_frame::{compress, decompress};
 use super::constants::HEADER_BYTES;
 use super::directory;
-use super::error::{FileSection, FormatError};
+use super::error::{FormatError, SectionName};
 use super::extension::{self, Extension};
 use super::header::{Header, SectionEntry};
+use super::memory_budget::MemoryBudget;
 use super::metadata::{Metadata, MetadataJson};
 use super::scan::{Scan, ScanCoding, rank_of};
 use crate::transport::Geometry;
@@ -40,18 +40,18 @@ impl FileIndex {
         budget: &MemoryBudget,
     ) -> Result<Self, FormatError> {
         let mut rest = &bytes[HEADER_BYTES..];
-        let mut take = |SectionEntry { bytes, crc }, section: FileSection| {
+        let mut take = |SectionEntry { bytes, crc }, section: SectionName| {
             let (taken, after) = rest.split_at(bytes as usize);
             rest = after;
             check_crc(taken, crc, section).map(|()| taken)
         };
-        let frame = take(header.directory, FileSection::Directory)?;
-        let extensions = take(header.extensions, FileSection::Extensions)?;
-        let metadata = take(header.metadata, FileSection::Metadata)?;
+        let frame = take(header.directory, SectionName::Directory)?;
+        let extensions = take(header.extensions, SectionName::Extensions)?;
+        let metadata = take(header.metadata, SectionName::Metadata)?;
         let extensions = extension::decode(extensions, budget)?;
         let content_bytes = usize::try_from(directory::content_bytes(&header));
         let records = decompress(frame, content_bytes.unwrap_or(usize::MAX), budget)
-            .map_err(|error| error.in_section(FileSection::Directory))?;
+            .map_err(|error| error.in_section(SectionName::Directory))?;
         let (scans, entries) = directory::decode(&header, &records, budget)?;
         budget.release_vec(records);
         let index = Self {
@@ -150,7 +150,7 @@ impl FileIndex {
             None => self.scans[chunk.scan].basis_crc,
             Some(tile) => self.entry(chunk.scan, tile).crc,
         };
-        check_crc(bytes, crc, FileSection::Chunk(chunk))
+        check_crc(bytes, crc, SectionName::Chunk(chunk))
     }
 
     /// The basis functions in the basis chunk of a scan.

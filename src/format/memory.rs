@@ -4,12 +4,12 @@
 //! when chunks come in file order; out of order, chunks that wait are reserved in addition.
 
 use super::chunk::{ChunkEntry, ChunkId};
-use super::codec::basis;
+use super::codec::basis_chunk;
 use super::directory;
 use super::header::Header;
 use super::index::FileIndex;
 use super::scan::Scan;
-use crate::transport::{CHANNELS, TexelCode, Tile};
+use crate::transport::{CHANNELS, TexelCodes, Tile};
 
 /// Bytes that the state of a chunk and of a tile take.
 const STATE_BYTES: u64 = 32;
@@ -30,7 +30,7 @@ pub(super) fn index_bytes(header: &Header) -> u64 {
     );
     let area = header.geometry.window.area();
     let entry = (size_of::<ChunkEntry>() + size_of::<u64>()) as u64 + STATE_BYTES;
-    let basis = 4 * basis::content_bytes(header.rank.into(), area) as u64;
+    let basis = 4 * basis_chunk::content_bytes(header.rank.into(), area) as u64;
     relight_bytes(header)
         + header.index_bytes()
         + directory::content_bytes(header)
@@ -54,7 +54,7 @@ pub(super) fn file_bytes(index: &FileIndex) -> u64 {
     for (i, rect) in geometry.tiles().enumerate() {
         let pixels = rect.extent.area() as u64;
         // A tile is kept as decoded values until it is complete, and then as codes.
-        let codes = (Tile::texels(rect, rank) * size_of::<TexelCode>()) as u64;
+        let codes = (Tile::texels(rect, rank) * size_of::<TexelCodes>()) as u64;
         let coefficients = pixels * rank as u64 * value;
         let functions = pixels * area * value;
         let [factored, direct] = [false, true].map(|direct| u64::from(has_chunk(i, direct)));

@@ -7,8 +7,8 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::budget::MemoryBudget;
 use super::error::FormatError;
+use super::memory_budget::MemoryBudget;
 
 /// Bytes of parsed JSON for each byte of its text, at most: an array grows to twice its length, of eight
 /// bytes for every two characters.
@@ -30,7 +30,7 @@ pub struct Metadata {
     pub rights: String,
     /// How the object was captured.
     #[serde(deserialize_with = "object")]
-    pub capture: CaptureNote,
+    pub capture: CaptureSummary,
     /// Program and version that wrote the file.
     pub writer: String,
     /// Recovery method.
@@ -45,7 +45,7 @@ pub struct Metadata {
 /// How an object was captured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct CaptureNote {
+pub struct CaptureSummary {
     /// Number of different patterns.
     pub patterns: usize,
     /// Number of photographs that the recovery used.

@@ -14,7 +14,6 @@
 //! [`LtmReader`] does no I/O: it is fed bytes in any pieces and lists the byte ranges that it needs.
 //! [`EncodedFile`] is the inverse.
 
-mod budget;
 mod checksum;
 mod chunk;
 mod codec;
@@ -28,21 +27,22 @@ mod fields;
 mod header;
 mod index;
 mod memory;
+mod memory_budget;
 mod metadata;
 mod reader;
 mod scan;
 mod tile_decoder;
 
-pub use budget::Limits;
 pub use chunk::{ChunkEntry, ChunkId};
 pub use constants::{FIRST_BYTES, HEADER_BYTES};
 pub use decoder_state::ChunkSelection;
-pub use encode::{DistortionMetric, EncodedFile, RateTarget, Source};
-pub use error::{FileSection, FormatError, TextModeDamage};
+pub use encode::{DistortionMetric, EncodedFile, EncoderInput, RateTarget};
+pub use error::{FormatError, SectionName, TextModeDamage};
 pub use extension::Extension;
 pub use header::Header;
 pub use index::FileIndex;
-pub use metadata::{CaptureNote, Metadata, MetadataJson};
+pub use memory_budget::Limits;
+pub use metadata::{CaptureSummary, Metadata, MetadataJson};
 pub use reader::{LtmReader, Progress};
 pub use scan::{Scan, ScanCoding};
 pub use tile_decoder::{check, decode_basis, decode_tile};

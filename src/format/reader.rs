@@ -2,13 +2,13 @@
 
 use std::ops::Range;
 
-use super::budget::{Limits, MemoryBudget};
 use super::constants::{FIRST_BYTES, HEADER_BYTES};
 use super::decoder_state::{ChunkSelection, DecoderState};
 use super::error::FormatError;
 use super::header::{self, Header};
 use super::index::FileIndex;
 use super::memory;
+use super::memory_budget::{Limits, MemoryBudget};
 use super::metadata::MetadataJson;
 use crate::transport::Transport;
 

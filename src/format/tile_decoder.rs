@@ -1,11 +1,11 @@
 //! Decoding one tile: chunks in the order of scans to coefficients c and direct functions d.
 
-use super::budget::{MemoryBudget, vec_bytes};
 use super::chunk::ChunkId;
 use super::codec::transform::CoefficientPlanes;
-use super::codec::{basis, direct, halves};
+use super::codec::{basis_chunk, direct_functions, halves};
 use super::error::{FormatError, SectionError};
 use super::index::FileIndex;
+use super::memory_budget::{MemoryBudget, vec_bytes};
 use super::scan::{Scan, ScanCoding};
 use crate::transport::{Basis, CHANNELS, FloatTile, Tile, TileCodes};
 
@@ -68,7 +68,7 @@ impl TileDecoder {
                 ScanCoding::Transform => self.planes.add(extent, scan, bytes, tokens, budget),
                 ScanCoding::Direct => {
                     allocate(&mut self.functions, area)?;
-                    direct::add(&mut self.functions, order, scan, bytes, tokens, budget)
+                    direct_functions::add(&mut self.functions, order, scan, bytes, tokens, budget)
                 }
                 ScanCoding::Halves => {
                     allocate(&mut self.coefficients, rank)?;
@@ -145,7 +145,7 @@ pub(super) fn decode_basis_chunk(
     let functions = &mut kernels[index.new_basis_functions(scan)];
     let area = index.header.geometry.window.area();
     let _scratch = budget.scratch();
-    let decoded = basis::decode(bytes, functions, area, budget);
+    let decoded = basis_chunk::decode(bytes, functions, area, budget);
     decoded.map_err(|error| error.in_chunk(ChunkId { scan, tile: None }))
 }
 
@@ -159,7 +159,7 @@ pub fn decode_tile<E: From<FormatError>>(
     mut fetch: impl FnMut(ChunkId) -> Result<Vec<u8>, E>,
 ) -> Result<FloatTile, E> {
     let budget = MemoryBudget::unlimited();
-    let order = direct::centre_out_order(index.header.geometry.window, &budget)?;
+    let order = direct_functions::centre_out_order(index.header.geometry.window, &budget)?;
     let mut decoder = TileDecoder::new(tile);
     for scan in 0..index.scans.len() {
         if index.entry(scan, tile).bytes == 0 {
@@ -237,6 +237,6 @@ pub fn check(index: &FileIndex, chunk: ChunkId, bytes: &[u8]) -> Result<(), Form
     if !index.has_colour_klt(scan, tile) {
         decoder.planes = CoefficientPlanes::with_klt();
     }
-    let order = direct::centre_out_order(index.header.geometry.window, &budget)?;
+    let order = direct_functions::centre_out_order(index.header.geometry.window, &budget)?;
     decoder.add(index, &order, bytes, &budget)
 }

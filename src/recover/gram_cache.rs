@@ -249,7 +249,7 @@ fn subtract_outer_product(a: &mut [f64], factor: f64, v: &[f64]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::preparation;
+    use super::super::preparation_input;
     use super::*;
     use crate::capture::{NoiseModel, Pattern, RowSet};
     use crate::transport::{CHANNELS, Correspondence};
@@ -284,7 +284,7 @@ mod tests {
     fn table_agrees_with_products() {
         let (measurements, indices) = (measurements(), (0..PATTERNS).collect::<Vec<_>>());
         let window = Window::new(3).unwrap();
-        let geometry = preparation::geometry(&measurements, window).unwrap();
+        let geometry = preparation_input::geometry(&measurements, window).unwrap();
         let cache = |origins: &[LightElement]| {
             GramCache::new(&measurements, geometry, &indices, 0, origins)
         };

@@ -7,13 +7,11 @@
 
 use super::error::RecoverError;
 use super::holdout::HoldoutSplit;
-use super::preparation::Preparation;
+use super::preparation_input::PreparationInput;
 use super::{prediction, sampling};
 use crate::capture::{Measurements, Pattern};
 use crate::executor::Executor;
-use crate::transport::{
-    Basis, CHANNELS, Decibels, FloatTile, Geometry, TileRect, TransportFunctions,
-};
+use crate::transport::{Basis, CHANNELS, Decibels, FloatTile, Geometry, TileFunctions, TileRect};
 
 /// Squares of the picture that are validated.
 const MAX_SQUARES: usize = 96;
@@ -52,11 +50,11 @@ impl HoldoutValidation {
     /// # Errors
     /// If the executor is cancelled.
     pub(super) fn new(
-        preparation: &Preparation<impl Executor>,
+        preparation: &PreparationInput<impl Executor>,
         basis: Option<&Basis>,
         recover_from_training: impl Fn(TileRect) -> FloatTile + Sync + Send,
     ) -> Result<Option<Self>, RecoverError> {
-        let &Preparation {
+        let &PreparationInput {
             measurements,
             geometry,
             split,
@@ -105,7 +103,7 @@ impl HoldoutValidation {
 
     /// Estimated loss of SNR if `functions` replace those of the [squares](Self::tiles). It is negative if the
     /// replacement removes noise.
-    pub fn loss(&self, functions: &[TransportFunctions]) -> Decibels {
+    pub fn loss(&self, functions: &[TileFunctions]) -> Decibels {
         let before = self.error(self.residual);
         // An error in the variance of the noise is in both residuals and cancels.
         let after = before + self.residual_variance(functions) - self.residual;
@@ -118,7 +116,7 @@ impl HoldoutValidation {
     }
 
     /// Variance of the residuals of `functions` between held-out patterns, summed over pixels and channels.
-    fn residual_variance(&self, functions: &[TransportFunctions]) -> f64 {
+    fn residual_variance(&self, functions: &[TileFunctions]) -> f64 {
         let squares = self.squares.iter().zip(functions);
         let of_squares = squares.map(|(square, functions)| {
             let predictions = prediction::predictions(&self.geometry, &self.patterns, functions);
@@ -176,7 +174,7 @@ mod tests {
     /// Validates functions that are the true ones times `factor`.
     fn validate(capture: &SyntheticCapture, factor: f64) -> Option<HoldoutValidation> {
         let functions = capture.functions(factor);
-        let preparation = Preparation {
+        let preparation = PreparationInput {
             measurements: &capture.measurements,
             geometry: capture.geometry,
             split: &HoldoutSplit::new(&capture.measurements.patterns),
@@ -186,12 +184,12 @@ mod tests {
         HoldoutValidation::new(&preparation, None, recover).ok()?
     }
 
-    fn cropped(functions: &TransportFunctions, rect: TileRect) -> TransportFunctions {
+    fn cropped(functions: &TileFunctions, rect: TileRect) -> TileFunctions {
         let (area, extent) = (
             functions.tau.len() / functions.rect.extent.area(),
             functions.rect.extent,
         );
-        let mut crop = TransportFunctions::zeros(rect, area);
+        let mut crop = TileFunctions::zeros(rect, area);
         for (pixel, tau) in rect.pixels().zip(crop.tau.chunks_exact_mut(area)) {
             let n = extent.index(pixel);
             tau.copy_from_slice(&functions.tau[n * area..(n + 1) * area]);

@@ -12,7 +12,6 @@
 //!
 //! [`Recovery`] has no threads and no files: an [`Executor`](crate::executor::Executor) runs its jobs.
 
-mod bandwidth;
 mod bpdn;
 mod common_mode;
 mod error;
@@ -25,17 +24,17 @@ mod model_selection;
 mod nnls;
 mod normal_equations;
 mod passive_set;
-mod pattern_check;
+mod pattern_mismatch;
 mod pixelwise;
 mod pooled;
 mod prediction;
-mod preparation;
+mod preparation_input;
 mod recovery;
 mod sampling;
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod test_problems;
+mod window_size;
 
-pub use bandwidth::{BandwidthEstimate, WindowEstimate};
 pub use bpdn::{Homotopy, SparsityBasis};
 pub use common_mode::CommonMode;
 pub use error::RecoverError;
@@ -44,3 +43,4 @@ pub use method::Method;
 pub use nnls::Nnls;
 pub use recovery::{Recovery, RecoverySettings};
 pub use sampling::MIN_PATTERNS;
+pub use window_size::{BandExtent, WindowSizeEstimate};

@@ -7,17 +7,17 @@
 use std::collections::BTreeMap;
 use std::slice::from_ref;
 
-use super::bpdn::{SparsityBasis, Tolerance};
+use super::bpdn::{ResidualTolerance, SparsityBasis};
 use super::common_mode::CommonMode;
 use super::error::RecoverError;
 use super::gram_cache::WindowEquations;
 use super::holdout::HoldoutSplit;
-use super::pixelwise::{PixelProblem, PixelSamples, PixelsByWindow, PixelwiseRecovery};
-use super::preparation::Preparation;
+use super::pixelwise::{PixelSamples, PixelsByWindow, PixelwiseMethod, PixelwiseRecovery};
+use super::preparation_input::PreparationInput;
 use super::sampling::{self, MIN_PATTERNS};
 use crate::capture::Measurements;
 use crate::executor::Executor;
-use crate::transport::{Decibels, TileRect, TransportError};
+use crate::transport::{Decibels, SnrAccumulator, TileRect};
 
 /// Largest number of windows in a sample, and of pixels in each: enough to tell candidates apart by hundredths of a
 /// decibel, and few enough to take seconds. For least squares each pixel takes as long as the next, so all may have
@@ -31,13 +31,15 @@ impl PixelwiseRecovery {
     ///
     /// # Errors
     /// If no pixel in memory sees the light plane, and if the executor is cancelled.
-    pub fn least_squares(preparation: &Preparation<impl Executor>) -> Result<Self, RecoverError> {
+    pub fn least_squares(
+        preparation: &PreparationInput<impl Executor>,
+    ) -> Result<Self, RecoverError> {
         preparation.executor.check_cancelled()?;
         let sample = sample_windows(preparation, LEAST_SQUARES_SAMPLE)?;
         let candidates = CommonMode::CANDIDATES.map(|common_mode| Self {
             geometry: preparation.geometry,
             common_mode,
-            problem: PixelProblem::LeastSquares,
+            problem: PixelwiseMethod::LeastSquares,
         });
         Ok(best_of(candidates, preparation, &sample))
     }
@@ -47,7 +49,7 @@ impl PixelwiseRecovery {
     /// # Errors
     /// If no pixel in memory sees the light plane, and if the executor is cancelled.
     pub fn denoising(
-        preparation: &Preparation<impl Executor>,
+        preparation: &PreparationInput<impl Executor>,
         basis: SparsityBasis,
     ) -> Result<Self, RecoverError> {
         let least_squares = Self::least_squares(preparation)?;
@@ -55,8 +57,8 @@ impl PixelwiseRecovery {
         let noise = least_squares.fit_noise(preparation, &sample);
         preparation.executor.check_cancelled()?;
         let sample = sample_windows(preparation, DENOISING_SAMPLE)?;
-        let candidates = Tolerance::CANDIDATE_SHARES.map(|share| Self {
-            problem: PixelProblem::Denoising(basis, Tolerance { share, ..noise }),
+        let candidates = ResidualTolerance::CANDIDATE_SHARES.map(|share| Self {
+            problem: PixelwiseMethod::Denoising(basis, ResidualTolerance { share, ..noise }),
             ..least_squares
         });
         Ok(best_of(candidates, preparation, &sample))
@@ -68,8 +70,8 @@ impl PixelwiseRecovery {
         measurements: &Measurements,
         split: &HoldoutSplit,
         window: &PixelsByWindow,
-    ) -> TransportError {
-        let mut error = TransportError::default();
+    ) -> SnrAccumulator {
+        let mut error = SnrAccumulator::default();
         let elements: Vec<_> = self.geometry.elements_of_window(window.0).collect();
         let mut add = |_: &WindowEquations, samples: &PixelSamples, x: &[f64]| {
             for &l in &split.held_out {
@@ -88,9 +90,9 @@ impl PixelwiseRecovery {
     /// The noise of the measurements, by the residuals of least squares and the degrees of freedom that it leaves.
     fn fit_noise(
         &self,
-        preparation: &Preparation<impl Executor>,
+        preparation: &PreparationInput<impl Executor>,
         sample: &[PixelsByWindow],
-    ) -> Tolerance {
+    ) -> ResidualTolerance {
         let (measurements, all) = (preparation.measurements, &preparation.split.all);
         let pairs = preparation.executor.map(sample.len(), |i| {
             let mut pairs = Vec::new();
@@ -107,13 +109,13 @@ impl PixelwiseRecovery {
             self.solve_windows(measurements, from_ref(&sample[i]), all, &mut add);
             pairs
         });
-        Tolerance::fit(&pairs.concat())
+        ResidualTolerance::fit(&pairs.concat())
     }
 }
 
 /// Windows spread over the picture, with some of their pixels.
 fn sample_windows(
-    preparation: &Preparation<impl Executor>,
+    preparation: &PreparationInput<impl Executor>,
     [max_windows, max_pixels]: [usize; 2],
 ) -> Result<Vec<PixelsByWindow>, RecoverError> {
     let geometry = &preparation.geometry;
@@ -137,7 +139,7 @@ fn sample_windows(
 /// The candidate that predicts the held-out patterns of the sample best; the first if no pattern is held out.
 fn best_of<const N: usize>(
     candidates: [PixelwiseRecovery; N],
-    preparation: &Preparation<impl Executor>,
+    preparation: &PreparationInput<impl Executor>,
     sample: &[PixelsByWindow],
 ) -> PixelwiseRecovery {
     let (measurements, split) = (preparation.measurements, preparation.split);
@@ -150,7 +152,7 @@ fn best_of<const N: usize>(
     });
     let mut best_snr: Option<Decibels> = None;
     for (n, candidate) in candidates.into_iter().enumerate() {
-        let error: TransportError = errors.iter().map(|errors| errors[n]).sum();
+        let error: SnrAccumulator = errors.iter().map(|errors| errors[n]).sum();
         if let Some(snr) = error.snr()
             && best_snr.is_none_or(|best_snr| snr > best_snr)
         {

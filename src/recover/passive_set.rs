@@ -177,7 +177,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
 
     /// Evaluates unknown `j`, with its entries `b` of the right-hand sides, as a candidate for the set.
     #[inline(always)]
-    pub fn evaluate(&mut self, j: usize, b: [f64; N]) -> InsertionCandidate<N> {
+    pub fn evaluate(&mut self, j: usize, b: [f64; N]) -> PassiveSetCandidate<N> {
         let row = self.row(j);
         self.gather(row);
         let column = &self.column[..self.padded_len()];
@@ -185,7 +185,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         for (residual, z) in residual.iter_mut().zip(&self.solutions) {
             *residual -= dot_padded(column, &z[..column.len()]);
         }
-        InsertionCandidate {
+        PassiveSetCandidate {
             j,
             diagonal: row[j],
             residual,
@@ -202,7 +202,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
 
     /// Inserts the candidate that was evaluated last. Returns false if its column depends linearly on those of the set.
     #[inline(always)]
-    pub fn insert(&mut self, candidate: InsertionCandidate<N>) -> bool {
+    pub fn insert(&mut self, candidate: PassiveSetCandidate<N>) -> bool {
         self.multiply_by_inverse();
         let (n, before) = (self.members.len(), self.padded_len());
         let explained = dot_padded(&self.column[..before], &self.product[..before]);
@@ -309,7 +309,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
 
 /// An unknown that may be inserted.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct InsertionCandidate<const N: usize> {
+pub(super) struct PassiveSetCandidate<const N: usize> {
     j: usize,
     /// `G[j, j]`.
     diagonal: f64,

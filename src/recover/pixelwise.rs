@@ -8,14 +8,14 @@
 use std::collections::BTreeMap;
 
 use super::bpdn::{
-    BpdnConstraint, Homotopy, SensingOperator, SparsityBasis, Tolerance, interior_point,
+    BpdnConstraint, Homotopy, ResidualTolerance, SensingOperator, SparsityBasis, interior_point,
 };
 use super::common_mode::CommonMode;
 use super::gram_cache::{GramCache, WindowEquations};
 use super::nnls::Nnls;
 use super::sampling;
 use crate::capture::Measurements;
-use crate::transport::{CameraPx, Geometry, LightElement, TileRect, TransportFunctions, Window};
+use crate::transport::{CameraPx, Geometry, LightElement, TileFunctions, TileRect, Window};
 
 /// Side, in light elements, of the squares of window origins that share a [`GramCache`]: a default tile has one, at two
 /// camera pixels an element.
@@ -26,18 +26,18 @@ const MAX_EXCESS_RESIDUAL: f64 = 1e-6;
 
 /// The problem that is solved for each pixel and channel.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum PixelProblem {
+pub(super) enum PixelwiseMethod {
     /// Case (a).
     LeastSquares,
     /// Case (b).
-    Denoising(SparsityBasis, Tolerance),
+    Denoising(SparsityBasis, ResidualTolerance),
 }
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelwiseRecovery {
     pub geometry: Geometry,
     pub common_mode: CommonMode,
-    pub problem: PixelProblem,
+    pub problem: PixelwiseMethod,
 }
 
 /// Pixels that share a window, by its origin.
@@ -73,9 +73,9 @@ impl PixelwiseRecovery {
         measurements: &Measurements,
         pattern_indices: &[usize],
         rect: TileRect,
-    ) -> TransportFunctions {
+    ) -> TileFunctions {
         let area = self.geometry.window.area();
-        let mut functions = TransportFunctions::zeros(rect, area);
+        let mut functions = TileFunctions::zeros(rect, area);
         let mut squares: BTreeMap<_, Vec<PixelsByWindow>> = BTreeMap::new();
         for (origin, pixels) in sampling::pixels_by_window(&self.geometry, rect) {
             let square = [origin.v, origin.u].map(|at| at.div_euclid(CACHE_SIDE));
@@ -138,8 +138,8 @@ impl PixelwiseRecovery {
         let unknowns = equations.slots.len();
         let mut nnls = Nnls::new(&equations.gram, unknowns);
         let mut solve: PixelSolver<'_> = match self.problem {
-            PixelProblem::LeastSquares => Box::new(move |_, h, _| nnls.solve(h)),
-            PixelProblem::Denoising(SparsityBasis::Identity, tolerance) => {
+            PixelwiseMethod::LeastSquares => Box::new(move |_, h, _| nnls.solve(h)),
+            PixelwiseMethod::Denoising(SparsityBasis::Identity, tolerance) => {
                 let mut homotopy = Homotopy::new(&equations.gram, unknowns);
                 Box::new(move |weighted_y, h, y| {
                     let epsilon = tolerance.epsilon(y);
@@ -155,7 +155,7 @@ impl PixelwiseRecovery {
                     }
                 })
             }
-            PixelProblem::Denoising(basis, tolerance) => {
+            PixelwiseMethod::Denoising(basis, tolerance) => {
                 let side = self.geometry.window.side() as usize;
                 let operator = SensingOperator::new(basis, equations, side);
                 Box::new(move |weighted_y, h, y| {

@@ -3,7 +3,7 @@
 //! With every pixel and channel n scaled by its brightness `f_n`, one function h is taken for all:
 //! `min_h Σ_n q_n ‖W(y_n / f_n − P̂_n h)‖²`, `h ≥ 0`, where `P̂_n` are the patterns on the pixel's window and `q_n` is
 //! the certainty of the pixel. Brightness and function are found in turn: given h, `f_n = ȳ_n / p̄_n h`. That no pixel
-//! sees exactly h hardly matters: [`super::pattern_check`] and the learned prior start from it.
+//! sees exactly h hardly matters: [`super::pattern_mismatch`] and the learned prior start from it.
 
 use std::ops::Range;
 
@@ -11,8 +11,8 @@ use super::common_mode::CommonMode;
 use super::error::RecoverError;
 use super::nnls::Nnls;
 use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns};
-use super::pattern_check;
-use super::preparation::Preparation;
+use super::pattern_mismatch;
+use super::preparation_input::PreparationInput;
 use super::sampling::{self, PixelsOfWindow};
 use crate::capture::Measurements;
 use crate::executor::Executor;
@@ -49,7 +49,7 @@ pub(super) fn sample_squares(measurements: &Measurements) -> Vec<TileRect> {
 /// # Errors
 /// If the photographs are dark or overexposed, if they do not match their patterns, and if the executor is cancelled.
 pub(super) fn mean_function(
-    preparation: &Preparation<impl Executor>,
+    preparation: &PreparationInput<impl Executor>,
 ) -> Result<Vec<f64>, RecoverError> {
     let squares = sample_squares(preparation.measurements);
     let area = preparation.geometry.window.area();
@@ -64,13 +64,13 @@ pub(super) fn mean_function(
         mean = function.iter().map(|m| m / sum).collect();
     }
     preparation.executor.check_cancelled()?;
-    pattern_check::check_patterns(preparation, &mean, &squares)?;
+    pattern_mismatch::check_patterns(preparation, &mean, &squares)?;
     Ok(mean)
 }
 
 /// Estimates every pixel's brightness with the function `mean`, then the function of all pixels, `[slot]`.
 fn fit_round(
-    preparation: &Preparation<impl Executor>,
+    preparation: &PreparationInput<impl Executor>,
     squares: &[TileRect],
     mean: &[f64],
 ) -> Vec<f64> {
@@ -108,7 +108,7 @@ fn fit_round(
 #[inline(always)]
 fn add_window(
     sums: &mut NormalEquations,
-    preparation: &Preparation<impl Executor>,
+    preparation: &PreparationInput<impl Executor>,
     mean: &[f64],
     origin: LightElement,
     pixels: &PixelsOfWindow,
@@ -201,7 +201,7 @@ mod tests {
     use crate::executor::SequentialExecutor;
 
     fn fit(capture: &SyntheticCapture) -> Result<Vec<f64>, RecoverError> {
-        mean_function(&Preparation {
+        mean_function(&PreparationInput {
             measurements: &capture.measurements,
             geometry: capture.geometry,
             split: &HoldoutSplit::new(&capture.measurements.patterns),

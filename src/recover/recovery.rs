@@ -8,7 +8,7 @@ use super::learned::LearnedRecovery;
 use super::method::Method;
 use super::pixelwise::PixelwiseRecovery;
 use super::pooled;
-use super::preparation::{self, Preparation};
+use super::preparation_input::{self, PreparationInput};
 use super::sampling::MIN_PATTERNS;
 use crate::capture::Measurements;
 use crate::executor::Executor;
@@ -51,13 +51,13 @@ impl Recovery {
         settings: RecoverySettings,
         executor: &impl Executor,
     ) -> Result<Self, RecoverError> {
-        let geometry = preparation::geometry(measurements, settings.window)?;
+        let geometry = preparation_input::geometry(measurements, settings.window)?;
         let patterns = measurements.patterns.len();
         if patterns < MIN_PATTERNS {
             return Err(RecoverError::TooFewPatterns(patterns));
         }
         let split = HoldoutSplit::new(&measurements.patterns);
-        let preparation = Preparation {
+        let preparation = PreparationInput {
             measurements,
             geometry,
             split: &split,

@@ -2,7 +2,7 @@
 
 use crate::capture::{Measurements, NoiseModel, Pattern, RowSet};
 use crate::transport::{
-    CHANNELS, Correspondence, Extent, Geometry, TileRect, TransportFunctions, Window,
+    CHANNELS, Correspondence, Extent, Geometry, TileFunctions, TileRect, Window,
 };
 
 /// Numbers uniform in [−½, ½), the same for each seed.
@@ -139,10 +139,10 @@ impl SyntheticCapture {
     }
 
     /// The true functions of the picture, times `factor`.
-    pub fn functions(&self, factor: f64) -> TransportFunctions {
+    pub fn functions(&self, factor: f64) -> TileFunctions {
         let extent = self.geometry.camera;
         let mut functions =
-            TransportFunctions::zeros(TileRect { x: 0, y: 0, extent }, self.function.len());
+            TileFunctions::zeros(TileRect { x: 0, y: 0, extent }, self.function.len());
         for (i, tau) in functions.tau.iter_mut().enumerate() {
             let (n, slot) = (i / self.function.len(), i % self.function.len());
             let brightness = 0.1 + 0.02 * (n * 37 % 29) as f64;

@@ -3,13 +3,13 @@
 use thiserror::Error;
 
 use super::texture_layout::LayoutError;
-use super::{Gamut, Light, LightChroma, OutputTransform};
+use super::{ChannelRatio, Gamut, Light, OutputTransform};
 #[cfg(target_arch = "wasm32")]
 use crate::transport::Extent;
 
 /// One frame to draw.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame<'a> {
+pub struct FrameRequest<'a> {
     /// The light; `None` for the last light image.
     pub light: Option<&'a Light>,
     /// From linear light to codes.
@@ -24,7 +24,7 @@ pub struct LightCache {
     /// The uploaded light; `None` for a light image, whose elements only the device has.
     light: Option<Light>,
     /// The ratio between the light's channels.
-    pub chroma: LightChroma,
+    pub chroma: ChannelRatio,
     /// The quality of the basis response, once it is computed.
     response_quality: Option<f32>,
 }
@@ -34,7 +34,7 @@ impl LightCache {
     pub fn new(light: &Light) -> Self {
         Self {
             light: Some(light.clone()),
-            chroma: LightChroma::of_rows(std::iter::once(light.elements())),
+            chroma: ChannelRatio::of_rows(std::iter::once(light.elements())),
             response_quality: None,
         }
     }
@@ -72,7 +72,7 @@ pub trait Backend {
     ///
     /// # Errors
     /// [`BackendError::Lost`] once the device no longer works.
-    fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError>;
+    fn render(&mut self, frame: &FrameRequest<'_>) -> Result<(), BackendError>;
 }
 
 /// Why a backend does not draw.

@@ -16,14 +16,14 @@ pub struct Camera {
 /// One of a capture's independent random sequences. A seed and a stream determine its numbers, whatever
 /// other streams are used and in whatever order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RandomStream {
+pub enum RandomStreamId {
     /// The elements of the pattern with this index.
     Pattern(u32),
     /// The noise of the photograph with this index.
     Photograph(u32),
 }
 
-impl RandomStream {
+impl RandomStreamId {
     /// Starts the sequence.
     pub fn start(self, seed: u64) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn noise_has_the_mean_and_variance_of_shot_and_read_noise() {
         for measurement in [0.0f32, 0.0001, 0.02, 0.7] {
-            let mut rng = RandomStream::Photograph(3).start(1);
+            let mut rng = RandomStreamId::Photograph(3).start(1);
             let codes = CAMERA.photograph(&[[measurement; 3]; 40_000], &mut rng);
             let gain = (60000.0 - 512.0) / 40000.0;
             let electrons: Vec<f64> = codes
@@ -101,20 +101,20 @@ mod tests {
 
     #[test]
     fn streams_differ_and_repeat() {
-        let draw = |stream: RandomStream, seed| {
+        let draw = |stream: RandomStreamId, seed| {
             let mut rng = stream.start(seed);
             CAMERA.photograph(&[[0.5; 3]; 8], &mut rng)
         };
-        let first = draw(RandomStream::Photograph(0), 1);
-        assert_eq!(first, draw(RandomStream::Photograph(0), 1));
-        assert_ne!(first, draw(RandomStream::Photograph(1), 1));
-        assert_ne!(first, draw(RandomStream::Pattern(0), 1));
-        assert_ne!(first, draw(RandomStream::Photograph(0), 2));
+        let first = draw(RandomStreamId::Photograph(0), 1);
+        assert_eq!(first, draw(RandomStreamId::Photograph(0), 1));
+        assert_ne!(first, draw(RandomStreamId::Photograph(1), 1));
+        assert_ne!(first, draw(RandomStreamId::Pattern(0), 1));
+        assert_ne!(first, draw(RandomStreamId::Photograph(0), 2));
     }
 
     #[test]
     fn too_much_light_saturates() {
-        let mut rng = RandomStream::Photograph(0).start(1);
+        let mut rng = RandomStreamId::Photograph(0).start(1);
         let codes = CAMERA.photograph(&[[9.0; 3]], &mut rng);
         assert_eq!(codes, [[u16::MAX; 3]]);
     }

@@ -59,12 +59,12 @@ impl Mul<f64> for Vec2 {
 
 /// Unit coordinates of a light plane: the origin in its centre, ±1 at the ends of its shorter side, y downwards.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct UnitPlane {
+pub(super) struct UnitCoordinates {
     centre: Vec2,
     half: f64,
 }
 
-impl UnitPlane {
+impl UnitCoordinates {
     pub fn new(light: Extent) -> Self {
         let (w, h) = (f64::from(light.width), f64::from(light.height));
         Self {

@@ -5,24 +5,24 @@
 //! of light in it. The lengths that determine the band (scattering widths, refraction, parallax) are in
 //! light elements, so that one window holds the band at every resolution.
 //!
-//! [`EmissionMatrix`] computes y = pT under many lights, [`Camera`] adds noise. This module uses no threads,
+//! [`PatternMatrix`] computes y = pT under many lights, [`Camera`] adds noise. This module uses no threads,
 //! files or clock; callers compute [`SimulatedScene::tile`] in parallel.
 
 mod camera;
 mod cookies;
 mod coordinates;
-mod emission_matrix;
 mod gradient_noise;
-mod light_codes;
-mod scene;
+mod pattern_image;
+mod pattern_matrix;
 mod scene_kind;
-mod shapes;
+mod signed_distance;
+mod simulated_scene;
 mod stained_glass;
 mod truth_lights;
 
-pub use camera::{Camera, RandomStream};
-pub use emission_matrix::EmissionMatrix;
-pub use light_codes::{GrayCodePattern, LightCodes, MONITOR_GAMMA, PatternEnsemble, emission};
-pub use scene::{SimulatedScene, WINDOW_SIDE};
+pub use camera::{Camera, RandomStreamId};
+pub use pattern_image::{GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage, emission};
+pub use pattern_matrix::PatternMatrix;
 pub use scene_kind::SceneKind;
+pub use simulated_scene::{SimulatedScene, WINDOW_SIDE};
 pub use truth_lights::truth_lights;

@@ -1,8 +1,8 @@
 //! The built-in scenes by name.
 
 use super::cookies::Cookies;
-use super::light_codes::PatternEnsemble;
-use super::scene::{SimulatedScene, scene_geometry};
+use super::pattern_image::PatternEnsemble;
+use super::simulated_scene::{SimulatedScene, scene_geometry};
 use super::stained_glass::StainedGlass;
 use crate::transport::{Extent, GeometryError};
 

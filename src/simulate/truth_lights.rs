@@ -3,18 +3,18 @@
 
 use super::coordinates::{Vec2, mix3, smoothstep, vec2};
 use super::gradient_noise::layered_noise;
-use super::light_codes::{LightCodes, code_for};
+use super::pattern_image::{PatternImage, code_for};
 use crate::transport::Extent;
 
 /// The lights by their names NAME in `light_NAME.png` and `relit_NAME.png`; all RGB.
-pub fn truth_lights(light: Extent) -> [(&'static str, LightCodes); 5] {
+pub fn truth_lights(light: Extent) -> [(&'static str, PatternImage); 5] {
     let white = |on: bool| [if on { 255 } else { 0 }; 3];
     // Sixteen squares along the shorter side, and sixteen periods across.
     let square = (light.width.min(light.height) / 16).max(1);
     let checker = |u: u32, v: u32| white((u / square + v / square) % 2 == 1);
     let stripe = (light.width / 32).max(1);
     let codes = |code: &dyn Fn(u32, u32) -> [u8; 3]| {
-        LightCodes::Rgb(light.cells().map(|(u, v)| code(u, v)).collect())
+        PatternImage::Rgb(light.cells().map(|(u, v)| code(u, v)).collect())
     };
     let centre = |u: u32, v: u32| {
         let share = |x: u32, side: u32| (f64::from(x) + 0.5) / f64::from(side);
@@ -65,7 +65,7 @@ mod tests {
         let light = Extent::new(64, 48);
         let all = truth_lights(light);
         for (i, (name, codes)) in all.iter().enumerate() {
-            let LightCodes::Rgb(rgb) = codes else {
+            let PatternImage::Rgb(rgb) = codes else {
                 panic!("a truth light is always RGB")
             };
             assert_eq!(rgb.len(), light.area());

@@ -10,7 +10,7 @@ use super::pixel_sampling;
 use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::recover::{Method, Recovery, RecoverySettings};
-use crate::transport::{Decibels, TransportError};
+use crate::transport::{Decibels, SnrAccumulator};
 
 /// SNR and time of a method.
 #[derive(Clone, Copy, Debug)]
@@ -91,10 +91,10 @@ pub(super) fn measure_accuracy(
 
 /// SNR over all `parts`, and its standard error in dB if they are a random sample that covers a `share` of the
 /// picture: that of a ratio of two sums (Cochran 1977, section 6.4).
-pub(super) fn pooled_snr(parts: &[TransportError], share: f64) -> (Option<Decibels>, f64) {
-    let sum: TransportError = parts.iter().copied().sum();
+pub(super) fn pooled_snr(parts: &[SnrAccumulator], share: f64) -> (Option<Decibels>, f64) {
+    let sum: SnrAccumulator = parts.iter().copied().sum();
     let n = parts.len() as f64;
-    let TransportError { signal, error } = sum;
+    let SnrAccumulator { signal, error } = sum;
     if parts.len() < 2 || signal == 0.0 || error == 0.0 {
         return (sum.snr(), 0.0);
     }
@@ -109,8 +109,8 @@ pub(super) fn pooled_snr(parts: &[TransportError], share: f64) -> (Option<Decibe
 mod tests {
     use super::*;
 
-    fn part(truth: f64, estimate: f64) -> TransportError {
-        let mut part = TransportError::default();
+    fn part(truth: f64, estimate: f64) -> SnrAccumulator {
+        let mut part = SnrAccumulator::default();
         part.add(truth, estimate);
         part
     }

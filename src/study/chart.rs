@@ -32,7 +32,7 @@ pub(super) struct ChartSeries {
     pub points: Vec<(f64, f64)>,
 }
 
-pub(super) struct Chart<'a> {
+pub(super) struct LineChart<'a> {
     pub title: &'a str,
     pub x_label: &'a str,
     pub y_label: &'a str,
@@ -45,7 +45,7 @@ pub(super) struct Chart<'a> {
     pub series: Vec<ChartSeries>,
 }
 
-impl Chart<'_> {
+impl LineChart<'_> {
     pub fn svg(&self) -> Result<String, StudyError> {
         let mut svg = String::new();
         let area = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn a_chart_has_labels_and_markers() {
-        let chart = Chart {
+        let chart = LineChart {
             title: "Title",
             x_label: "across",
             y_label: "up (dB)",

@@ -4,21 +4,21 @@
 use std::time::Instant;
 
 use super::accuracy::{AccuracyPoint, MethodCurve, measure_accuracy, pooled_snr};
-use super::chart::{Chart, axis_range};
+use super::brute_force_scan;
+use super::chart::{LineChart, axis_range};
 use super::error::StudyError;
 use super::known_transport::{DenseTransport, dense_transport};
 use super::methods;
-use super::nystrom::{Nystrom, NystromSamples};
+use super::nystrom::{NystromSamples, NystromTransport};
 use super::pixel_sampling;
-use super::scanning;
-use super::scene_camera::{SceneCamera, first_shots};
 use super::section::{MarkdownTable, ProgressCallback, ReportSection, seconds_cell, snr_cell};
+use super::simulated_capture::{SimulatedCapture, first_shots};
 use super::unwindowed;
 use crate::capture::LinearPhoto;
 use crate::executor::Executor;
 use crate::recover::Method;
-use crate::simulate::{LightCodes, PatternEnsemble};
-use crate::transport::{CHANNELS, Extent, Geometry, TransportError};
+use crate::simulate::{PatternEnsemble, PatternImage};
+use crate::transport::{CHANNELS, Extent, Geometry, SnrAccumulator};
 
 /// Numbers of photographs at the points of curves, ascending.
 const PHOTOGRAPH_COUNTS: [usize; 8] = [10, 20, 40, 80, 160, 320, 640, 1024];
@@ -37,13 +37,13 @@ const FIRST_ROW_PHOTOGRAPH: u32 = 1 << 20;
 /// Those of photographing and recovering the scene, and [`StudyError`] if a chart or a table cannot be written.
 pub fn comparison(
     name: &str,
-    scene_camera: SceneCamera,
+    simulated_capture: SimulatedCapture,
     ensemble: PatternEnsemble,
     executor: &impl Executor,
     progress: ProgressCallback,
 ) -> Result<ReportSection, StudyError> {
-    let geometry = scene_camera.scene.geometry();
-    let truth = dense_transport(&scene_camera, executor);
+    let geometry = simulated_capture.scene.geometry();
+    let truth = dense_transport(&simulated_capture, executor);
     let counts = |max: usize| PHOTOGRAPH_COUNTS.into_iter().filter(move |&k| k <= max);
     let mut curves = Vec::new();
     let mut add_curve = |method: String, points: Vec<AccuracyPoint>| {
@@ -59,9 +59,9 @@ pub fn comparison(
         });
     };
 
-    let scans = scene_camera.photographs(&single_elements(geometry.light), executor);
+    let scans = simulated_capture.photographs(&single_elements(geometry.light), executor);
     let start = Instant::now();
-    let scanned = scanning::snr_by_scans(&truth, &scans);
+    let scanned = brute_force_scan::snr_by_scans(&truth, &scans);
     let seconds = start.elapsed().as_secs_f64();
     let point = |(snr, photographs)| AccuracyPoint {
         photographs,
@@ -74,11 +74,11 @@ pub fn comparison(
     add_curve("scanning".to_owned(), points.collect());
 
     let nystrom = counts(2 * geometry.light.area().min(truth.len()))
-        .map(|photographs| run_nystrom(&truth, &scene_camera, &scans, photographs, executor));
+        .map(|photographs| run_nystrom(&truth, &simulated_capture, &scans, photographs, executor));
     add_curve("kernel Nyström".to_owned(), nystrom.collect());
     drop(scans);
 
-    let measurements = scene_camera.measure(ensemble, MAX_PATTERNS, executor);
+    let measurements = simulated_capture.measure(ensemble, MAX_PATTERNS, executor);
     let unwindowed = counts(MAX_PATTERNS).map(|l| {
         let measurements = first_shots(&measurements, l);
         unwindowed::measure_accuracy(&truth, &measurements, UNWINDOWED_PIXELS, executor)
@@ -92,7 +92,13 @@ pub fn comparison(
             .filter(is_measured)
             .map(|l| {
                 let measurements = first_shots(&measurements, l);
-                measure_accuracy(&scene_camera, &measurements, method, truth.len(), executor)
+                measure_accuracy(
+                    &simulated_capture,
+                    &measurements,
+                    method,
+                    truth.len(),
+                    executor,
+                )
             })
             .collect();
         add_curve(format!("window, {}", methods::name(method)), points?);
@@ -161,7 +167,7 @@ fn section(
     });
     let series: Vec<_> = series.collect();
     let levels = series.iter().flat_map(|s| &s.points).map(|p| p.1);
-    let chart = Chart {
+    let chart = LineChart {
         title: &format!("{name}, N = {}, M = {elements}", camera.area()),
         x_label: "photographs",
         y_label: "SNR of T (dB)",
@@ -182,11 +188,11 @@ fn section(
 }
 
 /// The codes of each light element alone at full brightness.
-fn single_elements(light: Extent) -> Vec<LightCodes> {
+fn single_elements(light: Extent) -> Vec<PatternImage> {
     let single = |m: usize| {
         let mut codes = vec![0; light.area()];
         codes[m] = 255;
-        LightCodes::Grey(codes)
+        PatternImage::Grey(codes)
     };
     (0..light.area()).map(single).collect()
 }
@@ -194,7 +200,7 @@ fn single_elements(light: Extent) -> Vec<LightCodes> {
 /// Kernel Nyström from random columns and rows, half of `photographs` each.
 fn run_nystrom(
     truth: &DenseTransport,
-    scene_camera: &SceneCamera,
+    simulated_capture: &SimulatedCapture,
     scans: &[LinearPhoto],
     photographs: usize,
     executor: &impl Executor,
@@ -203,13 +209,13 @@ fn run_nystrom(
     let elements = pixel_sampling::random_indices(light, photographs / 2);
     let pixels = pixel_sampling::random_indices(truth.len(), photographs - photographs / 2);
     let black = vec![[0.0; CHANNELS]; light];
-    let dark = scene_camera.add_noise(&black, FIRST_ROW_PHOTOGRAPH);
+    let dark = simulated_capture.add_noise(&black, FIRST_ROW_PHOTOGRAPH);
     let rows = executor.map(pixels.len(), |i| {
         let number = FIRST_ROW_PHOTOGRAPH + 1 + pixels[i] as u32;
-        scene_camera.add_noise(&truth[pixels[i]], number)
+        simulated_capture.add_noise(&truth[pixels[i]], number)
     });
     let start = Instant::now();
-    let mut parts = vec![TransportError::default(); truth.len()];
+    let mut parts = vec![SnrAccumulator::default(); truth.len()];
     for c in 0..CHANNELS {
         let columns =
             (0..truth.len()).flat_map(|n| elements.iter().map(move |&m| f64::from(scans[m][n][c])));
@@ -217,7 +223,7 @@ fn run_nystrom(
             let less_dark = row.iter().zip(&dark);
             less_dark.map(|(y, dark)| f64::from(y[c] - dark[c]))
         });
-        let nystrom = Nystrom::new(
+        let nystrom = NystromTransport::new(
             &NystromSamples {
                 columns: columns.collect(),
                 rows: sampled.collect(),
@@ -238,7 +244,7 @@ fn run_nystrom(
                     *estimate = f64::from((rows[i][m][c] - dark[m][c]).max(0.0));
                 }
             }
-            let mut error = TransportError::default();
+            let mut error = SnrAccumulator::default();
             for (truth, estimate) in truth[n].iter().zip(estimate) {
                 error.add(f64::from(truth[c]), estimate);
             }
@@ -305,14 +311,14 @@ mod tests {
     fn comparison_runs_every_method_on_a_tiny_scene() {
         let side = |side| Extent::new(side, side);
         let scene = SceneKind::Cookies.build(side(8), side(4)).unwrap();
-        let scene_camera = SceneCamera {
+        let simulated_capture = SimulatedCapture {
             scene: scene.as_ref(),
             electrons: 1e6,
             seed: 3,
         };
         let section = comparison(
             "tiny",
-            scene_camera,
+            simulated_capture,
             PatternEnsemble::Bernoulli,
             &SequentialExecutor,
             &|_| {},

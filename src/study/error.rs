@@ -19,7 +19,7 @@ pub enum StudyError {
     Geometry(#[from] GeometryError),
     /// Drawing a chart failed.
     #[error("a chart cannot be drawn")]
-    Chart(#[from] ChartError),
+    LineChart(#[from] ChartError),
     /// Encoding a picture failed.
     #[error("a picture cannot be encoded")]
     Picture(#[from] image::ImageError),

@@ -4,8 +4,8 @@ use crate::capture::GroundTruth;
 use crate::executor::Executor;
 use crate::relight::Light;
 use crate::transport::{
-    CHANNELS, CameraPx, Correspondence, Geometry, GeometryError, LightElement, TileRect,
-    TransportError, TransportFunctions,
+    CHANNELS, CameraPx, Correspondence, Geometry, GeometryError, LightElement, SnrAccumulator,
+    TileFunctions, TileRect,
 };
 
 /// A light transport matrix whose columns are known.
@@ -91,10 +91,10 @@ pub(super) fn dense_transport(
 pub fn transport_error(
     known: &impl KnownTransport,
     geometry: &Geometry,
-    functions: &TransportFunctions,
-) -> TransportError {
+    functions: &TileFunctions,
+) -> SnrAccumulator {
     let (window, known_window) = (geometry.window, known.geometry().window);
-    let mut sum = TransportError::default();
+    let mut sum = SnrAccumulator::default();
     let mut truth = vec![[0.0; CHANNELS]; known_window.area()];
     let recovered = functions.tau.chunks_exact(window.area());
     for (pixel, estimate) in functions.rect.pixels().zip(recovered) {

@@ -5,6 +5,7 @@
 //! pictures in memory. The caller writes them to files.
 
 mod accuracy;
+mod brute_force_scan;
 mod chart;
 mod comparison;
 mod error;
@@ -14,20 +15,19 @@ mod nystrom;
 mod picture_sheet;
 mod pixel_sampling;
 mod relit_pictures;
-mod scanning;
-mod scene_camera;
-mod scenes;
 mod section;
+mod simulated_capture;
 mod snr_curves;
 mod sparsity;
+mod unseen_scenes;
 mod unwindowed;
 
 pub use comparison::comparison;
 pub use error::StudyError;
 pub use known_transport::{CaptureTruth, KnownTransport, transport_error};
-pub use relit_pictures::{RelitLight, built_in_lights, psnr, relit_pictures};
-pub use scene_camera::{SceneCamera, first_shots};
-pub use scenes::scenes_table;
+pub use relit_pictures::{EvaluationLight, built_in_lights, psnr, relit_pictures};
 pub use section::{ProgressCallback, ReportSection};
+pub use simulated_capture::{SimulatedCapture, first_shots};
 pub use snr_curves::{SNR_PATTERNS, snr_curves};
 pub use sparsity::sparsity;
+pub use unseen_scenes::scenes_table;

@@ -35,7 +35,7 @@ pub(super) struct NystromSamples {
 
 /// A transport with low rank under a kernel.
 #[derive(Clone, Debug)]
-pub(super) struct Nystrom {
+pub(super) struct NystromTransport {
     exponent: f64,
     /// `f(C)`, `[N, r]`.
     columns: Vec<f64>,
@@ -45,7 +45,7 @@ pub(super) struct Nystrom {
     light: usize,
 }
 
-impl Nystrom {
+impl NystromTransport {
     /// Chooses the exponent and the ridge with the smallest error on held-out rows, then fits all rows.
     pub fn new(samples: &NystromSamples, executor: &impl Executor) -> Self {
         let with_ridges = |exponent| RIDGES.map(|ridge| (exponent, ridge));
@@ -153,7 +153,7 @@ mod tests {
             pixels: sampled,
             light,
         };
-        let nystrom = Nystrom::new(&samples, &SequentialExecutor);
+        let nystrom = NystromTransport::new(&samples, &SequentialExecutor);
         let (mut signal, mut error) = (0.0, 0.0);
         for n in 0..pixels {
             for (m, estimate) in nystrom.pixel(n).into_iter().enumerate() {

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::error::StudyError;
 use super::known_transport::{KnownTransport, known_picture, relight_pixel};
 use super::methods::{self, DEFAULT_METHOD};
-use super::picture_sheet::{CaptionedPanel, Panel, PictureSheet};
+use super::picture_sheet::{CaptionedPanel, FigurePanel, PictureSheet};
 use super::section::{MarkdownTable, ProgressCallback, ReportSection, snr_cell};
 use crate::capture::Measurements;
 use crate::executor::Executor;
@@ -21,7 +21,7 @@ const ERROR_GAIN: f64 = 10.0;
 const OVEREXPOSED_SHARE: f64 = 0.01;
 
 /// A light and, if there is one, the true picture under it.
-pub struct RelitLight {
+pub struct EvaluationLight {
     /// The name of the light.
     pub name: String,
     /// The emissions.
@@ -31,10 +31,10 @@ pub struct RelitLight {
 }
 
 /// The five built-in lights that correspond to the paper's.
-pub fn built_in_lights(light: Extent) -> Vec<RelitLight> {
+pub fn built_in_lights(light: Extent) -> Vec<EvaluationLight> {
     let lights = BuiltinLight::BY_NAME.into_iter();
     let of_paper = lights.filter(|(_, builtin)| *builtin != BuiltinLight::Torch);
-    let relit = of_paper.map(|(name, builtin)| RelitLight {
+    let relit = of_paper.map(|(name, builtin)| EvaluationLight {
         name: name.to_owned(),
         light: builtin.render(light),
         photographed: None,
@@ -50,7 +50,7 @@ pub fn relit_pictures(
     name: &str,
     known: &impl KnownTransport,
     measurements: &Measurements,
-    lights: Vec<RelitLight>,
+    lights: Vec<EvaluationLight>,
     executor: &impl Executor,
     progress: ProgressCallback,
 ) -> Result<ReportSection, StudyError> {
@@ -93,7 +93,7 @@ pub fn relit_pictures(
         let emitted = light.light.elements().iter();
         let emitted = emitted.map(|e| [0, 1, 2].map(|c| f64::from(e[c])));
         let photograph = |extent, picture: &[[f64; CHANNELS]]| {
-            Panel::photograph(extent, picture.iter().map(|y| y.map(|y| y * exposure)))
+            FigurePanel::photograph(extent, picture.iter().map(|y| y.map(|y| y * exposure)))
         };
         let error: Vec<[f64; CHANNELS]> = truth[i]
             .iter()
@@ -109,10 +109,10 @@ pub fn relit_pictures(
             let (extent, picture) = downsample(camera, picture);
             photograph(extent, &picture)
         };
-        let light_panel = Panel {
+        let light_panel = FigurePanel {
             // Light elements of a small light plane are visible squares.
             is_data: light.light.extent().width <= MAX_PANEL_SIDE_PX / 2,
-            ..Panel::photograph(light.light.extent(), emitted)
+            ..FigurePanel::photograph(light.light.extent(), emitted)
         };
         let panels = [
             (light_panel, String::new()),
@@ -146,7 +146,7 @@ type PictureSet = Vec<Vec<[f64; CHANNELS]>>;
 fn pictures(
     known: &impl KnownTransport,
     measurements: &Measurements,
-    lights: &[RelitLight],
+    lights: &[EvaluationLight],
     executor: &impl Executor,
     report_tenths: &(impl Fn(usize) + Sync),
 ) -> Result<(PictureSet, PictureSet), StudyError> {

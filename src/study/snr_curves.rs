@@ -1,7 +1,7 @@
 //! SNR against undersampling L/M for each method (paper, figures 3a and 3b).
 
 use super::accuracy::{MethodCurve, measure_accuracy};
-use super::chart::{Chart, axis_range};
+use super::chart::{LineChart, axis_range};
 use super::error::StudyError;
 use super::known_transport::KnownTransport;
 use super::methods;
@@ -144,7 +144,7 @@ impl SnrCurves {
         let max_patterns = self.counts.last().copied().unwrap_or(0);
         let ticks = TICKS.into_iter().filter(|&l| l <= max_patterns);
         let levels = series.iter().flat_map(|s| &s.points).map(|p| p.1);
-        let chart = Chart {
+        let chart = LineChart {
             title: &format!("{name}, N = {}, M = {elements}", self.camera.area()),
             x_label: "undersampling L/M",
             y_label: "SNR of T (dB)",

@@ -3,10 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use super::chart::{Chart, ChartSeries};
+use super::chart::{ChartSeries, LineChart};
 use super::error::StudyError;
 use super::known_transport::KnownTransport;
-use super::picture_sheet::{CaptionedPanel, Panel, PictureSheet};
+use super::picture_sheet::{CaptionedPanel, FigurePanel, PictureSheet};
 use super::section::{MarkdownTable, ProgressCallback, ReportSection};
 use crate::executor::Executor;
 use crate::transport::{CHANNELS, CameraPx, Extent, Geometry};
@@ -168,16 +168,16 @@ pub fn sparsity(
 
 /// The statistics of one row of camera pixels.
 #[derive(Default)]
-struct RowSurvey {
+struct RowStatistics {
     profile: SparsityProfile,
     /// The largest element in each cell of the overview.
     overview: BTreeMap<usize, f32>,
     energies: Vec<f32>,
 }
 
-fn survey_row(known: &impl KnownTransport, y: u32) -> RowSurvey {
+fn survey_row(known: &impl KnownTransport, y: u32) -> RowStatistics {
     let geometry = known.geometry();
-    let mut row = RowSurvey::default();
+    let mut row = RowStatistics::default();
     let mut tau = vec![[0.0; CHANNELS]; geometry.window.area()];
     let scale = |i: usize, of: usize| i * OVERVIEW_SIDE as usize / of;
     for x in 0..geometry.camera.width {
@@ -239,7 +239,7 @@ fn profile_chart(
         ]);
     }
     let ticks = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0].into_iter();
-    let chart = Chart {
+    let chart = LineChart {
         title: &format!("Sparsity profile of T, {name}"),
         x_label: "largest elements kept, per light transport function and channel",
         y_label: "energy held (%)",
@@ -305,24 +305,24 @@ fn median_pixel(camera: Extent, energies: &[f32]) -> CameraPx {
 }
 
 /// One function in colour, scaled to its maximum.
-fn function_panel(side: u32, tau: &[[f32; CHANNELS]]) -> Panel {
+fn function_panel(side: u32, tau: &[[f32; CHANNELS]]) -> FigurePanel {
     let peak = tau.as_flattened().iter().fold(0.0f32, |a, &b| a.max(b));
     let scale = 1.0 / f64::from(peak.max(f32::MIN_POSITIVE));
     let linear = tau.iter().map(|t| t.map(|t| f64::from(t) * scale));
-    Panel {
+    FigurePanel {
         is_data: true,
-        ..Panel::photograph(Extent::new(side, side), linear)
+        ..FigurePanel::photograph(Extent::new(side, side), linear)
     }
 }
 
 /// Elements in grey, on a logarithmic scale over three decades.
-fn grey_panel(extent: Extent, values: &[f32]) -> Panel {
+fn grey_panel(extent: Extent, values: &[f32]) -> FigurePanel {
     let peak = values.iter().fold(0.0f32, |a, &b| a.max(b));
     let code = |v: f32| {
         let decades = (v / peak.max(f32::MIN_POSITIVE)).log10();
         (255.0 * (1.0 + decades / 3.0).clamp(0.0, 1.0)) as u8
     };
-    Panel {
+    FigurePanel {
         extent,
         rgb: values.iter().flat_map(|&v| [code(v); 3]).collect(),
         is_data: true,

@@ -9,7 +9,7 @@ use super::pixel_sampling;
 use crate::capture::Measurements;
 use crate::executor::Executor;
 use crate::recover::Nnls;
-use crate::transport::TransportError;
+use crate::transport::SnrAccumulator;
 
 /// Recovers `pixels` random pixels, each by non-negative least squares over all M elements.
 ///
@@ -34,7 +34,7 @@ pub(super) fn measure_accuracy(
     });
     let each = start.elapsed().as_secs_f64() / indices.len() as f64;
     let errors = functions.iter().zip(indices).map(|(function, n)| {
-        let mut error = TransportError::default();
+        let mut error = SnrAccumulator::default();
         for (c, tau) in function.iter().enumerate() {
             for (truth, &tau) in truth[n].iter().zip(tau) {
                 error.add(f64::from(truth[c]), tau);
@@ -42,7 +42,7 @@ pub(super) fn measure_accuracy(
         }
         error
     });
-    let errors: Vec<TransportError> = errors.collect();
+    let errors: Vec<SnrAccumulator> = errors.collect();
     let (snr, standard_error) = pooled_snr(&errors, errors.len() as f64 / truth.len() as f64);
     AccuracyPoint {
         photographs: measurements.patterns.len(),
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use crate::capture::{NoiseModel, Pattern, RowSet};
     use crate::executor::SequentialExecutor;
-    use crate::simulate::RandomStream;
+    use crate::simulate::RandomStreamId;
     use crate::transport::{CHANNELS, Correspondence, Extent};
 
     #[test]
@@ -99,7 +99,7 @@ mod tests {
         tau[3] = [0.5, 0.2, 0.1];
         tau[11] = [0.0, 0.3, 0.4];
         let random = |l: u32| -> Vec<f32> {
-            let mut stream = RandomStream::Pattern(l).start(1);
+            let mut stream = RandomStreamId::Pattern(l).start(1);
             (0..16)
                 .map(|_| StandardUniform.sample(&mut stream))
                 .collect()

@@ -6,18 +6,18 @@
 //!
 //! `recover`, `format` and `relight` share this module: the positions of pixels, windows and tiles ([`Geometry`]), the
 //! values of a tile as real numbers ([`FloatTile`]) and as codes ([`Tile`]), and the distance of two transports
-//! ([`TransportError`]).
+//! ([`SnrAccumulator`]).
 
 mod float_tile;
 mod geometry;
 mod snr;
 mod tile;
 
-pub use float_tile::{Basis, FloatTile, TransportFunctions};
+pub use float_tile::{Basis, FloatTile, TileFunctions};
 pub(crate) use geometry::ClippedRect;
 pub use geometry::{
     CHANNELS, CameraPx, Correspondence, Extent, Geometry, GeometryError, LightElement, LightPx,
     MAX_SIDE, MAX_WINDOW, TileRect, Window,
 };
-pub use snr::{Decibels, TransportError};
-pub use tile::{TEXEL_COMPONENTS, TexelCode, Tile, TileCodes, Transport};
+pub use snr::{Decibels, SnrAccumulator};
+pub use tile::{TEXEL_COMPONENTS, TexelCodes, Tile, TileCodes, Transport};

@@ -17,14 +17,14 @@ impl fmt::Display for Decibels {
 /// Sums of squares for SNR(T, T̂) = 20 log10(‖T‖_F / ‖T − T̂‖_F) (paper, section 4) over all entries of both matrices,
 /// in any order.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct TransportError {
+pub struct SnrAccumulator {
     /// Of the true values.
     pub signal: f64,
     /// Of the differences.
     pub error: f64,
 }
 
-impl TransportError {
+impl SnrAccumulator {
     /// Adds one entry: its true value and its estimate.
     pub fn add(&mut self, truth: f64, estimate: f64) {
         self.signal += truth * truth;
@@ -48,7 +48,7 @@ impl TransportError {
     }
 }
 
-impl Sum for TransportError {
+impl Sum for SnrAccumulator {
     fn sum<I: Iterator<Item = Self>>(errors: I) -> Self {
         let mut sum = Self::default();
         errors.for_each(|error| sum.merge(error));
@@ -62,11 +62,11 @@ mod tests {
 
     #[test]
     fn an_error_of_a_tenth_is_twenty_decibels() {
-        let mut e = TransportError::default();
+        let mut e = SnrAccumulator::default();
         for t in [1.0, 2.0, -3.0] {
             e.add(t, 0.9 * t);
         }
         assert!((e.snr().unwrap().0 - 20.0).abs() < 1e-9);
-        assert_eq!(TransportError::default().snr(), None);
+        assert_eq!(SnrAccumulator::default().snr(), None);
     }
 }

@@ -2,12 +2,12 @@
 //!
 //! `τ_n = Σ_k c_nk v_k + d_n`: coefficients `c` over the basis of the transport, and direct functions `d`.
 
-use super::float_tile::{Basis, FloatTile, TransportFunctions};
+use super::float_tile::{Basis, FloatTile, TileFunctions};
 use super::geometry::{CHANNELS, Geometry, TileRect};
 
 /// Four codes: a texel of an `rgba16sint` texture, and one SIMD load. They are signed, as a truncated sum of basis
 /// functions has negative values, and clipping these would brighten the picture.
-pub type TexelCode = [i16; 4];
+pub type TexelCodes = [i16; 4];
 
 /// Components in one texel of coefficients: a quad.
 pub const TEXEL_COMPONENTS: usize = 4;
@@ -24,7 +24,7 @@ pub struct TileCodes {
     /// Value of one code, per channel: the largest value of the channel has the largest code.
     pub step: [f32; CHANNELS],
     /// Empty if all values are zero.
-    pub codes: Vec<TexelCode>,
+    pub codes: Vec<TexelCodes>,
 }
 
 impl TileCodes {
@@ -43,7 +43,7 @@ impl TileCodes {
         rect: TileRect,
         coefficients: &[[f32; CHANNELS]],
         rank: usize,
-        mut codes: Vec<TexelCode>,
+        mut codes: Vec<TexelCodes>,
     ) -> Self {
         let Some(step) = steps(coefficients, i16::MAX.into()).filter(|_| rank > 0) else {
             return Self::dark(rect);
@@ -64,7 +64,7 @@ impl TileCodes {
     pub(crate) fn of_functions(
         rect: TileRect,
         functions: &[[f32; CHANNELS]],
-        mut codes: Vec<TexelCode>,
+        mut codes: Vec<TexelCodes>,
     ) -> Self {
         let Some(step) = steps(functions, MAX_DIRECT_CODE) else {
             return Self::dark(rect);
@@ -81,7 +81,7 @@ impl TileCodes {
         &self,
         all: usize,
         rank: usize,
-        mut codes: Vec<TexelCode>,
+        mut codes: Vec<TexelCodes>,
     ) -> Self {
         let (plane, quads) = (Tile::plane(self.rect), rank.div_ceil(TEXEL_COMPONENTS));
         let all_quads = all.div_ceil(TEXEL_COMPONENTS).max(1);
@@ -173,7 +173,7 @@ impl Tile {
     /// Distance of two planes of coefficients in texels: the number of pixels, rounded up to whole cache lines, and one
     /// line more. Planes at a distance of a power of two would compete for the same lines of the cache.
     pub fn plane(rect: TileRect) -> usize {
-        const LINE: usize = 64 / size_of::<TexelCode>();
+        const LINE: usize = 64 / size_of::<TexelCodes>();
         rect.extent.area().next_multiple_of(LINE) + LINE
     }
 
@@ -217,14 +217,14 @@ impl Tile {
     }
 
     /// The light transport functions.
-    pub fn functions(&self, geometry: &Geometry, basis: &Basis) -> TransportFunctions {
+    pub fn functions(&self, geometry: &Geometry, basis: &Basis) -> TileFunctions {
         self.dequantise(geometry, basis)
             .functions(geometry, Some(basis))
     }
 
     /// Size of the codes in bytes.
     pub fn bytes(&self) -> usize {
-        (self.coefficients.codes.len() + self.functions.codes.len()) * size_of::<TexelCode>()
+        (self.coefficients.codes.len() + self.functions.codes.len()) * size_of::<TexelCodes>()
     }
 }
 

@@ -10,8 +10,8 @@ use web_sys::{CanvasRenderingContext2d, HtmlCanvasElement};
 use super::drawing::output_transform::parse_gamut;
 use super::{CodedError, Photo, Relighter};
 use crate::executor::SequentialExecutor;
-use crate::relight::backend::{Backend, BackendError, Frame};
-use crate::relight::canvas2d::{CanvasStorage, open_2d};
+use crate::relight::backend::{Backend, BackendError, FrameRequest};
+use crate::relight::canvas2d_context::{CanvasStorage, open_2d};
 use crate::relight::cpu::{self, CpuRelighter};
 use crate::relight::{Gamut, Rgba8Picture};
 use crate::transport::{Extent, Transport};
@@ -89,7 +89,7 @@ impl Backend for Canvas2dBackend {
         self.gamut
     }
 
-    fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
+    fn render(&mut self, frame: &FrameRequest<'_>) -> Result<(), BackendError> {
         self.relighter.set_quality(frame.quality);
         // This backend takes no light images, so frames have a light.
         if let Some(light) = frame.light {

@@ -12,9 +12,9 @@ mod error;
 #[cfg(any(feature = "webgl2", feature = "webgpu"))]
 mod graphics_device;
 mod photo;
+mod photo_transfer;
 #[cfg(feature = "cpu")]
 mod row_range_relighter;
-mod transfer;
 /// What every module with a backend has.
 #[cfg(feature = "drawing")]
 mod drawing {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::{CodedError, transfer};
+use super::{CodedError, photo_transfer};
 use crate::transport::{Geometry, Tile, Transport};
 
 /// A photograph, with all or some of its tiles.
@@ -42,9 +42,9 @@ impl Photo {
     #[wasm_bindgen(js_name = takeTile)]
     pub fn take_tile(&mut self, index: usize) -> Result<Vec<u8>, CodedError> {
         let tiles = &mut self.transport_mut()?.tiles;
-        let tile = tiles.get_mut(index).ok_or_else(transfer::corrupt)?;
+        let tile = tiles.get_mut(index).ok_or_else(photo_transfer::corrupt)?;
         let dark = Tile::dark(tile.rect());
-        Ok(transfer::pack_tile(&std::mem::replace(tile, dark)))
+        Ok(photo_transfer::pack_tile(&std::mem::replace(tile, dark)))
     }
 }
 
@@ -57,7 +57,7 @@ impl Photo {
     /// # Errors
     /// Code `internal` if the values are not those of `packGeometry` and `packBasis`.
     pub fn receive(geometry: &[f64], basis: &[f32]) -> Result<Photo, CodedError> {
-        let transport = transfer::unpack_transport(geometry, basis)?;
+        let transport = photo_transfer::unpack_transport(geometry, basis)?;
         Ok(Self {
             transport: Arc::new(transport),
             #[cfg(feature = "decoder")]
@@ -78,8 +78,8 @@ impl Photo {
         let tile = transport
             .tiles
             .get_mut(index)
-            .ok_or_else(transfer::corrupt)?;
-        *tile = transfer::unpack_tile(bytes, tile.rect(), rank, area)?;
+            .ok_or_else(photo_transfer::corrupt)?;
+        *tile = photo_transfer::unpack_tile(bytes, tile.rect(), rank, area)?;
         Ok(())
     }
 }
@@ -150,7 +150,7 @@ impl Photo {
     /// Grids, window and correspondence, for `Photo.receive` of another module.
     #[wasm_bindgen(js_name = packGeometry)]
     pub fn pack_geometry(&self) -> Vec<f64> {
-        transfer::pack_geometry(self.geometry())
+        photo_transfer::pack_geometry(self.geometry())
     }
 
     /// The basis, for `Photo.receive` of another module.

@@ -19,7 +19,7 @@ const ALL = { ...GLASS, backend: 'webgpu webgl2 cpu' };
 const removeWebGpu = () => {
   Object.defineProperty(Navigator.prototype, 'gpu', { get: () => undefined });
 };
-/** @param {import('./page-helpers.js').PhotoEvent[]} photoEvents */
+/** @param {import('./page-helpers.js').ElementEvent[]} photoEvents */
 const backendChanges = (photoEvents) =>
   photoEvents.filter((event) => event.type === 'backendchange');
 

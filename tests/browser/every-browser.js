@@ -14,7 +14,7 @@ import {
 import { LIGHTS, nativePicture } from './test-photos.js';
 
 /** @typedef {import('./any-browser.js').AnyPage} AnyPage */
-/** @typedef {import('./page-helpers.js').PhotoEvent} PhotoEvent */
+/** @typedef {import('./page-helpers.js').ElementEvent} ElementEvent */
 
 const PAGE = '/monitored';
 const SRC = '/photos/glass.ltm';

@@ -48,7 +48,7 @@ function recordDevices() {
   );
 }
 
-/** @param {import('./page-helpers.js').PhotoEvent[]} photoEvents */
+/** @param {import('./page-helpers.js').ElementEvent[]} photoEvents */
 const backendChanges = (photoEvents) =>
   photoEvents.filter((event) => event.type === 'backendchange');
 

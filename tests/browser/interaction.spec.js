@@ -33,7 +33,7 @@ async function visit(openPage, attributes, options) {
 
 /** @param {Page} page */
 const viewOf = async (page) =>
-  /** @type {import('../../www/src/index.js').PhotoView} */ (await page.evaluate('photo.view'));
+  /** @type {import('../../www/src/index.js').ZoomView} */ (await page.evaluate('photo.view'));
 
 /** @param {Page} page */
 const torchOf = async (page) =>

@@ -10,7 +10,7 @@ import {
 } from './page-helpers.js';
 import { glassBytes, nativePicture } from './test-photos.js';
 
-/** @param {import('./page-helpers.js').PhotoEvent[]} photoEvents @param {string} type */
+/** @param {import('./page-helpers.js').ElementEvent[]} photoEvents @param {string} type */
 const count = (photoEvents, type) => photoEvents.filter((event) => event.type === type).length;
 
 test.describe('the module', () => {

@@ -5,7 +5,7 @@ import { decodePng } from '../../www/tools/pictures.js';
 /** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
 /** @typedef {import('@playwright/test').Page} Page */
 /** @typedef {import('./any-browser.js').AnyPage} AnyPage */
-/** @typedef {{ type: string } & Record<string, unknown>} PhotoEvent an event of the element, as data */
+/** @typedef {{ type: string } & Record<string, unknown>} ElementEvent an event of the element, as data */
 
 /**
  * Puts an element with these attributes into a page. The page's globals are then `photo`, the element, and
@@ -18,7 +18,7 @@ export async function mountPhoto(page, attributes) {
   await page.evaluate(async (attributes) => {
     await customElements.whenDefined('relightable-photo');
     const photo = document.createElement('relightable-photo');
-    /** @type {PhotoEvent[]} */
+    /** @type {ElementEvent[]} */
     const photoEvents = [];
     const changes = ['lightchange', 'viewchange', 'backendchange', 'contextlost', 'qualitychange'];
     for (const type of ['load', 'progress', 'error', ...changes]) {
@@ -44,13 +44,13 @@ export async function mountPhoto(page, attributes) {
  * @param {AnyPage} page
  * @param {string} type
  * @param {number} [count] how many events of the type to wait for
- * @returns {Promise<PhotoEvent[]>}
+ * @returns {Promise<ElementEvent[]>}
  */
 export async function waitForEvents(page, type, count = 1) {
   await page.waitForFunction(
     ([type, count]) => {
       const { photoEvents } = /** @type {any} */ (globalThis);
-      return photoEvents.filter((/** @type {PhotoEvent} */ e) => e.type === type).length >= count;
+      return photoEvents.filter((/** @type {ElementEvent} */ e) => e.type === type).length >= count;
     },
     /** @type {const} */ ([type, count]),
   );
@@ -66,9 +66,9 @@ export async function waitForEvents(page, type, count = 1) {
 export async function waitForLoad(page) {
   await page.waitForFunction(() => {
     const { photoEvents } = /** @type {any} */ (globalThis);
-    return photoEvents.some((/** @type {PhotoEvent} */ { type }) => /^(load|error)$/.test(type));
+    return photoEvents.some((/** @type {ElementEvent} */ { type }) => /^(load|error)$/.test(type));
   });
-  /** @type {PhotoEvent[]} */
+  /** @type {ElementEvent[]} */
   const photoEvents = await page.evaluate('photoEvents');
   const error = photoEvents.find((event) => event.type === 'error');
   if (error) throw new Error(`${error['code']}: ${error['message']}`);
@@ -82,7 +82,7 @@ export async function waitForLoad(page) {
  * @param {string} type
  */
 export async function countEvents(page, type) {
-  /** @type {PhotoEvent[]} */
+  /** @type {ElementEvent[]} */
   const events = await page.evaluate('photoEvents');
   return events.filter((event) => event.type === type).length;
 }

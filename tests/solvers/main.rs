@@ -11,7 +11,7 @@ mod glass_s;
 use relightable_photo::capture::Measurements;
 use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::recover::{Method, Recovery, RecoverySettings, SparsityBasis};
-use relightable_photo::transport::{Extent, Geometry, TileRect, TransportError};
+use relightable_photo::transport::{Extent, Geometry, SnrAccumulator, TileRect};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::{wasm_bindgen_test, wasm_bindgen_test_configure};
 
@@ -105,12 +105,12 @@ fn regions(method: Method, geometry: &Geometry) -> Vec<TileRect> {
 }
 
 /// Recovers by `method` and returns the error against the true functions.
-fn recover(measurements: &Measurements, method: Method, truth: &[[f64; 3]]) -> TransportError {
+fn recover(measurements: &Measurements, method: Method, truth: &[[f64; 3]]) -> SnrAccumulator {
     let window = glass_s::true_window();
     let settings = RecoverySettings { method, window };
     let recovery = Recovery::prepare(measurements, settings, &SequentialExecutor).unwrap();
     let (geometry, area) = (recovery.geometry(), window.area());
-    let mut error = TransportError::default();
+    let mut error = SnrAccumulator::default();
     for rect in regions(method, geometry) {
         let tile = recovery.tile(measurements, rect);
         let functions = tile.functions(geometry, recovery.basis());
@@ -152,7 +152,9 @@ fn report(line: &str) {
 #[cfg(not(target_arch = "wasm32"))]
 #[test]
 fn embedded_fixture_equals_its_folder() {
-    use relightable_photo::capture::{CaptureFolder, LinearPhoto, NoiseModel, PhotoReader, RowSet};
+    use relightable_photo::capture::{
+        CameraRowReader, CaptureFolder, LinearPhoto, NoiseModel, RowSet,
+    };
 
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/glass-s");
     let folder = CaptureFolder::open(root.as_ref()).unwrap();
@@ -163,7 +165,7 @@ fn embedded_fixture_equals_its_folder() {
     let correspondence = folder.manifest().correspondence.unwrap();
     let mut read = folder.empty_measurements(&shots, patterns.collect(), correspondence, &dark);
     read.rows = RowSet::all(read.camera.height);
-    let whole = |mut photo: PhotoReader| {
+    let whole = |mut photo: CameraRowReader| {
         let mut picture = LinearPhoto::new();
         photo.read(&read.rows, &mut picture).unwrap();
         picture

@@ -1,6 +1,6 @@
 /** Decodes and relights without the element: in Node, in workers and in pages. No DOM, no side effects. */
 
-export { type DecodeOptions, decode, type PhotoFile } from './core/decode.js';
+export { type DecodeOptions, decode, type LtmInput } from './core/decode.js';
 export {
   type CoreLight as Light,
   type Picture,
@@ -10,7 +10,7 @@ export {
   type Torch,
 } from './core/relight.js';
 export type { CorePhotograph as Photograph } from './core/types.js';
-export { type ModuleName, provideWasm, type WasmCode } from './core/wasm-code.js';
+export { type CoreModuleName, provideWasm, type WasmCode } from './core/wasm-code.js';
 export {
   type EngineErrorCode,
   type ErrorCode,

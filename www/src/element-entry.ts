@@ -11,18 +11,18 @@ export {
   type RelightablePhotoEventMap,
   ViewChangeEvent,
 } from './element/events.js';
-export type { Reflected } from './element/reflect.js';
+export type { ReflectedProperties } from './element/reflect.js';
 export type {
-  BrowserPicture,
+  BrowserImageSource,
   LightPicture,
   LightSource,
-  LinearLight,
+  LinearImage,
 } from './lights/light-source.js';
 export type { EngineErrorCode, ErrorCode, PageErrorCode } from './shared/errors.js';
 export { PhotoError } from './shared/errors.js';
 export type { Backend, Gamut, LightName, ToneCurve } from './shared/names.js';
 export { BACKENDS, LIGHTS } from './shared/names.js';
 export type { PicturePoint } from './shared/values.js';
-export type { Loading, Reveal } from './state/attribute-values.js';
-export type { LightPose } from './state/viewer-state.js';
-export type { PhotoView } from './state/viewport.js';
+export type { LoadingMode, RevealMode } from './state/attribute-values.js';
+export type { LightUpdate } from './state/viewer-state.js';
+export type { ZoomView } from './state/viewport.js';

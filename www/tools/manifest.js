@@ -23,7 +23,7 @@ const DEFINING_MODULE = 'dist/index.js';
 const CLASS = 'RelightablePhoto';
 const SOURCES = ['www/src/element/element.ts', 'www/src/element/events.ts'];
 /** The interface with the properties that reflect attributes. */
-const REFLECTED = { file: 'www/src/element/reflect.ts', name: 'Reflected' };
+const REFLECTED = { file: 'www/src/element/reflect.ts', name: 'ReflectedProperties' };
 /** Observed attributes that every element has. */
 const GLOBAL = ['lang'];
 

@@ -3,21 +3,21 @@
 //! The manifest is checked when the folder is opened; patterns and photographs are read one by one, so that callers may
 //! read them in parallel.
 
-mod image_file;
-mod photo_reader;
+mod camera_row_reader;
+mod capture_png;
 mod truth;
 
 use std::path::{Path, PathBuf};
 
-pub use self::photo_reader::{DarkFrame, PhotoReader};
+pub use self::camera_row_reader::{CameraRowReader, DarkFrame};
 pub use self::truth::{GroundTruth, RELIT_FULL_SCALE};
 
-use self::image_file::ImageFile;
+use self::capture_png::CapturePng;
 use super::error::{CaptureError, CaptureProblem, MANIFEST_NAME};
 use super::manifest::{GrayCodeShot, Manifest};
 use super::measurements::{LinearPhoto, Measurements, Pattern};
 use super::noise_model::NoiseModel;
-use super::rows::RowSet;
+use super::row_set::RowSet;
 use crate::calibrate::{BitPair, GrayCodePhotos, LightPlaneAxis};
 use crate::transport::{CHANNELS, Correspondence};
 
@@ -155,7 +155,7 @@ impl CaptureFolder {
             None => vec![[0.0; CHANNELS]; camera.extent().area()],
             Some(name) => {
                 let (path, field) = (self.root.join(name), Some("dark".to_owned()));
-                let file = ImageFile::new(path, camera.extent(), field);
+                let file = CapturePng::new(path, camera.extent(), field);
                 let codes = file.read_rgb16()?.into_iter();
                 let linear = |code| camera.linear(code, 1.0);
                 codes.map(|codes| codes.map(linear)).collect()
@@ -173,7 +173,7 @@ impl CaptureFolder {
     pub fn open_flood<'a>(
         &'a self,
         dark: &'a DarkFrame,
-    ) -> Result<Option<PhotoReader<'a>>, CaptureError> {
+    ) -> Result<Option<CameraRowReader<'a>>, CaptureError> {
         let flood = self.manifest.flood.as_ref();
         let open = |name: &String| self.open_photo(name, "flood".to_owned(), 1.0, dark);
         flood.map(open).transpose()
@@ -190,7 +190,7 @@ impl CaptureFolder {
         &'a self,
         i: usize,
         dark: &'a DarkFrame,
-    ) -> Result<PhotoReader<'a>, CaptureError> {
+    ) -> Result<CameraRowReader<'a>, CaptureError> {
         let field = format!("shots[{i}].photo");
         let name = &self.manifest.shots[i].photo;
         self.open_photo(name, field, self.exposure(i), dark)
@@ -206,7 +206,7 @@ impl CaptureFolder {
     pub fn read_pattern(&self, i: usize) -> Result<Pattern, CaptureError> {
         let path = self.root.join(&self.manifest.shots[i].pattern);
         let (light, field) = (self.manifest.light.extent(), format!("shots[{i}].pattern"));
-        ImageFile::new(path, light, Some(field)).read_pattern(&self.emission)
+        CapturePng::new(path, light, Some(field)).read_pattern(&self.emission)
     }
 
     /// Measurements of `shots` without any camera rows yet. Their noise has only its floor.
@@ -241,10 +241,10 @@ impl CaptureFolder {
         field: String,
         exposure: f64,
         dark: &'a DarkFrame,
-    ) -> Result<PhotoReader<'a>, CaptureError> {
+    ) -> Result<CameraRowReader<'a>, CaptureError> {
         let camera = &self.manifest.camera;
-        let file = ImageFile::new(self.root.join(name), camera.extent(), Some(field));
-        Ok(PhotoReader {
+        let file = CapturePng::new(self.root.join(name), camera.extent(), Some(field));
+        Ok(CameraRowReader {
             camera,
             dark,
             exposure,

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use half::f16;
 use npyz::NpyFile;
 
-use super::image_file::ImageFile;
+use super::capture_png::CapturePng;
 use crate::capture::error::{CaptureError, CaptureProblem};
 use crate::capture::manifest::Manifest;
 use crate::capture::measurements::Pattern;
@@ -107,7 +107,7 @@ impl GroundTruth {
     /// If its picture cannot be read.
     pub fn light(&self, name: &str) -> Result<Pattern, CaptureError> {
         let path = self.root.join(format!("light_{name}.png"));
-        ImageFile::new(path, self.light_plane, None).read_pattern(&self.emission)
+        CapturePng::new(path, self.light_plane, None).read_pattern(&self.emission)
     }
 
     /// The true picture under light `name`, `[N]`, in units of the measurement.
@@ -116,7 +116,7 @@ impl GroundTruth {
     /// If it cannot be read.
     pub fn relit(&self, name: &str) -> Result<Vec<[f64; CHANNELS]>, CaptureError> {
         let path = self.root.join(format!("relit_{name}.png"));
-        let file = ImageFile::new(path, self.camera, None);
+        let file = CapturePng::new(path, self.camera, None);
         let codes = file.read_rgb16()?.into_iter();
         let linear = |code| f64::from(code) / RELIT_FULL_SCALE;
         Ok(codes.map(|codes| codes.map(linear)).collect())

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use crate::cli::arguments::{ByteCount, parse_number};
+use crate::cli::value_parsers::{ByteCount, parse_number};
 use crate::format::{DistortionMetric, HEADER_BYTES, RateTarget};
 use crate::recover::{Method, SparsityBasis};
 use crate::transport::{Decibels, Window};

@@ -13,9 +13,9 @@ use super::tile_record;
 use crate::cli::process::InterruptibleCores;
 use crate::cli::progress;
 use crate::executor::{Cancelled, Executor};
-use crate::format::{DistortionMetric, EncodedFile, FormatError, Metadata, Source};
+use crate::format::{DistortionMetric, EncodedFile, EncoderInput, FormatError, Metadata};
 use crate::recover::{HoldoutValidation, Recovery};
-use crate::transport::{Basis, Decibels, FloatTile, Geometry, TransportFunctions};
+use crate::transport::{Basis, Decibels, FloatTile, Geometry, TileFunctions};
 
 /// The loss of SNR on held-out patterns.
 impl DistortionMetric for HoldoutValidation {
@@ -23,7 +23,7 @@ impl DistortionMetric for HoldoutValidation {
         self.tiles().cloned().collect()
     }
 
-    fn loss(&self, functions: &[TransportFunctions]) -> Decibels {
+    fn loss(&self, functions: &[TileFunctions]) -> Decibels {
         self.loss(functions)
     }
 }
@@ -59,7 +59,7 @@ pub fn encode_file(
         }
         Ok(tile)
     };
-    let source = Source {
+    let source = EncoderInput {
         geometry,
         basis,
         tile: &tile,

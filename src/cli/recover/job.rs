@@ -12,17 +12,17 @@ use super::encode::encode_file;
 use super::memory_plan::MemoryPlan;
 use super::report::RecoverReport;
 use super::run_key::{PROGRAM, RunKey, recovery_fingerprint};
-use super::{shots, tile_record};
+use super::{shot_selection, tile_record};
 use crate::capture::{CaptureFolder, DarkFrame, Measurements, group_count, group_ids};
 use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process::{InterruptibleCores, peak_rss_bytes};
 use crate::cli::progress;
 use crate::cli::shot_reader::{ShotReader, read_patterns};
 use crate::executor::{Cancelled, Executor};
-use crate::format::{CaptureNote, Metadata};
+use crate::format::{CaptureSummary, Metadata};
 use crate::recover::{
-    BandwidthEstimate, HoldoutValidation, MIN_PATTERNS, RecoverError, Recovery, RecoverySettings,
-    WindowEstimate,
+    BandExtent, HoldoutValidation, MIN_PATTERNS, RecoverError, Recovery, RecoverySettings,
+    WindowSizeEstimate,
 };
 use crate::transport::{Basis, Decibels, Window};
 
@@ -75,7 +75,7 @@ impl RecoverJob<'_> {
         saturated: usize,
         checkpoint: &Mutex<Checkpoint>,
     ) -> Result<RecoverReport> {
-        shots::warn_of_saturation(saturated, &measurements);
+        shot_selection::warn_of_saturation(saturated, &measurements);
         let (window, tail_fraction) = self.choose_window(&measurements)?;
         let method = self.args.method();
         let recovery = self.prepare(&measurements, RecoverySettings { method, window })?;
@@ -120,18 +120,18 @@ impl RecoverJob<'_> {
         if let Some(window) = self.args.window {
             return Ok((window, None));
         }
-        let estimate = WindowEstimate::from_measurements(measurements, self.cores);
-        let WindowEstimate { window, bandwidth } = estimate.map_err(|e| self.recover_error(e))?;
+        let estimate = WindowSizeEstimate::from_measurements(measurements, self.cores);
+        let WindowSizeEstimate { window, band } = estimate.map_err(|e| self.recover_error(e))?;
         let side = window.side();
-        match bandwidth {
-            BandwidthEstimate::Bounded { tail_fraction } => {
+        match band {
+            BandExtent::Bounded { tail_fraction } => {
                 return Ok((window, Some(tail_fraction)));
             }
-            BandwidthEstimate::Unbounded => eprintln!(
+            BandExtent::Unbounded => eprintln!(
                 "warning: the band is at least as wide as the largest window tried, {side}x{side} light \
                  elements; a larger one can be given by --window"
             ),
-            BandwidthEstimate::Undetermined => eprintln!(
+            BandExtent::Undetermined => eprintln!(
                 "warning: the photographs do not show how wide the band is; a window of {side}x{side} \
                  light elements is used, another can be given by --window"
             ),
@@ -226,7 +226,7 @@ impl RecoverJob<'_> {
             title: manifest.title.clone(),
             creator: manifest.creator.clone(),
             rights: manifest.rights.clone(),
-            capture: CaptureNote {
+            capture: CaptureSummary {
                 patterns,
                 photographs: self.shots.len(),
             },
@@ -243,7 +243,7 @@ impl RecoverJob<'_> {
             RecoverError::Cancelled(cancelled) => cancelled.into(),
             RecoverError::MismatchedPatterns { pattern_indices } => {
                 let shots = pattern_indices.iter().map(|&l| self.shots[l]);
-                shots::mismatched_shots(self.folder, shots)
+                shot_selection::mismatched_shots(self.folder, shots)
             }
             other => Error::new(other).context(self.args.capture.display().to_string()),
         }

@@ -9,7 +9,7 @@ use std::ops::Range;
 use anyhow::{Result, ensure};
 
 use crate::capture::{Manifest, RowSet};
-use crate::cli::arguments::ByteCount;
+use crate::cli::value_parsers::ByteCount;
 use crate::recover::Method;
 use crate::transport::{CHANNELS, Extent, Geometry, Window};
 

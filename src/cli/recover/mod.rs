@@ -10,7 +10,7 @@ mod job;
 mod memory_plan;
 mod report;
 mod run_key;
-mod shots;
+mod shot_selection;
 mod tile_record;
 
 use std::time::Instant;
@@ -21,12 +21,12 @@ pub use self::args::RecoverArgs;
 
 use self::job::{RecoverJob, thread_pool};
 use self::memory_plan::MemoryPlan;
-use super::arguments::UsageError;
 use super::output_file::{LTM, OutputFile};
 use super::process::InterruptibleCores;
 use super::report::print_json;
+use super::value_parsers::UsageError;
 use crate::capture::CaptureFolder;
-use crate::recover::{MIN_PATTERNS, RecoverError, WindowEstimate};
+use crate::recover::{MIN_PATTERNS, RecoverError, WindowSizeEstimate};
 
 pub fn run(args: &RecoverArgs) -> Result<()> {
     let start = Instant::now();
@@ -38,14 +38,14 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     drop(OutputFile::create(&args.output, &LTM)?);
     let folder = CaptureFolder::open(&args.capture)?;
     let manifest = folder.manifest();
-    shots::warn_of_unknown_fields(&folder);
-    let shots = shots::choose_shots(&manifest.shots, args.patterns)?;
+    shot_selection::warn_of_unknown_fields(&folder);
+    let shots = shot_selection::choose_shots(&manifest.shots, args.patterns)?;
     if shots.len() < MIN_PATTERNS {
         let manifest = folder.manifest_path().display().to_string();
         return Err(RecoverError::TooFewPatterns(shots.len())).context(manifest);
     }
     let method = args.method();
-    let max_window = args.window.unwrap_or(WindowEstimate::MAX_WINDOW);
+    let max_window = args.window.unwrap_or(WindowSizeEstimate::MAX_WINDOW);
     let (limit, threads) = (args.memory, rayon::current_num_threads());
     let plan = MemoryPlan::new(limit, manifest, shots.len(), method, max_window, threads)?;
     if let Some(window) = args.window {

@@ -10,7 +10,7 @@ use crate::linalg::symmetric_eigen;
 use crate::transport::CHANNELS;
 
 /// Red, green and blue, or the coordinates on other axes.
-pub type Pixel = [f32; CHANNELS];
+pub type ColourVector = [f32; CHANNELS];
 
 /// The integer that stands for 1 in a stored matrix.
 const UNIT: f32 = 16384.0;
@@ -24,7 +24,7 @@ impl ColourKlt {
     pub const BYTES: usize = 2 * CHANNELS * CHANNELS;
 
     /// The principal axes of `pixels`.
-    pub fn of_pixels(pixels: impl Iterator<Item = Pixel>) -> Self {
+    pub fn of_pixels(pixels: impl Iterator<Item = ColourVector>) -> Self {
         let mut moment = vec![0.0f64; CHANNELS * CHANNELS];
         for pixel in pixels {
             for i in 0..CHANNELS {
@@ -53,17 +53,17 @@ impl ColourKlt {
         }))
     }
 
-    fn axes(&self) -> [Pixel; CHANNELS] {
+    fn axes(&self) -> [ColourVector; CHANNELS] {
         self.0.map(|axis| axis.map(|c| f32::from(c) / UNIT))
     }
 
     /// A colour's coordinates on the axes.
-    pub fn forward(&self, rgb: Pixel) -> Pixel {
+    pub fn forward(&self, rgb: ColourVector) -> ColourVector {
         self.axes().map(|axis| dot(axis, rgb))
     }
 
     /// The colour with these coordinates.
-    pub fn inverse(&self, coordinates: Pixel) -> Pixel {
+    pub fn inverse(&self, coordinates: ColourVector) -> ColourVector {
         let [a, b, d] = self.axes();
         std::array::from_fn(|c| {
             coordinates[0] * a[c] + coordinates[1] * b[c] + coordinates[2] * d[c]
@@ -74,14 +74,14 @@ impl ColourKlt {
 /// The reflection that maps a colour to the first axis, and back.
 #[derive(Clone, Copy, Debug)]
 pub struct HouseholderReflection {
-    normal: Pixel,
+    normal: ColourVector,
     /// `2 / ‖normal‖²`, or 0 for the identity.
     factor: f32,
 }
 
 impl HouseholderReflection {
     /// The reflection of a pixel whose component 0 has this colour.
-    pub fn of_colour(colour: Pixel) -> Self {
+    pub fn of_colour(colour: ColourVector) -> Self {
         let length = dot(colour, colour).sqrt();
         let normal = [colour[0] - length, colour[1], colour[2]];
         let square = dot(normal, normal);
@@ -93,18 +93,18 @@ impl HouseholderReflection {
     }
 
     /// Reflects a pixel. The reflection is its own inverse.
-    pub fn apply(&self, pixel: Pixel) -> Pixel {
+    pub fn apply(&self, pixel: ColourVector) -> ColourVector {
         let scale = self.factor * dot(self.normal, pixel);
         std::array::from_fn(|c| pixel[c] - scale * self.normal[c])
     }
 }
 
 /// The pixel with 0 for values that are not finite.
-pub fn finite(pixel: Pixel) -> Pixel {
+pub fn finite(pixel: ColourVector) -> ColourVector {
     pixel.map(|c| if c.is_finite() { c } else { 0.0 })
 }
 
-fn dot(a: Pixel, b: Pixel) -> f32 {
+fn dot(a: ColourVector, b: ColourVector) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
@@ -141,7 +141,8 @@ mod tests {
 
     #[test]
     fn a_reflection_maps_its_colour_to_the_first_axis_and_back() {
-        let near = |a: Pixel, b: Pixel| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
+        let near =
+            |a: ColourVector, b: ColourVector| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
         for colour in [[0.3, 0.9, 0.1], [1.0, 0.0, 0.0], [-1.0, 0.2, 0.1], [0.0; 3]] {
             let reflection = HouseholderReflection::of_colour(colour);
             let length = dot(colour, colour).sqrt();

@@ -6,10 +6,10 @@
 use half::f16;
 
 use super::byte_planes::{join, split};
-use super::colour::Pixel;
+use super::colour::ColourVector;
 use super::zstd_frame::{compress, decompress};
-use crate::format::budget::MemoryBudget;
 use crate::format::error::{FormatError, SectionError, damaged};
+use crate::format::memory_budget::MemoryBudget;
 use crate::format::scan::Scan;
 use crate::transport::CHANNELS;
 
@@ -63,7 +63,7 @@ fn column(scan: &Scan, order: Option<&[u16]>, item: usize) -> usize {
 /// # Errors
 /// [`SectionError`] if the chunk is damaged or holds a value that is not finite, or the budget refuses memory.
 pub fn add(
-    values: &mut [Pixel],
+    values: &mut [ColourVector],
     columns: usize,
     scan: &Scan,
     order: Option<&[u16]>,
@@ -90,7 +90,12 @@ pub fn add(
 }
 
 /// The values that [`add`] reads.
-pub fn gather(values: &[Pixel], columns: usize, scan: &Scan, order: Option<&[u16]>) -> Vec<f32> {
+pub fn gather(
+    values: &[ColourVector],
+    columns: usize,
+    scan: &Scan,
+    order: Option<&[u16]>,
+) -> Vec<f32> {
     let count = usize::from(scan.count);
     let mut gathered = Vec::with_capacity(values.len() / columns.max(1) * count * CHANNELS);
     for item in 0..count {
@@ -116,7 +121,7 @@ mod tests {
     fn decoded_values_have_eleven_bits() {
         for peak in [1e-6f32, 0.3, 7e5] {
             let value = |i: usize| [1.0, 0.5, -0.7].map(|c| c * peak * (i as f32 * 0.37).sin());
-            let values: Vec<Pixel> = (0..5 * 40).map(value).collect();
+            let values: Vec<ColourVector> = (0..5 * 40).map(value).collect();
             let step = step_for(peak);
             let mut got = vec![[0.0; CHANNELS]; values.len()];
             let mut claimed = 0.0;

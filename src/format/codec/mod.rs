@@ -7,11 +7,11 @@
 //! basis        -> basis  -> byte_planes             -> zstd_frame
 //! ```
 
-pub(super) mod basis;
+pub(super) mod basis_chunk;
 mod byte_planes;
 mod colour;
 mod dct;
-pub(super) mod direct;
+pub(super) mod direct_functions;
 pub(super) mod halves;
 pub(super) mod tokens;
 pub(super) mod transform;

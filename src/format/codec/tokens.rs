@@ -10,10 +10,10 @@
 use std::ops::Range;
 
 use super::zstd_frame::{compress, compressed_bound, decompress};
-use crate::format::budget::MemoryBudget;
 use crate::format::chunk::EncodedChunk;
 use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::fields::FieldReader;
+use crate::format::memory_budget::MemoryBudget;
 
 /// Largest magnitude of a number.
 pub const MAX_MAGNITUDE: i32 = (1 << 15) - 1;
@@ -52,7 +52,7 @@ pub struct QuantisedRun<'a> {
 }
 
 /// Values that a codec writes as runs.
-pub trait ItemRuns {
+pub trait TokenSource {
     /// Calls `visit` with each run of `items`, quantised to `step`.
     fn for_runs(&self, items: Range<usize>, step: f32, visit: &mut dyn FnMut(QuantisedRun<'_>));
 

@@ -16,13 +16,13 @@
 //! string, the main token string (axis 0, a run of 64 numbers for each component and block) and the side
 //! token string (axes 1 and 2 interleaved, a run of 128).
 
-use super::colour::{ColourKlt, HouseholderReflection, Pixel};
+use super::colour::{ColourKlt, ColourVector, HouseholderReflection};
 use super::dct::{self, AREA, DctBlock, SIDE, ZIGZAG};
 use super::tokens::{self, MAX_MAGNITUDE, TokenReader};
-use crate::format::budget::{MemoryBudget, vec_bytes};
 use crate::format::constants::MAX_CONTENT_BYTES;
 use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::fields::FieldReader;
+use crate::format::memory_budget::{MemoryBudget, vec_bytes};
 use crate::format::scan::Scan;
 use crate::transport::{CHANNELS, Extent, Geometry};
 
@@ -64,9 +64,9 @@ impl CoefficientPlanes {
         extent: Extent,
         rank: usize,
         budget: &MemoryBudget,
-    ) -> Result<Vec<Pixel>, FormatError> {
+    ) -> Result<Vec<ColourVector>, FormatError> {
         let pixels = extent.area();
-        let mut coefficients: Vec<Pixel> = budget.try_zeroed(pixels * rank)?;
+        let mut coefficients: Vec<ColourVector> = budget.try_zeroed(pixels * rank)?;
         let mut reflections = budget.try_with_capacity(pixels)?;
         if let (Some(klt), Some(plane)) = (self.klt, self.components.first())
             && !plane.is_empty()
@@ -211,7 +211,7 @@ pub fn block_corners(extent: Extent) -> impl Iterator<Item = (usize, usize)> {
     tops.flat_map(move |top| (0..width).step_by(SIDE).map(move |left| (left, top)))
 }
 
-fn axis_values(plane: &[f32], pixels: usize, p: usize) -> Pixel {
+fn axis_values(plane: &[f32], pixels: usize, p: usize) -> ColourVector {
     std::array::from_fn(|axis| plane[axis * pixels + p])
 }
 

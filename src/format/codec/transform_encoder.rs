@@ -5,16 +5,16 @@
 use std::array::from_fn;
 use std::ops::Range;
 
-use super::colour::{ColourKlt, HouseholderReflection, Pixel, finite};
+use super::colour::{ColourKlt, ColourVector, HouseholderReflection, finite};
 use super::dct::{self, AREA, DctBlock, SIDE, ZIGZAG};
-use super::tokens::{ItemRuns, MAX_MAGNITUDE, QuantisedRun, TokenWriter};
+use super::tokens::{MAX_MAGNITUDE, QuantisedRun, TokenSource, TokenWriter};
 use super::transform::{
     CoefficientPlane, CoefficientPlanes, add_block, block_corners, block_count, dequantise,
     try_axis,
 };
-use crate::format::budget::MemoryBudget;
 use crate::format::chunk::EncodedChunk;
 use crate::format::error::FormatError;
+use crate::format::memory_budget::MemoryBudget;
 use crate::format::scan::Scan;
 use crate::transport::{CHANNELS, Extent};
 
@@ -39,7 +39,7 @@ pub struct TransformedTile {
 
 impl TransformedTile {
     /// Transforms coefficients, `[pixel, component]`. Reflections are those of their exact colours.
-    pub fn new(extent: Extent, coefficients: &[Pixel]) -> Self {
+    pub fn new(extent: Extent, coefficients: &[ColourVector]) -> Self {
         let pixels = extent.area();
         let rank = coefficients.len() / pixels;
         let of = |p: usize, k: usize| finite(coefficients[p * rank + k]);
@@ -50,7 +50,7 @@ impl TransformedTile {
                 0 => klt.forward(of(p, 0)),
                 _ => HouseholderReflection::of_colour(of(p, 0)).apply(of(p, k)),
             };
-            let component: Vec<Pixel> = (0..pixels).map(on_axes).collect();
+            let component: Vec<ColourVector> = (0..pixels).map(on_axes).collect();
             for axis in 0..CHANNELS {
                 for corner in block_corners(extent) {
                     values.extend(transformed(&component, extent, corner, axis));
@@ -64,7 +64,7 @@ impl TransformedTile {
     }
 }
 
-impl ItemRuns for TransformedTile {
+impl TokenSource for TransformedTile {
     fn for_runs(&self, items: Range<usize>, step: f32, visit: &mut dyn FnMut(QuantisedRun<'_>)) {
         let axis = self.blocks * AREA;
         let components = self.values.chunks_exact(CHANNELS * axis).enumerate();
@@ -116,7 +116,12 @@ pub struct QuantisedCoefficients {
 impl QuantisedCoefficients {
     /// Transforms and quantises coefficients, `[pixel, component]`, by `scans`, which cover all components;
     /// `keep_decoded` says whether [`decoded`](Self::decoded) will be called.
-    pub fn new(extent: Extent, coefficients: &[Pixel], scans: &[Scan], keep_decoded: bool) -> Self {
+    pub fn new(
+        extent: Extent,
+        coefficients: &[ColourVector],
+        scans: &[Scan],
+        keep_decoded: bool,
+    ) -> Self {
         let (pixels, blocks) = (extent.area(), block_count(extent));
         let rank = coefficients.len() / pixels;
         let of = |p: usize, k: usize| finite(coefficients[p * rank + k]);
@@ -137,8 +142,8 @@ impl QuantisedCoefficients {
             components: vec![Vec::new()],
         };
         let on_axes = |p: usize| quantised.klt.forward(of(p, 0));
-        let mut component: Vec<Pixel> = (0..pixels).map(on_axes).collect();
-        let square = |(p, on_axes): (usize, &Pixel)| -> f64 {
+        let mut component: Vec<ColourVector> = (0..pixels).map(on_axes).collect();
+        let square = |(p, on_axes): (usize, &ColourVector)| -> f64 {
             let (got, want) = (quantised.klt.inverse(*on_axes), of(p, 0));
             let square = |c: usize| f64::from(got[c] - want[c]).powi(2);
             (0..CHANNELS).map(square).sum()
@@ -168,7 +173,7 @@ impl QuantisedCoefficients {
     ///
     /// # Errors
     /// [`FormatError::Memory`].
-    pub fn decoded(&self, extent: Extent) -> Result<Vec<Pixel>, FormatError> {
+    pub fn decoded(&self, extent: Extent) -> Result<Vec<ColourVector>, FormatError> {
         let rank = self.planes.components.len();
         self.planes
             .coefficients(extent, rank, &MemoryBudget::unlimited())
@@ -178,7 +183,7 @@ impl QuantisedCoefficients {
     fn quantise_component(
         &mut self,
         k: usize,
-        pixels: &[Pixel],
+        pixels: &[ColourVector],
         extent: Extent,
         scans: &[Scan],
         mut decoded: Option<&mut CoefficientPlane>,
@@ -268,7 +273,7 @@ impl QuantisedCoefficients {
 
 /// A block's coefficients in zigzag order.
 fn transformed(
-    pixels: &[Pixel],
+    pixels: &[ColourVector],
     extent: Extent,
     (left, top): (usize, usize),
     axis: usize,
@@ -325,7 +330,7 @@ mod tests {
     use crate::transport::TileRect;
 
     /// Coefficients that fall off from one component to the next, smooth in space, of a few colours.
-    fn tile(extent: Extent, rank: usize) -> Vec<Pixel> {
+    fn tile(extent: Extent, rank: usize) -> Vec<ColourVector> {
         let rect = TileRect { x: 0, y: 0, extent };
         let mut coefficients = Vec::new();
         for pixel in rect.pixels() {
@@ -347,7 +352,7 @@ mod tests {
         Scan::new(ScanCoding::Transform, first, count, step)
     }
 
-    fn decoded(planes: &CoefficientPlanes, extent: Extent, rank: usize) -> Vec<Pixel> {
+    fn decoded(planes: &CoefficientPlanes, extent: Extent, rank: usize) -> Vec<ColourVector> {
         planes
             .coefficients(extent, rank, &MemoryBudget::unlimited())
             .unwrap()
@@ -356,7 +361,7 @@ mod tests {
     fn squared_error(
         planes: &CoefficientPlanes,
         extent: Extent,
-        tile: &[Pixel],
+        tile: &[ColourVector],
         rank: usize,
     ) -> f64 {
         let decoded = decoded(planes, extent, rank);

@@ -2,9 +2,9 @@
 
 use zstd::zstd_safe;
 
-use crate::format::budget::MemoryBudget;
 use crate::format::constants::MAX_CONTENT_BYTES;
 use crate::format::error::{FormatError, SectionError, damaged};
+use crate::format::memory_budget::MemoryBudget;
 
 /// The highest level whose window stays within 8 MiB. Decoding speed does not depend on it.
 const LEVEL: i32 = 19;

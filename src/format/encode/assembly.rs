@@ -8,14 +8,14 @@ use super::scan_plan::SHARES;
 use crate::executor::Executor;
 use crate::format::checksum::checksum;
 use crate::format::chunk::{ChunkEntry, EncodedChunk};
-use crate::format::codec::basis::QuantisedBasis;
-use crate::format::codec::direct::{self, QuantisedFunctions};
+use crate::format::codec::basis_chunk::QuantisedBasis;
+use crate::format::codec::direct_functions::{self, QuantisedDirectFunctions};
 use crate::format::codec::halves;
 use crate::format::codec::transform_encoder::QuantisedCoefficients;
 use crate::format::error::FormatError;
 use crate::format::index::FileIndex;
 use crate::format::scan::{Scan, ScanCoding};
-use crate::transport::{Basis, Decibels, FloatTile, TransportError};
+use crate::transport::{Basis, Decibels, FloatTile, SnrAccumulator};
 
 /// Share of the error that the rounding of the basis may add.
 const BASIS_ERROR_SHARE: f64 = 0.02;
@@ -63,7 +63,7 @@ impl EncodedFile {
 /// A tile, quantised scan by scan.
 pub struct QuantisedTile {
     coefficients: Option<QuantisedCoefficients>,
-    functions: Option<QuantisedFunctions>,
+    functions: Option<QuantisedDirectFunctions>,
 }
 
 /// A tile's chunks `[scan]`, and its squared error after each scan.
@@ -87,15 +87,16 @@ impl QuantisedTile {
         let functions = encoder.direct(tile);
         Self {
             coefficients,
-            functions: functions.map(|tau| QuantisedFunctions::new(tau, &encoder.order, scans)),
+            functions: functions
+                .map(|tau| QuantisedDirectFunctions::new(tau, &encoder.order, scans)),
         }
     }
 
     /// The error after `scans` scans, without that of the KLT.
-    pub fn error(&self, scans: usize) -> TransportError {
+    pub fn error(&self, scans: usize) -> SnrAccumulator {
         let coefficients = self.coefficients.iter().map(|q| &q.errors);
         let parts = coefficients.chain(self.functions.iter().map(|q| &q.errors));
-        let errors = parts.map(|errors| TransportError {
+        let errors = parts.map(|errors| SnrAccumulator {
             signal: errors[0],
             error: errors[scans],
         });
@@ -158,7 +159,7 @@ pub fn encode_lossless(encoder: &Encoder<'_, impl Executor>) -> Result<EncodedFi
     let peak = (encoder.coefficient_peak * gain).max(encoder.function_peak);
     let step = halves::step_for(peak);
     let side = encoder.source.geometry.tile_side;
-    let max_per_scan = direct::max_slots(side) as usize;
+    let max_per_scan = direct_functions::max_slots(side) as usize;
     let (rank, slots) = (encoder.rank(), encoder.slots());
     // All items have the same bytes.
     let share = |share: f64| ((share * (rank + slots) as f64) as usize).clamp(1, max_per_scan);
@@ -268,7 +269,7 @@ fn assemble(
             scan.basis_crc = checksum(&bytes);
             in_file.push(bytes);
         }
-        let error = TransportError {
+        let error = SnrAccumulator {
             signal: encoder.energy,
             error: error + basis_error,
         };

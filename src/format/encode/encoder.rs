@@ -1,11 +1,11 @@
 //! The encoder's view of a source: the rotated basis, energies and peaks, from one pass over all tiles.
 
 use super::basis_rotation::{BasisRotation, coefficient_moments};
-use super::source::Source;
+use super::encoder_input::EncoderInput;
 use crate::executor::Executor;
-use crate::format::budget::MemoryBudget;
-use crate::format::codec::{direct, transform};
+use crate::format::codec::{direct_functions, transform};
 use crate::format::error::FormatError;
+use crate::format::memory_budget::MemoryBudget;
 use crate::transport::{Basis, CHANNELS, FloatTile};
 
 /// Number of tiles that are encoded at a time.
@@ -13,7 +13,7 @@ const BATCH_TILES: usize = 64;
 
 /// A source whose tiles have been analysed.
 pub struct Encoder<'a, E> {
-    pub source: Source<'a>,
+    pub source: EncoderInput<'a>,
     pub executor: &'a E,
     /// The rotation to the file's basis; `None` if there are no coefficients.
     pub rotation: Option<BasisRotation>,
@@ -69,7 +69,7 @@ impl<'a, E: Executor> Encoder<'a, E> {
     ///
     /// # Panics
     /// If a tile or a basis function has the wrong length.
-    pub fn new(source: Source<'a>, executor: &'a E) -> Result<Self, FormatError> {
+    pub fn new(source: EncoderInput<'a>, executor: &'a E) -> Result<Self, FormatError> {
         let rank = source.basis.map_or(0, Basis::rank);
         let area = source.geometry.window.area();
         if let Some(basis) = source.basis {
@@ -96,7 +96,10 @@ impl<'a, E: Executor> Encoder<'a, E> {
         let rotation = basis.and_then(|basis| BasisRotation::new(basis, &moments));
         let coefficient_energy = rotation.as_ref().map_or(0.0, BasisRotation::energy);
         Ok(Self {
-            order: direct::centre_out_order(source.geometry.window, &MemoryBudget::unlimited())?,
+            order: direct_functions::centre_out_order(
+                source.geometry.window,
+                &MemoryBudget::unlimited(),
+            )?,
             energy: coefficient_energy + function_energy,
             coefficient_energy,
             has_functions: function_energy > 0.0,
@@ -146,7 +149,7 @@ impl<'a, E: Executor> Encoder<'a, E> {
 /// # Errors
 /// [`FormatError::Source`] if a tile cannot be read, and the errors of `take`.
 pub fn for_tiles<T: Send>(
-    source: &Source<'_>,
+    source: &EncoderInput<'_>,
     executor: &impl Executor,
     work: impl Fn(FloatTile) -> T + Sync + Send,
     mut take: impl FnMut(usize, T) -> Result<(), FormatError>,

@@ -11,11 +11,11 @@
 mod assembly;
 mod basis_rotation;
 mod encoder;
+mod encoder_input;
 mod rate_control;
 mod sampling;
 mod scan_costs;
 mod scan_plan;
-mod source;
 
 pub use assembly::EncodedFile;
-pub use source::{DistortionMetric, RateTarget, Source};
+pub use encoder_input::{DistortionMetric, EncoderInput, RateTarget};

@@ -7,16 +7,16 @@ use std::convert::Infallible;
 
 use super::assembly::{self, EncodedFile, QuantisedTile};
 use super::encoder::Encoder;
+use super::encoder_input::{DistortionMetric, EncoderInput, RateTarget};
 use super::sampling::{SampledTilePart, sample};
 use super::scan_costs::CostModel;
 use super::scan_plan::{self, MAX_SHARES, SHARES, ScanPlan, ScanShares};
-use super::source::{DistortionMetric, RateTarget, Source};
 use crate::bisect::bisect;
 use crate::executor::Executor;
 use crate::format::constants::FIRST_BYTES;
 use crate::format::error::FormatError;
 use crate::format::scan::Scan;
-use crate::transport::{Decibels, FloatTile, TransportError, TransportFunctions};
+use crate::transport::{Decibels, FloatTile, SnrAccumulator, TileFunctions};
 
 /// Energy of the dropped components, relative to the quantisation error.
 const DROPPED_ENERGY_RATIO: f64 = 0.01;
@@ -48,7 +48,7 @@ impl EncodedFile {
     /// # Panics
     /// If a tile or a basis function does not have the length that geometry and basis give it.
     pub fn new(
-        source: Source<'_>,
+        source: EncoderInput<'_>,
         target: RateTarget<'_>,
         executor: &impl Executor,
     ) -> Result<Self, FormatError> {
@@ -182,16 +182,16 @@ impl<'a, E: Executor> RateControl<'a, E> {
         Ok(plan)
     }
 
-    fn trial_error(&self, step: f32) -> TransportError {
+    fn trial_error(&self, step: f32) -> SnrAccumulator {
         self.error_of(&scan_plan::trial(&self.encoder, step))
     }
 
     /// The quantisation error of some scans, predicted from the sample.
-    fn error_of(&self, scans: &[Scan]) -> TransportError {
+    fn error_of(&self, scans: &[Scan]) -> SnrAccumulator {
         let errors = self.encoder.executor.map(self.sample.len(), |i| {
             let SampledTilePart { tile, weight } = &self.sample[i];
             let error = QuantisedTile::new(&self.encoder, tile, scans, false).error(scans.len());
-            TransportError {
+            SnrAccumulator {
                 signal: error.signal * weight,
                 error: error.error * weight,
             }
@@ -229,7 +229,7 @@ fn decoded(
     encoder: &Encoder<'_, impl Executor>,
     tile: &FloatTile,
     scans: &[Scan],
-) -> TransportFunctions {
+) -> TileFunctions {
     let quantised = QuantisedTile::new(encoder, tile, scans, true);
     let decoded = quantised.decoded(tile, &encoder.order);
     let basis = encoder.rotation.as_ref().map(|rotation| &rotation.basis);
@@ -237,8 +237,8 @@ fn decoded(
 }
 
 /// Drops the last components, as far as their energy is small against the quantisation error.
-fn drop_weak_components(encoder: &mut Encoder<'_, impl Executor>, error: TransportError) {
-    let TransportError { signal, error } = error;
+fn drop_weak_components(encoder: &mut Encoder<'_, impl Executor>, error: SnrAccumulator) {
+    let SnrAccumulator { signal, error } = error;
     let allowed = DROPPED_ENERGY_RATIO * encoder.energy * error / signal.max(f64::MIN_POSITIVE);
     if let Some(rotation) = &mut encoder.rotation {
         let mut dropped = 0.0;
@@ -252,7 +252,7 @@ fn drop_weak_components(encoder: &mut Encoder<'_, impl Executor>, error: Transpo
 }
 
 /// The coarsest step with the given SNR, where `error` gives the error of a step. `None` if all values are zero.
-fn step_for(snr: Decibels, error: impl Fn(f32) -> TransportError) -> Option<f32> {
+fn step_for(snr: Decibels, error: impl Fn(f32) -> SnrAccumulator) -> Option<f32> {
     let norm = error(1.0).signal.sqrt() as f32;
     if !norm.is_normal() {
         return None;
@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn the_step_is_the_coarsest_with_the_snr() {
         // The error of values that are large against the step.
-        let error = |step: f32| TransportError {
+        let error = |step: f32| SnrAccumulator {
             signal: 1e4,
             error: f64::from(step).powi(2),
         };
@@ -281,6 +281,6 @@ mod tests {
             let snr = 10.0 * (1e4 / f64::from(step).powi(2)).log10();
             assert!((0.0..0.1).contains(&(snr - target)), "{snr} dB");
         }
-        assert!(step_for(Decibels(30.0), |_| TransportError::default()).is_none());
+        assert!(step_for(Decibels(30.0), |_| SnrAccumulator::default()).is_none());
     }
 }

@@ -6,15 +6,15 @@
 use super::encoder::Encoder;
 use super::sampling::SampledTilePart;
 use crate::executor::Executor;
-use crate::format::codec::direct::OrderedFunctions;
-use crate::format::codec::tokens::{CONTEXTS, ItemRuns, for_tokens};
+use crate::format::codec::direct_functions::CentreOutFunctions;
+use crate::format::codec::tokens::{CONTEXTS, TokenSource, for_tokens};
 use crate::format::codec::transform_encoder::TransformedTile;
 use crate::format::error::FormatError;
 use crate::format::scan::{Scan, ScanCoding};
 
 /// Bytes and squared error of one item at one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ItemCost {
+pub struct RateDistortion {
     pub bytes: f64,
     /// Squared error if the item is left out.
     pub energy: f64,
@@ -24,17 +24,17 @@ pub struct ItemCost {
 
 /// The sample's values as the codecs quantise them.
 pub struct CostModel {
-    parts: Vec<TransformedSample>,
+    parts: Vec<TransformedTilePart>,
 }
 
-struct TransformedSample {
+struct TransformedTilePart {
     weight: f64,
     coefficients: Option<TransformedTile>,
-    functions: Option<OrderedFunctions>,
+    functions: Option<CentreOutFunctions>,
 }
 
 /// One token of an item.
-struct ItemToken {
+struct EntropyToken {
     item: u16,
     context: u8,
     token: u8,
@@ -45,10 +45,10 @@ impl CostModel {
         let parts = encoder.executor.map(sample.len(), |i| {
             let SampledTilePart { tile, weight } = &sample[i];
             let (coefficients, functions) = (encoder.rotated(tile), encoder.direct(tile));
-            TransformedSample {
+            TransformedTilePart {
                 weight: *weight,
                 coefficients: coefficients.map(|c| TransformedTile::new(tile.rect.extent, &c)),
-                functions: functions.map(|tau| OrderedFunctions::new(tau, &encoder.order)),
+                functions: functions.map(|tau| CentreOutFunctions::new(tau, &encoder.order)),
             }
         });
         Self { parts }
@@ -78,7 +78,7 @@ impl CostModel {
         count: usize,
         step: f32,
         executor: &impl Executor,
-    ) -> Vec<ItemCost> {
+    ) -> Vec<RateDistortion> {
         let parts = executor.map(self.parts.len(), |i| {
             let runs = self.parts[i].runs(coding);
             let (tokens, costs) = runs
@@ -99,7 +99,7 @@ impl CostModel {
                 (all / counts[token].max(1.0)).log2() + (token % 16) as f64
             })
         });
-        let mut sums = vec![ItemCost::default(); count];
+        let mut sums = vec![RateDistortion::default(); count];
         for (tokens, costs, weight) in parts {
             for token in tokens {
                 let bits = bits[usize::from(token.context)][usize::from(token.token)];
@@ -114,8 +114,8 @@ impl CostModel {
     }
 }
 
-impl TransformedSample {
-    fn runs(&self, coding: ScanCoding) -> Option<&dyn ItemRuns> {
+impl TransformedTilePart {
+    fn runs(&self, coding: ScanCoding) -> Option<&dyn TokenSource> {
         match coding.is_direct() {
             true => self.functions.as_ref().map(|runs| runs as _),
             false => self.coefficients.as_ref().map(|runs| runs as _),
@@ -124,8 +124,12 @@ impl TransformedSample {
 }
 
 /// The tokens of `count` items, and their squared values and errors.
-fn part_costs(runs: &dyn ItemRuns, count: usize, step: f32) -> (Vec<ItemToken>, Vec<ItemCost>) {
-    let (mut tokens, mut costs) = (Vec::new(), vec![ItemCost::default(); count]);
+fn part_costs(
+    runs: &dyn TokenSource,
+    count: usize,
+    step: f32,
+) -> (Vec<EntropyToken>, Vec<RateDistortion>) {
+    let (mut tokens, mut costs) = (Vec::new(), vec![RateDistortion::default(); count]);
     let square = |v: f32| f64::from(v).powi(2);
     runs.for_runs(0..count, step, &mut |run| {
         let item = |i: usize| run.first_item + i / run.values_per_item;
@@ -134,7 +138,7 @@ fn part_costs(runs: &dyn ItemRuns, count: usize, step: f32) -> (Vec<ItemToken>, 
             costs[item(i)].error += square(*residual);
         }
         for_tokens(run.numbers, |i, context, token, _| {
-            tokens.push(ItemToken {
+            tokens.push(EntropyToken {
                 item: item(i) as u16, // ranks and slots are below 2^12
                 context: context as u8,
                 token,

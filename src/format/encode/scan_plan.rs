@@ -12,10 +12,10 @@
 use std::ops::Range;
 
 use super::encoder::Encoder;
-use super::scan_costs::{CostModel, ItemCost};
+use super::scan_costs::{CostModel, RateDistortion};
 use crate::bisect::bisect;
 use crate::executor::Executor;
-use crate::format::codec::{direct, transform};
+use crate::format::codec::{direct_functions, transform};
 use crate::format::constants::FIRST_BYTES;
 use crate::format::error::FormatError;
 use crate::format::scan::{Scan, ScanCoding, rank_of};
@@ -90,8 +90,11 @@ impl CodedItems {
         };
         let slots = Self {
             coding: ScanCoding::Direct,
-            max_per_scan: direct::max_slots(side) as usize,
-            finest_steps: vec![direct::finest_step(encoder.function_peak); encoder.slots()],
+            max_per_scan: direct_functions::max_slots(side) as usize,
+            finest_steps: vec![
+                direct_functions::finest_step(encoder.function_peak);
+                encoder.slots()
+            ],
         };
         let mut kinds = Vec::from([components, slots]);
         kinds.retain(|items| items.count() > 0);
@@ -199,7 +202,7 @@ pub fn plan(
     let area = encoder.order.len() as f64;
     let kinds = CodedItems::of(encoder);
     let costs = |items: &CodedItems, step| model.costs(items.coding, items.count(), step, executor);
-    let last: Vec<Vec<ItemCost>> = kinds.iter().map(|items| costs(items, step)).collect();
+    let last: Vec<Vec<RateDistortion>> = kinds.iter().map(|items| costs(items, step)).collect();
     let basis_bytes = BASIS_BYTES_PER_SLOT * area;
     let file_bytes = basis_bytes * encoder.rank() as f64
         + last.iter().flatten().map(|cost| cost.bytes).sum::<f64>();
@@ -244,10 +247,11 @@ pub fn plan(
 
 /// Number of first items up to the last whose gain is worth its bytes: at a step, a bit reduces the squared
 /// error of a value by 2 ln 2 step² / 12.
-fn worthwhile(costs: &[ItemCost], step: f32) -> usize {
+fn worthwhile(costs: &[RateDistortion], step: f32) -> usize {
     let gain_per_byte = 8.0 * 2.0 * std::f64::consts::LN_2 * f64::from(step).powi(2) / 12.0;
-    let is_worthwhile =
-        |cost: &ItemCost| cost.energy - cost.error > gain_per_byte * cost.bytes && cost.bytes > 0.0;
+    let is_worthwhile = |cost: &RateDistortion| {
+        cost.energy - cost.error > gain_per_byte * cost.bytes && cost.bytes > 0.0
+    };
     costs
         .iter()
         .rposition(is_worthwhile)

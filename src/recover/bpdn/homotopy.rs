@@ -33,7 +33,7 @@ const MIN_RELATIVE_LAMBDA: f64 = 1e-10;
 const MAX_SEGMENTS_PER_UNKNOWN: usize = 10;
 
 /// The end of a segment of the path.
-enum PathEvent {
+enum HomotopyBreakpoint {
     /// The residual is ε, or λ zero.
     End,
     /// This element becomes positive.
@@ -98,13 +98,13 @@ impl<'a> Homotopy<'a> {
             add_scaled(&mut self.x, step, self.passive.solution(ONES));
             add_scaled(&mut self.correlation, -step, &self.slope);
             match event {
-                PathEvent::End => break,
-                PathEvent::Remove(i) => {
+                HomotopyBreakpoint::End => break,
+                HomotopyBreakpoint::Remove(i) => {
                     self.x.swap_remove(i);
                     self.passive.remove(i);
                     self.dependent.fill(false);
                 }
-                PathEvent::Insert(j) => self.insert(j),
+                HomotopyBreakpoint::Insert(j) => self.insert(j),
             }
             if lambda <= min_lambda {
                 break;
@@ -131,15 +131,15 @@ impl<'a> Homotopy<'a> {
 
     /// How far λ falls to the end of the segment, and that end. `excess` is the squared residual minus its limit.
     #[inline(always)]
-    fn next_event(&self, lambda: f64, excess: f64) -> (f64, PathEvent) {
+    fn next_event(&self, lambda: f64, excess: f64) -> (f64, HomotopyBreakpoint) {
         // With s = 1ᵀG[P, P]⁻¹1 the squared residual falls by 2γλs − γ²s over a step γ.
         let direction = self.passive.solution(ONES);
         let root = lambda * lambda - excess / direction.iter().sum::<f64>();
         let mut step = lambda - root.max(0.0).sqrt();
-        let mut event = PathEvent::End;
+        let mut event = HomotopyBreakpoint::End;
         for (i, (&x, &d)) in self.x.iter().zip(direction).enumerate() {
             if d < 0.0 && x < -d * step {
-                (step, event) = ((-x / d).max(0.0), PathEvent::Remove(i));
+                (step, event) = ((-x / d).max(0.0), HomotopyBreakpoint::Remove(i));
             }
         }
         for (j, (&c, &f)) in self.correlation.iter().zip(&self.slope).enumerate() {
@@ -149,7 +149,10 @@ impl<'a> Homotopy<'a> {
                 && !self.passive.contains(j)
                 && !self.dependent[j]
             {
-                (step, event) = (((lambda - c) / (1.0 - f)).max(0.0), PathEvent::Insert(j));
+                (step, event) = (
+                    ((lambda - c) / (1.0 - f)).max(0.0),
+                    HomotopyBreakpoint::Insert(j),
+                );
             }
         }
         (step, event)

@@ -19,4 +19,4 @@ pub use homotopy::Homotopy;
 pub(super) use sensing_operator::SensingOperator;
 pub(super) use solution::BpdnConstraint;
 pub use sparsity_basis::SparsityBasis;
-pub(super) use tolerance::Tolerance;
+pub(super) use tolerance::ResidualTolerance;

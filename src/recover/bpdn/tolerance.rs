@@ -14,7 +14,7 @@ const MIN_EXPECTED_VARIANCE_SHARE: f64 = 0.1;
 
 /// The noise model and the share that determine ε.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tolerance {
+pub struct ResidualTolerance {
     /// Noise variance for each unit of the measurement.
     pub gain: f64,
     /// Noise variance without light.
@@ -23,7 +23,7 @@ pub struct Tolerance {
     pub share: f64,
 }
 
-impl Tolerance {
+impl ResidualTolerance {
     /// Shares to choose from. With 0 the constraint is infeasible and the solution is least squares, so that
     /// sparsity that only harms is not used.
     pub const CANDIDATE_SHARES: [f64; 7] = [1.0, 0.6, 0.35, 0.2, 0.1, 0.04, 0.0];
@@ -85,7 +85,7 @@ mod tests {
             .map(|i| f64::from(i) / 50.0)
             .map(|x| (x, 0.02 * x + 0.003))
             .collect();
-        let fit = Tolerance::fit(&pairs);
+        let fit = ResidualTolerance::fit(&pairs);
         assert!((fit.gain - 0.02).abs() < 1e-9 && (fit.floor - 0.003).abs() < 1e-9);
         let epsilon = fit.epsilon(&[0.5; 80]);
         assert!((epsilon - (80.0f64 * 0.013).sqrt()).abs() < 1e-9);
@@ -94,13 +94,13 @@ mod tests {
     #[test]
     fn gain_and_floor_are_not_negative() {
         let falling: Vec<_> = (0..9).map(|i| (f64::from(i), 9.0 - f64::from(i))).collect();
-        let fit = Tolerance::fit(&falling);
+        let fit = ResidualTolerance::fit(&falling);
         assert!(fit.gain == 0.0 && fit.floor > 0.0);
         let steep: Vec<_> = (1..9).map(|i| (f64::from(i), f64::from(i) - 0.5)).collect();
-        let fit = Tolerance::fit(&steep);
+        let fit = ResidualTolerance::fit(&steep);
         assert!(fit.gain > 0.0 && fit.floor == 0.0);
-        let one = Tolerance::fit(&[(0.5, 0.1)]);
+        let one = ResidualTolerance::fit(&[(0.5, 0.1)]);
         assert!((one.epsilon(&[0.5]) - 0.1f64.sqrt()).abs() < 1e-9);
-        assert_eq!(Tolerance::fit(&[]).epsilon(&[1.0; 10]), 0.0);
+        assert_eq!(ResidualTolerance::fit(&[]).epsilon(&[1.0; 10]), 0.0);
     }
 }

@@ -150,13 +150,13 @@ impl RegionEquations {
         (responses, pixels, channels): (&PatternResponses, &PixelsOfWindow, Range<usize>),
     ) {
         let first_gram = self.gram_matrices.len();
-        let mut shared: Vec<WeightedResponses> = Vec::new();
+        let mut shared: Vec<WeightedBasisResponses> = Vec::new();
         for &(p, pixel) in pixels {
             for c in channels.clone() {
                 let (usable, y) = usable_samples(measurements, pattern_indices, pixel, c);
                 let known = shared.iter().position(|s| s.pattern_indices == usable);
                 let known = known.unwrap_or_else(|| {
-                    let weighted = WeightedResponses::new(measurements, responses, usable);
+                    let weighted = WeightedBasisResponses::new(measurements, responses, usable);
                     self.gram_matrices.push(weighted.columns.gram());
                     shared.push(weighted);
                     shared.len() - 1
@@ -207,7 +207,7 @@ pub(super) fn with_margin(measurements: &Measurements, rect: TileRect, margin: u
 }
 
 /// The responses of the basis on one window, weighted, to one set of L patterns.
-struct WeightedResponses {
+struct WeightedBasisResponses {
     pattern_indices: Vec<usize>,
     /// B.
     columns: WeightedColumns,
@@ -215,7 +215,7 @@ struct WeightedResponses {
     mean_response: f64,
 }
 
-impl WeightedResponses {
+impl WeightedBasisResponses {
     #[inline(always)]
     fn new(
         measurements: &Measurements,

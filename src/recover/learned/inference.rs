@@ -9,13 +9,13 @@ use super::equations::{BrightnessThresholds, RegionEquations, with_margin};
 use super::neighbour_prior::NeighbourPrior;
 use super::nonnegativity::NonNegativityPenalty;
 use super::posterior::PosteriorSolver;
-use super::posterior_means::{NEIGHBOURHOOD_RADIUS, ObservationLocation, PosteriorMeans};
+use super::posterior_means::{NEIGHBOURHOOD_RADIUS, ObservationIndex, PosteriorMeans};
 use super::prior::Prior;
 use crate::capture::Measurements;
 use crate::linalg::vectorise;
 use crate::recover::holdout::HoldoutSplit;
 use crate::recover::prediction;
-use crate::transport::{CHANNELS, FloatTile, Geometry, TileRect, TransportFunctions};
+use crate::transport::{CHANNELS, FloatTile, Geometry, TileFunctions, TileRect};
 
 /// Everything that training learns.
 #[derive(Debug)]
@@ -75,7 +75,7 @@ impl LearnedModel {
     fn estimate(
         &self,
         means: &PosteriorMeans<'_>,
-        location: ObservationLocation,
+        location: ObservationIndex,
         solver: &mut PosteriorSolver,
     ) -> Vec<f64> {
         let index = location.index;
@@ -95,7 +95,7 @@ impl LearnedModel {
         estimate
     }
 
-    pub fn expand(&self, tile: &FloatTile) -> TransportFunctions {
+    pub fn expand(&self, tile: &FloatTile) -> TileFunctions {
         tile.functions(&self.geometry, Some(&self.basis.functions))
     }
 

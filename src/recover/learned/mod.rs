@@ -19,11 +19,11 @@
 //! - [`blending`] mixes in non-negative least squares where that predicts held-out patterns better.
 
 mod basis;
-mod blending;
 mod equations;
 mod inference;
 mod initial_prior;
 mod neighbour_prior;
+mod nnls_blending;
 mod nonnegativity;
 mod posterior;
 mod posterior_means;
@@ -37,14 +37,12 @@ use super::common_mode::CommonMode;
 use super::error::RecoverError;
 use super::holdout::HoldoutSplit;
 use super::pixelwise::PixelwiseRecovery;
-use super::preparation::Preparation;
+use super::preparation_input::PreparationInput;
 use crate::capture::Measurements;
 use crate::executor::Executor;
-use crate::transport::{
-    Basis, CHANNELS, FloatTile, Geometry, TileRect, TransportFunctions, Window,
-};
-use blending::{MIN_TILE_GAIN, ResidualProducts, TILE_CENTRE_SIDE_PX, fit_nnls_alternative};
+use crate::transport::{Basis, CHANNELS, FloatTile, Geometry, TileFunctions, TileRect, Window};
 use inference::LearnedModel;
+use nnls_blending::{MIN_TILE_GAIN, ResidualGram, TILE_CENTRE_SIDE_PX, fit_nnls_alternative};
 pub(super) use posterior_means::NEIGHBOURHOOD_RADIUS as MAX_HALO;
 pub(super) use training::{max_rank, preparation_bytes};
 
@@ -70,7 +68,7 @@ impl LearnedRecovery {
     /// [`RecoverError::NoSignal`] where no prior can be learned, [`RecoverError::Cancelled`] after cancellation, and the
     /// errors of [`PixelwiseRecovery::least_squares`].
     pub fn new(
-        preparation: &Preparation<impl Executor>,
+        preparation: &PreparationInput<impl Executor>,
         mean_function: &[f64],
     ) -> Result<Self, RecoverError> {
         let (split, executor) = (preparation.split, preparation.executor);
@@ -121,8 +119,8 @@ impl LearnedRecovery {
         };
         // The prior was trained on the held-out patterns, too, but has few parameters to fit to them; the pixels' own
         // measurements in this comparison are those under the other patterns only.
-        let centre = blending::centre(rect, TILE_CENTRE_SIDE_PX);
-        let products = ResidualProducts::recover(&self.model, nnls, measurements, split, centre);
+        let centre = nnls_blending::centre(rect, TILE_CENTRE_SIDE_PX);
+        let products = ResidualGram::recover(&self.model, nnls, measurements, split, centre);
         self.blended_tile(tile, products, || nnls.tile(measurements, &split.all, rect))
     }
 
@@ -141,7 +139,7 @@ impl LearnedRecovery {
         let learned = self.model.expand(&tile);
         let alternative = nnls.tile(measurements, &split.training, rect);
         let recovered = [&learned, &alternative];
-        let products = ResidualProducts::new(&self.model, measurements, split, recovered);
+        let products = ResidualGram::new(&self.model, measurements, split, recovered);
         self.blended_tile(tile, products, || alternative)
     }
 
@@ -149,8 +147,8 @@ impl LearnedRecovery {
     fn blended_tile(
         &self,
         tile: FloatTile,
-        products: ResidualProducts,
-        alternative: impl FnOnce() -> TransportFunctions,
+        products: ResidualGram,
+        alternative: impl FnOnce() -> TileFunctions,
     ) -> FloatTile {
         let weight = products.best_weight(MIN_TILE_GAIN);
         if weight == 0.0 {

@@ -7,8 +7,8 @@ use super::*;
 use crate::capture::{NoiseModel, Pattern, RowSet};
 use crate::executor::{Executor, SequentialExecutor};
 use crate::recover::sampling::pixels_by_window;
-use crate::recover::{BandwidthEstimate, WindowEstimate, pooled};
-use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent, TransportFunctions, Window};
+use crate::recover::{BandExtent, WindowSizeEstimate, pooled};
+use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent, TileFunctions, Window};
 
 /// Runs jobs in reverse order, on which results must not depend.
 struct ReverseOrder;
@@ -128,7 +128,7 @@ fn photograph(patterns: usize, seed: u64, tau: &[[f64; CHANNELS]]) -> Measuremen
     }
 }
 
-fn snr(tiles: &[TransportFunctions], tau: &[[f64; CHANNELS]]) -> f64 {
+fn snr(tiles: &[TileFunctions], tau: &[[f64; CHANNELS]]) -> f64 {
     let geometry = geometry();
     let area = geometry.window.area();
     let (mut signal, mut error) = (0.0, 0.0);
@@ -151,8 +151,8 @@ fn preparation<'a, E: Executor>(
     measurements: &'a Measurements,
     split: &'a HoldoutSplit,
     executor: &'a E,
-) -> Preparation<'a, E> {
-    Preparation {
+) -> PreparationInput<'a, E> {
+    PreparationInput {
         measurements,
         geometry: geometry(),
         split,
@@ -305,13 +305,14 @@ fn training_uses_pixels_with_saturated_samples() {
 #[test]
 fn estimated_band_is_as_wide_as_the_objects() {
     let (measurements, _) = measurements(80, 7);
-    let band = WindowEstimate::from_measurements(&measurements, &SequentialExecutor).unwrap();
+    let estimate =
+        WindowSizeEstimate::from_measurements(&measurements, &SequentialExecutor).unwrap();
     // The estimate has a margin of one ring.
-    let side = band.window.side();
-    assert!((WINDOW..=WINDOW + 2).contains(&side), "{band:?}");
+    let side = estimate.window.side();
+    assert!((WINDOW..=WINDOW + 2).contains(&side), "{estimate:?}");
     assert!(
-        matches!(band.bandwidth, BandwidthEstimate::Bounded { tail_fraction } if tail_fraction < 0.01),
-        "{band:?}"
+        matches!(estimate.band, BandExtent::Bounded { tail_fraction } if tail_fraction < 0.01),
+        "{estimate:?}"
     );
 }
 
@@ -357,8 +358,9 @@ fn saturated_photographs_are_an_overexposed_error() {
     }
     let error = learn(&measurements, &SequentialExecutor).unwrap_err();
     assert!(matches!(error, RecoverError::Overexposed), "{error}");
-    let band = WindowEstimate::from_measurements(&measurements, &SequentialExecutor).unwrap();
-    assert_eq!(band.bandwidth, BandwidthEstimate::Undetermined);
+    let estimate =
+        WindowSizeEstimate::from_measurements(&measurements, &SequentialExecutor).unwrap();
+    assert_eq!(estimate.band, BandExtent::Undetermined);
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! Training: from all measurements to the learned model.
 //!
-//! 1. [`Preparation::fit_basis`] starts from smooth variations of the mean function
+//! 1. [`PreparationInput::fit_basis`] starts from smooth variations of the mean function
 //!    ([`initial_prior`](super::initial_prior)), learns the pixel prior over them by expectation–maximisation (EM) on
 //!    small squares spread over the picture, and truncates the basis to the smallest candidate rank whose error on
 //!    held-out patterns is near the least.
-//! 2. [`Preparation::fit_neighbour_prior`] repeats EM on larger training regions, where neighbours of most pixels are
-//!    known, and learns the neighbour prior there.
-//! 3. [`Preparation::select_neighbour_prior`] compares the errors on held-out patterns with and without it.
+//! 2. [`PreparationInput::fit_neighbour_prior`] repeats EM on larger training regions, where neighbours of most pixels
+//!    are known, and learns the neighbour prior there.
+//! 3. [`PreparationInput::select_neighbour_prior`] compares the errors on held-out patterns with and without it.
 
 use super::basis::LearnedBasis;
 use super::equations::{RegionEquations, brightness_thresholds, with_margin};
@@ -18,7 +18,7 @@ use super::posterior_means::{NEIGHBOURHOOD_RADIUS, PosteriorMeans};
 use crate::executor::Executor;
 use crate::recover::error::RecoverError;
 use crate::recover::pooled;
-use crate::recover::preparation::Preparation;
+use crate::recover::preparation_input::PreparationInput;
 use crate::recover::sampling::spread_squares;
 use crate::transport::{TileRect, Window};
 
@@ -55,7 +55,7 @@ pub(in crate::recover) fn preparation_bytes(window: Window) -> usize {
     squares.max(2 * MAX_GRAM_BYTES)
 }
 
-impl<E: Executor> Preparation<'_, E> {
+impl<E: Executor> PreparationInput<'_, E> {
     /// Learns the basis and the pixel prior over it, starting from the mean function, `[S]`.
     ///
     /// # Errors

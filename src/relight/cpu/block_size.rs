@@ -1,4 +1,4 @@
-//! The side of the Fourier transforms and of the light blocks.
+//! The side of the Fourier transforms and of the origin blocks.
 //!
 //! A transform of side `n` correlates a block of `(n + 1 - w)²` window origins with a window of side `w`. A larger
 //! `n` spends less of its work on elements that blocks share, but takes more memory.

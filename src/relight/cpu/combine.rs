@@ -1,17 +1,17 @@
 //! Factored pixels from the basis response: `y_n = Σ_k c_nk C_k(o_n)`, in each channel.
 
-use super::simd::{MAX_PIXELS, Scalar, Simd};
-use crate::relight::LightChroma;
-use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode, Tile, TileCodes};
+use super::simd::{MAX_PIXELS, ScalarFallback, Simd};
+use crate::relight::ChannelRatio;
+use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCodes, Tile, TileCodes};
 
-/// The basis response of a light block, `C`.
+/// The basis response of a origin block, `C`.
 #[derive(Clone, Copy, Debug)]
-pub struct BlockResponse<'a> {
+pub struct BlockBasisResponse<'a> {
     /// `[origin, channel, quad]`; one channel where the light has a uniform chroma.
     pub texels: &'a [[f32; TEXEL_COMPONENTS]],
     /// Quads of components of each origin and channel: the tiles' first ones.
     pub quads: usize,
-    pub chroma: LightChroma,
+    pub chroma: ChannelRatio,
 }
 
 /// Writes the pixels of a tile from number `first` on. `offsets` has the origin of each, as an index in the block.
@@ -21,18 +21,18 @@ pub fn combine<S: Simd>(
     tile: &TileCodes,
     first: usize,
     offsets: &[u16],
-    response: BlockResponse<'_>,
+    response: BlockBasisResponse<'_>,
     out: &mut [[f32; CHANNELS]],
 ) {
     match response.chroma {
-        LightChroma::Uniform { factors, .. } => {
+        ChannelRatio::Uniform { factors, .. } => {
             let mut gain = tile.step;
             for c in 0..CHANNELS {
                 gain[c] *= factors[c];
             }
             combine_span::<S, 1>(simd, tile, first, offsets, response, gain, out);
         }
-        LightChroma::Varying => {
+        ChannelRatio::Varying => {
             combine_span::<S, CHANNELS>(simd, tile, first, offsets, response, tile.step, out);
         }
     }
@@ -44,7 +44,7 @@ fn combine_span<S: Simd, const LIGHT_CHANNELS: usize>(
     tile: &TileCodes,
     first: usize,
     offsets: &[u16],
-    BlockResponse { texels, quads, .. }: BlockResponse<'_>,
+    BlockBasisResponse { texels, quads, .. }: BlockBasisResponse<'_>,
     gain: [f32; CHANNELS],
     out: &mut [[f32; CHANNELS]],
 ) {
@@ -59,7 +59,7 @@ fn combine_span<S: Simd, const LIGHT_CHANNELS: usize>(
     let channel_stride = tile.codes.len() / CHANNELS;
     let last_quad = (CHANNELS - 1) * channel_stride + quads.saturating_sub(1) * quad_stride;
     assert!(last_quad + first + pixels <= tile.codes.len());
-    let span = SpanPointers {
+    let span = CombineOperands {
         texels: texels.as_ptr(),
         quads,
         offsets,
@@ -82,28 +82,28 @@ fn combine_span<S: Simd, const LIGHT_CHANNELS: usize>(
             done = pixels;
         }
         while done < pixels {
-            span.combine::<Scalar, LIGHT_CHANNELS>(Scalar, done);
+            span.combine::<ScalarFallback, LIGHT_CHANNELS>(ScalarFallback, done);
             done += 1;
         }
     }
 }
 
 /// Input and output of the inner loop, for pixels side by side.
-struct SpanPointers<'a> {
+struct CombineOperands<'a> {
     /// `[origin, channel, quad]`.
     texels: *const [f32; TEXEL_COMPONENTS],
     quads: usize,
     /// Each pixel's origin.
     offsets: &'a [u16],
     /// `[channel, quad, pixel]`.
-    codes: *const TexelCode,
+    codes: *const TexelCodes,
     quad_stride: usize,
     channel_stride: usize,
     gain: [f32; CHANNELS],
     out: *mut [f32; CHANNELS],
 }
 
-impl SpanPointers<'_> {
+impl CombineOperands<'_> {
     /// Combines `S::PIXELS` pixels from number `first` of the span on.
     ///
     /// # Safety
@@ -158,7 +158,7 @@ mod tests {
         tile: &'a TileCodes,
         first: usize,
         offsets: &'a [u16],
-        response: BlockResponse<'a>,
+        response: BlockBasisResponse<'a>,
         out: &'a mut [[f32; CHANNELS]],
     }
 
@@ -182,11 +182,11 @@ mod tests {
         let rect = TileRect { x: 0, y: 0, extent };
         let test_value = |i: usize| ((i * 7919) % 1009) as f32 / 504.0 - 1.0;
         for (rank, chroma) in [
-            (1usize, LightChroma::Varying),
-            (9, LightChroma::Varying),
+            (1usize, ChannelRatio::Varying),
+            (9, ChannelRatio::Varying),
             (
                 16,
-                LightChroma::Uniform {
+                ChannelRatio::Uniform {
                     base: 1,
                     factors: [0.5, 1.0, 0.25],
                 },
@@ -207,7 +207,7 @@ mod tests {
             for used in 1..=quads {
                 for (first, count) in [(0, 27), (3, 8), (26, 1), (5, 0), (1, 13), (0, 2), (4, 3)] {
                     let offsets: Vec<u16> = (0..count).map(|i| (i * 5 / 2 % 20) as u16).collect();
-                    let response = BlockResponse {
+                    let response = BlockBasisResponse {
                         texels: &texels[..20 * used * chroma.channels().len()],
                         quads: used,
                         chroma,
@@ -225,15 +225,15 @@ mod tests {
                         assert_eq!([out[0], out[count + 1]], [[7.0; CHANNELS]; 2]);
                         out[1..=count].to_vec()
                     };
-                    let scalar = combine_by(SimdLevel::Scalar(Scalar));
+                    let scalar = combine_by(SimdLevel::ScalarFallback(ScalarFallback));
                     for level in SimdLevel::available() {
                         assert_eq!(scalar, combine_by(level), "{level:?}");
                     }
                     for (i, got) in scalar.iter().enumerate() {
                         for c in 0..CHANNELS {
                             let (channels, channel, gain) = match chroma {
-                                LightChroma::Uniform { factors, .. } => (1, 0, factors[c]),
-                                LightChroma::Varying => (3, c, 1.0),
+                                ChannelRatio::Uniform { factors, .. } => (1, 0, factors[c]),
+                                ChannelRatio::Varying => (3, c, 1.0),
                             };
                             let at = (usize::from(offsets[i]) * channels + channel) * used;
                             let products = (0..rank.min(TEXEL_COMPONENTS * used)).map(|k| {

@@ -1,4 +1,4 @@
-//! The basis response of a light block: `C_k(o) = Σ_s v_k(s) p(o + s)` for each window origin `o` of the block, each
+//! The basis response of a origin block: `C_k(o) = Σ_s v_k(s) p(o + s)` for each window origin `o` of the block, each
 //! basis function `v_k` and each channel of the light `p`.
 //!
 //! A factored pixel is `Σ_k c_nk C_k(o_n)`: everything that depends on the light is in `C`, and pixels with the same
@@ -7,15 +7,15 @@
 //! where the sum over a window of side 15 takes 450.
 
 use super::block_size::{even_block_side, fft_side};
-use super::fft::{Complex, ComplexLine, Fft, FftScratch};
+use super::fft::{Complex, ComplexLanes, Fft, FftScratch};
 use super::light_spectrum::LightSpectrum;
-use super::simd::{LANES, Scalar, Simd};
+use super::simd::{LANES, ScalarFallback, Simd};
 use crate::transport::{Basis, TEXEL_COMPONENTS, Window};
 
 /// Basis functions in one transform: one in the real part and one in the imaginary part of each lane.
 const GROUP: usize = 2 * LANES;
 
-/// Correlates light blocks with the functions of a basis.
+/// Correlates origin blocks with the functions of a basis.
 #[derive(Debug)]
 pub struct Correlator {
     fft: Fft,
@@ -26,7 +26,7 @@ pub struct Correlator {
     /// Texels of four components that an origin and channel have.
     pub quads: usize,
     /// Spectra of the mirrored basis functions: `[group, u, v]`.
-    spectra: Vec<ComplexLine>,
+    spectra: Vec<ComplexLanes>,
 }
 
 #[derive(Debug)]
@@ -34,7 +34,7 @@ pub struct CorrelationScratch {
     fft: FftScratch,
     light: LightSpectrum,
     /// The product of the spectra, transformed back along `v`: `[u, v]`, `v` within the block.
-    columns: Vec<ComplexLine>,
+    columns: Vec<ComplexLanes>,
     /// `C`: `[origin, channel, quad]`.
     response: Vec<CacheLine>,
 }
@@ -67,12 +67,12 @@ impl Correlator {
         let n = self.fft.side;
         // 1/n² of the inverse transform; ½, as the light's spectrum comes doubled.
         let scale = 0.5 / (n * n) as f32;
-        let mut mirrored = vec![ComplexLine::default(); n * n];
+        let mut mirrored = vec![ComplexLanes::default(); n * n];
         for (k, function) in functions.iter().enumerate() {
             for (s, value) in function.iter().enumerate() {
                 // A product of spectra is a convolution; mirroring makes it a correlation.
                 let (u, v) = ((n - s % window) % n, (n - s / window) % n);
-                let ComplexLine { re, im } = &mut mirrored[v * n + u];
+                let ComplexLanes { re, im } = &mut mirrored[v * n + u];
                 let part = if k < LANES { re } else { im };
                 part[k % LANES] = value * scale;
             }
@@ -81,20 +81,20 @@ impl Correlator {
         for row in mirrored.chunks_exact_mut(n) {
             let values = row.to_vec();
             self.fft.transform(
-                Scalar,
+                ScalarFallback,
                 &mut scratch,
-                |u| Complex::load(Scalar, |_| &values[u]),
-                |u, value| value.store(Scalar, 0, &mut row[u]),
+                |u| Complex::load(ScalarFallback, |_| &values[u]),
+                |u, value| value.store(ScalarFallback, 0, &mut row[u]),
             );
         }
         for u in 0..n {
             let start = self.spectra.len();
-            self.spectra.resize(start + n, ComplexLine::default());
+            self.spectra.resize(start + n, ComplexLanes::default());
             self.fft.transform(
-                Scalar,
+                ScalarFallback,
                 &mut scratch,
-                |v| Complex::load(Scalar, |_| &mirrored[v * n + u]),
-                |v, value| value.store(Scalar, 0, &mut self.spectra[start + v]),
+                |v| Complex::load(ScalarFallback, |_| &mirrored[v * n + u]),
+                |v, value| value.store(ScalarFallback, 0, &mut self.spectra[start + v]),
             );
         }
     }
@@ -104,7 +104,7 @@ impl Correlator {
         CorrelationScratch {
             fft: self.fft.scratch(),
             light: LightSpectrum::new(n),
-            columns: vec![ComplexLine::default(); n * self.block_side],
+            columns: vec![ComplexLanes::default(); n * self.block_side],
             response: Vec::new(),
         }
     }
@@ -147,7 +147,7 @@ impl Correlator {
     fn invert_along_v<S: Simd>(
         &self,
         simd: S,
-        spectra: &[ComplexLine],
+        spectra: &[ComplexLanes],
         scratch: &mut CorrelationScratch,
     ) {
         let n = self.fft.side;
@@ -179,7 +179,7 @@ impl Correlator {
                     (functions * light).swapped()
                 },
                 #[inline(always)]
-                |v: usize, value: Complex<S::Vector>| {
+                |v: usize, value: Complex<S::SimdVector>| {
                     if v < self.block_side {
                         for line in 0..S::LINES {
                             value.store(simd, line, &mut columns[line * self.block_side + v]);
@@ -221,7 +221,7 @@ impl Correlator {
                     )
                 },
                 #[inline(always)]
-                |u: usize, value: Complex<S::Vector>| {
+                |u: usize, value: Complex<S::SimdVector>| {
                     if u >= self.block_side {
                         return;
                     }
@@ -234,7 +234,7 @@ impl Correlator {
                             simd.store(value.im, line, im);
                             continue;
                         }
-                        let mut stored = ComplexLine::default();
+                        let mut stored = ComplexLanes::default();
                         value.store(simd, line, &mut stored);
                         let re = stored.re.as_chunks().0;
                         let im = stored.im.as_chunks().0;
@@ -315,7 +315,7 @@ mod tests {
                 });
                 response
             };
-            let out = correlate(SimdLevel::Scalar(Scalar), quads);
+            let out = correlate(SimdLevel::ScalarFallback(ScalarFallback), quads);
             // The first quads do not depend on the others.
             let fewer = quads.div_ceil(2);
             let first: Vec<_> = out

@@ -8,7 +8,7 @@
 use std::f64::consts::TAU;
 use std::ops::{Add, Mul, Sub};
 
-use super::simd::{LANES, MAX_LINES, Simd, Vector};
+use super::simd::{LANES, MAX_LINES, Simd, SimdVector};
 use crate::relight::math;
 
 /// A line of complex values in memory: one of each of [`LANES`] transforms.
@@ -16,7 +16,7 @@ use crate::relight::math;
 #[repr(C)]
 #[cfg_attr(not(target_arch = "wasm32"), repr(align(64)))] // its size, and a cache line's
 #[cfg_attr(target_arch = "wasm32", repr(align(32)))]
-pub struct ComplexLine {
+pub struct ComplexLanes {
     pub re: [f32; LANES],
     pub im: [f32; LANES],
 }
@@ -28,9 +28,12 @@ pub struct Complex<V> {
     pub im: V,
 }
 
-impl<V: Vector> Complex<V> {
+impl<V: SimdVector> Complex<V> {
     #[inline(always)]
-    pub fn load<'a, S: Simd<Vector = V>>(simd: S, line: impl Fn(usize) -> &'a ComplexLine) -> Self {
+    pub fn load<'a, S: Simd<SimdVector = V>>(
+        simd: S,
+        line: impl Fn(usize) -> &'a ComplexLanes,
+    ) -> Self {
         Self {
             re: simd.load(
                 #[inline(always)]
@@ -44,13 +47,13 @@ impl<V: Vector> Complex<V> {
     }
 
     #[inline(always)]
-    pub fn store<S: Simd<Vector = V>>(self, simd: S, line: usize, to: &mut ComplexLine) {
+    pub fn store<S: Simd<SimdVector = V>>(self, simd: S, line: usize, to: &mut ComplexLanes) {
         simd.store(self.re, line, &mut to.re);
         simd.store(self.im, line, &mut to.im);
     }
 
     #[inline(always)]
-    pub fn unspill<S: Simd<Vector = V>>(simd: S, [re, im]: &[S::Spilled; 2]) -> Self {
+    pub fn unspill<S: Simd<SimdVector = V>>(simd: S, [re, im]: &[S::LaneArray; 2]) -> Self {
         Self {
             re: simd.unspill(re),
             im: simd.unspill(im),
@@ -58,14 +61,14 @@ impl<V: Vector> Complex<V> {
     }
 
     #[inline(always)]
-    pub fn spill<S: Simd<Vector = V>>(self, simd: S, [re, im]: &mut [S::Spilled; 2]) {
+    pub fn spill<S: Simd<SimdVector = V>>(self, simd: S, [re, im]: &mut [S::LaneArray; 2]) {
         simd.spill(self.re, re);
         simd.spill(self.im, im);
     }
 
     /// The same complex value in each lane.
     #[inline(always)]
-    pub fn splat<S: Simd<Vector = V>>(simd: S, [re, im]: [f32; 2]) -> Self {
+    pub fn splat<S: Simd<SimdVector = V>>(simd: S, [re, im]: [f32; 2]) -> Self {
         Self {
             re: simd.splat(re),
             im: simd.splat(im),
@@ -84,7 +87,7 @@ impl<V: Vector> Complex<V> {
 
 macro_rules! impl_partwise {
     ($($operator:ident $method:ident $symbol:tt),*) => {$(
-        impl<V: Vector> $operator for Complex<V> {
+        impl<V: SimdVector> $operator for Complex<V> {
             type Output = Self;
 
             #[inline(always)]
@@ -100,7 +103,7 @@ macro_rules! impl_partwise {
 
 impl_partwise!(Add add +, Sub sub -);
 
-impl<V: Vector> Mul for Complex<V> {
+impl<V: SimdVector> Mul for Complex<V> {
     type Output = Self;
 
     #[inline(always)]
@@ -123,24 +126,24 @@ pub struct Fft {
 
 /// Memory for spilled complex vectors of any instruction set.
 #[derive(Debug)]
-pub struct SpillBuffer(Vec<ComplexLine>);
+pub struct ComplexBuffer(Vec<ComplexLanes>);
 
-impl SpillBuffer {
+impl ComplexBuffer {
     /// Room for `count` complex vectors.
     pub fn new(count: usize) -> Self {
-        Self(vec![ComplexLine::default(); count * MAX_LINES])
+        Self(vec![ComplexLanes::default(); count * MAX_LINES])
     }
 
     /// The memory as spilled vectors of one instruction set: at least as many as asked for.
     #[inline(always)]
-    pub fn vectors<S: Simd>(&mut self) -> &mut [[S::Spilled; 2]] {
+    pub fn vectors<S: Simd>(&mut self) -> &mut [[S::LaneArray; 2]] {
         const { assert!(S::LINES <= MAX_LINES) };
         bytemuck::cast_slice_mut(&mut self.0)
     }
 }
 
 /// Values between two passes.
-pub type FftScratch = [SpillBuffer; 2];
+pub type FftScratch = [ComplexBuffer; 2];
 
 impl Fft {
     /// Plans transforms of `side` values, a power of two of at least 16.
@@ -162,7 +165,7 @@ impl Fft {
 
     /// Memory for transforms.
     pub fn scratch(&self) -> FftScratch {
-        [(); 2].map(|()| SpillBuffer::new(self.side))
+        [(); 2].map(|()| ComplexBuffer::new(self.side))
     }
 
     /// Transforms `load(0)` to `load(side - 1)`. Calls `store` once with each `k` and `X(k)`, in any order.
@@ -171,8 +174,8 @@ impl Fft {
         &self,
         simd: S,
         [current, next]: &mut FftScratch,
-        load: impl Fn(usize) -> Complex<S::Vector>,
-        mut store: impl FnMut(usize, Complex<S::Vector>),
+        load: impl Fn(usize) -> Complex<S::SimdVector>,
+        mut store: impl FnMut(usize, Complex<S::SimdVector>),
     ) {
         let (mut current, mut next) = (current.vectors::<S>(), next.vectors::<S>());
         let quarter = self.side / 4;
@@ -221,7 +224,7 @@ impl Fft {
 
 /// The transform of four values.
 #[inline(always)]
-fn butterfly<V: Vector>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
+fn butterfly<V: SimdVector>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
     let (even_sum, even_difference) = (a + c, a - c);
     let (odd_sum, odd_difference) = (b + d, b - d);
     [
@@ -241,7 +244,10 @@ fn butterfly<V: Vector>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
 }
 
 #[inline(always)]
-fn unspill_four<S: Simd>(simd: S, [a, b, c, d]: [&[S::Spilled; 2]; 4]) -> [Complex<S::Vector>; 4] {
+fn unspill_four<S: Simd>(
+    simd: S,
+    [a, b, c, d]: [&[S::LaneArray; 2]; 4],
+) -> [Complex<S::SimdVector>; 4] {
     [
         Complex::unspill(simd, a),
         Complex::unspill(simd, b),
@@ -254,9 +260,9 @@ fn unspill_four<S: Simd>(simd: S, [a, b, c, d]: [&[S::Spilled; 2]; 4]) -> [Compl
 #[inline(always)]
 fn spill_twiddled<S: Simd>(
     simd: S,
-    [a, b, c, d]: [Complex<S::Vector>; 4],
+    [a, b, c, d]: [Complex<S::SimdVector>; 4],
     [one, two, three]: &[[f32; 2]; 3],
-    [w, x, y, z]: [&mut [S::Spilled; 2]; 4],
+    [w, x, y, z]: [&mut [S::LaneArray; 2]; 4],
 ) {
     a.spill(simd, w);
     (b * Complex::splat(simd, *one)).spill(simd, x);
@@ -275,8 +281,8 @@ fn quarters<T>(values: &[T]) -> [&[T]; 4] {
 #[inline(always)]
 fn radix_four_pass<S: Simd>(
     simd: S,
-    from: &[[S::Spilled; 2]],
-    to: &mut [[S::Spilled; 2]],
+    from: &[[S::LaneArray; 2]],
+    to: &mut [[S::LaneArray; 2]],
     twiddles: &[[[f32; 2]; 3]],
     stride: usize,
 ) {
@@ -299,13 +305,13 @@ fn radix_four_pass<S: Simd>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::relight::cpu::simd::{Scalar, SimdKernel, SimdLevel};
+    use crate::relight::cpu::simd::{ScalarFallback, SimdKernel, SimdLevel};
 
     /// Transforms two lines.
     struct TransformKernel<'a> {
         fft: &'a Fft,
-        values: &'a [[ComplexLine; 2]],
-        spectrum: &'a mut [[Option<ComplexLine>; 2]],
+        values: &'a [[ComplexLanes; 2]],
+        spectrum: &'a mut [[Option<ComplexLanes>; 2]],
     }
 
     impl SimdKernel for TransformKernel<'_> {
@@ -313,9 +319,9 @@ mod tests {
         fn run<S: Simd>(self, simd: S) {
             let scratch = &mut self.fft.scratch();
             for first in (0..2).step_by(S::LINES) {
-                let store = |k: usize, value: Complex<S::Vector>| {
+                let store = |k: usize, value: Complex<S::SimdVector>| {
                     for line in 0..S::LINES {
-                        let mut stored = ComplexLine::default();
+                        let mut stored = ComplexLanes::default();
                         value.store(simd, line, &mut stored);
                         assert!(self.spectrum[k][first + line].replace(stored).is_none());
                     }
@@ -334,9 +340,9 @@ mod tests {
     fn transforms_match_the_definition() {
         for side in [16, 32, 64, 128, 256] {
             let fft = Fft::new(side);
-            let values: Vec<[ComplexLine; 2]> = (0..side)
+            let values: Vec<[ComplexLanes; 2]> = (0..side)
                 .map(|i| {
-                    [0, 1].map(|line| ComplexLine {
+                    [0, 1].map(|line| ComplexLanes {
                         re: std::array::from_fn(|lane| test_value(i + 77 * line, lane)),
                         im: std::array::from_fn(|lane| test_value(i + 500 + 77 * line, lane)),
                     })
@@ -351,7 +357,7 @@ mod tests {
                 });
                 spectrum
             };
-            let spectrum = transform(SimdLevel::Scalar(Scalar));
+            let spectrum = transform(SimdLevel::ScalarFallback(ScalarFallback));
             for level in SimdLevel::available() {
                 assert_eq!(transform(level), spectrum, "{level:?}");
             }

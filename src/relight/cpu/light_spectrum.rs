@@ -6,7 +6,7 @@
 //! `n/2` is transformed along `u`: the rest is `F(-u, -v) = F̄(u, v)`. All values here are twice the spectrum's;
 //! the basis's spectra make up for it.
 
-use super::fft::{Complex, ComplexLine, Fft, FftScratch, SpillBuffer};
+use super::fft::{Complex, ComplexBuffer, ComplexLanes, Fft, FftScratch};
 use super::simd::{LANES, Simd};
 
 /// The spectrum of one channel, and the memory to compute it in.
@@ -17,9 +17,9 @@ pub struct LightSpectrum {
     /// One channel of the light, `[v, u]`; zero beyond the footprint.
     channel: Vec<[f32; LANES]>,
     /// Some columns, transformed along `v`: `[v]`.
-    columns: SpillBuffer,
+    columns: ComplexBuffer,
     /// All columns, transformed along `v`: `[block of v, u]`, `v` up to `n/2`.
-    half: Vec<ComplexLine>,
+    half: Vec<ComplexLanes>,
     /// `2F`: `[u, part, v]`.
     values: Vec<f32>,
 }
@@ -29,8 +29,8 @@ impl LightSpectrum {
         Self {
             side,
             channel: vec![[0.0; LANES]; side * side / LANES],
-            columns: SpillBuffer::new(side),
-            half: vec![ComplexLine::default(); half_blocks(side) * side],
+            columns: ComplexBuffer::new(side),
+            half: vec![ComplexLanes::default(); half_blocks(side) * side],
             values: vec![0.0; 2 * side * side],
         }
     }
@@ -96,7 +96,7 @@ impl LightSpectrum {
                     }
                 },
                 #[inline(always)]
-                |v: usize, value: Complex<S::Vector>| value.spill(simd, &mut columns[v]),
+                |v: usize, value: Complex<S::SimdVector>| value.spill(simd, &mut columns[v]),
             );
             for v in 0..=n / 2 {
                 let f = Complex::unspill(simd, &columns[v]);
@@ -113,7 +113,7 @@ impl LightSpectrum {
                 ];
                 for line in 0..S::LINES {
                     for (part, value) in both.into_iter().enumerate() {
-                        let mut stored = ComplexLine::default();
+                        let mut stored = ComplexLanes::default();
                         value.store(simd, line, &mut stored);
                         let u = (first + 2 * line + part) * LANES;
                         let to = &mut self.half[v / LANES * n + u..][..LANES];
@@ -145,7 +145,7 @@ impl LightSpectrum {
                     )
                 },
                 #[inline(always)]
-                |u: usize, value: Complex<S::Vector>| {
+                |u: usize, value: Complex<S::SimdVector>| {
                     for line in 0..S::LINES {
                         let v = (first + line).min(last) * LANES;
                         let (re, im) = values[2 * u * n..][..2 * n].split_at_mut(n);

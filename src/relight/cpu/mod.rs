@@ -1,6 +1,6 @@
 //! Relighting on the CPU: the picture `y = pT` in linear light, single precision.
 //!
-//! Pixels are grouped by *light block* ([`light_blocks`]), a square of window origins. Where the light under a
+//! Pixels are grouped by *origin block* ([`origin_blocks`]), a square of window origins. Where the light under a
 //! block has changed, the block's basis response is computed ([`correlation`]) and combined with the pixels'
 //! coefficients while it is in the cache ([`combine`]); the functions of direct tiles are summed slot by slot
 //! ([`windowed_sum`]). Other blocks keep their pixels. Blocks are independent, so threads share them.
@@ -11,8 +11,8 @@ mod block_size;
 mod combine;
 mod correlation;
 mod fft;
-mod light_blocks;
 mod light_spectrum;
+mod origin_blocks;
 mod padded_light;
 mod simd;
 
@@ -20,12 +20,12 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use super::output_transform::OutputEncoder;
-use super::{Light, LightChroma, LinearPicture, OutputTransform, Rgba8Picture, used_count};
+use super::{ChannelRatio, Light, LinearPicture, OutputTransform, Rgba8Picture, used_count};
 use crate::executor::Executor;
 use crate::transport::{CHANNELS, Tile, TileCodes, Transport};
-use combine::{BlockResponse, combine};
+use combine::{BlockBasisResponse, combine};
 use correlation::{CorrelationScratch, Correlator};
-use light_blocks::{DIRECT_BLOCK_SIDE, LightBlock, LightBlocks, OriginBounds, PixelSpan};
+use origin_blocks::{DIRECT_BLOCK_SIDE, OriginBlock, OriginBlocks, OriginBounds, PixelSpan};
 use padded_light::PaddedLight;
 use simd::{Simd, SimdKernel, SimdLevel};
 
@@ -47,7 +47,7 @@ pub struct CpuRelighter {
     transport: Arc<Transport>,
     /// `None` where no tile is factored.
     correlator: Option<Correlator>,
-    blocks: LightBlocks,
+    blocks: OriginBlocks,
     /// Elements along the side of a block's footprint.
     footprint: usize,
     light: PaddedLight,
@@ -75,9 +75,9 @@ impl CpuRelighter {
             Some(correlator) => (correlator.block_side, correlator.quads),
             None => (DIRECT_BLOCK_SIDE, 0),
         };
-        let blocks = LightBlocks::new(&transport, &bounds, side);
+        let blocks = OriginBlocks::new(&transport, &bounds, side);
         let light = PaddedLight::new(geometry.light, blocks.origin, blocks.footprint);
-        let dark = |block: &LightBlock| RwLock::new(vec![[0.0; CHANNELS]; block.offsets.len()]);
+        let dark = |block: &OriginBlock| RwLock::new(vec![[0.0; CHANNELS]; block.offsets.len()]);
         Self {
             linear: blocks.blocks.iter().map(dark).collect(),
             quads,
@@ -171,7 +171,7 @@ impl CpuRelighter {
             .unwrap_or_else(PoisonError::into_inner);
         let [u, v] = block.at;
         let row = |r: usize| &self.light.elements_from(u, v + r)[..self.footprint];
-        let chroma = LightChroma::of_rows((0..self.footprint).map(row));
+        let chroma = ChannelRatio::of_rows((0..self.footprint).map(row));
         if chroma.is_dark() {
             linear.fill([0.0; CHANNELS]);
             return;
@@ -189,7 +189,7 @@ impl CpuRelighter {
             let scratch = scratch.get_or_insert_with(|| correlator.scratch());
             let quads = self.quads;
             let texels = correlator.correlate(simd, row, chroma.channels(), quads, scratch);
-            let response = BlockResponse {
+            let response = BlockBasisResponse {
                 texels,
                 quads,
                 chroma,
@@ -207,7 +207,7 @@ impl CpuRelighter {
     }
 
     #[inline(always)]
-    fn add_direct(&self, block: &LightBlock, linear: &mut [[f32; CHANNELS]]) {
+    fn add_direct(&self, block: &OriginBlock, linear: &mut [[f32; CHANNELS]]) {
         let [u, v] = block.at;
         let window = self.transport.geometry.window.side() as usize;
         for span in &block.spans {

@@ -17,7 +17,7 @@ int dither;
 struct BasisUniforms {
 vec4 quads[1024];
 };
-struct ResponsePair {
+struct ResponseQuads {
 vec4 first;
 vec4 second;
 };
@@ -32,7 +32,7 @@ layout(location = 0) out vec4 _fs2p_location0;
 layout(location = 1) out vec4 _fs2p_location1;
 void main() {
 vec4 position = gl_FragCoord;
-ResponsePair response = ResponsePair(vec4(0.0), vec4(0.0));
+ResponseQuads response = ResponseQuads(vec4(0.0), vec4(0.0));
 int v = 0;
 int u = 0;
 int _e5 = _group_0_binding_7_fs.window;
@@ -89,7 +89,7 @@ response.second = (_e74 + (value * _e82));
 }
 }
 }
-ResponsePair _e91 = response;
+ResponseQuads _e91 = response;
 _fs2p_location0 = _e91.first;
 _fs2p_location1 = _e91.second;
 return;

@@ -44,7 +44,7 @@ fn correlate_group(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invoc
     workgroupBarrier();
     let at = vec2<i32>(group.xy * GROUP + local.xy);
     let is_inside = all(at < vec2<i32>(textureDimensions(basis_response_out)));
-    var red = ResponsePair(vec4<f32>(0.0), vec4<f32>(0.0));
+    var red = ResponseQuads(vec4<f32>(0.0), vec4<f32>(0.0));
     if frame.response_stride == 0 {
         for (var v = 0u; v < window; v++) {
             for (var u = 0u; u < window; u++) {
@@ -82,7 +82,7 @@ fn correlate_group(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invoc
     }
 }
 
-fn store(at: vec2<i32>, layer: i32, response: ResponsePair) {
+fn store(at: vec2<i32>, layer: i32, response: ResponseQuads) {
     textureStore(basis_response_out, at, layer, response.first);
     textureStore(basis_response_out, at, layer + 1, response.second);
 }

@@ -9,14 +9,14 @@ struct ChannelUniforms {
 @group(0) @binding(9) var<uniform> channel: ChannelUniforms;
 
 @fragment
-fn correlate(@builtin(position) position: vec4<f32>) -> ResponsePair {
+fn correlate(@builtin(position) position: vec4<f32>) -> ResponseQuads {
     // Rows of a texture are counted the same way in WebGL and WebGPU.
     let origin = vec2<i32>(position.xy) - frame.window;
     // The part of the window that lies on the light plane.
     let begin = clamp(-origin, vec2<i32>(0), vec2<i32>(frame.window));
     let plane = vec2<i32>(textureDimensions(light));
     let end = clamp(plane - origin, vec2<i32>(0), vec2<i32>(frame.window));
-    var response = ResponsePair(vec4<f32>(0.0), vec4<f32>(0.0));
+    var response = ResponseQuads(vec4<f32>(0.0), vec4<f32>(0.0));
     for (var v = begin.y; v < end.y; v++) {
         for (var u = begin.x; u < end.x; u++) {
             let emission = textureLoad(light, origin + vec2<i32>(u, v), 0);

@@ -2,7 +2,7 @@
 
 use super::{TextureDescriptor, TextureLayout, binding};
 use crate::transport::{
-    CameraPx, Extent, Geometry, LightElement, TexelCode, Tile, TileRect, Transport,
+    CameraPx, Extent, Geometry, LightElement, TexelCodes, Tile, TileRect, Transport,
 };
 
 /// Rows of codes in one region: up to 4 MiB, which makes uploads few and their copies small.
@@ -78,7 +78,7 @@ impl TextureLayout {
         let TextureDescriptor { extent, layers, .. } = self.textures[binding::CODES];
         let Extent { width, height } = extent;
         let mut tiles = transport.tiles.iter().map(|tile| &tile.functions.codes);
-        let mut source: &[TexelCode] = &[];
+        let mut source: &[TexelCodes] = &[];
         let mut texels = Vec::new();
         for layer in 0..layers.unwrap_or(1) {
             for row in (0..height).step_by(REGION_ROWS as usize) {

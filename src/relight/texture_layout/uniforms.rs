@@ -1,7 +1,7 @@
 //! The shaders' uniforms, field by field as in the WGSL.
 
 use super::{MAX_SLOTS, TextureLayout};
-use crate::relight::{LightChroma, OutputTransform, ToneCurve};
+use crate::relight::{ChannelRatio, OutputTransform, ToneCurve};
 use crate::transport::{Basis, CHANNELS, TEXEL_COMPONENTS};
 
 /// `BasisUniforms` of the WGSL: a pair of quads of basis functions, slot by slot.
@@ -51,13 +51,13 @@ impl TextureLayout {
     /// The uniforms of a frame.
     pub fn frame_uniforms(
         &self,
-        chroma: LightChroma,
+        chroma: ChannelRatio,
         output: &OutputTransform,
         quality: f32,
     ) -> FrameUniforms {
         let (response_stride, [r, g, b]) = match chroma {
-            LightChroma::Uniform { factors, .. } => (0, factors),
-            LightChroma::Varying => (2 * self.quad_pairs() as i32, [1.0; CHANNELS]),
+            ChannelRatio::Uniform { factors, .. } => (0, factors),
+            ChannelRatio::Varying => (2 * self.quad_pairs() as i32, [1.0; CHANNELS]),
         };
         let [red, green, blue] = output.gains;
         let row = |row: [f32; CHANNELS]| [row[0] * red, row[1] * green, row[2] * blue, 0.0];

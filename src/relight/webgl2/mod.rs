@@ -3,11 +3,11 @@
 //! All photographs of a page share one context, on a hidden canvas; each frame is copied from there into the
 //! photograph's own canvas.
 
-mod canvas;
+mod backend;
 mod context;
 mod downsampler;
 mod photo_resources;
 mod resources;
 
-pub use canvas::WebGl2Backend;
+pub use backend::WebGl2Backend;
 pub use context::GlContext;

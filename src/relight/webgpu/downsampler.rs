@@ -2,7 +2,7 @@
 
 use wasm_bindgen::JsValue;
 
-use super::api::{BindGroup, BindingResource, Texture, UniformBuffer, record_draw, usage};
+use super::api::{BindGroup, BindingResource, UniformBuffer, WebGpuTexture, record_draw, usage};
 use super::device::Device;
 use crate::relight::texture_layout::{TextureDescriptor, TextureFormat};
 use crate::transport::Extent;
@@ -12,9 +12,9 @@ use crate::transport::Extent;
 pub(super) struct Downsampler {
     /// Extent of the light images.
     pub extent: Extent,
-    image: Texture,
+    image: WebGpuTexture,
     /// The image resampled along columns.
-    columns: Texture,
+    columns: WebGpuTexture,
     /// For columns, then for rows.
     bind_groups: [BindGroup; 2],
     /// Kept alive for the bind groups.
@@ -40,7 +40,7 @@ impl Downsampler {
         // `DownsampleUniforms` of the WGSL.
         let uniforms = [[1, 0, light.width, 0], [0, 1, light.height, 0]]
             .map(|uniforms| gpu.create_uniforms(bytemuck::cast_slice(&uniforms)));
-        let bind = |i: usize, source: &Texture| {
+        let bind = |i: usize, source: &WebGpuTexture| {
             let resources = [
                 (10, BindingResource::Texture(source)),
                 (11, BindingResource::Uniforms(&uniforms[i])),
@@ -64,7 +64,7 @@ impl Downsampler {
         &self,
         device: &Device,
         image: &JsValue,
-        light: &Texture,
+        light: &WebGpuTexture,
     ) -> Result<(), JsValue> {
         let Device { gpu, pipelines, .. } = device;
         gpu.write_image(&self.image, image, self.extent)?;

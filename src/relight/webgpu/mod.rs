@@ -4,7 +4,7 @@
 
 mod api;
 #[cfg(target_arch = "wasm32")]
-mod canvas;
+mod backend;
 mod device;
 #[cfg(target_arch = "wasm32")]
 mod downsampler;
@@ -15,7 +15,7 @@ mod photo_textures;
 mod shader;
 
 #[cfg(target_arch = "wasm32")]
-pub use canvas::WebGpuBackend;
+pub use backend::WebGpuBackend;
 pub use device::Device;
 #[cfg(not(target_arch = "wasm32"))]
 pub use offscreen::OffscreenRenderer;

@@ -2,11 +2,11 @@
 
 use std::rc::Rc;
 
-use super::api::{API, DeviceQueue, Texture, usage};
+use super::api::{API, DeviceQueue, WebGpuTexture, usage};
 use super::device::Device;
-use super::photo_renderer::PhotoRenderer;
+use super::photo_renderer::WebGpuRenderer;
 use crate::relight::Rgba8Picture;
-use crate::relight::backend::{BackendError, Frame};
+use crate::relight::backend::{BackendError, FrameRequest};
 use crate::relight::texture_layout::{TextureDescriptor, TextureFormat};
 use crate::transport::{Extent, Transport};
 
@@ -38,8 +38,8 @@ impl Device {
 /// Draws one photograph into a texture.
 #[derive(Debug)]
 pub struct OffscreenRenderer {
-    renderer: PhotoRenderer,
-    picture: Texture,
+    renderer: WebGpuRenderer,
+    picture: WebGpuTexture,
 }
 
 impl OffscreenRenderer {
@@ -48,7 +48,7 @@ impl OffscreenRenderer {
     /// # Errors
     /// [`BackendError::Layout`] or [`BackendError::Upload`] if the device cannot hold it.
     pub async fn new(device: Rc<Device>, transport: &Transport) -> Result<Self, BackendError> {
-        let renderer = PhotoRenderer::new(device.clone(), transport).await?;
+        let renderer = WebGpuRenderer::new(device.clone(), transport).await?;
         let picture = device.try_upload(|| {
             let camera = transport.geometry.camera;
             let descriptor = TextureDescriptor::flat("picture", device.format, camera);
@@ -63,7 +63,7 @@ impl OffscreenRenderer {
     ///
     /// # Errors
     /// [`BackendError::Lost`] if the device is lost.
-    pub fn draw(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
+    pub fn draw(&mut self, frame: &FrameRequest<'_>) -> Result<(), BackendError> {
         self.renderer.device.check()?;
         self.renderer.draw(frame, &self.picture.view);
         Ok(())

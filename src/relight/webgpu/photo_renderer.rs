@@ -5,7 +5,7 @@ use std::rc::Rc;
 use super::api::{TextureView, record_dispatches, record_draw};
 use super::device::Device;
 use super::photo_textures::PhotoTextures;
-use crate::relight::backend::{BackendError, Frame, LightCache};
+use crate::relight::backend::{BackendError, FrameRequest, LightCache};
 use crate::relight::texture_layout::{TextureLayout, binding};
 use crate::transport::{Extent, Transport};
 
@@ -14,14 +14,14 @@ const WORKGROUP_ORIGINS: [u32; 2] = [32, 4];
 
 /// A transport in a device's memory, and the basis response of the last light.
 #[derive(Debug)]
-pub struct PhotoRenderer {
+pub struct WebGpuRenderer {
     pub device: Rc<Device>,
     pub layout: TextureLayout,
     pub textures: PhotoTextures,
     pub light: LightCache,
 }
 
-impl PhotoRenderer {
+impl WebGpuRenderer {
     /// Uploads a transport. A failure leaves nothing on the device.
     ///
     /// # Errors
@@ -39,7 +39,7 @@ impl PhotoRenderer {
     }
 
     /// Draws a frame into a target of the camera's extent.
-    pub fn draw(&mut self, frame: &Frame<'_>, target: &TextureView) {
+    pub fn draw(&mut self, frame: &FrameRequest<'_>, target: &TextureView) {
         let Device { gpu, pipelines, .. } = &*self.device;
         let (layout, textures) = (&self.layout, &self.textures);
         if let Some(light) = frame.light.filter(|light| !self.light.has(light)) {

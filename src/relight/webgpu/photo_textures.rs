@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use super::api::{BindGroup, BindingResource, Texture, UniformBuffer, usage};
+use super::api::{BindGroup, BindingResource, UniformBuffer, WebGpuTexture, usage};
 use super::device::Device;
 use crate::relight::texture_layout::{
     FrameUniforms, TEXTURES, TextureLayout, TextureRegion, binding,
@@ -12,7 +12,7 @@ use crate::transport::Transport;
 #[derive(Debug)]
 pub(super) struct PhotoTextures {
     /// By binding.
-    textures: [Texture; TEXTURES],
+    textures: [WebGpuTexture; TEXTURES],
     pub frame: UniformBuffer,
     /// `BasisUniforms` and `DispatchUniforms` of the WGSL, pair by pair; kept alive for the bind groups.
     _pairs: Vec<[UniformBuffer; 2]>,
@@ -73,7 +73,7 @@ impl PhotoTextures {
         }
     }
 
-    pub fn light(&self) -> &Texture {
+    pub fn light(&self) -> &WebGpuTexture {
         &self.textures[binding::LIGHT]
     }
 }

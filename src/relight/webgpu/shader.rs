@@ -2,8 +2,8 @@
 
 const SOURCE: &str = concat!(
     include_str!("../shaders/fullscreen.wgsl"),
-    include_str!("../shaders/frame.wgsl"),
-    include_str!("../shaders/basis.wgsl"),
+    include_str!("../shaders/frame_uniforms.wgsl"),
+    include_str!("../shaders/basis_uniforms.wgsl"),
     include_str!("../shaders/correlate.wgsl"),
     include_str!("../shaders/downsample.wgsl"),
     include_str!("../shaders/relight.wgsl"),

@@ -13,7 +13,7 @@ mod tray;
 use surface_grid::{SurfaceGrid, SurfacePoint};
 
 use super::coordinates::{Vec2, vec2};
-use super::scene::SimulatedScene;
+use super::simulated_scene::SimulatedScene;
 use crate::transport::{CHANNELS, CameraPx, Extent, Geometry, LightElement};
 
 /// Samples along each side of a camera pixel.
@@ -41,12 +41,12 @@ pub(super) struct Cookies {
     /// Surface samples, `SAMPLES_PER_SIDE`² for each camera pixel.
     surface: SurfaceGrid,
     /// One reflector for each light element.
-    reflectors: Vec<Reflector>,
+    reflectors: Vec<RadiosityPatch>,
 }
 
 /// An area of surface, one element wide, that reflects light onto its surroundings.
 #[derive(Clone, Copy, Debug)]
-struct Reflector {
+struct RadiosityPatch {
     /// Height in elements.
     height: f64,
     /// Gradient of the height.
@@ -70,7 +70,7 @@ impl Cookies {
         let scale = max_height_elements();
         let reflector = |(u, v)| {
             let point = element_surface.point(u, v);
-            Reflector {
+            RadiosityPatch {
                 height: point.surface.height * scale,
                 slope: element_surface.slope(u, v) * scale,
                 radiosity: reflected(&element_surface, &point).diffuse,
@@ -90,7 +90,7 @@ impl Cookies {
         &self,
         pixel: CameraPx,
         albedo: [f64; CHANNELS],
-        window: &mut WindowAccumulator,
+        window: &mut TransportAccumulator,
     ) {
         let [i, j] = [pixel.x, pixel.y].map(|x| x * SAMPLES_PER_SIDE + SAMPLES_PER_SIDE / 2);
         let scale = max_height_elements();
@@ -133,7 +133,7 @@ impl SimulatedScene for Cookies {
     }
 
     fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
-        let mut window = WindowAccumulator {
+        let mut window = TransportAccumulator {
             origin: self.geometry.window_origin(pixel),
             geometry: &self.geometry,
             tau,
@@ -203,13 +203,13 @@ fn reflected(surface: &SurfaceGrid, point: &SurfacePoint) -> ReflectedLight {
 }
 
 /// Sums one pixel's light transport function.
-struct WindowAccumulator<'a> {
+struct TransportAccumulator<'a> {
     origin: LightElement,
     geometry: &'a Geometry,
     tau: &'a mut [[f32; CHANNELS]],
 }
 
-impl WindowAccumulator<'_> {
+impl TransportAccumulator<'_> {
     /// Adds light from `element`; ignores elements outside the light plane or the window.
     fn add(&mut self, element: LightElement, light: [f64; CHANNELS]) {
         let slot = self.geometry.window.slot(self.origin, element);

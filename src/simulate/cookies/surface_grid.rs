@@ -1,7 +1,7 @@
 //! The surface of the tray and the cookies, sampled on a grid for fast ray marching.
 
 use super::tray::{Surface, surface_at};
-use crate::simulate::coordinates::{UnitPlane, Vec2, vec2};
+use crate::simulate::coordinates::{UnitCoordinates, Vec2, vec2};
 use crate::transport::{CHANNELS, Extent};
 
 /// Distance of the finite differences for shading, in unit coordinates: the same at every resolution, so that
@@ -11,16 +11,16 @@ const SLOPE_STEP: f64 = 0.008;
 /// Heights and colours at grid points over the light plane.
 #[derive(Debug)]
 pub(super) struct SurfaceGrid {
-    plane: UnitPlane,
+    plane: UnitCoordinates,
     extent: Extent,
     /// Light elements from one sample to the next.
     pub pitch: Vec2,
-    samples: Vec<Sample>,
+    samples: Vec<SurfaceSample>,
 }
 
 /// [`Surface`] in single precision.
 #[derive(Debug)]
-struct Sample {
+struct SurfaceSample {
     height: f32,
     albedo: [f32; CHANNELS],
     gloss: f32,
@@ -39,14 +39,14 @@ pub(super) struct SurfacePoint {
 impl SurfaceGrid {
     /// Samples the surface at `extent` points, `pitch` light elements apart.
     pub fn new(light: Extent, extent: Extent, pitch: Vec2) -> Self {
-        let plane = UnitPlane::new(light);
+        let plane = UnitCoordinates::new(light);
         let sample = |(i, j)| {
             let Surface {
                 height,
                 albedo,
                 gloss,
             } = surface_at(plane.at(sample_position(pitch, i, j)));
-            Sample {
+            SurfaceSample {
                 height: height as f32,
                 albedo: albedo.map(|a| a as f32),
                 gloss: gloss as f32,

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::simulate::coordinates::{Vec2, mix, mix3, smoothstep, vec2};
 use crate::simulate::gradient_noise::{cell_hash, layered_noise};
-use crate::simulate::shapes::{circle, fold, heart, segment, smooth_union, star, vesica};
+use crate::simulate::signed_distance::{circle, fold, heart, segment, smooth_union, star, vesica};
 use crate::transport::CHANNELS;
 
 /// The surface at a point.
@@ -19,7 +19,7 @@ pub(super) struct Surface {
 }
 
 #[derive(Clone, Copy, Debug)]
-enum CookieKind {
+enum CookieVariety {
     ChocolateChip,
     DarkChocolate,
     Star,
@@ -33,20 +33,20 @@ enum CookieKind {
 }
 
 /// The cookies: kind, middle, size, and rotation in radians.
-const COOKIES: [(CookieKind, Vec2, f64, f64); 13] = [
-    (CookieKind::ChocolateChip, vec2(-0.56, -0.57), 0.31, 0.0),
-    (CookieKind::Star, vec2(0.08, -0.62), 0.30, 0.2),
-    (CookieKind::JamHeart, vec2(0.62, -0.60), 0.29, -0.25),
-    (CookieKind::Ring, vec2(-0.63, 0.10), 0.25, 0.5),
-    (CookieKind::Gingerbread, vec2(-0.02, 0.16), 0.46, 0.12),
-    (CookieKind::DarkChocolate, vec2(0.62, 0.04), 0.28, 1.0),
-    (CookieKind::JamFlower, vec2(-0.55, 0.66), 0.27, 0.3),
-    (CookieKind::Pinwheel, vec2(0.60, 0.63), 0.29, 2.2),
-    (CookieKind::SmallStar, vec2(0.09, 0.80), 0.13, -0.3),
-    (CookieKind::Leaf, vec2(-0.20, -0.30), 0.13, 0.7),
-    (CookieKind::Leaf, vec2(0.33, -0.27), 0.11, 2.5),
-    (CookieKind::SmallStar, vec2(0.31, 0.33), 0.085, 0.5),
-    (CookieKind::SmallStar, vec2(-0.17, 0.83), 0.085, 1.1),
+const COOKIES: [(CookieVariety, Vec2, f64, f64); 13] = [
+    (CookieVariety::ChocolateChip, vec2(-0.56, -0.57), 0.31, 0.0),
+    (CookieVariety::Star, vec2(0.08, -0.62), 0.30, 0.2),
+    (CookieVariety::JamHeart, vec2(0.62, -0.60), 0.29, -0.25),
+    (CookieVariety::Ring, vec2(-0.63, 0.10), 0.25, 0.5),
+    (CookieVariety::Gingerbread, vec2(-0.02, 0.16), 0.46, 0.12),
+    (CookieVariety::DarkChocolate, vec2(0.62, 0.04), 0.28, 1.0),
+    (CookieVariety::JamFlower, vec2(-0.55, 0.66), 0.27, 0.3),
+    (CookieVariety::Pinwheel, vec2(0.60, 0.63), 0.29, 2.2),
+    (CookieVariety::SmallStar, vec2(0.09, 0.80), 0.13, -0.3),
+    (CookieVariety::Leaf, vec2(-0.20, -0.30), 0.13, 0.7),
+    (CookieVariety::Leaf, vec2(0.33, -0.27), 0.11, 2.5),
+    (CookieVariety::SmallStar, vec2(0.31, 0.33), 0.085, 0.5),
+    (CookieVariety::SmallStar, vec2(-0.17, 0.83), 0.085, 1.1),
 ];
 
 const TRAY: [f64; 3] = [0.23, 0.38, 0.44];
@@ -135,43 +135,43 @@ impl Surface {
 }
 
 /// A cookie of size `s` at `q`, in its own coordinates; `p` is the same point on the tray. `None` beside the cookie.
-fn cookie_surface(kind: CookieKind, s: f64, q: Vec2, p: Vec2) -> Option<Surface> {
+fn cookie_surface(kind: CookieVariety, s: f64, q: Vec2, p: Vec2) -> Option<Surface> {
     let surface = match kind {
-        CookieKind::ChocolateChip => {
+        CookieVariety::ChocolateChip => {
             let d = circle(q, s) + 0.02 * layered_noise(q * 6.0, 2, 75);
             chips(dough(d, 0.12, 0.72, BROWN, p), q, s, CHIP)
         }
-        CookieKind::DarkChocolate => {
+        CookieVariety::DarkChocolate => {
             let d = circle(q, s) + 0.02 * layered_noise(q * 6.0, 2, 76);
             chips(dough(d, 0.13, 0.70, COCOA, p), q, s, ICING)
         }
-        CookieKind::Star => {
+        CookieVariety::Star => {
             let d = star(q, 6, s, 0.60 * s) - 0.012;
             dough(d, 0.07, 0.60, BUTTER, p).sugared(p, if d < -0.03 { 0.4 } else { 0.0 })
         }
-        CookieKind::SmallStar => {
+        CookieVariety::SmallStar => {
             let d = star(q, 5, s, 0.50 * s) - 0.010;
             dough(d, 0.04, 0.42, BROWN, p).topped(d + 0.016, 0.08, ICING)
         }
-        CookieKind::JamHeart => {
+        CookieVariety::JamHeart => {
             let d = scalloped(q, s, 16);
             let filling = heart(q - vec2(0.0, 0.01), 0.52 * s);
             filled(dough(d, 0.06, 0.66, BUTTER, p), filling, CHERRY, q)
         }
-        CookieKind::JamFlower => {
+        CookieVariety::JamFlower => {
             let d = scalloped(q, s, 8);
             let filling = circle(q, 0.42 * s);
             filled(dough(d, 0.06, 0.64, BUTTER, p), filling, APRICOT, q)
         }
-        CookieKind::Ring => {
+        CookieVariety::Ring => {
             let d = (q.length() - 0.63 * s).abs() - 0.37 * s;
             let wave = 0.018 * (q.y.atan2(q.x) * 7.0).sin();
             let icing = (q.length() - 0.63 * s).abs() - 0.27 * s + wave;
             let ring = dough(d, 0.085, 0.86, BROWN, p).topped(icing, 0.06, [0.92, 0.55, 0.62]);
             sprinkled(ring, q, icing)
         }
-        CookieKind::Gingerbread => return gingerbread(q * (1.0 / s), s, p),
-        CookieKind::Pinwheel => {
+        CookieVariety::Gingerbread => return gingerbread(q * (1.0 / s), s, p),
+        CookieVariety::Pinwheel => {
             let d = circle(q, s);
             let angle = q.y.atan2(q.x) / TAU;
             let spiral = (q.length() / (0.24 * s) - angle).rem_euclid(1.0);
@@ -182,7 +182,7 @@ fn cookie_surface(kind: CookieKind, s: f64, q: Vec2, p: Vec2) -> Option<Surface>
             wheel.height *= groove;
             wheel
         }
-        CookieKind::Leaf => {
+        CookieVariety::Leaf => {
             let d = vesica(q, s, 0.42 * s);
             let rib = segment(q, vec2(-0.8 * s, 0.0), vec2(0.8 * s, 0.0));
             let slant = (q.x - 1.4 * q.y.abs()).rem_euclid(0.042) - 0.021;

@@ -4,7 +4,7 @@ use crate::simulate::coordinates::{Vec2, smoothstep, vec2};
 use crate::simulate::gradient_noise::{cell_hash, layered_noise, unit_hash};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Glass {
+pub(super) enum GlassColour {
     Cobalt,
     Azure,
     Ruby,
@@ -20,7 +20,7 @@ pub(super) enum Glass {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Optics {
+pub(super) struct GlassOptics {
     /// Transmittance at the nominal thickness, RGB.
     pub transmittance: [f64; 3],
     /// Share of the light that is not scattered.
@@ -37,12 +37,12 @@ pub(super) struct Optics {
     pub streaks: f64,
 }
 
-impl Glass {
+impl GlassColour {
     /// The sheet's optical properties. Roughness and scattering are those of glass types on the market: antique
     /// glass is clear and wavy, hammered glass rough, opalescent glass milky.
-    pub fn optics(self) -> Optics {
-        let sheet =
-            |transmittance, [ballistic, peak, ripple, grain, tail, streaks]: [f64; 6]| Optics {
+    pub fn optics(self) -> GlassOptics {
+        let sheet = |transmittance, [ballistic, peak, ripple, grain, tail, streaks]: [f64; 6]| {
+            GlassOptics {
                 transmittance,
                 ballistic,
                 peak,
@@ -50,7 +50,8 @@ impl Glass {
                 grain,
                 tail,
                 streaks,
-            };
+            }
+        };
         const ANTIQUE: [f64; 6] = [0.72, 0.42, 0.75, 0.26, 1.7, 0.30];
         const HAMMERED: [f64; 6] = [0.62, 0.55, 1.25, 0.13, 1.9, 0.16];
         const STREAKY: [f64; 6] = [0.45, 0.60, 0.70, 0.22, 2.0, 0.55];
@@ -75,7 +76,7 @@ impl Glass {
 
 /// Transmittance of piece `piece` at `p`: the Beer–Lambert law for a sheet whose thickness and colour vary
 /// between pieces and, in streaks, within each; minus the dark rims of bubbles.
-pub(super) fn transmittance(optics: &Optics, piece: u32, p: Vec2) -> [f64; 3] {
+pub(super) fn transmittance(optics: &GlassOptics, piece: u32, p: Vec2) -> [f64; 3] {
     let jitter = 0.76 + 0.42 * unit_hash(piece, 31);
     // The colour varies between pieces.
     let warm = 0.16 * (unit_hash(piece, 35) - 0.5);

@@ -13,12 +13,12 @@
 mod glass;
 mod rose;
 
-use glass::{Optics, transmittance};
-use rose::{GlassPoint, glass_at};
+use glass::{GlassOptics, transmittance};
+use rose::{GlassSample, glass_at};
 
-use super::coordinates::{UnitPlane, Vec2, mix, smoothstep, vec2};
+use super::coordinates::{UnitCoordinates, Vec2, mix, smoothstep, vec2};
 use super::gradient_noise::{noise, unit_hash};
-use super::scene::SimulatedScene;
+use super::simulated_scene::SimulatedScene;
 use crate::transport::{CHANNELS, CameraPx, Extent, Geometry};
 
 /// Samples along each side of a pixel or element, for averages over its area.
@@ -40,7 +40,7 @@ const RELATIVE_TAIL_WIDTH: [f64; CHANNELS] = [1.14, 1.0, 0.88];
 #[derive(Debug)]
 pub(super) struct StainedGlass {
     geometry: Geometry,
-    plane: UnitPlane,
+    plane: UnitCoordinates,
     /// Distance between camera pixels along u and v, in light elements.
     pitch: Vec2,
     /// Visible share of each light element, `[M]`.
@@ -49,7 +49,7 @@ pub(super) struct StainedGlass {
 
 impl StainedGlass {
     pub fn new(geometry: Geometry) -> Self {
-        let plane = UnitPlane::new(geometry.light);
+        let plane = UnitCoordinates::new(geometry.light);
         let is_hidden = |p| f64::from(u8::from(glass_at(plane.at(p)).clearance < 0.0));
         let visible = |(u, v)| {
             let corner = vec2(f64::from(u), f64::from(v));
@@ -80,7 +80,7 @@ impl StainedGlass {
     }
 
     /// Displacement by refraction at the point `centre`; both in light elements.
-    fn displacement(&self, optics: &Optics, piece: u32, centre: Vec2) -> Vec2 {
+    fn displacement(&self, optics: &GlassOptics, piece: u32, centre: Vec2) -> Vec2 {
         let p = self.plane.at(centre);
         // Each piece is another part of the sheet.
         let offset = vec2(unit_hash(piece, 61), unit_hash(piece, 62)) * 90.0;
@@ -101,7 +101,7 @@ impl SimulatedScene for StainedGlass {
 
     fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
         let centre = Vec2::from(self.geometry.correspondence.at(pixel));
-        let GlassPoint { piece, glass, .. } = glass_at(self.plane.at(centre));
+        let GlassSample { piece, glass, .. } = glass_at(self.plane.at(centre));
         let optics = glass.optics();
         let displacement = self.displacement(&optics, piece, centre);
         // The gradient of the displacement stretches the pixel's footprint.
@@ -151,7 +151,7 @@ impl SimulatedScene for StainedGlass {
 }
 
 /// The transmittance at one point.
-fn transmittance_at(point: &GlassPoint, p: Vec2) -> [f64; CHANNELS] {
+fn transmittance_at(point: &GlassSample, p: Vec2) -> [f64; CHANNELS] {
     if point.clearance < 0.0 {
         return LEAD_TRANSMITTANCE;
     }
@@ -199,7 +199,7 @@ fn samples(corner: Vec2, size: Vec2) -> impl Iterator<Item = Vec2> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::scene::scene_geometry;
+    use crate::simulate::simulated_scene::scene_geometry;
 
     #[test]
     fn gaussian_has_unit_weight_and_its_centre() {
@@ -220,7 +220,7 @@ mod tests {
         let side = |n| Extent::new(n, n);
         let scene = StainedGlass::new(scene_geometry(side(192), side(96)).unwrap());
         let geometry = scene.geometry();
-        let plane = UnitPlane::new(geometry.light);
+        let plane = UnitCoordinates::new(geometry.light);
         let (mut lead, mut glass) = (0, 0);
         for rect in geometry.tiles() {
             let functions = scene.tile(rect);
@@ -242,7 +242,7 @@ mod tests {
     }
 
     /// Whether lead covers all of a pixel.
-    fn is_covered(plane: &UnitPlane, geometry: &Geometry, pixel: CameraPx) -> bool {
+    fn is_covered(plane: &UnitCoordinates, geometry: &Geometry, pixel: CameraPx) -> bool {
         let at = Vec2::from(geometry.correspondence.at(pixel));
         let affine = geometry.correspondence.affine;
         let pitch = vec2(affine[0][0], affine[1][1]);

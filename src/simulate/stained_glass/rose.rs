@@ -6,12 +6,12 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
-use super::glass::Glass::{
+use super::glass::GlassColour::{
     self, Amber, Aqua, Azure, Cobalt, Emerald, Gold, Moss, Opal, Pale, Rose, Ruby, Violet,
 };
 use crate::simulate::coordinates::{Vec2, smoothstep, vec2};
 use crate::simulate::gradient_noise::{cell_hash, noise};
-use crate::simulate::shapes::{circle, fold, segment, smooth_union, star, vesica};
+use crate::simulate::signed_distance::{circle, fold, segment, smooth_union, star, vesica};
 
 /// Half the width of stone bars, of leads between large parts, and of fine leads.
 const STONE_HALF_WIDTH: f64 = 0.0076;
@@ -22,18 +22,18 @@ const SOLDER_RADIUS: f64 = 0.005;
 
 /// The window at one point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct GlassPoint {
+pub(super) struct GlassSample {
     /// Identifier of the piece of glass.
     pub piece: u32,
-    pub glass: Glass,
+    pub glass: GlassColour,
     /// Signed distance to the nearest edge of lead; negative within lead.
     pub clearance: f64,
     /// Density of brown paint, 0 to 1.
     pub paint: f64,
 }
 
-impl GlassPoint {
-    fn new(piece: u32, glass: Glass) -> Self {
+impl GlassSample {
+    fn new(piece: u32, glass: GlassColour) -> Self {
         Self {
             piece,
             glass,
@@ -50,7 +50,7 @@ impl GlassPoint {
     }
 
     /// Inserts `piece` into the shape with signed distance `d`, with a lead around it.
-    fn inlay(mut self, d: f64, half_width: f64, piece: u32, glass: Glass) -> Self {
+    fn inlay(mut self, d: f64, half_width: f64, piece: u32, glass: GlassColour) -> Self {
         if d < 0.0 {
             self = Self::new(piece, glass);
         }
@@ -106,7 +106,7 @@ const PEARLS_RADIUS: f64 = 0.914;
 const FRAME_HALF_SIDE: f64 = 0.940;
 
 /// The window at `p`. The identifier of a piece is its part in hundreds plus its index there.
-pub(super) fn glass_at(p: Vec2) -> GlassPoint {
+pub(super) fn glass_at(p: Vec2) -> GlassSample {
     // Irregular, as if drawn by hand.
     let p = p + vec2(noise(p * 6.0, 52).0, noise(p * 6.0, 53).0) * 0.005;
     let r = p.length();
@@ -135,14 +135,14 @@ pub(super) fn glass_at(p: Vec2) -> GlassPoint {
 }
 
 /// A star with twelve points around six petals.
-fn sun(p: Vec2) -> GlassPoint {
+fn sun(p: Vec2) -> GlassSample {
     let (k, q) = fold(p, 12, 0.0);
     let (gap, _) = fold(p, 12, PI / 12.0);
     let rays = star(vec2(p.y, -p.x), 12, 0.146, 0.082);
     let (petal, l) = fold(p, 6, PI / 6.0);
     let petals = vesica(l - vec2(0.046, 0.0), 0.026, 0.017);
     let glass = [Amber, Gold][(k % 2) as usize];
-    GlassPoint::new(10 + gap, Cobalt)
+    GlassSample::new(10 + gap, Cobalt)
         .inlay(rays, FINE_HALF_WIDTH, 30 + k, glass)
         .painted(0.5 * stroke(q.y, 0.0028) * smoothstep(0.0, 0.01, -rays))
         .inlay(circle(p, 0.080), FINE_HALF_WIDTH, 50, Ruby)
@@ -165,15 +165,15 @@ fn lancet(q: Vec2, half_angle: f64, head: f64, foot: f64) -> f64 {
 }
 
 /// A disc of glass, piece `disc`, in the pale ground between the heads of lancets, piece `ground`.
-fn eyelet(p: Vec2, radius: f64, [ground, disc]: [u32; 2], glass: Glass) -> GlassPoint {
+fn eyelet(p: Vec2, radius: f64, [ground, disc]: [u32; 2], glass: GlassColour) -> GlassSample {
     let ring = stroke(circle(p, 0.45 * radius), 0.003);
     let edge = circle(p, radius);
-    GlassPoint::new(ground, Pale)
+    GlassSample::new(ground, Pale)
         .inlay(edge, FINE_HALF_WIDTH, disc, glass)
         .painted_inside(edge, 0.5 * ring)
 }
 
-fn first_lancets(p: Vec2) -> GlassPoint {
+fn first_lancets(p: Vec2) -> GlassSample {
     const HEAD: f64 = 0.428;
     let (gap, g) = fold(p, 12, PI / 12.0);
     let (k, q) = fold(p, 12, 0.0);
@@ -193,7 +193,7 @@ fn first_lancets(p: Vec2) -> GlassPoint {
     let side = u32::from(q.y > 0.0);
     let border = [edge, Pale][step.rem_euclid(2.0) as usize];
     let joint = (q.x / 0.058 - (q.x / 0.058).round()) * 0.058;
-    let border = GlassPoint::new(220 + 40 * k + 2 * (step as u32) + side, border)
+    let border = GlassSample::new(220 + 40 * k + 2 * (step as u32) + side, border)
         .lead(joint, 0.7 * FINE_HALF_WIDTH)
         .lead(q.y, 0.7 * FINE_HALF_WIDTH);
     let field = light + 0.021;
@@ -229,7 +229,7 @@ fn first_lancets(p: Vec2) -> GlassPoint {
         .within(light)
 }
 
-fn second_lancets(p: Vec2) -> GlassPoint {
+fn second_lancets(p: Vec2) -> GlassSample {
     const HEAD: f64 = 0.754;
     let (gap, g) = fold(p, 24, 0.0);
     let (k, q) = fold(p, 24, PI / 24.0);
@@ -249,7 +249,7 @@ fn second_lancets(p: Vec2) -> GlassPoint {
     // Three panels along the radius, with leads between them.
     let panel = (((q.x - 0.562) / 0.0600).floor().clamp(0.0, 2.0)) as u32;
     let level = 0.562 + 0.0600 * ((q.x - 0.562) / 0.0600).round().clamp(1.0, 2.0);
-    let foot = GlassPoint::new(1230 + 4 * k + panel, ground)
+    let foot = GlassSample::new(1230 + 4 * k + panel, ground)
         .lead(q.x - level, 0.8 * FINE_HALF_WIDTH)
         .painted(diaper(q, 0.0175));
     // A lozenge in each of the two inner panels.
@@ -282,20 +282,20 @@ fn second_lancets(p: Vec2) -> GlassPoint {
         .within(light)
 }
 
-fn pearls(p: Vec2, r: f64) -> GlassPoint {
+fn pearls(p: Vec2, r: f64) -> GlassSample {
     const MIDDLE: f64 = 0.5 * (PEARLS_RADIUS + SECOND_LANCETS_RADIUS) + 0.002;
     let (k, q) = fold(p, 36, 0.0);
     let (gap, g) = fold(p, 36, PI / 36.0);
     let glass = [Ruby, Cobalt][(gap % 2) as usize];
     let leaf = stroke(vesica(vec2(g.y, r - MIDDLE), 0.028, 0.008), 0.0028);
     let pearl = circle(q - vec2(MIDDLE, 0.0), 0.0185);
-    GlassPoint::new(1500 + gap, glass)
+    GlassSample::new(1500 + gap, glass)
         .painted(0.5 * leaf)
         .lead(q.y, 0.8 * FINE_HALF_WIDTH)
         .inlay(pearl, 0.7 * FINE_HALF_WIDTH, 1540 + k, Opal)
 }
 
-fn corner(p: Vec2) -> GlassPoint {
+fn corner(p: Vec2) -> GlassSample {
     let place = u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0);
     let q = vec2(p.x.abs(), p.y.abs());
     let half = 2 * place + u32::from(q.x > q.y);
@@ -311,13 +311,13 @@ fn corner(p: Vec2) -> GlassPoint {
     let gem = circle(jewel, 0.029);
     let stars = star(h - vec2(0.645, 0.917), 4, 0.017, 0.006);
     let ground = if tail < 0.0 {
-        GlassPoint::new(1880 + half, Gold)
+        GlassSample::new(1880 + half, Gold)
             .painted(foliage(vec2(h.x, h.y - 0.920), 0.036))
             .lead(h.x, FINE_HALF_WIDTH)
             .inlay(gem, 0.8 * FINE_HALF_WIDTH, 1890 + half, Ruby)
             .painted(0.55 * stroke(circle(jewel, 0.014), 0.003))
     } else {
-        GlassPoint::new(1860 + half, Cobalt)
+        GlassSample::new(1860 + half, Cobalt)
             .lead(q.x - q.y, FINE_HALF_WIDTH)
             .lead(h.x, FINE_HALF_WIDTH)
             .painted(diaper(q, 0.024))
@@ -346,13 +346,13 @@ fn corner(p: Vec2) -> GlassPoint {
     if opening > 0.0 {
         // Between the foils.
         let (between, _) = fold(c, 4, PI / 4.0);
-        return GlassPoint::new(1800 + 4 * place + between, Azure)
+        return GlassSample::new(1800 + 4 * place + between, Azure)
             .within((2.0 * BOLD_HALF_WIDTH - opening).max(great + BOLD_HALF_WIDTH));
     }
     let leaf = vesica(l - vec2(0.092, 0.0), 0.046, 0.025);
     let (medallion, rays) = (circle(c, 0.050), star(c, 8, 0.040, 0.022));
     let number = 4 * place + foil;
-    GlassPoint::new(1730 + number, Ruby)
+    GlassSample::new(1730 + number, Ruby)
         .lead((l.y.abs() - l.x) * FRAC_1_SQRT_2, FINE_HALF_WIDTH)
         .painted(diaper(c, 0.018))
         .inlay(leaf, 0.8 * FINE_HALF_WIDTH, 1750 + number, Emerald)
@@ -362,7 +362,7 @@ fn corner(p: Vec2) -> GlassPoint {
         .within(opening)
 }
 
-fn frame(p: Vec2) -> GlassPoint {
+fn frame(p: Vec2) -> GlassSample {
     const STONES: f64 = 12.0;
     let (along, side) = match (p.x.abs() > p.y.abs(), p.x > 0.0, p.y > 0.0) {
         (true, right, _) => (p.y, u32::from(right)),
@@ -370,7 +370,7 @@ fn frame(p: Vec2) -> GlassPoint {
     };
     if along.abs() > FRAME_HALF_SIDE {
         let place = u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0);
-        return GlassPoint::new(700 + place, Ruby)
+        return GlassSample::new(700 + place, Ruby)
             .lead(along.abs() - FRAME_HALF_SIDE, FINE_HALF_WIDTH);
     }
     // Long stones in two blues, with short golden ones between them.
@@ -381,18 +381,18 @@ fn frame(p: Vec2) -> GlassPoint {
     let middle = p.x.abs().max(p.y.abs()) - 0.5 * (1.0 + FRAME_HALF_SIDE);
     if short < 0.0 {
         let dot = 0.55 * stroke(circle(vec2(from_joint, middle), 0.008), 0.003);
-        GlassPoint::new(2000 + 20 * side + t.round() as u32, Gold).painted(dot)
+        GlassSample::new(2000 + 20 * side + t.round() as u32, Gold).painted(dot)
     } else {
         let stone = (t.floor() as u32).min(STONES as u32 - 1);
         let glass = [Cobalt, Azure][(stone % 2) as usize];
         let centre = (t - t.floor() - 0.5) * length;
         let leaf = stroke(vesica(vec2(centre, middle), 0.045, 0.013), 0.0028);
-        GlassPoint::new(710 + 20 * side + stone, glass).painted(0.5 * leaf)
+        GlassSample::new(710 + 20 * side + stone, glass).painted(0.5 * leaf)
     }
     .lead(short, FINE_HALF_WIDTH)
 }
 
-fn quarries(p: Vec2) -> GlassPoint {
+fn quarries(p: Vec2) -> GlassSample {
     const SIDE: f64 = 0.2;
     let [a, b] = [p.x + p.y, p.x - p.y].map(|x| x * FRAC_1_SQRT_2 / SIDE);
     let (i, j) = (a.floor(), b.floor());
@@ -408,7 +408,7 @@ fn quarries(p: Vec2) -> GlassPoint {
     let (u, v) = (a - i - 0.5, b - j - 0.5);
     let (_, q) = fold(vec2(u, v), 4, TAU / 8.0);
     let flower = stroke(vesica(q - vec2(0.16, 0.0), 0.11, 0.05), 0.012);
-    GlassPoint::new(piece, glass)
+    GlassSample::new(piece, glass)
         .painted(0.5 * flower)
         .lead(line(a), FINE_HALF_WIDTH)
         .lead(line(b), FINE_HALF_WIDTH)

@@ -5,7 +5,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::light::WebLight;
 use super::output_transform::WebOutputTransform;
-use crate::relight::backend::{Backend, Frame};
+use crate::relight::backend::{Backend, FrameRequest};
 use crate::relight::{Light, LightError};
 use crate::transport::Extent;
 use crate::web::CodedError;
@@ -92,7 +92,7 @@ impl Relighter {
         output: &WebOutputTransform,
         quality: f64,
     ) -> Result<(), CodedError> {
-        Ok(self.backend.render(&Frame {
+        Ok(self.backend.render(&FrameRequest {
             light,
             output: output.0,
             quality: quality as f32,

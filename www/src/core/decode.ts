@@ -1,18 +1,18 @@
 /** Decodes a file from any source on the calling thread. */
 
 import { loadDecoder } from '../engine/core-modules.js';
-import type { FilePiece } from '../loading/byte-source.js';
 import { tooLong } from '../loading/http-errors.js';
+import type { FilePiece } from '../loading/http-source.js';
 import { decodePieces, openPhoto } from '../loading/load.js';
 import { createMainThreadDecoder } from '../photo/main-thread-decoder.js';
 import type { PhotoDecoder } from '../photo/photo-decoder.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
-import { DecodedPhotograph } from './decoded-photo.js';
+import { LtmPhotograph } from './decoded-photo.js';
 import type { CorePhotograph } from './types.js';
 import { fetchCoreWasm, readFile } from './wasm-code.js';
 
 /** A `.ltm` file: its bytes, a stream of them, or its address, which may be relative in a page and `file:` in Node. */
-export type PhotoFile =
+export type LtmInput =
   | string
   | URL
   | ArrayBuffer
@@ -34,7 +34,7 @@ export interface DecodeOptions {
  * `PhotoError`, or with the signal's reason if it is aborted.
  */
 export async function decode(
-  file: PhotoFile,
+  file: LtmInput,
   { signal = new AbortController().signal, onProgress = () => {} }: DecodeOptions = {},
 ): Promise<CorePhotograph> {
   signal.throwIfAborted();
@@ -47,7 +47,7 @@ export async function decode(
     try {
       const pieces = piecesOf(arriving, decoder);
       const photograph = await decodePieces(decoder, pieces, options, { now, yieldToPage });
-      return new DecodedPhotograph(photograph);
+      return new LtmPhotograph(photograph);
     } catch (thrown) {
       signal.throwIfAborted();
       throw toPhotoError(thrown);
@@ -62,7 +62,7 @@ export async function decode(
   if (bytes) return decode(bytes, { signal, onProgress });
   const fetchFile: typeof fetch = (...request) => fetch(...request);
   const ports = { createDecoder, fetch: fetchFile, yieldToPage, now };
-  return new DecodedPhotograph(await openPhoto(url, options, ports));
+  return new LtmPhotograph(await openPhoto(url, options, ports));
 }
 
 async function* piecesOf(
@@ -78,7 +78,7 @@ async function* piecesOf(
   }
 }
 
-function arrivingBytes(file: Exclude<PhotoFile, string | URL>) {
+function arrivingBytes(file: Exclude<LtmInput, string | URL>) {
   if (file instanceof ArrayBuffer) return [new Uint8Array(file)];
   if (ArrayBuffer.isView(file)) {
     return [new Uint8Array(file.buffer, file.byteOffset, file.byteLength)];

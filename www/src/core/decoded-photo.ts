@@ -5,10 +5,10 @@ import type { Photograph } from '../photo/photograph.js';
 import type { PhotoInfo } from '../shared/values.js';
 import type { CorePhotograph } from './types.js';
 
-export interface DecodedPhotograph extends PhotoInfo {}
+export interface LtmPhotograph extends PhotoInfo {}
 
 // biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the constructor assigns the interface's properties
-export class DecodedPhotograph implements CorePhotograph {
+export class LtmPhotograph implements CorePhotograph {
   /** Made for the first picture. */
   relighter: RowRangeRelighter | null = null;
   #isFreed = false;

@@ -11,8 +11,8 @@ import {
   parseLight,
   parseTone,
   parseWhiteBalance,
-} from '../shared/parse-settings.js';
-import { DecodedPhotograph } from './decoded-photo.js';
+} from '../shared/setting-parsers.js';
+import { LtmPhotograph } from './decoded-photo.js';
 import type { CorePhotograph } from './types.js';
 import { fetchCoreWasm } from './wasm-code.js';
 
@@ -65,7 +65,7 @@ export async function relight(
   light: CoreLight = 'flood',
   options: RelightOptions = {},
 ): Promise<Picture> {
-  if (!(photo instanceof DecodedPhotograph)) {
+  if (!(photo instanceof LtmPhotograph)) {
     throw new TypeError('relight takes a photograph from decode');
   }
   const { exposure = 1, whiteBalance = [1, 1, 1], tone, gamut, detail = 1 } = options;

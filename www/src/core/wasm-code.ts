@@ -4,7 +4,7 @@ import { type FetchWasm, fetchWasm } from '../engine/wasm-loader.js';
 import { CORE_MODULES } from '../shared/names.js';
 
 /** The name of a WebAssembly module. */
-export type ModuleName = (typeof CORE_MODULES)[number];
+export type CoreModuleName = (typeof CORE_MODULES)[number];
 
 /** A module's bytes, or their address. */
 export type WasmCode = ArrayBuffer | ArrayBufferView<ArrayBuffer> | URL | string;
@@ -22,7 +22,7 @@ const provided = new Map<string, WasmCode>();
  * Sets the bytes or the addresses of WebAssembly modules, where the files beside the script can be neither fetched nor
  * read. Call it before the first `decode`. Code with SIMD needs a machine with SIMD.
  */
-export function provideWasm(codes: Readonly<Partial<Record<ModuleName, WasmCode>>>): void {
+export function provideWasm(codes: Readonly<Partial<Record<CoreModuleName, WasmCode>>>): void {
   const known: readonly string[] = CORE_MODULES;
   for (const [name, code] of Object.entries(codes)) {
     if (!known.includes(name)) {

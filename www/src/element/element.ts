@@ -1,14 +1,14 @@
-/** `<relightable-photo>`: the public interface. The class delegates to `PhotoController`. */
+/** `<relightable-photo>`: the public interface. The class delegates to `ElementController`. */
 
 import { checkLightSource, isLightSource, type LightSource } from '../lights/light-source.js';
 import type { Backend, Gamut, LightName } from '../shared/names.js';
 import type { PhotoInfo, PicturePoint } from '../shared/values.js';
-import type { LightPose } from '../state/viewer-state.js';
-import type { PhotoView } from '../state/viewport.js';
+import type { LightUpdate } from '../state/viewer-state.js';
+import type { ZoomView } from '../state/viewport.js';
+import { ElementController } from './element-controller.js';
 import { encodePicture } from './encode-picture.js';
 import type { RelightablePhotoEventMap } from './events.js';
-import { PhotoController } from './photo-controller.js';
-import { ATTRIBUTES, PROPERTIES, type Reflected, reflect } from './reflect.js';
+import { ATTRIBUTES, PROPERTIES, type ReflectedProperties, reflect } from './reflect.js';
 
 // Servers have no HTMLElement, but importing this module must work there.
 const Base = globalThis.HTMLElement ?? (class {} as unknown as typeof HTMLElement);
@@ -71,7 +71,7 @@ export class RelightablePhoto extends Base {
     reflect(RelightablePhoto.prototype);
   }
 
-  readonly #controller = new PhotoController(this);
+  readonly #controller = new ElementController(this);
   readonly #state = this.#controller.state;
   readonly #session = this.#controller.session;
 
@@ -98,10 +98,10 @@ export class RelightablePhoto extends Base {
   }
 
   /** The visible part of the picture: its centre, and a magnification of at most `zoom`. */
-  get view(): PhotoView {
+  get view(): ZoomView {
     return this.#state.view;
   }
-  set view(view: PhotoView) {
+  set view(view: ZoomView) {
     if (![view?.zoom, view?.x, view?.y].every(Number.isFinite)) {
       throw new TypeError('view must have finite numbers zoom, from 1, and x and y, from 0 to 1');
     }
@@ -141,7 +141,7 @@ export class RelightablePhoto extends Base {
    * Sets the light until `reset` or until an attribute changes: a built-in light by its name, or with position, size
    * and colour; or a source, as with `lightSource`; `null` is the light of the attributes, without a source.
    */
-  setLight(light: LightName | LightPose | LightSource | null): void {
+  setLight(light: LightName | LightUpdate | LightSource | null): void {
     if (light === null || isLightSource(light)) {
       this.#state.light.reset();
       this.lightSource = light;
@@ -241,7 +241,7 @@ export class RelightablePhoto extends Base {
 }
 
 /** The reflected properties, and listeners with the types of the element's own events. */
-export interface RelightablePhoto extends Reflected {
+export interface RelightablePhoto extends ReflectedProperties {
   addEventListener<K extends keyof RelightablePhotoEventMap>(
     type: K,
     listener: (this: RelightablePhoto, event: RelightablePhotoEventMap[K]) => unknown,

@@ -4,12 +4,12 @@ import type { LightSource } from '../lights/light-source.js';
 import type { ErrorCode, PhotoError } from '../shared/errors.js';
 import type { Backend, LightName } from '../shared/names.js';
 import type { PicturePoint } from '../shared/values.js';
-import type { PhotoView } from '../state/viewport.js';
+import type { ZoomView } from '../state/viewport.js';
 
 export const EVENT_OPTIONS: EventInit = { bubbles: true, composed: true };
 
 /** An event with further fields. */
-class PhotoEvent extends Event {
+class ElementEvent extends Event {
   constructor(type: string, fields: object) {
     super(type, EVENT_OPTIONS);
     Object.assign(this, fields);
@@ -17,7 +17,7 @@ class PhotoEvent extends Event {
 }
 
 /** `error`: something failed. The element shows the message as well. */
-export class PhotoErrorEvent extends PhotoEvent {
+export class PhotoErrorEvent extends ElementEvent {
   /** Identifies the error for programs. */
   declare readonly code: ErrorCode;
   /** Explains the error to people. */
@@ -31,7 +31,7 @@ export class PhotoErrorEvent extends PhotoEvent {
 }
 
 /** `lightchange`: another light is active, or the torch has moved. New frames of a source are no change. */
-export class LightChangeEvent extends PhotoEvent {
+export class LightChangeEvent extends ElementEvent {
   /** The built-in light, or the one that the source replaces. */
   declare readonly light: LightName;
   /** The torch's position; `null` behind the centre, and for other lights. */
@@ -45,7 +45,7 @@ export class LightChangeEvent extends PhotoEvent {
 }
 
 /** `backendchange`: a backend is in use, the first one or another one. */
-export class BackendChangeEvent extends PhotoEvent {
+export class BackendChangeEvent extends ElementEvent {
   declare readonly backend: Backend;
   /** The backend before it, `null` for the first. */
   declare readonly previous: Backend | null;
@@ -58,7 +58,7 @@ export class BackendChangeEvent extends PhotoEvent {
 }
 
 /** `qualitychange`: another share of the components is drawn, below 1 only while the picture changes fast. */
-export class QualityChangeEvent extends PhotoEvent {
+export class QualityChangeEvent extends ElementEvent {
   /** 0 to 1; the first picture has 1. */
   declare readonly share: number;
 
@@ -68,7 +68,7 @@ export class QualityChangeEvent extends PhotoEvent {
 }
 
 /** `contextlost`: the backend in use was lost; `backendchange` reports its replacement. */
-export class ContextLostEvent extends PhotoEvent {
+export class ContextLostEvent extends ElementEvent {
   declare readonly backend: Backend;
   /** The browser's explanation. */
   declare readonly message: string;
@@ -79,14 +79,14 @@ export class ContextLostEvent extends PhotoEvent {
 }
 
 /** `viewchange`: another part of the picture is visible. */
-export class ViewChangeEvent extends PhotoEvent {
+export class ViewChangeEvent extends ElementEvent {
   /** Magnification; 1 shows the whole picture. */
   declare readonly zoom: number;
   /** The point of the picture at the centre of the element, 0 to 1. */
   declare readonly x: number;
   declare readonly y: number;
 
-  constructor({ zoom, x, y }: PhotoView) {
+  constructor({ zoom, x, y }: ZoomView) {
     super('viewchange', { zoom, x, y });
   }
 }

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import { AttributeReader } from '../state/attribute-reader.js';
 import { type ElementOptions, readOptions } from '../state/options.js';
-import { ATTRIBUTES, PROPERTIES, type Reflected, reflect } from './reflect.js';
+import { ATTRIBUTES, PROPERTIES, type ReflectedProperties, reflect } from './reflect.js';
 
 /** The part of an element that the properties use. */
 class FakeElement {
@@ -20,8 +20,8 @@ class FakeElement {
 }
 reflect(FakeElement.prototype);
 
-function createElement(): FakeElement & Reflected {
-  return new FakeElement() as FakeElement & Reflected;
+function createElement(): FakeElement & ReflectedProperties {
+  return new FakeElement() as FakeElement & ReflectedProperties;
 }
 
 test('properties have defaults', () => {

@@ -3,15 +3,15 @@
 import { CENTRE } from '../shared/values.js';
 import {
   DEFAULT_TORCH_SIZE,
-  type Loading,
+  type LoadingMode,
   type PARSERS,
   type ParsedValue,
   parserOf,
-  type Reveal,
+  type RevealMode,
 } from '../state/attribute-values.js';
 
 /** The properties that reflect attributes. */
-export interface Reflected {
+export interface ReflectedProperties {
   /** Address of the `.ltm` file. */
   src: string;
   /** Description of the picture for visitors who cannot see it. */
@@ -41,9 +41,9 @@ export interface Reflected {
   /** Address of an image that is shown until the photograph is drawn, and if it cannot be drawn. */
   poster: string;
   /** When the photograph is fetched: `auto` within one screen of the viewport, `lazy` in the viewport, `eager` at once. */
-  loading: Loading;
+  loading: LoadingMode;
   /** When the poster gives way: `auto` when the photograph is drawn, `interaction` on a press, `manual` by `dismissPoster()`. */
-  reveal: Reveal;
+  reveal: RevealMode;
   /** Whether the toolbar is shown. */
   controls: boolean;
   /** Largest magnification; 1 disables zooming. */
@@ -61,14 +61,16 @@ export interface Reflected {
 }
 
 /** Converts between an attribute and a property. */
-interface Reflection<T> {
+interface AttributeConverter<T> {
   readonly attribute: string;
   get(text: string | null): T;
   /** `null` removes the attribute. */
   set(value: T): string | null;
 }
 
-const REFLECTED: { readonly [P in keyof Reflected]: Reflection<Reflected[P]> } = {
+const REFLECTED: {
+  readonly [P in keyof ReflectedProperties]: AttributeConverter<ReflectedProperties[P]>;
+} = {
   src: text('src'),
   alt: text('alt'),
   light: text('light', 'flood'),
@@ -95,12 +97,12 @@ const REFLECTED: { readonly [P in keyof Reflected]: Reflection<Reflected[P]> } =
 };
 
 export const ATTRIBUTES = Object.values(REFLECTED).map(({ attribute }) => attribute);
-export const PROPERTIES = Object.keys(REFLECTED) as readonly (keyof Reflected)[];
+export const PROPERTIES = Object.keys(REFLECTED) as readonly (keyof ReflectedProperties)[];
 
 /** Defines the properties on the prototype of an element class. */
 export function reflect(prototype: object): void {
   for (const [property, reflection] of Object.entries(REFLECTED)) {
-    const { attribute, get, set } = reflection as Reflection<unknown>;
+    const { attribute, get, set } = reflection as AttributeConverter<unknown>;
     Object.defineProperty(prototype, property, {
       configurable: true,
       enumerable: true,
@@ -116,15 +118,15 @@ export function reflect(prototype: object): void {
   }
 }
 
-function text(attribute: string, defaultValue = ''): Reflection<string> {
+function text(attribute: string, defaultValue = ''): AttributeConverter<string> {
   return { attribute, get: (text) => text ?? defaultValue, set: String };
 }
 
-function flag(attribute: string): Reflection<boolean> {
+function flag(attribute: string): AttributeConverter<boolean> {
   return { attribute, get: (text) => text !== null, set: (value) => (value ? '' : null) };
 }
 
-function parsed<K extends keyof typeof PARSERS>(attribute: K): Reflection<ParsedValue<K>> {
+function parsed<K extends keyof typeof PARSERS>(attribute: K): AttributeConverter<ParsedValue<K>> {
   const parse = parserOf(attribute);
   const get = (text: string | null) => {
     try {
@@ -139,7 +141,7 @@ function parsed<K extends keyof typeof PARSERS>(attribute: K): Reflection<Parsed
 function number(
   attribute: 'light-size' | 'light-x' | 'light-y' | 'exposure' | 'zoom' | 'kiosk',
   defaultValue = 0,
-): Reflection<number> {
+): AttributeConverter<number> {
   const { get, set } = parsed(attribute);
   return { attribute, get: (text) => get(text) ?? defaultValue, set };
 }

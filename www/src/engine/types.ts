@@ -9,7 +9,11 @@ import type { PhotoInfo } from '../shared/values.js';
 export type { Backend, Gamut, ToneCurve } from '../shared/names.js';
 
 /** A picture that a graphics device can upload directly, and that may change at any time. */
-export type LivePicture = HTMLCanvasElement | OffscreenCanvas | ImageBitmap | HTMLVideoElement;
+export type ExternalImageSource =
+  | HTMLCanvasElement
+  | OffscreenCanvas
+  | ImageBitmap
+  | HTMLVideoElement;
 
 /** An object in a module's memory, until it is freed. */
 export interface Freeable {
@@ -86,7 +90,7 @@ export interface Relighter extends Freeable {
   readonly gamut: Gamut;
   render(light: Light, transform: OutputTransform, quality: number): void;
   /** Uploads a picture for `renderLightImage`; `false` if the backend cannot. If it throws, the last light stays. */
-  setLightImage(picture: LivePicture, width: number, height: number): boolean;
+  setLightImage(picture: ExternalImageSource, width: number, height: number): boolean;
   /** As `render`, with the uploaded picture. */
   renderLightImage(transform: OutputTransform, quality: number): void;
 }

@@ -1,13 +1,13 @@
 /** Runs named animations in the browser's animation frames, and requests no frame while none runs. */
 
 /** Advances an animation by some seconds; `false` ends it. */
-export type AnimationStep = (seconds: number) => boolean;
+export type AnimationCallback = (seconds: number) => boolean;
 
 /** After a pause, for example in a hidden page, animations continue where they were. */
 const MAX_STEP_SECONDS = 0.1;
 
 export class AnimationLoop {
-  readonly #steps = new Map<string, AnimationStep>();
+  readonly #steps = new Map<string, AnimationCallback>();
   #isEnabled = true;
   #isRequested = false;
   #lastMs: number | null = null;
@@ -15,14 +15,14 @@ export class AnimationLoop {
   constructor(private readonly requestFrame: (callback: (ms: number) => void) => void) {}
 
   /** Starts or replaces the animation of that name; `null` ends it. */
-  set(name: string, step: AnimationStep | null): void {
+  set(name: string, step: AnimationCallback | null): void {
     if (step) this.#steps.set(name, step);
     else this.#steps.delete(name);
     this.#request();
   }
 
   /** Starts the animation of that name unless it runs, or ends it. */
-  toggle(name: string, isRunning: boolean, createStep: () => AnimationStep): void {
+  toggle(name: string, isRunning: boolean, createStep: () => AnimationCallback): void {
     if (!isRunning) this.set(name, null);
     else if (!this.#steps.has(name)) this.set(name, createStep());
   }

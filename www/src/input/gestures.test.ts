@@ -1,8 +1,8 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { type GesturePermissions, GestureRecognizer, type PointerSample } from './gestures.js';
+import { type EnabledGestures, GestureRecognizer, type PointerSample } from './gestures.js';
 
-const ALL: GesturePermissions = { movesLight: true, zooms: true, isZoomed: true };
+const ALL: EnabledGestures = { movesLight: true, zooms: true, isZoomed: true };
 
 /** A recognizer, and the calls of its listener since the last check. */
 function createRecognizer() {

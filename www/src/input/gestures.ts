@@ -11,7 +11,7 @@ export interface PointerSample {
   readonly time: number;
 }
 
-export interface GesturePermissions {
+export interface EnabledGestures {
   readonly movesLight: boolean;
   readonly zooms: boolean;
   /** The picture is magnified, so that panning has an effect. */
@@ -63,7 +63,7 @@ export class GestureRecognizer {
   }
 
   /** `forcePan`: a modifier key or another button requests panning. */
-  down({ id, x, y, time }: PointerSample, allowed: GesturePermissions, forcePan = false): void {
+  down({ id, x, y, time }: PointerSample, allowed: EnabledGestures, forcePan = false): void {
     this.#throwPoint = null;
     const pans = forcePan || !allowed.movesLight;
     this.#pressed.set(id, { x, y, startX: x, startY: y, pans, hasMoved: false });
@@ -81,7 +81,7 @@ export class GestureRecognizer {
     }
   }
 
-  move({ id, isTouch, x, y, time }: PointerSample, allowed: GesturePermissions): void {
+  move({ id, isTouch, x, y, time }: PointerSample, allowed: EnabledGestures): void {
     const pointer = this.#pressed.get(id);
     if (!pointer) {
       if (!isTouch && !this.isPressed) this.#hover(x, y, allowed);
@@ -108,7 +108,7 @@ export class GestureRecognizer {
     }
   }
 
-  up({ id, x, y, time }: PointerSample, allowed: GesturePermissions): void {
+  up({ id, x, y, time }: PointerSample, allowed: EnabledGestures): void {
     const pointer = this.#pressed.get(id);
     if (!pointer) return;
     this.#pressed.delete(id);
@@ -130,7 +130,7 @@ export class GestureRecognizer {
     this.#lastTap = null;
   }
 
-  #hover(x: number, y: number, { movesLight }: GesturePermissions): void {
+  #hover(x: number, y: number, { movesLight }: EnabledGestures): void {
     if (!movesLight) return;
     const from = this.#throwPoint;
     if (from && Math.hypot(x - from.x, y - from.y) < MIN_HOVER_PIXELS) return;
@@ -138,7 +138,7 @@ export class GestureRecognizer {
     this.listener.moveLight(x, y);
   }
 
-  #tap(x: number, y: number, time: number, { zooms }: GesturePermissions): void {
+  #tap(x: number, y: number, time: number, { zooms }: EnabledGestures): void {
     const last = this.#lastTap;
     const isNear = last && Math.hypot(x - last.x, y - last.y) <= 2 * MAX_TAP_PIXELS;
     const isDouble = isNear && time - last.time <= DOUBLE_TAP_MS;

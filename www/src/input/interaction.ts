@@ -5,20 +5,20 @@ import { CENTRE, type PicturePoint } from '../shared/values.js';
 import type { ViewerState } from '../state/viewer-state.js';
 import {
   FULL_VIEW,
-  type PhotoView,
   pan,
   toggleZoom,
   toPicture,
   ZOOM_STEP,
+  type ZoomView,
   zoomAt,
 } from '../state/viewport.js';
 import type { Presenter } from '../ui/presenter.js';
 import type { ShadowDom } from '../ui/shadow-dom.js';
 import { AnimationLoop } from './animation-loop.js';
-import type { GesturePermissions } from './gestures.js';
+import type { EnabledGestures } from './gestures.js';
 import { IdleTimer } from './idle-timer.js';
 import type { Velocity } from './inertia.js';
-import { type FocusTarget, type KeyAction, keyAction } from './keys.js';
+import { type FocusedPart, type KeyAction, keyAction } from './keys.js';
 import { LightAnimator } from './light-animator.js';
 import { listenToPointer, toViewportUnits } from './pointer-input.js';
 import { reducedMotion } from './reduced-motion.js';
@@ -175,7 +175,7 @@ export class InteractionController {
     handle.addEventListener('blur', focusChanged);
   }
 
-  get #permissions(): GesturePermissions {
+  get #permissions(): EnabledGestures {
     const { light, options, isPictureShown, view } = this.state;
     return {
       movesLight: isPictureShown && light.isTorch,
@@ -196,7 +196,7 @@ export class InteractionController {
   }
 
   /** Sets the nearest view inside the picture. Returns whether the view has changed. */
-  #setView(view: PhotoView): boolean {
+  #setView(view: ZoomView): boolean {
     const last = this.state.view;
     this.state.view = view;
     const hasChanged = this.state.view !== last;
@@ -220,7 +220,7 @@ export class InteractionController {
     if (action && this.#perform(action)) event.preventDefault();
   }
 
-  #focusTarget(target: EventTarget | null): FocusTarget | null {
+  #focusTarget(target: EventTarget | null): FocusedPart | null {
     if (target === this.dom.handle) return 'light';
     if (target === this.dom.viewport) return 'picture';
     const isControl =

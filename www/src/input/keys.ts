@@ -12,7 +12,7 @@ export type KeyAction =
   | { readonly kind: 'reset-view' | 'escape' };
 
 /** The focused part: the torch handle, the picture (if no light can be moved), or the controls. */
-export type FocusTarget = 'light' | 'picture' | 'controls';
+export type FocusedPart = 'light' | 'picture' | 'controls';
 
 const LIGHT_STEP = 0.05;
 /** With Shift. */
@@ -44,7 +44,7 @@ const LIGHT_MOVES: Readonly<Record<string, ArrowDirection>> = {
   End: [1, 0],
 };
 
-export function keyAction(press: KeyPress, focus: FocusTarget): KeyAction | null {
+export function keyAction(press: KeyPress, focus: FocusedPart): KeyAction | null {
   const { key, metaKey, ctrlKey, altKey } = press;
   if (metaKey || (ctrlKey && !altKey)) return null;
   // Many layouts type brackets with Alt, some with Ctrl and Alt.
@@ -59,7 +59,7 @@ function zoomAction(key: string): KeyAction | null {
   return key === '0' ? { kind: 'reset-view' } : null;
 }
 
-function pictureAction({ key, code, shiftKey }: KeyPress, focus: FocusTarget): KeyAction | null {
+function pictureAction({ key, code, shiftKey }: KeyPress, focus: FocusedPart): KeyAction | null {
   if (key === 'Escape') return { kind: 'escape' };
   const hasLight = focus === 'light';
   const arrow = ARROWS[key];

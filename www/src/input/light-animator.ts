@@ -2,7 +2,7 @@
 
 import { CENTRE } from '../shared/values.js';
 import type { LightState } from '../state/light-state.js';
-import type { AnimationLoop, AnimationStep } from './animation-loop.js';
+import type { AnimationCallback, AnimationLoop } from './animation-loop.js';
 import { glide, speedOf, type Velocity } from './inertia.js';
 import { wander } from './wander.js';
 
@@ -44,7 +44,7 @@ export class LightAnimator {
     this.loop.set('wander', null);
   }
 
-  #wander(): AnimationStep {
+  #wander(): AnimationCallback {
     const start = this.light.torch ?? CENTRE;
     let elapsed = 0;
     return (seconds) => {

@@ -2,10 +2,10 @@
 
 import type { PicturePoint } from '../shared/values.js';
 import { wheelFactor } from '../state/viewport.js';
-import { type GestureListener, type GesturePermissions, GestureRecognizer } from './gestures.js';
+import { type EnabledGestures, type GestureListener, GestureRecognizer } from './gestures.js';
 
 export interface PointerInputListener extends GestureListener {
-  permissions(): GesturePermissions;
+  permissions(): EnabledGestures;
   /** Whether drags pan, because a key is held. */
   isPanning(): boolean;
   /** Whether the page keeps the wheel unless a modifier key is held. */

@@ -3,7 +3,7 @@
 import { messageOf, PhotoError } from '../shared/errors.js';
 import type { ImageLight } from './light-setting.js';
 import {
-  type BrowserPicture,
+  type BrowserImageSource,
   isInstance,
   isLinearLight,
   isLivePicture,
@@ -36,7 +36,7 @@ export function toImageLight(image: LightPicture): ImageLight {
 }
 
 /** The current sRGB pixels; `null` while nothing is loaded. Throws `light-tainted`, `light-size` or `light-source`. */
-function readPixels(image: BrowserPicture): ImageData | null {
+function readPixels(image: BrowserImageSource): ImageData | null {
   const size = imageSize(image);
   if (!size) return null;
   const { width, height } = size;
@@ -61,7 +61,7 @@ function readPixels(image: BrowserPicture): ImageData | null {
 }
 
 /** `null` while nothing is loaded. */
-function imageSize(image: BrowserPicture): Size | null {
+function imageSize(image: BrowserImageSource): Size | null {
   if (isInstance('HTMLImageElement', image)) {
     const { complete, naturalWidth: width, naturalHeight: height } = image;
     return complete && width > 0 && height > 0 ? { width, height } : null;
@@ -74,7 +74,7 @@ function imageSize(image: BrowserPicture): Size | null {
   return image;
 }
 
-function drawPixels(image: BrowserPicture, { width, height }: Size): ImageData {
+function drawPixels(image: BrowserImageSource, { width, height }: Size): ImageData {
   if (isInstance('ImageData', image)) {
     const context = emptyContext(width, height);
     context.putImageData(image, 0, 0);

@@ -5,10 +5,10 @@ import { PhotoError } from '../shared/errors.js';
 import { toImageLight } from './image-pixels.js';
 import { LightCache } from './light-cache.js';
 import type { LightSetting } from './light-setting.js';
-import type { LightPicture, LinearLight } from './light-source.js';
+import type { LightPicture, LinearImage } from './light-source.js';
 
-const GOOD: LinearLight = { data: new Float32Array(3), width: 1, height: 1 };
-const BAD: LinearLight = { data: new Float32Array(1), width: 1, height: 1 };
+const GOOD: LinearImage = { data: new Float32Array(3), width: 1, height: 1 };
+const BAD: LinearImage = { data: new Float32Array(1), width: 1, height: 1 };
 
 const setting = (picture: LightPicture | null): LightSetting => ({
   name: 'fire',

@@ -1,6 +1,6 @@
 /** The light of one frame. Immutable: a change makes a new object. */
 
-import type { Light, LivePicture, ReceivedPhoto, RelightModule } from '../engine/types.js';
+import type { ExternalImageSource, Light, ReceivedPhoto, RelightModule } from '../engine/types.js';
 import type { LightName } from '../shared/names.js';
 import { CENTRE, type PicturePoint } from '../shared/values.js';
 
@@ -20,7 +20,7 @@ export interface LightSetting {
 export interface ImageLight {
   /** The current content and its size in pixels, if a graphics device can upload it directly. */
   uploadable(): {
-    readonly image: LivePicture;
+    readonly image: ExternalImageSource;
     readonly width: number;
     readonly height: number;
   } | null;

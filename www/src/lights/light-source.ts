@@ -1,9 +1,9 @@
 /** The light sources that a page may use in place of the built-in lights. */
 
-import type { LivePicture } from '../engine/types.js';
+import type { ExternalImageSource } from '../engine/types.js';
 
 /** A light image of any size in linear values. */
-export interface LinearLight {
+export interface LinearImage {
   /** Linear red, green and blue, row by row: 0 is dark, 1 is full brightness. */
   readonly data: Float32Array;
   readonly width: number;
@@ -11,10 +11,10 @@ export interface LinearLight {
 }
 
 /** A picture in one of the browser's classes, in sRGB. */
-export type BrowserPicture = HTMLImageElement | ImageData | LivePicture;
+export type BrowserImageSource = HTMLImageElement | ImageData | ExternalImageSource;
 
 /** A picture whose pixels can be read at any time. */
-export type LightPicture = BrowserPicture | LinearLight;
+export type LightPicture = BrowserImageSource | LinearImage;
 
 /**
  * Lights the photograph: the source's upper left corner is that of the light plane. Transparent pixels are dark.
@@ -39,14 +39,14 @@ export function isInstance<K extends (typeof CLASSES)[number]>(
   return typeof type === 'function' && value instanceof type;
 }
 
-export function isLivePicture(picture: LightPicture): picture is LivePicture {
+export function isLivePicture(picture: LightPicture): picture is ExternalImageSource {
   return LIVE_CLASSES.some((name) => isInstance(name, picture));
 }
 
 /** Checks the types only; the WebAssembly module checks that the size fits the data. */
-export function isLinearLight(value: unknown): value is LinearLight {
+export function isLinearLight(value: unknown): value is LinearImage {
   if (typeof value !== 'object' || value === null) return false;
-  const { data, width, height } = value as Partial<LinearLight>;
+  const { data, width, height } = value as Partial<LinearImage>;
   return data instanceof Float32Array && typeof width === 'number' && typeof height === 'number';
 }
 

@@ -11,7 +11,7 @@ import {
 import type { AddressInfo } from 'node:net';
 import type { TestContext } from 'node:test';
 import type { ByteRange } from '../shared/values.js';
-import { HttpSource, type SourcePorts } from './byte-source.js';
+import { HttpSource, type HttpSourcePorts } from './http-source.js';
 
 /** A signal that is never aborted. */
 export const never = new AbortController().signal;
@@ -113,7 +113,7 @@ interface TestSource {
 }
 
 /** A source whose pauses take no time. */
-export function createSource(url: string, ports: Partial<SourcePorts> = {}): TestSource {
+export function createSource(url: string, ports: Partial<HttpSourcePorts> = {}): TestSource {
   const pauses: number[] = [];
   const sleep = async (ms: number) => {
     pauses.push(ms);

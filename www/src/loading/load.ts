@@ -5,8 +5,8 @@ import type { Photograph } from '../photo/photograph.js';
 import { endSentence, hasCode, PhotoError, toPhotoError } from '../shared/errors.js';
 import { linkedController, withTimeout } from '../shared/promises.js';
 import type { ByteRange } from '../shared/values.js';
-import { type FilePiece, HttpSource } from './byte-source.js';
 import { fileName, tooLong } from './http-errors.js';
+import { type FilePiece, HttpSource } from './http-source.js';
 
 export interface LoadOptions {
   readonly signal: AbortSignal;

@@ -11,10 +11,10 @@ export interface ResponseHead {
   readonly end: number | undefined;
   /** The size of the whole file, if known. */
   readonly size: number | undefined;
-  readonly version: FileVersion;
+  readonly validators: HttpValidators;
 }
 
-export interface FileVersion {
+export interface HttpValidators {
   /** A strong entity tag. */
   readonly etag?: string | undefined;
   readonly modified?: string | undefined;
@@ -31,12 +31,12 @@ export function readHead(
   if (!isWhole && (status !== 206 || requested === 'whole')) throw badStatus(url, response);
   const type = mediaType(response);
   if (type === 'text/html' || type === 'application/xhtml+xml') throw webPage(url, type);
-  const version = { etag: strongTag(response), modified: header(response, 'last-modified') };
+  const validators = { etag: strongTag(response), modified: header(response, 'last-modified') };
   if (isWhole) {
     const size = wholeSize(response);
-    return { isWhole, start: 0, end: size, size, version };
+    return { isWhole, start: 0, end: size, size, validators };
   }
-  return { isWhole, ...readContentRange(url, response, requested as ByteRange), version };
+  return { isWhole, ...readContentRange(url, response, requested as ByteRange), validators };
 }
 
 /** The file's size as a response with status 416 gives it. */
@@ -46,7 +46,7 @@ export function sizeFromUnsatisfiedRange(response: Response): number | undefined
 }
 
 /** Whether two responses belong to different versions of the file for certain. */
-export function isOtherVersion(a: FileVersion, b: FileVersion): boolean {
+export function isOtherVersion(a: HttpValidators, b: HttpValidators): boolean {
   if (a.etag !== undefined && b.etag !== undefined) return a.etag !== b.etag;
   return a.modified !== undefined && b.modified !== undefined && a.modified !== b.modified;
 }

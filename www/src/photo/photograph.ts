@@ -16,13 +16,13 @@ import type { PhotoInfo } from '../shared/values.js';
 import {
   describePhoto,
   type PhotoDescriptor,
-  type TileBytes,
-  type TileSession,
-  type TileWorkers,
+  type SerialisedTile,
+  type TileWorkerPool,
+  type WorkerTiles,
 } from './types.js';
 
 /** A module of the page with tiles in its memory. */
-interface TileStore {
+interface ModuleTiles {
   /** `null` for the decoder's. */
   readonly module: RelightModule | null;
   readonly photo: ModulePhoto;
@@ -31,14 +31,14 @@ interface TileStore {
 }
 
 /** 'in transit': sent to a worker, or requested from it. */
-type TileLocation = TileStore | 'workers' | 'in transit' | TileBytes;
+type TileResidency = ModuleTiles | 'workers' | 'in transit' | SerialisedTile;
 
 export class Photograph implements Freeable {
   readonly info: PhotoInfo;
-  #tiles: TileLocation[];
+  #tiles: TileResidency[];
   /** One, unless a move has failed halfway. */
-  readonly #stores = new Set<TileStore>();
-  #session: TileSession | null = null;
+  readonly #stores = new Set<ModuleTiles>();
+  #session: WorkerTiles | null = null;
   /** Why the photograph is unusable: tiles are lost, or it was freed. */
   #fault: PhotoError | null = null;
   /** Settles after the last use that was requested. */
@@ -47,7 +47,7 @@ export class Photograph implements Freeable {
   /** Its tiles are on the page. `completeness` is the decoded share of the file, 0 to 1. Throws `format-invalid`. */
   constructor(
     readonly descriptor: PhotoDescriptor,
-    tiles: TileBytes[],
+    tiles: SerialisedTile[],
     readonly completeness = 1,
   ) {
     const { width, height, lightWidth, lightHeight, decodedBytes } = descriptor;
@@ -58,7 +58,7 @@ export class Photograph implements Freeable {
 
   /** A photograph in the memory of the page's decoder, which is freed with it or if this throws `format-invalid`. */
   static fromModule(photo: DecodedPhoto, completeness = 1): Photograph {
-    const store: TileStore = { module: null, photo, onLeave: new Set() };
+    const store: ModuleTiles = { module: null, photo, onLeave: new Set() };
     try {
       const descriptor = describePhoto(photo);
       const photograph = new Photograph(descriptor, [], completeness);
@@ -103,8 +103,8 @@ export class Photograph implements Freeable {
    * Moves all tiles to workers, always the same ones, and calls `use`. Rejects with `worker-unavailable` if there are
    * none; the photograph is unchanged then.
    */
-  withWorkers<S extends TileSession, T>(
-    workers: TileWorkers<S>,
+  withWorkers<S extends WorkerTiles, T>(
+    workers: TileWorkerPool<S>,
     use: (session: S) => T | Promise<T>,
   ): Promise<T> {
     return this.#enqueue(async () => use(await this.#moveToWorkers(workers)));
@@ -172,7 +172,7 @@ export class Photograph implements Freeable {
     return { ...store, photo };
   }
 
-  #storeIn(module: RelightModule): [TileStore, ReceivedPhoto] {
+  #storeIn(module: RelightModule): [ModuleTiles, ReceivedPhoto] {
     for (const store of this.#stores) {
       if (store.module === module) return [store, store.photo as ReceivedPhoto];
     }
@@ -182,7 +182,7 @@ export class Photograph implements Freeable {
     return [store, photo];
   }
 
-  async #moveToWorkers<S extends TileSession>(workers: TileWorkers<S>): Promise<S> {
+  async #moveToWorkers<S extends WorkerTiles>(workers: TileWorkerPool<S>): Promise<S> {
     this.#session ??= await workers.open(this.descriptor);
     const session = this.#session as S;
     if (this.#fault) {
@@ -209,15 +209,15 @@ export class Photograph implements Freeable {
   }
 
   /** Takes a tile out of its module, if it is in one. */
-  #toBytes(index: number): TileBytes {
-    const location = this.#tiles[index] as TileStore | TileBytes;
+  #toBytes(index: number): SerialisedTile {
+    const location = this.#tiles[index] as ModuleTiles | SerialisedTile;
     if (location instanceof Uint8Array) return location;
-    const bytes = location.photo.takeTile(index) as TileBytes;
+    const bytes = location.photo.takeTile(index) as SerialisedTile;
     this.#tiles[index] = bytes;
     return bytes;
   }
 
-  #announceLeave(except?: TileStore): void {
+  #announceLeave(except?: ModuleTiles): void {
     for (const store of this.#stores) {
       if (store === except) continue;
       for (const onLeave of store.onLeave) onLeave();
@@ -241,7 +241,7 @@ export class Photograph implements Freeable {
 }
 
 /** Moves tile after tile, so that few are in memory twice, but with all workers at once. */
-async function forEachTile(session: TileSession, move: (index: number) => Promise<void>) {
+async function forEachTile(session: WorkerTiles, move: (index: number) => Promise<void>) {
   await allSettledOrThrow(
     session.tiles.map(async (tiles) => {
       for (const index of tiles) await move(index);

@@ -2,7 +2,7 @@
 
 import type { Backend, Freeable } from '../engine/types.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { Renderer, RenderOptions } from '../renderers/types.js';
+import type { BackendOptions, Renderer } from '../renderers/types.js';
 import type { Deferred } from '../shared/promises.js';
 import { QualityController } from './quality-controller.js';
 
@@ -34,7 +34,7 @@ export class ActiveBackend {
 
   constructor(
     readonly backend: Backend,
-    readonly options: RenderOptions,
+    readonly options: BackendOptions,
     readonly renderer: Renderer,
     readonly photo: RefCounted<Photograph>,
   ) {

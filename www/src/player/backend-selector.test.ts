@@ -19,30 +19,30 @@ test('an unavailable backend is skipped with its reason', async () => {
 
 test('the session fails without a backend, and tries again with other options', async () => {
   const f = fakeSession();
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['webgpu']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['webgpu']) });
   await f.finishLoad('a.ltm');
   await f.failRenderer(0, 'no adapter');
   assert.match(f.takeLog()[1] ?? '', /^failed backend-unavailable: .*WebGPU: no adapter\./);
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['cpu']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['cpu']) });
   await f.createRenderer(1);
   assert.deepEqual(f.takeLog(), ['backend null -> cpu', 'cpu draws flood', 'recovered', 'loaded']);
 });
 
 test('other options change the backend; the photograph is not loaded again', async () => {
   const f = await loadedSession();
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['cpu']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['cpu']) });
   await f.createRenderer(1);
   assert.deepEqual(f.takeLog(), ['backend webgpu -> cpu', 'cpu draws flood', 'free webgpu']);
   // Options that begin with the active backend keep it.
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['cpu', 'webgpu']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['cpu', 'webgpu']) });
   await settle();
   assert.deepEqual(f.takeLog(), ['cpu draws flood']);
 });
 
 test('the last of two quick changes of the options wins', async () => {
   const f = await loadedSession();
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['webgl2']) });
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['cpu']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['webgl2']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['cpu']) });
   await f.createRenderer(2);
   await f.createRenderer(1);
   assert.deepEqual(f.takeLog(), [
@@ -104,8 +104,8 @@ test('a backend that is lost before its first frame is not tried again', async (
 });
 
 test('a loss during a search does not end the search', async () => {
-  const f = await loadedSession({ ...SETTINGS, renderOptions: withBackends(['webgl2']) });
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['webgpu', 'webgl2', 'cpu']) });
+  const f = await loadedSession({ ...SETTINGS, backendOptions: withBackends(['webgl2']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['webgpu', 'webgl2', 'cpu']) });
   f.lose(0, 'the browser took it away.');
   assert.deepEqual(f.takeLog(), []);
   await f.createRenderer(1);
@@ -113,8 +113,8 @@ test('a loss during a search does not end the search', async () => {
 });
 
 test('a backend lost during a search is set up again when its turn comes', async () => {
-  const f = await loadedSession({ ...SETTINGS, renderOptions: withBackends(['webgl2']) });
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['webgpu', 'webgl2', 'cpu']) });
+  const f = await loadedSession({ ...SETTINGS, backendOptions: withBackends(['webgl2']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['webgpu', 'webgl2', 'cpu']) });
   f.lose(0, 'the browser took it away.');
   await f.failRenderer(1, 'no adapter');
   await f.createRenderer(2);
@@ -126,10 +126,10 @@ test('a backend lost during a search is set up again when its turn comes', async
 });
 
 test('a loss is reported once, and another gamut is not reported as another backend', async () => {
-  const f = await loadedSession({ ...SETTINGS, renderOptions: withBackends(['webgl2']) });
+  const f = await loadedSession({ ...SETTINGS, backendOptions: withBackends(['webgl2']) });
   f.session.set({
     ...SETTINGS,
-    renderOptions: { ...withBackends(['webgl2']), gamut: 'display-p3' },
+    backendOptions: { ...withBackends(['webgl2']), gamut: 'display-p3' },
   });
   await f.createRenderer(1);
   assert.deepEqual(f.takeLog(), ['webgl2 draws flood', 'free webgl2']);
@@ -191,7 +191,7 @@ test('a backend lost at any moment after its setup is replaced and freed once', 
 });
 
 test('the loss of the last backend reports the loss and the failed attempt', async () => {
-  const f = await loadedSession({ ...SETTINGS, renderOptions: withBackends(['webgpu']) });
+  const f = await loadedSession({ ...SETTINGS, backendOptions: withBackends(['webgpu']) });
   f.lose(0, 'the device is gone.');
   await f.failRenderer(1, 'no adapter');
   const [freed, failed] = f.takeLog();

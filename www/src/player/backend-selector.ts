@@ -5,14 +5,14 @@
 
 import type { Backend } from '../engine/types.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { CreateRenderer, RenderOptions } from '../renderers/types.js';
+import type { BackendOptions, CreateRenderer } from '../renderers/types.js';
 import { joinSentences, PhotoError, toPhotoError } from '../shared/errors.js';
 import { Deferred } from '../shared/promises.js';
 import { ActiveBackend, type RefCounted } from './active-backend.js';
 import { BACKEND_TITLES, firstWorking } from './backends.js';
-import type { SessionListener } from './types.js';
+import type { PhotoSessionListener } from './types.js';
 
-export interface SelectorEvents {
+export interface BackendSelectorEvents {
   failed(error: PhotoError): void;
   /** A search has ended with a backend that works. */
   selected(): void;
@@ -21,7 +21,7 @@ export interface SelectorEvents {
 }
 
 /** A search, which ends also when it is cancelled. */
-class BackendSearch extends Deferred {
+class PendingSearch extends Deferred {
   readonly abort = new AbortController();
 
   cancel(): void {
@@ -32,18 +32,18 @@ class BackendSearch extends Deferred {
 
 export class BackendSelector {
   /** The options with which a lost backend is replaced. */
-  options: RenderOptions | null = null;
+  options: BackendOptions | null = null;
   active: ActiveBackend | null = null;
   /** On the screen until `active` has drawn. */
   #outgoing: ActiveBackend | null = null;
-  #search: BackendSearch | null = null;
+  #search: PendingSearch | null = null;
   /** The photograph of the last search. */
   #photo: RefCounted<Photograph> | null = null;
 
   constructor(
     private readonly createRenderer: CreateRenderer,
-    private readonly listener: SessionListener,
-    private readonly events: SelectorEvents,
+    private readonly listener: PhotoSessionListener,
+    private readonly events: BackendSelectorEvents,
   ) {}
 
   /** Resolves when the search in progress ends; `null` if there is none. */
@@ -54,12 +54,12 @@ export class BackendSelector {
   /** Replaces the backend `previous` by the first that works. `reason` is empty if only the options have changed. */
   async select(
     photo: RefCounted<Photograph>,
-    options: RenderOptions,
+    options: BackendOptions,
     previous: Backend | null,
     reason: string,
   ): Promise<void> {
     this.#search?.cancel();
-    const search = new BackendSearch();
+    const search = new PendingSearch();
     const { signal } = search.abort;
     this.#search = search;
     this.#photo = photo;
@@ -118,7 +118,7 @@ export class BackendSelector {
 
   #use(
     found: ActiveBackend,
-    options: RenderOptions,
+    options: BackendOptions,
     previous: Backend | null,
     reasons: readonly string[],
   ): void {
@@ -143,7 +143,7 @@ export class BackendSelector {
 
   #replace(
     { backend, hasDrawn, lossReason }: ActiveBackend,
-    options: RenderOptions,
+    options: BackendOptions,
     previous: Backend | null,
     reasonBefore: string,
   ): void {
@@ -162,7 +162,7 @@ export class BackendSelector {
   /** Sets a backend up, unless the active one already meets the options. */
   async #attempt(
     backend: Backend,
-    options: RenderOptions,
+    options: BackendOptions,
     photo: RefCounted<Photograph>,
     signal: AbortSignal,
   ): Promise<ActiveBackend> {
@@ -200,7 +200,7 @@ export class BackendSelector {
   }
 }
 
-function meets(active: ActiveBackend, backend: Backend, options: RenderOptions): boolean {
+function meets(active: ActiveBackend, backend: Backend, options: BackendOptions): boolean {
   return (
     active.backend === backend &&
     active.options.gamut === options.gamut &&

@@ -2,7 +2,7 @@
 
 import { forbiddenByPolicy } from '../loading/http-errors.js';
 import { openPhoto } from '../loading/load.js';
-import { createDecoder } from '../photo/decoders.js';
+import { createDecoder } from '../photo/create-decoder.js';
 import { createRenderer, prepare } from '../renderers/renderer-factory.js';
 import { withPolicyErrors } from '../shared/content-security-policy.js';
 import { callLater } from '../shared/promises.js';

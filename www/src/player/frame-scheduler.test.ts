@@ -158,7 +158,7 @@ test('the first frame, that of another backend and renderNow are drawn while hid
   await f.finishLoad('a.ltm');
   await f.createRenderer(0);
   assert.equal(f.takeLog().at(-1), 'loaded');
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['cpu']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['cpu']) });
   await f.createRenderer(1);
   assert.deepEqual(f.takeLog().slice(-2), ['cpu draws flood', 'free webgpu']);
   f.session.redraw();
@@ -313,7 +313,7 @@ test('renderNow draws in full quality during an animation', async () => {
 
 test('another backend and another photograph start in full quality', async () => {
   const f = await reducedSession();
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['cpu']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['cpu']) });
   await f.createRenderer(1);
   assert.deepEqual(f.takeLog().slice(-3), ['cpu draws flood', 'free webgpu', 'quality 1']);
   await animate(f, 20, 60);

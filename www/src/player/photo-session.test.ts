@@ -97,17 +97,17 @@ test('no address is src-missing', () => {
 });
 
 test('the session fails if the photograph cannot be fetched again', async () => {
-  const f = await loadedSession({ ...SETTINGS, renderOptions: withBackends(['cpu']) });
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['webgl2']) });
+  const f = await loadedSession({ ...SETTINGS, backendOptions: withBackends(['cpu']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['webgl2']) });
   await f.failRenderer(1, 'a worker stopped.', 'photo-lost');
   await f.failLoad('a.ltm', new PhotoError('http-network', 'the server cannot be reached'));
   assert.equal(f.takeLog().at(-1), 'failed http-network: the server cannot be reached');
 });
 
 test('a photograph that lost tiles is fetched again, and its picture stays until then', async () => {
-  const f = await loadedSession({ ...SETTINGS, renderOptions: withBackends(['cpu']) });
+  const f = await loadedSession({ ...SETTINGS, backendOptions: withBackends(['cpu']) });
   const frames = f.slowDown();
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['cpu']), output: withExposure(2) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['cpu']), output: withExposure(2) });
   await f.frame();
   const asked = assert.rejects(f.session.renderNow(), { name: 'PhotoError' });
   frames[0]?.fail(new PhotoError('photo-lost', 'a worker stopped.'));
@@ -129,8 +129,8 @@ test('a photograph that lost tiles is fetched again, and its picture stays until
 });
 
 test('if tiles are lost during a setup, the photograph is fetched again and no other backend is tried', async () => {
-  const f = await loadedSession({ ...SETTINGS, renderOptions: withBackends(['cpu']) });
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['webgl2', 'webgpu']) });
+  const f = await loadedSession({ ...SETTINGS, backendOptions: withBackends(['cpu']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['webgl2', 'webgpu']) });
   await f.failRenderer(1, 'a worker stopped.', 'photo-lost');
   assert.deepEqual(f.takeLog(), ['free cpu', 'free a.ltm']);
   assert.equal(f.requests.length, 2);
@@ -144,7 +144,7 @@ test('if tiles are lost during a setup, the photograph is fetched again and no o
 });
 
 test('repeated losses of tiles fail after five fetches without a frame', async () => {
-  const cpu: SessionSettings = { ...SETTINGS, renderOptions: withBackends(['cpu']) };
+  const cpu: SessionSettings = { ...SETTINGS, backendOptions: withBackends(['cpu']) };
   const f = await loadedSession(cpu);
   const frames = f.slowDown();
   f.session.set({ ...cpu, output: withExposure(2) });
@@ -247,7 +247,7 @@ test('a photograph that waits for a search is freed if the session stops', async
 
 test('a preview without a backend, or whose tiles are lost, is not reported', async () => {
   const f = fakeSession();
-  f.session.set({ ...SETTINGS, renderOptions: withBackends(['cpu']) });
+  f.session.set({ ...SETTINGS, backendOptions: withBackends(['cpu']) });
   await f.sendPreview('a.ltm', 0.25);
   await f.failRenderer(0, 'no canvas');
   assert.deepEqual(f.takeLog(), ['loading']);
@@ -281,7 +281,7 @@ test('a failed load keeps the last preview and reports the error', async () => {
 });
 
 test('a request that waits for a preview’s frame is drawn with the photograph', async () => {
-  const cpu = { ...SETTINGS, renderOptions: withBackends(['cpu']) };
+  const cpu = { ...SETTINGS, backendOptions: withBackends(['cpu']) };
   const f = fakeSession();
   const frames = f.slowDown();
   f.session.set(cpu);

@@ -19,7 +19,7 @@ import { Deferred } from '../shared/promises.js';
 import { type ActiveBackend, RefCounted } from './active-backend.js';
 import { BackendSelector } from './backend-selector.js';
 import { FrameScheduler } from './frame-scheduler.js';
-import type { SessionListener, SessionPorts, SessionSettings } from './types.js';
+import type { PhotoSessionListener, SessionPorts, SessionSettings } from './types.js';
 
 /** How often a photograph that loses tiles is fetched again without a frame in between. */
 const MAX_REFETCHES = 5;
@@ -46,7 +46,7 @@ export class PhotoSession {
 
   constructor(
     private readonly ports: SessionPorts,
-    private readonly listener: SessionListener,
+    private readonly listener: PhotoSessionListener,
   ) {
     this.#selector = new BackendSelector(ports.createRenderer, listener, {
       failed: (error) => this.#fail(error),
@@ -78,7 +78,7 @@ export class PhotoSession {
   set(settings: SessionSettings, reload = false): void {
     const previous = this.settings;
     this.settings = settings;
-    this.#selector.options = settings.renderOptions;
+    this.#selector.options = settings.backendOptions;
     const isSameFile =
       previous?.src === settings.src && previous.credentials === settings.credentials;
     if (!previous || reload || !isSameFile) {
@@ -86,10 +86,10 @@ export class PhotoSession {
       this.#refetches = 0;
       this.listener.loadStarted();
       void this.#run(settings, null, '');
-    } else if (previous.renderOptions === settings.renderOptions) {
+    } else if (previous.backendOptions === settings.backendOptions) {
       this.#scheduler.invalidate();
     } else if (this.#photo) {
-      void this.#selector.select(this.#photo, settings.renderOptions, this.backend, '');
+      void this.#selector.select(this.#photo, settings.backendOptions, this.backend, '');
     }
   }
 
@@ -136,7 +136,7 @@ export class PhotoSession {
 
   /** Loads a file, and has it and its previews drawn. `reason` says why `previous` is replaced. */
   async #run(
-    { src, credentials, renderOptions }: SessionSettings,
+    { src, credentials, backendOptions }: SessionSettings,
     previous: Backend | null,
     reason: string,
   ): Promise<void> {
@@ -152,7 +152,7 @@ export class PhotoSession {
         const message = 'There is no photograph to show: set the src attribute.';
         throw new PhotoError('src-missing', message);
       }
-      this.ports.prepare(renderOptions, preparation.signal);
+      this.ports.prepare(backendOptions, preparation.signal);
       const photo = await this.ports.open(src, credentials, {
         signal,
         onProgress: (loaded, total) => {
@@ -181,7 +181,7 @@ export class PhotoSession {
     this.#photo = shared;
     // The canvas of the CPU keeps its picture by itself, and memory may suffice for one photograph only.
     if (backend === 'cpu') this.#selector.active?.free();
-    const options = this.settings?.renderOptions;
+    const options = this.settings?.backendOptions;
     if (!options) return;
     if (!backend) return this.#selector.select(shared, options, previous, reason);
     // Backends that could not draw the preview are not tried again.

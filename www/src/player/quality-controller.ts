@@ -29,7 +29,7 @@ const MAX_DROP_DELAY_FRAMES = 64 * DROP_DELAY_FRAMES;
 const MIN_SAVING = 1 / 4;
 
 /** The quality and the median frame time before the quality was lowered. */
-interface QualityDrop {
+interface QualityBeforeDrop {
   readonly quality: number;
   readonly ms: number;
 }
@@ -45,7 +45,7 @@ export class QualityController {
   #raisedAtFrame = Number.NEGATIVE_INFINITY;
   #raiseDelay = RAISE_DELAY_FRAMES;
   /** The last drop, until its effect is known. */
-  #drop: QualityDrop | null = null;
+  #drop: QualityBeforeDrop | null = null;
   #noDropBeforeFrame = 0;
   #dropDelay = DROP_DELAY_FRAMES;
 
@@ -75,7 +75,7 @@ export class QualityController {
   }
 
   /** A lower quality does not help if the page itself is slow, or its display. */
-  #hasHelped(drop: QualityDrop, ms: number): boolean {
+  #hasHelped(drop: QualityBeforeDrop, ms: number): boolean {
     const idealSaving = 1 - this.quality / drop.quality;
     return ms <= drop.ms * (1 - MIN_SAVING * idealSaving);
   }

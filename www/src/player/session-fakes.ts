@@ -11,7 +11,7 @@ import type { SessionSettings } from './types.js';
 export const SETTINGS: SessionSettings = {
   src: 'a.ltm',
   credentials: 'same-origin',
-  renderOptions: withBackends(['webgpu', 'cpu']),
+  backendOptions: withBackends(['webgpu', 'cpu']),
   light: { name: 'flood', torch: null, image: null },
   output: withExposure(1),
 };

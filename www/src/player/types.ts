@@ -6,7 +6,7 @@ import type { FrameLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LoadOptions } from '../loading/load.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { CreateRenderer, Renderer, RenderOptions } from '../renderers/types.js';
+import type { BackendOptions, CreateRenderer, Renderer } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
 import type { callLater } from '../shared/promises.js';
 
@@ -15,7 +15,7 @@ export interface SessionSettings {
   /** Absolute address; `null` if there is none. */
   readonly src: string | null;
   readonly credentials: RequestCredentials;
-  readonly renderOptions: RenderOptions;
+  readonly backendOptions: BackendOptions;
   readonly light: LightSetting;
   readonly output: OutputSettings;
 }
@@ -31,11 +31,11 @@ export interface FramePorts {
 export interface SessionPorts extends FramePorts {
   open(src: string, credentials: RequestCredentials, options: LoadOptions): Promise<Photograph>;
   /** Warms up the backend that will probably be used, until `signal` is aborted. */
-  prepare(options: RenderOptions, signal: AbortSignal): void;
+  prepare(options: BackendOptions, signal: AbortSignal): void;
   readonly createRenderer: CreateRenderer;
 }
 
-export interface SessionListener {
+export interface PhotoSessionListener {
   /** A load starts; the last photograph is gone. */
   loadStarted(): void;
   progress: LoadOptions['onProgress'];

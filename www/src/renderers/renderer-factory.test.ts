@@ -17,7 +17,7 @@ import { PLAIN, withBackends, withExposure } from './settings-fakes.js';
 const SETTINGS: SessionSettings = {
   src: 'a.ltm',
   credentials: 'same-origin',
-  renderOptions: withBackends(['cpu']),
+  backendOptions: withBackends(['cpu']),
   light: { name: 'flood', torch: null, image: null },
   output: withExposure(1),
 };
@@ -114,7 +114,7 @@ test('frames that wait during a change of the backend are drawn by the new one, 
   frames.shift()?.();
   await settle();
   const waiting = session.renderNow();
-  session.set({ ...SETTINGS, renderOptions: withBackends(['webgl2']) });
+  session.set({ ...SETTINGS, backendOptions: withBackends(['webgl2']) });
   const during = session.renderNow();
   await settle();
   for (const worker of workers) worker.catchUp();
@@ -185,7 +185,7 @@ function openingDevices() {
 test('unavailable backends leave the tiles in the workers', async (t) => {
   const { open, requested, answers } = openingDevices();
   const { session, workers, tilesInModules, changes } = await startSession(t, open);
-  session.set({ ...SETTINGS, renderOptions: withBackends(['webgpu', 'webgl2', 'cpu']) });
+  session.set({ ...SETTINGS, backendOptions: withBackends(['webgpu', 'webgl2', 'cpu']) });
   await settle();
   await answers(false);
   await answers(false);
@@ -198,14 +198,14 @@ test('unavailable backends leave the tiles in the workers', async (t) => {
 test('a software renderer is skipped unless the page names backends', async (t) => {
   const { session, tilesInModules, changes, created, released } = await startSession(t);
   const order = withBackends(['webgl2', 'cpu']);
-  session.set({ ...SETTINGS, renderOptions: { ...order, software: false } });
+  session.set({ ...SETTINGS, backendOptions: { ...order, software: false } });
   await session.renderNow();
   assert.deepEqual([tilesInModules.size, changes, created], [0, ['cpu'], []]);
-  session.set({ ...SETTINGS, renderOptions: order });
+  session.set({ ...SETTINGS, backendOptions: order });
   await session.renderNow();
   assert.deepEqual([changes, created], [['cpu', 'webgl2'], ['webgl2 of 4']]);
   // It is replaced once the page names none any more.
-  session.set({ ...SETTINGS, renderOptions: { ...order, software: false } });
+  session.set({ ...SETTINGS, backendOptions: { ...order, software: false } });
   await session.renderNow();
   assert.deepEqual(changes, ['cpu', 'webgl2', 'cpu']);
   session.stop();
@@ -215,7 +215,7 @@ test('a software renderer is skipped unless the page names backends', async (t) 
 test('a backend that does not answer does not delay the next choice, and gets no tiles', async (t) => {
   const { open, requested, answers } = openingDevices();
   const { session, workers, created } = await startSession(t, open);
-  session.set({ ...SETTINGS, renderOptions: withBackends(['webgpu']) });
+  session.set({ ...SETTINGS, backendOptions: withBackends(['webgpu']) });
   await settle();
   session.set(SETTINGS);
   assert.equal((await session.renderNow()).kernel, 'fake, 2 workers');
@@ -237,7 +237,7 @@ test('a freed renderer rejects and moves no tiles', async (t) => {
   ).createRenderer(
     'cpu',
     photograph,
-    SETTINGS.renderOptions,
+    SETTINGS.backendOptions,
     () => {},
     new AbortController().signal,
   );

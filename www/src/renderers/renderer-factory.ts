@@ -7,7 +7,7 @@ import { startWorker } from '../engine/worker-server.js';
 import { messageOf, PhotoError } from '../shared/errors.js';
 import type { CpuRenderers } from './cpu/cpu-renderer.js';
 import type { GpuRenderers } from './gpu/gpu-renderer.js';
-import type { CreateRenderer, RenderOptions } from './types.js';
+import type { BackendOptions, CreateRenderer } from './types.js';
 
 /** More workers would wait for memory and for each other. */
 const MAX_WORKERS = 4;
@@ -46,7 +46,7 @@ export function rendererFactory({
     return signal.aborted ? () => {} : renderers.warmUp();
   };
   /** Warms up the first backend that works until `signal` is aborted. Errors are left to `createRenderer`. */
-  const prepare = async ({ backends, software }: RenderOptions, signal: AbortSignal) => {
+  const prepare = async ({ backends, software }: BackendOptions, signal: AbortSignal) => {
     for (const backend of backends) {
       if (signal.aborted) return;
       try {

@@ -7,7 +7,7 @@ import type { LightSetting } from '../lights/light-setting.js';
 import type { Photograph } from '../photo/photograph.js';
 
 /** Which backends may draw, and in which colours. */
-export interface RenderOptions {
+export interface BackendOptions {
   /** In the order in which they are tried. */
   readonly backends: readonly Backend[];
   /** Whether WebGPU and WebGL2 may be software renderers. */
@@ -42,7 +42,7 @@ export interface Renderer extends Freeable {
 export type CreateRenderer = (
   backend: Backend,
   photo: Photograph,
-  options: RenderOptions,
+  options: BackendOptions,
   onLost: (reason: string) => void,
   signal: AbortSignal,
 ) => Promise<Renderer>;

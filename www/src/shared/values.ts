@@ -36,7 +36,7 @@ export function clampToPicture({ x, y }: PicturePoint): PicturePoint {
   return { x: clampAndRound(x, 0, 1), y: clampAndRound(y, 0, 1) };
 }
 
-/** The nearest value in a range, with four decimals: far finer than a pixel, and short in shared states. */
+/** The nearest value in a range, with four decimals: far finer than a pixel, and short in share links. */
 export function clampAndRound(value: number, min: number, max: number): number {
   return Math.round(Math.min(max, Math.max(min, value)) * 1e4) / 1e4;
 }

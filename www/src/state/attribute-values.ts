@@ -1,4 +1,4 @@
-/** Parsers of all attributes that are not plain text; `null` is an absent one. As in `parse-settings`, they throw. */
+/** Parsers of all attributes that are not plain text; `null` is an absent one. As in `setting-parsers`, they throw. */
 
 import { PhotoError } from '../shared/errors.js';
 import { BACKENDS, type Backend, type CrossOrigin } from '../shared/names.js';
@@ -10,7 +10,7 @@ import {
   parseNumber,
   parseTone,
   parseWhiteBalance,
-} from '../shared/parse-settings.js';
+} from '../shared/setting-parsers.js';
 
 const LOADINGS = ['auto', 'lazy', 'eager'] as const;
 const REVEALS = ['auto', 'interaction', 'manual'] as const;
@@ -28,9 +28,9 @@ const MAX_KIOSK_SECONDS = 86_400;
 const EMPTY_KIOSK_SECONDS = 60;
 
 /** When the photograph is fetched: close to the viewport, in the viewport, or immediately. */
-export type Loading = (typeof LOADINGS)[number];
+export type LoadingMode = (typeof LOADINGS)[number];
 /** When the poster gives way to the picture: when it is drawn, on a press, or by `dismissPoster()`. */
-export type Reveal = (typeof REVEALS)[number];
+export type RevealMode = (typeof REVEALS)[number];
 
 type AttributeText = string | null;
 

@@ -6,7 +6,7 @@
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
 import type { LightName } from '../shared/names.js';
-import { reuse } from '../shared/reuse.js';
+import { reuse } from '../shared/shallow-equal.js';
 import type { PicturePoint } from '../shared/values.js';
 
 /** As in a `lightchange` event. */

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import { isVideoAddress } from '../lights/light-media.js';
 import { PENDING_IMAGE } from '../lights/light-setting.js';
-import type { LinearLight } from '../lights/light-source.js';
+import type { LinearImage } from '../lights/light-source.js';
 import * as sourceSupport from '../lights/light-sources.js';
 import type { PhotoError } from '../shared/errors.js';
 import { LightState } from './light-state.js';
@@ -17,7 +17,7 @@ const OPTIONS: LightOptions = {
   color: null,
 };
 const RED = { factors: [1, 0, 0], hex: '#ff0000' } as const;
-const SOURCE: LinearLight = { data: new Float32Array(3), width: 1, height: 1 };
+const SOURCE: LinearImage = { data: new Float32Array(3), width: 1, height: 1 };
 
 function createLight(options = OPTIONS, fetchSupport = async () => sourceSupport) {
   const calls: string[] = [];

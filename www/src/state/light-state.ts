@@ -11,7 +11,7 @@ import type { LightSourceListener, LightSourceObserver } from '../lights/light-s
 import type * as SourceSupport from '../lights/light-sources.js';
 import { missingScript, type PhotoError } from '../shared/errors.js';
 import { LIGHTS, type LightName } from '../shared/names.js';
-import { reuse } from '../shared/reuse.js';
+import { reuse } from '../shared/shallow-equal.js';
 import { clampToPicture, type PicturePoint } from '../shared/values.js';
 import type { LightOptions } from './options.js';
 

@@ -1,7 +1,7 @@
 /** The element's options: the values of all its attributes. Immutable: a change makes a new object. */
 
 import { parseLightColor } from '../lights/light-color.js';
-import { reuse } from '../shared/reuse.js';
+import { reuse } from '../shared/shallow-equal.js';
 import { CENTRE, type PicturePoint } from '../shared/values.js';
 import type { AttributeReader } from './attribute-reader.js';
 

@@ -1,9 +1,9 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { Loading, Reveal } from './attribute-values.js';
+import type { LoadingMode, RevealMode } from './attribute-values.js';
 import { RevealState } from './reveal.js';
 
-const options = (loading: Loading, reveal: Reveal = 'auto') => ({ loading, reveal });
+const options = (loading: LoadingMode, reveal: RevealMode = 'auto') => ({ loading, reveal });
 
 test('a photograph is fetched at once, near the viewport, or in the viewport', () => {
   const state = new RevealState();

@@ -4,17 +4,17 @@ import type { OutputSettings } from '../engine/output-settings.js';
 import { multiplyRgb, parseLightColor } from '../lights/light-color.js';
 import type { PhotoError } from '../shared/errors.js';
 import type { LightName } from '../shared/names.js';
-import { reuse } from '../shared/reuse.js';
+import { reuse } from '../shared/shallow-equal.js';
 import { CENTRE, clampToPicture } from '../shared/values.js';
 import { PARSERS } from './attribute-values.js';
 import { type LightOverrides, LightState, type LightStateListener } from './light-state.js';
 import type { ElementOptions } from './options.js';
 import { RevealState } from './reveal.js';
-import { formatState, parseState } from './share-state.js';
-import { clampView, FULL_VIEW, type PhotoView } from './viewport.js';
+import { formatState, parseState } from './share-link.js';
+import { clampView, FULL_VIEW, type ZoomView } from './viewport.js';
 
 /** A built-in light for `setLight`. Absent fields keep their values. */
-export interface LightPose {
+export interface LightUpdate {
   readonly name?: LightName;
   /** The torch's position, 0 to 1 across the picture. */
   readonly x?: number;
@@ -69,10 +69,10 @@ export class ViewerState {
   }
 
   /** The same object as last time, unless the view has changed. The setter clamps. */
-  get view(): PhotoView {
+  get view(): ZoomView {
     return this.#view;
   }
-  set view(view: PhotoView) {
+  set view(view: ZoomView) {
     this.#view = reuse(this.#view, clampView(view, this.#options.maxZoom));
   }
 
@@ -96,7 +96,7 @@ export class ViewerState {
   }
 
   /** @throws {TypeError | PhotoError} for an invalid field, before anything changes */
-  setLight({ name, x, y, size, color }: LightPose): void {
+  setLight({ name, x, y, size, color }: LightUpdate): void {
     const overrides: { -readonly [K in keyof LightOverrides]?: LightOverrides[K] } = {};
     if (name !== undefined) overrides.name = PARSERS.light(name);
     if (x !== undefined || y !== undefined) {
@@ -139,7 +139,7 @@ export class ViewerState {
     });
   }
 
-  /** Restores a shared state. Returns an error for each invalid value. */
+  /** Restores the state of a share link. Returns an error for each invalid value. */
   restore(text: string): readonly PhotoError[] {
     const { state, errors } = parseState(text);
     const { light: name, torch, size, color, exposure, view } = state;

@@ -3,16 +3,16 @@ import test from 'node:test';
 import {
   clampView,
   FULL_VIEW,
-  type PhotoView,
   pan,
   toggleZoom,
   toPicture,
   toViewport,
   wheelFactor,
+  type ZoomView,
   zoomAt,
 } from './viewport.js';
 
-const CLOSE: PhotoView = { zoom: 4, x: 0.4, y: 0.6 };
+const CLOSE: ZoomView = { zoom: 4, x: 0.4, y: 0.6 };
 
 function near(a: number, b: number): void {
   assert.ok(Math.abs(a - b) < 1e-3, `${a} and ${b}`);

@@ -6,7 +6,7 @@
 import { CENTRE, clampAndRound, type PicturePoint } from '../shared/values.js';
 
 /** The part of the picture that is shown. */
-export interface PhotoView {
+export interface ZoomView {
   /** Magnification; 1 shows the whole picture. */
   readonly zoom: number;
   /** The point of the picture at the centre: (0, 0) is the top left corner, (1, 1) the bottom right corner. */
@@ -14,7 +14,7 @@ export interface PhotoView {
   readonly y: number;
 }
 
-export const FULL_VIEW: PhotoView = { zoom: 1, ...CENTRE };
+export const FULL_VIEW: ZoomView = { zoom: 1, ...CENTRE };
 const DOUBLE_TAP_ZOOM = 2.5;
 export const ZOOM_STEP = 1.5;
 const WHEEL_PIXELS_PER_DOUBLING = 240;
@@ -24,23 +24,23 @@ const MAX_WHEEL_PIXELS = 120;
 const WHEEL_LINE_PIXELS = 40;
 
 /** The nearest view inside the picture, with a magnification of at most `maxZoom`. */
-export function clampView({ zoom, x, y }: PhotoView, maxZoom: number): PhotoView {
+export function clampView({ zoom, x, y }: ZoomView, maxZoom: number): ZoomView {
   const edge = 0.5 / Math.min(maxZoom, Math.max(1, zoom));
   const clampCentre = (value: number) => clampAndRound(value, edge, 1 - edge);
   return { zoom: clampAndRound(zoom, 1, maxZoom), x: clampCentre(x), y: clampCentre(y) };
 }
 
-export function toPicture(view: PhotoView, { x, y }: PicturePoint): PicturePoint {
+export function toPicture(view: ZoomView, { x, y }: PicturePoint): PicturePoint {
   return { x: view.x + (x - 0.5) / view.zoom, y: view.y + (y - 0.5) / view.zoom };
 }
 
 /** From picture to viewport coordinates; outside of 0 to 1 the point is not visible. */
-export function toViewport(view: PhotoView, { x, y }: PicturePoint): PicturePoint {
+export function toViewport(view: ZoomView, { x, y }: PicturePoint): PicturePoint {
   return { x: (x - view.x) * view.zoom + 0.5, y: (y - view.y) * view.zoom + 0.5 };
 }
 
 /** Magnifies by `factor`. The picture stays fixed at the viewport point `at`; the centre may lie beyond the edges. */
-export function zoomAt(view: PhotoView, factor: number, at: PicturePoint, maxZoom: number) {
+export function zoomAt(view: ZoomView, factor: number, at: PicturePoint, maxZoom: number) {
   const fixed = toPicture(view, at);
   const zoom = Math.min(maxZoom, Math.max(1, view.zoom * factor));
   const x = fixed.x - (at.x - 0.5) / zoom;
@@ -49,12 +49,12 @@ export function zoomAt(view: PhotoView, factor: number, at: PicturePoint, maxZoo
 }
 
 /** Moves the picture by (dx, dy) in viewport coordinates, perhaps beyond its edges. */
-export function pan({ zoom, x, y }: PhotoView, dx: number, dy: number): PhotoView {
+export function pan({ zoom, x, y }: ZoomView, dx: number, dy: number): ZoomView {
   return { zoom, x: x - dx / zoom, y: y - dy / zoom };
 }
 
 /** Zooms in at a viewport point, or back out to the whole picture. */
-export function toggleZoom(view: PhotoView, at: PicturePoint, maxZoom: number): PhotoView {
+export function toggleZoom(view: ZoomView, at: PicturePoint, maxZoom: number): ZoomView {
   return view.zoom > 1 ? FULL_VIEW : zoomAt(view, DOUBLE_TAP_ZOOM, at, maxZoom);
 }
 

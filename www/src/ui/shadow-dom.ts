@@ -3,7 +3,7 @@
 import { type Language, t } from '../i18n/strings.js';
 import type { PicturePoint } from '../shared/values.js';
 import type { ElementOptions } from '../state/options.js';
-import { type PhotoView, toViewport } from '../state/viewport.js';
+import { toViewport, type ZoomView } from '../state/viewport.js';
 import { adoptStyles } from './adopted-styles.js';
 import { createElement, createSlot, updateAttribute, updateText } from './dom-helpers.js';
 import { createIcon, LIGHT_ICON } from './icons.js';
@@ -136,7 +136,7 @@ export class ShadowDom {
   }
 
   /** Shows a part of the picture. The handle is at the torch's position, or at the nearest edge of the view. */
-  updateView(view: PhotoView, torch: PicturePoint, description: string): void {
+  updateView(view: ZoomView, torch: PicturePoint, description: string): void {
     const { zoom } = view;
     this.viewport.classList.toggle('zoomed', zoom > 1);
     if (this.#canvas) {

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::{LANES, MAX_PIXELS, Simd, SimdKernel};
-use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode};
+use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCodes};
 
 /// Proves that the CPU has AVX2.
 #[derive(Clone, Copy, Debug)]
@@ -36,10 +36,10 @@ impl Avx2 {
 // All intrinsics below need AVX2 at most, which the token in `self` proves.
 impl Simd for Avx2 {
     const LINES: usize = 1;
-    type Vector = Avx2Vector;
-    type Spilled = [f32; LANES];
+    type SimdVector = Avx2Vector;
+    type LaneArray = [f32; LANES];
     const PIXELS: usize = 2;
-    type TexelVector = Avx2Vector;
+    type PackedTexels = Avx2Vector;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Avx2Vector {
@@ -73,7 +73,7 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn load_codes(self, codes: *const TexelCode) -> Avx2Vector {
+    unsafe fn load_codes(self, codes: *const TexelCodes) -> Avx2Vector {
         // SAFETY: the token proves AVX2; the caller vouches for two texels.
         Avx2Vector(unsafe {
             _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(codes.cast())))

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::{LANES, MAX_PIXELS, Simd, SimdKernel};
-use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode};
+use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCodes};
 
 /// Proves that the CPU has AVX-512 F, DQ and VL, which include AVX2.
 #[derive(Clone, Copy, Debug)]
@@ -39,10 +39,10 @@ impl Avx512 {
 // All intrinsics below need AVX-512 F, DQ and VL at most, which the token in `self` proves.
 impl Simd for Avx512 {
     const LINES: usize = 2;
-    type Vector = Avx512Vector;
-    type Spilled = [f32; 2 * LANES];
+    type SimdVector = Avx512Vector;
+    type LaneArray = [f32; 2 * LANES];
     const PIXELS: usize = 4;
-    type TexelVector = Avx512Vector;
+    type PackedTexels = Avx512Vector;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Avx512Vector {
@@ -112,7 +112,7 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn load_codes(self, codes: *const TexelCode) -> Avx512Vector {
+    unsafe fn load_codes(self, codes: *const TexelCodes) -> Avx512Vector {
         // SAFETY: the token proves AVX-512; the caller vouches for four texels.
         Avx512Vector(unsafe {
             _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(codes.cast())))

@@ -9,7 +9,7 @@ use std::ops::{Add, Mul, Sub};
 
 use bytemuck::Pod;
 
-use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode};
+use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCodes};
 
 /// Lane-wise `+`, `-` and `*` of a vector by intrinsics.
 #[cfg(any(
@@ -55,7 +55,7 @@ mod simd128;
 #[cfg(target_arch = "x86_64")]
 use {avx2::Avx2, avx512::Avx512};
 
-pub use scalar::Scalar;
+pub use scalar::ScalarFallback;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 use simd128::Simd128;
 
@@ -69,9 +69,9 @@ pub const MAX_LINES: usize = if cfg!(target_arch = "x86_64") { 2 } else { 1 };
 pub const MAX_PIXELS: usize = if cfg!(target_arch = "x86_64") { 4 } else { 1 };
 
 /// Lane-wise arithmetic.
-pub trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
+pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
 
-impl<V: Copy + Add<Output = V> + Sub<Output = V> + Mul<Output = V>> Vector for V {}
+impl<V: Copy + Add<Output = V> + Sub<Output = V> + Mul<Output = V>> SimdVector for V {}
 
 /// A token: proves that the CPU has an instruction set, and gives access to its operations.
 ///
@@ -80,42 +80,42 @@ pub trait Simd: Copy {
     /// Lines in a vector.
     const LINES: usize;
     /// `LINES` lines.
-    type Vector: Vector;
+    type SimdVector: SimdVector;
     /// A vector spilled to memory.
-    type Spilled: Pod;
+    type LaneArray: Pod;
     /// Pixels that are combined at once, at most [`MAX_PIXELS`].
     const PIXELS: usize;
     /// A vector of `PIXELS` texels, one for each pixel.
-    type TexelVector: Vector;
+    type PackedTexels: SimdVector;
 
-    fn splat(self, value: f32) -> Self::Vector;
+    fn splat(self, value: f32) -> Self::SimdVector;
 
-    fn unspill(self, values: &Self::Spilled) -> Self::Vector;
+    fn unspill(self, values: &Self::LaneArray) -> Self::SimdVector;
 
-    fn spill(self, vector: Self::Vector, to: &mut Self::Spilled);
+    fn spill(self, vector: Self::SimdVector, to: &mut Self::LaneArray);
 
     /// One value for each line.
     #[inline(always)]
-    fn splat_lines(self, value: impl Fn(usize) -> f32) -> Self::Vector {
+    fn splat_lines(self, value: impl Fn(usize) -> f32) -> Self::SimdVector {
         const { assert!(Self::LINES == 1) };
         self.splat(value(0))
     }
 
     /// Reads each line from memory.
     #[inline(always)]
-    fn load<'a>(self, line: impl Fn(usize) -> &'a [f32; LANES]) -> Self::Vector {
+    fn load<'a>(self, line: impl Fn(usize) -> &'a [f32; LANES]) -> Self::SimdVector {
         const { assert!(Self::LINES == 1) };
         self.unspill(bytemuck::cast_ref(line(0)))
     }
 
     /// Writes line number `line` to memory.
     #[inline(always)]
-    fn store(self, vector: Self::Vector, _line: usize, to: &mut [f32; LANES]) {
+    fn store(self, vector: Self::SimdVector, _line: usize, to: &mut [f32; LANES]) {
         const { assert!(Self::LINES == 1) };
         self.spill(vector, bytemuck::cast_mut(to));
     }
 
-    fn zero_texels(self) -> Self::TexelVector;
+    fn zero_texels(self) -> Self::PackedTexels;
 
     /// Reads one texel for each pixel.
     ///
@@ -124,13 +124,13 @@ pub trait Simd: Copy {
     unsafe fn load_texels(
         self,
         from: [*const [f32; TEXEL_COMPONENTS]; MAX_PIXELS],
-    ) -> Self::TexelVector;
+    ) -> Self::PackedTexels;
 
     /// Reads the codes of each pixel's texel.
     ///
     /// # Safety
     /// `codes` is valid to read for `PIXELS` texels.
-    unsafe fn load_codes(self, codes: *const TexelCode) -> Self::TexelVector;
+    unsafe fn load_codes(self, codes: *const TexelCodes) -> Self::PackedTexels;
 
     /// Writes each pixel's channels: the sum of the channel's four lanes, times its gain.
     ///
@@ -138,7 +138,7 @@ pub trait Simd: Copy {
     /// `to` is valid to write for `PIXELS` pixels.
     unsafe fn store_sums(
         self,
-        channels: [Self::TexelVector; CHANNELS],
+        channels: [Self::PackedTexels; CHANNELS],
         gain: [f32; CHANNELS],
         to: *mut [f32; CHANNELS],
     );
@@ -168,7 +168,7 @@ pub enum SimdLevel {
         all(target_arch = "wasm32", target_feature = "simd128", not(test)),
         expect(dead_code)
     )]
-    Scalar(Scalar),
+    ScalarFallback(ScalarFallback),
 }
 
 impl SimdLevel {
@@ -184,7 +184,7 @@ impl SimdLevel {
         #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
         return Self::Simd128(Simd128::detect());
         #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
-        Self::Scalar(Scalar)
+        Self::ScalarFallback(ScalarFallback)
     }
 
     /// Runs a kernel by this instruction set.
@@ -197,7 +197,7 @@ impl SimdLevel {
             Self::Avx2(simd) => simd.run(kernel),
             #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
             Self::Simd128(simd) => kernel.run(simd),
-            Self::Scalar(simd) => kernel.run(simd),
+            Self::ScalarFallback(simd) => kernel.run(simd),
         }
     }
 }
@@ -216,7 +216,7 @@ mod tests {
                 Avx2::detect().map(Self::Avx2),
                 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
                 Some(Self::Simd128(Simd128::detect())),
-                Some(Self::Scalar(Scalar)),
+                Some(Self::ScalarFallback(ScalarFallback)),
             ];
             levels.into_iter().flatten()
         }

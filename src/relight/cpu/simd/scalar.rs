@@ -3,11 +3,11 @@
 use std::ops::{Add, Mul, Sub};
 
 use super::{LANES, MAX_PIXELS, Simd};
-use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode};
+use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCodes};
 
 /// The token of the baseline, which every CPU has.
 #[derive(Clone, Copy, Debug)]
-pub struct Scalar;
+pub struct ScalarFallback;
 
 /// A line, or a texel.
 #[derive(Clone, Copy, Debug)]
@@ -33,25 +33,25 @@ macro_rules! impl_lanewise {
 
 impl_lanewise!(Add add +=, Sub sub -=, Mul mul *=);
 
-impl Simd for Scalar {
+impl Simd for ScalarFallback {
     const LINES: usize = 1;
-    type Vector = ScalarVector<LANES>;
-    type Spilled = [f32; LANES];
+    type SimdVector = ScalarVector<LANES>;
+    type LaneArray = [f32; LANES];
     const PIXELS: usize = 1;
-    type TexelVector = ScalarTexel;
+    type PackedTexels = ScalarTexel;
 
     #[inline(always)]
-    fn splat(self, value: f32) -> Self::Vector {
+    fn splat(self, value: f32) -> Self::SimdVector {
         ScalarVector([value; LANES])
     }
 
     #[inline(always)]
-    fn unspill(self, values: &[f32; LANES]) -> Self::Vector {
+    fn unspill(self, values: &[f32; LANES]) -> Self::SimdVector {
         ScalarVector(*values)
     }
 
     #[inline(always)]
-    fn spill(self, vector: Self::Vector, to: &mut [f32; LANES]) {
+    fn spill(self, vector: Self::SimdVector, to: &mut [f32; LANES]) {
         *to = vector.0;
     }
 
@@ -67,7 +67,7 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    unsafe fn load_codes(self, codes: *const TexelCode) -> ScalarTexel {
+    unsafe fn load_codes(self, codes: *const TexelCodes) -> ScalarTexel {
         // SAFETY: the caller vouches for one texel.
         let [a, b, c, d] = unsafe { *codes };
         ScalarVector([a.into(), b.into(), c.into(), d.into()])

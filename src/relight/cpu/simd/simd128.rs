@@ -3,7 +3,7 @@
 use std::arch::wasm32::*;
 
 use super::{LANES, MAX_PIXELS, Simd};
-use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCode};
+use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCodes};
 
 /// Proves that the module was compiled with simd128: a browser without it does not load the module.
 #[derive(Clone, Copy, Debug)]
@@ -24,10 +24,10 @@ impl Simd128 {
 
 impl Simd for Simd128 {
     const LINES: usize = 1;
-    type Vector = Simd128Vector;
-    type Spilled = [f32; LANES];
+    type SimdVector = Simd128Vector;
+    type LaneArray = [f32; LANES];
     const PIXELS: usize = 1;
-    type TexelVector = Simd128Vector;
+    type PackedTexels = Simd128Vector;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Simd128Vector {
@@ -61,7 +61,7 @@ impl Simd for Simd128 {
     }
 
     #[inline(always)]
-    unsafe fn load_codes(self, codes: *const TexelCode) -> Simd128Vector {
+    unsafe fn load_codes(self, codes: *const TexelCodes) -> Simd128Vector {
         // SAFETY: the caller vouches for one texel.
         let codes = unsafe { i32x4_load_extend_i16x4(codes.cast()) };
         Simd128Vector(f32x4_convert_i32x4(codes))

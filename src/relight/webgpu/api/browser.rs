@@ -3,11 +3,11 @@
 mod bindings;
 
 use bindings as js;
-use bindings::{Dictionary, dictionary, list};
 pub use bindings::{
     GpuCommandEncoder as CommandEncoder, GpuPipeline as ComputePipeline,
     GpuPipeline as RenderPipeline,
 };
+use bindings::{WebIdlDictionary, dictionary, list};
 use wasm_bindgen::{JsCast, JsValue, prelude::Closure};
 use wasm_bindgen_futures::{JsFuture, spawn_local};
 use web_sys::HtmlCanvasElement;
@@ -36,7 +36,7 @@ pub struct DeviceQueue {
 /// A texture and a view of all of it. Dropping it frees the device's memory, of which the garbage collector does not
 /// know.
 #[derive(Debug)]
-pub struct Texture {
+pub struct WebGpuTexture {
     texture: js::GpuResource,
     pub view: TextureView,
 }
@@ -148,7 +148,7 @@ impl DeviceQueue {
     }
 
     /// Creates a texture for these bits of [`usage`].
-    pub fn create_texture(&self, descriptor: &TextureDescriptor, usage: u32) -> Texture {
+    pub fn create_texture(&self, descriptor: &TextureDescriptor, usage: u32) -> WebGpuTexture {
         let layers = descriptor.layers.unwrap_or(1);
         let texture = self.device.create_texture(&dictionary(&[
             ("label", descriptor.label.into()),
@@ -161,11 +161,17 @@ impl DeviceQueue {
             None => "2d",
         };
         let view = texture.create_view(&dictionary(&[("dimension", dimension.into())]));
-        Texture { texture, view }
+        WebGpuTexture { texture, view }
     }
 
     /// Writes a rectangle of one layer, from that column, row and layer on.
-    pub fn write_texture(&self, texture: &Texture, texels: &[u8], at: [u32; 3], extent: Extent) {
+    pub fn write_texture(
+        &self,
+        texture: &WebGpuTexture,
+        texels: &[u8],
+        at: [u32; 3],
+        extent: Extent,
+    ) {
         let to = dictionary(&[
             ("texture", texture.texture.clone().into()),
             ("origin", list(at.map(JsValue::from))),
@@ -182,7 +188,7 @@ impl DeviceQueue {
     /// What the browser throws, for instance for pictures of another origin.
     pub fn write_image(
         &self,
-        texture: &Texture,
+        texture: &WebGpuTexture,
         image: &JsValue,
         extent: Extent,
     ) -> Result<(), JsValue> {
@@ -321,7 +327,7 @@ impl CanvasContext {
     }
 }
 
-impl Drop for Texture {
+impl Drop for WebGpuTexture {
     fn drop(&mut self) {
         self.texture.destroy();
     }
@@ -339,13 +345,13 @@ fn watch_loss(device: &js::GpuDevice) -> DeviceLoss {
     let (recorder, lost) = (loss.clone(), device.lost());
     spawn_local(async move {
         if let Ok(info) = JsFuture::from(lost).await {
-            let info: Dictionary = info.unchecked_into();
+            let info: WebIdlDictionary = info.unchecked_into();
             let reason = info.get("reason").as_string().unwrap_or_default();
             let _ = recorder.set([reason, message(&info)].join(" "));
         }
     });
     let recorder = loss.clone();
-    let listener = Closure::<dyn FnMut(Dictionary)>::new(move |event: Dictionary| {
+    let listener = Closure::<dyn FnMut(WebIdlDictionary)>::new(move |event: WebIdlDictionary| {
         let _ = recorder.set(message(event.get("error").unchecked_ref()));
     });
     device.set_onuncapturederror(&listener.into_js_value());
@@ -353,11 +359,11 @@ fn watch_loss(device: &js::GpuDevice) -> DeviceLoss {
 }
 
 /// The message of a `GPUError` or `GPUDeviceLostInfo`.
-fn message(info: &Dictionary) -> String {
+fn message(info: &WebIdlDictionary) -> String {
     info.get("message").as_string().unwrap_or_default()
 }
 
-fn stage(module: &JsValue, entry_point: &str) -> Dictionary {
+fn stage(module: &JsValue, entry_point: &str) -> WebIdlDictionary {
     dictionary(&[
         ("module", module.clone()),
         ("entryPoint", entry_point.into()),

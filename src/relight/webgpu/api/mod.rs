@@ -17,8 +17,8 @@ use native as system;
 #[cfg(target_arch = "wasm32")]
 pub use browser::CanvasContext;
 pub use system::{
-    BindGroup, ComputePipeline, DeviceQueue, RenderPipeline, Texture, TextureView, UniformBuffer,
-    record_dispatches, record_draw,
+    BindGroup, ComputePipeline, DeviceQueue, RenderPipeline, TextureView, UniformBuffer,
+    WebGpuTexture, record_dispatches, record_draw,
 };
 
 /// The interface's name in errors.
@@ -36,7 +36,7 @@ pub mod usage {
 
 /// The resource of a binding.
 pub enum BindingResource<'a> {
-    Texture(&'a Texture),
+    Texture(&'a WebGpuTexture),
     Uniforms(&'a UniformBuffer),
 }
 

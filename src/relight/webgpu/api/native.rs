@@ -27,7 +27,7 @@ pub struct DeviceQueue {
 
 /// A texture and a view of all of it. wgpu frees resources when their last user is dropped.
 #[derive(Debug)]
-pub struct Texture {
+pub struct WebGpuTexture {
     pub texture: wgpu::Texture,
     pub view: TextureView,
 }
@@ -152,7 +152,7 @@ impl DeviceQueue {
     }
 
     /// Creates a texture for these bits of [`usage`](super::usage).
-    pub fn create_texture(&self, descriptor: &TextureDescriptor, usage: u32) -> Texture {
+    pub fn create_texture(&self, descriptor: &TextureDescriptor, usage: u32) -> WebGpuTexture {
         let texture = self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some(descriptor.label),
             size: size(descriptor.extent, descriptor.layers.unwrap_or(1)),
@@ -171,13 +171,13 @@ impl DeviceQueue {
             dimension: Some(dimension),
             ..Default::default()
         });
-        Texture { texture, view }
+        WebGpuTexture { texture, view }
     }
 
     /// Writes a rectangle of one layer, from that column, row and layer on.
     pub fn write_texture(
         &self,
-        texture: &Texture,
+        texture: &WebGpuTexture,
         texels: &[u8],
         [x, y, z]: [u32; 3],
         extent: Extent,

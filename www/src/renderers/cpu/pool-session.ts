@@ -1,12 +1,12 @@
 /** A photograph in the worker pool: moves its tiles and relights it, one row range in each worker. */
 
 import type { Light } from '../../engine/types.js';
-import type { PhotoDescriptor, TileBytes, TileSession } from '../../photo/types.js';
+import type { PhotoDescriptor, SerialisedTile, WorkerTiles } from '../../photo/types.js';
 import { type PhotoError, photoReleased } from '../../shared/errors.js';
 import { allSettledOrThrow, withTimeout } from '../../shared/promises.js';
 import type { FrameSettings, RelightClient, RowRange, RowTask } from './protocol.js';
 
-export interface RowPixels extends RowRange {
+export interface RenderedRows extends RowRange {
   /** RGBA, row by row. */
   readonly pixels: ArrayBuffer;
 }
@@ -22,7 +22,7 @@ interface WorkerPart extends TileRowRange {
   pixels: ArrayBuffer | null;
 }
 
-export class PoolSession implements TileSession {
+export class PoolSession implements WorkerTiles {
   readonly #width: number;
   readonly #parts: readonly WorkerPart[];
   /** Whether the workers know their light rows; false while tiles are moved. */
@@ -64,12 +64,12 @@ export class PoolSession implements TileSession {
     );
   }
 
-  async put(index: number, bytes: TileBytes): Promise<void> {
+  async put(index: number, bytes: SerialisedTile): Promise<void> {
     this.#isPlanned = false;
     await this.#request(this.#clientOf(index), { kind: 'put', index, bytes }, [bytes.buffer]);
   }
 
-  async take(index: number): Promise<TileBytes> {
+  async take(index: number): Promise<SerialisedTile> {
     this.#isPlanned = false;
     return new Uint8Array(await this.#request(this.#clientOf(index), { kind: 'take', index }));
   }
@@ -89,14 +89,18 @@ export class PoolSession implements TileSession {
    * Relights the whole picture. Call it after `plan`, and again only after it has settled: the next call reuses the
    * memory of the pixels. `light` may be freed at once. The same object is not sent to the workers twice.
    */
-  async relight(light: Light, settings: FrameSettings): Promise<RowPixels[]> {
+  async relight(light: Light, settings: FrameSettings): Promise<RenderedRows[]> {
     const rowPixels = this.#parts.map((part) => this.#relightPart(part, light, settings));
     const picture = await allSettledOrThrow(rowPixels);
     this.events.frameDrawn();
     return picture;
   }
 
-  async #relightPart(part: WorkerPart, light: Light, settings: FrameSettings): Promise<RowPixels> {
+  async #relightPart(
+    part: WorkerPart,
+    light: Light,
+    settings: FrameSettings,
+  ): Promise<RenderedRows> {
     const { firstRow, rows } = part;
     const [first = 0, end = 0] = part.lightRows;
     const rgb =

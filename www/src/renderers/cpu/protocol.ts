@@ -37,11 +37,11 @@ export type RowTask =
     }
   | { readonly kind: 'close' };
 
-export interface RelightTask {
+export interface RelightWorkerTask {
   readonly photo: number;
   readonly task: RowTask;
 }
 
 /** `Ready` is the kernel's name, `Result` the bytes that the task asks for. */
-export type RelightWorker = WorkerLike<RelightTask, string, ArrayBuffer>;
-export type RelightClient = WorkerClient<RelightTask, string, ArrayBuffer>;
+export type RelightWorker = WorkerLike<RelightWorkerTask, string, ArrayBuffer>;
+export type RelightClient = WorkerClient<RelightWorkerTask, string, ArrayBuffer>;

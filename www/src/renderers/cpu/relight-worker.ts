@@ -4,15 +4,15 @@ import { loadCpu } from '../../engine/core-modules.js';
 import { createOutputTransform } from '../../engine/output-settings.js';
 import type { CpuModule, ReceivedPhoto, RowRangeRelighter } from '../../engine/types.js';
 import { serve } from '../../engine/worker-server.js';
-import type { RelightTask, RowRange, RowTask } from './protocol.js';
+import type { RelightWorkerTask, RowRange, RowTask } from './protocol.js';
 
-interface StoredRows extends RowRange {
+interface WorkerPhoto extends RowRange {
   readonly photo: ReceivedPhoto;
   /** `null` while tiles are moved. */
   relighter: RowRangeRelighter | null;
 }
 
-const storedRows = new Map<number, StoredRows>();
+const storedRows = new Map<number, WorkerPhoto>();
 const NO_BYTES = new ArrayBuffer(0);
 
 function handle(module: CpuModule, photo: number, task: RowTask): ArrayBuffer {
@@ -53,12 +53,12 @@ function handle(module: CpuModule, photo: number, task: RowTask): ArrayBuffer {
   }
 }
 
-function relighterOf(module: CpuModule, stored: StoredRows): RowRangeRelighter {
+function relighterOf(module: CpuModule, stored: WorkerPhoto): RowRangeRelighter {
   stored.relighter ??= new module.RowRangeRelighter(stored.photo, stored.firstRow, stored.rows);
   return stored.relighter;
 }
 
-function freeRelighter(stored: StoredRows): void {
+function freeRelighter(stored: WorkerPhoto): void {
   stored.relighter?.free();
   stored.relighter = null;
 }
@@ -67,7 +67,7 @@ serve(async () => {
   const module = await loadCpu();
   return {
     ready: module.cpuKernel(),
-    handle: ({ photo, task }: RelightTask) => {
+    handle: ({ photo, task }: RelightWorkerTask) => {
       const bytes = handle(module, photo, task);
       return [bytes, bytes.byteLength > 0 ? [bytes] : []] as const;
     },

@@ -8,11 +8,11 @@ import {
   type WorkerResponse,
 } from '../../shared/worker-client.js';
 import { PLAIN } from '../settings-fakes.js';
-import type { RowPixels } from './pool-session.js';
-import type { FrameSettings, RelightTask, RelightWorker } from './protocol.js';
+import type { RenderedRows } from './pool-session.js';
+import type { FrameSettings, RelightWorker, RelightWorkerTask } from './protocol.js';
 import { WorkerPool } from './worker-pool.js';
 
-type Request = WorkerRequest<RelightTask>;
+type Request = WorkerRequest<RelightWorkerTask>;
 type Response = WorkerResponse<string, ArrayBuffer>;
 
 export const FRAME: FrameSettings = { output: PLAIN, gamut: 'srgb', quality: 1 };
@@ -107,7 +107,7 @@ export class FakeWorker implements RelightWorker {
 }
 
 /** The tile indices in a picture, from top to bottom. */
-export function tileIndices(picture: readonly RowPixels[]): number[] {
+export function tileIndices(picture: readonly RenderedRows[]): number[] {
   return picture.flatMap(({ firstRow, pixels }) => {
     const tiles = [...new Uint32Array(pixels)];
     assert.equal(tiles[0], firstRow);

@@ -6,9 +6,13 @@
 import type { GraphicsDevice, GraphicsModules } from '../../engine/types.js';
 import { PhotoError } from '../../shared/errors.js';
 import { withTimeout } from '../../shared/promises.js';
-import { BROWSER_GRAPHICS, type GraphicsBackend, type GraphicsPorts } from './graphics-ports.js';
+import {
+  BROWSER_GRAPHICS,
+  type GraphicsBackendName,
+  type GraphicsPorts,
+} from './graphics-ports.js';
 
-export type LoadGraphics = <N extends GraphicsBackend>(name: N) => Promise<GraphicsModules[N]>;
+export type LoadGraphics = <N extends GraphicsBackendName>(name: N) => Promise<GraphicsModules[N]>;
 
 /** A photograph's use of a device. Free its relighter before `release`. */
 export interface DeviceLease {
@@ -35,12 +39,12 @@ const MAX_ANSWER_MS = 10_000;
 const SOFTWARE_RENDERERS = /swiftshader|llvmpipe|lavapipe|softpipe|basic render|software/i;
 
 export class Devices {
-  readonly #devices = new Map<GraphicsBackend, SharedDevice>();
+  readonly #devices = new Map<GraphicsBackendName, SharedDevice>();
   /** The names of adapters, once requested. */
-  readonly #names = new Map<GraphicsBackend, Promise<string | null>>();
+  readonly #names = new Map<GraphicsBackendName, Promise<string | null>>();
   /** Set while WebGPU leaves a request unanswered: no photograph waits for it again. */
   #silence: PhotoError | null = null;
-  readonly #losses = new Map<GraphicsBackend, { count: number; lastMs: number }>();
+  readonly #losses = new Map<GraphicsBackendName, { count: number; lastMs: number }>();
 
   constructor(
     private readonly ports: GraphicsPorts = BROWSER_GRAPHICS,
@@ -50,7 +54,7 @@ export class Devices {
   /** `software` allows a software renderer; `onLost` is called at most once. Rejects with `backend-unavailable`. */
   async lease(
     load: LoadGraphics,
-    backend: GraphicsBackend,
+    backend: GraphicsBackendName,
     software: boolean,
     onLost: (reason: string) => void,
   ): Promise<DeviceLease> {
@@ -78,7 +82,7 @@ export class Devices {
     }
   }
 
-  #checkLosses(backend: GraphicsBackend): void {
+  #checkLosses(backend: GraphicsBackendName): void {
     const losses = this.#losses.get(backend);
     if (!losses || this.ports.now() - losses.lastMs > LOSS_MEMORY_MS) return;
     if (losses.count >= MAX_LOSSES) {
@@ -86,7 +90,7 @@ export class Devices {
     }
   }
 
-  #open(load: LoadGraphics, backend: GraphicsBackend): SharedDevice {
+  #open(load: LoadGraphics, backend: GraphicsBackendName): SharedDevice {
     const lose = (reason: string): void => this.#lose(backend, device, reason);
     const graphics = backend === 'webgpu' ? this.#openWebGpu(load) : this.#openWebGl2(load, lose);
     const device: SharedDevice = { graphics, holders: new Set(), isClosed: false };
@@ -98,7 +102,7 @@ export class Devices {
     return device;
   }
 
-  #nameOf(backend: GraphicsBackend): Promise<string | null> {
+  #nameOf(backend: GraphicsBackendName): Promise<string | null> {
     const known = this.#names.get(backend);
     if (known) return known;
     const name = this.#untilAnswered(this.ports.nameOf(backend), () => {});
@@ -140,7 +144,7 @@ export class Devices {
     return graphics;
   }
 
-  #lose(backend: GraphicsBackend, device: SharedDevice, reason: string): void {
+  #lose(backend: GraphicsBackendName, device: SharedDevice, reason: string): void {
     if (device.isClosed) return;
     const losses = this.#losses.get(backend) ?? { count: 0, lastMs: 0 };
     const now = this.ports.now();
@@ -153,7 +157,7 @@ export class Devices {
     for (const onLost of holders) onLost(reason);
   }
 
-  #close(backend: GraphicsBackend, device: SharedDevice): void {
+  #close(backend: GraphicsBackendName, device: SharedDevice): void {
     if (device.isClosed) return;
     device.isClosed = true;
     if (this.#devices.get(backend) === device) this.#devices.delete(backend);

@@ -2,18 +2,18 @@
 
 import type { Photograph } from '../../photo/photograph.js';
 import { createModuleRenderer } from '../module-renderer.js';
-import type { Renderer, RenderOptions } from '../types.js';
+import type { BackendOptions, Renderer } from '../types.js';
 import { Devices, type LoadGraphics } from './devices.js';
-import type { GraphicsBackend } from './graphics-ports.js';
+import type { GraphicsBackendName } from './graphics-ports.js';
 
 export type GpuRenderers = ReturnType<typeof gpuRenderers>;
 
 export function gpuRenderers(load: LoadGraphics, devices = new Devices()) {
   return {
     async create(
-      backend: GraphicsBackend,
+      backend: GraphicsBackendName,
       photograph: Photograph,
-      { gamut, software }: RenderOptions,
+      { gamut, software }: BackendOptions,
       onLost: (reason: string) => void,
       signal: AbortSignal,
     ): Promise<Renderer> {
@@ -36,7 +36,7 @@ export function gpuRenderers(load: LoadGraphics, devices = new Devices()) {
       }
     },
     /** Opens a device. The returned function releases it. */
-    async warmUp(backend: GraphicsBackend, software: boolean): Promise<() => void> {
+    async warmUp(backend: GraphicsBackendName, software: boolean): Promise<() => void> {
       return (await devices.lease(load, backend, software, () => {})).release;
     },
   };

@@ -3,12 +3,12 @@
 import type { Backend } from '../../engine/types.js';
 
 /** A backend that draws with a graphics device. */
-export type GraphicsBackend = Exclude<Backend, 'cpu'>;
+export type GraphicsBackendName = Exclude<Backend, 'cpu'>;
 
 /** The page's graphics; tests replace them. */
 export interface GraphicsPorts {
   /** The name of the adapter that the browser would use; `null` if there is none. */
-  nameOf(backend: GraphicsBackend): Promise<string | null>;
+  nameOf(backend: GraphicsBackendName): Promise<string | null>;
   createCanvas(): HTMLCanvasElement;
   /** Milliseconds, from any start. */
   now(): number;

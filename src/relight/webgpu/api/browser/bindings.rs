@@ -14,20 +14,20 @@ extern "C" {
     #[wasm_bindgen(method, catch, js_name = requestAdapter)]
     pub async fn request_adapter(
         this: &GpuEntryPoint,
-        options: &Dictionary,
+        options: &WebIdlDictionary,
     ) -> Result<JsValue, JsValue>;
     #[wasm_bindgen(method, js_name = getPreferredCanvasFormat)]
     pub fn get_preferred_canvas_format(this: &GpuEntryPoint) -> String;
 
     pub type GpuAdapter;
     #[wasm_bindgen(method, getter)]
-    pub fn limits(this: &GpuAdapter) -> Dictionary;
+    pub fn limits(this: &GpuAdapter) -> WebIdlDictionary;
     #[wasm_bindgen(method, getter)]
-    pub fn info(this: &GpuAdapter) -> Option<Dictionary>;
+    pub fn info(this: &GpuAdapter) -> Option<WebIdlDictionary>;
     #[wasm_bindgen(method, catch, js_name = requestDevice)]
     pub async fn request_device(
         this: &GpuAdapter,
-        descriptor: &Dictionary,
+        descriptor: &WebIdlDictionary,
     ) -> Result<JsValue, JsValue>;
 
     #[derive(Clone, Debug)]
@@ -45,17 +45,17 @@ extern "C" {
     #[wasm_bindgen(method, js_name = popErrorScope)]
     pub fn pop_error_scope(this: &GpuDevice) -> Promise;
     #[wasm_bindgen(method, js_name = createShaderModule)]
-    pub fn create_shader_module(this: &GpuDevice, descriptor: &Dictionary) -> JsValue;
+    pub fn create_shader_module(this: &GpuDevice, descriptor: &WebIdlDictionary) -> JsValue;
     #[wasm_bindgen(method, js_name = createComputePipeline)]
-    pub fn create_compute_pipeline(this: &GpuDevice, descriptor: &Dictionary) -> GpuPipeline;
+    pub fn create_compute_pipeline(this: &GpuDevice, descriptor: &WebIdlDictionary) -> GpuPipeline;
     #[wasm_bindgen(method, js_name = createRenderPipeline)]
-    pub fn create_render_pipeline(this: &GpuDevice, descriptor: &Dictionary) -> GpuPipeline;
+    pub fn create_render_pipeline(this: &GpuDevice, descriptor: &WebIdlDictionary) -> GpuPipeline;
     #[wasm_bindgen(method, js_name = createTexture)]
-    pub fn create_texture(this: &GpuDevice, descriptor: &Dictionary) -> GpuResource;
+    pub fn create_texture(this: &GpuDevice, descriptor: &WebIdlDictionary) -> GpuResource;
     #[wasm_bindgen(method, js_name = createBuffer)]
-    pub fn create_buffer(this: &GpuDevice, descriptor: &Dictionary) -> GpuResource;
+    pub fn create_buffer(this: &GpuDevice, descriptor: &WebIdlDictionary) -> GpuResource;
     #[wasm_bindgen(method, js_name = createBindGroup)]
-    pub fn create_bind_group(this: &GpuDevice, descriptor: &Dictionary) -> JsValue;
+    pub fn create_bind_group(this: &GpuDevice, descriptor: &WebIdlDictionary) -> JsValue;
     #[wasm_bindgen(method, js_name = createCommandEncoder)]
     pub fn create_command_encoder(this: &GpuDevice) -> GpuCommandEncoder;
 
@@ -64,16 +64,16 @@ extern "C" {
     #[wasm_bindgen(method, js_name = writeTexture)]
     pub fn write_texture(
         this: &GpuQueue,
-        to: &Dictionary,
+        to: &WebIdlDictionary,
         texels: &[u8],
-        layout: &Dictionary,
+        layout: &WebIdlDictionary,
         size: &JsValue,
     );
     #[wasm_bindgen(method, catch, js_name = copyExternalImageToTexture)]
     pub fn copy_external_image_to_texture(
         this: &GpuQueue,
-        source: &Dictionary,
-        to: &Dictionary,
+        source: &WebIdlDictionary,
+        to: &WebIdlDictionary,
         size: &JsValue,
     ) -> Result<(), JsValue>;
     #[wasm_bindgen(method, js_name = writeBuffer)]
@@ -85,7 +85,7 @@ extern "C" {
     #[derive(Clone, Debug)]
     pub type GpuResource;
     #[wasm_bindgen(method, js_name = createView)]
-    pub fn create_view(this: &GpuResource, descriptor: &Dictionary) -> JsValue;
+    pub fn create_view(this: &GpuResource, descriptor: &WebIdlDictionary) -> JsValue;
     #[wasm_bindgen(method)]
     pub fn destroy(this: &GpuResource);
 
@@ -99,7 +99,10 @@ extern "C" {
     #[wasm_bindgen(method, js_name = beginComputePass)]
     pub fn begin_compute_pass(this: &GpuCommandEncoder) -> GpuPassEncoder;
     #[wasm_bindgen(method, js_name = beginRenderPass)]
-    pub fn begin_render_pass(this: &GpuCommandEncoder, descriptor: &Dictionary) -> GpuPassEncoder;
+    pub fn begin_render_pass(
+        this: &GpuCommandEncoder,
+        descriptor: &WebIdlDictionary,
+    ) -> GpuPassEncoder;
     #[wasm_bindgen(method)]
     pub fn finish(this: &GpuCommandEncoder) -> JsValue;
 
@@ -119,16 +122,19 @@ extern "C" {
     #[derive(Clone, Debug)]
     pub type GpuCanvasContext;
     #[wasm_bindgen(method, catch)]
-    pub fn configure(this: &GpuCanvasContext, configuration: &Dictionary) -> Result<(), JsValue>;
+    pub fn configure(
+        this: &GpuCanvasContext,
+        configuration: &WebIdlDictionary,
+    ) -> Result<(), JsValue>;
     #[wasm_bindgen(method, catch, js_name = getCurrentTexture)]
     pub fn get_current_texture(this: &GpuCanvasContext) -> Result<GpuResource, JsValue>;
 
     /// An object of options or of read-only values.
-    pub type Dictionary;
+    pub type WebIdlDictionary;
     #[wasm_bindgen(method, indexing_getter)]
-    pub fn get(this: &Dictionary, name: &str) -> JsValue;
+    pub fn get(this: &WebIdlDictionary, name: &str) -> JsValue;
     #[wasm_bindgen(method, indexing_setter)]
-    pub fn set(this: &Dictionary, name: &str, value: &JsValue);
+    pub fn set(this: &WebIdlDictionary, name: &str, value: &JsValue);
 
     /// JavaScript's conversion to a string.
     #[wasm_bindgen(js_name = String)]
@@ -136,8 +142,8 @@ extern "C" {
 }
 
 /// A JavaScript object with these fields.
-pub fn dictionary(fields: &[(&str, JsValue)]) -> Dictionary {
-    let dictionary: Dictionary = Object::new().unchecked_into();
+pub fn dictionary(fields: &[(&str, JsValue)]) -> WebIdlDictionary {
+    let dictionary: WebIdlDictionary = Object::new().unchecked_into();
     for (name, value) in fields {
         dictionary.set(name, value);
     }

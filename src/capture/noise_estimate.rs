@@ -38,7 +38,7 @@ impl NoiseModel {
 }
 
 /// The samples of a square of camera pixels in all shots in which none of them is saturated.
-struct PixelBlock {
+struct BlockSamples {
     /// `[shots, p]`, scaled by the square root of the exposure.
     samples: Vec<f64>,
     /// Square root of each shot's exposure.
@@ -50,7 +50,7 @@ struct PixelBlock {
 }
 
 /// At most [`MAX_BLOCKS`] blocks, spread evenly over the loaded rows.
-fn blocks(measurements: &Measurements) -> Vec<PixelBlock> {
+fn blocks(measurements: &Measurements) -> Vec<BlockSamples> {
     let columns = measurements.camera.width / BLOCK_SIDE;
     let strips = measurements.rows.strips().iter();
     let tops: Vec<u32> = strips
@@ -67,11 +67,11 @@ fn blocks(measurements: &Measurements) -> Vec<PixelBlock> {
         let column = (i as u32 % columns + row * 7) % columns;
         (column * BLOCK_SIDE, tops[row as usize])
     });
-    let blocks = positions.filter_map(|(x, y)| PixelBlock::at(measurements, x, y));
+    let blocks = positions.filter_map(|(x, y)| BlockSamples::at(measurements, x, y));
     blocks.collect()
 }
 
-impl PixelBlock {
+impl BlockSamples {
     /// The block with `(x, y)` at its top left; `None` if it is saturated too often.
     fn at(measurements: &Measurements, x: u32, y: u32) -> Option<Self> {
         let mut block = Self {
@@ -173,7 +173,7 @@ fn channel_mean(values: &[f64; BLOCK_SERIES], c: usize) -> f64 {
 
 /// The gain by channel. Samples are weighted by the `last` estimate, or at first by their measurement.
 fn estimate_gain(
-    blocks: &[PixelBlock],
+    blocks: &[BlockSamples],
     floor: [f64; CHANNELS],
     last: Option<NoiseModel>,
 ) -> [f64; CHANNELS] {
@@ -217,7 +217,7 @@ mod tests {
     use super::*;
     use crate::capture::{LinearPhoto, Pattern, RowSet};
     use crate::simulate::{
-        Camera, EmissionMatrix, LightCodes, PatternEnsemble, RandomStream, SceneKind,
+        Camera, PatternEnsemble, PatternImage, PatternMatrix, RandomStreamId, SceneKind,
     };
     use crate::transport::{Extent, TileRect};
 
@@ -228,10 +228,10 @@ mod tests {
         let (camera, light) = (extent(camera), extent([24, 24]));
         let sensor = Camera { electrons };
         let draw = |i| {
-            let mut stream = RandomStream::Pattern(i).start(7);
+            let mut stream = RandomStreamId::Pattern(i).start(7);
             PatternEnsemble::Gaussian.draw(light, &mut stream)
         };
-        let lights: Vec<LightCodes> = std::iter::once(LightCodes::uniform(light, 0))
+        let lights: Vec<PatternImage> = std::iter::once(PatternImage::uniform(light, 0))
             .chain((0..patterns).map(draw))
             .collect();
         let scene = kind.build(camera, light).unwrap();
@@ -243,14 +243,14 @@ mod tests {
         });
         let exposure = |i: usize| if i % 3 == 2 { 2.0 } else { 1.0 };
         let linear = |code: u16| (f64::from(code) - 512.0) / (60_000.0 - 512.0);
-        let exposed = EmissionMatrix::new(light, &lights).pictures(scene.geometry(), &functions);
+        let exposed = PatternMatrix::new(light, &lights).pictures(scene.geometry(), &functions);
         let mut photos = exposed.iter().enumerate().map(|(i, photo)| -> LinearPhoto {
             let exposed: LinearPhoto = photo
                 .iter()
                 .map(|y| y.map(|y| y * exposure(i) as f32))
                 .collect();
             let take = |take: u32| {
-                let mut stream = RandomStream::Photograph(2 * i as u32 + take).start(7);
+                let mut stream = RandomStreamId::Photograph(2 * i as u32 + take).start(7);
                 sensor.photograph(&exposed, &mut stream)
             };
             let pairs = take(0).into_iter().zip(take(1));

@@ -21,14 +21,14 @@ pub(super) fn code_for(emission: f64) -> u8 {
 
 /// A code for each light element, row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum LightCodes {
+pub enum PatternImage {
     /// The same code for all three primaries.
     Grey(Vec<u8>),
     /// Red, green, blue.
     Rgb(Vec<[u8; 3]>),
 }
 
-impl LightCodes {
+impl PatternImage {
     /// The same grey code for all elements.
     pub fn uniform(light: Extent, code: u8) -> Self {
         Self::Grey(vec![code; light.area()])
@@ -47,7 +47,7 @@ pub enum PatternEnsemble {
 
 impl PatternEnsemble {
     /// A random pattern from the numbers of `stream`.
-    pub fn draw(self, light: Extent, stream: &mut ChaCha8Rng) -> LightCodes {
+    pub fn draw(self, light: Extent, stream: &mut ChaCha8Rng) -> PatternImage {
         let mut codes = vec![0; light.area()];
         match self {
             // N(0.5, 0.17²): 0.3 % of the elements are clipped.
@@ -60,7 +60,7 @@ impl PatternEnsemble {
                 false => 0,
             }),
         }
-        LightCodes::Grey(codes)
+        PatternImage::Grey(codes)
     }
 }
 
@@ -95,7 +95,7 @@ impl GrayCodePattern {
     }
 
     /// The codes of the pattern.
-    pub fn codes(self, light: Extent) -> LightCodes {
+    pub fn codes(self, light: Extent) -> PatternImage {
         let code = |(u, v): (u32, u32)| {
             let n = match self.axis {
                 LightPlaneAxis::X => u,
@@ -104,7 +104,7 @@ impl GrayCodePattern {
             let on = (n ^ (n >> 1)) >> self.bit & 1 == 1;
             if on != self.inverted { 255 } else { 0 }
         };
-        LightCodes::Grey(light.cells().map(code).collect())
+        PatternImage::Grey(light.cells().map(code).collect())
     }
 }
 
@@ -125,8 +125,8 @@ mod tests {
         );
         let column = |u: usize| -> Vec<u8> {
             let code = |g: &GrayCodePattern| match g.codes(light) {
-                LightCodes::Grey(c) => c[u],
-                LightCodes::Rgb(_) => unreachable!(),
+                PatternImage::Grey(c) => c[u],
+                PatternImage::Rgb(_) => unreachable!(),
             };
             patterns.iter().map(code).collect()
         };

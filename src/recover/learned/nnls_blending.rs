@@ -12,8 +12,8 @@ use crate::recover::error::RecoverError;
 use crate::recover::holdout::HoldoutSplit;
 use crate::recover::pixelwise::PixelwiseRecovery;
 use crate::recover::prediction;
-use crate::recover::preparation::Preparation;
-use crate::transport::{Extent, TileRect, TransportFunctions};
+use crate::recover::preparation_input::PreparationInput;
+use crate::transport::{Extent, TileFunctions, TileRect};
 
 /// Smallest share of a tile's squared held-out residual that blending must save: a blended tile is direct and takes ten
 /// times the bytes of a factored one.
@@ -27,7 +27,7 @@ const REGION_CENTRE_SIDE_PX: u32 = 4;
 
 /// Inner products of the two methods' residuals on held-out patterns.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct ResidualProducts {
+pub(super) struct ResidualGram {
     /// `aᵀa`, of the learned recovery.
     pub learned: f64,
     /// `aᵀb`.
@@ -36,14 +36,14 @@ pub(super) struct ResidualProducts {
     pub nnls: f64,
 }
 
-impl ResidualProducts {
+impl ResidualGram {
     /// The products for a tile's functions that both methods recovered without the held-out patterns. Saturated samples
     /// do not count.
     pub fn new(
         model: &LearnedModel,
         measurements: &Measurements,
         split: &HoldoutSplit,
-        [learned, nnls]: [&TransportFunctions; 2],
+        [learned, nnls]: [&TileFunctions; 2],
     ) -> Self {
         let [learned, nnls] = [learned, nnls].map(|functions| {
             prediction::residuals(&model.geometry, measurements, &split.held_out, functions)
@@ -91,21 +91,21 @@ impl ResidualProducts {
 /// NNLS, if blending with it pays over all of `regions`. Errors are those of [`PixelwiseRecovery::least_squares`].
 pub(super) fn fit_nnls_alternative(
     model: &LearnedModel,
-    preparation: &Preparation<impl Executor>,
+    preparation: &PreparationInput<impl Executor>,
     regions: &[TileRect],
 ) -> Result<Option<PixelwiseRecovery>, RecoverError> {
     let (measurements, split) = (preparation.measurements, preparation.split);
     let nnls = PixelwiseRecovery::least_squares(preparation)?;
     let products = preparation.executor.map(regions.len(), |i| {
         let rect = centre(regions[i], REGION_CENTRE_SIDE_PX);
-        ResidualProducts::recover(model, &nnls, measurements, split, rect)
+        ResidualGram::recover(model, &nnls, measurements, split, rect)
     });
-    let sum = |a: ResidualProducts, b: ResidualProducts| ResidualProducts {
+    let sum = |a: ResidualGram, b: ResidualGram| ResidualGram {
         learned: a.learned + b.learned,
         cross: a.cross + b.cross,
         nnls: a.nnls + b.nnls,
     };
-    let total = products.into_iter().fold(ResidualProducts::default(), sum);
+    let total = products.into_iter().fold(ResidualGram::default(), sum);
     Ok((total.best_weight(MIN_PICTURE_GAIN) > 0.0).then_some(nnls))
 }
 
@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn blend_weight_minimises_the_held_out_residual() {
         let weight = |learned, cross, nnls| {
-            let products = ResidualProducts {
+            let products = ResidualGram {
                 learned,
                 cross,
                 nnls,

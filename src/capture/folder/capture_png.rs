@@ -20,7 +20,7 @@ const READ_BYTES: usize = 1 << 16;
 type PngReader = png::Reader<BufReader<ReopenedFile>>;
 
 /// A PNG and what the manifest says of it.
-pub(super) struct ImageFile {
+pub(super) struct CapturePng {
     path: PathBuf,
     /// The size it must have.
     extent: Extent,
@@ -28,7 +28,7 @@ pub(super) struct ImageFile {
     field: Option<String>,
 }
 
-impl ImageFile {
+impl CapturePng {
     pub fn new(path: PathBuf, extent: Extent, field: Option<String>) -> Self {
         Self {
             path,
@@ -126,7 +126,7 @@ fn sample_type((color, depth): (ColorType, BitDepth)) -> String {
 
 /// A 16-bit RGB photograph that is read row by row from the top.
 pub(super) struct Rgb16Rows {
-    file: ImageFile,
+    file: CapturePng,
     reader: PngReader,
 }
 

@@ -8,7 +8,7 @@ struct BasisUniforms {
 @group(0) @binding(8) var<uniform> basis: BasisUniforms;
 
 // The response of the eight functions at one window origin.
-struct ResponsePair {
+struct ResponseQuads {
     @location(0) first: vec4<f32>,
     @location(1) second: vec4<f32>,
 }

@@ -8,9 +8,9 @@ use wasm_bindgen::JsValue;
 use super::api::{API, CanvasContext};
 use super::device::Device;
 use super::downsampler::Downsampler;
-use super::photo_renderer::PhotoRenderer;
+use super::photo_renderer::WebGpuRenderer;
 use crate::relight::Gamut;
-use crate::relight::backend::{Backend, BackendError, Frame, LightCache};
+use crate::relight::backend::{Backend, BackendError, FrameRequest, LightCache};
 use crate::relight::texture_layout::binding;
 use crate::transport::{Extent, Transport};
 
@@ -32,7 +32,7 @@ impl Device {
 /// Draws one photograph into one canvas.
 #[derive(Debug)]
 pub struct WebGpuBackend {
-    renderer: PhotoRenderer,
+    renderer: WebGpuRenderer,
     /// `None` unless the light is a light image.
     downsampler: Option<Downsampler>,
     canvas: CanvasContext,
@@ -50,7 +50,7 @@ impl WebGpuBackend {
         canvas: &web_sys::HtmlCanvasElement,
         gamut: Gamut,
     ) -> Result<Self, BackendError> {
-        let renderer = PhotoRenderer::new(device.clone(), transport).await?;
+        let renderer = WebGpuRenderer::new(device.clone(), transport).await?;
         let canvas_error = |reason| BackendError::Canvas(API, reason);
         let configured = device.try_upload(|| {
             let camera = transport.geometry.camera;
@@ -81,7 +81,7 @@ impl Backend for WebGpuBackend {
     }
 
     fn set_light_image(&mut self, image: &JsValue, extent: Extent) -> Result<bool, JsValue> {
-        let PhotoRenderer {
+        let WebGpuRenderer {
             device,
             layout,
             textures,
@@ -101,7 +101,7 @@ impl Backend for WebGpuBackend {
         Ok(true)
     }
 
-    fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
+    fn render(&mut self, frame: &FrameRequest<'_>) -> Result<(), BackendError> {
         self.renderer.device.check()?;
         let lost = |reason| BackendError::Lost(format!("the canvas gives no texture: {reason}"));
         let view = self.canvas.view().map_err(lost)?;
@@ -144,7 +144,7 @@ mod tests {
         let device = Rc::new(Device::for_canvases().await.unwrap());
         let webgpu = WebGpuBackend::new(device.clone(), &transport, &canvas, Gamut::Srgb).await;
         let mut webgpu = webgpu.unwrap();
-        let frame = Frame {
+        let frame = FrameRequest {
             light: Some(&BuiltinLight::Flood.render(extent)),
             output: OutputTransform::srgb(1.0),
             quality: 1.0,

@@ -1,12 +1,12 @@
 //! y = pT under many lights at once, while a tile's transport is in memory.
 
-use super::light_codes::{LightCodes, emission};
-use crate::transport::{CHANNELS, Extent, Geometry, TransportFunctions};
+use super::pattern_image::{PatternImage, emission};
+use crate::transport::{CHANNELS, Extent, Geometry, TileFunctions};
 
 /// Emissions under many lights, `[M, columns]`: one column for each grey light, three for each RGB light. The
 /// emissions of one element are contiguous, so that the sums over elements are vector operations.
 #[derive(Clone, Debug)]
-pub struct EmissionMatrix {
+pub struct PatternMatrix {
     light: Extent,
     columns: usize,
     emissions: Vec<f32>,
@@ -14,15 +14,15 @@ pub struct EmissionMatrix {
     channels: Vec<[usize; CHANNELS]>,
 }
 
-impl EmissionMatrix {
+impl PatternMatrix {
     /// The emissions of `lights`, each of `light.area()` elements.
-    pub fn new(light: Extent, lights: &[LightCodes]) -> Self {
+    pub fn new(light: Extent, lights: &[PatternImage]) -> Self {
         let mut channels = Vec::with_capacity(lights.len());
         let mut columns = 0;
         for codes in lights {
             match codes {
-                LightCodes::Grey(_) => channels.push([columns; CHANNELS]),
-                LightCodes::Rgb(_) => channels.push([columns, columns + 1, columns + 2]),
+                PatternImage::Grey(_) => channels.push([columns; CHANNELS]),
+                PatternImage::Rgb(_) => channels.push([columns, columns + 1, columns + 2]),
             }
             columns = channels.last().map_or(0, |c| c[CHANNELS - 1]) + 1;
         }
@@ -32,8 +32,8 @@ impl EmissionMatrix {
             for m in 0..light.area() {
                 let row = &mut emissions[m * columns..(m + 1) * columns];
                 let codes = match codes {
-                    LightCodes::Grey(grey) => [grey[m]; CHANNELS],
-                    LightCodes::Rgb(rgb) => rgb[m],
+                    PatternImage::Grey(grey) => [grey[m]; CHANNELS],
+                    PatternImage::Rgb(rgb) => rgb[m],
                 };
                 for (column, code) in channels.iter().zip(codes) {
                     row[*column] = table[usize::from(code)];
@@ -52,7 +52,7 @@ impl EmissionMatrix {
     pub fn pictures(
         &self,
         geometry: &Geometry,
-        functions: &TransportFunctions,
+        functions: &TileFunctions,
     ) -> Vec<Vec<[f32; CHANNELS]>> {
         let pixels = functions.rect.extent.area();
         let area = geometry.window.area();

@@ -5,10 +5,10 @@ use std::io;
 
 use crate::format::extension::Extension;
 use crate::format::metadata::Metadata;
-use crate::transport::{Basis, Decibels, FloatTile, Geometry, TransportFunctions};
+use crate::transport::{Basis, Decibels, FloatTile, Geometry, TileFunctions};
 
 /// The light transport of a file.
-pub struct Source<'a> {
+pub struct EncoderInput<'a> {
     /// Grids, window, correspondence and the file's tiling.
     pub geometry: Geometry,
     /// The basis of the coefficients, if a tile has any.
@@ -29,7 +29,7 @@ pub trait DistortionMetric: Sync {
     fn tiles(&self) -> Vec<FloatTile>;
 
     /// Estimated loss of SNR against the object's light transport if `functions` replace the tiles.
-    fn loss(&self, functions: &[TransportFunctions]) -> Decibels;
+    fn loss(&self, functions: &[TileFunctions]) -> Decibels;
 }
 
 /// The target of the rate control.

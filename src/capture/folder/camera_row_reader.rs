@@ -1,11 +1,11 @@
 //! One photograph as measurements, read row by row.
 
-use super::image_file::Rgb16Rows;
+use super::capture_png::Rgb16Rows;
 use crate::capture::error::CaptureError;
-use crate::capture::manifest::CameraSpec;
+use crate::capture::manifest::ManifestCamera;
 use crate::capture::measurements::LinearPhoto;
 use crate::capture::noise_model::NoiseModel;
-use crate::capture::rows::RowSet;
+use crate::capture::row_set::RowSet;
 use crate::transport::CHANNELS;
 
 /// The photograph under no light, which is subtracted from all others.
@@ -18,8 +18,8 @@ pub struct DarkFrame {
 }
 
 /// Reads the camera rows of one photograph once, from the top down.
-pub struct PhotoReader<'a> {
-    pub(super) camera: &'a CameraSpec,
+pub struct CameraRowReader<'a> {
+    pub(super) camera: &'a ManifestCamera,
     pub(super) dark: &'a DarkFrame,
     pub(super) exposure: f64,
     pub(super) codes: Rgb16Rows,
@@ -27,7 +27,7 @@ pub struct PhotoReader<'a> {
     pub(super) saturated_samples: usize,
 }
 
-impl PhotoReader<'_> {
+impl CameraRowReader<'_> {
     /// Appends those of `rows` that were not read before to `photo`, as measurements minus the dark frame, NaN where
     /// saturated. Skips the rows between them.
     ///

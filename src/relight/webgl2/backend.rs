@@ -10,8 +10,8 @@ use super::downsampler::GlDownsampler;
 use super::photo_resources::PhotoResources;
 use super::resources::Staging;
 use crate::relight::Gamut;
-use crate::relight::backend::{Backend, BackendError, Frame, LightCache};
-use crate::relight::canvas2d::{CanvasStorage, open_2d};
+use crate::relight::backend::{Backend, BackendError, FrameRequest, LightCache};
+use crate::relight::canvas2d_context::{CanvasStorage, open_2d};
 use crate::relight::texture_layout::TextureLayout;
 use crate::transport::{Extent, Transport};
 
@@ -70,7 +70,7 @@ impl WebGl2Backend {
     }
 
     /// Draws a frame into the context's canvas.
-    fn draw(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
+    fn draw(&mut self, frame: &FrameRequest<'_>) -> Result<(), BackendError> {
         let gl = &self.context.gl;
         // Calls to a lost context do nothing. Asking for other errors would wait for the device, and a draw that
         // succeeded once has none.
@@ -142,7 +142,7 @@ impl Backend for WebGl2Backend {
         Ok(true)
     }
 
-    fn render(&mut self, frame: &Frame<'_>) -> Result<(), BackendError> {
+    fn render(&mut self, frame: &FrameRequest<'_>) -> Result<(), BackendError> {
         self.draw(frame)?;
         // The picture is in the upper left corner; the rest, if any, falls outside the canvas.
         self.canvas

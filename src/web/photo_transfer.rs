@@ -1,15 +1,15 @@
 //! Serialisation of a photograph between modules, each of which has its own memory: geometry as numbers, the basis as
-//! floats, and each tile as a [`TileHeader`] followed by its codes.
+//! floats, and each tile as a [`PackedTileHeader`] followed by its codes.
 
 use super::CodedError;
 #[cfg(feature = "drawing")]
-use crate::transport::{Basis, Correspondence, TexelCode, TileRect, Transport};
+use crate::transport::{Basis, Correspondence, TexelCodes, TileRect, Transport};
 use crate::transport::{CHANNELS, Geometry, Tile};
 
 /// The first bytes of a packed tile.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct TileHeader {
+struct PackedTileHeader {
     /// Of the coefficients and of the functions.
     steps: [[f32; CHANNELS]; 2],
     /// Texels of the coefficients and of the functions.
@@ -32,7 +32,7 @@ pub fn pack_geometry(geometry: &Geometry) -> Vec<f64> {
 /// A header, the coefficients' codes and the functions' codes.
 pub fn pack_tile(tile: &Tile) -> Vec<u8> {
     let codes = [&tile.coefficients.codes, &tile.functions.codes];
-    let header = TileHeader {
+    let header = PackedTileHeader {
         steps: [tile.coefficients.step, tile.functions.step],
         texels: codes.map(|codes| codes.len() as u32), // fits: a 32-bit memory
     };
@@ -79,9 +79,9 @@ pub fn unpack_tile(
     area: usize,
 ) -> Result<Tile, CodedError> {
     let (header, codes) = bytes
-        .split_at_checked(size_of::<TileHeader>())
+        .split_at_checked(size_of::<PackedTileHeader>())
         .ok_or_else(corrupt)?;
-    let TileHeader { steps, texels } = bytemuck::pod_read_unaligned(header);
+    let PackedTileHeader { steps, texels } = bytemuck::pod_read_unaligned(header);
     let (codes, []) = codes.as_chunks() else {
         return Err(corrupt());
     };
@@ -91,9 +91,9 @@ pub fn unpack_tile(
     if !is_complete || codes.len() != texels[0] + texels[1] {
         return Err(corrupt());
     }
-    let code = |bytes: &[u8; size_of::<TexelCode>()]| bytemuck::cast::<_, TexelCode>(*bytes);
+    let code = |bytes: &[u8; size_of::<TexelCodes>()]| bytemuck::cast::<_, TexelCodes>(*bytes);
     // Fallible: running out of memory must not abort the module.
-    let try_copy = |codes: &[[u8; size_of::<TexelCode>()]]| {
+    let try_copy = |codes: &[[u8; size_of::<TexelCodes>()]]| {
         let mut copy = Vec::new();
         let no_memory =
             |_| CodedError::new("format-limit", "there is no memory for the photograph");

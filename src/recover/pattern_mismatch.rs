@@ -7,7 +7,7 @@
 //! certainty.
 
 use super::error::RecoverError;
-use super::preparation::Preparation;
+use super::preparation_input::PreparationInput;
 use super::sampling::{self, PixelsOfWindow};
 use crate::executor::Executor;
 use crate::transport::{LightElement, TileRect};
@@ -30,7 +30,7 @@ const MIN_HELD_OUT: usize = 2;
 /// [`RecoverError::MismatchedPatterns`] if some photographs do not match their patterns, and
 /// [`RecoverError::UncorrelatedPatterns`] if most do not, or if the held-out patterns together predict nothing.
 pub(super) fn check_patterns(
-    preparation: &Preparation<impl Executor>,
+    preparation: &PreparationInput<impl Executor>,
     mean_function: &[f64],
     squares: &[TileRect],
 ) -> Result<(), RecoverError> {
@@ -45,8 +45,8 @@ pub(super) fn check_patterns(
         }
         moments
     });
-    let slope = |&l: &usize| RegressionSlope::fit(&moments, &[l]);
-    let slopes: Vec<Option<RegressionSlope>> = split.all.iter().map(slope).collect();
+    let slope = |&l: &usize| SlopeEstimate::fit(&moments, &[l]);
+    let slopes: Vec<Option<SlopeEstimate>> = split.all.iter().map(slope).collect();
     let mut values: Vec<f64> = slopes.iter().flatten().map(|slope| slope.value).collect();
     values.sort_by(f64::total_cmp);
     let reference = values.get(values.len() * REFERENCE_PERCENTILE / 100);
@@ -56,7 +56,7 @@ pub(super) fn check_patterns(
     let held_out = split.held_out.iter().copied();
     let held_out: Vec<usize> = held_out.filter(|l| !mismatched.contains(l)).collect();
     let is_uncorrelated = split.held_out.len() >= MIN_HELD_OUT
-        && RegressionSlope::fit(&moments, &held_out).is_some_and(RegressionSlope::may_be_zero);
+        && SlopeEstimate::fit(&moments, &held_out).is_some_and(SlopeEstimate::may_be_zero);
     if is_uncorrelated || 2 * mismatched.len() > split.all.len() {
         return Err(RecoverError::UncorrelatedPatterns);
     }
@@ -76,12 +76,12 @@ struct RegressionMoments {
 
 /// A regression slope of measurements on predictions.
 #[derive(Clone, Copy, Debug)]
-struct RegressionSlope {
+struct SlopeEstimate {
     value: f64,
     standard_error: f64,
 }
 
-impl RegressionSlope {
+impl SlopeEstimate {
     /// The common slope of `patterns`, from moments `[square][pattern]`; `None` if the predictions do not vary.
     fn fit(moments: &[Vec<RegressionMoments>], patterns: &[usize]) -> Option<Self> {
         let squares = moments.iter().map(|square| {
@@ -114,7 +114,7 @@ impl RegressionSlope {
 
 fn add_window(
     moments: &mut [RegressionMoments],
-    preparation: &Preparation<impl Executor>,
+    preparation: &PreparationInput<impl Executor>,
     mean_function: &[f64],
     origin: LightElement,
     pixels: &PixelsOfWindow,
@@ -156,11 +156,11 @@ fn add_window(
 mod tests {
     use super::*;
 
-    fn slope(squares: &[(f64, f64)]) -> Option<RegressionSlope> {
+    fn slope(squares: &[(f64, f64)]) -> Option<SlopeEstimate> {
         let moments = squares
             .iter()
             .map(|&(prediction, cross)| vec![RegressionMoments { prediction, cross }]);
-        RegressionSlope::fit(&moments.collect::<Vec<_>>(), &[0])
+        SlopeEstimate::fit(&moments.collect::<Vec<_>>(), &[0])
     }
 
     #[test]

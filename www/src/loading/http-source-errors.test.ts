@@ -4,7 +4,6 @@ import { createServer, type OutgoingHttpHeaders, type ServerResponse } from 'nod
 import type { AddressInfo } from 'node:net';
 import test, { type TestContext } from 'node:test';
 import { gzipSync } from 'node:zlib';
-import { HttpSource, type SourcePorts } from './byte-source.js';
 import {
   createSource,
   drain,
@@ -16,6 +15,7 @@ import {
   sendBody,
   serve,
 } from './http-fakes.js';
+import { HttpSource, type HttpSourcePorts } from './http-source.js';
 
 test('compressed ranges are http-encoding', async (t) => {
   const server = await serve(t, (request, response) =>
@@ -286,7 +286,7 @@ test('silence before the head and within the body is limited', async (t) => {
 async function abortWhen(
   t: TestContext,
   handler: (response: ServerResponse, abort: () => void) => void,
-  ports: (abort: () => void) => Partial<SourcePorts> = () => ({}),
+  ports: (abort: () => void) => Partial<HttpSourcePorts> = () => ({}),
 ): Promise<void> {
   const controller = new AbortController();
   const reason = new Error('no longer needed');

@@ -16,12 +16,12 @@ import type { SessionSettings } from '../player/types.js';
 import type { Renderer } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
 import { BACKENDS } from '../shared/names.js';
-import { reuse } from '../shared/reuse.js';
+import { reuse } from '../shared/shallow-equal.js';
 import { AttributeReader } from '../state/attribute-reader.js';
 import { type ActiveLight, LightChangeDetector } from '../state/light-change.js';
 import { type ElementOptions, readOptions } from '../state/options.js';
 import { ViewerState } from '../state/viewer-state.js';
-import type { PhotoView } from '../state/viewport.js';
+import type { ZoomView } from '../state/viewport.js';
 import { Presenter } from '../ui/presenter.js';
 import { ShadowDom } from '../ui/shadow-dom.js';
 import {
@@ -35,7 +35,7 @@ import {
 } from './events.js';
 import { observeVisibility, type Visibility } from './visibility.js';
 
-export class PhotoController {
+export class ElementController {
   readonly state: ViewerState;
   readonly session: PhotoSession;
   readonly interaction: InteractionController;
@@ -43,7 +43,7 @@ export class PhotoController {
   readonly #dom: ShadowDom;
   readonly #presenter: Presenter;
   readonly #lightChanges = new LightChangeDetector();
-  #reportedView: PhotoView;
+  #reportedView: ZoomView;
   #mustReload = false;
   #isUpdateScheduled = false;
   /** Ends the listeners that exist only while the element is in the document. */
@@ -263,7 +263,7 @@ export class PhotoController {
     const settings = reuse<SessionSettings>(last, {
       src,
       credentials: options.crossOrigin === 'use-credentials' ? 'include' : 'same-origin',
-      renderOptions: reuse(last?.renderOptions, {
+      backendOptions: reuse(last?.backendOptions, {
         backends: options.backends ?? BACKENDS,
         // Software renderers are used only on request: the CPU backend is faster.
         software: options.backends !== null,

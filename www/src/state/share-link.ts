@@ -2,13 +2,13 @@
 
 import { PhotoError } from '../shared/errors.js';
 import { LIGHTS, type LightName } from '../shared/names.js';
-import { MAX_EXPOSURE } from '../shared/parse-settings.js';
+import { MAX_EXPOSURE } from '../shared/setting-parsers.js';
 import { CENTRE, type PicturePoint } from '../shared/values.js';
 import { MAX_TORCH_SIZE } from './attribute-values.js';
-import type { PhotoView } from './viewport.js';
+import type { ZoomView } from './viewport.js';
 
 /** What a visitor may have changed; `null` stands for the page's own value. */
-export interface SharedState {
+export interface ShareLinkState {
   readonly light: LightName | null;
   readonly torch: PicturePoint | null;
   /** The torch's radius in units of the light plane's shorter side. */
@@ -16,13 +16,13 @@ export interface SharedState {
   /** A CSS colour. */
   readonly color: string | null;
   readonly exposure: number | null;
-  readonly view: PhotoView;
+  readonly view: ZoomView;
 }
 
 /** Beyond any `zoom` attribute; the view is clamped to that. */
 const MAX_SHARED_ZOOM = 1e4;
 
-export function formatState({ light, torch, size, color, exposure, view }: SharedState): string {
+export function formatState({ light, torch, size, color, exposure, view }: ShareLinkState): string {
   const params = new URLSearchParams();
   const put = (key: string, value: string | number | null | undefined) => {
     if (value != null) params.set(key, String(value));
@@ -43,7 +43,7 @@ export function formatState({ light, torch, size, color, exposure, view }: Share
 }
 
 /** Parses a state. An invalid value counts as absent and gives an error; unknown keys are ignored. */
-export function parseState(text: string): { state: SharedState; errors: readonly PhotoError[] } {
+export function parseState(text: string): { state: ShareLinkState; errors: readonly PhotoError[] } {
   const params = new URLSearchParams(text.replace(/^[?#]/, ''));
   const errors: PhotoError[] = [];
   /** Reads a value; `parse` gives `null` if it is invalid. */

@@ -1,9 +1,9 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { formatState, parseState, type SharedState } from './share-state.js';
+import { formatState, parseState, type ShareLinkState } from './share-link.js';
 import { FULL_VIEW } from './viewport.js';
 
-const EMPTY: SharedState = {
+const EMPTY: ShareLinkState = {
   light: null,
   torch: null,
   size: null,
@@ -12,7 +12,7 @@ const EMPTY: SharedState = {
   view: FULL_VIEW,
 };
 
-const FULL: SharedState = {
+const FULL: ShareLinkState = {
   light: 'torch',
   torch: { x: 0.312, y: 0.64 },
   size: 0.25,

@@ -4,8 +4,8 @@
 
 use super::byte_planes::{join, split, unzigzag, zigzag};
 use super::zstd_frame::{compress, decompress};
-use crate::format::budget::MemoryBudget;
 use crate::format::error::{FormatError, SectionError, damaged};
+use crate::format::memory_budget::MemoryBudget;
 
 /// Largest exponent: values are multiples of `2⁻³⁰` or coarser.
 const MAX_EXPONENT: u8 = 30;

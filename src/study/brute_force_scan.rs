@@ -2,7 +2,7 @@
 
 use super::known_transport::DenseTransport;
 use crate::capture::LinearPhoto;
-use crate::transport::{CHANNELS, Decibels, TransportError};
+use crate::transport::{CHANNELS, Decibels, SnrAccumulator};
 
 /// The SNR after scanning the first 1, 2, … M elements. Columns that have not been scanned are estimated as
 /// zero. `photographs[m]` shows element `m` alone at full brightness.
@@ -10,11 +10,11 @@ pub(super) fn snr_by_scans(
     truth: &DenseTransport,
     photographs: &[LinearPhoto],
 ) -> Vec<Option<Decibels>> {
-    let columns: Vec<(TransportError, TransportError)> = photographs
+    let columns: Vec<(SnrAccumulator, SnrAccumulator)> = photographs
         .iter()
         .enumerate()
         .map(|(m, photograph)| {
-            let mut column = <(TransportError, TransportError)>::default();
+            let mut column = <(SnrAccumulator, SnrAccumulator)>::default();
             for (n, y) in photograph.iter().enumerate() {
                 let tau = truth[n][m];
                 for c in 0..CHANNELS {
@@ -32,7 +32,7 @@ pub(super) fn snr_by_scans(
             let (scanned, unscanned) = columns.split_at(scanned);
             let scanned = scanned.iter().map(|c| c.0);
             let errors = scanned.chain(unscanned.iter().map(|c| c.1));
-            errors.sum::<TransportError>().snr()
+            errors.sum::<SnrAccumulator>().snr()
         })
         .collect()
 }

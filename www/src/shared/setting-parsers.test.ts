@@ -6,7 +6,7 @@ import {
   parseLight,
   parseTone,
   parseWhiteBalance,
-} from './parse-settings.js';
+} from './setting-parsers.js';
 
 test('an empty value means the default', () => {
   assert.equal(parseLight(null), 'flood');

@@ -9,7 +9,7 @@ import type { ByteRange } from '../shared/values.js';
 import * as errors from './http-errors.js';
 import { RetryableError } from './http-errors.js';
 import {
-  type FileVersion,
+  type HttpValidators,
   isOtherVersion,
   readHead,
   sizeFromUnsatisfiedRange,
@@ -22,7 +22,7 @@ export interface FilePiece {
   readonly bytes: Uint8Array;
 }
 
-export interface SourcePorts extends RetryPorts {
+export interface HttpSourcePorts extends RetryPorts {
   readonly fetch: typeof fetch;
   readonly sleep: (ms: number, signal: AbortSignal) => Promise<void>;
   /** Silence after which a transfer counts as interrupted, in milliseconds. */
@@ -31,7 +31,7 @@ export interface SourcePorts extends RetryPorts {
   readonly maxRetries: number;
 }
 
-const DEFAULT_PORTS: Omit<SourcePorts, 'fetch'> = {
+const DEFAULT_PORTS: Omit<HttpSourcePorts, 'fetch'> = {
   sleep,
   random: Math.random,
   now: Date.now,
@@ -50,18 +50,18 @@ interface RangeTransfer {
 
 /** A file at a URL. Only one `read` may run at a time. */
 export class HttpSource {
-  readonly #ports: SourcePorts;
+  readonly #ports: HttpSourcePorts;
   /** Size of the whole file in bytes, once known. */
   size: number | undefined;
   /** Whether a header has told the size, and not only the end of a transfer. */
   #isSizeCertain = true;
-  #version: FileVersion | undefined;
+  #validators: HttpValidators | undefined;
   /** The transfer of the whole file, once the server has sent it instead of a range. */
   #wholeTransfer: RangeTransfer | undefined;
 
   constructor(
     readonly url: string,
-    ports: Pick<SourcePorts, 'fetch'> & Partial<SourcePorts>,
+    ports: Pick<HttpSourcePorts, 'fetch'> & Partial<HttpSourcePorts>,
   ) {
     this.#ports = { ...DEFAULT_PORTS, ...ports };
   }
@@ -89,7 +89,7 @@ export class HttpSource {
         if (failures > this.#ports.maxRetries) throw thrown.afterAttempts(failures);
         // A missing response has no reason: the range header may be the cause, which some browsers refuse for
         // compressed files, and for which some ask another origin's server for permission first.
-        const hasNoResponse = this.#version === undefined && thrown.code === 'http-network';
+        const hasNoResponse = this.#validators === undefined && thrown.code === 'http-network';
         if (hasNoResponse) transfer.usesRange = failures % 2 === 1;
         const pause = this.#ports.sleep(retryPauseMs(thrown, failures, this.#ports), signal);
         await withTimeout(pause, { signal });
@@ -115,7 +115,7 @@ export class HttpSource {
       if (response.status === 416 && transfer.usesRange) return this.#endBefore(transfer, response);
       const requested = { start: transfer.position, end: transfer.end };
       const head = readHead(this.url, response, transfer.usesRange ? requested : 'whole');
-      this.#checkVersion(head.version, head.size);
+      this.#checkVersion(head.validators, head.size);
       if (head.isWhole && !this.#wholeTransfer) {
         this.#wholeTransfer = transfer;
         transfer.usesRange = false;
@@ -171,13 +171,13 @@ export class HttpSource {
   }
 
   /** Throws if a response belongs to another version of the file than the ones before. */
-  #checkVersion(version: FileVersion, size: number | undefined): void {
-    const known = this.#version ?? version;
-    if (isOtherVersion(known, version) || (this.size ?? size) !== (size ?? this.size)) {
+  #checkVersion(validators: HttpValidators, size: number | undefined): void {
+    const known = this.#validators ?? validators;
+    if (isOtherVersion(known, validators) || (this.size ?? size) !== (size ?? this.size)) {
       throw errors.changed(this.url);
     }
-    const { etag = version.etag, modified = version.modified } = known;
-    this.#version = { etag, modified };
+    const { etag = validators.etag, modified = validators.modified } = known;
+    this.#validators = { etag, modified };
     this.size ??= size;
   }
 

@@ -6,7 +6,7 @@ use crate::capture::Measurements;
 use crate::transport::{Geometry, TileRect, Window};
 
 /// What a recovery is prepared from, and the executor that runs the preparation.
-pub(super) struct Preparation<'a, E> {
+pub(super) struct PreparationInput<'a, E> {
     pub measurements: &'a Measurements,
     pub geometry: Geometry,
     pub split: &'a HoldoutSplit,

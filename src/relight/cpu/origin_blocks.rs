@@ -58,8 +58,8 @@ impl PixelSpan {
 
 /// A square of window origins, and the pixels that have them.
 #[derive(Clone, Debug, Default)]
-pub struct LightBlock {
-    /// Column and row of its first origin, from [`LightBlocks::origin`].
+pub struct OriginBlock {
+    /// Column and row of its first origin, from [`OriginBlocks::origin`].
     pub at: [usize; 2],
     /// Its pixels.
     pub spans: Vec<PixelSpan>,
@@ -67,9 +67,9 @@ pub struct LightBlock {
     pub offsets: Vec<u16>,
 }
 
-/// The light blocks of all pixels that can be lit.
+/// The origin blocks of all pixels that can be lit.
 #[derive(Clone, Debug)]
-pub struct LightBlocks {
+pub struct OriginBlocks {
     /// The first origin of the first block.
     pub origin: LightElement,
     /// Origins along a block's side, at most 256.
@@ -77,10 +77,10 @@ pub struct LightBlocks {
     /// Extent of the footprints of all blocks together.
     pub footprint: Extent,
     /// Blocks with at least one pixel.
-    pub blocks: Vec<LightBlock>,
+    pub blocks: Vec<OriginBlock>,
 }
 
-impl LightBlocks {
+impl OriginBlocks {
     /// Assigns the pixels to blocks of `side × side` origins.
     pub fn new(transport: &Transport, bounds: &OriginBounds, side: usize) -> Self {
         let geometry = &transport.geometry;
@@ -93,7 +93,7 @@ impl LightBlocks {
             u: first(&bounds.columns, grid[0]),
             v: first(&bounds.rows, grid[1]),
         };
-        let mut blocks = vec![LightBlock::default(); grid[0] * grid[1]];
+        let mut blocks = vec![OriginBlock::default(); grid[0] * grid[1]];
         let tiles = transport.tiles.iter().enumerate();
         for (i, tile) in tiles.filter(|(_, tile)| !tile.is_dark()) {
             for (p, pixel) in tile.rect().pixels().enumerate() {
@@ -136,7 +136,7 @@ impl LightBlocks {
     }
 }
 
-impl LightBlock {
+impl OriginBlock {
     /// Adds pixel number `p` of a tile: to the last span if it continues that.
     fn add(&mut self, tile: usize, p: usize, pixel: CameraPx, offset: usize) {
         let begin = self.offsets.len();

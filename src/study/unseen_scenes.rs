@@ -3,8 +3,8 @@
 use super::accuracy::measure_accuracy;
 use super::error::StudyError;
 use super::methods::{self, DEFAULT_METHOD};
-use super::scene_camera::SceneCamera;
 use super::section::{MarkdownTable, ProgressCallback, ReportSection, snr_cell};
+use super::simulated_capture::SimulatedCapture;
 use crate::executor::Executor;
 use crate::recover::Method;
 use crate::simulate::{PatternEnsemble, SceneKind};
@@ -14,11 +14,11 @@ use PatternEnsemble::{Bernoulli, Gaussian};
 use SceneKind::{Cookies, StainedGlass};
 
 /// A row of the table: scene, sides of camera and light plane, ensemble, number of patterns, electrons, seed.
-type SceneTableRow = (SceneKind, [u32; 2], PatternEnsemble, usize, f64, u64);
+type SceneSettings = (SceneKind, [u32; 2], PatternEnsemble, usize, f64, u64);
 
 /// Both scenes, both ensembles, few and many photographs, little and much light, one to three camera pixels for each
 /// light element, and a seed for each.
-const SETTINGS: [SceneTableRow; 14] = [
+const SETTINGS: [SceneSettings; 14] = [
     (StainedGlass, [128, 64], Gaussian, 80, 4e4, 101),
     (StainedGlass, [128, 64], Bernoulli, 80, 4e4, 102),
     (StainedGlass, [128, 64], Bernoulli, 40, 2e5, 103),
@@ -55,16 +55,16 @@ pub fn scenes_table(
     for (kind, sides, ensemble, patterns, electrons, seed) in SETTINGS {
         let [camera, light] = sides.map(|side| Extent::new(side, side));
         let scene = kind.build(camera, light)?;
-        let scene_camera = SceneCamera {
+        let simulated_capture = SimulatedCapture {
             scene: scene.as_ref(),
             electrons,
             seed,
         };
-        let measurements = scene_camera.measure(ensemble, patterns, executor);
+        let measurements = simulated_capture.measure(ensemble, patterns, executor);
         let mut snrs = Vec::new();
         for &method in Method::ALL {
             let accuracy =
-                measure_accuracy(&scene_camera, &measurements, method, pixels, executor)?;
+                measure_accuracy(&simulated_capture, &measurements, method, pixels, executor)?;
             snrs.push(accuracy.snr);
         }
         let scene_name = match kind {

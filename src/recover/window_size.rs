@@ -15,7 +15,7 @@ use super::error::RecoverError;
 use super::holdout::pattern_ids;
 use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns};
 use super::pooled::PooledMeasurements;
-use super::preparation;
+use super::preparation_input;
 use super::sampling::{self, PixelsOfWindow};
 use crate::capture::{Measurements, group_count};
 use crate::executor::Executor;
@@ -42,16 +42,16 @@ const PARTS: usize = 8;
 
 /// A window for the recovery, as estimated from measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WindowEstimate {
+pub struct WindowSizeEstimate {
     /// The smallest window that holds nearly all light, as far as that is known.
     pub window: Window,
     /// The light from outside it.
-    pub bandwidth: BandwidthEstimate,
+    pub band: BandExtent,
 }
 
 /// How wide the band of T is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BandwidthEstimate {
+pub enum BandExtent {
     /// Hardly wider than the window.
     Bounded {
         /// Estimated share of a pixel's light that comes from outside the window.
@@ -63,7 +63,7 @@ pub enum BandwidthEstimate {
     Undetermined,
 }
 
-impl WindowEstimate {
+impl WindowSizeEstimate {
     /// The widest window that an estimate may come to.
     pub const MAX_WINDOW: Window = match Window::new(MAX_SIDE) {
         Ok(window) => window,
@@ -80,8 +80,8 @@ impl WindowEstimate {
     ) -> Result<Self, RecoverError> {
         let light = measurements.light;
         let max_side = MAX_SIDE.min((light.width.min(light.height) / 2).saturating_sub(1) | 1);
-        let geometry = preparation::geometry(measurements, Window::new(max_side)?)?;
-        let rings = Rings::new(max_side, group_count(&pattern_ids(&measurements.patterns)));
+        let geometry = preparation_input::geometry(measurements, Window::new(max_side)?)?;
+        let rings = WindowRings::new(max_side, group_count(&pattern_ids(&measurements.patterns)));
         let mut squares = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
         // Errors of neighbouring squares are correlated: each part is a strip of the picture.
         squares.sort_by_key(|square| (square.y, square.x));
@@ -117,7 +117,7 @@ impl WindowEstimate {
 }
 
 /// The division of the widest window into a centre and rings around it.
-struct Rings {
+struct WindowRings {
     centre: u32,
     /// The region of each slot: the centre's elements are regions by themselves, and come first; then the rings, from
     /// the inside out.
@@ -125,7 +125,7 @@ struct Rings {
     sizes: Vec<f64>,
 }
 
-impl Rings {
+impl WindowRings {
     fn new(side: u32, patterns: usize) -> Self {
         let fits = |centre: &u32| *centre < side && 4 * (centre * centre) as usize <= 3 * patterns;
         let centre = CENTRE_SIDES.into_iter().find(fits).unwrap_or(1);
@@ -244,7 +244,7 @@ fn choose_window(
     tails: &[f64],
     errors: &[f64],
     max_side: u32,
-) -> Result<WindowEstimate, RecoverError> {
+) -> Result<WindowSizeEstimate, RecoverError> {
     let rings = tails.len();
     let is_small = |i: usize| match (tails.get(i), errors.get(i)) {
         (Some(tail), Some(error)) => tail.abs() <= MAX_TAIL_FRACTION && *error <= MAX_TAIL_FRACTION,
@@ -256,17 +256,17 @@ fn choose_window(
     let inside = small.next().map(|first| first + MARGIN_RINGS);
     // The last ring may be dark: the band then ends with the widest window.
     let mut but_last = tails.iter().zip(errors).take(rings.saturating_sub(1));
-    let (side, bandwidth) = if let Some(inside) = inside.filter(|&i| i < rings) {
+    let (side, band) = if let Some(inside) = inside.filter(|&i| i < rings) {
         let tail_fraction = tails[inside].max(0.0);
-        (side(inside), BandwidthEstimate::Bounded { tail_fraction })
+        (side(inside), BandExtent::Bounded { tail_fraction })
     } else if rings > 1 && but_last.all(|(tail, error)| *tail > MAX_TAIL_FRACTION + 2.0 * error) {
-        (side(rings), BandwidthEstimate::Unbounded)
+        (side(rings), BandExtent::Unbounded)
     } else {
-        (DEFAULT_SIDE.min(max_side), BandwidthEstimate::Undetermined)
+        (DEFAULT_SIDE.min(max_side), BandExtent::Undetermined)
     };
-    Ok(WindowEstimate {
+    Ok(WindowSizeEstimate {
         window: Window::new(side)?,
-        bandwidth,
+        band,
     })
 }
 
@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn window_ends_where_tail_fractions_are_small() {
-        let rings = Rings::new(15, 100);
+        let rings = WindowRings::new(15, 100);
         let flux = [0.06, 0.035, 0.004, 0.001]; // out to sides 9, 11, 13 and 15
         let tails = rings.tail_fractions(&flux, 15);
         let close = |a: f64, b: f64| (a - b).abs() < 1e-12;
@@ -288,24 +288,24 @@ mod tests {
         let bounded = choose_window(&tails, &errors, 15).unwrap();
         assert_eq!(bounded.window.side(), 13);
         assert!(matches!(
-            bounded.bandwidth,
-            BandwidthEstimate::Bounded { tail_fraction } if close(tail_fraction, 0.001)
+            bounded.band,
+            BandExtent::Bounded { tail_fraction } if close(tail_fraction, 0.001)
         ));
         // Where no ring is dark, and that is certain, the band is as wide as the widest window.
         let unbounded = choose_window(&[0.1, 0.06, 0.04, 0.02], &errors, 15).unwrap();
         assert_eq!(unbounded.window.side(), 15);
-        assert_eq!(unbounded.bandwidth, BandwidthEstimate::Unbounded);
+        assert_eq!(unbounded.band, BandExtent::Unbounded);
         let edge = choose_window(&[0.1, 0.06, 0.04, 0.002], &errors, 15).unwrap();
-        assert_eq!(edge.bandwidth, BandwidthEstimate::Unbounded);
+        assert_eq!(edge.band, BandExtent::Unbounded);
         let uncertain = choose_window(&[0.1; 12], &[0.06; 12], 31).unwrap();
         assert_eq!(uncertain.window.side(), 15);
-        assert_eq!(uncertain.bandwidth, BandwidthEstimate::Undetermined);
+        assert_eq!(uncertain.band, BandExtent::Undetermined);
     }
 
     #[test]
     fn centre_and_rings_cover_the_window() {
         for (side, patterns, centre) in [(3, 80, 1), (7, 80, 5), (9, 20, 3), (31, 80, 7)] {
-            let rings = Rings::new(side, patterns);
+            let rings = WindowRings::new(side, patterns);
             assert_eq!(rings.centre, centre);
             assert_eq!(rings.sizes.iter().sum::<f64>(), f64::from(side * side));
             assert!(rings.sizes.iter().all(|&size| size >= 1.0));

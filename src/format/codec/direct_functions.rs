@@ -7,12 +7,12 @@
 
 use std::ops::Range;
 
-use super::colour::{Pixel, finite, ycocg_forward, ycocg_inverse};
-use super::tokens::{ItemRuns, MAX_MAGNITUDE, QuantisedRun, TokenReader, TokenWriter};
-use crate::format::budget::{MemoryBudget, vec_bytes};
+use super::colour::{ColourVector, finite, ycocg_forward, ycocg_inverse};
+use super::tokens::{MAX_MAGNITUDE, QuantisedRun, TokenReader, TokenSource, TokenWriter};
 use crate::format::chunk::EncodedChunk;
 use crate::format::constants::MAX_CONTENT_BYTES;
 use crate::format::error::{FormatError, SectionError, damaged};
+use crate::format::memory_budget::{MemoryBudget, vec_bytes};
 use crate::format::scan::Scan;
 use crate::transport::{CHANNELS, Extent, Window};
 
@@ -68,7 +68,7 @@ pub fn finest_step(peak: f32) -> f32 {
 /// # Errors
 /// [`SectionError`] if the chunk is damaged, or the budget refuses memory.
 pub fn add(
-    functions: &mut [Pixel],
+    functions: &mut [ColourVector],
     order: &[u16],
     scan: &Scan,
     bytes: &[u8],
@@ -98,17 +98,17 @@ pub fn add(
 
 /// The direct functions of a tile in centre-out order, before quantisation.
 #[derive(Debug)]
-pub struct OrderedFunctions {
+pub struct CentreOutFunctions {
     slots: usize,
     /// `[pixel, centre-out index]`.
-    values: Vec<Pixel>,
+    values: Vec<ColourVector>,
 }
 
-impl OrderedFunctions {
+impl CentreOutFunctions {
     /// Orders functions, `[pixel, slot]`.
-    pub fn new(functions: &[Pixel], order: &[u16]) -> Self {
+    pub fn new(functions: &[ColourVector], order: &[u16]) -> Self {
         let pixels = functions.chunks_exact(order.len());
-        let ordered = |function: &[Pixel]| -> Vec<Pixel> {
+        let ordered = |function: &[ColourVector]| -> Vec<ColourVector> {
             let values = order.iter().map(|&slot| function[usize::from(slot)]);
             values.map(finite).collect()
         };
@@ -119,7 +119,7 @@ impl OrderedFunctions {
     }
 }
 
-impl ItemRuns for OrderedFunctions {
+impl TokenSource for CentreOutFunctions {
     fn for_runs(&self, items: Range<usize>, step: f32, visit: &mut dyn FnMut(QuantisedRun<'_>)) {
         let (mut residuals, mut numbers) = (Vec::new(), Vec::new());
         for function in self.values.chunks_exact(self.slots) {
@@ -145,20 +145,20 @@ impl ItemRuns for OrderedFunctions {
 
 /// The direct functions of a tile, quantised scan by scan.
 #[derive(Clone, Debug)]
-pub struct QuantisedFunctions {
+pub struct QuantisedDirectFunctions {
     /// `[scan]`, then `[pixel, item, Y Co Cg]`; empty for scans of coefficients.
     numbers: Vec<Vec<i32>>,
     /// Sum of squared values, and of squared errors after each scan.
     pub errors: Vec<f64>,
     /// The error after the last scan, `[pixel, centre-out index]`.
-    residual: Vec<Pixel>,
+    residual: Vec<ColourVector>,
 }
 
-impl QuantisedFunctions {
+impl QuantisedDirectFunctions {
     /// Quantises functions, `[pixel, slot]`, by `scans`.
-    pub fn new(functions: &[Pixel], order: &[u16], scans: &[Scan]) -> Self {
-        let mut residual = OrderedFunctions::new(functions, order).values;
-        let square = |residual: &[Pixel]| {
+    pub fn new(functions: &[ColourVector], order: &[u16], scans: &[Scan]) -> Self {
+        let mut residual = CentreOutFunctions::new(functions, order).values;
+        let square = |residual: &[ColourVector]| {
             let all = residual.as_flattened().iter();
             all.map(|t| f64::from(*t).powi(2)).sum::<f64>()
         };
@@ -196,8 +196,8 @@ impl QuantisedFunctions {
     }
 
     /// The functions as a reader decodes them, of the `functions` that were quantised.
-    pub fn decoded(&self, functions: &[Pixel], order: &[u16]) -> Vec<Pixel> {
-        let mut decoded: Vec<Pixel> = functions.iter().copied().map(finite).collect();
+    pub fn decoded(&self, functions: &[ColourVector], order: &[u16]) -> Vec<ColourVector> {
+        let mut decoded: Vec<ColourVector> = functions.iter().copied().map(finite).collect();
         let of_pixels = decoded.chunks_exact_mut(order.len());
         for (function, residual) in of_pixels.zip(self.residual.chunks_exact(order.len())) {
             for (&slot, residual) in order.iter().zip(residual) {
@@ -246,7 +246,7 @@ mod tests {
         centre_out_order(Window::new(side).unwrap(), &MemoryBudget::unlimited()).unwrap()
     }
 
-    fn functions(area: usize) -> Vec<Pixel> {
+    fn functions(area: usize) -> Vec<ColourVector> {
         let tau = |i: usize| {
             let near = 1.0 / (1.0 + (i % area) as f32);
             [0.3, 0.9, -0.2].map(|c| c * near * near * (1.0 + (i as f32 * 0.7).sin()))
@@ -269,12 +269,12 @@ mod tests {
                 Scan::new(ScanCoding::Direct, 0, 10, step),
                 Scan::new(ScanCoding::Direct, 10, 15, step),
             ];
-            let quantised = QuantisedFunctions::new(&functions, &order, &scans);
+            let quantised = QuantisedDirectFunctions::new(&functions, &order, &scans);
             let mut got = vec![[0.0; CHANNELS]; functions.len()];
             let chunks = quantised.chunks(&scans).unwrap();
             for ((scan, chunk), error) in scans.iter().zip(chunks).zip(&quantised.errors[1..]) {
                 if !chunk.bytes.is_empty() {
-                    let add_to = |functions: &mut [Pixel], bytes: &[u8]| {
+                    let add_to = |functions: &mut [ColourVector], bytes: &[u8]| {
                         let budget = MemoryBudget::unlimited();
                         add(functions, &order, scan, bytes, chunk.content_bytes, &budget)
                     };
@@ -300,7 +300,7 @@ mod tests {
         let order = order(1);
         let scan = Scan::new(ScanCoding::Direct, 0, 1, 1e-6);
         let functions = [[1.0, -1.0, f32::NAN]];
-        let quantised = QuantisedFunctions::new(&functions, &order, &[scan]);
+        let quantised = QuantisedDirectFunctions::new(&functions, &order, &[scan]);
         let chunk = quantised.chunks(&[scan]).unwrap().remove(0);
         let mut got = [[0.0; CHANNELS]];
         let (tokens, budget) = (chunk.content_bytes, MemoryBudget::unlimited());

@@ -1,8 +1,8 @@
 //! The interface of simulated scenes, and their geometry.
 
 use crate::transport::{
-    CHANNELS, CameraPx, Correspondence, Extent, Geometry, GeometryError, TileRect,
-    TransportFunctions, Window,
+    CHANNELS, CameraPx, Correspondence, Extent, Geometry, GeometryError, TileFunctions, TileRect,
+    Window,
 };
 
 /// Side of the window that holds every built-in scene's band, in light elements.
@@ -18,9 +18,9 @@ pub trait SimulatedScene: Sync {
     fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]);
 
     /// The light transport functions of the pixels in `rect`.
-    fn tile(&self, rect: TileRect) -> TransportFunctions {
+    fn tile(&self, rect: TileRect) -> TileFunctions {
         let area = self.geometry().window.area();
-        let mut functions = TransportFunctions::zeros(rect, area);
+        let mut functions = TileFunctions::zeros(rect, area);
         for (pixel, tau) in rect.pixels().zip(functions.tau.chunks_exact_mut(area)) {
             self.transport_function(pixel, tau);
         }

@@ -4,7 +4,7 @@ use super::known_transport::KnownTransport;
 use crate::capture::{LinearPhoto, Measurements, NoiseModel, Pattern, RowSet};
 use crate::executor::Executor;
 use crate::simulate::{
-    Camera, EmissionMatrix, LightCodes, PatternEnsemble, RandomStream, SimulatedScene, emission,
+    Camera, PatternEnsemble, PatternImage, PatternMatrix, RandomStreamId, SimulatedScene, emission,
 };
 use crate::transport::{CHANNELS, CameraPx, Geometry};
 
@@ -13,7 +13,7 @@ const NOISE_BATCH: usize = 16;
 
 /// A simulated camera in front of a scene, whose transport is known.
 #[derive(Clone, Copy)]
-pub struct SceneCamera<'a> {
+pub struct SimulatedCapture<'a> {
     /// The scene.
     pub scene: &'a dyn SimulatedScene,
     /// Electrons of the measurement 1.
@@ -22,7 +22,7 @@ pub struct SceneCamera<'a> {
     pub seed: u64,
 }
 
-impl KnownTransport for SceneCamera<'_> {
+impl KnownTransport for SimulatedCapture<'_> {
     fn geometry(&self) -> &Geometry {
         self.scene.geometry()
     }
@@ -33,7 +33,7 @@ impl KnownTransport for SceneCamera<'_> {
     }
 }
 
-impl SceneCamera<'_> {
+impl SimulatedCapture<'_> {
     /// Photographs the scene under `count` random patterns.
     pub fn measure(
         &self,
@@ -43,7 +43,7 @@ impl SceneCamera<'_> {
     ) -> Measurements {
         let geometry = self.scene.geometry();
         let draw = |i| {
-            let mut stream = RandomStream::Pattern(i).start(self.seed);
+            let mut stream = RandomStreamId::Pattern(i).start(self.seed);
             ensemble.draw(geometry.light, &mut stream)
         };
         let codes: Vec<_> = (0..count as u32).map(draw).collect();
@@ -70,7 +70,7 @@ impl SceneCamera<'_> {
     /// One photograph for each light, in units of the measurement, minus a dark photograph; saturated samples are NaN.
     pub(super) fn photographs(
         &self,
-        lights: &[LightCodes],
+        lights: &[PatternImage],
         executor: &impl Executor,
     ) -> Vec<LinearPhoto> {
         let mut pictures = self.pictures(lights, executor);
@@ -92,7 +92,7 @@ impl SceneCamera<'_> {
 
     /// A photograph of `picture` with the noise of the photograph number `index`.
     pub(super) fn add_noise(&self, picture: &LinearPhoto, index: u32) -> LinearPhoto {
-        let mut noise = RandomStream::Photograph(index).start(self.seed);
+        let mut noise = RandomStreamId::Photograph(index).start(self.seed);
         let electrons = self.electrons;
         let codes = Camera { electrons }.photograph(picture, &mut noise);
         let linear = |code: u16| match f64::from(code) - Camera::BLACK {
@@ -103,9 +103,9 @@ impl SceneCamera<'_> {
     }
 
     /// The pictures of the scene under each light, without noise.
-    fn pictures(&self, lights: &[LightCodes], executor: &impl Executor) -> Vec<LinearPhoto> {
+    fn pictures(&self, lights: &[PatternImage], executor: &impl Executor) -> Vec<LinearPhoto> {
         let geometry = self.scene.geometry();
-        let emissions = EmissionMatrix::new(geometry.light, lights);
+        let emissions = PatternMatrix::new(geometry.light, lights);
         let mut pictures = vec![vec![[0.0; CHANNELS]; geometry.camera.area()]; lights.len()];
         let tiles: Vec<_> = geometry.tiles().collect();
         // One row of tiles at a time, to bound the memory.
@@ -126,11 +126,11 @@ impl SceneCamera<'_> {
 }
 
 /// The pattern that the monitor emits for `codes`.
-fn emitted_pattern(codes: &LightCodes) -> Pattern {
+fn emitted_pattern(codes: &PatternImage) -> Pattern {
     let linear = |code: &u8| emission(*code) as f32;
     match codes {
-        LightCodes::Grey(codes) => Pattern::Grey(codes.iter().map(linear).collect()),
-        LightCodes::Rgb(codes) => Pattern::Rgb(std::array::from_fn(|c| {
+        PatternImage::Grey(codes) => Pattern::Grey(codes.iter().map(linear).collect()),
+        PatternImage::Rgb(codes) => Pattern::Rgb(std::array::from_fn(|c| {
             codes.iter().map(|code| linear(&code[c])).collect()
         })),
     }
