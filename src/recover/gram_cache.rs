@@ -5,7 +5,7 @@
 //! [`GramCache`] computes it once, and a window's matrix is then copied from a table instead of multiplied out, at L
 //! products an entry.
 
-use super::common_mode::CommonMode;
+use super::common_mode_weight::CommonModeWeight;
 use super::normal_equations::{EquationWeights, WeightedColumns};
 use crate::capture::Measurements;
 use crate::linalg::{dot, vectorise};
@@ -154,7 +154,7 @@ impl GramCache {
     pub fn equations(
         &self,
         origin: LightElement,
-        common_mode: CommonMode,
+        common_mode: CommonModeWeight,
         pattern_indices: &[usize],
     ) -> WindowEquations {
         let columns = self.geometry.clip_window(origin).columns.len();
@@ -298,7 +298,7 @@ mod tests {
             for excluded in [&[][..], &[3], &[0, 8]] {
                 let mut included = indices.clone();
                 included.retain(|l| !excluded.contains(l));
-                for common_mode in [CommonMode::FULL, CommonMode::POOLED] {
+                for common_mode in [CommonModeWeight::FULL, CommonModeWeight::POOLED] {
                     let ours = shared.equations(origin, common_mode, &included);
                     let expected = own.equations(origin, common_mode, &included);
                     assert_eq!(ours.slots, expected.slots);
@@ -311,7 +311,7 @@ mod tests {
             }
         }
         // Slot 0 of the window at (-1, -2) is off the light plane, as all but its last row are.
-        let corner = shared.equations(origins[0], CommonMode::FULL, &indices);
+        let corner = shared.equations(origins[0], CommonModeWeight::FULL, &indices);
         assert_eq!(corner.slots, [7, 8]);
         let emission = f64::from(measurements.patterns[4].plane(0)[1]);
         let weight = measurements.pattern_weights()[4];

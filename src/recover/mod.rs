@@ -7,13 +7,13 @@
 //! and basis pursuit denoising (case (b)).
 //!
 //! Pixels and channels with one window share their normal equations, and windows share the patterns' correlations: that
-//! makes recovery fast. The weight of the patterns' common mode ([`CommonMode`]) makes it accurate. Parameters
+//! makes recovery fast. The weight of the patterns' common mode ([`CommonModeWeight`]) makes it accurate. Parameters
 //! are chosen on held-out patterns, which also estimate the SNR ([`HoldoutValidation`]).
 //!
 //! [`Recovery`] has no threads and no files: an [`Executor`](crate::executor::Executor) runs its jobs.
 
 mod bpdn;
-mod common_mode;
+mod common_mode_weight;
 mod error;
 mod gram_cache;
 mod holdout;
@@ -36,7 +36,7 @@ mod test_problems;
 mod window_size;
 
 pub use bpdn::{Homotopy, SparsityBasis};
-pub use common_mode::CommonMode;
+pub use common_mode_weight::CommonModeWeight;
 pub use error::RecoverError;
 pub use holdout_validation::HoldoutValidation;
 pub use method::Method;

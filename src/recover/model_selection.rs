@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::slice::from_ref;
 
 use super::bpdn::{ResidualTolerance, SparsityBasis};
-use super::common_mode::CommonMode;
+use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
 use super::gram_cache::WindowEquations;
 use super::holdout::HoldoutSplit;
@@ -36,7 +36,7 @@ impl PixelwiseRecovery {
     ) -> Result<Self, RecoverError> {
         preparation.executor.check_cancelled()?;
         let sample = sample_windows(preparation, LEAST_SQUARES_SAMPLE)?;
-        let candidates = CommonMode::CANDIDATES.map(|common_mode| Self {
+        let candidates = CommonModeWeight::CANDIDATES.map(|common_mode| Self {
             geometry: preparation.geometry,
             common_mode,
             problem: PixelwiseMethod::LeastSquares,

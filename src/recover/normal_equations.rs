@@ -2,10 +2,10 @@
 //!
 //! `A` `[L, k]` has a row for each of L patterns and a column for each of k unknowns, and `y` `[L]` holds the
 //! measurements of one pixel and channel. The weights are `W = (I − (1 − ω) wwᵀ/‖w‖²) diag(w)`: `w` `[L]` weights the
-//! patterns, and ω their [`CommonMode`]. W is applied to the columns of A and to y once, so that Gram matrix,
+//! patterns, and ω their [`CommonModeWeight`]. W is applied to the columns of A and to y once, so that Gram matrix,
 //! right-hand side and residual are plain inner products.
 
-use super::common_mode::CommonMode;
+use super::common_mode_weight::CommonModeWeight;
 use crate::linalg::{self, add_scaled, dot};
 
 /// `W`.
@@ -15,11 +15,11 @@ pub(super) struct EquationWeights {
     pub patterns: Vec<f64>,
     /// `‖w‖²`.
     pub energy: f64,
-    pub common_mode: CommonMode,
+    pub common_mode: CommonModeWeight,
 }
 
 impl EquationWeights {
-    pub fn new(patterns: Vec<f64>, common_mode: CommonMode) -> Self {
+    pub fn new(patterns: Vec<f64>, common_mode: CommonModeWeight) -> Self {
         Self {
             energy: patterns.iter().map(|w| w * w).sum(),
             patterns,
@@ -27,7 +27,7 @@ impl EquationWeights {
         }
     }
 
-    pub fn uniform(patterns: usize, common_mode: CommonMode) -> Self {
+    pub fn uniform(patterns: usize, common_mode: CommonModeWeight) -> Self {
         Self::new(vec![1.0; patterns], common_mode)
     }
 
@@ -202,7 +202,7 @@ mod tests {
     const WEIGHTS: [f64; PATTERNS] = [1.0, 2.0, 0.5, 1.5, 1.0];
     const Y: [f64; PATTERNS] = [0.3, 0.8, 0.2, 0.6, 0.4];
 
-    fn columns(common_mode: CommonMode) -> WeightedColumns {
+    fn columns(common_mode: CommonModeWeight) -> WeightedColumns {
         let weights = EquationWeights::new(WEIGHTS.to_vec(), common_mode);
         WeightedColumns::new(COLUMNS.to_vec(), weights)
     }
@@ -219,7 +219,7 @@ mod tests {
     }
 
     /// `‖diag(w)(v − v̄)‖² + ω²‖w‖² v̄²` for `v = y − Ax`: the definition of the weights.
-    fn split_residual(x: [f64; 2], common_mode: CommonMode) -> f64 {
+    fn split_residual(x: [f64; 2], common_mode: CommonModeWeight) -> f64 {
         let [a, b] = [&COLUMNS[..PATTERNS], &COLUMNS[PATTERNS..]];
         let residual: Vec<f64> = (0..PATTERNS)
             .map(|l| Y[l] - a[l] * x[0] - b[l] * x[1])
@@ -236,7 +236,11 @@ mod tests {
 
     #[test]
     fn weights_split_off_the_common_mode() {
-        for common_mode in [CommonMode::FULL, CommonMode::POOLED, CommonMode::EXCLUDED] {
+        for common_mode in [
+            CommonModeWeight::FULL,
+            CommonModeWeight::POOLED,
+            CommonModeWeight::EXCLUDED,
+        ] {
             let columns = columns(common_mode);
             assert!((columns.means[1] - mean(&COLUMNS[PATTERNS..])).abs() < 1e-12);
             let mut y = Y.to_vec();
@@ -250,7 +254,7 @@ mod tests {
 
     #[test]
     fn sums_of_equations_have_the_least_squares_solution() {
-        let columns = columns(CommonMode::POOLED);
+        let columns = columns(CommonModeWeight::POOLED);
         let mut y = Y.to_vec();
         columns.weights.apply(&mut y);
         // Two pixels, the second at unknowns 1 and 2 of three, and twice as certain.
@@ -284,7 +288,7 @@ mod tests {
 
     #[test]
     fn gram_matrix_and_right_hand_side_are_inner_products() {
-        let columns = columns(CommonMode::FULL);
+        let columns = columns(CommonModeWeight::FULL);
         let gram = columns.gram();
         let right: Vec<f64> = columns.right_hand_side(&Y).collect();
         let products = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();

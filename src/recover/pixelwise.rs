@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use super::bpdn::{
     BpdnConstraint, Homotopy, ResidualTolerance, SensingOperator, SparsityBasis, interior_point,
 };
-use super::common_mode::CommonMode;
+use super::common_mode_weight::CommonModeWeight;
 use super::gram_cache::{GramCache, WindowEquations};
 use super::nnls::Nnls;
 use super::sampling;
@@ -36,7 +36,7 @@ pub(super) enum PixelwiseMethod {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelwiseRecovery {
     pub geometry: Geometry,
-    pub common_mode: CommonMode,
+    pub common_mode: CommonModeWeight,
     pub problem: PixelwiseMethod,
 }
 

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::common_mode::CommonMode;
+use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
 use super::nnls::Nnls;
 use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns};
@@ -125,7 +125,7 @@ fn add_window(
                 columns[j * indices.len() + i] = f64::from(pattern[m]);
             }
         }
-        let weights = EquationWeights::uniform(indices.len(), CommonMode::POOLED);
+        let weights = EquationWeights::uniform(indices.len(), CommonModeWeight::POOLED);
         let columns = WeightedColumns::new(columns, weights);
         let levels = slots.iter().zip(&columns.means);
         let level: f64 = levels.map(|(&slot, p)| mean[slot] * p).sum();

@@ -1,6 +1,6 @@
 //! Recovery of a light transport matrix, tile by tile, by any of the methods.
 
-use super::common_mode::CommonMode;
+use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
 use super::holdout::HoldoutSplit;
 use super::holdout_validation::HoldoutValidation;
@@ -105,7 +105,7 @@ impl Recovery {
     }
 
     /// The weight of the patterns' common mode in least squares or denoising, if tiles depend on either.
-    pub fn common_mode(&self) -> Option<CommonMode> {
+    pub fn common_mode(&self) -> Option<CommonModeWeight> {
         match &self.solver {
             TileSolver::Learned(learned) => learned.common_mode(),
             TileSolver::Pixelwise(solver) => Some(solver.common_mode),

@@ -10,7 +10,7 @@
 //! The *tail fraction* of a window is the flux of all rings outside it. Its standard error is that of a jackknife over
 //! parts of the picture.
 
-use super::common_mode::CommonMode;
+use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
 use super::holdout::pattern_ids;
 use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns};
@@ -187,7 +187,7 @@ impl WindowRings {
                 }
             }
             let columns = centre.split_off(centre_area * patterns);
-            let weights = EquationWeights::uniform(patterns, CommonMode::EXCLUDED);
+            let weights = EquationWeights::uniform(patterns, CommonModeWeight::EXCLUDED);
             let centre = WeightedColumns::new(centre, weights.clone());
             let mut columns = WeightedColumns::new(columns, weights);
             let level = centre.means.iter().sum::<f64>() / centre_area as f64;

@@ -5,7 +5,7 @@
 //! added on top. Everything is a function of time, through hashes of lattice points, so a fire can be drawn at any
 //! moment. Lengths are in heights of the light plane, `y` upwards.
 
-use super::math;
+use super::platform_math;
 use crate::transport::Extent;
 
 /// Rows at which heat is computed, at most; it is interpolated between them.
@@ -78,7 +78,7 @@ fn add_sparks(extent: Extent, seconds: f64, elements: &mut [[f32; 4]]) {
         let lives = seconds / life + unit(0, 91);
         let (number, age) = (lives.floor(), lives - lives.floor());
         let n = number.rem_euclid(4_294_967_296.0) as u32;
-        let sway = math::sin(age * (2.0 + 3.0 * unit(n, 92)) + 6.0 * unit(n, 93));
+        let sway = platform_math::sin(age * (2.0 + 3.0 * unit(n, 92)) + 6.0 * unit(n, 93));
         let u = width * (0.08 + 0.84 * unit(n, 94)) + size * 0.05 * sway;
         let v = size * (0.92 - (0.35 + 0.55 * unit(n, 95)) * age);
         // It lights up quickly and fades.

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::resample::AreaResampler;
-use super::{fire, math};
+use super::{fire, platform_math};
 use crate::transport::{Extent, Geometry, LightPx};
 
 /// The linear emission of every light element, 0 to 1 at full brightness.
@@ -265,7 +265,7 @@ fn element([r, g, b]: [f32; 3]) -> [f32; 4] {
 fn rainbow(x: f64) -> [f32; 3] {
     let lobe = |centre: f64| {
         let d = ((x - centre).abs() / 0.36).min(1.0);
-        (0.5 + 0.5 * math::cos(std::f64::consts::PI * d)) as f32
+        (0.5 + 0.5 * platform_math::cos(std::f64::consts::PI * d)) as f32
     };
     // Violet is blue with a little red coming back.
     [lobe(0.12) + 0.35 * lobe(1.0), lobe(0.48), lobe(0.82)]

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use super::math;
+use super::platform_math;
 
 /// A linear value, clamped to 0..=1, to an encoded one of 0..=1.
 pub fn srgb_encode(linear: f64) -> f64 {
@@ -10,7 +10,7 @@ pub fn srgb_encode(linear: f64) -> f64 {
     if y <= 0.003_130_8 {
         12.92 * y
     } else {
-        1.055 * math::pow(y, 1.0 / 2.4) - 0.055
+        1.055 * platform_math::pow(y, 1.0 / 2.4) - 0.055
     }
 }
 
@@ -19,7 +19,7 @@ pub fn srgb_decode(encoded: f64) -> f64 {
     if encoded <= 0.040_45 {
         encoded / 12.92
     } else {
-        math::pow((encoded + 0.055) / 1.055, 2.4)
+        platform_math::pow((encoded + 0.055) / 1.055, 2.4)
     }
 }
 

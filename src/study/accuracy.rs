@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::chart::ChartSeries;
 use super::error::StudyError;
 use super::known_transport::{KnownTransport, transport_error};
-use super::methods::sample_for;
+use super::method_samples::sample_for;
 use super::pixel_sampling;
 use crate::capture::Measurements;
 use crate::executor::Executor;

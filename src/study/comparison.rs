@@ -8,7 +8,7 @@ use super::brute_force_scan;
 use super::chart::{LineChart, axis_range};
 use super::error::StudyError;
 use super::known_transport::{DenseTransport, dense_transport};
-use super::methods;
+use super::method_samples;
 use super::nystrom::{NystromSamples, NystromTransport};
 use super::pixel_sampling;
 use super::section::{MarkdownTable, ProgressCallback, ReportSection, seconds_cell, snr_cell};
@@ -87,7 +87,8 @@ pub fn comparison(
 
     for &method in Method::ALL {
         // All points of a slow method would take longer than everything else here.
-        let is_measured = |l: &usize| !methods::is_slow(method) || SLOW_PATTERN_COUNTS.contains(l);
+        let is_measured =
+            |l: &usize| !method_samples::is_slow(method) || SLOW_PATTERN_COUNTS.contains(l);
         let points: Result<_, _> = counts(MAX_PATTERNS)
             .filter(is_measured)
             .map(|l| {
@@ -101,7 +102,7 @@ pub fn comparison(
                 )
             })
             .collect();
-        add_curve(format!("window, {}", methods::name(method)), points?);
+        add_curve(format!("window, {}", method_samples::name(method)), points?);
     }
     section(name, geometry, &curves)
 }

@@ -10,7 +10,7 @@ mod chart;
 mod comparison;
 mod error;
 mod known_transport;
-mod methods;
+mod method_samples;
 mod nystrom;
 mod picture_sheet;
 mod pixel_sampling;

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::error::StudyError;
 use super::known_transport::{KnownTransport, known_picture, relight_pixel};
-use super::methods::{self, DEFAULT_METHOD};
+use super::method_samples::{self, DEFAULT_METHOD};
 use super::picture_sheet::{CaptionedPanel, FigurePanel, PictureSheet};
 use super::section::{MarkdownTable, ProgressCallback, ReportSection, snr_cell};
 use crate::capture::Measurements;
@@ -57,7 +57,7 @@ pub fn relit_pictures(
     let patterns = measurements.patterns.len();
     progress(&format!(
         "{name}: relighting, recovered by {} from {patterns} patterns",
-        methods::name(DEFAULT_METHOD)
+        method_samples::name(DEFAULT_METHOD)
     ));
     let report_tenths = |tenths: usize| progress(&format!("{name}: relighting, {tenths}0 %"));
     let (truth, relit) = pictures(known, measurements, &lights, executor, &report_tenths)?;
@@ -72,7 +72,7 @@ pub fn relit_pictures(
     section.add_paragraph(&format!(
         "Recovered by `{}` from {patterns} patterns. PSNR is against the true pictures, peak 1 in \
          units of the measurement, over all pixels and channels.",
-        methods::name(DEFAULT_METHOD)
+        method_samples::name(DEFAULT_METHOD)
     ));
     let mut table = MarkdownTable::new("light | psnr_db | true_mean | method | patterns");
     let mut psnr_table = MarkdownTable::new("light | PSNR (dB)");
@@ -86,7 +86,7 @@ pub fn relit_pictures(
             light.name.clone(),
             snr_cell(psnr),
             format!("{mean:.4}"),
-            methods::name(DEFAULT_METHOD).to_owned(),
+            method_samples::name(DEFAULT_METHOD).to_owned(),
             patterns.to_string(),
         ]);
         psnr_table.add_row([light.name.clone(), snr_cell(psnr)]);

@@ -4,7 +4,7 @@ use super::accuracy::{MethodCurve, measure_accuracy};
 use super::chart::{LineChart, axis_range};
 use super::error::StudyError;
 use super::known_transport::KnownTransport;
-use super::methods;
+use super::method_samples;
 use super::section::{MarkdownTable, ProgressCallback, ReportSection, seconds_cell, snr_cell};
 use crate::capture::{Measurements, NoiseModel};
 use crate::executor::Executor;
@@ -74,7 +74,7 @@ impl SnrCurves {
             counts.push(available);
         }
         let curve = |&method: &Method| MethodCurve {
-            name: methods::name(method).to_owned(),
+            name: method_samples::name(method).to_owned(),
             points: Vec::new(),
         };
         let mut curves: Vec<MethodCurve> = Method::ALL.iter().map(curve).collect();
@@ -84,7 +84,7 @@ impl SnrCurves {
             measurements.photos.truncate(l);
             measurements.noise = NoiseModel::with_gain_from(&measurements);
             for (curve, &method) in curves.iter_mut().zip(Method::ALL) {
-                if methods::is_slow(method) && !SLOW_PATTERN_COUNTS.contains(&l) {
+                if method_samples::is_slow(method) && !SLOW_PATTERN_COUNTS.contains(&l) {
                     continue;
                 }
                 let accuracy = measure_accuracy(known, &measurements, method, pixels, executor)?;
@@ -111,7 +111,7 @@ impl SnrCurves {
             "method | patterns | patterns_per_light_element | snr_db | standard_error_db | \
              pixels_judged | pixels | seconds_for_all_pixels",
         );
-        let mut table = MarkdownTable::new(&format!("L | L/M | {}", methods::names()));
+        let mut table = MarkdownTable::new(&format!("L | L/M | {}", method_samples::names()));
         for &l in &self.counts {
             let mut row = vec![l.to_string(), format!("{:.5}", self.undersampling(l))];
             for curve in &self.curves {

@@ -2,7 +2,7 @@
 
 use super::accuracy::measure_accuracy;
 use super::error::StudyError;
-use super::methods::{self, DEFAULT_METHOD};
+use super::method_samples::{self, DEFAULT_METHOD};
 use super::section::{MarkdownTable, ProgressCallback, ReportSection, snr_cell};
 use super::simulated_capture::SimulatedCapture;
 use crate::executor::Executor;
@@ -49,7 +49,7 @@ pub fn scenes_table(
 ) -> Result<ReportSection, StudyError> {
     let mut table = MarkdownTable::new(&format!(
         "scene | camera | light | ensemble | patterns | electrons | seed | {} | default | shortfall",
-        methods::names()
+        method_samples::names()
     ));
     let mut worst = f64::NEG_INFINITY;
     for (kind, sides, ensemble, patterns, electrons, seed) in SETTINGS {
@@ -95,7 +95,7 @@ pub fn scenes_table(
         let best_snrs = best_snr(false).zip(best_snr(true));
         let shortfall = best_snrs.map(|(other, default)| other - default);
         worst = worst.max(shortfall.unwrap_or(worst));
-        row.push(methods::name(DEFAULT_METHOD).to_owned());
+        row.push(method_samples::name(DEFAULT_METHOD).to_owned());
         row.push(shortfall.map_or(String::new(), |db| format!("{db:.2}")));
         table.add_row(row);
     }

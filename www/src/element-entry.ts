@@ -22,7 +22,7 @@ export type { EngineErrorCode, ErrorCode, PageErrorCode } from './shared/errors.
 export { PhotoError } from './shared/errors.js';
 export type { Backend, Gamut, LightName, ToneCurve } from './shared/names.js';
 export { BACKENDS, LIGHTS } from './shared/names.js';
-export type { PicturePoint } from './shared/values.js';
+export type { PicturePoint } from './shared/value-types.js';
 export type { LoadingMode, RevealMode } from './state/attribute-values.js';
 export type { LightUpdate } from './state/viewer-state.js';
 export type { ZoomView } from './state/viewport.js';

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::args::RecoverArgs;
 use crate::capture::{Manifest, NoiseModel};
 use crate::cli::report::{format_bytes, format_shots, print_line};
-use crate::recover::{CommonMode, Method, SparsityBasis};
+use crate::recover::{CommonModeWeight, Method, SparsityBasis};
 use crate::transport::Decibels;
 
 /// Fields of `recover --json`; see docs/capture.md.
@@ -29,7 +29,7 @@ pub struct RecoverReport {
     pub expected_snr_db: Option<Decibels>,
     /// SNR of the file relative to the recovered transport.
     pub file_snr_db: Option<Decibels>,
-    pub common_mode: Option<CommonMode>,
+    pub common_mode: Option<CommonModeWeight>,
     pub noise: NoiseModel,
     /// Number of strips in which the photographs were read; 1 if they fit in memory whole.
     pub strips: usize,

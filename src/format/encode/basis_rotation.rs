@@ -1,7 +1,7 @@
 //! The basis of a file: an orthonormal basis of the recovered basis's span, whose first function alone
 //! responds to a flat light, and whose others are the principal components of the coefficients.
 
-use crate::linalg::{mirror_upper, multiply, symmetric_eigen, transpose};
+use crate::linalg::{mirror_upper, multiply, symmetric_eigen, transpose, vectorise};
 use crate::transport::{Basis, CHANNELS, FloatTile};
 
 /// Smallest eigenvalue of the Gram matrix, relative to the largest, of a direction of the span.
@@ -103,19 +103,30 @@ impl BasisRotation {
     /// A tile's coefficients over this basis, `[pixel, component]`; empty if it has none.
     pub fn coefficients(&self, tile: &FloatTile) -> Vec<[f32; CHANNELS]> {
         let rank = self.rank();
-        let mut rotated =
-            vec![[0.0f32; CHANNELS]; tile.coefficients.len() / self.input_rank * rank];
+        let pixels = tile.coefficients.len() / self.input_rank;
+        let mut rotated = vec![[0.0f32; CHANNELS]; pixels * rank];
         let matrix: Vec<f32> = self.matrix.iter().map(|r| *r as f32).collect();
-        let pixels = tile.coefficients.chunks_exact(self.input_rank);
-        for (input, rotated) in pixels.zip(rotated.chunks_exact_mut(rank)) {
-            for (c, row) in input.iter().zip(matrix.chunks_exact(rank)) {
-                for (rotated, weight) in rotated.iter_mut().zip(row) {
-                    for channel in 0..CHANNELS {
-                        rotated[channel] += c[channel] * weight;
+        // One pixel, `[channel, component]`: consecutive sums fill vector registers.
+        let mut sums = vec![0.0f32; CHANNELS * rank];
+        vectorise(
+            #[inline(always)]
+            || {
+                let pixels = tile.coefficients.chunks_exact(self.input_rank);
+                for (input, rotated) in pixels.zip(rotated.chunks_exact_mut(rank)) {
+                    sums.fill(0.0);
+                    for (coefficient, row) in input.iter().zip(matrix.chunks_exact(rank)) {
+                        for (sums, value) in sums.chunks_exact_mut(rank).zip(coefficient) {
+                            for (sum, weight) in sums.iter_mut().zip(row) {
+                                *sum += value * weight;
+                            }
+                        }
+                    }
+                    for (k, rotated) in rotated.iter_mut().enumerate() {
+                        *rotated = std::array::from_fn(|channel| sums[channel * rank + k]);
                     }
                 }
-            }
-        }
+            },
+        );
         rotated
     }
 }

@@ -69,7 +69,7 @@ pub struct ScanShares {
 
 /// Components, or slots.
 #[derive(Clone, Debug)]
-struct CodedItems {
+struct ScanItems {
     coding: ScanCoding,
     /// Maximum number in one scan.
     max_per_scan: usize,
@@ -77,7 +77,7 @@ struct CodedItems {
     finest_steps: Vec<f32>,
 }
 
-impl CodedItems {
+impl ScanItems {
     /// Components and slots of a source, where there are some.
     fn of(encoder: &Encoder<'_, impl Executor>) -> Vec<Self> {
         let side = encoder.source.geometry.tile_side;
@@ -179,7 +179,7 @@ impl CodedItems {
 /// A plan without shares, by which the rate control measures a step.
 pub fn trial(encoder: &Encoder<'_, impl Executor>, step: f32) -> Vec<Scan> {
     let mut scans = Vec::new();
-    for items in CodedItems::of(encoder) {
+    for items in ScanItems::of(encoder) {
         let count = items.count().div_ceil(TRIAL_FIRST_ITEMS);
         items.first_layer(count, TRIAL_FIRST_STEP_RATIO * step, &mut scans);
         let bytes = vec![0.0; items.count()];
@@ -200,8 +200,8 @@ pub fn plan(
 ) -> Result<ScanPlan, FormatError> {
     let executor = encoder.executor;
     let area = encoder.order.len() as f64;
-    let kinds = CodedItems::of(encoder);
-    let costs = |items: &CodedItems, step| model.costs(items.coding, items.count(), step, executor);
+    let kinds = ScanItems::of(encoder);
+    let costs = |items: &ScanItems, step| model.costs(items.coding, items.count(), step, executor);
     let last: Vec<Vec<RateDistortion>> = kinds.iter().map(|items| costs(items, step)).collect();
     let basis_bytes = BASIS_BYTES_PER_SLOT * area;
     let file_bytes = basis_bytes * encoder.rank() as f64

@@ -82,7 +82,7 @@ mod tests {
 
     use super::*;
     use crate::linalg;
-    use crate::recover::common_mode::CommonMode;
+    use crate::recover::common_mode_weight::CommonModeWeight;
     use crate::recover::gram_cache::WindowEquations;
     use crate::recover::normal_equations::{EquationWeights, WeightedColumns};
     use crate::recover::test_problems::Problem;
@@ -95,7 +95,7 @@ mod tests {
         let slots: Vec<usize> = (missing..SIDE * SIDE).collect();
         let problem = Problem::random(slots.len(), rows, seed, 0.5);
         let columns = linalg::transpose(&problem.matrix, slots.len());
-        let weights = EquationWeights::uniform(rows, CommonMode::FULL);
+        let weights = EquationWeights::uniform(rows, CommonModeWeight::FULL);
         let equations = WindowEquations {
             slots,
             columns: WeightedColumns::new(columns, weights),

@@ -5,7 +5,7 @@
 //! `[r, r]`, Bᵀy, `[r]`, ‖y‖² and the noise variance. Observations with the same window and the same unsaturated patterns
 //! share BᵀB.
 //!
-//! B and y are weighted by the patterns' exposures, and the patterns' common mode by [`CommonMode::POOLED`].
+//! B and y are weighted by the patterns' exposures, and the patterns' common mode by [`CommonModeWeight::POOLED`].
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -13,7 +13,7 @@ use std::ops::Range;
 use super::basis::{LearnedBasis, PatternResponses};
 use crate::capture::Measurements;
 use crate::linalg::{dot, vectorise};
-use crate::recover::common_mode::CommonMode;
+use crate::recover::common_mode_weight::CommonModeWeight;
 use crate::recover::normal_equations::{EquationWeights, WeightedColumns};
 use crate::recover::sampling::{PixelsOfWindow, pixels_by_window, usable_samples};
 use crate::transport::{CHANNELS, CameraPx, Extent, Geometry, TileRect};
@@ -231,7 +231,7 @@ impl WeightedBasisResponses {
         }
         let weights = measurements.pattern_weights();
         let weights = pattern_indices.iter().map(|&l| weights[l]).collect();
-        let weights = EquationWeights::new(weights, CommonMode::POOLED);
+        let weights = EquationWeights::new(weights, CommonModeWeight::POOLED);
         let products = pattern_indices.iter().zip(&weights.patterns);
         let products = products.map(|(&l, w)| w * w * responses.mean(l));
         Self {

@@ -9,7 +9,7 @@ use super::equations::{BrightnessThresholds, RegionEquations, with_margin};
 use super::neighbour_prior::NeighbourPrior;
 use super::nonnegativity::NonNegativityPenalty;
 use super::posterior::PosteriorSolver;
-use super::posterior_means::{NEIGHBOURHOOD_RADIUS, ObservationIndex, PosteriorMeans};
+use super::posterior_means::{NEIGHBOURHOOD_RADIUS, ObservationPosition, PosteriorMeans};
 use super::prior::Prior;
 use crate::capture::Measurements;
 use crate::linalg::vectorise;
@@ -75,7 +75,7 @@ impl LearnedModel {
     fn estimate(
         &self,
         means: &PosteriorMeans<'_>,
-        location: ObservationIndex,
+        location: ObservationPosition,
         solver: &mut PosteriorSolver,
     ) -> Vec<f64> {
         let index = location.index;

@@ -33,7 +33,7 @@ mod regression;
 mod tests;
 mod training;
 
-use super::common_mode::CommonMode;
+use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
 use super::holdout::HoldoutSplit;
 use super::pixelwise::PixelwiseRecovery;
@@ -97,7 +97,7 @@ impl LearnedRecovery {
     }
 
     /// Weight of the patterns' common mode in the least squares that tiles are blended with.
-    pub fn common_mode(&self) -> Option<CommonMode> {
+    pub fn common_mode(&self) -> Option<CommonModeWeight> {
         self.nnls.as_ref().map(|nnls| nnls.common_mode)
     }
 

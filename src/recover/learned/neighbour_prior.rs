@@ -23,7 +23,7 @@
 
 use super::equations::PHASES;
 use super::posterior::{PosteriorSolver, PriorPrecision};
-use super::posterior_means::{ObservationIndex, PREDICTORS, PosteriorMeans};
+use super::posterior_means::{ObservationPosition, PREDICTORS, PosteriorMeans};
 use super::prior::Prior;
 use super::regression::{RegressionSums, add_products, solve_regressions};
 use crate::executor::Executor;
@@ -45,7 +45,7 @@ const MIN_OBSERVATIONS_PER_WEIGHT: usize = 4;
 /// Classes of observations with regressions of their own.
 const CLASSES: usize = PHASES * CHANNELS;
 
-fn class(region: &PosteriorMeans<'_>, location: ObservationIndex) -> usize {
+fn class(region: &PosteriorMeans<'_>, location: ObservationPosition) -> usize {
     region.equations.observations[location.index].phase * CHANNELS + location.channel
 }
 
@@ -173,7 +173,7 @@ impl NeighbourPrior {
 
     /// m, the prediction of an observation from its neighbours.
     #[inline(always)]
-    fn predict(&self, means: &PosteriorMeans<'_>, location: ObservationIndex) -> Vec<f64> {
+    fn predict(&self, means: &PosteriorMeans<'_>, location: ObservationPosition) -> Vec<f64> {
         let rank = self.rank;
         let weights = &self.weights[class(means, location)];
         let mut mean = vec![0.0; rank];
@@ -189,7 +189,7 @@ impl NeighbourPrior {
         &self,
         means: &PosteriorMeans<'_>,
         noise: f64,
-        location: ObservationIndex,
+        location: ObservationPosition,
         solver: &mut PosteriorSolver,
     ) -> (f64, Vec<f64>) {
         let index = location.index;

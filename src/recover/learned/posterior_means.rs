@@ -39,7 +39,7 @@ impl NeighbourOffset {
 
 /// Where an observation lies in its region.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ObservationIndex {
+pub(super) struct ObservationPosition {
     /// Column and row from the region's first pixel.
     x: u32,
     y: u32,
@@ -106,7 +106,10 @@ impl<'a> PosteriorMeans<'a> {
     /// The predictors of an observation, each with its number below [`PREDICTORS`]: a constant 1, and the posterior means
     /// of its bright neighbours, `[r]`.
     #[inline(always)]
-    pub fn predictors(&self, location: ObservationIndex) -> impl Iterator<Item = (usize, &[f64])> {
+    pub fn predictors(
+        &self,
+        location: ObservationPosition,
+    ) -> impl Iterator<Item = (usize, &[f64])> {
         let neighbours = self.offsets.iter().zip(1..);
         let neighbours =
             neighbours.filter_map(move |(offset, j)| Some((j, self.neighbour(location, offset)?)));
@@ -115,7 +118,7 @@ impl<'a> PosteriorMeans<'a> {
 
     /// Posterior mean of a neighbour, `[r]`; `None` outside the region and if it is not bright.
     #[inline(always)]
-    fn neighbour(&self, location: ObservationIndex, offset: &NeighbourOffset) -> Option<&[f64]> {
+    fn neighbour(&self, location: ObservationPosition, offset: &NeighbourOffset) -> Option<&[f64]> {
         let Extent { width, height } = self.equations.rect.extent;
         let x = location.x.checked_add_signed(offset.dx)?;
         let y = location.y.checked_add_signed(offset.dy)?;
@@ -128,18 +131,18 @@ impl<'a> PosteriorMeans<'a> {
     }
 
     /// The bright observations of the interior.
-    pub fn bright_locations(&self) -> impl Iterator<Item = ObservationIndex> {
+    pub fn bright_locations(&self) -> impl Iterator<Item = ObservationPosition> {
         let locations = self.interior_locations();
         locations.filter(|location| self.is_bright[location.index])
     }
 
     /// The observations of the interior, `[pixel, channel]`.
-    pub fn interior_locations(&self) -> impl Iterator<Item = ObservationIndex> + use<> {
+    pub fn interior_locations(&self) -> impl Iterator<Item = ObservationPosition> + use<> {
         let rect = self.equations.rect;
         self.interior.pixels().flat_map(move |pixel| {
             let (x, y) = (pixel.x - rect.x, pixel.y - rect.y);
             let first = (y * rect.extent.width + x) as usize * CHANNELS;
-            (0..CHANNELS).map(move |channel| ObservationIndex {
+            (0..CHANNELS).map(move |channel| ObservationPosition {
                 x,
                 y,
                 channel,

@@ -34,7 +34,7 @@ pub(super) struct Prior {
 
 /// Sufficient statistics of one E step.
 #[derive(Debug)]
-struct PriorStatistics {
+struct EStepStatistics {
     /// Observations by sub-element position.
     counts: [f64; PHASES],
     /// Σ ẑ by sub-element position.
@@ -89,7 +89,7 @@ impl Prior {
                 || self.expectation(&regions[i], thresholds, only_full),
             )
         });
-        let mut total = PriorStatistics::new(self.rank);
+        let mut total = EStepStatistics::new(self.rank);
         parts.iter().for_each(|part| total.merge(part));
         self.maximisation(total);
     }
@@ -100,8 +100,8 @@ impl Prior {
         region: &RegionEquations,
         thresholds: &BrightnessThresholds,
         only_full: bool,
-    ) -> PriorStatistics {
-        let mut sums = PriorStatistics::new(self.rank);
+    ) -> EStepStatistics {
+        let mut sums = EStepStatistics::new(self.rank);
         let mut solver = PosteriorSolver::new(self.rank);
         for (index, observation) in region.observations.iter().enumerate() {
             if !region.is_bright(index, thresholds) || only_full && !observation.has_full_window {
@@ -120,7 +120,7 @@ impl Prior {
     }
 
     /// The M step. Without observations the prior stays as it is.
-    fn maximisation(&mut self, statistics: PriorStatistics) {
+    fn maximisation(&mut self, statistics: EStepStatistics) {
         let rank = self.rank;
         let count: f64 = statistics.counts.iter().sum();
         if count < 1.0 {
@@ -153,7 +153,7 @@ impl Prior {
     }
 }
 
-impl PriorStatistics {
+impl EStepStatistics {
     fn new(rank: usize) -> Self {
         Self {
             counts: [0.0; PHASES],

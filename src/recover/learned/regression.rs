@@ -4,7 +4,7 @@
 //! over all observations of one class (sub-element position and channel); all components are kept side by side, so that
 //! the sums are vector operations of length r.
 
-use super::posterior_means::{ObservationIndex, PREDICTORS, PosteriorMeans};
+use super::posterior_means::{ObservationPosition, PREDICTORS, PosteriorMeans};
 use crate::linalg::{self, add_scaled};
 
 /// Ridge, as a share of the predictors' mean square, that keeps the regressions well posed.
@@ -31,7 +31,12 @@ impl RegressionSums {
 
     /// Adds an observation whose coefficients are `target`, `[r]`.
     #[inline(always)]
-    pub fn add(&mut self, means: &PosteriorMeans<'_>, location: ObservationIndex, target: &[f64]) {
+    pub fn add(
+        &mut self,
+        means: &PosteriorMeans<'_>,
+        location: ObservationPosition,
+        target: &[f64],
+    ) {
         let rank = self.rank;
         let predictors: Vec<(usize, &[f64])> = means.predictors(location).collect();
         for (n, &(i, a)) in predictors.iter().enumerate() {

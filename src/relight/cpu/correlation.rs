@@ -3,12 +3,12 @@
 //!
 //! A factored pixel is `Σ_k c_nk C_k(o_n)`: everything that depends on the light is in `C`, and pixels with the same
 //! window origin share it. `C` is computed by Fourier transforms: `F⁻¹(V̄_k · F)`, with `V_k` the basis function's
-//! spectrum, which is computed once, and `F` the light's ([`LightSpectrum`]). That takes some 60 operations a value,
+//! spectrum, which is computed once, and `F` the light's ([`LightFft`]). That takes some 60 operations a value,
 //! where the sum over a window of side 15 takes 450.
 
 use super::block_size::{even_block_side, fft_side};
 use super::fft::{Complex, ComplexLanes, Fft, FftScratch};
-use super::light_spectrum::LightSpectrum;
+use super::light_fft::LightFft;
 use super::simd::{LANES, ScalarFallback, Simd};
 use crate::transport::{Basis, TEXEL_COMPONENTS, Window};
 
@@ -32,7 +32,7 @@ pub struct Correlator {
 #[derive(Debug)]
 pub struct CorrelationScratch {
     fft: FftScratch,
-    light: LightSpectrum,
+    light: LightFft,
     /// The product of the spectra, transformed back along `v`: `[u, v]`, `v` within the block.
     columns: Vec<ComplexLanes>,
     /// `C`: `[origin, channel, quad]`.
@@ -103,7 +103,7 @@ impl Correlator {
         let n = self.fft.side;
         CorrelationScratch {
             fft: self.fft.scratch(),
-            light: LightSpectrum::new(n),
+            light: LightFft::new(n),
             columns: vec![ComplexLanes::default(); n * self.block_side],
             response: Vec::new(),
         }

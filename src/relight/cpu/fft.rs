@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use std::ops::{Add, Mul, Sub};
 
 use super::simd::{LANES, MAX_LINES, Simd, SimdVector};
-use crate::relight::math;
+use crate::relight::platform_math;
 
 /// A line of complex values in memory: one of each of [`LANES`] transforms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -154,7 +154,10 @@ impl Fft {
             for p in 0..n / 4 {
                 let power = |k: usize| {
                     let angle = -TAU * (k * p) as f64 / n as f64;
-                    [math::cos(angle) as f32, math::sin(angle) as f32]
+                    [
+                        platform_math::cos(angle) as f32,
+                        platform_math::sin(angle) as f32,
+                    ]
                 };
                 twiddles.push([power(1), power(2), power(3)]);
             }

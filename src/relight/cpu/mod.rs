@@ -11,7 +11,7 @@ mod block_size;
 mod combine;
 mod correlation;
 mod fft;
-mod light_spectrum;
+mod light_fft;
 mod origin_blocks;
 mod padded_light;
 mod simd;

@@ -2,7 +2,7 @@
 
 import type { RowRangeRelighter } from '../engine/types.js';
 import type { Photograph } from '../photo/photograph.js';
-import type { PhotoInfo } from '../shared/values.js';
+import type { PhotoInfo } from '../shared/value-types.js';
 import type { CorePhotograph } from './types.js';
 
 export interface LtmPhotograph extends PhotoInfo {}

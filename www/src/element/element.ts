@@ -2,7 +2,7 @@
 
 import { checkLightSource, isLightSource, type LightSource } from '../lights/light-source.js';
 import type { Backend, Gamut, LightName } from '../shared/names.js';
-import type { PhotoInfo, PicturePoint } from '../shared/values.js';
+import type { PhotoInfo, PicturePoint } from '../shared/value-types.js';
 import type { LightUpdate } from '../state/viewer-state.js';
 import type { ZoomView } from '../state/viewport.js';
 import { ElementController } from './element-controller.js';
@@ -13,7 +13,7 @@ import { ATTRIBUTES, PROPERTIES, type ReflectedProperties, reflect } from './ref
 // Servers have no HTMLElement, but importing this module must work there.
 const Base = globalThis.HTMLElement ?? (class {} as unknown as typeof HTMLElement);
 
-export type { PhotoInfo } from '../shared/values.js';
+export type { PhotoInfo } from '../shared/value-types.js';
 
 /** Options of `toBlob`. */
 export interface ToBlobOptions {

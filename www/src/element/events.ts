@@ -3,7 +3,7 @@
 import type { LightSource } from '../lights/light-source.js';
 import type { ErrorCode, PhotoError } from '../shared/errors.js';
 import type { Backend, LightName } from '../shared/names.js';
-import type { PicturePoint } from '../shared/values.js';
+import type { PicturePoint } from '../shared/value-types.js';
 import type { ZoomView } from '../state/viewport.js';
 
 export const EVENT_OPTIONS: EventInit = { bubbles: true, composed: true };

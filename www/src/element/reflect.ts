@@ -1,6 +1,6 @@
 /** Reflects attributes as typed properties. An absent or invalid attribute gives the property's default. */
 
-import { CENTRE } from '../shared/values.js';
+import { CENTRE } from '../shared/value-types.js';
 import {
   DEFAULT_TORCH_SIZE,
   type LoadingMode,

@@ -1,13 +1,13 @@
 /** The output transform's settings: how a linear picture becomes codes on the canvas. */
 
-import type { RgbFactors } from '../shared/values.js';
+import type { RgbGains } from '../shared/value-types.js';
 import type { Gamut, OutputTransform, RelightModule, ToneCurve } from './types.js';
 
 /** Immutable: a change makes a new object. */
 export interface OutputSettings {
   /** Factor on the picture's brightness. */
   readonly exposure: number;
-  readonly whiteBalance: RgbFactors;
+  readonly whiteBalance: RgbGains;
   readonly tone: ToneCurve;
 }
 

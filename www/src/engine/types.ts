@@ -4,7 +4,7 @@
  */
 
 import type { Gamut, ToneCurve } from '../shared/names.js';
-import type { PhotoInfo } from '../shared/values.js';
+import type { PhotoInfo } from '../shared/value-types.js';
 
 export type { Backend, Gamut, ToneCurve } from '../shared/names.js';
 

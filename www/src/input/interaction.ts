@@ -1,7 +1,7 @@
 /** Turns input by pointer, wheel, keyboard and tilt into changes of the viewer's state, and runs its animations. */
 
 import { callLater } from '../shared/promises.js';
-import { CENTRE, type PicturePoint } from '../shared/values.js';
+import { CENTRE, type PicturePoint } from '../shared/value-types.js';
 import type { ViewerState } from '../state/viewer-state.js';
 import {
   FULL_VIEW,

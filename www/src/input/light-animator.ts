@@ -1,6 +1,6 @@
 /** Animates the light: the fire, the wandering torch, the thrown torch. */
 
-import { CENTRE } from '../shared/values.js';
+import { CENTRE } from '../shared/value-types.js';
 import type { LightState } from '../state/light-state.js';
 import type { AnimationCallback, AnimationLoop } from './animation-loop.js';
 import { glide, speedOf, type Velocity } from './inertia.js';

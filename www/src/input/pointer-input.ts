@@ -1,6 +1,6 @@
 /** Feeds the browser's pointer and wheel events over the picture to the gesture recognizer. */
 
-import type { PicturePoint } from '../shared/values.js';
+import type { PicturePoint } from '../shared/value-types.js';
 import { wheelFactor } from '../state/viewport.js';
 import { type EnabledGestures, type GestureListener, GestureRecognizer } from './gestures.js';
 

@@ -1,6 +1,6 @@
 /** Asks for permission to read the device's orientation, and moves the torch by it. */
 
-import type { PicturePoint } from '../shared/values.js';
+import type { PicturePoint } from '../shared/value-types.js';
 
 /** Whether the device is likely to have an orientation sensor: handheld devices. */
 export function isTiltSupported(): boolean {

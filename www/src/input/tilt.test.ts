@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { PicturePoint } from '../shared/values.js';
+import type { PicturePoint } from '../shared/value-types.js';
 import { type DeviceAngles, TiltTracker } from './tilt.js';
 
 /** The torch's position after the smoothing has settled. */

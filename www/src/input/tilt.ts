@@ -1,6 +1,6 @@
 /** Maps the device's orientation to the torch's position. The initial orientation is the centre of the picture. */
 
-import { CENTRE, clampToPicture, type PicturePoint } from '../shared/values.js';
+import { CENTRE, clampToPicture, type PicturePoint } from '../shared/value-types.js';
 
 /** In degrees, as in a `deviceorientation` event. */
 export interface DeviceAngles {

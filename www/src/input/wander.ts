@@ -1,6 +1,6 @@
 /** The path of a torch that wanders by itself: a Lissajous curve around the centre of the picture. */
 
-import { CENTRE, type PicturePoint } from '../shared/values.js';
+import { CENTRE, type PicturePoint } from '../shared/value-types.js';
 
 /** One horizontal period: slow enough for the eye to rest on the light. */
 const PERIOD_SECONDS = 16;

@@ -1,10 +1,10 @@
 /** The colour of a light. It is a part of the white balance: the light transport matrix keeps channels apart. */
 
 import { PhotoError } from '../shared/errors.js';
-import type { RgbFactors } from '../shared/values.js';
+import type { RgbGains } from '../shared/value-types.js';
 
 export interface LightColor {
-  readonly factors: RgbFactors;
+  readonly factors: RgbGains;
   /** The CSS colour in hexadecimal, with `#`. */
   readonly hex: string;
 }
@@ -30,7 +30,7 @@ export function parseLightColor(value: string | null, parse = parseCssColor): Li
   };
 }
 
-export function multiplyRgb(a: RgbFactors, b: RgbFactors): RgbFactors {
+export function multiplyRgb(a: RgbGains, b: RgbGains): RgbGains {
   return [a[0] * b[0], a[1] * b[1], a[2] * b[2]];
 }
 

@@ -2,7 +2,7 @@
 
 import type { ExternalImageSource, Light, ReceivedPhoto, RelightModule } from '../engine/types.js';
 import type { LightName } from '../shared/names.js';
-import { CENTRE, type PicturePoint } from '../shared/values.js';
+import { CENTRE, type PicturePoint } from '../shared/value-types.js';
 
 export interface LightSetting {
   readonly name: LightName;

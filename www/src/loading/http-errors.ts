@@ -1,7 +1,7 @@
 /** The errors of a transfer. Each message names the file, the cause and, where there is one, the remedy. */
 
 import { messageOf, PhotoError } from '../shared/errors.js';
-import type { ByteRange } from '../shared/values.js';
+import type { ByteRange } from '../shared/value-types.js';
 
 /** An error after which the same request may succeed. */
 export class RetryableError extends PhotoError {

@@ -10,7 +10,7 @@ import {
 } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import type { TestContext } from 'node:test';
-import type { ByteRange } from '../shared/values.js';
+import type { ByteRange } from '../shared/value-types.js';
 import { HttpSource, type HttpSourcePorts } from './http-source.js';
 
 /** A signal that is never aborted. */

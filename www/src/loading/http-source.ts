@@ -5,7 +5,7 @@
 
 import { PhotoError } from '../shared/errors.js';
 import { linkedController, withTimeout } from '../shared/promises.js';
-import type { ByteRange } from '../shared/values.js';
+import type { ByteRange } from '../shared/value-types.js';
 import * as errors from './http-errors.js';
 import { RetryableError } from './http-errors.js';
 import {

@@ -4,7 +4,7 @@ import type { PhotoDecoder } from '../photo/photo-decoder.js';
 import type { Photograph } from '../photo/photograph.js';
 import { endSentence, hasCode, PhotoError, toPhotoError } from '../shared/errors.js';
 import { linkedController, withTimeout } from '../shared/promises.js';
-import type { ByteRange } from '../shared/values.js';
+import type { ByteRange } from '../shared/value-types.js';
 import { fileName, tooLong } from './http-errors.js';
 import { type FilePiece, HttpSource } from './http-source.js';
 

@@ -1,6 +1,6 @@
 /** Reads a response's status and headers, and recognises everything that can be wrong with them. */
 
-import type { ByteRange } from '../shared/values.js';
+import type { ByteRange } from '../shared/value-types.js';
 import { badStatus, compressed, webPage, wrongRange } from './http-errors.js';
 
 export interface ResponseHead {

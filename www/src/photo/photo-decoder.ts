@@ -1,7 +1,7 @@
 /** The interface of the decoders, each of which decodes one file, on the page's thread or in a worker. */
 
 import type { Decoder } from '../engine/types.js';
-import type { ByteRange } from '../shared/values.js';
+import type { ByteRange } from '../shared/value-types.js';
 import type { Photograph } from './photograph.js';
 
 export interface DecoderState extends Pick<Decoder, 'bytesFed' | 'fileBytes' | 'scansDone'> {

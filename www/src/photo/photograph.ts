@@ -12,7 +12,7 @@ import type {
 } from '../engine/types.js';
 import { messageOf, PhotoError, photoReleased } from '../shared/errors.js';
 import { allSettledOrThrow } from '../shared/promises.js';
-import type { PhotoInfo } from '../shared/values.js';
+import type { PhotoInfo } from '../shared/value-types.js';
 import {
   describePhoto,
   type PhotoDescriptor,

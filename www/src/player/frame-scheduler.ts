@@ -3,7 +3,7 @@
  * and again in full quality when a picture of reduced quality is at rest. Changes wait while nobody can see the picture.
  */
 
-import type { FramePorts } from './types.js';
+import type { FrameClock } from './types.js';
 
 /** A picture is at rest if no new frame is requested for this long after the browser's next frame. */
 const REST_DELAY_MS = 150;
@@ -21,7 +21,7 @@ export class FrameScheduler {
 
   /** `draw` draws a frame, with the quality that the device has time for unless it is to be full. */
   constructor(
-    private readonly ports: FramePorts,
+    private readonly ports: FrameClock,
     private readonly draw: (isFullQuality: boolean) => void,
   ) {}
 

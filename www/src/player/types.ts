@@ -20,7 +20,7 @@ export interface SessionSettings {
   readonly output: OutputSettings;
 }
 
-export interface FramePorts {
+export interface FrameClock {
   nextFrame(callback: () => void): void;
   readonly callLater: typeof callLater;
   /** Milliseconds, from any start. */
@@ -28,7 +28,7 @@ export interface FramePorts {
 }
 
 /** Loading and drawing; tests replace them. */
-export interface SessionPorts extends FramePorts {
+export interface SessionPorts extends FrameClock {
   open(src: string, credentials: RequestCredentials, options: LoadOptions): Promise<Photograph>;
   /** Warms up the backend that will probably be used, until `signal` is aborted. */
   prepare(options: BackendOptions, signal: AbortSignal): void;

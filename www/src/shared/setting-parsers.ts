@@ -5,7 +5,7 @@
 
 import { PhotoError } from './errors.js';
 import { type Gamut, LIGHTS, type LightName, type ToneCurve } from './names.js';
-import type { RgbFactors } from './values.js';
+import type { RgbGains } from './value-types.js';
 
 const TONES = ['clip', 'filmic'] as const;
 const GAMUTS = ['srgb', 'display-p3'] as const;
@@ -24,14 +24,14 @@ export function parseExposure(value: string | null): number {
   return parseNumber(value, 'exposure', 0, MAX_EXPOSURE, hint) ?? 1;
 }
 
-export function parseWhiteBalance(value: string | null): RgbFactors {
+export function parseWhiteBalance(value: string | null): RgbGains {
   if (!value?.trim()) return [1, 1, 1];
   const factors = value
     .trim()
     .split(/[\s,]+/)
     .map(Number);
   const inRange = (factor: number) => factor >= 0 && factor <= MAX_WHITE_BALANCE;
-  if (factors.length === 3 && factors.every(inRange)) return factors as unknown as RgbFactors;
+  if (factors.length === 3 && factors.every(inRange)) return factors as unknown as RgbGains;
   const message =
     `The white balance “${value}” is not three numbers from 0 to ${MAX_WHITE_BALANCE}, for red, ` +
     'green and blue; “1 1 1” shows the photograph as taken.';

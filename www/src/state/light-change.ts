@@ -7,7 +7,7 @@ import type { LightSetting } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
 import type { LightName } from '../shared/names.js';
 import { reuse } from '../shared/shallow-equal.js';
-import type { PicturePoint } from '../shared/values.js';
+import type { PicturePoint } from '../shared/value-types.js';
 
 /** As in a `lightchange` event. */
 export interface ActiveLight {

@@ -12,7 +12,7 @@ import type * as SourceSupport from '../lights/light-sources.js';
 import { missingScript, type PhotoError } from '../shared/errors.js';
 import { LIGHTS, type LightName } from '../shared/names.js';
 import { reuse } from '../shared/shallow-equal.js';
-import { clampToPicture, type PicturePoint } from '../shared/values.js';
+import { clampToPicture, type PicturePoint } from '../shared/value-types.js';
 import type { LightOptions } from './options.js';
 
 /** Values that take precedence over the options, and a name also over a source; `null` leaves an option in effect. */

@@ -2,7 +2,7 @@
 
 import { parseLightColor } from '../lights/light-color.js';
 import { reuse } from '../shared/shallow-equal.js';
-import { CENTRE, type PicturePoint } from '../shared/values.js';
+import { CENTRE, type PicturePoint } from '../shared/value-types.js';
 import type { AttributeReader } from './attribute-reader.js';
 
 /** As `PARSERS` gives them. Addresses are absolute; an absent address is `null`. */

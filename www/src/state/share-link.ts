@@ -3,7 +3,7 @@
 import { PhotoError } from '../shared/errors.js';
 import { LIGHTS, type LightName } from '../shared/names.js';
 import { MAX_EXPOSURE } from '../shared/setting-parsers.js';
-import { CENTRE, type PicturePoint } from '../shared/values.js';
+import { CENTRE, type PicturePoint } from '../shared/value-types.js';
 import { MAX_TORCH_SIZE } from './attribute-values.js';
 import type { ZoomView } from './viewport.js';
 

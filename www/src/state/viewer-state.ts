@@ -5,7 +5,7 @@ import { multiplyRgb, parseLightColor } from '../lights/light-color.js';
 import type { PhotoError } from '../shared/errors.js';
 import type { LightName } from '../shared/names.js';
 import { reuse } from '../shared/shallow-equal.js';
-import { CENTRE, clampToPicture } from '../shared/values.js';
+import { CENTRE, clampToPicture } from '../shared/value-types.js';
 import { PARSERS } from './attribute-values.js';
 import { type LightOverrides, LightState, type LightStateListener } from './light-state.js';
 import type { ElementOptions } from './options.js';

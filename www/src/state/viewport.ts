@@ -3,7 +3,7 @@
  * are in units of the box, 0 to 1. A view never shows anything beyond the picture.
  */
 
-import { CENTRE, clampAndRound, type PicturePoint } from '../shared/values.js';
+import { CENTRE, clampAndRound, type PicturePoint } from '../shared/value-types.js';
 
 /** The part of the picture that is shown. */
 export interface ZoomView {

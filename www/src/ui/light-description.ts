@@ -1,7 +1,7 @@
 /** Describes the torch's position in words, for screen readers. */
 
 import { type Language, type StringKey, t } from '../i18n/strings.js';
-import type { PicturePoint } from '../shared/values.js';
+import type { PicturePoint } from '../shared/value-types.js';
 
 const DIRECTIONS: readonly (readonly StringKey[])[] = [
   ['upperLeft', 'above', 'upperRight'],

@@ -3,7 +3,7 @@
 import { languageOf } from '../i18n/language.js';
 import { type Language, type StringKey, t } from '../i18n/strings.js';
 import { missingScript, type PhotoError } from '../shared/errors.js';
-import { CENTRE } from '../shared/values.js';
+import { CENTRE } from '../shared/value-types.js';
 import type { ViewerState } from '../state/viewer-state.js';
 import { describeLight } from './light-description.js';
 import type { ShadowDom } from './shadow-dom.js';

@@ -1,7 +1,7 @@
 /** The element's shadow DOM: the viewport with picture, poster and torch handle; controls, progress bar and message. */
 
 import { type Language, t } from '../i18n/strings.js';
-import type { PicturePoint } from '../shared/values.js';
+import type { PicturePoint } from '../shared/value-types.js';
 import type { ElementOptions } from '../state/options.js';
 import { toViewport, type ZoomView } from '../state/viewport.js';
 import { adoptStyles } from './adopted-styles.js';

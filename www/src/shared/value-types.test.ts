@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { clampToPicture } from './values.js';
+import { clampToPicture } from './value-types.js';
 
 test('points are clamped to the picture and rounded to a ten-thousandth', () => {
   assert.deepEqual(clampToPicture({ x: -1, y: 2 }), { x: 0, y: 1 });

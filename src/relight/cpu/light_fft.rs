@@ -11,7 +11,7 @@ use super::simd::{LANES, Simd};
 
 /// The spectrum of one channel, and the memory to compute it in.
 #[derive(Debug)]
-pub struct LightSpectrum {
+pub struct LightFft {
     /// Side of the transforms, `n`.
     side: usize,
     /// One channel of the light, `[v, u]`; zero beyond the footprint.
@@ -24,7 +24,7 @@ pub struct LightSpectrum {
     values: Vec<f32>,
 }
 
-impl LightSpectrum {
+impl LightFft {
     pub fn new(side: usize) -> Self {
         Self {
             side,

@@ -30,7 +30,7 @@ export interface PicturePoint {
 
 export const CENTRE: PicturePoint = { x: 0.5, y: 0.5 };
 
-export type RgbFactors = readonly [red: number, green: number, blue: number];
+export type RgbGains = readonly [red: number, green: number, blue: number];
 
 export function clampToPicture({ x, y }: PicturePoint): PicturePoint {
   return { x: clampAndRound(x, 0, 1), y: clampAndRound(y, 0, 1) };

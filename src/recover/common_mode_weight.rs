@@ -9,9 +9,9 @@
 /// therefore weighted by ω².
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[serde(transparent)]
-pub struct CommonMode(f64);
+pub struct CommonModeWeight(f64);
 
-impl CommonMode {
+impl CommonModeWeight {
     /// Plain least squares.
     pub const FULL: Self = Self(1.0);
 
