@@ -309,9 +309,16 @@ fn round(block: &[f32], step: f32, offset: impl Fn(usize) -> f32, numbers: &mut 
 
 /// Sum of squared pixels of a block in zigzag order, over the columns and rows inside the tile.
 fn squared_pixels(zigzag: &DctBlock, (columns, rows): (usize, usize)) -> f64 {
-    let sum = |values: &[f32]| values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
+    let square = |v: f32| f64::from(v).powi(2);
     if (columns, rows) == (SIDE, SIDE) {
-        return sum(zigzag);
+        // Independent sums fill vector registers.
+        let mut sums = [0.0; SIDE];
+        for values in zigzag.as_chunks::<SIDE>().0 {
+            for (sum, v) in sums.iter_mut().zip(values) {
+                *sum += square(*v);
+            }
+        }
+        return sums.iter().sum();
     }
     let mut block = [0.0; AREA];
     for (value, i) in zigzag.iter().zip(ZIGZAG) {
@@ -319,7 +326,8 @@ fn squared_pixels(zigzag: &DctBlock, (columns, rows): (usize, usize)) -> f64 {
     }
     let pixels = dct::inverse(&block);
     let lines = pixels.chunks_exact(SIDE).take(rows);
-    lines.map(|line| sum(&line[..columns])).sum()
+    let inside = lines.flat_map(|line| &line[..columns]);
+    inside.map(|v| square(*v)).sum()
 }
 
 #[cfg(test)]

@@ -74,21 +74,20 @@ struct EncodedTile {
 }
 
 impl QuantisedTile {
-    /// Quantises a tile; `keep_decoded` says whether [`decoded`](Self::decoded) will be called.
-    pub fn new(
-        encoder: &Encoder<'_, impl Executor>,
-        tile: &FloatTile,
-        scans: &[Scan],
-        keep_decoded: bool,
-    ) -> Self {
-        let coefficients = encoder.rotated(tile).map(|coefficients| {
-            QuantisedCoefficients::new(tile.rect.extent, &coefficients, scans, keep_decoded)
-        });
-        let functions = encoder.direct(tile);
-        Self {
+    /// Quantises a tile over the file's basis; `keep_decoded` says whether [`decoded`](Self::decoded) will be called.
+    pub fn new(tile: &FloatTile, order: &[u16], scans: &[Scan], keep_decoded: bool) -> Self {
+        let FloatTile {
+            rect,
             coefficients,
-            functions: functions
-                .map(|tau| QuantisedDirectFunctions::new(tau, &encoder.order, scans)),
+            functions,
+        } = tile;
+        let has = |values: &[_]| !values.is_empty();
+        Self {
+            coefficients: has(coefficients).then(|| {
+                QuantisedCoefficients::new(rect.extent, coefficients, scans, keep_decoded)
+            }),
+            functions: has(functions)
+                .then(|| QuantisedDirectFunctions::new(functions, order, scans)),
         }
     }
 
@@ -143,7 +142,9 @@ pub fn encode_quantised(
     encoder: &Encoder<'_, impl Executor>,
     scans: Vec<Scan>,
 ) -> Result<EncodedFile, FormatError> {
-    let encode = |tile: FloatTile| QuantisedTile::new(encoder, &tile, &scans, false).encode(&scans);
+    let encode = |tile: FloatTile| {
+        QuantisedTile::new(&encoder.rotated(tile), &encoder.order, &scans, false).encode(&scans)
+    };
     assemble(encoder, scans.clone(), encode)
 }
 
@@ -180,7 +181,7 @@ pub fn encode_lossless(encoder: &Encoder<'_, impl Executor>) -> Result<EncodedFi
             first += count;
         }
     }
-    let encode = |tile: FloatTile| encode_halves(encoder, &tile, &scans);
+    let encode = |tile: FloatTile| encode_halves(encoder, &encoder.rotated(tile), &scans);
     assemble(encoder, scans.clone(), encode)
 }
 
@@ -189,14 +190,13 @@ fn encode_halves(
     tile: &FloatTile,
     scans: &[Scan],
 ) -> Result<EncodedTile, FormatError> {
-    let coefficients = encoder.rotated(tile).unwrap_or_default();
     let mut encoded = EncodedTile::default();
     let (mut energies, mut errors) = (Vec::new(), Vec::new());
     for scan in scans {
         let order = &encoder.order;
         let values = match scan.coding.is_direct() {
             true => halves::gather(&tile.functions, order.len(), scan, Some(order)),
-            false => halves::gather(&coefficients, encoder.rank(), scan, None),
+            false => halves::gather(&tile.coefficients, encoder.rank(), scan, None),
         };
         let energy = values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
         energies.push(energy);

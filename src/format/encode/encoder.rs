@@ -1,5 +1,7 @@
 //! The encoder's view of a source: the rotated basis, energies and peaks, from one pass over all tiles.
 
+use std::borrow::Cow;
+
 use super::basis_rotation::{BasisRotation, coefficient_moments};
 use super::encoder_input::EncoderInput;
 use crate::executor::Executor;
@@ -122,15 +124,32 @@ impl<'a, E: Executor> Encoder<'a, E> {
         usize::from(self.has_functions) * self.order.len()
     }
 
-    /// A tile's coefficients over the file's basis; `None` if there are none.
-    pub fn rotated(&self, tile: &FloatTile) -> Option<Vec<[f32; CHANNELS]>> {
-        let coefficients = self.rotation.as_ref()?.coefficients(tile);
-        (!coefficients.is_empty()).then_some(coefficients)
+    /// The tile over the file's basis, without functions if the file has none.
+    pub fn rotated(&self, mut tile: FloatTile) -> FloatTile {
+        let rotation = self.rotation.as_ref();
+        tile.coefficients = rotation.map_or(Vec::new(), |r| r.coefficients(&tile));
+        if !self.has_functions {
+            tile.functions.clear();
+        }
+        tile
     }
 
-    /// A tile's direct functions; `None` if there are none, or the file has none.
-    pub fn direct<'t>(&self, tile: &'t FloatTile) -> Option<&'t [[f32; CHANNELS]]> {
-        (self.has_functions && !tile.functions.is_empty()).then_some(&tile.functions)
+    /// The tile over the file's basis without the components that were dropped since its [rotation](Self::rotated).
+    pub fn truncated<'t>(&self, tile: &'t FloatTile) -> Cow<'t, FloatTile> {
+        let (pixels, rank) = (tile.rect.extent.area(), self.rank());
+        let rotated_rank = tile.coefficients.len() / pixels;
+        if rotated_rank <= rank {
+            return Cow::Borrowed(tile);
+        }
+        let coefficients = tile.coefficients.chunks_exact(rotated_rank);
+        Cow::Owned(FloatTile {
+            rect: tile.rect,
+            coefficients: coefficients
+                .flat_map(|pixel| &pixel[..rank])
+                .copied()
+                .collect(),
+            functions: tile.functions.clone(),
+        })
     }
 
     /// The finest step of component `k` whose numbers do not overflow: from the largest coefficient there can

@@ -96,6 +96,8 @@ impl<'a, E: Executor> RateControl<'a, E> {
         // The metric may have direct functions where the file has none.
         let has_functions = encoder.has_functions;
         encoder.has_functions |= tiles.iter().any(|tile| !tile.functions.is_empty());
+        let rotated = |tile| encoder.rotated(tile);
+        let tiles: Vec<FloatTile> = tiles.into_iter().map(rotated).collect();
         let [exponent, _] = bisect(LOSS_EXPONENTS, LOSS_HALVINGS, |exponent| {
             let scans = scan_plan::trial(encoder, (coarsest * exponent.exp2()) as f32);
             let decoded = |i: usize| decoded(encoder, &tiles[i], &scans);
@@ -190,7 +192,9 @@ impl<'a, E: Executor> RateControl<'a, E> {
     fn error_of(&self, scans: &[Scan]) -> SnrAccumulator {
         let errors = self.encoder.executor.map(self.sample.len(), |i| {
             let SampledTilePart { tile, weight } = &self.sample[i];
-            let error = QuantisedTile::new(&self.encoder, tile, scans, false).error(scans.len());
+            let tile = self.encoder.truncated(tile);
+            let quantised = QuantisedTile::new(&tile, &self.encoder.order, scans, false);
+            let error = quantised.error(scans.len());
             SnrAccumulator {
                 signal: error.signal * weight,
                 error: error.error * weight,
@@ -224,13 +228,13 @@ fn codable(encoder: &Encoder<'_, impl Executor>, mut tiles: Vec<FloatTile>) -> V
     tiles
 }
 
-/// The functions of a tile as a reader decodes them.
+/// The functions of a tile over the file's basis, as a reader decodes them.
 fn decoded(
     encoder: &Encoder<'_, impl Executor>,
     tile: &FloatTile,
     scans: &[Scan],
 ) -> TileFunctions {
-    let quantised = QuantisedTile::new(encoder, tile, scans, true);
+    let quantised = QuantisedTile::new(tile, &encoder.order, scans, true);
     let decoded = quantised.decoded(tile, &encoder.order);
     let basis = encoder.rotation.as_ref().map(|rotation| &rotation.basis);
     decoded.functions(&encoder.source.geometry, basis)

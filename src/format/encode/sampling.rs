@@ -15,6 +15,7 @@ const PART_SIDE: u32 = 8;
 
 /// A part of a tile.
 pub struct SampledTilePart {
+    /// Over the file's basis.
     pub tile: FloatTile,
     /// Number of parts that it represents.
     pub weight: f64,
@@ -45,7 +46,7 @@ pub fn sample(encoder: &Encoder<'_, impl Executor>) -> Result<Vec<SampledTilePar
         let tile = (encoder.source.tile)(tile)?;
         let (tile, lit_parts) = lit_part(tile, side, hash(n + MAX_SAMPLED_TILES));
         Ok(SampledTilePart {
-            tile,
+            tile: encoder.rotated(tile),
             weight: (lit_parts * (to - from)) as f64,
         })
     };

@@ -44,11 +44,15 @@ impl CostModel {
     pub fn new(encoder: &Encoder<'_, impl Executor>, sample: &[SampledTilePart]) -> Self {
         let parts = encoder.executor.map(sample.len(), |i| {
             let SampledTilePart { tile, weight } = &sample[i];
-            let (coefficients, functions) = (encoder.rotated(tile), encoder.direct(tile));
+            let tile = encoder.truncated(tile);
+            let (extent, coefficients) = (tile.rect.extent, &tile.coefficients);
+            let functions = &tile.functions;
             TransformedTilePart {
                 weight: *weight,
-                coefficients: coefficients.map(|c| TransformedTile::new(tile.rect.extent, &c)),
-                functions: functions.map(|tau| CentreOutFunctions::new(tau, &encoder.order)),
+                coefficients: (!coefficients.is_empty())
+                    .then(|| TransformedTile::new(extent, coefficients)),
+                functions: (!functions.is_empty())
+                    .then(|| CentreOutFunctions::new(functions, &encoder.order)),
             }
         });
         Self { parts }
