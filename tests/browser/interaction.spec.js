@@ -48,16 +48,22 @@ const torchOf = async (page) =>
  */
 async function touchInput(page) {
   const session = await page.context().newCDPSession(page);
+  // Every event is a frame after the last, however slow the machine is: a gesture has a speed.
+  let seconds = Date.now() / 1000;
   return (
     /** @type {'touchStart' | 'touchMove' | 'touchEnd'} */ type,
     /** @type {{ x: number, y: number }[]} */ ...points
-  ) =>
-    session.send('Input.dispatchTouchEvent', {
+  ) => {
+    seconds += FRAME_SECONDS;
+    return session.send('Input.dispatchTouchEvent', {
       type,
       touchPoints: points.map((point, id) => ({ ...point, id })),
+      timestamp: seconds,
     });
+  };
 }
 
+const FRAME_SECONDS = 1 / 60;
 /** Longer than the time between the taps of a double tap. */
 const DOUBLE_TAP_GAP_MS = 1000;
 /** Longer than visitors rest before autoplay starts again. */
