@@ -34,8 +34,13 @@ export type OpenPhoto = (
   options?: PageOptions,
 ) => Promise<Page>;
 
+/** Runs a named check. A failed check fails the test, but only after the test's other checks. */
+export type Step = (name: string, check: () => unknown) => Promise<void>;
+
 interface TestFixtures {
   openPage: OpenPage;
+  /** For checks that share a page, because loading it is what takes most of a test's time. */
+  step: Step;
   openPhoto: OpenPhoto;
   /** For tests that run in every browser: `openPage`, unless Playwright cannot control the browser. */
   openAnyPage: OpenAnyPage;
@@ -53,6 +58,8 @@ interface WorkerFixtures extends WorkerOptions {
 
 /** Messages that no page may log, whatever its level. */
 const FORBIDDEN_MESSAGES = /Content Security Policy|panicked/;
+/** Longest wait of an action or an expectation. */
+const FAILED_STEP_MS = 120_000;
 
 export const test = base.extend<TestFixtures, WorkerFixtures>({
   server: [
@@ -101,6 +108,20 @@ export const test = base.extend<TestFixtures, WorkerFixtures>({
       await context.close();
     }
     baseExpect(faults, 'the page must not report errors').toEqual([]);
+  },
+  // biome-ignore lint/correctness/noEmptyPattern: Playwright reads the names of fixtures from the pattern.
+  step: async ({}, use) => {
+    const failures: string[] = [];
+    await use(async (name, check) => {
+      try {
+        await test.step(name, async () => check());
+      } catch (error) {
+        failures.push(`${name}: ${error instanceof Error ? error.stack : error}`);
+        // What the check waited for in vain is not taken from the next checks.
+        test.setTimeout(test.info().timeout + FAILED_STEP_MS);
+      }
+    });
+    baseExpect(failures.join('\n\n'), 'steps that failed').toBe('');
   },
   openAnyPage: async ({ openPage }, use) => use((path) => openPage(path)),
   openPhoto: async ({ openPage }, use) => {

@@ -161,8 +161,8 @@ const HANDLERS = {
   '/half.png': send('image/png', () => HALF_WHITE),
   '/film.webm': (response, request) =>
     sendRange(response, request, { etag: '"film"', bytes: FILM, type: 'video/webm' }),
-  // No script and no element.
-  '/blank': send('text/html', () => page('')),
+  // No script, no element and no request for an icon.
+  '/blank': send('text/html', () => page('<link rel="icon" href="data:,">')),
   // The element, without a policy.
   '/plain': send('text/html', () => page(`<style>body { margin: 0 }</style>${ELEMENT}`)),
   // The element and axe-core under the site's policy, in the language of `lang`.
