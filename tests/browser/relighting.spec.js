@@ -2,8 +2,14 @@
 
 import { compare } from '../../www/tools/pictures.js';
 import { expect, note, test } from './fixtures.js';
-import { capturePicture, mountPhoto, screenPicture, waitForLoad } from './page-helpers.js';
-import { LIGHTS, nativePicture } from './test-photos.js';
+import {
+  capturePicture,
+  mountPhoto,
+  screenPicture,
+  waitForEvents,
+  waitForLoad,
+} from './page-helpers.js';
+import { LIGHTS, nativePicture, TALL_FILE } from './test-photos.js';
 
 const BACKENDS = ['webgpu', 'webgl2', 'cpu'];
 const SRC = '/photos/glass.ltm';
@@ -14,50 +20,57 @@ const removeWorkers = () => {
 
 test.describe('relighting', () => {
   for (const backend of BACKENDS) {
-    test(`${backend} agrees with ltm-export to 1/255`, async ({ openPage }) => {
+    test(`${backend} draws as ltm-export does`, async ({ openPage, step }) => {
       const page = await openPage('/plain', { reducedMotion: 'reduce' });
-      await mountPhoto(page, { src: SRC, backend });
+      await mountPhoto(page, { src: SRC, backend, light: 'spectrum' });
       const photoEvents = await waitForLoad(page);
       const change = photoEvents.find((event) => event.type === 'backendchange');
       expect(change).toStrictEqual({ type: 'backendchange', backend, previous: null, reason: '' });
-      for (const light of LIGHTS) {
-        const drawn = await capturePicture(page, { light });
-        for (const native of /** @type {const} */ (['cpu', 'reference'])) {
-          const { worst, psnr } = compare(drawn, nativePicture(light, { backend: native }));
-          note(`${light} against native ${native}: worst ${worst}/255, ${psnr.toFixed(1)} dB`);
-          expect(
-            worst,
-            `${light} differs by ${worst}/255 from native ${native}`,
-          ).toBeLessThanOrEqual(1);
+
+      await step(`${backend} presents its picture on the screen`, async () => {
+        const shown = await screenPicture(page);
+        // Presentation may round once more.
+        expect(shown).toMatchPicture(nativePicture('spectrum'), 2);
+      });
+
+      await step(`${backend} agrees with ltm-export to 1/255`, async () => {
+        for (const light of LIGHTS) {
+          const drawn = await capturePicture(page, { light });
+          for (const native of /** @type {const} */ (['cpu', 'reference'])) {
+            const { worst, psnr } = compare(drawn, nativePicture(light, { backend: native }));
+            note(`${light} against native ${native}: worst ${worst}/255, ${psnr.toFixed(1)} dB`);
+            expect
+              .soft(worst, `${light} differs by ${worst}/255 from native ${native}`)
+              .toBeLessThanOrEqual(1);
+          }
         }
-      }
-    });
+      });
 
-    test(`${backend} scales by the exposure`, async ({ openPhoto }) => {
-      const page = await openPhoto({ src: SRC, backend, exposure: '0.4' });
-      const dim = await capturePicture(page, { light: 'spectrum' });
-      expect(dim).toMatchPicture(nativePicture('spectrum', { exposure: 0.4 }), 1);
-      const bright = await capturePicture(page, { exposure: '2.5' });
-      expect(bright).toMatchPicture(nativePicture('spectrum', { exposure: 2.5 }), 1);
-    });
+      await step(`${backend} draws the torch at the same position as ltm-export`, async () => {
+        for (const point of [
+          { x: 0.3, y: 0.65 },
+          { x: 1, y: 0 },
+        ]) {
+          const drawn = await capturePicture(page, { light: 'torch' }, point);
+          expect(drawn, 'the torch moved').not.toMatchPicture(nativePicture('torch'), 20);
+          expect(drawn).toMatchPicture(nativePicture('torch', { torch: point }), 1);
+        }
+      });
 
-    test(`${backend} draws the torch at the same position as ltm-export`, async ({ openPhoto }) => {
-      const page = await openPhoto({ src: SRC, backend, light: 'torch' });
-      for (const point of [
-        { x: 0.3, y: 0.65 },
-        { x: 1, y: 0 },
-      ]) {
-        const drawn = await capturePicture(page, {}, point);
-        expect(drawn, 'the torch moved').not.toMatchPicture(nativePicture('torch'), 20);
-        expect(drawn).toMatchPicture(nativePicture('torch', { torch: point }), 1);
-      }
-    });
+      await step(`${backend} scales by the exposure`, async () => {
+        const bright = await capturePicture(page, { light: 'spectrum', exposure: '2.5' });
+        expect(bright).toMatchPicture(nativePicture('spectrum', { exposure: 2.5 }), 1);
+      });
 
-    test(`${backend} presents its picture on the screen`, async ({ openPhoto }) => {
-      const page = await openPhoto({ src: SRC, backend, light: 'spectrum' });
-      const shown = await screenPicture(page);
-      // Presentation may round once more.
-      expect(shown).toMatchPicture(nativePicture('spectrum'), 2);
+      await step(
+        `${backend} draws several tiles, and scales by the exposure from the first frame on`,
+        async () => {
+          await page.evaluate("photo.exposure = 0.4, photo.src = '/photos/tall.ltm'");
+          await waitForEvents(page, 'load', 2);
+          const native = nativePicture('spectrum', { photo: TALL_FILE, exposure: 0.4 });
+          expect(await capturePicture(page)).toMatchPicture(native, 1);
+        },
+      );
     });
   }
 
