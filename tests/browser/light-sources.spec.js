@@ -7,10 +7,12 @@ import {
   capturePicture,
   countEvents,
   dominantColour,
+  mountPhoto,
   openAlertDetails,
   screenPicture,
   waitForEvents,
   waitForFrames,
+  waitForLoad,
 } from './page-helpers.js';
 import { LIGHT_IMAGE_FILE, LIGHT_IMAGE_URL, nativePicture } from './test-photos.js';
 
@@ -129,22 +131,41 @@ async function expectColour(page, colour) {
 
 test.describe('a light source', () => {
   for (const backend of BACKENDS) {
-    test(`of each kind agrees with ltm-export on ${backend} to 1/255`, async ({ openPhoto }) => {
+    test(`of each kind agrees with ltm-export on ${backend}`, async ({ openPhoto, step }) => {
       const page = await openPhoto({ ...GLASS, backend });
-      await makeSources(page);
-      const want = nativePicture(LIGHT_IMAGE_FILE);
-      for (const kind of KINDS) {
-        await page.evaluate(`photo.lightSource = sources.${kind}`);
-        const { worst } = compare(await capturePicture(page), want);
-        expect(worst, `${kind} differs by ${worst}/255`).toBeLessThanOrEqual(1);
-        const shown = await screenPicture(page);
-        expect(shown, `${kind} is not on the screen`).toMatchPicture(want, 2);
-      }
-      await page.evaluate('photo.lightSource = null');
-      const back = compare(await capturePicture(page), nativePicture('spectrum'));
-      expect(back.worst, 'the built-in light is not back').toBeLessThanOrEqual(1);
-      expect(await countEvents(page, 'lightchange')).toBe(KINDS.length + 1);
-      expect(await countEvents(page, 'error')).toBe(0);
+      await step(`each kind on ${backend} agrees to 1/255`, async () => {
+        await makeSources(page);
+        const want = nativePicture(LIGHT_IMAGE_FILE);
+        for (const kind of KINDS) {
+          await page.evaluate(`photo.lightSource = sources.${kind}`);
+          const { worst } = compare(await capturePicture(page), want);
+          expect(worst, `${kind} differs by ${worst}/255`).toBeLessThanOrEqual(1);
+          const shown = await screenPicture(page);
+          expect(shown, `${kind} is not on the screen`).toMatchPicture(want, 2);
+        }
+        await page.evaluate('photo.lightSource = null');
+        const back = compare(await capturePicture(page), nativePicture('spectrum'));
+        expect(back.worst, 'the built-in light is not back').toBeLessThanOrEqual(1);
+        expect(await countEvents(page, 'lightchange')).toBe(KINDS.length + 1);
+        expect(await countEvents(page, 'error')).toBe(0);
+      });
+
+      await step(`each kind on ${backend} is dimmed by its transparency`, async () => {
+        const fifth = nativePicture('flood', { exposure: 0.2 });
+        for (const kind of ['canvas', 'bitmap', 'plain']) {
+          await page.evaluate(async (kind) => {
+            const canvas = Object.assign(document.createElement('canvas'), { width: 9, height: 9 });
+            const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
+            context.fillStyle = 'rgb(255 255 255 / 0.2)';
+            context.fillRect(0, 0, 9, 9);
+            const { photo } = /** @type {any} */ (globalThis);
+            const apart = /** @type {const} */ ({ premultiplyAlpha: 'none' });
+            if (kind === 'canvas') photo.lightSource = canvas;
+            else photo.lightSource = await createImageBitmap(canvas, kind === 'plain' ? apart : {});
+          }, kind);
+          expect(await capturePicture(page), kind).toMatchPicture(fifth, 1);
+        }
+      });
     });
 
     test(`that is a video is followed on ${backend}`, async ({ openPhoto }) => {
@@ -232,36 +253,41 @@ test.describe('a light source', () => {
     expect(await page.evaluate('stream.getVideoTracks()[0].readyState')).toBe('live');
   });
 
-  for (const [how, leave, back] of [
-    ['that is replaced', 'photo.lightSource = null', 'photo.lightSource = source'],
-    ['of an element that is removed', 'photo.remove()', 'document.body.append(photo)'],
-    [
-      'of an element out of view',
-      "photo.before(Object.assign(document.createElement('p'), { style: 'height: 5000px' }))",
-      'photo.scrollIntoView()',
-    ],
-    ['of an element that is not displayed', 'photo.hidden = true', 'photo.hidden = false'],
-  ]) {
-    for (const source of ['video', 'stream']) {
-      test(`${how} is not read: a ${source}`, async ({ openPhoto }) => {
-        const page = await openPhoto({ ...GLASS, backend: 'cpu' }, { before: countReads });
-        await (source === 'video' ? makeVideo(page) : makeStream(page));
-        if (source === 'video')
-          await page.evaluate('(video.loop = true, video.src = film, video.play())');
-        await page.evaluate(`void (globalThis.source = ${source}, photo.lightSource = source)`);
-        const reads = async () => Number(await page.evaluate('counts.reads'));
-        await page.waitForFunction('counts.reads > 3');
-        await page.evaluate(`void (${leave})`);
-        await page.waitForFunction('waiting.size === 0');
-        await waitForFrames(page);
-        const before = await reads();
-        await waitForFrames(page);
-        expect(await reads()).toBe(before);
-        expect(await page.evaluate('waiting.size')).toBe(0);
-        await page.evaluate(`void (${back})`);
-        await page.waitForFunction(`counts.reads > ${before} + 3`);
-      });
-    }
+  for (const source of ['video', 'stream']) {
+    test(`that is a ${source} is not read while it lights nothing`, async ({ openPage, step }) => {
+      const page = await openPage('/blank', { before: countReads });
+      for (const [how, leave, back] of /** @type {const} */ ([
+        ['that is replaced', 'photo.lightSource = null', 'photo.lightSource = source'],
+        ['of an element that is removed', 'photo.remove()', 'document.body.append(photo)'],
+        [
+          'of an element out of view',
+          "photo.before(Object.assign(document.createElement('p'), { style: 'height: 5000px' }))",
+          'photo.scrollIntoView()',
+        ],
+        ['of an element that is not displayed', 'photo.hidden = true', 'photo.hidden = false'],
+      ])) {
+        await step(`a ${source} ${how} is not read`, async () => {
+          await page.goto('/plain');
+          await mountPhoto(page, { ...GLASS, backend: 'cpu' });
+          await waitForLoad(page);
+          await (source === 'video' ? makeVideo(page) : makeStream(page));
+          if (source === 'video')
+            await page.evaluate('(video.loop = true, video.src = film, video.play())');
+          await page.evaluate(`void (globalThis.source = ${source}, photo.lightSource = source)`);
+          const reads = async () => Number(await page.evaluate('counts.reads'));
+          await page.waitForFunction('counts.reads > 3');
+          await page.evaluate(`void (${leave})`);
+          await page.waitForFunction('waiting.size === 0');
+          await waitForFrames(page);
+          const before = await reads();
+          await waitForFrames(page);
+          expect(await reads()).toBe(before);
+          expect(await page.evaluate('waiting.size')).toBe(0);
+          await page.evaluate(`void (${back})`);
+          await page.waitForFunction(`counts.reads > ${before} + 3`);
+        });
+      }
+    });
   }
 
   test('that is a canvas is read again after lightChanged', async ({ openPhoto }) => {
@@ -306,61 +332,47 @@ test.describe('a light source', () => {
     expect(await capturePicture(page)).toMatchPicture(nativePicture('flood', { exposure: 0 }), 0);
   });
 
-  for (const backend of ['webgpu', 'webgl2', 'cpu']) {
-    test(`of each kind is dimmed by its transparency on ${backend}`, async ({ openPhoto }) => {
-      const page = await openPhoto({ ...GLASS, backend });
-      const fifth = nativePicture('flood', { exposure: 0.2 });
-      for (const kind of ['canvas', 'bitmap', 'plain']) {
-        await page.evaluate(async (kind) => {
-          const canvas = Object.assign(document.createElement('canvas'), { width: 9, height: 9 });
-          const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
-          context.fillStyle = 'rgb(255 255 255 / 0.2)';
-          context.fillRect(0, 0, 9, 9);
-          const { photo } = /** @type {any} */ (globalThis);
-          const apart = /** @type {const} */ ({ premultiplyAlpha: 'none' });
-          if (kind === 'canvas') photo.lightSource = canvas;
-          else photo.lightSource = await createImageBitmap(canvas, kind === 'plain' ? apart : {});
-        }, kind);
-        expect(await capturePicture(page), kind).toMatchPicture(fifth, 1);
-      }
-    });
-  }
-
-  for (const kind of ['image', 'canvas', 'bitmap']) {
-    test(`of another origin is an error and the last light stays: ${kind}`, async ({
-      openPhoto,
-      server,
-    }) => {
-      const page = await openPhoto({ ...GLASS, backend: 'cpu' });
-      await makeSources(page);
-      await page.evaluate('photo.lightSource = sources.linear');
-      const want = await capturePicture(page);
-      await page.evaluate(
-        async ({ address, kind }) => {
-          const { photo } = /** @type {any} */ (globalThis);
-          const image = new Image(40, 40);
-          image.src = address;
-          await image.decode();
-          const canvas = document.createElement('canvas');
-          canvas.getContext('2d')?.drawImage(image, 0, 0);
-          const bitmap = await createImageBitmap(canvas);
-          photo.lightSource = { image, canvas, bitmap }[kind];
-        },
-        { address: `${server.otherOrigin}/site/icon.svg`, kind },
-      );
-      const error = (await waitForEvents(page, 'error')).find(({ type }) => type === 'error');
-      expect(error?.['code']).toBe('light-tainted');
-      await (await openAlertDetails(page)).getByText('crossorigin').waitFor();
-      expect(await capturePicture(page)).toMatchPicture(want, 0);
-      const brighter = await capturePicture(page, { exposure: '2' });
-      expect(brighter, 'the last light stays in use').not.toMatchPicture(want, 20);
-      expect(await countEvents(page, 'error')).toBe(1);
-      await page.evaluate('photo.lightSource = sources.canvas');
-      await alertOf(page).waitFor({ state: 'hidden' });
-      const drawn = await capturePicture(page, { exposure: '1' });
-      expect(drawn).toMatchPicture(nativePicture(LIGHT_IMAGE_FILE), 1);
-    });
-  }
+  test('of another origin is an error and the last light stays', async ({
+    openPage,
+    server,
+    step,
+  }) => {
+    const page = await openPage('/blank');
+    for (const kind of ['image', 'canvas', 'bitmap']) {
+      await step(`${kind} of another origin`, async () => {
+        await page.goto('/plain');
+        await mountPhoto(page, { ...GLASS, backend: 'cpu' });
+        await waitForLoad(page);
+        await makeSources(page);
+        await page.evaluate('photo.lightSource = sources.linear');
+        const want = await capturePicture(page);
+        await page.evaluate(
+          async ({ address, kind }) => {
+            const { photo } = /** @type {any} */ (globalThis);
+            const image = new Image(40, 40);
+            image.src = address;
+            await image.decode();
+            const canvas = document.createElement('canvas');
+            canvas.getContext('2d')?.drawImage(image, 0, 0);
+            const bitmap = await createImageBitmap(canvas);
+            photo.lightSource = { image, canvas, bitmap }[kind];
+          },
+          { address: `${server.otherOrigin}/site/icon.svg`, kind },
+        );
+        const error = (await waitForEvents(page, 'error')).find(({ type }) => type === 'error');
+        expect(error?.['code']).toBe('light-tainted');
+        await (await openAlertDetails(page)).getByText('crossorigin').waitFor();
+        expect(await capturePicture(page)).toMatchPicture(want, 0);
+        const brighter = await capturePicture(page, { exposure: '2' });
+        expect(brighter, 'the last light stays in use').not.toMatchPicture(want, 20);
+        expect(await countEvents(page, 'error')).toBe(1);
+        await page.evaluate('photo.lightSource = sources.canvas');
+        await alertOf(page).waitFor({ state: 'hidden' });
+        const drawn = await capturePicture(page, { exposure: '1' });
+        expect(drawn).toMatchPicture(nativePicture(LIGHT_IMAGE_FILE), 1);
+      });
+    }
+  });
 
   test('that is invalid is reported once, and can be corrected', async ({ openPhoto }) => {
     const page = await openPhoto({ ...GLASS, backend: 'cpu' });
