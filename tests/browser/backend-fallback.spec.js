@@ -7,6 +7,7 @@ import {
   mountPhoto,
   openAlertDetails,
   removeGraphics,
+  skipPausesUntil,
   waitForEvents,
   waitForLoad,
 } from './page-helpers.js';
@@ -49,11 +50,12 @@ test.describe('the fallback', () => {
 
   test('is WebGL2 when WebGPU does not answer', async ({ openPage }) => {
     const page = await openPage('/plain', {
+      fakeClock: true,
       before: () => {
         /** @type {any} */ (globalThis).GPU.prototype.requestAdapter = () => new Promise(() => {});
       },
     });
-    await mountPhoto(page, ALL);
+    await skipPausesUntil(page, 'backendchange', () => mountPhoto(page, ALL));
     const [change] = backendChanges(await waitForLoad(page));
     expect(change?.['backend']).toBe('webgl2');
     expect(String(change?.['reason'])).toMatch(/^WebGPU: it does not answer/);

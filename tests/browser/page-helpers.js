@@ -139,6 +139,32 @@ export async function waitForFrames(page, count = 12) {
   }, count);
 }
 
+/** At most how long the element pauses after a request that failed. */
+const LONGEST_PAUSE_MS = 8000;
+
+/**
+ * Waits for an event of a type, and ends the element's pauses early. The page needs a fake clock. While a request is
+ * in progress the clock runs as usual, lest the element takes it for stalled.
+ *
+ * @param {Page} page
+ * @param {string} type
+ * @param {() => Promise<unknown>} start what leads to the event
+ */
+export async function skipPausesUntil(page, type, start) {
+  const requests = new Set();
+  const add = (/** @type {import('@playwright/test').Request} */ request) => requests.add(request);
+  const remove = (/** @type {import('@playwright/test').Request} */ request) =>
+    requests.delete(request);
+  page.on('request', add).on('requestfinished', remove).on('requestfailed', remove);
+  await start();
+  while ((await countEvents(page, type)) === 0) {
+    if (requests.size === 0) await page.clock.fastForward(LONGEST_PAUSE_MS);
+    // A request that begins is reported meanwhile.
+    await waitForFrames(page, 3);
+  }
+  page.off('request', add).off('requestfinished', remove).off('requestfailed', remove);
+}
+
 /** The element's error message. @param {Page} page */
 export function alertOf(page) {
   return page.getByRole('alert');
