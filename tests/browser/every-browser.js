@@ -50,7 +50,10 @@ export function testEveryBrowser(test, browser) {
 
   test.describe('relighting', () => {
     for (const backend of backends) {
-      test(`${backend} agrees with ltm-export to 1/255`, async ({ openAnyPage }) => {
+      test(`${backend} draws lights, the torch under the pointer, a canvas and a video`, async ({
+        openAnyPage,
+        step,
+      }) => {
         const page = await openAnyPage(PAGE);
         await mountPhoto(page, { src: SRC, backend });
         const photoEvents = await waitForLoad(page);
@@ -62,65 +65,67 @@ export function testEveryBrowser(test, browser) {
           reason: '',
         });
         note(`drawn by ${await page.evaluate('photo.kernel')}`);
-        for (const light of LIGHTS) {
-          const want = nativePicture(light);
-          const { worst, psnr } = compare(await capturePicture(page, { light }), want);
-          note(`${light}: worst ${worst}/255, ${psnr.toFixed(1)} dB`);
-          expect(worst, `${light} differs by ${worst}/255`).toBeLessThanOrEqual(1);
-        }
-        const want = nativePicture('spectrum', { exposure: 2.5 });
-        const bright = await capturePicture(page, { light: 'spectrum', exposure: '2.5' });
-        expect(bright, 'the exposure').toMatchPicture(want, 1);
-        // Presentation may round once more.
-        if (canReadScreen)
-          expect(await screenPicture(page), 'on the screen').toMatchPicture(want, 2);
-      });
 
-      test(`the torch follows the pointer on ${backend}`, async ({ openAnyPage }) => {
-        const page = await openAnyPage(PAGE);
-        await mountPhoto(page, { src: SRC, backend, light: 'torch' });
-        await waitForLoad(page);
-        await page.evaluate("void (photo.style.width = '320px')");
-        const at = await pointOf(page);
-        for (const [x, y] of /** @type {const} */ ([
-          [0.25, 0.3],
-          [0.75, 0.7],
-        ])) {
-          const point = at(x, y);
-          await page.mouse.move(point.x, point.y);
-          const torch = await page.evaluate('photo.torch');
-          expect(torch, 'the torch has a position').toBeTruthy();
-          expect(Math.abs(torch.x - x)).toBeLessThan(0.01);
-          expect(Math.abs(torch.y - y)).toBeLessThan(0.01);
-          const want = nativePicture('torch', { torch });
-          expect(await capturePicture(page)).toMatchPicture(want, 1);
-        }
-      });
+        await step(`${backend} agrees with ltm-export to 1/255`, async () => {
+          for (const light of LIGHTS) {
+            const want = nativePicture(light);
+            const { worst, psnr } = compare(await capturePicture(page, { light }), want);
+            note(`${light}: worst ${worst}/255, ${psnr.toFixed(1)} dB`);
+            expect(worst, `${light} differs by ${worst}/255`).toBeLessThanOrEqual(1);
+          }
+          const want = nativePicture('spectrum', { exposure: 2.5 });
+          const bright = await capturePicture(page, { light: 'spectrum', exposure: '2.5' });
+          expect(bright, 'the exposure').toMatchPicture(want, 1);
+          // Presentation may round once more.
+          if (canReadScreen)
+            expect(await screenPicture(page), 'on the screen').toMatchPicture(want, 2);
+        });
 
-      test(`a canvas and a video are light sources on ${backend}`, async ({ openAnyPage }) => {
-        const page = await openAnyPage(PAGE);
-        await mountPhoto(page, { src: SRC, backend, light: 'flood' });
-        await waitForLoad(page);
-        await page.evaluate(() => {
-          const canvas = Object.assign(document.createElement('canvas'), { width: 40, height: 30 });
-          const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
-          context.fillStyle = 'rgb(255 255 255 / 0.2)';
-          context.fillRect(0, 0, 40, 30);
-          /** @type {any} */ (globalThis).photo.lightSource = canvas;
+        await step(`the torch follows the pointer on ${backend}`, async () => {
+          await page.evaluate("void (photo.exposure = 1, photo.light = 'torch')");
+          await page.evaluate("void (photo.style.width = '320px')");
+          const at = await pointOf(page);
+          for (const [x, y] of /** @type {const} */ ([
+            [0.25, 0.3],
+            [0.75, 0.7],
+          ])) {
+            const point = at(x, y);
+            await page.mouse.move(point.x, point.y);
+            const torch = await page.evaluate('photo.torch');
+            expect(torch, 'the torch has a position').toBeTruthy();
+            expect(Math.abs(torch.x - x)).toBeLessThan(0.01);
+            expect(Math.abs(torch.y - y)).toBeLessThan(0.01);
+            const want = nativePicture('torch', { torch });
+            expect(await capturePicture(page)).toMatchPicture(want, 1);
+          }
         });
-        const fifth = nativePicture('flood', { exposure: 0.2 });
-        expect(await capturePicture(page), 'the canvas').toMatchPicture(fifth, 1);
-        await page.evaluate(async () => {
-          const video = document.createElement('video');
-          Object.assign(video, { muted: true, playsInline: true, src: '/film.webm' });
-          Object.assign(globalThis, { video });
-          /** @type {any} */ (globalThis).photo.lightSource = video;
+
+        await step(`a canvas and a video are light sources on ${backend}`, async () => {
+          await page.evaluate("void (photo.light = 'flood')");
+          await page.evaluate(() => {
+            const canvas = Object.assign(document.createElement('canvas'), {
+              width: 40,
+              height: 30,
+            });
+            const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
+            context.fillStyle = 'rgb(255 255 255 / 0.2)';
+            context.fillRect(0, 0, 40, 30);
+            /** @type {any} */ (globalThis).photo.lightSource = canvas;
+          });
+          const fifth = nativePicture('flood', { exposure: 0.2 });
+          expect(await capturePicture(page), 'the canvas').toMatchPicture(fifth, 1);
+          await page.evaluate(async () => {
+            const video = document.createElement('video');
+            Object.assign(video, { muted: true, playsInline: true, src: '/film.webm' });
+            Object.assign(globalThis, { video });
+            /** @type {any} */ (globalThis).photo.lightSource = video;
+          });
+          const colour = async () =>
+            dominantColour(await (canReadScreen ? screenPicture(page) : capturePicture(page)));
+          await expect.poll(colour).toBe('red');
+          await page.evaluate('video.play()');
+          await expect.poll(colour).toBe('blue');
         });
-        const colour = async () =>
-          dominantColour(await (canReadScreen ? screenPicture(page) : capturePicture(page)));
-        await expect.poll(colour).toBe('red');
-        await page.evaluate('video.play()');
-        await expect.poll(colour).toBe('blue');
       });
     }
 
@@ -176,37 +181,38 @@ export function testEveryBrowser(test, browser) {
   });
 
   test.describe('an element', () => {
-    test('moves its torch with the arrow keys when focused', async ({ openAnyPage }) => {
+    test('moves its torch with the arrow keys and the pointer', async ({ openAnyPage, step }) => {
       const page = await openAnyPage(PAGE);
       await mountPhoto(page, { src: SRC, backend: 'cpu', light: 'torch' });
       await waitForLoad(page);
-      await page.keyboard.press('ArrowLeft');
-      expect(await page.evaluate('photo.torch'), 'it has no focus yet').toBeNull();
-      await page.keyboard.press('Tab');
-      for (let i = 0; i < 5; i += 1) await page.keyboard.press('ArrowLeft');
-      await page.keyboard.press('ArrowUp');
-      const torch = await page.evaluate('photo.torch');
-      expect(torch, JSON.stringify(torch)).toBeTruthy();
-      expect(torch.x, JSON.stringify(torch)).toBeLessThan(0.4);
-      expect(torch.y, JSON.stringify(torch)).toBeLessThan(0.5);
-      const want = nativePicture('torch', { torch });
-      expect(await capturePicture(page)).toMatchPicture(want, 1);
-    });
-
-    test('keeps its torch at the edge when a drag leaves the picture', async ({ openAnyPage }) => {
-      const page = await openAnyPage(PAGE);
-      await mountPhoto(page, { src: SRC, backend: 'cpu', light: 'torch' });
-      await waitForLoad(page);
-      await page.evaluate("void (photo.style.width = '320px')");
-      const at = await pointOf(page);
-      const [from, to] = [at(0.5, 0.5), at(1.4, 0.5)];
-      await page.mouse.move(from.x, from.y);
-      await page.mouse.down();
-      await page.mouse.move(to.x, to.y);
-      await page.mouse.up();
-      const torch = await page.evaluate('photo.torch');
-      expect(torch?.x, JSON.stringify(torch)).toBe(1);
-      expect(Math.abs(torch.y - 0.5), JSON.stringify(torch)).toBeLessThan(0.01);
+      await step('an element moves its torch with the arrow keys when focused', async () => {
+        await page.keyboard.press('ArrowLeft');
+        expect(await page.evaluate('photo.torch'), 'it has no focus yet').toBeNull();
+        await page.keyboard.press('Tab');
+        for (let i = 0; i < 5; i += 1) await page.keyboard.press('ArrowLeft');
+        await page.keyboard.press('ArrowUp');
+        const torch = await page.evaluate('photo.torch');
+        expect(torch, JSON.stringify(torch)).toBeTruthy();
+        expect(torch.x, JSON.stringify(torch)).toBeLessThan(0.4);
+        expect(torch.y, JSON.stringify(torch)).toBeLessThan(0.5);
+        const want = nativePicture('torch', { torch });
+        expect(await capturePicture(page)).toMatchPicture(want, 1);
+      });
+      await step(
+        'an element keeps its torch at the edge when a drag leaves the picture',
+        async () => {
+          await page.evaluate("void (photo.style.width = '320px')");
+          const at = await pointOf(page);
+          const [from, to] = [at(0.5, 0.5), at(1.4, 0.5)];
+          await page.mouse.move(from.x, from.y);
+          await page.mouse.down();
+          await page.mouse.move(to.x, to.y);
+          await page.mouse.up();
+          const torch = await page.evaluate('photo.torch');
+          expect(torch?.x, JSON.stringify(torch)).toBe(1);
+          expect(Math.abs(torch.y - 0.5), JSON.stringify(torch)).toBeLessThan(0.01);
+        },
+      );
     });
 
     test('encodes its picture in the requested type', async ({ openAnyPage }) => {
@@ -233,24 +239,27 @@ export function testEveryBrowser(test, browser) {
       ['/photos/flipped-tile.ltm', 'format-checksum'],
       ['/photos/truncated.ltm', 'format-truncated'],
     ];
-    for (const [src, code] of faults) {
-      test(`reports ${code} for ${src}`, async ({ openAnyPage }) => {
-        const page = await openAnyPage(PAGE);
-        await mountPhoto(page, { src });
-        const error = (await waitForEvents(page, 'error')).find(({ type }) => type === 'error');
-        expect(error?.['code'], String(error?.['message'])).toBe(code);
-        const shown = await page.evaluate(() => {
-          const root = document.querySelector('relightable-photo')?.shadowRoot;
-          const alert = /** @type {HTMLElement | null} */ (root?.querySelector('[role=alert]'));
-          return alert && !alert.hidden ? alert.textContent : null;
+    test('reports errors', async ({ openAnyPage, step }) => {
+      const page = await openAnyPage(PAGE);
+      for (const [src, code] of faults) {
+        await step(`an element reports ${code} for ${src}`, async () => {
+          await page.evaluate("document.querySelector('relightable-photo')?.remove()");
+          await mountPhoto(page, { src });
+          const error = (await waitForEvents(page, 'error')).find(({ type }) => type === 'error');
+          expect(error?.['code'], String(error?.['message'])).toBe(code);
+          const shown = await page.evaluate(() => {
+            const root = document.querySelector('relightable-photo')?.shadowRoot;
+            const alert = /** @type {HTMLElement | null} */ (root?.querySelector('[role=alert]'));
+            return alert && !alert.hidden ? alert.textContent : null;
+          });
+          // The details follow a short sentence.
+          expect(shown?.endsWith(String(error?.['message'])), String(shown)).toBeTruthy();
+          // A correct address loads afterwards.
+          await page.evaluate(`void (photo.src = '${SRC}')`);
+          await waitForEvents(page, 'load');
         });
-        // The details follow a short sentence.
-        expect(shown?.endsWith(String(error?.['message'])), String(shown)).toBeTruthy();
-        // A correct address loads afterwards.
-        await page.evaluate(`void (photo.src = '${SRC}')`);
-        await waitForEvents(page, 'load');
-      });
-    }
+      }
+    });
 
     for (const backend of backends) {
       test(`draws on ${backend} next to fifteen others`, async ({ openAnyPage }) => {

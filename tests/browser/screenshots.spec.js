@@ -18,7 +18,7 @@ import { LIGHTS } from './test-photos.js';
  * @property {Record<string, string>} [attributes]
  * @property {number} [width] of the element, in pixels
  * @property {(page: Page) => Promise<unknown>} [enter] brings the element into the state
- * @property {import('./fixtures.js').PageOptions} [options]
+ * @property {NonNullable<Parameters<Page['emulateMedia']>[0]>} [media]
  */
 
 const GLASS = { src: '/photos/glass.ltm', backend: 'cpu', alt: 'A window', light: 'torch' };
@@ -62,85 +62,105 @@ const focusToolbar = async (page) => {
   await expect(page.getByRole('button', { name: 'Light: Torch' })).toBeFocused();
 };
 
-/** @type {Record<string, State>} */
+/** States by the part of the element that they are about. @type {Record<string, Record<string, State>>} */
 const STATES = {
-  ...Object.fromEntries(
-    LIGHTS.map((light) => [`light-${light}`, { attributes: { ...GLASS, light } }]),
-  ),
-  'torch-moved': {
-    enter: async (page) => {
-      await waitForLoad(page);
-      await page.evaluate('void (photo.torch = { x: 0.2, y: 0.8 })');
+  light: {
+    ...Object.fromEntries(
+      LIGHTS.map((light) => [`light-${light}`, { attributes: { ...GLASS, light } }]),
+    ),
+    'torch-moved': {
+      enter: async (page) => {
+        await waitForLoad(page);
+        await page.evaluate('void (photo.torch = { x: 0.2, y: 0.8 })');
+      },
+    },
+    exposed: { attributes: { ...GLASS, light: 'flood', exposure: '0.5' } },
+    'light-focus': { enter: focusLight },
+    'light-focus-forced-colors': { enter: focusLight, media: { forcedColors: 'active' } },
+  },
+  toolbar: {
+    toolbar: { attributes: CONTROLS, width: CONTROLS_WIDTH_PX, enter: waitForToolbar },
+    'toolbar-menu': {
+      attributes: CONTROLS,
+      width: CONTROLS_WIDTH_PX,
+      enter: async (page) => {
+        await waitForToolbar(page);
+        await page.getByRole('button', { name: 'Light: Torch' }).click();
+        await page.getByRole('radiogroup', { name: 'Light' }).waitFor();
+      },
+    },
+    'toolbar-focus': { attributes: CONTROLS, width: CONTROLS_WIDTH_PX, enter: focusToolbar },
+    'toolbar-dark': {
+      attributes: CONTROLS,
+      width: CONTROLS_WIDTH_PX,
+      enter: waitForToolbar,
+      media: { colorScheme: 'dark' },
+    },
+    'toolbar-forced-colors': {
+      attributes: CONTROLS,
+      width: CONTROLS_WIDTH_PX,
+      enter: focusToolbar,
+      media: { forcedColors: 'active' },
     },
   },
-  exposed: { attributes: { ...GLASS, light: 'flood', exposure: '0.5' } },
-  toolbar: { attributes: CONTROLS, width: CONTROLS_WIDTH_PX, enter: waitForToolbar },
-  'toolbar-menu': {
-    attributes: CONTROLS,
-    width: CONTROLS_WIDTH_PX,
-    enter: async (page) => {
-      await waitForToolbar(page);
-      await page.getByRole('button', { name: 'Light: Torch' }).click();
-      await page.getByRole('radiogroup', { name: 'Light' }).waitFor();
+  poster: {
+    poster: { attributes: POSTER, width: CONTROLS_WIDTH_PX, enter: waitForPoster },
+    'poster-dark': {
+      attributes: POSTER,
+      width: CONTROLS_WIDTH_PX,
+      enter: waitForPoster,
+      media: { colorScheme: 'dark' },
+    },
+    'poster-forced-colors': {
+      attributes: POSTER,
+      width: CONTROLS_WIDTH_PX,
+      enter: waitForPoster,
+      media: { forcedColors: 'active' },
     },
   },
-  'toolbar-focus': { attributes: CONTROLS, width: CONTROLS_WIDTH_PX, enter: focusToolbar },
-  'toolbar-dark': {
-    attributes: CONTROLS,
-    width: CONTROLS_WIDTH_PX,
-    enter: waitForToolbar,
-    options: { colorScheme: 'dark' },
-  },
-  'toolbar-forced-colors': {
-    attributes: CONTROLS,
-    width: CONTROLS_WIDTH_PX,
-    enter: focusToolbar,
-    options: { forcedColors: 'active' },
-  },
-  'light-focus': { enter: focusLight },
-  'light-focus-forced-colors': { enter: focusLight, options: { forcedColors: 'active' } },
-  poster: { attributes: POSTER, width: CONTROLS_WIDTH_PX, enter: waitForPoster },
-  'poster-dark': {
-    attributes: POSTER,
-    width: CONTROLS_WIDTH_PX,
-    enter: waitForPoster,
-    options: { colorScheme: 'dark' },
-  },
-  'poster-forced-colors': {
-    attributes: POSTER,
-    width: CONTROLS_WIDTH_PX,
-    enter: waitForPoster,
-    options: { forcedColors: 'active' },
-  },
-  error: { attributes: FAILING, width: CONTROLS_WIDTH_PX, enter: waitForAlert },
-  'error-dark': {
-    attributes: FAILING,
-    width: CONTROLS_WIDTH_PX,
-    enter: waitForAlert,
-    options: { colorScheme: 'dark' },
-  },
-  'error-forced-colors': {
-    attributes: FAILING,
-    width: CONTROLS_WIDTH_PX,
-    enter: waitForAlert,
-    options: { forcedColors: 'active' },
+  error: {
+    error: { attributes: FAILING, width: CONTROLS_WIDTH_PX, enter: waitForAlert },
+    'error-dark': {
+      attributes: FAILING,
+      width: CONTROLS_WIDTH_PX,
+      enter: waitForAlert,
+      media: { colorScheme: 'dark' },
+    },
+    'error-forced-colors': {
+      attributes: FAILING,
+      width: CONTROLS_WIDTH_PX,
+      enter: waitForAlert,
+      media: { forcedColors: 'active' },
+    },
   },
 };
 
 test.describe('the element looks as before:', () => {
-  for (const [name, state] of Object.entries(STATES)) {
-    test(name, async ({ openPage }) => {
-      const { attributes = GLASS, width = 128, enter = waitForLoad, options } = state;
-      const page = await openPage('/plain', { reducedMotion: 'reduce', ...options });
-      await mountPhoto(page, attributes);
-      await page.evaluate(`void (photo.style.width = '${width}px')`);
-      await page.addStyleTag({ content: FONT });
-      await enter(page);
-      await page.evaluate('document.fonts.ready.then(() => {})');
-      // Frames in less than full quality are replaced before `toBlob` resolves.
-      await page.evaluate('photo.toBlob().then(() => {}, () => {})');
-      await waitForFrames(page, 2);
-      await expect(page.locator('relightable-photo')).toHaveScreenshot(`${name}.png`, TOLERANCE);
+  for (const [part, states] of Object.entries(STATES)) {
+    test(part, async ({ openPage, step }) => {
+      const page = await openPage('/blank');
+      for (const [name, state] of Object.entries(states)) {
+        const { attributes = GLASS, width = 128, enter = waitForLoad, media } = state;
+        await step(`the element looks as before: ${name}`, async () => {
+          const usual = /** @type {const} */ ({ colorScheme: 'light', forcedColors: 'none' });
+          await page.emulateMedia({ reducedMotion: 'reduce', ...usual, ...media });
+          await page.goto('/plain');
+          // Away from the element, which a state before may have clicked.
+          await page.mouse.move(1000, 700);
+          await mountPhoto(page, attributes);
+          await page.evaluate(`void (photo.style.width = '${width}px')`);
+          await page.addStyleTag({ content: FONT });
+          await enter(page);
+          await page.evaluate('document.fonts.ready.then(() => {})');
+          // Frames in less than full quality are replaced before `toBlob` resolves.
+          await page.evaluate('photo.toBlob().then(() => {}, () => {})');
+          await waitForFrames(page, 2);
+          await expect(page.locator('relightable-photo')).toHaveScreenshot(
+            `${name}.png`,
+            TOLERANCE,
+          );
+        });
+      }
     });
   }
 });
