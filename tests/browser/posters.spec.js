@@ -31,26 +31,31 @@ test.describe('a photograph', () => {
     ['lazy', 1000, false],
     ['lazy', 100, true],
   ];
-  for (const [loading, below, fetched] of cases) {
-    test(`${below} pixels down is ${fetched ? '' : 'not '}fetched with loading=${loading}`, async ({
-      openPage,
-      server,
-    }) => {
-      const page = await openPage('/plain', { viewport: { width: 800, height: 600 } });
-      await pushDown(page, below);
-      const src = addressOf(`${loading}-${below}`);
-      await mountPhoto(page, { ...GLASS, src, loading });
-      if (fetched) {
-        await waitForLoad(page);
-      } else {
-        await waitForFrames(page);
-        expect(server.requestedRanges.has(src)).toBe(false);
-        await page.evaluate('photo.scrollIntoView()');
-        await waitForLoad(page);
-      }
-      expect(server.requestedRanges.has(src)).toBeTruthy();
-    });
-  }
+  test('is fetched when it comes near enough for its loading attribute', async ({
+    openPage,
+    server,
+    step,
+  }) => {
+    const page = await openPage('/blank', { viewport: { width: 800, height: 600 } });
+    for (const [loading, below, fetched] of cases) {
+      const what = `a photograph ${below} pixels down is ${fetched ? '' : 'not '}fetched`;
+      await step(`${what} with loading=${loading}`, async () => {
+        await page.goto('/plain');
+        await pushDown(page, below);
+        const src = addressOf(`${loading}-${below}`);
+        await mountPhoto(page, { ...GLASS, src, loading });
+        if (fetched) {
+          await waitForLoad(page);
+        } else {
+          await waitForFrames(page);
+          expect(server.requestedRanges.has(src)).toBe(false);
+          await page.evaluate('photo.scrollIntoView()');
+          await waitForLoad(page);
+        }
+        expect(server.requestedRanges.has(src)).toBeTruthy();
+      });
+    }
+  });
 
   test('that replaces another before it enters the viewport is fetched alone', async ({
     openPage,
