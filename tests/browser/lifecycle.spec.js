@@ -126,6 +126,7 @@ test.describe('an element', () => {
         }
         return { before, after: bytes(), photo: photo.info.decodedBytes };
       }, backend);
+      note(JSON.stringify(growth));
       // Ten loads may fragment the heap, but not by the size of a photograph.
       expect(growth.after - growth.before, JSON.stringify(growth)).toBeLessThan(growth.photo);
     });

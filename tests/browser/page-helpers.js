@@ -141,6 +141,8 @@ export async function waitForFrames(page, count = 12) {
 
 /** At most how long the element pauses after a request that failed. */
 const LONGEST_PAUSE_MS = 8000;
+/** How long a test waits for an event, on a machine that compiles Rust meanwhile. */
+const LONGEST_WAIT_MS = 60_000;
 
 /**
  * Waits for an event of a type, and ends the element's pauses early. The page needs a fake clock. While a request is
@@ -157,7 +159,9 @@ export async function skipPausesUntil(page, type, start) {
     requests.delete(request);
   page.on('request', add).on('requestfinished', remove).on('requestfailed', remove);
   await start();
+  const deadline = Date.now() + LONGEST_WAIT_MS;
   while ((await countEvents(page, type)) === 0) {
+    if (Date.now() > deadline) throw new Error(`the element reported no ${type}`);
     if (requests.size === 0) await page.clock.fastForward(LONGEST_PAUSE_MS);
     // A request that begins is reported meanwhile.
     await waitForFrames(page, 3);

@@ -185,7 +185,7 @@ test.describe('the site', () => {
 });
 
 test.describe('the playground', () => {
-  test('has a control for every attribute; shows the chosen attributes, their HTML and the events, and keeps them in the address', async ({
+  test('has a control for every attribute, and shows and keeps what it chooses', async ({
     openPage,
     step,
   }) => {
@@ -201,6 +201,7 @@ test.describe('the playground', () => {
         expect(await page.getByLabel(name, { exact: true }).count(), name).toBe(1);
       }
     });
+    // The chosen attributes, their HTML and the events are shown, and the address keeps them.
     await waitUntilDrawn(page);
     await page.getByLabel('light', { exact: true }).selectOption('stripes');
     await page.getByLabel('alt', { exact: true }).fill('A "window" & more');
