@@ -116,14 +116,7 @@ struct Interruptible {
 impl Interruptible {
     fn new() -> Self {
         let folder = TempDir::new().unwrap();
-        let size = [
-            "--camera",
-            "128x128",
-            "--light",
-            "64x64",
-            "--patterns",
-            "16",
-        ];
+        let size = ["--camera", "128x64", "--light", "64x32", "--patterns", "16"];
         let capture = simulate(&folder, "cookies", &size);
         let mut this = Self {
             folder,
@@ -218,7 +211,7 @@ fn an_interrupted_recovery_resumes_to_the_same_bytes() {
         assert_eq!(output.status.code(), Some(130), "{}", stderr_text(&output));
         let words = [
             "interrupted: ",
-            " of 16 tiles",
+            " of 8 tiles",
             "stopped.ltm.checkpoint",
             "--resume",
         ];
@@ -298,7 +291,7 @@ fn a_killed_recovery_resumes_and_mismatches_are_named() {
     refuses(&["--patterns", "9"], &["--patterns was", "is 9 now"]);
     let photo = recovery.capture.join("photos/0003.png");
     let sound = fs::read(&photo).unwrap();
-    image::ImageBuffer::<image::Rgb<u16>, _>::new(128, 128)
+    image::ImageBuffer::<image::Rgb<u16>, _>::new(128, 64)
         .save(&photo)
         .unwrap();
     refuses(&[], &["photos/0003.png in the capture has changed"]);
