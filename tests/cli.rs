@@ -282,12 +282,7 @@ fn relit_pictures_agree_with_the_reference_and_follow_the_torch() {
     for light in ["flood", "torch", "checkerboard", "stripes", "spectrum"] {
         let fast = relit("a.png", &["--light", light]);
         let exact = relit("b.png", &["--light", light, "--backend", "reference"]);
-        let apart = fast
-            .iter()
-            .zip(exact.iter())
-            .map(|(a, b)| a.abs_diff(*b))
-            .max();
-        assert!(apart.unwrap() <= 1, "{light}");
+        assert!(largest_difference(&fast, &exact) <= 1, "{light}");
         assert!(fast.iter().any(|&code| code > 40), "{light} shows nothing");
     }
     let brightness = |picture: &image::RgbImage, left: bool| -> u32 {
@@ -315,6 +310,19 @@ fn relit_pictures_agree_with_the_reference_and_follow_the_torch() {
     assert_eq!(pictured, relit("f.png", &["--light", "flood"]));
     let dim = relit("d.png", &["--light", "flood", "--exposure", "0.5"]);
     assert!(brightness(&dim, true) < brightness(&pictured, true));
+    // An image that is a fifth opaque.
+    let fifth = folder.path().join("fifth.png");
+    image::RgbaImage::from_pixel(90, 50, image::Rgba([255, 255, 255, 51]))
+        .save(&fifth)
+        .unwrap();
+    let transparent = relit("t.png", &["--light", text(&fifth)]);
+    let dim = relit("e.png", &["--light", "flood", "--exposure", "0.2"]);
+    assert!(largest_difference(&transparent, &dim) <= 1);
+}
+
+fn largest_difference(a: &image::RgbImage, b: &image::RgbImage) -> u8 {
+    let differences = a.iter().zip(b.iter()).map(|(a, b)| a.abs_diff(*b));
+    differences.max().unwrap()
 }
 
 #[test]

@@ -112,7 +112,8 @@ pub fn run(args: &RelightArgs) -> Result<()> {
     Ok(())
 }
 
-/// The built-in light of this name, or the image file at this path, decoded as sRGB and resampled to the light plane.
+/// The built-in light of this name, or the image file at this path, decoded as sRGB, dimmed by its transparency, and
+/// resampled to the light plane.
 fn load_light(light: &str, plane: Extent) -> Result<Light> {
     if let Some(builtin) = BuiltinLight::from_name(light) {
         return Ok(builtin.render(plane));
@@ -125,11 +126,13 @@ fn load_light(light: &str, plane: Extent) -> Result<Light> {
     let read = || ImageReader::open(path)?.with_guessed_format()?.decode();
     let picture = read()
         .with_context(|| format!("--light {light}: is not a readable image"))?
-        .into_rgb32f();
+        .into_rgba32f();
     let extent = Extent::new(picture.width(), picture.height());
-    let codes = picture.into_raw().into_iter();
-    let linear: Vec<f32> = codes
-        .map(|code| srgb::srgb_decode(f64::from(code)) as f32)
+    let linear: Vec<f32> = picture
+        .pixels()
+        .flat_map(|image::Rgba([red, green, blue, alpha])| {
+            [red, green, blue].map(|code| srgb::srgb_decode(f64::from(*code)) as f32 * alpha)
+        })
         .collect();
     let resampled = area_resample(&linear, extent, plane);
     Ok(Light::from_linear_rgb(plane, &resampled)?)
