@@ -128,12 +128,10 @@ fn load_light(light: &str, plane: Extent) -> Result<Light> {
         .with_context(|| format!("--light {light}: is not a readable image"))?
         .into_rgba32f();
     let extent = Extent::new(picture.width(), picture.height());
-    let linear: Vec<f32> = picture
-        .pixels()
-        .flat_map(|image::Rgba([red, green, blue, alpha])| {
-            [red, green, blue].map(|code| srgb::srgb_decode(f64::from(*code)) as f32 * alpha)
-        })
-        .collect();
+    let linear = |image::Rgba([rgb @ .., alpha]): &image::Rgba<f32>| -> [f32; 3] {
+        rgb.map(|code| srgb::srgb_decode(f64::from(code)) as f32 * alpha)
+    };
+    let linear: Vec<f32> = picture.pixels().flat_map(linear).collect();
     let resampled = area_resample(&linear, extent, plane);
     Ok(Light::from_linear_rgb(plane, &resampled)?)
 }

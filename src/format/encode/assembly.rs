@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::basis_rotation::BasisRotation;
-use super::encoder::{Encoder, for_tiles};
+use super::encoder::{Encoder, for_tiles, non_empty};
 use super::scan_plan::SHARES;
 use crate::executor::Executor;
 use crate::format::checksum::checksum;
@@ -76,18 +76,12 @@ struct EncodedTile {
 impl QuantisedTile {
     /// Quantises a tile over the file's basis; `keep_decoded` says whether [`decoded`](Self::decoded) will be called.
     pub fn new(tile: &FloatTile, order: &[u16], scans: &[Scan], keep_decoded: bool) -> Self {
-        let FloatTile {
-            rect,
-            coefficients,
-            functions,
-        } = tile;
-        let has = |values: &[_]| !values.is_empty();
+        let extent = tile.rect.extent;
+        let (coefficients, functions) = (non_empty(&tile.coefficients), non_empty(&tile.functions));
         Self {
-            coefficients: has(coefficients).then(|| {
-                QuantisedCoefficients::new(rect.extent, coefficients, scans, keep_decoded)
-            }),
-            functions: has(functions)
-                .then(|| QuantisedDirectFunctions::new(functions, order, scans)),
+            coefficients: coefficients
+                .map(|c| QuantisedCoefficients::new(extent, c, scans, keep_decoded)),
+            functions: functions.map(|tau| QuantisedDirectFunctions::new(tau, order, scans)),
         }
     }
 
@@ -163,7 +157,6 @@ pub fn encode_lossless(encoder: &Encoder<'_, impl Executor>) -> Result<EncodedFi
     let max_per_scan = direct_functions::max_slots(side) as usize;
     let (rank, slots) = (encoder.rank(), encoder.slots());
     // All items have the same bytes.
-    let share = |share: f64| ((share * (rank + slots) as f64) as usize).clamp(1, max_per_scan);
     let mut scans = Vec::new();
     for (coding, items) in [
         (ScanCoding::Halves, rank),
@@ -175,7 +168,8 @@ pub fn encode_lossless(encoder: &Encoder<'_, impl Executor>) -> Result<EncodedFi
                 true => SHARES.first,
                 false => SHARES.scan,
             };
-            let count = share(planned).min(items - first);
+            let count = (planned * (rank + slots) as f64) as usize;
+            let count = count.clamp(1, max_per_scan).min(items - first);
             // Ranks and slots are below 2^12.
             scans.push(Scan::new(coding, first as u16, count as u16, step));
             first += count;

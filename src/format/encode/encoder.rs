@@ -58,6 +58,10 @@ impl TileAnalysis {
     }
 }
 
+pub fn non_empty<T>(values: &[T]) -> Option<&[T]> {
+    (!values.is_empty()).then_some(values)
+}
+
 fn peak(values: &[[f32; CHANNELS]]) -> f32 {
     let finite = values.iter().flatten().filter(|v| v.is_finite());
     finite.fold(0.0, |peak, v| peak.max(v.abs()))

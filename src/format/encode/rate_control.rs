@@ -96,8 +96,7 @@ impl<'a, E: Executor> RateControl<'a, E> {
         // The metric may have direct functions where the file has none.
         let has_functions = encoder.has_functions;
         encoder.has_functions |= tiles.iter().any(|tile| !tile.functions.is_empty());
-        let rotated = |tile| encoder.rotated(tile);
-        let tiles: Vec<FloatTile> = tiles.into_iter().map(rotated).collect();
+        let tiles: Vec<_> = tiles.into_iter().map(|t| encoder.rotated(t)).collect();
         let [exponent, _] = bisect(LOSS_EXPONENTS, LOSS_HALVINGS, |exponent| {
             let scans = scan_plan::trial(encoder, (coarsest * exponent.exp2()) as f32);
             let decoded = |i: usize| decoded(encoder, &tiles[i], &scans);

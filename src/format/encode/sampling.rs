@@ -28,11 +28,8 @@ pub struct SampledTilePart {
 pub fn sample(encoder: &Encoder<'_, impl Executor>) -> Result<Vec<SampledTilePart>, FormatError> {
     let lit_tiles = &encoder.lit_tiles;
     let pixel_bytes = ((encoder.rank() + encoder.slots()) * CHANNELS * size_of::<f32>()).max(1);
-    let smallest_part = PART_SIDE.pow(2) as usize * pixel_bytes;
-    let max_count = MAX_SAMPLED_TILES
-        .min(MAX_SAMPLE_BYTES / smallest_part)
-        .max(1);
-    let count = lit_tiles.len().min(max_count);
+    let max_count = MAX_SAMPLE_BYTES / (PART_SIDE.pow(2) as usize * pixel_bytes);
+    let count = max_count.clamp(1, MAX_SAMPLED_TILES).min(lit_tiles.len());
     let tile_side = encoder.source.geometry.tile_side;
     let side = (MAX_SAMPLE_BYTES / (count.max(1) * pixel_bytes)).isqrt() as u32;
     let side = match side >= tile_side {

@@ -3,7 +3,7 @@
 //! Bytes are the entropy of the tokens in their three contexts, plus sign and mantissa bits. Both bytes and
 //! squared errors are told apart by item: by component, or by slot in centre-out order.
 
-use super::encoder::Encoder;
+use super::encoder::{Encoder, non_empty};
 use super::sampling::SampledTilePart;
 use crate::executor::Executor;
 use crate::format::codec::direct_functions::CentreOutFunctions;
@@ -45,14 +45,12 @@ impl CostModel {
         let parts = encoder.executor.map(sample.len(), |i| {
             let SampledTilePart { tile, weight } = &sample[i];
             let tile = encoder.truncated(tile);
-            let (extent, coefficients) = (tile.rect.extent, &tile.coefficients);
-            let functions = &tile.functions;
+            let (extent, functions) = (tile.rect.extent, non_empty(&tile.functions));
+            let coefficients = non_empty(&tile.coefficients);
             TransformedTilePart {
                 weight: *weight,
-                coefficients: (!coefficients.is_empty())
-                    .then(|| TransformedTile::new(extent, coefficients)),
-                functions: (!functions.is_empty())
-                    .then(|| CentreOutFunctions::new(functions, &encoder.order)),
+                coefficients: coefficients.map(|c| TransformedTile::new(extent, c)),
+                functions: functions.map(|tau| CentreOutFunctions::new(tau, &encoder.order)),
             }
         });
         Self { parts }
