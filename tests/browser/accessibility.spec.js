@@ -2,7 +2,14 @@
 
 import { join } from 'node:path';
 import { expect, test } from './fixtures.js';
-import { alertOf, boxOf, mountPhoto, waitForEvents, waitForLoad } from './page-helpers.js';
+import {
+  alertOf,
+  axeViolations,
+  boxOf,
+  mountPhoto,
+  waitForEvents,
+  waitForLoad,
+} from './page-helpers.js';
 import { SCREENSHOTS } from './test-photos.js';
 
 /** @typedef {import('@playwright/test').Page} Page */
@@ -27,15 +34,6 @@ async function open(page, attributes = {}, lang = 'en') {
   await page.goto(`/strict?lang=${lang}`);
   await mountPhoto(page, { ...GLASS, ...attributes });
   await page.evaluate("photo.style.width = 'min(480px, 100%)'");
-}
-
-/** The rules of axe-core that a page violates, with the HTML of the elements. @param {Page} page */
-async function axeViolations(page) {
-  const results = await page.evaluate('axe.run()');
-  return results.violations.map(
-    (/** @type {any} */ { id, nodes }) =>
-      `${id}: ${nodes.map((/** @type {any} */ node) => node.html).join(' ')}`,
-  );
 }
 
 /** Functions that bring an element into a state. @type {Record<string, (page: Page) => Promise<void>>} */

@@ -6,7 +6,9 @@ import {
   capturePicture,
   decodeDataUrl,
   dominantColour,
+  drag,
   mountPhoto,
+  pointOf,
   screenPicture,
   waitForEvents,
   waitForLoad,
@@ -20,17 +22,6 @@ const PAGE = '/monitored';
 const SRC = '/photos/glass.ltm';
 const ELEMENTS = 16;
 const CYCLES = 10;
-
-/** Makes a function that converts picture coordinates to a point on the page. @param {AnyPage} page */
-async function pointOf(page) {
-  const { left, top, width, height } = await page.evaluate(
-    "(({ left, top, width, height }) => ({ left, top, width, height }))(document.querySelector('relightable-photo').getBoundingClientRect())",
-  );
-  return (/** @type {number} */ x, /** @type {number} */ y) => ({
-    x: left + x * width,
-    y: top + y * height,
-  });
-}
 
 /**
  * Declares the tests for a browser.
@@ -203,11 +194,7 @@ export function testEveryBrowser(test, browser) {
         async () => {
           await page.evaluate("void (photo.style.width = '320px')");
           const at = await pointOf(page);
-          const [from, to] = [at(0.5, 0.5), at(1.4, 0.5)];
-          await page.mouse.move(from.x, from.y);
-          await page.mouse.down();
-          await page.mouse.move(to.x, to.y);
-          await page.mouse.up();
+          await drag(page, at(0.5, 0.5), at(1.4, 0.5));
           const torch = await page.evaluate('photo.torch');
           expect(torch?.x, JSON.stringify(torch)).toBe(1);
           expect(Math.abs(torch.y - 0.5), JSON.stringify(torch)).toBeLessThan(0.01);

@@ -3,7 +3,13 @@
 import { join } from 'node:path';
 import { brightest, encodePng } from '../../www/tools/pictures.js';
 import { expect, test } from './fixtures.js';
-import { boxOf, dominantColour, screenPicture, waitForFrames } from './page-helpers.js';
+import {
+  boxOf,
+  dominantColour,
+  horizontalOverflow,
+  screenPicture,
+  waitForFrames,
+} from './page-helpers.js';
 import { SCREENSHOTS } from './test-photos.js';
 
 /** @param {import('@playwright/test').Page} page */
@@ -151,10 +157,7 @@ test.describe('the gallery', () => {
       for (const colorScheme of /** @type {const} */ (['light', 'dark'])) {
         await page.emulateMedia({ colorScheme });
         await step(`it does not scroll sideways at ${width} pixels, ${colorScheme}`, async () => {
-          const overflow = await page.evaluate(
-            'document.documentElement.scrollWidth - document.documentElement.clientWidth',
-          );
-          expect(overflow).toBe(0);
+          expect(await horizontalOverflow(page)).toBe(0);
           await page.screenshot({
             path: join(SCREENSHOTS, `page-${width}-${colorScheme}.png`),
             fullPage: true,

@@ -4,6 +4,7 @@ import { expect, test } from './fixtures.js';
 import {
   boxOf,
   capturePicture,
+  drag,
   mountPhoto,
   pointOf,
   waitForEvents,
@@ -178,35 +179,31 @@ test.describe('zooming', () => {
     openPage,
   }) => {
     const { page, at } = await visit(openPage, { zoom: '' });
-    const [from, to] = [at(0.5, 0.5), at(0.6, 0.5)];
-    const drag = async (/** @type {'left' | 'middle'} */ button) => {
-      await page.mouse.move(from.x, from.y);
-      await page.mouse.down({ button });
-      await page.mouse.move(to.x, to.y);
-      await page.mouse.up({ button });
+    const xAfterDrag = async (/** @type {'left' | 'middle'} */ button = 'left') => {
+      await drag(page, at(0.5, 0.5), at(0.6, 0.5), button);
       return (await viewOf(page)).x;
     };
     const begin = 'photo.view = { zoom: 2, x: 0.5, y: 0.5 }';
     await page.evaluate(begin);
     await page.keyboard.down('Shift');
-    expect(Math.abs((await drag('left')) - 0.45)).toBeLessThan(1e-3);
+    expect(Math.abs((await xAfterDrag()) - 0.45)).toBeLessThan(1e-3);
     await page.keyboard.up('Shift');
     await page.evaluate(begin);
-    expect(Math.abs((await drag('middle')) - 0.45)).toBeLessThan(1e-3);
+    expect(Math.abs((await xAfterDrag('middle')) - 0.45)).toBeLessThan(1e-3);
     await page.evaluate(begin);
     // The first drag focused the picture.
     await page.keyboard.down(' ');
-    expect(Math.abs((await drag('left')) - 0.45)).toBeLessThan(1e-3);
+    expect(Math.abs((await xAfterDrag()) - 0.45)).toBeLessThan(1e-3);
     await page.keyboard.up(' ');
     await page.evaluate(begin);
-    expect(await drag('left'), 'a plain drag moves the torch').toBe(0.5);
+    expect(await xAfterDrag(), 'a plain drag moves the torch').toBe(0.5);
     expect((await torchOf(page))?.x).not.toBe(0.5);
     await page.evaluate("photo.light = 'flood'");
-    expect(Math.abs((await drag('left')) - 0.45), 'under flood a plain drag pans').toBeLessThan(
+    expect(Math.abs((await xAfterDrag()) - 0.45), 'under flood a plain drag pans').toBeLessThan(
       1e-3,
     );
     await page.evaluate('photo.view = { zoom: 1, x: 0.5, y: 0.5 }');
-    expect(await drag('left')).toBe(0.5);
+    expect(await xAfterDrag()).toBe(0.5);
   });
 });
 

@@ -3,6 +3,7 @@
 import { expect, note, test } from './fixtures.js';
 import {
   capturePicture,
+  loadPhoto,
   mountPhoto,
   waitForEvents,
   waitForFrames,
@@ -44,9 +45,11 @@ test.describe('an element', () => {
         await step(
           `an element accepts a compressed transfer from the server's ${where}: ${path}`,
           async () => {
-            await page.goto('/plain');
-            await mountPhoto(page, { src: server[where] + path, backend: 'cpu' });
-            const progress = (await waitForLoad(page)).filter((event) => event.type === 'progress');
+            const photoEvents = await loadPhoto(page, {
+              src: server[where] + path,
+              backend: 'cpu',
+            });
+            const progress = photoEvents.filter((event) => event.type === 'progress');
             const { loaded: bytes, total } = /** @type {any} */ (progress.at(-1));
             expect({ bytes, total }).toStrictEqual({
               bytes: glassBytes().length,

@@ -7,12 +7,11 @@ import {
   capturePicture,
   countEvents,
   dominantColour,
-  mountPhoto,
+  loadPhoto,
   openAlertDetails,
   screenPicture,
   waitForEvents,
   waitForFrames,
-  waitForLoad,
 } from './page-helpers.js';
 import { LIGHT_IMAGE_FILE, LIGHT_IMAGE_URL, nativePicture } from './test-photos.js';
 
@@ -267,9 +266,7 @@ test.describe('a light source', () => {
         ['of an element that is not displayed', 'photo.hidden = true', 'photo.hidden = false'],
       ])) {
         await step(`a ${source} ${how} is not read`, async () => {
-          await page.goto('/plain');
-          await mountPhoto(page, { ...GLASS, backend: 'cpu' });
-          await waitForLoad(page);
+          await loadPhoto(page, { ...GLASS, backend: 'cpu' });
           await (source === 'video' ? makeVideo(page) : makeStream(page));
           if (source === 'video')
             await page.evaluate('(video.loop = true, video.src = film, video.play())');
@@ -340,9 +337,7 @@ test.describe('a light source', () => {
     const page = await openPage('/blank');
     for (const kind of ['image', 'canvas', 'bitmap']) {
       await step(`${kind} of another origin`, async () => {
-        await page.goto('/plain');
-        await mountPhoto(page, { ...GLASS, backend: 'cpu' });
-        await waitForLoad(page);
+        await loadPhoto(page, { ...GLASS, backend: 'cpu' });
         await makeSources(page);
         await page.evaluate('photo.lightSource = sources.linear');
         const want = await capturePicture(page);

@@ -1,7 +1,7 @@
 /** Requests for a photograph: ranges, interrupted transfers, compression, caches, and the worker that decodes. */
 
 import { expect, test } from './fixtures.js';
-import { capturePicture, mountPhoto, waitForLoad } from './page-helpers.js';
+import { capturePicture, loadPhoto, mountPhoto, waitForLoad } from './page-helpers.js';
 import { demoBytes, glassBytes, nativePicture } from './test-photos.js';
 import { FIRST_BYTES } from './test-server.js';
 
@@ -129,9 +129,7 @@ test.describe('a photograph', () => {
             ? route.fulfill({ status: worker })
             : route.fulfill({ contentType: 'text/javascript', body: worker }),
         );
-        await page.goto('/plain');
-        await mountPhoto(page, { src: SRC, backend: 'cpu', light: 'spectrum' });
-        await waitForLoad(page);
+        await loadPhoto(page, { src: SRC, backend: 'cpu', light: 'spectrum' });
         expect(await capturePicture(page)).toMatchPicture(nativePicture('spectrum'), 1);
       });
     }

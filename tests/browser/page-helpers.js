@@ -76,6 +76,18 @@ export async function waitForLoad(page) {
 }
 
 /**
+ * Opens a new page with an element, waits for `load` and returns all events.
+ *
+ * @param {Page} page
+ * @param {Record<string, string>} attributes
+ */
+export async function loadPhoto(page, attributes) {
+  await page.goto('/plain');
+  await mountPhoto(page, attributes);
+  return waitForLoad(page);
+}
+
+/**
  * Counts the events of a type since the element was mounted.
  *
  * @param {AnyPage} page
@@ -137,6 +149,37 @@ export async function waitForFrames(page, count = 12) {
   await page.evaluate(async (count) => {
     for (let i = 0; i < count; i += 1) await new Promise(requestAnimationFrame);
   }, count);
+}
+
+/** The rules of axe-core that a page violates, with the HTML of the elements. @param {Page} page */
+export async function axeViolations(page) {
+  const { violations } = await page.evaluate('axe.run()');
+  return violations.map(
+    (/** @type {any} */ { id, nodes }) =>
+      `${id}: ${nodes.map((/** @type {any} */ node) => node.html).join(' ')}`,
+  );
+}
+
+/** By how many pixels a page is wider than its viewport. @param {Page} page @returns {Promise<number>} */
+export function horizontalOverflow(page) {
+  return page.evaluate(
+    'document.documentElement.scrollWidth - document.documentElement.clientWidth',
+  );
+}
+
+/**
+ * Drags with the mouse, in one movement.
+ *
+ * @param {AnyPage} page
+ * @param {{ x: number, y: number }} from
+ * @param {{ x: number, y: number }} to
+ * @param {'left' | 'middle'} [button]
+ */
+export async function drag(page, from, to, button = 'left') {
+  await page.mouse.move(from.x, from.y);
+  await page.mouse.down({ button });
+  await page.mouse.move(to.x, to.y);
+  await page.mouse.up({ button });
 }
 
 /** At most how long the element pauses after a request that failed. */
@@ -210,10 +253,12 @@ export async function boxOf(locator) {
 /**
  * Makes a function that converts picture coordinates, from 0 to 1, to a point on the page.
  *
- * @param {Page} page
+ * @param {AnyPage} page
  */
 export async function pointOf(page) {
-  const { x: left, y: top, width, height } = await boxOf(page.locator('relightable-photo'));
+  const { left, top, width, height } = await page.evaluate(
+    "document.querySelector('relightable-photo').getBoundingClientRect().toJSON()",
+  );
   return (/** @type {number} */ x, /** @type {number} */ y) => ({
     x: left + x * width,
     y: top + y * height,

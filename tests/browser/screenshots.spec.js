@@ -22,9 +22,6 @@ import { LIGHTS } from './test-photos.js';
  */
 
 const GLASS = { src: '/photos/glass.ltm', backend: 'cpu', alt: 'A window', light: 'torch' };
-const CONTROLS = { ...GLASS, controls: '', zoom: '' };
-const POSTER = { ...GLASS, poster: '/half.png', reveal: 'interaction' };
-const FAILING = { ...GLASS, src: '/photos/absent.ltm' };
 const CONTROLS_WIDTH_PX = 400;
 const FONT =
   '@font-face { font-family: Screenshots; src: url(/fonts/source-serif-4.woff2) } ' +
@@ -62,6 +59,30 @@ const focusToolbar = async (page) => {
   await expect(page.getByRole('button', { name: 'Light: Torch' })).toBeFocused();
 };
 
+/** @type {State} */
+const TOOLBAR = {
+  attributes: { ...GLASS, controls: '', zoom: '' },
+  width: CONTROLS_WIDTH_PX,
+  enter: waitForToolbar,
+};
+/** @type {State} */
+const POSTER = {
+  attributes: { ...GLASS, poster: '/half.png', reveal: 'interaction' },
+  width: CONTROLS_WIDTH_PX,
+  enter: waitForPoster,
+};
+/** @type {State} */
+const FAILING = {
+  attributes: { ...GLASS, src: '/photos/absent.ltm' },
+  width: CONTROLS_WIDTH_PX,
+  enter: waitForAlert,
+};
+
+/** @type {State['media']} */
+const DARK = { colorScheme: 'dark' };
+/** @type {State['media']} */
+const FORCED_COLOURS = { forcedColors: 'active' };
+
 /** States by the part of the element that they are about. @type {Record<string, Record<string, State>>} */
 const STATES = {
   light: {
@@ -76,62 +97,31 @@ const STATES = {
     },
     exposed: { attributes: { ...GLASS, light: 'flood', exposure: '0.5' } },
     'light-focus': { enter: focusLight },
-    'light-focus-forced-colors': { enter: focusLight, media: { forcedColors: 'active' } },
+    'light-focus-forced-colors': { enter: focusLight, media: FORCED_COLOURS },
   },
   toolbar: {
-    toolbar: { attributes: CONTROLS, width: CONTROLS_WIDTH_PX, enter: waitForToolbar },
+    toolbar: TOOLBAR,
     'toolbar-menu': {
-      attributes: CONTROLS,
-      width: CONTROLS_WIDTH_PX,
+      ...TOOLBAR,
       enter: async (page) => {
         await waitForToolbar(page);
         await page.getByRole('button', { name: 'Light: Torch' }).click();
         await page.getByRole('radiogroup', { name: 'Light' }).waitFor();
       },
     },
-    'toolbar-focus': { attributes: CONTROLS, width: CONTROLS_WIDTH_PX, enter: focusToolbar },
-    'toolbar-dark': {
-      attributes: CONTROLS,
-      width: CONTROLS_WIDTH_PX,
-      enter: waitForToolbar,
-      media: { colorScheme: 'dark' },
-    },
-    'toolbar-forced-colors': {
-      attributes: CONTROLS,
-      width: CONTROLS_WIDTH_PX,
-      enter: focusToolbar,
-      media: { forcedColors: 'active' },
-    },
+    'toolbar-focus': { ...TOOLBAR, enter: focusToolbar },
+    'toolbar-dark': { ...TOOLBAR, media: DARK },
+    'toolbar-forced-colors': { ...TOOLBAR, enter: focusToolbar, media: FORCED_COLOURS },
   },
   poster: {
-    poster: { attributes: POSTER, width: CONTROLS_WIDTH_PX, enter: waitForPoster },
-    'poster-dark': {
-      attributes: POSTER,
-      width: CONTROLS_WIDTH_PX,
-      enter: waitForPoster,
-      media: { colorScheme: 'dark' },
-    },
-    'poster-forced-colors': {
-      attributes: POSTER,
-      width: CONTROLS_WIDTH_PX,
-      enter: waitForPoster,
-      media: { forcedColors: 'active' },
-    },
+    poster: POSTER,
+    'poster-dark': { ...POSTER, media: DARK },
+    'poster-forced-colors': { ...POSTER, media: FORCED_COLOURS },
   },
   error: {
-    error: { attributes: FAILING, width: CONTROLS_WIDTH_PX, enter: waitForAlert },
-    'error-dark': {
-      attributes: FAILING,
-      width: CONTROLS_WIDTH_PX,
-      enter: waitForAlert,
-      media: { colorScheme: 'dark' },
-    },
-    'error-forced-colors': {
-      attributes: FAILING,
-      width: CONTROLS_WIDTH_PX,
-      enter: waitForAlert,
-      media: { forcedColors: 'active' },
-    },
+    error: FAILING,
+    'error-dark': { ...FAILING, media: DARK },
+    'error-forced-colors': { ...FAILING, media: FORCED_COLOURS },
   },
 };
 

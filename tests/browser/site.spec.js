@@ -7,6 +7,7 @@ import { join } from 'node:path';
 import { transform } from 'esbuild';
 import { composePage, PAGES } from '../../www/tools/pages.js';
 import { expect, test } from './fixtures.js';
+import { axeViolations, horizontalOverflow } from './page-helpers.js';
 import { FOLDER, SCREENSHOTS } from './test-photos.js';
 
 /** @typedef {import('@playwright/test').Page} Page */
@@ -26,15 +27,6 @@ async function waitUntilDrawn(page) {
     await photo.locator('canvas').waitFor();
   }
   await page.evaluate('scrollTo(0, 0)');
-}
-
-/** The rules of axe-core that a page violates, with the HTML of the elements. @param {Page} page */
-async function axeViolations(page) {
-  const { violations } = await page.evaluate('axe.run()');
-  return violations.map(
-    (/** @type {any} */ { id, nodes }) =>
-      `${id}: ${nodes.map((/** @type {any} */ node) => node.html).join(' ')}`,
-  );
 }
 
 /** The addresses in a page's attributes. @param {Page} page @returns {Promise<string[]>} */
@@ -101,10 +93,7 @@ test.describe('the site', () => {
       for (const width of [320, 390, 820, 1440]) {
         await page.setViewportSize({ width, height: 900 });
         await step(`${name} does not scroll sideways at ${width} pixels`, async () => {
-          const overflow = await page.evaluate(
-            'document.documentElement.scrollWidth - document.documentElement.clientWidth',
-          );
-          expect(overflow).toBe(0);
+          expect(await horizontalOverflow(page)).toBe(0);
         });
         const path = join(SCREENSHOTS, `site-${name.replace('.html', '')}-${width}.png`);
         await page.screenshot({ path, fullPage: true });

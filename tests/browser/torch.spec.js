@@ -2,7 +2,7 @@
 
 import { brightest } from '../../www/tools/pictures.js';
 import { expect, test } from './fixtures.js';
-import { capturePicture, mountPhoto, pointOf, waitForEvents, waitForLoad } from './page-helpers.js';
+import { capturePicture, drag, loadPhoto, pointOf, waitForEvents } from './page-helpers.js';
 
 const TORCH = { src: '/photos/glass.ltm', alt: 'A window', light: 'torch' };
 
@@ -49,9 +49,7 @@ test.describe('the torch', () => {
     const mount = async (/** @type {Record<string, string>} */ attributes) => {
       // Away from the element that comes.
       await page.mouse.move(1000, 700);
-      await page.goto('/plain');
-      await mountPhoto(page, attributes);
-      await waitForLoad(page);
+      await loadPhoto(page, attributes);
     };
 
     await step('the torch reports its position in lightchange', async () => {
@@ -70,11 +68,7 @@ test.describe('the torch', () => {
     await step('the torch stays at the edge of the picture when a drag leaves it', async () => {
       await mount({ ...TORCH, backend: 'cpu' });
       const at = await enlarge(page);
-      const [from, to] = [at(0.5, 0.5), at(1.4, 0.5)];
-      await page.mouse.move(from.x, from.y);
-      await page.mouse.down();
-      await page.mouse.move(to.x, to.y);
-      await page.mouse.up();
+      await drag(page, at(0.5, 0.5), at(1.4, 0.5));
       expect(await page.evaluate('photo.torch')).toStrictEqual({ x: 1, y: 0.5 });
     });
 

@@ -3,6 +3,7 @@
 import { expect, note, test } from './fixtures.js';
 import {
   capturePicture,
+  loadPhoto,
   mountPhoto,
   removeGraphics,
   waitForEvents,
@@ -211,9 +212,7 @@ test.describe('the worker pool', () => {
       const headers = { 'content-security-policy': "worker-src 'none'" };
       await route.fulfill({ response, headers: { ...response.headers(), ...headers } });
     });
-    await page.goto('/plain');
-    await mountPhoto(page, GLASS);
-    await waitForLoad(page);
+    await loadPhoto(page, GLASS);
     expect(await page.evaluate('photo.kernel')).toBe('simd128');
     await expectSpectrum(page);
   });

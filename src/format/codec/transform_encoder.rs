@@ -38,11 +38,11 @@ pub struct TransformedTile {
 }
 
 impl TransformedTile {
-    /// Transforms coefficients, `[pixel, component]`. Reflections are those of their exact colours.
-    pub fn new(extent: Extent, coefficients: &[ColourVector]) -> Self {
+    /// Transforms the first `rank` of coefficients, `[pixel, component]`. Reflections are those of their exact colours.
+    pub fn new(extent: Extent, coefficients: &[ColourVector], rank: usize) -> Self {
         let pixels = extent.area();
-        let rank = coefficients.len() / pixels;
-        let of = |p: usize, k: usize| finite(coefficients[p * rank + k]);
+        let components = coefficients.len() / pixels;
+        let of = |p: usize, k: usize| finite(coefficients[p * components + k]);
         let klt = ColourKlt::of_pixels((0..pixels).map(|p| of(p, 0)));
         let mut values = Vec::with_capacity(rank * CHANNELS * block_count(extent) * AREA);
         for k in 0..rank {
@@ -114,17 +114,18 @@ pub struct QuantisedCoefficients {
 }
 
 impl QuantisedCoefficients {
-    /// Transforms and quantises coefficients, `[pixel, component]`, by `scans`, which cover all components;
-    /// `keep_decoded` says whether [`decoded`](Self::decoded) will be called.
+    /// Transforms and quantises the first `rank` of coefficients, `[pixel, component]`, by `scans`, which cover all
+    /// of these; `keep_decoded` says whether [`decoded`](Self::decoded) will be called.
     pub fn new(
         extent: Extent,
         coefficients: &[ColourVector],
+        rank: usize,
         scans: &[Scan],
         keep_decoded: bool,
     ) -> Self {
         let (pixels, blocks) = (extent.area(), block_count(extent));
-        let rank = coefficients.len() / pixels;
-        let of = |p: usize, k: usize| finite(coefficients[p * rank + k]);
+        let components = coefficients.len() / pixels;
+        let of = |p: usize, k: usize| finite(coefficients[p * components + k]);
         let zeros = |scan: &Scan| match scan.coding.is_direct() {
             true => Vec::new(),
             false => vec![0; scan.items().len() * CHANNELS * blocks * AREA],
@@ -391,7 +392,7 @@ mod tests {
                     scan(1, 1, step),
                     scan(2, 4, step),
                 ];
-                let quantised = QuantisedCoefficients::new(extent, &tile, &scans, true);
+                let quantised = QuantisedCoefficients::new(extent, &tile, rank, &scans, true);
                 let mut planes = CoefficientPlanes::default();
                 let chunks = quantised.chunks(&scans).unwrap();
                 for ((scan, chunk), error) in scans.iter().zip(chunks).zip(&quantised.errors[1..]) {
@@ -421,6 +422,25 @@ mod tests {
     }
 
     #[test]
+    fn components_beyond_the_rank_are_left_out() {
+        let extent = Extent::new(11, 9);
+        let tile = tile(extent, 4);
+        let first: Vec<ColourVector> = tile
+            .chunks_exact(4)
+            .flat_map(|pixel| &pixel[..2])
+            .copied()
+            .collect();
+        let scans = [scan(0, 2, 1e-2)];
+        let bytes = |coefficients: &[ColourVector]| {
+            let quantised = QuantisedCoefficients::new(extent, coefficients, 2, &scans, false);
+            quantised.chunks(&scans).unwrap().remove(0).bytes
+        };
+        assert_eq!(bytes(&tile), bytes(&first));
+        let values = |coefficients| TransformedTile::new(extent, coefficients, 2).values;
+        assert_eq!(values(&tile), values(&first));
+    }
+
+    #[test]
     fn dark_tiles_have_no_chunks_and_cut_chunks_are_errors() {
         let extent = Extent {
             width: 16,
@@ -430,7 +450,7 @@ mod tests {
         let dark = vec![[0.0; CHANNELS]; tile.len()];
         let scan = scan(0, 3, 1e-2);
         let chunk = |tile| {
-            let quantised = QuantisedCoefficients::new(extent, tile, &[scan], false);
+            let quantised = QuantisedCoefficients::new(extent, tile, 3, &[scan], false);
             quantised.chunks(&[scan]).unwrap().remove(0)
         };
         assert!(chunk(&dark).bytes.is_empty());

@@ -75,12 +75,17 @@ struct EncodedTile {
 
 impl QuantisedTile {
     /// Quantises a tile over the file's basis; `keep_decoded` says whether [`decoded`](Self::decoded) will be called.
-    pub fn new(tile: &FloatTile, order: &[u16], scans: &[Scan], keep_decoded: bool) -> Self {
-        let extent = tile.rect.extent;
+    pub fn new(
+        encoder: &Encoder<'_, impl Executor>,
+        tile: &FloatTile,
+        scans: &[Scan],
+        keep_decoded: bool,
+    ) -> Self {
+        let (extent, rank, order) = (tile.rect.extent, encoder.rank(), &encoder.order);
         let (coefficients, functions) = (non_empty(&tile.coefficients), non_empty(&tile.functions));
         Self {
             coefficients: coefficients
-                .map(|c| QuantisedCoefficients::new(extent, c, scans, keep_decoded)),
+                .map(|c| QuantisedCoefficients::new(extent, c, rank, scans, keep_decoded)),
             functions: functions.map(|tau| QuantisedDirectFunctions::new(tau, order, scans)),
         }
     }
@@ -137,7 +142,7 @@ pub fn encode_quantised(
     scans: Vec<Scan>,
 ) -> Result<EncodedFile, FormatError> {
     let encode = |tile: FloatTile| {
-        QuantisedTile::new(&encoder.rotated(tile), &encoder.order, &scans, false).encode(&scans)
+        QuantisedTile::new(encoder, &encoder.rotated(tile), &scans, false).encode(&scans)
     };
     assemble(encoder, scans.clone(), encode)
 }

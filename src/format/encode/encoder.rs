@@ -1,7 +1,5 @@
 //! The encoder's view of a source: the rotated basis, energies and peaks, from one pass over all tiles.
 
-use std::borrow::Cow;
-
 use super::basis_rotation::{BasisRotation, coefficient_moments};
 use super::encoder_input::EncoderInput;
 use crate::executor::Executor;
@@ -58,6 +56,7 @@ impl TileAnalysis {
     }
 }
 
+/// The values, if there are some.
 pub fn non_empty<T>(values: &[T]) -> Option<&[T]> {
     (!values.is_empty()).then_some(values)
 }
@@ -136,24 +135,6 @@ impl<'a, E: Executor> Encoder<'a, E> {
             tile.functions.clear();
         }
         tile
-    }
-
-    /// The tile over the file's basis without the components that were dropped since its [rotation](Self::rotated).
-    pub fn truncated<'t>(&self, tile: &'t FloatTile) -> Cow<'t, FloatTile> {
-        let (pixels, rank) = (tile.rect.extent.area(), self.rank());
-        let rotated_rank = tile.coefficients.len() / pixels;
-        if rotated_rank <= rank {
-            return Cow::Borrowed(tile);
-        }
-        let coefficients = tile.coefficients.chunks_exact(rotated_rank);
-        Cow::Owned(FloatTile {
-            rect: tile.rect,
-            coefficients: coefficients
-                .flat_map(|pixel| &pixel[..rank])
-                .copied()
-                .collect(),
-            functions: tile.functions.clone(),
-        })
     }
 
     /// The finest step of component `k` whose numbers do not overflow: from the largest coefficient there can

@@ -191,9 +191,7 @@ impl<'a, E: Executor> RateControl<'a, E> {
     fn error_of(&self, scans: &[Scan]) -> SnrAccumulator {
         let errors = self.encoder.executor.map(self.sample.len(), |i| {
             let SampledTilePart { tile, weight } = &self.sample[i];
-            let tile = self.encoder.truncated(tile);
-            let quantised = QuantisedTile::new(&tile, &self.encoder.order, scans, false);
-            let error = quantised.error(scans.len());
+            let error = QuantisedTile::new(&self.encoder, tile, scans, false).error(scans.len());
             SnrAccumulator {
                 signal: error.signal * weight,
                 error: error.error * weight,
@@ -233,7 +231,7 @@ fn decoded(
     tile: &FloatTile,
     scans: &[Scan],
 ) -> TileFunctions {
-    let quantised = QuantisedTile::new(tile, &encoder.order, scans, true);
+    let quantised = QuantisedTile::new(encoder, tile, scans, true);
     let decoded = quantised.decoded(tile, &encoder.order);
     let basis = encoder.rotation.as_ref().map(|rotation| &rotation.basis);
     decoded.functions(&encoder.source.geometry, basis)

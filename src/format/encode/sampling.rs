@@ -15,7 +15,7 @@ const PART_SIDE: u32 = 8;
 
 /// A part of a tile.
 pub struct SampledTilePart {
-    /// Over the file's basis.
+    /// Over the file's basis, with the components that are dropped later.
     pub tile: FloatTile,
     /// Number of parts that it represents.
     pub weight: f64,

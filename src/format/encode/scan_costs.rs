@@ -44,12 +44,11 @@ impl CostModel {
     pub fn new(encoder: &Encoder<'_, impl Executor>, sample: &[SampledTilePart]) -> Self {
         let parts = encoder.executor.map(sample.len(), |i| {
             let SampledTilePart { tile, weight } = &sample[i];
-            let tile = encoder.truncated(tile);
             let (extent, functions) = (tile.rect.extent, non_empty(&tile.functions));
             let coefficients = non_empty(&tile.coefficients);
             TransformedTilePart {
                 weight: *weight,
-                coefficients: coefficients.map(|c| TransformedTile::new(extent, c)),
+                coefficients: coefficients.map(|c| TransformedTile::new(extent, c, encoder.rank())),
                 functions: functions.map(|tau| CentreOutFunctions::new(tau, &encoder.order)),
             }
         });
