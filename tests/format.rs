@@ -1032,7 +1032,7 @@ fn scans_keep_their_shares_of_the_file() {
         let share = |bytes: u64| bytes as f64 / encoded.bytes() as f64;
         // The first layer ends where the first coding begins again.
         let coding = index.scans[0].coding;
-        let again = |scan: &format::Scan| scan.coding == coding && scan.first == 0;
+        let again = |scan: &format::ProgressiveScan| scan.coding == coding && scan.first == 0;
         let later = index.scans[1..].iter().position(again);
         let later = later.map_or(1, |at| at + 1);
         let first = share(index.scan_range(later - 1).end);

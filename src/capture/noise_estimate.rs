@@ -38,7 +38,7 @@ impl NoiseModel {
 }
 
 /// The samples of a square of camera pixels in all shots in which none of them is saturated.
-struct BlockSamples {
+struct NoiseBlock {
     /// `[shots, p]`, scaled by the square root of the exposure.
     samples: Vec<f64>,
     /// Square root of each shot's exposure.
@@ -50,7 +50,7 @@ struct BlockSamples {
 }
 
 /// At most [`MAX_BLOCKS`] blocks, spread evenly over the loaded rows.
-fn blocks(measurements: &Measurements) -> Vec<BlockSamples> {
+fn blocks(measurements: &Measurements) -> Vec<NoiseBlock> {
     let columns = measurements.camera.width / BLOCK_SIDE;
     let strips = measurements.rows.strips().iter();
     let tops: Vec<u32> = strips
@@ -67,11 +67,11 @@ fn blocks(measurements: &Measurements) -> Vec<BlockSamples> {
         let column = (i as u32 % columns + row * 7) % columns;
         (column * BLOCK_SIDE, tops[row as usize])
     });
-    let blocks = positions.filter_map(|(x, y)| BlockSamples::at(measurements, x, y));
+    let blocks = positions.filter_map(|(x, y)| NoiseBlock::at(measurements, x, y));
     blocks.collect()
 }
 
-impl BlockSamples {
+impl NoiseBlock {
     /// The block with `(x, y)` at its top left; `None` if it is saturated too often.
     fn at(measurements: &Measurements, x: u32, y: u32) -> Option<Self> {
         let mut block = Self {
@@ -173,7 +173,7 @@ fn channel_mean(values: &[f64; BLOCK_SERIES], c: usize) -> f64 {
 
 /// The gain by channel. Samples are weighted by the `last` estimate, or at first by their measurement.
 fn estimate_gain(
-    blocks: &[BlockSamples],
+    blocks: &[NoiseBlock],
     floor: [f64; CHANNELS],
     last: Option<NoiseModel>,
 ) -> [f64; CHANNELS] {

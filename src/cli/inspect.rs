@@ -41,14 +41,14 @@ struct InspectReport {
     /// Bytes before the first scan.
     index_bytes: u64,
     largest_chunk_bytes: u32,
-    scans: Vec<ScanReport>,
+    scans: Vec<ProgressiveScanReport>,
     file_bytes: u64,
     metadata: Metadata,
 }
 
 /// One scan, and the prefix of the file up to its end.
 #[derive(Serialize)]
-struct ScanReport {
+struct ProgressiveScanReport {
     coding: &'static str,
     /// Range of components, or of centre-out slot indices.
     items: Range<u16>,
@@ -61,7 +61,7 @@ struct ScanReport {
     prefix_snr_db: Decibels,
 }
 
-impl ScanReport {
+impl ProgressiveScanReport {
     fn new(index: &FileIndex, scan: usize) -> Self {
         let range = index.scan_range(scan);
         let scan = &index.scans[scan];
@@ -135,7 +135,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         index_bytes: index.header.index_bytes(),
         largest_chunk_bytes,
         scans: (0..index.scans.len())
-            .map(|scan| ScanReport::new(&index, scan))
+            .map(|scan| ProgressiveScanReport::new(&index, scan))
             .collect(),
         file_bytes: index.header.file_bytes,
         metadata: index.metadata.read()?,
@@ -184,7 +184,7 @@ fn print(report: &InspectReport) -> Result<()> {
             "scans", "", "items", "bytes", "file to here", "SNR to recovered"
         ))?;
     }
-    report.scans.iter().try_for_each(ScanReport::print)?;
+    report.scans.iter().try_for_each(|scan| scan.print())?;
     line("file", &format_bytes(report.file_bytes))
 }
 

@@ -10,7 +10,8 @@ use anyhow::{Context, Result, anyhow, ensure};
 
 use super::value_parsers::ByteCount;
 use crate::format::{
-    ChunkSelection, FileIndex, FormatError, HEADER_BYTES, Limits, LtmReader, Progress, SectionName,
+    ChunkSelection, FileIndex, FormatError, HEADER_BYTES, Limits, LtmReader, ReadProgress,
+    SectionName,
 };
 use crate::transport::Transport;
 
@@ -24,7 +25,7 @@ const LIMITS: Limits = Limits {
 pub struct LtmFile {
     pub index: FileIndex,
     pub transport: Transport,
-    pub progress: Progress,
+    pub progress: ReadProgress,
 }
 
 /// Reads and checks an `.ltm` file, or its prefix `first`.

@@ -10,7 +10,7 @@ use super::error::FormatError;
 use super::index::FileIndex;
 use super::memory_budget::MemoryBudget;
 use super::metadata::MetadataJson;
-use super::scan::Scan;
+use super::scan::ProgressiveScan;
 use super::tile_decoder::{TileDecoder, decode_basis_chunk};
 use crate::transport::{Basis, Decibels, Tile, TileCodes, Transport};
 
@@ -109,7 +109,8 @@ impl DecoderState {
     /// Byte ranges to fetch, in file order: of visible tiles, and of scans up to the first with a sufficient SNR.
     pub fn wants(&self, selection: &ChunkSelection) -> Vec<Range<u64>> {
         let scans = &self.index.scans;
-        let is_sufficient = |scan: &Scan| selection.snr.is_some_and(|snr| scan.snr.0 >= snr.0);
+        let is_sufficient =
+            |scan: &ProgressiveScan| selection.snr.is_some_and(|snr| scan.snr.0 >= snr.0);
         let scans = scans
             .iter()
             .position(is_sufficient)

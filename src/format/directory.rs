@@ -10,7 +10,7 @@ use super::constants::{CHUNK_ENTRY_BYTES, MAX_CONTENT_BYTES, SCAN_RECORD_BYTES};
 use super::error::FormatError;
 use super::header::Header;
 use super::memory_budget::MemoryBudget;
-use super::scan::{Scan, ScanCoding};
+use super::scan::{ProgressiveScan, ScanCoding};
 use crate::transport::{CHANNELS, Extent};
 
 /// Bytes of the directory before compression. At most 1024 · (24 + 12 · 2^24): no overflow.
@@ -20,8 +20,8 @@ pub(super) fn content_bytes(header: &Header) -> u64 {
 }
 
 /// The directory before compression; `entries` are `[scan, tile]`.
-pub(super) fn encode(scans: &[Scan], entries: &[ChunkEntry]) -> Vec<u8> {
-    let mut bytes: Vec<u8> = scans.iter().flat_map(Scan::encode).collect();
+pub(super) fn encode(scans: &[ProgressiveScan], entries: &[ChunkEntry]) -> Vec<u8> {
+    let mut bytes: Vec<u8> = scans.iter().flat_map(ProgressiveScan::encode).collect();
     let fields: [fn(&ChunkEntry) -> u32; 3] = [|e| e.bytes, |e| e.content_bytes, |e| e.crc];
     for field in fields {
         bytes.extend(entries.iter().flat_map(|entry| field(entry).to_le_bytes()));
@@ -34,7 +34,7 @@ pub(super) fn decode(
     header: &Header,
     bytes: &[u8],
     budget: &MemoryBudget,
-) -> Result<(Vec<Scan>, Vec<ChunkEntry>), FormatError> {
+) -> Result<(Vec<ProgressiveScan>, Vec<ChunkEntry>), FormatError> {
     let scans = decode_scans(header, bytes, budget)?;
     let geometry = &header.geometry;
     let tiles = geometry.tile_grid().area();
@@ -64,17 +64,22 @@ fn decode_scans(
     header: &Header,
     bytes: &[u8],
     budget: &MemoryBudget,
-) -> Result<Vec<Scan>, FormatError> {
+) -> Result<Vec<ProgressiveScan>, FormatError> {
     let mut scans = budget.try_with_capacity(header.scans as usize)?;
     let mut known = 0;
     let records = bytes.as_chunks().0.iter().take(header.scans as usize);
     for (scan, record) in records.enumerate() {
-        let record = Scan::decode(record).filter(|record| is_valid_scan(header, record, known));
+        let record =
+            ProgressiveScan::decode(record).filter(|record| is_valid_scan(header, record, known));
         let record = record.ok_or(FormatError::InvalidScan(scan))?;
         known += record.new_basis_functions(known);
         scans.push(record);
     }
-    let has = |coding| scans.iter().any(|scan: &Scan| scan.coding == coding);
+    let has = |coding| {
+        scans
+            .iter()
+            .any(|scan: &ProgressiveScan| scan.coding == coding)
+    };
     let is_mixed = has(ScanCoding::Transform) && has(ScanCoding::Halves)
         || has(ScanCoding::Direct) && has(ScanCoding::DirectHalves);
     match is_mixed || known != usize::from(header.rank) {
@@ -84,7 +89,7 @@ fn decode_scans(
 }
 
 /// Whether the file can have the scan, where earlier scans have brought `known` basis functions.
-fn is_valid_scan(header: &Header, scan: &Scan, known: usize) -> bool {
+fn is_valid_scan(header: &Header, scan: &ProgressiveScan, known: usize) -> bool {
     let area = header.geometry.window.area();
     let is_in_range = match scan.coding.is_direct() {
         true => scan.end() <= area,
@@ -102,7 +107,7 @@ fn is_valid_scan(header: &Header, scan: &Scan, known: usize) -> bool {
 }
 
 /// Whether a tile of this extent can have the chunk.
-fn is_valid_entry(scan: &Scan, extent: Extent, entry: ChunkEntry) -> bool {
+fn is_valid_entry(scan: &ProgressiveScan, extent: Extent, entry: ChunkEntry) -> bool {
     let (bytes, content) = (u64::from(entry.bytes), u64::from(entry.content_bytes));
     if bytes == 0 {
         return content == 0;

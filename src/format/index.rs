@@ -12,7 +12,7 @@ use super::extension::{self, Extension};
 use super::header::{Header, SectionEntry};
 use super::memory_budget::MemoryBudget;
 use super::metadata::{Metadata, MetadataJson};
-use super::scan::{Scan, ScanCoding, rank_of};
+use super::scan::{ProgressiveScan, ScanCoding, rank_of};
 use crate::transport::Geometry;
 
 /// Everything that precedes the first scan.
@@ -21,7 +21,7 @@ pub struct FileIndex {
     /// The fixed header.
     pub header: Header,
     /// The scans, in file order.
-    pub scans: Vec<Scan>,
+    pub scans: Vec<ProgressiveScan>,
     /// Extensions that readers may ignore.
     pub extensions: Vec<Extension>,
     /// Origin of the file.
@@ -72,7 +72,7 @@ impl FileIndex {
     /// Assembles the index of a file, and its bytes. There is an entry for each scan and tile.
     pub(super) fn encode(
         geometry: Geometry,
-        scans: Vec<Scan>,
+        scans: Vec<ProgressiveScan>,
         entries: Vec<ChunkEntry>,
         extensions: Vec<Extension>,
         metadata: &Metadata,
@@ -139,7 +139,7 @@ impl FileIndex {
     /// Whether a tile's chunk of a scan begins with the tile's colour KLT: its first chunk with component 0 does.
     pub(super) fn has_colour_klt(&self, scan: usize, tile: usize) -> bool {
         let has_first = |scan: usize| {
-            let Scan { coding, first, .. } = self.scans[scan];
+            let ProgressiveScan { coding, first, .. } = self.scans[scan];
             coding == ScanCoding::Transform && first == 0 && self.entry(scan, tile).bytes > 0
         };
         has_first(scan) && !(0..scan).any(has_first)
@@ -194,7 +194,7 @@ impl FileIndex {
 /// Chunk offsets, from the end of the index on. There are at most 2^34 chunks of less than 2^25 bytes: no overflow.
 fn offsets(
     header: &Header,
-    scans: &[Scan],
+    scans: &[ProgressiveScan],
     entries: &[ChunkEntry],
     budget: &MemoryBudget,
 ) -> Result<Vec<u64>, FormatError> {

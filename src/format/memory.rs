@@ -8,7 +8,7 @@ use super::codec::basis_chunk;
 use super::directory;
 use super::header::Header;
 use super::index::FileIndex;
-use super::scan::Scan;
+use super::scan::ProgressiveScan;
 use crate::transport::{CHANNELS, TexelCodes, Tile};
 
 /// Bytes that the state of a chunk and of a tile take.
@@ -34,7 +34,7 @@ pub(super) fn index_bytes(header: &Header) -> u64 {
     relight_bytes(header)
         + header.index_bytes()
         + directory::content_bytes(header)
-        + scans * ((tiles + 1) * entry + size_of::<Scan>() as u64)
+        + scans * ((tiles + 1) * entry + size_of::<ProgressiveScan>() as u64)
         + tiles * TILE_STATE_BYTES
         + basis
 }

@@ -43,6 +43,6 @@ pub use header::Header;
 pub use index::FileIndex;
 pub use memory_budget::Limits;
 pub use metadata::{CaptureSummary, Metadata, MetadataJson};
-pub use reader::{LtmReader, Progress};
-pub use scan::{Scan, ScanCoding};
+pub use reader::{LtmReader, ReadProgress};
+pub use scan::{ProgressiveScan, ScanCoding};
 pub use tile_decoder::{check, decode_basis, decode_tile};

@@ -53,7 +53,7 @@ pub struct LtmReader {
 
 /// How much of a file has been read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Progress {
+pub struct ReadProgress {
     /// Bytes received, each counted once.
     pub bytes: u64,
     /// Bytes of the file, once the header is known.
@@ -89,9 +89,9 @@ impl LtmReader {
     }
 
     /// How much has been read.
-    pub fn progress(&self) -> Progress {
+    pub fn progress(&self) -> ReadProgress {
         let state = self.state.as_ref();
-        Progress {
+        ReadProgress {
             bytes: self.received_bytes,
             file_bytes: self.header.map(|header| header.file_bytes),
             scans: state.map_or(0, DecoderState::complete_scans),

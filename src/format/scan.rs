@@ -28,14 +28,14 @@ impl ScanCoding {
 }
 
 /// Number of basis functions in the basis chunks of `scans`.
-pub(super) fn rank_of(scans: &[Scan]) -> usize {
+pub(super) fn rank_of(scans: &[ProgressiveScan]) -> usize {
     let coefficients = scans.iter().filter(|scan| !scan.coding.is_direct());
-    coefficients.map(Scan::end).max().unwrap_or(0)
+    coefficients.map(ProgressiveScan::end).max().unwrap_or(0)
 }
 
 /// One pass over all tiles. A decoded value is the sum of what its scans bring.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scan {
+pub struct ProgressiveScan {
     /// How its values are written.
     pub coding: ScanCoding,
     /// First component, or for direct codings the first slot by centre-out index.
@@ -51,7 +51,7 @@ pub struct Scan {
     pub(super) basis_crc: u32,
 }
 
-impl Scan {
+impl ProgressiveScan {
     /// A scan whose chunks are not encoded yet.
     pub(super) fn new(coding: ScanCoding, first: u16, count: u16, step: f32) -> Self {
         Self {

@@ -6,7 +6,7 @@ use super::codec::{basis_chunk, direct_functions, halves};
 use super::error::{FormatError, SectionError};
 use super::index::FileIndex;
 use super::memory_budget::{MemoryBudget, vec_bytes};
-use super::scan::{Scan, ScanCoding};
+use super::scan::{ProgressiveScan, ScanCoding};
 use crate::transport::{Basis, CHANNELS, FloatTile, Tile, TileCodes};
 
 /// A tile as the sum of its chunks so far.
@@ -223,7 +223,7 @@ pub fn check(index: &FileIndex, chunk: ChunkId, bytes: &[u8]) -> Result<(), Form
         let columns = usize::from(record.count);
         let pixels = index.header.geometry.tile(tile).extent.area();
         let mut values = budget.try_zeroed(pixels * columns)?;
-        let alone = Scan {
+        let alone = ProgressiveScan {
             first: 0,
             ..*record
         };

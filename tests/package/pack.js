@@ -171,14 +171,14 @@ test('types resolve under every moduleResolution', () => {
   const uses = `
     import { type PhotoInfo, RelightablePhoto, type RelightablePhotoEventMap } from 'relightable-photo';
     import { defineRelightablePhoto, PhotoError } from 'relightable-photo/element';
-    import type { Picture } from 'relightable-photo/core';
+    import type { RelitPicture } from 'relightable-photo/core';
     import 'relightable-photo/script';
     import type { RelightablePhotoProps } from 'relightable-photo/jsx';
     const photo = document.querySelector('relightable-photo');
     photo?.addEventListener('error', ({ code }) => code.length);
     export const info: PhotoInfo | null = photo instanceof RelightablePhoto ? photo.info : null;
     export const props: RelightablePhotoProps = { src: '/window.ltm', exposure: 1 };
-    export type { Picture, RelightablePhotoEventMap };
+    export type { RelitPicture, RelightablePhotoEventMap };
     export { defineRelightablePhoto, PhotoError };
     // @ts-expect-error: there is no such property
     photo?.nothing;

@@ -3,9 +3,9 @@
 export { type DecodeOptions, decode, type LtmInput } from './core/decode.js';
 export {
   type CoreLight as Light,
-  type Picture,
   type PictureLight,
   type RelightOptions,
+  type RelitPicture,
   relight,
   type Torch,
 } from './core/relight.js';

@@ -13,7 +13,7 @@ use crate::format::chunk::EncodedChunk;
 use crate::format::constants::MAX_CONTENT_BYTES;
 use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::memory_budget::{MemoryBudget, vec_bytes};
-use crate::format::scan::Scan;
+use crate::format::scan::ProgressiveScan;
 use crate::transport::{CHANNELS, Extent, Window};
 
 /// Added to a magnitude in steps before it is truncated. Less than a half: small values are mostly noise,
@@ -70,7 +70,7 @@ pub fn finest_step(peak: f32) -> f32 {
 pub fn add(
     functions: &mut [ColourVector],
     order: &[u16],
-    scan: &Scan,
+    scan: &ProgressiveScan,
     bytes: &[u8],
     tokens: u32,
     budget: &MemoryBudget,
@@ -156,7 +156,7 @@ pub struct QuantisedDirectFunctions {
 
 impl QuantisedDirectFunctions {
     /// Quantises functions, `[pixel, slot]`, by `scans`.
-    pub fn new(functions: &[ColourVector], order: &[u16], scans: &[Scan]) -> Self {
+    pub fn new(functions: &[ColourVector], order: &[u16], scans: &[ProgressiveScan]) -> Self {
         let mut residual = CentreOutFunctions::new(functions, order).values;
         let square = |residual: &[ColourVector]| {
             let all = residual.as_flattened().iter();
@@ -213,7 +213,7 @@ impl QuantisedDirectFunctions {
     ///
     /// # Errors
     /// [`FormatError::Compress`].
-    pub fn chunks(&self, scans: &[Scan]) -> Result<Vec<EncodedChunk>, FormatError> {
+    pub fn chunks(&self, scans: &[ProgressiveScan]) -> Result<Vec<EncodedChunk>, FormatError> {
         let chunks = self.numbers.iter().zip(scans).map(|(numbers, scan)| {
             if numbers.iter().all(|number| *number == 0) {
                 return Ok(EncodedChunk::default());
@@ -265,9 +265,9 @@ mod tests {
         let functions = functions(25);
         for step in [1e-4, 1e-2] {
             let scans = [
-                Scan::new(ScanCoding::Direct, 0, 25, 8.0 * step),
-                Scan::new(ScanCoding::Direct, 0, 10, step),
-                Scan::new(ScanCoding::Direct, 10, 15, step),
+                ProgressiveScan::new(ScanCoding::Direct, 0, 25, 8.0 * step),
+                ProgressiveScan::new(ScanCoding::Direct, 0, 10, step),
+                ProgressiveScan::new(ScanCoding::Direct, 10, 15, step),
             ];
             let quantised = QuantisedDirectFunctions::new(&functions, &order, &scans);
             let mut got = vec![[0.0; CHANNELS]; functions.len()];
@@ -298,7 +298,7 @@ mod tests {
     #[test]
     fn numbers_saturate() {
         let order = order(1);
-        let scan = Scan::new(ScanCoding::Direct, 0, 1, 1e-6);
+        let scan = ProgressiveScan::new(ScanCoding::Direct, 0, 1, 1e-6);
         let functions = [[1.0, -1.0, f32::NAN]];
         let quantised = QuantisedDirectFunctions::new(&functions, &order, &[scan]);
         let chunk = quantised.chunks(&[scan]).unwrap().remove(0);

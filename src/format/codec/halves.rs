@@ -10,7 +10,7 @@ use super::colour::ColourVector;
 use super::zstd_frame::{compress, decompress};
 use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::memory_budget::MemoryBudget;
-use crate::format::scan::Scan;
+use crate::format::scan::ProgressiveScan;
 use crate::transport::CHANNELS;
 
 /// Bytes of `values` values before compression.
@@ -53,7 +53,7 @@ fn half(value: f32, step: f32) -> f16 {
 }
 
 /// The column of `values` that item `item` of a scan stands for; `order` is that of direct scans' slots.
-fn column(scan: &Scan, order: Option<&[u16]>, item: usize) -> usize {
+fn column(scan: &ProgressiveScan, order: Option<&[u16]>, item: usize) -> usize {
     let at = usize::from(scan.first) + item;
     order.map_or(at, |order| order[at].into())
 }
@@ -65,7 +65,7 @@ fn column(scan: &Scan, order: Option<&[u16]>, item: usize) -> usize {
 pub fn add(
     values: &mut [ColourVector],
     columns: usize,
-    scan: &Scan,
+    scan: &ProgressiveScan,
     order: Option<&[u16]>,
     frame: &[u8],
     budget: &MemoryBudget,
@@ -93,7 +93,7 @@ pub fn add(
 pub fn gather(
     values: &[ColourVector],
     columns: usize,
-    scan: &Scan,
+    scan: &ProgressiveScan,
     order: Option<&[u16]>,
 ) -> Vec<f32> {
     let count = usize::from(scan.count);
@@ -113,8 +113,8 @@ mod tests {
     use super::*;
     use crate::format::scan::ScanCoding;
 
-    fn scan(first: u16, count: u16, step: f32) -> Scan {
-        Scan::new(ScanCoding::DirectHalves, first, count, step)
+    fn scan(first: u16, count: u16, step: f32) -> ProgressiveScan {
+        ProgressiveScan::new(ScanCoding::DirectHalves, first, count, step)
     }
 
     #[test]

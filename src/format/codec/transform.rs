@@ -23,7 +23,7 @@ use crate::format::constants::MAX_CONTENT_BYTES;
 use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::fields::FieldReader;
 use crate::format::memory_budget::{MemoryBudget, vec_bytes};
-use crate::format::scan::Scan;
+use crate::format::scan::ProgressiveScan;
 use crate::transport::{CHANNELS, Extent, Geometry};
 
 /// The axes of one component of a tile, `[axis, pixel]`; empty if all are zero.
@@ -97,7 +97,7 @@ impl CoefficientPlanes {
     pub fn add(
         &mut self,
         extent: Extent,
-        scan: &Scan,
+        scan: &ProgressiveScan,
         bytes: &[u8],
         tokens: u32,
         budget: &MemoryBudget,

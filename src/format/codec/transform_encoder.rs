@@ -15,7 +15,7 @@ use super::transform::{
 use crate::format::chunk::EncodedChunk;
 use crate::format::error::FormatError;
 use crate::format::memory_budget::MemoryBudget;
-use crate::format::scan::Scan;
+use crate::format::scan::ProgressiveScan;
 use crate::transport::{CHANNELS, Extent};
 
 /// Added to a magnitude in steps before it is truncated, by the sum of the magnitudes of the numbers before
@@ -120,13 +120,13 @@ impl QuantisedCoefficients {
         extent: Extent,
         coefficients: &[ColourVector],
         rank: usize,
-        scans: &[Scan],
+        scans: &[ProgressiveScan],
         keep_decoded: bool,
     ) -> Self {
         let (pixels, blocks) = (extent.area(), block_count(extent));
         let components = coefficients.len() / pixels;
         let of = |p: usize, k: usize| finite(coefficients[p * components + k]);
-        let zeros = |scan: &Scan| match scan.coding.is_direct() {
+        let zeros = |scan: &ProgressiveScan| match scan.coding.is_direct() {
             true => Vec::new(),
             false => vec![0; scan.items().len() * CHANNELS * blocks * AREA],
         };
@@ -186,10 +186,10 @@ impl QuantisedCoefficients {
         k: usize,
         pixels: &[ColourVector],
         extent: Extent,
-        scans: &[Scan],
+        scans: &[ProgressiveScan],
         mut decoded: Option<&mut CoefficientPlane>,
     ) {
-        let covers = |scan: &Scan| !scan.coding.is_direct() && scan.items().contains(&k);
+        let covers = |scan: &ProgressiveScan| !scan.coding.is_direct() && scan.items().contains(&k);
         let last = scans.iter().rposition(covers);
         for a in 0..CHANNELS {
             for (b, (left, top)) in block_corners(extent).enumerate() {
@@ -232,7 +232,7 @@ impl QuantisedCoefficients {
     ///
     /// # Errors
     /// [`FormatError::Compress`].
-    pub fn chunks(&self, scans: &[Scan]) -> Result<Vec<EncodedChunk>, FormatError> {
+    pub fn chunks(&self, scans: &[ProgressiveScan]) -> Result<Vec<EncodedChunk>, FormatError> {
         let mut klt = Some(self.klt);
         let chunks = scans.iter().zip(&self.numbers).map(|(scan, numbers)| {
             if numbers.iter().all(|number| *number == 0) {
@@ -357,8 +357,8 @@ mod tests {
         coefficients
     }
 
-    fn scan(first: u16, count: u16, step: f32) -> Scan {
-        Scan::new(ScanCoding::Transform, first, count, step)
+    fn scan(first: u16, count: u16, step: f32) -> ProgressiveScan {
+        ProgressiveScan::new(ScanCoding::Transform, first, count, step)
     }
 
     fn decoded(planes: &CoefficientPlanes, extent: Extent, rank: usize) -> Vec<ColourVector> {

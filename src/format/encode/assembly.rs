@@ -14,7 +14,7 @@ use crate::format::codec::halves;
 use crate::format::codec::transform_encoder::QuantisedCoefficients;
 use crate::format::error::FormatError;
 use crate::format::index::FileIndex;
-use crate::format::scan::{Scan, ScanCoding};
+use crate::format::scan::{ProgressiveScan, ScanCoding};
 use crate::transport::{Basis, Decibels, FloatTile, SnrAccumulator};
 
 /// Share of the error that the rounding of the basis may add.
@@ -78,7 +78,7 @@ impl QuantisedTile {
     pub fn new(
         encoder: &Encoder<'_, impl Executor>,
         tile: &FloatTile,
-        scans: &[Scan],
+        scans: &[ProgressiveScan],
         keep_decoded: bool,
     ) -> Self {
         let (extent, rank, order) = (tile.rect.extent, encoder.rank(), &encoder.order);
@@ -113,7 +113,7 @@ impl QuantisedTile {
         }
     }
 
-    fn encode(&self, scans: &[Scan]) -> Result<EncodedTile, FormatError> {
+    fn encode(&self, scans: &[ProgressiveScan]) -> Result<EncodedTile, FormatError> {
         let coefficients = self.coefficients.as_ref().map(|q| q.chunks(scans));
         let functions = self.functions.as_ref().map(|q| q.chunks(scans));
         let mut chunks = vec![EncodedChunk::default(); scans.len()];
@@ -139,7 +139,7 @@ impl QuantisedTile {
 /// As [`EncodedFile::new`].
 pub fn encode_quantised(
     encoder: &Encoder<'_, impl Executor>,
-    scans: Vec<Scan>,
+    scans: Vec<ProgressiveScan>,
 ) -> Result<EncodedFile, FormatError> {
     let encode = |tile: FloatTile| {
         QuantisedTile::new(encoder, &encoder.rotated(tile), &scans, false).encode(&scans)
@@ -176,7 +176,12 @@ pub fn encode_lossless(encoder: &Encoder<'_, impl Executor>) -> Result<EncodedFi
             let count = (planned * (rank + slots) as f64) as usize;
             let count = count.clamp(1, max_per_scan).min(items - first);
             // Ranks and slots are below 2^12.
-            scans.push(Scan::new(coding, first as u16, count as u16, step));
+            scans.push(ProgressiveScan::new(
+                coding,
+                first as u16,
+                count as u16,
+                step,
+            ));
             first += count;
         }
     }
@@ -187,7 +192,7 @@ pub fn encode_lossless(encoder: &Encoder<'_, impl Executor>) -> Result<EncodedFi
 fn encode_halves(
     encoder: &Encoder<'_, impl Executor>,
     tile: &FloatTile,
-    scans: &[Scan],
+    scans: &[ProgressiveScan],
 ) -> Result<EncodedTile, FormatError> {
     let mut encoded = EncodedTile::default();
     let (mut energies, mut errors) = (Vec::new(), Vec::new());
@@ -228,7 +233,7 @@ fn quantise_basis(rotation: &BasisRotation, area: usize, error: f64) -> Quantise
 /// Encodes all tiles by `encode`, and puts the file together.
 fn assemble(
     encoder: &Encoder<'_, impl Executor>,
-    mut scans: Vec<Scan>,
+    mut scans: Vec<ProgressiveScan>,
     encode: impl Fn(FloatTile) -> Result<EncodedTile, FormatError> + Sync + Send,
 ) -> Result<EncodedFile, FormatError> {
     let (source, rotation) = (&encoder.source, encoder.rotation.as_ref());

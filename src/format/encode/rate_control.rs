@@ -10,12 +10,12 @@ use super::encoder::Encoder;
 use super::encoder_input::{DistortionMetric, EncoderInput, RateTarget};
 use super::sampling::{SampledTilePart, sample};
 use super::scan_costs::CostModel;
-use super::scan_plan::{self, MAX_SHARES, SHARES, ScanPlan, ScanShares};
+use super::scan_plan::{self, MAX_SHARES, ProgressiveScanPlan, SHARES, ScanByteShares};
 use crate::bisect::bisect;
 use crate::executor::Executor;
 use crate::format::constants::FIRST_BYTES;
 use crate::format::error::FormatError;
-use crate::format::scan::Scan;
+use crate::format::scan::ProgressiveScan;
 use crate::transport::{Decibels, FloatTile, SnrAccumulator, TileFunctions};
 
 /// Energy of the dropped components, relative to the quantisation error.
@@ -139,7 +139,7 @@ impl<'a, E: Executor> RateControl<'a, E> {
         drop_weak_components(&mut self.encoder, expected);
         let model = CostModel::new(&self.encoder, &self.sample);
         let encode = |factor: f64| {
-            let ScanPlan { scans, first_scans } =
+            let ProgressiveScanPlan { scans, first_scans } =
                 self.plan(&model, step, expected.error, factor)?;
             let file = assembly::encode_quantised(&self.encoder, scans)?;
             let is_within = is_within_shares(&file, first_scans);
@@ -164,8 +164,8 @@ impl<'a, E: Executor> RateControl<'a, E> {
         mut step: f32,
         expected_error: f64,
         factor: f64,
-    ) -> Result<ScanPlan, FormatError> {
-        let shares = ScanShares {
+    ) -> Result<ProgressiveScanPlan, FormatError> {
+        let shares = ScanByteShares {
             first: SHARES.first * factor,
             scan: SHARES.scan * factor,
         };
@@ -188,7 +188,7 @@ impl<'a, E: Executor> RateControl<'a, E> {
     }
 
     /// The quantisation error of some scans, predicted from the sample.
-    fn error_of(&self, scans: &[Scan]) -> SnrAccumulator {
+    fn error_of(&self, scans: &[ProgressiveScan]) -> SnrAccumulator {
         let errors = self.encoder.executor.map(self.sample.len(), |i| {
             let SampledTilePart { tile, weight } = &self.sample[i];
             let error = QuantisedTile::new(&self.encoder, tile, scans, false).error(scans.len());
@@ -229,7 +229,7 @@ fn codable(encoder: &Encoder<'_, impl Executor>, mut tiles: Vec<FloatTile>) -> V
 fn decoded(
     encoder: &Encoder<'_, impl Executor>,
     tile: &FloatTile,
-    scans: &[Scan],
+    scans: &[ProgressiveScan],
 ) -> TileFunctions {
     let quantised = QuantisedTile::new(encoder, tile, scans, true);
     let decoded = quantised.decoded(tile, &encoder.order);

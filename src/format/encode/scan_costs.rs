@@ -10,7 +10,7 @@ use crate::format::codec::direct_functions::CentreOutFunctions;
 use crate::format::codec::tokens::{CONTEXTS, TokenSource, for_tokens};
 use crate::format::codec::transform_encoder::TransformedTile;
 use crate::format::error::FormatError;
-use crate::format::scan::{Scan, ScanCoding};
+use crate::format::scan::{ProgressiveScan, ScanCoding};
 
 /// Bytes and squared error of one item at one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -61,7 +61,7 @@ impl CostModel {
     /// [`FormatError::Compress`].
     pub fn compressed_bytes(
         &self,
-        scan: &Scan,
+        scan: &ProgressiveScan,
         executor: &impl Executor,
     ) -> Result<f64, FormatError> {
         let bytes = executor.map(self.parts.len(), |i| {

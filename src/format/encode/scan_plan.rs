@@ -18,20 +18,20 @@ use crate::executor::Executor;
 use crate::format::codec::{direct_functions, transform};
 use crate::format::constants::FIRST_BYTES;
 use crate::format::error::FormatError;
-use crate::format::scan::{Scan, ScanCoding, rank_of};
+use crate::format::scan::{ProgressiveScan, ScanCoding, rank_of};
 
 /// The shares that a plan aims for. Predictions err; files keep [`MAX_SHARES`].
-pub const SHARES: ScanShares = ScanShares {
+pub const SHARES: ScanByteShares = ScanByteShares {
     first: 0.08,
     scan: 0.18,
 };
 /// The shares of files that fit into a reader's first request, where many scans cost more than they give.
-const SMALL_FILE_SHARES: ScanShares = ScanShares {
+const SMALL_FILE_SHARES: ScanByteShares = ScanByteShares {
     first: 0.3,
     scan: f64::INFINITY,
 };
 /// The shares that files keep: a tenth and a quarter.
-pub const MAX_SHARES: ScanShares = ScanShares {
+pub const MAX_SHARES: ScanByteShares = ScanByteShares {
     first: 0.1,
     scan: 0.25,
 };
@@ -52,15 +52,15 @@ const FIRST_STEP_TRIALS: usize = 6;
 const BASIS_BYTES_PER_SLOT: f64 = 1.2;
 
 /// The scans of a file.
-pub struct ScanPlan {
-    pub scans: Vec<Scan>,
+pub struct ProgressiveScanPlan {
+    pub scans: Vec<ProgressiveScan>,
     /// Number of scans of the first layer.
     pub first_scans: usize,
 }
 
 /// Bounds on the parts of a file, as shares of its bytes.
 #[derive(Clone, Copy, Debug)]
-pub struct ScanShares {
+pub struct ScanByteShares {
     /// Of the index and the first layer.
     pub first: f64,
     /// Of any later scan.
@@ -111,7 +111,7 @@ impl ScanItems {
     }
 
     /// Codes the first `count` items at `step`, or at the finest step that does not overflow.
-    fn first_layer(&self, count: usize, step: f32, scans: &mut Vec<Scan>) {
+    fn first_layer(&self, count: usize, step: f32, scans: &mut Vec<ProgressiveScan>) {
         let flat_step = (step * FIRST_FLAT_STEP_RATIO).max(self.finest_step(0..1));
         let others = usize::from(!self.coding.is_direct())..self.count();
         let step = step.max(self.finest_step(others));
@@ -132,7 +132,7 @@ impl ScanItems {
         bytes: &[f64],
         step: f32,
         max_bytes: f64,
-        scans: &mut Vec<Scan>,
+        scans: &mut Vec<ProgressiveScan>,
     ) {
         let finest = self.finest_step(coded..self.count());
         if finest > step {
@@ -150,12 +150,12 @@ impl ScanItems {
         bytes: &[f64],
         [flat_step, step]: [f32; 2],
         max_bytes: f64,
-        scans: &mut Vec<Scan>,
+        scans: &mut Vec<ProgressiveScan>,
     ) {
         let is_flat = |item: usize| item == 0 && !self.coding.is_direct();
         let mut push = |first: usize, end: usize, step: f32| {
             let (first, count) = (first as u16, (end - first) as u16); // below 2^12
-            scans.push(Scan::new(self.coding, first, count, step));
+            scans.push(ProgressiveScan::new(self.coding, first, count, step));
         };
         let (mut start, mut scan_bytes) = (first, 0.0);
         for (item, item_bytes) in (first..).zip(bytes) {
@@ -177,7 +177,7 @@ impl ScanItems {
 }
 
 /// A plan without shares, by which the rate control measures a step.
-pub fn trial(encoder: &Encoder<'_, impl Executor>, step: f32) -> Vec<Scan> {
+pub fn trial(encoder: &Encoder<'_, impl Executor>, step: f32) -> Vec<ProgressiveScan> {
     let mut scans = Vec::new();
     for items in ScanItems::of(encoder) {
         let count = items.count().div_ceil(TRIAL_FIRST_ITEMS);
@@ -196,8 +196,8 @@ pub fn plan(
     encoder: &Encoder<'_, impl Executor>,
     model: &CostModel,
     step: f32,
-    shares: ScanShares,
-) -> Result<ScanPlan, FormatError> {
+    shares: ScanByteShares,
+) -> Result<ProgressiveScanPlan, FormatError> {
     let executor = encoder.executor;
     let area = encoder.order.len() as f64;
     let kinds = ScanItems::of(encoder);
@@ -238,11 +238,11 @@ pub fn plan(
     let max_bytes = shares.scan * file_bytes;
     for (items, last) in kinds.iter().zip(&last) {
         let of_kind = scans.iter().filter(|scan| scan.coding == items.coding);
-        let coded = of_kind.map(Scan::end).max().unwrap_or(0);
+        let coded = of_kind.map(ProgressiveScan::end).max().unwrap_or(0);
         let bytes: Vec<f64> = last.iter().map(|cost| cost.bytes).collect();
         items.last_layer(coded, &bytes, step, max_bytes, &mut scans);
     }
-    Ok(ScanPlan { scans, first_scans })
+    Ok(ProgressiveScanPlan { scans, first_scans })
 }
 
 /// Number of first items up to the last whose gain is worth its bytes: at a step, a bit reduces the squared

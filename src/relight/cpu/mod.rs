@@ -147,7 +147,7 @@ impl CpuRelighter {
         let this = &*self;
         executor.map(stale.len(), |i| {
             let mut scratch = lock(&this.scratch_pool).pop();
-            SimdLevel::widest().run(BlockKernel {
+            SimdLevel::widest().run(BlockRelightKernel {
                 relighter: this,
                 block: stale[i],
                 scratch: &mut scratch,
@@ -300,13 +300,13 @@ impl CpuRelighter {
     }
 }
 
-struct BlockKernel<'a> {
+struct BlockRelightKernel<'a> {
     relighter: &'a CpuRelighter,
     block: usize,
     scratch: &'a mut Option<CorrelationScratch>,
 }
 
-impl SimdKernel for BlockKernel<'_> {
+impl SimdKernel for BlockRelightKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         self.relighter.relight_block(simd, self.block, self.scratch);

@@ -52,7 +52,7 @@ export interface RelightOptions {
 }
 
 /** A picture for `new ImageData`. */
-export interface Picture {
+export interface RelitPicture {
   readonly width: number;
   readonly height: number;
   /** RGBA, row by row. */
@@ -64,7 +64,7 @@ export async function relight(
   photo: CorePhotograph,
   light: CoreLight = 'flood',
   options: RelightOptions = {},
-): Promise<Picture> {
+): Promise<RelitPicture> {
   if (!(photo instanceof LtmPhotograph)) {
     throw new TypeError('relight takes a photograph from decode');
   }

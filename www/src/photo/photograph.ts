@@ -16,9 +16,9 @@ import type { PhotoInfo } from '../shared/value-types.js';
 import {
   describePhoto,
   type PhotoDescriptor,
-  type SerialisedTile,
+  type TilesInWorkers,
+  type TileTransferBytes,
   type TileWorkerPool,
-  type WorkerTiles,
 } from './types.js';
 
 /** A module of the page with tiles in its memory. */
@@ -31,14 +31,14 @@ interface ModuleTiles {
 }
 
 /** 'in transit': sent to a worker, or requested from it. */
-type TileResidency = ModuleTiles | 'workers' | 'in transit' | SerialisedTile;
+type TileResidency = ModuleTiles | 'workers' | 'in transit' | TileTransferBytes;
 
 export class Photograph implements Freeable {
   readonly info: PhotoInfo;
   #tiles: TileResidency[];
   /** One, unless a move has failed halfway. */
   readonly #stores = new Set<ModuleTiles>();
-  #session: WorkerTiles | null = null;
+  #session: TilesInWorkers | null = null;
   /** Why the photograph is unusable: tiles are lost, or it was freed. */
   #fault: PhotoError | null = null;
   /** Settles after the last use that was requested. */
@@ -47,7 +47,7 @@ export class Photograph implements Freeable {
   /** Its tiles are on the page. `completeness` is the decoded share of the file, 0 to 1. Throws `format-invalid`. */
   constructor(
     readonly descriptor: PhotoDescriptor,
-    tiles: SerialisedTile[],
+    tiles: TileTransferBytes[],
     readonly completeness = 1,
   ) {
     const { width, height, lightWidth, lightHeight, decodedBytes } = descriptor;
@@ -103,7 +103,7 @@ export class Photograph implements Freeable {
    * Moves all tiles to workers, always the same ones, and calls `use`. Rejects with `worker-unavailable` if there are
    * none; the photograph is unchanged then.
    */
-  withWorkers<S extends WorkerTiles, T>(
+  withWorkers<S extends TilesInWorkers, T>(
     workers: TileWorkerPool<S>,
     use: (session: S) => T | Promise<T>,
   ): Promise<T> {
@@ -182,7 +182,7 @@ export class Photograph implements Freeable {
     return [store, photo];
   }
 
-  async #moveToWorkers<S extends WorkerTiles>(workers: TileWorkerPool<S>): Promise<S> {
+  async #moveToWorkers<S extends TilesInWorkers>(workers: TileWorkerPool<S>): Promise<S> {
     this.#session ??= await workers.open(this.descriptor);
     const session = this.#session as S;
     if (this.#fault) {
@@ -209,10 +209,10 @@ export class Photograph implements Freeable {
   }
 
   /** Takes a tile out of its module, if it is in one. */
-  #toBytes(index: number): SerialisedTile {
-    const location = this.#tiles[index] as ModuleTiles | SerialisedTile;
+  #toBytes(index: number): TileTransferBytes {
+    const location = this.#tiles[index] as ModuleTiles | TileTransferBytes;
     if (location instanceof Uint8Array) return location;
-    const bytes = location.photo.takeTile(index) as SerialisedTile;
+    const bytes = location.photo.takeTile(index) as TileTransferBytes;
     this.#tiles[index] = bytes;
     return bytes;
   }
@@ -241,7 +241,7 @@ export class Photograph implements Freeable {
 }
 
 /** Moves tile after tile, so that few are in memory twice, but with all workers at once. */
-async function forEachTile(session: WorkerTiles, move: (index: number) => Promise<void>) {
+async function forEachTile(session: TilesInWorkers, move: (index: number) => Promise<void>) {
   await allSettledOrThrow(
     session.tiles.map(async (tiles) => {
       for (const index of tiles) await move(index);

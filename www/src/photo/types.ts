@@ -4,7 +4,7 @@ import type { DecodedPhoto } from '../engine/types.js';
 import type { PhotoError } from '../shared/errors.js';
 
 /** A tile on its way between two modules. */
-export type SerialisedTile = Uint8Array<ArrayBuffer>;
+export type TileTransferBytes = Uint8Array<ArrayBuffer>;
 
 /** A photograph without its tiles: what a module needs to create it. */
 export interface PhotoDescriptor
@@ -21,20 +21,20 @@ export function describePhoto(photo: DecodedPhoto): PhotoDescriptor {
 }
 
 /** One photograph's tiles in workers. */
-export interface WorkerTiles {
+export interface TilesInWorkers {
   /** Why the tiles are lost; `null` while the workers are alive. */
   readonly failure: PhotoError | null;
   /** The indices of the tiles that each worker takes. */
   readonly tiles: readonly (readonly number[])[];
   /** Moves a tile to its worker. If that fails before it is sent, `bytes` are still there. */
-  put(index: number, bytes: SerialisedTile): Promise<void>;
-  take(index: number): Promise<SerialisedTile>;
+  put(index: number, bytes: TileTransferBytes): Promise<void>;
+  take(index: number): Promise<TileTransferBytes>;
   /** Prepares relighting, once all tiles are there. */
   plan(): Promise<void>;
   end(): void;
 }
 
-export interface TileWorkerPool<S extends WorkerTiles> {
+export interface TileWorkerPool<S extends TilesInWorkers> {
   /** Rejects with `worker-unavailable`. */
   open(photo: PhotoDescriptor): Promise<S>;
 }

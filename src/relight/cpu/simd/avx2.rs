@@ -39,7 +39,7 @@ impl Simd for Avx2 {
     type SimdVector = Avx2Vector;
     type LaneArray = [f32; LANES];
     const PIXELS: usize = 2;
-    type PackedTexels = Avx2Vector;
+    type TexelVector = Avx2Vector;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Avx2Vector {

@@ -42,7 +42,7 @@ impl Simd for Avx512 {
     type SimdVector = Avx512Vector;
     type LaneArray = [f32; 2 * LANES];
     const PIXELS: usize = 4;
-    type PackedTexels = Avx512Vector;
+    type TexelVector = Avx512Vector;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Avx512Vector {

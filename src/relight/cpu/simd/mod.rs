@@ -86,7 +86,7 @@ pub trait Simd: Copy {
     /// Pixels that are combined at once, at most [`MAX_PIXELS`].
     const PIXELS: usize;
     /// A vector of `PIXELS` texels, one for each pixel.
-    type PackedTexels: SimdVector;
+    type TexelVector: SimdVector;
 
     fn splat(self, value: f32) -> Self::SimdVector;
 
@@ -115,7 +115,7 @@ pub trait Simd: Copy {
         self.spill(vector, bytemuck::cast_mut(to));
     }
 
-    fn zero_texels(self) -> Self::PackedTexels;
+    fn zero_texels(self) -> Self::TexelVector;
 
     /// Reads one texel for each pixel.
     ///
@@ -124,13 +124,13 @@ pub trait Simd: Copy {
     unsafe fn load_texels(
         self,
         from: [*const [f32; TEXEL_COMPONENTS]; MAX_PIXELS],
-    ) -> Self::PackedTexels;
+    ) -> Self::TexelVector;
 
     /// Reads the codes of each pixel's texel.
     ///
     /// # Safety
     /// `codes` is valid to read for `PIXELS` texels.
-    unsafe fn load_codes(self, codes: *const TexelCodes) -> Self::PackedTexels;
+    unsafe fn load_codes(self, codes: *const TexelCodes) -> Self::TexelVector;
 
     /// Writes each pixel's channels: the sum of the channel's four lanes, times its gain.
     ///
@@ -138,7 +138,7 @@ pub trait Simd: Copy {
     /// `to` is valid to write for `PIXELS` pixels.
     unsafe fn store_sums(
         self,
-        channels: [Self::PackedTexels; CHANNELS],
+        channels: [Self::TexelVector; CHANNELS],
         gain: [f32; CHANNELS],
         to: *mut [f32; CHANNELS],
     );

@@ -38,7 +38,7 @@ impl Simd for ScalarFallback {
     type SimdVector = ScalarVector<LANES>;
     type LaneArray = [f32; LANES];
     const PIXELS: usize = 1;
-    type PackedTexels = ScalarTexel;
+    type TexelVector = ScalarTexel;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Self::SimdVector {

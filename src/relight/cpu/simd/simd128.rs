@@ -27,7 +27,7 @@ impl Simd for Simd128 {
     type SimdVector = Simd128Vector;
     type LaneArray = [f32; LANES];
     const PIXELS: usize = 1;
-    type PackedTexels = Simd128Vector;
+    type TexelVector = Simd128Vector;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Simd128Vector {
