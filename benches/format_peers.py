@@ -407,10 +407,10 @@ def zfp(problem):
 
 
 def save_jpeg(picture, quality):
-    from PIL import CapturePng
+    from PIL import ImageFile
 
     # The whole file must fit into one block; Pillow's default may be too small.
-    CapturePng.MAXBLOCK = 8 * picture.width * picture.height + 65536
+    ImageFile.MAXBLOCK = 8 * picture.width * picture.height + 65536
     files = []
     for progressive in [False, True]:
         file = io.BytesIO()
