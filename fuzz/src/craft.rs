@@ -16,7 +16,7 @@ const SIXTEEN_ZEROS: u8 = 0xF0;
 const KLT_BYTES: usize = 2 * CHANNELS * CHANNELS;
 
 /// A scan and its chunks, each with its content bytes.
-struct ProgressiveScan {
+struct CraftedScan {
     coding: ScanCoding,
     first: u16,
     count: u16,
@@ -26,7 +26,7 @@ struct ProgressiveScan {
     chunks: Vec<(Vec<u8>, u32)>,
 }
 
-impl ProgressiveScan {
+impl CraftedScan {
     fn new(coding: ScanCoding, first: u16, count: u16, choices: &mut Choices<'_>) -> Self {
         let step = match choices.below(8) {
             0 | 1 => 1.0,
@@ -91,7 +91,7 @@ pub fn file(choices: &mut Choices<'_>) -> Vec<u8> {
     assemble(choices, &geometry, rank, &scans)
 }
 
-fn scans(choices: &mut Choices<'_>, geometry: &Geometry, rank: usize) -> Vec<ProgressiveScan> {
+fn scans(choices: &mut Choices<'_>, geometry: &Geometry, rank: usize) -> Vec<CraftedScan> {
     let area = geometry.window.area();
     let coefficients = match choices.chance(64) {
         true => ScanCoding::Halves,
@@ -112,7 +112,7 @@ fn scans(choices: &mut Choices<'_>, geometry: &Geometry, rank: usize) -> Vec<Pro
         let first = usize::from(choices.byte()) % (max_first + 1);
         let count = 1 + usize::from(choices.byte()) % (end - first);
         let coding = if direct { functions } else { coefficients };
-        let mut scan = ProgressiveScan::new(coding, first as u16, count as u16, choices);
+        let mut scan = CraftedScan::new(coding, first as u16, count as u16, choices);
         if choices.rarely() {
             (scan.first, scan.count) = (choices.u16(), choices.u16());
             scan.coding = choices.of([
@@ -127,13 +127,13 @@ fn scans(choices: &mut Choices<'_>, geometry: &Geometry, rank: usize) -> Vec<Pro
     }
     if known < rank {
         let (first, count) = (known as u16, (rank - known) as u16);
-        scans.push(ProgressiveScan::new(coefficients, first, count, choices));
+        scans.push(CraftedScan::new(coefficients, first, count, choices));
     }
     if choices.rarely() {
         // Many scans; a small input leaves most of them without chunks.
         for _ in 0..choices.byte() {
             let coding = if rank > 0 { coefficients } else { functions };
-            scans.push(ProgressiveScan::new(coding, 0, 1, choices));
+            scans.push(CraftedScan::new(coding, 0, 1, choices));
         }
     }
     scans
@@ -152,7 +152,7 @@ fn basis(choices: &mut Choices<'_>, functions: usize, area: usize) -> Vec<u8> {
 /// A tile chunk and its content bytes.
 fn chunk(
     choices: &mut Choices<'_>,
-    scan: &ProgressiveScan,
+    scan: &CraftedScan,
     extent: Extent,
     area: usize,
     has_klt: &mut bool,
@@ -367,7 +367,7 @@ fn assemble(
     choices: &mut Choices<'_>,
     geometry: &Geometry,
     rank: usize,
-    scans: &[ProgressiveScan],
+    scans: &[CraftedScan],
 ) -> Vec<u8> {
     let mut directory = Vec::new();
     for scan in scans {
