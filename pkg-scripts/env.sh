@@ -71,9 +71,10 @@ fi
 export CC_wasm32_unknown_unknown AR_wasm32_unknown_unknown
 
 CHROMIUM=${CHROMIUM:-$(first_command chromium chromium-browser google-chrome google-chrome-stable)}
+HEADLESS_SHELL=${HEADLESS_SHELL:-$(first_command chromium-headless-shell chrome-headless-shell)}
 CHROMEDRIVER=${CHROMEDRIVER:-$(first_command chromedriver chromium.chromedriver)}
 FIREFOX=${FIREFOX:-$(first_command firefox-esr firefox)}
 WEBKIT_DRIVER=${WEBKIT_DRIVER:-$(first_command WebKitWebDriver)}
 # Without a screen neither has a graphics device: both run on a virtual one.
 if ! command -v Xvfb >/dev/null; then FIREFOX='' WEBKIT_DRIVER=''; fi
-export CHROMIUM CHROMEDRIVER FIREFOX WEBKIT_DRIVER
+export CHROMIUM HEADLESS_SHELL CHROMEDRIVER FIREFOX WEBKIT_DRIVER

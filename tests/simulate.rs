@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::LazyLock;
 
 use assert_cmd::Command;
 use relightable_photo::calibrate::LightPlaneAxis;
@@ -265,14 +266,29 @@ fn all_functions(scene: &dyn SimulatedScene) -> TileFunctions {
     })
 }
 
-/// The scene's picture under flood light without noise, `[N]`.
-fn flood(scene: &dyn SimulatedScene) -> Vec<[f32; CHANNELS]> {
-    let light = scene.geometry().light;
-    let emissions = PatternMatrix::new(light, &[PatternImage::uniform(light, 255)]);
-    emissions
-        .pictures(scene.geometry(), &all_functions(scene))
-        .remove(0)
+/// A scene's pictures under flood light without noise, `[N]`.
+struct FloodPictures {
+    kind: SceneKind,
+    /// 128 pixels wide and high.
+    coarse: Vec<[f32; CHANNELS]>,
+    /// 256 pixels wide and high.
+    fine: Vec<[f32; CHANNELS]>,
 }
+
+static FLOOD_PICTURES: LazyLock<[FloodPictures; 2]> = LazyLock::new(|| {
+    [SceneKind::StainedGlass, SceneKind::Cookies].map(|kind| {
+        let [coarse, fine] = [128, 256].map(|side| {
+            let scene = kind
+                .build(extent(side, side), extent(side / 2, side / 2))
+                .unwrap();
+            let light = scene.geometry().light;
+            let emissions = PatternMatrix::new(light, &[PatternImage::uniform(light, 255)]);
+            let functions = all_functions(scene.as_ref());
+            emissions.pictures(scene.geometry(), &functions).remove(0)
+        });
+        FloodPictures { kind, coarse, fine }
+    })
+});
 
 #[test]
 fn transport_is_finite_non_negative_and_inside_the_window() {
@@ -320,13 +336,9 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
 
 #[test]
 fn flood_light_fills_the_cameras_range_without_clipping() {
-    for kind in [SceneKind::StainedGlass, SceneKind::Cookies] {
-        for (camera, light) in [(128, 64), (256, 128)] {
-            let scene = kind
-                .build(extent(camera, camera), extent(light, light))
-                .unwrap();
+    for FloodPictures { kind, coarse, fine } in &*FLOOD_PICTURES {
+        for picture in [coarse, fine] {
             // The brightest channel, as saturated colours have dark channels.
-            let picture = flood(scene.as_ref());
             let brightest = |p: &[f32; 3]| f64::from(p[0].max(p[1]).max(p[2]));
             let values: Vec<_> = picture.iter().map(brightest).collect();
             let [low, middle, high, top] =
@@ -361,14 +373,7 @@ fn cookies_are_sparse_and_glass_is_not() {
 
 #[test]
 fn the_picture_is_the_same_at_every_resolution() {
-    for kind in [SceneKind::StainedGlass, SceneKind::Cookies] {
-        let flood_picture = |camera, light| {
-            let scene = kind
-                .build(extent(camera, camera), extent(light, light))
-                .unwrap();
-            flood(scene.as_ref())
-        };
-        let (coarse, fine) = (flood_picture(128, 64), flood_picture(256, 128));
+    for FloodPictures { kind, coarse, fine } in &*FLOOD_PICTURES {
         // The mean of 2x2 pixels of the fine picture.
         let mut reduced = vec![[0.0; CHANNELS]; 128 * 128];
         for (n, pixel) in fine.iter().enumerate() {
@@ -378,7 +383,7 @@ fn the_picture_is_the_same_at_every_resolution() {
         }
         for c in 0..CHANNELS {
             let plane = |p: &[[f32; 3]]| p.iter().map(|p| f64::from(p[c])).collect::<Vec<_>>();
-            let r = correlation(&plane(&coarse), &plane(&reduced));
+            let r = correlation(&plane(coarse), &plane(&reduced));
             assert!(r > 0.88, "{kind:?} channel {c}: correlation {r}");
         }
     }

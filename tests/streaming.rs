@@ -5,6 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::LazyLock;
 use std::time::Duration;
 
 use serde_json::Value;
@@ -105,12 +106,18 @@ fn with_little_memory_photographs_are_read_in_strips_with_the_same_result() {
     assert_eq!(impossible.status.code(), Some(2));
 }
 
+/// The file of an uninterrupted recovery, the same for every [`Interruptible`].
+static WHOLE: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let recovery = Interruptible::new();
+    let output = recovery.recover("whole.ltm", &[]).output().unwrap();
+    assert!(output.status.success(), "{}", stderr_text(&output));
+    fs::read(recovery.path("whole.ltm")).unwrap()
+});
+
 /// A recovery of many tiles that tests interrupt.
 struct Interruptible {
     folder: TempDir,
     capture: PathBuf,
-    /// The file of an uninterrupted recovery.
-    whole: Vec<u8>,
 }
 
 impl Interruptible {
@@ -118,15 +125,7 @@ impl Interruptible {
         let folder = TempDir::new().unwrap();
         let size = ["--camera", "128x64", "--light", "64x32", "--patterns", "16"];
         let capture = simulate(&folder, "cookies", &size);
-        let mut this = Self {
-            folder,
-            capture,
-            whole: Vec::new(),
-        };
-        let output = this.recover("whole.ltm", &[]).output().unwrap();
-        assert!(output.status.success(), "{}", stderr_text(&output));
-        this.whole = fs::read(this.path("whole.ltm")).unwrap();
-        this
+        Self { folder, capture }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -180,7 +179,7 @@ impl Interruptible {
             "{}",
             stderr_text(&output)
         );
-        assert!(fs::read(self.path(name)).unwrap() == self.whole);
+        assert!(fs::read(self.path(name)).unwrap() == *WHOLE);
         assert!(!self.path(&format!("{name}.checkpoint")).exists());
     }
 }
@@ -206,7 +205,8 @@ fn wait_for_a_tile(child: &mut Child, checkpoint: &Path) {
 #[test]
 fn an_interrupted_recovery_resumes_to_the_same_bytes() {
     let recovery = Interruptible::new();
-    for signal in ["-INT", "-TERM"] {
+    for signal in ["-TERM", "-INT"] {
+        let _ = fs::remove_file(recovery.path("stopped.ltm.checkpoint"));
         let output = recovery.interrupt("stopped.ltm", signal);
         assert_eq!(output.status.code(), Some(130), "{}", stderr_text(&output));
         let words = [
@@ -222,17 +222,16 @@ fn an_interrupted_recovery_resumes_to_the_same_bytes() {
                 stderr_text(&output)
             );
         }
-        // Without --resume the checkpoint is kept.
-        let again = recovery.recover("stopped.ltm", &[]).output().unwrap();
-        assert_eq!(again.status.code(), Some(1));
-        assert!(
-            stderr_text(&again).contains("add --resume"),
-            "{}",
-            stderr_text(&again)
-        );
-        recovery.resumes("stopped.ltm");
-        fs::remove_file(recovery.path("stopped.ltm")).unwrap();
     }
+    // Without --resume the checkpoint is kept.
+    let again = recovery.recover("stopped.ltm", &[]).output().unwrap();
+    assert_eq!(again.status.code(), Some(1));
+    assert!(
+        stderr_text(&again).contains("add --resume"),
+        "{}",
+        stderr_text(&again)
+    );
+    recovery.resumes("stopped.ltm");
     // Without a checkpoint --resume starts from the beginning.
     let output = recovery.recover("new.ltm", &["--resume"]).output().unwrap();
     assert!(
@@ -240,7 +239,7 @@ fn an_interrupted_recovery_resumes_to_the_same_bytes() {
         "{}",
         stderr_text(&output)
     );
-    assert!(fs::read(recovery.path("new.ltm")).unwrap() == recovery.whole);
+    assert!(fs::read(recovery.path("new.ltm")).unwrap() == *WHOLE);
 }
 
 #[test]

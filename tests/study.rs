@@ -11,7 +11,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 /// Number of shots that the test uses, for speed.
-const SHOTS: usize = 16;
+const SHOTS: usize = 12;
 
 fn run(args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
@@ -94,14 +94,14 @@ fn figures_agree_with_recover_and_evaluate() {
         .filter(|row| row[0] == "nnls")
         .map(|row| row[1].as_str())
         .collect();
-    assert_eq!(patterns, ["10", "14", "16"]);
+    assert_eq!(patterns, ["10", "12"]);
     let (_, profile) = csv(&results.join("glass-figure2.csv"));
     let last = profile.last().unwrap();
     assert_eq!((last[1].as_str(), last[2].as_str()), ("100.000", "100.000"));
 
     // Relit pictures agree with `recover` and `evaluate`, which round to half floats.
     let file = folder.path().join("glass.ltm");
-    let window = ["--window", "13", "--patterns", "16", "--lossless"];
+    let window = ["--window", "13", "--patterns", "12", "--lossless"];
     let (_, rows) = csv(&results.join("glass-figure4.csv"));
     let method = ["--method", rows[0][3].as_str()];
     let recover = ["recover", text(&capture), "-o", text(&file)];

@@ -455,7 +455,8 @@ test.describe('kiosk mode', () => {
 
 test.describe('tilting the device', () => {
   test('moves the light once permission is granted', async ({ openPage }) => {
-    const { page } = await visit(openPage, {});
+    const permissions = ['accelerometer', 'gyroscope'];
+    const { page } = await visit(openPage, {}, { permissions });
     const tilt = (/** @type {number} */ beta, /** @type {number} */ gamma) =>
       page.evaluate(
         `dispatchEvent(new DeviceOrientationEvent('deviceorientation', { beta: ${beta}, gamma: ${gamma} }))`,

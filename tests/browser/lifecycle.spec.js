@@ -163,21 +163,34 @@ test.describe('an element', () => {
       );
       return { heap: usedSize, nodes, listeners, wasm, workers: page.workers().length };
     };
-    const cycle = (/** @type {number} */ times) =>
-      page.evaluate(async (times) => {
-        for (let i = 0; i < times; i += 1) {
-          const photo = document.createElement('relightable-photo');
-          Object.assign(photo, { src: '/photos/glass.ltm', backend: 'cpu', loading: 'eager' });
-          const load = new Promise((resolve, reject) => {
-            photo.addEventListener('load', resolve);
-            photo.addEventListener('error', ({ message }) => reject(new Error(message)));
-          });
-          document.body.append(photo);
-          await load;
-          photo.remove();
-          await new Promise((resolve) => setTimeout(resolve));
-        }
-      }, times);
+    const AT_ONCE = 4;
+    const cycle = (/** @type {number} */ elements) =>
+      page.evaluate(
+        async ([rounds, atOnce]) => {
+          for (let round = 0; round < rounds; round += 1) {
+            const photos = Array.from({ length: atOnce }, () => {
+              const photo = document.createElement('relightable-photo');
+              return Object.assign(photo, {
+                src: '/photos/glass.ltm',
+                backend: 'cpu',
+                loading: 'eager',
+              });
+            });
+            const loads = photos.map(
+              (photo) =>
+                new Promise((resolve, reject) => {
+                  photo.addEventListener('load', resolve);
+                  photo.addEventListener('error', ({ message }) => reject(new Error(message)));
+                }),
+            );
+            document.body.append(...photos);
+            await Promise.all(loads);
+            for (const photo of photos) photo.remove();
+            await new Promise((resolve) => setTimeout(resolve));
+          }
+        },
+        /** @type {const} */ ([elements / AT_ONCE, AT_ONCE]),
+      );
     await cycle(20);
     const before = await usage();
     await cycle(200);

@@ -10,18 +10,23 @@ import { defineConfig } from '@playwright/test';
 import { chromiumOptions } from '../../www/tools/chromium.js';
 import type { WorkerOptions } from './fixtures.js';
 
+/** Matches the titles of tests that use WebGPU. */
+const WEBGPU = /webgpu/i;
+/** Tag of tests that differ between the whole browser and its headless shell: the shell smooths text differently. */
+const WHOLE_BROWSER = /@whole-browser/;
+
 /** By default Firefox has WebGPU switched off on Linux, and both WebGPU and WebGL with a software renderer. */
 const FIREFOX_PREFERENCES = {
   'dom.webgpu.enabled': true,
   'gfx.webgpu.ignore-blocklist': true,
   'webgl.force-enabled': true,
 };
-const chromium = {
-  testIgnore: ['firefox.spec.js', 'webkitgtk.spec.ts'],
-  use: {
-    browserName: 'chromium' as const,
-    launchOptions: chromiumOptions('--font-render-hinting=none'),
-  },
+const testIgnore = ['firefox.spec.js', 'webkitgtk.spec.ts'];
+const wholeChromium = chromiumOptions('--font-render-hinting=none');
+// The shell has the same engine without the browser's windows, and needs two thirds of the processor time.
+const headlessShell = {
+  ...wholeChromium,
+  executablePath: process.env['HEADLESS_SHELL'] || wholeChromium.executablePath,
 };
 const results = '../../target/browser-tests';
 
@@ -45,17 +50,22 @@ export default defineConfig<object, WorkerOptions>({
     trace: { mode: 'retain-on-failure', screenshots: false, snapshots: false },
   },
   projects: [
-    { name: 'chromium', grepInvert: /webgpu/i, ...chromium },
+    {
+      name: 'chromium',
+      testIgnore,
+      grepInvert: [WEBGPU, WHOLE_BROWSER],
+      use: { browserName: 'chromium', launchOptions: headlessShell },
+    },
     // SwiftShader's WebGPU uses all cores, so these tests run one at a time, and its first frame in each quality can
-    // take half a minute. `grep` also reads the project's name.
+    // take half a minute.
     {
       name: 'chromium-serial',
-      grep: /webgpu/i,
+      testIgnore,
+      grep: [WEBGPU, WHOLE_BROWSER],
       workers: 1,
       timeout: 300_000,
       expect: { timeout: 120_000 },
-      testIgnore: chromium.testIgnore,
-      use: { ...chromium.use, actionTimeout: 120_000 },
+      use: { browserName: 'chromium', launchOptions: wholeChromium, actionTimeout: 120_000 },
     },
     {
       name: 'firefox',

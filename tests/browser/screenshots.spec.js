@@ -125,7 +125,7 @@ const STATES = {
   },
 };
 
-test.describe('the element looks as before:', () => {
+test.describe('the element looks as before:', { tag: '@whole-browser' }, () => {
   for (const [part, states] of Object.entries(STATES)) {
     test(part, async ({ openPage, step }) => {
       const page = await openPage('/blank');
