@@ -9,7 +9,7 @@
 //!   and zfp, where lossless coders get quantised values in their best layout. `vs_best_plain_band_codec`: the best of
 //!   zfp at equal SNR, and f16 + zstd-19 without quantisation.
 //! - `decode_*`: MB of dequantised coefficients, four bytes each, per second and thread: natively tile by tile; in
-//!   WebAssembly with simd128, in Node, all scans except the last.
+//!   WebAssembly with simd128, in Node, in the file's order.
 
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a failed benchmark should panic
 
