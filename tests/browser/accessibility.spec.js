@@ -9,6 +9,7 @@ import {
   mountPhoto,
   waitForEvents,
   waitForLoad,
+  waitUntil,
 } from './page-helpers.js';
 import { SCREENSHOTS } from './test-photos.js';
 
@@ -76,7 +77,7 @@ const STATES = {
     await open(page);
     await waitForLoad(page);
     await page.getByRole('button', { name: 'Full screen' }).click();
-    await page.waitForFunction('document.fullscreenElement === photo');
+    await waitUntil(page, 'document.fullscreenElement === photo');
   },
   async 'with an error'(page) {
     await open(page, { src: '/photos/absent.ltm', poster: '/half.png' });

@@ -8,6 +8,7 @@ import {
   openAlertDetails,
   skipPausesUntil,
   waitForEvents,
+  waitUntil,
 } from './page-helpers.js';
 import { DAMAGED, nativePicture } from './test-photos.js';
 
@@ -146,7 +147,7 @@ test.describe('an invalid attribute', () => {
     await waitForEvents(page, 'load');
     await page.evaluate("photo.light = 'torch', photo.torch = { x: 0.2, y: 0.4 }");
     await page.evaluate("photo.tone = 'hdr', photo.src = 'http://['");
-    await page.waitForFunction("photoEvents.filter(({ type }) => type === 'error').length === 4");
+    await waitUntil(page, "photoEvents.filter(({ type }) => type === 'error').length === 4");
     const photoEvents = await page.evaluate('photoEvents');
     const told = photoEvents.filter((/** @type {any} */ e) => e.type === 'error');
     expect(told.map((/** @type {any} */ e) => /“(.*?)”/.exec(e.message)?.[1])).toStrictEqual([

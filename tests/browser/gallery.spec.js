@@ -9,6 +9,7 @@ import {
   horizontalOverflow,
   screenPicture,
   waitForFrames,
+  waitUntil,
 } from './page-helpers.js';
 import { SCREENSHOTS } from './test-photos.js';
 
@@ -140,7 +141,7 @@ test.describe('the gallery', () => {
 
     await step('the camera, which stops afterwards', async () => {
       await page.getByRole('button', { name: 'your camera' }).click();
-      await page.waitForFunction('document.getElementById("photo").lightSource === stream');
+      await waitUntil(page, 'document.getElementById("photo").lightSource === stream');
       const state = () => page.evaluate('stream.getVideoTracks()[0].readyState');
       expect(await state()).toBe('live');
       await page.getByRole('radio', { name: 'Stripes' }).check();

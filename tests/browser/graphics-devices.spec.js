@@ -8,6 +8,7 @@ import {
   waitForEvents,
   waitForFrames,
   waitForLoad,
+  waitUntil,
 } from './page-helpers.js';
 import { nativePicture } from './test-photos.js';
 
@@ -107,7 +108,7 @@ test.describe('graphics devices', () => {
       await waitForFrames(page);
       expect(await page.evaluate('devices.at(-1).isLost()')).toBe(false);
       await page.evaluate('photos[0].remove()');
-      await page.waitForFunction('devices.at(-1).isLost()');
+      await waitUntil(page, 'devices.at(-1).isLost()');
     });
 
     test(`a lost ${backend} device is replaced without a new transfer`, async ({

@@ -10,6 +10,7 @@ import {
   waitForEvents,
   waitForFrames,
   waitForLoad,
+  waitUntil,
 } from './page-helpers.js';
 
 /** @typedef {import('@playwright/test').Page} Page */
@@ -28,7 +29,7 @@ async function visit(openPage, attributes, options) {
   await mountPhoto(page, { ...GLASS, ...attributes });
   await page.evaluate("photo.style.width = '320px'");
   await waitForLoad(page);
-  await page.waitForFunction('photo.detail === 1');
+  await waitUntil(page, 'photo.detail === 1');
   return { page, at: await pointOf(page) };
 }
 
@@ -77,7 +78,7 @@ test.describe('zooming', () => {
     const point = at(0.25, 0.75);
     await page.mouse.move(point.x, point.y);
     for (let i = 0; i < 4; i += 1) await page.mouse.wheel(0, -120);
-    await page.waitForFunction('Math.abs(photo.view.zoom - 4) < 0.01');
+    await waitUntil(page, 'Math.abs(photo.view.zoom - 4) < 0.01');
     const { zoom, x, y } = await viewOf(page);
     expect(Math.abs(x + (0.25 - 0.5) / zoom - 0.25)).toBeLessThan(2e-3);
     expect(Math.abs(y + (0.75 - 0.5) / zoom - 0.75)).toBeLessThan(2e-3);
@@ -105,13 +106,13 @@ test.describe('zooming', () => {
     const point = at(0.5, 0.5);
     await page.mouse.move(point.x, point.y);
     for (let i = 0; i < 2; i += 1) await page.mouse.wheel(0, -120);
-    await page.waitForFunction('photo.view.zoom === 2');
+    await waitUntil(page, 'photo.view.zoom === 2');
     expect(await page.evaluate('scrollY')).toBe(0);
     for (let i = 0; i < 4; i += 1) await page.mouse.wheel(0, 120);
-    await page.waitForFunction('photo.view.zoom === 1 && scrollY > 0');
+    await waitUntil(page, 'photo.view.zoom === 1 && scrollY > 0');
     await page.evaluate("scrollTo(0, 0), photo.removeAttribute('zoom')");
     await page.mouse.wheel(0, 120);
-    await page.waitForFunction('scrollY > 0');
+    await waitUntil(page, 'scrollY > 0');
   });
 
   test('needs Ctrl under cooperative-gestures, which a hint says', async ({ openPage }) => {
@@ -122,14 +123,14 @@ test.describe('zooming', () => {
     const point = at(0.5, 0.5);
     await page.mouse.move(point.x, point.y);
     await page.mouse.wheel(0, 60);
-    await page.waitForFunction('scrollY > 0');
+    await waitUntil(page, 'scrollY > 0');
     await page.getByText('Ctrl + scroll to zoom').waitFor({ state: 'visible' });
     await page.getByText('Ctrl + scroll to zoom').waitFor({ state: 'hidden' });
     await page.evaluate('scrollTo(0, 0)');
     await page.keyboard.down('Control');
     await page.mouse.wheel(0, -120);
     await page.keyboard.up('Control');
-    await page.waitForFunction('photo.view.zoom > 1.2');
+    await waitUntil(page, 'photo.view.zoom > 1.2');
     expect(await page.evaluate('scrollY')).toBe(0);
   });
 
@@ -217,7 +218,7 @@ test.describe('a finger', () => {
     await touch('touchStart', at(0.5, 0.9));
     for (let i = 1; i <= 8; i += 1) await touch('touchMove', at(0.5, 0.9 - 0.1 * i));
     await touch('touchEnd');
-    await page.waitForFunction('scrollY > 50');
+    await waitUntil(page, 'scrollY > 50');
   });
 
   test('that lifts while moving throws the light, unless the visitor prefers reduced motion', async ({
@@ -233,7 +234,7 @@ test.describe('a finger', () => {
         await waitForFrames(page);
         expect((await torchOf(page))?.x).toBe(0.3);
       } else {
-        await page.waitForFunction('photo.torch.x > 0.32');
+        await waitUntil(page, 'photo.torch.x > 0.32');
       }
     }
   });
@@ -342,11 +343,13 @@ test.describe('the controls', () => {
     expect((await viewOf(page)).zoom).toBe(1);
     expect(await torchOf(page)).toBeNull();
     await page.mouse.click(point.x, point.y);
-    await page.waitForFunction(
+    await waitUntil(
+      page,
       "getComputedStyle(photo.shadowRoot.querySelector('[role=toolbar]')).opacity === '0'",
     );
     await page.keyboard.press('ArrowRight');
-    await page.waitForFunction(
+    await waitUntil(
+      page,
       "getComputedStyle(photo.shadowRoot.querySelector('[role=toolbar]')).opacity === '1'",
     );
   });
@@ -354,11 +357,11 @@ test.describe('the controls', () => {
   test('enter and leave full screen', async ({ openPage }) => {
     const { page } = await visit(openPage, { controls: '' });
     await page.getByRole('button', { name: 'Full screen' }).click();
-    await page.waitForFunction('document.fullscreenElement === photo');
+    await waitUntil(page, 'document.fullscreenElement === photo');
     const { height } = await boxOf(page.getByRole('img', { name: 'A window' }));
     expect(Math.abs(height - (page.viewportSize()?.height ?? 0))).toBeLessThan(2);
     await page.getByRole('button', { name: 'Leave full screen' }).click();
-    await page.waitForFunction('document.fullscreenElement === null');
+    await waitUntil(page, 'document.fullscreenElement === null');
   });
 
   test('can be replaced by the page’s own', async ({ openPage }) => {
@@ -370,7 +373,7 @@ test.describe('the controls', () => {
 
   test('pause the animation', async ({ openPage }) => {
     const { page } = await visit(openPage, { controls: '', 'autoplay-light': '' });
-    await page.waitForFunction('photo.torch !== null');
+    await waitUntil(page, 'photo.torch !== null');
     await page.getByRole('button', { name: 'Pause' }).click();
     expect(await page.evaluate('photo.paused')).toBe(true);
     const rest = await torchOf(page);
@@ -414,13 +417,13 @@ test.describe('autoplay', () => {
     openPage,
   }) => {
     const { page, at } = await visit(openPage, { 'autoplay-light': '' }, { fakeClock: true });
-    await page.waitForFunction('photo.torch !== null');
+    await waitUntil(page, 'photo.torch !== null');
     const point = at(0.9, 0.9);
     await page.mouse.move(point.x, point.y);
     await waitForFrames(page);
     expect(await torchOf(page)).toStrictEqual({ x: 0.9, y: 0.9 });
     await page.clock.fastForward(REST_MS);
-    await page.waitForFunction('photo.torch.x < 0.88');
+    await waitUntil(page, 'photo.torch.x < 0.88');
   });
 
   test('rests under reduced motion and outside the viewport', async ({ openPage }) => {
@@ -428,7 +431,7 @@ test.describe('autoplay', () => {
     await waitForFrames(page);
     expect(await torchOf(page)).toBeNull();
     await page.emulateMedia({ reducedMotion: 'no-preference' });
-    await page.waitForFunction('photo.torch !== null');
+    await waitUntil(page, 'photo.torch !== null');
     await page.evaluate("photo.style.marginTop = '5000px'");
     // The browser reports the visibility within a few frames.
     await waitForFrames(page, 5);
@@ -448,7 +451,7 @@ test.describe('kiosk mode', () => {
     expect(await page.evaluate('photo.activeLight')).toBe('checkerboard');
     expect((await viewOf(page)).zoom).toBe(2.5);
     await page.clock.fastForward(6_000);
-    await page.waitForFunction("photo.activeLight === 'torch' && photo.view.zoom === 1");
+    await waitUntil(page, "photo.activeLight === 'torch' && photo.view.zoom === 1");
     expect(await torchOf(page)).toBeNull();
   });
 });

@@ -12,6 +12,7 @@ import {
   screenPicture,
   waitForEvents,
   waitForFrames,
+  waitUntil,
 } from './page-helpers.js';
 import { LIGHT_IMAGE_FILE, LIGHT_IMAGE_URL, nativePicture } from './test-photos.js';
 
@@ -272,16 +273,16 @@ test.describe('a light source', () => {
             await page.evaluate('(video.loop = true, video.src = film, video.play())');
           await page.evaluate(`void (globalThis.source = ${source}, photo.lightSource = source)`);
           const reads = async () => Number(await page.evaluate('counts.reads'));
-          await page.waitForFunction('counts.reads > 3');
+          await waitUntil(page, 'counts.reads > 3');
           await page.evaluate(`void (${leave})`);
-          await page.waitForFunction('waiting.size === 0');
+          await waitUntil(page, 'waiting.size === 0');
           await waitForFrames(page);
           const before = await reads();
           await waitForFrames(page);
           expect(await reads()).toBe(before);
           expect(await page.evaluate('waiting.size')).toBe(0);
           await page.evaluate(`void (${back})`);
-          await page.waitForFunction(`counts.reads > ${before} + 3`);
+          await waitUntil(page, `counts.reads > ${before} + 3`);
         });
       }
     });

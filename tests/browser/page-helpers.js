@@ -1,5 +1,6 @@
 /** What tests do with a page: put an element into it, wait for its events, read its picture. */
 
+import { expect } from '@playwright/test';
 import { decodePng } from '../../www/tools/pictures.js';
 
 /** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
@@ -73,6 +74,18 @@ export async function waitForLoad(page) {
   const error = photoEvents.find((event) => event.type === 'error');
   if (error) throw new Error(`${error['code']}: ${error['message']}`);
   return photoEvents;
+}
+
+/**
+ * Waits until an expression is true in the page. `page.waitForFunction` evaluates strings in the page itself, which its
+ * Content Security Policy forbids.
+ *
+ * @param {AnyPage} page
+ * @param {string} expression
+ */
+export function waitUntil(page, expression) {
+  const options = { message: expression, intervals: [50] };
+  return expect.poll(() => page.evaluate(expression), options).toBe(true);
 }
 
 /**

@@ -23,10 +23,12 @@ const FIREFOX_PREFERENCES = {
 };
 const testIgnore = ['firefox.spec.js', 'webkitgtk.spec.ts'];
 const wholeChromium = chromiumOptions('--font-render-hinting=none');
-// The shell has the same engine without the browser's windows, and needs two thirds of the processor time.
+// The shell has the same engine without the browser's windows, and needs two thirds of the processor time; half, if
+// SwiftShader draws the canvases alone and not the pages around them.
 const headlessShell = {
   ...wholeChromium,
   executablePath: process.env['HEADLESS_SHELL'] || wholeChromium.executablePath,
+  args: [...wholeChromium.args, '--disable-gpu-compositing'],
 };
 const results = '../../target/browser-tests';
 

@@ -8,6 +8,7 @@ import {
   waitForEvents,
   waitForFrames,
   waitForLoad,
+  waitUntil,
 } from './page-helpers.js';
 
 /** @typedef {import('@playwright/test').Page} Page */
@@ -87,12 +88,11 @@ test.describe('a poster', () => {
   test('is shown until the photograph is drawn', async ({ openPage }) => {
     const page = await openPage('/plain');
     await mountPhoto(page, { ...GLASS, src: '/faults/slow', poster: '/half.png' });
-    await page.waitForFunction(
-      "photo.shadowRoot.querySelector('[part=poster]').naturalWidth === 10",
-    );
+    await waitUntil(page, "photo.shadowRoot.querySelector('[part=poster]').naturalWidth === 10");
     expect(await isPosterVisible(page)).toBe(true);
     await waitForLoad(page);
-    await page.waitForFunction(
+    await waitUntil(
+      page,
       "getComputedStyle(photo.shadowRoot.querySelector('[part=poster]')).visibility === 'hidden'",
     );
   });
@@ -119,7 +119,8 @@ test.describe('a poster', () => {
     await waitForFrames(page);
     expect(await isPosterVisible(page)).toBe(true);
     await page.evaluate('photo.dismissPoster()');
-    await page.waitForFunction(
+    await waitUntil(
+      page,
       "getComputedStyle(photo.shadowRoot.querySelector('[part=poster]')).visibility === 'hidden'",
     );
   });

@@ -10,6 +10,7 @@ import {
   waitForEvents,
   waitForFrames,
   waitForLoad,
+  waitUntil,
 } from './page-helpers.js';
 import { nativePicture } from './test-photos.js';
 
@@ -106,7 +107,7 @@ test.describe('under a moving light, a picture', () => {
     await page.evaluate(`slow = ${SLOW_FRAME_MS}`);
     await moveTorchUntil(page, 'photo.detail === 0.25');
     // The frames in progress, and the frame at rest.
-    await page.waitForFunction('photo.detail === 1');
+    await waitUntil(page, 'photo.detail === 1');
     const atRest = await canvasPicture(page);
     expect(atRest).toMatchPicture(pictureAtRest(), 1);
     expect(await qualityChanges(page)).toStrictEqual([0.25, 1]);
@@ -140,7 +141,7 @@ test.describe('under a moving light, a picture', () => {
     });
     // Without a movement nothing would be drawn.
     await moveTorchUntil(page, 'step === 1');
-    await page.waitForFunction('photo.detail === 1');
+    await waitUntil(page, 'photo.detail === 1');
     const url = String(await page.evaluate('soft'));
     const soft = decodeDataUrl(url);
     const { worst, psnr } = compare(soft, pictureAtRest());
@@ -172,7 +173,7 @@ test.describe('under a moving light, a picture', () => {
     await waitAndClear(page);
     await page.evaluate('stopClock()');
     await moveTorchUntil(page, 'photo.detail === 0.25', `${SLOW_FRAME_MS} * photo.detail`);
-    await page.waitForFunction('photo.detail === 1');
+    await waitUntil(page, 'photo.detail === 1');
     const onScreen = await screenPicture(page);
     expect(onScreen).toMatchPicture(pictureAtRest(), 2);
     expect(await qualityChanges(page)).toStrictEqual([0.25, 1]);

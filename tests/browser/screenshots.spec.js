@@ -8,7 +8,7 @@
  */
 
 import { expect, test } from './fixtures.js';
-import { alertOf, mountPhoto, waitForFrames, waitForLoad } from './page-helpers.js';
+import { alertOf, mountPhoto, waitForFrames, waitForLoad, waitUntil } from './page-helpers.js';
 import { LIGHTS } from './test-photos.js';
 
 /** @typedef {import('@playwright/test').Page} Page */
@@ -43,7 +43,7 @@ const waitForAlert = (page) => alertOf(page).waitFor();
 /** @param {Page} page */
 const waitForPoster = async (page) => {
   await page.getByRole('button', { name: 'Light it yourself' }).waitFor();
-  await page.waitForFunction("photo.shadowRoot.querySelector('[part=poster]').naturalWidth > 0");
+  await waitUntil(page, "photo.shadowRoot.querySelector('[part=poster]').naturalWidth > 0");
 };
 /** @param {Page} page */
 const focusLight = async (page) => {

@@ -2,7 +2,7 @@
 
 import { brightest } from '../../www/tools/pictures.js';
 import { expect, test } from './fixtures.js';
-import { capturePicture, waitForEvents } from './page-helpers.js';
+import { capturePicture, waitForEvents, waitUntil } from './page-helpers.js';
 import { nativePicture } from './test-photos.js';
 
 const GLASS = { src: '/photos/glass.ltm', alt: 'A window', light: 'torch', backend: 'cpu' };
@@ -131,7 +131,7 @@ test.describe('the light', () => {
   test('keeps its backend when the gamut changes', async ({ openPhoto }) => {
     const page = await open(openPhoto);
     await page.evaluate("photo.gamut = 'display-p3'");
-    await page.waitForFunction("photo.activeGamut === 'display-p3'");
+    await waitUntil(page, "photo.activeGamut === 'display-p3'");
     const photoEvents = await waitForEvents(page, 'backendchange');
     expect(photoEvents.filter(({ type }) => type === 'backendchange').length).toBe(1);
   });

@@ -7,6 +7,7 @@ import {
   screenPicture,
   waitForFrames,
   waitForLoad,
+  waitUntil,
 } from './page-helpers.js';
 import { nativePicture } from './test-photos.js';
 
@@ -65,7 +66,7 @@ test.describe('an element outside the viewport', () => {
     await moveTorch(page);
     expect(await drawCount(page)).toBe(first);
     await page.evaluate('photo.scrollIntoView()');
-    await page.waitForFunction(`counts.draws === ${first + 1}`);
+    await waitUntil(page, `counts.draws === ${first + 1}`);
     const shown = await screenPicture(page);
     const want = nativePicture('torch', { torch: { x: 0.3, y: 0.65 } });
     expect(shown).toMatchPicture(want, 2);
@@ -100,6 +101,6 @@ test.describe('an element outside the viewport', () => {
     await moveTorch(page);
     expect(await drawCount(page)).toBe(before);
     await page.evaluate('photo.hidden = false');
-    await page.waitForFunction(`counts.draws === ${before + 1}`);
+    await waitUntil(page, `counts.draws === ${before + 1}`);
   });
 });
