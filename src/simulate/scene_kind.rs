@@ -1,9 +1,9 @@
 //! The built-in scenes by name.
 
-use super::cookies::Cookies;
+use super::cookies::CookiesScene;
 use super::pattern_image::PatternEnsemble;
 use super::simulated_scene::{SimulatedScene, scene_geometry};
-use super::stained_glass::StainedGlass;
+use super::stained_glass::StainedGlassScene;
 use crate::transport::{Extent, GeometryError};
 
 /// The built-in scenes. The command line shows the variants' descriptions.
@@ -28,8 +28,8 @@ impl SceneKind {
     ) -> Result<Box<dyn SimulatedScene>, GeometryError> {
         let geometry = scene_geometry(camera, light)?;
         Ok(match self {
-            Self::StainedGlass => Box::new(StainedGlass::new(geometry)),
-            Self::Cookies => Box::new(Cookies::new(geometry)),
+            Self::StainedGlass => Box::new(StainedGlassScene::new(geometry)),
+            Self::Cookies => Box::new(CookiesScene::new(geometry)),
         })
     }
 

@@ -1,11 +1,11 @@
 //! The encoder: light transport to an `.ltm` file.
 //!
 //! ```text
-//! encoder        one pass over all tiles: moments, peaks  -> rotated basis
-//! sampling       parts of some tiles
-//! rate_control   sample, target                           -> step, rank
-//! scan_plan      sample, step, shares of the file         -> scans
-//! assembly       all tiles, scans                         -> chunks, file
+//! encoder              one pass over all tiles: moments, peaks  -> rotated basis
+//! rate_control_sample  parts of some tiles
+//! rate_control         sample, target                           -> step, rank
+//! scan_plan            sample, step, shares of the file         -> scans
+//! assembly             all tiles, scans                         -> chunks, file
 //! ```
 
 mod assembly;
@@ -13,7 +13,7 @@ mod basis_rotation;
 mod encoder;
 mod encoder_input;
 mod rate_control;
-mod sampling;
+mod rate_control_sample;
 mod scan_costs;
 mod scan_plan;
 

@@ -8,7 +8,7 @@ use std::convert::Infallible;
 use super::assembly::{self, EncodedFile, QuantisedTile};
 use super::encoder::Encoder;
 use super::encoder_input::{DistortionMetric, EncoderInput, RateTarget};
-use super::sampling::{SampledTilePart, sample};
+use super::rate_control_sample::{SampledTilePart, sample};
 use super::scan_costs::CostModel;
 use super::scan_plan::{self, MAX_SHARES, ProgressiveScanPlan, SHARES, ScanByteShares};
 use crate::bisect::bisect;

@@ -4,7 +4,7 @@
 //! squared errors are told apart by item: by component, or by slot in centre-out order.
 
 use super::encoder::{Encoder, non_empty};
-use super::sampling::SampledTilePart;
+use super::rate_control_sample::SampledTilePart;
 use crate::executor::Executor;
 use crate::format::codec::direct_functions::CentreOutFunctions;
 use crate::format::codec::tokens::{CONTEXTS, TokenSource, for_tokens};

@@ -36,7 +36,7 @@ const SHININESS: f64 = 50.0;
 const SHADING_HALF_SIDE: f64 = 32.0;
 
 #[derive(Debug)]
-pub(super) struct Cookies {
+pub(super) struct CookiesScene {
     geometry: Geometry,
     /// Surface samples, `SAMPLES_PER_SIDE`² for each camera pixel.
     surface: SurfaceGrid,
@@ -57,7 +57,7 @@ struct RadiosityPatch {
     light_element: LightElement,
 }
 
-impl Cookies {
+impl CookiesScene {
     pub fn new(geometry: Geometry) -> Self {
         let affine = geometry.correspondence.affine;
         let samples = Extent::new(
@@ -127,7 +127,7 @@ impl Cookies {
     }
 }
 
-impl SimulatedScene for Cookies {
+impl SimulatedScene for CookiesScene {
     fn geometry(&self) -> &Geometry {
         &self.geometry
     }

@@ -38,7 +38,7 @@ const MAX_DISPLACEMENT: f64 = 4.0;
 const RELATIVE_TAIL_WIDTH: [f64; CHANNELS] = [1.14, 1.0, 0.88];
 
 #[derive(Debug)]
-pub(super) struct StainedGlass {
+pub(super) struct StainedGlassScene {
     geometry: Geometry,
     plane: UnitCoordinates,
     /// Distance between camera pixels along u and v, in light elements.
@@ -47,7 +47,7 @@ pub(super) struct StainedGlass {
     visible: Vec<f32>,
 }
 
-impl StainedGlass {
+impl StainedGlassScene {
     pub fn new(geometry: Geometry) -> Self {
         let plane = UnitCoordinates::new(geometry.light);
         let is_hidden = |p| f64::from(u8::from(glass_at(plane.at(p)).clearance < 0.0));
@@ -94,7 +94,7 @@ impl StainedGlass {
     }
 }
 
-impl SimulatedScene for StainedGlass {
+impl SimulatedScene for StainedGlassScene {
     fn geometry(&self) -> &Geometry {
         &self.geometry
     }
@@ -218,7 +218,7 @@ mod tests {
     #[test]
     fn lead_is_nearly_black_and_glass_is_not() {
         let side = |n| Extent::new(n, n);
-        let scene = StainedGlass::new(scene_geometry(side(192), side(96)).unwrap());
+        let scene = StainedGlassScene::new(scene_geometry(side(192), side(96)).unwrap());
         let geometry = scene.geometry();
         let plane = UnitCoordinates::new(geometry.light);
         let (mut lead, mut glass) = (0, 0);

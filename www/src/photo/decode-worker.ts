@@ -5,7 +5,7 @@ import type { DecodedPhoto, Decoder } from '../engine/types.js';
 import { serve } from '../engine/worker-server.js';
 import { toPhotoError } from '../shared/errors.js';
 import { decoderState } from './main-thread-decoder.js';
-import { describePhoto, type TileTransferBytes } from './types.js';
+import { describePhoto, type SerialisedTile } from './types.js';
 import type { DecodeResult, DecodeTask, TransferredPhoto } from './worker-decoder.js';
 
 function answer(decoder: Decoder, task: DecodeTask): DecodeResult {
@@ -25,7 +25,7 @@ function answer(decoder: Decoder, task: DecodeTask): DecodeResult {
 /** Moves a photograph out of the module's memory. */
 function takeOut(photo: DecodedPhoto): TransferredPhoto {
   const descriptor = describePhoto(photo);
-  const takeTile = (_: unknown, index: number) => photo.takeTile(index) as TileTransferBytes;
+  const takeTile = (_: unknown, index: number) => photo.takeTile(index) as SerialisedTile;
   const tiles = Array.from({ length: descriptor.tiles }, takeTile);
   photo.free();
   return { descriptor, tiles };

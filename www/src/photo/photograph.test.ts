@@ -11,14 +11,14 @@ import {
 } from '../renderers/cpu/worker-pool-fakes.js';
 import { Photograph } from './photograph.js';
 import { fakeLight, fakePhoto } from './photograph-fakes.js';
-import { describePhoto, type TileTransferBytes } from './types.js';
+import { describePhoto, type SerialisedTile } from './types.js';
 
 const ALL = [0, 1, 2, 3];
 
 /** A photograph of four tiles from a worker. */
 function fromWorker() {
   const { photo, tilesInModules, state, module } = fakePhoto(4);
-  const tiles = ALL.map((index) => photo.takeTile(index) as TileTransferBytes);
+  const tiles = ALL.map((index) => photo.takeTile(index) as SerialisedTile);
   const descriptor = describePhoto(photo);
   photo.free();
   return { photograph: new Photograph(descriptor, tiles), tilesInModules, state, module };

@@ -16,8 +16,8 @@ import type { PhotoInfo } from '../shared/value-types.js';
 import {
   describePhoto,
   type PhotoDescriptor,
+  type SerialisedTile,
   type TilesInWorkers,
-  type TileTransferBytes,
   type TileWorkerPool,
 } from './types.js';
 
@@ -31,7 +31,7 @@ interface ModuleTiles {
 }
 
 /** 'in transit': sent to a worker, or requested from it. */
-type TileResidency = ModuleTiles | 'workers' | 'in transit' | TileTransferBytes;
+type TileResidency = ModuleTiles | 'workers' | 'in transit' | SerialisedTile;
 
 export class Photograph implements Freeable {
   readonly info: PhotoInfo;
@@ -47,7 +47,7 @@ export class Photograph implements Freeable {
   /** Its tiles are on the page. `completeness` is the decoded share of the file, 0 to 1. Throws `format-invalid`. */
   constructor(
     readonly descriptor: PhotoDescriptor,
-    tiles: TileTransferBytes[],
+    tiles: SerialisedTile[],
     readonly completeness = 1,
   ) {
     const { width, height, lightWidth, lightHeight, decodedBytes } = descriptor;
@@ -209,10 +209,10 @@ export class Photograph implements Freeable {
   }
 
   /** Takes a tile out of its module, if it is in one. */
-  #toBytes(index: number): TileTransferBytes {
-    const location = this.#tiles[index] as ModuleTiles | TileTransferBytes;
+  #toBytes(index: number): SerialisedTile {
+    const location = this.#tiles[index] as ModuleTiles | SerialisedTile;
     if (location instanceof Uint8Array) return location;
-    const bytes = location.photo.takeTile(index) as TileTransferBytes;
+    const bytes = location.photo.takeTile(index) as SerialisedTile;
     this.#tiles[index] = bytes;
     return bytes;
   }

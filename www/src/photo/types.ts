@@ -3,8 +3,8 @@
 import type { DecodedPhoto } from '../engine/types.js';
 import type { PhotoError } from '../shared/errors.js';
 
-/** A tile on its way between two modules. */
-export type TileTransferBytes = Uint8Array<ArrayBuffer>;
+/** A tile as bytes, on its way between two modules. */
+export type SerialisedTile = Uint8Array<ArrayBuffer>;
 
 /** A photograph without its tiles: what a module needs to create it. */
 export interface PhotoDescriptor
@@ -27,8 +27,8 @@ export interface TilesInWorkers {
   /** The indices of the tiles that each worker takes. */
   readonly tiles: readonly (readonly number[])[];
   /** Moves a tile to its worker. If that fails before it is sent, `bytes` are still there. */
-  put(index: number, bytes: TileTransferBytes): Promise<void>;
-  take(index: number): Promise<TileTransferBytes>;
+  put(index: number, bytes: SerialisedTile): Promise<void>;
+  take(index: number): Promise<SerialisedTile>;
   /** Prepares relighting, once all tiles are there. */
   plan(): Promise<void>;
   end(): void;

@@ -4,7 +4,7 @@ import { PhotoError } from '../shared/errors.js';
 import { type WatchdogLimits, WorkerClient, type WorkerLike } from '../shared/worker-client.js';
 import { completenessOf, type DecoderState, type PhotoDecoder } from './photo-decoder.js';
 import { Photograph } from './photograph.js';
-import type { PhotoDescriptor, TileTransferBytes } from './types.js';
+import type { PhotoDescriptor, SerialisedTile } from './types.js';
 
 export type DecodeTask =
   | { readonly kind: 'feed'; readonly offset: number; readonly bytes: Uint8Array }
@@ -13,7 +13,7 @@ export type DecodeTask =
 /** A photograph on its way from the worker to the page. */
 export interface TransferredPhoto {
   readonly descriptor: PhotoDescriptor;
-  readonly tiles: TileTransferBytes[];
+  readonly tiles: SerialisedTile[];
 }
 
 export type DecodeResult =

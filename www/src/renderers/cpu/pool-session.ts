@@ -1,7 +1,7 @@
 /** A photograph in the worker pool: moves its tiles and relights it, one row range in each worker. */
 
 import type { Light } from '../../engine/types.js';
-import type { PhotoDescriptor, TilesInWorkers, TileTransferBytes } from '../../photo/types.js';
+import type { PhotoDescriptor, SerialisedTile, TilesInWorkers } from '../../photo/types.js';
 import { type PhotoError, photoReleased } from '../../shared/errors.js';
 import { allSettledOrThrow, withTimeout } from '../../shared/promises.js';
 import type { FrameSettings, RelightClient, RowRange, RowTask } from './protocol.js';
@@ -64,12 +64,12 @@ export class PoolSession implements TilesInWorkers {
     );
   }
 
-  async put(index: number, bytes: TileTransferBytes): Promise<void> {
+  async put(index: number, bytes: SerialisedTile): Promise<void> {
     this.#isPlanned = false;
     await this.#request(this.#clientOf(index), { kind: 'put', index, bytes }, [bytes.buffer]);
   }
 
-  async take(index: number): Promise<TileTransferBytes> {
+  async take(index: number): Promise<SerialisedTile> {
     this.#isPlanned = false;
     return new Uint8Array(await this.#request(this.#clientOf(index), { kind: 'take', index }));
   }
