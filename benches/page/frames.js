@@ -132,6 +132,7 @@ export async function time(photo, name, seconds) {
   const change = KINDS[name](photo);
   waitForScreen(false);
   await frame(photo, change, 1);
+  await settled();
   const times = { issued: /** @type {number[]} */ ([]), done: /** @type {number[]} */ ([]) };
   const start = performance.now();
   for (let i = 0; i < MOST; i += 1) {
@@ -147,6 +148,15 @@ export async function time(photo, name, seconds) {
   }
   waitForScreen(true);
   return times;
+}
+
+/** Waits until the element draws no more: a new light source and its first change can be two pictures. */
+async function settled() {
+  let before = -1;
+  while (before !== drawCount()) {
+    before = drawCount();
+    await new Promise((resolve) => setTimeout(resolve, REST_MS));
+  }
 }
 
 /**
@@ -189,6 +199,7 @@ export async function draw(photo, name, count) {
 export async function timeTogether(photo, name, each) {
   const change = KINDS[name](photo);
   waitForScreen(false);
+  await settled();
   const times = [];
   for (let turn = 0; turn < FEWEST; turn += 1) {
     const start = performance.now();
