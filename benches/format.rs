@@ -22,11 +22,11 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use npyz::WriterBuilder;
-use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{
-    ChunkId, EncodedFile, EncoderInput, FileIndex, HEADER_BYTES, Limits, LtmReader, Metadata,
-    RateTarget, decode_basis, decode_tile,
+    ChunkId, EncodedFile, EncoderInput, EncodingTarget, FileIndex, HEADER_BYTES, Limits, LtmReader,
+    Metadata, decode_basis, decode_tile,
 };
+use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::transport::{Basis, CHANNELS, Decibels, FloatTile, SnrAccumulator};
 use serde_json::{Value, json};
 
@@ -281,7 +281,12 @@ fn rates(files: &Files, figures: &mut Figures) {
         extensions: Vec::new(),
     };
     let start = Instant::now();
-    EncodedFile::new(source, RateTarget::Snr(Decibels(33.0)), &SequentialExecutor).unwrap();
+    EncodedFile::new(
+        source,
+        EncodingTarget::Snr(Decibels(33.0)),
+        &SequentialExecutor,
+    )
+    .unwrap();
     let encoding = megabytes(&given) / start.elapsed().as_secs_f64();
     figures.insert("encode_native_mb_s".to_owned(), encoding);
     let fastest = (0..5).map(|_| {

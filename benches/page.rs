@@ -10,7 +10,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::Command;
 
-use relightable_photo::format::{EncodedFile, EncoderInput, Metadata, RateTarget};
+use relightable_photo::format::{EncodedFile, EncoderInput, EncodingTarget, Metadata};
 use serde_json::{Value, json};
 
 use figures::Figures;
@@ -67,7 +67,7 @@ fn write_file(path: &Path, side: u32, rank: usize) {
         extensions: Vec::new(),
     };
     // A lower quality might drop components.
-    let encoded = EncodedFile::new(source, RateTarget::Lossless, &RayonExecutor).unwrap();
+    let encoded = EncodedFile::new(source, EncodingTarget::Lossless, &RayonExecutor).unwrap();
     let kept = usize::from(encoded.index().header.rank);
     assert_eq!(kept, rank, "components of the file");
     let mut file = BufWriter::new(fs::File::create(path).unwrap());

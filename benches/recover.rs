@@ -1,7 +1,7 @@
 //! `pkg-scripts/bench recover`: the time of recovery against scipy and scikit-learn on the same measurements, against
 //! problem size and threads, and at the paper's scale.
 //!
-//! Our time is that of whole tiles by [`Recovery::tile`] on one thread, divided by pixels and channels; it includes
+//! Our time is that of whole tiles by [`PreparedRecovery::tile`] on one thread, divided by pixels and channels; it includes
 //! patterns, Gram matrices and right-hand sides. A peer's time is that of its solver alone, on one thread, for the same
 //! equations as ready arrays, one right-hand side after the other; Gram matrices that it can use are not counted. The
 //! time of our own solvers alone, on the same arrays, is shown as well.
@@ -26,16 +26,16 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use rayon::prelude::*;
-use relightable_photo::capture::{LinearPhoto, Measurements, NoiseModel, Pattern, RowSet};
-use relightable_photo::executor::{Executor, SequentialExecutor};
+use relightable_photo::capture::{CameraRowSet, LinearPhoto, Measurements, NoiseModel, Pattern};
+use relightable_photo::job_executor::{Executor, SequentialExecutor};
 use relightable_photo::recover::{
-    Homotopy, Method, Nnls, Recovery, RecoverySettings, SparsityBasis,
+    Homotopy, Method, Nnls, PreparedRecovery, RecoverySettings, SparsityBasis,
 };
 use relightable_photo::simulate::{
-    Camera, PatternEnsemble, PatternImage, PatternMatrix, RandomStreamId, SceneKind, emission,
+    Camera, EmissionMatrix, PatternEnsemble, PatternImage, RandomStreamId, SceneKind, emission,
 };
 use relightable_photo::transport::{
-    CHANNELS, CameraPx, Extent, SnrAccumulator, TileFunctions, TileRect, Window,
+    CHANNELS, CameraPixel, Extent, SnrAccumulator, TileRect, TileTransportFunctions, Window,
 };
 use serde_json::Value;
 
@@ -68,7 +68,7 @@ fn square(side: u32) -> Extent {
 }
 
 /// Stained glass at two camera pixels an element, photographed with noise; and the true transport.
-fn photograph(camera: Extent) -> (Measurements, Vec<TileFunctions>) {
+fn photograph(camera: Extent) -> (Measurements, Vec<TileTransportFunctions>) {
     let light = square(camera.width / 2);
     let scene = SceneKind::StainedGlass.build(camera, light).unwrap();
     let codes: Vec<PatternImage> = (0..PATTERNS as u32)
@@ -80,7 +80,7 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TileFunctions>) {
     let sensor = Camera {
         electrons: 40_000.0,
     };
-    let emissions = PatternMatrix::new(light, &codes);
+    let emissions = EmissionMatrix::new(light, &codes);
     let geometry = *scene.geometry();
     let truth: Vec<_> = (0..geometry.tile_grid().area())
         .into_par_iter()
@@ -118,7 +118,7 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TileFunctions>) {
         correspondence: geometry.correspondence,
         patterns: patterns.collect(),
         full_scale: vec![1.0; PATTERNS],
-        rows: RowSet::all(camera.height),
+        rows: CameraRowSet::all(camera.height),
         photos: pictures,
         noise: NoiseModel::from_dark(&dark, camera.width, code),
     };
@@ -126,9 +126,9 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TileFunctions>) {
     (measurements, truth)
 }
 
-fn prepare(measurements: &Measurements, method: Method) -> Recovery {
+fn prepare(measurements: &Measurements, method: Method) -> PreparedRecovery {
     let window = Window::new(WINDOW).unwrap();
-    Recovery::prepare(
+    PreparedRecovery::prepare(
         measurements,
         RecoverySettings { method, window },
         &SequentialExecutor,
@@ -136,7 +136,11 @@ fn prepare(measurements: &Measurements, method: Method) -> Recovery {
     .unwrap()
 }
 
-fn tile(recovery: &Recovery, measurements: &Measurements, rect: TileRect) -> TileFunctions {
+fn tile(
+    recovery: &PreparedRecovery,
+    measurements: &Measurements,
+    rect: TileRect,
+) -> TileTransportFunctions {
     recovery
         .tile(measurements, rect)
         .functions(recovery.geometry(), recovery.basis())
@@ -152,7 +156,7 @@ fn fastest(runs: usize, mut work: impl FnMut()) -> f64 {
     times.fold(f64::INFINITY, f64::min)
 }
 
-fn snr(recovered: &[TileFunctions], truth: &[TileFunctions]) -> f64 {
+fn snr(recovered: &[TileTransportFunctions], truth: &[TileTransportFunctions]) -> f64 {
     let mut error = SnrAccumulator::default();
     for (recovered, truth) in recovered.iter().zip(truth) {
         // The truth's tile may be larger.
@@ -170,7 +174,7 @@ fn snr(recovered: &[TileFunctions], truth: &[TileFunctions]) -> f64 {
 }
 
 /// Tiles from the middle of the picture, whose windows lie inside the light plane.
-fn inner_tiles(recovery: &Recovery) -> Vec<usize> {
+fn inner_tiles(recovery: &PreparedRecovery) -> Vec<usize> {
     let grid = recovery.geometry().tile_grid();
     let across = grid.width as usize;
     let inner = |i: usize| {
@@ -324,8 +328,8 @@ impl WindowEquations {
     /// The equations of windows spread over the tiles.
     fn of_windows(
         measurements: &Measurements,
-        recovery: &Recovery,
-        truth: &[TileFunctions],
+        recovery: &PreparedRecovery,
+        truth: &[TileTransportFunctions],
     ) -> Vec<Self> {
         let common_mode = recovery.common_mode().expect("least squares chooses it");
         let weigh = |mut values: Vec<f64>| {
@@ -343,8 +347,8 @@ impl WindowEquations {
 
     fn new(
         measurements: &Measurements,
-        recovery: &Recovery,
-        functions: &TileFunctions,
+        recovery: &PreparedRecovery,
+        functions: &TileTransportFunctions,
         n: u32,
         weigh: &impl Fn(Vec<f64>) -> Vec<f64>,
     ) -> Self {
@@ -352,7 +356,7 @@ impl WindowEquations {
         let area = geometry.window.area();
         // The first of the window's four pixels: both coordinates are even.
         let step = 2 * (1 + n);
-        let first = CameraPx {
+        let first = CameraPixel {
             x: functions.rect.x + step,
             y: functions.rect.y + (5 * step) % functions.rect.extent.height,
         };
@@ -371,7 +375,7 @@ impl WindowEquations {
             sides: Vec::new(),
         };
         for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let pixel = CameraPx {
+            let pixel = CameraPixel {
                 x: first.x + dx,
                 y: first.y + dy,
             };

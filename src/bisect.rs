@@ -1,7 +1,7 @@
 //! Bisection.
 
-/// Halves `[low, high]` as often as `halvings` says, so that `is_low` still holds of the first and not of the
-/// second end, if it does at the beginning. Ends with the first error of `is_low`.
+/// Halves `[low, high]` `halvings` times. If `is_low` holds at `low` and not at `high`, it still does afterwards.
+/// Ends with the first error of `is_low`.
 pub(crate) fn bisect<E>(
     [mut low, mut high]: [f64; 2],
     halvings: usize,

@@ -24,8 +24,8 @@ pub mod calibrate;
 pub mod capture;
 #[cfg(all(feature = "cli", not(target_arch = "wasm32")))]
 pub mod cli;
-pub mod executor;
 pub mod format;
+pub mod job_executor;
 mod linalg;
 pub mod recover;
 pub mod relight;

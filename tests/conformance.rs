@@ -12,14 +12,14 @@ use std::path::Path;
 use std::sync::Once;
 
 use common::{Noise, functions, tiled};
-use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{
-    self, CaptureSummary, ChunkId, EncodedFile, EncoderInput, Extension, FileIndex, FormatError,
-    Limits, LtmReader, Metadata, RateTarget,
+    self, CaptureMetadata, ChunkId, EncodedFile, EncoderInput, EncodingTarget, FileIndex,
+    FormatError, FormatExtension, Limits, LtmReader, Metadata,
 };
+use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::relight::{Light, OutputTransform, reference};
 use relightable_photo::transport::{
-    Basis, CHANNELS, CameraPx, Decibels, FloatTile, Geometry, Tile, TileRect,
+    Basis, CHANNELS, CameraPixel, Decibels, FloatTile, Geometry, Tile, TileRect,
 };
 
 /// The files, as appendix G of `docs/format.md` lists them.
@@ -116,9 +116,9 @@ impl Synthetic {
 
     fn encode(
         &self,
-        target: RateTarget<'_>,
+        target: EncodingTarget<'_>,
         metadata: Metadata,
-        extensions: Vec<Extension>,
+        extensions: Vec<FormatExtension>,
     ) -> Vec<u8> {
         let source = EncoderInput {
             geometry: self.geometry,
@@ -185,7 +185,7 @@ fn make(name: &str) -> Vec<u8> {
     );
     // Windows cross each border of the light plane, or lie off it.
     let crossing = tiled([20, 10], [8, 5], 5, 8, [[0.7, 0.0, -4.0], [0.0, 0.7, -1.0]]);
-    let snr = |snr| RateTarget::Snr(Decibels(snr));
+    let snr = |snr| EncodingTarget::Snr(Decibels(snr));
     let (synthetic, target) = match name {
         "transform" => (Synthetic::factored(wide, 4, &[0, 2, 3, 4]), snr(40.0)),
         "coarse" => (
@@ -203,7 +203,7 @@ fn make(name: &str) -> Vec<u8> {
         ),
         "lossless" => (
             Synthetic::factored(small, 3, &[0, 2, 4]).and_direct(&[1, 2]),
-            RateTarget::Lossless,
+            EncodingTarget::Lossless,
         ),
         "extended" => return extended(&Synthetic::factored(small, 2, &[0, 2, 3, 4])),
         "dark" => (Synthetic::factored(small, 2, &[]), snr(30.0)),
@@ -218,7 +218,7 @@ fn extended(synthetic: &Synthetic) -> Vec<u8> {
         title: "Rosace nord – «la Création» · 北の薔薇窓 🌹".to_owned(),
         creator: "Zoë Ångström".to_owned(),
         rights: "© Łódź, CC BY 4.0".to_owned(),
-        capture: CaptureSummary {
+        capture: CaptureMetadata {
             patterns: 80,
             photographs: 83,
         },
@@ -226,13 +226,13 @@ fn extended(synthetic: &Synthetic) -> Vec<u8> {
         shots_used: vec![0, 1, 4],
         ..metadata()
     };
-    let extension = |tag: &[u8; 4], data: &[u8]| Extension {
+    let extension = |tag: &[u8; 4], data: &[u8]| FormatExtension {
         tag: *tag,
         must_understand: false,
         data: data.to_vec(),
     };
     let extensions = vec![extension(b"test", b"anything"), extension(b"none", b"")];
-    let mut file = synthetic.encode(RateTarget::Snr(Decibels(30.0)), metadata, extensions);
+    let mut file = synthetic.encode(EncodingTarget::Snr(Decibels(30.0)), metadata, extensions);
     // A field that version 1.0 does not have.
     let units = b"\"units\"";
     let at = file.windows(units.len()).position(|bytes| bytes == units);
@@ -353,7 +353,7 @@ fn the_specification_shows_windows_light_transport_functions_and_a_picture() {
 
     let pixels = [(0, 0), (5, 1), (5, 8), (12, 3), (19, 9)];
     let windows = pixels.map(|(x, y)| {
-        let pixel = CameraPx { x, y };
+        let pixel = CameraPixel { x, y };
         let (at, origin) = (
             geometry.correspondence.at(pixel),
             geometry.window_origin(pixel),
@@ -365,7 +365,7 @@ fn the_specification_shows_windows_light_transport_functions_and_a_picture() {
     });
     assert_specified(&windows.concat());
 
-    let origin = geometry.window_origin(CameraPx { x: 5, y: 8 });
+    let origin = geometry.window_origin(CameraPixel { x: 5, y: 8 });
     let elements: Vec<_> = (0..window.area())
         .map(|slot| window.element(origin, slot).index_in(plane))
         .collect();

@@ -5,14 +5,15 @@ mod common;
 
 use common::{Noise, functions, geometry, sealed};
 use proptest::prelude::*;
-use relightable_photo::executor::{Executor, SequentialExecutor};
 use relightable_photo::format::{
-    self, ChunkId, ChunkSelection, DistortionMetric, EncodedFile, EncoderInput, Extension,
-    FormatError, HEADER_BYTES, Limits, LtmReader, Metadata, RateTarget, ScanCoding, SectionName,
-    TextModeDamage,
+    self, ChunkId, ChunkSelection, DistortionMetric, EncodedFile, EncoderInput, EncodingTarget,
+    FormatError, FormatExtension, HEADER_BYTES, Limits, LtmReader, Metadata, ScanCoding,
+    SectionName, TextModeDamage,
 };
+use relightable_photo::job_executor::{Executor, SequentialExecutor};
 use relightable_photo::transport::{
-    Basis, CHANNELS, Decibels, FloatTile, Geometry, SnrAccumulator, Tile, TileFunctions, Transport,
+    Basis, CHANNELS, Decibels, FloatTile, Geometry, SnrAccumulator, Tile, TileTransportFunctions,
+    Transport,
 };
 
 /// A recovered light transport.
@@ -74,15 +75,15 @@ impl Recovered {
         recovered
     }
 
-    fn encode(&self, quality: RateTarget<'_>) -> Result<EncodedFile, FormatError> {
+    fn encode(&self, quality: EncodingTarget<'_>) -> Result<EncodedFile, FormatError> {
         self.encode_by(quality, &SequentialExecutor, Vec::new())
     }
 
     fn encode_by(
         &self,
-        quality: RateTarget<'_>,
+        quality: EncodingTarget<'_>,
         executor: &impl Executor,
-        extensions: Vec<Extension>,
+        extensions: Vec<FormatExtension>,
     ) -> Result<EncodedFile, FormatError> {
         let source = EncoderInput {
             geometry: self.geometry,
@@ -94,12 +95,12 @@ impl Recovered {
         EncodedFile::new(source, quality, executor)
     }
 
-    fn file(&self, quality: RateTarget<'_>) -> Vec<u8> {
+    fn file(&self, quality: EncodingTarget<'_>) -> Vec<u8> {
         bytes(&self.encode(quality).unwrap())
     }
 
     /// Light transport functions of tile `i`.
-    fn functions(&self, i: usize) -> TileFunctions {
+    fn functions(&self, i: usize) -> TileTransportFunctions {
         self.tiles[i].functions(&self.geometry, self.basis.as_ref())
     }
 
@@ -165,7 +166,7 @@ fn metadata() -> Metadata {
     }
 }
 
-const QUALITY: RateTarget<'static> = RateTarget::Snr(Decibels(30.0));
+const QUALITY: EncodingTarget<'static> = EncodingTarget::Snr(Decibels(30.0));
 
 /// Six tiles of 8 x 8 pixels and less.
 fn small_geometry() -> Geometry {
@@ -181,7 +182,7 @@ fn mixed() -> Recovered {
 fn small_files() -> Vec<Vec<u8>> {
     let mut files = Vec::new();
     for recovered in [mixed(), Recovered::direct(small_geometry(), 1)] {
-        files.extend([QUALITY, RateTarget::Lossless].map(|quality| recovered.file(quality)));
+        files.extend([QUALITY, EncodingTarget::Lossless].map(|quality| recovered.file(quality)));
     }
     files
 }
@@ -205,7 +206,7 @@ proptest! {
 
     #[test]
     fn lossless_files_keep_eleven_bits(recovered in any_recovered(), piece in 1usize..5000) {
-        let (decoded, meta) = decode(&recovered.file(RateTarget::Lossless), piece).unwrap();
+        let (decoded, meta) = decode(&recovered.file(EncodingTarget::Lossless), piece).unwrap();
         prop_assert_eq!(meta, metadata());
         prop_assert_eq!(decoded.geometry, recovered.geometry);
         let snr = recovered.error(&decoded).snr();
@@ -216,7 +217,7 @@ proptest! {
     fn files_reach_the_target_snr(
         recovered in any_recovered(), quality in 15.0f64..60.0, piece in 1usize..5000,
     ) {
-        let encoded = recovered.encode(RateTarget::Snr(Decibels(quality))).unwrap();
+        let encoded = recovered.encode(EncodingTarget::Snr(Decibels(quality))).unwrap();
         let (decoded, _) = decode(&bytes(&encoded), piece).unwrap();
         let snr = recovered.error(&decoded).snr();
         // The encoder also counts values off the light plane; and rounding to twelve bits adds noise.
@@ -272,7 +273,11 @@ impl Executor for ReversedExecutor {
 
 #[test]
 fn the_same_transport_gives_the_same_bytes() {
-    for quality in [QUALITY, RateTarget::Bytes(6000), RateTarget::Lossless] {
+    for quality in [
+        QUALITY,
+        EncodingTarget::Bytes(6000),
+        EncodingTarget::Lossless,
+    ] {
         let first = mixed().file(quality);
         let again = mixed()
             .encode_by(quality, &ReversedExecutor, Vec::new())
@@ -287,12 +292,12 @@ fn every_scan_raises_the_snr_as_declared() {
     for (recovered, quality) in [
         (
             Recovered::mixed(geometry, 12, 3),
-            RateTarget::Snr(Decibels(35.0)),
+            EncodingTarget::Snr(Decibels(35.0)),
         ),
-        (Recovered::mixed(geometry, 12, 3), RateTarget::Lossless),
+        (Recovered::mixed(geometry, 12, 3), EncodingTarget::Lossless),
         (
             Recovered::direct(geometry, 3),
-            RateTarget::Snr(Decibels(35.0)),
+            EncodingTarget::Snr(Decibels(35.0)),
         ),
     ] {
         let file = recovered.file(quality);
@@ -353,7 +358,7 @@ fn files_stay_within_the_target_size() {
     let recovered = Recovered::mixed(geometry, 8, 5);
     let mut before = 0.0;
     for limit in [30_000, 60_000, 120_000] {
-        let file = recovered.encode(RateTarget::Bytes(limit)).unwrap();
+        let file = recovered.encode(EncodingTarget::Bytes(limit)).unwrap();
         assert!(
             (limit * 9 / 10..=limit).contains(&file.bytes()),
             "{} of {limit} bytes",
@@ -363,7 +368,7 @@ fn files_stay_within_the_target_size() {
         assert!(snr > before + 1.0, "{snr} dB in {limit} bytes");
         before = snr;
     }
-    let error = recovered.encode(RateTarget::Bytes(300)).unwrap_err();
+    let error = recovered.encode(EncodingTarget::Bytes(300)).unwrap_err();
     assert!(
         matches!(error, FormatError::TooLarge { limit: 300, smallest } if smallest > 300),
         "{error}"
@@ -382,7 +387,7 @@ impl DistortionMetric for KnownTransportMetric<'_> {
         self.tiles.clone()
     }
 
-    fn loss(&self, functions: &[TileFunctions]) -> Decibels {
+    fn loss(&self, functions: &[TileTransportFunctions]) -> Decibels {
         let mut error = SnrAccumulator::default();
         for (got, tile) in functions.iter().zip(self.tiles()) {
             let want = tile.functions(&self.geometry, Some(self.basis));
@@ -417,7 +422,7 @@ fn a_metric_may_have_tiles_of_another_kind_than_the_file() {
             basis,
             tiles: metric_tiles.clone(),
         };
-        let quality = RateTarget::Loss(Decibels(0.0), &metric);
+        let quality = EncodingTarget::Loss(Decibels(0.0), &metric);
         let snr = recovered.encode(quality).unwrap().snr().unwrap();
         // The same step gives different errors in factored and direct tiles.
         assert!((20.0..40.0).contains(&snr.0), "{snr}");
@@ -506,7 +511,11 @@ fn dark_tiles_take_no_bytes() {
     for tile in &mut recovered.tiles {
         *tile = FloatTile::dark(tile.rect);
     }
-    for quality in [QUALITY, RateTarget::Bytes(1000), RateTarget::Lossless] {
+    for quality in [
+        QUALITY,
+        EncodingTarget::Bytes(1000),
+        EncodingTarget::Lossless,
+    ] {
         let (transport, _) = decode(&recovered.file(quality), 7).unwrap();
         assert!(transport.tiles.iter().all(Tile::is_dark));
     }
@@ -561,7 +570,7 @@ fn tiles_have_no_seams() {
         tile.coefficients = coefficients.collect();
         recovered.tiles.push(tile);
     }
-    let file = recovered.file(RateTarget::Snr(Decibels(28.0)));
+    let file = recovered.file(EncodingTarget::Snr(Decibels(28.0)));
     let (decoded, _) = decode(&file, file.len()).unwrap();
     let window = geometry.window;
     for edge in [64.0, 31.3] {
@@ -705,7 +714,7 @@ fn error_messages_name_the_fault() {
 
 #[test]
 fn other_minor_versions_and_unknown_extensions_are_read_unless_they_must_be_understood() {
-    let extension = |must_understand| Extension {
+    let extension = |must_understand| FormatExtension {
         tag: *b"TEST",
         must_understand,
         data: vec![1, 2, 3],
@@ -792,7 +801,10 @@ fn a_crafted_file_is_refused_with_its_fault() {
         "{error}"
     );
     let error = header(field::DIRECTORY_BYTES, 1 << 30);
-    assert!(matches!(error, FormatError::Truncated { .. }), "{error}");
+    assert!(
+        matches!(error, FormatError::IndexBeyondEnd { .. }),
+        "{error}"
+    );
     let error = header(field::EXTENSION_BYTES, 1 << 30);
     assert!(
         matches!(
@@ -924,11 +936,11 @@ fn values_near_the_limits_of_single_precision_are_written_and_read() {
                 }
             }
         }
-        for quality in [0.0, 30.0, 60.0].map(|snr| RateTarget::Snr(Decibels(snr))) {
+        for quality in [0.0, 30.0, 60.0].map(|snr| EncodingTarget::Snr(Decibels(snr))) {
             let (transport, _) = decode(&recovered.file(quality), 1000).unwrap();
             assert!(steps(&transport).all(f32::is_finite), "{size:e}");
         }
-        decode(&recovered.file(RateTarget::Lossless), 1000).unwrap();
+        decode(&recovered.file(EncodingTarget::Lossless), 1000).unwrap();
     }
 }
 
@@ -938,7 +950,7 @@ fn a_basis_of_zeros_is_written_and_read() {
     recovered.basis = Some(Basis {
         kernels: vec![vec![0.0; 9]; 4],
     });
-    for quality in [QUALITY, RateTarget::Lossless] {
+    for quality in [QUALITY, EncodingTarget::Lossless] {
         decode(&recovered.file(quality), 1000).unwrap();
     }
 }
@@ -954,7 +966,7 @@ fn values_that_are_not_finite_become_zero() {
     let mut recovered = mixed();
     recovered.tiles[1].coefficients[5] = [f32::NAN, f32::INFINITY, 0.1];
     recovered.tiles[2].functions[7] = [f32::NEG_INFINITY, 0.1, f32::NAN];
-    for quality in [QUALITY, RateTarget::Lossless] {
+    for quality in [QUALITY, EncodingTarget::Lossless] {
         let (transport, _) = decode(&recovered.file(quality), 1000).unwrap();
         assert!(steps(&transport).all(f32::is_finite));
     }
@@ -1015,17 +1027,17 @@ fn scans_keep_their_shares_of_the_file() {
     for (recovered, target) in [
         (
             Recovered::mixed(geometry, 8, 5),
-            RateTarget::Snr(Decibels(35.0)),
+            EncodingTarget::Snr(Decibels(35.0)),
         ),
         (
             Recovered::mixed(geometry, 2, 5),
-            RateTarget::Snr(Decibels(45.0)),
+            EncodingTarget::Snr(Decibels(45.0)),
         ),
         (
             Recovered::direct(geometry, 5),
-            RateTarget::Snr(Decibels(35.0)),
+            EncodingTarget::Snr(Decibels(35.0)),
         ),
-        (Recovered::direct(geometry, 5), RateTarget::Lossless),
+        (Recovered::direct(geometry, 5), EncodingTarget::Lossless),
     ] {
         let encoded = recovered.encode(target).unwrap();
         let index = encoded.index();

@@ -8,10 +8,10 @@ use std::sync::Arc;
 use common::relit::{self, TileContents};
 use common::tiled;
 use proptest::prelude::*;
-use relightable_photo::executor::SequentialExecutor;
+use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::relight::cpu::CpuRelighter;
-use relightable_photo::relight::{Light, OutputTransform, TorchPose, reference};
-use relightable_photo::transport::{Geometry, LightPx, MAX_WINDOW, Tile};
+use relightable_photo::relight::{Light, OutputTransform, TorchSpot, reference};
+use relightable_photo::transport::{Geometry, LightPosition, MAX_WINDOW, Tile};
 
 /// Grids, windows and tiles of all shapes, with correspondences that rotate, mirror and shift the picture until windows
 /// hang over the light plane's edges, or miss it.
@@ -85,11 +85,11 @@ fn a_moving_light_leaves_nothing_behind() {
     ));
     let mut moved = CpuRelighter::new(transport.clone());
     for step in 0..6 {
-        let centre = LightPx {
+        let centre = LightPosition {
             u: 20.0 * f64::from(step),
             v: 100.0 - 15.0 * f64::from(step),
         };
-        let pose = TorchPose {
+        let pose = TorchSpot {
             centre,
             radius: 2.0,
         };

@@ -11,12 +11,12 @@ use common::relit::{self, TileContents};
 use common::tiled;
 use pollster::block_on;
 use relightable_photo::relight::backend::{BackendError, FrameRequest};
-use relightable_photo::relight::webgpu::{Device, OffscreenRenderer};
+use relightable_photo::relight::webgpu::{GpuContext, HeadlessRenderer};
 use relightable_photo::relight::{Light, OutputTransform, reference};
 use relightable_photo::transport::Transport;
 
-fn device() -> Rc<Device> {
-    Rc::new(block_on(Device::offscreen()).expect("a graphics device, if only in software"))
+fn device() -> Rc<GpuContext> {
+    Rc::new(block_on(GpuContext::offscreen()).expect("a graphics device, if only in software"))
 }
 
 fn frame(light: &Light, output: OutputTransform) -> FrameRequest<'_> {
@@ -57,7 +57,7 @@ fn transports() -> Vec<Transport> {
 fn all_lights_and_output_transforms_are_within_one_code_of_the_reference() {
     let device = device();
     for (i, transport) in transports().into_iter().enumerate() {
-        let mut photo = block_on(OffscreenRenderer::new(device.clone(), &transport)).unwrap();
+        let mut photo = block_on(HeadlessRenderer::new(device.clone(), &transport)).unwrap();
         for (name, light) in relit::lights(transport.geometry.light) {
             for (j, output) in relit::output_transforms(1.0).into_iter().enumerate() {
                 photo.draw(&frame(&light, output)).unwrap();
@@ -74,7 +74,7 @@ fn a_picture_does_not_depend_on_the_frames_before() {
     let device = device();
     let transport = &transports()[1];
     let lights = relit::lights(transport.geometry.light);
-    let mut photo = block_on(OffscreenRenderer::new(device.clone(), transport)).unwrap();
+    let mut photo = block_on(HeadlessRenderer::new(device.clone(), transport)).unwrap();
     let mut draw = |i: usize, quality: f32| {
         let light = &lights[i].1;
         photo
@@ -100,7 +100,7 @@ fn a_picture_does_not_depend_on_the_frames_before() {
 fn lower_quality_is_the_first_components() {
     let device = device();
     for transport in &transports()[..2] {
-        let mut photo = block_on(OffscreenRenderer::new(device.clone(), transport)).unwrap();
+        let mut photo = block_on(HeadlessRenderer::new(device.clone(), transport)).unwrap();
         for (name, light) in &relit::lights(transport.geometry.light) {
             for (quality, quads) in [(0.0, 1), (0.2, 1), (0.5, 2)] {
                 let output = OutputTransform::srgb(1.0);
@@ -125,7 +125,7 @@ fn a_lost_device_is_reported_to_all_its_renderers() {
     let transport = &transports()[3];
     let (_, light) = &relit::lights(transport.geometry.light)[0];
     let photos =
-        [(); 2].map(|()| block_on(OffscreenRenderer::new(device.clone(), transport)).unwrap());
+        [(); 2].map(|()| block_on(HeadlessRenderer::new(device.clone(), transport)).unwrap());
     device.destroy();
     let _ = device.wait(); // the loss is reported while waiting
     for mut photo in photos {

@@ -24,7 +24,7 @@ const SHADERS: [(&str, &str, ShaderStage, &[&str]); 4] = [
         ShaderStage::Fragment,
         &[
             "frame_uniforms.wgsl",
-            "basis_uniforms.wgsl",
+            "basis_function_uniforms.wgsl",
             "correlate_fragment.wgsl",
         ],
     ),

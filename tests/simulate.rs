@@ -8,11 +8,13 @@ use std::sync::LazyLock;
 
 use assert_cmd::Command;
 use relightable_photo::calibrate::LightPlaneAxis;
-use relightable_photo::capture::{CaptureFolder, LinearPhoto, Pattern, RowSet};
+use relightable_photo::capture::{CameraRowSet, CaptureFolder, LinearPhoto, Pattern};
 use relightable_photo::simulate::{
-    Camera, PatternImage, PatternMatrix, RandomStreamId, SceneKind, SimulatedScene,
+    Camera, EmissionMatrix, PatternImage, RandomStreamId, SceneKind, SimulatedScene,
 };
-use relightable_photo::transport::{CHANNELS, Extent, LightElement, TileFunctions, TileRect};
+use relightable_photo::transport::{
+    CHANNELS, Extent, LightElement, TileRect, TileTransportFunctions,
+};
 
 fn simulate(out: &Path, args: &[&str]) -> Command {
     let mut command = Command::cargo_bin("ltm-export").unwrap();
@@ -119,7 +121,7 @@ fn photographs_and_relit_pictures_match_the_known_transport() {
                 panic!("patterns are grey")
             };
             let (mut shot, mut photo) = (folder.open_shot(i, &dark).unwrap(), LinearPhoto::new());
-            let rows = RowSet::all(folder.manifest().camera.height);
+            let rows = CameraRowSet::all(folder.manifest().camera.height);
             shot.read(&rows, &mut photo).unwrap();
             assert_eq!(shot.finish().unwrap(), 0, "saturated samples");
             let light: Vec<_> = pattern.iter().map(|&p| [f64::from(p); CHANNELS]).collect();
@@ -258,7 +260,7 @@ const fn extent(width: u32, height: u32) -> Extent {
 }
 
 /// The functions of all pixels.
-fn all_functions(scene: &dyn SimulatedScene) -> TileFunctions {
+fn all_functions(scene: &dyn SimulatedScene) -> TileTransportFunctions {
     scene.tile(TileRect {
         x: 0,
         y: 0,
@@ -282,7 +284,7 @@ static FLOOD_PICTURES: LazyLock<[FloodPictures; 2]> = LazyLock::new(|| {
                 .build(extent(side, side), extent(side / 2, side / 2))
                 .unwrap();
             let light = scene.geometry().light;
-            let emissions = PatternMatrix::new(light, &[PatternImage::uniform(light, 255)]);
+            let emissions = EmissionMatrix::new(light, &[PatternImage::uniform(light, 255)]);
             let functions = all_functions(scene.as_ref());
             emissions.pictures(scene.geometry(), &functions).remove(0)
         });

@@ -184,7 +184,7 @@ impl Interruptible {
     }
 }
 
-/// Waits until the checkpoint has a tile, after its run key and the learned prior.
+/// Waits until the checkpoint has a tile, after its checkpoint key and the learned prior.
 fn wait_for_a_tile(child: &mut Child, checkpoint: &Path) {
     let (mut last, mut grown) = (0, 0);
     loop {
@@ -305,7 +305,7 @@ fn a_killed_recovery_resumes_and_mismatches_are_named() {
     let crc = crc32c::crc32c(&other[prior..prior + 8]);
     let crc = crc32c::crc32c_append(crc, &other[prior + 12..prior + 12 + length]);
     other[prior + 8..prior + 12].copy_from_slice(&crc.to_le_bytes());
-    // A damaged run key: its number, its length, and its content.
+    // A damaged checkpoint key: its number, its length, and its content.
     let damaged = [(8, 1), (14, 0x80), (15, 0x80), (20, 1)].map(|(at, bit)| {
         let mut damaged = kept.clone();
         damaged[at] ^= bit;

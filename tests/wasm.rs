@@ -11,14 +11,14 @@ mod common;
 use common::relit::{self, TileContents};
 use common::tiled;
 use js_sys::{Float32Array, Object, Reflect, Uint8ClampedArray};
-use relightable_photo::executor::SequentialExecutor;
 use relightable_photo::format::{
-    EncodedFile, EncoderInput, Limits, LtmReader, Metadata, RateTarget,
+    EncodedFile, EncoderInput, EncodingTarget, Limits, LtmReader, Metadata,
 };
+use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::relight::{self, BuiltinLight, Rgba8Picture, reference};
 use relightable_photo::transport::{Extent, Geometry, Tile, Transport};
 use relightable_photo::web::{
-    CodedError, Decoder, GraphicsDevice, Photo, Relighter, WebLight, WebOutputTransform,
+    CanvasRelighter, CodedError, Decoder, GraphicsDevice, Photo, WebLight, WebOutputTransform,
 };
 use wasm_bindgen::convert::TryFromJsValue;
 use wasm_bindgen::{JsCast, JsValue};
@@ -118,7 +118,7 @@ fn file(transport: &Transport, metadata: &Metadata) -> Vec<u8> {
         extensions: Vec::new(),
     };
     let mut bytes = Vec::new();
-    let file = EncodedFile::new(source, RateTarget::Lossless, &SequentialExecutor).unwrap();
+    let file = EncodedFile::new(source, EncodingTarget::Lossless, &SequentialExecutor).unwrap();
     file.write(&mut bytes).unwrap();
     bytes
 }
@@ -157,7 +157,7 @@ fn new_canvas() -> HtmlCanvasElement {
 
 /// A relighter, with the device that it needs.
 struct DeviceRelighter {
-    relighter: Relighter,
+    relighter: CanvasRelighter,
     _device: Option<GraphicsDevice>,
 }
 
@@ -193,10 +193,10 @@ async fn relighter_on(
     photo: &Photo,
     canvas: &HtmlCanvasElement,
     gamut: &str,
-) -> Result<Relighter, JsValue> {
+) -> Result<CanvasRelighter, JsValue> {
     let relighter = device.draw(photo, canvas.clone(), gamut.into());
     let relighter = JsFuture::from(relighter).await?;
-    Ok(Relighter::try_from_js_value(relighter).expect("a Relighter"))
+    Ok(CanvasRelighter::try_from_js_value(relighter).expect("a CanvasRelighter"))
 }
 
 async fn open_relighter(
@@ -207,7 +207,7 @@ async fn open_relighter(
     let device = open_device(backend).await;
     let relighter = match &device {
         Some(device) => relighter_on(device, photo, canvas, "srgb").await?,
-        None => Relighter::new(photo, canvas.clone(), "srgb")?,
+        None => CanvasRelighter::new(photo, canvas.clone(), "srgb")?,
     };
     Ok(DeviceRelighter {
         relighter,
@@ -654,7 +654,7 @@ async fn all_output_transforms_match_the_reference() {
             let (canvas, space) = (new_canvas(), gamut.color_space());
             let mut relighter = match &device {
                 Some(device) => relighter_on(device, &photo, &canvas, space).await.unwrap(),
-                None => Relighter::new(&photo, canvas.clone(), space).unwrap(),
+                None => CanvasRelighter::new(&photo, canvas.clone(), space).unwrap(),
             };
             assert_eq!(relighter.gamut(), space);
             let curves = [relight::ToneCurve::Clip, relight::ToneCurve::Filmic];

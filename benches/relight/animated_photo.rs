@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
-use relightable_photo::executor::{Executor, SequentialExecutor};
+use relightable_photo::job_executor::{Executor, SequentialExecutor};
 use relightable_photo::relight::cpu::CpuRelighter;
-use relightable_photo::relight::{Light, OutputTransform, Rgba8Picture, TorchPose};
-use relightable_photo::transport::{Extent, LightPx, Tile, Transport};
+use relightable_photo::relight::{Light, OutputTransform, Rgba8Picture, TorchSpot};
+use relightable_photo::transport::{Extent, LightPosition, Tile, Transport};
 
 use crate::synthetic_photo::{self, RayonExecutor, noise, square};
 
@@ -150,7 +150,7 @@ fn video(extent: Extent, frame: usize) -> Light {
 
 fn torch(extent: Extent, frame: usize) -> Light {
     let u = f64::from(extent.width) * (0.3 + 0.04 * frame as f64);
-    let pose = TorchPose::central(extent);
-    let centre = LightPx { u, ..pose.centre };
-    Light::torch(extent, TorchPose { centre, ..pose })
+    let pose = TorchSpot::central(extent);
+    let centre = LightPosition { u, ..pose.centre };
+    Light::torch(extent, TorchSpot { centre, ..pose })
 }

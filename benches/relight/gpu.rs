@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use pollster::block_on;
 use relightable_photo::relight::backend::FrameRequest;
-use relightable_photo::relight::webgpu::{Device, OffscreenRenderer};
+use relightable_photo::relight::webgpu::{GpuContext, HeadlessRenderer};
 use relightable_photo::relight::{Light, OutputTransform};
 
 use super::animated_photo::{self, LightSequence};
@@ -18,7 +18,7 @@ const COPY_BYTES: u64 = 256 << 20;
 /// Milliseconds of a frame, in the fastest of five runs of many frames: under a video, and of the last pass alone, which
 /// is all that a change of exposure needs.
 pub fn frames(figures: &mut Figures) {
-    let device = match block_on(Device::offscreen()) {
+    let device = match block_on(GpuContext::offscreen()) {
         Ok(device) => Rc::new(device),
         Err(error) => {
             println!("\nNo graphics device: {error}");
@@ -43,7 +43,7 @@ pub fn frames(figures: &mut Figures) {
     for side in SIDES {
         for rank in RANKS {
             let transport = animated_photo::transport(side, rank);
-            let photo = block_on(OffscreenRenderer::new(device.clone(), &transport));
+            let photo = block_on(HeadlessRenderer::new(device.clone(), &transport));
             let Ok(mut photo) = photo.inspect_err(|error| println!("{side}² rank {rank}: {error}"))
             else {
                 continue;
@@ -69,7 +69,7 @@ pub fn frames(figures: &mut Figures) {
     }
 }
 
-fn draw(photo: &mut OffscreenRenderer, light: &Light, exposure: f32) {
+fn draw(photo: &mut HeadlessRenderer, light: &Light, exposure: f32) {
     let frame = FrameRequest {
         light: Some(light),
         output: OutputTransform::srgb(exposure),
@@ -79,7 +79,7 @@ fn draw(photo: &mut OffscreenRenderer, light: &Light, exposure: f32) {
 }
 
 /// Seconds to copy [`COPY_BYTES`] within the device's memory, in the fastest of five runs.
-fn copy_seconds(device: &Device) -> f64 {
+fn copy_seconds(device: &GpuContext) -> f64 {
     const COPIES: u32 = 8;
     let (gpu, queue) = device.wgpu();
     let buffers = [(); 2].map(|()| {
@@ -105,7 +105,7 @@ fn copy_seconds(device: &Device) -> f64 {
 }
 
 /// Milliseconds of one of many consecutive frames.
-fn frame_ms(device: &Device, mut draw: impl FnMut(usize)) -> f64 {
+fn frame_ms(device: &GpuContext, mut draw: impl FnMut(usize)) -> f64 {
     let mut best = f64::INFINITY;
     // Counted on from run to run, so that even runs of a single frame draw different ones.
     let mut next = 0..;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use rayon::prelude::*;
-use relightable_photo::executor::SequentialExecutor;
+use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::relight::Light;
 use relightable_photo::relight::cpu::CpuRelighter;
 use relightable_photo::transport::{CHANNELS, Transport};

@@ -1,7 +1,7 @@
 //! Photographs with pseudo-random coefficients: the time of relighting does not depend on their values.
 
 use rayon::prelude::*;
-use relightable_photo::executor::Executor;
+use relightable_photo::job_executor::Executor;
 use relightable_photo::transport::{
     Basis, CHANNELS, Correspondence, Extent, FloatTile, Geometry, TEXEL_COMPONENTS, TexelCodes,
     Window,

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use fuzzing::choices::Choices;
 use fuzzing::source::ArbitraryInput;
-use relightable_photo::executor::SequentialExecutor;
-use relightable_photo::format::{Metadata, RateTarget};
+use relightable_photo::job_executor::SequentialExecutor;
+use relightable_photo::format::{Metadata, EncodingTarget};
 use relightable_photo::transport::{
     Basis, Correspondence, Decibels, Extent, FloatTile, Geometry, Window,
 };
@@ -59,12 +59,12 @@ fn input(rank: usize) -> ArbitraryInput {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("seeds");
-    let snr = RateTarget::Snr(Decibels(20.0));
+    let snr = EncodingTarget::Snr(Decibels(20.0));
     for (name, rank, quality) in [
         ("transform", 3, snr),
-        ("halves", 2, RateTarget::Lossless),
+        ("halves", 2, EncodingTarget::Lossless),
         ("direct", 0, snr),
-        ("direct-halves", 0, RateTarget::Lossless),
+        ("direct-halves", 0, EncodingTarget::Lossless),
     ] {
         let file = input(rank).encode(quality, &SequentialExecutor)?;
         let mut bytes = Vec::new();

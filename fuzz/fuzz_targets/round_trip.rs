@@ -5,7 +5,7 @@ use fuzzing::choices::Choices;
 use fuzzing::source::{ArbitraryInput, ReversedExecutor, TargetChoice};
 use fuzzing::{reading, seal};
 use libfuzzer_sys::fuzz_target;
-use relightable_photo::format::{EncodedFile, FormatError, RateTarget};
+use relightable_photo::format::{EncodedFile, FormatError, EncodingTarget};
 
 fuzz_target!(|data: &[u8]| {
     let mut choices = Choices(data);
@@ -46,7 +46,7 @@ fuzz_target!(|data: &[u8]| {
         assert!(!scan.snr.0.is_nan(), "scan {s} of {input:?}, {target:?}");
     }
     if encodes_again && let TargetChoice::Snr(snr) = target {
-        let again = input.encode(RateTarget::Snr(snr), &ReversedExecutor);
+        let again = input.encode(EncodingTarget::Snr(snr), &ReversedExecutor);
         assert!(again.is_ok_and(|again| bytes(&again) == file));
     }
     if input.is_moderate && input.has_all_windows_on_plane() {

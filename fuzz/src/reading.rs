@@ -2,7 +2,7 @@
 
 use relightable_photo::format::{
     self, ChunkSelection, FIRST_BYTES, FileIndex, FormatError, HEADER_BYTES, Limits, LtmReader,
-    MetadataJson,
+    MetadataText,
 };
 use relightable_photo::transport::{CHANNELS, Decibels, Tile, Transport};
 
@@ -18,7 +18,7 @@ pub const LIMITS: Limits = Limits {
 const UNCOUNTED_BYTES: usize = 64 << 10;
 
 /// The result of reading a file.
-pub type Read = Result<(Transport, MetadataJson), FormatError>;
+pub type Read = Result<(Transport, MetadataText), FormatError>;
 
 /// Reads the whole file in one piece.
 pub fn whole(file: &[u8]) -> Read {

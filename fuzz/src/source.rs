@@ -2,12 +2,12 @@
 
 use std::ops::RangeInclusive;
 
-use relightable_photo::executor::{Executor, SequentialExecutor};
+use relightable_photo::job_executor::{Executor, SequentialExecutor};
 use relightable_photo::format::{
-    DistortionMetric, EncodedFile, EncoderInput, Extension, FormatError, Metadata, RateTarget,
+    DistortionMetric, EncodedFile, EncoderInput, FormatExtension, FormatError, Metadata, EncodingTarget,
 };
 use relightable_photo::transport::{
-    Basis, CHANNELS, Correspondence, Decibels, Extent, FloatTile, Geometry, TileFunctions,
+    Basis, CHANNELS, Correspondence, Decibels, Extent, FloatTile, Geometry, TileTransportFunctions,
     TileRect, Window,
 };
 
@@ -72,7 +72,7 @@ pub struct ArbitraryInput {
     pub basis: Option<Basis>,
     pub tiles: Vec<FloatTile>,
     pub metadata: Metadata,
-    pub extensions: Vec<Extension>,
+    pub extensions: Vec<FormatExtension>,
     /// Whether all values are 0 or of moderate magnitude, and not all 0.
     pub is_moderate: bool,
 }
@@ -117,7 +117,7 @@ impl ArbitraryInput {
             input.metadata.shots_used = vec![choices.u32() as usize; choices.byte().into()];
         }
         if choices.chance(32) {
-            input.extensions.push(Extension {
+            input.extensions.push(FormatExtension {
                 tag: choices.bytes(),
                 must_understand: false,
                 data: choices.fill(3),
@@ -204,7 +204,7 @@ impl ArbitraryInput {
 
     pub fn encode(
         &self,
-        target: RateTarget<'_>,
+        target: EncodingTarget<'_>,
         executor: &impl Executor,
     ) -> Result<EncodedFile, FormatError> {
         let source = EncoderInput {
@@ -218,7 +218,7 @@ impl ArbitraryInput {
     }
 
     /// Light transport functions of tile `i`.
-    pub fn functions(&self, i: usize) -> TileFunctions {
+    pub fn functions(&self, i: usize) -> TileTransportFunctions {
         self.tiles[i].functions(&self.geometry, self.basis.as_ref())
     }
 
@@ -292,10 +292,10 @@ impl TargetChoice {
             calls: std::sync::atomic::AtomicUsize::new(0),
         };
         let target = match self {
-            Self::Snr(snr) => RateTarget::Snr(snr),
-            Self::Bytes(limit) => RateTarget::Bytes(limit),
-            Self::Lossless => RateTarget::Lossless,
-            Self::Loss(limit) => RateTarget::Loss(limit, &metric),
+            Self::Snr(snr) => EncodingTarget::Snr(snr),
+            Self::Bytes(limit) => EncodingTarget::Bytes(limit),
+            Self::Lossless => EncodingTarget::Lossless,
+            Self::Loss(limit) => EncodingTarget::Loss(limit, &metric),
         };
         input.encode(target, &SequentialExecutor)
     }
@@ -314,7 +314,7 @@ impl DistortionMetric for ArbitraryMetric<'_> {
         tiles.take(3).cloned().collect()
     }
 
-    fn loss(&self, functions: &[TileFunctions]) -> Decibels {
+    fn loss(&self, functions: &[TileTransportFunctions]) -> Decibels {
         for (functions, tile) in functions.iter().zip(self.tiles()) {
             assert_eq!(functions.rect, tile.rect);
             let area = self.input.geometry.window.area();

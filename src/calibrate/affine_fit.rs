@@ -4,12 +4,12 @@
 //! weights).
 
 use crate::linalg;
-use crate::transport::CameraPx;
+use crate::transport::CameraPixel;
 
 /// The decoded position of one camera pixel along one axis.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct DecodedPosition {
-    pub pixel: CameraPx,
+pub(super) struct GrayCodePosition {
+    pub pixel: CameraPixel,
     /// Centre of the range of light elements it was decoded to.
     pub position: f64,
     /// Width of that range, in light elements.
@@ -23,9 +23,9 @@ const REWEIGHTING_ROUNDS: usize = 10;
 const MIN_PIVOT_RATIO: f64 = 1e-12;
 
 /// The row `a`; `None` if the pixels lie on one line.
-pub(super) fn fit_affine_row(pixels: &[DecodedPosition]) -> Option<[f64; 3]> {
-    let row = |p: &DecodedPosition| [f64::from(p.pixel.x) + 0.5, f64::from(p.pixel.y) + 0.5, 1.0];
-    let precision = |p: &DecodedPosition| 1.0 / (p.width * p.width);
+pub(super) fn fit_affine_row(pixels: &[GrayCodePosition]) -> Option<[f64; 3]> {
+    let row = |p: &GrayCodePosition| [f64::from(p.pixel.x) + 0.5, f64::from(p.pixel.y) + 0.5, 1.0];
+    let precision = |p: &GrayCodePosition| 1.0 / (p.width * p.width);
     let mut weights: Vec<f64> = pixels.iter().map(precision).collect();
     let mut solution = [0.0; 3];
     for _ in 0..REWEIGHTING_ROUNDS {

@@ -7,8 +7,8 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::affine_fit::{DecodedPosition, fit_affine_row};
-use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent};
+use super::affine_fit::{GrayCodePosition, fit_affine_row};
+use crate::transport::{CHANNELS, CameraPixel, Correspondence, Extent};
 
 /// Least contrast `|p − n| / (p + n)` of a clear bit. Scattering lowers the contrast; at the edge of a stripe it passes
 /// through zero, and noise would decide.
@@ -101,7 +101,7 @@ impl GrayCodePhotos {
 }
 
 /// Positions along one axis of the pixels with at least half of their bits clear.
-fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<DecodedPosition> {
+fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<GrayCodePosition> {
     let pixels = rows.len() * width as usize;
     // A saturated sample is at least white, which is 1.
     let value = |v: &f32| if v.is_nan() { 1.0 } else { *v };
@@ -130,8 +130,8 @@ fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<DecodedPosition> {
         (2 * clear >= bits.len() && clear > 0).then(|| {
             let range = f64::from(1u32 << unclear.min(31));
             let (x, y) = (n as u32 % width, rows[n / width as usize]);
-            DecodedPosition {
-                pixel: CameraPx { x, y },
+            GrayCodePosition {
+                pixel: CameraPixel { x, y },
                 position: (f64::from(code) + 0.5) * range,
                 width: range,
             }
@@ -151,7 +151,7 @@ mod tests {
             let bit = |b: u32| {
                 let brightness = |n: usize| -> f32 {
                     let (x, y) = (n as u32 % camera.width, n as u32 / camera.width);
-                    let at = map.at(CameraPx { x, y });
+                    let at = map.at(CameraPixel { x, y });
                     let centre = if along == LightPlaneAxis::X {
                         at.u
                     } else {
@@ -185,8 +185,8 @@ mod tests {
         let affine = [[0.5, 0.02, 1.3], [-0.03, 0.45, 4.0]];
         for blur in [0.0, 0.8, 2.0] {
             let found = photograph(camera, affine, 5, blur).correspondence(camera);
-            let found = Correspondence::at(&found.unwrap(), CameraPx { x: 50, y: 5 });
-            let truth = Correspondence { affine }.at(CameraPx { x: 50, y: 5 });
+            let found = Correspondence::at(&found.unwrap(), CameraPixel { x: 50, y: 5 });
+            let truth = Correspondence { affine }.at(CameraPixel { x: 50, y: 5 });
             let apart = (found.u - truth.u).hypot(found.v - truth.v);
             assert!(apart < 0.1, "blur {blur}: {apart} elements off");
         }

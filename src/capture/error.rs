@@ -19,11 +19,11 @@ pub struct CaptureError {
     /// The field of the manifest that names the file, if any.
     pub field: Option<String>,
     /// The problem of the file.
-    pub problem: CaptureProblem,
+    pub problem: CaptureErrorKind,
 }
 
 impl CaptureError {
-    pub(super) fn new(path: impl Into<PathBuf>, problem: CaptureProblem) -> Self {
+    pub(super) fn new(path: impl Into<PathBuf>, problem: CaptureErrorKind) -> Self {
         Self {
             path: path.into(),
             field: None,
@@ -34,7 +34,7 @@ impl CaptureError {
 
 /// The problem of a file in a capture, or of a field of its manifest.
 #[derive(Debug, Error)]
-pub enum CaptureProblem {
+pub enum CaptureErrorKind {
     /// The path is no capture folder.
     #[error("{0}")]
     NotACapture(&'static str),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{CaptureError, CaptureProblem};
+use super::error::{CaptureError, CaptureErrorKind};
 use crate::calibrate::LightPlaneAxis;
 use crate::transport::{Correspondence, Extent, MAX_SIDE};
 
@@ -110,18 +110,18 @@ impl ManifestLight {
     }
 
     /// Exactly one of gamma and response must be given, and be usable.
-    fn check(&self) -> Result<(), CaptureProblem> {
+    fn check(&self) -> Result<(), CaptureErrorKind> {
         match (&self.response, self.gamma) {
-            (Some(_), Some(_)) => Err(CaptureProblem::ConflictingResponse),
+            (Some(_), Some(_)) => Err(CaptureErrorKind::ConflictingResponse),
             (Some(table), None) if !is_valid_response(table) => {
-                Err(CaptureProblem::InvalidResponse)
+                Err(CaptureErrorKind::InvalidResponse)
             }
             (Some(_), None) => Ok(()),
             (None, Some(gamma)) => {
                 let valid = (0.1..=10.0).contains(&gamma);
                 check_range(valid, "light.gamma", gamma, "between 0.1 and 10")
             }
-            (None, None) => Err(CaptureProblem::MissingResponse),
+            (None, None) => Err(CaptureErrorKind::MissingResponse),
         }
     }
 
@@ -157,7 +157,7 @@ impl Manifest {
     /// `path` and the field.
     pub fn parse(json: &str, path: &Path) -> Result<Self, CaptureError> {
         let error = |problem| CaptureError::new(path, problem);
-        let json_error = |reason| error(CaptureProblem::NotAManifest(reason));
+        let json_error = |reason| error(CaptureErrorKind::NotAManifest(reason));
         // The version first: another version may differ in any other field.
         #[derive(Deserialize)]
         struct VersionOnly {
@@ -165,7 +165,7 @@ impl Manifest {
         }
         let VersionOnly { version } = serde_json::from_str(json).map_err(json_error)?;
         if version != 1 {
-            return Err(error(CaptureProblem::UnknownVersion(version)));
+            return Err(error(CaptureErrorKind::UnknownVersion(version)));
         }
         let mut source = serde_json::Deserializer::from_str(json);
         let mut unknown = Vec::new();
@@ -174,7 +174,7 @@ impl Manifest {
         let parsed: Result<Self, _> = serde_path_to_error::deserialize(deserializer);
         let manifest = parsed.map_err(|e| match e.path().to_string() {
             field if e.path().iter().next().is_some() => {
-                error(CaptureProblem::FieldType(field, e.into_inner()))
+                error(CaptureErrorKind::FieldType(field, e.into_inner()))
             }
             _ => json_error(e.into_inner()),
         })?;
@@ -187,7 +187,7 @@ impl Manifest {
     }
 
     /// Checks all values; the error is the problem of the first invalid field.
-    fn check(&self) -> Result<(), CaptureProblem> {
+    fn check(&self) -> Result<(), CaptureErrorKind> {
         let (light, camera) = (&self.light, &self.camera);
         for (field, side) in [
             ("light.width", light.width),
@@ -206,7 +206,7 @@ impl Manifest {
         check_range(valid, "camera.white", white, &allowed)?;
         light.check()?;
         if self.shots.is_empty() {
-            return Err(CaptureProblem::NoShots);
+            return Err(CaptureErrorKind::NoShots);
         }
         for (i, shot) in self.shots.iter().enumerate() {
             let exposure = shot.exposure.unwrap_or(1.0);
@@ -222,7 +222,7 @@ impl Manifest {
             let [[a, b, _], [c, d, _]] = affine;
             let finite = affine.iter().flatten().all(|x| x.is_finite());
             if !finite || a * d - b * c == 0.0 {
-                return Err(CaptureProblem::NotInvertible);
+                return Err(CaptureErrorKind::NotInvertible);
             }
         }
         Ok(())
@@ -234,10 +234,10 @@ fn check_range(
     field: &str,
     value: impl ToString,
     allowed: &str,
-) -> Result<(), CaptureProblem> {
+) -> Result<(), CaptureErrorKind> {
     match is_valid {
         true => Ok(()),
-        false => Err(CaptureProblem::OutOfRange {
+        false => Err(CaptureErrorKind::OutOfRange {
             field: field.to_owned(),
             value: value.to_string(),
             allowed: allowed.to_owned(),
@@ -285,8 +285,8 @@ mod tests {
     #[test]
     fn errors_name_the_file_and_the_field() {
         assert_eq!(manifest(|_| {}).unwrap().unknown, ["someday"]);
-        type Edit = fn(&mut serde_json::Value);
-        let cases: [(Edit, &str); 12] = [
+        type ManifestEdit = fn(&mut serde_json::Value);
+        let cases: [(ManifestEdit, &str); 12] = [
             (
                 |j| {
                     j["graycode"] = serde_json::json!([{"photo": "g", "axis": "z", "bit": 0, "inverted": false}])
@@ -332,7 +332,7 @@ mod tests {
             assert!(message.contains("x/capture.json"), "{message}");
         }
         let missing = manifest(|j| j["camera"] = serde_json::json!({"width": 8}));
-        let CaptureProblem::FieldType(field, reason) = missing.unwrap_err().problem else {
+        let CaptureErrorKind::FieldType(field, reason) = missing.unwrap_err().problem else {
             panic!("a different error")
         };
         assert_eq!(field, "camera");

@@ -3,9 +3,9 @@
 
 use std::ops::Range;
 
+use super::camera_row_set::CameraRowSet;
 use super::noise_model::NoiseModel;
-use super::row_set::RowSet;
-use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent, TileRect};
+use crate::transport::{CHANNELS, CameraPixel, Correspondence, Extent, TileRect};
 
 /// The emission of each light element during one shot, `[M]`, row by row.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,7 +54,7 @@ pub struct Measurements {
     /// For each pattern the measurement at which a sample saturates: 1 / exposure.
     pub full_scale: Vec<f32>,
     /// The loaded camera rows.
-    pub rows: RowSet,
+    pub rows: CameraRowSet,
     /// These rows of the `L` photographs.
     pub photos: Vec<LinearPhoto>,
     /// Variance of the samples.
@@ -76,20 +76,20 @@ impl Measurements {
     }
 
     /// Channel `c` of a pixel under pattern `l`; NaN if saturated or not loaded.
-    pub fn sample(&self, l: usize, pixel: CameraPx, c: usize) -> f64 {
+    pub fn sample(&self, l: usize, pixel: CameraPixel, c: usize) -> f64 {
         let pixel = self.pixel_index(pixel).map(|n| self.photos[l][n]);
         pixel.map_or(f64::NAN, |sample| f64::from(sample[c]))
     }
 
     /// Index of a pixel in `photos`, if its row is loaded.
-    pub fn pixel_index(&self, pixel: CameraPx) -> Option<usize> {
+    pub fn pixel_index(&self, pixel: CameraPixel) -> Option<usize> {
         let row = self.rows.index_of(pixel.y)?;
         Some(row * self.camera.width as usize + pixel.x as usize)
     }
 
     /// Unloads all rows and frees their memory.
     pub fn clear_rows(&mut self) {
-        self.rows = RowSet::from_strips([]);
+        self.rows = CameraRowSet::from_strips([]);
         self.photos.fill(LinearPhoto::new());
     }
 
@@ -114,7 +114,7 @@ impl Measurements {
 
     /// Number of pixels of a tile with fewer than `min_samples` unsaturated samples in some channel.
     pub fn count_overexposed_pixels(&self, rect: TileRect, min_samples: usize) -> usize {
-        let is_overexposed = |pixel: &CameraPx| {
+        let is_overexposed = |pixel: &CameraPixel| {
             (0..CHANNELS).any(|c| {
                 let samples = (0..self.photos.len()).map(|l| self.sample(l, *pixel, c));
                 samples.filter(|y| !y.is_nan()).count() < min_samples

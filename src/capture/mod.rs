@@ -5,8 +5,9 @@
 //! `(code − black) / (white − black)`.
 //!
 //! Reading files needs the feature `capture`. Photographs are read row by row from the top, so that captures larger
-//! than memory can be recovered strip by strip ([`RowSet`]).
+//! than memory can be recovered strip by strip ([`CameraRowSet`]).
 
+mod camera_row_set;
 mod error;
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
 mod folder;
@@ -15,13 +16,12 @@ mod manifest;
 mod measurements;
 mod noise_estimate;
 mod noise_model;
-mod row_set;
 
-pub use error::{CaptureError, CaptureProblem, MANIFEST_NAME};
+pub use camera_row_set::CameraRowSet;
+pub use error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
-pub use folder::{CameraRowReader, CaptureFolder, DarkFrame, GroundTruth, RELIT_FULL_SCALE};
+pub use folder::{CaptureFolder, DarkFrame, GroundTruth, PhotographRowReader, RELIT_FULL_SCALE};
 pub(crate) use group_ids::{group_count, group_ids};
 pub use manifest::{GrayCodeShot, Manifest, ManifestCamera, ManifestLight, Shot};
 pub use measurements::{LinearPhoto, Measurements, Pattern};
 pub use noise_model::NoiseModel;
-pub use row_set::RowSet;

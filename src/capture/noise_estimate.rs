@@ -8,7 +8,7 @@
 use super::measurements::Measurements;
 use super::noise_model::{NoiseModel, quantile};
 use crate::linalg::{mirror_upper, symmetric_eigen};
-use crate::transport::{CHANNELS, CameraPx};
+use crate::transport::{CHANNELS, CameraPixel};
 
 /// Camera pixels along a side of a block. At two pixels a light element, signal then takes a minority of the ranks.
 const BLOCK_SIDE: u32 = 3;
@@ -38,7 +38,7 @@ impl NoiseModel {
 }
 
 /// The samples of a square of camera pixels in all shots in which none of them is saturated.
-struct NoiseBlock {
+struct NoiseEstimationPatch {
     /// `[shots, p]`, scaled by the square root of the exposure.
     samples: Vec<f64>,
     /// Square root of each shot's exposure.
@@ -50,7 +50,7 @@ struct NoiseBlock {
 }
 
 /// At most [`MAX_BLOCKS`] blocks, spread evenly over the loaded rows.
-fn blocks(measurements: &Measurements) -> Vec<NoiseBlock> {
+fn blocks(measurements: &Measurements) -> Vec<NoiseEstimationPatch> {
     let columns = measurements.camera.width / BLOCK_SIDE;
     let strips = measurements.rows.strips().iter();
     let tops: Vec<u32> = strips
@@ -67,11 +67,11 @@ fn blocks(measurements: &Measurements) -> Vec<NoiseBlock> {
         let column = (i as u32 % columns + row * 7) % columns;
         (column * BLOCK_SIDE, tops[row as usize])
     });
-    let blocks = positions.filter_map(|(x, y)| NoiseBlock::at(measurements, x, y));
+    let blocks = positions.filter_map(|(x, y)| NoiseEstimationPatch::at(measurements, x, y));
     blocks.collect()
 }
 
-impl NoiseBlock {
+impl NoiseEstimationPatch {
     /// The block with `(x, y)` at its top left; `None` if it is saturated too often.
     fn at(measurements: &Measurements, x: u32, y: u32) -> Option<Self> {
         let mut block = Self {
@@ -84,7 +84,7 @@ impl NoiseBlock {
             let mut samples = [0.0; BLOCK_SERIES];
             for (j, sample) in samples.iter_mut().enumerate() {
                 let (pixel, c) = (j as u32 / CHANNELS as u32, j % CHANNELS);
-                let pixel = CameraPx {
+                let pixel = CameraPixel {
                     x: x + pixel % BLOCK_SIDE,
                     y: y + pixel / BLOCK_SIDE,
                 };
@@ -173,7 +173,7 @@ fn channel_mean(values: &[f64; BLOCK_SERIES], c: usize) -> f64 {
 
 /// The gain by channel. Samples are weighted by the `last` estimate, or at first by their measurement.
 fn estimate_gain(
-    blocks: &[NoiseBlock],
+    blocks: &[NoiseEstimationPatch],
     floor: [f64; CHANNELS],
     last: Option<NoiseModel>,
 ) -> [f64; CHANNELS] {
@@ -215,9 +215,9 @@ fn estimate_gain(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::{LinearPhoto, Pattern, RowSet};
+    use crate::capture::{CameraRowSet, LinearPhoto, Pattern};
     use crate::simulate::{
-        Camera, PatternEnsemble, PatternImage, PatternMatrix, RandomStreamId, SceneKind,
+        Camera, EmissionMatrix, PatternEnsemble, PatternImage, RandomStreamId, SceneKind,
     };
     use crate::transport::{Extent, TileRect};
 
@@ -243,7 +243,7 @@ mod tests {
         });
         let exposure = |i: usize| if i % 3 == 2 { 2.0 } else { 1.0 };
         let linear = |code: u16| (f64::from(code) - 512.0) / (60_000.0 - 512.0);
-        let exposed = PatternMatrix::new(light, &lights).pictures(scene.geometry(), &functions);
+        let exposed = EmissionMatrix::new(light, &lights).pictures(scene.geometry(), &functions);
         let mut photos = exposed.iter().enumerate().map(|(i, photo)| -> LinearPhoto {
             let exposed: LinearPhoto = photo
                 .iter()
@@ -276,7 +276,7 @@ mod tests {
             full_scale: (1..=patterns as usize)
                 .map(|i| exposure(i).recip() as f32)
                 .collect(),
-            rows: RowSet::all(camera.height),
+            rows: CameraRowSet::all(camera.height),
             photos: photos.map(less_dark).collect(),
             noise,
         }

@@ -5,7 +5,7 @@ use std::error::Error;
 use anyhow::Error as AnyError;
 
 use crate::calibrate::CalibrationError;
-use crate::capture::{CaptureError, CaptureProblem};
+use crate::capture::{CaptureError, CaptureErrorKind};
 use crate::recover::RecoverError;
 
 /// The text of `error` and its causes, followed by the remedy if there is one.
@@ -29,22 +29,22 @@ fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
     })
 }
 
-fn capture_remedy(is_named: bool, problem: &CaptureProblem) -> Option<&'static str> {
+fn capture_remedy(is_named: bool, problem: &CaptureErrorKind) -> Option<&'static str> {
     Some(match problem {
-        CaptureProblem::Missing if is_named => "add it or correct its name",
-        CaptureProblem::NotACapture(_) => "give the folder that holds capture.json",
-        CaptureProblem::UnknownVersion(_) => "get a newer program",
-        CaptureProblem::MissingResponse => {
+        CaptureErrorKind::Missing if is_named => "add it or correct its name",
+        CaptureErrorKind::NotACapture(_) => "give the folder that holds capture.json",
+        CaptureErrorKind::UnknownVersion(_) => "get a newer program",
+        CaptureErrorKind::MissingResponse => {
             "give the gamma of the monitor or projector, usually about 2.2, or its measured response"
         }
-        CaptureProblem::ConflictingResponse => "remove one of them",
-        CaptureProblem::NoShots => "list the patterns and their photographs",
-        CaptureProblem::MissingGrayCode { .. } => "add it, or give \"correspondence\"",
-        CaptureProblem::Unreadable(_) => "export or copy it again",
-        CaptureProblem::WrongExtent { .. } => "correct one of them",
-        CaptureProblem::PhotoType(_) => "export it again from raw",
-        CaptureProblem::PatternType(_) => "convert it",
-        CaptureProblem::Interlaced => "save it without interlacing",
+        CaptureErrorKind::ConflictingResponse => "remove one of them",
+        CaptureErrorKind::NoShots => "list the patterns and their photographs",
+        CaptureErrorKind::MissingGrayCode { .. } => "add it, or give \"correspondence\"",
+        CaptureErrorKind::Unreadable(_) => "export or copy it again",
+        CaptureErrorKind::WrongExtent { .. } => "correct one of them",
+        CaptureErrorKind::PhotoType(_) => "export it again from raw",
+        CaptureErrorKind::PatternType(_) => "convert it",
+        CaptureErrorKind::Interlaced => "save it without interlacing",
         _ => return None,
     })
 }

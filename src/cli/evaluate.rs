@@ -11,9 +11,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::ltm_file::{PrefixLength, read_ltm};
-use super::process::AllCoresExecutor;
+use super::process_resources::AllCoresExecutor;
 use super::report::{format_bytes, print_json, print_line};
-use crate::capture::{CameraRowReader, CaptureFolder, GroundTruth, LinearPhoto, RowSet};
+use crate::capture::{CameraRowSet, CaptureFolder, GroundTruth, LinearPhoto, PhotographRowReader};
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{BuiltinLight, Light};
 use crate::study::{CaptureTruth, psnr, transport_error};
@@ -167,12 +167,12 @@ fn add_error(
     errors: &mut [SnrAccumulator; CHANNELS],
     relighter: &mut CpuRelighter,
     light: &Light,
-    mut reader: CameraRowReader,
+    mut reader: PhotographRowReader,
 ) -> Result<()> {
     relighter.relight(light, &AllCoresExecutor);
     let picture = relighter.linear();
     let mut photo = LinearPhoto::new();
-    reader.read(&RowSet::all(picture.extent.height), &mut photo)?;
+    reader.read(&CameraRowSet::all(picture.extent.height), &mut photo)?;
     reader.finish()?;
     for (predicted, measured) in picture.pixels.iter().zip(&photo) {
         for c in 0..CHANNELS {

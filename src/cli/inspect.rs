@@ -105,8 +105,8 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         );
     } else if length > declared {
         eprintln!(
-            "warning: {name}: has {length} bytes, but the photograph ends after {declared}; the rest is \
-             ignored"
+            "warning: {name}: goes on after its end at byte {declared}, to {length} bytes; other commands and \
+             the element refuse it: copy or export it again"
         );
     }
     let geometry = &index.header.geometry;

@@ -7,14 +7,14 @@ mod advice;
 mod evaluate;
 mod inspect;
 mod ltm_file;
+mod measurement_reader;
 mod output_file;
 mod output_folder;
-mod process;
+mod process_resources;
 mod progress;
 mod recover;
 mod relight;
 mod report;
-mod shot_reader;
 mod simulate;
 mod study;
 mod value_parsers;
@@ -58,9 +58,9 @@ pub fn main() -> ExitCode {
     let Err(error) = result else {
         return ExitCode::SUCCESS;
     };
-    if error.is::<process::Interrupted>() {
+    if error.is::<process_resources::Interrupted>() {
         eprintln!("{error:#}");
-        return ExitCode::from(process::INTERRUPTED_STATUS);
+        return ExitCode::from(process_resources::INTERRUPTED_STATUS);
     }
     eprintln!("error: {}", advice::error_with_remedy(&error));
     match error.is::<value_parsers::UsageError>() {

@@ -27,7 +27,7 @@ pub fn temporary_beside(path: &Path, mode: u32) -> (tempfile::Builder<'static, '
 }
 
 #[derive(Debug)]
-pub struct FileFormat {
+pub struct FileSignature {
     /// With its article.
     name: &'static str,
     /// The extension that paths must have if they have one.
@@ -36,19 +36,19 @@ pub struct FileFormat {
     signature: &'static [(usize, &'static [u8])],
 }
 
-pub const LTM: FileFormat = FileFormat {
+pub const LTM: FileSignature = FileSignature {
     name: "an .ltm file",
     extension: None,
     signature: &[(0, b"\xABLTM")],
 };
 /// A picture: an 8-bit RGB PNG. Photographs have 16 bits.
-pub const PNG: FileFormat = FileFormat {
+pub const PNG: FileSignature = FileSignature {
     name: "a PNG",
     extension: Some("png"),
     signature: &[(0, b"\x89PNG"), (24, &[8, 2])],
 };
 
-impl FileFormat {
+impl FileSignature {
     /// Whether `path` is free, empty, or holds a file of this format as this program writes it.
     fn may_replace(&self, path: &Path) -> io::Result<bool> {
         let file = match File::open(path) {
@@ -75,7 +75,7 @@ pub struct OutputFile {
 
 impl OutputFile {
     /// Creates the temporary file, so that a path that cannot be written fails before the work is done.
-    pub fn create(path: &Path, format: &FileFormat) -> Result<Self> {
+    pub fn create(path: &Path, format: &FileSignature) -> Result<Self> {
         let name = format.name;
         let create = || -> Result<NamedTempFile> {
             ensure!(

@@ -11,11 +11,11 @@ use image::{ExtendedColorType, ImageEncoder, ImageReader};
 
 use super::ltm_file::{PrefixLength, read_ltm};
 use super::output_file::{OutputFile, PNG};
-use super::process::AllCoresExecutor;
+use super::process_resources::AllCoresExecutor;
 use super::value_parsers::{UsageError, parse_number};
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{
-    BuiltinLight, Light, OutputTransform, TorchPose, area_resample, reference, srgb,
+    BuiltinLight, Light, OutputTransform, TorchSpot, area_resample, reference, srgb,
 };
 use crate::transport::Extent;
 
@@ -42,15 +42,15 @@ pub struct RelightArgs {
     #[arg(long, value_name = "BYTES|PERCENT", value_parser = PrefixLength::parse)]
     first: Option<PrefixLength>,
     /// Implementation that computes the picture
-    #[arg(long, value_enum, default_value_t = CliBackend::Cpu)]
-    backend: CliBackend,
+    #[arg(long, value_enum, default_value_t = RelightImplementation::Cpu)]
+    backend: RelightImplementation,
     /// PNG to write
     #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum CliBackend {
+enum RelightImplementation {
     /// Single precision, fast
     Cpu,
     /// Double precision, by the definition; slow
@@ -88,18 +88,18 @@ pub fn run(args: &RelightArgs) -> Result<()> {
     }
     let geometry = &file.index.header.geometry;
     let light = match (args.at, args.time) {
-        (Some([x, y]), _) => Light::torch(geometry.light, TorchPose::behind(geometry, x, y)),
+        (Some([x, y]), _) => Light::torch(geometry.light, TorchSpot::behind(geometry, x, y)),
         (None, Some(seconds)) => Light::fire(geometry.light, seconds),
         (None, None) => load_light(&args.light, geometry.light)?,
     };
     let transform = OutputTransform::srgb(args.exposure);
     let picture = match args.backend {
-        CliBackend::Cpu => {
+        RelightImplementation::Cpu => {
             let mut relighter = CpuRelighter::new(Arc::new(file.transport));
             relighter.relight(&light, &AllCoresExecutor);
             relighter.picture(&transform, &AllCoresExecutor)
         }
-        CliBackend::Reference => reference::picture(&file.transport, &light, &transform),
+        RelightImplementation::Reference => reference::picture(&file.transport, &light, &transform),
     };
     let rgba = picture.pixels.iter();
     let rgb: Vec<u8> = rgba.flat_map(|p| [p[0], p[1], p[2]]).collect();

@@ -19,10 +19,10 @@ use crate::capture::{
     GrayCodeShot, MANIFEST_NAME, Manifest, ManifestCamera, ManifestLight, RELIT_FULL_SCALE, Shot,
 };
 use crate::simulate::{
-    Camera, GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage, PatternMatrix,
+    Camera, EmissionMatrix, GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage,
     RandomStreamId, SceneKind, SimulatedScene, truth_lights,
 };
-use crate::transport::{CHANNELS, CameraPx, Extent, TileFunctions, TileRect};
+use crate::transport::{CHANNELS, CameraPixel, Extent, TileRect, TileTransportFunctions};
 
 /// Camera rows whose transport is computed as one job.
 const STRIP_ROWS: u32 = 4;
@@ -108,11 +108,11 @@ struct SimulationPlan<'a> {
     manifest: Manifest,
     lights: Vec<PatternImage>,
     /// One for each light.
-    pictures: Vec<PictureFiles>,
+    pictures: Vec<SimulatedPictureFiles>,
 }
 
 /// The files to write of the object under one light.
-struct PictureFiles {
+struct SimulatedPictureFiles {
     /// The true picture under a truth light, or else a photograph with noise.
     picture: String,
     is_true: bool,
@@ -178,7 +178,7 @@ impl<'a> SimulationPlan<'a> {
         }
         for (name, codes) in truth_lights(args.light) {
             plan.lights.push(codes);
-            plan.pictures.push(PictureFiles {
+            plan.pictures.push(SimulatedPictureFiles {
                 picture: format!("truth/relit_{name}.png"),
                 is_true: true,
                 codes: Some(format!("truth/light_{name}.png")),
@@ -189,7 +189,7 @@ impl<'a> SimulationPlan<'a> {
 
     fn photograph(&mut self, light: PatternImage, picture: String, codes: Option<String>) {
         self.lights.push(light);
-        self.pictures.push(PictureFiles {
+        self.pictures.push(SimulatedPictureFiles {
             picture,
             is_true: false,
             codes,
@@ -241,7 +241,7 @@ fn write(plan: &SimulationPlan, root: &Path) -> Result<()> {
 fn write_transport(plan: &SimulationPlan, truth: &Path) -> Result<Vec<Vec<[f32; CHANNELS]>>> {
     let geometry = plan.scene.geometry();
     let (camera, side) = (geometry.camera, u64::from(geometry.window.side()));
-    let emissions = PatternMatrix::new(geometry.light, &plan.lights);
+    let emissions = EmissionMatrix::new(geometry.light, &plan.lights);
     let mut pictures = vec![Vec::with_capacity(camera.area()); plan.lights.len()];
     let n = camera.area() as u64;
     let tau_shape = [n, side, side, CHANNELS as u64];
@@ -274,7 +274,7 @@ fn write_transport(plan: &SimulationPlan, truth: &Path) -> Result<Vec<Vec<[f32; 
     tau_file.finish().context(TAU_ERROR)?;
     let mut uv_file = create_npy::<f32>(&truth.join("uv.npy"), &[n, 2])?;
     let written = uv_file.extend(camera.cells().flat_map(|(x, y)| {
-        let at = geometry.correspondence.at(CameraPx { x, y });
+        let at = geometry.correspondence.at(CameraPixel { x, y });
         [at.u as f32, at.v as f32]
     }));
     written
@@ -285,7 +285,7 @@ fn write_transport(plan: &SimulationPlan, truth: &Path) -> Result<Vec<Vec<[f32; 
 
 /// Rounds τ to float16, the precision of `tau.npy`, so that the pictures follow exactly from the file. Returns the
 /// rounded values.
-fn round_to_f16(functions: &mut TileFunctions) -> Vec<f16> {
+fn round_to_f16(functions: &mut TileTransportFunctions) -> Vec<f16> {
     let round = |value: &mut f32| {
         let rounded = f16::from_f32(*value);
         *value = rounded.to_f32();

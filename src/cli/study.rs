@@ -6,15 +6,15 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 
+use super::measurement_reader::{MeasurementReader, read_patterns};
 use super::output_folder;
-use super::process::AllCoresExecutor;
-use super::shot_reader::{ShotReader, read_patterns};
-use crate::capture::{CaptureFolder, Measurements, RowSet};
+use super::process_resources::AllCoresExecutor;
+use crate::capture::{CameraRowSet, CaptureFolder, Measurements};
 use crate::relight::Light;
 use crate::simulate::{SceneKind, SimulatedScene, WINDOW_SIDE};
 use crate::study::{
-    self, CaptureTruth, EvaluationLight, KnownTransport, ProgressCallback, ReportSection,
-    SNR_PATTERNS, SimulatedCapture,
+    self, CaptureTruth, EvaluationLight, KnownTransport, ProgressLog, ReportSection, SNR_PATTERNS,
+    SimulatedCapture,
 };
 use crate::transport::Extent;
 
@@ -108,11 +108,11 @@ struct StudySubject<'a> {
     is_part: bool,
     name: String,
     pixels: usize,
-    progress: ProgressCallback<'a>,
+    progress: ProgressLog<'a>,
 }
 
 impl<'a> StudySubject<'a> {
-    fn new(path: &'a Path, pixels: usize, progress: ProgressCallback<'a>) -> Result<Self> {
+    fn new(path: &'a Path, pixels: usize, progress: ProgressLog<'a>) -> Result<Self> {
         let is_part = PARTS.iter().any(|part| Path::new(part) == path);
         let folder = match is_part {
             true => path.to_owned(),
@@ -220,10 +220,10 @@ fn simulated_capture(scene: &dyn SimulatedScene) -> SimulatedCapture<'_> {
 
 fn read_measurements(folder: &CaptureFolder) -> Result<Measurements> {
     let shots: Vec<usize> = (0..folder.manifest().shots.len()).collect();
-    let rows = RowSet::all(folder.manifest().camera.height);
+    let rows = CameraRowSet::all(folder.manifest().camera.height);
     let dark = folder.read_dark()?;
     let mut measurements = read_patterns(folder, &dark, &shots, &rows)?;
-    let reader = ShotReader::open(folder, &dark, &shots)?;
+    let reader = MeasurementReader::open(folder, &dark, &shots)?;
     reader.read_sample(&mut measurements, &rows, CORES)?;
     Ok(measurements)
 }

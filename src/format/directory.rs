@@ -5,7 +5,7 @@
 
 use super::chunk::{ChunkEntry, ChunkId};
 use super::codec::zstd_frame::compressed_bound;
-use super::codec::{basis_chunk, direct_functions, halves, tokens, transform};
+use super::codec::{basis_chunk, direct_functions, half_float_codec, tokens, transform};
 use super::constants::{CHUNK_ENTRY_BYTES, MAX_CONTENT_BYTES, SCAN_RECORD_BYTES};
 use super::error::FormatError;
 use super::header::Header;
@@ -83,7 +83,7 @@ fn decode_scans(
     let is_mixed = has(ScanCoding::Transform) && has(ScanCoding::Halves)
         || has(ScanCoding::Direct) && has(ScanCoding::DirectHalves);
     match is_mixed || known != usize::from(header.rank) {
-        true => Err(FormatError::InvalidScan(scans.len())),
+        true => Err(FormatError::InconsistentScans(header.rank)),
         false => Ok(scans),
     }
 }
@@ -123,7 +123,7 @@ fn is_valid_entry(scan: &ProgressiveScan, extent: Extent, entry: ChunkEntry) -> 
             (1, max_tokens, tokens::max_bytes(content))
         }
         ScanCoding::Halves | ScanCoding::DirectHalves => {
-            let exact = halves::content_bytes(values) as u64;
+            let exact = half_float_codec::content_bytes(values) as u64;
             (exact, exact, compressed_bound(content))
         }
     };

@@ -33,11 +33,26 @@ pub enum FormatError {
     /// The header has an invalid geometry.
     #[error("the header is invalid: {0}")]
     InvalidGeometry(GeometryError),
-    /// The directory has an invalid record of this scan; the number of scans if they are invalid together.
+    /// The directory has an invalid record of this scan.
     #[error(
         "the directory is invalid: scan {0} has an unknown coding, or components, a step or a length outside its range; export the file again"
     )]
     InvalidScan(usize),
+    /// The scans do not agree with each other or with the header.
+    #[error(
+        "the directory is invalid: its scans mix codings that exclude each other, or do not bring all {0} basis functions; export the file again"
+    )]
+    InconsistentScans(u16),
+    /// The header declares a file that is shorter than its own index.
+    #[error(
+        "the header is invalid: a file of {file_bytes} bytes cannot hold an index of {index_bytes}; export the file again"
+    )]
+    IndexBeyondEnd {
+        /// Length of the file in the header.
+        file_bytes: u64,
+        /// Length of the index by the header.
+        index_bytes: u64,
+    },
     /// The header declares more of something than this version allows.
     #[error("the file has {value} {quantity}, more than the {limit} allowed")]
     TooMany {
@@ -88,6 +103,16 @@ pub enum FormatError {
         need: u64,
         /// Bytes allowed.
         limit: u64,
+    },
+    /// A chunk that is checked by itself is longer than its entry says.
+    #[error("the {chunk} has {got} bytes, not {expected}; copy or export the file again")]
+    ChunkLength {
+        /// The chunk.
+        chunk: ChunkId,
+        /// Its length.
+        got: u64,
+        /// Its length by the directory.
+        expected: u64,
     },
     /// The system refuses so many bytes of memory.
     #[error(

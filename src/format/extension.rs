@@ -11,7 +11,7 @@ const MUST_UNDERSTAND: u32 = 1;
 
 /// A named block of data. This version knows none; it keeps those that a reader may ignore.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Extension {
+pub struct FormatExtension {
     /// Its name: four ASCII characters.
     pub tag: [u8; 4],
     /// Whether a reader that does not know it has to refuse the file.
@@ -21,7 +21,7 @@ pub struct Extension {
 }
 
 /// The records of `extensions` one after another.
-pub(super) fn encode(extensions: &[Extension]) -> Vec<u8> {
+pub(super) fn encode(extensions: &[FormatExtension]) -> Vec<u8> {
     let mut bytes = Vec::new();
     for extension in extensions {
         let flags = u32::from(extension.must_understand) * MUST_UNDERSTAND;
@@ -33,7 +33,10 @@ pub(super) fn encode(extensions: &[Extension]) -> Vec<u8> {
     bytes
 }
 
-pub(super) fn decode(bytes: &[u8], budget: &MemoryBudget) -> Result<Vec<Extension>, FormatError> {
+pub(super) fn decode(
+    bytes: &[u8],
+    budget: &MemoryBudget,
+) -> Result<Vec<FormatExtension>, FormatError> {
     let cut = || FormatError::DamagedSection {
         section: SectionName::Extensions,
         reason: "the last one is cut".to_owned(),
@@ -47,7 +50,7 @@ pub(super) fn decode(bytes: &[u8], budget: &MemoryBudget) -> Result<Vec<Extensio
             return Err(FormatError::UnknownExtension(tag));
         }
         let data = fields.try_bytes(length as usize).ok_or_else(cut)?;
-        let extension = Extension {
+        let extension = FormatExtension {
             tag,
             must_understand: false,
             data: budget.try_copy(data)?,

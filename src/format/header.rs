@@ -129,11 +129,11 @@ impl Header {
                 });
             }
         }
-        let need = header.index_bytes();
-        match file_bytes < need {
-            true => Err(FormatError::Truncated {
-                got: file_bytes,
-                need,
+        let index_bytes = header.index_bytes();
+        match file_bytes < index_bytes {
+            true => Err(FormatError::IndexBeyondEnd {
+                file_bytes,
+                index_bytes,
             }),
             false => Ok(header),
         }

@@ -8,10 +8,10 @@ use super::codec::zstd_frame::{compress, decompress};
 use super::constants::HEADER_BYTES;
 use super::directory;
 use super::error::{FormatError, SectionName};
-use super::extension::{self, Extension};
+use super::extension::{self, FormatExtension};
 use super::header::{Header, SectionEntry};
 use super::memory_budget::MemoryBudget;
-use super::metadata::{Metadata, MetadataJson};
+use super::metadata::{Metadata, MetadataText};
 use super::scan::{ProgressiveScan, ScanCoding, rank_of};
 use crate::transport::Geometry;
 
@@ -23,9 +23,9 @@ pub struct FileIndex {
     /// The scans, in file order.
     pub scans: Vec<ProgressiveScan>,
     /// Extensions that readers may ignore.
-    pub extensions: Vec<Extension>,
+    pub extensions: Vec<FormatExtension>,
     /// Origin of the file.
-    pub metadata: MetadataJson,
+    pub metadata: MetadataText,
     /// `[scan, tile]`.
     entries: Vec<ChunkEntry>,
     /// Where each chunk begins, and where the last ends: of each scan the basis chunk, then a tile chunk for each tile.
@@ -60,7 +60,7 @@ impl FileIndex {
             scans,
             entries,
             extensions,
-            metadata: MetadataJson::decode(metadata, budget)?,
+            metadata: MetadataText::decode(metadata, budget)?,
         };
         let (end, file_bytes) = (index.offsets[index.offsets.len() - 1], header.file_bytes);
         match end == file_bytes {
@@ -74,12 +74,12 @@ impl FileIndex {
         geometry: Geometry,
         scans: Vec<ProgressiveScan>,
         entries: Vec<ChunkEntry>,
-        extensions: Vec<Extension>,
+        extensions: Vec<FormatExtension>,
         metadata: &Metadata,
     ) -> Result<(Self, Vec<u8>), FormatError> {
         let directory = compress(&directory::encode(&scans, &entries))?;
         let extension_bytes = extension::encode(&extensions);
-        let metadata = MetadataJson::encode(metadata)?;
+        let metadata = MetadataText::encode(metadata)?;
         let json = metadata.text().as_bytes();
         let mut header = Header {
             geometry,

@@ -30,7 +30,7 @@ pub struct Metadata {
     pub rights: String,
     /// How the object was captured.
     #[serde(deserialize_with = "object")]
-    pub capture: CaptureSummary,
+    pub capture: CaptureMetadata,
     /// Program and version that wrote the file.
     pub writer: String,
     /// Recovery method.
@@ -45,7 +45,7 @@ pub struct Metadata {
 /// How an object was captured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct CaptureSummary {
+pub struct CaptureMetadata {
     /// Number of different patterns.
     pub patterns: usize,
     /// Number of photographs that the recovery used.
@@ -54,9 +54,9 @@ pub struct CaptureSummary {
 
 /// The metadata's JSON text.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MetadataJson(String);
+pub struct MetadataText(String);
 
-impl MetadataJson {
+impl MetadataText {
     /// The JSON of `metadata`.
     pub(super) fn encode(metadata: &Metadata) -> Result<Self, FormatError> {
         let json = serde_json::to_string(metadata).map_err(invalid)?;
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn metadata_is_one_json_object_in_utf8() {
-        let decode = |bytes: &[u8]| MetadataJson::decode(bytes, &MemoryBudget::unlimited());
+        let decode = |bytes: &[u8]| MetadataText::decode(bytes, &MemoryBudget::unlimited());
         let json = decode(br#"{"title": "A", "other": ["B"]}"#).unwrap();
         let title = json.read().unwrap().title;
         assert_eq!(title, "A");

@@ -3,13 +3,13 @@
 use std::ops::Range;
 
 use super::constants::{FIRST_BYTES, HEADER_BYTES};
-use super::decoder_state::{ChunkSelection, DecoderState};
-use super::error::FormatError;
+use super::error::{FormatError, damaged};
 use super::header::{self, Header};
 use super::index::FileIndex;
-use super::memory;
 use super::memory_budget::{Limits, MemoryBudget};
-use super::metadata::MetadataJson;
+use super::memory_estimate;
+use super::metadata::MetadataText;
+use super::partial_file::{ChunkSelection, PartialFile};
 use crate::transport::Transport;
 
 /// An incremental reader. [`wants`](Self::wants) lists the byte ranges to fetch, and [`feed`](Self::feed) takes bytes
@@ -22,7 +22,8 @@ use crate::transport::Transport;
 ///  16 KiB               of the index          by scan; index()               scans; preview()     nothing; finish()
 ///
 ///  finish_early() gives the light transport of any state from CHUNKS on. After an error of feed the
-///  reader keeps the chunks that it has decoded.
+///  reader keeps the chunks that it has decoded. A chunk with a wrong checksum can be fed again. If a
+///  chunk does not decode, its tile is dark, later previews end before its scan, and finish() fails.
 /// ```
 ///
 /// All memory comes from one budget, [`Limits`]: a reader that exceeds it returns
@@ -35,11 +36,15 @@ use crate::transport::Transport;
 /// loop {
 ///     let wanted = reader.wants(&ChunkSelection::default());
 ///     let Some(range) = wanted.first() else { break };
-///     let end = file.len().min(range.end as usize);
-///     reader.feed(range.start, &file[range.start as usize..end])?;
+///     let (start, end) = (range.start as usize, file.len().min(range.end as usize));
+///     if start >= end {
+///         break; // the file is cut short, which `finish` reports
+///     }
+///     reader.feed(range.start, &file[start..end])?;
 /// }
 /// let (transport, metadata) = reader.finish()?;
 /// # Ok(()) }
+/// # assert!(matches!(open(b"\xABLTM 10"), Err(relightable_photo::format::FormatError::Truncated { .. })));
 /// ```
 #[derive(Debug)]
 pub struct LtmReader {
@@ -47,8 +52,9 @@ pub struct LtmReader {
     /// The first bytes of the index, until it is complete.
     gathered: Vec<u8>,
     header: Option<Header>,
-    state: Option<DecoderState>,
-    received_bytes: u64,
+    state: Option<PartialFile>,
+    /// Bytes of the index received.
+    received_index_bytes: u64,
 }
 
 /// How much of a file has been read.
@@ -72,7 +78,7 @@ impl LtmReader {
             gathered: Vec::new(),
             header: None,
             state: None,
-            received_bytes: 0,
+            received_index_bytes: 0,
         }
     }
 
@@ -92,10 +98,10 @@ impl LtmReader {
     pub fn progress(&self) -> ReadProgress {
         let state = self.state.as_ref();
         ReadProgress {
-            bytes: self.received_bytes,
+            bytes: self.received_bytes(),
             file_bytes: self.header.map(|header| header.file_bytes),
-            scans: state.map_or(0, DecoderState::complete_scans),
-            tiles: state.map_or(0, DecoderState::complete_tiles),
+            scans: state.map_or(0, PartialFile::complete_scans),
+            tiles: state.map_or(0, PartialFile::complete_tiles),
         }
     }
 
@@ -106,7 +112,7 @@ impl LtmReader {
 
     /// The file index, once it is complete.
     pub fn index(&self) -> Option<&FileIndex> {
-        self.state.as_ref().map(DecoderState::index)
+        self.state.as_ref().map(PartialFile::index)
     }
 
     /// Takes bytes of the file from `offset` on. Bytes of the index, and those of each chunk, must come in
@@ -136,15 +142,20 @@ impl LtmReader {
             let missing = target - self.gathered.len();
             let (now, later) = bytes.split_at(bytes.len().min(missing));
             self.budget.try_extend(&mut self.gathered, now, target)?;
-            self.received_bytes += now.len() as u64;
+            self.received_index_bytes += now.len() as u64;
             offset += now.len() as u64;
             bytes = later;
             self.advance()?;
         }
-        if let Some(state) = &mut self.state {
-            self.received_bytes += state.feed(offset, bytes, &self.budget)?;
+        match &mut self.state {
+            Some(state) => state.feed(offset, bytes, &self.budget),
+            None => Ok(()),
         }
-        Ok(())
+    }
+
+    fn received_bytes(&self) -> u64 {
+        let chunks = self.state.as_ref().map_or(0, PartialFile::received_bytes);
+        self.received_index_bytes + chunks
     }
 
     /// Decodes the header and the index when their bytes are complete.
@@ -155,15 +166,16 @@ impl LtmReader {
                 return Ok(());
             };
             let header = Header::decode(bytes)?;
-            self.budget.check(memory::index_bytes(&header))?;
-            self.budget.reserve(memory::relight_bytes(&header))?;
+            self.budget.check(memory_estimate::index_bytes(&header))?;
+            self.budget
+                .reserve(memory_estimate::relight_bytes(&header))?;
             self.header = Some(header);
             return self.advance();
         };
         if self.gathered.len() as u64 == header.index_bytes() {
             let index = FileIndex::decode(header, &self.gathered, &self.budget)?;
-            self.budget.check(memory::file_bytes(&index))?;
-            self.state = Some(DecoderState::new(index, &self.budget)?);
+            self.budget.check(memory_estimate::file_bytes(&index))?;
+            self.state = Some(PartialFile::new(index, &self.budget)?);
             self.budget.release_vec(std::mem::take(&mut self.gathered));
         }
         Ok(())
@@ -173,7 +185,7 @@ impl LtmReader {
     pub fn truncated(&self) -> FormatError {
         let need = self.header.map(|header| header.file_bytes);
         FormatError::Truncated {
-            got: self.received_bytes,
+            got: self.received_bytes(),
             need: need.unwrap_or(HEADER_BYTES as u64),
         }
     }
@@ -181,12 +193,17 @@ impl LtmReader {
     /// The whole light transport.
     ///
     /// # Errors
-    /// [`FormatError::Truncated`] if bytes are missing, and the errors of the budget.
-    pub fn finish(self) -> Result<(Transport, MetadataJson), FormatError> {
+    /// [`FormatError::Truncated`] if bytes are missing, [`FormatError::DamagedSection`] if a chunk did not decode,
+    /// and the errors of the budget.
+    pub fn finish(self) -> Result<(Transport, MetadataText), FormatError> {
         let truncated = self.truncated();
-        match self.state {
-            Some(state) if state.is_complete() => state.finish(&self.budget),
-            _ => Err(truncated),
+        let Some(state) = self.state else {
+            return Err(truncated);
+        };
+        match state.undecodable() {
+            Some(chunk) => Err(damaged("its values are missing").in_chunk(chunk)),
+            None if state.is_complete() => state.finish(&self.budget),
+            None => Err(truncated),
         }
     }
 
@@ -207,7 +224,7 @@ impl LtmReader {
     ///
     /// # Errors
     /// [`FormatError::Truncated`] before, and the errors of the budget.
-    pub fn finish_early(self) -> Result<(Transport, MetadataJson), FormatError> {
+    pub fn finish_early(self) -> Result<(Transport, MetadataText), FormatError> {
         match self.state {
             Some(state) => state.finish(&self.budget),
             None => Err(self.truncated()),

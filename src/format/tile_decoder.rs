@@ -2,7 +2,7 @@
 
 use super::chunk::ChunkId;
 use super::codec::transform::CoefficientPlanes;
-use super::codec::{basis_chunk, direct_functions, halves};
+use super::codec::{basis_chunk, direct_functions, half_float_codec};
 use super::error::{FormatError, SectionError};
 use super::index::FileIndex;
 use super::memory_budget::{MemoryBudget, vec_bytes};
@@ -72,11 +72,18 @@ impl TileDecoder {
                 }
                 ScanCoding::Halves => {
                     allocate(&mut self.coefficients, rank)?;
-                    halves::add(&mut self.coefficients, rank, scan, None, bytes, budget)
+                    half_float_codec::add(&mut self.coefficients, rank, scan, None, bytes, budget)
                 }
                 ScanCoding::DirectHalves => {
                     allocate(&mut self.functions, area)?;
-                    halves::add(&mut self.functions, area, scan, Some(order), bytes, budget)
+                    half_float_codec::add(
+                        &mut self.functions,
+                        area,
+                        scan,
+                        Some(order),
+                        bytes,
+                        budget,
+                    )
                 }
             }
         };
@@ -205,10 +212,18 @@ pub fn decode_basis<E: From<FormatError>>(
 /// The [`FormatError`] that a reader would report.
 pub fn check(index: &FileIndex, chunk: ChunkId, bytes: &[u8]) -> Result<(), FormatError> {
     let range = index.range(chunk);
-    if bytes.len() as u64 != range.end - range.start {
+    let (got, expected) = (bytes.len() as u64, range.end - range.start);
+    if got < expected {
         return Err(FormatError::Truncated {
-            got: range.start + bytes.len() as u64,
+            got: range.start + got,
             need: index.header.file_bytes,
+        });
+    }
+    if got > expected {
+        return Err(FormatError::ChunkLength {
+            chunk,
+            got,
+            expected,
         });
     }
     index.check_crc(chunk, bytes)?;
@@ -227,7 +242,7 @@ pub fn check(index: &FileIndex, chunk: ChunkId, bytes: &[u8]) -> Result<(), Form
             first: 0,
             ..*record
         };
-        return halves::add(&mut values, columns, &alone, None, bytes, &budget)
+        return half_float_codec::add(&mut values, columns, &alone, None, bytes, &budget)
             .map_err(|error| error.in_chunk(chunk));
     }
     let mut decoder = TileDecoder {

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::sampling::MIN_PATTERNS;
-use crate::executor::Cancelled;
+use crate::job_executor::Cancelled;
 use crate::transport::GeometryError;
 
 /// Why a recovery fails.

@@ -251,7 +251,7 @@ fn subtract_outer_product(a: &mut [f64], factor: f64, v: &[f64]) {
 mod tests {
     use super::super::preparation_input;
     use super::*;
-    use crate::capture::{NoiseModel, Pattern, RowSet};
+    use crate::capture::{CameraRowSet, NoiseModel, Pattern};
     use crate::transport::{CHANNELS, Correspondence};
 
     const LIGHT: Extent = Extent::new(7, 6);
@@ -269,7 +269,7 @@ mod tests {
             },
             patterns: patterns.collect(),
             full_scale: (0..PATTERNS).map(|l| 0.5 + 0.2 * l as f32).collect(),
-            rows: RowSet::all(LIGHT.height),
+            rows: CameraRowSet::all(LIGHT.height),
             photos: Vec::new(),
             noise: NoiseModel {
                 gain: [0.0; CHANNELS],

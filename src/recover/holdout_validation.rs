@@ -4,20 +4,27 @@
 //! The elements of patterns vary independently, with a variance var(p). Between patterns, measurements then vary by
 //! `var(p) ‖τ‖²`, and the residuals of functions τ̂ by `var(p) ‖τ − τ̂‖²`, each plus the noise, whose variance is
 //! known. With sums over sampled pixels and channels, `SNR = (Σ var y − Σ noise) / (Σ var residual − Σ noise)`.
+//! Saturated measurements are left out; all three sums are over the pixels and channels with two held-out measurements
+//! or more.
+//!
+//! The squares are recovered from the training patterns alone. What a method learns from the whole picture, a prior
+//! and the weights of a blend, has seen all patterns, the held-out ones included.
 
 use super::error::RecoverError;
-use super::holdout::HoldoutSplit;
-use super::preparation_input::PreparationInput;
+use super::holdout_split::{HoldoutSplit, pattern_ids};
+use super::preparation_input::RecoveryPreparationInput;
 use super::{prediction, sampling};
-use crate::capture::{Measurements, Pattern};
-use crate::executor::Executor;
-use crate::transport::{Basis, CHANNELS, Decibels, FloatTile, Geometry, TileFunctions, TileRect};
+use crate::capture::{Measurements, Pattern, group_count};
+use crate::job_executor::Executor;
+use crate::transport::{
+    Basis, CHANNELS, Decibels, FloatTile, Geometry, TileRect, TileTransportFunctions,
+};
 
 /// Squares of the picture that are validated.
 const MAX_SQUARES: usize = 96;
 /// Their side in camera pixels: that of a file's blocks.
 const SQUARE_SIDE: u32 = 8;
-/// Fewest held-out patterns that have a variance.
+/// Fewest held-out patterns, or unsaturated measurements under them, that have a variance.
 const MIN_HELD_OUT: usize = 2;
 /// Smallest error that is distinguishable from noise, as a share of the noise, whose variance is known to a few percent.
 const ERROR_RESOLUTION: f64 = 0.1;
@@ -27,7 +34,7 @@ const ERROR_RESOLUTION: f64 = 0.1;
 pub struct HoldoutValidation {
     geometry: Geometry,
     patterns: Vec<Pattern>,
-    squares: Vec<ValidationSquare>,
+    squares: Vec<ValidationRegion>,
     /// Variance of the measurements between patterns, less their noise.
     signal: f64,
     /// Variance of the noise under the held-out patterns.
@@ -37,7 +44,7 @@ pub struct HoldoutValidation {
 }
 
 #[derive(Clone, Debug)]
-struct ValidationSquare {
+struct ValidationRegion {
     tile: FloatTile,
     /// Under the held-out patterns, `[pixel, pattern, channel]`.
     measurements: Vec<f64>,
@@ -45,37 +52,39 @@ struct ValidationSquare {
 
 impl HoldoutValidation {
     /// Recovers squares of the picture by `recover_from_training`, which uses training patterns only. Returns `None` if
-    /// the split has too few held-out patterns.
+    /// the split has too few distinct held-out patterns.
     ///
     /// # Errors
     /// If the executor is cancelled.
     pub(super) fn new(
-        preparation: &PreparationInput<impl Executor>,
+        preparation: &RecoveryPreparationInput<impl Executor>,
         basis: Option<&Basis>,
         recover_from_training: impl Fn(TileRect) -> FloatTile + Sync + Send,
     ) -> Result<Option<Self>, RecoverError> {
-        let &PreparationInput {
+        let &RecoveryPreparationInput {
             measurements,
             geometry,
             split,
             executor,
         } = preparation;
         executor.check_cancelled()?;
-        if split.held_out.len() < MIN_HELD_OUT {
+        let held_out = split.held_out.iter().map(|&l| &measurements.patterns[l]);
+        let held_out: Vec<Pattern> = held_out.cloned().collect();
+        // Exposures of one pattern differ by their noise only.
+        if group_count(&pattern_ids(&held_out)) < MIN_HELD_OUT {
             return Ok(None);
         }
         let rects = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
-        let squares = executor.map(rects.len(), |i| ValidationSquare {
+        let squares = executor.map(rects.len(), |i| ValidationRegion {
             tile: recover_from_training(rects[i]),
             measurements: prediction::samples(measurements, &split.held_out, rects[i]),
         });
         let functions = |i: usize| squares[i].tile.functions(&geometry, basis);
         let recovered = executor.map(rects.len(), functions);
         let variances = executor.map(rects.len(), |i| variances(measurements, split, rects[i]));
-        let pattern = |&l: &usize| measurements.patterns[l].clone();
         let mut validation = Self {
             geometry,
-            patterns: split.held_out.iter().map(pattern).collect(),
+            patterns: held_out,
             squares,
             signal: variances.iter().map(|(signal, _)| signal).sum(),
             noise: variances.iter().map(|(_, noise)| noise).sum(),
@@ -103,7 +112,7 @@ impl HoldoutValidation {
 
     /// Estimated loss of SNR if `functions` replace those of the [squares](Self::tiles). It is negative if the
     /// replacement removes noise.
-    pub fn loss(&self, functions: &[TileFunctions]) -> Decibels {
+    pub fn loss(&self, functions: &[TileTransportFunctions]) -> Decibels {
         let before = self.error(self.residual);
         // An error in the variance of the noise is in both residuals and cancels.
         let after = before + self.residual_variance(functions) - self.residual;
@@ -116,7 +125,7 @@ impl HoldoutValidation {
     }
 
     /// Variance of the residuals of `functions` between held-out patterns, summed over pixels and channels.
-    fn residual_variance(&self, functions: &[TileFunctions]) -> f64 {
+    fn residual_variance(&self, functions: &[TileTransportFunctions]) -> f64 {
         let squares = self.squares.iter().zip(functions);
         let of_squares = squares.map(|(square, functions)| {
             let predictions = prediction::predictions(&self.geometry, &self.patterns, functions);
@@ -125,56 +134,65 @@ impl HoldoutValidation {
             let pixels = residuals.chunks_exact(self.patterns.len() * CHANNELS);
             let variances = pixels.flat_map(|residuals| {
                 let of_channel = |c| residuals.iter().skip(c).step_by(CHANNELS).copied();
-                (0..CHANNELS).map(move |c| variance(of_channel(c)))
+                (0..CHANNELS).filter_map(move |c| variance(of_channel(c)))
             });
-            variances.filter(|v| v.is_finite()).sum::<f64>()
+            variances.sum::<f64>()
         });
         of_squares.sum()
     }
 }
 
-/// Variances between patterns, summed over the pixels and channels that are nowhere saturated: of the measurements less
-/// their noise, and of the noise under the held-out patterns.
+/// Variances between patterns, summed over pixels and channels: of the measurements less their noise, and of the noise
+/// under the held-out patterns.
 fn variances(measurements: &Measurements, split: &HoldoutSplit, rect: TileRect) -> (f64, f64) {
     let (mut signal, mut noise) = (0.0, 0.0);
     for pixel in rect.pixels() {
         for c in 0..CHANNELS {
             let sample = |l: &usize| measurements.sample(*l, pixel, c);
             let noise_variance = |l: &usize| measurements.variance(*l, c, sample(l));
-            let total = variance(split.all.iter().map(sample));
-            if total.is_finite() {
-                signal += total - mean(split.all.iter().map(noise_variance));
+            if variance(split.held_out.iter().map(sample)).is_none() {
+                continue;
             }
-            if split.held_out.iter().all(|l| sample(l).is_finite()) {
-                noise += mean(split.held_out.iter().map(noise_variance));
-            }
+            let total = variance(split.all.iter().map(sample)).unwrap_or_default();
+            signal += total - finite_mean(split.all.iter().map(noise_variance));
+            noise += finite_mean(split.held_out.iter().map(noise_variance));
         }
     }
     (signal, noise)
 }
 
-/// The mean; NaN if any value is.
-fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let count = values.len() as f64;
-    values.sum::<f64>() / count
+/// The mean of the finite values.
+fn finite_mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for value in values.filter(|value| value.is_finite()) {
+        sum += value;
+        count += 1.0;
+    }
+    sum / count
 }
 
-/// The unbiased variance; NaN if any value is.
-fn variance(values: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
-    let (count, mean) = (values.len() as f64, mean(values.clone()));
-    values.map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0)
+/// The unbiased variance of the finite values; `None` if they are fewer than [`MIN_HELD_OUT`].
+fn variance(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
+    let finite = values.filter(|value| value.is_finite());
+    let count = finite.clone().count();
+    if count < MIN_HELD_OUT {
+        return None;
+    }
+    let mean = finite.clone().sum::<f64>() / count as f64;
+    let squares = finite.map(|value| (value - mean).powi(2));
+    Some(squares.sum::<f64>() / (count - 1) as f64)
 }
 
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests {
     use super::super::test_problems::SyntheticCapture;
     use super::*;
-    use crate::executor::SequentialExecutor;
+    use crate::job_executor::SequentialExecutor;
 
     /// Validates functions that are the true ones times `factor`.
     fn validate(capture: &SyntheticCapture, factor: f64) -> Option<HoldoutValidation> {
         let functions = capture.functions(factor);
-        let preparation = PreparationInput {
+        let preparation = RecoveryPreparationInput {
             measurements: &capture.measurements,
             geometry: capture.geometry,
             split: &HoldoutSplit::new(&capture.measurements.patterns),
@@ -184,12 +202,12 @@ mod tests {
         HoldoutValidation::new(&preparation, None, recover).ok()?
     }
 
-    fn cropped(functions: &TileFunctions, rect: TileRect) -> TileFunctions {
+    fn cropped(functions: &TileTransportFunctions, rect: TileRect) -> TileTransportFunctions {
         let (area, extent) = (
             functions.tau.len() / functions.rect.extent.area(),
             functions.rect.extent,
         );
-        let mut crop = TileFunctions::zeros(rect, area);
+        let mut crop = TileTransportFunctions::zeros(rect, area);
         for (pixel, tau) in rect.pixels().zip(crop.tau.chunks_exact_mut(area)) {
             let n = extent.index(pixel);
             tau.copy_from_slice(&functions.tau[n * area..(n + 1) * area]);
@@ -244,5 +262,33 @@ mod tests {
         let validation = validate(&capture, 1.0).unwrap();
         assert!(!validation.has_signal() && validation.snr().is_none());
         assert!(validate(&SyntheticCapture::new(15), 1.0).is_none());
+    }
+
+    #[test]
+    fn exposures_of_one_pattern_are_no_validation() {
+        // Of 12 patterns, each twice, two exposures of one pattern are held out.
+        let mut capture = SyntheticCapture::new(24);
+        for l in (0..24).step_by(2) {
+            capture.measurements.patterns[l + 1] = capture.measurements.patterns[l].clone();
+            capture.measurements.photos[l + 1] = capture.measurements.photos[l].clone();
+        }
+        assert!(validate(&capture, 1.1).is_none());
+    }
+
+    #[test]
+    fn saturated_measurements_are_left_out() {
+        let mut capture = SyntheticCapture::new(60);
+        // Each pixel is saturated under some patterns, held-out ones among them.
+        for (l, photo) in capture.measurements.photos.iter_mut().enumerate() {
+            for (n, colour) in photo.iter_mut().enumerate() {
+                if (l + n) % 4 == 0 {
+                    colour.fill(f32::NAN);
+                }
+            }
+        }
+        let validation = validate(&capture, 1.1).unwrap();
+        assert!(validation.has_signal());
+        let snr = validation.snr().unwrap().0;
+        assert!((snr - 20.0).abs() < 1.5, "{snr} dB, not 20");
     }
 }

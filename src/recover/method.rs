@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::bpdn::SparsityBasis;
 use super::learned;
+use super::mean_function;
 use super::pixelwise::PixelwiseRecovery;
-use super::pooled;
 use crate::transport::Window;
 
 /// How light transport functions are recovered.
@@ -43,7 +43,7 @@ impl Method {
     /// Upper bound on the memory that preparing a recovery takes beside the measurements, in bytes.
     pub fn preparation_bytes(self, window: Window) -> usize {
         let learned = self.if_learned(learned::preparation_bytes(window));
-        learned.max(pooled::max_bytes(window))
+        learned.max(mean_function::max_bytes(window))
     }
 
     /// Upper bound on the memory that recovering a tile takes beside the measurements and the tile's functions, in

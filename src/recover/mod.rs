@@ -10,26 +10,26 @@
 //! makes recovery fast. The weight of the patterns' common mode ([`CommonModeWeight`]) makes it accurate. Parameters
 //! are chosen on held-out patterns, which also estimate the SNR ([`HoldoutValidation`]).
 //!
-//! [`Recovery`] has no threads and no files: an [`Executor`](crate::executor::Executor) runs its jobs.
+//! [`PreparedRecovery`] has no threads and no files: an [`Executor`](crate::job_executor::Executor) runs its jobs.
 
 mod bpdn;
 mod common_mode_weight;
 mod error;
 mod gram_cache;
-mod holdout;
+mod holdout_split;
 mod holdout_validation;
+mod hyperparameter_selection;
 mod learned;
+mod mean_function;
 mod method;
-mod model_selection;
 mod nnls;
 mod normal_equations;
 mod passive_set;
-mod pattern_mismatch;
+mod pattern_check;
 mod pixelwise;
-mod pooled;
 mod prediction;
 mod preparation_input;
-mod recovery;
+mod prepared_recovery;
 mod sampling;
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod test_problems;
@@ -41,6 +41,6 @@ pub use error::RecoverError;
 pub use holdout_validation::HoldoutValidation;
 pub use method::Method;
 pub use nnls::Nnls;
-pub use recovery::{Recovery, RecoverySettings};
+pub use prepared_recovery::{PreparedRecovery, RecoverySettings};
 pub use sampling::MIN_PATTERNS;
-pub use window_size::{BandExtent, WindowSizeEstimate};
+pub use window_size::{TailEstimate, WindowSizeEstimate};

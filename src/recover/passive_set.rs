@@ -11,7 +11,7 @@
 use crate::linalg::{LANES, add_scaled_padded, add_scaled_rows, dot_padded, padded_len};
 
 /// The values of one vector register, or of a few.
-type LaneBlock = [f64; LANES];
+type RegisterBlock = [f64; LANES];
 
 /// Smallest pivot, relative to its diagonal entry, of an unknown whose column is linearly independent of the passive
 /// ones, to the precision of the Gram matrix. Another unknown would not lower the residual.
@@ -32,7 +32,7 @@ pub(super) struct PassiveSet<'a, const N: usize> {
     is_member: Vec<bool>,
     /// `H`, `[stride, stride]`, zero beyond the members' rows and columns, in panels of [`LANES`] columns: the part of
     /// a vector that belongs to a panel stays in registers.
-    inverse: Vec<LaneBlock>,
+    inverse: Vec<RegisterBlock>,
     /// Length of the vectors below, a multiple of [`LANES`]. They are zero beyond the members.
     stride: usize,
     solutions: [Vec<f64>; N],
@@ -177,7 +177,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
 
     /// Evaluates unknown `j`, with its entries `b` of the right-hand sides, as a candidate for the set.
     #[inline(always)]
-    pub fn evaluate(&mut self, j: usize, b: [f64; N]) -> PassiveSetCandidate<N> {
+    pub fn evaluate(&mut self, j: usize, b: [f64; N]) -> EnteringUnknown<N> {
         let row = self.row(j);
         self.gather(row);
         let column = &self.column[..self.padded_len()];
@@ -185,7 +185,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         for (residual, z) in residual.iter_mut().zip(&self.solutions) {
             *residual -= dot_padded(column, &z[..column.len()]);
         }
-        PassiveSetCandidate {
+        EnteringUnknown {
             j,
             diagonal: row[j],
             residual,
@@ -202,7 +202,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
 
     /// Inserts the candidate that was evaluated last. Returns false if its column depends linearly on those of the set.
     #[inline(always)]
-    pub fn insert(&mut self, candidate: PassiveSetCandidate<N>) -> bool {
+    pub fn insert(&mut self, candidate: EnteringUnknown<N>) -> bool {
         self.multiply_by_inverse();
         let (n, before) = (self.members.len(), self.padded_len());
         let explained = dot_padded(&self.column[..before], &self.product[..before]);
@@ -309,7 +309,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
 
 /// An unknown that may be inserted.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PassiveSetCandidate<const N: usize> {
+pub(super) struct EnteringUnknown<const N: usize> {
     j: usize,
     /// `G[j, j]`.
     diagonal: f64,
@@ -320,10 +320,10 @@ pub(super) struct PassiveSetCandidate<const N: usize> {
 /// The panels of the first `width` columns of `H`, `width` rows each.
 #[inline(always)]
 fn panels(
-    inverse: &mut [LaneBlock],
+    inverse: &mut [RegisterBlock],
     stride: usize,
     width: usize,
-) -> impl Iterator<Item = &mut [LaneBlock]> {
+) -> impl Iterator<Item = &mut [RegisterBlock]> {
     let panels = inverse.chunks_exact_mut(stride.max(1)).take(width / LANES);
     panels.map(move |panel| &mut panel[..width])
 }

@@ -15,7 +15,9 @@ use super::gram_cache::{GramCache, WindowEquations};
 use super::nnls::Nnls;
 use super::sampling;
 use crate::capture::Measurements;
-use crate::transport::{CameraPx, Geometry, LightElement, TileFunctions, TileRect, Window};
+use crate::transport::{
+    CameraPixel, Geometry, LightElement, TileRect, TileTransportFunctions, Window,
+};
 
 /// Side, in light elements, of the squares of window origins that share a [`GramCache`]: a default tile has one, at two
 /// camera pixels an element.
@@ -41,13 +43,13 @@ pub(super) struct PixelwiseRecovery {
 }
 
 /// Pixels that share a window, by its origin.
-pub(super) type PixelsByWindow = (LightElement, Vec<(usize, CameraPx)>);
+pub(super) type PixelsByWindow = (LightElement, Vec<(usize, CameraPixel)>);
 
 /// The measurements of a pixel and channel, one for each pattern of its equations.
 pub(super) struct PixelSamples {
     /// Position of the pixel in its region.
     pub index: usize,
-    pub pixel: CameraPx,
+    pub pixel: CameraPixel,
     pub channel: usize,
     pub y: Vec<f64>,
 }
@@ -73,9 +75,9 @@ impl PixelwiseRecovery {
         measurements: &Measurements,
         pattern_indices: &[usize],
         rect: TileRect,
-    ) -> TileFunctions {
+    ) -> TileTransportFunctions {
         let area = self.geometry.window.area();
-        let mut functions = TileFunctions::zeros(rect, area);
+        let mut functions = TileTransportFunctions::zeros(rect, area);
         let mut squares: BTreeMap<_, Vec<PixelsByWindow>> = BTreeMap::new();
         for (origin, pixels) in sampling::pixels_by_window(&self.geometry, rect) {
             let square = [origin.v, origin.u].map(|at| at.div_euclid(CACHE_SIDE));

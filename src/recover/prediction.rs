@@ -1,13 +1,13 @@
 //! What light transport functions predict of measurements: `y = pT`, restricted to each pixel's window.
 
 use crate::capture::{Measurements, Pattern};
-use crate::transport::{CHANNELS, Geometry, TileFunctions, TileRect};
+use crate::transport::{CHANNELS, Geometry, TileRect, TileTransportFunctions};
 
 /// The measurements that the functions of a region predict for `patterns`, `[pixel, pattern, channel]`.
 pub(super) fn predictions<'a>(
     geometry: &Geometry,
     patterns: impl IntoIterator<Item = &'a Pattern, IntoIter: Clone>,
-    functions: &TileFunctions,
+    functions: &TileTransportFunctions,
 ) -> Vec<f64> {
     let (area, patterns) = (geometry.window.area(), patterns.into_iter());
     let mut predictions = Vec::new();
@@ -50,7 +50,7 @@ pub(super) fn residuals(
     geometry: &Geometry,
     measurements: &Measurements,
     pattern_indices: &[usize],
-    functions: &TileFunctions,
+    functions: &TileTransportFunctions,
 ) -> Vec<f64> {
     let patterns = pattern_indices.iter().map(|&l| &measurements.patterns[l]);
     let predicted = predictions(geometry, patterns, functions);

@@ -1,12 +1,12 @@
 //! The input of every stage that prepares a recovery.
 
 use super::error::RecoverError;
-use super::holdout::HoldoutSplit;
+use super::holdout_split::HoldoutSplit;
 use crate::capture::Measurements;
 use crate::transport::{Geometry, TileRect, Window};
 
 /// What a recovery is prepared from, and the executor that runs the preparation.
-pub(super) struct PreparationInput<'a, E> {
+pub(super) struct RecoveryPreparationInput<'a, E> {
     pub measurements: &'a Measurements,
     pub geometry: Geometry,
     pub split: &'a HoldoutSplit,

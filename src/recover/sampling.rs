@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::capture::Measurements;
-use crate::transport::{CameraPx, Extent, Geometry, LightElement, TileRect};
+use crate::transport::{CameraPixel, Extent, Geometry, LightElement, TileRect};
 
 /// Fewest patterns that recovery makes sense with.
 pub const MIN_PATTERNS: usize = 4;
 
 /// Pixels that share a window, each with its position in a region, row by row.
-pub(super) type PixelsOfWindow = [(usize, CameraPx)];
+pub(super) type PixelsSharingWindow = [(usize, CameraPixel)];
 
 /// Squares of `side²` pixels spread evenly over the picture, without overlap, at most `max_count`. Only squares whose
 /// measurements are in memory.
@@ -66,7 +66,7 @@ fn spread_over(
 pub(super) fn pixels_by_window(
     geometry: &Geometry,
     rect: TileRect,
-) -> BTreeMap<LightElement, Vec<(usize, CameraPx)>> {
+) -> BTreeMap<LightElement, Vec<(usize, CameraPixel)>> {
     let mut windows: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for (p, pixel) in rect.pixels().enumerate() {
         let origin = geometry.window_origin(pixel);
@@ -80,7 +80,7 @@ pub(super) fn pixels_by_window(
 pub(super) fn unsaturated(
     measurements: &Measurements,
     pattern_indices: &[usize],
-    pixels: &PixelsOfWindow,
+    pixels: &PixelsSharingWindow,
     channels: Range<usize>,
 ) -> Vec<usize> {
     let is_finite = |l, pixel| {
@@ -100,7 +100,7 @@ pub(super) fn unsaturated(
 pub(super) fn usable_samples(
     measurements: &Measurements,
     pattern_indices: &[usize],
-    pixel: CameraPx,
+    pixel: CameraPixel,
     c: usize,
 ) -> (Vec<usize>, Vec<f64>) {
     let usable = unsaturated(measurements, pattern_indices, &[(0, pixel)], c..c + 1);

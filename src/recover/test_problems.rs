@@ -1,8 +1,8 @@
 //! Synthetic problems with known properties.
 
-use crate::capture::{Measurements, NoiseModel, Pattern, RowSet};
+use crate::capture::{CameraRowSet, Measurements, NoiseModel, Pattern};
 use crate::transport::{
-    CHANNELS, Correspondence, Extent, Geometry, TileFunctions, TileRect, Window,
+    CHANNELS, Correspondence, Extent, Geometry, TileRect, TileTransportFunctions, Window,
 };
 
 /// Numbers uniform in [−½, ½), the same for each seed.
@@ -117,7 +117,7 @@ impl SyntheticCapture {
                 correspondence: geometry.correspondence,
                 full_scale: vec![1.0; patterns.len()],
                 patterns,
-                rows: RowSet::all(geometry.camera.height),
+                rows: CameraRowSet::all(geometry.camera.height),
                 photos: Vec::new(),
                 noise: NoiseModel {
                     gain: [0.0; CHANNELS],
@@ -139,10 +139,10 @@ impl SyntheticCapture {
     }
 
     /// The true functions of the picture, times `factor`.
-    pub fn functions(&self, factor: f64) -> TileFunctions {
+    pub fn functions(&self, factor: f64) -> TileTransportFunctions {
         let extent = self.geometry.camera;
         let mut functions =
-            TileFunctions::zeros(TileRect { x: 0, y: 0, extent }, self.function.len());
+            TileTransportFunctions::zeros(TileRect { x: 0, y: 0, extent }, self.function.len());
         for (i, tau) in functions.tau.iter_mut().enumerate() {
             let (n, slot) = (i / self.function.len(), i % self.function.len());
             let brightness = 0.1 + 0.02 * (n * 37 % 29) as f64;

@@ -12,13 +12,13 @@
 
 use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
-use super::holdout::pattern_ids;
+use super::holdout_split::pattern_ids;
+use super::mean_function::PooledMeasurements;
 use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns};
-use super::pooled::PooledMeasurements;
 use super::preparation_input;
-use super::sampling::{self, PixelsOfWindow};
+use super::sampling::{self, PixelsSharingWindow};
 use crate::capture::{Measurements, group_count};
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::linalg::{self, add_scaled, vectorise};
 use crate::transport::{Geometry, LightElement, Window};
 
@@ -46,12 +46,12 @@ pub struct WindowSizeEstimate {
     /// The smallest window that holds nearly all light, as far as that is known.
     pub window: Window,
     /// The light from outside it.
-    pub band: BandExtent,
+    pub band: TailEstimate,
 }
 
 /// How wide the band of T is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BandExtent {
+pub enum TailEstimate {
     /// Hardly wider than the window.
     Bounded {
         /// Estimated share of a pixel's light that comes from outside the window.
@@ -165,7 +165,7 @@ impl WindowRings {
         measurements: &Measurements,
         geometry: &Geometry,
         origin: LightElement,
-        pixels: &PixelsOfWindow,
+        pixels: &PixelsSharingWindow,
     ) {
         let elements: Vec<_> = geometry.elements_of_window(origin).collect();
         let centre_area = self.centre_area();
@@ -258,11 +258,11 @@ fn choose_window(
     let mut but_last = tails.iter().zip(errors).take(rings.saturating_sub(1));
     let (side, band) = if let Some(inside) = inside.filter(|&i| i < rings) {
         let tail_fraction = tails[inside].max(0.0);
-        (side(inside), BandExtent::Bounded { tail_fraction })
+        (side(inside), TailEstimate::Bounded { tail_fraction })
     } else if rings > 1 && but_last.all(|(tail, error)| *tail > MAX_TAIL_FRACTION + 2.0 * error) {
-        (side(rings), BandExtent::Unbounded)
+        (side(rings), TailEstimate::Unbounded)
     } else {
-        (DEFAULT_SIDE.min(max_side), BandExtent::Undetermined)
+        (DEFAULT_SIDE.min(max_side), TailEstimate::Undetermined)
     };
     Ok(WindowSizeEstimate {
         window: Window::new(side)?,
@@ -289,17 +289,17 @@ mod tests {
         assert_eq!(bounded.window.side(), 13);
         assert!(matches!(
             bounded.band,
-            BandExtent::Bounded { tail_fraction } if close(tail_fraction, 0.001)
+            TailEstimate::Bounded { tail_fraction } if close(tail_fraction, 0.001)
         ));
         // Where no ring is dark, and that is certain, the band is as wide as the widest window.
         let unbounded = choose_window(&[0.1, 0.06, 0.04, 0.02], &errors, 15).unwrap();
         assert_eq!(unbounded.window.side(), 15);
-        assert_eq!(unbounded.band, BandExtent::Unbounded);
+        assert_eq!(unbounded.band, TailEstimate::Unbounded);
         let edge = choose_window(&[0.1, 0.06, 0.04, 0.002], &errors, 15).unwrap();
-        assert_eq!(edge.band, BandExtent::Unbounded);
+        assert_eq!(edge.band, TailEstimate::Unbounded);
         let uncertain = choose_window(&[0.1; 12], &[0.06; 12], 31).unwrap();
         assert_eq!(uncertain.window.side(), 15);
-        assert_eq!(uncertain.band, BandExtent::Undetermined);
+        assert_eq!(uncertain.band, TailEstimate::Undetermined);
     }
 
     #[test]

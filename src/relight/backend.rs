@@ -2,8 +2,8 @@
 
 use thiserror::Error;
 
-use super::texture_layout::LayoutError;
-use super::{ChannelRatio, Gamut, Light, OutputTransform};
+use super::texture_layout::TextureLayoutError;
+use super::{Gamut, Light, LightChroma, OutputTransform};
 #[cfg(target_arch = "wasm32")]
 use crate::transport::Extent;
 
@@ -20,21 +20,21 @@ pub struct FrameRequest<'a> {
 
 /// What a graphics device holds of the last light.
 #[derive(Clone, Debug, Default)]
-pub struct LightCache {
+pub struct UploadedLight {
     /// The uploaded light; `None` for a light image, whose elements only the device has.
     light: Option<Light>,
     /// The ratio between the light's channels.
-    pub chroma: ChannelRatio,
+    pub chroma: LightChroma,
     /// The quality of the basis response, once it is computed.
     response_quality: Option<f32>,
 }
 
-impl LightCache {
+impl UploadedLight {
     /// A light that was just uploaded.
     pub fn new(light: &Light) -> Self {
         Self {
             light: Some(light.clone()),
-            chroma: ChannelRatio::of_rows(std::iter::once(light.elements())),
+            chroma: LightChroma::of_rows(std::iter::once(light.elements())),
             response_quality: None,
         }
     }
@@ -92,7 +92,7 @@ pub enum BackendError {
     Device(&'static str, String),
     /// The photograph exceeds the device's limits.
     #[error("{0}")]
-    Layout(#[from] LayoutError),
+    Layout(#[from] TextureLayoutError),
     /// The driver rejects a shader, with this log.
     #[error("the graphics driver rejects a shader: {0}")]
     Shader(String),

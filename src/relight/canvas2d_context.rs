@@ -10,7 +10,7 @@ use crate::transport::Extent;
 
 /// Where a canvas stores its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CanvasStorage {
+pub enum CanvasMemoryLocation {
     /// The browser decides, usually for graphics memory.
     Default,
     /// Main memory, for pixels that come from the CPU: a software renderer would copy every frame twice.
@@ -26,7 +26,7 @@ pub fn open_2d(
     canvas: &HtmlCanvasElement,
     extent: Extent,
     gamut: Gamut,
-    storage: CanvasStorage,
+    storage: CanvasMemoryLocation,
 ) -> Result<(CanvasRenderingContext2d, Gamut), BackendError> {
     let error = |reason: &str| BackendError::Canvas("2D", reason.into());
     let thrown = |e| error(&format!("{e:?}"));
@@ -38,7 +38,7 @@ pub fn open_2d(
     set("alpha", JsValue::from(false))?;
     set(
         "willReadFrequently",
-        JsValue::from(storage == CanvasStorage::MainMemory),
+        JsValue::from(storage == CanvasMemoryLocation::MainMemory),
     )?;
     let context = canvas
         .get_context_with_context_options("2d", &settings)

@@ -103,22 +103,22 @@ fn add_sparks(extent: Extent, seconds: f64, elements: &mut [[f32; 4]]) {
 /// The layers of noise at one moment.
 struct FlameNoise {
     /// Height of all flames.
-    gust: NoiseLayer,
+    gust: FlameNoiseLayer,
     /// Height of each flame.
-    draught: NoiseLayer,
+    draught: FlameNoiseLayer,
     /// Horizontal shift.
-    sway: NoiseLayer,
+    sway: FlameNoiseLayer,
     /// Finer shift, both ways.
-    curl: NoiseLayer,
+    curl: FlameNoiseLayer,
     /// The flames, from coarse to fine.
-    tongues: [NoiseLayer; 3],
+    tongues: [FlameNoiseLayer; 3],
 }
 
 impl FlameNoise {
     fn at(seconds: f64) -> Self {
         // Lattice cells per height along x and y, and speed in heights a second: finer noise is faster.
         let layer = |seed, x_scale, y_scale, speed| {
-            NoiseLayer::new(seed, x_scale, y_scale, speed * seconds)
+            FlameNoiseLayer::new(seed, x_scale, y_scale, speed * seconds)
         };
         Self {
             gust: layer(1, 0.9, 1.0, 0.8),
@@ -173,7 +173,7 @@ impl FlameColumn {
 }
 
 /// Gradient noise (K. Perlin, "Improving noise", 2002) that has risen by some distance.
-struct NoiseLayer {
+struct FlameNoiseLayer {
     seed: u32,
     /// Lattice cells per height.
     x_scale: f32,
@@ -183,7 +183,7 @@ struct NoiseLayer {
     risen_part: f32,
 }
 
-impl NoiseLayer {
+impl FlameNoiseLayer {
     fn new(seed: u32, x_scale: f32, y_scale: f32, risen: f64) -> Self {
         // In double precision, so that it still moves smoothly after days.
         let cells = risen * f64::from(y_scale);

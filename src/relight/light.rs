@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::resample::AreaResampler;
 use super::{fire, platform_math};
-use crate::transport::{Extent, Geometry, LightPx};
+use crate::transport::{Extent, Geometry, LightPosition};
 
 /// The linear emission of every light element, 0 to 1 at full brightness.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,14 +15,14 @@ pub struct Light {
 
 /// Position and size of a torch.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TorchPose {
+pub struct TorchSpot {
     /// Centre of the spot on the light plane.
-    pub centre: LightPx,
+    pub centre: LightPosition,
     /// Standard deviation of the spot, in light elements.
     pub radius: f64,
 }
 
-impl TorchPose {
+impl TorchSpot {
     /// The default radius, as a fraction of the light plane's shorter side.
     pub const DEFAULT_RADIUS: f64 = 1.0 / 7.0;
 
@@ -30,7 +30,7 @@ impl TorchPose {
     pub fn central(light: Extent) -> Self {
         let (w, h) = (f64::from(light.width), f64::from(light.height));
         Self {
-            centre: LightPx {
+            centre: LightPosition {
                 u: w / 2.0,
                 v: h / 2.0,
             },
@@ -90,7 +90,7 @@ impl BuiltinLight {
         let white = |on: bool| if on { [1.0; 3] } else { [0.0; 3] };
         match self {
             Self::Flood => Light::from_fn(extent, |_| [1.0; 3]),
-            Self::Torch => Light::torch(extent, TorchPose::central(extent)),
+            Self::Torch => Light::torch(extent, TorchSpot::central(extent)),
             Self::Checkerboard => {
                 let cell = (w.min(h) / 8.0).max(1.0);
                 Light::from_fn(extent, |p| {
@@ -131,11 +131,11 @@ pub enum LightError {
 
 impl Light {
     /// A light from the emission at each element's centre, which must be finite and not negative.
-    fn from_fn(extent: Extent, emission: impl Fn(LightPx) -> [f32; 3]) -> Self {
+    fn from_fn(extent: Extent, emission: impl Fn(LightPosition) -> [f32; 3]) -> Self {
         let mut elements = Vec::with_capacity(extent.area());
         for (u, v) in extent.cells() {
             let [u, v] = [u, v].map(|at| f64::from(at) + 0.5);
-            elements.push(element(emission(LightPx { u, v })));
+            elements.push(element(emission(LightPosition { u, v })));
         }
         Self { extent, elements }
     }
@@ -217,7 +217,7 @@ impl Light {
     }
 
     /// A warm Gaussian spot.
-    pub fn torch(extent: Extent, pose: TorchPose) -> Self {
+    pub fn torch(extent: Extent, pose: TorchSpot) -> Self {
         const WARM_WHITE: [f64; 3] = [1.0, 0.93, 0.80];
         let scale = 0.5 / (pose.radius * pose.radius).max(1e-6);
         // Separable: one exponential for each column and row, not for each element.
@@ -292,10 +292,10 @@ mod tests {
 
     #[test]
     fn the_torch_peaks_at_its_centre() {
-        let centre = LightPx { u: 4.5, v: 9.5 };
+        let centre = LightPosition { u: 4.5, v: 9.5 };
         let light = Light::torch(
             PLANE,
-            TorchPose {
+            TorchSpot {
                 centre,
                 radius: 2.0,
             },

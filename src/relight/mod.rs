@@ -13,10 +13,10 @@
 pub mod backend;
 #[cfg(target_arch = "wasm32")]
 pub mod canvas2d_context;
-mod channel_ratio;
 pub mod cpu;
 mod fire;
 mod light;
+mod light_chroma;
 pub mod output_transform;
 mod picture;
 mod platform_math;
@@ -29,8 +29,8 @@ pub mod webgl2;
 #[cfg(any(target_arch = "wasm32", feature = "gpu"))]
 pub mod webgpu;
 
-pub use channel_ratio::ChannelRatio;
-pub use light::{BuiltinLight, Light, LightError, TorchPose};
+pub use light::{BuiltinLight, Light, LightError, TorchSpot};
+pub use light_chroma::LightChroma;
 pub use output_transform::{Gamut, OutputTransform, ToneCurve};
 pub use picture::{LinearPicture, Picture, Rgba8Picture};
 pub use resample::area_resample;

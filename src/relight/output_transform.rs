@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 
 use super::srgb::srgb_encode;
-use crate::transport::{CHANNELS, CameraPx};
+use crate::transport::{CHANNELS, CameraPixel};
 
 /// How linear light becomes codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +64,7 @@ impl OutputTransform {
     }
 
     /// The codes of the pixel at `at`.
-    pub fn codes(&self, linear: [f64; CHANNELS], at: CameraPx) -> [u8; CHANNELS] {
+    pub fn codes(&self, linear: [f64; CHANNELS], at: CameraPixel) -> [u8; CHANNELS] {
         let threshold = match self.dither {
             true => (f64::from(bayer(at)) + 0.5) / 64.0,
             false => 0.5,
@@ -123,7 +123,7 @@ impl ToneCurve {
 
 /// The threshold matrix of ordered dither, 0 to 63, each once in every 8 × 8 pixels (B. E. Bayer, "An optimum method
 /// for two-level rendition of continuous-tone pictures", 1973).
-pub fn bayer(at: CameraPx) -> u32 {
+pub fn bayer(at: CameraPixel) -> u32 {
     let (x, y) = (at.x ^ at.y, at.y);
     let bits = |n: u32| ((n & 1) << 4) | ((n & 2) << 1) | ((n & 4) >> 2);
     bits(x) << 1 | bits(y)
@@ -131,8 +131,8 @@ pub fn bayer(at: CameraPx) -> u32 {
 
 /// [`OutputTransform::codes`] by table, for whole rows, to within one code.
 #[derive(Debug)]
-pub struct OutputEncoder {
-    table: &'static EncodingTable,
+pub struct TabulatedOutputTransform {
+    table: &'static OutputCodeTable,
     /// The gains, repeated for each pixel of a batch.
     gains: [f32; CHANNELS * BATCH_PIXELS],
     /// `None` for sRGB.
@@ -144,7 +144,7 @@ pub struct OutputEncoder {
 
 /// Codes in units of 1/256, by the square root of the linear value: over the root the curves are so even that
 /// neighbours differ by a quarter of a code at most.
-type EncodingTable = [u16; (INDEX_MASK + 1) as usize];
+type OutputCodeTable = [u16; (INDEX_MASK + 1) as usize];
 
 const TABLE_ENTRIES: usize = 4096;
 /// Twice the entries, so that a masked index needs no bounds check; the second half repeats the last entry.
@@ -152,12 +152,12 @@ const INDEX_MASK: u32 = 2 * TABLE_ENTRIES as u32 - 1;
 /// Pixels that are encoded together.
 const BATCH_PIXELS: usize = 32;
 
-impl OutputEncoder {
+impl TabulatedOutputTransform {
     /// For one output transform.
     pub fn new(output: &OutputTransform) -> Self {
-        static TABLES: [LazyLock<EncodingTable>; 2] = [
-            LazyLock::new(|| encoding_table(ToneCurve::Clip)),
-            LazyLock::new(|| encoding_table(ToneCurve::Filmic)),
+        static TABLES: [LazyLock<OutputCodeTable>; 2] = [
+            LazyLock::new(|| output_code_table(ToneCurve::Clip)),
+            LazyLock::new(|| output_code_table(ToneCurve::Filmic)),
         ];
         Self {
             table: &TABLES[usize::from(output.curve == ToneCurve::Filmic)],
@@ -172,12 +172,12 @@ impl OutputEncoder {
     ///
     /// # Panics
     /// If `out` has another length than `linear`.
-    pub fn encode(&self, linear: &[[f32; CHANNELS]], at: CameraPx, out: &mut [[u8; 4]]) {
+    pub fn encode(&self, linear: &[[f32; CHANNELS]], at: CameraPixel, out: &mut [[u8; 4]]) {
         assert_eq!(linear.len(), out.len(), "as many codes as pixels");
         // In units of 1/256; 128 rounds.
         let thresholds: [u32; 8] = std::array::from_fn(|i| match self.dither {
             true => {
-                4 * bayer(CameraPx {
+                4 * bayer(CameraPixel {
                     x: at.x + i as u32,
                     y: at.y,
                 }) + 2
@@ -219,7 +219,7 @@ impl OutputEncoder {
     }
 }
 
-fn encoding_table(curve: ToneCurve) -> EncodingTable {
+fn output_code_table(curve: ToneCurve) -> OutputCodeTable {
     std::array::from_fn(|i| {
         let root = i.min(TABLE_ENTRIES) as f64 / TABLE_ENTRIES as f64;
         let encoded = srgb_encode(curve.apply(f64::from(curve.white()) * root * root));
@@ -253,7 +253,7 @@ mod tests {
     #[test]
     fn the_table_is_within_one_code_of_the_formula() {
         for output in outputs() {
-            let encoder = OutputEncoder::new(&output);
+            let encoder = TabulatedOutputTransform::new(&output);
             for y in 0..9 {
                 let linear: Vec<[f32; 3]> = (0..3000)
                     .map(|i| {
@@ -266,13 +266,13 @@ mod tests {
                     ])
                     .collect();
                 let mut out = vec![[0; 4]; linear.len()];
-                let at = CameraPx { x: 5, y };
+                let at = CameraPixel { x: 5, y };
                 encoder.encode(&linear, at, &mut out);
                 for (i, (linear, out)) in linear.iter().zip(&out).enumerate() {
                     if output.gamut != Gamut::Srgb && linear.iter().any(|y| !y.is_finite()) {
                         continue; // the matrix makes NaN of infinities
                     }
-                    let at = CameraPx { x: 5 + i as u32, y };
+                    let at = CameraPixel { x: 5 + i as u32, y };
                     let want = output.codes(linear.map(f64::from), at);
                     for c in 0..CHANNELS {
                         assert!(
@@ -289,7 +289,7 @@ mod tests {
     fn without_dither_codes_are_srgb() {
         for i in 0..=4000 {
             let linear = f64::from(i) / 3000.0;
-            let codes = OutputTransform::srgb(0.5).codes([linear; 3], CameraPx { x: 3, y: 4 });
+            let codes = OutputTransform::srgb(0.5).codes([linear; 3], CameraPixel { x: 3, y: 4 });
             assert_eq!(codes, [srgb8(linear * 0.5); 3]);
         }
     }
@@ -302,7 +302,7 @@ mod tests {
         };
         for linear in [0.0, 0.001, 0.01, 0.2, 0.7, 1.0] {
             let encoded = output.encode([linear; 3])[0] * 255.0;
-            let pixels = (0..64).map(|i| CameraPx {
+            let pixels = (0..64).map(|i| CameraPixel {
                 x: i % 8 + 16,
                 y: i / 8,
             });
@@ -323,7 +323,7 @@ mod tests {
     #[test]
     fn each_threshold_occurs_once_in_eight_by_eight() {
         let mut thresholds: Vec<u32> = (0..64)
-            .map(|i| bayer(CameraPx { x: i % 8, y: i / 8 }))
+            .map(|i| bayer(CameraPixel { x: i % 8, y: i / 8 }))
             .collect();
         thresholds.sort_unstable();
         assert!(thresholds.into_iter().eq(0..64));
@@ -336,7 +336,7 @@ mod tests {
                 gains: [9.0; 3],
                 ..output
             };
-            assert_eq!(white.codes([1.0; 3], CameraPx { x: 0, y: 0 }), [255; 3]);
+            assert_eq!(white.codes([1.0; 3], CameraPixel { x: 0, y: 0 }), [255; 3]);
         }
         for curve in [ToneCurve::Clip, ToneCurve::Filmic] {
             assert_eq!(curve.apply(0.0), 0.0);

@@ -1,7 +1,7 @@
 //! Relighting in double precision, term by term as in the equations: the standard for all backends.
 
 use super::{Light, OutputTransform, Rgba8Picture};
-use crate::transport::{CHANNELS, CameraPx, LightElement, Transport};
+use crate::transport::{CHANNELS, CameraPixel, LightElement, Transport};
 
 /// `y = pT`: RGB of each of the `N` camera pixels, in units of the measurement.
 ///
@@ -60,7 +60,7 @@ pub fn picture(transport: &Transport, light: &Light, output: &OutputTransform) -
     let extent = transport.geometry.camera;
     let linear = relight(transport, light);
     let pixels = extent.cells().zip(linear).map(|((x, y), linear)| {
-        let [r, g, b] = output.codes(linear, CameraPx { x, y });
+        let [r, g, b] = output.codes(linear, CameraPixel { x, y });
         [r, g, b, 255]
     });
     Rgba8Picture {

@@ -1,6 +1,6 @@
 //! Reproducible randomness: hashes of integers, and gradient noise (Perlin 2002).
 
-use super::coordinates::{Vec2, mix, vec2};
+use super::vec2::{Vec2, mix, vec2};
 
 /// A hash of a lattice point and a seed in 0..1.
 pub(super) fn cell_hash(x: i32, y: i32, seed: u32) -> f64 {

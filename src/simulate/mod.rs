@@ -5,24 +5,24 @@
 //! of light in it. The lengths that determine the band (scattering widths, refraction, parallax) are in
 //! light elements, so that one window holds the band at every resolution.
 //!
-//! [`PatternMatrix`] computes y = pT under many lights, [`Camera`] adds noise. This module uses no threads,
+//! [`EmissionMatrix`] computes y = pT under many lights, [`Camera`] adds noise. This module uses no threads,
 //! files or clock; callers compute [`SimulatedScene::tile`] in parallel.
 
 mod camera;
 mod cookies;
-mod coordinates;
+mod emission_matrix;
 mod gradient_noise;
 mod pattern_image;
-mod pattern_matrix;
 mod scene_kind;
 mod signed_distance;
 mod simulated_scene;
 mod stained_glass;
 mod truth_lights;
+mod vec2;
 
 pub use camera::{Camera, RandomStreamId};
+pub use emission_matrix::EmissionMatrix;
 pub use pattern_image::{GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage, emission};
-pub use pattern_matrix::PatternMatrix;
 pub use scene_kind::SceneKind;
 pub use simulated_scene::{SimulatedScene, WINDOW_SIDE};
 pub use truth_lights::truth_lights;

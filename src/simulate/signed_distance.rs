@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::coordinates::{Vec2, vec2};
+use super::vec2::{Vec2, vec2};
 
 pub(super) fn circle(p: Vec2, radius: f64) -> f64 {
     p.length() - radius

@@ -1,8 +1,8 @@
 //! The interface of simulated scenes, and their geometry.
 
 use crate::transport::{
-    CHANNELS, CameraPx, Correspondence, Extent, Geometry, GeometryError, TileFunctions, TileRect,
-    Window,
+    CHANNELS, CameraPixel, Correspondence, Extent, Geometry, GeometryError, TileRect,
+    TileTransportFunctions, Window,
 };
 
 /// Side of the window that holds every built-in scene's band, in light elements.
@@ -15,12 +15,12 @@ pub trait SimulatedScene: Sync {
 
     /// Writes the light transport function of one pixel, `[S]`, to `tau`, which holds zeros. Elements
     /// outside the light plane stay zero.
-    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]);
+    fn transport_function(&self, pixel: CameraPixel, tau: &mut [[f32; CHANNELS]]);
 
     /// The light transport functions of the pixels in `rect`.
-    fn tile(&self, rect: TileRect) -> TileFunctions {
+    fn tile(&self, rect: TileRect) -> TileTransportFunctions {
         let area = self.geometry().window.area();
-        let mut functions = TileFunctions::zeros(rect, area);
+        let mut functions = TileTransportFunctions::zeros(rect, area);
         for (pixel, tau) in rect.pixels().zip(functions.tau.chunks_exact_mut(area)) {
             self.transport_function(pixel, tau);
         }

@@ -1,9 +1,9 @@
 //! The lights of a simulated capture's `truth/` folder, under which relit pictures are evaluated. Recovery
 //! never uses them.
 
-use super::coordinates::{Vec2, mix3, smoothstep, vec2};
 use super::gradient_noise::layered_noise;
 use super::pattern_image::{PatternImage, code_for};
+use super::vec2::{Vec2, mix3, smoothstep, vec2};
 use crate::transport::Extent;
 
 /// The lights by their names NAME in `light_NAME.png` and `relit_NAME.png`; all RGB.

@@ -5,11 +5,11 @@ use std::time::Instant;
 use super::chart::ChartSeries;
 use super::error::StudyError;
 use super::known_transport::{KnownTransport, transport_error};
-use super::method_samples::sample_for;
+use super::method_sample_sizes::sample_for;
 use super::pixel_sampling;
 use crate::capture::Measurements;
-use crate::executor::Executor;
-use crate::recover::{Method, Recovery, RecoverySettings};
+use crate::job_executor::Executor;
+use crate::recover::{Method, PreparedRecovery, RecoverySettings};
 use crate::transport::{Decibels, SnrAccumulator};
 
 /// SNR and time of a method.
@@ -52,7 +52,7 @@ impl MethodCurve {
 }
 
 /// Recovers a sample of about `pixels` pixels, scaled by the method's speed ([`sample_for`]), and compares it
-/// with the known transport. Errors are those of [`Recovery::prepare`].
+/// with the known transport. Errors are those of [`PreparedRecovery::prepare`].
 pub(super) fn measure_accuracy(
     known: &impl KnownTransport,
     measurements: &Measurements,
@@ -65,7 +65,7 @@ pub(super) fn measure_accuracy(
         method,
         window: known.geometry().window,
     };
-    let recovery = Recovery::prepare(measurements, settings, executor)?;
+    let recovery = PreparedRecovery::prepare(measurements, settings, executor)?;
     let prepared = start.elapsed().as_secs_f64();
     let geometry = *recovery.geometry();
     let rects = sample_for(method, &geometry, pixels);

@@ -8,14 +8,14 @@ use super::brute_force_scan;
 use super::chart::{LineChart, axis_range};
 use super::error::StudyError;
 use super::known_transport::{DenseTransport, dense_transport};
-use super::method_samples;
+use super::method_sample_sizes;
 use super::nystrom::{NystromSamples, NystromTransport};
 use super::pixel_sampling;
-use super::section::{MarkdownTable, ProgressCallback, ReportSection, seconds_cell, snr_cell};
+use super::section::{MarkdownTable, ProgressLog, ReportSection, seconds_cell, snr_cell};
 use super::simulated_capture::{SimulatedCapture, first_shots};
 use super::unwindowed;
 use crate::capture::LinearPhoto;
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::recover::Method;
 use crate::simulate::{PatternEnsemble, PatternImage};
 use crate::transport::{CHANNELS, Extent, Geometry, SnrAccumulator};
@@ -40,7 +40,7 @@ pub fn comparison(
     simulated_capture: SimulatedCapture,
     ensemble: PatternEnsemble,
     executor: &impl Executor,
-    progress: ProgressCallback,
+    progress: ProgressLog,
 ) -> Result<ReportSection, StudyError> {
     let geometry = simulated_capture.scene.geometry();
     let truth = dense_transport(&simulated_capture, executor);
@@ -88,7 +88,7 @@ pub fn comparison(
     for &method in Method::ALL {
         // All points of a slow method would take longer than everything else here.
         let is_measured =
-            |l: &usize| !method_samples::is_slow(method) || SLOW_PATTERN_COUNTS.contains(l);
+            |l: &usize| !method_sample_sizes::is_slow(method) || SLOW_PATTERN_COUNTS.contains(l);
         let points: Result<_, _> = counts(MAX_PATTERNS)
             .filter(is_measured)
             .map(|l| {
@@ -102,7 +102,10 @@ pub fn comparison(
                 )
             })
             .collect();
-        add_curve(format!("window, {}", method_samples::name(method)), points?);
+        add_curve(
+            format!("window, {}", method_sample_sizes::name(method)),
+            points?,
+        );
     }
     section(name, geometry, &curves)
 }
@@ -285,7 +288,7 @@ fn photographs_for(target: f64, points: &[AccuracyPoint]) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::executor::SequentialExecutor;
+    use crate::job_executor::SequentialExecutor;
     use crate::simulate::SceneKind;
     use crate::transport::Decibels;
 

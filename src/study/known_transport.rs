@@ -1,11 +1,11 @@
 //! Known light transport, from a simulated scene or from a capture's `truth/` folder.
 
 use crate::capture::GroundTruth;
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::relight::Light;
 use crate::transport::{
-    CHANNELS, CameraPx, Correspondence, Geometry, GeometryError, LightElement, SnrAccumulator,
-    TileFunctions, TileRect,
+    CHANNELS, CameraPixel, Correspondence, Geometry, GeometryError, LightElement, SnrAccumulator,
+    TileRect, TileTransportFunctions,
 };
 
 /// A light transport matrix whose columns are known.
@@ -14,12 +14,12 @@ pub trait KnownTransport: Sync {
     fn geometry(&self) -> &Geometry;
 
     /// Origin of a pixel's window.
-    fn origin(&self, pixel: CameraPx) -> LightElement {
+    fn origin(&self, pixel: CameraPixel) -> LightElement {
         self.geometry().window_origin(pixel)
     }
 
     /// Writes the light transport function of one pixel, `[S]`, in units of the measurement.
-    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]);
+    fn transport_function(&self, pixel: CameraPixel, tau: &mut [[f32; CHANNELS]]);
 }
 
 /// The transport in a capture's `truth/` folder.
@@ -52,11 +52,11 @@ impl KnownTransport for CaptureTruth {
         &self.geometry
     }
 
-    fn origin(&self, pixel: CameraPx) -> LightElement {
+    fn origin(&self, pixel: CameraPixel) -> LightElement {
         self.truth.window_origin(self.geometry.camera.index(pixel))
     }
 
-    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
+    fn transport_function(&self, pixel: CameraPixel, tau: &mut [[f32; CHANNELS]]) {
         let known = self.truth.tau(self.geometry.camera.index(pixel));
         for (tau, known) in tau.iter_mut().zip(known) {
             *tau = known.map(|t| t.to_f32());
@@ -76,7 +76,7 @@ pub(super) fn dense_transport(
     executor.map(geometry.camera.area(), |n| {
         let width = geometry.camera.width;
         let (x, y) = (n as u32 % width, n as u32 / width);
-        let pixel = CameraPx { x, y };
+        let pixel = CameraPixel { x, y };
         let mut function = vec![[0.0; CHANNELS]; geometry.window.area()];
         known.transport_function(pixel, &mut function);
         let mut column = vec![[0.0; CHANNELS]; geometry.light.area()];
@@ -91,7 +91,7 @@ pub(super) fn dense_transport(
 pub fn transport_error(
     known: &impl KnownTransport,
     geometry: &Geometry,
-    functions: &TileFunctions,
+    functions: &TileTransportFunctions,
 ) -> SnrAccumulator {
     let (window, known_window) = (geometry.window, known.geometry().window);
     let mut sum = SnrAccumulator::default();

@@ -8,7 +8,7 @@
 //! both cross. Rows need a second projector at the camera's position and a second camera at the light's. The kernel f
 //! compresses the range of values, so that a lower rank suffices.
 
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::linalg::{add_scaled, cholesky_solve, cholesky_with_ridge, transpose};
 
 /// Exponents γ to choose from.
@@ -129,7 +129,7 @@ fn solve_with_ridge(matrix: &[f64], right: &[f64], k: usize, ridge: f64) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::executor::SequentialExecutor;
+    use crate::job_executor::SequentialExecutor;
 
     #[test]
     fn a_low_rank_matrix_is_reproduced() {

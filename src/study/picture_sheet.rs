@@ -16,14 +16,14 @@ const LINE_HEIGHT_PX: u32 = 22;
 const GAP_PX: u32 = 8;
 
 /// An 8-bit sRGB picture.
-pub(super) struct FigurePanel {
+pub(super) struct PanelImage {
     pub extent: Extent,
     pub rgb: Vec<u8>,
     /// Whether its pixels are data, shown as exact squares, or those of a photograph.
     pub is_data: bool,
 }
 
-impl FigurePanel {
+impl PanelImage {
     /// A photograph from linear RGB, encoded as sRGB.
     pub fn photograph(extent: Extent, linear: impl Iterator<Item = [f64; CHANNELS]>) -> Self {
         Self {
@@ -61,7 +61,7 @@ impl FigurePanel {
 
 /// A panel with lines of text below it.
 pub(super) struct CaptionedPanel {
-    pub panel: FigurePanel,
+    pub panel: PanelImage,
     pub caption: String,
 }
 
@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn a_sheet_contains_panels_names_and_captions() {
-        let panel = |is_data| FigurePanel {
+        let panel = |is_data| PanelImage {
             extent: Extent::new(2, 2),
             rgb: vec![200; 12],
             is_data,

@@ -4,12 +4,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::error::StudyError;
 use super::known_transport::{KnownTransport, known_picture, relight_pixel};
-use super::method_samples::{self, DEFAULT_METHOD};
-use super::picture_sheet::{CaptionedPanel, FigurePanel, PictureSheet};
-use super::section::{MarkdownTable, ProgressCallback, ReportSection, snr_cell};
+use super::method_sample_sizes::{self, DEFAULT_METHOD};
+use super::picture_sheet::{CaptionedPanel, PanelImage, PictureSheet};
+use super::section::{MarkdownTable, ProgressLog, ReportSection, snr_cell};
 use crate::capture::Measurements;
-use crate::executor::Executor;
-use crate::recover::{Recovery, RecoverySettings};
+use crate::job_executor::Executor;
+use crate::recover::{PreparedRecovery, RecoverySettings};
 use crate::relight::{BuiltinLight, Light, area_resample};
 use crate::transport::{CHANNELS, Decibels, Extent, Tile};
 
@@ -45,19 +45,19 @@ pub fn built_in_lights(light: Extent) -> Vec<EvaluationLight> {
 /// The section of figures 4 and 5: recovers the transport by the default method and relights it.
 ///
 /// # Errors
-/// Those of [`Recovery::prepare`], and [`StudyError`] if a picture or a table cannot be written.
+/// Those of [`PreparedRecovery::prepare`], and [`StudyError`] if a picture or a table cannot be written.
 pub fn relit_pictures(
     name: &str,
     known: &impl KnownTransport,
     measurements: &Measurements,
     lights: Vec<EvaluationLight>,
     executor: &impl Executor,
-    progress: ProgressCallback,
+    progress: ProgressLog,
 ) -> Result<ReportSection, StudyError> {
     let patterns = measurements.patterns.len();
     progress(&format!(
         "{name}: relighting, recovered by {} from {patterns} patterns",
-        method_samples::name(DEFAULT_METHOD)
+        method_sample_sizes::name(DEFAULT_METHOD)
     ));
     let report_tenths = |tenths: usize| progress(&format!("{name}: relighting, {tenths}0 %"));
     let (truth, relit) = pictures(known, measurements, &lights, executor, &report_tenths)?;
@@ -72,7 +72,7 @@ pub fn relit_pictures(
     section.add_paragraph(&format!(
         "Recovered by `{}` from {patterns} patterns. PSNR is against the true pictures, peak 1 in \
          units of the measurement, over all pixels and channels.",
-        method_samples::name(DEFAULT_METHOD)
+        method_sample_sizes::name(DEFAULT_METHOD)
     ));
     let mut table = MarkdownTable::new("light | psnr_db | true_mean | method | patterns");
     let mut psnr_table = MarkdownTable::new("light | PSNR (dB)");
@@ -86,14 +86,14 @@ pub fn relit_pictures(
             light.name.clone(),
             snr_cell(psnr),
             format!("{mean:.4}"),
-            method_samples::name(DEFAULT_METHOD).to_owned(),
+            method_sample_sizes::name(DEFAULT_METHOD).to_owned(),
             patterns.to_string(),
         ]);
         psnr_table.add_row([light.name.clone(), snr_cell(psnr)]);
         let emitted = light.light.elements().iter();
         let emitted = emitted.map(|e| [0, 1, 2].map(|c| f64::from(e[c])));
         let photograph = |extent, picture: &[[f64; CHANNELS]]| {
-            FigurePanel::photograph(extent, picture.iter().map(|y| y.map(|y| y * exposure)))
+            PanelImage::photograph(extent, picture.iter().map(|y| y.map(|y| y * exposure)))
         };
         let error: Vec<[f64; CHANNELS]> = truth[i]
             .iter()
@@ -109,10 +109,10 @@ pub fn relit_pictures(
             let (extent, picture) = downsample(camera, picture);
             photograph(extent, &picture)
         };
-        let light_panel = FigurePanel {
+        let light_panel = PanelImage {
             // Light elements of a small light plane are visible squares.
             is_data: light.light.extent().width <= MAX_PANEL_SIDE_PX / 2,
-            ..FigurePanel::photograph(light.light.extent(), emitted)
+            ..PanelImage::photograph(light.light.extent(), emitted)
         };
         let panels = [
             (light_panel, String::new()),
@@ -140,7 +140,7 @@ pub fn relit_pictures(
 }
 
 /// One picture for each light, `[light][pixel]`.
-type PictureSet = Vec<Vec<[f64; CHANNELS]>>;
+type PicturesByLight = Vec<Vec<[f64; CHANNELS]>>;
 
 /// The true pictures, and those from the recovered transport.
 fn pictures(
@@ -149,12 +149,12 @@ fn pictures(
     lights: &[EvaluationLight],
     executor: &impl Executor,
     report_tenths: &(impl Fn(usize) + Sync),
-) -> Result<(PictureSet, PictureSet), StudyError> {
+) -> Result<(PicturesByLight, PicturesByLight), StudyError> {
     let settings = RecoverySettings {
         method: DEFAULT_METHOD,
         window: known.geometry().window,
     };
-    let recovery = Recovery::prepare(measurements, settings, executor)?;
+    let recovery = PreparedRecovery::prepare(measurements, settings, executor)?;
     let geometry = *recovery.geometry();
     let basis = recovery.basis().cloned().unwrap_or_default();
     let area = geometry.window.area();

@@ -4,7 +4,7 @@ use super::error::StudyError;
 use crate::transport::Decibels;
 
 /// Receives a line of text when a part of the study advances.
-pub type ProgressCallback<'a> = &'a (dyn Fn(&str) + Sync);
+pub type ProgressLog<'a> = &'a (dyn Fn(&str) + Sync);
 
 /// A section of the report.
 #[derive(Debug, Default)]

@@ -1,12 +1,12 @@
 //! Simulated photographs of a scene, in memory.
 
 use super::known_transport::KnownTransport;
-use crate::capture::{LinearPhoto, Measurements, NoiseModel, Pattern, RowSet};
-use crate::executor::Executor;
+use crate::capture::{CameraRowSet, LinearPhoto, Measurements, NoiseModel, Pattern};
+use crate::job_executor::Executor;
 use crate::simulate::{
-    Camera, PatternEnsemble, PatternImage, PatternMatrix, RandomStreamId, SimulatedScene, emission,
+    Camera, EmissionMatrix, PatternEnsemble, PatternImage, RandomStreamId, SimulatedScene, emission,
 };
-use crate::transport::{CHANNELS, CameraPx, Geometry};
+use crate::transport::{CHANNELS, CameraPixel, Geometry};
 
 /// Photographs that noise is added to at once; bounds the memory for copies.
 const NOISE_BATCH: usize = 16;
@@ -27,7 +27,7 @@ impl KnownTransport for SimulatedCapture<'_> {
         self.scene.geometry()
     }
 
-    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
+    fn transport_function(&self, pixel: CameraPixel, tau: &mut [[f32; CHANNELS]]) {
         tau.fill([0.0; CHANNELS]);
         self.scene.transport_function(pixel, tau);
     }
@@ -54,7 +54,7 @@ impl SimulatedCapture<'_> {
             correspondence: geometry.correspondence,
             patterns: codes.iter().map(emitted_pattern).collect(),
             full_scale: vec![1.0; count],
-            rows: RowSet::all(geometry.camera.height),
+            rows: CameraRowSet::all(geometry.camera.height),
             photos: self.photographs(&codes, executor),
             noise: NoiseModel::from_dark(&self.dark(), geometry.camera.width, code),
         };
@@ -105,7 +105,7 @@ impl SimulatedCapture<'_> {
     /// The pictures of the scene under each light, without noise.
     fn pictures(&self, lights: &[PatternImage], executor: &impl Executor) -> Vec<LinearPhoto> {
         let geometry = self.scene.geometry();
-        let emissions = PatternMatrix::new(geometry.light, lights);
+        let emissions = EmissionMatrix::new(geometry.light, lights);
         let mut pictures = vec![vec![[0.0; CHANNELS]; geometry.camera.area()]; lights.len()];
         let tiles: Vec<_> = geometry.tiles().collect();
         // One row of tiles at a time, to bound the memory.

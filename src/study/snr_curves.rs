@@ -4,10 +4,10 @@ use super::accuracy::{MethodCurve, measure_accuracy};
 use super::chart::{LineChart, axis_range};
 use super::error::StudyError;
 use super::known_transport::KnownTransport;
-use super::method_samples;
-use super::section::{MarkdownTable, ProgressCallback, ReportSection, seconds_cell, snr_cell};
+use super::method_sample_sizes;
+use super::section::{MarkdownTable, ProgressLog, ReportSection, seconds_cell, snr_cell};
 use crate::capture::{Measurements, NoiseModel};
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::recover::Method;
 use crate::transport::Extent;
 
@@ -34,7 +34,7 @@ struct SnrCurves {
 /// Consumes the measurements, because at the paper's scale memory has no room for a second copy.
 ///
 /// # Errors
-/// Those of [`Recovery::prepare`](crate::recover::Recovery::prepare), and [`StudyError`] if the chart or a table
+/// Those of [`PreparedRecovery::prepare`](crate::recover::Recovery::prepare), and [`StudyError`] if the chart or a table
 /// cannot be written.
 pub fn snr_curves(
     name: &str,
@@ -42,7 +42,7 @@ pub fn snr_curves(
     measurements: Measurements,
     pixels: usize,
     executor: &impl Executor,
-    progress: ProgressCallback,
+    progress: ProgressLog,
 ) -> Result<ReportSection, StudyError> {
     let curves = SnrCurves::measure(name, known, measurements, pixels, executor, progress)?;
     let mut section = ReportSection::new(&format!("Figure 3: SNR against undersampling, {name}"));
@@ -65,7 +65,7 @@ impl SnrCurves {
         mut measurements: Measurements,
         pixels: usize,
         executor: &impl Executor,
-        progress: ProgressCallback,
+        progress: ProgressLog,
     ) -> Result<Self, StudyError> {
         let available = measurements.patterns.len();
         let mut counts = SNR_PATTERNS.to_vec();
@@ -74,7 +74,7 @@ impl SnrCurves {
             counts.push(available);
         }
         let curve = |&method: &Method| MethodCurve {
-            name: method_samples::name(method).to_owned(),
+            name: method_sample_sizes::name(method).to_owned(),
             points: Vec::new(),
         };
         let mut curves: Vec<MethodCurve> = Method::ALL.iter().map(curve).collect();
@@ -84,7 +84,7 @@ impl SnrCurves {
             measurements.photos.truncate(l);
             measurements.noise = NoiseModel::with_gain_from(&measurements);
             for (curve, &method) in curves.iter_mut().zip(Method::ALL) {
-                if method_samples::is_slow(method) && !SLOW_PATTERN_COUNTS.contains(&l) {
+                if method_sample_sizes::is_slow(method) && !SLOW_PATTERN_COUNTS.contains(&l) {
                     continue;
                 }
                 let accuracy = measure_accuracy(known, &measurements, method, pixels, executor)?;
@@ -111,7 +111,7 @@ impl SnrCurves {
             "method | patterns | patterns_per_light_element | snr_db | standard_error_db | \
              pixels_judged | pixels | seconds_for_all_pixels",
         );
-        let mut table = MarkdownTable::new(&format!("L | L/M | {}", method_samples::names()));
+        let mut table = MarkdownTable::new(&format!("L | L/M | {}", method_sample_sizes::names()));
         for &l in &self.counts {
             let mut row = vec![l.to_string(), format!("{:.5}", self.undersampling(l))];
             for curve in &self.curves {

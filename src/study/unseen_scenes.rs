@@ -2,10 +2,10 @@
 
 use super::accuracy::measure_accuracy;
 use super::error::StudyError;
-use super::method_samples::{self, DEFAULT_METHOD};
-use super::section::{MarkdownTable, ProgressCallback, ReportSection, snr_cell};
+use super::method_sample_sizes::{self, DEFAULT_METHOD};
+use super::section::{MarkdownTable, ProgressLog, ReportSection, snr_cell};
 use super::simulated_capture::SimulatedCapture;
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::recover::Method;
 use crate::simulate::{PatternEnsemble, SceneKind};
 use crate::transport::Extent;
@@ -45,11 +45,11 @@ const MAX_SHORTFALL_DB: f64 = 0.3;
 pub fn scenes_table(
     pixels: usize,
     executor: &impl Executor,
-    progress: ProgressCallback,
+    progress: ProgressLog,
 ) -> Result<ReportSection, StudyError> {
     let mut table = MarkdownTable::new(&format!(
         "scene | camera | light | ensemble | patterns | electrons | seed | {} | default | shortfall",
-        method_samples::names()
+        method_sample_sizes::names()
     ));
     let mut worst = f64::NEG_INFINITY;
     for (kind, sides, ensemble, patterns, electrons, seed) in SETTINGS {
@@ -95,7 +95,7 @@ pub fn scenes_table(
         let best_snrs = best_snr(false).zip(best_snr(true));
         let shortfall = best_snrs.map(|(other, default)| other - default);
         worst = worst.max(shortfall.unwrap_or(worst));
-        row.push(method_samples::name(DEFAULT_METHOD).to_owned());
+        row.push(method_sample_sizes::name(DEFAULT_METHOD).to_owned());
         row.push(shortfall.map_or(String::new(), |db| format!("{db:.2}")));
         table.add_row(row);
     }

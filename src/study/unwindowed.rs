@@ -7,7 +7,7 @@ use super::accuracy::{AccuracyPoint, pooled_snr};
 use super::known_transport::DenseTransport;
 use super::pixel_sampling;
 use crate::capture::Measurements;
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::recover::Nnls;
 use crate::transport::SnrAccumulator;
 
@@ -87,8 +87,8 @@ mod tests {
     use rand_distr::{Distribution, StandardUniform};
 
     use super::*;
-    use crate::capture::{NoiseModel, Pattern, RowSet};
-    use crate::executor::SequentialExecutor;
+    use crate::capture::{CameraRowSet, NoiseModel, Pattern};
+    use crate::job_executor::SequentialExecutor;
     use crate::simulate::RandomStreamId;
     use crate::transport::{CHANNELS, Correspondence, Extent};
 
@@ -116,7 +116,7 @@ mod tests {
                 affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             },
             full_scale: vec![1.0; 10],
-            rows: RowSet::all(1),
+            rows: CameraRowSet::all(1),
             photos: patterns.iter().map(seen).collect(),
             noise: NoiseModel {
                 gain: [0.0; CHANNELS],

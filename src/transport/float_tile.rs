@@ -19,7 +19,7 @@ impl Basis {
 
 /// The light transport functions of the pixels of a tile, before quantisation.
 #[derive(Clone, Debug)]
-pub struct TileFunctions {
+pub struct TileTransportFunctions {
     /// The pixels of the tile.
     pub rect: TileRect,
     /// τ as `[pixel, slot, channel]`, pixels and slots row by row, in units of the measurement for a light element at
@@ -27,7 +27,7 @@ pub struct TileFunctions {
     pub tau: Vec<[f32; CHANNELS]>,
 }
 
-impl TileFunctions {
+impl TileTransportFunctions {
     /// Zeros for `rect` and windows of `area` slots.
     pub fn zeros(rect: TileRect, area: usize) -> Self {
         Self {
@@ -115,8 +115,8 @@ impl FloatTile {
 
     /// The light transport functions, zero at elements off the light plane. Coefficients need the `basis`. Negative
     /// values of the sum are kept: pictures would be too bright without them.
-    pub fn functions(&self, geometry: &Geometry, basis: Option<&Basis>) -> TileFunctions {
-        let mut functions = TileFunctions::zeros(self.rect, geometry.window.area());
+    pub fn functions(&self, geometry: &Geometry, basis: Option<&Basis>) -> TileTransportFunctions {
+        let mut functions = TileTransportFunctions::zeros(self.rect, geometry.window.area());
         if !self.functions.is_empty() {
             functions.tau.copy_from_slice(&self.functions);
         }
@@ -130,8 +130,8 @@ impl FloatTile {
     }
 }
 
-impl From<TileFunctions> for FloatTile {
-    fn from(TileFunctions { rect, tau }: TileFunctions) -> Self {
+impl From<TileTransportFunctions> for FloatTile {
+    fn from(TileTransportFunctions { rect, tau }: TileTransportFunctions) -> Self {
         Self {
             functions: tau,
             ..Self::dark(rect)

@@ -31,7 +31,7 @@ impl Extent {
     }
 
     /// Row-major index of a pixel of this grid.
-    pub fn index(self, pixel: CameraPx) -> usize {
+    pub fn index(self, pixel: CameraPixel) -> usize {
         pixel.y as usize * self.width as usize + pixel.x as usize
     }
 
@@ -54,7 +54,7 @@ impl std::fmt::Display for Extent {
 
 /// A camera pixel; its centre lies at `(x + ½, y + ½)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CameraPx {
+pub struct CameraPixel {
     /// Column.
     pub x: u32,
     /// Row.
@@ -63,7 +63,7 @@ pub struct CameraPx {
 
 /// A continuous position on the light plane, in light elements: element `m` covers `[m, m + 1)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightPx {
+pub struct LightPosition {
     /// Along columns.
     pub u: f64,
     /// Along rows.
@@ -96,14 +96,14 @@ pub struct Correspondence {
 
 impl Correspondence {
     /// Light plane position behind the centre of a camera pixel.
-    pub fn at(&self, pixel: CameraPx) -> LightPx {
+    pub fn at(&self, pixel: CameraPixel) -> LightPosition {
         self.map(f64::from(pixel.x) + 0.5, f64::from(pixel.y) + 0.5)
     }
 
     /// Light plane position behind a camera position.
-    pub fn map(&self, x: f64, y: f64) -> LightPx {
+    pub fn map(&self, x: f64, y: f64) -> LightPosition {
         let row = |[a, b, c]: [f64; 3]| a * x + b * y + c;
-        LightPx {
+        LightPosition {
             u: row(self.affine[0]),
             v: row(self.affine[1]),
         }
@@ -140,7 +140,7 @@ impl Window {
     }
 
     /// Window origin: the top left element of the window around `floor(centre)`.
-    pub fn origin(self, centre: LightPx) -> LightElement {
+    pub fn origin(self, centre: LightPosition) -> LightElement {
         let half = (self.side / 2) as i32;
         // Positions far off the light plane saturate; their windows are off it as well.
         LightElement {
@@ -180,10 +180,10 @@ pub struct TileRect {
 
 impl TileRect {
     /// The pixels, row by row.
-    pub fn pixels(self) -> impl Iterator<Item = CameraPx> {
+    pub fn pixels(self) -> impl Iterator<Item = CameraPixel> {
         let TileRect { x, y, extent } = self;
         (y..y + extent.height)
-            .flat_map(move |y| (x..x + extent.width).map(move |x| CameraPx { x, y }))
+            .flat_map(move |y| (x..x + extent.width).map(move |x| CameraPixel { x, y }))
     }
 }
 
@@ -287,7 +287,7 @@ impl Geometry {
     }
 
     /// Window origin of a pixel.
-    pub fn window_origin(&self, pixel: CameraPx) -> LightElement {
+    pub fn window_origin(&self, pixel: CameraPixel) -> LightElement {
         self.window.origin(self.correspondence.at(pixel))
     }
 

@@ -13,11 +13,11 @@ mod geometry;
 mod snr;
 mod tile;
 
-pub use float_tile::{Basis, FloatTile, TileFunctions};
+pub use float_tile::{Basis, FloatTile, TileTransportFunctions};
 pub(crate) use geometry::ClippedRect;
 pub use geometry::{
-    CHANNELS, CameraPx, Correspondence, Extent, Geometry, GeometryError, LightElement, LightPx,
-    MAX_SIDE, MAX_WINDOW, TileRect, Window,
+    CHANNELS, CameraPixel, Correspondence, Extent, Geometry, GeometryError, LightElement,
+    LightPosition, MAX_SIDE, MAX_WINDOW, TileRect, Window,
 };
 pub use snr::{Decibels, SnrAccumulator};
 pub use tile::{TEXEL_COMPONENTS, TexelCodes, Tile, TileCodes, Transport};

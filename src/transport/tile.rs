@@ -2,7 +2,7 @@
 //!
 //! `τ_n = Σ_k c_nk v_k + d_n`: coefficients `c` over the basis of the transport, and direct functions `d`.
 
-use super::float_tile::{Basis, FloatTile, TileFunctions};
+use super::float_tile::{Basis, FloatTile, TileTransportFunctions};
 use super::geometry::{CHANNELS, Geometry, TileRect};
 
 /// Four codes: a texel of an `rgba16sint` texture, and one SIMD load. They are signed, as a truncated sum of basis
@@ -217,7 +217,7 @@ impl Tile {
     }
 
     /// The light transport functions.
-    pub fn functions(&self, geometry: &Geometry, basis: &Basis) -> TileFunctions {
+    pub fn functions(&self, geometry: &Geometry, basis: &Basis) -> TileTransportFunctions {
         self.dequantise(geometry, basis)
             .functions(geometry, Some(basis))
     }

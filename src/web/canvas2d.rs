@@ -8,10 +8,10 @@ use wasm_bindgen::{Clamped, JsCast, JsValue};
 use web_sys::{CanvasRenderingContext2d, HtmlCanvasElement};
 
 use super::drawing::output_transform::parse_gamut;
-use super::{CodedError, Photo, Relighter};
-use crate::executor::SequentialExecutor;
+use super::{CanvasRelighter, CodedError, Photo};
+use crate::job_executor::SequentialExecutor;
 use crate::relight::backend::{Backend, BackendError, FrameRequest};
-use crate::relight::canvas2d_context::{CanvasStorage, open_2d};
+use crate::relight::canvas2d_context::{CanvasMemoryLocation, open_2d};
 use crate::relight::cpu::{self, CpuRelighter};
 use crate::relight::{Gamut, Rgba8Picture};
 use crate::transport::{Extent, Transport};
@@ -48,7 +48,7 @@ impl Canvas2dBackend {
         gamut: Gamut,
     ) -> Result<Self, BackendError> {
         let camera = transport.geometry.camera;
-        let (context, gamut) = open_2d(canvas, camera, gamut, CanvasStorage::MainMemory)?;
+        let (context, gamut) = open_2d(canvas, camera, gamut, CanvasMemoryLocation::MainMemory)?;
         let settings = Object::new();
         let space = gamut.color_space().into();
         Reflect::set(&settings, &"colorSpace".into(), &space).map_err(lost)?;
@@ -63,8 +63,8 @@ impl Canvas2dBackend {
 }
 
 #[wasm_bindgen]
-impl Relighter {
-    /// A relighter on this thread. Each `Relighter` needs a new canvas, also after a failure.
+impl CanvasRelighter {
+    /// A relighter on this thread. Each `CanvasRelighter` needs a new canvas, also after a failure.
     ///
     /// # Errors
     /// Code `backend-unavailable`.
@@ -73,7 +73,7 @@ impl Relighter {
         photo: &Photo,
         canvas: HtmlCanvasElement,
         #[wasm_bindgen(unchecked_param_type = "\"srgb\" | \"display-p3\"")] gamut: &str,
-    ) -> Result<Relighter, CodedError> {
+    ) -> Result<CanvasRelighter, CodedError> {
         let gamut = parse_gamut(gamut)?;
         let backend = Canvas2dBackend::new(photo.transport(), &canvas, gamut)?;
         Ok(Self {

@@ -9,12 +9,12 @@ use wasm_bindgen_futures::future_to_promise;
 use web_sys::HtmlCanvasElement;
 
 use super::drawing::output_transform::parse_gamut;
-use super::{CodedError, Photo, Relighter};
+use super::{CanvasRelighter, CodedError, Photo};
 use crate::relight::backend::Backend;
 #[cfg(feature = "webgl2")]
 use crate::relight::webgl2::{GlContext, WebGl2Backend};
 #[cfg(feature = "webgpu")]
-use crate::relight::webgpu::{Device, WebGpuBackend};
+use crate::relight::webgpu::{GpuContext, WebGpuBackend};
 
 /// A WebGPU device or a WebGL2 context. Freeing a device frees everything on it, also for relighters that still use it;
 /// a context is freed with its last relighter.
@@ -25,7 +25,7 @@ pub struct GraphicsDevice(DeviceHandle);
 #[derive(Clone, Debug)]
 enum DeviceHandle {
     #[cfg(feature = "webgpu")]
-    WebGpu(Rc<Device>),
+    WebGpu(Rc<GpuContext>),
     #[cfg(feature = "webgl2")]
     WebGl2(Rc<GlContext>),
 }
@@ -37,7 +37,7 @@ impl GraphicsDevice {
     #[wasm_bindgen(unchecked_return_type = "Promise<GraphicsDevice>")]
     pub fn webgpu() -> Promise {
         future_to_promise(async {
-            let device = Device::for_canvases().await.map_err(CodedError::from)?;
+            let device = GpuContext::for_canvases().await.map_err(CodedError::from)?;
             Ok(Self(DeviceHandle::WebGpu(Rc::new(device))).into())
         })
     }
@@ -78,8 +78,8 @@ impl GraphicsDevice {
     }
 
     /// Uploads a photograph, to be drawn into a canvas, which is resized. `photo` may be freed afterwards. Each
-    /// `Relighter` needs a new canvas, also after a failure.
-    #[wasm_bindgen(unchecked_return_type = "Promise<Relighter>")]
+    /// `CanvasRelighter` needs a new canvas, also after a failure.
+    #[wasm_bindgen(unchecked_return_type = "Promise<CanvasRelighter>")]
     pub fn draw(
         &self,
         photo: &Photo,
@@ -104,7 +104,7 @@ impl GraphicsDevice {
                 }
             };
             let backend = backend.map_err(CodedError::from)?;
-            Ok(JsValue::from(Relighter {
+            Ok(JsValue::from(CanvasRelighter {
                 backend,
                 kernel,
                 light,

@@ -18,15 +18,17 @@ mod row_range_relighter;
 /// What every module with a backend has.
 #[cfg(feature = "drawing")]
 mod drawing {
+    pub mod canvas_relighter;
     pub mod light;
     pub mod output_transform;
-    pub mod relighter;
 }
 
 #[cfg(feature = "decoder")]
 pub use decoder::Decoder;
 #[cfg(feature = "drawing")]
-pub use drawing::{light::WebLight, output_transform::WebOutputTransform, relighter::Relighter};
+pub use drawing::{
+    canvas_relighter::CanvasRelighter, light::WebLight, output_transform::WebOutputTransform,
+};
 pub use error::CodedError;
 #[cfg(any(feature = "webgl2", feature = "webgpu"))]
 pub use graphics_device::GraphicsDevice;

@@ -87,7 +87,7 @@ impl Photo {
 /// The sending side.
 #[cfg(feature = "decoder")]
 impl Photo {
-    pub(super) fn new(transport: Transport, metadata: &crate::format::MetadataJson) -> Self {
+    pub(super) fn new(transport: Transport, metadata: &crate::format::MetadataText) -> Self {
         Self {
             transport: Arc::new(transport),
             metadata: metadata.text().to_owned(),

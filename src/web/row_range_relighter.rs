@@ -6,7 +6,7 @@ use js_sys::{Float32Array, Uint8Array};
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{CodedError, Photo, WebOutputTransform};
-use crate::executor::SequentialExecutor;
+use crate::job_executor::SequentialExecutor;
 use crate::relight::cpu::{self, CpuRelighter, STRIP_ROWS};
 use crate::transport::CHANNELS;
 

@@ -8,17 +8,17 @@ import type * as Decoders from '../../dist/wasm/decoder.js';
 import type * as WebGl2 from '../../dist/wasm/webgl2.js';
 import type * as WebGpu from '../../dist/wasm/webgpu.js';
 import type {
+  CanvasRelighter,
   DecodedPhoto,
   Decoder,
   Gamut,
   GraphicsDevice,
+  ImportedPhoto,
   Light,
   OutputTransform,
-  ReceivedPhoto,
-  Relighter,
   RelightModule,
   RowRangeRelighter,
-} from '../../www/src/engine/types.js';
+} from '../../www/src/engine/wasm-exports.js';
 
 // Its classes are nominal, so functions of one cannot be assigned to functions of the other; what
 // they give and take can.
@@ -29,8 +29,8 @@ type _Constructor = Extends<[number?], ConstructorParameters<typeof Decoders.Dec
 type _Finish = Extends<ReturnType<Decoders.Decoder['finish']>, DecodedPhoto>;
 type _Preview = Extends<ReturnType<Decoders.Decoder['preview']>, DecodedPhoto | undefined>;
 
-type _CpuReceive = Extends<ReturnType<typeof Cpu.Photo.receive>, ReceivedPhoto>;
-type _CpuParcels = Extends<[Float64Array, Float32Array], Parameters<typeof Cpu.Photo.receive>>;
+type _CpuReceive = Extends<ReturnType<typeof Cpu.Photo.receive>, ImportedPhoto>;
+type _CpuDescriptor = Extends<[Float64Array, Float32Array], Parameters<typeof Cpu.Photo.receive>>;
 type _CpuLight = Extends<ReturnType<typeof Cpu.Light.builtin>, Light>;
 type _CpuBuiltin = Extends<[Cpu.Photo, string], Parameters<typeof Cpu.Light.builtin>>;
 type _CpuTorch = Extends<[Cpu.Photo, number, number, number?], Parameters<typeof Cpu.Light.torch>>;
@@ -42,22 +42,25 @@ type _CpuSrgb = Extends<
   [Cpu.Photo, Uint8ClampedArray, number, number],
   Parameters<typeof Cpu.Light.fromSrgb>
 >;
-type _CpuDisplay = Extends<Cpu.OutputTransform, OutputTransform>;
-type _CpuDisplayOf = Extends<
+type _CpuOutputTransform = Extends<Cpu.OutputTransform, OutputTransform>;
+type _CpuOutputTransformOf = Extends<
   ConstructorParameters<RelightModule['OutputTransform']>,
   ConstructorParameters<typeof Cpu.OutputTransform>
 >;
-type _CpuRelighter = Extends<Cpu.Relighter, Omit<Relighter, 'render' | 'renderLightImage'>>;
+type _CpuRelighter = Extends<
+  Cpu.CanvasRelighter,
+  Omit<CanvasRelighter, 'render' | 'renderLightImage'>
+>;
 type _CpuRender = Extends<
   [Cpu.Light, Cpu.OutputTransform, number],
-  Parameters<Cpu.Relighter['render']>
+  Parameters<Cpu.CanvasRelighter['render']>
 >;
 type _CpuRenderPicture = Extends<
   [Cpu.OutputTransform, number],
-  Parameters<Cpu.Relighter['renderLightImage']>
+  Parameters<Cpu.CanvasRelighter['renderLightImage']>
 >;
 
-type _WebGl2Receive = Extends<ReturnType<typeof WebGl2.Photo.receive>, ReceivedPhoto>;
+type _WebGl2Receive = Extends<ReturnType<typeof WebGl2.Photo.receive>, ImportedPhoto>;
 type _WebGl2Parcels = Extends<
   [Float64Array, Float32Array],
   Parameters<typeof WebGl2.Photo.receive>
@@ -76,22 +79,25 @@ type _WebGl2Srgb = Extends<
   [WebGl2.Photo, Uint8ClampedArray, number, number],
   Parameters<typeof WebGl2.Light.fromSrgb>
 >;
-type _WebGl2Display = Extends<WebGl2.OutputTransform, OutputTransform>;
-type _WebGl2DisplayOf = Extends<
+type _WebGl2OutputTransform = Extends<WebGl2.OutputTransform, OutputTransform>;
+type _WebGl2OutputTransformOf = Extends<
   ConstructorParameters<RelightModule['OutputTransform']>,
   ConstructorParameters<typeof WebGl2.OutputTransform>
 >;
-type _WebGl2Relighter = Extends<WebGl2.Relighter, Omit<Relighter, 'render' | 'renderLightImage'>>;
+type _WebGl2Relighter = Extends<
+  WebGl2.CanvasRelighter,
+  Omit<CanvasRelighter, 'render' | 'renderLightImage'>
+>;
 type _WebGl2Render = Extends<
   [WebGl2.Light, WebGl2.OutputTransform, number],
-  Parameters<WebGl2.Relighter['render']>
+  Parameters<WebGl2.CanvasRelighter['render']>
 >;
 type _WebGl2RenderPicture = Extends<
   [WebGl2.OutputTransform, number],
-  Parameters<WebGl2.Relighter['renderLightImage']>
+  Parameters<WebGl2.CanvasRelighter['renderLightImage']>
 >;
 
-type _WebGpuReceive = Extends<ReturnType<typeof WebGpu.Photo.receive>, ReceivedPhoto>;
+type _WebGpuReceive = Extends<ReturnType<typeof WebGpu.Photo.receive>, ImportedPhoto>;
 type _WebGpuParcels = Extends<
   [Float64Array, Float32Array],
   Parameters<typeof WebGpu.Photo.receive>
@@ -110,31 +116,34 @@ type _WebGpuSrgb = Extends<
   [WebGpu.Photo, Uint8ClampedArray, number, number],
   Parameters<typeof WebGpu.Light.fromSrgb>
 >;
-type _WebGpuDisplay = Extends<WebGpu.OutputTransform, OutputTransform>;
-type _WebGpuDisplayOf = Extends<
+type _WebGpuOutputTransform = Extends<WebGpu.OutputTransform, OutputTransform>;
+type _WebGpuOutputTransformOf = Extends<
   ConstructorParameters<RelightModule['OutputTransform']>,
   ConstructorParameters<typeof WebGpu.OutputTransform>
 >;
-type _WebGpuRelighter = Extends<WebGpu.Relighter, Omit<Relighter, 'render' | 'renderLightImage'>>;
+type _WebGpuRelighter = Extends<
+  WebGpu.CanvasRelighter,
+  Omit<CanvasRelighter, 'render' | 'renderLightImage'>
+>;
 type _WebGpuRender = Extends<
   [WebGpu.Light, WebGpu.OutputTransform, number],
-  Parameters<WebGpu.Relighter['render']>
+  Parameters<WebGpu.CanvasRelighter['render']>
 >;
 type _WebGpuRenderPicture = Extends<
   [WebGpu.OutputTransform, number],
-  Parameters<WebGpu.Relighter['renderLightImage']>
+  Parameters<WebGpu.CanvasRelighter['renderLightImage']>
 >;
 
 type _RelighterOf = Extends<
   [Cpu.Photo, HTMLCanvasElement, Gamut],
-  ConstructorParameters<typeof Cpu.Relighter>
+  ConstructorParameters<typeof Cpu.CanvasRelighter>
 >;
-type _Band = Extends<Cpu.RowRangeRelighter, Omit<RowRangeRelighter, 'relight'>>;
-type _BandOf = Extends<
+type _RowRangeRelighter = Extends<Cpu.RowRangeRelighter, Omit<RowRangeRelighter, 'relight'>>;
+type _RowRangeRelighterOf = Extends<
   [Cpu.Photo, number, number],
   ConstructorParameters<typeof Cpu.RowRangeRelighter>
 >;
-type _BandRelight = Extends<
+type _RowRangeRelight = Extends<
   [Float32Array | null, Cpu.OutputTransform, number, Uint8Array],
   Parameters<Cpu.RowRangeRelighter['relight']>
 >;
@@ -145,14 +154,20 @@ type _WebGl2Draw = Extends<
   [WebGl2.Photo, HTMLCanvasElement, Gamut],
   Parameters<WebGl2.GraphicsDevice['draw']>
 >;
-type _WebGl2Drawn = Extends<ReturnType<WebGl2.GraphicsDevice['draw']>, Promise<WebGl2.Relighter>>;
+type _WebGl2Drawn = Extends<
+  ReturnType<WebGl2.GraphicsDevice['draw']>,
+  Promise<WebGl2.CanvasRelighter>
+>;
 
 type _WebGpuGraphics = Extends<WebGpu.GraphicsDevice, Omit<GraphicsDevice, 'draw'>>;
 type _WebGpuDraw = Extends<
   [WebGpu.Photo, HTMLCanvasElement, Gamut],
   Parameters<WebGpu.GraphicsDevice['draw']>
 >;
-type _WebGpuDrawn = Extends<ReturnType<WebGpu.GraphicsDevice['draw']>, Promise<WebGpu.Relighter>>;
+type _WebGpuDrawn = Extends<
+  ReturnType<WebGpu.GraphicsDevice['draw']>,
+  Promise<WebGpu.CanvasRelighter>
+>;
 type _WebGpuOpen = Extends<
   ReturnType<typeof WebGpu.GraphicsDevice.webgpu>,
   Promise<WebGpu.GraphicsDevice>
@@ -165,14 +180,14 @@ export type Contract = [
   _Finish,
   _Preview,
   _CpuReceive,
-  _CpuParcels,
+  _CpuDescriptor,
   _CpuLight,
   _CpuBuiltin,
   _CpuTorch,
   _CpuLinear,
   _CpuSrgb,
-  _CpuDisplay,
-  _CpuDisplayOf,
+  _CpuOutputTransform,
+  _CpuOutputTransformOf,
   _CpuRelighter,
   _CpuRender,
   _CpuRenderPicture,
@@ -183,8 +198,8 @@ export type Contract = [
   _WebGl2Torch,
   _WebGl2Linear,
   _WebGl2Srgb,
-  _WebGl2Display,
-  _WebGl2DisplayOf,
+  _WebGl2OutputTransform,
+  _WebGl2OutputTransformOf,
   _WebGl2Relighter,
   _WebGl2Render,
   _WebGl2RenderPicture,
@@ -195,15 +210,15 @@ export type Contract = [
   _WebGpuTorch,
   _WebGpuLinear,
   _WebGpuSrgb,
-  _WebGpuDisplay,
-  _WebGpuDisplayOf,
+  _WebGpuOutputTransform,
+  _WebGpuOutputTransformOf,
   _WebGpuRelighter,
   _WebGpuRender,
   _WebGpuRenderPicture,
   _RelighterOf,
-  _Band,
-  _BandOf,
-  _BandRelight,
+  _RowRangeRelighter,
+  _RowRangeRelighterOf,
+  _RowRangeRelight,
   _Kernel,
   _WebGl2Graphics,
   _WebGl2Draw,

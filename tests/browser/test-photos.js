@@ -59,6 +59,7 @@ export function makeTestPhotos() {
   const build = createHash('sha256')
     .update(readFileSync(program))
     .update(readFileSync(import.meta.filename))
+    .update(readFileSync('tests/fixtures/glass-s/capture.json'))
     .digest('hex');
   const stamp = join(FOLDER, '../made-by');
   if (!existsSync(stamp) || readFileSync(stamp, 'utf8') !== build) {

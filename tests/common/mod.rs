@@ -5,7 +5,9 @@
 pub mod relit;
 
 use relightable_photo::format::HEADER_BYTES;
-use relightable_photo::transport::{Correspondence, Extent, Geometry, TileFunctions, Window};
+use relightable_photo::transport::{
+    Correspondence, Extent, Geometry, TileTransportFunctions, Window,
+};
 
 /// A reproducible stream of numbers in 0..1.
 pub struct Noise(pub u64);
@@ -45,11 +47,11 @@ pub fn tiled(
 }
 
 /// Noisy light transport functions, zero off the light plane; the first tile is dark.
-pub fn functions(geometry: Geometry, seed: u64) -> Vec<TileFunctions> {
+pub fn functions(geometry: Geometry, seed: u64) -> Vec<TileTransportFunctions> {
     let mut noise = Noise(seed);
     let (side, area) = (geometry.window.side() as usize, geometry.window.area());
     let tiles = geometry.tiles().enumerate().map(|(i, rect)| {
-        let mut functions = TileFunctions::zeros(rect, area);
+        let mut functions = TileTransportFunctions::zeros(rect, area);
         for (p, pixel) in rect.pixels().enumerate() {
             let origin = geometry.window_origin(pixel);
             for s in 0..area {

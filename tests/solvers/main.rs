@@ -9,8 +9,8 @@
 mod glass_s;
 
 use relightable_photo::capture::Measurements;
-use relightable_photo::executor::SequentialExecutor;
-use relightable_photo::recover::{Method, Recovery, RecoverySettings, SparsityBasis};
+use relightable_photo::job_executor::SequentialExecutor;
+use relightable_photo::recover::{Method, PreparedRecovery, RecoverySettings, SparsityBasis};
 use relightable_photo::transport::{Extent, Geometry, SnrAccumulator, TileRect, Window};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::{wasm_bindgen_test, wasm_bindgen_test_configure};
@@ -112,7 +112,7 @@ fn regions(method: Method, geometry: &Geometry) -> Vec<TileRect> {
 fn recover(measurements: &Measurements, method: Method, truth: &[[f64; 3]]) -> SnrAccumulator {
     let window = window(method);
     let settings = RecoverySettings { method, window };
-    let recovery = Recovery::prepare(measurements, settings, &SequentialExecutor).unwrap();
+    let recovery = PreparedRecovery::prepare(measurements, settings, &SequentialExecutor).unwrap();
     let geometry = recovery.geometry();
     let [side, true_side] = [window, glass_s::true_window()].map(|w| w.side() as usize);
     let margin = (true_side - side) / 2;
@@ -160,7 +160,7 @@ fn report(line: &str) {
 #[test]
 fn embedded_fixture_equals_its_folder() {
     use relightable_photo::capture::{
-        CameraRowReader, CaptureFolder, LinearPhoto, NoiseModel, RowSet,
+        CameraRowSet, CaptureFolder, LinearPhoto, NoiseModel, PhotographRowReader,
     };
 
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/glass-s");
@@ -171,8 +171,8 @@ fn embedded_fixture_equals_its_folder() {
     let patterns = shots.iter().map(|&i| folder.read_pattern(i).unwrap());
     let correspondence = folder.manifest().correspondence.unwrap();
     let mut read = folder.empty_measurements(&shots, patterns.collect(), correspondence, &dark);
-    read.rows = RowSet::all(read.camera.height);
-    let whole = |mut photo: CameraRowReader| {
+    read.rows = CameraRowSet::all(read.camera.height);
+    let whole = |mut photo: PhotographRowReader| {
         let mut picture = LinearPhoto::new();
         photo.read(&read.rows, &mut picture).unwrap();
         picture
@@ -195,7 +195,7 @@ fn embedded_fixture_equals_its_folder() {
     let functions = glass_s::true_functions();
     let area = truth.window.area();
     for n in 0..embedded.camera.area() {
-        let pixel = relightable_photo::transport::CameraPx {
+        let pixel = relightable_photo::transport::CameraPixel {
             x: n as u32 % embedded.camera.width,
             y: n as u32 / embedded.camera.width,
         };

@@ -1,20 +1,20 @@
 /** Decodes and relights without the element: in Node, in workers and in pages. No DOM, no side effects. */
 
-export { type DecodeOptions, decode, type LtmInput } from './core/decode.js';
+export type { CorePhotograph as Photograph } from './core/core-photograph.js';
+export { type DecodeInput, type DecodeOptions, decode } from './core/decode.js';
 export {
-  type CoreLight as Light,
-  type PictureLight,
+  type LightDescriptor as Light,
+  type LightImage,
   type RelightOptions,
   type RelitPicture,
   relight,
   type Torch,
 } from './core/relight.js';
-export type { CorePhotograph as Photograph } from './core/types.js';
-export { type CoreModuleName, provideWasm, type WasmCode } from './core/wasm-code.js';
+export { type CoreModuleName, provideWasm, type WasmInput } from './core/wasm-provider.js';
 export {
-  type EngineErrorCode,
   type ErrorCode,
   type PageErrorCode,
   PhotoError,
+  type WasmErrorCode,
 } from './shared/errors.js';
-export { type Gamut, LIGHTS, type LightName, type ToneCurve } from './shared/names.js';
+export { type Gamut, LIGHTS, type LightName, type ToneCurve } from './shared/keywords.js';

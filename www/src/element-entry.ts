@@ -14,15 +14,15 @@ export {
 export type { ReflectedProperties } from './element/reflect.js';
 export type {
   BrowserImageSource,
-  LightPicture,
+  LightImageSource,
   LightSource,
   LinearImage,
 } from './lights/light-source.js';
-export type { EngineErrorCode, ErrorCode, PageErrorCode } from './shared/errors.js';
+export type { ErrorCode, PageErrorCode, WasmErrorCode } from './shared/errors.js';
 export { PhotoError } from './shared/errors.js';
-export type { Backend, Gamut, LightName, ToneCurve } from './shared/names.js';
-export { BACKENDS, LIGHTS } from './shared/names.js';
+export type { Backend, Gamut, LightName, ToneCurve } from './shared/keywords.js';
+export { BACKENDS, LIGHTS } from './shared/keywords.js';
 export type { PicturePoint } from './shared/value-types.js';
-export type { LoadingMode, RevealMode } from './state/attribute-values.js';
-export type { LightUpdate } from './state/viewer-state.js';
+export type { LoadingMode, RevealMode } from './state/attribute-parsers.js';
+export type { SetLightOptions } from './state/viewer-state.js';
 export type { ZoomView } from './state/viewport.js';

@@ -22,9 +22,9 @@ const dist = join(repository, 'dist');
 
 /** The scripts that the element loads on demand, by their sources. */
 const LAZY_SCRIPTS = new Map([
-  ['renderers/cpu/cpu-renderer', 'relightable-photo-cpu'],
-  ['renderers/gpu/gpu-renderer', 'relightable-photo-gpu'],
-  ['lights/light-sources', 'relightable-photo-sources'],
+  ['renderers/cpu/create-cpu-renderer', 'relightable-photo-cpu'],
+  ['renderers/gpu/create-gpu-renderer', 'relightable-photo-gpu'],
+  ['lights/image-light-entry', 'relightable-photo-sources'],
   ['input/tilt', 'relightable-photo-tilt'],
   ['ui/toolbar', 'relightable-photo-controls'],
   ...['fr', 'de', 'it', 'es', 'ja', 'zh'].map(

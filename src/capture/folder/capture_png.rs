@@ -10,14 +10,14 @@ use std::path::{Path, PathBuf};
 
 use png::{BitDepth, ColorType, Transformations};
 
-use crate::capture::error::{CaptureError, CaptureProblem};
+use crate::capture::error::{CaptureError, CaptureErrorKind};
 use crate::capture::measurements::Pattern;
 use crate::transport::{CHANNELS, Extent};
 
 /// Bytes read from a file at a time.
 const READ_BYTES: usize = 1 << 16;
 
-type PngReader = png::Reader<BufReader<ReopenedFile>>;
+type PngReader = png::Reader<BufReader<ReopeningFile>>;
 
 /// A PNG and what the manifest says of it.
 pub(super) struct CapturePng {
@@ -44,7 +44,7 @@ impl CapturePng {
         let channels = match reader.output_color_type() {
             (ColorType::Grayscale, BitDepth::Eight) => 1,
             (ColorType::Rgb, BitDepth::Eight) => CHANNELS,
-            other => return Err(self.error(CaptureProblem::PatternType(sample_type(other)))),
+            other => return Err(self.error(CaptureErrorKind::PatternType(sample_type(other)))),
         };
         let mut codes = vec![0; channels * self.extent.area()];
         let decoded = reader.next_frame(&mut codes);
@@ -69,23 +69,23 @@ impl CapturePng {
     }
 
     /// Opens a 16-bit photograph to be read row by row.
-    pub fn open_rgb16(self) -> Result<Rgb16Rows, CaptureError> {
+    pub fn open_rgb16(self) -> Result<Rgb16RowReader, CaptureError> {
         let reader = self.open(Transformations::IDENTITY)?;
         let info = reader.info();
         let found = (info.color_type, info.bit_depth);
         if found != (ColorType::Rgb, BitDepth::Sixteen) {
-            return Err(self.error(CaptureProblem::PhotoType(sample_type(found))));
+            return Err(self.error(CaptureErrorKind::PhotoType(sample_type(found))));
         }
         if info.interlaced {
-            return Err(self.error(CaptureProblem::Interlaced));
+            return Err(self.error(CaptureErrorKind::Interlaced));
         }
-        Ok(Rgb16Rows { reader, file: self })
+        Ok(Rgb16RowReader { reader, file: self })
     }
 
     fn open(&self, transformations: Transformations) -> Result<PngReader, CaptureError> {
-        let file = ReopenedFile::open(&self.path).map_err(|e| match e.kind() {
-            ErrorKind::NotFound => self.error(CaptureProblem::Missing),
-            _ => self.error(CaptureProblem::Io(e)),
+        let file = ReopeningFile::open(&self.path).map_err(|e| match e.kind() {
+            ErrorKind::NotFound => self.error(CaptureErrorKind::Missing),
+            _ => self.error(CaptureErrorKind::Io(e)),
         })?;
         let mut decoder = png::Decoder::new(BufReader::with_capacity(READ_BYTES, file));
         decoder.set_transformations(transformations);
@@ -94,16 +94,16 @@ impl CapturePng {
         let expected = self.extent;
         match found == expected {
             true => Ok(reader),
-            false => Err(self.error(CaptureProblem::WrongExtent { found, expected })),
+            false => Err(self.error(CaptureErrorKind::WrongExtent { found, expected })),
         }
     }
 
     fn unreadable(&self, reason: impl Display) -> CaptureError {
         let reason = reason.to_string().trim_end_matches('.').to_owned();
-        self.error(CaptureProblem::Unreadable(reason))
+        self.error(CaptureErrorKind::Unreadable(reason))
     }
 
-    fn error(&self, problem: CaptureProblem) -> CaptureError {
+    fn error(&self, problem: CaptureErrorKind) -> CaptureError {
         CaptureError {
             path: self.path.clone(),
             field: self.field.clone(),
@@ -125,12 +125,12 @@ fn sample_type((color, depth): (ColorType, BitDepth)) -> String {
 }
 
 /// A 16-bit RGB photograph that is read row by row from the top.
-pub(super) struct Rgb16Rows {
+pub(super) struct Rgb16RowReader {
     file: CapturePng,
     reader: PngReader,
 }
 
-impl Rgb16Rows {
+impl Rgb16RowReader {
     /// The codes of the next row; `None` after the last.
     pub fn next(&mut self) -> Result<Option<impl Iterator<Item = [u16; CHANNELS]>>, CaptureError> {
         let row = self.reader.next_row();
@@ -152,13 +152,13 @@ impl Rgb16Rows {
 }
 
 /// A file that is open only during a read: some systems allow a process no more than 256 open files.
-struct ReopenedFile {
+struct ReopeningFile {
     path: PathBuf,
     position: u64,
     length: u64,
 }
 
-impl ReopenedFile {
+impl ReopeningFile {
     fn open(path: &Path) -> io::Result<Self> {
         Ok(Self {
             path: path.to_owned(),
@@ -168,7 +168,7 @@ impl ReopenedFile {
     }
 }
 
-impl Read for ReopenedFile {
+impl Read for ReopeningFile {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let mut file = File::open(&self.path)?;
         file.seek(SeekFrom::Start(self.position))?;
@@ -178,7 +178,7 @@ impl Read for ReopenedFile {
     }
 }
 
-impl Seek for ReopenedFile {
+impl Seek for ReopeningFile {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         let position = match to {
             SeekFrom::Start(position) => Some(position),

@@ -3,21 +3,21 @@
 //! The manifest is checked when the folder is opened; patterns and photographs are read one by one, so that callers may
 //! read them in parallel.
 
-mod camera_row_reader;
 mod capture_png;
+mod photograph_row_reader;
 mod truth;
 
 use std::path::{Path, PathBuf};
 
-pub use self::camera_row_reader::{CameraRowReader, DarkFrame};
+pub use self::photograph_row_reader::{DarkFrame, PhotographRowReader};
 pub use self::truth::{GroundTruth, RELIT_FULL_SCALE};
 
 use self::capture_png::CapturePng;
-use super::error::{CaptureError, CaptureProblem, MANIFEST_NAME};
+use super::camera_row_set::CameraRowSet;
+use super::error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
 use super::manifest::{GrayCodeShot, Manifest};
 use super::measurements::{LinearPhoto, Measurements, Pattern};
 use super::noise_model::NoiseModel;
-use super::row_set::RowSet;
 use crate::calibrate::{BitPair, GrayCodePhotos, LightPlaneAxis};
 use crate::transport::{CHANNELS, Correspondence};
 
@@ -43,11 +43,11 @@ impl CaptureFolder {
             _ => None,
         };
         if let Some(problem) = problem {
-            let problem = CaptureProblem::NotACapture(problem);
+            let problem = CaptureErrorKind::NotACapture(problem);
             return Err(CaptureError::new(root, problem));
         }
         let text = std::fs::read_to_string(&path)
-            .map_err(|e| CaptureError::new(&path, CaptureProblem::Io(e)))?;
+            .map_err(|e| CaptureError::new(&path, CaptureErrorKind::Io(e)))?;
         // Some editors write a byte order mark, which is not JSON.
         let json = text.strip_prefix('\u{feff}').unwrap_or(&text);
         let manifest = Manifest::parse(json, &path)?;
@@ -97,7 +97,7 @@ impl CaptureFolder {
     pub fn read_gray_code(
         &self,
         dark: &DarkFrame,
-        rows: &RowSet,
+        rows: &CameraRowSet,
     ) -> Result<GrayCodePhotos, CaptureError> {
         let light = &self.manifest.light;
         Ok(GrayCodePhotos {
@@ -114,14 +114,14 @@ impl CaptureFolder {
         axis: LightPlaneAxis,
         side: u32,
         dark: &DarkFrame,
-        rows: &RowSet,
+        rows: &CameraRowSet,
     ) -> Result<Vec<BitPair>, CaptureError> {
         let read = |bit, inverted| {
             let mut shots = self.manifest.graycode.iter().enumerate();
             let bit_of = |shot: &GrayCodeShot| (shot.axis, shot.bit, shot.inverted);
             let found = shots.find(|(_, shot)| bit_of(shot) == (axis, bit, inverted));
             let Some((i, shot)) = found else {
-                let problem = CaptureProblem::MissingGrayCode {
+                let problem = CaptureErrorKind::MissingGrayCode {
                     axis,
                     bit,
                     inverted,
@@ -173,7 +173,7 @@ impl CaptureFolder {
     pub fn open_flood<'a>(
         &'a self,
         dark: &'a DarkFrame,
-    ) -> Result<Option<CameraRowReader<'a>>, CaptureError> {
+    ) -> Result<Option<PhotographRowReader<'a>>, CaptureError> {
         let flood = self.manifest.flood.as_ref();
         let open = |name: &String| self.open_photo(name, "flood".to_owned(), 1.0, dark);
         flood.map(open).transpose()
@@ -190,7 +190,7 @@ impl CaptureFolder {
         &'a self,
         i: usize,
         dark: &'a DarkFrame,
-    ) -> Result<CameraRowReader<'a>, CaptureError> {
+    ) -> Result<PhotographRowReader<'a>, CaptureError> {
         let field = format!("shots[{i}].photo");
         let name = &self.manifest.shots[i].photo;
         self.open_photo(name, field, self.exposure(i), dark)
@@ -224,7 +224,7 @@ impl CaptureFolder {
             correspondence,
             patterns,
             full_scale: full_scale.collect(),
-            rows: RowSet::from_strips([]),
+            rows: CameraRowSet::from_strips([]),
             photos: vec![LinearPhoto::new(); shots.len()],
             noise: dark.noise,
         }
@@ -241,10 +241,10 @@ impl CaptureFolder {
         field: String,
         exposure: f64,
         dark: &'a DarkFrame,
-    ) -> Result<CameraRowReader<'a>, CaptureError> {
+    ) -> Result<PhotographRowReader<'a>, CaptureError> {
         let camera = &self.manifest.camera;
         let file = CapturePng::new(self.root.join(name), camera.extent(), Some(field));
-        Ok(CameraRowReader {
+        Ok(PhotographRowReader {
             camera,
             dark,
             exposure,

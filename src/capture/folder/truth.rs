@@ -10,10 +10,10 @@ use half::f16;
 use npyz::NpyFile;
 
 use super::capture_png::CapturePng;
-use crate::capture::error::{CaptureError, CaptureProblem};
+use crate::capture::error::{CaptureError, CaptureErrorKind};
 use crate::capture::manifest::Manifest;
 use crate::capture::measurements::Pattern;
-use crate::transport::{CHANNELS, Extent, LightElement, LightPx, Window};
+use crate::transport::{CHANNELS, Extent, LightElement, LightPosition, Window};
 
 /// Code in `relit_NAME.png` for a measurement of 1.
 pub const RELIT_FULL_SCALE: f64 = 0.9 * 65535.0;
@@ -59,7 +59,7 @@ impl GroundTruth {
         let (uv, _) = uv.as_chunks();
         let origin = |uv: &[f32; 2]| {
             let [u, v] = uv.map(f64::from);
-            window.origin(LightPx { u, v })
+            window.origin(LightPosition { u, v })
         };
         Ok(Some(Self {
             root: root.to_owned(),
@@ -88,7 +88,7 @@ impl GroundTruth {
     /// # Errors
     /// If the folder cannot be read.
     pub fn lights(&self) -> Result<Vec<String>, CaptureError> {
-        let io = |e| CaptureError::new(&self.root, CaptureProblem::Io(e));
+        let io = |e| CaptureError::new(&self.root, CaptureErrorKind::Io(e));
         let mut names = Vec::new();
         for entry in std::fs::read_dir(&self.root).map_err(io)? {
             let name = entry.map_err(io)?.file_name();
@@ -124,7 +124,7 @@ impl GroundTruth {
 }
 
 fn truth_error(path: &Path, problem: String) -> CaptureError {
-    CaptureError::new(path, CaptureProblem::InvalidTruth(problem))
+    CaptureError::new(path, CaptureErrorKind::InvalidTruth(problem))
 }
 
 /// Reads a NumPy file: what `check` makes of its shape, before the values are read, and the values.
@@ -132,7 +132,7 @@ fn read_npy<T: npyz::Deserialize, S>(
     path: &Path,
     check: impl FnOnce(&[u64]) -> Result<S, String>,
 ) -> Result<(S, Vec<T>), CaptureError> {
-    let file = File::open(path).map_err(|e| CaptureError::new(path, CaptureProblem::Io(e)))?;
+    let file = File::open(path).map_err(|e| CaptureError::new(path, CaptureErrorKind::Io(e)))?;
     let read = || {
         let npy = NpyFile::new(BufReader::new(file))?;
         if npy.order() != npyz::Order::C {

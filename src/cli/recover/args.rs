@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use crate::cli::value_parsers::{ByteCount, parse_number};
-use crate::format::{DistortionMetric, HEADER_BYTES, RateTarget};
+use crate::format::{DistortionMetric, EncodingTarget, HEADER_BYTES};
 use crate::recover::{Method, SparsityBasis};
 use crate::transport::{Decibels, Window};
 
@@ -37,7 +37,7 @@ pub struct RecoverArgs {
     /// Side of the window of light elements around each camera pixel's correspondence: an odd number, or "auto" to
     /// estimate it
     #[arg(long, value_name = "W", default_value = "15", value_parser = parse_window)]
-    pub window: WindowChoice,
+    pub window: WindowArg,
     /// Use the first K shots only [default: all but every tenth, which are held out]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     pub patterns: Option<u32>,
@@ -72,13 +72,16 @@ impl RecoverArgs {
     }
 
     /// The quality or size asked for, or the default quality, which needs a distortion metric.
-    pub fn rate_target<'a>(&self, metric: Option<&'a dyn DistortionMetric>) -> RateTarget<'a> {
+    pub fn encoding_target<'a>(
+        &self,
+        metric: Option<&'a dyn DistortionMetric>,
+    ) -> EncodingTarget<'a> {
         match (self.quality, self.max_bytes, metric) {
-            (Some(snr), ..) => RateTarget::Snr(Decibels(f64::from(snr))),
-            (_, Some(max_bytes), _) => RateTarget::Bytes(max_bytes.0),
-            _ if self.lossless => RateTarget::Lossless,
-            (.., Some(metric)) => RateTarget::Loss(DEFAULT_LOSS, metric),
-            (.., None) => RateTarget::Snr(DEFAULT_SNR),
+            (Some(snr), ..) => EncodingTarget::Snr(Decibels(f64::from(snr))),
+            (_, Some(max_bytes), _) => EncodingTarget::Bytes(max_bytes.0),
+            _ if self.lossless => EncodingTarget::Lossless,
+            (.., Some(metric)) => EncodingTarget::Loss(DEFAULT_LOSS, metric),
+            (.., None) => EncodingTarget::Snr(DEFAULT_SNR),
         }
     }
 }
@@ -95,9 +98,9 @@ fn parse_max_bytes(text: &str) -> Result<ByteCount, String> {
 
 /// The value of `--window`; `None` for "auto". The alias hides the `Option` from clap, which would take it as an
 /// argument without a default.
-type WindowChoice = Option<Window>;
+type WindowArg = Option<Window>;
 
-fn parse_window(text: &str) -> Result<WindowChoice, String> {
+fn parse_window(text: &str) -> Result<WindowArg, String> {
     if text == "auto" {
         return Ok(None);
     }

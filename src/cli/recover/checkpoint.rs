@@ -5,8 +5,8 @@
 //!
 //! | number | content |
 //! |---|---|
-//! | `u32::MAX` | the [`RunKey`] as JSON; the first record |
-//! | `u32::MAX - 1` | the [fingerprint](super::run_key) of the prepared recovery; the second record |
+//! | `u32::MAX` | the [`CheckpointKey`] as JSON; the first record |
+//! | `u32::MAX - 1` | the [fingerprint](super::checkpoint_key) of the prepared recovery; the second record |
 //! | index of a tile | the [tile](super::tile_record); in the order of completion |
 //!
 //! When the process ends, only the last record can be incomplete; it is then ignored.
@@ -20,8 +20,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use anyhow::{Context, Error, Result, bail, ensure};
 
-use super::run_key::RunKey;
-use crate::cli::process::Interrupted;
+use super::checkpoint_key::CheckpointKey;
+use crate::cli::process_resources::Interrupted;
 
 const MAGIC: [u8; 8] = *b"LTMPART2";
 /// What the magics of all versions begin with.
@@ -49,7 +49,7 @@ pub struct Checkpoint {
     pub delete_on_drop: bool,
 }
 
-struct Record {
+struct CheckpointRecord {
     number: u32,
     content: Vec<u8>,
     range: Range<u64>,
@@ -63,14 +63,14 @@ pub fn lock(checkpoint: &Mutex<Checkpoint>) -> MutexGuard<'_, Checkpoint> {
 
 impl Checkpoint {
     /// Creates the checkpoint of the recovery to `output`, or opens an existing one if `resume` is set.
-    pub fn open(output: &Path, key: &RunKey, resume: bool) -> Result<Self> {
+    pub fn open(output: &Path, key: &CheckpointKey, resume: bool) -> Result<Self> {
         let mut path = OsString::from(output);
         path.push(".checkpoint");
         let path = PathBuf::from(path);
         Self::create_or_load(&path, key, resume).with_context(|| path.display().to_string())
     }
 
-    fn create_or_load(path: &Path, key: &RunKey, resume: bool) -> Result<Self> {
+    fn create_or_load(path: &Path, key: &CheckpointKey, resume: bool) -> Result<Self> {
         let mut options = File::options();
         let options = options.read(true).write(true).create(true).truncate(false);
         let file = options
@@ -179,7 +179,7 @@ impl Checkpoint {
     }
 
     /// Loads the records of an existing checkpoint of so many bytes. Returns false if it holds no tile.
-    fn load(&mut self, key: &RunKey, resume: bool, bytes: u64) -> Result<bool> {
+    fn load(&mut self, key: &CheckpointKey, resume: bool, bytes: u64) -> Result<bool> {
         let mut reader = BufReader::with_capacity(1 << 18, self.file.try_clone()?);
         let mut magic = Vec::new();
         let mut start = reader.by_ref().take(MAGIC.len() as u64);
@@ -197,7 +197,8 @@ impl Checkpoint {
             return Ok(false);
         };
         ensure!(first.is_intact, DAMAGED);
-        let recorded: RunKey = serde_json::from_slice(&first.content).context(OTHER_VERSION)?;
+        let recorded: CheckpointKey =
+            serde_json::from_slice(&first.content).context(OTHER_VERSION)?;
         self.end = first.range.end;
         self.tiles = vec![None; recorded.tiles];
         while let Some(record) = self.read_record(&mut reader, bytes)? {
@@ -242,7 +243,7 @@ impl Checkpoint {
     }
 
     /// Reads the record after the last complete one; `None` if the file of so many bytes ends before its end.
-    fn read_record(&self, reader: &mut impl Read, bytes: u64) -> Result<Option<Record>> {
+    fn read_record(&self, reader: &mut impl Read, bytes: u64) -> Result<Option<CheckpointRecord>> {
         let start = self.end + RECORD_HEAD_BYTES as u64;
         if bytes < start {
             return Ok(None);
@@ -262,7 +263,7 @@ impl Checkpoint {
         let mut content = vec![0; length as usize];
         reader.read_exact(&mut content)?;
         let computed_crc = crc32c::crc32c_append(crc32c::crc32c(&head[..8]), &content);
-        Ok(Some(Record {
+        Ok(Some(CheckpointRecord {
             number,
             content,
             range: start..end,

@@ -10,12 +10,12 @@ use super::args::RecoverArgs;
 use super::checkpoint::{Checkpoint, lock};
 use super::memory_plan::FILE_TILE_SIDE;
 use super::tile_record;
-use crate::cli::process::InterruptibleCores;
+use crate::cli::process_resources::InterruptibleCores;
 use crate::cli::progress;
-use crate::executor::{Cancelled, Executor};
 use crate::format::{DistortionMetric, EncodedFile, EncoderInput, FormatError, Metadata};
-use crate::recover::{HoldoutValidation, Recovery};
-use crate::transport::{Basis, Decibels, FloatTile, Geometry, TileFunctions};
+use crate::job_executor::{Cancelled, Executor};
+use crate::recover::{HoldoutValidation, PreparedRecovery};
+use crate::transport::{Basis, Decibels, FloatTile, Geometry, TileTransportFunctions};
 
 /// The loss of SNR on held-out patterns.
 impl DistortionMetric for HoldoutValidation {
@@ -23,7 +23,7 @@ impl DistortionMetric for HoldoutValidation {
         self.tiles().cloned().collect()
     }
 
-    fn loss(&self, functions: &[TileFunctions]) -> Decibels {
+    fn loss(&self, functions: &[TileTransportFunctions]) -> Decibels {
         self.loss(functions)
     }
 }
@@ -32,7 +32,7 @@ impl DistortionMetric for HoldoutValidation {
 pub fn encode_file(
     args: &RecoverArgs,
     checkpoint: &Mutex<Checkpoint>,
-    recovery: &Recovery,
+    recovery: &PreparedRecovery,
     metadata: Metadata,
     cores: &InterruptibleCores,
 ) -> Result<EncodedFile> {
@@ -68,7 +68,7 @@ pub fn encode_file(
     };
     let metric = recovery.holdout_validation();
     let metric = metric.map(|validation| validation as &dyn DistortionMetric);
-    let file = EncodedFile::new(source, args.rate_target(metric), cores);
+    let file = EncodedFile::new(source, args.encoding_target(metric), cores);
     file.map_err(|error| {
         let output = args.output.display();
         match error {

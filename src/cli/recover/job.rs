@@ -8,21 +8,21 @@ use rayon::prelude::*;
 
 use super::args::RecoverArgs;
 use super::checkpoint::{Checkpoint, lock};
+use super::checkpoint_key::{CheckpointKey, PROGRAM, recovery_fingerprint};
 use super::encode::encode_file;
 use super::memory_plan::MemoryPlan;
 use super::report::RecoverReport;
-use super::run_key::{PROGRAM, RunKey, recovery_fingerprint};
 use super::{shot_selection, tile_record};
 use crate::capture::{CaptureFolder, DarkFrame, Measurements, group_count, group_ids};
+use crate::cli::measurement_reader::{MeasurementReader, read_patterns};
 use crate::cli::output_file::{LTM, OutputFile};
-use crate::cli::process::{InterruptibleCores, peak_rss_bytes};
+use crate::cli::process_resources::{InterruptibleCores, peak_rss_bytes};
 use crate::cli::progress;
-use crate::cli::shot_reader::{ShotReader, read_patterns};
-use crate::executor::{Cancelled, Executor};
-use crate::format::{CaptureSummary, Metadata};
+use crate::format::{CaptureMetadata, Metadata};
+use crate::job_executor::{Cancelled, Executor};
 use crate::recover::{
-    BandExtent, HoldoutValidation, MIN_PATTERNS, RecoverError, Recovery, RecoverySettings,
-    WindowSizeEstimate,
+    HoldoutValidation, MIN_PATTERNS, PreparedRecovery, RecoverError, RecoverySettings,
+    TailEstimate, WindowSizeEstimate,
 };
 use crate::transport::{Basis, Decibels, Window};
 
@@ -51,8 +51,8 @@ impl RecoverJob<'_> {
         let gray_code_shots = self.folder.manifest().graycode.len();
         let gray_code_rows = self.plan.gray_code_rows(gray_code_shots);
         let mut measurements = read_patterns(self.folder, &dark, self.shots, &gray_code_rows)?;
-        let reader = ShotReader::open(self.folder, &dark, self.shots)?;
-        let key = RunKey::new(self.args, self.folder, self.shots, self.plan, self.cores)?;
+        let reader = MeasurementReader::open(self.folder, &dark, self.shots)?;
+        let key = CheckpointKey::new(self.args, self.folder, self.shots, self.plan, self.cores)?;
         // Before the long work, so that a checkpoint that does not match fails early.
         let checkpoint = Checkpoint::open(&self.args.output, &key, self.args.resume)?;
         let checkpoint = Mutex::new(checkpoint);
@@ -124,14 +124,14 @@ impl RecoverJob<'_> {
         let WindowSizeEstimate { window, band } = estimate.map_err(|e| self.recover_error(e))?;
         let side = window.side();
         match band {
-            BandExtent::Bounded { tail_fraction } => {
+            TailEstimate::Bounded { tail_fraction } => {
                 return Ok((window, Some(tail_fraction)));
             }
-            BandExtent::Unbounded => eprintln!(
+            TailEstimate::Unbounded => eprintln!(
                 "warning: the band is at least as wide as the largest window tried, {side}x{side} light \
                  elements; a larger one can be given by --window"
             ),
-            BandExtent::Undetermined => eprintln!(
+            TailEstimate::Undetermined => eprintln!(
                 "warning: the photographs do not show how wide the band is; a window of {side}x{side} \
                  light elements is used, another can be given by --window"
             ),
@@ -140,9 +140,13 @@ impl RecoverJob<'_> {
     }
 
     /// Learns or chooses what the method needs. Refuses photographs without a signal.
-    fn prepare(&self, measurements: &Measurements, settings: RecoverySettings) -> Result<Recovery> {
+    fn prepare(
+        &self,
+        measurements: &Measurements,
+        settings: RecoverySettings,
+    ) -> Result<PreparedRecovery> {
         let spinner = progress::spinner("learning");
-        let recovery = Recovery::prepare(measurements, settings, self.cores);
+        let recovery = PreparedRecovery::prepare(measurements, settings, self.cores);
         drop(spinner);
         let recovery = recovery.map_err(|error| self.recover_error(error))?;
         let Some(validation) = recovery.holdout_validation() else {
@@ -171,7 +175,7 @@ impl RecoverJob<'_> {
         &self,
         mut measurements: Measurements,
         dark: DarkFrame,
-        recovery: &Recovery,
+        recovery: &PreparedRecovery,
         checkpoint: &Mutex<Checkpoint>,
         has_saturation: bool,
     ) -> Result<usize> {
@@ -182,7 +186,7 @@ impl RecoverJob<'_> {
         bar.reset_eta(); // these tiles took no time
         let mut reader = None;
         if !self.plan.fits_photographs() {
-            reader = Some(ShotReader::open(self.folder, &dark, self.shots)?);
+            reader = Some(MeasurementReader::open(self.folder, &dark, self.shots)?);
             measurements.clear_rows();
         }
         let mut overexposed = 0;
@@ -226,7 +230,7 @@ impl RecoverJob<'_> {
             title: manifest.title.clone(),
             creator: manifest.creator.clone(),
             rights: manifest.rights.clone(),
-            capture: CaptureSummary {
+            capture: CaptureMetadata {
                 patterns,
                 photographs: self.shots.len(),
             },

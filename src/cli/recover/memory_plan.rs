@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use anyhow::{Result, ensure};
 
-use crate::capture::{Manifest, RowSet};
+use crate::capture::{CameraRowSet, Manifest};
 use crate::cli::value_parsers::ByteCount;
 use crate::recover::Method;
 use crate::transport::{CHANNELS, Extent, Geometry, Window};
@@ -132,29 +132,29 @@ impl MemoryPlan {
 
     /// The camera rows to prepare the recovery from: all if they fit, otherwise rows of tiles spread evenly over the
     /// picture.
-    pub fn sample_rows(&self) -> RowSet {
+    pub fn sample_rows(&self) -> CameraRowSet {
         if self.fits_photographs() {
-            return RowSet::all(self.camera.height);
+            return CameraRowSet::all(self.camera.height);
         }
         let tile_rows = self.tile_rows();
         let count = (self.max_rows() / TILE_SIDE).clamp(1, tile_rows);
         // The middles of `count` equal parts.
         let middle = |i: u32| ((2 * i + 1) * tile_rows) / (2 * count);
-        RowSet::from_strips((0..count).map(|i| self.pixel_rows(middle(i)..middle(i) + 1, 0)))
+        CameraRowSet::from_strips((0..count).map(|i| self.pixel_rows(middle(i)..middle(i) + 1, 0)))
     }
 
     /// Strips of tile rows from the top down, each with the camera rows to load for it: its own and `halo` more on
     /// either side.
-    pub fn strips(&self, halo: u32) -> Vec<(Range<u32>, RowSet)> {
+    pub fn strips(&self, halo: u32) -> Vec<(Range<u32>, CameraRowSet)> {
         let tile_rows = self.tile_rows();
         if self.fits_photographs() {
-            return vec![(0..tile_rows, RowSet::all(self.camera.height))];
+            return vec![(0..tile_rows, CameraRowSet::all(self.camera.height))];
         }
         let count = (self.max_rows().saturating_sub(2 * halo) / TILE_SIDE).max(1);
         let strip = |first: u32| {
             let strip = first..(first + count).min(tile_rows);
             let rows = self.pixel_rows(strip.clone(), halo);
-            (strip, RowSet::from_strips([rows]))
+            (strip, CameraRowSet::from_strips([rows]))
         };
         (0..tile_rows).step_by(count as usize).map(strip).collect()
     }
@@ -166,13 +166,13 @@ impl MemoryPlan {
 
     /// The camera rows to decode of so many Gray code photographs: all if they fit, otherwise rows spread evenly over
     /// the picture.
-    pub fn gray_code_rows(&self, photographs: usize) -> RowSet {
+    pub fn gray_code_rows(&self, photographs: usize) -> CameraRowSet {
         // The samples of a pixel and its decoded position.
         let pixel = photographs as u64 * PIXEL_BYTES + 64;
         let max_rows = (self.limit.0 - self.fixed_bytes) / (pixel * u64::from(self.camera.width));
         let interval = u64::from(self.camera.height).div_ceil(max_rows.max(1));
         let rows = (0..self.camera.height).step_by(interval as usize);
-        RowSet::from_strips(rows.map(|y| y..y + 1))
+        CameraRowSet::from_strips(rows.map(|y| y..y + 1))
     }
 
     fn pixel_rows(&self, tile_rows: Range<u32>, halo: u32) -> Range<u32> {
@@ -215,7 +215,7 @@ mod tests {
             }
             let sample = plan.sample_rows();
             assert!(sample.count() as u64 * plan.row_bytes <= plan.photograph_bytes);
-            assert_eq!(plan.fits_photographs(), sample == RowSet::all(300));
+            assert_eq!(plan.fits_photographs(), sample == CameraRowSet::all(300));
             assert!(sample.iter().all(|y| y < 300));
             assert_eq!(
                 sample,

@@ -5,11 +5,11 @@
 
 mod args;
 mod checkpoint;
+mod checkpoint_key;
 mod encode;
 mod job;
 mod memory_plan;
 mod report;
-mod run_key;
 mod shot_selection;
 mod tile_record;
 
@@ -22,7 +22,7 @@ pub use self::args::RecoverArgs;
 use self::job::{RecoverJob, thread_pool};
 use self::memory_plan::MemoryPlan;
 use super::output_file::{LTM, OutputFile};
-use super::process::InterruptibleCores;
+use super::process_resources::InterruptibleCores;
 use super::report::print_json;
 use super::value_parsers::UsageError;
 use crate::capture::CaptureFolder;

@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use super::colour::{ColourVector, finite, ycocg_forward, ycocg_inverse};
-use super::tokens::{MAX_MAGNITUDE, QuantisedRun, TokenReader, TokenSource, TokenWriter};
+use super::tokens::{EncodableRuns, EntropyTokenReader, MAX_MAGNITUDE, QuantisedRun, TokenWriter};
 use crate::format::chunk::EncodedChunk;
 use crate::format::constants::MAX_CONTENT_BYTES;
 use crate::format::error::{FormatError, SectionError, damaged};
@@ -75,7 +75,7 @@ pub fn add(
     tokens: u32,
     budget: &MemoryBudget,
 ) -> Result<(), SectionError> {
-    let mut reader = TokenReader::new(bytes, tokens as usize, budget)?;
+    let mut reader = EntropyTokenReader::new(bytes, tokens as usize, budget)?;
     if reader.tokens() < tokens as usize {
         return Err(damaged("it has fewer tokens than its entry says"));
     }
@@ -98,13 +98,13 @@ pub fn add(
 
 /// The direct functions of a tile in centre-out order, before quantisation.
 #[derive(Debug)]
-pub struct CentreOutFunctions {
+pub struct CentreOutDirectFunctions {
     slots: usize,
     /// `[pixel, centre-out index]`.
     values: Vec<ColourVector>,
 }
 
-impl CentreOutFunctions {
+impl CentreOutDirectFunctions {
     /// Orders functions, `[pixel, slot]`.
     pub fn new(functions: &[ColourVector], order: &[u16]) -> Self {
         let pixels = functions.chunks_exact(order.len());
@@ -119,7 +119,7 @@ impl CentreOutFunctions {
     }
 }
 
-impl TokenSource for CentreOutFunctions {
+impl EncodableRuns for CentreOutDirectFunctions {
     fn for_runs(&self, items: Range<usize>, step: f32, visit: &mut dyn FnMut(QuantisedRun<'_>)) {
         let (mut residuals, mut numbers) = (Vec::new(), Vec::new());
         for function in self.values.chunks_exact(self.slots) {
@@ -157,7 +157,7 @@ pub struct QuantisedDirectFunctions {
 impl QuantisedDirectFunctions {
     /// Quantises functions, `[pixel, slot]`, by `scans`.
     pub fn new(functions: &[ColourVector], order: &[u16], scans: &[ProgressiveScan]) -> Self {
-        let mut residual = CentreOutFunctions::new(functions, order).values;
+        let mut residual = CentreOutDirectFunctions::new(functions, order).values;
         let square = |residual: &[ColourVector]| {
             let all = residual.as_flattened().iter();
             all.map(|t| f64::from(*t).powi(2)).sum::<f64>()

@@ -1,10 +1,10 @@
 //! The codec: basis chunks and tile chunks to bytes and back.
 //!
 //! ```text
-//! coefficients -> transform (colour, dct) -> tokens -> zstd_frame        coding 1
-//! functions    -> direct (YCoCg-R)        -> tokens -> zstd_frame        coding 3
-//! either       -> halves -> byte_planes             -> zstd_frame        codings 2, 4
-//! basis        -> basis  -> byte_planes             -> zstd_frame
+//! coefficients -> transform (colour, dct)     -> tokens      -> zstd_frame        coding 1
+//! functions    -> direct_functions (YCoCg-R)  -> tokens      -> zstd_frame        coding 3
+//! either       -> half_float_codec            -> byte_planes -> zstd_frame        codings 2, 4
+//! basis        -> basis_chunk                 -> byte_planes -> zstd_frame
 //! ```
 
 pub(super) mod basis_chunk;
@@ -12,7 +12,7 @@ mod byte_planes;
 mod colour;
 mod dct;
 pub(super) mod direct_functions;
-pub(super) mod halves;
+pub(super) mod half_float_codec;
 pub(super) mod tokens;
 pub(super) mod transform;
 pub(super) mod transform_encoder;

@@ -52,7 +52,7 @@ pub struct QuantisedRun<'a> {
 }
 
 /// Values that a codec writes as runs.
-pub trait TokenSource {
+pub trait EncodableRuns {
     /// Calls `visit` with each run of `items`, quantised to `step`.
     fn for_runs(&self, items: Range<usize>, step: f32, visit: &mut dyn FnMut(QuantisedRun<'_>));
 
@@ -171,7 +171,7 @@ fn pack(streams: &[Vec<u8>]) -> Result<Vec<u8>, FormatError> {
 
 /// Reads runs from a token string.
 #[derive(Debug)]
-pub struct TokenReader<'a> {
+pub struct EntropyTokenReader<'a> {
     streams: [Vec<u8>; CONTEXTS],
     /// Index of the next token of each stream.
     next: [usize; CONTEXTS],
@@ -182,7 +182,7 @@ pub struct TokenReader<'a> {
     pending_count: u32,
 }
 
-impl<'a> TokenReader<'a> {
+impl<'a> EntropyTokenReader<'a> {
     /// Decompresses the tokens of a string, at most `max_tokens`.
     ///
     /// # Errors
@@ -304,7 +304,8 @@ mod tests {
         let (bytes, tokens) = (chunk.bytes, chunk.content_bytes);
         assert!(bytes.len() as u64 <= max_bytes(tokens.into()));
         let read = |bytes: &[u8]| {
-            let mut reader = TokenReader::new(bytes, tokens as usize, &MemoryBudget::unlimited())?;
+            let mut reader =
+                EntropyTokenReader::new(bytes, tokens as usize, &MemoryBudget::unlimited())?;
             assert_eq!(reader.tokens(), tokens as usize);
             for run in runs {
                 let mut read = vec![0; run.len()];
@@ -320,7 +321,10 @@ mod tests {
             assert!(read(&bytes[..length]).is_err());
         }
         assert!(read(&[&bytes[..], &[0]].concat()).is_err());
-        assert!(TokenReader::new(&bytes, tokens as usize - 1, &MemoryBudget::unlimited()).is_err());
+        assert!(
+            EntropyTokenReader::new(&bytes, tokens as usize - 1, &MemoryBudget::unlimited())
+                .is_err()
+        );
     }
 
     fn sparse(every: usize, length: usize) -> Vec<i32> {

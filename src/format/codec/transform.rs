@@ -18,7 +18,7 @@
 
 use super::colour::{ColourKlt, ColourVector, HouseholderReflection};
 use super::dct::{self, AREA, DctBlock, SIDE, ZIGZAG};
-use super::tokens::{self, MAX_MAGNITUDE, TokenReader};
+use super::tokens::{self, EntropyTokenReader, MAX_MAGNITUDE};
 use crate::format::constants::MAX_CONTENT_BYTES;
 use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::fields::FieldReader;
@@ -111,8 +111,8 @@ impl CoefficientPlanes {
         let length = fields.try_length().ok_or_else(too_short)?;
         let main = fields.try_bytes(length).ok_or_else(too_short)?;
         let tokens = tokens as usize;
-        let mut main = TokenReader::new(main, tokens, budget)?;
-        let mut side = TokenReader::new(fields.0, tokens - main.tokens(), budget)?;
+        let mut main = EntropyTokenReader::new(main, tokens, budget)?;
+        let mut side = EntropyTokenReader::new(fields.0, tokens - main.tokens(), budget)?;
         if main.tokens() + side.tokens() < tokens {
             return Err(damaged("it has fewer tokens than its entry says"));
         }

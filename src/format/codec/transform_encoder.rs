@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::colour::{ColourKlt, ColourVector, HouseholderReflection, finite};
 use super::dct::{self, AREA, DctBlock, SIDE, ZIGZAG};
-use super::tokens::{MAX_MAGNITUDE, QuantisedRun, TokenSource, TokenWriter};
+use super::tokens::{EncodableRuns, MAX_MAGNITUDE, QuantisedRun, TokenWriter};
 use super::transform::{
     CoefficientPlane, CoefficientPlanes, add_block, block_corners, block_count, dequantise,
     try_axis,
@@ -64,7 +64,7 @@ impl TransformedTile {
     }
 }
 
-impl TokenSource for TransformedTile {
+impl EncodableRuns for TransformedTile {
     fn for_runs(&self, items: Range<usize>, step: f32, visit: &mut dyn FnMut(QuantisedRun<'_>)) {
         let axis = self.blocks * AREA;
         let components = self.values.chunks_exact(CHANNELS * axis).enumerate();

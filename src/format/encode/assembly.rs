@@ -3,18 +3,18 @@
 use std::io::Write;
 
 use super::basis_rotation::BasisRotation;
-use super::encoder::{Encoder, for_tiles, non_empty};
 use super::scan_plan::SHARES;
-use crate::executor::Executor;
+use super::source_analysis::{AnalysedSource, for_tiles, non_empty};
 use crate::format::checksum::checksum;
 use crate::format::chunk::{ChunkEntry, EncodedChunk};
 use crate::format::codec::basis_chunk::QuantisedBasis;
 use crate::format::codec::direct_functions::{self, QuantisedDirectFunctions};
-use crate::format::codec::halves;
+use crate::format::codec::half_float_codec;
 use crate::format::codec::transform_encoder::QuantisedCoefficients;
 use crate::format::error::FormatError;
 use crate::format::index::FileIndex;
 use crate::format::scan::{ProgressiveScan, ScanCoding};
+use crate::job_executor::Executor;
 use crate::transport::{Basis, Decibels, FloatTile, SnrAccumulator};
 
 /// Share of the error that the rounding of the basis may add.
@@ -76,12 +76,12 @@ struct EncodedTile {
 impl QuantisedTile {
     /// Quantises a tile over the file's basis; `keep_decoded` says whether [`decoded`](Self::decoded) will be called.
     pub fn new(
-        encoder: &Encoder<'_, impl Executor>,
+        analysed: &AnalysedSource<'_, impl Executor>,
         tile: &FloatTile,
         scans: &[ProgressiveScan],
         keep_decoded: bool,
     ) -> Self {
-        let (extent, rank, order) = (tile.rect.extent, encoder.rank(), &encoder.order);
+        let (extent, rank, order) = (tile.rect.extent, analysed.rank(), &analysed.order);
         let (coefficients, functions) = (non_empty(&tile.coefficients), non_empty(&tile.functions));
         Self {
             coefficients: coefficients
@@ -138,29 +138,31 @@ impl QuantisedTile {
 /// # Errors
 /// As [`EncodedFile::new`].
 pub fn encode_quantised(
-    encoder: &Encoder<'_, impl Executor>,
+    analysed: &AnalysedSource<'_, impl Executor>,
     scans: Vec<ProgressiveScan>,
 ) -> Result<EncodedFile, FormatError> {
     let encode = |tile: FloatTile| {
-        QuantisedTile::new(encoder, &encoder.rotated(tile), &scans, false).encode(&scans)
+        QuantisedTile::new(analysed, &analysed.rotated(tile), &scans, false).encode(&scans)
     };
-    assemble(encoder, scans.clone(), encode)
+    assemble(analysed, scans.clone(), encode)
 }
 
 /// Encodes all tiles as half-precision floats.
 ///
 /// # Errors
 /// As [`EncodedFile::new`].
-pub fn encode_lossless(encoder: &Encoder<'_, impl Executor>) -> Result<EncodedFile, FormatError> {
+pub fn encode_lossless(
+    analysed: &AnalysedSource<'_, impl Executor>,
+) -> Result<EncodedFile, FormatError> {
     // A rotated coefficient is at most the norm of the input coefficients.
-    let gains = (0..encoder.rank()).filter_map(|k| Some(encoder.rotation.as_ref()?.gain(k)));
-    let input_rank = encoder.source.basis.map_or(0, Basis::rank);
+    let gains = (0..analysed.rank()).filter_map(|k| Some(analysed.rotation.as_ref()?.gain(k)));
+    let input_rank = analysed.source.basis.map_or(0, Basis::rank);
     let gain = gains.fold((input_rank as f64).sqrt(), f64::max) as f32;
-    let peak = (encoder.coefficient_peak * gain).max(encoder.function_peak);
-    let step = halves::step_for(peak);
-    let side = encoder.source.geometry.tile_side;
+    let peak = (analysed.coefficient_peak * gain).max(analysed.function_peak);
+    let step = half_float_codec::step_for(peak);
+    let side = analysed.source.geometry.tile_side;
     let max_per_scan = direct_functions::max_slots(side) as usize;
-    let (rank, slots) = (encoder.rank(), encoder.slots());
+    let (rank, slots) = (analysed.rank(), analysed.slots());
     // All items have the same bytes.
     let mut scans = Vec::new();
     for (coding, items) in [
@@ -185,31 +187,31 @@ pub fn encode_lossless(encoder: &Encoder<'_, impl Executor>) -> Result<EncodedFi
             first += count;
         }
     }
-    let encode = |tile: FloatTile| encode_halves(encoder, &encoder.rotated(tile), &scans);
-    assemble(encoder, scans.clone(), encode)
+    let encode = |tile: FloatTile| encode_halves(analysed, &analysed.rotated(tile), &scans);
+    assemble(analysed, scans.clone(), encode)
 }
 
 fn encode_halves(
-    encoder: &Encoder<'_, impl Executor>,
+    analysed: &AnalysedSource<'_, impl Executor>,
     tile: &FloatTile,
     scans: &[ProgressiveScan],
 ) -> Result<EncodedTile, FormatError> {
     let mut encoded = EncodedTile::default();
     let (mut energies, mut errors) = (Vec::new(), Vec::new());
     for scan in scans {
-        let order = &encoder.order;
+        let order = &analysed.order;
         let values = match scan.coding.is_direct() {
-            true => halves::gather(&tile.functions, order.len(), scan, Some(order)),
-            false => halves::gather(&tile.coefficients, encoder.rank(), scan, None),
+            true => half_float_codec::gather(&tile.functions, order.len(), scan, Some(order)),
+            false => half_float_codec::gather(&tile.coefficients, analysed.rank(), scan, None),
         };
         let energy = values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
         energies.push(energy);
-        errors.push(halves::error(&values, scan.step).max(HALVES_ERROR_RATIO * energy));
+        errors.push(half_float_codec::error(&values, scan.step).max(HALVES_ERROR_RATIO * energy));
         encoded.chunks.push(match values.iter().all(|v| *v == 0.0) {
             true => EncodedChunk::default(),
             false => EncodedChunk {
-                content_bytes: halves::content_bytes(values.len()) as u32,
-                bytes: halves::encode(&values, scan.step)?,
+                content_bytes: half_float_codec::content_bytes(values.len()) as u32,
+                bytes: half_float_codec::encode(&values, scan.step)?,
             },
         });
     }
@@ -232,18 +234,18 @@ fn quantise_basis(rotation: &BasisRotation, area: usize, error: f64) -> Quantise
 
 /// Encodes all tiles by `encode`, and puts the file together.
 fn assemble(
-    encoder: &Encoder<'_, impl Executor>,
+    analysed: &AnalysedSource<'_, impl Executor>,
     mut scans: Vec<ProgressiveScan>,
     encode: impl Fn(FloatTile) -> Result<EncodedTile, FormatError> + Sync + Send,
 ) -> Result<EncodedFile, FormatError> {
-    let (source, rotation) = (&encoder.source, encoder.rotation.as_ref());
+    let (source, rotation) = (&analysed.source, analysed.rotation.as_ref());
     let geometry = source.geometry;
     let (tiles, area) = (geometry.tile_grid().area(), geometry.window.area());
     let mut chunks = vec![Vec::with_capacity(tiles); scans.len()];
     // Every prefix lacks the dropped components.
     let kept = rotation.map_or(0.0, BasisRotation::energy);
-    let mut errors = vec![(encoder.coefficient_energy - kept).max(0.0); scans.len()];
-    for_tiles(source, encoder.executor, encode, |_, tile| {
+    let mut errors = vec![(analysed.coefficient_energy - kept).max(0.0); scans.len()];
+    for_tiles(source, analysed.executor, encode, |_, tile| {
         let tile = tile?;
         for (sum, error) in errors.iter_mut().zip(&tile.errors) {
             *sum += error;
@@ -274,7 +276,7 @@ fn assemble(
             in_file.push(bytes);
         }
         let error = SnrAccumulator {
-            signal: encoder.energy,
+            signal: analysed.energy,
             error: error + basis_error,
         };
         scan.snr = Decibels(f64::from(error.finite_snr().0 as f32));

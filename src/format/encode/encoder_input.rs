@@ -1,11 +1,11 @@
-//! The encoder's input: light transport, rate target and distortion metric.
+//! The encoder's input: light transport, target and distortion metric.
 
 use std::fmt;
 use std::io;
 
-use crate::format::extension::Extension;
+use crate::format::extension::FormatExtension;
 use crate::format::metadata::Metadata;
-use crate::transport::{Basis, Decibels, FloatTile, Geometry, TileFunctions};
+use crate::transport::{Basis, Decibels, FloatTile, Geometry, TileTransportFunctions};
 
 /// The light transport of a file.
 pub struct EncoderInput<'a> {
@@ -18,7 +18,7 @@ pub struct EncoderInput<'a> {
     /// Origin of the file.
     pub metadata: Metadata,
     /// Extensions of the file.
-    pub extensions: Vec<Extension>,
+    pub extensions: Vec<FormatExtension>,
 }
 
 /// Measures how much accuracy of light transport a file loses. Recovered light transport contains noise,
@@ -29,12 +29,12 @@ pub trait DistortionMetric: Sync {
     fn tiles(&self) -> Vec<FloatTile>;
 
     /// Estimated loss of SNR against the object's light transport if `functions` replace the tiles.
-    fn loss(&self, functions: &[TileFunctions]) -> Decibels;
+    fn loss(&self, functions: &[TileTransportFunctions]) -> Decibels;
 }
 
 /// The target of the rate control.
 #[derive(Clone, Copy, Debug)]
-pub enum RateTarget<'a> {
+pub enum EncodingTarget<'a> {
     /// The smallest file whose loss, by a metric, is at most this.
     Loss(Decibels, &'a dyn DistortionMetric),
     /// The smallest file with this SNR against the source.

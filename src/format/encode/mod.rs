@@ -1,7 +1,7 @@
 //! The encoder: light transport to an `.ltm` file.
 //!
 //! ```text
-//! encoder              one pass over all tiles: moments, peaks  -> rotated basis
+//! source_analysis      one pass over all tiles: moments, peaks  -> rotated basis
 //! rate_control_sample  parts of some tiles
 //! rate_control         sample, target                           -> step, rank
 //! scan_plan            sample, step, shares of the file         -> scans
@@ -10,12 +10,12 @@
 
 mod assembly;
 mod basis_rotation;
-mod encoder;
 mod encoder_input;
 mod rate_control;
 mod rate_control_sample;
 mod scan_costs;
 mod scan_plan;
+mod source_analysis;
 
 pub use assembly::EncodedFile;
-pub use encoder_input::{DistortionMetric, EncoderInput, RateTarget};
+pub use encoder_input::{DistortionMetric, EncoderInput, EncodingTarget};

@@ -6,17 +6,17 @@
 use std::convert::Infallible;
 
 use super::assembly::{self, EncodedFile, QuantisedTile};
-use super::encoder::Encoder;
-use super::encoder_input::{DistortionMetric, EncoderInput, RateTarget};
+use super::encoder_input::{DistortionMetric, EncoderInput, EncodingTarget};
 use super::rate_control_sample::{SampledTilePart, sample};
-use super::scan_costs::CostModel;
-use super::scan_plan::{self, MAX_SHARES, ProgressiveScanPlan, SHARES, ScanByteShares};
+use super::scan_costs::RateDistortionModel;
+use super::scan_plan::{self, ByteShareLimits, MAX_SHARES, ProgressiveScanPlan, SHARES};
+use super::source_analysis::AnalysedSource;
 use crate::bisect::bisect;
-use crate::executor::Executor;
 use crate::format::constants::FIRST_BYTES;
 use crate::format::error::FormatError;
 use crate::format::scan::ProgressiveScan;
-use crate::transport::{Decibels, FloatTile, SnrAccumulator, TileFunctions};
+use crate::job_executor::Executor;
+use crate::transport::{Decibels, FloatTile, SnrAccumulator, TileTransportFunctions};
 
 /// Energy of the dropped components, relative to the quantisation error.
 const DROPPED_ENERGY_RATIO: f64 = 0.01;
@@ -42,38 +42,39 @@ impl EncodedFile {
     /// Encodes a whole file. The result does not depend on the number of threads.
     ///
     /// # Errors
-    /// [`FormatError::Source`] if a tile cannot be read, [`FormatError::TooLarge`] if even the coarsest file is larger than
+    /// [`FormatError::InvalidGeometry`], [`FormatError::TooMany`] basis functions or scans, [`FormatError::Source`] if a
+    /// tile cannot be read, [`FormatError::Compress`], [`FormatError::TooLarge`] if even the coarsest file is larger than
     /// the target, and the errors of writing extensions and metadata.
     ///
     /// # Panics
     /// If a tile or a basis function does not have the length that geometry and basis give it.
     pub fn new(
         source: EncoderInput<'_>,
-        target: RateTarget<'_>,
+        target: EncodingTarget<'_>,
         executor: &impl Executor,
     ) -> Result<Self, FormatError> {
-        let encoder = Encoder::new(source, executor)?;
+        let analysed = AnalysedSource::new(source, executor)?;
         match target {
-            RateTarget::Snr(snr) => RateControl::new(encoder)?.encode_to_snr(snr),
-            RateTarget::Bytes(limit) => RateControl::new(encoder)?.encode_to_size(limit),
-            RateTarget::Loss(loss, metric) => {
-                RateControl::new(encoder)?.encode_to_loss(loss, metric)
+            EncodingTarget::Snr(snr) => RateController::new(analysed)?.encode_to_snr(snr),
+            EncodingTarget::Bytes(limit) => RateController::new(analysed)?.encode_to_size(limit),
+            EncodingTarget::Loss(loss, metric) => {
+                RateController::new(analysed)?.encode_to_loss(loss, metric)
             }
-            RateTarget::Lossless => assembly::encode_lossless(&encoder),
+            EncodingTarget::Lossless => assembly::encode_lossless(&analysed),
         }
     }
 }
 
 /// The search for a file's step and rank.
-struct RateControl<'a, E> {
-    encoder: Encoder<'a, E>,
+struct RateController<'a, E> {
+    analysed: AnalysedSource<'a, E>,
     sample: Vec<SampledTilePart>,
 }
 
-impl<'a, E: Executor> RateControl<'a, E> {
-    fn new(encoder: Encoder<'a, E>) -> Result<Self, FormatError> {
-        let sample = sample(&encoder)?;
-        Ok(Self { encoder, sample })
+impl<'a, E: Executor> RateController<'a, E> {
+    fn new(analysed: AnalysedSource<'a, E>) -> Result<Self, FormatError> {
+        let sample = sample(&analysed)?;
+        Ok(Self { analysed, sample })
     }
 
     fn encode_to_snr(&mut self, snr: Decibels) -> Result<EncodedFile, FormatError> {
@@ -85,32 +86,32 @@ impl<'a, E: Executor> RateControl<'a, E> {
         max_loss: Decibels,
         metric: &dyn DistortionMetric,
     ) -> Result<EncodedFile, FormatError> {
-        let encoder = &mut self.encoder;
-        let pixels = encoder.source.geometry.camera.area() as f64;
+        let analysed = &mut self.analysed;
+        let pixels = analysed.source.geometry.camera.area() as f64;
         // The step at which nothing is left.
-        let coarsest = 16.0 * (encoder.energy / pixels).sqrt();
+        let coarsest = 16.0 * (analysed.energy / pixels).sqrt();
         if !(coarsest as f32).is_normal() {
             return self.encode_with_step(None);
         }
-        let tiles = codable(encoder, metric.tiles());
+        let tiles = codable(analysed, metric.tiles());
         // The metric may have direct functions where the file has none.
-        let has_functions = encoder.has_functions;
-        encoder.has_functions |= tiles.iter().any(|tile| !tile.functions.is_empty());
-        let tiles: Vec<_> = tiles.into_iter().map(|t| encoder.rotated(t)).collect();
+        let has_functions = analysed.has_functions;
+        analysed.has_functions |= tiles.iter().any(|tile| !tile.functions.is_empty());
+        let tiles: Vec<_> = tiles.into_iter().map(|t| analysed.rotated(t)).collect();
         let [exponent, _] = bisect(LOSS_EXPONENTS, LOSS_HALVINGS, |exponent| {
-            let scans = scan_plan::trial(encoder, (coarsest * exponent.exp2()) as f32);
-            let decoded = |i: usize| decoded(encoder, &tiles[i], &scans);
-            let loss = metric.loss(&encoder.executor.map(tiles.len(), decoded));
+            let scans = scan_plan::trial(analysed, (coarsest * exponent.exp2()) as f32);
+            let decoded = |i: usize| decoded(analysed, &tiles[i], &scans);
+            let loss = metric.loss(&analysed.executor.map(tiles.len(), decoded));
             Ok::<_, FormatError>(loss.0 <= max_loss.0)
         })?;
-        encoder.has_functions = has_functions;
+        analysed.has_functions = has_functions;
         self.encode_with_step(Some((coarsest * exponent.exp2()) as f32))
     }
 
     fn encode_to_size(&mut self, limit: u64) -> Result<EncodedFile, FormatError> {
-        let rotation = self.encoder.rotation.clone();
+        let rotation = self.analysed.rotation.clone();
         let mut try_snr = |snr: f64| {
-            self.encoder.rotation.clone_from(&rotation);
+            self.analysed.rotation.clone_from(&rotation);
             self.encode_to_snr(Decibels(snr))
         };
         let mut best = try_snr(SIZE_SNRS[0])?;
@@ -133,15 +134,15 @@ impl<'a, E: Executor> RateControl<'a, E> {
     /// [`MAX_SHARES`]: predictions from samples may err.
     fn encode_with_step(&mut self, step: Option<f32>) -> Result<EncodedFile, FormatError> {
         let Some(step) = step else {
-            return assembly::encode_quantised(&self.encoder, Vec::new());
+            return assembly::encode_quantised(&self.analysed, Vec::new());
         };
         let expected = self.trial_error(step);
-        drop_weak_components(&mut self.encoder, expected);
-        let model = CostModel::new(&self.encoder, &self.sample);
+        drop_weak_components(&mut self.analysed, expected);
+        let model = RateDistortionModel::new(&self.analysed, &self.sample);
         let encode = |factor: f64| {
             let ProgressiveScanPlan { scans, first_scans } =
                 self.plan(&model, step, expected.error, factor)?;
-            let file = assembly::encode_quantised(&self.encoder, scans)?;
+            let file = assembly::encode_quantised(&self.analysed, scans)?;
             let is_within = is_within_shares(&file, first_scans);
             Ok::<_, FormatError>((file, is_within))
         };
@@ -160,16 +161,16 @@ impl<'a, E: Executor> RateControl<'a, E> {
     /// plan's layers change the error a little.
     fn plan(
         &self,
-        model: &CostModel,
+        model: &RateDistortionModel,
         mut step: f32,
         expected_error: f64,
         factor: f64,
     ) -> Result<ProgressiveScanPlan, FormatError> {
-        let shares = ScanByteShares {
+        let shares = ByteShareLimits {
             first: SHARES.first * factor,
             scan: SHARES.scan * factor,
         };
-        let mut plan = scan_plan::plan(&self.encoder, model, step, shares)?;
+        let mut plan = scan_plan::plan(&self.analysed, model, step, shares)?;
         for correction in 0..STEP_CORRECTIONS {
             let error = self.error_of(&plan.scans).error;
             let ratio = (expected_error / error.max(f64::MIN_POSITIVE)).sqrt() as f32;
@@ -178,20 +179,20 @@ impl<'a, E: Executor> RateControl<'a, E> {
                 break;
             }
             step *= 0.99 * ratio.clamp(MAX_STEP_CORRECTION.recip(), MAX_STEP_CORRECTION);
-            plan = scan_plan::plan(&self.encoder, model, step, shares)?;
+            plan = scan_plan::plan(&self.analysed, model, step, shares)?;
         }
         Ok(plan)
     }
 
     fn trial_error(&self, step: f32) -> SnrAccumulator {
-        self.error_of(&scan_plan::trial(&self.encoder, step))
+        self.error_of(&scan_plan::trial(&self.analysed, step))
     }
 
     /// The quantisation error of some scans, predicted from the sample.
     fn error_of(&self, scans: &[ProgressiveScan]) -> SnrAccumulator {
-        let errors = self.encoder.executor.map(self.sample.len(), |i| {
+        let errors = self.analysed.executor.map(self.sample.len(), |i| {
             let SampledTilePart { tile, weight } = &self.sample[i];
-            let error = QuantisedTile::new(&self.encoder, tile, scans, false).error(scans.len());
+            let error = QuantisedTile::new(&self.analysed, tile, scans, false).error(scans.len());
             SnrAccumulator {
                 signal: error.signal * weight,
                 error: error.error * weight,
@@ -214,12 +215,17 @@ fn is_within_shares(file: &EncodedFile, first_scans: usize) -> bool {
 }
 
 /// The metric's tiles in the file's coding: as direct functions where the file has no components.
-fn codable(encoder: &Encoder<'_, impl Executor>, mut tiles: Vec<FloatTile>) -> Vec<FloatTile> {
-    if encoder.rotation.is_none()
-        && let Some(basis) = encoder.source.basis
+fn codable(
+    analysed: &AnalysedSource<'_, impl Executor>,
+    mut tiles: Vec<FloatTile>,
+) -> Vec<FloatTile> {
+    if analysed.rotation.is_none()
+        && let Some(basis) = analysed.source.basis
     {
         for tile in &mut tiles {
-            *tile = tile.functions(&encoder.source.geometry, Some(basis)).into();
+            *tile = tile
+                .functions(&analysed.source.geometry, Some(basis))
+                .into();
         }
     }
     tiles
@@ -227,21 +233,21 @@ fn codable(encoder: &Encoder<'_, impl Executor>, mut tiles: Vec<FloatTile>) -> V
 
 /// The functions of a tile over the file's basis, as a reader decodes them.
 fn decoded(
-    encoder: &Encoder<'_, impl Executor>,
+    analysed: &AnalysedSource<'_, impl Executor>,
     tile: &FloatTile,
     scans: &[ProgressiveScan],
-) -> TileFunctions {
-    let quantised = QuantisedTile::new(encoder, tile, scans, true);
-    let decoded = quantised.decoded(tile, &encoder.order);
-    let basis = encoder.rotation.as_ref().map(|rotation| &rotation.basis);
-    decoded.functions(&encoder.source.geometry, basis)
+) -> TileTransportFunctions {
+    let quantised = QuantisedTile::new(analysed, tile, scans, true);
+    let decoded = quantised.decoded(tile, &analysed.order);
+    let basis = analysed.rotation.as_ref().map(|rotation| &rotation.basis);
+    decoded.functions(&analysed.source.geometry, basis)
 }
 
 /// Drops the last components, as far as their energy is small against the quantisation error.
-fn drop_weak_components(encoder: &mut Encoder<'_, impl Executor>, error: SnrAccumulator) {
+fn drop_weak_components(analysed: &mut AnalysedSource<'_, impl Executor>, error: SnrAccumulator) {
     let SnrAccumulator { signal, error } = error;
-    let allowed = DROPPED_ENERGY_RATIO * encoder.energy * error / signal.max(f64::MIN_POSITIVE);
-    if let Some(rotation) = &mut encoder.rotation {
+    let allowed = DROPPED_ENERGY_RATIO * analysed.energy * error / signal.max(f64::MIN_POSITIVE);
+    if let Some(rotation) = &mut analysed.rotation {
         let mut dropped = 0.0;
         let weak = rotation.energies.iter().rev().take_while(|energy| {
             dropped += **energy;

@@ -3,14 +3,14 @@
 //! Bytes are the entropy of the tokens in their three contexts, plus sign and mantissa bits. Both bytes and
 //! squared errors are told apart by item: by component, or by slot in centre-out order.
 
-use super::encoder::{Encoder, non_empty};
 use super::rate_control_sample::SampledTilePart;
-use crate::executor::Executor;
-use crate::format::codec::direct_functions::CentreOutFunctions;
-use crate::format::codec::tokens::{CONTEXTS, TokenSource, for_tokens};
+use super::source_analysis::{AnalysedSource, non_empty};
+use crate::format::codec::direct_functions::CentreOutDirectFunctions;
+use crate::format::codec::tokens::{CONTEXTS, EncodableRuns, for_tokens};
 use crate::format::codec::transform_encoder::TransformedTile;
 use crate::format::error::FormatError;
 use crate::format::scan::{ProgressiveScan, ScanCoding};
+use crate::job_executor::Executor;
 
 /// Bytes and squared error of one item at one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,14 +23,14 @@ pub struct RateDistortion {
 }
 
 /// The sample's values as the codecs quantise them.
-pub struct CostModel {
+pub struct RateDistortionModel {
     parts: Vec<TransformedTilePart>,
 }
 
 struct TransformedTilePart {
     weight: f64,
     coefficients: Option<TransformedTile>,
-    functions: Option<CentreOutFunctions>,
+    functions: Option<CentreOutDirectFunctions>,
 }
 
 /// One token of an item.
@@ -40,16 +40,17 @@ struct EntropyToken {
     token: u8,
 }
 
-impl CostModel {
-    pub fn new(encoder: &Encoder<'_, impl Executor>, sample: &[SampledTilePart]) -> Self {
-        let parts = encoder.executor.map(sample.len(), |i| {
+impl RateDistortionModel {
+    pub fn new(analysed: &AnalysedSource<'_, impl Executor>, sample: &[SampledTilePart]) -> Self {
+        let parts = analysed.executor.map(sample.len(), |i| {
             let SampledTilePart { tile, weight } = &sample[i];
             let (extent, functions) = (tile.rect.extent, non_empty(&tile.functions));
             let coefficients = non_empty(&tile.coefficients);
             TransformedTilePart {
                 weight: *weight,
-                coefficients: coefficients.map(|c| TransformedTile::new(extent, c, encoder.rank())),
-                functions: functions.map(|tau| CentreOutFunctions::new(tau, &encoder.order)),
+                coefficients: coefficients
+                    .map(|c| TransformedTile::new(extent, c, analysed.rank())),
+                functions: functions.map(|tau| CentreOutDirectFunctions::new(tau, &analysed.order)),
             }
         });
         Self { parts }
@@ -116,7 +117,7 @@ impl CostModel {
 }
 
 impl TransformedTilePart {
-    fn runs(&self, coding: ScanCoding) -> Option<&dyn TokenSource> {
+    fn runs(&self, coding: ScanCoding) -> Option<&dyn EncodableRuns> {
         match coding.is_direct() {
             true => self.functions.as_ref().map(|runs| runs as _),
             false => self.coefficients.as_ref().map(|runs| runs as _),
@@ -126,7 +127,7 @@ impl TransformedTilePart {
 
 /// The tokens of `count` items, and their squared values and errors.
 fn part_costs(
-    runs: &dyn TokenSource,
+    runs: &dyn EncodableRuns,
     count: usize,
     step: f32,
 ) -> (Vec<EntropyToken>, Vec<RateDistortion>) {

@@ -11,27 +11,27 @@
 
 use std::ops::Range;
 
-use super::encoder::Encoder;
-use super::scan_costs::{CostModel, RateDistortion};
+use super::scan_costs::{RateDistortion, RateDistortionModel};
+use super::source_analysis::AnalysedSource;
 use crate::bisect::bisect;
-use crate::executor::Executor;
 use crate::format::codec::{direct_functions, transform};
 use crate::format::constants::FIRST_BYTES;
 use crate::format::error::FormatError;
 use crate::format::scan::{ProgressiveScan, ScanCoding, rank_of};
+use crate::job_executor::Executor;
 
 /// The shares that a plan aims for. Predictions err; files keep [`MAX_SHARES`].
-pub const SHARES: ScanByteShares = ScanByteShares {
+pub const SHARES: ByteShareLimits = ByteShareLimits {
     first: 0.08,
     scan: 0.18,
 };
 /// The shares of files that fit into a reader's first request, where many scans cost more than they give.
-const SMALL_FILE_SHARES: ScanByteShares = ScanByteShares {
+const SMALL_FILE_SHARES: ByteShareLimits = ByteShareLimits {
     first: 0.3,
     scan: f64::INFINITY,
 };
 /// The shares that files keep: a tenth and a quarter.
-pub const MAX_SHARES: ScanByteShares = ScanByteShares {
+pub const MAX_SHARES: ByteShareLimits = ByteShareLimits {
     first: 0.1,
     scan: 0.25,
 };
@@ -60,7 +60,7 @@ pub struct ProgressiveScanPlan {
 
 /// Bounds on the parts of a file, as shares of its bytes.
 #[derive(Clone, Copy, Debug)]
-pub struct ScanByteShares {
+pub struct ByteShareLimits {
     /// Of the index and the first layer.
     pub first: f64,
     /// Of any later scan.
@@ -69,7 +69,7 @@ pub struct ScanByteShares {
 
 /// Components, or slots.
 #[derive(Clone, Debug)]
-struct ScanItems {
+struct CodingItems {
     coding: ScanCoding,
     /// Maximum number in one scan.
     max_per_scan: usize,
@@ -77,23 +77,23 @@ struct ScanItems {
     finest_steps: Vec<f32>,
 }
 
-impl ScanItems {
+impl CodingItems {
     /// Components and slots of a source, where there are some.
-    fn of(encoder: &Encoder<'_, impl Executor>) -> Vec<Self> {
-        let side = encoder.source.geometry.tile_side;
+    fn of(analysed: &AnalysedSource<'_, impl Executor>) -> Vec<Self> {
+        let side = analysed.source.geometry.tile_side;
         let components = Self {
             coding: ScanCoding::Transform,
             max_per_scan: transform::max_components(side) as usize,
-            finest_steps: (0..encoder.rank())
-                .map(|k| encoder.finest_step(k))
+            finest_steps: (0..analysed.rank())
+                .map(|k| analysed.finest_step(k))
                 .collect(),
         };
         let slots = Self {
             coding: ScanCoding::Direct,
             max_per_scan: direct_functions::max_slots(side) as usize,
             finest_steps: vec![
-                direct_functions::finest_step(encoder.function_peak);
-                encoder.slots()
+                direct_functions::finest_step(analysed.function_peak);
+                analysed.slots()
             ],
         };
         let mut kinds = Vec::from([components, slots]);
@@ -177,9 +177,9 @@ impl ScanItems {
 }
 
 /// A plan without shares, by which the rate control measures a step.
-pub fn trial(encoder: &Encoder<'_, impl Executor>, step: f32) -> Vec<ProgressiveScan> {
+pub fn trial(analysed: &AnalysedSource<'_, impl Executor>, step: f32) -> Vec<ProgressiveScan> {
     let mut scans = Vec::new();
-    for items in ScanItems::of(encoder) {
+    for items in CodingItems::of(analysed) {
         let count = items.count().div_ceil(TRIAL_FIRST_ITEMS);
         items.first_layer(count, TRIAL_FIRST_STEP_RATIO * step, &mut scans);
         let bytes = vec![0.0; items.count()];
@@ -193,18 +193,19 @@ pub fn trial(encoder: &Encoder<'_, impl Executor>, step: f32) -> Vec<Progressive
 /// # Errors
 /// [`FormatError::Compress`].
 pub fn plan(
-    encoder: &Encoder<'_, impl Executor>,
-    model: &CostModel,
+    analysed: &AnalysedSource<'_, impl Executor>,
+    model: &RateDistortionModel,
     step: f32,
-    shares: ScanByteShares,
+    shares: ByteShareLimits,
 ) -> Result<ProgressiveScanPlan, FormatError> {
-    let executor = encoder.executor;
-    let area = encoder.order.len() as f64;
-    let kinds = ScanItems::of(encoder);
-    let costs = |items: &ScanItems, step| model.costs(items.coding, items.count(), step, executor);
+    let executor = analysed.executor;
+    let area = analysed.order.len() as f64;
+    let kinds = CodingItems::of(analysed);
+    let costs =
+        |items: &CodingItems, step| model.costs(items.coding, items.count(), step, executor);
     let last: Vec<Vec<RateDistortion>> = kinds.iter().map(|items| costs(items, step)).collect();
     let basis_bytes = BASIS_BYTES_PER_SLOT * area;
-    let file_bytes = basis_bytes * encoder.rank() as f64
+    let file_bytes = basis_bytes * analysed.rank() as f64
         + last.iter().flatten().map(|cost| cost.bytes).sum::<f64>();
     // A reader fetches small files at once.
     let shares = match file_bytes <= FIRST_BYTES as f64 {

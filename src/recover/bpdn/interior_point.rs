@@ -11,10 +11,10 @@
 //! each of ten to twenty steps. Splitting methods have cheaper steps but need thousands: with few patterns, or ε near
 //! ‖y‖, the problem is almost a linear program.
 
+use super::dual_bound::{BpdnConstraint, BpdnSolution};
 use super::iterate::Iterate;
 use super::newton::NewtonSystem;
 use super::sensing_operator::SensingOperator;
-use super::solution::{BpdnConstraint, BpdnSolution};
 use crate::linalg::{dot, vectorise};
 
 /// Relative duality gap at which a solution is accepted; noise changes the objective by far more.

@@ -2,8 +2,8 @@
 //!
 //! Notation as in [`interior_point`](super::interior_point), with coefficients `c = φᵀx`.
 
+use super::dual_bound::BpdnConstraint;
 use super::sensing_operator::SensingOperator;
-use super::solution::BpdnConstraint;
 use crate::linalg::{add_scaled, dot};
 
 /// Share of the way to the nearest bound that a step goes.

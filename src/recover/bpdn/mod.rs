@@ -6,17 +6,17 @@
 //! If ε is less than the residual of non-negative least squares (NNLS), no τ satisfies the constraint, and both return
 //! the NNLS solution.
 
+mod dual_bound;
 mod homotopy;
 pub(super) mod interior_point;
 mod iterate;
 mod newton;
 mod sensing_operator;
-mod solution;
 mod sparsity_basis;
 mod tolerance;
 
+pub(super) use dual_bound::BpdnConstraint;
 pub use homotopy::Homotopy;
 pub(super) use sensing_operator::SensingOperator;
-pub(super) use solution::BpdnConstraint;
 pub use sparsity_basis::SparsityBasis;
 pub(super) use tolerance::ResidualTolerance;

@@ -15,8 +15,8 @@ use crate::capture::Measurements;
 use crate::linalg::{dot, vectorise};
 use crate::recover::common_mode_weight::CommonModeWeight;
 use crate::recover::normal_equations::{EquationWeights, WeightedColumns};
-use crate::recover::sampling::{PixelsOfWindow, pixels_by_window, usable_samples};
-use crate::transport::{CHANNELS, CameraPx, Extent, Geometry, TileRect};
+use crate::recover::sampling::{PixelsSharingWindow, pixels_by_window, usable_samples};
+use crate::transport::{CHANNELS, CameraPixel, Extent, Geometry, TileRect};
 
 /// Sub-element positions along one axis. With two camera pixels for each light element, neighbours lie in different
 /// halves of it and see different parts of their window.
@@ -25,17 +25,18 @@ pub(super) const PHASES: usize = PHASES_PER_AXIS * PHASES_PER_AXIS;
 
 /// Rounding variance of a 16-bit photograph, the least that a measurement has.
 const MIN_VARIANCE: f64 = 1.0 / (12.0 * 65536.0 * 65536.0);
-/// Share of the brightness at [`BRIGHT_PERCENTILE`] below which an observation is left out of training.
+/// Share of the brightness at [`BRIGHT_PERCENTILE`] below which an observation is not reliable.
 const MIN_RELATIVE_BRIGHTNESS: f64 = 0.1;
 const BRIGHT_PERCENTILE: usize = 95;
-/// Ratio of brightness to noise below which an observation is left out of training.
+/// Ratio of brightness to noise below which an observation is not reliable.
 const MIN_CONTRAST: f64 = 4.0;
 
-/// Brightness below which an observation is left out of training, by channel.
-pub(super) type BrightnessThresholds = [f64; CHANNELS];
+/// Brightness below which an observation is not reliable, by channel: it is left out of training, and in inference it
+/// gets neither the neighbour prior nor the non-negativity penalty.
+pub(super) type MinReliableBrightness = [f64; CHANNELS];
 
 /// The sub-element position of a pixel's correspondence, 0 to [`PHASES`] - 1.
-fn phase(geometry: &Geometry, pixel: CameraPx) -> usize {
+fn phase(geometry: &Geometry, pixel: CameraPixel) -> usize {
     let at = geometry.correspondence.at(pixel);
     let half = |x: f64| {
         let position = ((x - x.floor()) * PHASES_PER_AXIS as f64) as usize;
@@ -46,7 +47,7 @@ fn phase(geometry: &Geometry, pixel: CameraPx) -> usize {
 
 /// One channel of one pixel, but for BᵀB and Bᵀy.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Observation {
+pub(super) struct PixelObservation {
     /// Index of BᵀB among the region's Gram matrices.
     pub gram: usize,
     /// Brightness f, in units of the measurement: the response of the mean function under full light.
@@ -64,18 +65,18 @@ pub(super) struct Observation {
 
 /// The normal equations of all observations of a region.
 #[derive(Debug)]
-pub(super) struct RegionEquations {
+pub(super) struct ObservationEquations {
     pub rect: TileRect,
     pub rank: usize,
     /// `[pixel, channel]`.
-    pub observations: Vec<Observation>,
+    pub observations: Vec<PixelObservation>,
     /// BᵀB, `[r, r]` each, for each window and set of usable patterns.
     pub gram_matrices: Vec<Vec<f64>>,
     /// Bᵀy, `[pixel, channel, r]`.
     pub right_hand_sides: Vec<f64>,
 }
 
-impl RegionEquations {
+impl ObservationEquations {
     /// The equations of the pixels `rect` from the patterns `pattern_indices`.
     pub fn new(
         measurements: &Measurements,
@@ -88,7 +89,7 @@ impl RegionEquations {
         let mut equations = Self {
             rect,
             rank: basis.rank(),
-            observations: vec![Observation::default(); count],
+            observations: vec![PixelObservation::default(); count],
             gram_matrices: Vec::new(),
             right_hand_sides: vec![0.0; count * basis.rank()],
         };
@@ -133,10 +134,10 @@ impl RegionEquations {
     }
 
     /// Whether an observation is bright enough for training.
-    pub fn is_bright(&self, index: usize, thresholds: &BrightnessThresholds) -> bool {
+    pub fn is_reliable(&self, index: usize, min_brightness: &MinReliableBrightness) -> bool {
         let observation = &self.observations[index];
         observation.count > 0
-            && observation.brightness > thresholds[index % CHANNELS]
+            && observation.brightness > min_brightness[index % CHANNELS]
             && observation.brightness / observation.variance.sqrt() > MIN_CONTRAST
     }
 
@@ -147,7 +148,7 @@ impl RegionEquations {
         measurements: &Measurements,
         geometry: &Geometry,
         pattern_indices: &[usize],
-        (responses, pixels, channels): (&PatternResponses, &PixelsOfWindow, Range<usize>),
+        (responses, pixels, channels): (&PatternResponses, &PixelsSharingWindow, Range<usize>),
     ) {
         let first_gram = self.gram_matrices.len();
         let mut shared: Vec<WeightedBasisResponses> = Vec::new();
@@ -163,7 +164,7 @@ impl RegionEquations {
                 });
                 let index = p * CHANNELS + c;
                 let right_hand_side = &mut self.right_hand_sides[index * self.rank..][..self.rank];
-                self.observations[index] = Observation {
+                self.observations[index] = PixelObservation {
                     gram: first_gram + known,
                     phase: phase(geometry, pixel),
                     has_full_window: responses.has_full_window,
@@ -174,9 +175,9 @@ impl RegionEquations {
     }
 }
 
-/// The brightness below which observations are left out of training: by channel, a share of what the brightest 5 % of
+/// The brightness below which observations are not reliable: by channel, a share of what the brightest 5 % of
 /// the observations in `regions` exceed.
-pub(super) fn brightness_thresholds(regions: &[RegionEquations]) -> BrightnessThresholds {
+pub(super) fn min_reliable_brightness(regions: &[ObservationEquations]) -> MinReliableBrightness {
     std::array::from_fn(|c| {
         let observations = regions.iter().flat_map(|region| &region.observations);
         let of_channel = observations.skip(c).step_by(CHANNELS);
@@ -249,7 +250,7 @@ impl WeightedBasisResponses {
         c: usize,
         mut y: Vec<f64>,
         right_hand_side: &mut [f64],
-    ) -> Observation {
+    ) -> PixelObservation {
         let weights = &self.columns.weights;
         let samples = self.pattern_indices.iter().zip(&weights.patterns).zip(&y);
         let variances = samples.map(|((&l, w), &y)| w * w * measurements.variance(l, c, y));
@@ -262,12 +263,12 @@ impl WeightedBasisResponses {
             true => mean / self.mean_response,
             false => 0.0,
         };
-        Observation {
+        PixelObservation {
             brightness: brightness.max(0.0),
             variance: variance.max(MIN_VARIANCE),
             energy: dot(&y, &y),
             count: y.len(),
-            ..Observation::default()
+            ..PixelObservation::default()
         }
     }
 }

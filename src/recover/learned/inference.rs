@@ -5,17 +5,17 @@
 //! or, if the model has a neighbour prior, under the mixture of both, moved by the non-negativity penalty.
 
 use super::basis::LearnedBasis;
-use super::equations::{BrightnessThresholds, RegionEquations, with_margin};
+use super::equations::{MinReliableBrightness, ObservationEquations, with_margin};
 use super::neighbour_prior::NeighbourPrior;
 use super::nonnegativity::NonNegativityPenalty;
 use super::posterior::PosteriorSolver;
-use super::posterior_means::{NEIGHBOURHOOD_RADIUS, ObservationPosition, PosteriorMeans};
+use super::posterior_means::{NEIGHBOURHOOD_RADIUS, PixelObservationPosition, PosteriorMeans};
 use super::prior::Prior;
 use crate::capture::Measurements;
 use crate::linalg::vectorise;
-use crate::recover::holdout::HoldoutSplit;
+use crate::recover::holdout_split::HoldoutSplit;
 use crate::recover::prediction;
-use crate::transport::{CHANNELS, FloatTile, Geometry, TileFunctions, TileRect};
+use crate::transport::{CHANNELS, FloatTile, Geometry, TileRect, TileTransportFunctions};
 
 /// Everything that training learns.
 #[derive(Debug)]
@@ -26,7 +26,7 @@ pub(super) struct LearnedModel {
     pub prior: Prior,
     /// `None` where it does not help.
     pub neighbour_prior: Option<NeighbourPrior>,
-    pub thresholds: BrightnessThresholds,
+    pub min_brightness: MinReliableBrightness,
 }
 
 impl LearnedModel {
@@ -46,8 +46,8 @@ impl LearnedModel {
         let region = with_margin(measurements, rect, self.halo());
         let (geometry, basis) = (&self.geometry, &self.basis);
         let equations =
-            RegionEquations::new(measurements, geometry, basis, pattern_indices, region);
-        let means = PosteriorMeans::new(&equations, rect, &self.prior, &self.thresholds);
+            ObservationEquations::new(measurements, geometry, basis, pattern_indices, region);
+        let means = PosteriorMeans::new(&equations, rect, &self.prior, &self.min_brightness);
         let rank = basis.rank();
         let mut coefficients = vec![[0.0f32; CHANNELS]; rect.extent.area() * rank];
         vectorise(
@@ -75,12 +75,12 @@ impl LearnedModel {
     fn estimate(
         &self,
         means: &PosteriorMeans<'_>,
-        location: ObservationPosition,
+        location: PixelObservationPosition,
         solver: &mut PosteriorSolver,
     ) -> Vec<f64> {
         let index = location.index;
         let mut estimate = means.mean(index).to_vec();
-        if !means.is_bright[index] {
+        if !means.is_reliable[index] {
             return estimate;
         }
         if let Some(prior) = &self.neighbour_prior {
@@ -95,7 +95,7 @@ impl LearnedModel {
         estimate
     }
 
-    pub fn expand(&self, tile: &FloatTile) -> TileFunctions {
+    pub fn expand(&self, tile: &FloatTile) -> TileTransportFunctions {
         tile.functions(&self.geometry, Some(&self.basis.functions))
     }
 

@@ -11,7 +11,7 @@
 //! basis, [`truncate_basis`] keeps the directions in which functions vary most.
 
 use super::prior::Prior;
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::linalg::{self, add_scaled, dot};
 
 /// Rank of the initial basis; with the mean function a whole number of vector registers.
@@ -152,7 +152,7 @@ pub(super) fn truncate_basis(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::executor::SequentialExecutor;
+    use crate::job_executor::SequentialExecutor;
 
     #[test]
     fn initial_basis_is_orthonormal() {

@@ -16,33 +16,35 @@
 //!
 //! - [`training`] chooses the rank and decides, by hold-out validation, whether the neighbour prior is used;
 //! - [`inference`] computes the coefficients of a tile;
-//! - [`blending`] mixes in non-negative least squares where that predicts held-out patterns better.
+//! - [`nnls_blending`] mixes in non-negative least squares where that predicts held-out patterns better.
 
 mod basis;
 mod equations;
 mod inference;
 mod initial_prior;
 mod neighbour_prior;
+mod neighbour_regression;
 mod nnls_blending;
 mod nonnegativity;
 mod posterior;
 mod posterior_means;
 mod prior;
-mod regression;
 #[cfg(test)]
 mod tests;
 mod training;
 
 use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
-use super::holdout::HoldoutSplit;
+use super::holdout_split::HoldoutSplit;
 use super::pixelwise::PixelwiseRecovery;
-use super::preparation_input::PreparationInput;
+use super::preparation_input::RecoveryPreparationInput;
 use crate::capture::Measurements;
-use crate::executor::Executor;
-use crate::transport::{Basis, CHANNELS, FloatTile, Geometry, TileFunctions, TileRect, Window};
+use crate::job_executor::Executor;
+use crate::transport::{
+    Basis, CHANNELS, FloatTile, Geometry, TileRect, TileTransportFunctions, Window,
+};
 use inference::LearnedModel;
-use nnls_blending::{MIN_TILE_GAIN, ResidualGram, TILE_CENTRE_SIDE_PX, fit_nnls_alternative};
+use nnls_blending::{BlendingGram, MIN_TILE_GAIN, TILE_CENTRE_SIDE_PX, fit_nnls_alternative};
 pub(super) use posterior_means::NEIGHBOURHOOD_RADIUS as MAX_HALO;
 pub(super) use training::{max_rank, preparation_bytes};
 
@@ -62,13 +64,13 @@ pub(super) fn tile_bytes(window: Window) -> usize {
 }
 
 impl LearnedRecovery {
-    /// Trains on all measurements, starting from their [mean function](super::pooled::mean_function), `[S]`.
+    /// Trains on all measurements, starting from their [mean function](super::mean_function::mean_function), `[S]`.
     ///
     /// # Errors
     /// [`RecoverError::NoSignal`] where no prior can be learned, [`RecoverError::Cancelled`] after cancellation, and the
     /// errors of [`PixelwiseRecovery::least_squares`].
     pub fn new(
-        preparation: &PreparationInput<impl Executor>,
+        preparation: &RecoveryPreparationInput<impl Executor>,
         mean_function: &[f64],
     ) -> Result<Self, RecoverError> {
         let (split, executor) = (preparation.split, preparation.executor);
@@ -120,7 +122,7 @@ impl LearnedRecovery {
         // The prior was trained on the held-out patterns, too, but has few parameters to fit to them; the pixels' own
         // measurements in this comparison are those under the other patterns only.
         let centre = nnls_blending::centre(rect, TILE_CENTRE_SIDE_PX);
-        let products = ResidualGram::recover(&self.model, nnls, measurements, split, centre);
+        let products = BlendingGram::recover(&self.model, nnls, measurements, split, centre);
         self.blended_tile(tile, products, || nnls.tile(measurements, &split.all, rect))
     }
 
@@ -139,7 +141,7 @@ impl LearnedRecovery {
         let learned = self.model.expand(&tile);
         let alternative = nnls.tile(measurements, &split.training, rect);
         let recovered = [&learned, &alternative];
-        let products = ResidualGram::new(&self.model, measurements, split, recovered);
+        let products = BlendingGram::new(&self.model, measurements, split, recovered);
         self.blended_tile(tile, products, || alternative)
     }
 
@@ -147,8 +149,8 @@ impl LearnedRecovery {
     fn blended_tile(
         &self,
         tile: FloatTile,
-        products: ResidualGram,
-        alternative: impl FnOnce() -> TileFunctions,
+        products: BlendingGram,
+        alternative: impl FnOnce() -> TileTransportFunctions,
     ) -> FloatTile {
         let weight = products.best_weight(MIN_TILE_GAIN);
         if weight == 0.0 {

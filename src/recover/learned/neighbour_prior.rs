@@ -7,7 +7,7 @@
 //! z | neighbours ~ N(m, C),   m_k = w_k0 + Σ_j w_kj z_jk
 //! ```
 //!
-//! with weights w for each class of observations (sub-element position and channel; [`regression`]) and one covariance
+//! with weights w for each class of observations (sub-element position and channel; [`neighbour_regression`]) and one covariance
 //! C, `[r, r]`, of the prediction error. The prediction fails at an edge of the object. Therefore the prior is a
 //! mixture: with probability π this one, else the pixel prior. By Bayes' rule an observation's measurements y give it
 //! the responsibility q:
@@ -19,14 +19,14 @@
 //! Expectation–maximisation learns C, π and w: C = Σ q ((ẑ − m)(ẑ − m)ᵀ + P) / Σ q with the posterior mean ẑ and
 //! covariance P, π the mean of q, and w the regression of ẑ on the neighbours.
 //!
-//! [`regression`]: super::regression
+//! [`neighbour_regression`]: super::neighbour_regression
 
 use super::equations::PHASES;
+use super::neighbour_regression::{RegressionSums, add_products, solve_regressions};
 use super::posterior::{PosteriorSolver, PriorPrecision};
-use super::posterior_means::{ObservationPosition, PREDICTORS, PosteriorMeans};
+use super::posterior_means::{PREDICTORS, PixelObservationPosition, PosteriorMeans};
 use super::prior::Prior;
-use super::regression::{RegressionSums, add_products, solve_regressions};
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::linalg::{self, add_scaled, vectorise};
 use crate::transport::CHANNELS;
 
@@ -45,7 +45,7 @@ const MIN_OBSERVATIONS_PER_WEIGHT: usize = 4;
 /// Classes of observations with regressions of their own.
 const CLASSES: usize = PHASES * CHANNELS;
 
-fn class(region: &PosteriorMeans<'_>, location: ObservationPosition) -> usize {
+fn class(region: &PosteriorMeans<'_>, location: PixelObservationPosition) -> usize {
     region.equations.observations[location.index].phase * CHANNELS + location.channel
 }
 
@@ -143,7 +143,7 @@ impl NeighbourPrior {
         for region in regions {
             for (i, location) in region.interior_locations().enumerate() {
                 let index = location.index;
-                if !region.is_bright[index] {
+                if !region.is_reliable[index] {
                     continue;
                 }
                 let mean = self.predict(region, location);
@@ -173,7 +173,7 @@ impl NeighbourPrior {
 
     /// m, the prediction of an observation from its neighbours.
     #[inline(always)]
-    fn predict(&self, means: &PosteriorMeans<'_>, location: ObservationPosition) -> Vec<f64> {
+    fn predict(&self, means: &PosteriorMeans<'_>, location: PixelObservationPosition) -> Vec<f64> {
         let rank = self.rank;
         let weights = &self.weights[class(means, location)];
         let mut mean = vec![0.0; rank];
@@ -189,7 +189,7 @@ impl NeighbourPrior {
         &self,
         means: &PosteriorMeans<'_>,
         noise: f64,
-        location: ObservationPosition,
+        location: PixelObservationPosition,
         solver: &mut PosteriorSolver,
     ) -> (f64, Vec<f64>) {
         let index = location.index;
@@ -266,7 +266,7 @@ impl NeighbourStatistics {
 mod tests {
     use super::super::tests::synthetic_equations;
     use super::*;
-    use crate::executor::SequentialExecutor;
+    use crate::job_executor::SequentialExecutor;
     use crate::transport::{Extent, TileRect};
 
     const SIDE: u32 = 40;

@@ -7,13 +7,13 @@
 
 use super::inference::LearnedModel;
 use crate::capture::Measurements;
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::recover::error::RecoverError;
-use crate::recover::holdout::HoldoutSplit;
+use crate::recover::holdout_split::HoldoutSplit;
 use crate::recover::pixelwise::PixelwiseRecovery;
 use crate::recover::prediction;
-use crate::recover::preparation_input::PreparationInput;
-use crate::transport::{Extent, TileFunctions, TileRect};
+use crate::recover::preparation_input::RecoveryPreparationInput;
+use crate::transport::{Extent, TileRect, TileTransportFunctions};
 
 /// Smallest share of a tile's squared held-out residual that blending must save: a blended tile is direct and takes ten
 /// times the bytes of a factored one.
@@ -27,7 +27,7 @@ const REGION_CENTRE_SIDE_PX: u32 = 4;
 
 /// Inner products of the two methods' residuals on held-out patterns.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct ResidualGram {
+pub(super) struct BlendingGram {
     /// `aᵀa`, of the learned recovery.
     pub learned: f64,
     /// `aᵀb`.
@@ -36,14 +36,14 @@ pub(super) struct ResidualGram {
     pub nnls: f64,
 }
 
-impl ResidualGram {
+impl BlendingGram {
     /// The products for a tile's functions that both methods recovered without the held-out patterns. Saturated samples
     /// do not count.
     pub fn new(
         model: &LearnedModel,
         measurements: &Measurements,
         split: &HoldoutSplit,
-        [learned, nnls]: [&TileFunctions; 2],
+        [learned, nnls]: [&TileTransportFunctions; 2],
     ) -> Self {
         let [learned, nnls] = [learned, nnls].map(|functions| {
             prediction::residuals(&model.geometry, measurements, &split.held_out, functions)
@@ -91,21 +91,21 @@ impl ResidualGram {
 /// NNLS, if blending with it pays over all of `regions`. Errors are those of [`PixelwiseRecovery::least_squares`].
 pub(super) fn fit_nnls_alternative(
     model: &LearnedModel,
-    preparation: &PreparationInput<impl Executor>,
+    preparation: &RecoveryPreparationInput<impl Executor>,
     regions: &[TileRect],
 ) -> Result<Option<PixelwiseRecovery>, RecoverError> {
     let (measurements, split) = (preparation.measurements, preparation.split);
     let nnls = PixelwiseRecovery::least_squares(preparation)?;
     let products = preparation.executor.map(regions.len(), |i| {
         let rect = centre(regions[i], REGION_CENTRE_SIDE_PX);
-        ResidualGram::recover(model, &nnls, measurements, split, rect)
+        BlendingGram::recover(model, &nnls, measurements, split, rect)
     });
-    let sum = |a: ResidualGram, b: ResidualGram| ResidualGram {
+    let sum = |a: BlendingGram, b: BlendingGram| BlendingGram {
         learned: a.learned + b.learned,
         cross: a.cross + b.cross,
         nnls: a.nnls + b.nnls,
     };
-    let total = products.into_iter().fold(ResidualGram::default(), sum);
+    let total = products.into_iter().fold(BlendingGram::default(), sum);
     Ok((total.best_weight(MIN_PICTURE_GAIN) > 0.0).then_some(nnls))
 }
 
@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn blend_weight_minimises_the_held_out_residual() {
         let weight = |learned, cross, nnls| {
-            let products = ResidualGram {
+            let products = BlendingGram {
                 learned,
                 cross,
                 nnls,

@@ -8,7 +8,7 @@
 //! ln p(y) = −½ ((f²/σ²)‖Bm‖² − (2f/σ²) mᵀBᵀy − dᵀKd + ln|K| + ln|C|) + constant,   d = ẑ − m
 //! ```
 
-use super::equations::RegionEquations;
+use super::equations::ObservationEquations;
 use crate::linalg::{self, add_scaled, dot};
 
 /// Smallest variance along any direction, as a share of the mean variance: keeps the inverse finite.
@@ -76,7 +76,7 @@ impl PosteriorSolver {
     #[inline(always)]
     pub fn infer(
         &mut self,
-        equations: &RegionEquations,
+        equations: &ObservationEquations,
         index: usize,
         noise: f64,
         prior: &PriorPrecision,
@@ -129,7 +129,11 @@ impl PosteriorSolver {
 
     /// E‖y − f B z‖² under the posterior just inferred, whose covariance has been computed.
     #[inline(always)]
-    pub fn expected_squared_residual(&mut self, equations: &RegionEquations, index: usize) -> f64 {
+    pub fn expected_squared_residual(
+        &mut self,
+        equations: &ObservationEquations,
+        index: usize,
+    ) -> f64 {
         let rank = equations.rank;
         let observation = &equations.observations[index];
         let gram = equations.gram(index);

@@ -1,6 +1,6 @@
 //! Posterior means of a region under the pixel prior, and how neighbouring pixels find each other's.
 
-use super::equations::{BrightnessThresholds, RegionEquations};
+use super::equations::{MinReliableBrightness, ObservationEquations};
 use super::posterior::PosteriorSolver;
 use super::prior::Prior;
 use crate::linalg::vectorise;
@@ -39,7 +39,7 @@ impl NeighbourOffset {
 
 /// Where an observation lies in its region.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ObservationPosition {
+pub(super) struct PixelObservationPosition {
     /// Column and row from the region's first pixel.
     x: u32,
     y: u32,
@@ -51,7 +51,7 @@ pub(super) struct ObservationPosition {
 /// Posterior means of a region's observations under the pixel prior.
 #[derive(Debug)]
 pub(super) struct PosteriorMeans<'a> {
-    pub equations: &'a RegionEquations,
+    pub equations: &'a ObservationEquations,
     /// The pixels whose neighbours all lie in the region, unless the picture ends there.
     interior: TileRect,
     /// ẑ, `[pixel, channel, r]`.
@@ -59,7 +59,7 @@ pub(super) struct PosteriorMeans<'a> {
     /// ln p(y) up to a constant, `[pixel, channel]`.
     pub log_evidence: Vec<f64>,
     /// Whether an observation counts in training, `[pixel, channel]`.
-    pub is_bright: Vec<bool>,
+    pub is_reliable: Vec<bool>,
     offsets: Vec<NeighbourOffset>,
     /// The constant predictor, `[r]`.
     ones: Vec<f64>,
@@ -67,19 +67,19 @@ pub(super) struct PosteriorMeans<'a> {
 
 impl<'a> PosteriorMeans<'a> {
     pub fn new(
-        equations: &'a RegionEquations,
+        equations: &'a ObservationEquations,
         interior: TileRect,
         prior: &Prior,
-        thresholds: &BrightnessThresholds,
+        min_brightness: &MinReliableBrightness,
     ) -> Self {
         let (rank, count) = (equations.rank, equations.observations.len());
-        let is_bright = (0..count).map(|i| equations.is_bright(i, thresholds));
+        let is_reliable = (0..count).map(|i| equations.is_reliable(i, min_brightness));
         let mut all = Self {
             equations,
             interior,
             means: Vec::with_capacity(count * rank),
             log_evidence: Vec::with_capacity(count),
-            is_bright: is_bright.collect(),
+            is_reliable: is_reliable.collect(),
             offsets: NeighbourOffset::all().collect(),
             ones: vec![1.0; rank],
         };
@@ -108,7 +108,7 @@ impl<'a> PosteriorMeans<'a> {
     #[inline(always)]
     pub fn predictors(
         &self,
-        location: ObservationPosition,
+        location: PixelObservationPosition,
     ) -> impl Iterator<Item = (usize, &[f64])> {
         let neighbours = self.offsets.iter().zip(1..);
         let neighbours =
@@ -118,7 +118,11 @@ impl<'a> PosteriorMeans<'a> {
 
     /// Posterior mean of a neighbour, `[r]`; `None` outside the region and if it is not bright.
     #[inline(always)]
-    fn neighbour(&self, location: ObservationPosition, offset: &NeighbourOffset) -> Option<&[f64]> {
+    fn neighbour(
+        &self,
+        location: PixelObservationPosition,
+        offset: &NeighbourOffset,
+    ) -> Option<&[f64]> {
         let Extent { width, height } = self.equations.rect.extent;
         let x = location.x.checked_add_signed(offset.dx)?;
         let y = location.y.checked_add_signed(offset.dy)?;
@@ -127,22 +131,22 @@ impl<'a> PosteriorMeans<'a> {
         }
         let channel = (location.channel + offset.channel) % CHANNELS;
         let index = (y * width + x) as usize * CHANNELS + channel;
-        self.is_bright[index].then(|| self.mean(index))
+        self.is_reliable[index].then(|| self.mean(index))
     }
 
     /// The bright observations of the interior.
-    pub fn bright_locations(&self) -> impl Iterator<Item = ObservationPosition> {
+    pub fn bright_locations(&self) -> impl Iterator<Item = PixelObservationPosition> {
         let locations = self.interior_locations();
-        locations.filter(|location| self.is_bright[location.index])
+        locations.filter(|location| self.is_reliable[location.index])
     }
 
     /// The observations of the interior, `[pixel, channel]`.
-    pub fn interior_locations(&self) -> impl Iterator<Item = ObservationPosition> + use<> {
+    pub fn interior_locations(&self) -> impl Iterator<Item = PixelObservationPosition> + use<> {
         let rect = self.equations.rect;
         self.interior.pixels().flat_map(move |pixel| {
             let (x, y) = (pixel.x - rect.x, pixel.y - rect.y);
             let first = (y * rect.extent.width + x) as usize * CHANNELS;
-            (0..CHANNELS).map(move |channel| ObservationPosition {
+            (0..CHANNELS).map(move |channel| PixelObservationPosition {
                 x,
                 y,
                 channel,

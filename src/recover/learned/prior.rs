@@ -8,9 +8,9 @@
 //!
 //! The noise factor, E‖y − f B z‖² over its expected value, absorbs what the basis cannot represent.
 
-use super::equations::{BrightnessThresholds, PHASES, RegionEquations};
+use super::equations::{MinReliableBrightness, ObservationEquations, PHASES};
 use super::posterior::{PosteriorSolver, PriorPrecision};
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::linalg::{self, add_scaled, vectorise};
 
 /// If at least one in so many observations has a full window, the others are left out.
@@ -63,7 +63,7 @@ impl Prior {
     #[inline(always)]
     pub fn infer(
         &self,
-        equations: &RegionEquations,
+        equations: &ObservationEquations,
         index: usize,
         solver: &mut PosteriorSolver,
     ) -> f64 {
@@ -74,8 +74,8 @@ impl Prior {
     /// One iteration of EM over the bright observations of `regions`.
     pub fn em_iteration(
         &mut self,
-        regions: &[RegionEquations],
-        thresholds: &BrightnessThresholds,
+        regions: &[ObservationEquations],
+        min_brightness: &MinReliableBrightness,
         executor: &impl Executor,
     ) {
         // An observation whose window is partly outside the light plane determines little of its function and slows EM
@@ -86,7 +86,7 @@ impl Prior {
         let parts = executor.map(regions.len(), |i| {
             vectorise(
                 #[inline(always)]
-                || self.expectation(&regions[i], thresholds, only_full),
+                || self.expectation(&regions[i], min_brightness, only_full),
             )
         });
         let mut total = EStepStatistics::new(self.rank);
@@ -97,14 +97,16 @@ impl Prior {
     #[inline(always)]
     fn expectation(
         &self,
-        region: &RegionEquations,
-        thresholds: &BrightnessThresholds,
+        region: &ObservationEquations,
+        min_brightness: &MinReliableBrightness,
         only_full: bool,
     ) -> EStepStatistics {
         let mut sums = EStepStatistics::new(self.rank);
         let mut solver = PosteriorSolver::new(self.rank);
         for (index, observation) in region.observations.iter().enumerate() {
-            if !region.is_bright(index, thresholds) || only_full && !observation.has_full_window {
+            if !region.is_reliable(index, min_brightness)
+                || only_full && !observation.has_full_window
+            {
                 continue;
             }
             self.infer(region, index, &mut solver);

@@ -1,14 +1,16 @@
 //! Learned recovery of synthetic objects whose light transport functions are known.
 
 use super::basis::LearnedBasis;
-use super::equations::{Observation, RegionEquations};
+use super::equations::{ObservationEquations, PixelObservation};
 use super::posterior::{PosteriorSolver, PriorPrecision};
 use super::*;
-use crate::capture::{NoiseModel, Pattern, RowSet};
-use crate::executor::{Executor, SequentialExecutor};
+use crate::capture::{CameraRowSet, NoiseModel, Pattern};
+use crate::job_executor::{Executor, SequentialExecutor};
 use crate::recover::sampling::pixels_by_window;
-use crate::recover::{BandExtent, WindowSizeEstimate, pooled};
-use crate::transport::{CHANNELS, CameraPx, Correspondence, Extent, TileFunctions, Window};
+use crate::recover::{TailEstimate, WindowSizeEstimate, mean_function};
+use crate::transport::{
+    CHANNELS, CameraPixel, Correspondence, Extent, TileTransportFunctions, Window,
+};
 
 /// Runs jobs in reverse order, on which results must not depend.
 struct ReverseOrder;
@@ -119,7 +121,7 @@ fn photograph(patterns: usize, seed: u64, tau: &[[f64; CHANNELS]]) -> Measuremen
         correspondence: geometry.correspondence,
         patterns: emissions.into_iter().map(Pattern::Grey).collect(),
         full_scale: vec![1.0; patterns],
-        rows: RowSet::all(SIDE),
+        rows: CameraRowSet::all(SIDE),
         photos: pictures,
         noise: NoiseModel {
             gain: [0.0; CHANNELS],
@@ -128,7 +130,7 @@ fn photograph(patterns: usize, seed: u64, tau: &[[f64; CHANNELS]]) -> Measuremen
     }
 }
 
-fn snr(tiles: &[TileFunctions], tau: &[[f64; CHANNELS]]) -> f64 {
+fn snr(tiles: &[TileTransportFunctions], tau: &[[f64; CHANNELS]]) -> f64 {
     let geometry = geometry();
     let area = geometry.window.area();
     let (mut signal, mut error) = (0.0, 0.0);
@@ -151,8 +153,8 @@ fn preparation<'a, E: Executor>(
     measurements: &'a Measurements,
     split: &'a HoldoutSplit,
     executor: &'a E,
-) -> PreparationInput<'a, E> {
-    PreparationInput {
+) -> RecoveryPreparationInput<'a, E> {
+    RecoveryPreparationInput {
         measurements,
         geometry: geometry(),
         split,
@@ -166,7 +168,7 @@ fn learn(
 ) -> Result<LearnedRecovery, RecoverError> {
     let split = HoldoutSplit::new(&measurements.patterns);
     let preparation = preparation(measurements, &split, executor);
-    let mean = pooled::mean_function(&preparation)?;
+    let mean = mean_function::mean_function(&preparation)?;
     LearnedRecovery::new(&preparation, &mean)
 }
 
@@ -178,12 +180,12 @@ pub(super) fn synthetic_equations(
     z: &[f64],
     variance: f64,
     mut normal: impl FnMut() -> f64,
-) -> RegionEquations {
+) -> ObservationEquations {
     let rank = diagonal.len();
     let mut gram = vec![0.0; rank * rank];
     (0..rank).for_each(|k| gram[k * rank + k] = diagonal[k]);
     let observations = rect.pixels().flat_map(|pixel| {
-        let observation = Observation {
+        let observation = PixelObservation {
             gram: 0,
             brightness: 1.0,
             variance,
@@ -198,7 +200,7 @@ pub(super) fn synthetic_equations(
         let g = diagonal[i % rank];
         g * z + (variance * g).sqrt() * normal()
     });
-    RegionEquations {
+    ObservationEquations {
         rect,
         rank,
         observations: observations.collect(),
@@ -311,7 +313,7 @@ fn estimated_band_is_as_wide_as_the_objects() {
     let side = estimate.window.side();
     assert!((WINDOW..=WINDOW + 2).contains(&side), "{estimate:?}");
     assert!(
-        matches!(estimate.band, BandExtent::Bounded { tail_fraction } if tail_fraction < 0.01),
+        matches!(estimate.band, TailEstimate::Bounded { tail_fraction } if tail_fraction < 0.01),
         "{estimate:?}"
     );
 }
@@ -360,7 +362,7 @@ fn saturated_photographs_are_an_overexposed_error() {
     assert!(matches!(error, RecoverError::Overexposed), "{error}");
     let estimate =
         WindowSizeEstimate::from_measurements(&measurements, &SequentialExecutor).unwrap();
-    assert_eq!(estimate.band, BandExtent::Undetermined);
+    assert_eq!(estimate.band, TailEstimate::Undetermined);
 }
 
 #[test]
@@ -426,7 +428,8 @@ fn posterior_mean_minimises_the_negative_log_posterior() {
     let (measurements, _) = measurements(10, 5);
     let all: Vec<usize> = (0..10).collect();
     let basis = single_elements();
-    let equations = RegionEquations::new(&measurements, &geometry(), &basis, &all, two_by_two());
+    let equations =
+        ObservationEquations::new(&measurements, &geometry(), &basis, &all, two_by_two());
     let covariance = [2.0, 0.5, 0.1, 0.5, 1.0, 0.2, 0.1, 0.2, 0.7];
     let prior = PriorPrecision::new(&covariance, 3);
     let mean = [0.8, 0.1, -0.2];
@@ -459,11 +462,13 @@ fn a_saturated_sample_counts_as_missing() {
     let (mut measurements, _) = measurements(10, 5);
     let basis = single_elements();
     let without: Vec<usize> = (0..10).filter(|&l| l != 4).collect();
-    let clean = RegionEquations::new(&measurements, &geometry(), &basis, &without, two_by_two());
-    let n = geometry().camera.index(CameraPx { x: 21, y: 20 });
+    let clean =
+        ObservationEquations::new(&measurements, &geometry(), &basis, &without, two_by_two());
+    let n = geometry().camera.index(CameraPixel { x: 21, y: 20 });
     measurements.photos[4][n] = [f32::NAN; CHANNELS];
     let all: Vec<usize> = (0..10).collect();
-    let saturated = RegionEquations::new(&measurements, &geometry(), &basis, &all, two_by_two());
+    let saturated =
+        ObservationEquations::new(&measurements, &geometry(), &basis, &all, two_by_two());
     for index in 3..6 {
         assert_eq!(saturated.gram(index), clean.gram(index));
         assert_eq!(
@@ -489,8 +494,8 @@ fn rgb_patterns_with_equal_channels_equal_grey_patterns() {
     }
     let all: Vec<usize> = (0..8).collect();
     let basis = single_elements();
-    let a = RegionEquations::new(&grey, &geometry(), &basis, &all, two_by_two());
-    let b = RegionEquations::new(&colour, &geometry(), &basis, &all, two_by_two());
+    let a = ObservationEquations::new(&grey, &geometry(), &basis, &all, two_by_two());
+    let b = ObservationEquations::new(&colour, &geometry(), &basis, &all, two_by_two());
     for index in 0..12 {
         assert_eq!(a.gram(index), b.gram(index));
         assert_eq!(a.right_hand_side(index), b.right_hand_side(index));

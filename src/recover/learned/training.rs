@@ -1,24 +1,24 @@
 //! Training: from all measurements to the learned model.
 //!
-//! 1. [`PreparationInput::fit_basis`] starts from smooth variations of the mean function
+//! 1. [`RecoveryPreparationInput::fit_basis`] starts from smooth variations of the mean function
 //!    ([`initial_prior`](super::initial_prior)), learns the pixel prior over them by expectation–maximisation (EM) on
-//!    small squares spread over the picture, and truncates the basis to the smallest candidate rank whose error on
+//!    small squares spread over the picture, and truncates the basis to the largest candidate rank whose error on
 //!    held-out patterns is near the least.
-//! 2. [`PreparationInput::fit_neighbour_prior`] repeats EM on larger training regions, where neighbours of most pixels
+//! 2. [`RecoveryPreparationInput::fit_neighbour_prior`] repeats EM on larger training regions, where neighbours of most pixels
 //!    are known, and learns the neighbour prior there.
-//! 3. [`PreparationInput::select_neighbour_prior`] compares the errors on held-out patterns with and without it.
+//! 3. [`RecoveryPreparationInput::select_neighbour_prior`] compares the errors on held-out patterns with and without it.
 
 use super::basis::LearnedBasis;
-use super::equations::{RegionEquations, brightness_thresholds, with_margin};
+use super::equations::{ObservationEquations, min_reliable_brightness, with_margin};
 use super::inference::LearnedModel;
 use super::initial_prior::{MAX_INITIAL_RANK, initial_prior, smooth, truncate_basis};
 use super::neighbour_prior::NeighbourPrior;
 use super::nonnegativity::NonNegativityPenalty;
 use super::posterior_means::{NEIGHBOURHOOD_RADIUS, PosteriorMeans};
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::recover::error::RecoverError;
-use crate::recover::pooled;
-use crate::recover::preparation_input::PreparationInput;
+use crate::recover::mean_function;
+use crate::recover::preparation_input::RecoveryPreparationInput;
 use crate::recover::sampling::spread_squares;
 use crate::transport::{TileRect, Window};
 
@@ -51,11 +51,11 @@ pub(in crate::recover) fn max_rank(window: Window) -> usize {
 /// sums of their regressions.
 pub(in crate::recover) fn preparation_bytes(window: Window) -> usize {
     let rank = MAX_INITIAL_RANK.min(window.area());
-    let squares = pooled::MAX_SAMPLES * rank * rank * size_of::<f64>();
+    let squares = mean_function::MAX_SAMPLES * rank * rank * size_of::<f64>();
     squares.max(2 * MAX_GRAM_BYTES)
 }
 
-impl<E: Executor> PreparationInput<'_, E> {
+impl<E: Executor> RecoveryPreparationInput<'_, E> {
     /// Learns the basis and the pixel prior over it, starting from the mean function, `[S]`.
     ///
     /// # Errors
@@ -65,14 +65,14 @@ impl<E: Executor> PreparationInput<'_, E> {
         let mean = smooth(mean_function, side);
         let (functions, mut prior) = initial_prior(&mean, side, self.executor);
         let basis = LearnedBasis::new(&functions, &mean);
-        let squares = pooled::sample_squares(self.measurements);
+        let squares = mean_function::sample_squares(self.measurements);
         let samples = self.executor.map(squares.len(), |i| {
             self.equations(&basis, &self.split.training, squares[i])
         });
-        let thresholds = brightness_thresholds(&samples);
+        let min_brightness = min_reliable_brightness(&samples);
         for _ in 0..INITIAL_EM_ITERATIONS {
             self.executor.check_cancelled()?;
-            prior.em_iteration(&samples, &thresholds, self.executor);
+            prior.em_iteration(&samples, &min_brightness, self.executor);
         }
         drop(samples);
 
@@ -89,7 +89,7 @@ impl<E: Executor> PreparationInput<'_, E> {
                 penalty: NonNegativityPenalty::new(&functions, &mean),
                 prior,
                 neighbour_prior: None,
-                thresholds,
+                min_brightness,
             };
             let error = self.held_out_error(&model, &squares);
             let least = chosen.as_ref().map_or(error, |(least, _)| least.min(error));
@@ -106,7 +106,7 @@ impl<E: Executor> PreparationInput<'_, E> {
         let regions = spread_squares(self.measurements, REGION_SIDE_PX, MAX_REGIONS);
         let counts = self.executor.map(regions.len(), |i| {
             let (all, rect) = (&self.split.all, self.with_neighbours(regions[i]));
-            RegionEquations::count_gram_matrices(self.measurements, &self.geometry, all, rect)
+            ObservationEquations::count_gram_matrices(self.measurements, &self.geometry, all, rect)
         });
         let bytes = counts.iter().sum::<usize>() * rank * rank * size_of::<f64>();
         if bytes <= MAX_GRAM_BYTES {
@@ -128,12 +128,12 @@ impl<E: Executor> PreparationInput<'_, E> {
             let rect = self.with_neighbours(regions[i]);
             self.equations(&model.basis, pattern_indices, rect)
         });
-        let (prior, thresholds) = (&mut model.prior, &model.thresholds);
+        let (prior, min_brightness) = (&mut model.prior, &model.min_brightness);
         for _ in 0..FINAL_EM_ITERATIONS {
-            prior.em_iteration(&equations, thresholds, self.executor);
+            prior.em_iteration(&equations, min_brightness, self.executor);
         }
         let means = self.executor.map(regions.len(), |i| {
-            PosteriorMeans::new(&equations[i], regions[i], prior, thresholds)
+            PosteriorMeans::new(&equations[i], regions[i], prior, min_brightness)
         });
         model.neighbour_prior = NeighbourPrior::learn(&means, prior, self.executor);
     }
@@ -157,9 +157,9 @@ impl<E: Executor> PreparationInput<'_, E> {
         basis: &LearnedBasis,
         pattern_indices: &[usize],
         rect: TileRect,
-    ) -> RegionEquations {
+    ) -> ObservationEquations {
         let (measurements, geometry) = (self.measurements, &self.geometry);
-        RegionEquations::new(measurements, geometry, basis, pattern_indices, rect)
+        ObservationEquations::new(measurements, geometry, basis, pattern_indices, rect)
     }
 
     fn with_neighbours(&self, rect: TileRect) -> TileRect {

@@ -1,17 +1,17 @@
 //! Factored pixels from the basis response: `y_n = Σ_k c_nk C_k(o_n)`, in each channel.
 
 use super::simd::{MAX_PIXELS, ScalarFallback, Simd};
-use crate::relight::ChannelRatio;
+use crate::relight::LightChroma;
 use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCodes, Tile, TileCodes};
 
-/// The basis response of a origin block, `C`.
+/// The basis response of an origin block, `C`.
 #[derive(Clone, Copy, Debug)]
-pub struct BlockBasisResponse<'a> {
+pub struct OriginBlockResponse<'a> {
     /// `[origin, channel, quad]`; one channel where the light has a uniform chroma.
     pub texels: &'a [[f32; TEXEL_COMPONENTS]],
     /// Quads of components of each origin and channel: the tiles' first ones.
     pub quads: usize,
-    pub chroma: ChannelRatio,
+    pub chroma: LightChroma,
 }
 
 /// Writes the pixels of a tile from number `first` on. `offsets` has the origin of each, as an index in the block.
@@ -21,18 +21,18 @@ pub fn combine<S: Simd>(
     tile: &TileCodes,
     first: usize,
     offsets: &[u16],
-    response: BlockBasisResponse<'_>,
+    response: OriginBlockResponse<'_>,
     out: &mut [[f32; CHANNELS]],
 ) {
     match response.chroma {
-        ChannelRatio::Uniform { factors, .. } => {
+        LightChroma::Uniform { factors, .. } => {
             let mut gain = tile.step;
             for c in 0..CHANNELS {
                 gain[c] *= factors[c];
             }
             combine_span::<S, 1>(simd, tile, first, offsets, response, gain, out);
         }
-        ChannelRatio::Varying => {
+        LightChroma::Varying => {
             combine_span::<S, CHANNELS>(simd, tile, first, offsets, response, tile.step, out);
         }
     }
@@ -44,7 +44,7 @@ fn combine_span<S: Simd, const LIGHT_CHANNELS: usize>(
     tile: &TileCodes,
     first: usize,
     offsets: &[u16],
-    BlockBasisResponse { texels, quads, .. }: BlockBasisResponse<'_>,
+    OriginBlockResponse { texels, quads, .. }: OriginBlockResponse<'_>,
     gain: [f32; CHANNELS],
     out: &mut [[f32; CHANNELS]],
 ) {
@@ -158,7 +158,7 @@ mod tests {
         tile: &'a TileCodes,
         first: usize,
         offsets: &'a [u16],
-        response: BlockBasisResponse<'a>,
+        response: OriginBlockResponse<'a>,
         out: &'a mut [[f32; CHANNELS]],
     }
 
@@ -182,11 +182,11 @@ mod tests {
         let rect = TileRect { x: 0, y: 0, extent };
         let test_value = |i: usize| ((i * 7919) % 1009) as f32 / 504.0 - 1.0;
         for (rank, chroma) in [
-            (1usize, ChannelRatio::Varying),
-            (9, ChannelRatio::Varying),
+            (1usize, LightChroma::Varying),
+            (9, LightChroma::Varying),
             (
                 16,
-                ChannelRatio::Uniform {
+                LightChroma::Uniform {
                     base: 1,
                     factors: [0.5, 1.0, 0.25],
                 },
@@ -207,7 +207,7 @@ mod tests {
             for used in 1..=quads {
                 for (first, count) in [(0, 27), (3, 8), (26, 1), (5, 0), (1, 13), (0, 2), (4, 3)] {
                     let offsets: Vec<u16> = (0..count).map(|i| (i * 5 / 2 % 20) as u16).collect();
-                    let response = BlockBasisResponse {
+                    let response = OriginBlockResponse {
                         texels: &texels[..20 * used * chroma.channels().len()],
                         quads: used,
                         chroma,
@@ -232,8 +232,8 @@ mod tests {
                     for (i, got) in scalar.iter().enumerate() {
                         for c in 0..CHANNELS {
                             let (channels, channel, gain) = match chroma {
-                                ChannelRatio::Uniform { factors, .. } => (1, 0, factors[c]),
-                                ChannelRatio::Varying => (3, c, 1.0),
+                                LightChroma::Uniform { factors, .. } => (1, 0, factors[c]),
+                                LightChroma::Varying => (3, c, 1.0),
                             };
                             let at = (usize::from(offsets[i]) * channels + channel) * used;
                             let products = (0..rank.min(TEXEL_COMPONENTS * used)).map(|k| {

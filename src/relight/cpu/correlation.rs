@@ -255,14 +255,14 @@ mod tests {
     use crate::transport::CHANNELS;
 
     /// Correlates all channels of a block.
-    struct CorrelateKernel<'a> {
+    struct FftCorrelateKernel<'a> {
         correlator: &'a Correlator,
         quads: usize,
         light: &'a [[f32; 4]],
         response: &'a mut Vec<[f32; TEXEL_COMPONENTS]>,
     }
 
-    impl SimdKernel for CorrelateKernel<'_> {
+    impl SimdKernel for FftCorrelateKernel<'_> {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) {
             let row = |v: usize| &self.light[v * self.correlator.footprint..];
@@ -307,7 +307,7 @@ mod tests {
             let light: Vec<[f32; 4]> = (0..n * n).map(element).collect();
             let correlate = |level: SimdLevel, quads: usize| {
                 let mut response = Vec::new();
-                level.run(CorrelateKernel {
+                level.run(FftCorrelateKernel {
                     correlator: &correlator,
                     quads,
                     light: &light,

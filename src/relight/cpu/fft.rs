@@ -311,13 +311,13 @@ mod tests {
     use crate::relight::cpu::simd::{ScalarFallback, SimdKernel, SimdLevel};
 
     /// Transforms two lines.
-    struct TransformKernel<'a> {
+    struct FftKernel<'a> {
         fft: &'a Fft,
         values: &'a [[ComplexLanes; 2]],
         spectrum: &'a mut [[Option<ComplexLanes>; 2]],
     }
 
-    impl SimdKernel for TransformKernel<'_> {
+    impl SimdKernel for FftKernel<'_> {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) {
             let scratch = &mut self.fft.scratch();
@@ -353,7 +353,7 @@ mod tests {
                 .collect();
             let transform = |level: SimdLevel| {
                 let mut spectrum = vec![[None; 2]; side];
-                level.run(TransformKernel {
+                level.run(FftKernel {
                     fft: &fft,
                     values: &values,
                     spectrum: &mut spectrum,

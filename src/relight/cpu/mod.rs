@@ -19,13 +19,13 @@ mod simd;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
-use super::output_transform::OutputEncoder;
-use super::{ChannelRatio, Light, LinearPicture, OutputTransform, Rgba8Picture, used_count};
-use crate::executor::Executor;
+use super::output_transform::TabulatedOutputTransform;
+use super::{Light, LightChroma, LinearPicture, OutputTransform, Rgba8Picture, used_count};
+use crate::job_executor::Executor;
 use crate::transport::{CHANNELS, Tile, TileCodes, Transport};
-use combine::{BlockBasisResponse, combine};
+use combine::{OriginBlockResponse, combine};
 use correlation::{CorrelationScratch, Correlator};
-use origin_blocks::{DIRECT_BLOCK_SIDE, OriginBlock, OriginBlocks, OriginBounds, PixelSpan};
+use origin_blocks::{DIRECT_BLOCK_SIDE, OriginBlock, OriginBlocks, OriginBoundingBox, PixelSpan};
 use padded_light::PaddedLight;
 use simd::{Simd, SimdKernel, SimdLevel};
 
@@ -66,7 +66,7 @@ impl CpuRelighter {
     pub fn new(transport: Arc<Transport>) -> Self {
         let geometry = &transport.geometry;
         let window = geometry.window.side() as usize;
-        let bounds = OriginBounds::new(geometry);
+        let bounds = OriginBoundingBox::new(geometry);
         let is_factored = transport.tiles.iter().any(is_factored);
         let (columns, rows) = (bounds.columns.len(), bounds.rows.len());
         let correlator =
@@ -171,7 +171,7 @@ impl CpuRelighter {
             .unwrap_or_else(PoisonError::into_inner);
         let [u, v] = block.at;
         let row = |r: usize| &self.light.elements_from(u, v + r)[..self.footprint];
-        let chroma = ChannelRatio::of_rows((0..self.footprint).map(row));
+        let chroma = LightChroma::of_rows((0..self.footprint).map(row));
         if chroma.is_dark() {
             linear.fill([0.0; CHANNELS]);
             return;
@@ -189,7 +189,7 @@ impl CpuRelighter {
             let scratch = scratch.get_or_insert_with(|| correlator.scratch());
             let quads = self.quads;
             let texels = correlator.correlate(simd, row, chroma.channels(), quads, scratch);
-            let response = BlockBasisResponse {
+            let response = OriginBlockResponse {
                 texels,
                 quads,
                 chroma,
@@ -266,7 +266,7 @@ impl CpuRelighter {
     ) {
         let width = self.transport.geometry.camera.width as usize;
         assert_eq!(out.len(), rows.len() * width, "pixels of the rows");
-        let encoder = OutputEncoder::new(output);
+        let encoder = TabulatedOutputTransform::new(output);
         // Locked one by one, as threads share them.
         let strips: Vec<_> = out
             .chunks_mut((STRIP_ROWS * width).max(1))

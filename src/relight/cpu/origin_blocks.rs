@@ -1,23 +1,23 @@
-//! Light blocks: squares of window origins, each with the camera pixels whose windows begin there.
+//! Origin blocks: squares of window origins, each with the camera pixels whose windows begin there.
 //!
 //! A block is correlated at once, and relit when the light under it has changed. Its *footprint* is the square of light
 //! elements that the windows of its origins cover: `side + w - 1` elements along each side.
 
 use std::ops::Range;
 
-use crate::transport::{CameraPx, Extent, Geometry, LightElement, TileRect, Transport};
+use crate::transport::{CameraPixel, Extent, Geometry, LightElement, TileRect, Transport};
 
 /// The side of blocks where no tile is factored.
 pub const DIRECT_BLOCK_SIDE: usize = 64;
 
 /// The smallest rectangle of window origins that holds those of all pixels with a window on the light plane.
 #[derive(Clone, Debug, Default)]
-pub struct OriginBounds {
+pub struct OriginBoundingBox {
     pub columns: Range<i32>,
     pub rows: Range<i32>,
 }
 
-impl OriginBounds {
+impl OriginBoundingBox {
     /// Of all pixels, those of dark tiles too: where blocks lie decides how sums are rounded, and workers that
     /// each have a part of the tiles must agree to the bit.
     pub fn new(geometry: &Geometry) -> Self {
@@ -44,7 +44,7 @@ pub struct PixelSpan {
     pub tile: usize,
     /// Index of the first pixel in the tile.
     pub first: usize,
-    pub pixel: CameraPx,
+    pub pixel: CameraPixel,
     /// Index of the first pixel in the block.
     pub begin: usize,
     pub length: usize,
@@ -82,7 +82,7 @@ pub struct OriginBlocks {
 
 impl OriginBlocks {
     /// Assigns the pixels to blocks of `side × side` origins.
-    pub fn new(transport: &Transport, bounds: &OriginBounds, side: usize) -> Self {
+    pub fn new(transport: &Transport, bounds: &OriginBoundingBox, side: usize) -> Self {
         let geometry = &transport.geometry;
         let grid = [bounds.columns.len(), bounds.rows.len()].map(|span| span.div_ceil(side));
         // Centred, so that a half of the photograph has half of the blocks.
@@ -138,7 +138,7 @@ impl OriginBlocks {
 
 impl OriginBlock {
     /// Adds pixel number `p` of a tile: to the last span if it continues that.
-    fn add(&mut self, tile: usize, p: usize, pixel: CameraPx, offset: usize) {
+    fn add(&mut self, tile: usize, p: usize, pixel: CameraPixel, offset: usize) {
         let begin = self.offsets.len();
         self.offsets.push(offset as u16); // a side is at most 256
         match self.spans.last_mut() {

@@ -14,7 +14,7 @@ int response_stride;
 int filmic;
 int dither;
 };
-struct BasisUniforms {
+struct BasisFunctionUniforms {
 vec4 quads[1024];
 };
 struct ResponseQuads {
@@ -26,7 +26,7 @@ vec4 weights;
 };
 uniform highp sampler2D _group_0_binding_5_fs;
 layout(std140) uniform FrameUniforms_block_0Fragment { FrameUniforms _group_0_binding_7_fs; };
-layout(std140) uniform BasisUniforms_block_1Fragment { BasisUniforms _group_0_binding_8_fs; };
+layout(std140) uniform BasisFunctionUniforms_block_1Fragment { BasisFunctionUniforms _group_0_binding_8_fs; };
 layout(std140) uniform ChannelUniforms_block_2Fragment { ChannelUniforms _group_0_binding_9_fs; };
 layout(location = 0) out vec4 _fs2p_location0;
 layout(location = 1) out vec4 _fs2p_location1;

@@ -25,7 +25,7 @@ use super::used_count;
 use crate::transport::{CHANNELS, Extent, Geometry, TEXEL_COMPONENTS, Transport};
 
 pub use texels::TextureRegion;
-pub use uniforms::{BasisUniforms, FrameUniforms};
+pub use uniforms::{BasisFunctionUniforms, FrameUniforms};
 
 /// Largest width and height of the codes' texture: every WebGL2 and WebGPU implementation allows it.
 const MAX_FOLD_SIDE: u32 = 2048;
@@ -113,7 +113,7 @@ pub struct TextureLayout {
 /// A photograph that exceeds a device's limits.
 #[derive(Debug, Error, PartialEq, Eq)]
 #[error("the photograph needs {need} {quantity}, more than the graphics device's limit of {limit}")]
-pub struct LayoutError {
+pub struct TextureLayoutError {
     quantity: &'static str,
     need: u64,
     limit: u64,
@@ -123,8 +123,8 @@ impl TextureLayout {
     /// Lays out a transport for a device.
     ///
     /// # Errors
-    /// [`LayoutError`] if the transport exceeds the device's limits.
-    pub fn new(transport: &Transport, limits: TextureLimits) -> Result<Self, LayoutError> {
+    /// [`TextureLayoutError`] if the transport exceeds the device's limits.
+    pub fn new(transport: &Transport, limits: TextureLimits) -> Result<Self, TextureLayoutError> {
         use TextureFormat::{Rg16Sint, Rgba16Sint, Rgba32Float, Rgba32Sint};
         let (geometry, tiles) = (&transport.geometry, &transport.tiles);
         let Geometry { camera, light, .. } = *geometry;
@@ -215,10 +215,10 @@ impl TextureLayout {
 
 const TEXEL: Extent = Extent::new(1, 1);
 
-fn check_limit(quantity: &'static str, need: u64, limit: u64) -> Result<(), LayoutError> {
+fn check_limit(quantity: &'static str, need: u64, limit: u64) -> Result<(), TextureLayoutError> {
     match need <= limit {
         true => Ok(()),
-        false => Err(LayoutError {
+        false => Err(TextureLayoutError {
             quantity,
             need,
             limit,
@@ -227,7 +227,7 @@ fn check_limit(quantity: &'static str, need: u64, limit: u64) -> Result<(), Layo
 }
 
 /// Extent and layers of the array that holds `need` texels in rows: as few and as low layers as possible.
-fn fold(need: u64, limits: TextureLimits) -> Result<(Extent, u32), LayoutError> {
+fn fold(need: u64, limits: TextureLimits) -> Result<(Extent, u32), TextureLayoutError> {
     let side = u64::from(MAX_FOLD_SIDE.min(limits.max_side));
     // The shader counts texels in an i32.
     let limit = (side * side * u64::from(limits.max_layers)).min(i32::MAX as u64);

@@ -1,7 +1,7 @@
 //! Textures checked texel by texel against the rules that the shaders read them by.
 
 use super::*;
-use crate::transport::{Basis, CameraPx, Correspondence, Tile, Window};
+use crate::transport::{Basis, CameraPixel, Correspondence, Tile, Window};
 
 const WEBGL2_MINIMUM: TextureLimits = TextureLimits {
     max_side: 2048,
@@ -81,7 +81,7 @@ fn each_code_is_where_the_shader_reads_it() {
         for y in 0..camera.1 {
             for x in 0..camera.0 {
                 let [u, v] = origins[(y * camera.0 + x) as usize].map(i32::from);
-                let origin = geometry.window_origin(CameraPx { x, y });
+                let origin = geometry.window_origin(CameraPixel { x, y });
                 assert_eq!((u, v), (origin.u, origin.v));
                 let tile = (y / 16 * camera.0.div_ceil(16) + x / 16) as usize;
                 assert_eq!(steps[tiles.len() + tile][2], (x / 16 * 16) as f32);
@@ -167,7 +167,7 @@ fn photographs_beyond_the_limits_are_errors() {
         let transport = transport(geometry(camera, window), rank);
         TextureLayout::new(&transport, limits).unwrap_err()
     };
-    let exceeds = |quantity, need, limit| LayoutError {
+    let exceeds = |quantity, need, limit| TextureLayoutError {
         quantity,
         need,
         limit,

@@ -2,7 +2,7 @@
 
 use super::{TextureDescriptor, TextureLayout, binding};
 use crate::transport::{
-    CameraPx, Extent, Geometry, LightElement, TexelCodes, Tile, TileRect, Transport,
+    CameraPixel, Extent, Geometry, LightElement, TexelCodes, Tile, TileRect, Transport,
 };
 
 /// Rows of codes in one region: up to 4 MiB, which makes uploads few and their copies small.
@@ -118,7 +118,7 @@ impl TextureLayout {
         // All windows off the light plane are dark alike; clamped, their origins fit 16 bits.
         let clamp = |at: i32, side: u32| at.clamp(-(window.side() as i32), side as i32) as i16;
         let origin = |(x, y)| {
-            let LightElement { u, v } = self.geometry.window_origin(CameraPx { x, y });
+            let LightElement { u, v } = self.geometry.window_origin(CameraPixel { x, y });
             [clamp(u, light.width), clamp(v, light.height)]
         };
         camera.cells().map(origin).collect()

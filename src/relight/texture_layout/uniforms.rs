@@ -1,11 +1,11 @@
 //! The shaders' uniforms, field by field as in the WGSL.
 
 use super::{MAX_SLOTS, TextureLayout};
-use crate::relight::{ChannelRatio, OutputTransform, ToneCurve};
+use crate::relight::{LightChroma, OutputTransform, ToneCurve};
 use crate::transport::{Basis, CHANNELS, TEXEL_COMPONENTS};
 
-/// `BasisUniforms` of the WGSL: a pair of quads of basis functions, slot by slot.
-pub type BasisUniforms = [[[f32; TEXEL_COMPONENTS]; 2]; MAX_SLOTS];
+/// `BasisFunctionUniforms` of the WGSL: a pair of quads of basis functions, slot by slot.
+pub type BasisFunctionUniforms = [[[f32; TEXEL_COMPONENTS]; 2]; MAX_SLOTS];
 
 /// `FrameUniforms` of the WGSL.
 #[repr(C)]
@@ -33,7 +33,7 @@ impl TextureLayout {
     ];
 
     /// The basis, pair by pair.
-    pub fn basis_uniforms(&self, basis: &Basis) -> Vec<BasisUniforms> {
+    pub fn basis_uniforms(&self, basis: &Basis) -> Vec<BasisFunctionUniforms> {
         let pair = |functions: &[Vec<f32>]| {
             let mut pair = [[[0.0; TEXEL_COMPONENTS]; 2]; MAX_SLOTS];
             for (k, function) in functions.iter().enumerate() {
@@ -51,13 +51,13 @@ impl TextureLayout {
     /// The uniforms of a frame.
     pub fn frame_uniforms(
         &self,
-        chroma: ChannelRatio,
+        chroma: LightChroma,
         output: &OutputTransform,
         quality: f32,
     ) -> FrameUniforms {
         let (response_stride, [r, g, b]) = match chroma {
-            ChannelRatio::Uniform { factors, .. } => (0, factors),
-            ChannelRatio::Varying => (2 * self.quad_pairs() as i32, [1.0; CHANNELS]),
+            LightChroma::Uniform { factors, .. } => (0, factors),
+            LightChroma::Varying => (2 * self.quad_pairs() as i32, [1.0; CHANNELS]),
         };
         let [red, green, blue] = output.gains;
         let row = |row: [f32; CHANNELS]| [row[0] * red, row[1] * green, row[2] * blue, 0.0];

@@ -10,8 +10,8 @@ use super::downsampler::GlDownsampler;
 use super::photo_resources::PhotoResources;
 use super::resources::Staging;
 use crate::relight::Gamut;
-use crate::relight::backend::{Backend, BackendError, FrameRequest, LightCache};
-use crate::relight::canvas2d_context::{CanvasStorage, open_2d};
+use crate::relight::backend::{Backend, BackendError, FrameRequest, UploadedLight};
+use crate::relight::canvas2d_context::{CanvasMemoryLocation, open_2d};
 use crate::relight::texture_layout::TextureLayout;
 use crate::transport::{Extent, Transport};
 
@@ -23,7 +23,7 @@ pub struct WebGl2Backend {
     resources: PhotoResources,
     /// For the light's elements.
     staging: Staging,
-    light: LightCache,
+    light: UploadedLight,
     downsampler: Option<GlDownsampler>,
     camera: Extent,
     canvas: CanvasRenderingContext2d,
@@ -54,14 +54,14 @@ impl WebGl2Backend {
             false => Gamut::Srgb,
         };
         let camera = transport.geometry.camera;
-        let (canvas, gamut) = open_2d(canvas, camera, gamut, CanvasStorage::Default)?;
+        let (canvas, gamut) = open_2d(canvas, camera, gamut, CanvasMemoryLocation::Default)?;
         context.set_target(camera, gamut)?;
         Ok(Self {
             context,
             layout,
             resources,
             staging: Staging::default(),
-            light: LightCache::default(),
+            light: UploadedLight::default(),
             downsampler: None,
             camera,
             canvas,
@@ -81,11 +81,11 @@ impl WebGl2Backend {
         check_loss()?;
         self.resources.bind();
         if let Some(light) = frame.light.filter(|light| !self.light.has(light)) {
-            self.light = LightCache::default();
+            self.light = UploadedLight::default();
             let elements = bytemuck::cast_slice(light.elements());
             let texture = self.resources.light();
             texture.write([0; 3], light.extent(), elements, &mut self.staging)?;
-            self.light = LightCache::new(light);
+            self.light = UploadedLight::new(light);
             self.downsampler = None;
         }
         let chroma = self.light.chroma;
@@ -138,7 +138,7 @@ impl Backend for WebGl2Backend {
         };
         let downsampler = self.downsampler.insert(downsampler);
         downsampler.downsample(&programs.downsample, image, self.resources.light())?;
-        self.light = LightCache::default();
+        self.light = UploadedLight::default();
         Ok(true)
     }
 

@@ -27,7 +27,7 @@ pub(super) const LIGHT_IMAGE: u32 = 10;
 /// naga's names for the uniform blocks, by uniform buffer binding.
 const UNIFORM_BLOCKS: [&str; 4] = [
     "FrameUniforms_block_0Fragment",
-    "BasisUniforms_block_1Fragment",
+    "BasisFunctionUniforms_block_1Fragment",
     "ChannelUniforms_block_2Fragment",
     "DownsampleUniforms_block_0Fragment",
 ];

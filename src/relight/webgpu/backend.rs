@@ -6,15 +6,15 @@ use js_sys::Promise;
 use wasm_bindgen::JsValue;
 
 use super::api::{API, CanvasContext};
-use super::device::Device;
+use super::context::GpuContext;
 use super::downsampler::Downsampler;
 use super::photo_renderer::WebGpuRenderer;
 use crate::relight::Gamut;
-use crate::relight::backend::{Backend, BackendError, FrameRequest, LightCache};
+use crate::relight::backend::{Backend, BackendError, FrameRequest, UploadedLight};
 use crate::relight::texture_layout::binding;
 use crate::transport::{Extent, Transport};
 
-impl Device {
+impl GpuContext {
     /// A device for canvases.
     ///
     /// # Errors
@@ -45,7 +45,7 @@ impl WebGpuBackend {
     /// # Errors
     /// [`BackendError`] if the device cannot hold the transport or the canvas gives no context.
     pub async fn new(
-        device: Rc<Device>,
+        device: Rc<GpuContext>,
         transport: &Transport,
         canvas: &web_sys::HtmlCanvasElement,
         gamut: Gamut,
@@ -97,7 +97,7 @@ impl Backend for WebGpuBackend {
         };
         let downsampler = self.downsampler.insert(downsampler);
         downsampler.downsample(device, image, textures.light())?;
-        *light = LightCache::default();
+        *light = UploadedLight::default();
         Ok(true)
     }
 
@@ -141,7 +141,7 @@ mod tests {
         };
         let document = web_sys::window().unwrap().document().unwrap();
         let canvas = document.create_element("canvas").unwrap().unchecked_into();
-        let device = Rc::new(Device::for_canvases().await.unwrap());
+        let device = Rc::new(GpuContext::for_canvases().await.unwrap());
         let webgpu = WebGpuBackend::new(device.clone(), &transport, &canvas, Gamut::Srgb).await;
         let mut webgpu = webgpu.unwrap();
         let frame = FrameRequest {

@@ -3,7 +3,7 @@
 use wasm_bindgen::JsValue;
 
 use super::api::{BindGroup, BindingResource, UniformBuffer, WebGpuTexture, record_draw, usage};
-use super::device::Device;
+use super::context::GpuContext;
 use crate::relight::texture_layout::{TextureDescriptor, TextureFormat};
 use crate::transport::Extent;
 
@@ -23,9 +23,9 @@ pub(super) struct Downsampler {
 
 impl Downsampler {
     /// From light images of extent `image` to a light plane of extent `light`.
-    pub fn new(device: &Device, image: Extent, light: Extent) -> Self {
+    pub fn new(device: &GpuContext, image: Extent, light: Extent) -> Self {
         use TextureFormat::{Rgba8Unorm, Rgba32Float};
-        let Device { gpu, pipelines, .. } = device;
+        let GpuContext { gpu, pipelines, .. } = device;
         let create = |label, format, extent, usage| {
             let usage = usage | usage::TEXTURE_BINDING | usage::RENDER_ATTACHMENT;
             gpu.create_texture(&TextureDescriptor::flat(label, format, extent), usage)
@@ -62,11 +62,11 @@ impl Downsampler {
     /// What the browser throws, for instance for pictures of another origin. The light stays.
     pub fn downsample(
         &self,
-        device: &Device,
+        device: &GpuContext,
         image: &JsValue,
         light: &WebGpuTexture,
     ) -> Result<(), JsValue> {
-        let Device { gpu, pipelines, .. } = device;
+        let GpuContext { gpu, pipelines, .. } = device;
         gpu.write_image(&self.image, image, self.extent)?;
         gpu.submit(|commands| {
             for (bind_group, target) in self.bind_groups.iter().zip([&self.columns, light]) {

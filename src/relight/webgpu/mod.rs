@@ -5,17 +5,17 @@
 mod api;
 #[cfg(target_arch = "wasm32")]
 mod backend;
-mod device;
+mod context;
 #[cfg(target_arch = "wasm32")]
 mod downsampler;
 #[cfg(not(target_arch = "wasm32"))]
-mod offscreen;
+mod headless;
 mod photo_renderer;
 mod photo_textures;
 mod shader;
 
 #[cfg(target_arch = "wasm32")]
 pub use backend::WebGpuBackend;
-pub use device::Device;
+pub use context::GpuContext;
 #[cfg(not(target_arch = "wasm32"))]
-pub use offscreen::OffscreenRenderer;
+pub use headless::HeadlessRenderer;

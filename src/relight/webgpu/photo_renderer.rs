@@ -3,9 +3,9 @@
 use std::rc::Rc;
 
 use super::api::{TextureView, record_dispatches, record_draw};
-use super::device::Device;
+use super::context::GpuContext;
 use super::photo_textures::PhotoTextures;
-use crate::relight::backend::{BackendError, FrameRequest, LightCache};
+use crate::relight::backend::{BackendError, FrameRequest, UploadedLight};
 use crate::relight::texture_layout::{TextureLayout, binding};
 use crate::transport::{Extent, Transport};
 
@@ -15,10 +15,10 @@ const WORKGROUP_ORIGINS: [u32; 2] = [32, 4];
 /// A transport in a device's memory, and the basis response of the last light.
 #[derive(Debug)]
 pub struct WebGpuRenderer {
-    pub device: Rc<Device>,
+    pub device: Rc<GpuContext>,
     pub layout: TextureLayout,
     pub textures: PhotoTextures,
-    pub light: LightCache,
+    pub light: UploadedLight,
 }
 
 impl WebGpuRenderer {
@@ -26,26 +26,26 @@ impl WebGpuRenderer {
     ///
     /// # Errors
     /// [`BackendError::Layout`] or [`BackendError::Upload`] if the device cannot hold the transport.
-    pub async fn new(device: Rc<Device>, transport: &Transport) -> Result<Self, BackendError> {
+    pub async fn new(device: Rc<GpuContext>, transport: &Transport) -> Result<Self, BackendError> {
         let layout = TextureLayout::new(transport, device.gpu.limits)?;
         // In one error scope: a device without room for it is not lost.
         let textures = device.try_upload(|| PhotoTextures::new(&device, &layout, transport));
         Ok(Self {
             textures: textures.await?,
             layout,
-            light: LightCache::default(),
+            light: UploadedLight::default(),
             device,
         })
     }
 
     /// Draws a frame into a target of the camera's extent.
     pub fn draw(&mut self, frame: &FrameRequest<'_>, target: &TextureView) {
-        let Device { gpu, pipelines, .. } = &*self.device;
+        let GpuContext { gpu, pipelines, .. } = &*self.device;
         let (layout, textures) = (&self.layout, &self.textures);
         if let Some(light) = frame.light.filter(|light| !self.light.has(light)) {
             let elements = bytemuck::cast_slice(light.elements());
             gpu.write_texture(textures.light(), elements, [0; 3], light.extent());
-            self.light = LightCache::new(light);
+            self.light = UploadedLight::new(light);
         }
         let chroma = self.light.chroma;
         let uniforms = layout.frame_uniforms(chroma, &frame.output, frame.quality);

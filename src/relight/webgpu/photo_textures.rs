@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 
 use super::api::{BindGroup, BindingResource, UniformBuffer, WebGpuTexture, usage};
-use super::device::Device;
+use super::context::GpuContext;
 use crate::relight::texture_layout::{
     FrameUniforms, TEXTURES, TextureLayout, TextureRegion, binding,
 };
@@ -14,7 +14,7 @@ pub(super) struct PhotoTextures {
     /// By binding.
     textures: [WebGpuTexture; TEXTURES],
     pub frame: UniformBuffer,
-    /// `BasisUniforms` and `DispatchUniforms` of the WGSL, pair by pair; kept alive for the bind groups.
+    /// `BasisFunctionUniforms` and `DispatchUniforms` of the WGSL, pair by pair; kept alive for the bind groups.
     _pairs: Vec<[UniformBuffer; 2]>,
     /// For the correlation, pair by pair.
     pub correlation: Vec<BindGroup>,
@@ -24,8 +24,8 @@ pub(super) struct PhotoTextures {
 
 impl PhotoTextures {
     /// Creates everything, and fills all textures that do not depend on the light.
-    pub fn new(device: &Device, layout: &TextureLayout, transport: &Transport) -> Self {
-        let Device { gpu, pipelines, .. } = device;
+    pub fn new(device: &GpuContext, layout: &TextureLayout, transport: &Transport) -> Self {
+        let GpuContext { gpu, pipelines, .. } = device;
         let textures = std::array::from_fn(|i| {
             let usage = match i {
                 binding::BASIS_RESPONSE => usage::STORAGE_BINDING,

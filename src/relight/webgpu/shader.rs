@@ -3,7 +3,7 @@
 const SOURCE: &str = concat!(
     include_str!("../shaders/fullscreen.wgsl"),
     include_str!("../shaders/frame_uniforms.wgsl"),
-    include_str!("../shaders/basis_uniforms.wgsl"),
+    include_str!("../shaders/basis_function_uniforms.wgsl"),
     include_str!("../shaders/correlate.wgsl"),
     include_str!("../shaders/downsample.wgsl"),
     include_str!("../shaders/relight.wgsl"),

@@ -12,9 +12,9 @@ mod tray;
 
 use surface_grid::{SurfaceGrid, SurfacePoint};
 
-use super::coordinates::{Vec2, vec2};
 use super::simulated_scene::SimulatedScene;
-use crate::transport::{CHANNELS, CameraPx, Extent, Geometry, LightElement};
+use super::vec2::{Vec2, vec2};
+use crate::transport::{CHANNELS, CameraPixel, Extent, Geometry, LightElement};
 
 /// Samples along each side of a camera pixel.
 const SAMPLES_PER_SIDE: u32 = 3;
@@ -88,9 +88,9 @@ impl CookiesScene {
     /// Adds the light that the reflectors around `pixel` send it.
     fn add_interreflections(
         &self,
-        pixel: CameraPx,
+        pixel: CameraPixel,
         albedo: [f64; CHANNELS],
-        window: &mut TransportAccumulator,
+        window: &mut TransportFunctionAccumulator,
     ) {
         let [i, j] = [pixel.x, pixel.y].map(|x| x * SAMPLES_PER_SIDE + SAMPLES_PER_SIDE / 2);
         let scale = max_height_elements();
@@ -132,8 +132,8 @@ impl SimulatedScene for CookiesScene {
         &self.geometry
     }
 
-    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
-        let mut window = TransportAccumulator {
+    fn transport_function(&self, pixel: CameraPixel, tau: &mut [[f32; CHANNELS]]) {
+        let mut window = TransportFunctionAccumulator {
             origin: self.geometry.window_origin(pixel),
             geometry: &self.geometry,
             tau,
@@ -175,7 +175,7 @@ fn element_at(p: Vec2) -> LightElement {
 
 /// Direct light that a point reflects, as a fraction of what a white tray reflects.
 #[derive(Default)]
-struct ReflectedLight {
+struct DirectReflection {
     /// In all directions.
     diffuse: [f64; CHANNELS],
     /// Towards the camera only.
@@ -183,9 +183,9 @@ struct ReflectedLight {
 }
 
 /// The direct light that `point` reflects: none in shadow, more if its slope faces the projector.
-fn reflected(surface: &SurfaceGrid, point: &SurfacePoint) -> ReflectedLight {
+fn reflected(surface: &SurfaceGrid, point: &SurfacePoint) -> DirectReflection {
     if surface.is_shaded(point, TILT) {
-        return ReflectedLight::default();
+        return DirectReflection::default();
     }
     let slope = point.unit_slope * (max_height_elements() / SHADING_HALF_SIDE);
     // The normal is (-slope, 1) over its length; (-rake, 1) points to the projector.
@@ -196,20 +196,20 @@ fn reflected(surface: &SurfaceGrid, point: &SurfacePoint) -> ReflectedLight {
     let to_projector = (1.0 + rake.dot(rake)).sqrt();
     let half = rake * (1.0 / (1.0 + to_projector));
     let aligned = (1.0 + slope.dot(half)) / (normal * (1.0 + half.dot(half)).sqrt());
-    ReflectedLight {
+    DirectReflection {
         diffuse: point.surface.albedo.map(|a| a * facing),
         highlight: point.surface.gloss * HIGHLIGHT * aligned.max(0.0).powf(SHININESS),
     }
 }
 
 /// Sums one pixel's light transport function.
-struct TransportAccumulator<'a> {
+struct TransportFunctionAccumulator<'a> {
     origin: LightElement,
     geometry: &'a Geometry,
     tau: &'a mut [[f32; CHANNELS]],
 }
 
-impl TransportAccumulator<'_> {
+impl TransportFunctionAccumulator<'_> {
     /// Adds light from `element`; ignores elements outside the light plane or the window.
     fn add(&mut self, element: LightElement, light: [f64; CHANNELS]) {
         let slot = self.geometry.window.slot(self.origin, element);

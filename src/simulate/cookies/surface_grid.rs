@@ -1,7 +1,7 @@
 //! The surface of the tray and the cookies, sampled on a grid for fast ray marching.
 
 use super::tray::{Surface, surface_at};
-use crate::simulate::coordinates::{UnitCoordinates, Vec2, vec2};
+use crate::simulate::vec2::{CentredCoordinates, Vec2, vec2};
 use crate::transport::{CHANNELS, Extent};
 
 /// Distance of the finite differences for shading, in unit coordinates: the same at every resolution, so that
@@ -11,7 +11,7 @@ const SLOPE_STEP: f64 = 0.008;
 /// Heights and colours at grid points over the light plane.
 #[derive(Debug)]
 pub(super) struct SurfaceGrid {
-    plane: UnitCoordinates,
+    plane: CentredCoordinates,
     extent: Extent,
     /// Light elements from one sample to the next.
     pub pitch: Vec2,
@@ -39,7 +39,7 @@ pub(super) struct SurfacePoint {
 impl SurfaceGrid {
     /// Samples the surface at `extent` points, `pitch` light elements apart.
     pub fn new(light: Extent, extent: Extent, pitch: Vec2) -> Self {
-        let plane = UnitCoordinates::new(light);
+        let plane = CentredCoordinates::new(light);
         let sample = |(i, j)| {
             let Surface {
                 height,

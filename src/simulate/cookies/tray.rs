@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::simulate::coordinates::{Vec2, mix, mix3, smoothstep, vec2};
 use crate::simulate::gradient_noise::{cell_hash, layered_noise};
 use crate::simulate::signed_distance::{circle, fold, heart, segment, smooth_union, star, vesica};
+use crate::simulate::vec2::{Vec2, mix, mix3, smoothstep, vec2};
 use crate::transport::CHANNELS;
 
 /// The surface at a point.

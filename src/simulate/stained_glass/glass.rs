@@ -1,7 +1,7 @@
 //! The kinds of glass in the window, and their optical properties.
 
-use crate::simulate::coordinates::{Vec2, smoothstep, vec2};
 use crate::simulate::gradient_noise::{cell_hash, layered_noise, unit_hash};
+use crate::simulate::vec2::{Vec2, smoothstep, vec2};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum GlassColour {

@@ -16,10 +16,10 @@ mod rose;
 use glass::{GlassOptics, transmittance};
 use rose::{GlassSample, glass_at};
 
-use super::coordinates::{UnitCoordinates, Vec2, mix, smoothstep, vec2};
 use super::gradient_noise::{noise, unit_hash};
 use super::simulated_scene::SimulatedScene;
-use crate::transport::{CHANNELS, CameraPx, Extent, Geometry};
+use super::vec2::{CentredCoordinates, Vec2, mix, smoothstep, vec2};
+use crate::transport::{CHANNELS, CameraPixel, Extent, Geometry};
 
 /// Samples along each side of a pixel or element, for averages over its area.
 const SAMPLES_PER_SIDE: u32 = 4;
@@ -40,7 +40,7 @@ const RELATIVE_TAIL_WIDTH: [f64; CHANNELS] = [1.14, 1.0, 0.88];
 #[derive(Debug)]
 pub(super) struct StainedGlassScene {
     geometry: Geometry,
-    plane: UnitCoordinates,
+    plane: CentredCoordinates,
     /// Distance between camera pixels along u and v, in light elements.
     pitch: Vec2,
     /// Visible share of each light element, `[M]`.
@@ -49,7 +49,7 @@ pub(super) struct StainedGlassScene {
 
 impl StainedGlassScene {
     pub fn new(geometry: Geometry) -> Self {
-        let plane = UnitCoordinates::new(geometry.light);
+        let plane = CentredCoordinates::new(geometry.light);
         let is_hidden = |p| f64::from(u8::from(glass_at(plane.at(p)).clearance < 0.0));
         let visible = |(u, v)| {
             let corner = vec2(f64::from(u), f64::from(v));
@@ -99,7 +99,7 @@ impl SimulatedScene for StainedGlassScene {
         &self.geometry
     }
 
-    fn transport_function(&self, pixel: CameraPx, tau: &mut [[f32; CHANNELS]]) {
+    fn transport_function(&self, pixel: CameraPixel, tau: &mut [[f32; CHANNELS]]) {
         let centre = Vec2::from(self.geometry.correspondence.at(pixel));
         let GlassSample { piece, glass, .. } = glass_at(self.plane.at(centre));
         let optics = glass.optics();
@@ -220,7 +220,7 @@ mod tests {
         let side = |n| Extent::new(n, n);
         let scene = StainedGlassScene::new(scene_geometry(side(192), side(96)).unwrap());
         let geometry = scene.geometry();
-        let plane = UnitCoordinates::new(geometry.light);
+        let plane = CentredCoordinates::new(geometry.light);
         let (mut lead, mut glass) = (0, 0);
         for rect in geometry.tiles() {
             let functions = scene.tile(rect);
@@ -242,7 +242,7 @@ mod tests {
     }
 
     /// Whether lead covers all of a pixel.
-    fn is_covered(plane: &UnitCoordinates, geometry: &Geometry, pixel: CameraPx) -> bool {
+    fn is_covered(plane: &CentredCoordinates, geometry: &Geometry, pixel: CameraPixel) -> bool {
         let at = Vec2::from(geometry.correspondence.at(pixel));
         let affine = geometry.correspondence.affine;
         let pitch = vec2(affine[0][0], affine[1][1]);

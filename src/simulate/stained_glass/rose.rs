@@ -9,9 +9,9 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 use super::glass::GlassColour::{
     self, Amber, Aqua, Azure, Cobalt, Emerald, Gold, Moss, Opal, Pale, Rose, Ruby, Violet,
 };
-use crate::simulate::coordinates::{Vec2, smoothstep, vec2};
 use crate::simulate::gradient_noise::{cell_hash, noise};
 use crate::simulate::signed_distance::{circle, fold, segment, smooth_union, star, vesica};
+use crate::simulate::vec2::{Vec2, smoothstep, vec2};
 
 /// Half the width of stone bars, of leads between large parts, and of fine leads.
 const STONE_HALF_WIDTH: f64 = 0.0076;

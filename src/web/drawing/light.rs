@@ -3,7 +3,7 @@
 use js_sys::{Float32Array, Uint8ClampedArray};
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use crate::relight::{BuiltinLight, Light, LightError, TorchPose};
+use crate::relight::{BuiltinLight, Light, LightError, TorchSpot};
 use crate::transport::{CHANNELS, Extent};
 use crate::web::{CodedError, Photo};
 
@@ -34,7 +34,7 @@ impl WebLight {
     /// # Errors
     /// Code `light-value` for values that are out of range.
     pub fn torch(photo: &Photo, x: f64, y: f64, size: Option<f64>) -> Result<WebLight, CodedError> {
-        let size = size.unwrap_or(TorchPose::DEFAULT_RADIUS);
+        let size = size.unwrap_or(TorchSpot::DEFAULT_RADIUS);
         // Squares of larger distances could overflow.
         const MAX_DISTANCE: f64 = 1e6;
         if !(x.abs() <= MAX_DISTANCE
@@ -51,9 +51,9 @@ impl WebLight {
         }
         let geometry = photo.geometry();
         let side = f64::from(geometry.light.width.min(geometry.light.height));
-        let pose = TorchPose {
+        let pose = TorchSpot {
             radius: size * side,
-            ..TorchPose::behind(geometry, x, y)
+            ..TorchSpot::behind(geometry, x, y)
         };
         Ok(Self(Light::torch(geometry.light, pose)))
     }

@@ -1,18 +1,16 @@
 /** Decodes a file from any source on the calling thread. */
 
 import { loadDecoder } from '../engine/core-modules.js';
-import { tooLong } from '../loading/http-errors.js';
-import type { FilePiece } from '../loading/http-source.js';
+import type { FetchedPiece } from '../loading/http-source.js';
 import { decodePieces, openPhoto } from '../loading/load.js';
 import { createMainThreadDecoder } from '../photo/main-thread-decoder.js';
-import type { PhotoDecoder } from '../photo/photo-decoder.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
+import type { CorePhotograph } from './core-photograph.js';
 import { LtmPhotograph } from './decoded-photo.js';
-import type { CorePhotograph } from './types.js';
-import { fetchCoreWasm, readFile } from './wasm-code.js';
+import { fetchCoreWasm, readFile } from './wasm-provider.js';
 
 /** A `.ltm` file: its bytes, a stream of them, or its address, which may be relative in a page and `file:` in Node. */
-export type LtmInput =
+export type DecodeInput =
   | string
   | URL
   | ArrayBuffer
@@ -34,7 +32,7 @@ export interface DecodeOptions {
  * `PhotoError`, or with the signal's reason if it is aborted.
  */
 export async function decode(
-  file: LtmInput,
+  file: DecodeInput,
   { signal = new AbortController().signal, onProgress = () => {} }: DecodeOptions = {},
 ): Promise<CorePhotograph> {
   signal.throwIfAborted();
@@ -45,7 +43,7 @@ export async function decode(
     const arriving = arrivingBytes(file);
     const decoder = await createDecoder();
     try {
-      const pieces = piecesOf(arriving, decoder);
+      const pieces = piecesOf(arriving);
       const photograph = await decodePieces(decoder, pieces, options, { now, yieldToPage });
       return new LtmPhotograph(photograph);
     } catch (thrown) {
@@ -67,18 +65,15 @@ export async function decode(
 
 async function* piecesOf(
   arriving: Iterable<Uint8Array> | AsyncIterable<Uint8Array>,
-  decoder: PhotoDecoder,
-): AsyncGenerator<FilePiece, void> {
+): AsyncGenerator<FetchedPiece, void> {
   let offset = 0;
   for await (const bytes of arriving) {
     yield { offset, bytes };
     offset += bytes.byteLength;
-    const { fileBytes = offset } = decoder.state;
-    if (offset > fileBytes) throw tooLong('The file', fileBytes, offset);
   }
 }
 
-function arrivingBytes(file: Exclude<LtmInput, string | URL>) {
+function arrivingBytes(file: Exclude<DecodeInput, string | URL>) {
   if (file instanceof ArrayBuffer) return [new Uint8Array(file)];
   if (ArrayBuffer.isView(file)) {
     return [new Uint8Array(file.buffer, file.byteOffset, file.byteLength)];

@@ -1,9 +1,9 @@
 /** The class behind `CorePhotograph`. */
 
-import type { RowRangeRelighter } from '../engine/types.js';
-import type { Photograph } from '../photo/photograph.js';
+import type { RowRangeRelighter } from '../engine/wasm-exports.js';
+import type { LoadedPhotograph } from '../photo/photograph.js';
 import type { PhotoInfo } from '../shared/value-types.js';
-import type { CorePhotograph } from './types.js';
+import type { CorePhotograph } from './core-photograph.js';
 
 export interface LtmPhotograph extends PhotoInfo {}
 
@@ -13,7 +13,7 @@ export class LtmPhotograph implements CorePhotograph {
   relighter: RowRangeRelighter | null = null;
   #isFreed = false;
 
-  constructor(readonly photograph: Photograph) {
+  constructor(readonly photograph: LoadedPhotograph) {
     Object.assign(this, photograph.info);
   }
 

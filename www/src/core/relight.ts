@@ -2,19 +2,20 @@
 
 import { loadCpu } from '../engine/core-modules.js';
 import { createOutputTransform } from '../engine/output-settings.js';
-import type { CpuModule, Light, ReceivedPhoto } from '../engine/types.js';
+import type { CpuModule, ImportedPhoto, Light } from '../engine/wasm-exports.js';
 import { toPhotoError } from '../shared/errors.js';
-import type { Gamut, LightName, ToneCurve } from '../shared/names.js';
+import type { Gamut, LightName, ToneCurve } from '../shared/keywords.js';
 import {
   parseExposure,
   parseGamut,
   parseLight,
+  parseNumber,
   parseTone,
   parseWhiteBalance,
 } from '../shared/setting-parsers.js';
+import type { CorePhotograph } from './core-photograph.js';
 import { LtmPhotograph } from './decoded-photo.js';
-import type { CorePhotograph } from './types.js';
-import { fetchCoreWasm } from './wasm-code.js';
+import { fetchCoreWasm } from './wasm-provider.js';
 
 /** A torch behind a point of the picture: (0, 0) is the top left corner and (1, 1) the bottom right corner. */
 export interface Torch {
@@ -28,14 +29,14 @@ export interface Torch {
  * A light image of any size, row by row: linear red, green and blue from 0 to 1 in a `Float32Array`, or sRGB codes with
  * alpha as in `ImageData`. Alpha scales the pixel's light.
  */
-export interface PictureLight {
+export interface LightImage {
   readonly data: Float32Array | Uint8ClampedArray;
   readonly width: number;
   readonly height: number;
 }
 
 /** A light: the name of a built-in one, a torch or a light image. */
-export type CoreLight = LightName | Torch | PictureLight;
+export type LightDescriptor = LightName | Torch | LightImage;
 
 /** Options of `relight`. */
 export interface RelightOptions {
@@ -62,13 +63,14 @@ export interface RelitPicture {
 /** Rejects with a `PhotoError`: `attribute` for an invalid option, `light-…` for an invalid light. */
 export async function relight(
   photo: CorePhotograph,
-  light: CoreLight = 'flood',
+  light: LightDescriptor = 'flood',
   options: RelightOptions = {},
 ): Promise<RelitPicture> {
   if (!(photo instanceof LtmPhotograph)) {
     throw new TypeError('relight takes a photograph from decode');
   }
-  const { exposure = 1, whiteBalance = [1, 1, 1], tone, gamut, detail = 1 } = options;
+  const { exposure = 1, whiteBalance = [1, 1, 1], tone, gamut } = options;
+  const detail = parseNumber(String(options.detail ?? 1), 'detail', 0, 1, 'it is a share') ?? 1;
   const output = {
     exposure: parseExposure(String(exposure)),
     whiteBalance: parseWhiteBalance(whiteBalance.join(' ')),
@@ -99,7 +101,11 @@ export async function relight(
   return { width, height, pixels };
 }
 
-function createLight({ Light }: CpuModule, modulePhoto: ReceivedPhoto, light: CoreLight): Light {
+function createLight(
+  { Light }: CpuModule,
+  modulePhoto: ImportedPhoto,
+  light: LightDescriptor,
+): Light {
   if (typeof light === 'string') return Light.builtin(modulePhoto, parseLight(light));
   if ('x' in light) return Light.torch(modulePhoto, light.x, light.y, light.size);
   const { data, width, height } = light;

@@ -4,10 +4,10 @@
  */
 
 import { setModuleFolder } from '../engine/wasm-loader.js';
-import { fetchStrings, isPending } from '../i18n/strings.js';
+import { fetchStrings, isPending } from '../i18n/translations.js';
 import { InteractionController } from '../input/interaction.js';
 import { reducedMotion } from '../input/reduced-motion.js';
-import type { FrameLightStatus } from '../lights/light-cache.js';
+import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
 import { BROWSER_PORTS } from '../player/browser-ports.js';
@@ -15,15 +15,15 @@ import { PhotoSession } from '../player/photo-session.js';
 import type { SessionSettings } from '../player/types.js';
 import type { Renderer } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
-import { BACKENDS } from '../shared/names.js';
-import { reuse } from '../shared/shallow-equal.js';
+import { BACKENDS } from '../shared/keywords.js';
+import { reuse } from '../shared/reuse-if-equal.js';
+import { type ActiveLight, ActiveLightTracker } from '../state/active-light-tracker.js';
 import { AttributeReader } from '../state/attribute-reader.js';
-import { type ActiveLight, LightChangeDetector } from '../state/light-change.js';
 import { type ElementOptions, readOptions } from '../state/options.js';
 import { ViewerState } from '../state/viewer-state.js';
 import type { ZoomView } from '../state/viewport.js';
-import { Presenter } from '../ui/presenter.js';
 import { ShadowDom } from '../ui/shadow-dom.js';
+import { ViewerUi } from '../ui/viewer-ui.js';
 import {
   BackendChangeEvent,
   ContextLostEvent,
@@ -33,7 +33,7 @@ import {
   QualityChangeEvent,
   ViewChangeEvent,
 } from './events.js';
-import { observeVisibility, type Visibility } from './visibility.js';
+import { observeVisibility, type VisibilityFlag } from './visibility.js';
 
 export class ElementController {
   readonly state: ViewerState;
@@ -41,8 +41,8 @@ export class ElementController {
   readonly interaction: InteractionController;
   readonly #reader: AttributeReader;
   readonly #dom: ShadowDom;
-  readonly #presenter: Presenter;
-  readonly #lightChanges = new LightChangeDetector();
+  readonly #viewerUi: ViewerUi;
+  readonly #lightChanges = new ActiveLightTracker();
   #reportedView: ZoomView;
   #mustReload = false;
   #isUpdateScheduled = false;
@@ -60,9 +60,9 @@ export class ElementController {
       errorChanged: (error) => this.#lightErrorChanged(error),
     });
     this.#reportedView = this.state.view;
-    this.#presenter = this.#createPresenter();
+    this.#viewerUi = this.#createViewerUi();
     this.session = this.#createSession();
-    this.interaction = new InteractionController(this.state, this.#dom, this.#presenter, {
+    this.interaction = new InteractionController(this.state, this.#dom, this.#viewerUi, {
       changed: () => this.schedule(),
       expired: () => this.reset(),
     });
@@ -91,10 +91,10 @@ export class ElementController {
     this.#connect();
     const options = this.readOptions();
     const { state, isPaused } = this;
-    const { language } = this.#presenter;
+    const { language } = this.#viewerUi;
     state.light.observe(state.reveal.isVisible, !isPaused);
     if (isPending(language)) void fetchStrings(language).then(() => this.schedule());
-    this.#presenter.update(isPaused, this.interaction.isTilting);
+    this.#viewerUi.update(isPaused, this.interaction.isTilting);
     this.#showError();
     this.interaction.update(!isPaused);
     for (const error of this.#reader.takeErrors()) this.reportError(error);
@@ -160,8 +160,8 @@ export class ElementController {
     this.#dispatch(new PhotoErrorEvent(error));
   }
 
-  #createPresenter(): Presenter {
-    return new Presenter(this.host, this.#dom, this.state, {
+  #createViewerUi(): ViewerUi {
+    return new ViewerUi(this.host, this.#dom, this.state, {
       selectLight: (item) => {
         this.state.light.item = item;
         this.interaction.markActive();
@@ -193,7 +193,7 @@ export class ElementController {
       qualityChanged: (quality) => this.#dispatch(new QualityChangeEvent(quality)),
       loaded: () => {
         this.#dom.updateProgress(null);
-        this.#presenter.announce('loaded');
+        this.#viewerUi.announce('loaded');
         this.#dispatch(new Event('load', EVENT_OPTIONS));
       },
       rendererChanged: ({ canvas }) => {
@@ -217,7 +217,7 @@ export class ElementController {
     });
   }
 
-  #frameDrawn({ lightApplied, lightError }: FrameLightStatus, drawn: LightSetting): void {
+  #frameDrawn({ lightApplied, lightError }: AppliedLightStatus, drawn: LightSetting): void {
     const { reveal, light } = this.state;
     if (!reveal.isDrawn) this.schedule();
     reveal.isDrawn = true;
@@ -236,7 +236,7 @@ export class ElementController {
     this.#connection = new AbortController();
     const { signal } = this.#connection;
     reducedMotion().addEventListener('change', () => this.schedule(), { signal });
-    const update = (visibility: Visibility, isTrue: boolean) => {
+    const update = (visibility: VisibilityFlag, isTrue: boolean) => {
       this.state.reveal[visibility] = isTrue;
       if (visibility === 'isVisible') this.session.setVisible(isTrue);
       this.schedule();
@@ -288,7 +288,7 @@ export class ElementController {
   #showError(): void {
     const message = this.#reader.message ?? this.state.errorMessage;
     const lightMessage = this.state.light.error?.message ?? this.#lightError?.message;
-    this.#presenter.showError(message ?? lightMessage ?? null);
+    this.#viewerUi.showError(message ?? lightMessage ?? null);
   }
 
   #clearPicture(): void {

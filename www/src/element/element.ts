@@ -1,9 +1,9 @@
 /** `<relightable-photo>`: the public interface. The class delegates to `ElementController`. */
 
 import { checkLightSource, isLightSource, type LightSource } from '../lights/light-source.js';
-import type { Backend, Gamut, LightName } from '../shared/names.js';
+import type { Backend, Gamut, LightName } from '../shared/keywords.js';
 import type { PhotoInfo, PicturePoint } from '../shared/value-types.js';
-import type { LightUpdate } from '../state/viewer-state.js';
+import type { SetLightOptions } from '../state/viewer-state.js';
 import type { ZoomView } from '../state/viewport.js';
 import { ElementController } from './element-controller.js';
 import { encodePicture } from './encode-picture.js';
@@ -141,7 +141,7 @@ export class RelightablePhoto extends Base {
    * Sets the light until `reset` or until an attribute changes: a built-in light by its name, or with position, size
    * and colour; or a source, as with `lightSource`; `null` is the light of the attributes, without a source.
    */
-  setLight(light: LightName | LightUpdate | LightSource | null): void {
+  setLight(light: LightName | SetLightOptions | LightSource | null): void {
     if (light === null || isLightSource(light)) {
       this.#state.light.reset();
       this.lightSource = light;
@@ -190,7 +190,7 @@ export class RelightablePhoto extends Base {
 
   /**
    * The share of the photograph's components in the current picture, the most important ones first: 1, or less while
-   * the picture changes faster than it can be drawn in full. `null` without a picture.
+   * the file is loading and while the picture changes faster than it can be drawn in full. `null` without a picture.
    */
   get detail(): number | null {
     return this.#session.quality;

@@ -3,14 +3,14 @@
 import type { Renderer } from '../renderers/types.js';
 import { PhotoError } from '../shared/errors.js';
 
-type DrawnPicture = Pick<Renderer, 'canvas' | 'gamut'>;
+type DrawnCanvas = Pick<Renderer, 'canvas' | 'gamut'>;
 
 /**
  * Reads the canvas at once: that of a GPU keeps its content only until the next frame. `quality` is that of
  * `HTMLCanvasElement.toBlob`.
  */
 export function encodePicture(
-  picture: DrawnPicture,
+  picture: DrawnCanvas,
   type: string,
   quality: number | undefined,
   scale: number,
@@ -25,7 +25,7 @@ export function encodePicture(
   });
 }
 
-function resample({ canvas, gamut }: DrawnPicture, scale: number): HTMLCanvasElement {
+function resample({ canvas, gamut }: DrawnCanvas, scale: number): HTMLCanvasElement {
   const copy = document.createElement('canvas');
   copy.width = Math.max(1, Math.round(canvas.width * scale));
   copy.height = Math.max(1, Math.round(canvas.height * scale));

@@ -2,14 +2,14 @@
 
 import type { LightSource } from '../lights/light-source.js';
 import type { ErrorCode, PhotoError } from '../shared/errors.js';
-import type { Backend, LightName } from '../shared/names.js';
+import type { Backend, LightName } from '../shared/keywords.js';
 import type { PicturePoint } from '../shared/value-types.js';
 import type { ZoomView } from '../state/viewport.js';
 
 export const EVENT_OPTIONS: EventInit = { bubbles: true, composed: true };
 
 /** An event with further fields. */
-class ElementEvent extends Event {
+class BaseElementEvent extends Event {
   constructor(type: string, fields: object) {
     super(type, EVENT_OPTIONS);
     Object.assign(this, fields);
@@ -17,7 +17,7 @@ class ElementEvent extends Event {
 }
 
 /** `error`: something failed. The element shows the message as well. */
-export class PhotoErrorEvent extends ElementEvent {
+export class PhotoErrorEvent extends BaseElementEvent {
   /** Identifies the error for programs. */
   declare readonly code: ErrorCode;
   /** Explains the error to people. */
@@ -31,7 +31,7 @@ export class PhotoErrorEvent extends ElementEvent {
 }
 
 /** `lightchange`: another light is active, or the torch has moved. New frames of a source are no change. */
-export class LightChangeEvent extends ElementEvent {
+export class LightChangeEvent extends BaseElementEvent {
   /** The built-in light, or the one that the source replaces. */
   declare readonly light: LightName;
   /** The torch's position; `null` behind the centre, and for other lights. */
@@ -45,7 +45,7 @@ export class LightChangeEvent extends ElementEvent {
 }
 
 /** `backendchange`: a backend is in use, the first one or another one. */
-export class BackendChangeEvent extends ElementEvent {
+export class BackendChangeEvent extends BaseElementEvent {
   declare readonly backend: Backend;
   /** The backend before it, `null` for the first. */
   declare readonly previous: Backend | null;
@@ -57,9 +57,9 @@ export class BackendChangeEvent extends ElementEvent {
   }
 }
 
-/** `qualitychange`: another share of the components is drawn, below 1 only while the picture changes fast. */
-export class QualityChangeEvent extends ElementEvent {
-  /** 0 to 1; the first picture has 1. */
+/** `qualitychange`: another share of the components is drawn, below 1 while the file loads or the picture changes fast. */
+export class QualityChangeEvent extends BaseElementEvent {
+  /** 0 to 1. */
   declare readonly share: number;
 
   constructor(share: number) {
@@ -68,7 +68,7 @@ export class QualityChangeEvent extends ElementEvent {
 }
 
 /** `contextlost`: the backend in use was lost; `backendchange` reports its replacement. */
-export class ContextLostEvent extends ElementEvent {
+export class ContextLostEvent extends BaseElementEvent {
   declare readonly backend: Backend;
   /** The browser's explanation. */
   declare readonly message: string;
@@ -79,7 +79,7 @@ export class ContextLostEvent extends ElementEvent {
 }
 
 /** `viewchange`: another part of the picture is visible. */
-export class ViewChangeEvent extends ElementEvent {
+export class ViewChangeEvent extends BaseElementEvent {
   /** Magnification; 1 shows the whole picture. */
   declare readonly zoom: number;
   /** The point of the picture at the centre of the element, 0 to 1. */

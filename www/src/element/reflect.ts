@@ -8,7 +8,7 @@ import {
   type ParsedValue,
   parserOf,
   type RevealMode,
-} from '../state/attribute-values.js';
+} from '../state/attribute-parsers.js';
 
 /** The properties that reflect attributes. */
 export interface ReflectedProperties {

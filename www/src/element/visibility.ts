@@ -2,7 +2,7 @@
 
 import type { RevealState } from '../state/reveal.js';
 
-export type Visibility = keyof Pick<RevealState, 'isNear' | 'isVisible'>;
+export type VisibilityFlag = keyof Pick<RevealState, 'isNear' | 'isVisible'>;
 
 /** How far outside of the viewport counts: drawing begins shortly before an element becomes visible. */
 const ROOT_MARGINS = { isVisible: '64px', isNear: '100%' } as const;
@@ -10,7 +10,7 @@ const ROOT_MARGINS = { isVisible: '64px', isNear: '100%' } as const;
 /** Calls back soon, and then at each change, until `signal` is aborted. Without support, all elements are visible. */
 export function observeVisibility(
   element: Element,
-  callback: (visibility: Visibility, isTrue: boolean) => void,
+  callback: (visibility: VisibilityFlag, isTrue: boolean) => void,
   signal: AbortSignal,
 ): void {
   for (const visibility of ['isVisible', 'isNear'] as const) {

@@ -1,6 +1,6 @@
 /** Loads the modules of the core. The calls are pure, so that bundlers drop the module that a script does not use. */
 
-import type { CpuModule, DecoderModule } from './types.js';
+import type { CpuModule, DecoderModule } from './wasm-exports.js';
 import { createLoader } from './wasm-loader.js';
 
 export const loadDecoder = /* @__PURE__ */ createLoader<DecoderModule>(

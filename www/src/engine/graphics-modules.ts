@@ -1,6 +1,6 @@
 /** Loads the modules of the graphics backends, apart from the core's: bundlers keep the files that a script imports. */
 
-import type { GraphicsModules } from './types.js';
+import type { GraphicsModules } from './wasm-exports.js';
 import { createLoader } from './wasm-loader.js';
 
 export const GRAPHICS_LOADERS: {

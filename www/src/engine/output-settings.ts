@@ -1,7 +1,7 @@
 /** The output transform's settings: how a linear picture becomes codes on the canvas. */
 
 import type { RgbGains } from '../shared/value-types.js';
-import type { Gamut, OutputTransform, RelightModule, ToneCurve } from './types.js';
+import type { Gamut, OutputTransform, RelightModule, ToneCurve } from './wasm-exports.js';
 
 /** Immutable: a change makes a new object. */
 export interface OutputSettings {

@@ -2,7 +2,7 @@
 
 import { withPolicyErrors } from '../shared/content-security-policy.js';
 import { messageOf, PhotoError } from '../shared/errors.js';
-import type { WasmModuleName } from '../shared/names.js';
+import type { WasmModuleName } from '../shared/keywords.js';
 
 /** The bytes of a module, or the response that brings them. */
 type WasmSource = ArrayBuffer | ArrayBufferView<ArrayBuffer> | Response;

@@ -1,6 +1,6 @@
 /** Chooses the language of an element. */
 
-import { LANGUAGES, type Language } from './strings.js';
+import { LANGUAGES, type Language } from './translations.js';
 
 /** By the nearest `lang` attribute, also outside of shadow roots, and otherwise by the browser's language. */
 export function languageOf(element: Element): Language {

@@ -12,8 +12,8 @@ import {
   type ZoomView,
   zoomAt,
 } from '../state/viewport.js';
-import type { Presenter } from '../ui/presenter.js';
 import type { ShadowDom } from '../ui/shadow-dom.js';
+import type { ViewerUi } from '../ui/viewer-ui.js';
 import { AnimationLoop } from './animation-loop.js';
 import type { EnabledGestures } from './gestures.js';
 import { IdleTimer } from './idle-timer.js';
@@ -24,7 +24,7 @@ import { listenToPointer, toViewportUnits } from './pointer-input.js';
 import { reducedMotion } from './reduced-motion.js';
 import { isTiltSupported, TiltSensor } from './tilt-sensor.js';
 
-export interface InteractionListener {
+export interface InteractionCallbacks {
   /** The light, the view, an animation or the focus has changed. */
   changed(): void;
   /** The kiosk's time without input is over. */
@@ -46,8 +46,8 @@ export class InteractionController {
   constructor(
     private readonly state: ViewerState,
     private readonly dom: ShadowDom,
-    private readonly presenter: Presenter,
-    private readonly listener: InteractionListener,
+    private readonly viewerUi: ViewerUi,
+    private readonly listener: InteractionCallbacks,
   ) {
     this.#animator = new LightAnimator(state.light, this.#loop, () => listener.changed());
     this.#idle = new IdleTimer(callLater, {
@@ -57,8 +57,8 @@ export class InteractionController {
       },
       expired: () => {
         listener.expired();
-        presenter.toolbar?.closeMenu();
-        presenter.leaveFullscreen();
+        viewerUi.toolbar?.closeMenu();
+        viewerUi.leaveFullscreen();
       },
     });
     this.#tilt = new TiltSensor((point) => {
@@ -86,7 +86,7 @@ export class InteractionController {
   markActive(byKeyboard = false): void {
     this.#isActive = true;
     this.#idle.restart();
-    this.presenter.toolbar?.show(byKeyboard);
+    this.viewerUi.toolbar?.show(byKeyboard);
   }
 
   /** Whether the torch follows the device's tilt; `null` if it cannot. */
@@ -126,13 +126,19 @@ export class InteractionController {
 
   #listenToPointer(): void {
     const state = this.state;
-    const { handle, viewport } = this.dom;
+    const { handle, root, viewport } = this.dom;
+    // Also over the toolbar, and under a light that does not move.
+    for (const type of ['pointermove', 'pointerdown']) {
+      root.addEventListener(type, () => {
+        if (state.isPictureShown) this.markActive();
+      });
+    }
     const toUnits = (x: number, y: number) => toViewportUnits(viewport, x, y);
     listenToPointer(viewport, {
       permissions: () => this.#permissions,
       isPanning: () => this.#isPanning,
       isCooperative: () => state.options.cooperativeGestures,
-      zoomIgnored: (by) => this.presenter.hintAtZoom(by),
+      zoomIgnored: (by) => this.viewerUi.hintAtZoom(by),
       active: () => this.markActive(),
       pressed: () => (handle.hidden ? viewport : handle).focus({ preventScroll: true }),
       moveLight: (x, y) => {
@@ -201,7 +207,7 @@ export class InteractionController {
     this.state.view = view;
     const hasChanged = this.state.view !== last;
     if (hasChanged) {
-      this.presenter.announce('zoomed');
+      this.viewerUi.announce('zoomed');
       this.listener.changed();
     }
     return hasChanged;
@@ -245,11 +251,11 @@ export class InteractionController {
         return this.#setView(FULL_VIEW);
       case 'select-light':
         this.state.selectNextLight(action.by);
-        this.presenter.announce('light');
+        this.viewerUi.announce('light');
         this.listener.changed();
         return true;
       case 'escape':
-        if (this.presenter.leaveFullscreen()) return false;
+        if (this.viewerUi.leaveFullscreen()) return false;
         (this.dom.root.activeElement as HTMLElement | null)?.blur();
         return false;
     }

@@ -12,6 +12,7 @@ export interface PointerInputListener extends GestureListener {
   isCooperative(): boolean;
   /** The page scrolled where the visitor may have wanted to zoom. */
   zoomIgnored(by: 'wheel' | 'touch'): void;
+  /** The wheel zooms. */
   active(): void;
   /** The picture was pressed and should take the keyboard's focus. */
   pressed(): void;
@@ -38,13 +39,11 @@ export function listenToPointer(viewport: HTMLElement, listener: PointerInputLis
   };
   viewport.addEventListener('pointermove', (event) => {
     if (!isForPicture(event)) return;
-    listener.active();
     gestures.move(sampleOf(event), listener.permissions());
   });
   viewport.addEventListener('pointerdown', (event) => {
     const isMiddle = event.button === 1;
     if (!isForPicture(event) || (event.button !== 0 && !isMiddle)) return;
-    listener.active();
     const forcePan = isMiddle || event.shiftKey || listener.isPanning();
     gestures.down(sampleOf(event), listener.permissions(), forcePan);
     // A drag that leaves the picture continues. Pointers of synthetic events cannot be captured.

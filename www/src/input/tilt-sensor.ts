@@ -9,6 +9,8 @@ export function isTiltSupported(): boolean {
 
 export class TiltSensor {
   #listening: AbortController | null = null;
+  /** The last request, which may wait for the visitor. */
+  #request: AbortController | null = null;
 
   constructor(private readonly moveTorch: (point: PicturePoint) => void) {}
 
@@ -23,6 +25,9 @@ export class TiltSensor {
       DeviceOrientationEvent?: { requestPermission?: () => Promise<string> };
     };
     if (!type) return false;
+    this.#request?.abort();
+    const listening = new AbortController();
+    this.#request = listening;
     try {
       const permission = (await type.requestPermission?.()) ?? 'granted';
       if (permission !== 'granted') return false;
@@ -30,8 +35,9 @@ export class TiltSensor {
       // The browser asks only after a press.
       return false;
     }
-    this.stop();
-    const listening = new AbortController();
+    // Stopped while the visitor was asked.
+    if (listening.signal.aborted) return false;
+    this.#listening?.abort();
     this.#listening = listening;
     try {
       // A separate script, fetched after the request, which browsers accept only directly after a press.
@@ -44,6 +50,8 @@ export class TiltSensor {
   }
 
   stop(): void {
+    this.#request?.abort();
+    this.#request = null;
     this.#listening?.abort();
     this.#listening = null;
   }

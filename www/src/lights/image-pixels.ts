@@ -7,7 +7,7 @@ import {
   isInstance,
   isLinearLight,
   isLivePicture,
-  type LightPicture,
+  type LightImageSource,
 } from './light-source.js';
 
 type Size = Pick<ImageData, 'width' | 'height'>;
@@ -18,7 +18,7 @@ const MAX_PIXELS = 1 << 22;
 let sharedContext: CanvasRenderingContext2D | null = null;
 
 /** An image light that reads `image` at each frame. */
-export function toImageLight(image: LightPicture): ImageLight {
+export function toImageLight(image: LightImageSource): ImageLight {
   return {
     uploadable() {
       const size = isLivePicture(image) ? imageSize(image) : null;

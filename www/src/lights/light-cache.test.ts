@@ -1,16 +1,16 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { Light, ReceivedPhoto, RelightModule } from '../engine/types.js';
+import type { ImportedPhoto, Light, RelightModule } from '../engine/wasm-exports.js';
 import { PhotoError } from '../shared/errors.js';
 import { toImageLight } from './image-pixels.js';
 import { LightCache } from './light-cache.js';
 import type { LightSetting } from './light-setting.js';
-import type { LightPicture, LinearImage } from './light-source.js';
+import type { LightImageSource, LinearImage } from './light-source.js';
 
 const GOOD: LinearImage = { data: new Float32Array(3), width: 1, height: 1 };
 const BAD: LinearImage = { data: new Float32Array(1), width: 1, height: 1 };
 
-const setting = (picture: LightPicture | null): LightSetting => ({
+const setting = (picture: LightImageSource | null): LightSetting => ({
   name: 'fire',
   torch: null,
   image: picture && toImageLight(picture),
@@ -25,11 +25,11 @@ function createCache() {
   };
   const module = {
     Light: {
-      builtin: (_: ReceivedPhoto, name: string) => light(name),
-      torch: (_: ReceivedPhoto, x: number, y: number, size?: number) =>
+      builtin: (_: ImportedPhoto, name: string) => light(name),
+      torch: (_: ImportedPhoto, x: number, y: number, size?: number) =>
         light(`torch ${x} ${y} ${size}`),
-      fire: (_: ReceivedPhoto, seconds: number) => light(`fire ${seconds}`),
-      fromLinear: (_: ReceivedPhoto, values: Float32Array) => {
+      fire: (_: ImportedPhoto, seconds: number) => light(`fire ${seconds}`),
+      fromLinear: (_: ImportedPhoto, values: Float32Array) => {
         if (values.length !== 3) throw new PhotoError('light-size', 'three values');
         return light('linear');
       },
@@ -39,7 +39,7 @@ function createCache() {
     module as unknown as Pick<RelightModule, 'Light'>,
     {
       free: () => {},
-    } as unknown as ReceivedPhoto,
+    } as unknown as ImportedPhoto,
   );
   return { cache, live };
 }

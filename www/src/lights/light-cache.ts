@@ -1,11 +1,11 @@
 /** Keeps the last light that was made in a WebAssembly module, for as long as its setting is unchanged. */
 
-import type { Freeable, Light, ReceivedPhoto, RelightModule } from '../engine/types.js';
+import type { Freeable, ImportedPhoto, Light, RelightModule } from '../engine/wasm-exports.js';
 import { type PhotoError, toPhotoError } from '../shared/errors.js';
 import { createBuiltinLight, type LightSetting } from './light-setting.js';
 
 /** Whether a frame has the requested light. */
-export interface FrameLightStatus {
+export interface AppliedLightStatus {
   /** False if the frame shows the last light, because the requested one has no picture (yet). */
   readonly lightApplied: boolean;
   /** Why the requested light is unavailable; `null` if it is not, or is only loading. */
@@ -20,14 +20,14 @@ export class LightCache implements Freeable {
   /** `lightPlane` is a photograph without tiles, which is freed with the cache. */
   constructor(
     private readonly module: Pick<RelightModule, 'Light'>,
-    private readonly lightPlane: ReceivedPhoto,
+    private readonly lightPlane: ImportedPhoto,
   ) {}
 
   /**
    * The light of a frame, owned by the cache: the same object as last time if and only if its content is unchanged.
    * While a setting's image cannot be read, the last light replaces it, or, if there is none, the built-in light.
    */
-  get(setting: LightSetting): FrameLightStatus & { readonly light: Light } {
+  get(setting: LightSetting): AppliedLightStatus & { readonly light: Light } {
     let lightApplied = true;
     let lightError: PhotoError | null = null;
     if (setting.image) {

@@ -1,6 +1,6 @@
 /** The image or video of the `light-src` attribute. */
 
-import type { CrossOrigin } from '../shared/names.js';
+import type { CrossOrigin } from '../shared/keywords.js';
 
 const VIDEO_EXTENSION = /\.(mp4|m4v|webm|ogv|mov)$/i;
 

@@ -1,7 +1,12 @@
 /** The light of one frame. Immutable: a change makes a new object. */
 
-import type { ExternalImageSource, Light, ReceivedPhoto, RelightModule } from '../engine/types.js';
-import type { LightName } from '../shared/names.js';
+import type {
+  ExternalImageSource,
+  ImportedPhoto,
+  Light,
+  RelightModule,
+} from '../engine/wasm-exports.js';
+import type { LightName } from '../shared/keywords.js';
 import { CENTRE, type PicturePoint } from '../shared/value-types.js';
 
 export interface LightSetting {
@@ -25,14 +30,14 @@ export interface ImageLight {
     readonly height: number;
   } | null;
   /** `null` while nothing is loaded. Throws `light-tainted`, `light-size`, `light-value` or `light-source`. */
-  createLight(module: Pick<RelightModule, 'Light'>, photo: ReceivedPhoto): Light | null;
+  createLight(module: Pick<RelightModule, 'Light'>, photo: ImportedPhoto): Light | null;
 }
 
 export const PENDING_IMAGE: ImageLight = { uploadable: () => null, createLight: () => null };
 
 export function createBuiltinLight(
   { Light }: Pick<RelightModule, 'Light'>,
-  photo: ReceivedPhoto,
+  photo: ImportedPhoto,
   { name, torch, size, seconds = 0 }: LightSetting,
 ): Light {
   if (name === 'fire') return Light.fire(photo, seconds);

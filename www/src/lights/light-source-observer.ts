@@ -3,7 +3,7 @@
 import { messageOf, PhotoError } from '../shared/errors.js';
 import { toImageLight } from './image-pixels.js';
 import type { ImageLight } from './light-setting.js';
-import { isInstance, type LightPicture, type LightSource } from './light-source.js';
+import { isInstance, type LightImageSource, type LightSource } from './light-source.js';
 
 export interface LightSourceListener {
   changed(): void;
@@ -14,7 +14,7 @@ export interface LightSourceListener {
 /** Holds listeners and plays streams only between `start` and `stop`. */
 export class LightSourceObserver {
   /** The source itself, or a video that plays the stream. */
-  readonly picture: LightPicture;
+  readonly picture: LightImageSource;
   readonly image: ImageLight;
   #observing: AbortController | null = null;
   error: PhotoError | null = null;
@@ -138,7 +138,7 @@ function observeFrames(video: HTMLVideoElement, onFrame: () => void, signal: Abo
 }
 
 /** A text that changes with the content, as far as the browser exposes it. */
-function fingerprintOf(picture: LightPicture): string {
+function fingerprintOf(picture: LightImageSource): string {
   if (isInstance('HTMLImageElement', picture)) return `${picture.complete} ${picture.currentSrc}`;
   if (isInstance('HTMLVideoElement', picture)) {
     return `${picture.readyState >= 2} ${picture.currentTime} ${picture.currentSrc}`;

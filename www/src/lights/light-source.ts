@@ -1,6 +1,6 @@
 /** The light sources that a page may use in place of the built-in lights. */
 
-import type { ExternalImageSource } from '../engine/types.js';
+import type { ExternalImageSource } from '../engine/wasm-exports.js';
 
 /** A light image of any size in linear values. */
 export interface LinearImage {
@@ -14,13 +14,13 @@ export interface LinearImage {
 export type BrowserImageSource = HTMLImageElement | ImageData | ExternalImageSource;
 
 /** A picture whose pixels can be read at any time. */
-export type LightPicture = BrowserImageSource | LinearImage;
+export type LightImageSource = BrowserImageSource | LinearImage;
 
 /**
  * Lights the photograph: the source's upper left corner is that of the light plane. Transparent pixels are dark.
  * The element follows every frame of a video or stream; it reads canvases and numbers again on `lightChanged()`.
  */
-export type LightSource = LightPicture | MediaStream;
+export type LightSource = LightImageSource | MediaStream;
 
 const LIVE_CLASSES = [
   'HTMLCanvasElement',
@@ -39,7 +39,7 @@ export function isInstance<K extends (typeof CLASSES)[number]>(
   return typeof type === 'function' && value instanceof type;
 }
 
-export function isLivePicture(picture: LightPicture): picture is ExternalImageSource {
+export function isLivePicture(picture: LightImageSource): picture is ExternalImageSource {
   return LIVE_CLASSES.some((name) => isInstance(name, picture));
 }
 

@@ -17,7 +17,7 @@ import {
 import { type RetryPorts, retryPauseMs, sleep } from './retry.js';
 
 /** Bytes of the file that begin at `offset`. */
-export interface FilePiece {
+export interface FetchedPiece {
   readonly offset: number;
   readonly bytes: Uint8Array;
 }
@@ -71,7 +71,7 @@ export class HttpSource {
    * later calls nothing. The range may exceed the file only while its size is unknown. Throws a `PhotoError`, or the
    * signal's reason if it is aborted.
    */
-  async *read(range: ByteRange, signal: AbortSignal): AsyncGenerator<FilePiece, void> {
+  async *read(range: ByteRange, signal: AbortSignal): AsyncGenerator<FetchedPiece, void> {
     this.#checkSize(range, range.end);
     const transfer = this.#wholeTransfer ?? { ...range, position: range.start, usesRange: true };
     let failures = 0;
@@ -107,7 +107,10 @@ export class HttpSource {
   }
 
   /** Sends one request and yields its bytes, without those received before an interruption. */
-  async *#attempt(transfer: RangeTransfer, signal: AbortSignal): AsyncGenerator<FilePiece, void> {
+  async *#attempt(
+    transfer: RangeTransfer,
+    signal: AbortSignal,
+  ): AsyncGenerator<FetchedPiece, void> {
     // However the attempt ends, its request ends too.
     const stop = linkedController(signal);
     try {

@@ -4,9 +4,9 @@ import type { IncomingMessage, ServerResponse } from 'node:http';
 import test from 'node:test';
 import { gzipSync } from 'node:zlib';
 import { answer } from '../../tools/ranges.js';
-import type { DecodedPhoto, Decoder } from '../engine/types.js';
+import type { DecodedPhoto, Decoder } from '../engine/wasm-exports.js';
 import { createMainThreadDecoder } from '../photo/main-thread-decoder.js';
-import type { Photograph } from '../photo/photograph.js';
+import type { LoadedPhotograph } from '../photo/photograph.js';
 import { fakePhoto } from '../photo/photograph-fakes.js';
 import { never, serve, type TestServer } from './http-fakes.js';
 import { type LoadPorts, openPhoto } from './load.js';
@@ -107,13 +107,13 @@ function portsOf(ports: Partial<LoadPorts> = {}): LoadPorts {
 }
 
 /** Ignores previews. */
-const drop = (preview: Photograph) => preview.free();
+const drop = (preview: LoadedPhotograph) => preview.free();
 
 /** Loads a photograph, and checks that no decoder and no listener is left. */
 async function load(
   url: string,
   ports: Partial<LoadPorts> = {},
-): Promise<{ progress: [number, number][]; photo: Photograph }> {
+): Promise<{ progress: [number, number][]; photo: LoadedPhotograph }> {
   const progress: [number, number][] = [];
   try {
     const photo = await openPhoto(
@@ -434,7 +434,7 @@ test('previews come while the file loads, each of twice as many bytes, and not t
   const server = await serve(t, (request, response) => send(request, response, file));
   let now = 0;
   const shares: number[] = [];
-  const keep = (preview: Photograph) => shares.push(preview.completeness);
+  const keep = (preview: LoadedPhotograph) => shares.push(preview.completeness);
   const at = { now: () => now };
   await openPhoto(
     server.url,

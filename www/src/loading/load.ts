@@ -1,19 +1,19 @@
 /** Loads a photograph: fetches a file and decodes it while it arrives. */
 
 import type { PhotoDecoder } from '../photo/photo-decoder.js';
-import type { Photograph } from '../photo/photograph.js';
+import type { LoadedPhotograph } from '../photo/photograph.js';
 import { endSentence, hasCode, PhotoError, toPhotoError } from '../shared/errors.js';
 import { linkedController, withTimeout } from '../shared/promises.js';
 import type { ByteRange } from '../shared/value-types.js';
 import { fileName, tooLong } from './http-errors.js';
-import { type FilePiece, HttpSource } from './http-source.js';
+import { type FetchedPiece, HttpSource } from './http-source.js';
 
 export interface LoadOptions {
   readonly signal: AbortSignal;
   /** Gets the number of decoded bytes and that of the file, which is 0 until known. */
   readonly onProgress: (loaded: number, total: number) => void;
   /** Gets coarser photographs of the file so far, and must free them; `null` if none are needed. */
-  readonly onPreview: ((photograph: Photograph) => void) | null;
+  readonly onPreview: ((photograph: LoadedPhotograph) => void) | null;
 }
 
 export interface LoadPorts {
@@ -44,7 +44,11 @@ export async function openPhoto(url: string, options: LoadOptions, ports: LoadPo
   }
 }
 
-async function open(url: string, options: LoadOptions, ports: LoadPorts): Promise<Photograph> {
+async function open(
+  url: string,
+  options: LoadOptions,
+  ports: LoadPorts,
+): Promise<LoadedPhotograph> {
   const { signal } = options;
   signal.throwIfAborted();
   const stop = linkedController(signal);
@@ -81,10 +85,10 @@ function withFileName(error: PhotoError, url: string): PhotoError {
 async function* piecesFor(
   decoder: PhotoDecoder,
   source: HttpSource,
-  first: IteratorResult<FilePiece, void>,
-  firstPieces: AsyncIterable<FilePiece>,
+  first: IteratorResult<FetchedPiece, void>,
+  firstPieces: AsyncIterable<FetchedPiece>,
   signal: AbortSignal,
-): AsyncGenerator<FilePiece, void> {
+): AsyncGenerator<FetchedPiece, void> {
   if (!first.done) yield first.value;
   yield* firstPieces;
   let lastBytesFed = -1;
@@ -104,10 +108,10 @@ async function* piecesFor(
 /** Decodes pieces of a file in the order in which they arrive. The caller frees the decoder. */
 export async function decodePieces(
   decoder: PhotoDecoder,
-  pieces: AsyncIterable<FilePiece>,
+  pieces: AsyncIterable<FetchedPiece>,
   { signal, onProgress, onPreview }: LoadOptions,
   ports: Pick<LoadPorts, 'now' | 'yieldToPage'>,
-): Promise<Photograph> {
+): Promise<LoadedPhotograph> {
   let reported = 0;
   const nextPreview = previewsOf(decoder, ports.now);
   const reportProgress = () => {
@@ -142,7 +146,10 @@ export async function decodePieces(
  * takes as long as decoding the bytes so far, so that all of them together take as long as the photograph. None is made
  * once the whole file is there.
  */
-function previewsOf(decoder: PhotoDecoder, now: () => number): () => Promise<Photograph | null> {
+function previewsOf(
+  decoder: PhotoDecoder,
+  now: () => number,
+): () => Promise<LoadedPhotograph | null> {
   let lastScans = 0;
   let lastBytes = 0;
   let lastMs = Number.NEGATIVE_INFINITY;

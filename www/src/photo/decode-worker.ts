@@ -1,11 +1,11 @@
 /** The script of the worker that decodes one photograph. */
 
 import { loadDecoder } from '../engine/core-modules.js';
-import type { DecodedPhoto, Decoder } from '../engine/types.js';
+import type { DecodedPhoto, Decoder } from '../engine/wasm-exports.js';
 import { serve } from '../engine/worker-server.js';
 import { toPhotoError } from '../shared/errors.js';
 import { decoderState } from './main-thread-decoder.js';
-import { describePhoto, type SerialisedTile } from './types.js';
+import { describePhoto, type TransferredTile } from './types.js';
 import type { DecodeResult, DecodeTask, TransferredPhoto } from './worker-decoder.js';
 
 function answer(decoder: Decoder, task: DecodeTask): DecodeResult {
@@ -25,7 +25,7 @@ function answer(decoder: Decoder, task: DecodeTask): DecodeResult {
 /** Moves a photograph out of the module's memory. */
 function takeOut(photo: DecodedPhoto): TransferredPhoto {
   const descriptor = describePhoto(photo);
-  const takeTile = (_: unknown, index: number) => photo.takeTile(index) as SerialisedTile;
+  const takeTile = (_: unknown, index: number) => photo.takeTile(index) as TransferredTile;
   const tiles = Array.from({ length: descriptor.tiles }, takeTile);
   photo.free();
   return { descriptor, tiles };

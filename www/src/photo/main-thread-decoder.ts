@@ -1,8 +1,8 @@
 /** Decodes on the page's thread, in slices between which the page can draw. */
 
-import type { Decoder, DecoderModule } from '../engine/types.js';
-import { completenessOf, type DecoderState, type PhotoDecoder } from './photo-decoder.js';
-import { Photograph } from './photograph.js';
+import type { Decoder, DecoderModule } from '../engine/wasm-exports.js';
+import { completenessOf, type DecoderProgress, type PhotoDecoder } from './photo-decoder.js';
+import { LoadedPhotograph } from './photograph.js';
 
 /** Bytes decoded at once: so few that hardly more than one tile is completed by them. */
 const SLICE_BYTES = 1 << 10;
@@ -31,11 +31,13 @@ export function createMainThreadDecoder(
     },
     async preview() {
       const photo = decoder.preview();
-      return photo ? Photograph.fromModule(photo, completenessOf(decoderState(decoder))) : null;
+      return photo
+        ? LoadedPhotograph.fromModule(photo, completenessOf(decoderState(decoder)))
+        : null;
     },
     async finish() {
       hasEnded = true;
-      return Photograph.fromModule(decoder.finish());
+      return LoadedPhotograph.fromModule(decoder.finish());
     },
     free() {
       if (!hasEnded) decoder.free();
@@ -45,7 +47,7 @@ export function createMainThreadDecoder(
 }
 
 /** The state of a module's decoder. */
-export function decoderState(decoder: Decoder): DecoderState {
+export function decoderState(decoder: Decoder): DecoderProgress {
   const [start = 0, end] = decoder.wants();
   const next = end === undefined ? undefined : { start, end };
   const { bytesFed, fileBytes, scansDone } = decoder;

@@ -1,7 +1,7 @@
 /** A photograph and a module for tests. A tile is one row of one pixel, whose value is the tile's index. */
 
 import assert from 'node:assert/strict';
-import type { CpuModule, DecodedPhoto, Light, ReceivedPhoto } from '../engine/types.js';
+import type { CpuModule, DecodedPhoto, ImportedPhoto, Light } from '../engine/wasm-exports.js';
 
 const TILE_SIDE = 1;
 
@@ -42,7 +42,7 @@ export function fakePhoto(tileCount: number) {
         isFreed = true;
         state.alive -= 1;
       },
-    } satisfies ReceivedPhoto;
+    } satisfies ImportedPhoto;
   };
   const photo: DecodedPhoto = {
     width: 1,
@@ -64,7 +64,7 @@ export function fakePhoto(tileCount: number) {
       free() {}
     },
     cpuKernel: () => 'fake, on the page',
-    Relighter: class {
+    CanvasRelighter: class {
       readonly gamut = 'srgb';
       free() {}
     },

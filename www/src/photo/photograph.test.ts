@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { RelightModule } from '../engine/types.js';
+import type { RelightModule } from '../engine/wasm-exports.js';
 import { WorkerPool } from '../renderers/cpu/worker-pool.js';
 import {
   type FakeWorker,
@@ -9,22 +9,22 @@ import {
   settle,
   tileIndices,
 } from '../renderers/cpu/worker-pool-fakes.js';
-import { Photograph } from './photograph.js';
+import { LoadedPhotograph } from './photograph.js';
 import { fakeLight, fakePhoto } from './photograph-fakes.js';
-import { describePhoto, type SerialisedTile } from './types.js';
+import { describePhoto, type TransferredTile } from './types.js';
 
 const ALL = [0, 1, 2, 3];
 
 /** A photograph of four tiles from a worker. */
 function fromWorker() {
   const { photo, tilesInModules, state, module } = fakePhoto(4);
-  const tiles = ALL.map((index) => photo.takeTile(index) as SerialisedTile);
+  const tiles = ALL.map((index) => photo.takeTile(index) as TransferredTile);
   const descriptor = describePhoto(photo);
   photo.free();
-  return { photograph: new Photograph(descriptor, tiles), tilesInModules, state, module };
+  return { photograph: new LoadedPhotograph(descriptor, tiles), tilesInModules, state, module };
 }
 
-async function relight(photograph: Photograph, pool: WorkerPool): Promise<number[]> {
+async function relight(photograph: LoadedPhotograph, pool: WorkerPool): Promise<number[]> {
   return photograph.withWorkers(pool, async (session) =>
     tileIndices(await session.relight(fakeLight, FRAME)),
   );
@@ -45,7 +45,7 @@ test('tiles move to the workers, and to a module of the page when it needs them'
 test('uses of a photograph run in the order of the calls', async () => {
   const { pool } = fakePool(2);
   const { photo, tilesInModules, module } = fakePhoto(4);
-  const photograph = Photograph.fromModule(photo);
+  const photograph = LoadedPhotograph.fromModule(photo);
   const order: string[] = [];
   const note = (what: string) => () => {
     order.push(`${what} ${tilesInModules.size}`);
@@ -82,7 +82,7 @@ test('without workers the tiles stay', async () => {
 
 /** A worker crashes before `use`, or during it. */
 async function crashDuring(
-  use: (photograph: Photograph, pool: WorkerPool, module: RelightModule) => Promise<unknown>,
+  use: (photograph: LoadedPhotograph, pool: WorkerPool, module: RelightModule) => Promise<unknown>,
   isIdle: boolean,
 ) {
   const { pool, workers } = fakePool(2);
@@ -166,7 +166,7 @@ test('a worker that crashes while another one starts loses no tiles', async () =
 test('a tile for which the module tilesInModules no memory is not lost', async () => {
   const { pool } = fakePool(2);
   const { photo, tilesInModules, state, module } = fakePhoto(4);
-  const photograph = Photograph.fromModule(photo);
+  const photograph = LoadedPhotograph.fromModule(photo);
   await relight(photograph, pool);
   state.isOutOfMemory = true;
   await assert.rejects(
@@ -213,7 +213,7 @@ test('a photograph that is freed while workers start sends them no tiles', async
 
 test('before tiles leave a module, its users are told', async () => {
   const { photo, tilesInModules, state, module } = fakePhoto(4);
-  const photograph = Photograph.fromModule(photo);
+  const photograph = LoadedPhotograph.fromModule(photo);
   const calls: string[] = [];
   const onLeave = () => calls.push(`${tilesInModules.size} to leave`);
   await photograph.withModule(module, () => {}, { onLeave });
@@ -227,7 +227,7 @@ test('before tiles leave a module, its users are told', async () => {
 
 test('a module without memory leaves the tiles where they are', async () => {
   const { photo, tilesInModules, state, module } = fakePhoto(4);
-  const photograph = Photograph.fromModule(photo);
+  const photograph = LoadedPhotograph.fromModule(photo);
   state.isOutOfMemory = true;
   await assert.rejects(
     photograph.withModule(module, () => {}),
@@ -245,7 +245,7 @@ test('metadata that is not a JSON object is format-invalid, and the photograph i
   for (const metadata of ['[]', '', '1', '{"a": }', 'null']) {
     const { photo, state } = fakePhoto(1);
     const wrong = { ...photo, metadata };
-    assert.throws(() => Photograph.fromModule(wrong), { code: 'format-invalid' });
+    assert.throws(() => LoadedPhotograph.fromModule(wrong), { code: 'format-invalid' });
     assert.equal(state.alive, 0);
   }
 });

@@ -6,19 +6,19 @@
 import type {
   DecodedPhoto,
   Freeable,
+  ImportedPhoto,
   ModulePhoto,
-  ReceivedPhoto,
   RelightModule,
-} from '../engine/types.js';
+} from '../engine/wasm-exports.js';
 import { messageOf, PhotoError, photoReleased } from '../shared/errors.js';
 import { allSettledOrThrow } from '../shared/promises.js';
 import type { PhotoInfo } from '../shared/value-types.js';
 import {
   describePhoto,
   type PhotoDescriptor,
-  type SerialisedTile,
+  type RelightingPool,
   type TilesInWorkers,
-  type TileWorkerPool,
+  type TransferredTile,
 } from './types.js';
 
 /** A module of the page with tiles in its memory. */
@@ -31,11 +31,11 @@ interface ModuleTiles {
 }
 
 /** 'in transit': sent to a worker, or requested from it. */
-type TileResidency = ModuleTiles | 'workers' | 'in transit' | SerialisedTile;
+type TileLocation = ModuleTiles | 'workers' | 'in transit' | TransferredTile;
 
-export class Photograph implements Freeable {
+export class LoadedPhotograph implements Freeable {
   readonly info: PhotoInfo;
-  #tiles: TileResidency[];
+  #tiles: TileLocation[];
   /** One, unless a move has failed halfway. */
   readonly #stores = new Set<ModuleTiles>();
   #session: TilesInWorkers | null = null;
@@ -47,7 +47,7 @@ export class Photograph implements Freeable {
   /** Its tiles are on the page. `completeness` is the decoded share of the file, 0 to 1. Throws `format-invalid`. */
   constructor(
     readonly descriptor: PhotoDescriptor,
-    tiles: SerialisedTile[],
+    tiles: TransferredTile[],
     readonly completeness = 1,
   ) {
     const { width, height, lightWidth, lightHeight, decodedBytes } = descriptor;
@@ -57,11 +57,11 @@ export class Photograph implements Freeable {
   }
 
   /** A photograph in the memory of the page's decoder, which is freed with it or if this throws `format-invalid`. */
-  static fromModule(photo: DecodedPhoto, completeness = 1): Photograph {
+  static fromModule(photo: DecodedPhoto, completeness = 1): LoadedPhotograph {
     const store: ModuleTiles = { module: null, photo, onLeave: new Set() };
     try {
       const descriptor = describePhoto(photo);
-      const photograph = new Photograph(descriptor, [], completeness);
+      const photograph = new LoadedPhotograph(descriptor, [], completeness);
       photograph.#tiles = Array.from({ length: descriptor.tiles }, () => store);
       photograph.#stores.add(store);
       return photograph;
@@ -77,7 +77,7 @@ export class Photograph implements Freeable {
   }
 
   /** The photograph without tiles, which suffices for making lights. The caller frees it. */
-  createLightPlane(module: RelightModule): ReceivedPhoto {
+  createLightPlane(module: RelightModule): ImportedPhoto {
     return module.Photo.receive(this.descriptor.geometry, this.descriptor.basis);
   }
 
@@ -87,7 +87,7 @@ export class Photograph implements Freeable {
    */
   withModule<T>(
     module: RelightModule,
-    use: (photo: ReceivedPhoto) => T | Promise<T>,
+    use: (photo: ImportedPhoto) => T | Promise<T>,
     { signal, onLeave }: { signal?: AbortSignal | undefined; onLeave?: () => void } = {},
   ): Promise<T> {
     return this.#enqueue(async () => {
@@ -104,7 +104,7 @@ export class Photograph implements Freeable {
    * none; the photograph is unchanged then.
    */
   withWorkers<S extends TilesInWorkers, T>(
-    workers: TileWorkerPool<S>,
+    workers: RelightingPool<S>,
     use: (session: S) => T | Promise<T>,
   ): Promise<T> {
     return this.#enqueue(async () => use(await this.#moveToWorkers(workers)));
@@ -172,9 +172,9 @@ export class Photograph implements Freeable {
     return { ...store, photo };
   }
 
-  #storeIn(module: RelightModule): [ModuleTiles, ReceivedPhoto] {
+  #storeIn(module: RelightModule): [ModuleTiles, ImportedPhoto] {
     for (const store of this.#stores) {
-      if (store.module === module) return [store, store.photo as ReceivedPhoto];
+      if (store.module === module) return [store, store.photo as ImportedPhoto];
     }
     const photo = this.createLightPlane(module);
     const store = { module, photo, onLeave: new Set<() => void>() };
@@ -182,7 +182,7 @@ export class Photograph implements Freeable {
     return [store, photo];
   }
 
-  async #moveToWorkers<S extends TilesInWorkers>(workers: TileWorkerPool<S>): Promise<S> {
+  async #moveToWorkers<S extends TilesInWorkers>(workers: RelightingPool<S>): Promise<S> {
     this.#session ??= await workers.open(this.descriptor);
     const session = this.#session as S;
     if (this.#fault) {
@@ -209,10 +209,10 @@ export class Photograph implements Freeable {
   }
 
   /** Takes a tile out of its module, if it is in one. */
-  #toBytes(index: number): SerialisedTile {
-    const location = this.#tiles[index] as ModuleTiles | SerialisedTile;
+  #toBytes(index: number): TransferredTile {
+    const location = this.#tiles[index] as ModuleTiles | TransferredTile;
     if (location instanceof Uint8Array) return location;
-    const bytes = location.photo.takeTile(index) as SerialisedTile;
+    const bytes = location.photo.takeTile(index) as TransferredTile;
     this.#tiles[index] = bytes;
     return bytes;
   }

@@ -1,10 +1,10 @@
 /** The data of a photograph outside a WebAssembly module, and the workers that may hold its tiles. */
 
-import type { DecodedPhoto } from '../engine/types.js';
+import type { DecodedPhoto } from '../engine/wasm-exports.js';
 import type { PhotoError } from '../shared/errors.js';
 
 /** A tile as bytes, on its way between two modules. */
-export type SerialisedTile = Uint8Array<ArrayBuffer>;
+export type TransferredTile = Uint8Array<ArrayBuffer>;
 
 /** A photograph without its tiles: what a module needs to create it. */
 export interface PhotoDescriptor
@@ -27,14 +27,14 @@ export interface TilesInWorkers {
   /** The indices of the tiles that each worker takes. */
   readonly tiles: readonly (readonly number[])[];
   /** Moves a tile to its worker. If that fails before it is sent, `bytes` are still there. */
-  put(index: number, bytes: SerialisedTile): Promise<void>;
-  take(index: number): Promise<SerialisedTile>;
+  put(index: number, bytes: TransferredTile): Promise<void>;
+  take(index: number): Promise<TransferredTile>;
   /** Prepares relighting, once all tiles are there. */
   plan(): Promise<void>;
   end(): void;
 }
 
-export interface TileWorkerPool<S extends TilesInWorkers> {
+export interface RelightingPool<S extends TilesInWorkers> {
   /** Rejects with `worker-unavailable`. */
   open(photo: PhotoDescriptor): Promise<S>;
 }

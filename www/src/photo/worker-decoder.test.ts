@@ -1,8 +1,8 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { RelightModule } from '../engine/types.js';
+import type { RelightModule } from '../engine/wasm-exports.js';
 import { START_ID, type WorkerRequest, type WorkerResponse } from '../shared/worker-client.js';
-import type { DecoderState } from './photo-decoder.js';
+import type { DecoderProgress } from './photo-decoder.js';
 import {
   type DecodeResult,
   type DecodeTask,
@@ -12,14 +12,14 @@ import {
 
 const LIMITS = { intervalMs: 1, maxChecks: 3, maxStartChecks: 1000 };
 
-const stateAt = (bytesFed: number): DecoderState => ({
+const stateAt = (bytesFed: number): DecoderProgress => ({
   bytesFed,
   fileBytes: 900,
   scansDone: 0,
   next: undefined,
 });
 
-type Response = WorkerResponse<DecoderState, DecodeResult>;
+type Response = WorkerResponse<DecoderProgress, DecodeResult>;
 
 /** A worker that answers by a function; it stays silent for `undefined`. */
 class FakeWorker implements DecodeWorker {

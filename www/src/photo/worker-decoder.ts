@@ -2,9 +2,9 @@
 
 import { PhotoError } from '../shared/errors.js';
 import { type WatchdogLimits, WorkerClient, type WorkerLike } from '../shared/worker-client.js';
-import { completenessOf, type DecoderState, type PhotoDecoder } from './photo-decoder.js';
-import { Photograph } from './photograph.js';
-import type { PhotoDescriptor, SerialisedTile } from './types.js';
+import { completenessOf, type DecoderProgress, type PhotoDecoder } from './photo-decoder.js';
+import { LoadedPhotograph } from './photograph.js';
+import type { PhotoDescriptor, TransferredTile } from './types.js';
 
 export type DecodeTask =
   | { readonly kind: 'feed'; readonly offset: number; readonly bytes: Uint8Array }
@@ -13,18 +13,18 @@ export type DecodeTask =
 /** A photograph on its way from the worker to the page. */
 export interface TransferredPhoto {
   readonly descriptor: PhotoDescriptor;
-  readonly tiles: SerialisedTile[];
+  readonly tiles: TransferredTile[];
 }
 
 export type DecodeResult =
   /** Of `feed`. */
-  | { readonly state: DecoderState }
+  | { readonly state: DecoderProgress }
   /** Of `preview` and `finish`. */
   | { readonly photo: TransferredPhoto | null }
   /** The file is damaged, or memory is missing. */
   | { readonly error: { readonly code: string; readonly message: string } };
 
-export type DecodeWorker = WorkerLike<DecodeTask, DecoderState, DecodeResult>;
+export type DecodeWorker = WorkerLike<DecodeTask, DecoderProgress, DecodeResult>;
 
 /** A task takes a second at most; a start includes a download and a compilation. */
 const LIMITS: WatchdogLimits = { intervalMs: 1000, maxChecks: 30, maxStartChecks: 15 };
@@ -32,7 +32,7 @@ const LIMITS: WatchdogLimits = { intervalMs: 1000, maxChecks: 30, maxStartChecks
 /** Waits until the worker has started. Rejects with `worker-unavailable` if it does not. */
 export async function startWorkerDecoder(worker: DecodeWorker, limits = LIMITS) {
   const options = { name: 'decoding worker', limits, remedy: 'Load the photograph again.' };
-  const client = new WorkerClient<DecodeTask, DecoderState, DecodeResult>(worker, options);
+  const client = new WorkerClient<DecodeTask, DecoderProgress, DecodeResult>(worker, options);
   /** The state after the last task. */
   let state = await client.ready;
 
@@ -46,7 +46,7 @@ export async function startWorkerDecoder(worker: DecodeWorker, limits = LIMITS) 
     const photo = 'photo' in result ? result.photo : null;
     if (!photo && kind === 'preview') return null;
     if (photo && photo.descriptor.tiles === photo.tiles.length) {
-      return new Photograph(photo.descriptor, photo.tiles, completeness);
+      return new LoadedPhotograph(photo.descriptor, photo.tiles, completeness);
     }
     throw new PhotoError('internal', 'The decoding worker sent no complete photograph.');
   };
@@ -61,7 +61,7 @@ export async function startWorkerDecoder(worker: DecodeWorker, limits = LIMITS) 
     preview: () => requestPhoto('preview', completenessOf(state)),
     async finish() {
       try {
-        return (await requestPhoto('finish', 1)) as Photograph;
+        return (await requestPhoto('finish', 1)) as LoadedPhotograph;
       } finally {
         client.terminate();
       }

@@ -1,8 +1,8 @@
 /** A backend in use for one photograph, and the photograph's reference count. */
 
-import type { Backend, Freeable } from '../engine/types.js';
-import type { Photograph } from '../photo/photograph.js';
-import type { BackendOptions, Renderer } from '../renderers/types.js';
+import type { Backend, Freeable } from '../engine/wasm-exports.js';
+import type { LoadedPhotograph } from '../photo/photograph.js';
+import type { BackendPreferences, Renderer } from '../renderers/types.js';
 import type { Deferred } from '../shared/promises.js';
 import { QualityController } from './quality-controller.js';
 
@@ -34,9 +34,9 @@ export class ActiveBackend {
 
   constructor(
     readonly backend: Backend,
-    readonly options: BackendOptions,
+    readonly options: BackendPreferences,
     readonly renderer: Renderer,
-    readonly photo: RefCounted<Photograph>,
+    readonly photo: RefCounted<LoadedPhotograph>,
   ) {
     photo.retain();
   }

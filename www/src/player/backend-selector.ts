@@ -3,9 +3,9 @@
  * freed when it comes. The picture of the last backend stays until the new one has drawn a frame.
  */
 
-import type { Backend } from '../engine/types.js';
-import type { Photograph } from '../photo/photograph.js';
-import type { BackendOptions, CreateRenderer } from '../renderers/types.js';
+import type { Backend } from '../engine/wasm-exports.js';
+import type { LoadedPhotograph } from '../photo/photograph.js';
+import type { BackendPreferences, CreateRenderer } from '../renderers/types.js';
 import { joinSentences, PhotoError, toPhotoError } from '../shared/errors.js';
 import { Deferred } from '../shared/promises.js';
 import { ActiveBackend, type RefCounted } from './active-backend.js';
@@ -21,7 +21,7 @@ export interface BackendSelectorEvents {
 }
 
 /** A search, which ends also when it is cancelled. */
-class PendingSearch extends Deferred {
+class BackendSearch extends Deferred {
   readonly abort = new AbortController();
 
   cancel(): void {
@@ -32,13 +32,13 @@ class PendingSearch extends Deferred {
 
 export class BackendSelector {
   /** The options with which a lost backend is replaced. */
-  options: BackendOptions | null = null;
+  options: BackendPreferences | null = null;
   active: ActiveBackend | null = null;
   /** On the screen until `active` has drawn. */
   #outgoing: ActiveBackend | null = null;
-  #search: PendingSearch | null = null;
+  #search: BackendSearch | null = null;
   /** The photograph of the last search. */
-  #photo: RefCounted<Photograph> | null = null;
+  #photo: RefCounted<LoadedPhotograph> | null = null;
 
   constructor(
     private readonly createRenderer: CreateRenderer,
@@ -53,13 +53,13 @@ export class BackendSelector {
 
   /** Replaces the backend `previous` by the first that works. `reason` is empty if only the options have changed. */
   async select(
-    photo: RefCounted<Photograph>,
-    options: BackendOptions,
+    photo: RefCounted<LoadedPhotograph>,
+    options: BackendPreferences,
     previous: Backend | null,
     reason: string,
   ): Promise<void> {
     this.#search?.cancel();
-    const search = new PendingSearch();
+    const search = new BackendSearch();
     const { signal } = search.abort;
     this.#search = search;
     this.#photo = photo;
@@ -118,7 +118,7 @@ export class BackendSelector {
 
   #use(
     found: ActiveBackend,
-    options: BackendOptions,
+    options: BackendPreferences,
     previous: Backend | null,
     reasons: readonly string[],
   ): void {
@@ -143,7 +143,7 @@ export class BackendSelector {
 
   #replace(
     { backend, hasDrawn, lossReason }: ActiveBackend,
-    options: BackendOptions,
+    options: BackendPreferences,
     previous: Backend | null,
     reasonBefore: string,
   ): void {
@@ -162,8 +162,8 @@ export class BackendSelector {
   /** Sets a backend up, unless the active one already meets the options. */
   async #attempt(
     backend: Backend,
-    options: BackendOptions,
-    photo: RefCounted<Photograph>,
+    options: BackendPreferences,
+    photo: RefCounted<LoadedPhotograph>,
     signal: AbortSignal,
   ): Promise<ActiveBackend> {
     const active = this.active;
@@ -200,7 +200,7 @@ export class BackendSelector {
   }
 }
 
-function meets(active: ActiveBackend, backend: Backend, options: BackendOptions): boolean {
+function meets(active: ActiveBackend, backend: Backend, options: BackendPreferences): boolean {
   return (
     active.backend === backend &&
     active.options.gamut === options.gamut &&

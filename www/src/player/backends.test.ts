@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { Backend } from '../engine/types.js';
+import type { Backend } from '../engine/wasm-exports.js';
 import { PhotoError } from '../shared/errors.js';
 import { firstWorking } from './backends.js';
 

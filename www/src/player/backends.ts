@@ -1,6 +1,6 @@
 /** The order in which backends are tried. */
 
-import type { Backend } from '../engine/types.js';
+import type { Backend } from '../engine/wasm-exports.js';
 import { endSentence, hasCode, messageOf, PhotoError } from '../shared/errors.js';
 
 export const BACKEND_TITLES: Readonly<Record<Backend, string>> = {

@@ -9,10 +9,10 @@
  * wait checks it, and frees its result if it has come too late.
  */
 
-import type { Backend } from '../engine/types.js';
-import type { FrameLightStatus } from '../lights/light-cache.js';
+import type { Backend } from '../engine/wasm-exports.js';
+import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
-import type { Photograph } from '../photo/photograph.js';
+import type { LoadedPhotograph } from '../photo/photograph.js';
 import type { Renderer } from '../renderers/types.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
 import { Deferred } from '../shared/promises.js';
@@ -35,7 +35,7 @@ export class PhotoSession {
   #failure: 'temporary' | 'permanent' | null = null;
   /** Aborted when the load and its photograph are released. */
   #load = new AbortController();
-  #photo: RefCounted<Photograph> | null = null;
+  #photo: RefCounted<LoadedPhotograph> | null = null;
   /** Fetches since the photograph was last drawn. */
   #refetches = 0;
   /** The frame after the one, or the search, that is in progress. */
@@ -57,7 +57,7 @@ export class PhotoSession {
   }
 
   /** The photograph, or its preview, once it is decoded. */
-  get photo(): Photograph | null {
+  get photo(): LoadedPhotograph | null {
     return this.#photo?.value ?? null;
   }
 
@@ -142,7 +142,7 @@ export class PhotoSession {
   ): Promise<void> {
     const { signal } = this.#load;
     const preparation = new AbortController();
-    const onPreview = (preview: Photograph): void => {
+    const onPreview = (preview: LoadedPhotograph): void => {
       // The last preview must be drawn first.
       if (signal.aborted || this.#selector.search) preview.free();
       else void this.#use(preview, previous, reason);
@@ -174,7 +174,7 @@ export class PhotoSession {
     }
   }
 
-  async #use(photo: Photograph, previous: Backend | null, reason: string): Promise<void> {
+  async #use(photo: LoadedPhotograph, previous: Backend | null, reason: string): Promise<void> {
     const { backend } = this;
     this.#photo?.release();
     const shared = new RefCounted(photo);
@@ -272,7 +272,7 @@ export class PhotoSession {
 
   #report(
     active: ActiveBackend,
-    frame: FrameLightStatus,
+    frame: AppliedLightStatus,
     light: LightSetting,
     frameQuality: number,
   ): void {
@@ -322,6 +322,7 @@ export class PhotoSession {
     this.#photo?.release();
     this.#photo = null;
     this.#nextFrame = null;
+    this.#quality = 1;
     this.#isFullQualityRequested = false;
     this.#isLoaded = false;
     this.#failure = null;

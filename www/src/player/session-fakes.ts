@@ -1,7 +1,7 @@
 /** A photo session whose loads, renderers and frames are controlled by a test. */
 
-import type { Backend } from '../engine/types.js';
-import type { Photograph } from '../photo/photograph.js';
+import type { Backend } from '../engine/wasm-exports.js';
+import type { LoadedPhotograph } from '../photo/photograph.js';
 import { withBackends, withExposure } from '../renderers/settings-fakes.js';
 import type { Renderer } from '../renderers/types.js';
 import { PhotoError } from '../shared/errors.js';
@@ -25,14 +25,14 @@ interface SlowFrame {
   fail(error: Error): void;
 }
 
-function fakePhotograph(src: string, completeness: number, log: string[]): Photograph {
+function fakePhotograph(src: string, completeness: number, log: string[]): LoadedPhotograph {
   const name = completeness === 1 ? src : `${completeness} of ${src}`;
   const isComplete = completeness === 1;
   return {
     completeness,
     isComplete,
     free: () => log.push(`free ${name}`),
-  } as unknown as Photograph;
+  } as unknown as LoadedPhotograph;
 }
 
 /** A session whose listener writes a log. */

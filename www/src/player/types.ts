@@ -1,12 +1,12 @@
 /** The interfaces of a photo session: its settings, its ports to the browser, and its listener. */
 
 import type { OutputSettings } from '../engine/output-settings.js';
-import type { Backend } from '../engine/types.js';
-import type { FrameLightStatus } from '../lights/light-cache.js';
+import type { Backend } from '../engine/wasm-exports.js';
+import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LoadOptions } from '../loading/load.js';
-import type { Photograph } from '../photo/photograph.js';
-import type { BackendOptions, CreateRenderer, Renderer } from '../renderers/types.js';
+import type { LoadedPhotograph } from '../photo/photograph.js';
+import type { BackendPreferences, CreateRenderer, Renderer } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
 import type { callLater } from '../shared/promises.js';
 
@@ -15,7 +15,7 @@ export interface SessionSettings {
   /** Absolute address; `null` if there is none. */
   readonly src: string | null;
   readonly credentials: RequestCredentials;
-  readonly backendOptions: BackendOptions;
+  readonly backendOptions: BackendPreferences;
   readonly light: LightSetting;
   readonly output: OutputSettings;
 }
@@ -29,9 +29,13 @@ export interface FrameClock {
 
 /** Loading and drawing; tests replace them. */
 export interface SessionPorts extends FrameClock {
-  open(src: string, credentials: RequestCredentials, options: LoadOptions): Promise<Photograph>;
+  open(
+    src: string,
+    credentials: RequestCredentials,
+    options: LoadOptions,
+  ): Promise<LoadedPhotograph>;
   /** Warms up the backend that will probably be used, until `signal` is aborted. */
-  prepare(options: BackendOptions, signal: AbortSignal): void;
+  prepare(options: BackendPreferences, signal: AbortSignal): void;
   readonly createRenderer: CreateRenderer;
 }
 
@@ -42,7 +46,7 @@ export interface PhotoSessionListener {
   /** A new renderer has drawn its first frame: its canvas replaces the last one. */
   rendererChanged(renderer: Renderer): void;
   /** A frame was drawn; `light` is the light that was requested for it. */
-  frameDrawn(frame: FrameLightStatus, light: LightSetting): void;
+  frameDrawn(frame: AppliedLightStatus, light: LightSetting): void;
   /** That frame has another quality than the last one. The first frame is compared with 1. */
   qualityChanged(quality: number): void;
   /** The whole photograph was drawn for the first time since it was fetched. */

@@ -1,10 +1,10 @@
 /** Draws on a canvas with a WebAssembly module on the page's thread: WebGPU, WebGL2 or the CPU. */
 
 import { createOutputTransform } from '../engine/output-settings.js';
-import type { Relighter, RelightModule } from '../engine/types.js';
+import type { CanvasRelighter, RelightModule } from '../engine/wasm-exports.js';
 import { LightCache } from '../lights/light-cache.js';
 import type { ImageLight } from '../lights/light-setting.js';
-import type { Photograph } from '../photo/photograph.js';
+import type { LoadedPhotograph } from '../photo/photograph.js';
 import { toPhotoError } from '../shared/errors.js';
 import type { DeviceLease } from './gpu/devices.js';
 import type { Renderer } from './types.js';
@@ -12,8 +12,8 @@ import type { Renderer } from './types.js';
 /** A renderer with a module's relighter. Its `free` frees the relighter and releases the lease of a device. */
 export function createModuleRenderer(
   module: RelightModule,
-  photograph: Photograph,
-  relighter: Relighter,
+  photograph: LoadedPhotograph,
+  relighter: CanvasRelighter,
   canvas: HTMLCanvasElement,
   lease: DeviceLease | null = null,
 ): Renderer {
@@ -56,7 +56,7 @@ export function createModuleRenderer(
 }
 
 /** Uploads an image directly to the device, if both support that: its pixels bypass the page's memory. */
-function upload(relighter: Relighter, image: ImageLight | null): boolean {
+function upload(relighter: CanvasRelighter, image: ImageLight | null): boolean {
   const source = image?.uploadable();
   if (!source) return false;
   try {

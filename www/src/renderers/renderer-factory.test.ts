@@ -1,16 +1,16 @@
 import assert from 'node:assert/strict';
 import test, { type TestContext } from 'node:test';
-import type { Backend, CpuModule } from '../engine/types.js';
-import { Photograph } from '../photo/photograph.js';
+import type { Backend, CpuModule } from '../engine/wasm-exports.js';
+import { LoadedPhotograph } from '../photo/photograph.js';
 import { fakePhoto } from '../photo/photograph-fakes.js';
 import { PhotoSession } from '../player/photo-session.js';
 import type { SessionSettings } from '../player/types.js';
 import { PhotoError } from '../shared/errors.js';
-import { cpuRenderers } from './cpu/cpu-renderer.js';
+import { cpuRenderers } from './cpu/create-cpu-renderer.js';
 import type { WorkerPool } from './cpu/worker-pool.js';
 import { type FakeWorker, fakePool, settle } from './cpu/worker-pool-fakes.js';
+import { gpuRenderers } from './gpu/create-gpu-renderer.js';
 import type { Devices, LoadGraphics } from './gpu/devices.js';
-import { gpuRenderers } from './gpu/gpu-renderer.js';
 import { rendererFactory } from './renderer-factory.js';
 import { PLAIN, withBackends, withExposure } from './settings-fakes.js';
 
@@ -80,7 +80,7 @@ async function startSession(t: TestContext, open = async (_: Backend): Promise<v
   const changes: string[] = [];
   const session = new PhotoSession(
     {
-      open: async () => Photograph.fromModule(photo),
+      open: async () => LoadedPhotograph.fromModule(photo),
       prepare: () => {},
       createRenderer: factoryFor(module, pool, createDevices(open)).createRenderer,
       nextFrame: (callback) => frames.push(callback),
@@ -149,7 +149,7 @@ test("a renderer on the page's thread says why there are no workers", async (t) 
     pool,
     createDevices(async () => {}),
   );
-  const photograph = Photograph.fromModule(photo);
+  const photograph = LoadedPhotograph.fromModule(photo);
   const { signal } = new AbortController();
   for (let time = 0; time < 2; time += 1) {
     const renderer = await createRenderer(
@@ -229,7 +229,7 @@ test('a freed renderer rejects and moves no tiles', async (t) => {
   const { pool, workers, countAlive } = fakePool(2);
   const { photo, tilesInModules, module } = fakePhoto(4);
   const { createDevices } = fakeDevices(tilesInModules);
-  const photograph = Photograph.fromModule(photo);
+  const photograph = LoadedPhotograph.fromModule(photo);
   const renderer = await factoryFor(
     module,
     pool,

@@ -2,12 +2,12 @@
 
 import { loadCpu } from '../engine/core-modules.js';
 import { GRAPHICS_LOADERS } from '../engine/graphics-modules.js';
-import type { Backend, CpuModule } from '../engine/types.js';
+import type { Backend, CpuModule } from '../engine/wasm-exports.js';
 import { startWorker } from '../engine/worker-server.js';
 import { messageOf, PhotoError } from '../shared/errors.js';
-import type { CpuRenderers } from './cpu/cpu-renderer.js';
-import type { GpuRenderers } from './gpu/gpu-renderer.js';
-import type { BackendOptions, CreateRenderer } from './types.js';
+import type { CpuRendererFactory } from './cpu/create-cpu-renderer.js';
+import type { GpuRendererFactory } from './gpu/create-gpu-renderer.js';
+import type { BackendPreferences, CreateRenderer } from './types.js';
 
 /** More workers would wait for memory and for each other. */
 const MAX_WORKERS = 4;
@@ -20,8 +20,8 @@ export function rendererFactory({
   cpu,
   cpuModule,
 }: {
-  readonly gpu: () => Promise<GpuRenderers>;
-  readonly cpu: () => Promise<CpuRenderers>;
+  readonly gpu: () => Promise<GpuRendererFactory>;
+  readonly cpu: () => Promise<CpuRendererFactory>;
   readonly cpuModule: () => Promise<CpuModule>;
 }) {
   const createRenderer: CreateRenderer = async (backend, photograph, options, onLost, signal) => {
@@ -46,7 +46,7 @@ export function rendererFactory({
     return signal.aborted ? () => {} : renderers.warmUp();
   };
   /** Warms up the first backend that works until `signal` is aborted. Errors are left to `createRenderer`. */
-  const prepare = async ({ backends, software }: BackendOptions, signal: AbortSignal) => {
+  const prepare = async ({ backends, software }: BackendPreferences, signal: AbortSignal) => {
     for (const backend of backends) {
       if (signal.aborted) return;
       try {
@@ -66,11 +66,11 @@ const poolSize = Math.min(MAX_WORKERS, globalThis.navigator?.hardwareConcurrency
 
 export const { createRenderer, prepare } = rendererFactory({
   gpu: loadOnce(async () => {
-    const { gpuRenderers } = await import('./gpu/gpu-renderer.js');
+    const { gpuRenderers } = await import('./gpu/create-gpu-renderer.js');
     return gpuRenderers((name) => GRAPHICS_LOADERS[name]());
   }),
   cpu: loadOnce(async () => {
-    const { WorkerPool, cpuRenderers } = await import('./cpu/cpu-renderer.js');
+    const { WorkerPool, cpuRenderers } = await import('./cpu/create-cpu-renderer.js');
     return cpuRenderers(new WorkerPool(startRelightWorker, poolSize));
   }),
   cpuModule: loadCpu,

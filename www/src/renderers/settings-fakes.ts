@@ -1,8 +1,8 @@
 /** Settings for tests. */
 
 import type { OutputSettings } from '../engine/output-settings.js';
-import type { Backend } from '../engine/types.js';
-import type { BackendOptions } from './types.js';
+import type { Backend } from '../engine/wasm-exports.js';
+import type { BackendPreferences } from './types.js';
 
 export const PLAIN: OutputSettings = { exposure: 1, whiteBalance: [1, 1, 1], tone: 'clip' };
 
@@ -11,6 +11,6 @@ export function withExposure(exposure: number): OutputSettings {
 }
 
 /** The options of a page that names its backends. */
-export function withBackends(backends: readonly Backend[]): BackendOptions {
+export function withBackends(backends: readonly Backend[]): BackendPreferences {
   return { backends, software: true, gamut: 'srgb' };
 }

@@ -1,13 +1,13 @@
 /** The interface that every backend implements: a renderer draws one photograph on one canvas. */
 
 import type { OutputSettings } from '../engine/output-settings.js';
-import type { Backend, Freeable, Gamut } from '../engine/types.js';
-import type { FrameLightStatus } from '../lights/light-cache.js';
+import type { Backend, Freeable, Gamut } from '../engine/wasm-exports.js';
+import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
-import type { Photograph } from '../photo/photograph.js';
+import type { LoadedPhotograph } from '../photo/photograph.js';
 
 /** Which backends may draw, and in which colours. */
-export interface BackendOptions {
+export interface BackendPreferences {
   /** In the order in which they are tried. */
   readonly backends: readonly Backend[];
   /** Whether WebGPU and WebGL2 may be software renderers. */
@@ -24,14 +24,14 @@ export interface Renderer extends Freeable {
   readonly warning?: string;
   /**
    * Draws one frame with a share of the components (`quality`, 0 to 1). Call it again only after the last promise has
-   * settled. If the light is unavailable, the last available one is used and `FrameLightStatus` has the error. Throws or
+   * settled. If the light is unavailable, the last available one is used and `AppliedLightStatus` has the error. Throws or
    * rejects with `backend-lost`, or with `photo-lost` if parts of the photograph are lost.
    */
   render(
     light: LightSetting,
     output: OutputSettings,
     quality: number,
-  ): FrameLightStatus | Promise<FrameLightStatus>;
+  ): AppliedLightStatus | Promise<AppliedLightStatus>;
 }
 
 /**
@@ -41,8 +41,8 @@ export interface Renderer extends Freeable {
  */
 export type CreateRenderer = (
   backend: Backend,
-  photo: Photograph,
-  options: BackendOptions,
+  photo: LoadedPhotograph,
+  options: BackendPreferences,
   onLost: (reason: string) => void,
   signal: AbortSignal,
 ) => Promise<Renderer>;

@@ -9,14 +9,14 @@ import { PhotoError } from './errors.js';
 const MAX_EVENT_DELAY_MS = 50;
 
 /** Where the event is fired: the document of a page, or the global scope of a worker. */
-type ViolationTarget = Partial<Pick<EventTarget, 'addEventListener' | 'removeEventListener'>>;
+type ViolationEventTarget = Partial<Pick<EventTarget, 'addEventListener' | 'removeEventListener'>>;
 
 /** Does some work. If it fails, and a directive that matches `directive` was violated meanwhile, `toError` says why. */
 export async function withPolicyErrors<T>(
   work: () => Promise<T>,
   directive: RegExp,
   toError: (violated: string, cause: unknown) => PhotoError,
-  target: ViolationTarget = globalThis.document ?? globalThis,
+  target: ViolationEventTarget = globalThis.document ?? globalThis,
 ): Promise<T> {
   let violated: string | null = null;
   const onViolation = (event: Event) => {

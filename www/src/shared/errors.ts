@@ -25,7 +25,7 @@ export type PageErrorCode =
   | 'internal'; // A bug in this package.
 
 /** Codes of the WebAssembly modules. */
-export type EngineErrorCode =
+export type WasmErrorCode =
   | 'format-magic'
   | 'format-text-mode'
   | 'format-version'
@@ -40,7 +40,7 @@ export type EngineErrorCode =
   | 'backend-lost';
 
 /** Any code; a newer WebAssembly module may add some. */
-export type ErrorCode = PageErrorCode | EngineErrorCode | (string & {});
+export type ErrorCode = PageErrorCode | WasmErrorCode | (string & {});
 
 /** An error with a code for programs and a message for people. */
 export class PhotoError extends Error {

@@ -4,7 +4,7 @@
  */
 
 import { PhotoError } from './errors.js';
-import { type Gamut, LIGHTS, type LightName, type ToneCurve } from './names.js';
+import { type Gamut, LIGHTS, type LightName, type ToneCurve } from './keywords.js';
 import type { RgbGains } from './value-types.js';
 
 const TONES = ['clip', 'filmic'] as const;

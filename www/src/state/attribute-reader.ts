@@ -4,7 +4,7 @@
  */
 
 import { type PhotoError, toPhotoError } from '../shared/errors.js';
-import { type PARSERS, type ParsedValue, parseAddress, parserOf } from './attribute-values.js';
+import { type PARSERS, type ParsedValue, parseAddress, parserOf } from './attribute-parsers.js';
 
 interface ParsedAttribute {
   readonly text: string | null;

@@ -1,14 +1,14 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
+import * as sourceSupport from '../lights/image-light-entry.js';
 import { isVideoAddress } from '../lights/light-media.js';
 import { PENDING_IMAGE } from '../lights/light-setting.js';
 import type { LinearImage } from '../lights/light-source.js';
-import * as sourceSupport from '../lights/light-sources.js';
 import type { PhotoError } from '../shared/errors.js';
 import { LightState } from './light-state.js';
-import type { LightOptions } from './options.js';
+import type { LightAttributes } from './options.js';
 
-const OPTIONS: LightOptions = {
+const OPTIONS: LightAttributes = {
   name: 'torch',
   src: null,
   crossOrigin: null,

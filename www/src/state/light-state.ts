@@ -3,21 +3,21 @@
  * change of an option clear overrides. The script for sources is fetched when one is used for the first time.
  */
 
+import type * as SourceSupport from '../lights/image-light-entry.js';
 import type { LightColor } from '../lights/light-color.js';
 import type { LightMedia } from '../lights/light-media.js';
 import { type LightSetting, PENDING_IMAGE } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
 import type { LightSourceListener, LightSourceObserver } from '../lights/light-source-observer.js';
-import type * as SourceSupport from '../lights/light-sources.js';
 import { missingScript, type PhotoError } from '../shared/errors.js';
-import { LIGHTS, type LightName } from '../shared/names.js';
-import { reuse } from '../shared/shallow-equal.js';
+import { LIGHTS, type LightName } from '../shared/keywords.js';
+import { reuse } from '../shared/reuse-if-equal.js';
 import { clampToPicture, type PicturePoint } from '../shared/value-types.js';
-import type { LightOptions } from './options.js';
+import type { LightAttributes } from './options.js';
 
 /** Values that take precedence over the options, and a name also over a source; `null` leaves an option in effect. */
 export type LightOverrides = {
-  readonly [K in 'name' | 'torch' | 'size' | 'color']: LightOptions[K] | null;
+  readonly [K in 'name' | 'torch' | 'size' | 'color']: LightAttributes[K] | null;
 };
 
 export interface LightStateListener extends LightSourceListener {
@@ -29,7 +29,7 @@ export interface LightStateListener extends LightSourceListener {
 export type LightMenuItem = LightName | 'projection';
 
 const NO_OVERRIDES: LightOverrides = { name: null, torch: null, size: null, color: null };
-const DEFAULTS: LightOptions = { ...NO_OVERRIDES, name: 'flood', src: null, crossOrigin: null };
+const DEFAULTS: LightAttributes = { ...NO_OVERRIDES, name: 'flood', src: null, crossOrigin: null };
 const FIRE_FRAME_SECONDS = 1 / 30;
 /** Frames of a 30 Hz screen arrive a little early at times. */
 const FIRE_TOLERANCE_SECONDS = 0.004;
@@ -55,10 +55,10 @@ export class LightState {
   constructor(
     private readonly listener: LightStateListener,
     private readonly fetchSupport = (): Promise<typeof SourceSupport> =>
-      import('../lights/light-sources.js'),
+      import('../lights/image-light-entry.js'),
   ) {}
 
-  setOptions(options: LightOptions): void {
+  setOptions(options: LightAttributes): void {
     // Another source is a reason to try the fetch again.
     if (options.src !== this.#options.src) this.#fetchError = null;
     this.#options = options;

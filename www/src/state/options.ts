@@ -1,7 +1,7 @@
 /** The element's options: the values of all its attributes. Immutable: a change makes a new object. */
 
 import { parseLightColor } from '../lights/light-color.js';
-import { reuse } from '../shared/shallow-equal.js';
+import { reuse } from '../shared/reuse-if-equal.js';
 import { CENTRE, type PicturePoint } from '../shared/value-types.js';
 import type { AttributeReader } from './attribute-reader.js';
 
@@ -9,7 +9,7 @@ import type { AttributeReader } from './attribute-reader.js';
 export type ElementOptions = Readonly<ReturnType<typeof readAttributes>>;
 
 /** The light before a visitor or a script chooses another. */
-export type LightOptions = Readonly<ReturnType<typeof readLight>>;
+export type LightAttributes = Readonly<ReturnType<typeof readLight>>;
 
 /** Reads all attributes. Objects whose fields are unchanged are taken from `last`. */
 export function readOptions(reader: AttributeReader, last: ElementOptions | null): ElementOptions {

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { LoadingMode, RevealMode } from './attribute-values.js';
+import type { LoadingMode, RevealMode } from './attribute-parsers.js';
 import { RevealState } from './reveal.js';
 
 const options = (loading: LoadingMode, reveal: RevealMode = 'auto') => ({ loading, reveal });

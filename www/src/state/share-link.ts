@@ -1,10 +1,10 @@
 /** Light and view as a query string, for links: `l=torch&x=0.312&y=0.64&z=2&vx=0.5&vy=0.41&e=1.2`. */
 
 import { PhotoError } from '../shared/errors.js';
-import { LIGHTS, type LightName } from '../shared/names.js';
+import { LIGHTS, type LightName } from '../shared/keywords.js';
 import { MAX_EXPOSURE } from '../shared/setting-parsers.js';
 import { CENTRE, type PicturePoint } from '../shared/value-types.js';
-import { MAX_TORCH_SIZE } from './attribute-values.js';
+import { MAX_TORCH_SIZE } from './attribute-parsers.js';
 import type { ZoomView } from './viewport.js';
 
 /** What a visitor may have changed; `null` stands for the page's own value. */

@@ -3,10 +3,10 @@
 import type { OutputSettings } from '../engine/output-settings.js';
 import { multiplyRgb, parseLightColor } from '../lights/light-color.js';
 import type { PhotoError } from '../shared/errors.js';
-import type { LightName } from '../shared/names.js';
-import { reuse } from '../shared/shallow-equal.js';
+import type { LightName } from '../shared/keywords.js';
+import { reuse } from '../shared/reuse-if-equal.js';
 import { CENTRE, clampToPicture } from '../shared/value-types.js';
-import { PARSERS } from './attribute-values.js';
+import { PARSERS } from './attribute-parsers.js';
 import { type LightOverrides, LightState, type LightStateListener } from './light-state.js';
 import type { ElementOptions } from './options.js';
 import { RevealState } from './reveal.js';
@@ -14,7 +14,7 @@ import { formatState, parseState } from './share-link.js';
 import { clampView, FULL_VIEW, type ZoomView } from './viewport.js';
 
 /** A built-in light for `setLight`. Absent fields keep their values. */
-export interface LightUpdate {
+export interface SetLightOptions {
   readonly name?: LightName;
   /** The torch's position, 0 to 1 across the picture. */
   readonly x?: number;
@@ -96,7 +96,7 @@ export class ViewerState {
   }
 
   /** @throws {TypeError | PhotoError} for an invalid field, before anything changes */
-  setLight({ name, x, y, size, color }: LightUpdate): void {
+  setLight({ name, x, y, size, color }: SetLightOptions): void {
     const overrides: { -readonly [K in keyof LightOverrides]?: LightOverrides[K] } = {};
     if (name !== undefined) overrides.name = PARSERS.light(name);
     if (x !== undefined || y !== undefined) {

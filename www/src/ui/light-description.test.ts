@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { fetchStrings } from '../i18n/strings.js';
+import { fetchStrings } from '../i18n/translations.js';
 import { describeLight } from './light-description.js';
 
 await fetchStrings('ja');

@@ -1,6 +1,6 @@
 /** Describes the torch's position in words, for screen readers. */
 
-import { type Language, type StringKey, t } from '../i18n/strings.js';
+import { type Language, type StringKey, t } from '../i18n/translations.js';
 import type { PicturePoint } from '../shared/value-types.js';
 
 const DIRECTIONS: readonly (readonly StringKey[])[] = [

@@ -1,6 +1,6 @@
 /** The element's shadow DOM: the viewport with picture, poster and torch handle; controls, progress bar and message. */
 
-import { type Language, t } from '../i18n/strings.js';
+import { type Language, t } from '../i18n/translations.js';
 import type { PicturePoint } from '../shared/value-types.js';
 import type { ElementOptions } from '../state/options.js';
 import { toViewport, type ZoomView } from '../state/viewport.js';

@@ -1,6 +1,6 @@
 /** The toolbar, a single tab stop whose buttons the arrow keys focus, and the light menu. It is a separate script. */
 
-import type { StringKey } from '../i18n/strings.js';
+import type { StringKey } from '../i18n/translations.js';
 import type { LightMenuItem } from '../state/light-state.js';
 import type { ViewerState } from '../state/viewer-state.js';
 import { createElement, updateAttribute, updateText } from './dom-helpers.js';

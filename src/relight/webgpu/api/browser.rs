@@ -24,7 +24,7 @@ const COPY_DST: u32 = 8;
 
 /// A device and its queue.
 #[derive(Debug)]
-pub struct DeviceQueue {
+pub struct DeviceAndQueue {
     pub device: js::GpuDevice,
     queue: js::GpuQueue,
     pub limits: TextureLimits,
@@ -37,7 +37,7 @@ pub struct DeviceQueue {
 /// know.
 #[derive(Debug)]
 pub struct WebGpuTexture {
-    texture: js::GpuResource,
+    texture: js::GpuBufferOrTexture,
     pub view: TextureView,
 }
 
@@ -45,12 +45,12 @@ pub type TextureView = JsValue;
 pub type BindGroup = JsValue;
 
 #[derive(Debug)]
-pub struct UniformBuffer(js::GpuResource);
+pub struct UniformBuffer(js::GpuBufferOrTexture);
 
 #[derive(Debug)]
 pub struct CanvasContext(js::GpuCanvasContext);
 
-impl DeviceQueue {
+impl DeviceAndQueue {
     /// The browser's preferred device.
     ///
     /// # Errors
@@ -303,7 +303,7 @@ impl CanvasContext {
     /// What the browser throws.
     pub fn configure(
         &self,
-        gpu: &DeviceQueue,
+        gpu: &DeviceAndQueue,
         format: TextureFormat,
         gamut: Gamut,
     ) -> Result<(), String> {

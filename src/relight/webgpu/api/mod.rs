@@ -17,7 +17,7 @@ use native as system;
 #[cfg(target_arch = "wasm32")]
 pub use browser::CanvasContext;
 pub use system::{
-    BindGroup, ComputePipeline, DeviceQueue, RenderPipeline, TextureView, UniformBuffer,
+    BindGroup, ComputePipeline, DeviceAndQueue, RenderPipeline, TextureView, UniformBuffer,
     WebGpuTexture, record_dispatches, record_draw,
 };
 

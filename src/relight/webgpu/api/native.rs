@@ -16,7 +16,7 @@ use crate::transport::Extent;
 
 /// A device and its queue.
 #[derive(Debug)]
-pub struct DeviceQueue {
+pub struct DeviceAndQueue {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     pub limits: TextureLimits,
@@ -32,7 +32,7 @@ pub struct WebGpuTexture {
     pub view: TextureView,
 }
 
-impl DeviceQueue {
+impl DeviceAndQueue {
     /// The system's preferred device.
     ///
     /// # Errors

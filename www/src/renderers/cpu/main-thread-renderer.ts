@@ -1,14 +1,14 @@
 /** Draws with the CPU on the page's thread. If another renderer takes the tiles, the next frame takes them back. */
 
-import type { CpuModule, Gamut } from '../../engine/types.js';
-import type { Photograph } from '../../photo/photograph.js';
+import type { CpuModule, Gamut } from '../../engine/wasm-exports.js';
+import type { LoadedPhotograph } from '../../photo/photograph.js';
 import { photoReleased } from '../../shared/errors.js';
 import { createModuleRenderer } from '../module-renderer.js';
 import type { Renderer } from '../types.js';
 
 export async function createMainThreadRenderer(
   module: CpuModule,
-  photograph: Photograph,
+  photograph: LoadedPhotograph,
   requestedGamut: Gamut,
   warning: string,
   signal: AbortSignal,
@@ -26,7 +26,7 @@ export async function createMainThreadRenderer(
       module,
       (photo) => {
         if (isFreed) throw photoReleased();
-        const relighter = new module.Relighter(photo, canvas, requestedGamut);
+        const relighter = new module.CanvasRelighter(photo, canvas, requestedGamut);
         renderer = createModuleRenderer(module, photograph, relighter, canvas);
         return renderer;
       },

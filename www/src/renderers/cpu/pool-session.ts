@@ -1,10 +1,10 @@
 /** A photograph in the worker pool: moves its tiles and relights it, one row range in each worker. */
 
-import type { Light } from '../../engine/types.js';
-import type { PhotoDescriptor, SerialisedTile, TilesInWorkers } from '../../photo/types.js';
+import type { Light } from '../../engine/wasm-exports.js';
+import type { PhotoDescriptor, TilesInWorkers, TransferredTile } from '../../photo/types.js';
 import { type PhotoError, photoReleased } from '../../shared/errors.js';
 import { allSettledOrThrow, withTimeout } from '../../shared/promises.js';
-import type { FrameSettings, RelightClient, RowRange, RowTask } from './protocol.js';
+import type { FrameSettings, RelightClient, RowRange, RowRangeCommand } from './protocol.js';
 
 export interface RenderedRows extends RowRange {
   /** RGBA, row by row. */
@@ -64,12 +64,12 @@ export class PoolSession implements TilesInWorkers {
     );
   }
 
-  async put(index: number, bytes: SerialisedTile): Promise<void> {
+  async put(index: number, bytes: TransferredTile): Promise<void> {
     this.#isPlanned = false;
     await this.#request(this.#clientOf(index), { kind: 'put', index, bytes }, [bytes.buffer]);
   }
 
-  async take(index: number): Promise<SerialisedTile> {
+  async take(index: number): Promise<TransferredTile> {
     this.#isPlanned = false;
     return new Uint8Array(await this.#request(this.#clientOf(index), { kind: 'take', index }));
   }
@@ -107,7 +107,7 @@ export class PoolSession implements TilesInWorkers {
       light === part.light ? null : (light.linearRgb(first, end) as Float32Array<ArrayBuffer>);
     const memory = part.pixels ?? new ArrayBuffer(4 * this.#width * rows);
     part.pixels = null;
-    const task: RowTask = { kind: 'relight', light: rgb, settings, pixels: memory };
+    const task: RowRangeCommand = { kind: 'relight', light: rgb, settings, pixels: memory };
     const pixels = await this.#request(part.client, task, rgb ? [rgb.buffer, memory] : [memory]);
     part.pixels = pixels;
     part.light = light;
@@ -127,7 +127,7 @@ export class PoolSession implements TilesInWorkers {
   /** Rejects when the session ends; the worker still does the task. */
   async #request(
     client: RelightClient,
-    task: RowTask,
+    task: RowRangeCommand,
     transfer?: Transferable[],
   ): Promise<ArrayBuffer> {
     const { signal } = this.#end;

@@ -1,7 +1,7 @@
 /** The tasks of a relighting worker and their results. */
 
 import type { OutputSettings } from '../../engine/output-settings.js';
-import type { Gamut } from '../../engine/types.js';
+import type { Gamut } from '../../engine/wasm-exports.js';
 import type { PhotoDescriptor } from '../../photo/types.js';
 import type { WorkerClient, WorkerLike } from '../../shared/worker-client.js';
 
@@ -19,7 +19,7 @@ export interface RowRange {
 }
 
 /** What a worker does with the row range that it has of a photograph. */
-export type RowTask =
+export type RowRangeCommand =
   /** Allocates the row range. Its tiles follow. */
   | ({ readonly kind: 'open' } & Pick<PhotoDescriptor, 'geometry' | 'basis'> & RowRange)
   | { readonly kind: 'put'; readonly index: number; readonly bytes: Uint8Array<ArrayBuffer> }
@@ -39,7 +39,7 @@ export type RowTask =
 
 export interface RelightWorkerTask {
   readonly photo: number;
-  readonly task: RowTask;
+  readonly task: RowRangeCommand;
 }
 
 /** `Ready` is the kernel's name, `Result` the bytes that the task asks for. */

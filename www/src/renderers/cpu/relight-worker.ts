@@ -2,12 +2,12 @@
 
 import { loadCpu } from '../../engine/core-modules.js';
 import { createOutputTransform } from '../../engine/output-settings.js';
-import type { CpuModule, ReceivedPhoto, RowRangeRelighter } from '../../engine/types.js';
+import type { CpuModule, ImportedPhoto, RowRangeRelighter } from '../../engine/wasm-exports.js';
 import { serve } from '../../engine/worker-server.js';
-import type { RelightWorkerTask, RowRange, RowTask } from './protocol.js';
+import type { RelightWorkerTask, RowRange, RowRangeCommand } from './protocol.js';
 
 interface WorkerPhoto extends RowRange {
-  readonly photo: ReceivedPhoto;
+  readonly photo: ImportedPhoto;
   /** `null` while tiles are moved. */
   relighter: RowRangeRelighter | null;
 }
@@ -15,7 +15,7 @@ interface WorkerPhoto extends RowRange {
 const storedRows = new Map<number, WorkerPhoto>();
 const NO_BYTES = new ArrayBuffer(0);
 
-function handle(module: CpuModule, photo: number, task: RowTask): ArrayBuffer {
+function handle(module: CpuModule, photo: number, task: RowRangeCommand): ArrayBuffer {
   if (task.kind === 'open') {
     const { geometry, basis, firstRow, rows } = task;
     const received = module.Photo.receive(geometry, basis);

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { DecodedPhoto } from '../../engine/types.js';
+import type { DecodedPhoto } from '../../engine/wasm-exports.js';
 import { fakeLight, fakePhoto } from '../../photo/photograph-fakes.js';
 import { describePhoto } from '../../photo/types.js';
 import { WorkerPool } from './worker-pool.js';

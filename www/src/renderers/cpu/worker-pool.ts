@@ -1,6 +1,6 @@
 /** The page's workers that relight with the CPU. Each has rows of a photograph, with the only copy of their tiles. */
 
-import type { PhotoDescriptor, TileWorkerPool } from '../../photo/types.js';
+import type { PhotoDescriptor, RelightingPool } from '../../photo/types.js';
 import { PhotoError } from '../../shared/errors.js';
 import { type WatchdogLimits, WorkerClient } from '../../shared/worker-client.js';
 import { PoolSession, splitRows } from './pool-session.js';
@@ -21,7 +21,7 @@ interface PoolWorker {
   photos: number;
 }
 
-export class WorkerPool implements TileWorkerPool<PoolSession> {
+export class WorkerPool implements RelightingPool<PoolSession> {
   #workers: PoolWorker[] = [];
   /** Sessions and warm-ups; without any, the workers end. */
   #users = 0;

@@ -1,8 +1,8 @@
 /** Draws with the CPU in the page's worker pool; the page copies the pixels to the canvas. */
 
-import type { CpuModule, Gamut } from '../../engine/types.js';
+import type { CpuModule, Gamut } from '../../engine/wasm-exports.js';
 import { LightCache } from '../../lights/light-cache.js';
-import type { Photograph } from '../../photo/photograph.js';
+import type { LoadedPhotograph } from '../../photo/photograph.js';
 import { hasCode, messageOf, PhotoError, photoReleased } from '../../shared/errors.js';
 import type { Renderer } from '../types.js';
 import type { WorkerPool } from './worker-pool.js';
@@ -10,7 +10,7 @@ import type { WorkerPool } from './worker-pool.js';
 /** Rejects with `worker-unavailable` if there are no workers; the photograph is unchanged then. */
 export async function createWorkerRenderer(
   module: CpuModule,
-  photograph: Photograph,
+  photograph: LoadedPhotograph,
   pool: WorkerPool,
   requestedGamut: Gamut,
 ): Promise<Renderer> {

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { GraphicsDevice } from '../../engine/types.js';
+import type { GraphicsDevice } from '../../engine/wasm-exports.js';
 import { Devices, type LoadGraphics } from './devices.js';
 import type { GraphicsPorts } from './graphics-ports.js';
 

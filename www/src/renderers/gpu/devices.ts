@@ -3,7 +3,7 @@
  * next lease after a loss gets a new device, unless losses are frequent.
  */
 
-import type { GraphicsDevice, GraphicsModules } from '../../engine/types.js';
+import type { GraphicsDevice, GraphicsModules } from '../../engine/wasm-exports.js';
 import { PhotoError } from '../../shared/errors.js';
 import { withTimeout } from '../../shared/promises.js';
 import {
@@ -123,14 +123,11 @@ export class Devices {
     const ms = this.maxAnswerMs;
     const onTimeout = () => {
       this.#silence = unavailable(`it does not answer within ${ms / 1000} seconds`);
-      answer.then(
-        (late) => {
-          // The page may have slept, for example.
-          this.#silence = null;
-          onLate(late);
-        },
-        () => {},
-      );
+      // The page may have slept, for example. A refusal is an answer too.
+      const answered = () => {
+        this.#silence = null;
+      };
+      answer.then(onLate, () => {}).then(answered);
       return Promise.reject(this.#silence);
     };
     return withTimeout(answer, { ms, onTimeout });

@@ -1,6 +1,6 @@
 /** What the browser says about its graphics devices before a module is loaded for them. */
 
-import type { Backend } from '../../engine/types.js';
+import type { Backend } from '../../engine/wasm-exports.js';
 
 /** A backend that draws with a graphics device. */
 export type GraphicsBackendName = Exclude<Backend, 'cpu'>;

@@ -51,9 +51,9 @@ extern "C" {
     #[wasm_bindgen(method, js_name = createRenderPipeline)]
     pub fn create_render_pipeline(this: &GpuDevice, descriptor: &WebIdlDictionary) -> GpuPipeline;
     #[wasm_bindgen(method, js_name = createTexture)]
-    pub fn create_texture(this: &GpuDevice, descriptor: &WebIdlDictionary) -> GpuResource;
+    pub fn create_texture(this: &GpuDevice, descriptor: &WebIdlDictionary) -> GpuBufferOrTexture;
     #[wasm_bindgen(method, js_name = createBuffer)]
-    pub fn create_buffer(this: &GpuDevice, descriptor: &WebIdlDictionary) -> GpuResource;
+    pub fn create_buffer(this: &GpuDevice, descriptor: &WebIdlDictionary) -> GpuBufferOrTexture;
     #[wasm_bindgen(method, js_name = createBindGroup)]
     pub fn create_bind_group(this: &GpuDevice, descriptor: &WebIdlDictionary) -> JsValue;
     #[wasm_bindgen(method, js_name = createCommandEncoder)]
@@ -77,17 +77,17 @@ extern "C" {
         size: &JsValue,
     ) -> Result<(), JsValue>;
     #[wasm_bindgen(method, js_name = writeBuffer)]
-    pub fn write_buffer(this: &GpuQueue, buffer: &GpuResource, offset: u32, contents: &[u8]);
+    pub fn write_buffer(this: &GpuQueue, buffer: &GpuBufferOrTexture, offset: u32, contents: &[u8]);
     #[wasm_bindgen(method)]
     pub fn submit(this: &GpuQueue, commands: &JsValue);
 
     /// `GPUTexture` or `GPUBuffer`.
     #[derive(Clone, Debug)]
-    pub type GpuResource;
+    pub type GpuBufferOrTexture;
     #[wasm_bindgen(method, js_name = createView)]
-    pub fn create_view(this: &GpuResource, descriptor: &WebIdlDictionary) -> JsValue;
+    pub fn create_view(this: &GpuBufferOrTexture, descriptor: &WebIdlDictionary) -> JsValue;
     #[wasm_bindgen(method)]
-    pub fn destroy(this: &GpuResource);
+    pub fn destroy(this: &GpuBufferOrTexture);
 
     /// `GPUComputePipeline` or `GPURenderPipeline`.
     #[derive(Clone, Debug)]
@@ -127,7 +127,7 @@ extern "C" {
         configuration: &WebIdlDictionary,
     ) -> Result<(), JsValue>;
     #[wasm_bindgen(method, catch, js_name = getCurrentTexture)]
-    pub fn get_current_texture(this: &GpuCanvasContext) -> Result<GpuResource, JsValue>;
+    pub fn get_current_texture(this: &GpuCanvasContext) -> Result<GpuBufferOrTexture, JsValue>;
 
     /// An object of options or of read-only values.
     pub type WebIdlDictionary;

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import { ENGLISH, type StringKey } from './en.js';
 import { firstSupported } from './language.js';
-import { fetchStrings, isPending, LANGUAGES, type Language, t } from './strings.js';
+import { fetchStrings, isPending, LANGUAGES, type Language, t } from './translations.js';
 
 /** Translations that are correctly the same as in English. */
 const SAME_AS_ENGLISH = new Set([

@@ -1,7 +1,7 @@
 /** Parsers of all attributes that are not plain text; `null` is an absent one. As in `setting-parsers`, they throw. */
 
 import { PhotoError } from '../shared/errors.js';
-import { BACKENDS, type Backend, type CrossOrigin } from '../shared/names.js';
+import { BACKENDS, type Backend, type CrossOrigin } from '../shared/keywords.js';
 import {
   parseExposure,
   parseGamut,

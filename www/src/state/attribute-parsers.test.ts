@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { PARSERS, parseAddress } from './attribute-values.js';
+import { PARSERS, parseAddress } from './attribute-parsers.js';
 
 test('backends keep their order without duplicates', () => {
   assert.equal(PARSERS.backend(null), null);

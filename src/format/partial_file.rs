@@ -1,6 +1,7 @@
 //! The state of a [`LtmReader`](super::LtmReader) that has the index: which chunks have come, and the tiles so far.
 //!
-//! Tiles decode their chunks in the order of scans. A chunk that comes early waits for those before it.
+//! Tiles decode their chunks in the order of scans. A chunk that comes early waits for those before it. A chunk
+//! that does not decode makes its tile dark, or its basis functions zero, and its scan is never complete.
 
 use std::ops::Range;
 
@@ -9,12 +10,12 @@ use super::codec::direct_functions;
 use super::error::FormatError;
 use super::index::FileIndex;
 use super::memory_budget::MemoryBudget;
-use super::metadata::MetadataJson;
+use super::metadata::MetadataText;
 use super::scan::ProgressiveScan;
 use super::tile_decoder::{TileDecoder, decode_basis_chunk};
 use crate::transport::{Basis, Decibels, Tile, TileCodes, Transport};
 
-/// Maximum number of ranges that [`DecoderState::wants`] returns.
+/// Maximum number of ranges that [`PartialFile::wants`] returns.
 const MAX_RANGES: usize = 1024;
 
 /// Which chunks of a file to fetch: all by default.
@@ -28,7 +29,7 @@ pub struct ChunkSelection {
 
 /// The chunks and tiles of a file.
 #[derive(Debug)]
-pub(super) struct DecoderState {
+pub(super) struct PartialFile {
     index: FileIndex,
     /// Functions whose chunk has not come are zero.
     basis: Basis,
@@ -37,8 +38,12 @@ pub(super) struct DecoderState {
     tiles: Vec<TileState>,
     /// In file order.
     chunks: Vec<ChunkState>,
-    /// `[scan]`: number of chunks that have not come.
+    /// `[scan]`: number of chunks that have not come, or did not decode.
     missing: Vec<usize>,
+    /// The last chunk that did not decode.
+    undecodable: Option<ChunkId>,
+    /// Bytes of the chunks that have come, each counted once.
+    received_bytes: u64,
 }
 
 /// The bytes of a chunk so far.
@@ -48,7 +53,7 @@ enum ChunkState {
     Partial(Vec<u8>),
     /// All bytes, which wait for earlier scans of the tile.
     Waiting(Vec<u8>),
-    /// It is decoded, or empty.
+    /// It is decoded, or empty, or does not decode.
     Decoded,
 }
 
@@ -57,9 +62,11 @@ enum ChunkState {
 enum TileState {
     Partial(TileDecoder),
     Complete(Tile),
+    /// A chunk did not decode.
+    Undecodable,
 }
 
-impl DecoderState {
+impl PartialFile {
     pub fn new(index: FileIndex, budget: &MemoryBudget) -> Result<Self, FormatError> {
         let (tiles, scans) = (index.tiles(), index.scans.len());
         let mut state = Self {
@@ -70,6 +77,8 @@ impl DecoderState {
             tiles: budget.try_with_capacity(tiles)?,
             chunks: budget.try_with_capacity(scans * (tiles + 1))?,
             missing: budget.try_zeroed(scans)?,
+            undecodable: None,
+            received_bytes: 0,
             index,
         };
         let partial = |tile| TileState::Partial(TileDecoder::new(tile));
@@ -100,6 +109,16 @@ impl DecoderState {
     pub fn complete_tiles(&self) -> usize {
         let is_complete = |tile: &&TileState| matches!(tile, TileState::Complete(_));
         self.tiles.iter().filter(is_complete).count()
+    }
+
+    /// The last chunk that did not decode.
+    pub fn undecodable(&self) -> Option<ChunkId> {
+        self.undecodable
+    }
+
+    /// Bytes of chunks received, each counted once.
+    pub fn received_bytes(&self) -> u64 {
+        self.received_bytes
     }
 
     pub fn is_complete(&self) -> bool {
@@ -144,15 +163,14 @@ impl DecoderState {
         ranges
     }
 
-    /// Takes bytes from `offset` on. Returns how many of them are new.
+    /// Takes bytes from `offset` on.
     pub fn feed(
         &mut self,
         mut offset: u64,
         mut bytes: &[u8],
         budget: &MemoryBudget,
-    ) -> Result<u64, FormatError> {
+    ) -> Result<(), FormatError> {
         let end = self.index.header.file_bytes;
-        let mut new_bytes = 0;
         // A server may send the index again.
         let index_bytes = self.index.header.index_bytes();
         if offset < index_bytes {
@@ -168,14 +186,14 @@ impl DecoderState {
             let range = self.index.range(chunk);
             let here = bytes.len().min((range.end - offset) as usize); // a chunk is below 4 GiB
             let (now, later) = bytes.split_at(here);
-            new_bytes += self.feed_chunk(chunk, range, offset, now, budget)?;
+            self.feed_chunk(chunk, range, offset, now, budget)?;
             offset += here as u64;
             bytes = later;
         }
-        Ok(new_bytes)
+        Ok(())
     }
 
-    /// Takes some bytes of one chunk. Returns how many of them are new.
+    /// Takes some bytes of one chunk.
     fn feed_chunk(
         &mut self,
         chunk: ChunkId,
@@ -183,18 +201,17 @@ impl DecoderState {
         offset: u64,
         bytes: &[u8],
         budget: &MemoryBudget,
-    ) -> Result<u64, FormatError> {
+    ) -> Result<(), FormatError> {
         let number = self.index.chunk_number(chunk);
         let ChunkState::Partial(partial) = &mut self.chunks[number] else {
-            return Ok(0);
+            return Ok(());
         };
         let length = (range.end - range.start) as usize;
         if bytes.len() == length {
             let partial = std::mem::take(partial);
-            let known = partial.len() as u64;
+            self.received_bytes -= partial.len() as u64;
             budget.release_vec(partial);
-            self.take_chunk(chunk, bytes, budget)?;
-            return Ok(length as u64 - known);
+            return self.take_chunk(chunk, bytes, budget);
         }
         let at = (offset - range.start) as usize;
         if at > partial.len() {
@@ -205,15 +222,18 @@ impl DecoderState {
         }
         let new = bytes.get(partial.len() - at..).unwrap_or_default();
         budget.try_extend(partial, new, length)?;
-        if partial.len() == length {
-            let complete = std::mem::take(partial);
-            let taken = self.take_chunk(chunk, &complete, budget);
-            budget.release_vec(complete);
-            taken?;
+        self.received_bytes += new.len() as u64;
+        if partial.len() < length {
+            return Ok(());
         }
-        Ok(new.len() as u64)
+        let complete = std::mem::take(partial);
+        self.received_bytes -= length as u64;
+        let taken = self.take_chunk(chunk, &complete, budget);
+        budget.release_vec(complete);
+        taken
     }
 
+    /// Takes all bytes of a chunk. Bytes that do not match their checksum count as not received.
     fn take_chunk(
         &mut self,
         chunk: ChunkId,
@@ -222,26 +242,60 @@ impl DecoderState {
     ) -> Result<(), FormatError> {
         self.index.check_crc(chunk, bytes)?;
         let number = self.index.chunk_number(chunk);
-        let decoder = chunk.tile.and_then(|tile| match &mut self.tiles[tile] {
-            TileState::Partial(decoder) => Some(decoder),
-            TileState::Complete(_) => None,
-        });
-        self.chunks[number] = match &decoder {
-            Some(decoder) if decoder.scans < chunk.scan => {
-                ChunkState::Waiting(budget.try_copy(bytes)?)
-            }
-            _ => ChunkState::Decoded,
-        };
-        self.missing[chunk.scan] -= 1;
-        let Some(tile) = chunk.tile else {
-            let kernels = &mut self.basis.kernels;
-            return decode_basis_chunk(&self.index, chunk.scan, bytes, kernels, budget);
-        };
-        if let Some(decoder) = decoder.filter(|decoder| decoder.scans == chunk.scan) {
-            decoder.add(&self.index, &self.order, bytes, budget)?;
-            self.advance_tile(tile, budget)?;
+        if let Some(TileState::Partial(decoder)) = chunk.tile.map(|tile| &self.tiles[tile])
+            && decoder.scans < chunk.scan
+        {
+            self.chunks[number] = ChunkState::Waiting(budget.try_copy(bytes)?);
+            self.received_bytes += bytes.len() as u64;
+            return Ok(());
         }
-        Ok(())
+        self.chunks[number] = ChunkState::Decoded;
+        self.received_bytes += bytes.len() as u64;
+        self.decode_chunk(chunk, bytes, budget)?;
+        match chunk.tile {
+            Some(tile) => self.advance_tile(tile, budget),
+            None => Ok(()),
+        }
+    }
+
+    /// Decodes the next chunk of its tile, or a basis chunk.
+    fn decode_chunk(
+        &mut self,
+        chunk: ChunkId,
+        bytes: &[u8],
+        budget: &MemoryBudget,
+    ) -> Result<(), FormatError> {
+        let decoded = match chunk.tile.map(|tile| &mut self.tiles[tile]) {
+            None => {
+                let kernels = &mut self.basis.kernels;
+                decode_basis_chunk(&self.index, chunk.scan, bytes, kernels, budget)
+            }
+            Some(TileState::Partial(decoder)) => {
+                decoder.add(&self.index, &self.order, bytes, budget)
+            }
+            Some(TileState::Complete(_) | TileState::Undecodable) => Ok(()),
+        };
+        match decoded {
+            Ok(()) => self.missing[chunk.scan] -= 1,
+            Err(_) => self.drop_values(chunk, budget),
+        }
+        decoded
+    }
+
+    /// Drops the values that depend on a chunk that does not decode.
+    fn drop_values(&mut self, chunk: ChunkId, budget: &MemoryBudget) {
+        self.undecodable = Some(chunk);
+        let Some(tile) = chunk.tile else {
+            let functions = self.index.new_basis_functions(chunk.scan);
+            for kernel in &mut self.basis.kernels[functions] {
+                kernel.fill(0.0);
+            }
+            return;
+        };
+        if let TileState::Partial(decoder) = &self.tiles[tile] {
+            budget.release(decoder.bytes());
+        }
+        self.tiles[tile] = TileState::Undecodable;
     }
 
     /// Skips scans that have no chunk for the tile, decodes chunks that waited, and turns the tile into codes
@@ -269,7 +323,7 @@ impl DecoderState {
             };
             let bytes = std::mem::take(bytes);
             *state = ChunkState::Decoded;
-            let decoded = decoder.add(&self.index, &self.order, &bytes, budget);
+            let decoded = self.decode_chunk(chunk, &bytes, budget);
             budget.release_vec(bytes);
             decoded?;
         }
@@ -297,10 +351,11 @@ impl DecoderState {
             kernels.push(budget.try_copy(kernel)?);
         }
         let mut tiles = budget.try_with_capacity(self.tiles.len())?;
-        for tile in &self.tiles {
+        for (i, tile) in self.tiles.iter().enumerate() {
             tiles.push(match tile {
                 TileState::Partial(decoder) => decoder.quantise(&self.index, rank, budget)?,
                 TileState::Complete(tile) => self.copy_components(tile, rank, budget)?,
+                TileState::Undecodable => Tile::dark(self.index.header.geometry.tile(i)),
             });
         }
         Ok(Transport {
@@ -333,12 +388,13 @@ impl DecoderState {
     }
 
     /// The transport of all chunks so far.
-    pub fn finish(self, budget: &MemoryBudget) -> Result<(Transport, MetadataJson), FormatError> {
+    pub fn finish(self, budget: &MemoryBudget) -> Result<(Transport, MetadataText), FormatError> {
         let rank = self.basis.rank();
         let mut tiles = budget.try_with_capacity(self.tiles.len())?;
-        for tile in self.tiles {
+        for (i, tile) in self.tiles.into_iter().enumerate() {
             tiles.push(match tile {
                 TileState::Complete(tile) => tile,
+                TileState::Undecodable => Tile::dark(self.index.header.geometry.tile(i)),
                 TileState::Partial(decoder) => {
                     let tile = decoder.quantise(&self.index, rank, budget)?;
                     budget.release(decoder.bytes());

@@ -7,9 +7,9 @@
 //! certainty.
 
 use super::error::RecoverError;
-use super::preparation_input::PreparationInput;
-use super::sampling::{self, PixelsOfWindow};
-use crate::executor::Executor;
+use super::preparation_input::RecoveryPreparationInput;
+use super::sampling::{self, PixelsSharingWindow};
+use crate::job_executor::Executor;
 use crate::transport::{LightElement, TileRect};
 
 /// Smallest slope of a photograph that matches its pattern, relative to [`REFERENCE_PERCENTILE`].
@@ -30,7 +30,7 @@ const MIN_HELD_OUT: usize = 2;
 /// [`RecoverError::MismatchedPatterns`] if some photographs do not match their patterns, and
 /// [`RecoverError::UncorrelatedPatterns`] if most do not, or if the held-out patterns together predict nothing.
 pub(super) fn check_patterns(
-    preparation: &PreparationInput<impl Executor>,
+    preparation: &RecoveryPreparationInput<impl Executor>,
     mean_function: &[f64],
     squares: &[TileRect],
 ) -> Result<(), RecoverError> {
@@ -39,7 +39,7 @@ pub(super) fn check_patterns(
     }
     let split = preparation.split;
     let moments = preparation.executor.map(squares.len(), |i| {
-        let mut moments = vec![RegressionMoments::default(); split.all.len()];
+        let mut moments = vec![SlopeMoments::default(); split.all.len()];
         for (origin, pixels) in sampling::pixels_by_window(&preparation.geometry, squares[i]) {
             add_window(&mut moments, preparation, mean_function, origin, &pixels);
         }
@@ -69,7 +69,7 @@ pub(super) fn check_patterns(
 
 /// Sums over pixels, both centred over the patterns: of squared predictions, and of predictions times measurements.
 #[derive(Clone, Copy, Debug, Default)]
-struct RegressionMoments {
+struct SlopeMoments {
     prediction: f64,
     cross: f64,
 }
@@ -83,18 +83,18 @@ struct SlopeEstimate {
 
 impl SlopeEstimate {
     /// The common slope of `patterns`, from moments `[square][pattern]`; `None` if the predictions do not vary.
-    fn fit(moments: &[Vec<RegressionMoments>], patterns: &[usize]) -> Option<Self> {
+    fn fit(moments: &[Vec<SlopeMoments>], patterns: &[usize]) -> Option<Self> {
         let squares = moments.iter().map(|square| {
             let of_patterns = patterns.iter().map(|&l| square[l]);
-            of_patterns.fold(RegressionMoments::default(), |a, b| RegressionMoments {
+            of_patterns.fold(SlopeMoments::default(), |a, b| SlopeMoments {
                 prediction: a.prediction + b.prediction,
                 cross: a.cross + b.cross,
             })
         });
-        let squares: Vec<RegressionMoments> = squares.collect();
+        let squares: Vec<SlopeMoments> = squares.collect();
         let prediction: f64 = squares.iter().map(|m| m.prediction).sum();
         let value = squares.iter().map(|m| m.cross).sum::<f64>() / prediction;
-        let residual = |m: &RegressionMoments| (m.cross - value * m.prediction).powi(2);
+        let residual = |m: &SlopeMoments| (m.cross - value * m.prediction).powi(2);
         let residuals = squares.iter().map(residual);
         let standard_error = residuals.sum::<f64>().sqrt() / prediction;
         (value.is_finite() && standard_error.is_finite()).then_some(Self {
@@ -113,11 +113,11 @@ impl SlopeEstimate {
 }
 
 fn add_window(
-    moments: &mut [RegressionMoments],
-    preparation: &PreparationInput<impl Executor>,
+    moments: &mut [SlopeMoments],
+    preparation: &RecoveryPreparationInput<impl Executor>,
     mean_function: &[f64],
     origin: LightElement,
-    pixels: &PixelsOfWindow,
+    pixels: &PixelsSharingWindow,
 ) {
     let (measurements, split) = (preparation.measurements, preparation.split);
     let elements: Vec<_> = preparation.geometry.elements_of_window(origin).collect();
@@ -159,7 +159,7 @@ mod tests {
     fn slope(squares: &[(f64, f64)]) -> Option<SlopeEstimate> {
         let moments = squares
             .iter()
-            .map(|&(prediction, cross)| vec![RegressionMoments { prediction, cross }]);
+            .map(|&(prediction, cross)| vec![SlopeMoments { prediction, cross }]);
         SlopeEstimate::fit(&moments.collect::<Vec<_>>(), &[0])
     }
 

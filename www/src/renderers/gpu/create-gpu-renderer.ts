@@ -1,19 +1,19 @@
 /** Creates renderers for graphics devices. It is a separate script, which has its own copies of shared code. */
 
-import type { Photograph } from '../../photo/photograph.js';
+import type { LoadedPhotograph } from '../../photo/photograph.js';
 import { createModuleRenderer } from '../module-renderer.js';
-import type { BackendOptions, Renderer } from '../types.js';
+import type { BackendPreferences, Renderer } from '../types.js';
 import { Devices, type LoadGraphics } from './devices.js';
 import type { GraphicsBackendName } from './graphics-ports.js';
 
-export type GpuRenderers = ReturnType<typeof gpuRenderers>;
+export type GpuRendererFactory = ReturnType<typeof gpuRenderers>;
 
 export function gpuRenderers(load: LoadGraphics, devices = new Devices()) {
   return {
     async create(
       backend: GraphicsBackendName,
-      photograph: Photograph,
-      { gamut, software }: BackendOptions,
+      photograph: LoadedPhotograph,
+      { gamut, software }: BackendPreferences,
       onLost: (reason: string) => void,
       signal: AbortSignal,
     ): Promise<Renderer> {

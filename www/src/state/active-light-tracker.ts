@@ -5,8 +5,8 @@
 
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LightSource } from '../lights/light-source.js';
-import type { LightName } from '../shared/names.js';
-import { reuse } from '../shared/shallow-equal.js';
+import type { LightName } from '../shared/keywords.js';
+import { reuse } from '../shared/reuse-if-equal.js';
 import type { PicturePoint } from '../shared/value-types.js';
 
 /** As in a `lightchange` event. */
@@ -16,7 +16,7 @@ export interface ActiveLight {
   readonly source: LightSource | null;
 }
 
-export class LightChangeDetector {
+export class ActiveLightTracker {
   #active: ActiveLight | null = null;
 
   /** A setting was requested. The new light, if it is another built-in light. */

@@ -4,7 +4,7 @@
 //! over all observations of one class (sub-element position and channel); all components are kept side by side, so that
 //! the sums are vector operations of length r.
 
-use super::posterior_means::{ObservationPosition, PREDICTORS, PosteriorMeans};
+use super::posterior_means::{PREDICTORS, PixelObservationPosition, PosteriorMeans};
 use crate::linalg::{self, add_scaled};
 
 /// Ridge, as a share of the predictors' mean square, that keeps the regressions well posed.
@@ -34,7 +34,7 @@ impl RegressionSums {
     pub fn add(
         &mut self,
         means: &PosteriorMeans<'_>,
-        location: ObservationPosition,
+        location: PixelObservationPosition,
         target: &[f64],
     ) {
         let rank = self.rank;

@@ -2,17 +2,18 @@
 
 use super::basis_rotation::{BasisRotation, coefficient_moments};
 use super::encoder_input::EncoderInput;
-use crate::executor::Executor;
 use crate::format::codec::{direct_functions, transform};
+use crate::format::constants::MAX_RANK;
 use crate::format::error::FormatError;
 use crate::format::memory_budget::MemoryBudget;
+use crate::job_executor::Executor;
 use crate::transport::{Basis, CHANNELS, FloatTile};
 
 /// Number of tiles that are encoded at a time.
 const BATCH_TILES: usize = 64;
 
 /// A source whose tiles have been analysed.
-pub struct Encoder<'a, E> {
+pub struct AnalysedSource<'a, E> {
     pub source: EncoderInput<'a>,
     pub executor: &'a E,
     /// The rotation to the file's basis; `None` if there are no coefficients.
@@ -31,14 +32,14 @@ pub struct Encoder<'a, E> {
 }
 
 /// What the encoder needs to know of one tile.
-struct TileAnalysis {
+struct TileStatistics {
     moments: Vec<f64>,
     function_energy: f64,
     coefficient_peak: f32,
     function_peak: f32,
 }
 
-impl TileAnalysis {
+impl TileStatistics {
     fn new(tile: &FloatTile, rank: usize, area: usize) -> Self {
         let pixels = tile.rect.extent.area();
         let fits = |length: usize, columns: usize| length == 0 || length == pixels * columns;
@@ -66,16 +67,26 @@ fn peak(values: &[[f32; CHANNELS]]) -> f32 {
     finite.fold(0.0, |peak, v| peak.max(v.abs()))
 }
 
-impl<'a, E: Executor> Encoder<'a, E> {
+impl<'a, E: Executor> AnalysedSource<'a, E> {
     /// Analyses all tiles of a source.
     ///
     /// # Errors
-    /// [`FormatError::Source`] if a tile cannot be read.
+    /// [`FormatError::InvalidGeometry`], [`FormatError::TooMany`] basis functions, and [`FormatError::Source`] if a tile
+    /// cannot be read.
     ///
     /// # Panics
     /// If a tile or a basis function has the wrong length.
     pub fn new(source: EncoderInput<'a>, executor: &'a E) -> Result<Self, FormatError> {
+        let geometry = source.geometry.validate();
+        geometry.map_err(FormatError::InvalidGeometry)?;
         let rank = source.basis.map_or(0, Basis::rank);
+        if rank > usize::from(MAX_RANK) {
+            return Err(FormatError::TooMany {
+                quantity: "basis functions",
+                value: rank as u32,
+                limit: MAX_RANK.into(),
+            });
+        }
         let area = source.geometry.window.area();
         if let Some(basis) = source.basis {
             let fits = basis.kernels.iter().all(|kernel| kernel.len() == area);
@@ -84,7 +95,7 @@ impl<'a, E: Executor> Encoder<'a, E> {
         let mut moments = vec![0.0; rank * rank];
         let (mut function_energy, mut coefficient_peak, mut function_peak) = (0.0, 0.0f32, 0.0f32);
         let mut lit_tiles = Vec::new();
-        let analyse = |tile: FloatTile| TileAnalysis::new(&tile, rank, area);
+        let analyse = |tile: FloatTile| TileStatistics::new(&tile, rank, area);
         for_tiles(&source, executor, analyse, |i, tile| {
             if tile.coefficient_peak.max(tile.function_peak) > 0.0 {
                 lit_tiles.push(i);

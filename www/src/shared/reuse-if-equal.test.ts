@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { reuse } from './shallow-equal.js';
+import { reuse } from './reuse-if-equal.js';
 
 test('equal settings stay the same object', () => {
   const point = { x: 1, y: 2 };

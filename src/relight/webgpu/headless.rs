@@ -2,15 +2,15 @@
 
 use std::rc::Rc;
 
-use super::api::{API, DeviceQueue, WebGpuTexture, usage};
-use super::device::Device;
+use super::api::{API, DeviceAndQueue, WebGpuTexture, usage};
+use super::context::GpuContext;
 use super::photo_renderer::WebGpuRenderer;
 use crate::relight::Rgba8Picture;
 use crate::relight::backend::{BackendError, FrameRequest};
 use crate::relight::texture_layout::{TextureDescriptor, TextureFormat};
 use crate::transport::{Extent, Transport};
 
-impl Device {
+impl GpuContext {
     /// A device for textures.
     ///
     /// # Errors
@@ -37,17 +37,17 @@ impl Device {
 
 /// Draws one photograph into a texture.
 #[derive(Debug)]
-pub struct OffscreenRenderer {
+pub struct HeadlessRenderer {
     renderer: WebGpuRenderer,
     picture: WebGpuTexture,
 }
 
-impl OffscreenRenderer {
+impl HeadlessRenderer {
     /// Uploads a transport.
     ///
     /// # Errors
     /// [`BackendError::Layout`] or [`BackendError::Upload`] if the device cannot hold it.
-    pub async fn new(device: Rc<Device>, transport: &Transport) -> Result<Self, BackendError> {
+    pub async fn new(device: Rc<GpuContext>, transport: &Transport) -> Result<Self, BackendError> {
         let renderer = WebGpuRenderer::new(device.clone(), transport).await?;
         let picture = device.try_upload(|| {
             let camera = transport.geometry.camera;
@@ -59,7 +59,7 @@ impl OffscreenRenderer {
         Ok(Self { renderer, picture })
     }
 
-    /// Submits a frame. [`Device::wait`] waits until it is drawn.
+    /// Submits a frame. [`GpuContext::wait`] waits until it is drawn.
     ///
     /// # Errors
     /// [`BackendError::Lost`] if the device is lost.
@@ -74,7 +74,7 @@ impl OffscreenRenderer {
     /// # Errors
     /// [`BackendError::Lost`] or [`BackendError::Device`] if it cannot be read.
     pub fn read(&self) -> Result<Rgba8Picture, BackendError> {
-        let DeviceQueue { device, queue, .. } = &self.renderer.device.gpu;
+        let DeviceAndQueue { device, queue, .. } = &self.renderer.device.gpu;
         let picture = &self.picture.texture;
         let (width, height) = (picture.width(), picture.height());
         // Copies need aligned rows.

@@ -7,7 +7,7 @@ const CHROMA_TOLERANCE: f32 = 1e-6;
 
 /// The ratio between the channels of a light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum ChannelRatio {
+pub enum LightChroma {
     /// The same for all elements: channel `c` equals `factors[c]` times channel `base`.
     Uniform {
         /// The brightest channel.
@@ -20,7 +20,7 @@ pub enum ChannelRatio {
     Varying,
 }
 
-impl ChannelRatio {
+impl LightChroma {
     /// The chroma of the elements in `rows`.
     #[inline(always)]
     pub fn of_rows<'a>(rows: impl Iterator<Item = &'a [[f32; 4]]> + Clone) -> Self {
@@ -109,11 +109,11 @@ mod tests {
 
     #[test]
     fn uniform_and_varying_chroma_are_told_apart() {
-        let chroma = |elements: &[[f32; 4]]| ChannelRatio::of_rows(elements.chunks(2));
+        let chroma = |elements: &[[f32; 4]]| LightChroma::of_rows(elements.chunks(2));
         let warm = |x: f32| [x, 0.93 * x, 0.8 * x, 0.0];
         assert_eq!(
             chroma(&[warm(0.0), warm(0.3), warm(0.7)]),
-            ChannelRatio::Uniform {
+            LightChroma::Uniform {
                 base: 0,
                 factors: [1.0, 0.93 * 0.7 / 0.7, 0.8 * 0.7 / 0.7]
             }
@@ -121,15 +121,15 @@ mod tests {
         assert!(chroma(&[[0.0; 4]; 3]).is_dark());
         assert_eq!(
             chroma(&[warm(0.1), [0.1, 0.1, 0.1, 0.0]]),
-            ChannelRatio::Varying
+            LightChroma::Varying
         );
         assert_eq!(
             chroma(&[[1e4, 1e4, 1e4, 0.0], [0.005, 0.0, 0.0, 0.0]]),
-            ChannelRatio::Varying
+            LightChroma::Varying
         );
         assert!(matches!(
             chroma(&[warm(1.0), warm(1e-39)]),
-            ChannelRatio::Uniform { base: 0, .. }
+            LightChroma::Uniform { base: 0, .. }
         ));
         assert_eq!(chroma(&[[0.0, 0.0, 0.5, 0.0]]).channels(), [2]);
     }

@@ -1,13 +1,13 @@
 /** Where the core gets its modules: from the caller, from files in Node, or from the network. */
 
 import { type FetchWasm, fetchWasm } from '../engine/wasm-loader.js';
-import { CORE_MODULES } from '../shared/names.js';
+import { CORE_MODULES } from '../shared/keywords.js';
 
 /** The name of a WebAssembly module. */
 export type CoreModuleName = (typeof CORE_MODULES)[number];
 
 /** A module's bytes, or their address. */
-export type WasmCode = ArrayBuffer | ArrayBufferView<ArrayBuffer> | URL | string;
+export type WasmInput = ArrayBuffer | ArrayBufferView<ArrayBuffer> | URL | string;
 
 /** The part of Node that is used. An `import` would have to be resolved by bundlers for browsers. */
 interface NodeProcess {
@@ -16,13 +16,13 @@ interface NodeProcess {
   ): { readFile(file: URL): Promise<Uint8Array> } | undefined;
 }
 
-const provided = new Map<string, WasmCode>();
+const provided = new Map<string, WasmInput>();
 
 /**
  * Sets the bytes or the addresses of WebAssembly modules, where the files beside the script can be neither fetched nor
  * read. Call it before the first `decode`. Code with SIMD needs a machine with SIMD.
  */
-export function provideWasm(codes: Readonly<Partial<Record<CoreModuleName, WasmCode>>>): void {
+export function provideWasm(codes: Readonly<Partial<Record<CoreModuleName, WasmInput>>>): void {
   const known: readonly string[] = CORE_MODULES;
   for (const [name, code] of Object.entries(codes)) {
     if (!known.includes(name)) {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// A set of camera rows, stored as disjoint strips.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RowSet {
+pub struct CameraRowSet {
     /// From the top down; none empty, none adjacent to the next.
     strips: Vec<Range<u32>>,
     /// For each camera row up to the end of the last strip its index in the set, or [`ABSENT`].
@@ -13,7 +13,7 @@ pub struct RowSet {
 
 const ABSENT: u32 = u32::MAX;
 
-impl RowSet {
+impl CameraRowSet {
     /// The first `height` rows: a whole picture.
     pub fn all(height: u32) -> Self {
         Self::from_strips(std::iter::once(0..height))
@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn strips_are_merged_and_rows_indexed() {
-        let rows = RowSet::from_strips([2..4, 4..5, 5..5, 8..10, 9..11]);
+        let rows = CameraRowSet::from_strips([2..4, 4..5, 5..5, 8..10, 9..11]);
         assert_eq!(rows.strips(), [2..5, 8..11]);
         assert_eq!(rows.count(), 6);
         let indices = (0..12).map(|y| rows.index_of(y));
@@ -94,7 +94,10 @@ mod tests {
         );
         assert!(rows.contains_all(2..5) && rows.contains_all(9..10) && rows.contains_all(6..6));
         assert!(!rows.contains_all(4..9) && !rows.contains_all(10..12));
-        assert_eq!(RowSet::all(3), RowSet::from_strips([0..1, 1..3]));
-        assert_eq!(RowSet::from_strips([]).count(), 0);
+        assert_eq!(
+            CameraRowSet::all(3),
+            CameraRowSet::from_strips([0..1, 1..3])
+        );
+        assert_eq!(CameraRowSet::from_strips([]).count(), 0);
     }
 }

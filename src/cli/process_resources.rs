@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 
 /// Runs jobs on all cores of rayon's current pool.
 #[derive(Clone, Copy, Debug)]

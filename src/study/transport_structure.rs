@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 use super::chart::{ChartSeries, LineChart};
 use super::error::StudyError;
 use super::known_transport::KnownTransport;
-use super::picture_sheet::{CaptionedPanel, FigurePanel, PictureSheet};
-use super::section::{MarkdownTable, ProgressCallback, ReportSection};
-use crate::executor::Executor;
-use crate::transport::{CHANNELS, CameraPx, Extent, Geometry};
+use super::picture_sheet::{CaptionedPanel, PanelImage, PictureSheet};
+use super::section::{MarkdownTable, ProgressLog, ReportSection};
+use crate::job_executor::Executor;
+use crate::transport::{CHANNELS, CameraPixel, Extent, Geometry};
 
 /// Ignored low bits of the mantissa: elements within 1/64 of each other are in one class.
 const IGNORED_BITS: u32 = 17;
@@ -101,7 +101,7 @@ pub fn sparsity(
     name: &str,
     known: &impl KnownTransport,
     executor: &impl Executor,
-    progress: ProgressCallback,
+    progress: ProgressLog,
 ) -> Result<ReportSection, StudyError> {
     progress(&format!("{name}: structure of the transport"));
     let geometry = known.geometry();
@@ -168,20 +168,20 @@ pub fn sparsity(
 
 /// The statistics of one row of camera pixels.
 #[derive(Default)]
-struct RowStatistics {
+struct CameraRowSparsity {
     profile: SparsityProfile,
     /// The largest element in each cell of the overview.
     overview: BTreeMap<usize, f32>,
     energies: Vec<f32>,
 }
 
-fn survey_row(known: &impl KnownTransport, y: u32) -> RowStatistics {
+fn survey_row(known: &impl KnownTransport, y: u32) -> CameraRowSparsity {
     let geometry = known.geometry();
-    let mut row = RowStatistics::default();
+    let mut row = CameraRowSparsity::default();
     let mut tau = vec![[0.0; CHANNELS]; geometry.window.area()];
     let scale = |i: usize, of: usize| i * OVERVIEW_SIDE as usize / of;
     for x in 0..geometry.camera.width {
-        let pixel = CameraPx { x, y };
+        let pixel = CameraPixel { x, y };
         known.transport_function(pixel, &mut tau);
         let column = scale(geometry.camera.index(pixel), geometry.camera.area());
         let elements = tau.as_flattened().iter();
@@ -269,14 +269,14 @@ fn zoomed_part(known: &impl KnownTransport) -> CaptionedPanel {
     let left = (geometry.camera.width - width) / 2;
     let y = geometry.camera.height / 2;
     let x = left + width / 2;
-    let middle = known.origin(CameraPx { x, y });
+    let middle = known.origin(CameraPixel { x, y });
     let row = middle.v + half;
     let max_first = (geometry.light.width - height) as i32;
     let first = (middle.u + half - height as i32 / 2).clamp(0, max_first);
     let mut values = vec![0.0f32; (width * height) as usize];
     let mut tau = vec![[0.0; CHANNELS]; geometry.window.area()];
     for i in 0..width {
-        let pixel = CameraPx { x: left + i, y };
+        let pixel = CameraPixel { x: left + i, y };
         let origin = known.origin(pixel);
         known.transport_function(pixel, &mut tau);
         for (s, tau) in tau.iter().enumerate() {
@@ -295,34 +295,34 @@ fn zoomed_part(known: &impl KnownTransport) -> CaptionedPanel {
 
 /// The pixel whose function has the median energy, among those in the centre of the picture, whose windows are inside the
 /// light plane.
-fn median_pixel(camera: Extent, energies: &[f32]) -> CameraPx {
+fn median_pixel(camera: Extent, energies: &[f32]) -> CameraPixel {
     let middle = |side: u32| side / 4..(3 * side).div_ceil(4);
-    let row = |y: u32| middle(camera.width).map(move |x| CameraPx { x, y });
-    let mut pixels: Vec<CameraPx> = middle(camera.height).flat_map(row).collect();
-    let energy = |pixel: &CameraPx| energies[camera.index(*pixel)];
+    let row = |y: u32| middle(camera.width).map(move |x| CameraPixel { x, y });
+    let mut pixels: Vec<CameraPixel> = middle(camera.height).flat_map(row).collect();
+    let energy = |pixel: &CameraPixel| energies[camera.index(*pixel)];
     pixels.sort_by(|a, b| energy(a).total_cmp(&energy(b)));
     pixels[pixels.len() / 2]
 }
 
 /// One function in colour, scaled to its maximum.
-fn function_panel(side: u32, tau: &[[f32; CHANNELS]]) -> FigurePanel {
+fn function_panel(side: u32, tau: &[[f32; CHANNELS]]) -> PanelImage {
     let peak = tau.as_flattened().iter().fold(0.0f32, |a, &b| a.max(b));
     let scale = 1.0 / f64::from(peak.max(f32::MIN_POSITIVE));
     let linear = tau.iter().map(|t| t.map(|t| f64::from(t) * scale));
-    FigurePanel {
+    PanelImage {
         is_data: true,
-        ..FigurePanel::photograph(Extent::new(side, side), linear)
+        ..PanelImage::photograph(Extent::new(side, side), linear)
     }
 }
 
 /// Elements in grey, on a logarithmic scale over three decades.
-fn grey_panel(extent: Extent, values: &[f32]) -> FigurePanel {
+fn grey_panel(extent: Extent, values: &[f32]) -> PanelImage {
     let peak = values.iter().fold(0.0f32, |a, &b| a.max(b));
     let code = |v: f32| {
         let decades = (v / peak.max(f32::MIN_POSITIVE)).log10();
         (255.0 * (1.0 + decades / 3.0).clamp(0.0, 1.0)) as u8
     };
-    FigurePanel {
+    PanelImage {
         extent,
         rgb: values.iter().flat_map(|&v| [code(v); 3]).collect(),
         is_data: true,

@@ -3,10 +3,10 @@
  * descriptor and tiles. `tests/browser/engine-contract.ts` compares these types with those of wasm-bindgen.
  */
 
-import type { Gamut, ToneCurve } from '../shared/names.js';
+import type { Gamut, ToneCurve } from '../shared/keywords.js';
 import type { PhotoInfo } from '../shared/value-types.js';
 
-export type { Backend, Gamut, ToneCurve } from '../shared/names.js';
+export type { Backend, Gamut, ToneCurve } from '../shared/keywords.js';
 
 /** A picture that a graphics device can upload directly, and that may change at any time. */
 export type ExternalImageSource =
@@ -40,7 +40,7 @@ export interface DecodedPhoto extends ModulePhoto, Omit<PhotoInfo, 'metadata'> {
 }
 
 /** A photograph that another module has decoded. */
-export interface ReceivedPhoto extends ModulePhoto {
+export interface ImportedPhoto extends ModulePhoto {
   /** Moves a tile of `takeTile` in. Not allowed while a CPU relighter uses the photograph. */
   putTile(index: number, bytes: Uint8Array): void;
 }
@@ -77,14 +77,14 @@ export interface GraphicsDevice extends Freeable {
   readonly lost: Promise<{ readonly message: string }> | undefined;
   /** Uploads a photograph and draws it on a canvas, which it uses alone. */
   draw(
-    photo: ReceivedPhoto,
+    photo: ImportedPhoto,
     canvas: HTMLCanvasElement,
     gamut: Gamut,
-  ): Relighter | Promise<Relighter>;
+  ): CanvasRelighter | Promise<CanvasRelighter>;
 }
 
 /** Draws one photograph on one canvas. `quality` is the share of the components, 0 to 1. */
-export interface Relighter extends Freeable {
+export interface CanvasRelighter extends Freeable {
   readonly kernel: string;
   /** The canvas's gamut. */
   readonly gamut: Gamut;
@@ -116,17 +116,17 @@ export interface DecoderModule {
 export interface RelightModule {
   Photo: {
     /** Creates a photograph without tiles. */
-    receive(geometry: Float64Array, basis: Float32Array): ReceivedPhoto;
+    receive(geometry: Float64Array, basis: Float32Array): ImportedPhoto;
   };
   /** The photograph may be one without tiles. */
   Light: {
-    builtin(photo: ReceivedPhoto, name: string): Light;
-    torch(photo: ReceivedPhoto, x: number, y: number, size?: number): Light;
-    fire(photo: ReceivedPhoto, seconds: number): Light;
+    builtin(photo: ImportedPhoto, name: string): Light;
+    torch(photo: ImportedPhoto, x: number, y: number, size?: number): Light;
+    fire(photo: ImportedPhoto, seconds: number): Light;
     /** From linear RGB of a picture of any size, row by row. */
-    fromLinear(photo: ReceivedPhoto, values: Float32Array, width: number, height: number): Light;
+    fromLinear(photo: ImportedPhoto, values: Float32Array, width: number, height: number): Light;
     /** From sRGB codes with straight alpha of a picture of any size: RGBA, row by row. */
-    fromSrgb(photo: ReceivedPhoto, rgba: Uint8ClampedArray, width: number, height: number): Light;
+    fromSrgb(photo: ImportedPhoto, rgba: Uint8ClampedArray, width: number, height: number): Light;
   };
   OutputTransform: {
     new (exposure: number, balance: Float64Array, curve: ToneCurve, gamut: Gamut): OutputTransform;
@@ -137,10 +137,12 @@ export interface CpuModule extends RelightModule {
   /** `simd128` or `scalar`. */
   cpuKernel(): string;
   RowRangeRelighter: {
-    new (photo: ReceivedPhoto, firstRow: number, rows: number): RowRangeRelighter;
+    new (photo: ImportedPhoto, firstRow: number, rows: number): RowRangeRelighter;
   };
   /** Draws on the calling thread. */
-  Relighter: { new (photo: ReceivedPhoto, canvas: HTMLCanvasElement, gamut: Gamut): Relighter };
+  CanvasRelighter: {
+    new (photo: ImportedPhoto, canvas: HTMLCanvasElement, gamut: Gamut): CanvasRelighter;
+  };
 }
 
 /** The modules of the graphics backends. A WebGL2 device uses its canvas alone. */

@@ -1,7 +1,7 @@
 /** Shows the viewer's state in the shadow DOM and the toolbar, and announces changes, in the page's language. */
 
 import { languageOf } from '../i18n/language.js';
-import { type Language, type StringKey, t } from '../i18n/strings.js';
+import { type Language, type StringKey, t } from '../i18n/translations.js';
 import { missingScript, type PhotoError } from '../shared/errors.js';
 import { CENTRE } from '../shared/value-types.js';
 import type { ViewerState } from '../state/viewer-state.js';
@@ -9,13 +9,13 @@ import { describeLight } from './light-description.js';
 import type { ShadowDom } from './shadow-dom.js';
 import type { Toolbar, ToolbarActions } from './toolbar.js';
 
-export interface PresenterListener extends ToolbarActions {
+export interface ToolbarCallbacks extends ToolbarActions {
   /** The toolbar has been loaded: call `update`. */
   loaded(): void;
   failed(error: PhotoError): void;
 }
 
-export class Presenter {
+export class ViewerUi {
   /** `null` until it is needed. */
   toolbar: Toolbar | null = null;
   #toolbarFetch: Promise<void> | null = null;
@@ -24,7 +24,7 @@ export class Presenter {
     private readonly host: Element,
     private readonly dom: ShadowDom,
     private readonly state: ViewerState,
-    private readonly listener: PresenterListener,
+    private readonly listener: ToolbarCallbacks,
   ) {}
 
   get language(): Language {

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use crate::transport::{Extent, LightPx};
+use crate::transport::{Extent, LightPosition};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Vec2 {
@@ -30,8 +30,8 @@ impl Vec2 {
     }
 }
 
-impl From<LightPx> for Vec2 {
-    fn from(p: LightPx) -> Self {
+impl From<LightPosition> for Vec2 {
+    fn from(p: LightPosition) -> Self {
         vec2(p.u, p.v)
     }
 }
@@ -59,12 +59,12 @@ impl Mul<f64> for Vec2 {
 
 /// Unit coordinates of a light plane: the origin in its centre, ±1 at the ends of its shorter side, y downwards.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct UnitCoordinates {
+pub(super) struct CentredCoordinates {
     centre: Vec2,
     half: f64,
 }
 
-impl UnitCoordinates {
+impl CentredCoordinates {
     pub fn new(light: Extent) -> Self {
         let (w, h) = (f64::from(light.width), f64::from(light.height));
         Self {

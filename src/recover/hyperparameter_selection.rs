@@ -11,12 +11,12 @@ use super::bpdn::{ResidualTolerance, SparsityBasis};
 use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
 use super::gram_cache::WindowEquations;
-use super::holdout::HoldoutSplit;
+use super::holdout_split::HoldoutSplit;
 use super::pixelwise::{PixelSamples, PixelsByWindow, PixelwiseMethod, PixelwiseRecovery};
-use super::preparation_input::PreparationInput;
+use super::preparation_input::RecoveryPreparationInput;
 use super::sampling::{self, MIN_PATTERNS};
 use crate::capture::Measurements;
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::transport::{Decibels, SnrAccumulator, TileRect};
 
 /// Largest number of windows in a sample, and of pixels in each: enough to tell candidates apart by hundredths of a
@@ -32,7 +32,7 @@ impl PixelwiseRecovery {
     /// # Errors
     /// If no pixel in memory sees the light plane, and if the executor is cancelled.
     pub fn least_squares(
-        preparation: &PreparationInput<impl Executor>,
+        preparation: &RecoveryPreparationInput<impl Executor>,
     ) -> Result<Self, RecoverError> {
         preparation.executor.check_cancelled()?;
         let sample = sample_windows(preparation, LEAST_SQUARES_SAMPLE)?;
@@ -49,7 +49,7 @@ impl PixelwiseRecovery {
     /// # Errors
     /// If no pixel in memory sees the light plane, and if the executor is cancelled.
     pub fn denoising(
-        preparation: &PreparationInput<impl Executor>,
+        preparation: &RecoveryPreparationInput<impl Executor>,
         basis: SparsityBasis,
     ) -> Result<Self, RecoverError> {
         let least_squares = Self::least_squares(preparation)?;
@@ -90,7 +90,7 @@ impl PixelwiseRecovery {
     /// The noise of the measurements, by the residuals of least squares and the degrees of freedom that it leaves.
     fn fit_noise(
         &self,
-        preparation: &PreparationInput<impl Executor>,
+        preparation: &RecoveryPreparationInput<impl Executor>,
         sample: &[PixelsByWindow],
     ) -> ResidualTolerance {
         let (measurements, all) = (preparation.measurements, &preparation.split.all);
@@ -115,7 +115,7 @@ impl PixelwiseRecovery {
 
 /// Windows spread over the picture, with some of their pixels.
 fn sample_windows(
-    preparation: &PreparationInput<impl Executor>,
+    preparation: &RecoveryPreparationInput<impl Executor>,
     [max_windows, max_pixels]: [usize; 2],
 ) -> Result<Vec<PixelsByWindow>, RecoverError> {
     let geometry = &preparation.geometry;
@@ -139,7 +139,7 @@ fn sample_windows(
 /// The candidate that predicts the held-out patterns of the sample best; the first if no pattern is held out.
 fn best_of<const N: usize>(
     candidates: [PixelwiseRecovery; N],
-    preparation: &PreparationInput<impl Executor>,
+    preparation: &RecoveryPreparationInput<impl Executor>,
     sample: &[PixelsByWindow],
 ) -> PixelwiseRecovery {
     let (measurements, split) = (preparation.measurements, preparation.split);

@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 use super::args::RecoverArgs;
 use super::memory_plan::MemoryPlan;
 use crate::capture::CaptureFolder;
-use crate::cli::process::{Interrupted, InterruptibleCores};
-use crate::executor::Executor;
-use crate::recover::{HoldoutValidation, Recovery};
+use crate::cli::process_resources::{Interrupted, InterruptibleCores};
+use crate::job_executor::Executor;
+use crate::recover::{HoldoutValidation, PreparedRecovery};
 use crate::transport::Window;
 
 /// Name and version of this program.
@@ -23,7 +23,7 @@ pub const PROGRAM: &str = concat!("ltm-export ", env!("CARGO_PKG_VERSION"));
 
 /// Everything that determines the recovered tiles.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RunKey {
+pub struct CheckpointKey {
     /// Name and version of the program.
     pub program: String,
     /// `--method`.
@@ -42,7 +42,7 @@ pub struct RunKey {
     pub tiles: usize,
 }
 
-impl RunKey {
+impl CheckpointKey {
     /// The key of a recovery by `args` from `shots`. Reads all their files.
     pub fn new(
         args: &RecoverArgs,
@@ -127,7 +127,7 @@ impl FileDigest {
 /// CRC-32C of what a recovery learned or chose: its geometry, basis, weight of the common mode, and SNR on held-out
 /// patterns. Another build or machine may learn different values from the same photographs, and its tiles would not
 /// fit.
-pub fn recovery_fingerprint(recovery: &Recovery) -> u32 {
+pub fn recovery_fingerprint(recovery: &PreparedRecovery) -> u32 {
     let geometry = recovery.geometry();
     let affine = geometry.correspondence.affine.into_iter().flatten();
     let common_mode = recovery.common_mode().map(|mode| mode.weight());

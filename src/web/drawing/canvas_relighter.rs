@@ -12,7 +12,7 @@ use crate::web::CodedError;
 
 /// Draws a photograph into a canvas by one backend.
 #[wasm_bindgen]
-pub struct Relighter {
+pub struct CanvasRelighter {
     pub(in crate::web) backend: Box<dyn Backend>,
     /// The graphics device, or the instruction set of the CPU.
     pub(in crate::web) kernel: String,
@@ -21,7 +21,7 @@ pub struct Relighter {
 }
 
 #[wasm_bindgen]
-impl Relighter {
+impl CanvasRelighter {
     /// The graphics device's name, or `simd128` or `scalar` on the CPU.
     #[wasm_bindgen(getter)]
     pub fn kernel(&self) -> String {

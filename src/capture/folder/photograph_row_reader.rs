@@ -1,11 +1,11 @@
 //! One photograph as measurements, read row by row.
 
-use super::capture_png::Rgb16Rows;
+use super::capture_png::Rgb16RowReader;
+use crate::capture::camera_row_set::CameraRowSet;
 use crate::capture::error::CaptureError;
 use crate::capture::manifest::ManifestCamera;
 use crate::capture::measurements::LinearPhoto;
 use crate::capture::noise_model::NoiseModel;
-use crate::capture::row_set::RowSet;
 use crate::transport::CHANNELS;
 
 /// The photograph under no light, which is subtracted from all others.
@@ -18,22 +18,26 @@ pub struct DarkFrame {
 }
 
 /// Reads the camera rows of one photograph once, from the top down.
-pub struct CameraRowReader<'a> {
+pub struct PhotographRowReader<'a> {
     pub(super) camera: &'a ManifestCamera,
     pub(super) dark: &'a DarkFrame,
     pub(super) exposure: f64,
-    pub(super) codes: Rgb16Rows,
+    pub(super) codes: Rgb16RowReader,
     pub(super) next_row: u32,
     pub(super) saturated_samples: usize,
 }
 
-impl CameraRowReader<'_> {
+impl PhotographRowReader<'_> {
     /// Appends those of `rows` that were not read before to `photo`, as measurements minus the dark frame, NaN where
     /// saturated. Skips the rows between them.
     ///
     /// # Errors
     /// If the file is damaged or ends early.
-    pub fn read(&mut self, rows: &RowSet, photo: &mut LinearPhoto) -> Result<(), CaptureError> {
+    pub fn read(
+        &mut self,
+        rows: &CameraRowSet,
+        photo: &mut LinearPhoto,
+    ) -> Result<(), CaptureError> {
         let end = rows.strips().last().map_or(0, |strip| strip.end);
         self.read_to(end, rows, photo)
     }
@@ -43,7 +47,7 @@ impl CameraRowReader<'_> {
     /// # Errors
     /// If the file is damaged or ends early.
     pub fn finish(mut self) -> Result<usize, CaptureError> {
-        let none = RowSet::from_strips([]);
+        let none = CameraRowSet::from_strips([]);
         self.read_to(self.camera.height, &none, &mut LinearPhoto::new())?;
         self.codes.finish()?;
         Ok(self.saturated_samples)
@@ -53,7 +57,7 @@ impl CameraRowReader<'_> {
     fn read_to(
         &mut self,
         end: u32,
-        rows: &RowSet,
+        rows: &CameraRowSet,
         photo: &mut LinearPhoto,
     ) -> Result<(), CaptureError> {
         let white = self.camera.white;

@@ -3,7 +3,7 @@
 //! With every pixel and channel n scaled by its brightness `f_n`, one function h is taken for all:
 //! `min_h Σ_n q_n ‖W(y_n / f_n − P̂_n h)‖²`, `h ≥ 0`, where `P̂_n` are the patterns on the pixel's window and `q_n` is
 //! the certainty of the pixel. Brightness and function are found in turn: given h, `f_n = ȳ_n / p̄_n h`. That no pixel
-//! sees exactly h hardly matters: [`super::pattern_mismatch`] and the learned prior start from it.
+//! sees exactly h hardly matters: [`super::pattern_check`] and the learned prior start from it.
 
 use std::ops::Range;
 
@@ -11,11 +11,11 @@ use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
 use super::nnls::Nnls;
 use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns};
-use super::pattern_mismatch;
-use super::preparation_input::PreparationInput;
-use super::sampling::{self, PixelsOfWindow};
+use super::pattern_check;
+use super::preparation_input::RecoveryPreparationInput;
+use super::sampling::{self, PixelsSharingWindow};
 use crate::capture::Measurements;
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::linalg::{add_scaled, vectorise};
 use crate::transport::{CHANNELS, LightElement, TileRect, Window};
 
@@ -49,7 +49,7 @@ pub(super) fn sample_squares(measurements: &Measurements) -> Vec<TileRect> {
 /// # Errors
 /// If the photographs are dark or overexposed, if they do not match their patterns, and if the executor is cancelled.
 pub(super) fn mean_function(
-    preparation: &PreparationInput<impl Executor>,
+    preparation: &RecoveryPreparationInput<impl Executor>,
 ) -> Result<Vec<f64>, RecoverError> {
     let squares = sample_squares(preparation.measurements);
     let area = preparation.geometry.window.area();
@@ -64,13 +64,13 @@ pub(super) fn mean_function(
         mean = function.iter().map(|m| m / sum).collect();
     }
     preparation.executor.check_cancelled()?;
-    pattern_mismatch::check_patterns(preparation, &mean, &squares)?;
+    pattern_check::check_patterns(preparation, &mean, &squares)?;
     Ok(mean)
 }
 
 /// Estimates every pixel's brightness with the function `mean`, then the function of all pixels, `[slot]`.
 fn fit_round(
-    preparation: &PreparationInput<impl Executor>,
+    preparation: &RecoveryPreparationInput<impl Executor>,
     squares: &[TileRect],
     mean: &[f64],
 ) -> Vec<f64> {
@@ -108,10 +108,10 @@ fn fit_round(
 #[inline(always)]
 fn add_window(
     sums: &mut NormalEquations,
-    preparation: &PreparationInput<impl Executor>,
+    preparation: &RecoveryPreparationInput<impl Executor>,
     mean: &[f64],
     origin: LightElement,
-    pixels: &PixelsOfWindow,
+    pixels: &PixelsSharingWindow,
 ) {
     let (measurements, training) = (preparation.measurements, &preparation.split.training);
     let elements: Vec<_> = preparation.geometry.elements_of_window(origin).collect();
@@ -153,7 +153,7 @@ impl PooledMeasurements {
     pub fn new(
         measurements: &Measurements,
         pattern_indices: &[usize],
-        pixels: &PixelsOfWindow,
+        pixels: &PixelsSharingWindow,
         channels: Range<usize>,
         level: f64,
     ) -> Self {
@@ -195,13 +195,13 @@ fn dark_or_overexposed(measurements: &Measurements, squares: &[TileRect]) -> Rec
 
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests {
-    use super::super::holdout::HoldoutSplit;
+    use super::super::holdout_split::HoldoutSplit;
     use super::super::test_problems::SyntheticCapture;
     use super::*;
-    use crate::executor::SequentialExecutor;
+    use crate::job_executor::SequentialExecutor;
 
     fn fit(capture: &SyntheticCapture) -> Result<Vec<f64>, RecoverError> {
-        mean_function(&PreparationInput {
+        mean_function(&RecoveryPreparationInput {
             measurements: &capture.measurements,
             geometry: capture.geometry,
             split: &HoldoutSplit::new(&capture.measurements.patterns),

@@ -1,23 +1,23 @@
 //! A graphics device with the pipelines that run on it.
 
-use super::api::{API, ComputePipeline, DeviceQueue, RenderPipeline};
+use super::api::{API, ComputePipeline, DeviceAndQueue, RenderPipeline};
 use super::shader::SHADER;
 use crate::relight::backend::BackendError;
 use crate::relight::texture_layout::TextureFormat;
 
 /// A device that any number of photographs share.
 #[derive(Debug)]
-pub struct Device {
-    pub(super) gpu: DeviceQueue,
+pub struct GpuContext {
+    pub(super) gpu: DeviceAndQueue,
     /// Format of the pictures.
     pub(super) format: TextureFormat,
     pub(super) pipelines: Pipelines,
 }
 
-impl Device {
+impl GpuContext {
     /// The system's preferred device, for pictures of a format.
     pub(super) async fn open(format: TextureFormat) -> Result<Self, BackendError> {
-        let gpu = DeviceQueue::open().await?;
+        let gpu = DeviceAndQueue::open().await?;
         let pipelines = gpu.catch_errors(|| Pipelines::new(&gpu, format)).await;
         let pipelines = pipelines.map_err(|reason| {
             gpu.device.destroy();
@@ -73,7 +73,7 @@ pub(super) struct Pipelines {
 }
 
 impl Pipelines {
-    fn new(gpu: &DeviceQueue, format: TextureFormat) -> Self {
+    fn new(gpu: &DeviceAndQueue, format: TextureFormat) -> Self {
         let module = gpu.create_shader_module(SHADER);
         let fullscreen = |entry_point, format| {
             gpu.create_render_pipeline(&module, "fullscreen", entry_point, format)

@@ -2,16 +2,16 @@
 
 use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
-use super::holdout::HoldoutSplit;
+use super::holdout_split::HoldoutSplit;
 use super::holdout_validation::HoldoutValidation;
 use super::learned::LearnedRecovery;
+use super::mean_function;
 use super::method::Method;
 use super::pixelwise::PixelwiseRecovery;
-use super::pooled;
-use super::preparation_input::{self, PreparationInput};
+use super::preparation_input::{self, RecoveryPreparationInput};
 use super::sampling::MIN_PATTERNS;
 use crate::capture::Measurements;
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 use crate::transport::{Basis, FloatTile, Geometry, TileRect, Window};
 
 /// The options of a recovery.
@@ -26,7 +26,7 @@ pub struct RecoverySettings {
 /// A recovery that is ready to run. All that depends on the measurements as a whole has been learned or chosen; tiles
 /// can then be recovered one by one, in any order.
 #[derive(Debug)]
-pub struct Recovery {
+pub struct PreparedRecovery {
     geometry: Geometry,
     split: HoldoutSplit,
     solver: TileSolver,
@@ -39,7 +39,7 @@ enum TileSolver {
     Pixelwise(PixelwiseRecovery),
 }
 
-impl Recovery {
+impl PreparedRecovery {
     /// Learns and chooses from `measurements` what the method needs. They may hold strips of the picture instead of all
     /// of it; only [covered](Measurements::has_tile) tiles are then used.
     ///
@@ -57,14 +57,14 @@ impl Recovery {
             return Err(RecoverError::TooFewPatterns(patterns));
         }
         let split = HoldoutSplit::new(&measurements.patterns);
-        let preparation = PreparationInput {
+        let preparation = RecoveryPreparationInput {
             measurements,
             geometry,
             split: &split,
             executor,
         };
         // Also checks that the photographs match their patterns, for every method.
-        let mean = pooled::mean_function(&preparation)?;
+        let mean = mean_function::mean_function(&preparation)?;
         let solver = match settings.method {
             Method::Learned => {
                 TileSolver::Learned(Box::new(LearnedRecovery::new(&preparation, &mean)?))

@@ -1,12 +1,12 @@
 //! y = pT under many lights at once, while a tile's transport is in memory.
 
 use super::pattern_image::{PatternImage, emission};
-use crate::transport::{CHANNELS, Extent, Geometry, TileFunctions};
+use crate::transport::{CHANNELS, Extent, Geometry, TileTransportFunctions};
 
 /// Emissions under many lights, `[M, columns]`: one column for each grey light, three for each RGB light. The
 /// emissions of one element are contiguous, so that the sums over elements are vector operations.
 #[derive(Clone, Debug)]
-pub struct PatternMatrix {
+pub struct EmissionMatrix {
     light: Extent,
     columns: usize,
     emissions: Vec<f32>,
@@ -14,7 +14,7 @@ pub struct PatternMatrix {
     channels: Vec<[usize; CHANNELS]>,
 }
 
-impl PatternMatrix {
+impl EmissionMatrix {
     /// The emissions of `lights`, each of `light.area()` elements.
     pub fn new(light: Extent, lights: &[PatternImage]) -> Self {
         let mut channels = Vec::with_capacity(lights.len());
@@ -52,7 +52,7 @@ impl PatternMatrix {
     pub fn pictures(
         &self,
         geometry: &Geometry,
-        functions: &TileFunctions,
+        functions: &TileTransportFunctions,
     ) -> Vec<Vec<[f32; CHANNELS]>> {
         let pixels = functions.rect.extent.area();
         let area = geometry.window.area();

@@ -5,9 +5,10 @@ use rayon::prelude::*;
 
 use super::progress;
 use crate::capture::{
-    CameraRowReader, CaptureError, CaptureFolder, DarkFrame, Measurements, NoiseModel, RowSet,
+    CameraRowSet, CaptureError, CaptureFolder, DarkFrame, Measurements, NoiseModel,
+    PhotographRowReader,
 };
-use crate::executor::Executor;
+use crate::job_executor::Executor;
 
 /// Reads the patterns of `shots` and the correspondence, by `gray_code_rows` of the Gray code if the manifest does not
 /// give it. The measurements have no camera rows yet.
@@ -15,7 +16,7 @@ pub fn read_patterns(
     folder: &CaptureFolder,
     dark: &DarkFrame,
     shots: &[usize],
-    gray_code_rows: &RowSet,
+    gray_code_rows: &CameraRowSet,
 ) -> Result<Measurements> {
     let correspondence = match folder.manifest().correspondence {
         Some(correspondence) => correspondence,
@@ -30,11 +31,11 @@ pub fn read_patterns(
 }
 
 /// The opened photographs of some shots.
-pub struct ShotReader<'a> {
-    photos: Vec<CameraRowReader<'a>>,
+pub struct MeasurementReader<'a> {
+    photos: Vec<PhotographRowReader<'a>>,
 }
 
-impl<'a> ShotReader<'a> {
+impl<'a> MeasurementReader<'a> {
     /// Opens the photographs of `shots`.
     pub fn open(
         folder: &'a CaptureFolder,
@@ -52,7 +53,7 @@ impl<'a> ShotReader<'a> {
     pub fn load_rows(
         &mut self,
         measurements: &mut Measurements,
-        rows: &RowSet,
+        rows: &CameraRowSet,
         check: impl Fn() -> Result<()> + Sync,
     ) -> Result<()> {
         let width = measurements.camera.width as usize;
@@ -76,7 +77,7 @@ impl<'a> ShotReader<'a> {
     pub fn read_sample(
         mut self,
         measurements: &mut Measurements,
-        rows: &RowSet,
+        rows: &CameraRowSet,
         executor: &impl Executor,
     ) -> Result<usize> {
         let bar = progress::bar("reading", self.photos.len());
@@ -85,7 +86,7 @@ impl<'a> ShotReader<'a> {
             Ok(executor.check_cancelled()?)
         })?;
         drop(bar);
-        let saturated = self.photos.into_par_iter().map(CameraRowReader::finish);
+        let saturated = self.photos.into_par_iter().map(PhotographRowReader::finish);
         let saturated = saturated.try_reduce(|| 0, |a, b| Ok(a + b))?;
         measurements.noise = NoiseModel::with_gain_from(measurements);
         Ok(saturated)

@@ -1,7 +1,7 @@
 /** Creates renderers for the CPU, with or without workers: a separate script with its own copies of shared code. */
 
-import type { CpuModule, Gamut } from '../../engine/types.js';
-import type { Photograph } from '../../photo/photograph.js';
+import type { CpuModule, Gamut } from '../../engine/wasm-exports.js';
+import type { LoadedPhotograph } from '../../photo/photograph.js';
 import { hasCode, messageOf } from '../../shared/errors.js';
 import type { Renderer } from '../types.js';
 import { createMainThreadRenderer } from './main-thread-renderer.js';
@@ -10,16 +10,16 @@ import { createWorkerRenderer } from './worker-renderer.js';
 
 export { WorkerPool } from './worker-pool.js';
 
-export type CpuRenderers = ReturnType<typeof cpuRenderers>;
+export type CpuRendererFactory = ReturnType<typeof cpuRenderers>;
 
 export function cpuRenderers(pool: WorkerPool) {
   // Photographs that were drawn on the page's thread, and why. They stay there, because the page's renderer may still
   // need the tiles.
-  const warnings = new WeakMap<Photograph, string>();
+  const warnings = new WeakMap<LoadedPhotograph, string>();
   return {
     async create(
       module: CpuModule,
-      photograph: Photograph,
+      photograph: LoadedPhotograph,
       gamut: Gamut,
       signal: AbortSignal,
     ): Promise<Renderer> {
