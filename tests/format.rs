@@ -1092,3 +1092,39 @@ fn bytes_after_a_gap_are_refused() {
     assert!(matches!(error, FormatError::Gap { expected, .. } if expected == start + 3));
     assert_eq!(index.scans[0].coding, ScanCoding::Transform);
 }
+
+#[test]
+fn a_chunk_that_does_not_decode_is_an_error_and_its_scan_is_never_complete() {
+    for file in small_files() {
+        let chunks: Vec<ChunkId> = read(&file, file.len())
+            .unwrap()
+            .index()
+            .unwrap()
+            .chunks()
+            .collect();
+        for chunk in chunks {
+            // With a correct checksum, so that decoding alone can find the fault.
+            let damaged = sealed(file.clone(), |f| {
+                let index = read(f, f.len()).unwrap().index().unwrap().clone();
+                let range = index.range(chunk);
+                f[range.start as usize..range.end as usize].fill(0xff);
+            });
+            let mut reader = LtmReader::new(Limits::default());
+            let mut errors = Vec::new();
+            while let Some(range) = reader.wants(&ChunkSelection::default()).first() {
+                let end = (damaged.len() as u64).min(range.end);
+                let bytes = &damaged[range.start as usize..end as usize];
+                errors.extend(reader.feed(range.start, bytes).err());
+                assert!(errors.len() < 2, "{errors:?}");
+            }
+            let in_chunk = |error: &FormatError| matches!(error, FormatError::DamagedSection { section, .. } if *section == SectionName::Chunk(chunk));
+            assert!(
+                errors.iter().all(in_chunk) && errors.len() == 1,
+                "{chunk:?}: {errors:?}"
+            );
+            assert!(reader.progress().scans <= chunk.scan, "{chunk:?}");
+            let error = reader.finish().map(|_| ()).unwrap_err();
+            assert!(in_chunk(&error), "{error}");
+        }
+    }
+}

@@ -354,6 +354,17 @@ test.describe('the controls', () => {
     );
   });
 
+  test('come back as the pointer moves, under any light', async ({ openPage }) => {
+    const { page, at } = await visit(openPage, { controls: '' });
+    const opacity = "getComputedStyle(photo.shadowRoot.querySelector('[role=toolbar]')).opacity";
+    const point = at(0.3, 0.3);
+    await page.mouse.move(point.x, point.y);
+    await page.evaluate("photo.setLight('flood')");
+    await waitUntil(page, `${opacity} === '0'`);
+    await page.mouse.move(point.x + 10, point.y + 10);
+    await waitUntil(page, `${opacity} === '1'`);
+  });
+
   test('enter and leave full screen', async ({ openPage }) => {
     const { page } = await visit(openPage, { controls: '' });
     await page.getByRole('button', { name: 'Full screen' }).click();
@@ -453,6 +464,20 @@ test.describe('kiosk mode', () => {
     await page.clock.fastForward(6_000);
     await waitUntil(page, "photo.activeLight === 'torch' && photo.view.zoom === 1");
     expect(await torchOf(page)).toBeNull();
+  });
+
+  test('rests only while the toolbar does', async ({ openPage }) => {
+    const attributes = { kiosk: '5', zoom: '', controls: '' };
+    const { page } = await visit(openPage, attributes, { fakeClock: true });
+    const zoomIn = page.getByRole('button', { name: 'Zoom in' });
+    await zoomIn.click();
+    await page.clock.fastForward(4_000);
+    await zoomIn.click();
+    await page.clock.fastForward(4_000);
+    await waitForFrames(page);
+    expect((await viewOf(page)).zoom, 'eight seconds after the first press').toBeGreaterThan(1);
+    await page.clock.fastForward(2_000);
+    await waitUntil(page, 'photo.view.zoom === 1');
   });
 });
 
