@@ -50,7 +50,7 @@ const watch = () => {
   times.shown = new Promise((resolve) => {
     const look = () => {
       const photo = /** @type {any} */ (document.querySelector('relightable-photo'));
-      if (photo?.detail) resolve(performance.now() - times.began);
+      if (photo?.quality) resolve(performance.now() - times.began);
       else requestAnimationFrame(look);
     };
     look();

@@ -2,7 +2,7 @@
 
 import { devices, drawCount, drawn, waitForScreen } from './hooks.js';
 
-/** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
+/** @typedef {import('../../www/src/index.js').RelightablePhotoElement} RelightablePhotoElement */
 /** @typedef {'video' | 'torch' | 'exposure' | 'canvas'} KindName */
 
 /** Number of different lights that the frames alternate between. */
@@ -23,7 +23,7 @@ const SHOWN = '256px';
  *
  * @param {string} src
  * @param {string | null} backend
- * @returns {Promise<RelightablePhoto>}
+ * @returns {Promise<RelightablePhotoElement>}
  */
 export async function mount(src, backend) {
   await customElements.whenDefined('relightable-photo');
@@ -45,7 +45,7 @@ export async function mount(src, backend) {
 /** A number from 0 to 1. */
 const noise = () => Math.random();
 
-/** @type {Record<KindName, (photo: RelightablePhoto) => (frame: number) => void>} */
+/** @type {Record<KindName, (photo: RelightablePhotoElement) => (frame: number) => void>} */
 const KINDS = {
   /** Changes every light element, in colour, in each frame. */
   video(photo) {
@@ -54,7 +54,7 @@ const KINDS = {
       Float32Array.from({ length: 3 * width * height }, noise),
     );
     const source = { data: films[0], width, height };
-    photo.lightSource = /** @type {any} */ (source);
+    photo.light = /** @type {any} */ (source);
     return (frame) => {
       source.data = films[frame % LIGHTS];
       photo.lightChanged();
@@ -73,14 +73,13 @@ const KINDS = {
     });
     const canvas = Object.assign(document.createElement('canvas'), CANVAS);
     const context = canvas.getContext('2d');
-    photo.lightSource = canvas;
+    photo.light = canvas;
     return (frame) => {
       context?.drawImage(/** @type {ImageBitmap} */ (films[frame % LIGHTS]), 0, 0);
       photo.lightChanged();
     };
   },
   torch(photo) {
-    photo.lightSource = null;
     photo.light = 'torch';
     return (frame) => {
       photo.torch = { x: 0.3 + 0.04 * (frame % LIGHTS), y: 0.5 };
@@ -98,7 +97,7 @@ const KINDS = {
  * Waits until the picture is complete. A WebGPU device reports that. For other canvases, another canvas reads one
  * pixel: browsers move a 2D canvas out of graphics memory when the page reads the canvas itself.
  *
- * @param {RelightablePhoto} photo
+ * @param {RelightablePhotoElement} photo
  */
 async function finished(photo) {
   if (photo.activeBackend === 'webgpu') {
@@ -108,7 +107,7 @@ async function finished(photo) {
   readPixel(canvasOf(photo));
 }
 
-/** @param {RelightablePhoto} photo */
+/** @param {RelightablePhotoElement} photo */
 const canvasOf = (photo) =>
   /** @type {HTMLCanvasElement} */ (photo.shadowRoot?.querySelector('canvas'));
 
@@ -124,7 +123,7 @@ function readPixel(canvas) {
  * Draws frames of a kind one after the other for some seconds. Returns milliseconds from each change until the element
  * has drawn (`issued`) and until the picture is complete (`done`).
  *
- * @param {RelightablePhoto} photo
+ * @param {RelightablePhotoElement} photo
  * @param {KindName} name
  * @param {number} seconds
  */
@@ -140,8 +139,8 @@ export async function time(photo, name, seconds) {
     if (i >= FEWEST ? passed > seconds : passed > LONGEST * seconds) break;
     // Each frame differs from the one before, the first included.
     const { issued, done } = await frame(photo, change, i + 2);
-    if (photo.detail !== 1)
-      throw new Error(`a frame was drawn by ${photo.detail} of the components`);
+    if (photo.quality !== 1)
+      throw new Error(`a frame was drawn by ${photo.quality} of the components`);
     times.issued.push(issued);
     times.done.push(done);
     if (done > SLOW_MS) await new Promise((resolve) => setTimeout(resolve, REST_MS));
@@ -160,7 +159,7 @@ async function settled() {
 }
 
 /**
- * @param {RelightablePhoto} photo
+ * @param {RelightablePhotoElement} photo
  * @param {(frame: number) => void} change
  * @param {number} i
  */
@@ -177,7 +176,7 @@ async function frame(photo, change, i) {
 /**
  * Draws `count` frames without waiting for the screen.
  *
- * @param {RelightablePhoto} photo
+ * @param {RelightablePhotoElement} photo
  * @param {KindName} name
  * @param {number} count
  */
@@ -192,7 +191,7 @@ export async function draw(photo, name, count) {
  * Returns milliseconds a frame when several frames are drawn before one wait. If that is about the time of a frame with
  * its own wait, waiting really waits.
  *
- * @param {RelightablePhoto} photo
+ * @param {RelightablePhotoElement} photo
  * @param {KindName} name
  * @param {number} each
  */
@@ -215,7 +214,7 @@ export async function timeTogether(photo, name, each) {
   return times;
 }
 
-/** Returns milliseconds of a wait for a complete picture: the measurement's overhead. @param {RelightablePhoto} photo */
+/** Returns milliseconds of a wait for a complete picture: the measurement's overhead. @param {RelightablePhotoElement} photo */
 export async function timeWaiting(photo) {
   const times = [];
   for (let i = 0; i < FEWEST; i += 1) {
@@ -229,7 +228,7 @@ export async function timeWaiting(photo) {
 /**
  * Returns the frames a second that the page shows, at most one for each frame of the screen.
  *
- * @param {RelightablePhoto} photo
+ * @param {RelightablePhotoElement} photo
  * @param {KindName} name
  * @param {number} seconds
  */

@@ -1,13 +1,14 @@
-/** Each failure produces an error event with a code, and shows a message. */
+/** Failures are errors with a message on the picture's place if there is no picture, and otherwise only warnings. */
 
 import { expect, test } from './fixtures.js';
 import {
-  alertOf,
   capturePicture,
+  countEvents,
   mountPhoto,
   openAlertDetails,
   skipPausesUntil,
   waitForEvents,
+  waitForWarning,
   waitUntil,
 } from './page-helpers.js';
 import { DAMAGED, nativePicture } from './test-photos.js';
@@ -116,45 +117,57 @@ test.describe('an invalid attribute', () => {
       'attribute',
       /“1e300”.* 1e\+30/,
     ],
-    ['whose src is no URL', { src: 'http://[' }, 'attribute', /“http:\/\/\[”/],
-    ['that is a missing src', {}, 'src-missing', /set the src attribute/],
   ];
-  test('causes an error', async ({ openPage, step }) => {
+  test('causes a warning in an event and in the console, not on the picture', async ({
+    openPage,
+    step,
+  }) => {
     const page = await openPage('/blank');
+    /** @type {string[]} */
+    const logged = [];
+    page.on('console', (message) => logged.push(`${message.type()} ${message.text()}`));
     for (const [what, attributes, code, text] of cases) {
       await step(`an attribute ${what} causes ${code}`, async () => {
         await page.goto('/plain');
         await mountPhoto(page, attributes);
-        expect(await expectError(page, code)).toMatch(text);
+        const warning = await waitForWarning(page);
+        expect(warning['code']).toBe(code);
+        expect(String(warning['message'])).toMatch(text);
+        expect(logged.at(-1)).toBe(`warning <relightable-photo> ${code}: ${warning['message']}`);
+        await waitForEvents(page, 'load');
       });
     }
   });
 
-  test('keeps the picture, and a valid value removes the message', async ({ openPhoto }) => {
-    const page = await openPhoto({ src: '/photos/glass.ltm', light: 'flood' });
-    await page.evaluate("photo.light = 'moon'");
-    await expectError(page, 'attribute');
-    expect(await page.locator('relightable-photo canvas').count()).toBe(1);
-    await page.evaluate("photo.light = 'stripes'");
-    await alertOf(page).waitFor({ state: 'hidden' });
-    const photoEvents = await page.evaluate('photoEvents');
-    expect(photoEvents.filter((/** @type {any} */ e) => e.type === 'error').length).toBe(1);
+  test('of the address causes an error if there is no picture', async ({ openPage, step }) => {
+    const page = await openPage('/blank');
+    for (const [attributes, code, text] of /** @type {const} */ ([
+      [{ src: 'http://[' }, 'attribute', /“http:\/\/\[”/],
+      [{}, 'src-missing', /set the src attribute/],
+    ])) {
+      await step(code, async () => {
+        await page.goto('/plain');
+        await mountPhoto(page, attributes);
+        expect(await expectError(page, code)).toMatch(text);
+        expect(await countEvents(page, 'warning')).toBe(0);
+      });
+    }
   });
 
   test('does not affect the other attributes', async ({ openPage }) => {
     const page = await openPage('/plain');
     await mountPhoto(page, { src: '/photos/glass.ltm', light: 'moon', exposure: 'much' });
     await waitForEvents(page, 'load');
-    await page.evaluate("photo.light = 'torch', photo.torch = { x: 0.2, y: 0.4 }");
+    await page.evaluate("photo.setAttribute('light', 'torch'), photo.torch = { x: 0.2, y: 0.4 }");
     await page.evaluate("photo.tone = 'hdr', photo.src = 'http://['");
-    await waitUntil(page, "photoEvents.filter(({ type }) => type === 'error').length === 4");
+    await waitUntil(page, "photoEvents.filter(({ type }) => type === 'warning').length === 4");
     const photoEvents = await page.evaluate('photoEvents');
-    const told = photoEvents.filter((/** @type {any} */ e) => e.type === 'error');
+    const told = photoEvents.filter((/** @type {any} */ e) => e.type === 'warning');
     expect(told.map((/** @type {any} */ e) => /“(.*?)”/.exec(e.message)?.[1])).toStrictEqual([
       'moon',
       'much',
-      'hdr',
       'http://[',
+      'hdr',
     ]);
     const changes = photoEvents.filter((/** @type {any} */ e) => e.type === 'lightchange');
     expect(changes.at(-1)?.torch).toStrictEqual({ x: 0.2, y: 0.4 });
@@ -191,9 +204,9 @@ test.describe('a page', () => {
       light: 'stripes',
     });
     const photoEvents = await waitForEvents(page, 'load');
-    const error = photoEvents.find(({ type }) => type === 'error');
-    expect(error?.['code']).toBe('light-source');
-    expect(String(error?.['message'])).toMatch(/relightable-photo-sources\.js/);
+    const warning = photoEvents.find(({ type }) => type === 'warning');
+    expect(warning?.['code']).toBe('light-source');
+    expect(String(warning?.['message'])).toMatch(/relightable-photo-sources\.js/);
     const want = nativePicture('stripes');
     expect(await capturePicture(page)).toMatchPicture(want, 1);
   });
@@ -205,10 +218,21 @@ test.describe('a page', () => {
     await page.route('**/relightable-photo-controls.js', (route) => route.abort());
     await mountPhoto(page, { src: '/photos/glass.ltm', controls: '', light: 'stripes' });
     await waitForEvents(page, 'load');
-    const error = (await waitForEvents(page, 'error')).find(({ type }) => type === 'error');
-    expect(error?.['code']).toBe('controls-unavailable');
+    expect((await waitForWarning(page))['code']).toBe('controls-unavailable');
     const want = nativePicture('stripes');
     expect(await capturePicture(page)).toMatchPicture(want, 1);
+  });
+
+  test('without the script for input causes input-unavailable and still draws', async ({
+    openPage,
+  }) => {
+    const page = await openPage('/plain');
+    await page.route('**/relightable-photo-input.js', (route) => route.abort());
+    await mountPhoto(page, { src: '/photos/glass.ltm', light: 'stripes' });
+    await waitForEvents(page, 'load');
+    expect((await waitForWarning(page))['code']).toBe('input-unavailable');
+    expect(await capturePicture(page)).toMatchPicture(nativePicture('stripes'), 1);
+    expect(await page.evaluate('photo.requestTilt()')).toBe(false);
   });
 
   for (const [what, policy, code, text] of /** @type {const} */ ([

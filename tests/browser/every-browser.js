@@ -101,7 +101,7 @@ export function testEveryBrowser(test, browser) {
             const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
             context.fillStyle = 'rgb(255 255 255 / 0.2)';
             context.fillRect(0, 0, 40, 30);
-            /** @type {any} */ (globalThis).photo.lightSource = canvas;
+            /** @type {any} */ (globalThis).photo.light = canvas;
           });
           const fifth = nativePicture('flood', { exposure: 0.2 });
           expect(await capturePicture(page), 'the canvas').toMatchPicture(fifth, 1);
@@ -109,7 +109,7 @@ export function testEveryBrowser(test, browser) {
             const video = document.createElement('video');
             Object.assign(video, { muted: true, playsInline: true, src: '/film.webm' });
             Object.assign(globalThis, { video });
-            /** @type {any} */ (globalThis).photo.lightSource = video;
+            /** @type {any} */ (globalThis).photo.light = video;
           });
           const colour = async () =>
             dominantColour(await (canReadScreen ? screenPicture(page) : capturePicture(page)));
@@ -257,13 +257,14 @@ export function testEveryBrowser(test, browser) {
             const loads = Array.from({ length: count }, (_, i) => {
               const photo = document.createElement('relightable-photo');
               const light = lights[i % lights.length];
-              const still = { loading: 'eager', paused: true };
+              const still = { loading: 'eager' };
               Object.assign(photo, { src: `${src}?${i}`, backend, light, ...still });
               Object.assign(photo.style, { width: '64px', float: 'left' });
               const load = new Promise((resolve, reject) => {
                 photo.addEventListener('load', resolve);
                 photo.addEventListener('error', ({ message }) => reject(new Error(message)));
               });
+              photo.pause();
               document.body.append(photo);
               return load;
             });

@@ -59,7 +59,7 @@ test.describe('the gallery', () => {
     await waitUntilDrawn(page);
 
     await step('it has a radio button for each light, for pointer and keyboard', async () => {
-      const light = () => page.evaluate("document.getElementById('photo').light");
+      const light = () => page.evaluate("document.getElementById('photo').activeLight");
       expect(await light()).toBe('fire');
       for (const name of ['Torch', 'Flood', 'Checkerboard', 'Spectrum', 'Stripes']) {
         await page.getByRole('radio', { name }).check();
@@ -116,7 +116,7 @@ test.describe('the gallery', () => {
       const buffer = encodePng({ width: 10, height: 1, data });
       const file = { name: 'half.png', mimeType: 'image/png', buffer };
       await page.getByLabel('an image or video').setInputFiles(file);
-      await page.waitForFunction(() => document.querySelector('relightable-photo')?.lightSource);
+      await page.waitForFunction(() => document.querySelector('relightable-photo')?.light);
       expect(await page.getByRole('radio', { checked: true }).count()).toBe(0);
       await expect.poll(async () => (await brightnessOf(page)).x).toBeLessThan(before.x - 0.1);
       const half = await brightnessOf(page);
@@ -132,7 +132,7 @@ test.describe('the gallery', () => {
       const film = join(import.meta.dirname, '../fixtures/red-then-blue.webm');
       await page.getByLabel('an image or video').setInputFiles(film);
       await page.waitForFunction(
-        () => document.querySelector('relightable-photo')?.lightSource instanceof HTMLVideoElement,
+        () => document.querySelector('relightable-photo')?.light instanceof HTMLVideoElement,
       );
       const colour = async () => dominantColour(await screenPicture(page, '#photo'));
       await expect.poll(colour).toBe('red');
@@ -141,12 +141,12 @@ test.describe('the gallery', () => {
 
     await step('the camera, which stops afterwards', async () => {
       await page.getByRole('button', { name: 'your camera' }).click();
-      await waitUntil(page, 'document.getElementById("photo").lightSource === stream');
+      await waitUntil(page, 'document.getElementById("photo").light === stream');
       const state = () => page.evaluate('stream.getVideoTracks()[0].readyState');
       expect(await state()).toBe('live');
       await page.getByRole('radio', { name: 'Stripes' }).check();
       expect(await state()).toBe('ended');
-      expect(await page.evaluate("document.getElementById('photo').lightSource")).toBeNull();
+      expect(await page.evaluate("document.getElementById('photo').light")).toBeNull();
     });
   });
 

@@ -29,7 +29,7 @@ async function visit(openPage, attributes, options) {
   await mountPhoto(page, { ...GLASS, ...attributes });
   await page.evaluate("photo.style.width = '320px'");
   await waitForLoad(page);
-  await waitUntil(page, 'photo.detail === 1');
+  await waitUntil(page, 'photo.quality === 1');
   return { page, at: await pointOf(page) };
 }
 
@@ -71,6 +71,65 @@ const DOUBLE_TAP_GAP_MS = 1000;
 /** Longer than visitors rest before autoplay starts again. */
 const REST_MS = 20_000;
 const TOUCH = { hasTouch: true, viewport: { width: 400, height: 600 } };
+
+test.describe('the first input', () => {
+  /**
+   * Opens a page whose script for input arrives when `arrive` is called.
+   *
+   * @param {import('./fixtures.js').OpenPage} openPage
+   * @param {import('./fixtures.js').PageOptions} [options]
+   */
+  async function visitEarly(openPage, options) {
+    const page = await openPage('/plain', options);
+    let arrive = () => {};
+    /** @type {Promise<void>} */
+    const held = new Promise((resolve) => {
+      arrive = resolve;
+    });
+    await page.route('**/relightable-photo-input.js', async (route) => {
+      await held;
+      await route.continue();
+    });
+    await mountPhoto(page, GLASS);
+    await page.evaluate("photo.style.width = '320px'");
+    await waitForLoad(page);
+    return { page, arrive, at: await pointOf(page) };
+  }
+
+  test('of a mouse and of keys before their script is not lost', async ({ openPage }) => {
+    const { page, arrive, at } = await visitEarly(openPage);
+    await page.evaluate(() => {
+      /** @type {string[]} */
+      const heard = [];
+      for (const type of ['pointerdown', 'keydown']) {
+        addEventListener(type, (event) => heard.push(event.type));
+      }
+      Object.assign(globalThis, { heard });
+    });
+    const { x, y } = at(0.25, 0.75);
+    await page.mouse.click(x, y);
+    await page.getByRole('slider').focus();
+    await page.keyboard.press('ArrowRight');
+    expect(await torchOf(page)).toBeNull();
+    arrive();
+    await waitUntil(page, 'photo.torch !== null');
+    expect(await torchOf(page)).toStrictEqual({ x: 0.3, y: 0.75 });
+    const heard = await page.evaluate('heard');
+    expect(heard.filter((/** @type {string} */ type) => type === 'pointerdown').length).toBe(1);
+  });
+
+  test('of a finger that is still down goes on', async ({ openPage }) => {
+    const { page, arrive, at } = await visitEarly(openPage, TOUCH);
+    const touch = await touchInput(page);
+    await touch('touchStart', at(0.25, 0.5));
+    arrive();
+    await waitUntil(page, 'photo.torch !== null');
+    expect((await torchOf(page))?.x).toBeCloseTo(0.25, 2);
+    await touch('touchMove', at(0.75, 0.5));
+    await waitUntil(page, 'photo.torch.x > 0.7');
+    await touch('touchEnd');
+  });
+});
 
 test.describe('zooming', () => {
   test('with the wheel keeps the point under the pointer, and the light', async ({ openPage }) => {
@@ -281,9 +340,10 @@ test.describe('the keyboard', () => {
     await page.keyboard.press('[');
     await page.keyboard.press('[');
     expect(await light()).toBe('flood');
-    expect(await page.evaluate('photo.light'), 'the attribute keeps the page’s value').toBe(
-      'torch',
-    );
+    expect(
+      await page.evaluate("photo.getAttribute('light')"),
+      'the attribute keeps the page’s value',
+    ).toBe('torch');
     await page.keyboard.press(']');
     expect(await page.getByRole('slider').evaluate((e) => e.matches(':focus'))).toBeTruthy();
     await page.keyboard.press('[');
@@ -359,7 +419,7 @@ test.describe('the controls', () => {
     const opacity = "getComputedStyle(photo.shadowRoot.querySelector('[role=toolbar]')).opacity";
     const point = at(0.3, 0.3);
     await page.mouse.move(point.x, point.y);
-    await page.evaluate("photo.setLight('flood')");
+    await page.evaluate("photo.light = 'flood'");
     await waitUntil(page, `${opacity} === '0'`);
     await page.mouse.move(point.x + 10, point.y + 10);
     await waitUntil(page, `${opacity} === '1'`);
@@ -402,7 +462,7 @@ test.describe('fire', () => {
     const { page } = await visit(openPage, { light: 'fire', controls: '' });
     const first = await screenshot(page);
     await expect.poll(async () => first.equals(await screenshot(page))).toBe(false);
-    await page.evaluate('photo.paused = true');
+    await page.evaluate('photo.pause()');
     await capturePicture(page);
     await waitForFrames(page, 5);
     const paused = await screenshot(page);
@@ -416,7 +476,7 @@ test.describe('fire', () => {
     const before = await capturePicture(calm);
     await waitForFrames(calm);
     expect(await capturePicture(calm)).toMatchPicture(before, 0);
-    await calm.evaluate('photo.paused = false');
+    await calm.evaluate('photo.play()');
     await expect(async () => {
       expect(await capturePicture(calm)).not.toMatchPicture(before, 0);
     }).toPass();

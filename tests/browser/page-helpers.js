@@ -3,7 +3,7 @@
 import { expect } from '@playwright/test';
 import { decodePng } from '../../www/tools/pictures.js';
 
-/** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
+/** @typedef {import('../../www/src/index.js').RelightablePhotoElement} RelightablePhotoElement */
 /** @typedef {import('@playwright/test').Page} Page */
 /** @typedef {import('./any-browser.js').AnyPage} AnyPage */
 /** @typedef {{ type: string } & Record<string, unknown>} ElementEvent an event of the element, as data */
@@ -22,11 +22,10 @@ export async function mountPhoto(page, attributes) {
     /** @type {ElementEvent[]} */
     const photoEvents = [];
     const changes = ['lightchange', 'viewchange', 'backendchange', 'contextlost', 'qualitychange'];
-    for (const type of ['load', 'progress', 'error', ...changes]) {
-      // The document receives them only if they bubble.
-      document.addEventListener(type, (event) => {
+    for (const type of ['load', 'progress', 'error', 'warning', ...changes]) {
+      photo.addEventListener(type, (event) => {
         const fields = ['code', 'message', 'backend', 'previous', 'reason', 'light', 'torch'];
-        const data = [...fields, 'loaded', 'total', 'share', 'zoom', 'x', 'y']
+        const data = [...fields, 'loaded', 'total', 'quality', 'zoom', 'x', 'y']
           .filter((field) => field in event)
           .map((field) => [field, /** @type {any} */ (event)[field]]);
         photoEvents.push({ type, ...Object.fromEntries(data) });
@@ -122,7 +121,9 @@ export async function countEvents(page, type) {
 export async function capturePicture(page, attributes = {}, torch) {
   const url = await page.evaluate(
     async ({ attributes, torch }) => {
-      const photo = /** @type {RelightablePhoto} */ (document.querySelector('relightable-photo'));
+      const photo = /** @type {RelightablePhotoElement} */ (
+        document.querySelector('relightable-photo')
+      );
       for (const [name, value] of Object.entries(attributes)) photo.setAttribute(name, value);
       if (torch !== undefined) photo.torch = torch;
       const blob = await photo.toBlob();
@@ -225,6 +226,19 @@ export async function skipPausesUntil(page, type, start) {
   page.off('request', add).off('requestfinished', remove).off('requestfailed', remove);
 }
 
+/**
+ * Waits for a `warning` event and returns its data. A warning shows nothing on the picture.
+ *
+ * @param {Page} page
+ * @param {number} [count] how many warnings to wait for
+ */
+export async function waitForWarning(page, count = 1) {
+  const events = await waitForEvents(page, 'warning', count);
+  await alertOf(page).waitFor({ state: 'hidden' });
+  expect(events.some(({ type }) => type === 'error')).toBe(false);
+  return /** @type {ElementEvent} */ (events.findLast(({ type }) => type === 'warning'));
+}
+
 /** The element's error message. @param {Page} page */
 export function alertOf(page) {
   return page.getByRole('alert');
@@ -237,7 +251,7 @@ export function alertOf(page) {
  */
 export async function openAlertDetails(page) {
   await alertOf(page)
-    .getByText(/cannot be shown|not work as intended/)
+    .getByText(/cannot be shown/)
     .waitFor({ state: 'visible' });
   const details = page.locator('relightable-photo details');
   await details.evaluate((element) => element.setAttribute('open', ''));

@@ -94,7 +94,7 @@ async function canvasPicture(page) {
 const qualityChanges = async (page) =>
   (await waitForEvents(page, 'qualitychange'))
     .filter(({ type }) => type === 'qualitychange')
-    .map(({ share }) => share);
+    .map(({ quality }) => quality);
 
 const pictureAtRest = () => nativePicture('torch', { torch: REST_POSITION });
 
@@ -103,11 +103,11 @@ test.describe('under a moving light, a picture', () => {
     const page = await openPage('/plain', { before: slowDownWorkers });
     await mountPhoto(page, { ...GLASS, backend: 'cpu' });
     await waitAndClear(page);
-    expect(await page.evaluate('photo.detail')).toBe(1);
+    expect(await page.evaluate('photo.quality')).toBe(1);
     await page.evaluate(`slow = ${SLOW_FRAME_MS}`);
-    await moveTorchUntil(page, 'photo.detail === 0.25');
+    await moveTorchUntil(page, 'photo.quality === 0.25');
     // The frames in progress, and the frame at rest.
-    await waitUntil(page, 'photo.detail === 1');
+    await waitUntil(page, 'photo.quality === 1');
     const atRest = await canvasPicture(page);
     expect(atRest).toMatchPicture(pictureAtRest(), 1);
     expect(await qualityChanges(page)).toStrictEqual([0.25, 1]);
@@ -124,7 +124,7 @@ test.describe('under a moving light, a picture', () => {
     await mountPhoto(page, { ...GLASS, backend: 'cpu' });
     await waitAndClear(page);
     await page.evaluate(`stopClock(), slow = ${SLOW_FRAME_MS}`);
-    await moveTorchUntil(page, 'photo.detail === 0.25');
+    await moveTorchUntil(page, 'photo.quality === 0.25');
     await page.evaluate(() => {
       const { photo } = /** @type {any} */ (globalThis);
       // Keeps the last frame with less quality.
@@ -141,16 +141,16 @@ test.describe('under a moving light, a picture', () => {
     });
     // Without a movement nothing would be drawn.
     await moveTorchUntil(page, 'step === 1');
-    await waitUntil(page, 'photo.detail === 1');
+    await waitUntil(page, 'photo.quality === 1');
     const url = String(await page.evaluate('soft'));
     const soft = decodeDataUrl(url);
     const { worst, psnr } = compare(soft, pictureAtRest());
     note(`${psnr.toFixed(1)} dB at a quarter of the quality`);
     expect(worst, `${worst} of 255, ${psnr} dB`).toBeGreaterThan(1);
     expect(psnr, `${worst} of 255, ${psnr} dB`).toBeGreaterThan(20);
-    await moveTorchUntil(page, 'photo.detail < 1');
+    await moveTorchUntil(page, 'photo.quality < 1');
     expect(await capturePicture(page)).toMatchPicture(pictureAtRest(), 1);
-    expect(await page.evaluate('photo.detail')).toBe(1);
+    expect(await page.evaluate('photo.quality')).toBe(1);
   });
 
   test('regains its quality when frames become fast', async ({ openPage }) => {
@@ -158,12 +158,12 @@ test.describe('under a moving light, a picture', () => {
     await mountPhoto(page, { ...GLASS, backend: 'cpu' });
     await waitAndClear(page);
     await page.evaluate(`stopClock(), slow = ${SLOW_FRAME_MS}`);
-    await moveTorchUntil(page, 'photo.detail === 0.25');
+    await moveTorchUntil(page, 'photo.quality === 0.25');
     await page.evaluate('slow = 0');
-    await moveTorchUntil(page, 'photo.detail === 0.5');
+    await moveTorchUntil(page, 'photo.quality === 0.5');
     await moveTorchUntil(
       page,
-      'photo.detail === 1 && relit.slice(-5).every((share) => share === 1)',
+      'photo.quality === 1 && relit.slice(-5).every((share) => share === 1)',
     );
   });
 
@@ -172,8 +172,8 @@ test.describe('under a moving light, a picture', () => {
     await mountPhoto(page, { ...GLASS, backend: 'webgl2' });
     await waitAndClear(page);
     await page.evaluate('stopClock()');
-    await moveTorchUntil(page, 'photo.detail === 0.25', `${SLOW_FRAME_MS} * photo.detail`);
-    await waitUntil(page, 'photo.detail === 1');
+    await moveTorchUntil(page, 'photo.quality === 0.25', `${SLOW_FRAME_MS} * photo.quality`);
+    await waitUntil(page, 'photo.quality === 1');
     const onScreen = await screenPicture(page);
     expect(onScreen).toMatchPicture(pictureAtRest(), 2);
     expect(await qualityChanges(page)).toStrictEqual([0.25, 1]);

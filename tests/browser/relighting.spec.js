@@ -81,7 +81,7 @@ test.describe('relighting', () => {
       for (const page of [pooled, single]) {
         await page.evaluate('globalThis.photo?.remove()');
         await mountPhoto(page, { src, backend: 'cpu' });
-        await page.evaluate('photo.paused = true');
+        await page.evaluate('photo.pause()');
         await waitForLoad(page);
       }
       expect(await pooled.evaluate('photo.kernel')).toMatch(/^simd128, \d workers?$/);

@@ -26,6 +26,8 @@ const PLAYWRIGHT_STYLE_HASH = `sha256-${createHash('sha256').update('body {}').d
 const MONITORED_PAGE_POLICY =
   `default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' '${PLAYWRIGHT_STYLE_HASH}'; ` +
   "img-src 'self'; connect-src 'self'; media-src 'self'";
+/** Scripts get addresses only from the element's own policy. */
+const TRUSTED_TYPES = "require-trusted-types-for 'script'; trusted-types relightable-photo";
 const ELEMENT = '<script type="module" src="/relightable-photo/relightable-photo.js"></script>';
 /** A second of red, then a second of blue. */
 const FILM = readFileSync(join(import.meta.dirname, '../fixtures/red-then-blue.webm'));
@@ -183,6 +185,12 @@ const HANDLERS = {
         `<link rel="icon" href="/site/icon.svg"><script src="/page-monitor.js"></script>${ELEMENT}`,
       ),
     { 'Content-Security-Policy': MONITORED_PAGE_POLICY },
+  ),
+  // The same, with Trusted Types.
+  '/trusted-types/monitored': send(
+    'text/html',
+    () => page(`<script src="/page-monitor.js"></script>${ELEMENT}`),
+    { 'Content-Security-Policy': `${MONITORED_PAGE_POLICY}; ${TRUSTED_TYPES}` },
   ),
   '/page-monitor.js': send('text/javascript', () => `(${monitorPage})()`),
 };

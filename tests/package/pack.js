@@ -16,7 +16,7 @@ const glassBytes = readGlass();
 
 /** Scripts with fixed names. */
 const SCRIPTS = [
-  ...['', '-controls', '-worker', '-cpu', '-gpu', '-relighter', '-sources', '-tilt'].map(
+  ...['', '-controls', '-worker', '-cpu', '-gpu', '-relighter', '-sources', '-input'].map(
     (part) => `relightable-photo${part}`,
   ),
   ...['fr', 'de', 'it', 'es', 'ja', 'zh'].map((language) => `relightable-photo-${language}`),
@@ -100,10 +100,10 @@ test('every export exists and can be imported in Node', () => {
       if (!(await import('node:fs')).existsSync(new URL(url))) throw new Error(url);
       if (name.endsWith('.js')) await import(url);
     }
-    const { RelightablePhoto, PhotoError } = await import('relightable-photo');
+    const { RelightablePhotoElement, PhotoError } = await import('relightable-photo');
     const element = await import('relightable-photo/element');
     const core = await import('relightable-photo/core');
-    if (RelightablePhoto !== element.RelightablePhoto) throw new Error('there are two classes');
+    if (RelightablePhotoElement !== element.RelightablePhotoElement) throw new Error('there are two classes');
     if (PhotoError !== core.PhotoError) throw new Error('there are two errors');
     element.defineRelightablePhoto();
     const added = Object.getOwnPropertyNames(globalThis).filter((name) => !before.includes(name));
@@ -169,14 +169,14 @@ test('scripts need nothing that the content security policy forbids', () => {
 
 test('types resolve under every moduleResolution', () => {
   const uses = `
-    import { type PhotoInfo, RelightablePhoto, type RelightablePhotoEventMap } from 'relightable-photo';
+    import { type PhotoInfo, RelightablePhotoElement, type RelightablePhotoEventMap } from 'relightable-photo';
     import { defineRelightablePhoto, PhotoError } from 'relightable-photo/element';
     import type { RelitPicture } from 'relightable-photo/core';
     import 'relightable-photo/script';
     import type { RelightablePhotoProps } from 'relightable-photo/jsx';
     const photo = document.querySelector('relightable-photo');
     photo?.addEventListener('error', ({ code }) => code.length);
-    export const info: PhotoInfo | null = photo instanceof RelightablePhoto ? photo.info : null;
+    export const info: PhotoInfo | null = photo instanceof RelightablePhotoElement ? photo.info : null;
     export const props: RelightablePhotoProps = { src: '/window.ltm', exposure: 1 };
     export type { RelitPicture, RelightablePhotoEventMap };
     export { defineRelightablePhoto, PhotoError };
@@ -203,7 +203,7 @@ test('types resolve under every moduleResolution', () => {
   // CommonJS can import types only, without import().
   writeFileSync(
     join(folder, 'uses.cts'),
-    `export type Photo = import('relightable-photo', { with: { 'resolution-mode': 'import' } }).RelightablePhoto;`,
+    `export type Photo = import('relightable-photo', { with: { 'resolution-mode': 'import' } }).RelightablePhotoElement;`,
   );
   const types = join(folder, 'node_modules/@types');
   if (!existsSync(types)) symlinkSync(join(REPOSITORY, 'node_modules/@types'), types);
@@ -235,12 +235,12 @@ test('types resolve under every moduleResolution', () => {
 });
 
 test('the manifest lists every attribute, event, member, property and part', async () => {
-  const { RelightablePhoto } = await import(at('dist/element.js'));
+  const { RelightablePhotoElement } = await import(at('dist/element.js'));
   const element = manifestOf(place);
   const names = (/** @type {{ name: string }[]} */ entries) =>
     entries.map(({ name }) => name).sort();
   /** @type {string[]} */
-  const attributes = RelightablePhoto.observedAttributes;
+  const attributes = RelightablePhotoElement.observedAttributes;
   // `lang` is an attribute of every HTML element.
   const own = attributes.filter((name) => name !== 'lang');
   assert.deepEqual(names(element.attributes), own.sort());
@@ -249,7 +249,7 @@ test('the manifest lists every attribute, event, member, property and part', asy
   const events = [...body.matchAll(/^\s*'?(\w+)'?:/gm)].map(([, name]) => String(name));
   assert.ok(events.length >= 6);
   assert.deepEqual(names(element.events), events.sort());
-  const members = Object.getOwnPropertyNames(RelightablePhoto.prototype);
+  const members = Object.getOwnPropertyNames(RelightablePhotoElement.prototype);
   const open = members.filter((name) => name !== 'constructor' && !name.endsWith('Callback'));
   assert.deepEqual(names(element.members), open.sort());
   const read = (/** @type {string} */ part) =>
@@ -342,8 +342,8 @@ test('the core decodes and relights in Node', async (t) => {
     const photo = await decode(glassBytes);
     await assert.rejects(relight(photo, /** @type {any} */ ('moon')), code('attribute'));
     await assert.rejects(relight(photo, 'flood', { exposure: -1 }), code('attribute'));
-    for (const detail of [-1, 7, Number.NaN])
-      await assert.rejects(relight(photo, 'flood', { detail }), code('attribute'));
+    for (const quality of [-1, 7, Number.NaN])
+      await assert.rejects(relight(photo, 'flood', { quality }), code('attribute'));
     await assert.rejects(relight(/** @type {any} */ ({}), 'flood'), TypeError);
     photo.free();
     await assert.rejects(relight(photo), core.PhotoError);

@@ -18,7 +18,7 @@ const PATIENCE_MS = 120_000;
 const browser = await launchChromium();
 after(() => browser.close());
 
-/** @typedef {import('../../www/src/index.js').RelightablePhoto} RelightablePhoto */
+/** @typedef {import('../../www/src/index.js').RelightablePhotoElement} RelightablePhotoElement */
 
 /**
  * @typedef {object} Visit
@@ -79,7 +79,9 @@ export async function visit(mounts, attributes = {}, scripts = '') {
       throw new Error(`The page shows no photograph: ${seen}`, { cause });
     });
     const url = await page.evaluate(async (attributes) => {
-      const photo = /** @type {RelightablePhoto} */ (document.querySelector('relightable-photo'));
+      const photo = /** @type {RelightablePhotoElement} */ (
+        document.querySelector('relightable-photo')
+      );
       for (const [name, value] of Object.entries(attributes)) {
         const changed = new Promise((resolve) => photo.addEventListener(`${name}change`, resolve));
         photo.setAttribute(name, value);
@@ -92,7 +94,9 @@ export async function visit(mounts, attributes = {}, scripts = '') {
       return String(reader.result);
     }, attributes);
     const state = await page.evaluate(() => {
-      const photo = /** @type {RelightablePhoto} */ (document.querySelector('relightable-photo'));
+      const photo = /** @type {RelightablePhotoElement} */ (
+        document.querySelector('relightable-photo')
+      );
       const { activeBackend, kernel, shadowRoot } = photo;
       const inside = [...(shadowRoot?.querySelectorAll('*') ?? [])];
       const parts = inside.flatMap(({ part }) => [...part]);

@@ -7,7 +7,7 @@ let retryTimer = 0;
 photo.addEventListener('error', ({ code, message }) => {
   console.warn(code, message);
   clearTimeout(retryTimer);
-  retryTimer = setTimeout(() => photo.setAttribute('src', photo.getAttribute('src')), RETRY_MS);
+  retryTimer = setTimeout(() => photo.load(), RETRY_MS);
 });
 photo.addEventListener('load', () => clearTimeout(retryTimer));
 document.addEventListener('contextmenu', (event) => event.preventDefault());

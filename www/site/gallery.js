@@ -1,13 +1,13 @@
 /**
  * The gallery's first picture: its controls, and its state in the page's address, ?light=…&backend=…
  *
- * @typedef {import('../src/index.js').RelightablePhoto} RelightablePhoto
+ * @typedef {import('../src/index.js').RelightablePhotoElement} RelightablePhotoElement
  * @typedef {import('../src/index.js').LightSource} LightSource
  */
 
 const BACKEND_NAMES = /** @type {const} */ ({ webgpu: 'WebGPU', webgl2: 'WebGL2', cpu: 'CPU' });
 
-const photo = /** @type {RelightablePhoto} */ (document.getElementById('photo'));
+const photo = /** @type {RelightablePhotoElement} */ (document.getElementById('photo'));
 const form = /** @type {HTMLFormElement} */ (document.getElementById('controls'));
 const backend = /** @type {HTMLSelectElement} */ (document.getElementById('backend'));
 const status = /** @type {HTMLOutputElement} */ (document.getElementById('status'));
@@ -22,6 +22,8 @@ const lights = /** @type {NodeListOf<HTMLInputElement>} */ (
 
 /** Why a preferred backend is not in use. */
 let backendReason = '';
+/** Whether a source of the visitor lights the photograph. */
+let hasSource = false;
 /** Releases the visitor's current image, video or camera. */
 let releaseSource = () => {};
 /** Increases with each choice of the visitor, so that a source that opens late does not replace a newer choice. */
@@ -38,7 +40,7 @@ document.addEventListener('change', ({ target }) => {
   if (target === file) return;
   if (target !== backend) setSource(null);
   applyForm();
-  const state = new URLSearchParams({ light: photo.light });
+  const state = new URLSearchParams({ light: photo.getAttribute('light') ?? '' });
   if (backend.value) state.set('backend', backend.value);
   history.replaceState(null, '', `?${state}`);
 });
@@ -48,9 +50,12 @@ photo.addEventListener('backendchange', (event) => {
   updateStatus();
 });
 photo.addEventListener('load', updateStatus);
-photo.addEventListener('error', ({ code }) => {
-  // The element shows the message. After a light-… error it continues with the last light.
-  if (!code.startsWith('light-')) status.textContent = 'Not drawn.';
+// The element shows the message.
+photo.addEventListener('error', () => {
+  status.textContent = 'Not drawn.';
+});
+photo.addEventListener('warning', ({ message }) => {
+  status.textContent = message;
 });
 if (photo.info) updateStatus();
 
@@ -70,7 +75,8 @@ file.addEventListener('change', async () => {
 
 // Under prefers-reduced-motion the fire is paused at first.
 play.addEventListener('click', () => {
-  photo.paused = !photo.paused;
+  if (photo.paused) photo.play();
+  else photo.pause();
   updatePlayButton();
 });
 matchMedia('(prefers-reduced-motion: reduce)').addEventListener('change', updatePlayButton);
@@ -155,7 +161,8 @@ async function openVideo(video) {
  */
 function setSource(source, control, release = () => {}) {
   choiceCount += 1;
-  photo.lightSource = source;
+  photo.light = source;
+  hasSource = source !== null;
   releaseSource();
   releaseSource = release;
   file.nextElementSibling?.classList.toggle('active', control === file);
@@ -169,10 +176,11 @@ function setSource(source, control, release = () => {}) {
 
 function applyForm() {
   // No light is checked while a source of the visitor is in use.
-  const light = [...lights].find((input) => input.checked)?.value ?? photo.light;
+  const light =
+    [...lights].find((input) => input.checked)?.value ?? photo.getAttribute('light') ?? 'flood';
   if (photo.getAttribute('light') !== light) photo.setAttribute('light', light);
   updatePlayButton();
-  hint.classList.toggle('hidden', light !== 'torch' || photo.lightSource !== null);
+  hint.classList.toggle('hidden', light !== 'torch' || hasSource);
   if ((photo.getAttribute('backend') ?? '') === backend.value) return;
   if (backend.value) photo.setAttribute('backend', backend.value);
   else photo.removeAttribute('backend');
@@ -190,6 +198,6 @@ function updateStatus() {
 }
 
 function updatePlayButton() {
-  play.hidden = photo.light !== 'fire' || photo.lightSource != null || !photo.matches(':defined');
+  play.hidden = photo.getAttribute('light') !== 'fire' || hasSource || !photo.matches(':defined');
   play.textContent = photo.paused ? 'Play the fire.' : 'Pause the fire.';
 }

@@ -2,15 +2,16 @@
  * The playground: a form with all attributes, the resulting element, its HTML and its events. The page's address
  * contains the settings.
  *
- * @typedef {import('../src/index.js').RelightablePhoto} RelightablePhoto
+ * @typedef {import('../src/index.js').RelightablePhotoElement} RelightablePhotoElement
  */
 
 /** These take effect only when the element starts, so a change creates another element. */
-const START_ATTRIBUTES = ['loading', 'reveal', 'crossorigin', 'wasm-url'];
+const START_ATTRIBUTES = ['loading', 'reveal', 'crossorigin'];
 const EVENTS = [
   'load',
   'progress',
   'error',
+  'warning',
   'lightchange',
   'viewchange',
   'backendchange',
@@ -29,7 +30,7 @@ const EVENT_FIELDS = [
   'y',
   'backend',
   'reason',
-  'share',
+  'quality',
 ];
 /** More lines would make the page slow. */
 const MAX_LOG_LINES = 200;
@@ -43,7 +44,7 @@ const controls = /** @type {(HTMLInputElement | HTMLSelectElement)[]} */ (
   [...form.elements].filter((control) => control.getAttribute('name'))
 );
 
-/** @type {RelightablePhoto | null} */
+/** @type {RelightablePhotoElement | null} */
 let photo = null;
 
 const initial = settings();

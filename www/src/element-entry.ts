@@ -1,12 +1,13 @@
 /** The element's class, its events and its types. Importing this module has no side effects. */
 
 export { defineRelightablePhoto, TAG } from './element/define.js';
-export { type PhotoInfo, RelightablePhoto, type ToBlobOptions } from './element/element.js';
+export { type PhotoInfo, RelightablePhotoElement, type ToBlobOptions } from './element/element.js';
 export {
   BackendChangeEvent,
   ContextLostEvent,
   LightChangeEvent,
   PhotoErrorEvent,
+  PhotoWarningEvent,
   QualityChangeEvent,
   type RelightablePhotoEventMap,
   ViewChangeEvent,
@@ -24,5 +25,5 @@ export type { Backend, Gamut, LightName, ToneCurve } from './shared/keywords.js'
 export { BACKENDS, LIGHTS } from './shared/keywords.js';
 export type { PicturePoint } from './shared/value-types.js';
 export type { LoadingMode, RevealMode } from './state/attribute-parsers.js';
-export type { SetLightOptions } from './state/viewer-state.js';
+export type { LightOptions, LightValue } from './state/page-light.js';
 export type { ZoomView } from './state/viewport.js';

@@ -8,7 +8,8 @@
  */
 
 import { execFileSync } from 'node:child_process';
-import { copyFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { createHash } from 'node:crypto';
+import { copyFileSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { join, relative } from 'node:path';
 import { build } from 'esbuild';
@@ -25,7 +26,7 @@ const LAZY_SCRIPTS = new Map([
   ['renderers/cpu/create-cpu-renderer', 'relightable-photo-cpu'],
   ['renderers/gpu/create-gpu-renderer', 'relightable-photo-gpu'],
   ['lights/image-light-entry', 'relightable-photo-sources'],
-  ['input/tilt', 'relightable-photo-tilt'],
+  ['input/interaction', 'relightable-photo-input'],
   ['ui/toolbar', 'relightable-photo-controls'],
   ...['fr', 'de', 'it', 'es', 'ja', 'zh'].map(
     (language) => /** @type {const} */ ([`i18n/${language}`, `relightable-photo-${language}`]),
@@ -45,6 +46,25 @@ const lazyScripts = {
   },
 };
 
+/**
+ * Puts the hash of each WebAssembly module into the scripts, which check what they fetch.
+ *
+ * @type {import('esbuild').Plugin}
+ */
+const wasmHashes = {
+  name: 'wasm-hashes',
+  setup({ onLoad }) {
+    onLoad({ filter: /\/engine\/wasm-hashes\.ts$/ }, ({ path }) => {
+      const source = readFileSync(path, 'utf8');
+      const contents = source.replaceAll(/(?<=const (\w+) = )''/g, (_, name) => {
+        const wasm = readFileSync(join(dist, `wasm/${name}_bg.wasm`));
+        return `'sha256-${createHash('sha256').update(wasm).digest('base64')}'`;
+      });
+      return { contents, loader: 'ts' };
+    });
+  },
+};
+
 /** @type {import('esbuild').BuildOptions} */
 const options = {
   absWorkingDir: repository,
@@ -55,7 +75,7 @@ const options = {
   minify: true,
   // Browsers read modules as UTF-8 whatever the server says.
   charset: 'utf8',
-  plugins: [styles],
+  plugins: [styles, wasmHashes],
   sourcemap: 'linked',
   legalComments: 'none',
   logLevel: 'warning',
@@ -84,7 +104,7 @@ await Promise.all([
   build({
     ...options,
     external,
-    plugins: [styles, lazyScripts],
+    plugins: [styles, wasmHashes, lazyScripts],
     entryPoints: {
       'relightable-photo': 'www/src/index.ts',
       ...Object.fromEntries(
@@ -94,7 +114,7 @@ await Promise.all([
   }),
   build({
     ...options,
-    plugins: [inlineGlue],
+    plugins: [wasmHashes, inlineGlue],
     entryPoints: {
       'relightable-photo-worker': 'www/src/photo/decode-worker.ts',
       'relightable-photo-relighter': 'www/src/renderers/cpu/relight-worker.ts',

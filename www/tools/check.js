@@ -51,7 +51,7 @@ async function check() {
   await page.waitForFunction(() => {
     const element = document.querySelector('relightable-photo');
     const alert = element?.shadowRoot?.querySelector('[role=alert]');
-    return element?.detail === 1 || alert?.checkVisibility();
+    return element?.quality === 1 || alert?.checkVisibility();
   });
   const alert = page.locator('relightable-photo').first().getByRole('alert');
   if (await alert.isVisible()) return [...faults, await alert.innerText()];
@@ -74,10 +74,10 @@ async function check() {
 /** @param {import('playwright-core').Page} page @param {string} light */
 async function pagePicture(page, light) {
   const url = await page.evaluate(async (light) => {
-    const element = /** @type {import('../src/index.js').RelightablePhoto} */ (
+    const element = /** @type {import('../src/index.js').RelightablePhotoElement} */ (
       document.querySelector('relightable-photo')
     );
-    element.light = light;
+    element.setAttribute('light', light);
     const blob = await element.toBlob();
     const reader = new FileReader();
     reader.readAsDataURL(blob);

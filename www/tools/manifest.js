@@ -20,7 +20,7 @@ const repository = join(import.meta.dirname, '..', '..');
 /** The module that exports the class, and the one that defines the element. */
 const CLASS_MODULE = 'dist/element.js';
 const DEFINING_MODULE = 'dist/index.js';
-const CLASS = 'RelightablePhoto';
+const CLASS = 'RelightablePhotoElement';
 const SOURCES = ['www/src/element/element.ts', 'www/src/element/events.ts'];
 /** The interface with the properties that reflect attributes. */
 const REFLECTED = { file: 'www/src/element/reflect.ts', name: 'ReflectedProperties' };
@@ -45,10 +45,12 @@ export async function makeManifest() {
   if (!element) throw new Error(`manifest: there is no class ${CLASS} in the sources`);
   /** @type {{ [CLASS]: { observedAttributes: readonly string[] } }} */
   const { [CLASS]: built } = await import(pathToFileURL(join(repository, CLASS_MODULE)).href);
-  element.members.unshift(...reflected());
+  const own = reflected();
+  element.members.unshift(...own);
   tidy(
     element,
     built.observedAttributes.filter((name) => !GLOBAL.includes(name)),
+    new Set(own.map(({ name }) => name)),
   );
   const events = declarations.filter(({ name }) => /Event$/.test(name));
   for (const { members } of events) {
@@ -112,8 +114,9 @@ function reflected() {
  *
  * @param {Declaration} element
  * @param {readonly string[]} observed
+ * @param {ReadonlySet<string>} reflected the properties that reflect attributes
  */
-function tidy(element, observed) {
+function tidy(element, observed, reflected) {
   const callbacks = /Callback$/;
   element.members = element.members.filter(
     ({ name, privacy, static: ofClass }) =>
@@ -127,7 +130,7 @@ function tidy(element, observed) {
     const field = element.members.find((member) => member.name.toLowerCase() === asField);
     if (!field) throw new Error(`manifest: the attribute ${name} has no property`);
     field.attribute = name;
-    field.reflects = true;
+    field.reflects = reflected.has(field.name);
     const { type = { text: 'string' }, description = '' } = field;
     return { name, fieldName: field.name, type, description };
   });
@@ -154,9 +157,11 @@ function jsxAttributes({ attributes, events, members }) {
     `import type { ${CLASS} } from './element/element.js';\n\n`,
     '/** Attributes by their names in HTML, properties without an attribute, and event handlers. */\n',
     'export interface RelightablePhotoAttributes {\n',
-    ...attributes.map(({ name, type, description = '' }) =>
-      line(description, /-/.test(name) ? `'${name}'` : name, jsxType(type?.text ?? 'string')),
-    ),
+    ...attributes.map(({ name, fieldName, type, description = '' }) => {
+      const { reflects } = members.find((member) => member.name === fieldName) ?? {};
+      const jsx = reflects ? jsxType(type?.text ?? 'string') : `${CLASS}['${fieldName}']`;
+      return line(description, /-/.test(name) ? `'${name}'` : name, jsx);
+    }),
     ...settable.map(({ name, description = '' }) => line(description, name, `${CLASS}['${name}']`)),
     ...events.map(({ name, type, description = '' }) =>
       line(description, `on${name}`, `((event: ${type?.text ?? 'Event'}) => void)`),

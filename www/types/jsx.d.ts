@@ -1,6 +1,6 @@
 /** `<relightable-photo>` in the JSX of what looks for elements in the global namespace, as React 18 does. */
 
-import type { RelightablePhoto } from './element/element.js';
+import type { RelightablePhotoElement } from './element/element.js';
 import type { RelightablePhotoAttributes } from './jsx-attributes.js';
 
 /** What the element takes in JSX; keys, references and attributes of every element are not checked. */
@@ -10,8 +10,8 @@ export interface RelightablePhotoProps extends RelightablePhotoAttributes {
 }
 
 type RelightablePhotoRef =
-  | ((element: RelightablePhoto | null) => unknown)
-  | { current: RelightablePhoto | null }
+  | ((element: RelightablePhotoElement | null) => unknown)
+  | { current: RelightablePhotoElement | null }
   | string
   | null;
 

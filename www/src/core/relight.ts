@@ -49,7 +49,7 @@ export interface RelightOptions {
   /** The colour space of the pixels. */
   readonly gamut?: Gamut;
   /** The share of the components to use, the most important first: 0 to 1. */
-  readonly detail?: number;
+  readonly quality?: number;
 }
 
 /** A picture for `new ImageData`. */
@@ -70,7 +70,7 @@ export async function relight(
     throw new TypeError('relight takes a photograph from decode');
   }
   const { exposure = 1, whiteBalance = [1, 1, 1], tone, gamut } = options;
-  const detail = parseNumber(String(options.detail ?? 1), 'detail', 0, 1, 'it is a share') ?? 1;
+  const quality = parseNumber(String(options.quality ?? 1), 'quality', 0, 1, 'it is a share') ?? 1;
   const output = {
     exposure: parseExposure(String(exposure)),
     whiteBalance: parseWhiteBalance(whiteBalance.join(' ')),
@@ -89,7 +89,7 @@ export async function relight(
       try {
         const [first = 0, end = 0] = relighter.lightRows;
         const out = new Uint8Array(pixels.buffer);
-        relighter.relight(lightInModule.linearRgb(first, end), transform, detail, out);
+        relighter.relight(lightInModule.linearRgb(first, end), transform, quality, out);
       } finally {
         transform.free();
         lightInModule.free();

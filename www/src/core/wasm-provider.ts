@@ -20,7 +20,8 @@ const provided = new Map<string, WasmInput>();
 
 /**
  * Sets the bytes or the addresses of WebAssembly modules, where the files beside the script can be neither fetched nor
- * read. Call it before the first `decode`. Code with SIMD needs a machine with SIMD.
+ * read. They must be of this release. Call it before the first
+ * `decode`. Code with SIMD needs a machine with SIMD.
  */
 export function provideWasm(codes: Readonly<Partial<Record<CoreModuleName, WasmInput>>>): void {
   const known: readonly string[] = CORE_MODULES;
@@ -34,10 +35,10 @@ export function provideWasm(codes: Readonly<Partial<Record<CoreModuleName, WasmI
   }
 }
 
-export const fetchCoreWasm: FetchWasm = async (name, url) => {
+export const fetchCoreWasm: FetchWasm = async (name, url, integrity) => {
   const code = provided.get(name) ?? url;
   if (typeof code !== 'string' && !(code instanceof URL)) return code;
-  return (await readFile(String(code))) ?? (await fetchWasm(name, code));
+  return (await readFile(String(code))) ?? (await fetchWasm(name, code, integrity));
 };
 
 /** A file's bytes; `null` if the URL is not a `file:` URL, or outside of Node. */

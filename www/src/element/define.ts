@@ -1,6 +1,6 @@
 /** Registers `<relightable-photo>` with the page. */
 
-import { RelightablePhoto } from './element.js';
+import { RelightablePhotoElement } from './element.js';
 
 /** The element's name in HTML. */
 export const TAG = 'relightable-photo';
@@ -8,6 +8,6 @@ export const TAG = 'relightable-photo';
 /** Defines the element once, even if a page loads two copies of this script. Does nothing on a server. */
 export function defineRelightablePhoto(): void {
   if (globalThis.customElements && !customElements.get(TAG)) {
-    customElements.define(TAG, RelightablePhoto);
+    customElements.define(TAG, RelightablePhotoElement);
   }
 }

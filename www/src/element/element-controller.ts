@@ -3,42 +3,49 @@
  * script then brings the session, the shadow DOM, the animations and the page's listeners up to date with it.
  */
 
-import { setModuleFolder } from '../engine/wasm-loader.js';
 import { fetchStrings, isPending } from '../i18n/translations.js';
-import { InteractionController } from '../input/interaction.js';
+import type { InteractionController } from '../input/interaction.js';
 import { reducedMotion } from '../input/reduced-motion.js';
 import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
-import type { LightSource } from '../lights/light-source.js';
 import { BROWSER_PORTS } from '../player/browser-ports.js';
 import { PhotoSession } from '../player/photo-session.js';
 import type { SessionSettings } from '../player/types.js';
 import type { Renderer } from '../renderers/types.js';
-import type { PhotoError } from '../shared/errors.js';
+import { missingScript, PhotoError } from '../shared/errors.js';
 import { BACKENDS } from '../shared/keywords.js';
 import { reuse } from '../shared/reuse-if-equal.js';
 import { type ActiveLight, ActiveLightTracker } from '../state/active-light-tracker.js';
 import { AttributeReader } from '../state/attribute-reader.js';
 import { type ElementOptions, readOptions } from '../state/options.js';
+import type { LightValue } from '../state/page-light.js';
 import { ViewerState } from '../state/viewer-state.js';
 import type { ZoomView } from '../state/viewport.js';
 import { ShadowDom } from '../ui/shadow-dom.js';
 import { ViewerUi } from '../ui/viewer-ui.js';
+import { EarlyInput } from './early-input.js';
 import {
   BackendChangeEvent,
   ContextLostEvent,
-  EVENT_OPTIONS,
   LightChangeEvent,
   PhotoErrorEvent,
+  PhotoWarningEvent,
   QualityChangeEvent,
   ViewChangeEvent,
 } from './events.js';
+import { LoadStatus } from './load-status.js';
 import { observeVisibility, type VisibilityFlag } from './visibility.js';
 
-export class ElementController {
+export class ElementController<Host extends HTMLElement = HTMLElement> {
+  readonly status: LoadStatus<Host>;
   readonly state: ViewerState;
   readonly session: PhotoSession;
-  readonly interaction: InteractionController;
+  /** `null` until its script arrives, which is requested with the photograph. */
+  #interaction: InteractionController | null = null;
+  #inputFetch: Promise<void> | null = null;
+  readonly #earlyInput: EarlyInput;
+  /** The visitor pressed the poster before that. */
+  #isMarkedActive = false;
   readonly #reader: AttributeReader;
   readonly #dom: ShadowDom;
   readonly #viewerUi: ViewerUi;
@@ -51,23 +58,21 @@ export class ElementController {
   /** Why the last frame was not drawn with the requested light. */
   #lightError: PhotoError | null = null;
 
-  constructor(private readonly host: HTMLElement) {
+  constructor(private readonly host: Host) {
+    this.status = new LoadStatus(host);
     this.#reader = new AttributeReader(host);
     this.#dom = new ShadowDom(host);
     this.state = new ViewerState(readOptions(this.#reader, null), {
       changed: () => this.session.redraw(),
       loaded: () => this.schedule(),
-      errorChanged: (error) => this.#lightErrorChanged(error),
+      errorChanged: (error) => this.#warnOfLight(error),
     });
     this.#reportedView = this.state.view;
     this.#viewerUi = this.#createViewerUi();
     this.session = this.#createSession();
-    this.interaction = new InteractionController(this.state, this.#dom, this.#viewerUi, {
-      changed: () => this.schedule(),
-      expired: () => this.reset(),
-    });
+    this.#earlyInput = new EarlyInput(this.#dom.root, () => this.state.isPictureShown);
     this.#dom.revealButton.addEventListener('click', () => {
-      this.interaction.markActive();
+      this.#markActive();
       this.dismissPoster();
     });
     host.addEventListener('fullscreenchange', () => this.schedule());
@@ -94,10 +99,14 @@ export class ElementController {
     const { language } = this.#viewerUi;
     state.light.observe(state.reveal.isVisible, !isPaused);
     if (isPending(language)) void fetchStrings(language).then(() => this.schedule());
-    this.#viewerUi.update(isPaused, this.interaction.isTilting);
+    this.#viewerUi.update(isPaused, this.#interaction?.isTilting ?? null);
     this.#showError();
-    this.interaction.update(!isPaused);
-    for (const error of this.#reader.takeErrors()) this.reportError(error);
+    this.#interaction?.update(!isPaused);
+    const addressError = this.#reader.errorOf('src');
+    for (const error of this.#reader.takeErrors()) {
+      // Without an earlier address there is no picture, which is an error.
+      if (options.src !== null || error !== addressError) this.warn(error);
+    }
     this.#updateSession(options);
     this.#reportLight(this.#lightChanges.requested(state.light.setting));
     if (state.view !== this.#reportedView) {
@@ -115,8 +124,18 @@ export class ElementController {
 
   attributeChanged(name: string): void {
     // As on <img>, setting the same address again reloads the file.
-    if (name === 'src') this.#mustReload = true;
+    if (name === 'src') this.load();
     this.state.clearOverride(name);
+    this.schedule();
+  }
+
+  /** Loads the photograph again. An invalid address keeps the last photograph. */
+  load(): void {
+    this.#reader.readAddress('src');
+    if (this.#reader.errorOf('src') === null || this.session.settings === null) {
+      this.#mustReload = true;
+      this.status.set(null);
+    }
     this.schedule();
   }
 
@@ -128,8 +147,9 @@ export class ElementController {
     this.schedule();
   }
 
-  setLightSource(source: LightSource | null): void {
-    this.state.light.source = source;
+  set light(light: LightValue) {
+    this.readOptions();
+    this.state.pageLight = light;
     this.#lightError = null;
     this.schedule();
   }
@@ -140,9 +160,16 @@ export class ElementController {
   }
 
   reset(): void {
-    this.interaction.reset();
+    this.#interaction?.reset();
+    this.#isMarkedActive = false;
     this.state.reset();
     this.schedule();
+  }
+
+  /** Browsers ask the visitor only directly after a press, so the script should have arrived by then. */
+  async requestTilt(): Promise<boolean> {
+    if (!this.#interaction) await this.#fetchInput();
+    return (await this.#interaction?.requestTilt()) ?? false;
   }
 
   /** Draws the current state in full quality, after the fetch of the support for its light source. */
@@ -156,45 +183,74 @@ export class ElementController {
     return this.session.renderNow();
   }
 
-  reportError(error: PhotoError): void {
-    this.#dispatch(new PhotoErrorEvent(error));
+  /** Reports a fault that leaves the picture as it is: to developers, not to visitors. */
+  warn(error: PhotoError): void {
+    console.warn(`<relightable-photo> ${error.code}: ${error.message}`);
+    this.#dispatch(new PhotoWarningEvent(error));
+  }
+
+  #markActive(): void {
+    this.#isMarkedActive = true;
+    this.#interaction?.markActive();
+  }
+
+  /** The script for gestures, keys and animations is requested after the photograph, which it must not delay. */
+  #fetchInput(): Promise<void> {
+    this.#inputFetch ??= import('../input/interaction.js').then(
+      ({ InteractionController }) => {
+        this.#interaction = new InteractionController(this.state, this.#dom, this.#viewerUi, {
+          changed: () => this.schedule(),
+          expired: () => this.reset(),
+        });
+        if (this.#isMarkedActive) this.#interaction.markActive();
+        this.#earlyInput.replay();
+        this.schedule();
+      },
+      (cause: unknown) => {
+        this.warn(missingScript('input-unavailable', 'gestures, keys and animations', cause));
+      },
+    );
+    return this.#inputFetch;
   }
 
   #createViewerUi(): ViewerUi {
     return new ViewerUi(this.host, this.#dom, this.state, {
       selectLight: (item) => {
         this.state.light.item = item;
-        this.interaction.markActive();
+        this.#markActive();
         this.schedule();
       },
       play: () => {
         this.isPaused = !this.isPaused;
       },
-      zoom: (by) => this.interaction.zoom(by),
+      zoom: (by) => this.#interaction?.zoom(by),
       reset: () => this.reset(),
-      tilt: () => this.interaction.toggleTilt(),
+      tilt: () => this.#interaction?.toggleTilt(),
       loaded: () => this.schedule(),
-      failed: (error) => this.reportError(error),
+      failed: (error) => this.warn(error),
     });
   }
 
   #createSession(): PhotoSession {
     return new PhotoSession(BROWSER_PORTS, {
       loadStarted: () => {
+        this.status.set('loading');
         this.#clearPicture();
         this.#dom.updateProgress(Number.NaN);
       },
       progress: (loaded, total) => {
         this.#dom.updateProgress(total > 0 ? Math.min(1, loaded / total) : Number.NaN);
+        this.#fetchInput();
         const progress = { loaded, total, lengthComputable: total > 0 };
-        this.#dispatch(new ProgressEvent('progress', { ...EVENT_OPTIONS, ...progress }));
+        this.#dispatch(new ProgressEvent('progress', progress));
       },
       frameDrawn: (frame, light) => this.#frameDrawn(frame, light),
       qualityChanged: (quality) => this.#dispatch(new QualityChangeEvent(quality)),
       loaded: () => {
         this.#dom.updateProgress(null);
         this.#viewerUi.announce('loaded');
-        this.#dispatch(new Event('load', EVENT_OPTIONS));
+        this.status.set('ready');
+        this.#dispatch(new Event('load'));
       },
       rendererChanged: ({ canvas }) => {
         this.#dom.showCanvas(canvas);
@@ -202,23 +258,33 @@ export class ElementController {
       },
       backendChanged: (backend, previous, reason) =>
         this.#dispatch(new BackendChangeEvent(backend, previous, reason)),
-      backendLost: (backend, message) => this.#dispatch(new ContextLostEvent(backend, message)),
-      failed: (error) => {
-        this.state.errorMessage = error.message;
-        this.#dom.updateProgress(null);
-        this.schedule();
-        this.#showError();
-        this.reportError(error);
+      backendLost: (backend, message) => {
+        this.#dispatch(new ContextLostEvent(backend, message));
+        this.warn(new PhotoError('backend-lost', `${backend} was lost: ${message}`));
       },
+      failed: (error) => this.#fail(error),
+      warned: (error) => this.warn(error),
       recovered: () => {
         this.state.errorMessage = null;
+        this.status.set(this.session.isLoaded ? 'ready' : 'loading');
         this.schedule();
       },
     });
   }
 
+  /** There is no picture. */
+  #fail(error: PhotoError): void {
+    this.state.errorMessage = error.message;
+    this.status.set('error', error);
+    this.#dom.updateProgress(null);
+    this.schedule();
+    this.#showError();
+    this.#dispatch(new PhotoErrorEvent(error));
+  }
+
   #frameDrawn({ lightApplied, lightError }: AppliedLightStatus, drawn: LightSetting): void {
     const { reveal, light } = this.state;
+    this.#fetchInput();
     if (!reveal.isDrawn) this.schedule();
     reveal.isDrawn = true;
     const { setting, activeSource } = light;
@@ -228,7 +294,12 @@ export class ElementController {
     // An error that persists is reported once, even if its numbers change with each frame.
     if (lightError?.code === this.#lightError?.code) return;
     this.#lightError = lightError;
-    this.#lightErrorChanged(lightError);
+    this.#warnOfLight(lightError);
+  }
+
+  /** The photograph continues to load and to be drawn. */
+  #warnOfLight(error: PhotoError | null): void {
+    if (error && this.host.isConnected) this.warn(error);
   }
 
   #connect(): void {
@@ -246,12 +317,15 @@ export class ElementController {
 
   /** Gives the session new settings, as soon as the photograph may be fetched. */
   #updateSession(options: ElementOptions): void {
-    const { src, wasmUrl } = options;
+    const { src } = options;
     const last = this.session.settings;
-    // An invalid address neither reloads the last photograph nor reports a missing address.
-    const isInvalid = this.#reader.isInvalid('src');
-    if (src === null && isInvalid) return;
-    const reload = this.#mustReload && !isInvalid;
+    const addressError = this.#reader.errorOf('src');
+    if (src === null && addressError) {
+      if (this.#mustReload) this.#fail(addressError);
+      this.#mustReload = false;
+      return;
+    }
+    const reload = this.#mustReload && !addressError;
     if (reload || src !== last?.src) {
       if (src !== null && !this.state.reveal.mayFetch(options)) {
         if (last && last.src !== src) this.#stopSession();
@@ -259,7 +333,6 @@ export class ElementController {
       }
       this.#mustReload = false;
     }
-    if (wasmUrl !== null) setModuleFolder(wasmUrl);
     const settings = reuse<SessionSettings>(last, {
       src,
       credentials: options.crossOrigin === 'use-credentials' ? 'include' : 'same-origin',
@@ -279,16 +352,8 @@ export class ElementController {
     if (light) this.#dispatch(new LightChangeEvent(light.name, light.torch, light.source));
   }
 
-  /** The photograph continues to load and to be drawn. */
-  #lightErrorChanged(error: PhotoError | null): void {
-    this.#showError();
-    if (error && this.host.isConnected) this.reportError(error);
-  }
-
   #showError(): void {
-    const message = this.#reader.message ?? this.state.errorMessage;
-    const lightMessage = this.state.light.error?.message ?? this.#lightError?.message;
-    this.#viewerUi.showError(message ?? lightMessage ?? null);
+    this.#viewerUi.showError(this.state.errorMessage);
   }
 
   #clearPicture(): void {
@@ -310,9 +375,10 @@ export class ElementController {
     this.#connection = null;
     this.state.reveal.isNear = false;
     this.state.reveal.isVisible = false;
-    this.interaction.stop();
+    this.#interaction?.stop();
     this.state.light.observe(false, false);
     this.#reader.clear();
+    this.status.set(null);
     this.#stopSession();
   }
 

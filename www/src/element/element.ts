@@ -1,9 +1,10 @@
 /** `<relightable-photo>`: the public interface. The class delegates to `ElementController`. */
 
-import { checkLightSource, isLightSource, type LightSource } from '../lights/light-source.js';
+import { moduleFolder, setModuleFolder } from '../engine/wasm-loader.js';
+import type { PhotoError } from '../shared/errors.js';
 import type { Backend, Gamut, LightName } from '../shared/keywords.js';
 import type { PhotoInfo, PicturePoint } from '../shared/value-types.js';
-import type { SetLightOptions } from '../state/viewer-state.js';
+import type { LightValue } from '../state/page-light.js';
 import type { ZoomView } from '../state/viewport.js';
 import { ElementController } from './element-controller.js';
 import { encodePicture } from './encode-picture.js';
@@ -32,18 +33,23 @@ const MAX_SCALE = 4;
  *
  * @fires {Event} load - The whole photograph is drawn.
  * @fires {ProgressEvent} progress - More of the file has arrived: `loaded` bytes of `total`, which is 0 while unknown.
- * @fires {PhotoErrorEvent} error - Something failed: `code` for programs, `message` for people, `cause`.
+ * @fires {PhotoErrorEvent} error - There is no picture: `code` for programs, `message` for people, `cause`.
+ * @fires {PhotoWarningEvent} warning - Something else does not work as requested, such as an invalid attribute: `code`, `message`, `cause`.
  * @fires {LightChangeEvent} lightchange - Another light is active, or the torch has moved: `light`, `torch`, `source`.
  * @fires {ViewChangeEvent} viewchange - Another part of the picture is visible: `zoom`, `x`, `y`.
  * @fires {BackendChangeEvent} backendchange - A backend is in use: `backend`, `previous`, `reason`.
  * @fires {ContextLostEvent} contextlost - The backend in use was lost: `backend`, `message`.
- * @fires {QualityChangeEvent} qualitychange - The picture is drawn with another `share` of the photograph.
+ * @fires {QualityChangeEvent} qualitychange - The picture is drawn with another share of the photograph: `quality`.
  *
  * @slot - Content for browsers without scripts.
  * @slot poster - Replaces the `poster` image, until the photograph is drawn.
  * @slot progress - Replaces the progress bar, while the file loads.
  * @slot controls - Replaces the toolbar.
  * @slot error - Replaces the error message.
+ *
+ * @cssstate loading - The photograph is being loaded.
+ * @cssstate ready - The whole photograph is drawn.
+ * @cssstate error - There is no picture.
  *
  * @csspart picture - The picture and everything that lies over it.
  * @csspart canvas - The canvas with the photograph.
@@ -64,16 +70,49 @@ const MAX_SCALE = 4;
  * @cssprop --relightable-photo-aspect - Width / height of the place that is reserved before the photograph is drawn.
  */
 // biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the interface adds the properties that `reflect` defines, and typed overloads of inherited methods
-export class RelightablePhoto extends Base {
+export class RelightablePhotoElement extends Base {
   static readonly observedAttributes: readonly string[] = [...ATTRIBUTES, 'lang'];
 
-  static {
-    reflect(RelightablePhoto.prototype);
+  /** Folder of the WebAssembly modules for the whole page; `null` for the one beside the script. Set it at first. */
+  static get wasmUrl(): string | null {
+    return moduleFolder;
+  }
+  static set wasmUrl(url: string | URL | null) {
+    setModuleFolder(url && new URL(url, globalThis.document?.baseURI).href);
   }
 
-  readonly #controller = new ElementController(this);
+  static {
+    reflect(RelightablePhotoElement.prototype);
+  }
+
+  readonly #controller = new ElementController<RelightablePhotoElement>(this);
   readonly #state = this.#controller.state;
   readonly #session = this.#controller.session;
+
+  readonly #status = this.#controller.status;
+
+  /** Whether nothing is left to load: the whole photograph is drawn, loading has failed, or there is no `src`. */
+  get complete(): boolean {
+    return !this.src || this.#status.phase === 'ready' || this.#status.phase === 'error';
+  }
+
+  /** Why there is no picture; `null` unless the last `load` failed. */
+  get error(): PhotoError | null {
+    return this.#status.error;
+  }
+
+  /**
+   * Resolves to the element once the whole photograph is drawn, and rejects with a `PhotoError` if that fails. After it
+   * has settled, another load makes another promise.
+   */
+  get ready(): Promise<this> {
+    return this.#status.ready as Promise<this>;
+  }
+
+  /** Loads the photograph again, for example after an error. */
+  load(): void {
+    this.#controller.load();
+  }
 
   /** The colour space of the canvas; `null` without a picture. */
   get activeGamut(): Gamut | null {
@@ -114,44 +153,39 @@ export class RelightablePhoto extends Base {
   get paused(): boolean {
     return this.#controller.isPaused;
   }
-  set paused(paused: boolean) {
-    this.#controller.isPaused = paused;
+
+  /** Starts the animations, even if the visitor prefers reduced motion. */
+  play(): void {
+    this.#controller.isPaused = false;
+  }
+
+  /** Pauses the animations. */
+  pause(): void {
+    this.#controller.isPaused = true;
   }
 
   /**
-   * Replaces the built-in light; `null`, the default, uses the built-in light. Until the source has a picture, and
-   * while it fails, the last light stays. The element follows the frames of videos and streams while it is in the
-   * viewport. A WebGL canvas needs `preserveDrawingBuffer`, because the element reads it after its frame has ended.
+   * The light that a script sets: the name of a built-in one; its options `name`, `x`, `y`, `size`, `color`; or a source
+   * that replaces it; `null`, the default, follows the attributes. Until a source has a picture, and while it fails, the
+   * last light stays. The element follows the frames of videos and streams while it is in the viewport. A WebGL canvas
+   * needs `preserveDrawingBuffer`, because the element reads it after its frame has ended.
    */
-  get lightSource(): LightSource | null {
-    return this.#state.light.source;
+  get light(): LightValue {
+    return this.#state.pageLight;
   }
-  set lightSource(value: LightSource | null) {
-    const source = value === null ? null : checkLightSource(value);
-    if (source !== null && source === this.#state.light.activeSource) this.lightChanged();
-    else this.#controller.setLightSource(source);
+  set light(value: LightValue) {
+    const light = value ?? null;
+    const { activeSource } = this.#state.light;
+    if (activeSource !== null && light === activeSource) this.lightChanged();
+    else this.#controller.light = light;
   }
 
-  /** Reads the `lightSource` again in the next frame. Canvases, `ImageData` and numbers do not report changes. */
+  /** Reads the source in `light` again in the next frame. Canvases, `ImageData` and numbers do not report changes. */
   lightChanged(): void {
     if (this.#state.light.activeSource) this.#session.redraw();
   }
 
-  /**
-   * Sets the light until `reset` or until an attribute changes: a built-in light by its name, or with position, size
-   * and colour; or a source, as with `lightSource`; `null` is the light of the attributes, without a source.
-   */
-  setLight(light: LightName | SetLightOptions | LightSource | null): void {
-    if (light === null || isLightSource(light)) {
-      this.#state.light.reset();
-      this.lightSource = light;
-    } else {
-      this.#state.setLight(typeof light === 'string' ? { name: light } : light);
-    }
-    this.#controller.schedule();
-  }
-
-  /** Returns light and view to the attributes and `lightSource`. */
+  /** Returns light and view to the attributes and to the `light` of the script. */
   reset(): void {
     this.#controller.reset();
   }
@@ -167,7 +201,7 @@ export class RelightablePhoto extends Base {
     const controller = this.#controller;
     controller.reset();
     controller.readOptions();
-    for (const error of this.#state.restore(text)) controller.reportError(error);
+    for (const error of this.#state.restore(text)) controller.warn(error);
   }
 
   /** Removes the poster as soon as there is a picture. */
@@ -180,7 +214,7 @@ export class RelightablePhoto extends Base {
    * ask the visitor, so call it in a click handler.
    */
   requestTilt(): Promise<boolean> {
-    return this.#controller.interaction.requestTilt();
+    return this.#controller.requestTilt();
   }
 
   /** The backend in use; `null` if there is none. */
@@ -192,7 +226,7 @@ export class RelightablePhoto extends Base {
    * The share of the photograph's components in the current picture, the most important ones first: 1, or less while
    * the file is loading and while the picture changes faster than it can be drawn in full. `null` without a picture.
    */
-  get detail(): number | null {
+  get quality(): number | null {
     return this.#session.quality;
   }
 
@@ -207,7 +241,7 @@ export class RelightablePhoto extends Base {
   }
 
   /**
-   * Draws the current picture in full detail and encodes it. Rejects with `not-loaded` if there is no photograph, or
+   * Draws the current picture in full quality and encodes it. Rejects with `not-loaded` if there is no photograph, or
    * if another one replaces it meanwhile.
    */
   async toBlob({ type = 'image/png', quality, scale = 1 }: ToBlobOptions = {}): Promise<Blob> {
@@ -220,7 +254,7 @@ export class RelightablePhoto extends Base {
 
   connectedCallback(): void {
     // Properties that were set before the element was defined hide the accessors of this class.
-    for (const name of [...PROPERTIES, 'torch', 'lightSource', 'view', 'paused'] as const) {
+    for (const name of [...PROPERTIES, 'light', 'torch', 'view'] as const) {
       if (Object.hasOwn(this, name)) {
         const value = this[name];
         delete (this as Record<string, unknown>)[name];
@@ -241,10 +275,10 @@ export class RelightablePhoto extends Base {
 }
 
 /** The reflected properties, and listeners with the types of the element's own events. */
-export interface RelightablePhoto extends ReflectedProperties {
+export interface RelightablePhotoElement extends ReflectedProperties {
   addEventListener<K extends keyof RelightablePhotoEventMap>(
     type: K,
-    listener: (this: RelightablePhoto, event: RelightablePhotoEventMap[K]) => unknown,
+    listener: (this: RelightablePhotoElement, event: RelightablePhotoEventMap[K]) => unknown,
     options?: boolean | AddEventListenerOptions,
   ): void;
   addEventListener(
@@ -254,7 +288,7 @@ export interface RelightablePhoto extends ReflectedProperties {
   ): void;
   removeEventListener<K extends keyof RelightablePhotoEventMap>(
     type: K,
-    listener: (this: RelightablePhoto, event: RelightablePhotoEventMap[K]) => unknown,
+    listener: (this: RelightablePhotoElement, event: RelightablePhotoEventMap[K]) => unknown,
     options?: boolean | EventListenerOptions,
   ): void;
   removeEventListener(
@@ -266,6 +300,6 @@ export interface RelightablePhoto extends ReflectedProperties {
 
 declare global {
   interface HTMLElementTagNameMap {
-    'relightable-photo': RelightablePhoto;
+    'relightable-photo': RelightablePhotoElement;
   }
 }

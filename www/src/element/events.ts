@@ -1,4 +1,4 @@
-/** The element's events. All of them bubble and cross shadow boundaries; none can be cancelled. */
+/** The element's events. As those of `<img>` and `<video>` they do not bubble, and none can be cancelled. */
 
 import type { LightSource } from '../lights/light-source.js';
 import type { ErrorCode, PhotoError } from '../shared/errors.js';
@@ -6,27 +6,39 @@ import type { Backend, LightName } from '../shared/keywords.js';
 import type { PicturePoint } from '../shared/value-types.js';
 import type { ZoomView } from '../state/viewport.js';
 
-export const EVENT_OPTIONS: EventInit = { bubbles: true, composed: true };
-
 /** An event with further fields. */
 class BaseElementEvent extends Event {
   constructor(type: string, fields: object) {
-    super(type, EVENT_OPTIONS);
+    super(type);
     Object.assign(this, fields);
   }
 }
 
-/** `error`: something failed. The element shows the message as well. */
-export class PhotoErrorEvent extends BaseElementEvent {
-  /** Identifies the error for programs. */
+/** An event with the fields of an error. */
+class FaultEvent extends BaseElementEvent {
+  /** Identifies the fault for programs. */
   declare readonly code: ErrorCode;
-  /** Explains the error to people. */
+  /** Explains the fault to people. */
   declare readonly message: string;
   /** The underlying error, if any. */
   declare readonly cause: unknown;
 
-  constructor({ code, message, cause }: PhotoError) {
-    super('error', { code, message, cause });
+  constructor(type: string, { code, message, cause }: PhotoError) {
+    super(type, { code, message, cause });
+  }
+}
+
+/** `error`: there is no picture. The element shows the message as well. */
+export class PhotoErrorEvent extends FaultEvent {
+  constructor(error: PhotoError) {
+    super('error', error);
+  }
+}
+
+/** `warning`: something else does not work as requested. The console has the message as well, the picture does not. */
+export class PhotoWarningEvent extends FaultEvent {
+  constructor(error: PhotoError) {
+    super('warning', error);
   }
 }
 
@@ -60,10 +72,10 @@ export class BackendChangeEvent extends BaseElementEvent {
 /** `qualitychange`: another share of the components is drawn, below 1 while the file loads or the picture changes fast. */
 export class QualityChangeEvent extends BaseElementEvent {
   /** 0 to 1. */
-  declare readonly share: number;
+  declare readonly quality: number;
 
-  constructor(share: number) {
-    super('qualitychange', { share });
+  constructor(quality: number) {
+    super('qualitychange', { quality });
   }
 }
 
@@ -97,6 +109,7 @@ export interface RelightablePhotoEventMap
   load: Event;
   progress: ProgressEvent<HTMLElement>;
   error: PhotoErrorEvent;
+  warning: PhotoWarningEvent;
   lightchange: LightChangeEvent;
   backendchange: BackendChangeEvent;
   qualitychange: QualityChangeEvent;

@@ -29,7 +29,6 @@ test('properties have defaults', () => {
   assert.deepEqual(Object.fromEntries(PROPERTIES.map((name) => [name, element[name]])), {
     src: '',
     alt: '',
-    light: 'flood',
     lightSrc: '',
     lightColor: 'white',
     lightSize: 1 / 7,
@@ -48,10 +47,9 @@ test('properties have defaults', () => {
     cooperativeGestures: false,
     autoplayLight: false,
     kiosk: 0,
-    wasmUrl: '',
     crossOrigin: null,
   });
-  assert.equal(ATTRIBUTES.length, PROPERTIES.length);
+  assert.equal(ATTRIBUTES.length, PROPERTIES.length + 1, 'and light');
 });
 
 test('properties write their attributes', () => {
@@ -91,14 +89,12 @@ test('all options are read together, and errors name their attribute', (t) => {
   element.setAttribute('src', 'window.ltm');
   element.setAttribute('light-x', '0.25');
   element.setAttribute('light-color', 'red');
-  element.setAttribute('wasm-url', '../wasm');
   element.setAttribute('crossorigin', '');
   element.setAttribute('cooperative-gestures', '');
-  const { src, light, wasmUrl, crossOrigin, cooperativeGestures, autoplayLight } = read();
+  const { src, light, crossOrigin, cooperativeGestures, autoplayLight } = read();
   assert.equal(src, 'https://a.org/page/window.ltm');
   assert.deepEqual(light.torch, { x: 0.25, y: 0.5 });
   assert.deepEqual(light.color?.factors, [1, 0, 0]);
-  assert.equal(wasmUrl, 'https://a.org/wasm/');
   assert.deepEqual([crossOrigin, cooperativeGestures, autoplayLight], ['anonymous', true, false]);
   assert.equal(read(), options, 'the same object without a change');
   element.setAttribute('zoom', '3');

@@ -16,8 +16,6 @@ export interface ReflectedProperties {
   src: string;
   /** Description of the picture for visitors who cannot see it. */
   alt: string;
-  /** Name of the initial built-in light; `activeLight` is the current one. */
-  light: string;
   /** Address of an image or video that replaces the built-in light. */
   lightSrc: string;
   /** CSS colour of the light. */
@@ -54,8 +52,6 @@ export interface ReflectedProperties {
   autoplayLight: boolean;
   /** Seconds without input before the element resets itself; 0 is never. */
   kiosk: number;
-  /** Address of the folder of the WebAssembly modules; empty for the one beside the script. */
-  wasmUrl: string;
   /** CORS mode of requests, as on images. */
   crossOrigin: 'anonymous' | 'use-credentials' | null;
 }
@@ -73,7 +69,6 @@ const REFLECTED: {
 } = {
   src: text('src'),
   alt: text('alt'),
-  light: text('light', 'flood'),
   lightSrc: text('light-src'),
   lightColor: text('light-color', 'white'),
   lightSize: number('light-size', DEFAULT_TORCH_SIZE),
@@ -92,11 +87,11 @@ const REFLECTED: {
   cooperativeGestures: flag('cooperative-gestures'),
   autoplayLight: flag('autoplay-light'),
   kiosk: number('kiosk'),
-  wasmUrl: text('wasm-url'),
   crossOrigin: { ...parsed('crossorigin'), set: (value) => value },
 };
 
-export const ATTRIBUTES = Object.values(REFLECTED).map(({ attribute }) => attribute);
+/** `light` has a property of its own, which takes more than text. */
+export const ATTRIBUTES = [...Object.values(REFLECTED).map(({ attribute }) => attribute), 'light'];
 export const PROPERTIES = Object.keys(REFLECTED) as readonly (keyof ReflectedProperties)[];
 
 /** Defines the properties on the prototype of an element class. */

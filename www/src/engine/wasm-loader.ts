@@ -7,10 +7,14 @@ import type { WasmModuleName } from '../shared/keywords.js';
 /** The bytes of a module, or the response that brings them. */
 type WasmSource = ArrayBuffer | ArrayBufferView<ArrayBuffer> | Response;
 
-/** Gets the module with the given name, whose file is at `url`. */
-export type FetchWasm = (name: WasmModuleName, url: URL | string) => Promise<WasmSource>;
+/** Gets the module with the given name, whose file is at `url` and has the hash `integrity`. */
+export type FetchWasm = (
+  name: WasmModuleName,
+  url: URL | string,
+  integrity: string,
+) => Promise<WasmSource>;
 
-export const fetchWasm: FetchWasm = (_, url) => fetch(url);
+export const fetchWasm: FetchWasm = (_, url, integrity) => fetch(url, { integrity });
 
 /** A module's files. Functions, because bundlers recognise only literal paths. */
 export interface WasmBuilds {
@@ -21,6 +25,8 @@ export interface WasmBuilds {
   readonly simd: () => URL;
   /** The build for machines without SIMD; absent if one build runs everywhere. */
   readonly scalar?: () => URL;
+  /** The hashes of the two builds. */
+  readonly integrity: readonly [simd: string, scalar?: string];
 }
 
 // The smallest module with a 128-bit operation: () => i8x16.splat(0), dropped.
@@ -32,9 +38,9 @@ const SIMD_PROBE = new Uint8Array([
 /** The folder of the modules, with a slash at its end; `null` if they lie beside this script. */
 export let moduleFolder: string | null = null;
 
-/** Sets the folder of modules that are started from now on. */
+/** Sets the folder of modules that are started from now on, with or without a slash at its end. */
 export function setModuleFolder(url: string | null): void {
-  moduleFolder = url;
+  moduleFolder = url?.replace(/\/?$/, '/') ?? null;
 }
 
 /** Loads a module once per page, and again after a failure. `task`, for error messages, says what the module does. */
@@ -51,7 +57,8 @@ export function createLoader<Module>(
       if (cause instanceof PhotoError) throw cause;
       const message =
         `The module that ${task} could not be started. The wasm folder must lie beside the script or ` +
-        'where wasm-url says, and a content security policy must allow its address in connect-src. ' +
+        'where wasmUrl says and be of the same release as it, and a content security policy must allow its address in ' +
+        'connect-src. ' +
         `The browser says: ${messageOf(cause)}`;
       throw new PhotoError('wasm-unavailable', message, cause);
     });
@@ -67,7 +74,7 @@ function wasmForbidden(_: string, cause: unknown): PhotoError {
 
 async function startModule<Module>(
   name: WasmModuleName,
-  { glue, simd, scalar }: WasmBuilds,
+  { glue, simd, scalar, integrity }: WasmBuilds,
   fetchModule: FetchWasm,
 ): Promise<Module> {
   // Without SIMD support, a SIMD build does not even compile.
@@ -77,7 +84,7 @@ async function startModule<Module>(
       ? (scalarBuild ?? simd)()
       : `${moduleFolder}${name}${scalarBuild ? '_scalar' : ''}_bg.wasm`;
   // The module and its script load at the same time.
-  const source = fetchModule(name, url);
+  const source = fetchModule(name, url, integrity[scalarBuild ? 1 : 0] ?? '');
   source.catch(() => {});
   const module = await glue();
   await module.default({ module_or_path: await source });

@@ -1,6 +1,7 @@
 /** The worker's side of `shared/worker-client.ts`, and how the page starts a worker. */
 
 import { messageOf } from '../shared/errors.js';
+import { createTrustedWorker } from '../shared/trusted-worker.js';
 import { START_ID, type WorkerRequest, type WorkerResponse } from '../shared/worker-client.js';
 import { moduleFolder, setModuleFolder } from './wasm-loader.js';
 
@@ -14,7 +15,7 @@ export interface WorkerService<Task, Ready, Result> {
 /** `null` if the page may not have workers. `create` calls `new Worker` with a literal address, for bundlers. */
 export function startWorker(create: () => Worker): Worker | null {
   try {
-    const worker = create();
+    const worker = createTrustedWorker(create);
     worker.postMessage(moduleFolder);
     return worker;
   } catch {

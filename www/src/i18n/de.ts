@@ -9,7 +9,6 @@ export default {
   loading: 'Das Bild wird geladen',
   loaded: 'Das Bild ist da.',
   broken: 'Das Bild kann nicht gezeigt werden.',
-  degraded: 'Etwas funktioniert hier nicht wie gedacht.',
   details: 'Einzelheiten',
   flood: 'Flutlicht',
   torch: 'Taschenlampe',

@@ -8,7 +8,6 @@ export const ENGLISH = {
   loading: 'Loading the picture',
   loaded: 'The picture is ready.',
   broken: 'The picture cannot be shown.',
-  degraded: 'Something here does not work as intended.',
   details: 'Details',
   flood: 'Flood',
   torch: 'Torch',

@@ -9,7 +9,6 @@ export default {
   loading: 'Cargando la imagen',
   loaded: 'La imagen está lista.',
   broken: 'No se puede mostrar la imagen.',
-  degraded: 'Algo no funciona como debería.',
   details: 'Detalles',
   flood: 'Plena',
   torch: 'Linterna',

@@ -9,7 +9,6 @@ export default {
   loading: 'Chargement de l’image',
   loaded: 'L’image est prête.',
   broken: 'L’image ne peut pas être affichée.',
-  degraded: 'Quelque chose ne fonctionne pas comme prévu.',
   details: 'Détails',
   flood: 'Pleine',
   torch: 'Torche',

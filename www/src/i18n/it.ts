@@ -9,7 +9,6 @@ export default {
   loading: 'Caricamento dell’immagine',
   loaded: 'L’immagine è pronta.',
   broken: 'L’immagine non può essere mostrata.',
-  degraded: 'Qualcosa non funziona come previsto.',
   details: 'Dettagli',
   flood: 'Piena',
   torch: 'Torcia',

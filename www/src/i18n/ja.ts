@@ -9,7 +9,6 @@ export default {
   loading: '画像を読み込んでいます',
   loaded: '画像の準備ができました。',
   broken: '画像を表示できません。',
-  degraded: '一部が正しく動作していません。',
   details: '詳細',
   flood: '全面',
   torch: '懐中電灯',

@@ -9,7 +9,6 @@ export default {
   loading: '正在加载图片',
   loaded: '图片已就绪。',
   broken: '无法显示图片。',
-  degraded: '部分功能未按预期工作。',
   details: '详情',
   flood: '泛光',
   torch: '手电筒',

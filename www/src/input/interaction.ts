@@ -1,4 +1,7 @@
-/** Turns input by pointer, wheel, keyboard and tilt into changes of the viewer's state, and runs its animations. */
+/**
+ * Turns input by pointer, wheel, keyboard and tilt into changes of the viewer's state, and runs its animations. It is a
+ * separate script, because the first picture needs none of it.
+ */
 
 import { callLater } from '../shared/promises.js';
 import { CENTRE, type PicturePoint } from '../shared/value-types.js';
@@ -177,6 +180,8 @@ export class InteractionController {
       this.#isPanning = false;
       this.listener.changed();
     };
+    // The focus may be older than this script.
+    this.#isHandleFocused = handle.matches(':focus-visible');
     handle.addEventListener('focus', focusChanged);
     handle.addEventListener('blur', focusChanged);
   }

@@ -1,6 +1,7 @@
 /** Asks for permission to read the device's orientation, and moves the torch by it. */
 
 import type { PicturePoint } from '../shared/value-types.js';
+import { observeTilt } from './tilt.js';
 
 /** Whether the device is likely to have an orientation sensor: handheld devices. */
 export function isTiltSupported(): boolean {
@@ -39,14 +40,8 @@ export class TiltSensor {
     if (listening.signal.aborted) return false;
     this.#listening?.abort();
     this.#listening = listening;
-    try {
-      // A separate script, fetched after the request, which browsers accept only directly after a press.
-      const { observeTilt } = await import('./tilt.js');
-      observeTilt(this.moveTorch, listening.signal);
-    } catch {
-      if (this.#listening === listening) this.stop();
-    }
-    return !listening.signal.aborted;
+    observeTilt(this.moveTorch, listening.signal);
+    return true;
   }
 
   stop(): void {

@@ -42,7 +42,6 @@ function angleDifference(a: number, b: number, period: number): number {
 
 /** Calls back with the torch's position at each change of the device's orientation. */
 export function observeTilt(moveTorch: (point: PicturePoint) => void, signal: AbortSignal): void {
-  if (signal.aborted) return;
   const tracker = new TiltTracker();
   const update = ({ beta, gamma }: DeviceOrientationEvent) => {
     // Devices without a sensor report null.

@@ -221,6 +221,6 @@ test('other values are rejected with the accepted classes', (t) => {
     assert.equal(checkLightSource(source), source);
   }
   for (const wrong of [undefined, 'a.png', 7, {}, { data: [1, 1, 1], width: 1, height: 1 }]) {
-    assert.throws(() => checkLightSource(wrong), /^TypeError: lightSource must be .*MediaStream/);
+    assert.throws(() => checkLightSource(wrong), /^TypeError: light must be .*MediaStream/);
   }
 });

@@ -58,7 +58,8 @@ export function isLightSource(value: unknown): value is LightSource {
 export function checkLightSource(value: unknown): LightSource {
   if (isLightSource(value)) return value;
   throw new TypeError(
-    'lightSource must be null, an image, canvas or video element, an OffscreenCanvas, ImageBitmap, ' +
-      'ImageData or MediaStream, or linear light as { data: Float32Array, width, height }',
+    'light must be null, the name of a built-in light, its options { name, x, y, size, color }, an image, canvas or ' +
+      'video element, an OffscreenCanvas, ImageBitmap, ImageData or MediaStream, or linear light as ' +
+      '{ data: Float32Array, width, height }',
   );
 }

@@ -30,7 +30,7 @@ export class PhotoSession {
   /** `null` while it is stopped. */
   settings: SessionSettings | null = null;
   /** Whether a frame of the whole photograph was drawn; previews are drawn before. */
-  #isLoaded = false;
+  isLoaded = false;
   /** A failed load is permanent: frames, which are of a preview then, do not repair it. */
   #failure: 'temporary' | 'permanent' | null = null;
   /** Aborted when the load and its photograph are released. */
@@ -126,7 +126,8 @@ export class PhotoSession {
     this.#release(true);
     if (this.#refetches === MAX_REFETCHES) {
       const summary = `The photograph was fetched ${MAX_REFETCHES} more times without success. Reload the page.`;
-      this.#fail(new PhotoError('photo-lost', `${reason} ${summary}`));
+      const error = new PhotoError('photo-lost', `${reason} ${summary}`);
+      this.#fail(error, this.#scheduler.hasPicture);
       return;
     }
     this.#refetches += 1;
@@ -168,7 +169,7 @@ export class PhotoSession {
     } catch (thrown) {
       if (signal.aborted) return;
       this.#failure = 'permanent';
-      this.#fail(toPhotoError(thrown));
+      this.#fail(toPhotoError(thrown), this.#refetches > 0 && this.#scheduler.hasPicture);
     } finally {
       preparation.abort();
     }
@@ -293,7 +294,7 @@ export class PhotoSession {
 
   #handleFrameError(active: ActiveBackend, error: PhotoError): void {
     if (error.code === 'backend-lost') this.#selector.lose(active, error.message);
-    else if (error.code !== 'photo-lost') this.#fail(error);
+    else if (error.code !== 'photo-lost') this.#fail(error, active.hasDrawn);
     else if (active.photo.value.isComplete) this.#refetch(error.message);
     // The photograph replaces a lost preview.
     else this.#selector.drop();
@@ -303,15 +304,16 @@ export class PhotoSession {
     if (this.#failure === 'permanent') return;
     if (this.#failure) this.listener.recovered();
     this.#failure = null;
-    if (!this.#isLoaded && this.photo?.isComplete) {
-      this.#isLoaded = true;
+    if (!this.isLoaded && this.photo?.isComplete) {
+      this.isLoaded = true;
       this.listener.loaded();
     }
   }
 
-  #fail(error: PhotoError): void {
+  #fail(error: PhotoError, hasPicture = false): void {
     this.#failure ??= 'temporary';
-    this.listener.failed(error);
+    if (hasPicture) this.listener.warned(error);
+    else this.listener.failed(error);
   }
 
   #release(keepsPicture: boolean): void {
@@ -324,7 +326,7 @@ export class PhotoSession {
     this.#nextFrame = null;
     this.#quality = 1;
     this.#isFullQualityRequested = false;
-    this.#isLoaded = false;
+    this.isLoaded = false;
     this.#failure = null;
   }
 }

@@ -119,6 +119,7 @@ export function fakeSession() {
       backendChanged: (backend, previous, reason) =>
         log.push(`backend ${previous} -> ${backend}${reason && ` (${reason})`}`),
       failed: (error) => log.push(`failed ${error.code}: ${error.message}`),
+      warned: (error) => log.push(`warned ${error.code}: ${error.message}`),
       recovered: () => log.push('recovered'),
     },
   );

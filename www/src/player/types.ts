@@ -54,7 +54,10 @@ export interface PhotoSessionListener {
   /** Another backend is in use, or the same one again after a loss. */
   backendChanged(backend: Backend, previous: Backend | null, reason: string): void;
   backendLost(backend: Backend, reason: string): void;
+  /** There is no picture. */
   failed(error: PhotoError): void;
-  /** A frame was drawn after a failure. */
+  /** The last picture stays on the screen. */
+  warned(error: PhotoError): void;
+  /** A frame was drawn after `failed` or `warned`. */
   recovered(): void;
 }

@@ -97,6 +97,7 @@ async function startSession(t: TestContext, open = async (_: Backend): Promise<v
       backendChanged: (backend) => changes.push(backend),
       backendLost: () => {},
       failed: (error) => changes.push(error.code),
+      warned: (error) => changes.push(error.code),
       recovered: () => {},
     },
   );

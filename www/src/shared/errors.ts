@@ -17,6 +17,7 @@ export type PageErrorCode =
   | 'csp-wasm' // The page's content security policy blocks WebAssembly.
   | 'wasm-unavailable' // A WebAssembly module could not be loaded.
   | 'controls-unavailable' // The toolbar's script could not be loaded.
+  | 'input-unavailable' // The script for gestures, keys and animations could not be loaded.
   | 'worker-unavailable' // The worker that decodes the photograph stopped, usually because memory ran out.
   | 'photo-lost' // A worker with a part of the photograph stopped. The photograph is fetched again, up to five times.
   | 'light-tainted' // The light image contains data of another origin, which this page may not read.

@@ -17,18 +17,18 @@ test('an invalid attribute keeps its last value, is reported once, and affects n
   assert.deepEqual(reported(), ['moon']);
   assert.deepEqual(read('moon', 'much'), ['flood', 2]);
   assert.deepEqual(reported(), ['much']);
-  assert.match(reader.message ?? '', /moon/);
+  assert.match(reader.errorOf('light')?.message ?? '', /moon/);
   assert.deepEqual(read('stripes', 'much'), ['stripes', 2]);
   assert.deepEqual(reported(), []);
-  assert.match(reader.message ?? '', /much/);
+  assert.equal(reader.errorOf('light'), null);
   assert.deepEqual(read('sun', '3'), ['stripes', 3]);
   assert.deepEqual(reported(), ['sun']);
-  assert.ok(reader.isInvalid('light') && !reader.isInvalid('exposure'));
+  assert.ok(reader.errorOf('light') && !reader.errorOf('exposure'));
   assert.deepEqual(read(null, null), ['flood', 1]);
-  assert.equal(reader.message, null);
+  assert.equal(reader.errorOf('light'), null);
   read('sun', null);
   reader.clear();
-  assert.deepEqual([reader.message, reported()], [null, []]);
+  assert.deepEqual([reader.errorOf('light'), reported()], [null, []]);
 });
 
 test('an unchanged attribute gives the same object, and an address follows its base', () => {

@@ -53,14 +53,9 @@ export class AttributeReader {
     return this.source.getAttribute(name) !== null;
   }
 
-  isInvalid(name: string): boolean {
-    return Boolean(this.#attributes.get(name)?.error);
-  }
-
-  /** The message of the first invalid attribute. */
-  get message(): string | null {
-    for (const { error } of this.#attributes.values()) if (error) return error.message;
-    return null;
+  /** Why an attribute is invalid; `null` if it is not, or was not read. */
+  errorOf(name: string): PhotoError | null {
+    return this.#attributes.get(name)?.error ?? null;
   }
 
   /** The errors since the last call. */

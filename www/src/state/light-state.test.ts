@@ -7,6 +7,7 @@ import type { LinearImage } from '../lights/light-source.js';
 import type { PhotoError } from '../shared/errors.js';
 import { LightState } from './light-state.js';
 import type { LightAttributes } from './options.js';
+import { NO_OVERRIDES, parsePageLight } from './page-light.js';
 
 const OPTIONS: LightAttributes = {
   name: 'torch',
@@ -32,6 +33,12 @@ function createLight(options = OPTIONS, fetchSupport = async () => sourceSupport
   const light = new LightState(listener, fetchSupport);
   light.setOptions(options);
   return Object.assign(light, { calls });
+}
+
+/** Stands for the browser's class in tests with an image as the light. */
+class FakeImage extends EventTarget {
+  src = '';
+  removeAttribute(): void {}
 }
 
 const settle = () => new Promise((resolve) => setImmediate(resolve));
@@ -75,7 +82,7 @@ test('the setting is a new object only after a change', () => {
 test('a source replaces the built-in lights until one of them is selected', async () => {
   const light = createLight();
   assert.ok(light.isTorch && !light.items.includes('projection'));
-  light.source = SOURCE;
+  light.page = { ...NO_OVERRIDES, source: SOURCE };
   assert.deepEqual(
     [light.item, light.items[0], light.isTorch],
     ['projection', 'projection', false],
@@ -94,8 +101,43 @@ test('a source replaces the built-in lights until one of them is selected', asyn
   light.setOptions({ ...OPTIONS, name: 'spectrum' });
   light.override({ name: null });
   assert.equal(light.activeSource, SOURCE);
-  light.source = null;
+  light.page = { ...NO_OVERRIDES, source: null };
   assert.equal(light.item, 'spectrum');
+});
+
+test('the light of the script lies between the options and the visitor', async (t) => {
+  Object.assign(globalThis, { Image: FakeImage });
+  t.after(() => Reflect.deleteProperty(globalThis, 'Image'));
+  const light = createLight({ ...OPTIONS, src: 'https://a.org/a.png' });
+  await settle();
+  assert.equal(light.item, 'projection');
+  light.page = parsePageLight({ name: 'torch', x: 0.75 }, light.options);
+  assert.deepEqual([light.item, light.torch], ['torch', { x: 0.75, y: 0.3 }]);
+  assert.ok(!light.items.includes('projection'), 'a name replaces the source of the options');
+  light.override({ name: 'fire', torch: { x: 0, y: 0 } });
+  light.page = parsePageLight('spectrum', light.options);
+  assert.deepEqual([light.item, light.torch], ['spectrum', { x: 0, y: 0 }]);
+  light.reset();
+  assert.deepEqual([light.item, light.torch], ['spectrum', { x: 0.2, y: 0.3 }]);
+  light.override({ torch: { x: 0, y: 0 } });
+  light.page = parsePageLight(null, light.options);
+  assert.deepEqual([light.item, light.torch], ['projection', { x: 0.2, y: 0.3 }]);
+  light.page = parsePageLight({ name: 'fire', size: 0.5 }, light.options);
+  light.clear('size');
+  assert.deepEqual([light.item, light.size], ['fire', 0.1], 'an attribute was changed');
+  light.clear('name');
+  assert.equal(light.item, 'projection');
+});
+
+test('an invalid light of the script names the field', () => {
+  const parse = (value: unknown) => parsePageLight(value as never, OPTIONS);
+  assert.throws(() => parse({ x: Number.NaN }), /TypeError: light\.x must be a finite number/);
+  assert.throws(() => parse('moon'), /“moon”/);
+  assert.throws(
+    () => parse({ name: 'torch', radius: 1 }),
+    /TypeError: light must be null, the name/,
+  );
+  assert.throws(() => parse('torch') && parse(7), /TypeError: light must be/);
 });
 
 test('the support for sources is fetched once when needed, and again after a failure', async () => {
@@ -108,17 +150,17 @@ test('the support for sources is fetched once when needed, and again after a fai
   });
   await settle();
   assert.equal(fetches, 0);
-  light.source = SOURCE;
+  light.page = { ...NO_OVERRIDES, source: SOURCE };
   await settle();
   light.override({});
   await settle();
   assert.deepEqual([light.calls, fetches], [['light-source'], 1]);
   assert.match(light.error?.message ?? '', /offline.*the element's script/);
   assert.equal(light.setting.image, PENDING_IMAGE, 'the last light stays');
-  light.source = null;
+  light.page = { ...NO_OVERRIDES, source: null };
   assert.equal(light.error, null);
   offline = false;
-  light.source = SOURCE;
+  light.page = { ...NO_OVERRIDES, source: SOURCE };
   await settle();
   assert.deepEqual([light.calls.at(-1), fetches, light.error], ['loaded', 2, null]);
 });
@@ -129,7 +171,7 @@ test('a fire advances only while it is the light', () => {
   assert.equal(light.advanceFire(0.01), false);
   assert.equal(light.advanceFire(0.03), true);
   assert.equal(light.setting.seconds, 0.04);
-  light.source = SOURCE;
+  light.page = { ...NO_OVERRIDES, source: SOURCE };
   assert.ok(!light.isFire && !light.isPlayable);
 });
 

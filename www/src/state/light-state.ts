@@ -1,6 +1,6 @@
 /**
- * The light: as the options and `lightSource` request it, until a visitor or `setLight` overrides it. `reset` and a
- * change of an option clear overrides. The script for sources is fetched when one is used for the first time.
+ * The light. A visitor's choice takes precedence over the page's script, and that over the options. A change of an option
+ * takes precedence over both; `reset` clears the visitor's choice. The script for sources is fetched when one is used for the first time.
  */
 
 import type * as SourceSupport from '../lights/image-light-entry.js';
@@ -14,11 +14,7 @@ import { LIGHTS, type LightName } from '../shared/keywords.js';
 import { reuse } from '../shared/reuse-if-equal.js';
 import { clampToPicture, type PicturePoint } from '../shared/value-types.js';
 import type { LightAttributes } from './options.js';
-
-/** Values that take precedence over the options, and a name also over a source; `null` leaves an option in effect. */
-export type LightOverrides = {
-  readonly [K in 'name' | 'torch' | 'size' | 'color']: LightAttributes[K] | null;
-};
+import { type LightOverrides, NO_OVERRIDES, NO_PAGE_LIGHT, type PageLight } from './page-light.js';
 
 export interface LightStateListener extends LightSourceListener {
   /** The support for sources has been fetched: call `setOptions` again. */
@@ -28,7 +24,6 @@ export interface LightStateListener extends LightSourceListener {
 /** An item of the light menu: a built-in light, or the page's source. */
 export type LightMenuItem = LightName | 'projection';
 
-const NO_OVERRIDES: LightOverrides = { name: null, torch: null, size: null, color: null };
 const DEFAULTS: LightAttributes = { ...NO_OVERRIDES, name: 'flood', src: null, crossOrigin: null };
 const FIRE_FRAME_SECONDS = 1 / 30;
 /** Frames of a 30 Hz screen arrive a little early at times. */
@@ -40,9 +35,9 @@ export class LightState {
   /** Why the support could not be fetched. */
   #fetchError: PhotoError | null = null;
   #options = DEFAULTS;
+  #page: PageLight = NO_PAGE_LIGHT;
   #overrides = NO_OVERRIDES;
   #media: LightMedia | null = null;
-  #source: LightSource | null = null;
   #observer: LightSourceObserver | null = null;
   #setting: LightSetting | null = null;
   #isVisible = false;
@@ -65,19 +60,27 @@ export class LightState {
     this.#update();
   }
 
-  /** The source that the page's script has set. */
-  get source(): LightSource | null {
-    return this.#source;
+  get options(): LightAttributes {
+    return this.#options;
   }
-  set source(source: LightSource | null) {
-    this.#source = source;
+
+  /** The light that the page's script has set. It replaces a visitor's choice. */
+  set page(light: PageLight) {
+    const { name, source, torch, size, color } = light;
+    this.#page = light;
     this.#fetchError = null;
-    this.override({ name: null });
+    const isReset = !(name || source || torch || size || color);
+    this.override({
+      name: null,
+      ...((isReset || torch) && { torch: null }),
+      ...((isReset || size) && { size: null }),
+      ...((isReset || color) && { color: null }),
+    });
   }
 
   /** The source that replaces the built-in lights now; that of `light-src` only once it is supported. */
   get activeSource(): LightSource | null {
-    return this.#usesSource ? (this.#source ?? this.#media?.source ?? null) : null;
+    return this.#usesSource ? (this.#page.source ?? this.#media?.source ?? null) : null;
   }
 
   get #usesSource(): boolean {
@@ -85,17 +88,22 @@ export class LightState {
   }
 
   get #hasSource(): boolean {
-    return this.#source !== null || this.#options.src !== null;
+    const { source, name } = this.#page;
+    return source !== null || (name === null && this.#options.src !== null);
+  }
+
+  #get<K extends keyof LightOverrides>(key: K): LightAttributes[K] {
+    return this.#overrides[key] ?? this.#page[key] ?? this.#options[key];
   }
 
   /** The built-in light, or the one that the source replaces. */
   get name(): LightName {
-    return this.#overrides.name ?? this.#options.name;
+    return this.#get('name');
   }
 
   /** `null` behind the centre of the picture. */
   get torch(): PicturePoint | null {
-    return this.#overrides.torch ?? this.#options.torch;
+    return this.#get('torch');
   }
   set torch(torch: PicturePoint | null) {
     const point = torch && reuse(this.#overrides.torch, clampToPicture(torch));
@@ -103,16 +111,22 @@ export class LightState {
   }
 
   get size(): number | null {
-    return this.#overrides.size ?? this.#options.size;
+    return this.#get('size');
   }
 
   get color(): LightColor | null {
-    return this.#overrides.color ?? this.#options.color;
+    return this.#get('color');
   }
 
   override(overrides: Partial<LightOverrides>): void {
     this.#overrides = { ...this.#overrides, ...overrides };
     this.#update();
+  }
+
+  /** The option of this field has changed: it takes precedence over earlier choices. */
+  clear(key: keyof LightOverrides): void {
+    this.#page = key === 'name' ? NO_PAGE_LIGHT : { ...this.#page, [key]: null };
+    this.override({ [key]: null });
   }
 
   reset(): void {

@@ -36,8 +36,6 @@ function readAttributes(reader: AttributeReader) {
     cooperativeGestures: reader.has('cooperative-gestures'),
     autoplayLight: reader.has('autoplay-light'),
     kioskSeconds: reader.read('kiosk'),
-    /** Folder of the WebAssembly modules, ending in a slash; `null` for the one beside the script. */
-    wasmUrl: reader.readAddress('wasm-url')?.replace(/\/?$/, '/') ?? null,
     crossOrigin: reader.read('crossorigin'),
   };
 }

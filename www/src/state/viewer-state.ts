@@ -3,28 +3,14 @@
 import type { OutputSettings } from '../engine/output-settings.js';
 import { multiplyRgb, parseLightColor } from '../lights/light-color.js';
 import type { PhotoError } from '../shared/errors.js';
-import type { LightName } from '../shared/keywords.js';
 import { reuse } from '../shared/reuse-if-equal.js';
-import { CENTRE, clampToPicture } from '../shared/value-types.js';
-import { PARSERS } from './attribute-parsers.js';
-import { type LightOverrides, LightState, type LightStateListener } from './light-state.js';
+import { clampToPicture } from '../shared/value-types.js';
+import { LightState, type LightStateListener } from './light-state.js';
 import type { ElementOptions } from './options.js';
+import { type LightOverrides, type LightValue, parsePageLight } from './page-light.js';
 import { RevealState } from './reveal.js';
 import { formatState, parseState } from './share-link.js';
 import { clampView, FULL_VIEW, type ZoomView } from './viewport.js';
-
-/** A built-in light for `setLight`. Absent fields keep their values. */
-export interface SetLightOptions {
-  readonly name?: LightName;
-  /** The torch's position, 0 to 1 across the picture. */
-  readonly x?: number;
-  /** The torch's position, 0 to 1 down the picture. */
-  readonly y?: number;
-  /** The torch's radius, as a fraction of the light plane's shorter side. */
-  readonly size?: number;
-  /** Any CSS colour. */
-  readonly color?: string;
-}
 
 /** The override that a change of an attribute clears. */
 const OVERRIDE_OF_ATTRIBUTE: Readonly<Record<string, keyof LightOverrides>> = {
@@ -43,6 +29,7 @@ export class ViewerState {
   #view = FULL_VIEW;
   #output: OutputSettings | null = null;
   #exposure: number | null = null;
+  #pageLight: LightValue = null;
   /** Whether animations are paused; `null` until a visitor or a script decides. */
   paused: boolean | null = null;
   /** Why there is no picture. */
@@ -62,10 +49,11 @@ export class ViewerState {
     this.view = this.#view;
   }
 
-  /** A change of an attribute takes precedence over an earlier override. */
+  /** A change of an attribute takes precedence over earlier choices of the script and the visitor. */
   clearOverride(attribute: string): void {
     const key = OVERRIDE_OF_ATTRIBUTE[attribute];
-    if (key) this.light.override({ [key]: null });
+    if (key) this.light.clear(key);
+    if (key === 'name') this.#pageLight = null;
   }
 
   /** The same object as last time, unless the view has changed. The setter clamps. */
@@ -95,21 +83,14 @@ export class ViewerState {
     return this.#output;
   }
 
-  /** @throws {TypeError | PhotoError} for an invalid field, before anything changes */
-  setLight({ name, x, y, size, color }: SetLightOptions): void {
-    const overrides: { -readonly [K in keyof LightOverrides]?: LightOverrides[K] } = {};
-    if (name !== undefined) overrides.name = PARSERS.light(name);
-    if (x !== undefined || y !== undefined) {
-      const last = this.light.torch ?? CENTRE;
-      const torch = { x: x ?? last.x, y: y ?? last.y };
-      if (!(Number.isFinite(torch.x) && Number.isFinite(torch.y))) {
-        throw new TypeError('x and y must be finite numbers, from 0 to 1');
-      }
-      overrides.torch = clampToPicture(torch);
-    }
-    if (size !== undefined) overrides.size = PARSERS['light-size'](String(size));
-    if (color !== undefined) overrides.color = parseLightColor(color);
-    this.light.override(overrides);
+  /** The light that the page's script has set; `null` for that of the attributes. */
+  get pageLight(): LightValue {
+    return this.#pageLight;
+  }
+  /** @throws {TypeError | PhotoError} for an invalid value, before anything changes */
+  set pageLight(value: LightValue) {
+    this.light.page = parsePageLight(value, this.light.options);
+    this.#pageLight = value;
   }
 
   /** Selects another item of the light menu, `by` items away. */

@@ -59,8 +59,7 @@ export class ViewerUi {
 
   /** `null` hides the message. */
   showError(details: string | null): void {
-    const summary = this.state.errorMessage === null ? 'degraded' : 'broken';
-    this.dom.showError(details, this.#t(summary));
+    this.dom.showError(details, this.#t('broken'));
   }
 
   /** Explains how to zoom, after the page scrolled instead. */

@@ -1,10 +1,10 @@
 import 'relightable-photo';
 import { useEffect, useRef, useState } from 'react';
-import type { BackendChangeEvent, RelightablePhoto } from 'relightable-photo';
+import type { BackendChangeEvent, RelightablePhotoElement } from 'relightable-photo';
 import type {} from 'relightable-photo/react';
 
 export default function Page() {
-  const photo = useRef<RelightablePhoto>(null);
+  const photo = useRef<RelightablePhotoElement>(null);
   const [backend, setBackend] = useState('');
   // React attaches no handlers to custom elements that it hydrates.
   useEffect(() => {

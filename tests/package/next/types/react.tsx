@@ -1,4 +1,4 @@
-import type { RelightablePhoto } from 'relightable-photo';
+import type { RelightablePhotoElement } from 'relightable-photo';
 import type { RelightablePhotoProps } from 'relightable-photo/react';
 
 const props: RelightablePhotoProps = { src: '/window.ltm', exposure: 1, key: 'window' };
@@ -6,7 +6,7 @@ const props: RelightablePhotoProps = { src: '/window.ltm', exposure: 1, key: 'wi
 export const right = (
   <relightable-photo
     {...props}
-    ref={(photo: RelightablePhoto | null) => photo?.lightChanged()}
+    ref={(photo: RelightablePhotoElement | null) => photo?.lightChanged()}
     torch={{ x: 0.5, y: 0.5 }}
     onlightchange={({ light }) => light.length}
   />
