@@ -25,6 +25,7 @@ const dist = join(repository, 'dist');
 const LAZY_SCRIPTS = new Map([
   ['renderers/cpu/create-cpu-renderer', 'relightable-photo-cpu'],
   ['renderers/gpu/create-gpu-renderer', 'relightable-photo-gpu'],
+  ['photo/main-thread-decoder', 'relightable-photo-decoder'],
   ['lights/image-light-entry', 'relightable-photo-sources'],
   ['input/interaction', 'relightable-photo-input'],
   ['ui/toolbar', 'relightable-photo-controls'],

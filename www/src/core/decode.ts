@@ -38,7 +38,7 @@ export async function decode(
   signal.throwIfAborted();
   const now = () => performance.now();
   const createDecoder = async () => createMainThreadDecoder(await loadDecoder(fetchCoreWasm), now);
-  const options = { signal, onProgress, onPreview: null };
+  const options = { signal, onProgress, onPreview: null, onWaiting: () => {} };
   if (typeof file !== 'string' && !(file instanceof URL)) {
     const arriving = arrivingBytes(file);
     const decoder = await createDecoder();

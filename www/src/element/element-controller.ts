@@ -34,7 +34,7 @@ import {
   ViewChangeEvent,
 } from './events.js';
 import { LoadStatus } from './load-status.js';
-import { observeVisibility, type VisibilityFlag } from './visibility.js';
+import { observeVisibility, placementOf, type VisibilityFlag } from './visibility.js';
 
 export class ElementController<Host extends HTMLElement = HTMLElement> {
   readonly status: LoadStatus<Host>;
@@ -232,7 +232,11 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
   }
 
   #createSession(): PhotoSession {
+    const { host } = this;
     return new PhotoSession(BROWSER_PORTS, {
+      get placement() {
+        return placementOf(host);
+      },
       loadStarted: () => {
         this.status.set('loading');
         this.#clearPicture();
@@ -310,6 +314,7 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
     const update = (visibility: VisibilityFlag, isTrue: boolean) => {
       this.state.reveal[visibility] = isTrue;
       if (visibility === 'isVisible') this.session.setVisible(isTrue);
+      else this.session.setNear(isTrue);
       this.schedule();
     };
     observeVisibility(this.host, update, signal);

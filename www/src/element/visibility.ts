@@ -1,5 +1,6 @@
-/** Observes whether an element is in the viewport or near it. */
+/** Observes whether an element is in the viewport or near it, and measures how far it is from its middle. */
 
+import { OUT_OF_VIEW, type Placement } from '../photo/load-queue.js';
 import type { RevealState } from '../state/reveal.js';
 
 export type VisibilityFlag = keyof Pick<RevealState, 'isNear' | 'isVisible'>;
@@ -27,4 +28,15 @@ export function observeVisibility(
     observer.observe(element);
     signal.addEventListener('abort', () => observer.disconnect());
   }
+}
+
+export function placementOf(element: Element): Placement {
+  const [box] = element.getClientRects();
+  // It is not rendered.
+  if (!box) return 2 * OUT_OF_VIEW;
+  const [middleX, middleY] = [innerWidth / 2, innerHeight / 2];
+  const x = Math.max(box.left - middleX, middleX - box.right, 0);
+  const y = Math.max(box.top - middleY, middleY - box.bottom, 0);
+  const isInView = x < middleX && y < middleY;
+  return Math.hypot(x, y) + (isInView ? 0 : OUT_OF_VIEW);
 }

@@ -109,6 +109,8 @@ export interface RowRangeRelighter extends Freeable {
 }
 
 export interface DecoderModule {
+  /** Gives the started module's exports. */
+  default(): Promise<{ readonly memory: Pick<WebAssembly.Memory, 'buffer'> }>;
   Decoder: { new (maxDecodedBytes?: number): Decoder };
 }
 

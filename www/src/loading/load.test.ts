@@ -106,8 +106,11 @@ function portsOf(ports: Partial<LoadPorts> = {}): LoadPorts {
   };
 }
 
-/** Ignores previews. */
-const drop = (preview: LoadedPhotograph) => preview.free();
+/** Ignores previews, and waits for the network. */
+const ignored = {
+  onPreview: (preview: LoadedPhotograph) => preview.free(),
+  onWaiting: () => {},
+};
 
 /** Loads a photograph, and checks that no decoder and no listener is left. */
 async function load(
@@ -118,7 +121,7 @@ async function load(
   try {
     const photo = await openPhoto(
       url,
-      { signal: never, onProgress: (...p) => progress.push(p), onPreview: drop },
+      { signal: never, onProgress: (...p) => progress.push(p), ...ignored },
       portsOf(ports),
     );
     return { progress, photo };
@@ -316,14 +319,14 @@ test('an abort between two pieces frees the decoder and ends the transfer', asyn
       if (loaded > FIRST_BYTES) abort.abort(new Error('another src'));
     };
     await assert.rejects(
-      openPhoto(server.url, { signal: abort.signal, onProgress: stop, onPreview: drop }, portsOf()),
+      openPhoto(server.url, { signal: abort.signal, onProgress: stop, ...ignored }, portsOf()),
       /another src/,
     );
     assert.equal(FakeDecoder.alive, 0);
     assert.equal(getEventListeners(abort.signal, 'abort').length, 0);
     await Promise.all(server.closed);
     await assert.rejects(
-      openPhoto(server.url, { signal: abort.signal, onProgress: stop, onPreview: drop }, portsOf()),
+      openPhoto(server.url, { signal: abort.signal, onProgress: stop, ...ignored }, portsOf()),
       /another src/,
     );
     assert.equal(server.ranges.length, ranges ? 2 : 1, 'nothing more is requested');
@@ -336,7 +339,7 @@ test('an abort while the page runs is noticed', async (t) => {
   const yieldToPage = async () => abort.abort(new Error('another src'));
   const ports = portsOf({ yieldToPage });
   await assert.rejects(
-    openPhoto(server.url, { signal: abort.signal, onProgress: () => {}, onPreview: drop }, ports),
+    openPhoto(server.url, { signal: abort.signal, onProgress: () => {}, ...ignored }, ports),
     /another src/,
   );
   assert.equal(FakeDecoder.alive, 0);
@@ -350,7 +353,7 @@ test('an abort while the module loads does not wait for it', async (t) => {
   await assert.rejects(
     openPhoto(
       server.url,
-      { signal: abort.signal, onProgress: () => {}, onPreview: drop },
+      { signal: abort.signal, onProgress: () => {}, ...ignored },
       portsOf({ createDecoder: decoder }),
     ),
     /another src/,
@@ -387,7 +390,7 @@ test('decoding yields to the page, after reporting its progress', async (t) => {
   // Eight looks at the clock make a turn, and there is one after each slice.
   await openPhoto(
     server.url,
-    { signal: never, onProgress: (bytes) => (loaded = bytes), onPreview: drop },
+    { signal: never, onProgress: (bytes) => (loaded = bytes), ...ignored },
     portsOf({ yieldToPage }),
   );
   assert.ok(turns.length > 70, `${turns.length} turns`);
@@ -438,7 +441,7 @@ test('previews come while the file loads, each of twice as many bytes, and not t
   const at = { now: () => now };
   await openPhoto(
     server.url,
-    { signal: never, onProgress: () => (now += 1000), onPreview: keep },
+    { signal: never, onProgress: () => (now += 1000), onPreview: keep, onWaiting: () => {} },
     portsOf(at),
   );
   assert.ok(shares.length >= 2 && shares.length <= 3, String(shares));
@@ -447,7 +450,7 @@ test('previews come while the file loads, each of twice as many bytes, and not t
   shares.length = 0;
   await openPhoto(
     server.url,
-    { signal: never, onProgress: () => {}, onPreview: keep },
+    { signal: never, onProgress: () => {}, onPreview: keep, onWaiting: () => {} },
     portsOf(at),
   );
   assert.equal(shares.length, 1, 'no time has passed');

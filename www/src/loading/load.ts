@@ -1,5 +1,6 @@
 /** Loads a photograph: fetches a file and decodes it while it arrives. */
 
+import type { LoadOptions } from '../photo/load-options.js';
 import type { PhotoDecoder } from '../photo/photo-decoder.js';
 import type { LoadedPhotograph } from '../photo/photograph.js';
 import { endSentence, hasCode, PhotoError, toPhotoError } from '../shared/errors.js';
@@ -7,14 +8,6 @@ import { linkedController, withTimeout } from '../shared/promises.js';
 import type { ByteRange } from '../shared/value-types.js';
 import { fileName, tooLong } from './http-errors.js';
 import { type FetchedPiece, HttpSource } from './http-source.js';
-
-export interface LoadOptions {
-  readonly signal: AbortSignal;
-  /** Gets the number of decoded bytes and that of the file, which is 0 until known. */
-  readonly onProgress: (loaded: number, total: number) => void;
-  /** Gets coarser photographs of the file so far, and must free them; `null` if none are needed. */
-  readonly onPreview: ((photograph: LoadedPhotograph) => void) | null;
-}
 
 export interface LoadPorts {
   readonly createDecoder: () => Promise<PhotoDecoder>;
@@ -49,9 +42,10 @@ async function open(
   options: LoadOptions,
   ports: LoadPorts,
 ): Promise<LoadedPhotograph> {
-  const { signal } = options;
+  const { signal, onWaiting } = options;
   signal.throwIfAborted();
   const stop = linkedController(signal);
+  onWaiting(true);
   try {
     const source = new HttpSource(url, { fetch: ports.fetch });
     const firstPieces = source.read(FIRST_RANGE, stop.signal);
@@ -62,10 +56,10 @@ async function open(
     });
     const [decoder, first] = await Promise.all([
       withTimeout(starting, { signal: stop.signal }),
-      firstPieces.next(),
+      firstPieces.next().finally(() => onWaiting(false)),
     ]);
     const pieces = piecesFor(decoder, source, first, firstPieces, stop.signal);
-    return await decodePieces(decoder, pieces, options, ports);
+    return await decodePieces(decoder, reportWaits(pieces, onWaiting), options, ports);
   } catch (thrown) {
     signal.throwIfAborted();
     throw withFileName(toPhotoError(thrown), url);
@@ -105,13 +99,27 @@ async function* piecesFor(
   }
 }
 
+async function* reportWaits(
+  pieces: AsyncIterable<FetchedPiece>,
+  onWaiting: LoadOptions['onWaiting'],
+): AsyncGenerator<FetchedPiece, void> {
+  onWaiting(true);
+  for await (const piece of pieces) {
+    onWaiting(false);
+    yield piece;
+    onWaiting(true);
+  }
+  onWaiting(false);
+}
+
 /** Decodes pieces of a file in the order in which they arrive. The caller frees the decoder. */
 export async function decodePieces(
   decoder: PhotoDecoder,
   pieces: AsyncIterable<FetchedPiece>,
-  { signal, onProgress, onPreview }: LoadOptions,
+  options: Omit<LoadOptions, 'onWaiting'>,
   ports: Pick<LoadPorts, 'now' | 'yieldToPage'>,
 ): Promise<LoadedPhotograph> {
+  const { signal, onProgress } = options;
   let reported = 0;
   const nextPreview = previewsOf(decoder, ports.now);
   const reportProgress = () => {
@@ -130,9 +138,10 @@ export async function decodePieces(
     signal.throwIfAborted();
     reportProgress();
     signal.throwIfAborted();
-    const preview = onPreview ? await nextPreview() : null;
-    if (signal.aborted) preview?.free();
-    else if (preview) onPreview?.(preview);
+    const preview = options.onPreview ? await nextPreview() : null;
+    const { onPreview } = options;
+    if (signal.aborted || !onPreview) preview?.free();
+    else if (preview) onPreview(preview);
     signal.throwIfAborted();
   }
   const photo = await decoder.finish();

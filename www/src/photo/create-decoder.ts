@@ -2,15 +2,25 @@
 
 import { loadDecoder } from '../engine/core-modules.js';
 import { startWorker } from '../engine/worker-server.js';
-import { createMainThreadDecoder } from './main-thread-decoder.js';
+import { missingScript } from '../shared/errors.js';
 import type { PhotoDecoder } from './photo-decoder.js';
-import { startWorkerDecoder } from './worker-decoder.js';
+import { DecodeWorkers } from './worker-decoder.js';
+
+const workers = new DecodeWorkers(() =>
+  startWorker(
+    () => new Worker(new URL('./relightable-photo-worker.js', import.meta.url), { type: 'module' }),
+  ),
+);
 
 export async function createDecoder(): Promise<PhotoDecoder> {
-  const worker = startWorker(
-    () => new Worker(new URL('./relightable-photo-worker.js', import.meta.url), { type: 'module' }),
-  );
-  const decoder = worker && (await startWorkerDecoder(worker).catch(() => null));
+  const decoder = await workers.createDecoder().catch(() => null);
+  if (decoder) return decoder;
   // If the module cannot start at all, the page's attempt reports why.
-  return decoder ?? createMainThreadDecoder(await loadDecoder(), () => performance.now());
+  const [module, { createMainThreadDecoder }] = await Promise.all([
+    loadDecoder(),
+    import('./main-thread-decoder.js').catch((cause: unknown) => {
+      throw missingScript('worker-unavailable', 'decoding without a worker', cause);
+    }),
+  ]);
+  return createMainThreadDecoder(module, () => performance.now());
 }

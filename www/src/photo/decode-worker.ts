@@ -1,21 +1,36 @@
-/** The script of the worker that decodes one photograph. */
+/** The script of a worker that decodes one photograph after another. */
 
 import { loadDecoder } from '../engine/core-modules.js';
-import type { DecodedPhoto, Decoder } from '../engine/wasm-exports.js';
+import type { DecodedPhoto, Decoder, DecoderModule } from '../engine/wasm-exports.js';
 import { serve } from '../engine/worker-server.js';
 import { toPhotoError } from '../shared/errors.js';
 import { decoderState } from './main-thread-decoder.js';
 import { describePhoto, type TransferredTile } from './types.js';
 import type { DecodeResult, DecodeTask, TransferredPhoto } from './worker-decoder.js';
 
-function answer(decoder: Decoder, task: DecodeTask): DecodeResult {
+/** Ended by `finish`. */
+let decoder: Decoder | null = null;
+
+function answer(
+  { Decoder }: DecoderModule,
+  memory: Pick<WebAssembly.Memory, 'buffer'>,
+  task: DecodeTask,
+): DecodeResult {
   try {
+    if (task.kind === 'open') {
+      decoder?.free();
+      decoder = new Decoder();
+      return { state: decoderState(decoder) };
+    }
+    if (!decoder) throw new Error('No file was opened.');
     if (task.kind === 'feed') {
       decoder.feed(task.offset, task.bytes);
       return { state: decoderState(decoder) };
     }
-    const photo = task.kind === 'finish' ? decoder.finish() : decoder.preview();
-    return { photo: photo ? takeOut(photo) : null };
+    const current = decoder;
+    if (task.kind === 'finish') decoder = null;
+    const photo = task.kind === 'finish' ? current.finish() : current.preview();
+    return { photo: photo ? takeOut(photo) : null, memoryBytes: memory.buffer.byteLength };
   } catch (thrown) {
     const { code, message } = toPhotoError(thrown);
     return { error: { code, message } };
@@ -32,12 +47,12 @@ function takeOut(photo: DecodedPhoto): TransferredPhoto {
 }
 
 serve(async () => {
-  const { Decoder } = await loadDecoder();
-  const decoder = new Decoder();
+  const module = await loadDecoder();
+  const { memory } = await module.default();
   return {
-    ready: decoderState(decoder),
+    ready: null,
     handle: (task: DecodeTask) => {
-      const result = answer(decoder, task);
+      const result = answer(module, memory, task);
       const tiles = 'photo' in result ? result.photo?.tiles : undefined;
       return [result, tiles?.map(({ buffer }) => buffer) ?? []] as const;
     },

@@ -11,7 +11,7 @@ const YIELD_INTERVAL_MS = 8;
 
 /** `now` gives milliseconds, from any start. */
 export function createMainThreadDecoder(
-  { Decoder }: DecoderModule,
+  { Decoder }: Pick<DecoderModule, 'Decoder'>,
   now: () => number,
 ): PhotoDecoder {
   const decoder = new Decoder();

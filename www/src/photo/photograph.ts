@@ -76,6 +76,11 @@ export class LoadedPhotograph implements Freeable {
     return this.completeness === 1;
   }
 
+  /** Whether tiles are lost, or it was freed: every use rejects. */
+  get isLost(): boolean {
+    return this.#fault !== null;
+  }
+
   /** The photograph without tiles, which suffices for making lights. The caller frees it. */
   createLightPlane(module: RelightModule): ImportedPhoto {
     return module.Photo.receive(this.descriptor.geometry, this.descriptor.basis);

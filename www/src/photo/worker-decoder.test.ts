@@ -2,12 +2,12 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { RelightModule } from '../engine/wasm-exports.js';
 import { START_ID, type WorkerRequest, type WorkerResponse } from '../shared/worker-client.js';
-import type { DecoderProgress } from './photo-decoder.js';
+import type { DecoderProgress, PhotoDecoder } from './photo-decoder.js';
 import {
   type DecodeResult,
   type DecodeTask,
   type DecodeWorker,
-  startWorkerDecoder,
+  DecodeWorkers,
 } from './worker-decoder.js';
 
 const LIMITS = { intervalMs: 1, maxChecks: 3, maxStartChecks: 1000 };
@@ -19,14 +19,18 @@ const stateAt = (bytesFed: number): DecoderProgress => ({
   next: undefined,
 });
 
-type Response = WorkerResponse<DecoderProgress, DecodeResult>;
+const noYield = async () => {};
 
-/** A worker that answers by a function; it stays silent for `undefined`. */
+type Response = WorkerResponse<null, DecodeResult>;
+
+/** A worker that answers by a function, apart from `open`; it stays silent for `undefined`. */
 class FakeWorker implements DecodeWorker {
   onmessage: DecodeWorker['onmessage'] = null;
   onerror: DecodeWorker['onerror'] = null;
   onmessageerror: DecodeWorker['onmessageerror'] = null;
   hasEnded = false;
+  /** Files. */
+  opened = 0;
   readonly #answer: (task: DecodeTask) => DecodeResult | undefined;
 
   constructor(answer: (task: DecodeTask) => DecodeResult | undefined) {
@@ -35,7 +39,8 @@ class FakeWorker implements DecodeWorker {
 
   postMessage({ id, task }: WorkerRequest<DecodeTask>): void {
     assert.ok(!this.hasEnded, 'a worker that has ended gets no requests');
-    const result = this.#answer(task);
+    if (task.kind === 'open') this.opened += 1;
+    const result = task.kind === 'open' ? { state: stateAt(0) } : this.#answer(task);
     if (result) this.respond({ kind: 'done', id, result });
   }
 
@@ -55,7 +60,7 @@ class FakeWorker implements DecodeWorker {
 }
 
 /** A photograph of two tiles with the given lengths. */
-function photoWith(...tileLengths: number[]): DecodeResult {
+function photoWith(...tileLengths: number[]) {
   const descriptor = {
     width: 1,
     height: 2,
@@ -68,14 +73,32 @@ function photoWith(...tileLengths: number[]): DecodeResult {
     metadata: '{}',
     decodedBytes: 700,
   };
-  return { photo: { descriptor, tiles: tileLengths.map((length) => new Uint8Array(length)) } };
+  const tiles = tileLengths.map((length) => new Uint8Array(length));
+  return { photo: { descriptor, tiles }, memoryBytes: 1 << 20 } satisfies DecodeResult;
+}
+
+/** Workers that start at once; `all` are those that were started. */
+function startWorkers(answer: (task: DecodeTask) => DecodeResult | undefined, maxIdleMs = 1000) {
+  const all: FakeWorker[] = [];
+  const start = () => {
+    const worker = new FakeWorker(answer);
+    all.push(worker);
+    worker.respond({ kind: 'done', id: START_ID, result: null });
+    return worker;
+  };
+  return { all, workers: new DecodeWorkers(start, LIMITS, maxIdleMs) };
+}
+
+async function createDecoder(workers: DecodeWorkers): Promise<PhotoDecoder> {
+  const decoder = await workers.createDecoder();
+  assert.ok(decoder);
+  return decoder;
 }
 
 async function started(answer: (task: DecodeTask) => DecodeResult | undefined) {
-  const worker = new FakeWorker(answer);
-  const starting = startWorkerDecoder(worker, LIMITS);
-  worker.respond({ kind: 'done', id: START_ID, result: stateAt(0) });
-  return { worker, decoder: await starting };
+  const { all, workers } = startWorkers(answer);
+  const decoder = await createDecoder(workers);
+  return { worker: all[0] as FakeWorker, decoder };
 }
 
 test('the worker gets the bytes and sends the photograph', async () => {
@@ -83,11 +106,11 @@ test('the worker gets the bytes and sends the photograph', async () => {
     task.kind === 'feed' ? { state: stateAt(task.offset + task.bytes.length) } : photoWith(40, 50),
   );
   assert.equal(decoder.state.bytesFed, 0);
-  await decoder.feed(0, new Uint8Array(300));
-  await decoder.feed(300, new Uint8Array(600));
+  await decoder.feed(0, new Uint8Array(300), noYield);
+  await decoder.feed(300, new Uint8Array(600), noYield);
   assert.deepEqual(decoder.state, stateAt(900));
   const photograph = await decoder.finish();
-  assert.ok(worker.hasEnded);
+  assert.ok(!worker.hasEnded, 'it can decode the next one');
   assert.equal(photograph.info.decodedBytes, 700);
   const sizes: [number, number][] = [];
   const module = {
@@ -108,10 +131,10 @@ test('the worker gets the bytes and sends the photograph', async () => {
 test('a preview knows its completeness, and the decoder goes on', async () => {
   const { worker, decoder } = await started((task) => {
     if (task.kind === 'feed') return { state: stateAt(300) };
-    return decoder.state.bytesFed > 0 ? photoWith(4, 5) : { photo: null };
+    return decoder.state.bytesFed > 0 ? photoWith(4, 5) : { photo: null, memoryBytes: 0 };
   });
   assert.equal(await decoder.preview(), null);
-  await decoder.feed(0, new Uint8Array(300));
+  await decoder.feed(0, new Uint8Array(300), noYield);
   const preview = await decoder.preview();
   assert.equal(preview?.completeness, 1 / 3);
   assert.ok(!worker.hasEnded);
@@ -119,9 +142,14 @@ test('a preview knows its completeness, and the decoder goes on', async () => {
 
 test('an error of the file keeps its code', async () => {
   const error = { code: 'format-checksum', message: 'tile 3 is damaged' };
-  const { decoder } = await started(() => ({ error }));
-  await assert.rejects(decoder.feed(0, new Uint8Array(1)), error);
-  await assert.rejects(decoder.finish(), error);
+  for (const fail of [
+    (decoder: PhotoDecoder) => decoder.feed(0, new Uint8Array(1), noYield),
+    (decoder: PhotoDecoder) => decoder.finish(),
+  ]) {
+    const { worker, decoder } = await started(() => ({ error }));
+    await assert.rejects(fail(decoder), error);
+    assert.ok(worker.hasEnded, 'the state of its module is unknown');
+  }
 });
 
 test('a worker that does not start rejects and is ended', async () => {
@@ -130,7 +158,7 @@ test('a worker that does not start rejects and is ended', async () => {
     (worker: FakeWorker) => worker.respond({ kind: 'failed', message: 'no module' }),
   ]) {
     const worker = new FakeWorker(() => undefined);
-    const starting = startWorkerDecoder(worker);
+    const starting = new DecodeWorkers(() => worker).createDecoder();
     fail(worker);
     await assert.rejects(starting, { name: 'PhotoError' });
     assert.ok(worker.hasEnded);
@@ -139,14 +167,14 @@ test('a worker that does not start rejects and is ended', async () => {
 
 test('a worker that crashes is worker-unavailable', async () => {
   const { worker, decoder } = await started(() => undefined);
-  const feeding = decoder.feed(0, new Uint8Array(1));
+  const feeding = decoder.feed(0, new Uint8Array(1), noYield);
   worker.crash('out of memory');
   await assert.rejects(feeding, { code: 'worker-unavailable', message: /out of memory/ });
 });
 
 test('a worker that falls silent is worker-unavailable', async () => {
   const { decoder } = await started(() => undefined);
-  await assert.rejects(decoder.feed(0, new Uint8Array(1)), {
+  await assert.rejects(decoder.feed(0, new Uint8Array(1), noYield), {
     code: 'worker-unavailable',
     message: /does not answer/,
   });
@@ -154,7 +182,7 @@ test('a worker that falls silent is worker-unavailable', async () => {
 
 test('freeing a decoder rejects its requests', async () => {
   const { worker, decoder } = await started(() => undefined);
-  const feeding = decoder.feed(0, new Uint8Array(1));
+  const feeding = decoder.feed(0, new Uint8Array(1), noYield);
   decoder.free();
   await assert.rejects(feeding, { name: 'PhotoError' });
   assert.ok(worker.hasEnded);
@@ -164,10 +192,52 @@ test('a photograph without all its tiles is an internal error', async () => {
   for (const result of [
     { error: { code: 'internal', message: 'no memory' } },
     photoWith(40),
-    { photo: null },
+    { photo: null, memoryBytes: 0 },
   ] as DecodeResult[]) {
     const { worker, decoder } = await started(() => result);
     await assert.rejects(decoder.finish(), { code: 'internal' });
     assert.ok(worker.hasEnded);
   }
+});
+
+test('a worker decodes one photograph after another, and ends when it is idle', async () => {
+  const { all, workers } = startWorkers(() => photoWith(4, 5), 20);
+  for (let i = 0; i < 3; i += 1) await (await createDecoder(workers)).finish();
+  assert.deepEqual(
+    all.map(({ opened }) => opened),
+    [3],
+  );
+  await new Promise((resolve) => setTimeout(resolve, 100));
+  assert.ok(all[0]?.hasEnded);
+  await (await createDecoder(workers)).finish();
+  assert.equal(all.length, 2);
+});
+
+test('photographs at the same time have a worker each, of which one is kept', async () => {
+  const { all, workers } = startWorkers(() => photoWith(4, 5));
+  const decoders = await Promise.all([createDecoder(workers), createDecoder(workers)]);
+  for (const decoder of decoders) await decoder.finish();
+  assert.deepEqual(
+    all.map(({ hasEnded }) => hasEnded),
+    [false, true],
+  );
+});
+
+test('a worker whose memory has grown ends with its photograph', async () => {
+  const { worker, decoder } = await started(() => ({ ...photoWith(4, 5), memoryBytes: 1 << 28 }));
+  await decoder.finish();
+  assert.ok(worker.hasEnded);
+});
+
+test('an idle worker that stops is replaced', async () => {
+  const { all, workers } = startWorkers(() => photoWith(4, 5));
+  await (await createDecoder(workers)).finish();
+  all[0]?.crash('out of memory');
+  await new Promise((resolve) => setImmediate(resolve));
+  await (await createDecoder(workers)).finish();
+  assert.equal(all.length, 2);
+});
+
+test('a page that may not start workers gets no decoder', async () => {
+  assert.equal(await new DecodeWorkers(() => null).createDecoder(), null);
 });

@@ -1,26 +1,10 @@
-/** A backend in use for one photograph, and the photograph's reference count. */
+/** A backend in use for one photograph. */
 
-import type { Backend, Freeable } from '../engine/wasm-exports.js';
-import type { LoadedPhotograph } from '../photo/photograph.js';
+import type { Backend } from '../engine/wasm-exports.js';
+import type { SharedPhoto } from '../photo/photo-library.js';
 import type { BackendPreferences, Renderer } from '../renderers/types.js';
 import type { Deferred } from '../shared/promises.js';
 import { QualityController } from './quality-controller.js';
-
-/** An object that is freed when its last user releases it. The creator is its first user. */
-export class RefCounted<T extends Freeable> {
-  #users = 1;
-
-  constructor(readonly value: T) {}
-
-  retain(): void {
-    this.#users += 1;
-  }
-
-  release(): void {
-    this.#users -= 1;
-    if (this.#users === 0) this.value.free();
-  }
-}
 
 export class ActiveBackend {
   /** For this renderer alone: frame times of other renderers say nothing about it. */
@@ -36,7 +20,7 @@ export class ActiveBackend {
     readonly backend: Backend,
     readonly options: BackendPreferences,
     readonly renderer: Renderer,
-    readonly photo: RefCounted<LoadedPhotograph>,
+    readonly photo: SharedPhoto,
   ) {
     photo.retain();
   }

@@ -4,11 +4,11 @@
  */
 
 import type { Backend } from '../engine/wasm-exports.js';
-import type { LoadedPhotograph } from '../photo/photograph.js';
+import type { SharedPhoto } from '../photo/photo-library.js';
 import type { BackendPreferences, CreateRenderer } from '../renderers/types.js';
 import { joinSentences, PhotoError, toPhotoError } from '../shared/errors.js';
 import { Deferred } from '../shared/promises.js';
-import { ActiveBackend, type RefCounted } from './active-backend.js';
+import { ActiveBackend } from './active-backend.js';
 import { BACKEND_TITLES, firstWorking } from './backends.js';
 import type { PhotoSessionListener } from './types.js';
 
@@ -38,7 +38,7 @@ export class BackendSelector {
   #outgoing: ActiveBackend | null = null;
   #search: BackendSearch | null = null;
   /** The photograph of the last search. */
-  #photo: RefCounted<LoadedPhotograph> | null = null;
+  #photo: SharedPhoto | null = null;
 
   constructor(
     private readonly createRenderer: CreateRenderer,
@@ -53,7 +53,7 @@ export class BackendSelector {
 
   /** Replaces the backend `previous` by the first that works. `reason` is empty if only the options have changed. */
   async select(
-    photo: RefCounted<LoadedPhotograph>,
+    photo: SharedPhoto,
     options: BackendPreferences,
     previous: Backend | null,
     reason: string,
@@ -163,7 +163,7 @@ export class BackendSelector {
   async #attempt(
     backend: Backend,
     options: BackendPreferences,
-    photo: RefCounted<LoadedPhotograph>,
+    photo: SharedPhoto,
     signal: AbortSignal,
   ): Promise<ActiveBackend> {
     const active = this.active;

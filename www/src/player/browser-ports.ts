@@ -3,26 +3,31 @@
 import { forbiddenByPolicy } from '../loading/http-errors.js';
 import { openPhoto } from '../loading/load.js';
 import { createDecoder } from '../photo/create-decoder.js';
+import { PhotoLibrary } from '../photo/photo-library.js';
 import { createRenderer, prepare } from '../renderers/renderer-factory.js';
 import { withPolicyErrors } from '../shared/content-security-policy.js';
 import { callLater } from '../shared/promises.js';
 import type { SessionPorts } from './types.js';
 
+const library = new PhotoLibrary(({ src, credentials }, options) =>
+  openPhoto(src, options, {
+    createDecoder,
+    fetch: (input, init) =>
+      withPolicyErrors(
+        () => fetch(input, { ...init, credentials }),
+        /^connect-src/,
+        (directive, cause) => forbiddenByPolicy(src, directive, cause),
+      ),
+    yieldToPage,
+    now: () => performance.now(),
+  }),
+);
+
 export const BROWSER_PORTS: SessionPorts = {
-  open: (src, credentials, options) =>
-    openPhoto(src, options, {
-      createDecoder,
-      fetch: (input, init) =>
-        withPolicyErrors(
-          () => fetch(input, { ...init, credentials }),
-          /^connect-src/,
-          (directive, cause) => forbiddenByPolicy(src, directive, cause),
-        ),
-      yieldToPage,
-      now: () => performance.now(),
-    }),
+  library,
   createRenderer,
   prepare: (options, signal) => void prepare(options, signal),
+  copyCanvas,
   nextFrame: (callback) => requestAnimationFrame(callback),
   callLater,
   now: () => performance.now(),
@@ -31,4 +36,15 @@ export const BROWSER_PORTS: SessionPorts = {
 function yieldToPage(): Promise<void> {
   const { scheduler } = globalThis as { scheduler?: { yield?: () => Promise<void> } };
   return scheduler?.yield?.() ?? new Promise((resolve) => setTimeout(resolve));
+}
+
+function copyCanvas({
+  canvas,
+  gamut,
+}: Parameters<SessionPorts['copyCanvas']>[0]): HTMLCanvasElement {
+  const copy = document.createElement('canvas');
+  copy.width = canvas.width;
+  copy.height = canvas.height;
+  copy.getContext('2d', { colorSpace: gamut })?.drawImage(canvas, 0, 0);
+  return copy;
 }

@@ -1,8 +1,9 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
+import type { PhotoUser } from '../photo/photo-library.js';
 import { withBackends, withExposure } from '../renderers/settings-fakes.js';
 import { PhotoError } from '../shared/errors.js';
-import { fakeSession, loadedSession, SETTINGS, settle } from './session-fakes.js';
+import { type FakeSession, fakeSession, loadedSession, SETTINGS, settle } from './session-fakes.js';
 import type { SessionSettings } from './types.js';
 
 test('a photograph is loaded, gets a backend and is drawn', async () => {
@@ -192,8 +193,12 @@ test('previews are drawn while the file loads, each with the backend of the last
   assert.deepEqual(f.takeLog(), ['cpu draws flood'], 'the light may move');
   await f.sendPreview('a.ltm', 0.5);
   await f.sendPreview('a.ltm', 0.75);
-  const left = ['free cpu', 'free 0.125 of a.ltm', 'free 0.75 of a.ltm'];
-  assert.deepEqual(f.takeLog(), left, 'one is on its way to the screen');
+  const left = ['free cpu', 'free 0.125 of a.ltm'];
+  assert.deepEqual(
+    f.takeLog(),
+    left,
+    'one is on its way to the screen, so that 0.75 is not needed',
+  );
   assert.equal(f.session.backend, 'cpu');
   await f.createRenderer(2);
   assert.deepEqual(f.takeLog(), ['cpu draws flood', 'quality 0.5']);
@@ -304,4 +309,123 @@ test('a request that waits for a preview’s frame is drawn with the photograph'
   }
   assert.ok(f.takeLog().includes('loaded'));
   assert.equal(await waiting, f.session.renderer);
+});
+
+const CPU: SessionSettings = { ...SETTINGS, backendOptions: withBackends(['cpu']) };
+
+/** The library's view of a session with a photograph. */
+function userOf({ users }: FakeSession): PhotoUser {
+  const [user] = users;
+  assert.ok(user);
+  return user;
+}
+
+/** A session whose photograph was released while it was out of view. */
+async function restingSession(settings = CPU) {
+  const f = await loadedSession(settings);
+  f.session.setVisible(false);
+  userOf(f).rest();
+  return f;
+}
+
+test('only a whole photograph that is drawn and out of view may rest', async () => {
+  const f = fakeSession();
+  const frames = f.slowDown();
+  f.session.setVisible(false);
+  f.session.set(CPU);
+  const canRest = () => userOf(f).canRest;
+  assert.ok(!canRest());
+  await f.finishLoad('a.ltm');
+  await f.createRenderer(0);
+  assert.ok(!canRest(), 'its first frame is in progress');
+  frames.shift()?.done();
+  await settle();
+  assert.ok(canRest());
+  const picture = f.session.renderNow();
+  assert.ok(!canRest(), 'a script waits for it');
+  frames.shift()?.done();
+  await picture;
+  await settle();
+  assert.ok(canRest());
+  f.session.setVisible(true);
+  assert.ok(!canRest());
+});
+
+test('a resting picture stays as it is, and its photograph returns silently when it comes near', async () => {
+  const f = await restingSession();
+  const { session } = f;
+  assert.deepEqual(f.takeLog(), ['free cpu', 'free a.ltm']);
+  assert.equal(f.users.size, 0);
+  const { backend, quality, renderer, photo } = session;
+  assert.deepEqual([backend, quality, renderer?.kernel], ['cpu', 1, 'fake']);
+  assert.ok(photo);
+  // Changes are drawn when it is back.
+  session.set({ ...CPU, light: { ...CPU.light, name: 'torch' } });
+  await f.frame();
+  assert.equal(f.users.size, 0);
+  session.setNear(true);
+  assert.ok(userOf(f).isResting);
+  session.setVisible(true);
+  await f.finishLoad('a.ltm');
+  await f.createRenderer(1);
+  assert.deepEqual(f.takeLog(), ['cpu draws torch']);
+  assert.ok(!userOf(f).isResting);
+});
+
+test('a resting picture that leaves again gives up its place in the queue', async () => {
+  const f = await restingSession();
+  f.session.setNear(true);
+  f.session.setNear(false);
+  assert.equal(f.users.size, 0);
+  f.session.setNear(true);
+  await f.finishLoad('a.ltm');
+  await f.createRenderer(1);
+  assert.equal(f.takeLog().at(-1), 'cpu draws flood');
+});
+
+test('the picture of a graphics device is copied before it rests', async () => {
+  const f = await restingSession(SETTINGS);
+  assert.deepEqual(f.takeLog(), ['webgpu draws flood', 'copy', 'free webgpu', 'free a.ltm']);
+});
+
+test('renderNow opens the photograph of a resting picture before all others', async () => {
+  const f = await restingSession();
+  f.takeLog();
+  const picture = f.session.renderNow();
+  assert.deepEqual([userOf(f).placement, userOf(f).isResting], [0, false]);
+  f.session.setNear(false);
+  await f.finishLoad('a.ltm');
+  await f.createRenderer(1);
+  assert.equal(await picture, f.session.renderer);
+  assert.ok(f.takeLog().includes('cpu draws flood'));
+});
+
+test('a resting picture whose photograph cannot be opened is a warning, and the next time works', async () => {
+  const f = await restingSession();
+  f.takeLog();
+  f.session.setNear(true);
+  await f.failLoad('a.ltm', new PhotoError('http-network', 'the server cannot be reached'));
+  assert.deepEqual(f.takeLog(), ['warned http-network: the server cannot be reached']);
+  await assert.rejects(
+    Promise.all([
+      f.session.renderNow(),
+      f.failLoad('a.ltm', new PhotoError('http-network', 'still not')),
+    ]),
+    { code: 'not-loaded' },
+  );
+  f.takeLog();
+  f.session.setNear(true);
+  await f.finishLoad('a.ltm');
+  await f.createRenderer(1);
+  assert.deepEqual(f.takeLog(), ['cpu draws flood', 'recovered']);
+});
+
+test('another address replaces a resting picture', async () => {
+  const f = await restingSession();
+  f.takeLog();
+  f.session.set({ ...CPU, src: 'b.ltm' });
+  assert.equal(f.session.photo, null);
+  await f.finishLoad('b.ltm');
+  await f.createRenderer(1);
+  assert.deepEqual(f.takeLog(), ['loading', 'backend null -> cpu', 'cpu draws flood', 'loaded']);
 });

@@ -2,8 +2,11 @@
  * One photograph on the page: it is loaded, given a backend, drawn and released. Ports stand for the browser.
  *
  *     set ─▶ load ─▶ preview or photograph ─▶ BackendSelector ─▶ renderer ─▶ frames (FrameScheduler)
- *             ▲                                   │ photo-lost
+ *             ▲                                   │ photo-lost, or rested
  *             └───────────────────────────────────┘
+ *
+ * The photograph is the page library's, which elements share. The library may ask a session out of view to rest: the
+ * session releases the photograph and keeps its picture, until it comes near or a script needs the photograph.
  *
  * Each load has a signal, which is aborted when another load starts or the session stops. Whatever continues after a
  * wait checks it, and frees its result if it has come too late.
@@ -12,17 +15,26 @@
 import type { Backend } from '../engine/wasm-exports.js';
 import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
+import { OUT_OF_VIEW } from '../photo/load-queue.js';
+import type { PhotoUser, SharedPhoto } from '../photo/photo-library.js';
 import type { LoadedPhotograph } from '../photo/photograph.js';
 import type { Renderer } from '../renderers/types.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
 import { Deferred } from '../shared/promises.js';
-import { type ActiveBackend, RefCounted } from './active-backend.js';
+import type { ActiveBackend } from './active-backend.js';
 import { BackendSelector } from './backend-selector.js';
 import { FrameScheduler } from './frame-scheduler.js';
 import type { PhotoSessionListener, SessionPorts, SessionSettings } from './types.js';
 
 /** How often a photograph that loses tiles is fetched again without a frame in between. */
 const MAX_REFETCHES = 5;
+
+/** What is known of a photograph that was released while its picture stays. */
+interface RestingPicture {
+  readonly photo: Pick<LoadedPhotograph, 'info'>;
+  readonly renderer: Pick<Renderer, 'kernel' | 'gamut'>;
+  readonly backend: Backend;
+}
 
 export class PhotoSession {
   readonly #selector: BackendSelector;
@@ -35,7 +47,14 @@ export class PhotoSession {
   #failure: 'temporary' | 'permanent' | null = null;
   /** Aborted when the load and its photograph are released. */
   #load = new AbortController();
-  #photo: RefCounted<LoadedPhotograph> | null = null;
+  #photo: SharedPhoto | null = null;
+  /** Set from the release until the photograph is drawn again. */
+  #resting: RestingPicture | null = null;
+  /** The load that ends the rest. */
+  #wake: { readonly signal: AbortSignal; readonly done: Promise<void> } | null = null;
+  /** Calls of `renderNow` that wait for the end of the rest. */
+  #requests = 0;
+  #isVisible = true;
   /** Fetches since the photograph was last drawn. */
   #refetches = 0;
   /** The frame after the one, or the search, that is in progress. */
@@ -57,21 +76,21 @@ export class PhotoSession {
   }
 
   /** The photograph, or its preview, once it is decoded. */
-  get photo(): LoadedPhotograph | null {
-    return this.#photo?.value ?? null;
+  get photo(): Pick<LoadedPhotograph, 'info'> | null {
+    return this.#photo?.value ?? this.#resting?.photo ?? null;
   }
 
   get backend(): Backend | null {
-    return this.#selector.active?.backend ?? null;
+    return this.#selector.active?.backend ?? this.#resting?.backend ?? null;
   }
 
-  get renderer(): Renderer | null {
-    return this.#selector.active?.renderer ?? null;
+  get renderer(): Pick<Renderer, 'kernel' | 'gamut'> | null {
+    return this.#selector.active?.renderer ?? this.#resting?.renderer ?? null;
   }
 
   /** The share of the photograph's components in the last frame; `null` before the first. */
   get quality(): number | null {
-    return this.#selector.active?.hasDrawn ? this.#quality : null;
+    return this.#selector.active?.hasDrawn || this.#resting ? this.#quality : null;
   }
 
   /** A changed setting is a new object. `reload` fetches the file even if its address is the same. */
@@ -85,7 +104,7 @@ export class PhotoSession {
       this.#release(false);
       this.#refetches = 0;
       this.listener.loadStarted();
-      void this.#run(settings, null, '');
+      void this.#run(settings, null, '', isSameFile);
     } else if (previous.backendOptions === settings.backendOptions) {
       this.#scheduler.invalidate();
     } else if (this.#photo) {
@@ -100,7 +119,17 @@ export class PhotoSession {
 
   /** An invisible picture is drawn for the first time, for another backend and by `renderNow`, but not for changes. */
   setVisible(isVisible: boolean): void {
+    this.#isVisible = isVisible;
     this.#scheduler.setVisible(isVisible);
+    if (isVisible) this.#startWake();
+    this.ports.library.update();
+  }
+
+  /** The element has come within a screen of the viewport, or has left it. */
+  setNear(isNear: boolean): void {
+    if (isNear) this.#startWake();
+    else if (this.#resting && !this.#photo && this.#requests === 0) this.#abortLoad();
+    this.ports.library.update();
   }
 
   stop(): void {
@@ -113,9 +142,84 @@ export class PhotoSession {
    * progress; all requests made meanwhile get the same frame. Rejects with `not-loaded` if there is no photograph, and
    * with the error of a frame that fails.
    */
-  renderNow(): Promise<Renderer> {
+  async renderNow(): Promise<Renderer> {
+    if (this.#resting && !this.#photo) {
+      this.#requests += 1;
+      this.#startWake();
+      this.ports.library.update();
+      await this.#wake?.done;
+      this.#requests -= 1;
+    }
     this.#isFullQualityRequested = true;
     return this.#renderNext();
+  }
+
+  /** Releases the photograph; its picture stays. */
+  #rest(): void {
+    const { active } = this.#selector;
+    const { settings } = this;
+    if (!active || !settings) return;
+    const { backend, renderer } = active;
+    if (backend !== 'cpu') {
+      // The canvas of a graphics device keeps its picture only until the script ends.
+      try {
+        void renderer.render(settings.light, settings.output, 1);
+        this.listener.rendererChanged({ ...renderer, canvas: this.ports.copyCanvas(renderer) });
+      } catch {
+        return;
+      }
+    }
+    const { kernel, gamut } = renderer;
+    const { info } = active.photo.value;
+    this.#release(true);
+    this.#resting = { photo: { info }, renderer: { kernel, gamut }, backend };
+    this.isLoaded = true;
+  }
+
+  /** Opens the photograph of a resting picture again, unless it is being opened. */
+  #startWake(): void {
+    const { signal } = this.#load;
+    if (!this.#resting || !this.settings || this.#wake?.signal === signal) return;
+    const done = this.#run(this.settings, this.#resting.backend, '').finally(() => {
+      // After a failure, the next one tries again.
+      if (this.#wake?.signal === signal) this.#wake = null;
+    });
+    this.#wake = { signal, done };
+  }
+
+  /** The session as a user of the library, while the current load and its photograph last. */
+  #createUser(previous: Backend | null, reason: string): PhotoUser {
+    const session = this;
+    // After a loss or a rest, the picture on the screen is finer than a preview.
+    const needsPreviews = !this.#scheduler.hasPicture;
+    return {
+      get placement() {
+        return session.#requests > 0 ? 0 : session.listener.placement;
+      },
+      get isResting() {
+        return session.#resting !== null && session.#requests === 0;
+      },
+      get wantsPreviews() {
+        // The last preview must be drawn first.
+        return needsPreviews && !session.#selector.search && this.placement < OUT_OF_VIEW;
+      },
+      get canRest() {
+        return session.#canRest;
+      },
+      progress: (loaded, total) => {
+        if (!session.#resting) session.listener.progress(loaded, total);
+      },
+      preview: (photo) => {
+        photo.retain();
+        void session.#use(photo, previous, reason);
+      },
+      rest: () => session.#rest(),
+    };
+  }
+
+  get #canRest(): boolean {
+    const isBusy = this.#requests > 0 || this.#nextFrame || this.#inProgress;
+    return !this.#isVisible && this.isLoaded && !isBusy && this.#selector.active?.hasDrawn === true;
   }
 
   /** Fetches a photograph that has lost tiles again. Its picture stays until the new one is drawn. */
@@ -140,54 +244,46 @@ export class PhotoSession {
     { src, credentials, backendOptions }: SessionSettings,
     previous: Backend | null,
     reason: string,
+    isReload = false,
   ): Promise<void> {
     const { signal } = this.#load;
     const preparation = new AbortController();
-    const onPreview = (preview: LoadedPhotograph): void => {
-      // The last preview must be drawn first.
-      if (signal.aborted || this.#selector.search) preview.free();
-      else void this.#use(preview, previous, reason);
-    };
     try {
       if (src === null) {
         const message = 'There is no photograph to show: set the src attribute.';
         throw new PhotoError('src-missing', message);
       }
       this.ports.prepare(backendOptions, preparation.signal);
-      const photo = await this.ports.open(src, credentials, {
-        signal,
-        onProgress: (loaded, total) => {
-          if (!signal.aborted) this.listener.progress(loaded, total);
-        },
-        // After a loss, the picture on the screen is finer than a preview.
-        onPreview: this.#scheduler.hasPicture ? null : onPreview,
-      });
+      const user = this.#createUser(previous, reason);
+      const { library } = this.ports;
+      const photo = await library.open({ src, credentials }, user, signal, isReload);
       // The backend that the preview's search finds is used for the photograph as well.
       while (this.#selector.search && !signal.aborted) await this.#selector.search;
-      if (signal.aborted) photo.free();
+      if (signal.aborted) photo.release();
       else await this.#use(photo, previous, reason);
     } catch (thrown) {
       if (signal.aborted) return;
-      this.#failure = 'permanent';
-      this.#fail(toPhotoError(thrown), this.#refetches > 0 && this.#scheduler.hasPicture);
+      const isBehindPicture =
+        this.#scheduler.hasPicture && (this.#refetches > 0 || this.#resting !== null);
+      this.#failure = isBehindPicture ? 'temporary' : 'permanent';
+      this.#fail(toPhotoError(thrown), isBehindPicture);
     } finally {
       preparation.abort();
     }
   }
 
-  async #use(photo: LoadedPhotograph, previous: Backend | null, reason: string): Promise<void> {
-    const { backend } = this;
+  async #use(photo: SharedPhoto, previous: Backend | null, reason: string): Promise<void> {
+    const backend = this.#selector.active?.backend;
     this.#photo?.release();
-    const shared = new RefCounted(photo);
-    this.#photo = shared;
+    this.#photo = photo;
     // The canvas of the CPU keeps its picture by itself, and memory may suffice for one photograph only.
     if (backend === 'cpu') this.#selector.active?.free();
     const options = this.settings?.backendOptions;
     if (!options) return;
-    if (!backend) return this.#selector.select(shared, options, previous, reason);
+    if (!backend) return this.#selector.select(photo, options, previous, reason);
     // Backends that could not draw the preview are not tried again.
     const backends = options.backends.slice(options.backends.indexOf(backend));
-    return this.#selector.select(shared, { ...options, backends }, backend, '');
+    return this.#selector.select(photo, { ...options, backends }, backend, '');
   }
 
   #drawFrame(isFullQuality: boolean): void {
@@ -283,6 +379,7 @@ export class PhotoSession {
     this.#scheduler.frameDrawn(frameQuality < 1);
     if (!active.hasDrawn) {
       active.hasDrawn = true;
+      this.#resting = null;
       this.listener.rendererChanged(active.renderer);
       this.#selector.freeOutgoing();
     }
@@ -304,10 +401,12 @@ export class PhotoSession {
     if (this.#failure === 'permanent') return;
     if (this.#failure) this.listener.recovered();
     this.#failure = null;
-    if (!this.isLoaded && this.photo?.isComplete) {
+    if (!this.isLoaded && this.#photo?.value.isComplete) {
       this.isLoaded = true;
       this.listener.loaded();
     }
+    // The photograph may be released now.
+    if (!this.#isVisible) this.ports.library.update();
   }
 
   #fail(error: PhotoError, hasPicture = false): void {
@@ -316,9 +415,14 @@ export class PhotoSession {
     else this.listener.failed(error);
   }
 
-  #release(keepsPicture: boolean): void {
+  #abortLoad(): void {
     this.#load.abort();
     this.#load = new AbortController();
+  }
+
+  #release(keepsPicture: boolean): void {
+    this.#abortLoad();
+    this.#resting = null;
     this.#selector.release();
     this.#scheduler.reset(keepsPicture);
     this.#photo?.release();

@@ -1,7 +1,9 @@
 /** A photo session whose loads, renderers and frames are controlled by a test. */
 
 import type { Backend } from '../engine/wasm-exports.js';
+import type { PhotoUser } from '../photo/photo-library.js';
 import type { LoadedPhotograph } from '../photo/photograph.js';
+import { RefCounted } from '../photo/ref-counted.js';
 import { withBackends, withExposure } from '../renderers/settings-fakes.js';
 import type { Renderer } from '../renderers/types.js';
 import { PhotoError } from '../shared/errors.js';
@@ -43,6 +45,8 @@ export function fakeSession() {
     string,
     { preview(completeness: number): void; resolve(): void; reject(error: Error): void }
   >();
+  /** The sessions that have a photograph or wait for one. */
+  const users = new Set<PhotoUser>();
   /** The renderers that were requested. */
   const requests: {
     backend: Backend;
@@ -61,22 +65,36 @@ export function fakeSession() {
   let slowFrames: SlowFrame[] | null = null;
   const session = new PhotoSession(
     {
-      open: (src, _credentials, { signal, onPreview }) =>
-        new Promise((resolve, reject) => {
-          const onAbort = () => log.push(`abort ${src}`);
-          signal.addEventListener('abort', onAbort);
-          opens.set(src, {
-            preview: (completeness) => onPreview?.(fakePhotograph(src, completeness, log)),
-            resolve: () => {
-              signal.removeEventListener('abort', onAbort);
-              resolve(fakePhotograph(src, 1, log));
-            },
-            reject: (error) => {
-              signal.removeEventListener('abort', onAbort);
-              reject(error);
-            },
-          });
-        }),
+      library: {
+        open: ({ src }, user, signal) =>
+          new Promise((resolve, reject) => {
+            users.add(user);
+            const onAbort = () => log.push(`abort ${src}`);
+            signal.addEventListener('abort', onAbort);
+            signal.addEventListener('abort', () => users.delete(user));
+            opens.set(src, {
+              preview: (completeness) => {
+                if (!user.wantsPreviews) return;
+                const preview = new RefCounted(fakePhotograph(src, completeness, log));
+                user.preview(preview);
+                preview.release();
+              },
+              resolve: () => {
+                signal.removeEventListener('abort', onAbort);
+                resolve(new RefCounted(fakePhotograph(src, 1, log)));
+              },
+              reject: (error) => {
+                signal.removeEventListener('abort', onAbort);
+                reject(error);
+              },
+            });
+          }),
+        update: () => {},
+      },
+      copyCanvas: ({ canvas }) => {
+        log.push('copy');
+        return canvas;
+      },
       prepare: () => {},
       createRenderer: (backend, _photo, options, onLost) =>
         new Promise((resolve, reject) => {
@@ -109,6 +127,7 @@ export function fakeSession() {
       now: () => now,
     },
     {
+      placement: 0,
       loadStarted: () => log.push('loading'),
       progress: () => {},
       frameDrawn: (frame) => frame.lightError && log.push(`no light: ${frame.lightError.message}`),
@@ -128,6 +147,7 @@ export function fakeSession() {
     /** The losses that the listener was told. */
     losses,
     requests,
+    users,
     /** The callbacks that wait for the browser's next frame. */
     frames,
     /** The log since the last call. */

@@ -4,8 +4,9 @@ import type { OutputSettings } from '../engine/output-settings.js';
 import type { Backend } from '../engine/wasm-exports.js';
 import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
-import type { LoadOptions } from '../loading/load.js';
-import type { LoadedPhotograph } from '../photo/photograph.js';
+import type { LoadOptions } from '../photo/load-options.js';
+import type { Placement } from '../photo/load-queue.js';
+import type { PhotoLibrary } from '../photo/photo-library.js';
 import type { BackendPreferences, CreateRenderer, Renderer } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
 import type { callLater } from '../shared/promises.js';
@@ -29,17 +30,17 @@ export interface FrameClock {
 
 /** Loading and drawing; tests replace them. */
 export interface SessionPorts extends FrameClock {
-  open(
-    src: string,
-    credentials: RequestCredentials,
-    options: LoadOptions,
-  ): Promise<LoadedPhotograph>;
+  readonly library: Pick<PhotoLibrary, 'open' | 'update'>;
   /** Warms up the backend that will probably be used, until `signal` is aborted. */
   prepare(options: BackendPreferences, signal: AbortSignal): void;
   readonly createRenderer: CreateRenderer;
+  /** Copies the picture of a graphics device, which loses it, to a canvas that keeps it. */
+  copyCanvas(renderer: Pick<Renderer, 'canvas' | 'gamut'>): HTMLCanvasElement;
 }
 
 export interface PhotoSessionListener {
+  /** Where the element is now. */
+  readonly placement: Placement;
   /** A load starts; the last photograph is gone. */
   loadStarted(): void;
   progress: LoadOptions['onProgress'];

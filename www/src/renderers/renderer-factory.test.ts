@@ -3,6 +3,7 @@ import test, { type TestContext } from 'node:test';
 import type { Backend, CpuModule } from '../engine/wasm-exports.js';
 import { LoadedPhotograph } from '../photo/photograph.js';
 import { fakePhoto } from '../photo/photograph-fakes.js';
+import { RefCounted } from '../photo/ref-counted.js';
 import { PhotoSession } from '../player/photo-session.js';
 import type { SessionSettings } from '../player/types.js';
 import { PhotoError } from '../shared/errors.js';
@@ -80,7 +81,11 @@ async function startSession(t: TestContext, open = async (_: Backend): Promise<v
   const changes: string[] = [];
   const session = new PhotoSession(
     {
-      open: async () => LoadedPhotograph.fromModule(photo),
+      library: {
+        open: async () => new RefCounted(LoadedPhotograph.fromModule(photo)),
+        update: () => {},
+      },
+      copyCanvas: ({ canvas }) => canvas,
       prepare: () => {},
       createRenderer: factoryFor(module, pool, createDevices(open)).createRenderer,
       nextFrame: (callback) => frames.push(callback),
@@ -88,6 +93,7 @@ async function startSession(t: TestContext, open = async (_: Backend): Promise<v
       now: () => 0,
     },
     {
+      placement: 0,
       loadStarted: () => {},
       progress: () => {},
       frameDrawn: () => {},

@@ -8,8 +8,11 @@ import type { RelightClient, RelightWorker } from './protocol.js';
 
 /** Failures of workers without a frame in between, after which the page draws by itself. */
 const MAX_INCIDENTS = 3;
-/** The largest frames take two seconds on slow machines. The browser has the module in its cache. */
-const LIMITS: WatchdogLimits = { intervalMs: 1000, maxChecks: 10, maxStartChecks: 15 };
+/**
+ * The largest frames take two seconds on slow machines, and several times as long beside other work. Each answer starts
+ * the count anew, so that requests may wait for each other.
+ */
+const LIMITS: WatchdogLimits = { intervalMs: 1000, maxChecks: 20, maxStartChecks: 60 };
 const REMEDY =
   "Its script must lie beside the element's, and a content security policy must allow it in worker-src.";
 /** Workers to warm up before the photograph's size is known. Most photographs need at least as many. */
