@@ -96,7 +96,7 @@ function memorySizes(page) {
 }
 
 /**
- * Puts more photographs into a page, and waits until they have loaded.
+ * Puts more photographs into a page, each with an address of its own, and waits until they have loaded.
  *
  * @param {import('@playwright/test').Page} page
  * @param {number} count
@@ -105,9 +105,14 @@ function memorySizes(page) {
 async function mountMore(page, count, src) {
   await page.evaluate(
     async ({ count, src }) => {
-      const loads = Array.from({ length: count }, () => {
+      const loads = Array.from({ length: count }, (_, i) => {
         const photo = document.createElement('relightable-photo');
-        Object.assign(photo, { src, backend: 'cpu', light: 'spectrum', loading: 'eager' });
+        Object.assign(photo, {
+          src: `${src}?${i}`,
+          backend: 'cpu',
+          light: 'spectrum',
+          loading: 'eager',
+        });
         const load = new Promise((resolve, reject) => {
           photo.addEventListener('load', resolve);
           photo.addEventListener('error', (event) => reject(new Error(event.message)));

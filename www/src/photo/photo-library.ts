@@ -35,8 +35,15 @@ export interface PhotoUser {
 
 export type LoadPhoto = (address: PhotoAddress, options: LoadOptions) => Promise<LoadedPhotograph>;
 
-/** Decoded bytes above which photographs that are out of view are released. */
-const MAX_DECODED_BYTES = 256 << 20;
+/** Decoded bytes above which photographs that are out of view are released: less on devices with little memory. */
+const MAX_DECODED_BYTES = 256 * 2 ** 20;
+const MAX_DECODED_BYTES_PER_GIB = 64 * 2 ** 20;
+
+/** The device's memory in GiB is known in some browsers, up to 8. */
+function defaultMaxDecodedBytes(): number {
+  const { deviceMemory = 8 } = (globalThis.navigator ?? {}) as { readonly deviceMemory?: number };
+  return Math.min(MAX_DECODED_BYTES, deviceMemory * MAX_DECODED_BYTES_PER_GIB);
+}
 
 export class PhotoLibrary {
   /** The entry that an address has now. */
@@ -48,7 +55,7 @@ export class PhotoLibrary {
   constructor(
     private readonly load: LoadPhoto,
     private readonly queue = new LoadQueue(),
-    private readonly maxDecodedBytes = MAX_DECODED_BYTES,
+    private readonly maxDecodedBytes = defaultMaxDecodedBytes(),
   ) {}
 
   /**
