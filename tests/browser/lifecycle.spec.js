@@ -142,6 +142,8 @@ test.describe('an element', () => {
     const page = await openPage('/plain');
     const session = await page.context().newCDPSession(page);
     const usage = async () => {
+      // Until the timers of the last elements have fired, and idle workers have ended.
+      await page.waitForTimeout(1500);
       // Finalizers run after a collection, and a later collection frees what they release.
       for (let i = 0; i < 3; i += 1) {
         await session.send('HeapProfiler.collectGarbage');
@@ -191,7 +193,8 @@ test.describe('an element', () => {
         },
         /** @type {const} */ ([elements / AT_ONCE, AT_ONCE]),
       );
-    await cycle(20);
+    // Enough for the memory of the modules to reach its peak.
+    await cycle(100);
     const before = await usage();
     await cycle(200);
     const after = await usage();
