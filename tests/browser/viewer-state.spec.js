@@ -2,7 +2,13 @@
 
 import { brightest } from '../../www/tools/pictures.js';
 import { expect, test } from './fixtures.js';
-import { capturePicture, waitForEvents, waitForWarning, waitUntil } from './page-helpers.js';
+import {
+  capturePicture,
+  countEvents,
+  waitForEvents,
+  waitForWarning,
+  waitUntil,
+} from './page-helpers.js';
 import { nativePicture } from './test-photos.js';
 
 const GLASS = { src: '/photos/glass.ltm', alt: 'A window', light: 'torch', backend: 'cpu' };
@@ -28,7 +34,7 @@ test.describe('the state', () => {
     });
     const want = await capturePicture(page);
     const state = await page.evaluate('photo.getState()');
-    expect(state).toBe('l=torch&x=0.3333&y=0.7&s=0.3&c=ffa500&z=3&vx=0.4&vy=0.5&e=1.5');
+    expect(state).toBe('l=torch&x=0.3333&y=0.7&r=0.3&c=ffa500&z=3&vx=0.4&vy=0.5&e=1.5');
     const other = await open(openPhoto, { zoom: '4', light: 'stripes' });
     expect(await capturePicture(other)).not.toMatchPicture(want, 0);
     await other.evaluate(`photo.setState('#${state}')`);
@@ -39,6 +45,14 @@ test.describe('the state', () => {
     expect(await other.evaluate('photo.getState()')).toBe('l=stripes');
     const stripes = nativePicture('stripes');
     expect(await capturePicture(other)).toMatchPicture(stripes, 1);
+  });
+
+  test('of several photographs share an address by prefixes', async ({ openPhoto }) => {
+    const page = await open(openPhoto, { light: 'fire' });
+    expect(await page.evaluate("photo.getState({ prefix: 'a-' })")).toBe('a-l=fire');
+    await page.evaluate("photo.setState('?s=window&l=flood&a-l=stripes', { prefix: 'a-' })");
+    expect(await page.evaluate('photo.activeLight')).toBe('stripes');
+    expect(await countEvents(page, 'warning')).toBe(0);
   });
 
   test('that is partly invalid applies the rest and causes a warning', async ({ openPhoto }) => {
@@ -138,6 +152,60 @@ test.describe('the light', () => {
     await waitUntil(page, "photo.activeGamut === 'display-p3'");
     const photoEvents = await waitForEvents(page, 'backendchange');
     expect(photoEvents.filter(({ type }) => type === 'backendchange').length).toBe(1);
+  });
+});
+
+test.describe('torch and view', () => {
+  test('are set in part, and name a field that is no number', async ({ openPhoto }) => {
+    const page = await open(openPhoto, { zoom: '4' });
+    await page.evaluate('photo.torch = { x: 0.25 }, photo.torch = { y: 0.75 }');
+    expect(await page.evaluate('photo.torch')).toStrictEqual({ x: 0.25, y: 0.75 });
+    await page.evaluate('photo.view = { zoom: 2 }, photo.view = { x: 0.3 }');
+    expect(await page.evaluate('photo.view')).toStrictEqual({ zoom: 2, x: 0.3, y: 0.5 });
+    for (const [assignment, message] of /** @type {const} */ ([
+      ['photo.torch = { x: "left" }', /TypeError: torch\.x must be a finite number, but is left/],
+      ['photo.view = { zoom: NaN }', /TypeError: view\.zoom must be a finite number/],
+      ['photo.view = null', /TypeError: view must be an object with zoom, x, y/],
+      ['photo.light = { size: Infinity }', /TypeError: light\.size must be a finite number/],
+      ['photo.viewTo({ zoom: 2 }, { duration: -1 })', /TypeError: duration must be/],
+    ])) {
+      await expect(page.evaluate(assignment)).rejects.toThrow(message);
+    }
+    expect(await page.evaluate('photo.torch')).toStrictEqual({ x: 0.25, y: 0.75 });
+    await page.evaluate("photo.removeAttribute('zoom'), photo.view = { zoom: 2 }");
+    expect((await waitForWarning(page))['message']).toContain('set the zoom attribute');
+  });
+
+  test('move to their place, and stay where a visitor interferes', async ({ openPhoto }) => {
+    const page = await open(openPhoto, { zoom: '4' });
+    const trace = await page.evaluate(async () => {
+      const { photo } = /** @type {any} */ (globalThis);
+      /** @type {number[][]} */
+      const trace = [];
+      photo.torch = { x: 0, y: 0.5 };
+      photo.addEventListener('lightchange', () => trace.push([photo.torch.x, photo.view.zoom]));
+      const view = photo.viewTo({ zoom: 4, x: 0.5 }, { duration: 400 });
+      await photo.lightTo({ name: 'torch', x: 1 }, { duration: 400 });
+      await view;
+      return [...trace, [photo.torch.x, photo.view.zoom]];
+    });
+    expect(trace.at(-1)).toStrictEqual([1, 4]);
+    const between = trace.filter(([x = 0, zoom = 0]) => x > 0 && x < 1 && zoom > 1 && zoom < 4);
+    expect(between.length).toBeGreaterThan(2);
+    const isSorted = trace.every(([x = 0], i) => i === 0 || x >= (trace[i - 1]?.[0] ?? 0));
+    expect(isSorted, 'the torch moves one way').toBe(true);
+    const end = await page.evaluate(async () => {
+      const { photo } = /** @type {any} */ (globalThis);
+      const moved = photo.lightTo({ name: 'torch', x: 0 }, { duration: 1e6 });
+      await new Promise(requestAnimationFrame);
+      photo.torch = { x: 0.5 };
+      await moved;
+      return photo.torch.x;
+    });
+    expect(end).toBe(0.5);
+    await page.emulateMedia({ reducedMotion: 'reduce' });
+    await page.evaluate("photo.lightTo({ name: 'torch', x: 0.125 }, { duration: 1e6 })");
+    expect(await page.evaluate('photo.torch.x')).toBe(0.125);
   });
 });
 

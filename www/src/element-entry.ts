@@ -1,7 +1,13 @@
 /** The element's class, its events and its types. Importing this module has no side effects. */
 
 export { defineRelightablePhoto, TAG } from './element/define.js';
-export { type PhotoInfo, RelightablePhotoElement, type ToBlobOptions } from './element/element.js';
+export {
+  type PhotoInfo,
+  RelightablePhotoElement,
+  type StateOptions,
+  type ToBlobOptions,
+  type TransitionOptions,
+} from './element/element.js';
 export {
   BackendChangeEvent,
   ContextLostEvent,

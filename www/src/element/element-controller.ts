@@ -15,12 +15,13 @@ import type { Renderer } from '../renderers/types.js';
 import { missingScript, PhotoError } from '../shared/errors.js';
 import { BACKENDS } from '../shared/keywords.js';
 import { reuse } from '../shared/reuse-if-equal.js';
+import { CENTRE, type PicturePoint } from '../shared/value-types.js';
 import { type ActiveLight, ActiveLightTracker } from '../state/active-light-tracker.js';
 import { AttributeReader } from '../state/attribute-reader.js';
 import { type ElementOptions, readOptions } from '../state/options.js';
-import type { LightValue } from '../state/page-light.js';
+import { checkFields, type LightValue } from '../state/page-light.js';
 import { ViewerState } from '../state/viewer-state.js';
-import type { ZoomView } from '../state/viewport.js';
+import { clampView, type ZoomView } from '../state/viewport.js';
 import { ShadowDom } from '../ui/shadow-dom.js';
 import { ViewerUi } from '../ui/viewer-ui.js';
 import { EarlyInput } from './early-input.js';
@@ -147,11 +148,54 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
     this.schedule();
   }
 
-  set light(light: LightValue) {
+  setLight(light: LightValue): void {
     this.readOptions();
+    this.#interaction?.stopTorch();
     this.state.pageLight = light;
     this.#lightError = null;
     this.schedule();
+  }
+
+  /** @throws {TypeError} for an invalid field */
+  setTorch(torch: Partial<PicturePoint> | null): void {
+    if (torch !== null) checkFields(torch, 'torch', ['x', 'y']);
+    const last = this.state.light.torch ?? CENTRE;
+    this.#interaction?.stopTorch();
+    this.state.light.torch = torch && { x: torch.x ?? last.x, y: torch.y ?? last.y };
+    this.schedule();
+  }
+
+  async lightTo(light: LightValue, ms: number): Promise<void> {
+    await this.#fetchInput();
+    if (this.#interaction) await this.#interaction.lightTo(() => this.setLight(light), ms);
+    else this.setLight(light);
+  }
+
+  async viewTo(view: Partial<ZoomView>, ms: number): Promise<void> {
+    const target = this.#completeView(view);
+    await this.#fetchInput();
+    if (this.#interaction) await this.#interaction.viewTo(target, ms);
+    else this.setView(target);
+  }
+
+  setView(view: Partial<ZoomView>): void {
+    const target = this.#completeView(view);
+    this.#interaction?.stopView();
+    this.state.view = target;
+    this.schedule();
+  }
+
+  /** The current view with other values. @throws {TypeError} for an invalid field */
+  #completeView(view: Partial<ZoomView>): ZoomView {
+    checkFields(view, 'view', ['zoom', 'x', 'y']);
+    const { maxZoom } = this.readOptions();
+    const last = this.state.view;
+    const zoom = view.zoom ?? last.zoom;
+    if (zoom > 1 && maxZoom === 1) {
+      const message = `A view with zoom ${zoom} shows the whole picture: set the zoom attribute.`;
+      this.warn(new PhotoError('attribute', message));
+    }
+    return clampView({ zoom, x: view.x ?? last.x, y: view.y ?? last.y }, maxZoom);
   }
 
   dismissPoster(): void {

@@ -28,6 +28,20 @@ export interface ToBlobOptions {
 
 const MAX_SCALE = 4;
 
+/** Options of `lightTo` and `viewTo`. */
+export interface TransitionOptions {
+  /** In milliseconds, as in `Element.animate`; 600 by default. */
+  readonly duration?: number;
+}
+
+const DEFAULT_DURATION_MS = 600;
+
+/** Options of `getState` and `setState`. */
+export interface StateOptions {
+  /** Begins each key, so that one address can hold the states of several photographs. */
+  readonly prefix?: string;
+}
+
 /**
  * Shows a photograph that visitors can relight.
  *
@@ -124,29 +138,33 @@ export class RelightablePhotoElement extends Base {
     return this.#state.light.name;
   }
 
-  /** The torch's position on the picture; `null` behind the centre of the light plane. */
+  /** The torch's position on the picture; `null` behind the centre of the light plane. Absent fields keep their values. */
   get torch(): PicturePoint | null {
     return this.#state.light.torch;
   }
-  set torch(point: PicturePoint | null) {
-    if (point && !(Number.isFinite(point.x) && Number.isFinite(point.y))) {
-      throw new TypeError('torch must be null or have finite numbers x and y, from 0 to 1');
-    }
-    this.#state.light.torch = point;
-    this.#controller.schedule();
+  set torch(point: Partial<PicturePoint> | null) {
+    this.#controller.setTorch(point);
   }
 
-  /** The visible part of the picture: its centre, and a magnification of at most `zoom`. */
+  /** The visible part of the picture: its centre, and a magnification of at most `zoom`. Absent fields keep their values. */
   get view(): ZoomView {
     return this.#state.view;
   }
-  set view(view: ZoomView) {
-    if (![view?.zoom, view?.x, view?.y].every(Number.isFinite)) {
-      throw new TypeError('view must have finite numbers zoom, from 1, and x and y, from 0 to 1');
-    }
-    this.#controller.readOptions();
-    this.#state.view = view;
-    this.#controller.schedule();
+  set view(view: Partial<ZoomView>) {
+    this.#controller.setView(view);
+  }
+
+  /**
+   * Sets `light`, and moves the torch from its current position to that of `light`. Resolves at the end, or earlier if a
+   * visitor or a script changes the light. The torch does not move if less motion is preferred.
+   */
+  lightTo(light: LightValue, options: TransitionOptions = {}): Promise<void> {
+    return this.#controller.lightTo(light, durationOf(options));
+  }
+
+  /** Moves to another `view`. Resolves as `lightTo` does. */
+  viewTo(view: Partial<ZoomView>, options: TransitionOptions = {}): Promise<void> {
+    return this.#controller.viewTo(view, durationOf(options));
   }
 
   /** Whether animations are paused: the fire, the video of `light-src`, the wandering torch. */
@@ -177,7 +195,7 @@ export class RelightablePhotoElement extends Base {
     const light = value ?? null;
     const { activeSource } = this.#state.light;
     if (activeSource !== null && light === activeSource) this.lightChanged();
-    else this.#controller.light = light;
+    else this.#controller.setLight(light);
   }
 
   /** Reads the source in `light` again in the next frame. Canvases, `ImageData` and numbers do not report changes. */
@@ -191,17 +209,17 @@ export class RelightablePhotoElement extends Base {
   }
 
   /** Light and view as a short text that is safe in an address. It does not contain what a source shows. */
-  getState(): string {
+  getState({ prefix }: StateOptions = {}): string {
     this.#controller.readOptions();
-    return this.#state.sharedState;
+    return this.#state.share(prefix);
   }
 
   /** Restores a text of `getState`, of this or another element. Missing values follow the attributes. */
-  setState(text: string): void {
+  setState(text: string, { prefix }: StateOptions = {}): void {
     const controller = this.#controller;
     controller.reset();
     controller.readOptions();
-    for (const error of this.#state.restore(text)) controller.warn(error);
+    for (const error of this.#state.restore(text, prefix)) controller.warn(error);
   }
 
   /** Removes the poster as soon as there is a picture. */
@@ -272,6 +290,11 @@ export class RelightablePhotoElement extends Base {
   attributeChangedCallback(name: string): void {
     this.#controller.attributeChanged(name);
   }
+}
+
+function durationOf({ duration = DEFAULT_DURATION_MS }: TransitionOptions): number {
+  if (duration >= 0) return duration;
+  throw new TypeError(`duration must be a number of milliseconds, but is ${duration}`);
 }
 
 /** The reflected properties, and listeners with the types of the element's own events. */

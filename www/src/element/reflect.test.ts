@@ -40,7 +40,7 @@ test('properties have defaults', () => {
     gamut: 'srgb',
     backend: 'webgpu webgl2 cpu',
     poster: '',
-    loading: 'auto',
+    loading: 'eager',
     reveal: 'auto',
     controls: false,
     zoom: 1,
@@ -69,7 +69,7 @@ test('properties write their attributes', () => {
   assert.deepEqual([element.zoom, element.kiosk], [8, 60]);
   element.setAttribute('zoom', 'much');
   element.setAttribute('loading', 'later');
-  assert.deepEqual([element.zoom, element.loading], [1, 'auto']);
+  assert.deepEqual([element.zoom, element.loading], [1, 'eager']);
 });
 
 test('all options are read together, and errors name their attribute', (t) => {

@@ -38,7 +38,7 @@ export interface ReflectedProperties {
   backend: string;
   /** Address of an image that is shown until the photograph is drawn, and if it cannot be drawn. */
   poster: string;
-  /** When the photograph is fetched: `auto` within one screen of the viewport, `lazy` in the viewport, `eager` at once. */
+  /** When the photograph is fetched, as on `<img>`: `eager` at once, `lazy` within one screen of the viewport. */
   loading: LoadingMode;
   /** When the poster gives way: `auto` when the photograph is drawn, `interaction` on a press, `manual` by `dismissPoster()`. */
   reveal: RevealMode;

@@ -26,6 +26,7 @@ import { LightAnimator } from './light-animator.js';
 import { listenToPointer, toViewportUnits } from './pointer-input.js';
 import { reducedMotion } from './reduced-motion.js';
 import { isTiltSupported, TiltSensor } from './tilt-sensor.js';
+import { Transitions, torchTransition, viewBetween } from './transitions.js';
 
 export interface InteractionCallbacks {
   /** The light, the view, an animation or the focus has changed. */
@@ -38,6 +39,7 @@ export class InteractionController {
   readonly #tilt: TiltSensor;
   readonly #loop = new AnimationLoop(requestAnimationFrame.bind(globalThis));
   readonly #animator: LightAnimator;
+  readonly #transitions = new Transitions(this.#loop);
   readonly #idle: IdleTimer;
   #isActive = false;
   /** The space key is held: drags pan. */
@@ -78,7 +80,11 @@ export class InteractionController {
     const { light, isPictureShown, options, reveal } = this.state;
     this.#idle.kioskSeconds = options.kioskSeconds;
     this.#loop.isEnabled = reveal.isVisible;
-    const isInUse = this.#isActive || this.#isHandleFocused || this.#tilt.isActive;
+    const isInUse =
+      this.#isActive ||
+      this.#isHandleFocused ||
+      this.#tilt.isActive ||
+      this.#transitions.isRunning('light');
     const isAnimated = isPlaying && isPictureShown;
     this.#animator.update({
       fire: isAnimated && light.isFire,
@@ -112,8 +118,44 @@ export class InteractionController {
   /** Ends tilting, gliding and wandering. */
   reset(): void {
     this.#tilt.stop();
-    this.#animator.stopTorch();
+    this.stopTorch();
+    this.stopView();
     this.#isActive = false;
+  }
+
+  /** Another position is about to be set. */
+  stopTorch(): void {
+    this.#animator.stopTorch();
+    this.#transitions.end('light');
+  }
+
+  stopView(): void {
+    this.#transitions.end('view');
+  }
+
+  /** Lets the torch move from its current position to that of the light which `set` sets. */
+  lightTo(set: () => void, ms: number): Promise<void> {
+    this.stopTorch();
+    const show = torchTransition(this.state, set);
+    return this.#run('light', ms, show);
+  }
+
+  /** Moves to another view. */
+  viewTo(view: ZoomView, ms: number): Promise<void> {
+    const from = this.state.view;
+    return this.#run('view', ms, (at) => {
+      this.state.view = viewBetween(from, view, at);
+    });
+  }
+
+  /** Nothing moves where nobody can see it, or where less motion is asked for. */
+  #run(name: 'light' | 'view', ms: number, show: (at: number) => void): Promise<void> {
+    const { isPictureShown, reveal } = this.state;
+    const isSeen = isPictureShown && reveal.isVisible && !reducedMotion().matches;
+    return this.#transitions.run(name, isSeen ? ms : 0, (at) => {
+      show(at);
+      this.listener.changed();
+    });
   }
 
   /** Magnifies around the centre by one step. */
@@ -130,11 +172,12 @@ export class InteractionController {
   #listenToPointer(): void {
     const state = this.state;
     const { handle, root, viewport } = this.dom;
-    // Also over the toolbar, and under a light that does not move.
+    // Also over the toolbar, and under a light that does not move; first, so that the torch does not wander on.
+    const markActive = () => {
+      if (state.isPictureShown) this.markActive();
+    };
     for (const type of ['pointermove', 'pointerdown']) {
-      root.addEventListener(type, () => {
-        if (state.isPictureShown) this.markActive();
-      });
+      root.addEventListener(type, markActive, { capture: true });
     }
     const toUnits = (x: number, y: number) => toViewportUnits(viewport, x, y);
     listenToPointer(viewport, {
@@ -196,7 +239,7 @@ export class InteractionController {
   }
 
   #moveTorch(point: PicturePoint): void {
-    this.#animator.stopTorch();
+    this.stopTorch();
     this.state.light.torch = point;
     this.listener.changed();
   }
@@ -208,6 +251,7 @@ export class InteractionController {
 
   /** Sets the nearest view inside the picture. Returns whether the view has changed. */
   #setView(view: ZoomView): boolean {
+    this.stopView();
     const last = this.state.view;
     this.state.view = view;
     const hasChanged = this.state.view !== last;

@@ -29,9 +29,9 @@ test('numbers have bounds, and the message names the attribute', () => {
 });
 
 test('the first name is the default', () => {
-  assert.equal(PARSERS.loading(null), 'auto');
+  assert.equal(PARSERS.loading(null), 'eager');
   assert.equal(PARSERS.reveal('manual'), 'manual');
-  assert.throws(() => PARSERS.loading('later'), { message: /“later”.*auto, lazy, eager/ });
+  assert.throws(() => PARSERS.loading('later'), { message: /“later”.*eager, lazy/ });
   assert.throws(() => PARSERS.reveal('now'), { message: /“now”.*auto, interaction, manual/ });
 });
 

@@ -12,7 +12,7 @@ import {
   parseWhiteBalance,
 } from '../shared/setting-parsers.js';
 
-const LOADINGS = ['auto', 'lazy', 'eager'] as const;
+const LOADINGS = ['eager', 'lazy'] as const;
 const REVEALS = ['auto', 'interaction', 'manual'] as const;
 /** In units of the light plane's shorter side. A larger torch lights the plane evenly. */
 export const MAX_TORCH_SIZE = 100;
@@ -27,7 +27,7 @@ const MAX_KIOSK_SECONDS = 86_400;
 /** The meaning of `kiosk` without a value. */
 const EMPTY_KIOSK_SECONDS = 60;
 
-/** When the photograph is fetched: close to the viewport, in the viewport, or immediately. */
+/** When the photograph is fetched, as on `<img>`: at once, or close to the viewport. */
 export type LoadingMode = (typeof LOADINGS)[number];
 /** When the poster gives way to the picture: when it is drawn, on a press, or by `dismissPoster()`. */
 export type RevealMode = (typeof REVEALS)[number];

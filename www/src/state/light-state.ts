@@ -118,6 +118,10 @@ export class LightState {
     return this.#get('color');
   }
 
+  get overrides(): LightOverrides {
+    return this.#overrides;
+  }
+
   override(overrides: Partial<LightOverrides>): void {
     this.#overrides = { ...this.#overrides, ...overrides };
     this.#update();

@@ -3,7 +3,7 @@
 import { parseLightColor } from '../lights/light-color.js';
 import { checkLightSource, type LightSource } from '../lights/light-source.js';
 import type { LightName } from '../shared/keywords.js';
-import { CENTRE, clampToPicture, type PicturePoint } from '../shared/value-types.js';
+import { CENTRE, clampToPicture } from '../shared/value-types.js';
 import { PARSERS } from './attribute-parsers.js';
 import type { LightAttributes } from './options.js';
 
@@ -44,28 +44,29 @@ export function parsePageLight(value: LightValue, attributes: LightAttributes): 
   if (value === null) return none;
   if (typeof value === 'string') return { ...none, name: PARSERS.light(value) };
   if (!isOptions(value)) return { ...none, source: checkLightSource(value) };
+  checkFields(value, 'light', ['x', 'y', 'size']);
   const { name, x, y, size, color } = value;
   const hasPoint = x !== undefined || y !== undefined;
   const torch = attributes.torch ?? CENTRE;
   return {
     ...none,
     name: name === undefined ? null : PARSERS.light(name),
-    torch: hasPoint ? checkPoint({ x: x ?? torch.x, y: y ?? torch.y }, 'light') : null,
+    torch: hasPoint ? clampToPicture({ x: x ?? torch.x, y: y ?? torch.y }) : null,
     size: size === undefined ? null : PARSERS['light-size'](String(size)),
     color: color === undefined ? null : parseLightColor(color),
   };
 }
 
-/** The nearest point on the picture. @throws {TypeError} if a coordinate is not a finite number */
-export function checkPoint(point: PicturePoint, property: string): PicturePoint {
-  for (const key of ['x', 'y'] as const) checkNumber(point[key], `${property}.${key}`);
-  return clampToPicture(point);
-}
-
-/** @throws {TypeError} if `value` is not a finite number */
-export function checkNumber(value: unknown, field: string): void {
-  if (Number.isFinite(value)) return;
-  throw new TypeError(`${field} must be a finite number, but is ${String(value)}`);
+/** @throws {TypeError} if `value` is no object, or one of the fields that it has is no finite number */
+export function checkFields(value: unknown, property: string, fields: readonly string[]): void {
+  if (typeof value !== 'object' || value === null) {
+    throw new TypeError(`${property} must be an object with ${fields.join(', ')}`);
+  }
+  for (const name of fields) {
+    const number = (value as Record<string, unknown>)[name];
+    if (number === undefined || Number.isFinite(number)) continue;
+    throw new TypeError(`${property}.${name} must be a finite number, but is ${String(number)}`);
+  }
 }
 
 /** A plain object with fields of `LightOptions` only. */

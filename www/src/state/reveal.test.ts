@@ -5,15 +5,13 @@ import { RevealState } from './reveal.js';
 
 const options = (loading: LoadingMode, reveal: RevealMode = 'auto') => ({ loading, reveal });
 
-test('a photograph is fetched at once, near the viewport, or in the viewport', () => {
+test('a photograph is fetched at once or near the viewport', () => {
   const state = new RevealState();
   const mayFetch = () =>
-    (['eager', 'auto', 'lazy'] as const).map((loading) => state.mayFetch(options(loading)));
-  assert.deepEqual(mayFetch(), [true, false, false]);
+    (['eager', 'lazy'] as const).map((loading) => state.mayFetch(options(loading)));
+  assert.deepEqual(mayFetch(), [true, false]);
   state.isNear = true;
-  assert.deepEqual(mayFetch(), [true, true, false]);
-  state.isVisible = true;
-  assert.deepEqual(mayFetch(), [true, true, true]);
+  assert.deepEqual(mayFetch(), [true, true]);
 });
 
 test('the poster gives way to the picture, after a press or a call where required', () => {
@@ -21,18 +19,18 @@ test('the poster gives way to the picture, after a press or a call where require
   state.isNear = true;
   const isShown = () =>
     (['auto', 'interaction', 'manual'] as const).map((r) =>
-      state.isPosterShown(options('auto', r)),
+      state.isPosterShown(options('eager', r)),
     );
   assert.deepEqual(isShown(), [true, true, true]);
-  assert.equal(state.mayFetch(options('auto', 'interaction')), false);
-  assert.equal(state.mayFetch(options('eager', 'interaction')), true);
-  assert.equal(state.mayFetch(options('auto', 'manual')), true);
-  assert.equal(state.needsPress(options('auto', 'interaction')), true);
+  assert.equal(state.mayFetch(options('lazy', 'interaction')), false);
+  assert.equal(state.mayFetch(options('eager', 'interaction')), false);
+  assert.equal(state.mayFetch(options('lazy', 'manual')), true);
+  assert.equal(state.needsPress(options('eager', 'interaction')), true);
   state.isDrawn = true;
   assert.deepEqual(isShown(), [false, true, true]);
   state.isDismissed = true;
   assert.deepEqual(isShown(), [false, false, false]);
-  assert.equal(state.needsPress(options('auto', 'interaction')), false);
+  assert.equal(state.needsPress(options('eager', 'interaction')), false);
   state.isDrawn = false;
   assert.deepEqual(isShown(), [true, true, true], 'another photograph');
 });

@@ -15,9 +15,7 @@ export class RevealState {
   isDismissed = false;
 
   mayFetch(options: RevealOptions): boolean {
-    if (options.loading === 'eager') return true;
-    if (this.needsPress(options)) return false;
-    return options.loading === 'lazy' ? this.isVisible : this.isNear;
+    return !this.needsPress(options) && (options.loading === 'eager' || this.isNear);
   }
 
   isPosterShown({ reveal }: RevealOptions): boolean {

@@ -23,7 +23,7 @@ const FULL: ShareLinkState = {
 
 test('a formatted state is parsed to the same state, and is safe in an address', () => {
   const text = formatState(FULL);
-  assert.equal(text, 'l=torch&x=0.312&y=0.64&s=0.25&c=ff8800&z=2&vx=0.5&vy=0.41&e=1.2');
+  assert.equal(text, 'l=torch&x=0.312&y=0.64&r=0.25&c=ff8800&z=2&vx=0.5&vy=0.41&e=1.2');
   assert.equal(new URL(`https://a.org/#${text}`).hash, `#${text}`);
   for (const state of [FULL, EMPTY, { ...FULL, torch: { x: 0, y: 1 }, exposure: 0 }]) {
     assert.deepEqual(parseState(formatState(state)), { state, errors: [] });
@@ -36,8 +36,18 @@ test('a leading # and unknown keys are ignored', () => {
   assert.deepEqual(parseState('x=0.25').state.torch, { x: 0.25, y: 0.5 });
 });
 
+test('a prefix keeps the states of several photographs in one address apart', () => {
+  const other = { ...EMPTY, light: 'fire' } as const;
+  const text = `s=window&${formatState(FULL, 'a-')}&${formatState(other, 'b-')}`;
+  assert.match(text, /&a-l=torch&a-x=0\.312&.*&b-l=fire$/);
+  assert.deepEqual(parseState(text, 'a-'), { state: FULL, errors: [] });
+  assert.deepEqual(parseState(text, 'b-'), { state: other, errors: [] });
+  assert.deepEqual(parseState(text), { state: EMPTY, errors: [] });
+  assert.match(parseState('b-x=7', 'b-').errors[0]?.message ?? '', /has b-x=7\./);
+});
+
 test('an invalid value counts as absent and is reported', () => {
-  const { state, errors } = parseState('l=moon&x=2&y=&s=0&c=zz&z=0&vx=a&vy=-1&e=-1');
+  const { state, errors } = parseState('l=moon&x=2&y=&r=0&c=zz&z=0&vx=a&vy=-1&e=-1');
   assert.deepEqual(state, EMPTY);
   assert.equal(errors.length, 9);
   assert.ok(errors.every(({ code }) => code === 'state'));

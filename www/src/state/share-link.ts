@@ -1,4 +1,15 @@
-/** Light and view as a query string, for links: `l=torch&x=0.312&y=0.64&z=2&vx=0.5&vy=0.41&e=1.2`. */
+/**
+ * Light and view as a query string, for links: `l=torch&x=0.312&y=0.64&r=0.2&z=2&vx=0.5&vy=0.41&e=1.2`. A prefix before
+ * each key keeps the states of several photographs apart.
+ *
+ * | key | value |
+ * |---|---|
+ * | `l` | name of the light |
+ * | `x`, `y`, `r` | position and radius of the torch |
+ * | `c` | colour of the light, hexadecimal without `#` |
+ * | `e` | exposure |
+ * | `z`, `vx`, `vy` | zoom and centre of the view |
+ */
 
 import { PhotoError } from '../shared/errors.js';
 import { LIGHTS, type LightName } from '../shared/keywords.js';
@@ -22,15 +33,16 @@ export interface ShareLinkState {
 /** Beyond any `zoom` attribute; the view is clamped to that. */
 const MAX_SHARED_ZOOM = 1e4;
 
-export function formatState({ light, torch, size, color, exposure, view }: ShareLinkState): string {
+export function formatState(state: ShareLinkState, prefix = ''): string {
+  const { light, torch, size, color, exposure, view } = state;
   const params = new URLSearchParams();
   const put = (key: string, value: string | number | null | undefined) => {
-    if (value != null) params.set(key, String(value));
+    if (value != null) params.set(prefix + key, String(value));
   };
   put('l', light);
   put('x', torch?.x);
   put('y', torch?.y);
-  put('s', size);
+  put('r', size);
   // An unescaped # would begin the fragment of an address.
   put('c', color?.replace(/^#/, ''));
   if (view.zoom > 1) {
@@ -43,15 +55,18 @@ export function formatState({ light, torch, size, color, exposure, view }: Share
 }
 
 /** Parses a state. An invalid value counts as absent and gives an error; unknown keys are ignored. */
-export function parseState(text: string): { state: ShareLinkState; errors: readonly PhotoError[] } {
+export function parseState(
+  text: string,
+  prefix = '',
+): { state: ShareLinkState; errors: readonly PhotoError[] } {
   const params = new URLSearchParams(text.replace(/^[?#]/, ''));
   const errors: PhotoError[] = [];
   /** Reads a value; `parse` gives `null` if it is invalid. */
   const read = <T>(key: string, expected: string, parse: (value: string) => T | null): T | null => {
-    const value = params.get(key);
+    const value = params.get(prefix + key);
     const parsed = value === null ? null : parse(value);
     if (value !== null && parsed === null) {
-      const message = `The state “${text}” has ${key}=${value}. Expected ${expected}.`;
+      const message = `The state “${text}” has ${prefix}${key}=${value}. Expected ${expected}.`;
       errors.push(new PhotoError('state', message));
     }
     return parsed;
@@ -73,7 +88,7 @@ export function parseState(text: string): { state: ShareLinkState; errors: reado
     state: {
       light,
       torch: x === null && y === null ? null : { x: x ?? CENTRE.x, y: y ?? CENTRE.y },
-      size: number('s', 1e-6, MAX_TORCH_SIZE),
+      size: number('r', 1e-6, MAX_TORCH_SIZE),
       color,
       exposure: number('e', 0, MAX_EXPOSURE),
       view: { zoom, x: viewX ?? CENTRE.x, y: viewY ?? CENTRE.y },

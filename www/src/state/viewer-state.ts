@@ -106,23 +106,25 @@ export class ViewerState {
     this.paused = null;
   }
 
-  get sharedState(): string {
+  /** The state for a share link. */
+  share(prefix?: string): string {
     const { item, torch, size, color } = this.light;
     const { exposure } = this.output;
     const isTorch = item === 'torch';
-    return formatState({
+    const state = {
       light: item === 'projection' ? null : item,
       torch: isTorch ? torch : null,
       size: isTorch ? size : null,
       color: color?.hex ?? null,
       exposure: exposure === 1 ? null : exposure,
       view: this.#view,
-    });
+    };
+    return formatState(state, prefix);
   }
 
   /** Restores the state of a share link. Returns an error for each invalid value. */
-  restore(text: string): readonly PhotoError[] {
-    const { state, errors } = parseState(text);
+  restore(text: string, prefix?: string): readonly PhotoError[] {
+    const { state, errors } = parseState(text, prefix);
     const { light: name, torch, size, color, exposure, view } = state;
     this.reset();
     this.light.override({
