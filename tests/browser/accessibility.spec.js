@@ -149,6 +149,7 @@ test.describe('texts', () => {
       ['es', 'Luz: Linterna', 'Ampliar'],
       ['ja', '光: 懐中電灯', '拡大'],
       ['zh-Hans', '光: 手电筒', '放大'],
+      ['zh-TW', '光: 手電筒', '放大'],
     ])) {
       await step(`texts are in the page’s language: ${lang}`, async () => {
         await open(page, {}, lang);
@@ -158,6 +159,20 @@ test.describe('texts', () => {
         expect(await axeViolations(page)).toStrictEqual([]);
       });
     }
+  });
+
+  test('are in a language of the page', async ({ openPage }) => {
+    const page = await openPage('/blank');
+    await open(page, {}, 'pt-BR');
+    await waitForLoad(page);
+    await page.getByRole('button', { name: 'Light: Torch', exact: true }).waitFor();
+    await page.evaluate(() => {
+      const element = /** @type {any} */ (customElements.get('relightable-photo'));
+      element.addTranslation('pt', { light: 'Luz', torch: 'Lanterna' });
+    });
+    await page.getByRole('button', { name: 'Luz: Lanterna', exact: true }).waitFor();
+    await page.getByRole('button', { name: 'Zoom in', exact: true }).waitFor();
+    expect(await axeViolations(page)).toStrictEqual([]);
   });
 
   test('are in the language of the nearest ancestor, or of the browser', async ({ openPage }) => {

@@ -317,7 +317,7 @@ test.describe('the keyboard', () => {
     expect(await press('Shift+ArrowRight')).toStrictEqual({ x: 0.01, y: 0.3 });
     expect(await press('End')).toStrictEqual({ x: 1, y: 0.3 });
     expect(await press('PageDown')).toStrictEqual({ x: 1, y: 0.5 });
-    expect(await slider.getAttribute('aria-valuetext')).toBe('Light from right, far, 100 % · 50 %');
+    expect(await slider.getAttribute('aria-valuetext')).toBe('Light from right, far, 100% · 50%');
     expect(await slider.getAttribute('aria-valuenow')).toBe('100');
     await press('Escape');
     expect(await slider.evaluate((element) => element.matches(':focus'))).toBe(false);

@@ -207,9 +207,9 @@ test.describe('the playground', () => {
     await page.getByRole('button', { name: 'Reset all' }).click();
     await html.getByText('light="torch"').waitFor();
     expect(new URL(page.url()).search).toBe('');
-    await page.getByLabel('loading', { exact: true }).selectOption('eager');
+    await page.getByLabel('loading', { exact: true }).selectOption('lazy');
     await waitUntilDrawn(page);
-    expect(await page.locator('relightable-photo').getAttribute('loading')).toBe('eager');
+    expect(await page.locator('relightable-photo').getAttribute('loading')).toBe('lazy');
   });
 });
 

@@ -19,7 +19,9 @@ const SCRIPTS = [
   ...['', '-controls', '-worker', '-cpu', '-gpu', '-relighter', '-sources', '-input'].map(
     (part) => `relightable-photo${part}`,
   ),
-  ...['fr', 'de', 'it', 'es', 'ja', 'zh'].map((language) => `relightable-photo-${language}`),
+  ...['fr', 'de', 'it', 'es', 'ja', 'zh', 'zh-hant'].map(
+    (language) => `relightable-photo-${language}`,
+  ),
   ...['index', 'element', 'core'],
 ];
 const CORE_MODULES = ['decoder', 'cpu'];

@@ -19,6 +19,7 @@ export {
   ViewChangeEvent,
 } from './element/events.js';
 export type { ReflectedProperties } from './element/reflect.js';
+export type { StringKey as TranslationKey, Translation } from './i18n/translations.js';
 export type {
   BrowserImageSource,
   LightImageSource,

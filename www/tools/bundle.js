@@ -29,7 +29,7 @@ const LAZY_SCRIPTS = new Map([
   ['lights/image-light-entry', 'relightable-photo-sources'],
   ['input/interaction', 'relightable-photo-input'],
   ['ui/toolbar', 'relightable-photo-controls'],
-  ...['fr', 'de', 'it', 'es', 'ja', 'zh'].map(
+  ...['fr', 'de', 'it', 'es', 'ja', 'zh', 'zh-hant'].map(
     (language) => /** @type {const} */ ([`i18n/${language}`, `relightable-photo-${language}`]),
   ),
 ]);

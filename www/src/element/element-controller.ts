@@ -3,7 +3,7 @@
  * script then brings the session, the shadow DOM, the animations and the page's listeners up to date with it.
  */
 
-import { fetchStrings, isPending } from '../i18n/translations.js';
+import { fetchStrings, isPending, observeTranslations } from '../i18n/translations.js';
 import type { InteractionController } from '../input/interaction.js';
 import { reducedMotion } from '../input/reduced-motion.js';
 import type { AppliedLightStatus } from '../lights/light-cache.js';
@@ -355,6 +355,7 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
     this.#connection = new AbortController();
     const { signal } = this.#connection;
     reducedMotion().addEventListener('change', () => this.schedule(), { signal });
+    observeTranslations(() => this.schedule(), signal);
     const update = (visibility: VisibilityFlag, isTrue: boolean) => {
       this.state.reveal[visibility] = isTrue;
       if (visibility === 'isVisible') this.session.setVisible(isTrue);

@@ -1,6 +1,7 @@
 /** `<relightable-photo>`: the public interface. The class delegates to `ElementController`. */
 
 import { moduleFolder, setModuleFolder } from '../engine/wasm-loader.js';
+import { addTranslation, type Translation } from '../i18n/translations.js';
 import type { PhotoError } from '../shared/errors.js';
 import type { Backend, Gamut, LightName } from '../shared/keywords.js';
 import type { PhotoInfo, PicturePoint } from '../shared/value-types.js';
@@ -93,6 +94,11 @@ export class RelightablePhotoElement extends Base {
   }
   static set wasmUrl(url: string | URL | null) {
     setModuleFolder(url && new URL(url, globalThis.document?.baseURI).href);
+  }
+
+  /** Adds a language, or replaces single texts of one, for all photographs of the page. Absent texts are in English. */
+  static addTranslation(lang: string, strings: Translation): void {
+    addTranslation(lang, strings);
   }
 
   static {

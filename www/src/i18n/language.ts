@@ -1,6 +1,6 @@
 /** Chooses the language of an element. */
 
-import { LANGUAGES, type Language } from './translations.js';
+import { canonicalTag, isSupported, type Language } from './translations.js';
 
 /** By the nearest `lang` attribute, also outside of shadow roots, and otherwise by the browser's language. */
 export function languageOf(element: Element): Language {
@@ -17,9 +17,16 @@ function tagOf(element: Element): string {
 /** The first supported language of some BCP 47 tags; English if there is none. */
 export function firstSupported(tags: readonly string[]): Language {
   for (const tag of tags) {
-    const primary = tag.trim().toLowerCase().split(/[-_]/, 1)[0];
-    const language = LANGUAGES.find((known) => known === primary);
-    if (language) return language;
+    const found = candidates(tag).find(isSupported);
+    if (found) return found;
   }
   return 'en';
+}
+
+/** From the tag to its language alone. Between them is the script that its region uses: `zh-Hant` for `zh-TW`. */
+function candidates(tag: string): readonly string[] {
+  const exact = canonicalTag(tag);
+  if (!exact) return [];
+  const { language, script } = new Intl.Locale(exact).maximize();
+  return [exact, exact.split('-', 2).join('-'), `${language}-${script}`, language];
 }

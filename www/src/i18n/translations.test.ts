@@ -2,7 +2,16 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import { ENGLISH, type StringKey } from './en.js';
 import { firstSupported } from './language.js';
-import { fetchStrings, isPending, LANGUAGES, type Language, t } from './translations.js';
+import {
+  addTranslation,
+  fetchStrings,
+  formatNumber,
+  isPending,
+  LANGUAGES,
+  type Language,
+  observeTranslations,
+  t,
+} from './translations.js';
 
 /** Translations that are correctly the same as in English. */
 const SAME_AS_ENGLISH = new Set([
@@ -37,8 +46,44 @@ test('every text is translated into every language, with the same placeholders',
 test('the language is the first supported one', () => {
   assert.equal(firstSupported(['de-CH']), 'de');
   assert.equal(firstSupported(['pt', 'FR_ca']), 'fr');
-  assert.equal(firstSupported(['', 'zh-Hant-TW']), 'zh');
+  assert.equal(firstSupported(['', 'zh-Hant-TW']), 'zh-Hant');
+  assert.equal(firstSupported(['not a tag', 'ZH-tw']), 'zh-Hant');
+  assert.equal(firstSupported(['zh-HK']), 'zh-Hant');
+  for (const tag of ['zh', 'zh-CN', 'zh-Hans-HK', 'zh-SG']) {
+    assert.equal(firstSupported([tag]), 'zh', tag);
+  }
   assert.equal(firstSupported([]), 'en');
+});
+
+test('numbers are written as the language does', () => {
+  assert.equal(formatNumber(0.349, 'en', 'percent'), '35%');
+  assert.equal(formatNumber(0.349, 'de', 'percent'), '35\u00a0%');
+  assert.equal(formatNumber(2.54, 'fr', 'decimal'), '2,5');
+});
+
+test('a page adds a language and replaces single texts', () => {
+  let changes = 0;
+  const observing = new AbortController();
+  observeTranslations(() => {
+    changes += 1;
+  }, observing.signal);
+  assert.equal(firstSupported(['pt-BR']), 'en');
+  addTranslation('pt', { torch: 'Lanterna', zoomed: 'Zoom {0}×' });
+  assert.equal(firstSupported(['pt-BR']), 'pt');
+  assert.equal(isPending('pt'), false);
+  assert.deepEqual([t('torch', 'pt'), t('fire', 'pt')], ['Lanterna', 'Fire']);
+  addTranslation('PT', { fire: 'Fogo' });
+  assert.deepEqual([t('torch', 'pt'), t('fire', 'pt')], ['Lanterna', 'Fogo']);
+  addTranslation('fr', { reveal: 'Touchez la lumière' });
+  assert.deepEqual([t('reveal', 'fr'), t('torch', 'fr')], ['Touchez la lumière', 'Torche']);
+  assert.equal(changes, 3);
+  observing.abort();
+  addTranslation('pt-BR', { torch: 'Lanterna' });
+  assert.equal(changes, 3);
+  assert.equal(firstSupported(['pt-BR']), 'pt-BR');
+  assert.throws(() => addTranslation('1', {}), /TypeError: “1” is not a language tag/);
+  assert.throws(() => addTranslation('pt', { moon: 'Lua' } as never), /no text named “moon”/);
+  assert.throws(() => addTranslation('pt', { fire: 1 } as never), /the text fire must be a string/);
 });
 
 test('placeholders are filled in', () => {

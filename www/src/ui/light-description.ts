@@ -1,6 +1,6 @@
 /** Describes the torch's position in words, for screen readers. */
 
-import { type Language, type StringKey, t } from '../i18n/translations.js';
+import { formatNumber, type Language, type StringKey, t } from '../i18n/translations.js';
 import type { PicturePoint } from '../shared/value-types.js';
 
 const DIRECTIONS: readonly (readonly StringKey[])[] = [
@@ -14,10 +14,10 @@ const MIDDLE_DISTANCE = 1 / 8;
 /** The largest distance from the centre that counts as near; of the picture. */
 const NEAR_DISTANCE = 0.3;
 
-/** For example “Light from upper left, near, 35 % · 30 %”, which ends with the x and y coordinates. */
+/** For example “Light from upper left, near, 35% · 30%”, which ends with the x and y coordinates. */
 export function describeLight({ x, y }: PicturePoint, language: Language): string {
   const direction = DIRECTIONS[third(y)]?.[third(x)] ?? 'lightInMiddle';
-  const percent = (value: number) => `${Math.round(100 * value)} %`;
+  const percent = (value: number) => formatNumber(value, language, 'percent');
   const position = `${percent(x)} · ${percent(y)}`;
   if (direction === 'lightInMiddle') return `${t(direction, language)}, ${position}`;
   const distance = t(Math.hypot(x - 0.5, y - 0.5) < NEAR_DISTANCE ? 'near' : 'far', language);

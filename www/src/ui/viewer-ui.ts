@@ -1,7 +1,7 @@
 /** Shows the viewer's state in the shadow DOM and the toolbar, and announces changes, in the page's language. */
 
 import { languageOf } from '../i18n/language.js';
-import { type Language, type StringKey, t } from '../i18n/translations.js';
+import { formatNumber, type Language, type StringKey, t } from '../i18n/translations.js';
 import { missingScript, type PhotoError } from '../shared/errors.js';
 import { CENTRE } from '../shared/value-types.js';
 import type { ViewerState } from '../state/viewer-state.js';
@@ -70,7 +70,7 @@ export class ViewerUi {
 
   announce(change: 'loaded' | 'light' | 'zoomed'): void {
     const { light, view } = this.state;
-    const zoom = view.zoom.toLocaleString(this.language, { maximumFractionDigits: 1 });
+    const zoom = formatNumber(view.zoom, this.language, 'decimal');
     const text = this.#t(change, zoom);
     this.dom.announce(change === 'light' ? `${text}: ${this.#t(light.item)}` : text);
   }
