@@ -229,7 +229,9 @@ async function measureScroll(addresses) {
 /** Keeps each core busy while `work` runs. @template T @param {() => Promise<T>} work @returns {Promise<T>} */
 async function whileBusy(work) {
   const spinners = Array.from({ length: availableParallelism() }, () =>
-    spawn(process.execPath, ['-e', 'for (;;);'], { stdio: 'ignore' }),
+    spawn(process.execPath, ['-e', 'const { ppid } = process; while (process.ppid === ppid);'], {
+      stdio: 'ignore',
+    }),
   );
   try {
     return await work();
