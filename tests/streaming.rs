@@ -184,16 +184,22 @@ impl Interruptible {
     }
 }
 
-/// Waits until the checkpoint has a tile, after its checkpoint key and the learned prior.
+/// The records of a checkpoint that are whole: its key, the learned prior's fingerprint, then tiles.
+fn whole_records(checkpoint: &[u8]) -> usize {
+    const MAGIC_BYTES: usize = 8;
+    // Its number, the length of its content and a checksum.
+    const RECORD_HEAD_BYTES: usize = 12;
+    let (mut at, mut records) = (MAGIC_BYTES, 0);
+    while let Some(length) = checkpoint.get(at + 4..at + 8) {
+        at += RECORD_HEAD_BYTES + u32::from_le_bytes(length.try_into().unwrap()) as usize;
+        records += usize::from(at <= checkpoint.len());
+    }
+    records
+}
+
+/// Waits until the checkpoint has a whole tile.
 fn wait_for_a_tile(child: &mut Child, checkpoint: &Path) {
-    let (mut last, mut grown) = (0, 0);
-    loop {
-        let bytes = fs::metadata(checkpoint).map_or(0, |m| m.len());
-        grown += u32::from(bytes > last);
-        last = bytes;
-        if grown == 3 {
-            return;
-        }
+    while fs::read(checkpoint).map_or(0, |bytes| whole_records(&bytes)) < 3 {
         assert!(
             child.try_wait().unwrap().is_none(),
             "the recovery ended before the signal"

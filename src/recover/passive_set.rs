@@ -15,7 +15,7 @@ type RegisterBlock = [f64; LANES];
 
 /// Smallest pivot, relative to its diagonal entry, of an unknown whose column is linearly independent of the passive
 /// ones, to the precision of the Gram matrix. Another unknown would not lower the residual.
-const MIN_PIVOT_RATIO: f64 = 1e-9;
+pub(super) const MIN_PIVOT_RATIO: f64 = 1e-9;
 /// Members that a new set has memory for. Sets rarely grow beyond the number of patterns.
 const INITIAL_CAPACITY: usize = 96;
 /// Rows of the inverse that one pass multiplies.

@@ -491,8 +491,7 @@ test.describe('autoplay', () => {
     await waitUntil(page, 'photo.torch !== null');
     const point = at(0.9, 0.9);
     await page.mouse.move(point.x, point.y);
-    await waitForFrames(page);
-    expect(await torchOf(page)).toStrictEqual({ x: 0.9, y: 0.9 });
+    await expect.poll(() => torchOf(page)).toStrictEqual({ x: 0.9, y: 0.9 });
     await page.clock.fastForward(REST_MS);
     await waitUntil(page, 'photo.torch.x < 0.88');
   });
