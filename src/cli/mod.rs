@@ -22,7 +22,7 @@ mod verify;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 /// Recover, inspect and relight photographs of an object under many lights
 #[derive(Debug, Parser)]
@@ -41,6 +41,11 @@ enum Command {
     Inspect(inspect::InspectArgs),
     Verify(verify::VerifyArgs),
     Study(study::StudyArgs),
+}
+
+/// The definition of the command line, for its reference in `docs/cli.md`.
+pub fn definition() -> clap::Command {
+    Cli::command()
 }
 
 /// Parses the command line and runs it. The exit status is 0 on success, 1 on failure, 2 for a wrong command line, 130

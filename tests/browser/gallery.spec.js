@@ -60,7 +60,7 @@ test.describe('the gallery', () => {
 
     await step('it has a radio button for each light, for pointer and keyboard', async () => {
       const light = () => page.evaluate("document.getElementById('photo').activeLight");
-      expect(await light()).toBe('fire');
+      expect(await light()).toBe('flood');
       for (const name of ['Torch', 'Flood', 'Checkerboard', 'Spectrum', 'Stripes']) {
         await page.getByRole('radio', { name }).check();
         expect(await light()).toBe(name.toLowerCase());
@@ -96,6 +96,23 @@ test.describe('the gallery', () => {
         .waitFor();
       expect(page.url()).toMatch(/backend=cpu/);
     });
+  });
+
+  test('begins with flood light, then a fire, unless the visitor chooses a light', async ({
+    openPage,
+  }) => {
+    const page = await openPage('/', { fakeClock: true });
+    const light = () => page.evaluate("document.getElementById('photo').activeLight");
+    await waitUntilDrawn(page);
+    expect(await light()).toBe('flood');
+    await page.clock.runFor(6000);
+    await expect.poll(light).toBe('fire');
+    await expect(page.getByRole('radio', { name: 'Fire' })).toBeChecked();
+    await page.goto('/');
+    await waitUntilDrawn(page);
+    await page.getByRole('radio', { name: 'Spectrum' }).check();
+    await page.clock.runFor(6000);
+    expect(await light()).toBe('spectrum');
   });
 
   test('uses the visitor’s image, video and camera as the light', async ({ openPage, step }) => {

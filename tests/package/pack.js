@@ -3,10 +3,12 @@
 import assert from 'node:assert/strict';
 import { existsSync, readFileSync, statSync, symlinkSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:http';
-import { join } from 'node:path';
+import { join, posix } from 'node:path';
 import { test } from 'node:test';
 import { pathToFileURL } from 'node:url';
+import { PACKED_DOCUMENTS } from '../../www/tools/documents.js';
 import { integrityOf } from '../../www/tools/integrity.js';
+import { headingId } from '../../www/tools/markdown.js';
 import { compare } from '../../www/tools/pictures.js';
 import { makeTestPhotos, nativePicture, glassBytes as readGlass } from '../browser/test-photos.js';
 import { manifestOf, packed, REPOSITORY, run, unpacked } from './packed.js';
@@ -16,9 +18,17 @@ const glassBytes = readGlass();
 
 /** Scripts with fixed names. */
 const SCRIPTS = [
-  ...['', '-controls', '-worker', '-cpu', '-gpu', '-relighter', '-sources', '-input'].map(
-    (part) => `relightable-photo${part}`,
-  ),
+  ...[
+    '',
+    '-controls',
+    '-worker',
+    '-cpu',
+    '-gpu',
+    '-relighter',
+    '-decoder',
+    '-sources',
+    '-input',
+  ].map((part) => `relightable-photo${part}`),
   ...['fr', 'de', 'it', 'es', 'ja', 'zh', 'zh-hant'].map(
     (language) => `relightable-photo-${language}`,
   ),
@@ -30,14 +40,16 @@ const BUILDS = [...MODULES, 'decoder_scalar', 'cpu_scalar'];
 
 const EXPECTED = [
   ...['package.json', 'README.md', 'LICENSE-MIT', 'LICENSE-APACHE'],
+  ...PACKED_DOCUMENTS,
   ...['dist/custom-elements.json', 'dist/integrity.json', 'dist/THIRD-PARTY.md'],
   ...SCRIPTS.flatMap((name) => [`dist/${name}.js`, `dist/${name}.js.map`]),
   ...['dist/react.js', 'dist/jsx.js'],
   ...MODULES.flatMap((name) => [`dist/wasm/${name}.js`, `dist/wasm/${name}.d.ts`]),
   ...BUILDS.map((name) => `dist/wasm/${name}_bg.wasm`),
 ];
-/** Files whose names vary: shared chunks, and types without those of tests. */
+/** Files whose names vary: samples and figures of the documents, shared chunks, and types without those of tests. */
 const ALSO = [
+  /^docs\/(samples\/[\w.-]+|images\/[\w/-]+\.(svg|jpg))$/,
   /^dist\/chunk-[A-Z0-9]{8}\.js(\.map)?$/,
   /^dist\/types\/(?!.*(test|fakes))[a-z0-9/-]+\.d\.ts$/,
 ];
@@ -66,6 +78,41 @@ test('the tarball has exactly the expected files', () => {
     if (path.endsWith('.map')) assert.ok(size <= MAX_MAP_BYTES, `${path} has ${size} bytes`);
   }
 });
+
+test('the documents are complete, and their links lead to files and headings of the tarball', () => {
+  const texts = new Map(
+    packed.files
+      .filter(({ path }) => /^[^/]*\.md$|^docs\/.*\.md$/.test(path))
+      .map(({ path }) => [path, readFileSync(join(place, path), 'utf8')]),
+  );
+  assert.deepEqual([...texts.keys()].sort(), ['README.md', ...PACKED_DOCUMENTS].sort());
+  const broken = [];
+  let links = 0;
+  for (const [path, text] of texts) {
+    // Code may contain brackets.
+    const prose = text.replaceAll(/^```.*?^```/gms, '').replaceAll(/`[^`\n]*`/g, '');
+    for (const [, reference = ''] of prose.matchAll(/\]\(([^)\s]+)\)/g)) {
+      if (/^https?:/.test(reference)) continue;
+      links += 1;
+      const [file = '', hash] = reference.split('#');
+      const target = file ? posix.join(posix.dirname(path), file) : path;
+      const exists = existsSync(join(place, target));
+      const has = hash === undefined || headingsOf(texts.get(target) ?? '').includes(hash);
+      if (!exists || !has) broken.push(`${path}: ${reference}`);
+    }
+  }
+  assert.deepEqual(broken, []);
+  assert.ok(links >= 80, `${links} links`);
+});
+
+/** The ids of a document's headings. @param {string} text */
+function headingsOf(text) {
+  const used = new Map();
+  return [...text.replaceAll(/^```.*?^```/gms, '').matchAll(/^#{1,6} (.*)$/gm)].map(
+    ([, heading = '']) =>
+      headingId(heading.replaceAll(/\[([^\]]*)\]\([^)]*\)/g, '$1').replaceAll(/[`*]/g, ''), used),
+  );
+}
 
 test('the licences of compiled crates are included', () => {
   const text = readFileSync(join(place, 'dist/THIRD-PARTY.md'), 'utf8');

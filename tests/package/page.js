@@ -59,12 +59,17 @@ export async function visit(mounts, attributes = {}, scripts = '') {
     await page.addInitScript(() => {
       const state = { loads: 0, error: '' };
       Object.assign(globalThis, { state });
-      document.addEventListener('load', ({ target }) => {
-        if (target instanceof Element && target.localName === 'relightable-photo') state.loads += 1;
-      });
-      document.addEventListener('error', (event) => {
-        state.error ||= Object(event).message ?? String(event);
-      });
+      // The events do not bubble. Scripts have such events as well.
+      const isPhoto = (/** @type {Event} */ { target }) =>
+        target instanceof Element && target.localName === 'relightable-photo';
+      const onLoad = (/** @type {Event} */ event) => {
+        if (isPhoto(event)) state.loads += 1;
+      };
+      const onError = (/** @type {Event} */ event) => {
+        if (isPhoto(event)) state.error ||= Object(event).message ?? String(event);
+      };
+      document.addEventListener('load', onLoad, { capture: true });
+      document.addEventListener('error', onError, { capture: true });
       document.addEventListener('securitypolicyviolation', ({ violatedDirective, blockedURI }) => {
         Object(globalThis).refused(`${violatedDirective} refused ${blockedURI}`);
       });
@@ -108,6 +113,46 @@ export async function visit(mounts, attributes = {}, scripts = '') {
     });
     const picture = decodePng(Buffer.from(url.slice(url.indexOf(',') + 1), 'base64'));
     return { picture, state, workers, requests, complaints, origin: new URL(server.url).origin };
+  } finally {
+    await context.close();
+    await server.close();
+  }
+}
+
+/**
+ * Opens a page that the guide's component `Window` renders: shows a photograph, and lights a fire.
+ *
+ * @param {{ at: string, folder: string }[]} mounts
+ * @param {string} path of the page; the address of its photograph may be wrong
+ * @param {string} [scripts] as of `visit`
+ * @returns {Promise<{ message: string, faults: string[] }>} the caption, and the page's exceptions and policy
+ *   violations
+ */
+export async function useWindow(mounts, path, scripts = '') {
+  const server = await listen(serve(mounts, policy(scripts)), 0);
+  const context = await browser.newContext();
+  try {
+    const page = await context.newPage();
+    page.setDefaultTimeout(PATIENCE_MS);
+    /** @type {string[]} */
+    const faults = [];
+    page.on('pageerror', (error) => faults.push(String(error)));
+    page.on('console', (message) => {
+      if (/hydrat|policy|Vue warn/i.test(message.text())) faults.push(message.text());
+    });
+    await page.goto(new URL(path, server.url).href);
+    await page.waitForFunction(() => {
+      const photo = /** @type {RelightablePhotoElement} */ (
+        document.querySelector('relightable-photo')
+      );
+      return photo.activeBackend || document.querySelector('figcaption');
+    });
+    await page.getByRole('button', { name: 'Light a fire' }).click();
+    await page.waitForFunction(
+      () => document.querySelector('relightable-photo')?.activeLight === 'fire',
+    );
+    const captions = await page.locator('figcaption').allInnerTexts();
+    return { message: captions.join(), faults };
   } finally {
     await context.close();
     await server.close();

@@ -2,15 +2,17 @@
 
 import assert from 'node:assert/strict';
 import { createHash } from 'node:crypto';
-import { readFileSync, writeFileSync } from 'node:fs';
+import { cpSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { compare } from '../../www/tools/pictures.js';
 import { makeTestPhotos, nativePicture } from '../browser/test-photos.js';
-import { manifestOf, project, run, unpacked } from './packed.js';
-import { draw, visit } from './page.js';
+import { manifestOf, project, REPOSITORY, run, unpacked } from './packed.js';
+import { draw, useWindow, visit } from './page.js';
 
 const SCRIPT = 'relightable-photo.js';
+/** The samples of the guides. */
+const SAMPLES = join(REPOSITORY, 'docs/samples');
 
 /** The expected picture, whatever tool built the page. */
 makeTestPhotos();
@@ -99,8 +101,36 @@ test('webpack', async () => {
   await checkSite([{ at: '/', folder: join(folder, 'public') }]);
 });
 
-test('Next, with server rendering', async () => {
+/**
+ * Checks a page of the guide's component, with a photograph and with a wrong address.
+ *
+ * @param {{ at: string, folder: string }[]} mounts
+ * @param {{ good: string, wrong: string }} paths
+ * @param {string} [scripts] as of `visit`
+ */
+async function checkWindow(mounts, { good, wrong }, scripts) {
+  const shown = await useWindow(mounts, good, scripts);
+  assert.deepEqual(shown, { message: '', faults: [] });
+  const failed = await useWindow(mounts, wrong, scripts);
+  assert.match(failed.message, /missing\.ltm/);
+  assert.deepEqual(failed.faults, []);
+}
+
+test('the guide’s component in Vue, also rendered by a server', async () => {
+  const folder = project('vue');
+  cpSync(join(SAMPLES, 'vite.config.js'), join(folder, 'vite.config.js'));
+  cpSync(join(SAMPLES, 'Window.vue'), join(folder, 'src/Window.vue'));
+  run(folder, 'npm', 'run', 'build');
+  const mounts = [{ at: '/', folder: join(folder, 'dist') }];
+  const [good, wrong] = ['/?src=/photos/glass.ltm', '/?src=/photos/missing.ltm'];
+  await checkWindow(mounts, { good, wrong });
+  const html = run(folder, 'npm', 'run', '--silent', 'render');
+  assert.match(html, /<relightable-photo [^>]*src="\/photos\/glass\.ltm"[^>]*light="torch"/);
+});
+
+test('Next, with server rendering, and the guide’s component in it', async () => {
   const folder = project('next');
+  cpSync(join(SAMPLES, 'Window.jsx'), join(folder, 'Window.jsx'));
   run(folder, 'npm', 'run', 'build');
   const html = readFileSync(join(folder, 'out/index.html'), 'utf8');
   assert.match(html, /<relightable-photo [^>]*src="\/photos\/glass\.ltm"/);
@@ -110,6 +140,12 @@ test('Next, with server rendering', async () => {
   const { state } = await checkSite(mounts, hashesOfScripts(html));
   // React has hydrated the page.
   assert.equal(state['output'], 'webgl2');
+  const sample = readFileSync(join(folder, 'out/sample.html'), 'utf8');
+  assert.match(sample, /<relightable-photo [^>]*src="\/photos\/glass\.ltm"/);
+  const scripts = ['sample', 'failing'].map((name) =>
+    hashesOfScripts(readFileSync(join(folder, `out/${name}.html`), 'utf8')),
+  );
+  await checkWindow(mounts, { good: '/sample', wrong: '/failing' }, scripts.join(''));
   // The types compile without skipLibCheck, which Next's own types need.
   run(folder, join(folder, 'node_modules/.bin/tsc'), '-p', 'types');
 });

@@ -14,11 +14,17 @@ const status = /** @type {HTMLOutputElement} */ (document.getElementById('status
 const file = /** @type {HTMLInputElement} */ (document.getElementById('file'));
 const camera = /** @type {HTMLButtonElement} */ (document.getElementById('camera'));
 const play = /** @type {HTMLButtonElement} */ (document.getElementById('play'));
+const message = /** @type {HTMLOutputElement} */ (document.getElementById('message'));
 const hint = /** @type {HTMLElement} */ (document.getElementById('hint'));
 
 const lights = /** @type {NodeListOf<HTMLInputElement>} */ (
   form.querySelectorAll('input[name="light"]')
 );
+
+/** A torch and a fire light a part of the window only: as a camera would, the page exposes longer. */
+const EXPOSURES = /** @type {Record<string, number>} */ ({ torch: 2, fire: 1.5 });
+/** How long the window is shown under flood light before the fire begins. */
+const FIRE_DELAY_MS = 5000;
 
 /** Why a preferred backend is not in use. */
 let backendReason = '';
@@ -34,10 +40,12 @@ for (const input of lights) if (input.value === params.get('light')) input.check
 backend.value = params.get('backend') ?? '';
 if (backend.selectedIndex < 0) backend.value = '';
 applyForm();
+if (!params.has('light')) startFireLater();
 
 // The backend menu belongs to the form but is outside of it, so listen on the document.
 document.addEventListener('change', ({ target }) => {
   if (target === file) return;
+  message.textContent = '';
   if (target !== backend) setSource(null);
   applyForm();
   const state = new URLSearchParams({ light: photo.getAttribute('light') ?? '' });
@@ -54,8 +62,8 @@ photo.addEventListener('load', updateStatus);
 photo.addEventListener('error', () => {
   status.textContent = 'Not drawn.';
 });
-photo.addEventListener('warning', ({ message }) => {
-  status.textContent = message;
+photo.addEventListener('warning', (event) => {
+  message.textContent = event.message;
 });
 if (photo.info) updateStatus();
 
@@ -67,7 +75,7 @@ file.addEventListener('change', async () => {
       chosen.type.startsWith('video/') ? openVideo(chosen) : openImage(chosen),
     );
   } catch {
-    status.textContent = `This browser cannot show ${chosen.name}.`;
+    message.textContent = `This browser cannot show ${chosen.name}.`;
   }
   // Allows the visitor to choose the same file again.
   file.value = '';
@@ -90,7 +98,7 @@ camera.addEventListener('click', async () => {
     await openSource(camera, openCamera);
   } catch (error) {
     const name = error instanceof DOMException ? error.name : '';
-    status.textContent =
+    message.textContent =
       {
         NotAllowedError:
           'The browser blocks the camera. Allow it for this page in the browser’s settings.',
@@ -168,10 +176,29 @@ function setSource(source, control, release = () => {}) {
   file.nextElementSibling?.classList.toggle('active', control === file);
   camera.setAttribute('aria-pressed', String(control === camera));
   if (!source) return;
+  setExposure();
   for (const input of lights) input.checked = false;
-  hint.classList.add('hidden');
+  hint.hidden = true;
   updatePlayButton();
   updateStatus();
+}
+
+/** After a look at the window under flood light, a fire begins, unless the visitor has chosen a light. */
+function startFireLater() {
+  if (matchMedia('(prefers-reduced-motion: reduce)').matches) return;
+  const before = choiceCount;
+  photo.addEventListener('load', () => setTimeout(start, FIRE_DELAY_MS), { once: true });
+  const start = () => {
+    if (choiceCount !== before) return;
+    for (const input of lights) input.checked = input.value === 'fire';
+    applyForm();
+  };
+}
+
+function setExposure() {
+  const exposure = hasSource ? undefined : EXPOSURES[photo.getAttribute('light') ?? ''];
+  if (exposure === undefined) photo.removeAttribute('exposure');
+  else photo.setAttribute('exposure', String(exposure));
 }
 
 function applyForm() {
@@ -180,7 +207,8 @@ function applyForm() {
     [...lights].find((input) => input.checked)?.value ?? photo.getAttribute('light') ?? 'flood';
   if (photo.getAttribute('light') !== light) photo.setAttribute('light', light);
   updatePlayButton();
-  hint.classList.toggle('hidden', light !== 'torch' || hasSource);
+  hint.hidden = light !== 'torch' || hasSource;
+  setExposure();
   if ((photo.getAttribute('backend') ?? '') === backend.value) return;
   if (backend.value) photo.setAttribute('backend', backend.value);
   else photo.removeAttribute('backend');

@@ -11,10 +11,5 @@ export {
   type Torch,
 } from './core/relight.js';
 export { type CoreModuleName, provideWasm, type WasmInput } from './core/wasm-provider.js';
-export {
-  type ErrorCode,
-  type PageErrorCode,
-  PhotoError,
-  type WasmErrorCode,
-} from './shared/errors.js';
+export { type ErrorCode, PhotoError } from './shared/errors.js';
 export { type Gamut, LIGHTS, type LightName, type ToneCurve } from './shared/keywords.js';

@@ -26,7 +26,7 @@ export type {
   LightSource,
   LinearImage,
 } from './lights/light-source.js';
-export type { ErrorCode, PageErrorCode, WasmErrorCode } from './shared/errors.js';
+export type { ErrorCode } from './shared/error-codes.js';
 export { PhotoError } from './shared/errors.js';
 export type { Backend, Gamut, LightName, ToneCurve } from './shared/keywords.js';
 export { BACKENDS, LIGHTS } from './shared/keywords.js';

@@ -6,8 +6,9 @@
 
 import { cpSync, mkdirSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { dirname, extname, join, resolve } from 'node:path';
-import { composePage, manifestAt, PAGES } from './pages.js';
-import { FILES, FOLDERS, MANIFEST } from './site.js';
+import { packPackage } from './package-archive.js';
+import { ARCHIVE, buildPages, MANIFEST, manifestAt } from './pages.js';
+import { FILES, FOLDERS } from './site.js';
 
 const repository = join(import.meta.dirname, '..', '..');
 const [photos, out, address] = process.argv.slice(2);
@@ -20,7 +21,11 @@ if (!photos || !out || (address !== undefined && !URL.canParse(address))) {
 
 rmSync(out, { recursive: true, force: true });
 mkdirSync(out, { recursive: true });
-for (const page of PAGES) writeFileSync(join(out, page), composePage(page));
+for (const [page, content] of await buildPages()) {
+  mkdirSync(dirname(join(out, page)), { recursive: true });
+  writeFileSync(join(out, page), content);
+}
+cpSync(packPackage(), join(out, ARCHIVE));
 for (const [at, folder] of Object.entries(FOLDERS)) {
   cpSync(join(repository, folder), join(out, at), {
     recursive: true,

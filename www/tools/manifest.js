@@ -3,17 +3,11 @@
  * element's source, and from it the element's attributes in JSX.
  */
 
-import { readFileSync } from 'node:fs';
-import { createRequire } from 'node:module';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 // @ts-expect-error: it comes without types
 import { create } from '@custom-elements-manifest/analyzer/src/create.js';
-
-/** The analyser's own version of TypeScript: newer ones lack this API. */
-const ts = createRequire(import.meta.resolve('@custom-elements-manifest/analyzer/cli.js'))(
-  'typescript',
-);
+import { parseTypeScript, ts } from './typescript-api.js';
 
 const repository = join(import.meta.dirname, '..', '..');
 
@@ -36,7 +30,7 @@ const GLOBAL = ['lang'];
 
 /** @returns {Promise<{ manifest: object, attributes: string }>} needs dist/element.js */
 export async function makeManifest() {
-  const sources = SOURCES.map(parse);
+  const sources = SOURCES.map(parseTypeScript);
   const context = { dev: false, thirdPartyCEMs: [] };
   /** @type {{ modules: { declarations: Declaration[] }[] }} */
   const analysed = create({ modules: sources, plugins: [], context });
@@ -87,15 +81,9 @@ export async function makeManifest() {
   return { manifest, attributes: jsxAttributes(element) };
 }
 
-/** @param {string} file */
-function parse(file) {
-  const text = readFileSync(join(repository, file), 'utf8');
-  return ts.createSourceFile(file, text, ts.ScriptTarget.ES2022, true);
-}
-
 /** The reflected properties. @returns {Member[]} */
 function reflected() {
-  const source = parse(REFLECTED.file);
+  const source = parseTypeScript(REFLECTED.file);
   const found = source.statements.find(
     (/** @type {any} */ node) =>
       ts.isInterfaceDeclaration(node) && node.name.text === REFLECTED.name,

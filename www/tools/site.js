@@ -4,7 +4,8 @@ import { readFileSync } from 'node:fs';
 import { open } from 'node:fs/promises';
 import { extname, join, resolve, sep } from 'node:path';
 import sirv from 'sirv';
-import { composePage, manifestAt, PAGES } from './pages.js';
+import { packPackage } from './package-archive.js';
+import { ARCHIVE, cachedPages, MANIFEST, manifestAt } from './pages.js';
 import { answer } from './ranges.js';
 
 /** @typedef {import('node:http').IncomingMessage} Request */
@@ -16,18 +17,16 @@ const repository = join(import.meta.dirname, '..', '..');
 export const FOLDERS = {
   '/relightable-photo/': 'dist',
   '/site/': 'www/site',
-  '/samples/': 'www/samples',
-  '/results/': 'docs/images/results',
+  '/samples/': 'docs/samples',
+  '/docs/images/': 'docs/images',
 };
 
-/** The files of npm packages that are served. */
+/** Files of npm packages that are served. */
 export const FILES = {
   '/fonts/source-serif-4.woff2': font('source-serif-4-latin-wght-normal.woff2'),
   '/fonts/source-serif-4-italic.woff2': font('source-serif-4-latin-wght-italic.woff2'),
+  '/vendor/minisearch.js': join(repository, 'node_modules/minisearch/dist/es/index.js'),
 };
-
-/** The sample of a IIIF manifest, which contains the address of the site. */
-export const MANIFEST = '/samples/manifest.json';
 
 /**
  * The strictest policy under which the element works: no other hosts, no inline code or style, no `eval`, and neither
@@ -39,6 +38,14 @@ export const CONTENT_SECURITY_POLICY =
 
 /** @type {Record<string, string>} */
 const PHOTO_TYPES = { '.ltm': 'application/vnd.ltm', '.png': 'image/png' };
+/** @type {Record<string, string>} */
+const TYPES = {
+  '.html': 'text/html; charset=utf-8',
+  '.js': 'text/javascript',
+  '.json': 'application/json',
+  '.tgz': 'application/gzip',
+  '.woff2': 'font/woff2',
+};
 
 /**
  * @param {{ photos: string }} options folder whose `.ltm` and `.png` files are served below /photos/
@@ -62,7 +69,9 @@ export function site({ photos }) {
     })),
     { at: '/photos/', serve: photographs(photos) },
   ];
-  return (request, response) => {
+  const pages = cachedPages();
+  /** @param {Request} request @param {Response} response */
+  const serve = async (request, response) => {
     const missing = () => {
       response.writeHead(404, { 'Content-Type': 'text/plain' }).end('Not found\n');
     };
@@ -72,10 +81,13 @@ export function site({ photos }) {
       return;
     }
     const path = url.split('?', 1)[0] ?? '';
-    if (path === MANIFEST) {
+    /** @param {string | Buffer} content */
+    const send = (content, type = TYPES[extname(path)] ?? '') => {
       options.setHeaders(response);
-      response.setHeader('Content-Type', 'application/ld+json');
-      response.end(manifestAt(`http://${request.headers.host}/`));
+      response.setHeader('Content-Type', type).end(content);
+    };
+    if (path === `/${MANIFEST}`) {
+      send(manifestAt(`http://${request.headers.host}/`), 'application/ld+json');
       return;
     }
     for (const { at, serve } of mounts) {
@@ -85,15 +97,20 @@ export function site({ photos }) {
         return;
       }
     }
-    const page = path === '/' ? 'index.html' : path.slice(1);
     const file = FILES[/** @type {keyof typeof FILES} */ (path)];
-    if (PAGES.includes(page)) {
-      options.setHeaders(response);
-      response.setHeader('Content-Type', 'text/html; charset=utf-8').end(composePage(page));
-    } else if (file) {
-      options.setHeaders(response);
-      response.setHeader('Content-Type', 'font/woff2').end(readFileSync(file));
-    } else missing();
+    if (file) send(readFileSync(file));
+    else if (path === `/${ARCHIVE}`) send(readFileSync(packPackage()));
+    else {
+      const page = (await pages()).get(path === '/' ? 'index.html' : path.slice(1));
+      if (page === undefined) missing();
+      else send(page, path === '/' ? TYPES['.html'] : undefined);
+    }
+  };
+  return (request, response) => {
+    serve(request, response).catch((error) => {
+      console.error(error);
+      response.writeHead(500, { 'Content-Type': 'text/plain' }).end(`${error.stack}\n`);
+    });
   };
 }
 

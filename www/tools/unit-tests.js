@@ -1,4 +1,4 @@
-/** Compiles the tests in www/src and runs them in Node. */
+/** Compiles the tests in www/src, and runs them and those of the tools in Node. */
 
 import { spawnSync } from 'node:child_process';
 import { readdirSync, rmSync } from 'node:fs';
@@ -27,7 +27,11 @@ await build({
   logLevel: 'warning',
 });
 
-const files = tests.map((name) => join(out, name.replace(/\.ts$/, '.mjs')));
+const toolTests = readdirSync(import.meta.dirname).filter((name) => name.endsWith('.test.js'));
+const files = [
+  ...tests.map((name) => join(out, name.replace(/\.ts$/, '.mjs'))),
+  ...toolTests.map((name) => join(import.meta.dirname, name)),
+];
 const run = spawnSync(process.execPath, ['--enable-source-maps', '--test', ...files], {
   cwd: repository,
   stdio: 'inherit',

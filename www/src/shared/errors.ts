@@ -1,47 +1,8 @@
 /** The errors that the package reports. Pages may rely on the codes, but not on the messages. */
 
-/** Codes of the package's TypeScript, which the site's page about troubleshooting explains. */
-export type PageErrorCode =
-  | 'attribute' // An attribute has an unknown or invalid value.
-  | 'state' // The text passed to `setState` has an invalid value.
-  | 'src-missing' // `src` is not set.
-  | 'http-network' // The server cannot be reached, or this page may not read its response.
-  | 'http-status' // The server answered with an error status, such as 404.
-  | 'http-type' // The server sent a web page instead of the file.
-  | 'http-short' // The transfer ended before the end of the file.
-  | 'http-stalled' // No data arrived for 30 seconds.
-  | 'http-changed' // The file on the server was replaced during the transfer.
-  | 'http-encoding' // The server compresses partial responses, which makes them unreadable.
-  | 'http-range' // The server refused a range of the file, or sent another one.
-  | 'csp-connect' // The page's content security policy blocks the request for the file.
-  | 'csp-wasm' // The page's content security policy blocks WebAssembly.
-  | 'wasm-unavailable' // A WebAssembly module could not be loaded.
-  | 'controls-unavailable' // The toolbar's script could not be loaded.
-  | 'input-unavailable' // The script for gestures, keys and animations could not be loaded.
-  | 'worker-unavailable' // The worker that decodes the photograph stopped, usually because memory ran out.
-  | 'photo-lost' // A worker with a part of the photograph stopped. The photograph is fetched again, up to five times.
-  | 'light-tainted' // The light image contains data of another origin, which this page may not read.
-  | 'light-source' // The light image could not be loaded, played or read.
-  | 'not-loaded' // A method was called before the photograph was loaded.
-  | 'internal'; // A bug in this package.
+import type { ErrorCode } from './error-codes.js';
 
-/** Codes of the WebAssembly modules. */
-export type WasmErrorCode =
-  | 'format-magic'
-  | 'format-text-mode'
-  | 'format-version'
-  | 'format-checksum'
-  | 'format-invalid'
-  | 'format-limit'
-  | 'format-truncated'
-  | 'light-name'
-  | 'light-size'
-  | 'light-value'
-  | 'backend-unavailable'
-  | 'backend-lost';
-
-/** Any code; a newer WebAssembly module may add some. */
-export type ErrorCode = PageErrorCode | WasmErrorCode | (string & {});
+export type { ErrorCode };
 
 /** An error with a code for programs and a message for people. */
 export class PhotoError extends Error {
