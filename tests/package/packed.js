@@ -105,7 +105,7 @@ export function project(name) {
  * Reads the element's declaration in the manifest of an installed package.
  *
  * @param {string} place
- * @returns {import('../../www/tools/manifest.js').Declaration}
+ * @returns {import('../../www/tools/manifest-plugin.js').Declaration}
  */
 export function manifestOf(place) {
   const manifest = JSON.parse(readFileSync(join(place, 'dist/custom-elements.json'), 'utf8'));

@@ -14,7 +14,7 @@ import { createRequire } from 'node:module';
 import { join, relative } from 'node:path';
 import { build } from 'esbuild';
 import { writeIntegrity } from './integrity.js';
-import { makeManifest } from './manifest.js';
+import { elementOf, jsxAttributes, makeManifest } from './manifest.js';
 import { styles } from './styles.js';
 
 const repository = join(import.meta.dirname, '..', '..');
@@ -144,9 +144,9 @@ execFileSync(process.execPath, [join(tsc, '../bin/tsc'), '-p', 'tsconfig.types.j
   stdio: 'inherit',
 });
 
-const { manifest, attributes } = await makeManifest();
+const manifest = await makeManifest();
 writeFileSync(join(dist, 'custom-elements.json'), `${JSON.stringify(manifest, null, 2)}\n`);
-writeFileSync(join(dist, 'types/jsx-attributes.d.ts'), attributes);
+writeFileSync(join(dist, 'types/jsx-attributes.d.ts'), jsxAttributes(elementOf(manifest)));
 for (const name of ['react.d.ts', 'jsx.d.ts']) {
   copyFileSync(join(repository, 'www/types', name), join(dist, 'types', name));
 }

@@ -6,13 +6,29 @@
 import { readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { elementOf, makeManifest } from './manifest.js';
 import { parseTypeScript, ts } from './typescript-api.js';
 
 const docs = join(import.meta.dirname, '..', '..', 'docs');
 const ERROR_CODES = 'www/src/shared/error-codes.ts';
 
 /** The generated parts, by the names in their marks: <!-- begin: NAME --> … <!-- end: NAME --> */
-const PARTS = { 'error codes': errorCodes };
+const PARTS = {
+  'error codes': errorCodes,
+  attributes: () => table(['attribute', ''], attributes()),
+  properties: () => table(['property', 'type', ''], properties()),
+  methods: () => table(['method', ''], methods(false)),
+  configuration: () => table(['static member', ''], [...statics(), ...methods(true)]),
+  events: () => table(['event', ''], named(element.events)),
+  slots: () => table(['slot', ''], named(element.slots)),
+  states: () => table(['state', ''], named(element.cssStates)),
+  'css parts': () => table(['part', ''], named(element.cssParts)),
+  'custom properties': () => table(['custom property', ''], named(element.cssProperties)),
+};
+
+/** @typedef {import('./manifest-plugin.js').Member} Member */
+
+const element = elementOf(await makeManifest());
 
 /**
  * The documents whose generated parts differ from their sources, with their text as it should be.
@@ -72,6 +88,55 @@ function errorCodes() {
       return `### ${commentOf(group.jsDoc?.at(-1))}\n\n${codes.join('\n')}`;
     })
     .join('\n');
+}
+
+function attributes() {
+  return named(element.attributes ?? []);
+}
+
+/** The properties without an attribute; `light` has both. */
+function properties() {
+  const fields = element.members.filter(
+    ({ kind, static: ofClass, reflects }) => kind === 'field' && !ofClass && !reflects,
+  );
+  return fields.map(({ name, type, description = '', readonly }) => [
+    code(name),
+    code(type?.text ?? ''),
+    readonly ? `${description} Read-only.` : description,
+  ]);
+}
+
+function statics() {
+  const fields = element.members.filter((member) => member.kind === 'field' && member.static);
+  return named(fields);
+}
+
+/** @param {boolean} ofClass */
+function methods(ofClass) {
+  return element.members
+    .filter((member) => member.kind === 'method' && Boolean(member.static) === ofClass)
+    .map(({ name, parameters = [], description = '' }) => {
+      // Defaults are in the descriptions.
+      const names = parameters.map((parameter) => parameter.name.replaceAll(/ = [^,}]+/g, ''));
+      return [code(`${name}(${names.join(', ')})`), description];
+    });
+}
+
+/** @param {readonly { name: string, description?: string }[]} entries */
+function named(entries) {
+  return entries.map(({ name, description = '' }) => [name ? code(name) : 'none', description]);
+}
+
+/** @param {string} text */
+function code(text) {
+  return `\`${text}\``;
+}
+
+/** @param {string[]} head @param {string[][]} rows */
+function table(head, rows) {
+  const line = (/** @type {string[]} */ cells) =>
+    `| ${cells.map((cell) => cell.replaceAll(/\s+/g, ' ').replaceAll('|', '\\|')).join(' | ')} |\n`;
+  return [line(head), `|${'---|'.repeat(head.length)}\n`, ...rows.map(line)].join('');
 }
 
 /** The tags of a comment by their names. @param {any} node @returns {Record<string, string>} */

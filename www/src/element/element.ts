@@ -49,12 +49,14 @@ export interface StateOptions {
  * @fires {Event} load - The whole photograph is drawn.
  * @fires {ProgressEvent} progress - More of the file has arrived: `loaded` bytes of `total`, which is 0 while unknown.
  * @fires {PhotoErrorEvent} error - There is no picture: `code` for programs, `message` for people, `cause`.
- * @fires {PhotoWarningEvent} warning - Something else does not work as requested, such as an invalid attribute: `code`, `message`, `cause`.
- * @fires {LightChangeEvent} lightchange - Another light is active, or the torch has moved: `light`, `torch`, `source`.
+ * @fires {PhotoWarningEvent} warning - Something else does not work as requested, such as an invalid attribute, a light source that fails, or a lost graphics device: `code`, `message`, `cause`.
+ * @fires {LightChangeEvent} lightchange - Another light is active, or the torch has moved: `light`, `torch`, `source`. A source is reported when it first lights the picture.
  * @fires {ViewChangeEvent} viewchange - Another part of the picture is visible: `zoom`, `x`, `y`.
  * @fires {BackendChangeEvent} backendchange - A backend is in use: `backend`, `previous`, `reason`.
- * @fires {ContextLostEvent} contextlost - The backend in use was lost: `backend`, `message`.
+ * @fires {ContextLostEvent} contextlost - The backend in use was lost: `backend`, `message`. A `backendchange` follows.
  * @fires {QualityChangeEvent} qualitychange - The picture is drawn with another share of the photograph: `quality`.
+ *
+ * @attr {string} light - Built-in light: `flood` (all light elements; the default), `torch`, `checkerboard`, `stripes`, `spectrum` or `fire` (animated).
  *
  * @slot - Content for browsers without scripts.
  * @slot poster - Replaces the `poster` image, until the photograph is drawn.
@@ -144,7 +146,10 @@ export class RelightablePhotoElement extends Base {
     return this.#state.light.name;
   }
 
-  /** The torch's position on the picture; `null` behind the centre of the light plane. Absent fields keep their values. */
+  /**
+   * The torch's position on the picture, `{ x, y }`; `null` behind the centre of the light plane. Absent fields keep
+   * their values.
+   */
   get torch(): PicturePoint | null {
     return this.#state.light.torch;
   }
@@ -152,7 +157,10 @@ export class RelightablePhotoElement extends Base {
     this.#controller.setTorch(point);
   }
 
-  /** The visible part of the picture: its centre, and a magnification of at most `zoom`. Absent fields keep their values. */
+  /**
+   * The visible part of the picture, `{ zoom, x, y }`: a magnification of at most `zoom`, and its centre. Absent fields
+   * keep their values.
+   */
   get view(): ZoomView {
     return this.#state.view;
   }
@@ -161,8 +169,9 @@ export class RelightablePhotoElement extends Base {
   }
 
   /**
-   * Sets `light`, and moves the torch from its current position to that of `light`. Resolves at the end, or earlier if a
-   * visitor or a script changes the light. The torch does not move if less motion is preferred.
+   * Sets `light`, and moves the torch from its current position to that of `light` in `duration` milliseconds, 600 by
+   * default. Resolves at the end, or earlier if a visitor or a script changes the light. The torch jumps if less motion
+   * is preferred.
    */
   lightTo(light: LightValue, options: TransitionOptions = {}): Promise<void> {
     return this.#controller.lightTo(light, durationOf(options));
@@ -265,8 +274,8 @@ export class RelightablePhotoElement extends Base {
   }
 
   /**
-   * Draws the current picture in full quality and encodes it. Rejects with `not-loaded` if there is no photograph, or
-   * if another one replaces it meanwhile.
+   * Draws the current picture in full quality and encodes it; `scale` multiplies its width and height, up to 4. Rejects
+   * with `not-loaded` if there is no photograph, or if another one replaces it meanwhile.
    */
   async toBlob({ type = 'image/png', quality, scale = 1 }: ToBlobOptions = {}): Promise<Blob> {
     if (!(scale > 0 && scale <= MAX_SCALE)) {

@@ -16,43 +16,62 @@ export interface ReflectedProperties {
   src: string;
   /** Description of the picture for visitors who cannot see it. */
   alt: string;
-  /** Address of an image or video that replaces the built-in light. */
+  /**
+   * Address of an image or video that replaces the built-in light. A path that ends in mp4, m4v, webm, ogv or mov is a
+   * video, which plays muted, in a loop.
+   */
   lightSrc: string;
-  /** CSS colour of the light. */
+  /** Any CSS colour; it tints the light. */
   lightColor: string;
-  /** Radius of the torch, as a fraction of the light plane's shorter side. */
+  /** Radius of the torch, as a fraction of the light plane's shorter side; 1/7 by default. */
   lightSize: number;
-  /** Initial position of the torch, 0 to 1 across the picture. */
+  /**
+   * Initial position of the torch, 0 to 1 across the picture. Without `light-x` and `light-y` it is the middle of the
+   * light plane.
+   */
   lightX: number;
   /** Initial position of the torch, 0 to 1 down the picture. */
   lightY: number;
-  /** Factor on the brightness. */
+  /** Factor on the brightness; 1 by default. */
   exposure: number;
-  /** Factors on red, green and blue, separated by spaces. */
+  /** Factors on red, green and blue, separated by spaces; `1 1 1` by default. */
   whiteBalance: string;
-  /** Tone curve: `clip` cuts brightness off at white, `filmic` compresses highlights. */
+  /** Tone curve: `clip` (default) cuts brightness off at white, `filmic` compresses highlights and is darker. */
   tone: string;
-  /** Colour space of the canvas: `srgb` or `display-p3`. */
+  /**
+   * Colour space of the canvas: `srgb` (default), or `display-p3`, which shows more saturated bright colours on screens
+   * that have them.
+   */
   gamut: string;
-  /** Backends to try, in order, separated by spaces. */
+  /**
+   * Backends to try, in order; `webgpu webgl2 cpu` by default, without software renderers, as the CPU backend is
+   * faster.
+   */
   backend: string;
   /** Address of an image that is shown until the photograph is drawn, and if it cannot be drawn. */
   poster: string;
-  /** When the photograph is fetched, as on `<img>`: `eager` at once, `lazy` within one screen of the viewport. */
+  /** When the photograph is fetched, as on `<img>`: `eager` (default) at once, `lazy` within one screen of the viewport. */
   loading: LoadingMode;
-  /** When the poster gives way: `auto` when the photograph is drawn, `interaction` on a press, `manual` by `dismissPoster()`. */
+  /**
+   * When the poster gives way: `auto` (default) when the photograph is drawn; `interaction` when the visitor presses
+   * it, which also starts the download; `manual` when the page calls `dismissPoster()`.
+   */
   reveal: RevealMode;
-  /** Whether the toolbar is shown. */
+  /** Shows buttons: lights, play and pause, zoom, reset, tilt (on hand-held devices), full screen. */
   controls: boolean;
-  /** Largest magnification; 1 disables zooming. */
+  /**
+   * Largest magnification; 8 if the attribute has no value. Without the attribute, and at 1, the picture does not zoom.
+   */
   zoom: number;
-  /** Whether the wheel and single fingers scroll the page. */
+  /**
+   * With `zoom`: the wheel zooms with Ctrl or ⌘ only, one finger scrolls the page, two fingers zoom; a hint says so.
+   */
   cooperativeGestures: boolean;
-  /** Whether the torch wanders while there is no input. */
+  /** The torch wanders slowly until a visitor takes it, and again after eight seconds without input. */
   autoplayLight: boolean;
-  /** Seconds without input before the element resets itself; 0 is never. */
+  /** Resets everything after this many seconds without input; 60 if the attribute has no value, never at 0. */
   kiosk: number;
-  /** CORS mode of requests, as on images. */
+  /** CORS mode of the requests for `src`, `light-src` and `poster`, as on `<img>`. */
   crossOrigin: 'anonymous' | 'use-credentials' | null;
 }
 
