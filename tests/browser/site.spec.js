@@ -337,14 +337,43 @@ test.describe('the samples', () => {
     expect(fault).toBeUndefined();
   });
 
-  test('the plugin for WordPress is PHP', () => {
+  test('the plugin for WordPress is PHP, and knows the element’s attributes', () => {
+    const manifest = readFileSync(join(repository, 'dist/custom-elements.json'), 'utf8');
+    /** @type {string[]} */
+    const attributes = JSON.parse(manifest).modules[0].declarations.flatMap(
+      (/** @type {any} */ declaration) =>
+        declaration.customElement
+          ? declaration.attributes.map((/** @type {any} */ { name }) => name)
+          : [],
+    );
     const { Engine } = require('php-parser');
     const parser = new Engine({ parser: { version: '7.4' } });
     const text = sample('relightable-photo.php');
-    expect(parser.parseCode(text, 'plugin.php').kind).toBe('program');
+    const program = parser.parseCode(text, 'plugin.php');
+    // As on images.
+    attributes.push('width', 'height');
+    expect(program.kind).toBe('program');
+    // The shortcode passes attributes on that the element has, among them those that place and expose the light.
+    const names = stringsOf(program).filter((name) => attributes.includes(name));
+    for (const [, list = ''] of text.matchAll(
+      /\$(?:addresses|values|switches)\s*= array\(([^)]*)\)/g,
+    )) {
+      for (const [, name = ''] of list.matchAll(/'([^']*)'/g)) expect(attributes).toContain(name);
+    }
+    for (const name of ['src', 'alt', 'width', 'height', 'light-x', 'light-y', 'exposure']) {
+      expect(names).toContain(name);
+    }
     expect(() => parser.parseCode('<?php add_filter( ', 'plugin.php')).toThrow();
   });
 });
+
+/** All strings in a syntax tree of PHP. @param {unknown} node @returns {string[]} */
+function stringsOf(node) {
+  if (Array.isArray(node)) return node.flatMap(stringsOf);
+  if (typeof node !== 'object' || node === null) return [];
+  const { kind, value } = /** @type {{ kind?: string, value?: unknown }} */ (node);
+  return kind === 'string' ? [String(value)] : Object.values(node).flatMap(stringsOf);
+}
 
 test('the exported site contains every file that it refers to', async () => {
   const out = join(repository, 'target/browser-tests/site');

@@ -21,8 +21,11 @@ const lights = /** @type {NodeListOf<HTMLInputElement>} */ (
   form.querySelectorAll('input[name="light"]')
 );
 
-/** A torch and a fire light a part of the window only: as a camera would, the page exposes longer. */
-const EXPOSURES = /** @type {Record<string, number>} */ ({ torch: 2, fire: 1.5 });
+/** A torch and a fire light a part of the window only: the page exposes longer, as a camera would. */
+const SETTINGS = /** @type {Record<string, Record<string, string>>} */ ({
+  torch: { exposure: '2', 'light-size': '0.17' },
+  fire: { exposure: '1.5' },
+});
 /** How long the window is shown under flood light before the fire begins. */
 const FIRE_DELAY_MS = 5000;
 
@@ -176,7 +179,7 @@ function setSource(source, control, release = () => {}) {
   file.nextElementSibling?.classList.toggle('active', control === file);
   camera.setAttribute('aria-pressed', String(control === camera));
   if (!source) return;
-  setExposure();
+  applySettings();
   for (const input of lights) input.checked = false;
   hint.hidden = true;
   updatePlayButton();
@@ -195,10 +198,13 @@ function startFireLater() {
   };
 }
 
-function setExposure() {
-  const exposure = hasSource ? undefined : EXPOSURES[photo.getAttribute('light') ?? ''];
-  if (exposure === undefined) photo.removeAttribute('exposure');
-  else photo.setAttribute('exposure', String(exposure));
+function applySettings() {
+  const settings = hasSource ? {} : (SETTINGS[photo.getAttribute('light') ?? ''] ?? {});
+  for (const name of ['exposure', 'light-size']) {
+    const value = settings[name];
+    if (value === undefined) photo.removeAttribute(name);
+    else photo.setAttribute(name, value);
+  }
 }
 
 function applyForm() {
@@ -208,7 +214,7 @@ function applyForm() {
   if (photo.getAttribute('light') !== light) photo.setAttribute('light', light);
   updatePlayButton();
   hint.hidden = light !== 'torch' || hasSource;
-  setExposure();
+  applySettings();
   if ((photo.getAttribute('backend') ?? '') === backend.value) return;
   if (backend.value) photo.setAttribute('backend', backend.value);
   else photo.removeAttribute('backend');
