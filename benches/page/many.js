@@ -7,7 +7,8 @@
  * - `scroll`: 60 elements of the cookies and 60 of the window on a page that is scrolled down and up again; errors,
  *   elements without a picture, WebAssembly memory of the page and its workers at its peak, requests and decodings;
  * - `busy`: the same while another process keeps each core busy;
- * - `memory`: what one loaded cookies photograph, and thirty, add to the browser's processes (proportional set size).
+ * - `memory`: what loaded photographs add to the browser's processes (proportional set size): one of the cookies, thirty
+ *   of them, one of the window, ten of them.
  *
  * `view` and `scroll` are measured twice: with one address for each scene, and with an address for each element, as if
  * all photographs were different ones. Targets are printed beside the figures; the exit status does not depend on them.
@@ -281,26 +282,29 @@ async function settledBytes() {
   return least;
 }
 
-/** @param {number} count */
-async function measureMemory(count) {
+/** @param {string} scene @param {number} count */
+async function measureMemory(scene, count) {
   // The modules are loaded, but no photograph.
   const page = await open({ side: 120 });
   await page.evaluate(() => customElements.whenDefined('relightable-photo'));
   const before = await settledBytes();
-  await page.evaluate((count) => {
-    for (let i = 0; i < count; i += 1) {
-      const photo = document.createElement('relightable-photo');
-      for (const [name, value] of Object.entries({
-        src: `/photos/cookies.ltm?${i}`,
-        backend: 'cpu',
-        light: 'flood',
-        loading: 'eager',
-      })) {
-        photo.setAttribute(name, value);
+  await page.evaluate(
+    ({ scene, count }) => {
+      for (let i = 0; i < count; i += 1) {
+        const photo = document.createElement('relightable-photo');
+        for (const [name, value] of Object.entries({
+          src: `/photos/${scene}.ltm?${i}`,
+          backend: 'cpu',
+          light: 'flood',
+          loading: 'eager',
+        })) {
+          photo.setAttribute(name, value);
+        }
+        document.body.append(photo);
       }
-      document.body.append(photo);
-    }
-  }, count);
+    },
+    { scene, count },
+  );
   await settled(page, count);
   const after = await settledBytes();
   const { wasm_mb } = await usageOf(page);
@@ -324,9 +328,16 @@ try {
     }
   }
   if (parts.includes('memory')) {
-    show('memory, one photograph', await measureMemory(1));
-    const { added_mb: each_mb, ...rest } = await measureMemory(30);
-    show('memory, thirty photographs', { each_mb, ...rest });
+    show('memory, one of the cookies', await measureMemory('cookies', 1));
+    for (const [scene, count] of /** @type {const} */ ([
+      ['cookies', 30],
+      ['stained-glass', 1],
+      ['stained-glass', 10],
+    ])) {
+      // The target is that of one cookies photograph.
+      const { added_mb: each_mb, ...rest } = await measureMemory(scene, count);
+      show(`memory, ${scene}, ${count}`, { each_mb, ...rest });
+    }
   }
 } finally {
   await browser.close();
