@@ -16,7 +16,8 @@ for (const canvas of manifest.items) {
   photo.alt = textOf(canvas.summary ?? manifest.summary ?? canvas.label ?? manifest.label);
   photo.light = 'torch';
   photo.controls = true;
-  photo.style.setProperty('--relightable-photo-aspect', `${canvas.width} / ${canvas.height}`);
+  photo.width = canvas.width;
+  photo.height = canvas.height;
   const title = document.createElement('h1');
   title.textContent = textOf(canvas.label ?? manifest.label);
   const credit = document.createElement('p');

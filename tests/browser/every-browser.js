@@ -2,6 +2,7 @@
 
 import { compare } from '../../www/tools/pictures.js';
 import { expect, note } from './fixtures.js';
+import { checkLayoutBoxes } from './layout-boxes.js';
 import {
   capturePicture,
   decodeDataUrl,
@@ -215,6 +216,10 @@ export function testEveryBrowser(test, browser) {
         return blobs.map(({ type, size }) => `${type} ${size > 200}`);
       });
       expect(types).toStrictEqual(['image/png true', 'image/jpeg true']);
+    });
+
+    test('contains its picture in boxes of every kind', async ({ openAnyPage, step }) => {
+      await checkLayoutBoxes(await openAnyPage(PAGE), step);
     });
 
     /** @type {[src: string, code: string][]} */

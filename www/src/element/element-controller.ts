@@ -12,7 +12,7 @@ import { BROWSER_PORTS } from '../player/browser-ports.js';
 import { PhotoSession } from '../player/photo-session.js';
 import type { SessionSettings } from '../player/types.js';
 import type { Renderer } from '../renderers/types.js';
-import { missingScript, PhotoError } from '../shared/errors.js';
+import { explainOffline, missingScript, PhotoError } from '../shared/errors.js';
 import { BACKENDS } from '../shared/keywords.js';
 import { reuse } from '../shared/reuse-if-equal.js';
 import { CENTRE, type PicturePoint } from '../shared/value-types.js';
@@ -35,6 +35,7 @@ import {
   ViewChangeEvent,
 } from './events.js';
 import { LoadStatus } from './load-status.js';
+import { observeStyle } from './style-observer.js';
 import { observeVisibility, placementOf, type VisibilityFlag } from './visibility.js';
 
 export class ElementController<Host extends HTMLElement = HTMLElement> {
@@ -76,6 +77,7 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
       this.#markActive();
       this.dismissPoster();
     });
+    this.#dom.retryButton.addEventListener('click', () => this.load());
     host.addEventListener('fullscreenchange', () => this.schedule());
   }
 
@@ -138,6 +140,10 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
       this.status.set(null);
     }
     this.schedule();
+  }
+
+  get pictureBox(): DOMRectReadOnly | null {
+    return this.#dom.pictureBox;
   }
 
   get isPaused(): boolean {
@@ -321,7 +327,8 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
   }
 
   /** There is no picture. */
-  #fail(error: PhotoError): void {
+  #fail(cause: PhotoError): void {
+    const error = explainOffline(cause);
     this.state.errorMessage = error.message;
     this.status.set('error', error);
     this.#dom.updateProgress(null);
@@ -356,6 +363,10 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
     const { signal } = this.#connection;
     reducedMotion().addEventListener('change', () => this.schedule(), { signal });
     observeTranslations(() => this.schedule(), signal);
+    const retry = () => {
+      if (/^(offline|http-network)$/.test(this.status.error?.code ?? '')) this.load();
+    };
+    addEventListener('online', retry, { signal });
     const update = (visibility: VisibilityFlag, isTrue: boolean) => {
       this.state.reveal[visibility] = isTrue;
       if (visibility === 'isVisible') this.session.setVisible(isTrue);
@@ -363,6 +374,7 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
       this.schedule();
     };
     observeVisibility(this.host, update, signal);
+    observeStyle(this.host, () => this.#dom.updateFit(), signal);
   }
 
   /** Gives the session new settings, as soon as the photograph may be fetched. */
@@ -403,7 +415,7 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
   }
 
   #showError(): void {
-    this.#viewerUi.showError(this.state.errorMessage);
+    this.#viewerUi.showError(this.state.errorMessage, this.status.error?.code === 'offline');
   }
 
   #clearPicture(): void {

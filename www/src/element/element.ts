@@ -6,7 +6,7 @@ import type { PhotoError } from '../shared/errors.js';
 import type { Backend, Gamut, LightName } from '../shared/keywords.js';
 import type { PhotoInfo, PicturePoint } from '../shared/value-types.js';
 import type { LightValue } from '../state/page-light.js';
-import type { ZoomView } from '../state/viewport.js';
+import { pointAt, positionOf, type ZoomView } from '../state/viewport.js';
 import { ElementController } from './element-controller.js';
 import { encodePicture } from './encode-picture.js';
 import type { RelightablePhotoEventMap } from './events.js';
@@ -61,6 +61,8 @@ export interface StateOptions {
  * @slot - Content for browsers without scripts.
  * @slot poster - Replaces the `poster` image, until the photograph is drawn.
  * @slot progress - Replaces the progress bar, while the file loads.
+ * @slot overlay - Lies over the picture and follows zoom, `object-fit` and full screen. Positions in percent are those of
+ *   the picture.
  * @slot controls - Replaces the toolbar.
  * @slot error - Replaces the error message.
  *
@@ -73,6 +75,7 @@ export interface StateOptions {
  * @csspart poster - The poster image.
  * @csspart progress - The progress bar.
  * @csspart message - The error message.
+ * @csspart retry - The button that loads the photograph again.
  * @csspart controls - The toolbar.
  * @csspart menu - The light menu.
  * @csspart button - Each button.
@@ -84,7 +87,6 @@ export interface StateOptions {
  * @cssprop --relightable-photo-color - Text on that background.
  * @cssprop --relightable-photo-accent - The progress bar and the selected button.
  * @cssprop --relightable-photo-focus - The focus ring.
- * @cssprop --relightable-photo-aspect - Width / height of the place that is reserved before the photograph is drawn.
  */
 // biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the interface adds the properties that `reflect` defines, and typed overloads of inherited methods
 export class RelightablePhotoElement extends Base {
@@ -180,6 +182,24 @@ export class RelightablePhotoElement extends Base {
   /** Moves to another `view`. Resolves as `lightTo` does. */
   viewTo(view: Partial<ZoomView>, options: TransitionOptions = {}): Promise<void> {
     return this.#controller.viewTo(view, durationOf(options));
+  }
+
+  /**
+   * The point of the picture, 0 to 1, at a position in pixels from the element's top left corner; `null` beside the
+   * picture, and without one.
+   */
+  toPicture(x: number, y: number): PicturePoint | null {
+    const box = this.#controller.pictureBox;
+    return box && pointAt(this.view, box, { x, y });
+  }
+
+  /**
+   * The position, in pixels from the element's top left corner, of a point of the picture, 0 to 1; `null` without a
+   * picture. It is outside of the element where the view does not show the point.
+   */
+  toElement(x: number, y: number): PicturePoint | null {
+    const box = this.#controller.pictureBox;
+    return box && positionOf(this.view, box, { x, y });
   }
 
   /** Whether animations are paused: the fire, the video of `light-src`, the wandering torch. */

@@ -29,6 +29,8 @@ test('properties have defaults', () => {
   assert.deepEqual(Object.fromEntries(PROPERTIES.map((name) => [name, element[name]])), {
     src: '',
     alt: '',
+    width: 0,
+    height: 0,
     lightSrc: '',
     lightColor: 'white',
     lightSize: 1 / 7,

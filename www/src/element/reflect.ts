@@ -17,6 +17,12 @@ export interface ReflectedProperties {
   /** Description of the picture for visitors who cannot see it. */
   alt: string;
   /**
+   * Width of the element in CSS pixels, as on `<img>`; with `height`, it keeps the place before the photograph is there.
+   */
+  width: number;
+  /** Height of the element in CSS pixels, as on `<img>`. */
+  height: number;
+  /**
    * Address of an image or video that replaces the built-in light. A path that ends in mp4, m4v, webm, ogv or mov is a
    * video, which plays muted, in a loop.
    */
@@ -88,6 +94,8 @@ const REFLECTED: {
 } = {
   src: text('src'),
   alt: text('alt'),
+  width: number('width'),
+  height: number('height'),
   lightSrc: text('light-src'),
   lightColor: text('light-color', 'white'),
   lightSize: number('light-size', DEFAULT_TORCH_SIZE),
@@ -153,7 +161,15 @@ function parsed<K extends keyof typeof PARSERS>(attribute: K): AttributeConverte
 }
 
 function number(
-  attribute: 'light-size' | 'light-x' | 'light-y' | 'exposure' | 'zoom' | 'kiosk',
+  attribute:
+    | 'width'
+    | 'height'
+    | 'light-size'
+    | 'light-x'
+    | 'light-y'
+    | 'exposure'
+    | 'zoom'
+    | 'kiosk',
   defaultValue = 0,
 ): AttributeConverter<number> {
   const { get, set } = parsed(attribute);

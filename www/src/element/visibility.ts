@@ -8,7 +8,10 @@ export type VisibilityFlag = keyof Pick<RevealState, 'isNear' | 'isVisible'>;
 /** How far outside of the viewport counts: drawing begins shortly before an element becomes visible. */
 const ROOT_MARGINS = { isVisible: '64px', isNear: '100%' } as const;
 
-/** Calls back soon, and then at each change, until `signal` is aborted. Without support, all elements are visible. */
+/**
+ * Calls back soon, and then at each change, until `signal` is aborted. Without support and in print, all elements are
+ * visible.
+ */
 export function observeVisibility(
   element: Element,
   callback: (visibility: VisibilityFlag, isTrue: boolean) => void,
@@ -19,14 +22,19 @@ export function observeVisibility(
       callback(visibility, true);
       continue;
     }
+    let isIntersecting = false;
     const report = (entries: readonly IntersectionObserverEntry[]) => {
-      const last = entries.at(-1);
+      isIntersecting = entries.at(-1)?.isIntersecting ?? isIntersecting;
       // The browser may report changes from before `disconnect` after it.
-      if (last && !signal.aborted) callback(visibility, last.isIntersecting);
+      if (!signal.aborted) callback(visibility, isIntersecting);
     };
     const observer = new IntersectionObserver(report, { rootMargin: ROOT_MARGINS[visibility] });
     observer.observe(element);
     signal.addEventListener('abort', () => observer.disconnect());
+    // Paper shows what is below the viewport as well, unless it is not rendered.
+    const isPrinted = () => element.getClientRects().length > 0;
+    addEventListener('beforeprint', () => callback(visibility, isPrinted()), { signal });
+    addEventListener('afterprint', () => callback(visibility, isIntersecting), { signal });
   }
 }
 

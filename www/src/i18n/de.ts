@@ -9,6 +9,8 @@ export default {
   loading: 'Das Bild wird geladen',
   loaded: 'Das Bild ist da.',
   broken: 'Das Bild kann nicht gezeigt werden.',
+  offline: 'Sie sind offline. Das Bild wird geladen, sobald die Verbindung wieder da ist.',
+  retry: 'Erneut versuchen',
   details: 'Einzelheiten',
   flood: 'Flutlicht',
   torch: 'Taschenlampe',

@@ -8,6 +8,8 @@ export const ENGLISH = {
   loading: 'Loading the picture',
   loaded: 'The picture is ready.',
   broken: 'The picture cannot be shown.',
+  offline: 'You are offline. The picture is loaded when the connection returns.',
+  retry: 'Try again',
   details: 'Details',
   flood: 'Flood',
   torch: 'Torch',

@@ -9,6 +9,8 @@ export default {
   loading: 'Cargando la imagen',
   loaded: 'La imagen está lista.',
   broken: 'No se puede mostrar la imagen.',
+  offline: 'Sin conexión. La imagen se cargará cuando vuelva la red.',
+  retry: 'Reintentar',
   details: 'Detalles',
   flood: 'Plena',
   torch: 'Linterna',

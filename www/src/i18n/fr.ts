@@ -9,6 +9,8 @@ export default {
   loading: 'Chargement de l’image',
   loaded: 'L’image est prête.',
   broken: 'L’image ne peut pas être affichée.',
+  offline: 'Vous êtes hors ligne. L’image sera chargée au retour de la connexion.',
+  retry: 'Réessayer',
   details: 'Détails',
   flood: 'Pleine',
   torch: 'Torche',

@@ -9,6 +9,8 @@ export default {
   loading: 'Caricamento dell’immagine',
   loaded: 'L’immagine è pronta.',
   broken: 'L’immagine non può essere mostrata.',
+  offline: 'Nessuna connessione. L’immagine verrà caricata quando torna la rete.',
+  retry: 'Riprova',
   details: 'Dettagli',
   flood: 'Piena',
   torch: 'Torcia',

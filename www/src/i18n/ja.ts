@@ -9,6 +9,8 @@ export default {
   loading: '画像を読み込んでいます',
   loaded: '画像の準備ができました。',
   broken: '画像を表示できません。',
+  offline: 'オフラインです。接続が戻ると画像を読み込みます。',
+  retry: '再試行',
   details: '詳細',
   flood: '全面',
   torch: '懐中電灯',

@@ -9,6 +9,8 @@ export default {
   loading: '正在載入圖片',
   loaded: '圖片已就緒。',
   broken: '無法顯示圖片。',
+  offline: '目前處於離線狀態。恢復連線後將載入圖片。',
+  retry: '重試',
   details: '詳細資訊',
   flood: '泛光',
   torch: '手電筒',

@@ -9,6 +9,8 @@ export default {
   loading: '正在加载图片',
   loaded: '图片已就绪。',
   broken: '无法显示图片。',
+  offline: '当前处于离线状态。恢复连接后将加载图片。',
+  retry: '重试',
   details: '详情',
   flood: '泛光',
   torch: '手电筒',

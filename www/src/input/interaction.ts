@@ -15,18 +15,23 @@ import {
   type ZoomView,
   zoomAt,
 } from '../state/viewport.js';
+import { adoptStyles } from '../ui/adopted-styles.js';
+import { updateAttribute } from '../ui/dom-helpers.js';
 import type { ShadowDom } from '../ui/shadow-dom.js';
 import type { ViewerUi } from '../ui/viewer-ui.js';
 import { AnimationLoop } from './animation-loop.js';
 import type { EnabledGestures } from './gestures.js';
 import { IdleTimer } from './idle-timer.js';
 import type { Velocity } from './inertia.js';
+import INPUT_CSS from './input.css';
 import { type FocusedPart, type KeyAction, keyAction } from './keys.js';
 import { LightAnimator } from './light-animator.js';
+import { describeLight } from './light-description.js';
 import { listenToPointer, toViewportUnits } from './pointer-input.js';
 import { reducedMotion } from './reduced-motion.js';
 import { isTiltSupported, TiltSensor } from './tilt-sensor.js';
 import { Transitions, torchTransition, viewBetween } from './transitions.js';
+import { ZoomHint } from './zoom-hint.js';
 
 export interface InteractionCallbacks {
   /** The light, the view, an animation or the focus has changed. */
@@ -41,6 +46,7 @@ export class InteractionController {
   readonly #animator: LightAnimator;
   readonly #transitions = new Transitions(this.#loop);
   readonly #idle: IdleTimer;
+  readonly #hint = new ZoomHint();
   #isActive = false;
   /** The space key is held: drags pan. */
   #isPanning = false;
@@ -54,6 +60,8 @@ export class InteractionController {
     private readonly viewerUi: ViewerUi,
     private readonly listener: InteractionCallbacks,
   ) {
+    adoptStyles(dom.root, INPUT_CSS);
+    dom.contentBox.append(this.#hint.element);
     this.#animator = new LightAnimator(state.light, this.#loop, () => listener.changed());
     this.#idle = new IdleTimer(callLater, {
       rested: () => {
@@ -63,7 +71,7 @@ export class InteractionController {
       expired: () => {
         listener.expired();
         viewerUi.toolbar?.closeMenu();
-        viewerUi.leaveFullscreen();
+        this.#leaveFullscreen();
       },
     });
     this.#tilt = new TiltSensor((point) => {
@@ -75,9 +83,11 @@ export class InteractionController {
     this.#listenToKeyboard();
   }
 
-  /** Starts and stops animations. */
+  /** Describes the light, and starts and stops animations. */
   update(isPlaying: boolean): void {
     const { light, isPictureShown, options, reveal } = this.state;
+    const description = describeLight(light.torch ?? CENTRE, this.viewerUi);
+    updateAttribute(this.dom.handle, 'aria-valuetext', description);
     this.#idle.kioskSeconds = options.kioskSeconds;
     this.#loop.isEnabled = reveal.isVisible;
     const isInUse =
@@ -184,7 +194,7 @@ export class InteractionController {
       permissions: () => this.#permissions,
       isPanning: () => this.#isPanning,
       isCooperative: () => state.options.cooperativeGestures,
-      zoomIgnored: (by) => this.viewerUi.hintAtZoom(by),
+      zoomIgnored: (by) => this.#hint.show(by, this.viewerUi),
       active: () => this.markActive(),
       pressed: () => (handle.hidden ? viewport : handle).focus({ preventScroll: true }),
       moveLight: (x, y) => {
@@ -236,6 +246,13 @@ export class InteractionController {
       zooms: isPictureShown && options.maxZoom > 1,
       isZoomed: view.zoom > 1,
     };
+  }
+
+  /** Returns whether the element was in full screen. */
+  #leaveFullscreen(): boolean {
+    const wasFullscreen = this.dom.root.host.matches(':fullscreen');
+    if (wasFullscreen) document.exitFullscreen().catch(() => {});
+    return wasFullscreen;
   }
 
   #moveTorch(point: PicturePoint): void {
@@ -304,7 +321,7 @@ export class InteractionController {
         this.listener.changed();
         return true;
       case 'escape':
-        if (this.viewerUi.leaveFullscreen()) return false;
+        if (this.#leaveFullscreen()) return false;
         (this.dom.root.activeElement as HTMLElement | null)?.blur();
         return false;
     }

@@ -24,11 +24,13 @@ const PINCH_WHEEL_GAIN = 4;
 /** Listens for as long as the viewport exists. */
 export function listenToPointer(viewport: HTMLElement, listener: PointerInputListener): void {
   const gestures = new GestureRecognizer(listener);
-  /** Whether the event is for the picture. The poster's button over it handles its own events. */
-  const isForPicture = ({ target }: Event) => {
+  const hasGestures = () => {
     const { movesLight, zooms } = listener.permissions();
-    return (movesLight || zooms) && !(target as Element).closest('button');
+    return movesLight || zooms;
   };
+  /** Whether a press is for the picture. The page handles presses on its overlay. */
+  const isForPicture = ({ target }: Event) =>
+    hasGestures() && !(target as Element).closest('[slot="overlay"]');
   const positionOf = ({ clientX, clientY }: MouseEvent) => {
     const { left, top } = viewport.getBoundingClientRect();
     return { x: clientX - left, y: clientY - top };
@@ -38,7 +40,7 @@ export function listenToPointer(viewport: HTMLElement, listener: PointerInputLis
     return { id, isTouch: pointerType === 'touch', time, ...positionOf(event) };
   };
   viewport.addEventListener('pointermove', (event) => {
-    if (!isForPicture(event)) return;
+    if (!hasGestures()) return;
     gestures.move(sampleOf(event), listener.permissions());
   });
   viewport.addEventListener('pointerdown', (event) => {

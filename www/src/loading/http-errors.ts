@@ -1,6 +1,6 @@
 /** The errors of a transfer. Each message names the file, the cause and, where there is one, the remedy. */
 
-import { messageOf, PhotoError } from '../shared/errors.js';
+import { explainOffline, messageOf, PhotoError } from '../shared/errors.js';
 import type { ByteRange } from '../shared/value-types.js';
 
 /** An error after which the same request may succeed. */
@@ -26,9 +26,11 @@ export function badStatus(url: string, response: Response): PhotoError {
   return error;
 }
 
-export function unreachable(url: string, cause: unknown): RetryableError {
+/** Worth a retry, unless this device is offline. */
+export function unreachable(url: string, cause: unknown): PhotoError {
   const why = 'cannot be reached, or its CORS headers do not allow this page to read the file';
-  return retryable('http-network', url, `could not be fetched: the server ${why}.`, cause);
+  const text = `could not be fetched: the server ${why}.`;
+  return explainOffline(retryable('http-network', url, text, cause));
 }
 
 export function forbiddenByPolicy(url: string, directive: string, cause: unknown): PhotoError {

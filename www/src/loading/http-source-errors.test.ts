@@ -31,6 +31,20 @@ test('compressed ranges are http-encoding', async (t) => {
   await drain(createSource(plain.url).source, range(0, 100));
 });
 
+test('without a network a server that cannot be reached is offline at once', async (t) => {
+  const { navigator } = globalThis;
+  Object.defineProperty(globalThis, 'navigator', { value: { onLine: false }, configurable: true });
+  t.after(() => {
+    Object.defineProperty(globalThis, 'navigator', { value: navigator, configurable: true });
+  });
+  const lost = async () => {
+    throw new TypeError('Failed to fetch');
+  };
+  const { source, pauses } = createSource('https://museum.example/rose.ltm', { fetch: lost });
+  await assert.rejects(drain(source, range(0, 100)), { code: 'offline', message: /is offline/ });
+  assert.deepEqual(pauses, []);
+});
+
 test('a file that is too short is format-truncated', async (t) => {
   const file = fileOf(5000);
   const server = await serve(t, (request, response) => respond(request, response, file));

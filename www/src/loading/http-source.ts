@@ -188,7 +188,7 @@ export class HttpSource {
   #untilStalled<T>(
     promise: Promise<T>,
     signal: AbortSignal,
-    toError: (cause: unknown) => RetryableError,
+    toError: (cause: unknown) => PhotoError,
   ): Promise<T> {
     const ms = this.#ports.stallMs;
     const onTimeout = () => Promise.reject(errors.stalled(this.url, ms));

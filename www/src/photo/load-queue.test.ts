@@ -53,6 +53,20 @@ test('loads run one after another, the nearest first and those out of view last'
   assert.deepEqual(started, ['middle', 'corner', 'below']);
 });
 
+test('a load whose request ends after it has failed holds up no other', async () => {
+  const { started, create } = fakeLoads();
+  const failed = create('failed', 0);
+  const next = create('next', 1);
+  await pass();
+  await failed.end();
+  failed.setWaiting(false);
+  create('last', 2);
+  await pass();
+  assert.deepEqual(started, ['failed', 'next']);
+  await next.end();
+  assert.deepEqual(started, ['failed', 'next', 'last']);
+});
+
 test('a load that is removed does not run, and one that may not start is passed over', async () => {
   const { queue, started, create } = fakeLoads();
   let hasRoom = false;

@@ -61,7 +61,10 @@ export class LoadQueue {
     this.#waiting.delete(load);
     this.#busy.add(load);
     let cancelStall = (): void => {};
+    let hasEnded = false;
     const setWaiting = (isWaiting: boolean) => {
+      // A request may end after its load has failed.
+      if (hasEnded) return;
       cancelStall();
       this.#busy.add(load);
       if (!isWaiting) return;
@@ -71,6 +74,7 @@ export class LoadQueue {
       });
     };
     await load.run(setWaiting);
+    hasEnded = true;
     cancelStall();
     this.#busy.delete(load);
     this.schedule();

@@ -42,6 +42,12 @@ export interface PageFaults {
 /** The network */
 export interface NetworkFaults {
   /**
+   * The visitor's device has no network, so the photograph, a script or a module could not be fetched.
+   * @visitor a message that they are offline, with a button to try again.
+   * @remedy None needed: the photograph is loaded when the network returns.
+   */
+  offline: true;
+  /**
    * The server cannot be reached, or does not allow this page to read the file.
    * @visitor a message that the file cannot be fetched.
    * @remedy Open the file's address in a tab. If it is on another host, see [other origins](#other-origins).

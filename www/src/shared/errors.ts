@@ -29,6 +29,17 @@ export function photoReleased(): PhotoError {
   return new PhotoError('internal', 'The photograph was released.');
 }
 
+/** The codes of failures that the lack of a network may cause. */
+const NETWORK_CODE = /^(http-|wasm-|worker-|backend-unavailable|csp-connect)/;
+
+/** The `offline` error in place of a failure to fetch something, if this device is offline. */
+export function explainOffline(error: PhotoError): PhotoError {
+  if (globalThis.navigator?.onLine !== false || !NETWORK_CODE.test(error.code)) return error;
+  const message =
+    'This device is offline, so the photograph could not be loaded. It is loaded when the connection returns.';
+  return new PhotoError('offline', message, error);
+}
+
 /** Anything thrown as a `PhotoError`. Errors without a code become `internal`. */
 export function toPhotoError(thrown: unknown): PhotoError {
   if (thrown instanceof PhotoError) return thrown;

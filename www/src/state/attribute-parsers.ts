@@ -22,6 +22,7 @@ export const DEFAULT_TORCH_SIZE = 1 / 7;
 const MAX_ZOOM = 100;
 /** The meaning of `zoom` without a value. */
 const EMPTY_ZOOM = 8;
+const MAX_SIZE_PIXELS = 1e6;
 /** One day. Browser timers overflow after some weeks. */
 const MAX_KIOSK_SECONDS = 86_400;
 /** The meaning of `kiosk` without a value. */
@@ -46,6 +47,8 @@ export const PARSERS = {
     parseNumber(text, 'light size', 1e-6, MAX_TORCH_SIZE, LIGHT_SIZE_HINT),
   'light-x': (text: AttributeText) => parseCoordinate(text, 'light-x'),
   'light-y': (text: AttributeText) => parseCoordinate(text, 'light-y'),
+  width: (text: AttributeText) => parseSize(text, 'width'),
+  height: (text: AttributeText) => parseSize(text, 'height'),
   /** In order of preference. */
   backend: (text: AttributeText): readonly Backend[] | null => {
     const names = text?.split(/[\s,]+/).filter(Boolean) ?? [];
@@ -79,6 +82,10 @@ export function parserOf<K extends keyof typeof PARSERS>(name: K) {
 
 function parseCoordinate(text: AttributeText, name: string): number | null {
   return parseNumber(text, name, 0, 1, '0 is the picture’s left or upper edge');
+}
+
+function parseSize(text: AttributeText, name: string): number | null {
+  return parseNumber(text, name, 1, MAX_SIZE_PIXELS, 'it is in CSS pixels');
 }
 
 /** An absolute URL, resolved against `base`; `null` for an empty value. */

@@ -28,6 +28,8 @@ function readAttributes(reader: AttributeReader) {
     tone: reader.read('tone'),
     gamut: reader.read('gamut'),
     src: reader.readAddress('src'),
+    width: reader.read('width'),
+    height: reader.read('height'),
     poster: reader.readAddress('poster'),
     loading: reader.read('loading'),
     reveal: reader.read('reveal'),

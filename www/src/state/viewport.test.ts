@@ -4,6 +4,8 @@ import {
   clampView,
   FULL_VIEW,
   pan,
+  pointAt,
+  positionOf,
   toggleZoom,
   toPicture,
   toViewport,
@@ -17,6 +19,24 @@ const CLOSE: ZoomView = { zoom: 4, x: 0.4, y: 0.6 };
 function near(a: number, b: number): void {
   assert.ok(Math.abs(a - b) < 1e-3, `${a} and ${b}`);
 }
+
+test('positions on the page are points of the picture', () => {
+  const box = { left: 10, top: 20, width: 100, height: 200 };
+  assert.deepEqual(pointAt(FULL_VIEW, box, { x: 35, y: 120 }), { x: 0.25, y: 0.5 });
+  assert.deepEqual(positionOf(FULL_VIEW, box, { x: 0.25, y: 0.5 }), { x: 35, y: 120 });
+  const corner = pointAt(CLOSE, box, { x: 10, y: 220 });
+  near(corner?.x ?? 0, 0.4 - 0.125);
+  near(corner?.y ?? 0, 0.6 + 0.125);
+  near(positionOf(CLOSE, box, { x: 0.65, y: 0.6 }).x, 160);
+  for (const [x, y] of [
+    [9, 120],
+    [111, 120],
+    [35, 19],
+    [35, 221],
+  ] as const) {
+    assert.equal(pointAt(CLOSE, box, { x, y }), null);
+  }
+});
 
 test('toPicture and toViewport are inverse', () => {
   for (const at of [FULL_VIEW, { x: 0, y: 1 }, { x: 0.3, y: 0.9 }]) {

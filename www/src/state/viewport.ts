@@ -14,6 +14,9 @@ export interface ZoomView {
   readonly y: number;
 }
 
+/** Where the viewport is on the page. */
+export type Box = Pick<DOMRectReadOnly, 'left' | 'top' | 'width' | 'height'>;
+
 export const FULL_VIEW: ZoomView = { zoom: 1, ...CENTRE };
 const DOUBLE_TAP_ZOOM = 2.5;
 export const ZOOM_STEP = 1.5;
@@ -37,6 +40,19 @@ export function toPicture(view: ZoomView, { x, y }: PicturePoint): PicturePoint 
 /** From picture to viewport coordinates; outside of 0 to 1 the point is not visible. */
 export function toViewport(view: ZoomView, { x, y }: PicturePoint): PicturePoint {
   return { x: (x - view.x) * view.zoom + 0.5, y: (y - view.y) * view.zoom + 0.5 };
+}
+
+/** The point of the picture at a position on the page; `null` outside of the box that shows the picture. */
+export function pointAt(view: ZoomView, box: Box, { x, y }: PicturePoint): PicturePoint | null {
+  const shown = { x: (x - box.left) / box.width, y: (y - box.top) / box.height };
+  const isInside = [shown.x, shown.y].every((coordinate) => coordinate >= 0 && coordinate <= 1);
+  return isInside ? toPicture(view, shown) : null;
+}
+
+/** The position on the page of a point of the picture, also where the view does not show it. */
+export function positionOf(view: ZoomView, box: Box, point: PicturePoint): PicturePoint {
+  const { x, y } = toViewport(view, point);
+  return { x: box.left + x * box.width, y: box.top + y * box.height };
 }
 
 /** Magnifies by `factor`. The picture stays fixed at the viewport point `at`; the centre may lie beyond the edges. */

@@ -1,4 +1,7 @@
-/** The element's shadow DOM: the viewport with picture, poster and torch handle; controls, progress bar and message. */
+/**
+ * The element's shadow DOM: a spacer, which gives the element its natural size; over it the viewport with picture,
+ * overlay and torch handle, the poster, the controls, the progress bar and the message.
+ */
 
 import { type Language, t } from '../i18n/translations.js';
 import type { PicturePoint } from '../shared/value-types.js';
@@ -7,13 +10,20 @@ import { toViewport, type ZoomView } from '../state/viewport.js';
 import { adoptStyles } from './adopted-styles.js';
 import { createElement, createSlot, updateAttribute, updateText } from './dom-helpers.js';
 import { createIcon, LIGHT_ICON } from './icons.js';
+import { placePicture } from './object-fit.js';
 import ELEMENT_CSS from './style.css';
 
 /** Beyond this zoom, pixels are drawn as squares. */
 const MIN_PIXELATED_ZOOM = 4;
 /** An announcement waits this long, so that a newer one can replace it. */
 const ANNOUNCE_DELAY_MS = 400;
-const HINT_MS = 1800;
+/** The natural size until a better one is known, in pixels. */
+const UNKNOWN_SIZE: Size = { width: 300, height: 300 };
+
+interface Size {
+  readonly width: number;
+  readonly height: number;
+}
 
 export class ShadowDom {
   readonly root: ShadowRoot;
@@ -36,13 +46,20 @@ export class ShadowDom {
   readonly #picture = createElement('div', { part: 'picture' });
   readonly #posterImage = createElement('img', { part: 'poster', alt: '', hidden: '' });
   readonly #poster = createElement('div', { class: 'poster' });
-  readonly #hint = createElement('div', { class: 'hint panel', part: 'hint', hidden: '' });
+  readonly contentBox = createElement('div', { class: 'content-box' });
+  readonly #spacer = createIcon('');
+  readonly #overlay = createElement('div', { class: 'overlay' }, createSlot('overlay'));
   /** The box that shows the picture and receives pointer events. */
   readonly viewport = createElement('div', { class: 'viewport' });
   readonly #controls = createSlot('controls');
   readonly #progressBar = createElement('div', { class: 'progress-bar', role: 'progressbar' });
   readonly #progress = createElement('div', { class: 'progress', part: 'progress', hidden: '' });
   readonly #errorSummary = createElement('p');
+  readonly retryButton = createElement('button', {
+    class: 'retry',
+    part: 'button retry',
+    type: 'button',
+  });
   readonly #detailsLabel = createElement('summary');
   readonly #errorDetails = createElement('p');
   readonly #message = createElement('div', {
@@ -54,26 +71,33 @@ export class ShadowDom {
   readonly #footer = createElement('div', { class: 'footer' });
   readonly #status = createElement('div', { part: 'status', role: 'status' });
   #canvas: HTMLCanvasElement | null = null;
+  /** The last picture's size, so that the element keeps its place while another one loads. */
+  #pictureSize: Size | null = null;
+  /** The `width` and `height` attributes. */
+  #requestedSize: Partial<Size> = {};
   #announceTimer: ReturnType<typeof setTimeout> | undefined;
-  #hintTimer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(host: Element) {
+  constructor(private readonly host: Element) {
     this.root = host.attachShadow({ mode: 'open' });
     adoptStyles(this.root, ELEMENT_CSS);
     const { viewport, handle, revealButton } = this;
     const image = this.#posterImage;
-    image.addEventListener('load', () => viewport.classList.add('has-poster'));
+    image.addEventListener('load', () => this.#updateSpacer());
     image.addEventListener('error', () => {
       image.hidden = true;
     });
     this.#poster.append(createSlot('poster', image));
-    viewport.append(this.#picture, this.#poster, handle, revealButton, this.#hint);
+    viewport.append(this.#picture, this.#overlay, handle);
     const controls = createElement('div', { class: 'controls' }, this.#controls);
     this.#progress.append(createSlot('progress', this.#progressBar));
     const details = createElement('details', {}, this.#detailsLabel, this.#errorDetails);
-    this.#message.append(createSlot('error', this.#errorSummary, details));
+    this.#message.append(createSlot('error', this.#errorSummary, this.retryButton, details));
     this.#footer.append(controls, this.#progress, this.#message);
-    this.root.append(viewport, this.#footer, this.#status);
+    this.contentBox.append(viewport, this.#poster, revealButton, this.#footer);
+    const paddingBox = createElement('div', { class: 'padding-box' }, this.contentBox);
+    this.#spacer.setAttribute('class', 'spacer');
+    this.root.append(paddingBox, this.#status);
+    this.#updateSpacer();
   }
 
   /** Adds the built-in controls, which a page's own `controls` slot replaces. */
@@ -87,7 +111,7 @@ export class ShadowDom {
     updateAttribute(this.#picture, 'role', alt === '' ? 'presentation' : 'img');
     updateAttribute(this.#picture, 'aria-label', alt || null);
     const { handle, revealButton } = this;
-    for (const part of [handle, revealButton, this.#hint, this.#footer, this.#status]) {
+    for (const part of [handle, revealButton, this.#footer, this.#status]) {
       part.lang = language;
     }
     updateAttribute(handle, 'aria-label', t('light', language));
@@ -95,6 +119,7 @@ export class ShadowDom {
     updateAttribute(this.#progressBar, 'aria-label', t('loading', language));
     updateText(this.#revealText, t('reveal', language));
     updateText(this.#detailsLabel, t('details', language));
+    updateText(this.retryButton, t('retry', language));
   }
 
   /** When the handle disappears, its focus moves to the viewport, which may be focusable itself without a handle. */
@@ -123,7 +148,27 @@ export class ShadowDom {
     this.#canvas = canvas;
     this.#picture.replaceChildren(canvas);
     this.viewport.classList.add('has-picture');
-    this.viewport.style.setProperty('--ratio', String(canvas.width / canvas.height));
+    this.#pictureSize = { width: canvas.width, height: canvas.height };
+    this.#updateSpacer();
+  }
+
+  /** The size that the page requests by attributes. The photograph's or the poster's completes it. */
+  requestSize(width: number | null, height: number | null): void {
+    this.#requestedSize = { ...(width && { width }), ...(height && { height }) };
+    this.#updateSpacer();
+  }
+
+  /** Applies `object-fit` and `object-position`, which the page may have changed. */
+  updateFit(): void {
+    placePicture(this.viewport, getComputedStyle(this.host));
+  }
+
+  /** The picture's box, in pixels from the element's top left corner; `null` without a picture. */
+  get pictureBox(): DOMRectReadOnly | null {
+    if (!this.#canvas) return null;
+    const { left, top } = this.host.getBoundingClientRect();
+    const box = this.viewport.getBoundingClientRect();
+    return new DOMRectReadOnly(box.left - left, box.top - top, box.width, box.height);
   }
 
   /** Removes the canvas, the progress bar and the message. */
@@ -136,21 +181,24 @@ export class ShadowDom {
   }
 
   /** Shows a part of the picture. The handle is at the torch's position, or at the nearest edge of the view. */
-  updateView(view: ZoomView, torch: PicturePoint, description: string): void {
+  updateView(view: ZoomView, torch: PicturePoint): void {
     const { zoom } = view;
     this.viewport.classList.toggle('zoomed', zoom > 1);
+    const shift = (centre: number) => `${100 * (0.5 - centre * zoom)}%`;
     if (this.#canvas) {
-      const shift = (centre: number) => `${100 * (0.5 - centre * zoom)}%`;
       this.#canvas.style.transform =
         zoom > 1 ? `translate(${shift(view.x)}, ${shift(view.y)}) scale(${zoom})` : '';
       this.#canvas.classList.toggle('pixelated', zoom > MIN_PIXELATED_ZOOM);
     }
     const { x, y } = toViewport(view, torch);
     const percent = (coordinate: number) => `${100 * Math.min(1, Math.max(0, coordinate))}%`;
+    const { style } = this.#overlay;
+    style.width = style.height = `${100 * zoom}%`;
+    style.left = shift(view.x);
+    style.top = shift(view.y);
     this.handle.style.left = percent(x);
     this.handle.style.top = percent(y);
     updateAttribute(this.handle, 'aria-valuenow', String(Math.round(100 * torch.x)));
-    updateAttribute(this.handle, 'aria-valuetext', description);
   }
 
   /** `needsPress` shows the button that dismisses the poster. */
@@ -158,7 +206,6 @@ export class ShadowDom {
     const image = this.#posterImage;
     const { poster, crossOrigin } = options;
     if (image.getAttribute('src') !== poster) {
-      this.viewport.classList.remove('has-poster');
       image.hidden = poster === null;
       updateAttribute(image, 'crossorigin', crossOrigin);
       updateAttribute(image, 'src', poster);
@@ -180,19 +227,43 @@ export class ShadowDom {
 
   /** Shows a message over the picture; `null` hides it. */
   showError(details: string | null, summary = ''): void {
+    const isRetryFocused = this.root.activeElement === this.retryButton;
     this.#message.hidden = details === null;
-    if (details === null) return;
+    if (details === null) {
+      if (isRetryFocused) this.#keepFocus();
+      return;
+    }
     updateText(this.#errorSummary, summary);
     updateText(this.#errorDetails, details);
   }
 
-  showHint(text: string): void {
-    updateText(this.#hint, text);
-    this.#hint.hidden = false;
-    clearTimeout(this.#hintTimer);
-    this.#hintTimer = setTimeout(() => {
-      this.#hint.hidden = true;
-    }, HINT_MS);
+  /** Keeps the keyboard's focus in the element when the focused button disappears. */
+  #keepFocus(): void {
+    this.contentBox.tabIndex = -1;
+    this.contentBox.focus({ preventScroll: true });
+  }
+
+  /** Keeps the place of the picture on the page. */
+  #updateSpacer(): void {
+    const { naturalWidth, naturalHeight } = this.#posterImage;
+    const posterSize = naturalWidth > 0 ? { width: naturalWidth, height: naturalHeight } : null;
+    const natural = this.#pictureSize ?? posterSize ?? UNKNOWN_SIZE;
+    const requested = this.#requestedSize;
+    const ratio = natural.width / natural.height;
+    const width = requested.width ?? (requested.height ?? natural.height) * ratio;
+    const height = requested.height ?? width / ratio;
+    const viewBox = `0 0 ${width} ${height}`;
+    if (this.#spacer.getAttribute('viewBox') !== viewBox) {
+      this.#spacer.setAttribute('viewBox', viewBox);
+      this.#spacer.setAttribute('width', String(width));
+      this.#spacer.setAttribute('height', String(height));
+      // WebKit keeps the width of a float around it otherwise.
+      this.root.prepend(this.#spacer);
+    }
+    const shown = this.#pictureSize ?? { width, height };
+    const { style } = this.viewport;
+    style.setProperty('--_natural-width', String(shown.width));
+    style.setProperty('--_natural-height', String(shown.height));
   }
 
   /** Has a screen reader read a text, unless another one follows at once. */

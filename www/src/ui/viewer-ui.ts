@@ -5,7 +5,6 @@ import { formatNumber, type Language, type StringKey, t } from '../i18n/translat
 import { missingScript, type PhotoError } from '../shared/errors.js';
 import { CENTRE } from '../shared/value-types.js';
 import type { ViewerState } from '../state/viewer-state.js';
-import { describeLight } from './light-description.js';
 import type { ShadowDom } from './shadow-dom.js';
 import type { Toolbar, ToolbarActions } from './toolbar.js';
 
@@ -39,10 +38,12 @@ export class ViewerUi {
     const zooms = isPictureShown && options.maxZoom > 1;
     const capturesTouch = zooms && !options.cooperativeGestures && (hasHandle || view.zoom > 1);
     const torch = light.torch ?? CENTRE;
+    this.dom.requestSize(options.width, options.height);
+    this.dom.updateFit();
     this.dom.updateLabels(this.host.getAttribute('alt'), language);
     const touchAction = capturesTouch ? 'none' : hasHandle || zooms ? 'pan-y' : 'auto';
     this.dom.updateLayout(hasHandle, zooms && !hasHandle, touchAction, language);
-    this.dom.updateView(view, torch, describeLight(torch, language));
+    this.dom.updateView(view, torch);
     this.dom.updatePoster(options, !isPictureShown, reveal.needsPress(options));
     const hasToolbar = options.controls && isPictureShown;
     if (hasToolbar) this.#toolbarFetch ??= this.#fetchToolbar();
@@ -50,29 +51,17 @@ export class ViewerUi {
     else this.toolbar?.hide();
   }
 
-  /** Returns whether the element was in full screen. */
-  leaveFullscreen(): boolean {
-    const wasFullscreen = this.host.matches(':fullscreen');
-    if (wasFullscreen) document.exitFullscreen().catch(() => {});
-    return wasFullscreen;
-  }
-
   /** `null` hides the message. */
-  showError(details: string | null): void {
-    this.dom.showError(details, this.#t('broken'));
-  }
-
-  /** Explains how to zoom, after the page scrolled instead. */
-  hintAtZoom(by: 'wheel' | 'touch'): void {
-    const key = /mac|iphone|ipad/i.test(navigator.platform) ? '⌘' : 'Ctrl';
-    this.dom.showHint(this.#t(by === 'wheel' ? 'wheelHint' : 'touchHint', key));
+  showError(details: string | null, isOffline: boolean): void {
+    this.dom.retryButton.hidden = this.state.options.src === null;
+    this.dom.showError(details, this.t(isOffline ? 'offline' : 'broken'));
   }
 
   announce(change: 'loaded' | 'light' | 'zoomed'): void {
     const { light, view } = this.state;
     const zoom = formatNumber(view.zoom, this.language, 'decimal');
-    const text = this.#t(change, zoom);
-    this.dom.announce(change === 'light' ? `${text}: ${this.#t(light.item)}` : text);
+    const text = this.t(change, zoom);
+    this.dom.announce(change === 'light' ? `${text}: ${this.t(light.item)}` : text);
   }
 
   /** The toolbar is a separate script, fetched when the `controls` attribute is used for the first time. */
@@ -88,7 +77,12 @@ export class ViewerUi {
     }
   }
 
-  #t(key: StringKey, ...values: readonly string[]): string {
+  /** A text in the element's language. */
+  t(key: StringKey, ...values: readonly string[]): string {
     return t(key, this.language, ...values);
+  }
+
+  percent(value: number): string {
+    return formatNumber(value, this.language, 'percent');
   }
 }

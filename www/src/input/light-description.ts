@@ -1,7 +1,8 @@
 /** Describes the torch's position in words, for screen readers. */
 
-import { formatNumber, type Language, type StringKey, t } from '../i18n/translations.js';
+import type { StringKey } from '../i18n/translations.js';
 import type { PicturePoint } from '../shared/value-types.js';
+import type { ViewerUi } from '../ui/viewer-ui.js';
 
 const DIRECTIONS: readonly (readonly StringKey[])[] = [
   ['upperLeft', 'above', 'upperRight'],
@@ -15,13 +16,15 @@ const MIDDLE_DISTANCE = 1 / 8;
 const NEAR_DISTANCE = 0.3;
 
 /** For example “Light from upper left, near, 35% · 30%”, which ends with the x and y coordinates. */
-export function describeLight({ x, y }: PicturePoint, language: Language): string {
+export function describeLight(
+  { x, y }: PicturePoint,
+  language: Pick<ViewerUi, 't' | 'percent'>,
+): string {
   const direction = DIRECTIONS[third(y)]?.[third(x)] ?? 'lightInMiddle';
-  const percent = (value: number) => formatNumber(value, language, 'percent');
-  const position = `${percent(x)} · ${percent(y)}`;
-  if (direction === 'lightInMiddle') return `${t(direction, language)}, ${position}`;
-  const distance = t(Math.hypot(x - 0.5, y - 0.5) < NEAR_DISTANCE ? 'near' : 'far', language);
-  return t('lightAt', language, t(direction, language), distance, position);
+  const position = `${language.percent(x)} · ${language.percent(y)}`;
+  if (direction === 'lightInMiddle') return `${language.t(direction)}, ${position}`;
+  const distance = language.t(Math.hypot(x - 0.5, y - 0.5) < NEAR_DISTANCE ? 'near' : 'far');
+  return language.t('lightAt', language.t(direction), distance, position);
 }
 
 function third(coordinate: number): number {
