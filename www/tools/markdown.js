@@ -60,6 +60,8 @@ export function siteReference(reference, document) {
  * @param {any} md an instance of markdown-it
  */
 export function documentMarkdown(md) {
+  // Eleventy disables indented code blocks.
+  md.enable('code');
   md.core.ruler.push('document', (/** @type {{ tokens: Token[], env: any }} */ { tokens, env }) => {
     const document = documentOf(env);
     if (!document) return;
