@@ -11,6 +11,7 @@ import { parseTypeScript, ts } from './typescript-api.js';
 
 const docs = join(import.meta.dirname, '..', '..', 'docs');
 const ERROR_CODES = 'www/src/shared/error-codes.ts';
+const ENGLISH_TEXTS = 'www/src/i18n/en.ts';
 
 /** The generated parts, by the names in their marks: <!-- begin: NAME --> … <!-- end: NAME --> */
 const PARTS = {
@@ -19,6 +20,7 @@ const PARTS = {
   properties: () => table(['property', 'type', ''], properties()),
   methods: () => table(['method', ''], methods(false)),
   configuration: () => table(['static member', ''], [...statics(), ...methods(true)]),
+  texts: () => table(['name', 'English text'], texts()),
   events: () => table(['event', ''], named(element.events)),
   slots: () => table(['slot', ''], named(element.slots)),
   states: () => table(['state', ''], named(element.cssStates)),
@@ -88,6 +90,19 @@ function errorCodes() {
       return `### ${commentOf(group.jsDoc?.at(-1))}\n\n${codes.join('\n')}`;
     })
     .join('\n');
+}
+
+/** The names and English texts that a page may replace. */
+function texts() {
+  const declared = parseTypeScript(ENGLISH_TEXTS)
+    .statements.filter(ts.isVariableStatement)
+    .flatMap((/** @type {any} */ statement) => [...statement.declarationList.declarations])
+    .find((/** @type {any} */ { name }) => name.text === 'ENGLISH');
+  const { properties } = declared.initializer.expression;
+  return properties.map((/** @type {any} */ { name, initializer }) => [
+    code(name.text),
+    initializer.text,
+  ]);
 }
 
 function attributes() {

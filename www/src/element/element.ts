@@ -58,7 +58,7 @@ export interface StateOptions {
  *
  * @attr {string} light - Built-in light: `flood` (all light elements; the default), `torch`, `checkerboard`, `stripes`, `spectrum` or `fire` (animated).
  *
- * @slot - Content for browsers without scripts.
+ * @slot - Content that is shown until the element's script has run, by old browsers, and by browsers without scripts.
  * @slot poster - Replaces the `poster` image, until the photograph is drawn.
  * @slot progress - Replaces the progress bar, while the file loads.
  * @slot overlay - Lies over the picture and follows zoom, `object-fit` and full screen. Positions in percent are those of
@@ -92,7 +92,7 @@ export interface StateOptions {
 export class RelightablePhotoElement extends Base {
   static readonly observedAttributes: readonly string[] = [...ATTRIBUTES, 'lang'];
 
-  /** Folder of the WebAssembly modules for the whole page; `null` for the one beside the script. Set it at first. */
+  /** Folder of the WebAssembly modules for the whole page; `null` for the one beside the script. Set it before the first photograph loads. */
   static get wasmUrl(): string | null {
     return moduleFolder;
   }
@@ -100,7 +100,10 @@ export class RelightablePhotoElement extends Base {
     setModuleFolder(url && new URL(url, globalThis.document?.baseURI).href);
   }
 
-  /** Adds a language, or replaces single texts of one, for all photographs of the page. Absent texts are in English. */
+  /**
+   * Adds a language, or replaces single texts of one, for all photographs of the page. Absent texts are those of the
+   * element's own translation, or English.
+   */
   static addTranslation(lang: string, strings: Translation): void {
     addTranslation(lang, strings);
   }

@@ -142,7 +142,7 @@ export interface ScriptFaults {
   'worker-unavailable': true;
   /**
    * The browser stopped a worker that held a part of the photograph.
-   * @visitor the picture, until it is drawn again.
+   * @visitor a picture that does not react for a moment.
    * @remedy The element fetches the photograph again, up to five times. If the error persists, reduce memory use as
    *   above.
    */
