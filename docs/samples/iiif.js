@@ -15,6 +15,8 @@ for (const canvas of manifest.items) {
   if (image) photo.poster = new URL(image.id, address).href;
   photo.alt = textOf(canvas.summary ?? manifest.summary ?? canvas.label ?? manifest.label);
   photo.light = 'torch';
+  photo.lightSize = 0.25;
+  photo.exposure = 1.5;
   photo.controls = true;
   photo.width = canvas.width;
   photo.height = canvas.height;
