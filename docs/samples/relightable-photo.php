@@ -40,5 +40,12 @@ add_shortcode( 'relightable_photo', function ( $given ) {
 		}
 	}
 	wp_enqueue_script_module( 'relightable-photo' );
-	return $html . '></relightable-photo>';
+
+	// For browsers that cannot run the element.
+	$image = empty( $given['poster'] ) ? '' : sprintf(
+		'<img src="%s" alt="%s">',
+		esc_url( $given['poster'] ),
+		esc_attr( $given['alt'] ?? '' )
+	);
+	return $html . '>' . $image . '</relightable-photo>';
 } );

@@ -167,6 +167,25 @@ test.describe('the gallery', () => {
     });
   });
 
+  test('its photographs fill their frames', async ({ openPage, step }) => {
+    const page = await openPage('/?light=torch');
+    await waitUntilDrawn(page);
+    for (const width of [390, 1440]) {
+      await page.setViewportSize({ width, height: 900 });
+      await step(`at ${width} pixels`, async () => {
+        const margins = await page.locator('.frame').evaluateAll((frames) =>
+          frames.map((frame) => {
+            const { paddingLeft, paddingRight } = getComputedStyle(frame);
+            const padding = Number.parseFloat(paddingLeft) + Number.parseFloat(paddingRight);
+            const photo = frame.querySelector('relightable-photo');
+            return Math.round(frame.clientWidth - padding - (photo?.clientWidth ?? 0));
+          }),
+        );
+        expect(margins).toStrictEqual([0, 0, 0, 0]);
+      });
+    }
+  });
+
   test('does not scroll sideways at any width, in light and dark', async ({ openPage, step }) => {
     const page = await openPage('/?light=torch');
     await waitUntilDrawn(page);
