@@ -429,3 +429,30 @@ test('another address replaces a resting picture', async () => {
   await f.createRenderer(1);
   assert.deepEqual(f.takeLog(), ['loading', 'backend null -> cpu', 'cpu draws flood', 'loaded']);
 });
+
+test('a resting picture that becomes visible while its photograph is drawn opens it once', async () => {
+  const f = await restingSession();
+  f.takeLog();
+  const frames = f.slowDown();
+  f.session.setNear(true);
+  await f.finishLoad('a.ltm');
+  await f.createRenderer(1);
+  f.session.setVisible(true);
+  assert.equal(f.users.size, 1);
+  frames.shift()?.done();
+  await settle();
+  assert.deepEqual(f.takeLog(), ['cpu draws flood']);
+});
+
+test('a resting picture stays if no backend can draw its photograph again', async () => {
+  const f = await restingSession();
+  f.takeLog();
+  f.session.setNear(true);
+  await f.finishLoad('a.ltm');
+  await f.failRenderer(1, 'no memory is left');
+  assert.match(f.takeLog().join(), /^warned backend-unavailable: .*no memory is left/);
+  f.session.setVisible(true);
+  await f.finishLoad('a.ltm');
+  await f.createRenderer(2);
+  assert.deepEqual(f.takeLog(), ['free a.ltm', 'cpu draws flood', 'recovered']);
+});

@@ -68,7 +68,7 @@ export class PhotoSession {
     private readonly listener: PhotoSessionListener,
   ) {
     this.#selector = new BackendSelector(ports.createRenderer, listener, {
-      failed: (error) => this.#fail(error),
+      failed: (error) => this.#fail(error, this.#isBehindPicture),
       selected: () => this.#drawFrame(true),
       photoLost: (reason) => this.#refetch(reason),
     });
@@ -176,10 +176,12 @@ export class PhotoSession {
     this.isLoaded = true;
   }
 
-  /** Opens the photograph of a resting picture again, unless it is being opened. */
+  /** Opens the photograph of a resting picture again, unless it is being opened or drawn. */
   #startWake(): void {
     const { signal } = this.#load;
-    if (!this.#resting || !this.settings || this.#wake?.signal === signal) return;
+    const { active, search } = this.#selector;
+    const isAwake = active || search || this.#wake?.signal === signal;
+    if (!this.#resting || !this.settings || isAwake) return;
     const done = this.#run(this.settings, this.#resting.backend, '').finally(() => {
       // After a failure, the next one tries again.
       if (this.#wake?.signal === signal) this.#wake = null;
@@ -215,6 +217,11 @@ export class PhotoSession {
       },
       rest: () => session.#rest(),
     };
+  }
+
+  /** Whether the picture of a photograph that was released is on the screen. */
+  get #isBehindPicture(): boolean {
+    return this.#scheduler.hasPicture && (this.#refetches > 0 || this.#resting !== null);
   }
 
   get #canRest(): boolean {
@@ -263,10 +270,8 @@ export class PhotoSession {
       else await this.#use(photo, previous, reason);
     } catch (thrown) {
       if (signal.aborted) return;
-      const isBehindPicture =
-        this.#scheduler.hasPicture && (this.#refetches > 0 || this.#resting !== null);
-      this.#failure = isBehindPicture ? 'temporary' : 'permanent';
-      this.#fail(toPhotoError(thrown), isBehindPicture);
+      this.#failure = this.#isBehindPicture ? 'temporary' : 'permanent';
+      this.#fail(toPhotoError(thrown), this.#isBehindPicture);
     } finally {
       preparation.abort();
     }
@@ -391,7 +396,8 @@ export class PhotoSession {
 
   #handleFrameError(active: ActiveBackend, error: PhotoError): void {
     if (error.code === 'backend-lost') this.#selector.lose(active, error.message);
-    else if (error.code !== 'photo-lost') this.#fail(error, active.hasDrawn);
+    else if (error.code !== 'photo-lost')
+      this.#fail(error, active.hasDrawn || this.#isBehindPicture);
     else if (active.photo.value.isComplete) this.#refetch(error.message);
     // The photograph replaces a lost preview.
     else this.#selector.drop();
