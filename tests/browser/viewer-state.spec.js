@@ -209,6 +209,37 @@ test.describe('torch and view', () => {
   });
 });
 
+test.describe('a light that moves', () => {
+  test('gives way to every later choice', async ({ openPhoto }) => {
+    const page = await open(openPhoto, { controls: '' });
+    const move = "photo.lightTo({ name: 'torch', x: 1 }, { duration: 1e6 })";
+    // Later, but before the motion begins.
+    await page.evaluate(`Promise.all([${move}, photo.light = 'spectrum'])`);
+    expect(await page.evaluate('photo.activeLight')).toBe('spectrum');
+    for (const choice of [
+      "photo.setAttribute('light', 'fire')",
+      "photo.shadowRoot.querySelector('input[value=fire]').click()",
+    ]) {
+      await page.evaluate(`(async () => {
+        photo.light = 'flood';
+        const moved = ${move};
+        await new Promise(requestAnimationFrame);
+        ${choice};
+        await moved;
+      })()`);
+      expect(await page.evaluate('photo.activeLight')).toBe('fire');
+    }
+  });
+
+  test('is at its end once nobody sees it', async ({ openPhoto }) => {
+    const page = await open(openPhoto);
+    const moved = page.evaluate("photo.lightTo({ name: 'torch', x: 1 }, { duration: 1e6 })");
+    await page.evaluate("photo.style.marginTop = '5000px'");
+    await moved;
+    expect(await page.evaluate('photo.torch.x')).toBe(1);
+  });
+});
+
 test.describe('toBlob', () => {
   test('scales the picture', async ({ openPhoto }) => {
     const page = await open(openPhoto);

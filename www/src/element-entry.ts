@@ -6,7 +6,6 @@ export {
   RelightablePhotoElement,
   type StateOptions,
   type ToBlobOptions,
-  type TransitionOptions,
 } from './element/element.js';
 export {
   BackendChangeEvent,
@@ -20,6 +19,7 @@ export {
 } from './element/events.js';
 export type { ReflectedProperties } from './element/reflect.js';
 export type { StringKey as TranslationKey, Translation } from './i18n/translations.js';
+export type { TransitionOptions } from './input/transitions.js';
 export type {
   BrowserImageSource,
   LightImageSource,

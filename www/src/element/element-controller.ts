@@ -6,6 +6,7 @@
 import { fetchStrings, isPending, observeTranslations } from '../i18n/translations.js';
 import type { InteractionController } from '../input/interaction.js';
 import { reducedMotion } from '../input/reduced-motion.js';
+import type { TransitionOptions } from '../input/transitions.js';
 import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import { BROWSER_PORTS } from '../player/browser-ports.js';
@@ -128,6 +129,7 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
   attributeChanged(name: string): void {
     // As on <img>, setting the same address again reloads the file.
     if (name === 'src') this.load();
+    if (/^light(?!-color)/.test(name)) this.#interaction?.stopTorch();
     this.state.clearOverride(name);
     this.schedule();
   }
@@ -156,8 +158,8 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
 
   setLight(light: LightValue): void {
     this.readOptions();
-    this.#interaction?.stopTorch();
     this.state.pageLight = light;
+    this.#interaction?.stopTorch();
     this.#lightError = null;
     this.schedule();
   }
@@ -171,16 +173,17 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
     this.schedule();
   }
 
-  async lightTo(light: LightValue, ms: number): Promise<void> {
-    await this.#fetchInput();
-    if (this.#interaction) await this.#interaction.lightTo(() => this.setLight(light), ms);
+  async lightTo(light: LightValue, options: TransitionOptions): Promise<void> {
+    // Otherwise at once, so that later changes take precedence.
+    if (!this.#interaction) await this.#fetchInput();
+    if (this.#interaction) await this.#interaction.lightTo(() => this.setLight(light), options);
     else this.setLight(light);
   }
 
-  async viewTo(view: Partial<ZoomView>, ms: number): Promise<void> {
+  async viewTo(view: Partial<ZoomView>, options: TransitionOptions): Promise<void> {
     const target = this.#completeView(view);
-    await this.#fetchInput();
-    if (this.#interaction) await this.#interaction.viewTo(target, ms);
+    if (!this.#interaction) await this.#fetchInput();
+    if (this.#interaction) await this.#interaction.viewTo(target, options);
     else this.setView(target);
   }
 
@@ -257,6 +260,8 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
         this.schedule();
       },
       (cause: unknown) => {
+        // Nothing receives the events, and no more are kept.
+        this.#earlyInput.replay();
         this.warn(missingScript('input-unavailable', 'gestures, keys and animations', cause));
       },
     );
@@ -266,6 +271,7 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
   #createViewerUi(): ViewerUi {
     return new ViewerUi(this.host, this.#dom, this.state, {
       selectLight: (item) => {
+        this.#interaction?.stopTorch();
         this.state.light.item = item;
         this.#markActive();
         this.schedule();
@@ -317,7 +323,10 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
         this.warn(new PhotoError('backend-lost', `${backend} was lost: ${message}`));
       },
       failed: (error) => this.#fail(error),
-      warned: (error) => this.warn(error),
+      warned: (error) => {
+        this.#dom.updateProgress(null);
+        this.warn(error);
+      },
       recovered: () => {
         this.state.errorMessage = null;
         this.status.set(this.session.isLoaded ? 'ready' : 'loading');

@@ -2,6 +2,7 @@
 
 import { moduleFolder, setModuleFolder } from '../engine/wasm-loader.js';
 import { addTranslation, type Translation } from '../i18n/translations.js';
+import type { TransitionOptions } from '../input/transitions.js';
 import type { PhotoError } from '../shared/errors.js';
 import type { Backend, Gamut, LightName } from '../shared/keywords.js';
 import type { PhotoInfo, PicturePoint } from '../shared/value-types.js';
@@ -28,14 +29,6 @@ export interface ToBlobOptions {
 }
 
 const MAX_SCALE = 4;
-
-/** Options of `lightTo` and `viewTo`. */
-export interface TransitionOptions {
-  /** In milliseconds, as in `Element.animate`; 600 by default. */
-  readonly duration?: number;
-}
-
-const DEFAULT_DURATION_MS = 600;
 
 /** Options of `getState` and `setState`. */
 export interface StateOptions {
@@ -97,7 +90,7 @@ export class RelightablePhotoElement extends Base {
     return moduleFolder;
   }
   static set wasmUrl(url: string | URL | null) {
-    setModuleFolder(url && new URL(url, globalThis.document?.baseURI).href);
+    setModuleFolder(url ? new URL(url, globalThis.document?.baseURI).href : null);
   }
 
   /**
@@ -179,12 +172,12 @@ export class RelightablePhotoElement extends Base {
    * is preferred.
    */
   lightTo(light: LightValue, options: TransitionOptions = {}): Promise<void> {
-    return this.#controller.lightTo(light, durationOf(options));
+    return this.#controller.lightTo(light, options);
   }
 
   /** Moves to another `view`. Resolves as `lightTo` does. */
   viewTo(view: Partial<ZoomView>, options: TransitionOptions = {}): Promise<void> {
-    return this.#controller.viewTo(view, durationOf(options));
+    return this.#controller.viewTo(view, options);
   }
 
   /**
@@ -309,6 +302,7 @@ export class RelightablePhotoElement extends Base {
   }
 
   connectedCallback(): void {
+    this.#controller.schedule();
     // Properties that were set before the element was defined hide the accessors of this class.
     for (const name of [...PROPERTIES, 'light', 'torch', 'view'] as const) {
       if (Object.hasOwn(this, name)) {
@@ -317,7 +311,6 @@ export class RelightablePhotoElement extends Base {
         Object.assign(this, { [name]: value });
       }
     }
-    this.#controller.schedule();
   }
 
   disconnectedCallback(): void {
@@ -328,11 +321,6 @@ export class RelightablePhotoElement extends Base {
   attributeChangedCallback(name: string): void {
     this.#controller.attributeChanged(name);
   }
-}
-
-function durationOf({ duration = DEFAULT_DURATION_MS }: TransitionOptions): number {
-  if (duration >= 0) return duration;
-  throw new TypeError(`duration must be a number of milliseconds, but is ${duration}`);
 }
 
 /** The reflected properties, and listeners with the types of the element's own events. */

@@ -30,7 +30,13 @@ import { describeLight } from './light-description.js';
 import { listenToPointer, toViewportUnits } from './pointer-input.js';
 import { reducedMotion } from './reduced-motion.js';
 import { isTiltSupported, TiltSensor } from './tilt-sensor.js';
-import { Transitions, torchTransition, viewBetween } from './transitions.js';
+import {
+  durationOf,
+  type TransitionOptions,
+  Transitions,
+  torchTransition,
+  viewBetween,
+} from './transitions.js';
 import { ZoomHint } from './zoom-hint.js';
 
 export interface InteractionCallbacks {
@@ -90,6 +96,7 @@ export class InteractionController {
     updateAttribute(this.dom.handle, 'aria-valuetext', description);
     this.#idle.kioskSeconds = options.kioskSeconds;
     this.#loop.isEnabled = reveal.isVisible;
+    if (!reveal.isVisible) this.#transitions.finish();
     const isInUse =
       this.#isActive ||
       this.#isHandleFocused ||
@@ -144,16 +151,17 @@ export class InteractionController {
   }
 
   /** Lets the torch move from its current position to that of the light which `set` sets. */
-  lightTo(set: () => void, ms: number): Promise<void> {
+  lightTo(set: () => void, options: TransitionOptions): Promise<void> {
+    const ms = durationOf(options);
     this.stopTorch();
     const show = torchTransition(this.state, set);
     return this.#run('light', ms, show);
   }
 
   /** Moves to another view. */
-  viewTo(view: ZoomView, ms: number): Promise<void> {
+  viewTo(view: ZoomView, options: TransitionOptions): Promise<void> {
     const from = this.state.view;
-    return this.#run('view', ms, (at) => {
+    return this.#run('view', durationOf(options), (at) => {
       this.state.view = viewBetween(from, view, at);
     });
   }
@@ -316,6 +324,7 @@ export class InteractionController {
       case 'reset-view':
         return this.#setView(FULL_VIEW);
       case 'select-light':
+        this.stopTorch();
         this.state.selectNextLight(action.by);
         this.viewerUi.announce('light');
         this.listener.changed();

@@ -46,6 +46,19 @@ test('another transition ends the last one where it is', async () => {
   assert.equal(shown.length, 4);
 });
 
+test('a transition that nobody sees any more is at its end', async () => {
+  const { loop, frame, requests } = createLoop();
+  const transitions = new Transitions(loop);
+  const shown: number[] = [];
+  const done = transitions.run('light', 100, (at) => shown.push(at));
+  frame(0);
+  transitions.finish();
+  await done;
+  frame(50);
+  assert.deepEqual(shown, [0, 0, 1]);
+  assert.equal(requests.length, 0);
+});
+
 test('a view between two others keeps the point fixed that both show at the same place', () => {
   const from = { zoom: 1, x: 0.5, y: 0.5 };
   // The point (0.2, 0.2) of the picture stays at (0.2, 0.2) of the viewport.

@@ -6,11 +6,18 @@ import type { ViewerState } from '../state/viewer-state.js';
 import type { ZoomView } from '../state/viewport.js';
 import type { AnimationLoop } from './animation-loop.js';
 
+/** Options of `lightTo` and `viewTo`. */
+export interface TransitionOptions {
+  /** In milliseconds, as in `Element.animate`; 600 by default. */
+  readonly duration?: number;
+}
+
+const DEFAULT_DURATION_MS = 600;
+
 type TransitionName = 'light' | 'view';
 
 export class Transitions {
-  /** The functions that settle the promises of what is running. */
-  readonly #running = new Map<TransitionName, () => void>();
+  readonly #running = new Map<TransitionName, { show(progress: number): void; done(): void }>();
 
   constructor(private readonly loop: Pick<AnimationLoop, 'set'>) {}
 
@@ -34,15 +41,23 @@ export class Transitions {
       if (time === 1) this.end(name);
       return time < 1;
     });
-    return new Promise((resolve) => {
-      this.#running.set(name, resolve);
+    return new Promise((done) => {
+      this.#running.set(name, { show, done });
     });
+  }
+
+  /** Nobody sees them any more: all are at their ends. */
+  finish(): void {
+    for (const [name, { show }] of [...this.#running]) {
+      show(1);
+      this.end(name);
+    }
   }
 
   /** What is shown stays. */
   end(name: TransitionName): void {
     this.loop.set(`${name} transition`, null);
-    this.#running.get(name)?.();
+    this.#running.get(name)?.done();
     this.#running.delete(name);
   }
 }
@@ -76,4 +91,10 @@ export function viewBetween(from: ZoomView, to: ZoomView, at: number): ZoomView 
 
 function mix(from: number, to: number, share: number): number {
   return from + share * (to - from);
+}
+
+/** The duration in milliseconds. @throws {TypeError} if it is invalid */
+export function durationOf({ duration = DEFAULT_DURATION_MS }: TransitionOptions): number {
+  if (duration >= 0) return duration;
+  throw new TypeError(`duration must be a number of milliseconds, but is ${duration}`);
 }

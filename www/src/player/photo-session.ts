@@ -68,7 +68,7 @@ export class PhotoSession {
     private readonly listener: PhotoSessionListener,
   ) {
     this.#selector = new BackendSelector(ports.createRenderer, listener, {
-      failed: (error) => this.#fail(error, this.#isBehindPicture),
+      failed: (error) => this.#fail(error),
       selected: () => this.#drawFrame(true),
       photoLost: (reason) => this.#refetch(reason),
     });
@@ -238,7 +238,7 @@ export class PhotoSession {
     if (this.#refetches === MAX_REFETCHES) {
       const summary = `The photograph was fetched ${MAX_REFETCHES} more times without success. Reload the page.`;
       const error = new PhotoError('photo-lost', `${reason} ${summary}`);
-      this.#fail(error, this.#scheduler.hasPicture);
+      this.#fail(error);
       return;
     }
     this.#refetches += 1;
@@ -271,7 +271,7 @@ export class PhotoSession {
     } catch (thrown) {
       if (signal.aborted) return;
       this.#failure = this.#isBehindPicture ? 'temporary' : 'permanent';
-      this.#fail(toPhotoError(thrown), this.#isBehindPicture);
+      this.#fail(toPhotoError(thrown));
     } finally {
       preparation.abort();
     }
@@ -396,8 +396,7 @@ export class PhotoSession {
 
   #handleFrameError(active: ActiveBackend, error: PhotoError): void {
     if (error.code === 'backend-lost') this.#selector.lose(active, error.message);
-    else if (error.code !== 'photo-lost')
-      this.#fail(error, active.hasDrawn || this.#isBehindPicture);
+    else if (error.code !== 'photo-lost') this.#fail(error, active.hasDrawn);
     else if (active.photo.value.isComplete) this.#refetch(error.message);
     // The photograph replaces a lost preview.
     else this.#selector.drop();
@@ -417,7 +416,7 @@ export class PhotoSession {
 
   #fail(error: PhotoError, hasPicture = false): void {
     this.#failure ??= 'temporary';
-    if (hasPicture) this.listener.warned(error);
+    if (hasPicture || this.#isBehindPicture) this.listener.warned(error);
     else this.listener.failed(error);
   }
 
