@@ -10,6 +10,7 @@ import {
   skipPausesUntil,
   waitForEvents,
   waitForLoad,
+  waitUntil,
 } from './page-helpers.js';
 import { nativePicture } from './test-photos.js';
 
@@ -147,15 +148,8 @@ test.describe('the fallback', () => {
   test('changes whenever the backend attribute does', async ({ openPhoto }) => {
     const page = await openPhoto({ ...GLASS, backend: 'cpu' });
     for (const backend of ['webgl2', 'webgpu', 'cpu']) {
-      const before = (await page.evaluate('photoEvents')).length;
-      await page.evaluate((backend) => {
-        /** @type {any} */ (globalThis).photo.backend = backend;
-      }, backend);
-      await page.waitForFunction(
-        (n) => /** @type {any} */ (globalThis).photoEvents.length > n,
-        before,
-      );
-      expect(await page.evaluate('photo.activeBackend')).toBe(backend);
+      await page.evaluate(`photo.backend = '${backend}'`);
+      await waitUntil(page, `photo.activeBackend === '${backend}'`);
       await expectSpectrum(page);
     }
   });
