@@ -169,7 +169,7 @@ export class RelightablePhotoElement extends Base {
   /**
    * Sets `light`, and moves the torch from its current position to that of `light` in `duration` milliseconds, 600 by
    * default. Resolves at the end, or earlier if a visitor or a script changes the light. The torch jumps if less motion
-   * is preferred.
+   * is preferred, and where nobody sees it.
    */
   lightTo(light: LightValue, options: TransitionOptions = {}): Promise<void> {
     return this.#controller.lightTo(light, options);

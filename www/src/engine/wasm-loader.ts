@@ -56,9 +56,8 @@ export function createLoader<Module>(
       loading = undefined;
       if (cause instanceof PhotoError) throw cause;
       const message =
-        `The module that ${task} could not be started. The wasm folder must lie beside the script or ` +
-        'where wasmUrl says and be of the same release as it, and a content security policy must allow its address in ' +
-        'connect-src. ' +
+        `The module that ${task} could not be started. The wasm folder must be of the same release as the script ` +
+        'and lie beside it or where wasmUrl says, and a content security policy must allow it in connect-src. ' +
         `The browser says: ${messageOf(cause)}`;
       throw new PhotoError('wasm-unavailable', message, cause);
     });

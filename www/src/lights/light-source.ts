@@ -58,8 +58,7 @@ export function isLightSource(value: unknown): value is LightSource {
 export function checkLightSource(value: unknown): LightSource {
   if (isLightSource(value)) return value;
   throw new TypeError(
-    'light must be null, the name of a built-in light, its options { name, x, y, size, color }, an image, canvas or ' +
-      'video element, an OffscreenCanvas, ImageBitmap, ImageData or MediaStream, or linear light as ' +
-      '{ data: Float32Array, width, height }',
+    'light must be null, the name of a built-in light, { name, x, y, size, color }, an image, canvas, video, ' +
+      'OffscreenCanvas, ImageBitmap, ImageData or MediaStream, or { data: Float32Array, width, height }',
   );
 }

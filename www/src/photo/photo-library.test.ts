@@ -218,7 +218,6 @@ test('a resting picture near the viewport waits for room, one in view does not',
   const again = f.open('a', OUT_OF_VIEW + 500, { isResting: true });
   assert.deepEqual(await f.takeLog(), []);
   visible[0]?.leave();
-  f.library.update();
   assert.deepEqual(await f.takeLog(), ['free b', 'load a']);
   again.leave();
   f.open('d', 15);

@@ -95,6 +95,8 @@ export class PhotoLibrary {
       },
       ended: () => {
         this.queue.remove(entry);
+        // Its room is free.
+        this.queue.schedule();
         this.#loaded.delete(entry);
         if (this.#entries.get(key) === entry) this.#entries.delete(key);
       },

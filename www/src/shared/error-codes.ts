@@ -122,8 +122,8 @@ export interface ScriptFaults {
    */
   'csp-wasm': true;
   /**
-   * The script of the controls or of the translations could not be loaded.
-   * @visitor the picture without controls, or with English texts.
+   * The script of the controls could not be loaded. A missing translation is not reported: its texts are in English.
+   * @visitor the picture without controls.
    * @remedy Copy the whole `dist` folder, and do not rename its files: the scripts load each other by name.
    */
   'controls-unavailable': true;

@@ -18,8 +18,12 @@ let policy: TrustedTypesPolicy | undefined;
 
 /** Calls `create`, which calls `new Worker` with a literal address of this package, for bundlers. */
 export function createTrustedWorker(create: () => Worker): Worker {
-  if (!trustedTypes) return create();
-  policy ??= trustedTypes.createPolicy(POLICY, { createScriptURL: (url) => url });
+  try {
+    policy ??= trustedTypes?.createPolicy(POLICY, { createScriptURL: (url) => url });
+  } catch {
+    // The page does not list the policy, but may have a default one, or require none.
+  }
+  if (!policy) return create();
   const trusted = policy;
   const { Worker } = globalThis;
   // Bundlers recognise only `new Worker(new URL(…))`, which leaves no place for the policy but the class itself.
