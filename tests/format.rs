@@ -1021,6 +1021,24 @@ fn a_preview_stays_within_the_memory_limit() {
 }
 
 #[test]
+fn a_file_is_read_with_the_memory_that_its_index_asks_for() {
+    let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
+    let geometry = common::tiled([64, 64], [32, 32], 5, 32, affine);
+    for recovered in [
+        Recovered::mixed(geometry, 8, 5),
+        Recovered::direct(geometry, 5),
+    ] {
+        for target in [QUALITY, EncodingTarget::Lossless] {
+            let file = recovered.file(target);
+            let decoded_bytes = smallest_limit(&file);
+            let mut reader = LtmReader::new(Limits { decoded_bytes });
+            reader.feed(0, &file).unwrap();
+            reader.finish().unwrap();
+        }
+    }
+}
+
+#[test]
 fn scans_keep_their_shares_of_the_file() {
     let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
     let geometry = common::tiled([128, 128], [64, 64], 5, 64, affine);

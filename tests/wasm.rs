@@ -16,7 +16,7 @@ use relightable_photo::format::{
 };
 use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::relight::{self, BuiltinLight, Rgba8Picture, reference};
-use relightable_photo::transport::{Extent, Geometry, Tile, Transport};
+use relightable_photo::transport::{Extent, FunctionCodes, Geometry, Tile, Transport};
 use relightable_photo::web::{
     CanvasRelighter, CodedError, Decoder, GraphicsDevice, Photo, WebLight, WebOutputTransform,
 };
@@ -85,7 +85,7 @@ fn transport(i: usize) -> Transport {
         let across = geometry.tile_grid().width as usize;
         for (i, tile) in transport.tiles.iter_mut().enumerate() {
             if i % across > 0 {
-                tile.functions.codes.fill([0; 4]);
+                tile.functions = FunctionCodes::dark(tile.rect());
             }
         }
     }
@@ -439,7 +439,7 @@ async fn a_photo_is_transferred_to_another_module_tile_by_tile() {
         (sent.tiles(), 0.0)
     );
     let bytes = sent.decoded_bytes();
-    let mut tiles: Vec<_> = (0..sent.tiles())
+    let tiles: Vec<_> = (0..sent.tiles())
         .map(|i| sent.take_tile(i).unwrap())
         .collect();
     assert_eq!(sent.decoded_bytes(), 0.0);
@@ -457,8 +457,27 @@ async fn a_photo_is_transferred_to_another_module_tile_by_tile() {
     // A photograph in use and corrupt tiles are refused.
     assert_eq!(coded(received.put_tile(0, &tiles[0])), "internal");
     assert_eq!(coded(sent.put_tile(99, &tiles[0])), "internal");
-    tiles[1].pop();
-    assert_eq!(coded(sent.put_tile(1, &tiles[1])), "internal");
+    // Without the last bytes, with bytes after them, and with another tile's pixels.
+    let (whole, last) = (tiles[1].clone(), tiles.len() - 1);
+    for corrupt in [
+        &whole[..whole.len() - 1],
+        &[&whole[..], &[0]].concat(),
+        &tiles[last],
+        &[],
+    ] {
+        assert_eq!(coded(sent.put_tile(1, corrupt)), "internal");
+    }
+    // After six words of steps: two lengths, coefficients, and entries of two words, whose last half is the slot.
+    let word = |i: usize| u32::from_le_bytes(whole[4 * i..4 * i + 4].try_into().unwrap()) as usize;
+    let entries = 8 + 2 * word(6)..8 + 2 * word(6) + 2 * word(7);
+    assert_eq!(entries.end, whole.len() / 4);
+    for i in 0..entries.end {
+        let mut corrupt = whole.clone();
+        corrupt[4 * i..4 * i + 4].fill(0xFF);
+        let is_slot = entries.contains(&i) && (i - entries.start) % 2 == 1;
+        let is_refused = (6..8).contains(&i) || is_slot;
+        assert_eq!(sent.put_tile(1, &corrupt).is_err(), is_refused, "word {i}");
+    }
     assert_eq!(coded(Photo::receive(&geometry[1..], &basis)), "internal");
     assert_eq!(coded(Photo::receive(&geometry, &basis[1..])), "internal");
 }

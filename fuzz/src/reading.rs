@@ -4,7 +4,7 @@ use relightable_photo::format::{
     self, ChunkSelection, FIRST_BYTES, FileIndex, FormatError, HEADER_BYTES, Limits, LtmReader,
     MetadataText,
 };
-use relightable_photo::transport::{CHANNELS, Decibels, Tile, Transport};
+use relightable_photo::transport::{CHANNELS, Decibels, Tile, Transport, entry_slot};
 
 use crate::choices::Choices;
 use crate::heap::with_peak_bytes;
@@ -143,8 +143,13 @@ pub fn check_transport(transport: &Transport) {
         );
         let texels = Tile::texels(rect, rank);
         assert!(coefficients.is_dark() || coefficients.codes.len() == texels);
-        let codes = rect.extent.area() * area;
-        assert!(functions.is_dark() || functions.codes.len() == codes);
+        let pixels = functions.pixels().count();
+        assert!(functions.is_dark() || pixels == rect.extent.area());
+        for entries in functions.pixels() {
+            let slots = entries.iter().map(entry_slot);
+            assert!(slots.clone().is_sorted_by(|a, b| a < b));
+            assert!(slots.last() < Some(area));
+        }
     }
 }
 
@@ -286,8 +291,13 @@ pub fn check_error(
         let squared_error = |step: [f32; CHANNELS]| -> f64 {
             step.iter().map(|step| f64::from(*step).powi(2) / 4.0).sum()
         };
-        code_error += squared_error(tile.functions.step) * tile.functions.codes.len() as f64;
-        let coefficients = tile.rect().extent.area() * transport.basis.rank().pow(2);
+        let pixels = tile.rect().extent.area();
+        let slots = match tile.functions.is_dark() {
+            true => 0,
+            false => pixels * transport.geometry.window.area(),
+        };
+        code_error += squared_error(tile.functions.step) * slots as f64;
+        let coefficients = pixels * transport.basis.rank().pow(2);
         code_error += squared_error(tile.coefficients.step) * coefficients as f64;
     }
     let Some(declared) = declared else {

@@ -20,7 +20,7 @@ pub struct Limits {
 
 impl Default for Limits {
     /// 2 GiB: as much as a 32-bit WebAssembly module can hold. Direct tiles of 512 x 512 pixels with a
-    /// window of 15 take a third of it.
+    /// window of 15 take a quarter of it if no value is zero.
     fn default() -> Self {
         Self {
             decoded_bytes: 2 << 30,

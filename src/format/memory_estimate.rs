@@ -8,6 +8,7 @@ use super::codec::basis_chunk;
 use super::directory;
 use super::header::Header;
 use super::index::FileIndex;
+use super::partial_functions;
 use super::scan::ProgressiveScan;
 use crate::transport::{CHANNELS, TexelCodes, Tile};
 
@@ -43,11 +44,10 @@ pub(super) fn index_bytes(header: &Header) -> u64 {
 pub(super) fn file_bytes(index: &FileIndex) -> u64 {
     let Header { geometry, rank, .. } = index.header;
     let value = (CHANNELS * size_of::<f32>()) as u64;
-    let (rank, area) = (usize::from(rank), geometry.window.area() as u64);
-    let has_chunk = |tile: usize, is_direct: bool| {
-        let scans = index.scans.iter().enumerate();
-        let mut scans = scans.filter(|(_, scan)| scan.coding.is_direct() == is_direct);
-        scans.any(|(i, _)| index.entry(i, tile).bytes > 0)
+    let rank = usize::from(rank);
+    let is_factored = |tile: usize| {
+        let mut scans = index.scans.iter().enumerate();
+        scans.any(|(i, scan)| !scan.coding.is_direct() && index.entry(i, tile).bytes > 0)
     };
     // At most 2^30 pixels of 63² elements of 12 bytes: no overflow.
     let (mut kept, mut working) = (0, 0);
@@ -56,12 +56,12 @@ pub(super) fn file_bytes(index: &FileIndex) -> u64 {
         // A tile is kept as decoded values until it is complete, and then as codes.
         let codes = (Tile::texels(rect, rank) * size_of::<TexelCodes>()) as u64;
         let coefficients = pixels * rank as u64 * value;
-        let functions = pixels * area * value;
-        let [factored, direct] = [false, true].map(|direct| u64::from(has_chunk(i, direct)));
-        kept += factored * codes.max(coefficients) + direct * functions;
+        let factored = u64::from(is_factored(i));
+        let [partial, functions] = partial_functions::max_bytes(index, i);
+        kept += factored * codes.max(coefficients) + partial.max(functions);
         // Coefficients in red, green and blue with a reflection of each pixel, and codes of both.
         let reflections = pixels * 4 * size_of::<f32>() as u64;
-        working = working.max(factored * (coefficients + codes + reflections) + direct * functions);
+        working = working.max(factored * (coefficients + codes + reflections) + functions);
     }
     let chunk = |id: ChunkId| {
         let content = id

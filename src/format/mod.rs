@@ -29,6 +29,7 @@ mod memory_budget;
 mod memory_estimate;
 mod metadata;
 mod partial_file;
+mod partial_functions;
 mod reader;
 mod scan;
 mod tile_decoder;

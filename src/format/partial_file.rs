@@ -13,7 +13,7 @@ use super::memory_budget::MemoryBudget;
 use super::metadata::MetadataText;
 use super::scan::ProgressiveScan;
 use super::tile_decoder::{TileDecoder, decode_basis_chunk};
-use crate::transport::{Basis, Decibels, Tile, TileCodes, Transport};
+use crate::transport::{Basis, Decibels, FunctionCodes, Tile, Transport};
 
 /// Maximum number of ranges that [`PartialFile::wants`] returns.
 const MAX_RANGES: usize = 1024;
@@ -380,8 +380,8 @@ impl PartialFile {
         let codes = budget.try_with_capacity(coefficients.codes.len().min(texels))?;
         Ok(Tile {
             coefficients: coefficients.first_components(self.basis.rank(), rank, codes),
-            functions: TileCodes {
-                codes: budget.try_copy(&functions.codes)?,
+            functions: FunctionCodes {
+                entries: budget.try_copy(&functions.entries)?,
                 ..*functions
             },
         })

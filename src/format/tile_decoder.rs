@@ -6,8 +6,9 @@ use super::codec::{basis_chunk, direct_functions, half_float_codec};
 use super::error::{FormatError, SectionError};
 use super::index::FileIndex;
 use super::memory_budget::{MemoryBudget, vec_bytes};
+use super::partial_functions::PartialFunctions;
 use super::scan::{ProgressiveScan, ScanCoding};
-use crate::transport::{Basis, CHANNELS, FloatTile, Tile, TileCodes};
+use crate::transport::{Basis, CHANNELS, CoefficientCodes, FloatTile, Tile};
 
 /// A tile as the sum of its chunks so far.
 #[derive(Debug, Default)]
@@ -20,8 +21,7 @@ pub(super) struct TileDecoder {
     planes: CoefficientPlanes,
     /// Of coding 2, `[pixel, component]`.
     coefficients: Vec<[f32; CHANNELS]>,
-    /// `[pixel, slot]`.
-    functions: Vec<[f32; CHANNELS]>,
+    functions: PartialFunctions,
 }
 
 impl TileDecoder {
@@ -34,7 +34,7 @@ impl TileDecoder {
 
     /// Bytes allocated.
     pub fn bytes(&self) -> u64 {
-        self.planes.bytes() + vec_bytes(&self.coefficients) + vec_bytes(&self.functions)
+        self.planes.bytes() + vec_bytes(&self.coefficients) + self.functions.bytes()
     }
 
     /// Adds the tile's chunk of the next scan. `order` is the centre-out order.
@@ -56,34 +56,28 @@ impl TileDecoder {
         let scan = &index.scans[self.scans];
         let tokens = index.entry(self.scans, self.tile).content_bytes;
         let extent = index.header.geometry.tile(self.tile).extent;
-        let (rank, area) = (usize::from(index.header.rank), order.len());
-        let allocate = |values: &mut Vec<[f32; CHANNELS]>, columns: usize| {
-            if values.is_empty() {
-                *values = budget.try_zeroed(extent.area() * columns)?;
-            }
-            Ok::<_, FormatError>(())
-        };
+        let (pixels, rank) = (extent.area(), usize::from(index.header.rank));
         let mut decode = || -> Result<(), SectionError> {
             match scan.coding {
                 ScanCoding::Transform => self.planes.add(extent, scan, bytes, tokens, budget),
-                ScanCoding::Direct => {
-                    allocate(&mut self.functions, area)?;
-                    direct_functions::add(&mut self.functions, order, scan, bytes, tokens, budget)
-                }
                 ScanCoding::Halves => {
-                    allocate(&mut self.coefficients, rank)?;
-                    half_float_codec::add(&mut self.coefficients, rank, scan, None, bytes, budget)
+                    if self.coefficients.is_empty() {
+                        self.coefficients = budget.try_zeroed(pixels * rank)?;
+                    }
+                    half_float_codec::add(&mut self.coefficients, rank, scan, bytes, budget)
                 }
-                ScanCoding::DirectHalves => {
-                    allocate(&mut self.functions, area)?;
-                    half_float_codec::add(
-                        &mut self.functions,
-                        area,
-                        scan,
-                        Some(order),
-                        bytes,
-                        budget,
-                    )
+                ScanCoding::Direct | ScanCoding::DirectHalves => {
+                    let functions = &mut self.functions;
+                    let functions =
+                        functions.start_chunk(index, self.tile, scan, tokens, budget)?;
+                    let slots = &order[scan.items()];
+                    if scan.coding == ScanCoding::Direct {
+                        direct_functions::read(functions, pixels, slots, bytes, tokens, budget)?;
+                    } else {
+                        half_float_codec::read_functions(functions, pixels, slots, bytes, budget)?;
+                    }
+                    functions.entries.shrink_to_fit();
+                    Ok(())
                 }
             }
         };
@@ -130,11 +124,11 @@ impl TileDecoder {
         let coefficients = self.coefficients(index, rank, budget)?;
         if !coefficients.is_empty() {
             let codes = budget.try_zeroed(Tile::texels(rect, rank))?;
-            quantised.coefficients = TileCodes::of_coefficients(rect, &coefficients, rank, codes);
+            quantised.coefficients = CoefficientCodes::quantise(rect, &coefficients, rank, codes);
         }
         if !self.functions.is_empty() {
-            let codes = budget.try_with_capacity(self.functions.len())?;
-            quantised.functions = TileCodes::of_functions(rect, &self.functions, codes);
+            let area = index.header.geometry.window.area();
+            quantised.functions = self.functions.quantise(rect, area, budget)?;
         }
         scratch.keep(quantised.bytes() as u64);
         Ok(quantised)
@@ -181,10 +175,12 @@ pub fn decode_tile<E: From<FormatError>>(
         index.check_crc(chunk, &bytes)?;
         decoder.add(index, &order, &bytes, &budget)?;
     }
+    let rect = index.header.geometry.tile(tile);
+    let (pixels, area) = (rect.extent.area(), order.len());
     Ok(FloatTile {
-        rect: index.header.geometry.tile(tile),
+        rect,
         coefficients: decoder.coefficients(index, index.header.rank.into(), &budget)?,
-        functions: decoder.functions,
+        functions: decoder.functions.values(pixels, area, &budget)?,
     })
 }
 
@@ -233,16 +229,16 @@ pub fn check(index: &FileIndex, chunk: ChunkId, bytes: &[u8]) -> Result<(), Form
         return decode_basis_chunk(index, scan, bytes, &mut kernels, &budget);
     };
     let record = &index.scans[scan];
-    if matches!(record.coding, ScanCoding::Halves | ScanCoding::DirectHalves) {
-        // The scan's columns alone: lossless files have many scans, and all columns of a tile can be a gigabyte.
-        let columns = usize::from(record.count);
+    if record.coding == ScanCoding::Halves {
+        // The scan's components alone: lossless files have many scans, and all components of a tile can be a gigabyte.
+        let rank = usize::from(record.count);
         let pixels = index.header.geometry.tile(tile).extent.area();
-        let mut values = budget.try_zeroed(pixels * columns)?;
+        let mut values = budget.try_zeroed(pixels * rank)?;
         let alone = ProgressiveScan {
             first: 0,
             ..*record
         };
-        return half_float_codec::add(&mut values, columns, &alone, None, bytes, &budget)
+        return half_float_codec::add(&mut values, rank, &alone, bytes, &budget)
             .map_err(|error| error.in_chunk(chunk));
     }
     let mut decoder = TileDecoder {

@@ -1,7 +1,7 @@
 //! Relighting in double precision, term by term as in the equations: the standard for all backends.
 
 use super::{Light, OutputTransform, Rgba8Picture};
-use crate::transport::{CHANNELS, CameraPixel, LightElement, Transport};
+use crate::transport::{CHANNELS, CameraPixel, LightElement, Transport, entry_slot};
 
 /// `y = pT`: RGB of each of the `N` camera pixels, in units of the measurement.
 ///
@@ -22,10 +22,10 @@ pub fn relight(transport: &Transport, light: &Light) -> Vec<[f64; CHANNELS]> {
     };
     let mut picture = vec![[0.0; CHANNELS]; geometry.camera.area()];
     for tile in transport.tiles.iter().filter(|tile| !tile.is_dark()) {
-        let slots = if tile.functions.is_dark() { 0 } else { area };
         let components = if tile.coefficients.is_dark() { 0 } else { rank };
         // The window's light and the basis response at the last origin, which neighbours often share.
         let (mut last_origin, mut window, mut response) = (None, Vec::new(), Vec::new());
+        let mut functions = tile.functions.pixels();
         for (p, pixel) in tile.rect().pixels().enumerate() {
             let origin = geometry.window_origin(pixel);
             if last_origin.replace(origin) != Some(origin) {
@@ -41,8 +41,8 @@ pub fn relight(transport: &Transport, light: &Light) -> Vec<[f64; CHANNELS]> {
                 response = functions.map(correlate).collect();
             }
             let y = &mut picture[geometry.camera.index(pixel)];
-            for (s, light) in window[..slots].iter().enumerate() {
-                add(y, tile.tau(area, p, s), *light);
+            for entry in functions.next().unwrap_or_default() {
+                add(y, tile.functions.value(entry), window[entry_slot(entry)]);
             }
             for (k, response) in response.iter().enumerate() {
                 add(y, tile.coefficient(rank, p, k), *response);

@@ -193,7 +193,7 @@ fn combine(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::transport::{Correspondence, Extent, TileCodes, Window};
+    use crate::transport::{Correspondence, Extent, FunctionCodes, Window};
 
     fn wave(i: usize) -> f32 {
         ((i * 7919 % 1009) as f32 / 504.0 - 1.0) * 0.3
@@ -346,7 +346,7 @@ mod tests {
             let functions = tile.functions(&geometry, Some(&basis));
             expanding += start.elapsed().as_secs_f64();
             let start = std::time::Instant::now();
-            let codes = TileCodes::of_functions(rect, &functions.tau, Vec::new());
+            let codes = FunctionCodes::quantise(rect, &functions.tau, 225);
             std::hint::black_box(codes);
             quantising += start.elapsed().as_secs_f64();
         }

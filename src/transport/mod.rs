@@ -9,15 +9,20 @@
 //! ([`SnrAccumulator`]).
 
 mod float_tile;
+mod function_codes;
 mod geometry;
+mod quantisation;
 mod snr;
 mod tile;
 
 pub use float_tile::{Basis, FloatTile, TileTransportFunctions};
+pub(crate) use function_codes::end_pixel;
+pub use function_codes::{FunctionCodes, FunctionEntry, entries_by_pixel, entry_slot};
 pub(crate) use geometry::ClippedRect;
 pub use geometry::{
     CHANNELS, CameraPixel, Correspondence, Extent, Geometry, GeometryError, LightElement,
     LightPosition, MAX_SIDE, MAX_WINDOW, TileRect, Window,
 };
+pub(crate) use quantisation::ChannelPeaks;
 pub use snr::{Decibels, SnrAccumulator};
-pub use tile::{TEXEL_COMPONENTS, TexelCodes, Tile, TileCodes, Transport};
+pub use tile::{CoefficientCodes, TEXEL_COMPONENTS, TexelCodes, Tile, Transport};

@@ -3,7 +3,9 @@
 //! `τ_n = Σ_k c_nk v_k + d_n`: coefficients `c` over the basis of the transport, and direct functions `d`.
 
 use super::float_tile::{Basis, FloatTile, TileTransportFunctions};
+use super::function_codes::FunctionCodes;
 use super::geometry::{CHANNELS, Geometry, TileRect};
+use super::quantisation::{ChannelPeaks, code};
 
 /// Four codes: a texel of an `rgba16sint` texture, and one SIMD load. They are signed, as a truncated sum of basis
 /// functions has negative values, and clipping these would brighten the picture.
@@ -12,22 +14,21 @@ pub type TexelCodes = [i16; 4];
 /// Components in one texel of coefficients: a quad.
 pub const TEXEL_COMPONENTS: usize = 4;
 
-/// Largest code of direct functions. With 12 bits the quantisation noise of a pixel whose function is not sparse (S =
-/// 225, error step/√12 in each slot) is about 60 dB below the signal, less than the noise of any photograph.
-const MAX_DIRECT_CODE: f32 = 4095.0;
-
-/// One part of a tile as codes: `value = code · step`.
+/// The coefficients of a tile as codes: `value = code · step`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TileCodes {
+pub struct CoefficientCodes {
     /// The pixels of the tile.
     pub rect: TileRect,
     /// Value of one code, per channel: the largest value of the channel has the largest code.
     pub step: [f32; CHANNELS],
-    /// Empty if all values are zero.
+    /// `c_nk` as `[channel, quad, pixel]`: texels with the codes of [`TEXEL_COMPONENTS`] components, zero beyond the
+    /// last, in planes of [`Tile::plane`] texels with pixels row by row. All components share a step: each contributes
+    /// to the brightness of a pixel in proportion to its coefficient, so equal errors of weak and strong components are
+    /// equally visible. Empty if all values are zero.
     pub codes: Vec<TexelCodes>,
 }
 
-impl TileCodes {
+impl CoefficientCodes {
     /// All values zero.
     pub fn dark(rect: TileRect) -> Self {
         Self {
@@ -39,13 +40,15 @@ impl TileCodes {
 
     /// Rounds coefficients, `[pixel, component]`, to codes. Values that are not finite become zero. `codes` are
     /// [`Tile::texels`] zeros.
-    pub(crate) fn of_coefficients(
+    pub(crate) fn quantise(
         rect: TileRect,
         coefficients: &[[f32; CHANNELS]],
         rank: usize,
         mut codes: Vec<TexelCodes>,
     ) -> Self {
-        let Some(step) = steps(coefficients, i16::MAX.into()).filter(|_| rank > 0) else {
+        let mut peaks = ChannelPeaks::default();
+        coefficients.iter().for_each(|value| peaks.add(value));
+        let Some(step) = peaks.steps(i16::MAX.into()).filter(|_| rank > 0) else {
             return Self::dark(rect);
         };
         let (plane, quads) = (Tile::plane(rect), rank.div_ceil(TEXEL_COMPONENTS));
@@ -57,21 +60,6 @@ impl TileCodes {
                 }
             }
         }
-        Self { rect, step, codes }
-    }
-
-    /// Rounds direct functions, `[pixel, slot]`, to codes. Values that are not finite become zero. `codes` is empty.
-    pub(crate) fn of_functions(
-        rect: TileRect,
-        functions: &[[f32; CHANNELS]],
-        mut codes: Vec<TexelCodes>,
-    ) -> Self {
-        let Some(step) = steps(functions, MAX_DIRECT_CODE) else {
-            return Self::dark(rect);
-        };
-        let [r, g, b] = step;
-        let texel = |t: &[f32; CHANNELS]| [code(t[0], r), code(t[1], g), code(t[2], b), 0];
-        codes.extend(functions.iter().map(texel));
         Self { rect, step, codes }
     }
 
@@ -105,58 +93,36 @@ impl TileCodes {
     }
 }
 
-/// For each channel the step by which its largest value has the code `max_code`; `None` if all are dark.
-fn steps(values: &[[f32; CHANNELS]], max_code: f32) -> Option<[f32; CHANNELS]> {
-    let mut peak = [0.0f32; CHANNELS];
-    for value in values {
-        for c in 0..CHANNELS {
-            if value[c].is_finite() {
-                peak[c] = peak[c].max(value[c].abs());
-            }
-        }
-    }
-    // A channel whose step would be subnormal is dark.
-    let is_lit = |step: &f32| *step >= f32::MIN_POSITIVE;
-    let steps = peak.map(|peak| peak / max_code);
-    let any_lit = steps.iter().any(is_lit);
-    any_lit.then(|| steps.map(|step| if is_lit(&step) { step } else { 1.0 }))
-}
-
-/// The code nearest to a value; 0 for a value that is not finite.
-fn code(value: f32, step: f32) -> i16 {
-    match value.is_finite() {
-        true => (value / step + 0.5f32.copysign(value)) as i16, // rounds; `as` saturates
-        false => 0,
-    }
-}
-
 /// A tile as codes: `τ_n = Σ_k c_nk v_k + d_n`. Either part may be dark.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
-    /// `c_nk` as `[channel, quad, pixel]`: texels with the codes of [`TEXEL_COMPONENTS`] components, zero beyond the
-    /// last, in planes of [`plane`](Self::plane) texels with pixels row by row. All components share a step: each
-    /// contributes to the brightness of a pixel in proportion to its coefficient, so equal errors of weak and strong
-    /// components are equally visible.
-    pub coefficients: TileCodes,
-    /// `d_n` as `[pixel, slot]`, both row by row.
-    pub functions: TileCodes,
+    /// `c_nk`.
+    pub coefficients: CoefficientCodes,
+    /// `d_n`.
+    pub functions: FunctionCodes,
 }
 
 impl Tile {
     /// Rounds a tile over a basis of `rank` functions to codes.
     pub fn quantise(tile: &FloatTile, rank: usize) -> Self {
-        let codes = vec![[0; 4]; Self::texels(tile.rect, rank)];
+        let FloatTile {
+            rect,
+            coefficients,
+            functions,
+        } = tile;
+        let codes = vec![[0; 4]; Self::texels(*rect, rank)];
+        let area = functions.len() / rect.extent.area();
         Self {
-            coefficients: TileCodes::of_coefficients(tile.rect, &tile.coefficients, rank, codes),
-            functions: TileCodes::of_functions(tile.rect, &tile.functions, Vec::new()),
+            coefficients: CoefficientCodes::quantise(*rect, coefficients, rank, codes),
+            functions: FunctionCodes::quantise(*rect, functions, area),
         }
     }
 
     /// A tile that is dark under every light.
     pub fn dark(rect: TileRect) -> Self {
         Self {
-            coefficients: TileCodes::dark(rect),
-            functions: TileCodes::dark(rect),
+            coefficients: CoefficientCodes::dark(rect),
+            functions: FunctionCodes::dark(rect),
         }
     }
 
@@ -184,7 +150,7 @@ impl Tile {
 
     /// Coefficient `k` of pixel `p` of the tile, for a basis of `rank` functions.
     pub fn coefficient(&self, rank: usize, p: usize, k: usize) -> [f32; CHANNELS] {
-        let TileCodes { rect, step, codes } = &self.coefficients;
+        let CoefficientCodes { rect, step, codes } = &self.coefficients;
         let (plane, quads) = (Self::plane(*rect), rank.div_ceil(TEXEL_COMPONENTS));
         std::array::from_fn(|c| {
             let texel = codes.get((c * quads + k / TEXEL_COMPONENTS) * plane + p);
@@ -194,25 +160,15 @@ impl Tile {
         })
     }
 
-    /// Direct value of slot `s` of pixel `p` of the tile, for windows of `area` slots.
-    pub fn tau(&self, area: usize, p: usize, s: usize) -> [f32; CHANNELS] {
-        let TileCodes { step, codes, .. } = &self.functions;
-        let code = codes.get(p * area + s).unwrap_or(&[0; 4]);
-        std::array::from_fn(|c| f32::from(code[c]) * step[c])
-    }
-
     /// The tile's values.
     pub fn dequantise(&self, geometry: &Geometry, basis: &Basis) -> FloatTile {
-        let (rank, area) = (basis.rank(), geometry.window.area());
-        let (pixels, mut tile) = (self.rect().extent.area(), FloatTile::dark(self.rect()));
+        let (rank, rect) = (basis.rank(), self.rect());
+        let mut tile = FloatTile::dark(rect);
         if !self.coefficients.is_dark() {
             let coefficient = |i: usize| self.coefficient(rank, i / rank, i % rank);
-            tile.coefficients = (0..pixels * rank).map(coefficient).collect();
+            tile.coefficients = (0..rect.extent.area() * rank).map(coefficient).collect();
         }
-        if !self.functions.is_dark() {
-            let tau = |i: usize| self.tau(area, i / area, i % area);
-            tile.functions = (0..pixels * area).map(tau).collect();
-        }
+        tile.functions = self.functions.values(geometry.window.area());
         tile
     }
 
@@ -224,7 +180,7 @@ impl Tile {
 
     /// Size of the codes in bytes.
     pub fn bytes(&self) -> usize {
-        (self.coefficients.codes.len() + self.functions.codes.len()) * size_of::<TexelCodes>()
+        size_of_val(&self.coefficients.codes[..]) + self.functions.bytes()
     }
 }
 

@@ -1,5 +1,5 @@
 //! Serialisation of a photograph between modules, each of which has its own memory: geometry as numbers, the basis as
-//! floats, and each tile as a [`PackedTileHeader`] followed by its codes.
+//! floats, and each tile as a [`PackedTileHeader`] followed by the coefficients' codes and the functions' entries.
 
 use super::CodedError;
 #[cfg(feature = "drawing")]
@@ -12,8 +12,8 @@ use crate::transport::{CHANNELS, Geometry, Tile};
 struct PackedTileHeader {
     /// Of the coefficients and of the functions.
     steps: [[f32; CHANNELS]; 2],
-    /// Texels of the coefficients and of the functions.
-    texels: [u32; 2],
+    /// Texels of the coefficients, and entries of the functions.
+    lengths: [u32; 2],
 }
 
 /// The error for values that the other module cannot have sent.
@@ -29,12 +29,12 @@ pub fn pack_geometry(geometry: &Geometry) -> Vec<f64> {
     sides.chain(affine).collect()
 }
 
-/// A header, the coefficients' codes and the functions' codes.
+/// The bytes of a tile.
 pub fn pack_tile(tile: &Tile) -> Vec<u8> {
-    let codes = [&tile.coefficients.codes, &tile.functions.codes];
+    let codes = [&tile.coefficients.codes, &tile.functions.entries];
     let header = PackedTileHeader {
         steps: [tile.coefficients.step, tile.functions.step],
-        texels: codes.map(|codes| codes.len() as u32), // fits: a 32-bit memory
+        lengths: codes.map(|codes| codes.len() as u32), // fits: a 32-bit memory
     };
     let codes = codes.map(|codes| bytemuck::cast_slice::<_, u8>(codes));
     [bytemuck::bytes_of(&header), codes[0], codes[1]].concat()
@@ -81,29 +81,35 @@ pub fn unpack_tile(
     let (header, codes) = bytes
         .split_at_checked(size_of::<PackedTileHeader>())
         .ok_or_else(corrupt)?;
-    let PackedTileHeader { steps, texels } = bytemuck::pod_read_unaligned(header);
+    let PackedTileHeader { steps, lengths } = bytemuck::pod_read_unaligned(header);
+    let [texels, entries] = lengths.map(|length| length as usize);
     let (codes, []) = codes.as_chunks() else {
         return Err(corrupt());
     };
-    let texels = texels.map(|texels| texels as usize);
-    let full = [Tile::texels(rect, rank), rect.extent.area() * area];
-    let is_complete = (0..2).all(|i| texels[i] == 0 || texels[i] == full[i]);
-    if !is_complete || codes.len() != texels[0] + texels[1] {
+    let has_length = texels.checked_add(entries) == Some(codes.len());
+    if !has_length || (texels != 0 && texels != Tile::texels(rect, rank)) {
         return Err(corrupt());
     }
-    let code = |bytes: &[u8; size_of::<TexelCodes>()]| bytemuck::cast::<_, TexelCodes>(*bytes);
-    // Fallible: running out of memory must not abort the module.
-    let try_copy = |codes: &[[u8; size_of::<TexelCodes>()]]| {
-        let mut copy = Vec::new();
-        let no_memory =
-            |_| CodedError::new("format-limit", "there is no memory for the photograph");
-        copy.try_reserve_exact(codes.len()).map_err(no_memory)?;
-        copy.extend(codes.iter().map(code));
-        Ok::<_, CodedError>(copy)
-    };
-    let (coefficients, functions) = codes.split_at(texels[0]);
+    let (coefficients, entries) = codes.split_at(texels);
     let mut tile = Tile::dark(rect);
     (tile.coefficients.step, tile.coefficients.codes) = (steps[0], try_copy(coefficients)?);
-    (tile.functions.step, tile.functions.codes) = (steps[1], try_copy(functions)?);
-    Ok(tile)
+    (tile.functions.step, tile.functions.entries) = (steps[1], try_copy(entries)?);
+    match tile.functions.is_valid(area) {
+        true => Ok(tile),
+        false => Err(corrupt()),
+    }
+}
+
+/// Fallible: running out of memory must not abort the module.
+#[cfg(feature = "drawing")]
+fn try_copy(codes: &[[u8; size_of::<TexelCodes>()]]) -> Result<Vec<TexelCodes>, CodedError> {
+    let mut copy = Vec::new();
+    let no_memory = |_| CodedError::new("format-limit", "there is no memory for the photograph");
+    copy.try_reserve_exact(codes.len()).map_err(no_memory)?;
+    copy.extend(
+        codes
+            .iter()
+            .map(|bytes| bytemuck::cast::<_, TexelCodes>(*bytes)),
+    );
+    Ok(copy)
 }

@@ -7,7 +7,8 @@
 
 use std::ops::Range;
 
-use super::colour::{ColourVector, finite, ycocg_forward, ycocg_inverse};
+use super::colour::{ColourVector, finite, ycocg_forward};
+use super::scan_functions::ScanFunctions;
 use super::tokens::{EncodableRuns, EntropyTokenReader, MAX_MAGNITUDE, QuantisedRun, TokenWriter};
 use crate::format::chunk::EncodedChunk;
 use crate::format::constants::MAX_CONTENT_BYTES;
@@ -63,14 +64,14 @@ pub fn finest_step(peak: f32) -> f32 {
     2.0 * peak / MAX_MAGNITUDE as f32
 }
 
-/// Adds a tile's chunk of `scan` to its functions, `[pixel, slot]`.
+/// Reads a tile's chunk of `scan`, which has `tokens` tokens, into `functions`.
 ///
 /// # Errors
 /// [`SectionError`] if the chunk is damaged, or the budget refuses memory.
-pub fn add(
-    functions: &mut [ColourVector],
-    order: &[u16],
-    scan: &ProgressiveScan,
+pub fn read(
+    functions: &mut ScanFunctions,
+    pixels: usize,
+    slots: &[u16],
     bytes: &[u8],
     tokens: u32,
     budget: &MemoryBudget,
@@ -79,19 +80,16 @@ pub fn add(
     if reader.tokens() < tokens as usize {
         return Err(damaged("it has fewer tokens than its entry says"));
     }
-    let slots = &order[scan.items()];
     let mut numbers: Vec<i32> = budget.try_zeroed(slots.len() * CHANNELS)?;
-    for function in functions.chunks_exact_mut(order.len()) {
+    for _ in 0..pixels {
         let end = reader.read_run(&mut numbers)?;
         let (items, _) = numbers.as_chunks_mut::<CHANNELS>();
         let used = end.div_ceil(CHANNELS);
         for (item, &slot) in items[..used].iter_mut().zip(slots) {
-            let rgb = ycocg_inverse(*item);
-            for (value, number) in function[usize::from(slot)].iter_mut().zip(rgb) {
-                *value += number as f32 * scan.step;
-            }
+            functions.push(item.map(|number| number as i16), slot); // at most MAX_MAGNITUDE
             *item = [0; CHANNELS];
         }
+        functions.end_pixel();
     }
     reader.finish()
 }
@@ -239,6 +237,7 @@ mod tests {
     use super::super::tokens;
     use super::*;
     use crate::format::scan::ScanCoding;
+    use crate::transport::{entries_by_pixel, entry_slot};
 
     const EXTENT: Extent = Extent::new(9, 4);
 
@@ -252,6 +251,32 @@ mod tests {
             [0.3, 0.9, -0.2].map(|c| c * near * near * (1.0 + (i as f32 * 0.7).sin()))
         };
         (0..EXTENT.area() * area).map(tau).collect()
+    }
+
+    /// Decodes the chunk of a tile of so many pixels.
+    fn decode(
+        pixels: usize,
+        order: &[u16],
+        scan: &ProgressiveScan,
+        bytes: &[u8],
+        tokens: u32,
+    ) -> Result<ScanFunctions, SectionError> {
+        let budget = MemoryBudget::unlimited();
+        let mut functions = ScanFunctions::try_new(scan, pixels, tokens, &budget)?;
+        let slots = &order[scan.items()];
+        read(&mut functions, pixels, slots, bytes, tokens, &budget)?;
+        Ok(functions)
+    }
+
+    fn add(functions: &mut [ColourVector], area: usize, scan: &ScanFunctions) {
+        let pixels = functions.chunks_exact_mut(area);
+        for (function, entries) in pixels.zip(entries_by_pixel(&scan.entries)) {
+            for entry in entries {
+                let sum = &mut function[entry_slot(entry)];
+                let value = scan.value(entry);
+                (0..CHANNELS).for_each(|c| sum[c] += value[c]);
+            }
+        }
     }
 
     #[test]
@@ -274,17 +299,15 @@ mod tests {
             let chunks = quantised.chunks(&scans).unwrap();
             for ((scan, chunk), error) in scans.iter().zip(chunks).zip(&quantised.errors[1..]) {
                 if !chunk.bytes.is_empty() {
-                    let add_to = |functions: &mut [ColourVector], bytes: &[u8]| {
-                        let budget = MemoryBudget::unlimited();
-                        add(functions, &order, scan, bytes, chunk.content_bytes, &budget)
+                    let decode = |bytes: &[u8]| {
+                        decode(EXTENT.area(), &order, scan, bytes, chunk.content_bytes)
                     };
                     assert!(u64::from(chunk.content_bytes) <= max_tokens(EXTENT, scan.count));
                     let max_bytes = tokens::max_bytes(chunk.content_bytes.into());
                     assert!(chunk.bytes.len() as u64 <= max_bytes);
-                    add_to(&mut got, &chunk.bytes).unwrap();
+                    add(&mut got, 25, &decode(&chunk.bytes).unwrap());
                     for cut in 0..chunk.bytes.len() {
-                        let cut = &chunk.bytes[..cut];
-                        assert!(add_to(&mut got.clone(), cut).is_err());
+                        assert!(decode(&chunk.bytes[..cut]).is_err());
                     }
                 }
                 let off = got.iter().zip(&functions);
@@ -303,8 +326,8 @@ mod tests {
         let quantised = QuantisedDirectFunctions::new(&functions, &order, &[scan]);
         let chunk = quantised.chunks(&[scan]).unwrap().remove(0);
         let mut got = [[0.0; CHANNELS]];
-        let (tokens, budget) = (chunk.content_bytes, MemoryBudget::unlimited());
-        add(&mut got, &order, &scan, &chunk.bytes, tokens, &budget).unwrap();
+        let decoded = decode(1, &order, &scan, &chunk.bytes, chunk.content_bytes).unwrap();
+        add(&mut got, 1, &decoded);
         let max = (MAX_MAGNITUDE / 2) as f32 * 1e-6;
         assert_eq!(got, [[max, -max, 0.0]]);
     }

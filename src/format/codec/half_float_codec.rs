@@ -7,6 +7,7 @@ use half::f16;
 
 use super::byte_planes::{join, split};
 use super::colour::ColourVector;
+use super::scan_functions::ScanFunctions;
 use super::zstd_frame::{compress, decompress};
 use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::memory_budget::MemoryBudget;
@@ -58,38 +59,75 @@ fn column(scan: &ProgressiveScan, order: Option<&[u16]>, item: usize) -> usize {
     order.map_or(at, |order| order[at].into())
 }
 
-/// Adds the values of a chunk to `values`, `[pixel, column]` of `columns` columns.
+/// Adds the coefficients of a chunk to `values`, `[pixel, component]` of `rank` components.
 ///
 /// # Errors
 /// [`SectionError`] if the chunk is damaged or holds a value that is not finite, or the budget refuses memory.
 pub fn add(
     values: &mut [ColourVector],
-    columns: usize,
+    rank: usize,
     scan: &ProgressiveScan,
-    order: Option<&[u16]>,
     frame: &[u8],
     budget: &MemoryBudget,
 ) -> Result<(), SectionError> {
-    let count = usize::from(scan.count);
-    let length = content_bytes(values.len() / columns * count * CHANNELS);
-    let content = decompress(frame, length, budget)?;
-    let mut halves = join(&content).map(f16::from_bits);
-    for item in 0..count {
-        let column = column(scan, order, item);
+    let content = try_content(values.len() / rank * usize::from(scan.count), frame, budget)?;
+    let mut halves = join(&content).map(half_value);
+    for component in scan.items() {
         for c in 0..CHANNELS {
-            let of_column = values.iter_mut().skip(column).step_by(columns);
-            for (value, half) in of_column.zip(&mut halves) {
-                if !half.is_finite() {
-                    return Err(damaged("a value is not a finite number"));
-                }
-                value[c] += half.to_f32() * scan.step;
+            let of_component = values.iter_mut().skip(component).step_by(rank);
+            for (value, half) in of_component.zip(&mut halves) {
+                value[c] += half * scan.step;
             }
         }
     }
     Ok(())
 }
 
-/// The values that [`add`] reads.
+/// Reads a chunk of direct functions of a tile into `functions`.
+///
+/// # Errors
+/// As [`add`].
+pub fn read_functions(
+    functions: &mut ScanFunctions,
+    pixels: usize,
+    slots: &[u16],
+    frame: &[u8],
+    budget: &MemoryBudget,
+) -> Result<(), SectionError> {
+    let content = try_content(pixels * slots.len(), frame, budget)?;
+    let (low, high) = content.split_at(content.len() / 2);
+    let half = |at: usize| i16::from_le_bytes([low[at], high[at]]);
+    for p in 0..pixels {
+        for (item, &slot) in slots.iter().enumerate() {
+            let halves = [0, 1, 2].map(|c| half((item * CHANNELS + c) * pixels + p));
+            functions.push(halves, slot);
+        }
+        functions.end_pixel();
+    }
+    Ok(())
+}
+
+/// The value of a half float.
+#[inline(never)] // in WebAssembly a hundred instructions
+pub fn half_value(bits: u16) -> f32 {
+    f16::from_bits(bits).to_f32()
+}
+
+/// The content of a chunk of `colours` colours, whose values are finite.
+fn try_content(
+    colours: usize,
+    frame: &[u8],
+    budget: &MemoryBudget,
+) -> Result<Vec<u8>, SectionError> {
+    let content = decompress(frame, content_bytes(colours * CHANNELS), budget)?;
+    let is_finite = join(&content).all(|bits| f16::from_bits(bits).is_finite());
+    match is_finite {
+        true => Ok(content),
+        false => Err(damaged("a value is not a finite number")),
+    }
+}
+
+/// The values that [`add`] and [`read_functions`] read, from `values`, `[pixel, column]` of `columns` columns.
 pub fn gather(
     values: &[ColourVector],
     columns: usize,
@@ -112,6 +150,7 @@ pub fn gather(
 mod tests {
     use super::*;
     use crate::format::scan::ScanCoding;
+    use crate::transport::{entries_by_pixel, entry_slot};
 
     fn scan(first: u16, count: u16, step: f32) -> ProgressiveScan {
         ProgressiveScan::new(ScanCoding::DirectHalves, first, count, step)
@@ -119,26 +158,31 @@ mod tests {
 
     #[test]
     fn decoded_values_have_eleven_bits() {
-        for peak in [1e-6f32, 0.3, 7e5] {
+        let order = [3, 0, 1, 2, 4];
+        let budget = MemoryBudget::unlimited();
+        for (peak, is_direct) in [(1e-6f32, true), (0.3, false), (0.3, true), (7e5, false)] {
             let value = |i: usize| [1.0, 0.5, -0.7].map(|c| c * peak * (i as f32 * 0.37).sin());
             let values: Vec<ColourVector> = (0..5 * 40).map(value).collect();
             let step = step_for(peak);
             let mut got = vec![[0.0; CHANNELS]; values.len()];
             let mut claimed = 0.0;
-            let order = Some(&[3, 0, 1, 2, 4][..]);
             for scan in [scan(0, 2, step), scan(2, 3, step)] {
-                let gathered = gather(&values, 5, &scan, order);
+                let gathered = gather(&values, 5, &scan, is_direct.then_some(&order[..]));
                 let frame = encode(&gathered, step).unwrap();
-                add(
-                    &mut got,
-                    5,
-                    &scan,
-                    order,
-                    &frame,
-                    &MemoryBudget::unlimited(),
-                )
-                .unwrap();
                 claimed += error(&gathered, step);
+                if !is_direct {
+                    add(&mut got, 5, &scan, &frame, &budget).unwrap();
+                    continue;
+                }
+                let mut functions = ScanFunctions::try_new(&scan, 40, 0, &budget).unwrap();
+                let slots = &order[scan.items()];
+                read_functions(&mut functions, 40, slots, &frame, &budget).unwrap();
+                let pixels = entries_by_pixel(&functions.entries);
+                for (function, entries) in got.chunks_exact_mut(5).zip(pixels) {
+                    for entry in entries.iter().filter(|entry| entry[..3] != [0; 3]) {
+                        function[entry_slot(entry)] = functions.value(entry);
+                    }
+                }
             }
             let square = |(got, want): (&f32, &f32)| f64::from(got - want).powi(2);
             let pairs = got.as_flattened().iter().zip(values.as_flattened());
@@ -159,7 +203,12 @@ mod tests {
         let frame = encode(&[f32::NAN, f32::INFINITY, f32::MAX], 1.0).unwrap();
         let mut add = |frame: &[u8]| {
             let scan = scan(0, 1, 1.0);
-            add(&mut got, 1, &scan, None, frame, &MemoryBudget::unlimited()).map(|()| got)
+            let budget = MemoryBudget::unlimited();
+            let mut functions = ScanFunctions::try_new(&scan, 1, 0, &budget).unwrap();
+            let read = read_functions(&mut functions, 1, &[0], frame, &budget);
+            let added = add(&mut got, 1, &scan, frame, &budget);
+            assert_eq!(read.is_ok(), added.is_ok());
+            added.map(|()| got)
         };
         assert_eq!(add(&frame).unwrap(), [[1.0, 1.0, 65505.0]]);
         assert!(add(&compress(&[0, 0, 0, 0, 0, 0x7C]).unwrap()).is_err());

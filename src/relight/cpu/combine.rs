@@ -2,7 +2,7 @@
 
 use super::simd::{MAX_PIXELS, ScalarFallback, Simd};
 use crate::relight::LightChroma;
-use crate::transport::{CHANNELS, TEXEL_COMPONENTS, TexelCodes, Tile, TileCodes};
+use crate::transport::{CHANNELS, CoefficientCodes, TEXEL_COMPONENTS, TexelCodes, Tile};
 
 /// The basis response of an origin block, `C`.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,7 @@ pub struct OriginBlockResponse<'a> {
 #[inline(always)]
 pub fn combine<S: Simd>(
     simd: S,
-    tile: &TileCodes,
+    tile: &CoefficientCodes,
     first: usize,
     offsets: &[u16],
     response: OriginBlockResponse<'_>,
@@ -41,7 +41,7 @@ pub fn combine<S: Simd>(
 #[inline(always)]
 fn combine_span<S: Simd, const LIGHT_CHANNELS: usize>(
     simd: S,
-    tile: &TileCodes,
+    tile: &CoefficientCodes,
     first: usize,
     offsets: &[u16],
     OriginBlockResponse { texels, quads, .. }: OriginBlockResponse<'_>,
@@ -155,7 +155,7 @@ mod tests {
     use crate::transport::{Extent, FloatTile, TileRect};
 
     struct CombineKernel<'a> {
-        tile: &'a TileCodes,
+        tile: &'a CoefficientCodes,
         first: usize,
         offsets: &'a [u16],
         response: OriginBlockResponse<'a>,

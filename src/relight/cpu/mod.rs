@@ -22,7 +22,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use super::output_transform::TabulatedOutputTransform;
 use super::{Light, LightChroma, LinearPicture, OutputTransform, Rgba8Picture, used_count};
 use crate::job_executor::Executor;
-use crate::transport::{CHANNELS, Tile, TileCodes, Transport};
+use crate::transport::{CHANNELS, FunctionEntry, Tile, Transport, entries_by_pixel, entry_slot};
 use combine::{OriginBlockResponse, combine};
 use correlation::{CorrelationScratch, Correlator};
 use origin_blocks::{DIRECT_BLOCK_SIDE, OriginBlock, OriginBlocks, OriginBoundingBox, PixelSpan};
@@ -51,6 +51,8 @@ pub struct CpuRelighter {
     /// Elements along the side of a block's footprint.
     footprint: usize,
     light: PaddedLight,
+    /// Distance of each slot's light element from the window's first one.
+    slot_offsets: Vec<u32>,
     /// The picture, block by block; locked one by one, as threads share the blocks.
     linear: Vec<RwLock<Vec<[f32; CHANNELS]>>>,
     /// Quads of components in use.
@@ -77,6 +79,12 @@ impl CpuRelighter {
         };
         let blocks = OriginBlocks::new(&transport, &bounds, side);
         let light = PaddedLight::new(geometry.light, blocks.origin, blocks.footprint);
+        let mut slot_offsets = Vec::with_capacity(geometry.window.area());
+        for row in 0..window {
+            for column in 0..window {
+                slot_offsets.push((row * light.stride() + column) as u32);
+            }
+        }
         let dark = |block: &OriginBlock| RwLock::new(vec![[0.0; CHANNELS]; block.offsets.len()]);
         Self {
             linear: blocks.blocks.iter().map(dark).collect(),
@@ -86,6 +94,7 @@ impl CpuRelighter {
             correlator,
             blocks,
             scratch_pool: Mutex::default(),
+            slot_offsets,
             light,
             transport,
         }
@@ -209,20 +218,20 @@ impl CpuRelighter {
     #[inline(always)]
     fn add_direct(&self, block: &OriginBlock, linear: &mut [[f32; CHANNELS]]) {
         let [u, v] = block.at;
-        let window = self.transport.geometry.window.side() as usize;
         for span in &block.spans {
-            let tile = &self.tile(span).functions;
-            if tile.is_dark() {
+            let functions = &self.tile(span).functions;
+            if functions.is_dark() {
                 continue;
             }
-            for i in 0..span.length {
-                let offset = usize::from(block.offsets[span.begin + i]);
+            let offsets = &block.offsets[span.range()];
+            let pixels = entries_by_pixel(&functions.entries[span.first_entry..]);
+            let linear = linear[span.range()].iter_mut().zip(offsets);
+            for ((y, offset), entries) in linear.zip(pixels) {
+                let offset = usize::from(*offset);
                 let (column, row) = (offset % self.blocks.side, offset / self.blocks.side);
                 let light = self.light.elements_from(u + column, v + row);
-                let stride = self.light.stride();
-                let sum = windowed_sum(tile, span.first + i, light, window, stride);
-                let y = &mut linear[span.begin + i];
-                (0..CHANNELS).for_each(|c| y[c] += sum[c]);
+                let sum = windowed_sum(entries, light, &self.slot_offsets);
+                (0..CHANNELS).for_each(|c| y[c] += sum[c] * functions.step[c]);
             }
         }
     }
@@ -313,27 +322,19 @@ impl SimdKernel for BlockRelightKernel<'_> {
     }
 }
 
-/// A direct pixel's `y_n = Σ_s τ_n(s) p(o_n + s)` over the window, in each channel, for pixel number `p` of a tile.
-/// `light` begins with the window's first element; rows are `stride` apart.
+/// A direct pixel's `Σ_s code(s) p(o_n + s)` in each channel, over the slots with entries. `light` begins with the
+/// window's first element.
 #[inline(always)]
-fn windowed_sum(
-    tile: &TileCodes,
-    p: usize,
-    light: &[[f32; 4]],
-    window: usize,
-    stride: usize,
-) -> [f32; CHANNELS] {
-    let codes = &tile.codes[p * window * window..(p + 1) * window * window];
+fn windowed_sum(entries: &[FunctionEntry], light: &[[f32; 4]], slot_offsets: &[u32]) -> [f32; 4] {
     let mut sum = [0.0f32; 4];
-    for (row, codes) in codes.chunks_exact(window).enumerate() {
-        let elements = &light[row * stride..row * stride + window];
-        for (code, element) in codes.iter().zip(elements) {
-            for c in 0..4 {
-                sum[c] += f32::from(code[c]) * element[c];
-            }
+    for entry in entries {
+        let element = light[slot_offsets[entry_slot(entry)] as usize];
+        // The fourth lane, a slot, is computed because four are one instruction.
+        for c in 0..4 {
+            sum[c] += f32::from(entry[c]) * element[c];
         }
     }
-    std::array::from_fn(|c| sum[c] * tile.step[c])
+    sum
 }
 
 fn is_factored(tile: &Tile) -> bool {

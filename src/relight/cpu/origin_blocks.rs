@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use crate::transport::{CameraPixel, Extent, Geometry, LightElement, TileRect, Transport};
+use crate::transport::{CameraPixel, Extent, Geometry, LightElement, Transport};
 
 /// The side of blocks where no tile is factored.
 pub const DIRECT_BLOCK_SIDE: usize = 64;
@@ -21,19 +21,27 @@ impl OriginBoundingBox {
     /// Of all pixels, those of dark tiles too: where blocks lie decides how sums are rounded, and workers that
     /// each have a part of the tiles must agree to the bit.
     pub fn new(geometry: &Geometry) -> Self {
-        let pixels = geometry.tiles().flat_map(TileRect::pixels);
-        let origins = pixels.map(|pixel| geometry.window_origin(pixel));
-        let bounds = origins
-            .filter(|origin| !geometry.clip_window(*origin).is_empty())
-            .map(|LightElement { u, v }| Self {
-                columns: u..u + 1,
-                rows: v..v + 1,
-            });
-        let join = |a: Range<i32>, b: Range<i32>| a.start.min(b.start)..a.end.max(b.end);
-        let bounds = bounds.reduce(|a, b| Self {
-            columns: join(a.columns, b.columns),
-            rows: join(a.rows, b.rows),
-        });
+        let mut bounds: Option<Self> = None;
+        let join = |a: &Range<i32>, at: i32| a.start.min(at)..a.end.max(at + 1);
+        for y in 0..geometry.camera.height {
+            for x in 0..geometry.camera.width {
+                let origin = geometry.window_origin(CameraPixel { x, y });
+                if geometry.clip_window(origin).is_empty() {
+                    continue;
+                }
+                let LightElement { u, v } = origin;
+                bounds = Some(match bounds {
+                    Some(Self { columns, rows }) => Self {
+                        columns: join(&columns, u),
+                        rows: join(&rows, v),
+                    },
+                    None => Self {
+                        columns: u..u + 1,
+                        rows: v..v + 1,
+                    },
+                });
+            }
+        }
         bounds.unwrap_or_default()
     }
 }
@@ -44,6 +52,8 @@ pub struct PixelSpan {
     pub tile: usize,
     /// Index of the first pixel in the tile.
     pub first: usize,
+    /// Index of its first entry in the tile's direct functions.
+    pub first_entry: usize,
     pub pixel: CameraPixel,
     /// Index of the first pixel in the block.
     pub begin: usize,
@@ -96,7 +106,10 @@ impl OriginBlocks {
         let mut blocks = vec![OriginBlock::default(); grid[0] * grid[1]];
         let tiles = transport.tiles.iter().enumerate();
         for (i, tile) in tiles.filter(|(_, tile)| !tile.is_dark()) {
+            let (mut entries, mut entry) = (tile.functions.pixels(), 0);
             for (p, pixel) in tile.rect().pixels().enumerate() {
+                let first_entry = entry;
+                entry += entries.next().map_or(0, <[_]>::len);
                 let origin = geometry.window_origin(pixel);
                 if geometry.clip_window(origin).is_empty() {
                     continue;
@@ -105,7 +118,7 @@ impl OriginBlocks {
                 let v = (origin.v - grid_origin.v) as usize;
                 let block = &mut blocks[v / side * grid[0] + u / side];
                 block.at = [u / side * side, v / side * side];
-                block.add(i, p, pixel, v % side * side + u % side);
+                block.add([i, p, first_entry], pixel, v % side * side + u % side);
             }
         }
         blocks.retain(|block| !block.offsets.is_empty());
@@ -137,8 +150,8 @@ impl OriginBlocks {
 }
 
 impl OriginBlock {
-    /// Adds pixel number `p` of a tile: to the last span if it continues that.
-    fn add(&mut self, tile: usize, p: usize, pixel: CameraPixel, offset: usize) {
+    /// Adds pixel number `p` of a tile, whose entries begin at `first_entry`: to the last span if it continues that.
+    fn add(&mut self, [tile, p, first_entry]: [usize; 3], pixel: CameraPixel, offset: usize) {
         let begin = self.offsets.len();
         self.offsets.push(offset as u16); // a side is at most 256
         match self.spans.last_mut() {
@@ -152,6 +165,7 @@ impl OriginBlock {
             _ => self.spans.push(PixelSpan {
                 tile,
                 first: p,
+                first_entry,
                 pixel,
                 begin,
                 length: 1,

@@ -75,79 +75,66 @@ sum = (_e41 + vec3(dot(vec4(_e45), red), dot(vec4(_e55), _e57), dot(vec4(_e68), 
 vec3 _e77 = sum;
 return _e77;
 }
-vec3 windowed_sum(ivec2 origin, int first_code) {
-vec3 sum_1 = vec3(0.0);
-int v = 0;
+vec3 windowed_sum(ivec2 origin, ivec2 range) {
 ivec2 texel = ivec2(0);
 int layer = 0;
-int u = 0;
+vec3 sum_1 = vec3(0.0);
+int i = 0;
+bool local = false;
 ivec2 fold = ivec2(uvec2(textureSize(_group_0_binding_2_fs, 0).xy));
-int _e10 = _group_0_binding_7_fs.window;
-ivec2 begin = min(max(-(origin), ivec2(0)), ivec2(_e10));
 ivec2 plane = ivec2(uvec2(textureSize(_group_0_binding_5_fs, 0).xy));
-int _e21 = _group_0_binding_7_fs.window;
-ivec2 end = min(max((plane - origin), ivec2(0)), ivec2(_e21));
-v = begin.y;
+int line = (range.x / fold.x);
+texel = ivec2((range.x % fold.x), (line % fold.y));
+layer = (line / fold.y);
+i = range.x;
 bool loop_init_1 = true;
 while(true) {
 if (!loop_init_1) {
-int _e101 = v;
-v = (_e101 + 1);
+int _e90 = i;
+i = (_e90 + 1);
 }
 loop_init_1 = false;
-int _e29 = v;
-if ((_e29 < end.y)) {
+int _e26 = i;
+if ((_e26 < range.y)) {
 } else {
 break;
 }
 {
-int _e32 = v;
-int _e35 = _group_0_binding_7_fs.window;
-int code = ((first_code + (_e32 * _e35)) + begin.x);
-int line = (code / fold.x);
-texel = ivec2((code % fold.x), (line % fold.y));
-layer = (line / fold.y);
-u = begin.x;
-bool loop_init_2 = true;
-while(true) {
-if (!loop_init_2) {
-int _e98 = u;
-u = (_e98 + 1);
-}
-loop_init_2 = false;
-int _e53 = u;
-if ((_e53 < end.x)) {
+ivec2 _e30 = texel;
+int _e31 = layer;
+ivec4 code = texelFetch(_group_0_binding_2_fs, ivec3(_e30, _e31), 0);
+int slot = (code.w & 4095);
+int _e39 = _group_0_binding_7_fs.window;
+int _e43 = _group_0_binding_7_fs.window;
+ivec2 element = (origin + ivec2((slot % _e39), (slot / _e43)));
+if (all(greaterThanEqual(element, ivec2(0)))) {
+local = all(lessThan(element, plane));
 } else {
-break;
+local = false;
 }
-{
-int _e57 = u;
-int _e58 = v;
-vec4 emission = texelFetch(_group_0_binding_5_fs, (origin + ivec2(_e57, _e58)), 0);
-vec3 _e63 = sum_1;
-ivec2 _e65 = texel;
-int _e66 = layer;
-ivec4 _e68 = texelFetch(_group_0_binding_2_fs, ivec3(_e65, _e66), 0);
-sum_1 = (_e63 + (vec3(_e68.xyz) * emission.xyz));
-int _e76 = texel.x;
-texel.x = (_e76 + 1);
-int _e79 = texel.x;
-if ((_e79 == fold.x)) {
-int _e83 = texel.y;
-texel = ivec2(0, (_e83 + 1));
-int _e89 = texel.y;
-if ((_e89 == fold.y)) {
+bool _e56 = local;
+if (_e56) {
+vec3 _e57 = sum_1;
+vec4 _e62 = texelFetch(_group_0_binding_5_fs, element, 0);
+sum_1 = (_e57 + (vec3(code.xyz) * _e62.xyz));
+}
+int _e68 = texel.x;
+texel.x = (_e68 + 1);
+int _e71 = texel.x;
+if ((_e71 == fold.x)) {
+int _e75 = texel.y;
+texel = ivec2(0, (_e75 + 1));
+int _e81 = texel.y;
+if ((_e81 == fold.y)) {
 texel.y = 0;
-int _e95 = layer;
-layer = (_e95 + 1);
+int _e87 = layer;
+layer = (_e87 + 1);
 }
 }
 }
 }
-}
-}
-vec3 _e103 = sum_1;
-return _e103;
+vec3 _e92 = sum_1;
+return _e92;
 }
 vec3 hable(vec3 x) {
 vec3 above = ((x * ((0.15 * x) + vec3(0.05))) + vec3(0.004));
@@ -205,21 +192,17 @@ int _e42 = _group_0_binding_7_fs.window;
 vec3 _e45 = factored_sum(pixel_3, (origin_1 + ivec2(_e42)));
 linear = (_e33 + ((step_.xyz * _e37.xyz) * _e45));
 }
-ivec4 direct = texelFetch(_group_0_binding_6_fs, tile, 0);
-if ((direct.x >= 0)) {
-ivec2 in_tile = (pixel_3 - direct.yz);
-int index = ((in_tile.y * direct.w) + in_tile.x);
+ivec4 _e57 = texelFetch(_group_0_binding_6_fs, min(pixel_3, (ivec2(uvec2(textureSize(_group_0_binding_6_fs, 0).xy)) - ivec2(1))), 0);
+ivec2 range_1 = _e57.xy;
+if ((range_1.x < range_1.y)) {
 ivec2 below_1 = ivec2(0, (int(uvec2(textureSize(_group_0_binding_4_fs, 0).xy).y) / 2));
-vec4 step_1 = texelFetch(_group_0_binding_4_fs, (tile + below_1), 0);
-int _e76 = _group_0_binding_7_fs.window;
-int _e80 = _group_0_binding_7_fs.window;
-int first_code_1 = (direct.x + ((index * _e76) * _e80));
-vec3 _e83 = linear;
-vec3 _e85 = windowed_sum(origin_1, first_code_1);
-linear = (_e83 + (step_1.xyz * _e85));
+vec3 _e70 = linear;
+vec4 _e74 = texelFetch(_group_0_binding_4_fs, (tile + below_1), 0);
+vec3 _e76 = windowed_sum(origin_1, range_1);
+linear = (_e70 + (_e74.xyz * _e76));
 }
-vec3 _e88 = linear;
-vec3 _e89 = output_transform(_e88, pixel_3);
-_fs2p_location0 = vec4(_e89, 1.0);
+vec3 _e79 = linear;
+vec3 _e80 = output_transform(_e79, pixel_3);
+_fs2p_location0 = vec4(_e80, 1.0);
 return;
 }

@@ -5,14 +5,16 @@
 @group(0) @binding(0) var coefficients: texture_2d_array<i32>;
 // The basis response C: layers [channel, quad], a texel for each window origin from (-window, -window) on.
 @group(0) @binding(1) var basis_response: texture_2d_array<f32>;
-// τ as signed 16-bit codes: tile by tile, pixel by pixel, slot by slot, folded into rows and layers.
+// Direct functions without zeros, as signed 16-bit codes: R, G, B of a slot, and in twelve bits the slot. Tile by tile,
+// pixel by pixel, folded into rows and layers.
 @group(0) @binding(2) var codes: texture_2d_array<i32>;
 // The window origin of each camera pixel.
 @group(0) @binding(3) var origins: texture_2d<i32>;
 // The value of one code in each channel, tile by tile: of coefficients, and below them of τ.
 @group(0) @binding(4) var steps: texture_2d<f32>;
-// For each tile: index of its first code, or -1; first column and row; width.
-@group(0) @binding(6) var tiles: texture_2d<i32>;
+// For each camera pixel the index of its first texel of codes, and one past its last; a single texel of zeros if there are
+// no direct functions.
+@group(0) @binding(6) var functions: texture_2d<i32>;
 
 @fragment
 fn relight(@location(0) position: vec2<f32>) -> @location(0) vec4<f32> {
@@ -26,14 +28,10 @@ fn relight(@location(0) position: vec2<f32>) -> @location(0) vec4<f32> {
         let step = textureLoad(steps, tile, 0);
         linear += step.rgb * frame.chroma.rgb * factored_sum(pixel, origin + frame.window);
     }
-    let direct = textureLoad(tiles, tile, 0);
-    if direct.x >= 0 {
-        let in_tile = pixel - direct.yz;
-        let index = in_tile.y * direct.w + in_tile.x;
+    let range = textureLoad(functions, min(pixel, vec2<i32>(textureDimensions(functions)) - 1), 0).xy;
+    if range.x < range.y {
         let below = vec2<i32>(0, i32(textureDimensions(steps).y) / 2);
-        let step = textureLoad(steps, tile + below, 0);
-        let first_code = direct.x + index * frame.window * frame.window;
-        linear += step.rgb * windowed_sum(origin, first_code);
+        linear += textureLoad(steps, tile + below, 0).rgb * windowed_sum(origin, range);
     }
     return vec4<f32>(output_transform(linear, pixel), 1.0);
 }
@@ -58,28 +56,27 @@ fn factored_sum(pixel: vec2<i32>, at: vec2<i32>) -> vec3<f32> {
     return sum;
 }
 
-// Σ_s code(s) p(o + s) over the part of the window that lies on the light plane.
-fn windowed_sum(origin: vec2<i32>, first_code: i32) -> vec3<f32> {
+// Σ_s code(s) p(o + s) over a range of codes, for the slots that lie on the light plane.
+fn windowed_sum(origin: vec2<i32>, range: vec2<i32>) -> vec3<f32> {
     let fold = vec2<i32>(textureDimensions(codes));
-    let begin = clamp(-origin, vec2<i32>(0), vec2<i32>(frame.window));
     let plane = vec2<i32>(textureDimensions(light));
-    let end = clamp(plane - origin, vec2<i32>(0), vec2<i32>(frame.window));
+    let line = range.x / fold.x;
+    var texel = vec2<i32>(range.x % fold.x, line % fold.y);
+    var layer = line / fold.y;
     var sum = vec3<f32>(0.0);
-    for (var v = begin.y; v < end.y; v++) {
-        let code = first_code + v * frame.window + begin.x;
-        let line = code / fold.x;
-        var texel = vec2<i32>(code % fold.x, line % fold.y);
-        var layer = line / fold.y;
-        for (var u = begin.x; u < end.x; u++) {
-            let emission = textureLoad(light, origin + vec2<i32>(u, v), 0);
-            sum += vec3<f32>(textureLoad(codes, texel, layer, 0).rgb) * emission.rgb;
-            texel.x++;
-            if texel.x == fold.x {
-                texel = vec2<i32>(0, texel.y + 1);
-                if texel.y == fold.y {
-                    texel.y = 0;
-                    layer++;
-                }
+    for (var i = range.x; i < range.y; i++) {
+        let code = textureLoad(codes, texel, layer, 0);
+        let slot = code.w & 0xfff;
+        let element = origin + vec2<i32>(slot % frame.window, slot / frame.window);
+        if all(element >= vec2<i32>(0)) && all(element < plane) {
+            sum += vec3<f32>(code.rgb) * textureLoad(light, element, 0).rgb;
+        }
+        texel.x++;
+        if texel.x == fold.x {
+            texel = vec2<i32>(0, texel.y + 1);
+            if texel.y == fold.y {
+                texel.y = 0;
+                layer++;
             }
         }
     }

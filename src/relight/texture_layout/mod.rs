@@ -4,11 +4,11 @@
 //! |---|---|---|
 //! | coefficients | `rgba16sint`, 2D array, camera grid | four components of one channel |
 //! | basis response | `rgba32float`, 2D array, window origins | the response of four basis functions |
-//! | codes | `rgba16sint`, 2D array | τ in one slot: pixel by pixel, folded into rows and layers |
+//! | codes | `rgba16sint`, 2D array | entries of direct functions, folded into rows and layers |
 //! | origins | `rg16sint`, camera grid | window origin u, v |
 //! | steps | `rgba32float`, tile grid twice | value of one code in R, G, B: of coefficients, then of τ |
 //! | light | `rgba32float`, light plane | linear emission in R, G, B |
-//! | tiles | `rgba32sint`, tile grid | index of the first code or -1; first column and row; width |
+//! | functions | `rg32sint`, camera grid | index of a pixel's first entry, and one past its last |
 //!
 //! Layers of coefficients and of the basis response are `[channel, quad]`; one pass correlates a pair of quads, so the
 //! response has an even number of them. Everything that takes double precision or knowledge of tiles is computed here,
@@ -51,7 +51,7 @@ pub mod binding {
     pub const ORIGINS: usize = 3;
     pub const STEPS: usize = 4;
     pub const LIGHT: usize = 5;
-    pub const TILES: usize = 6;
+    pub const FUNCTIONS: usize = 6;
 }
 
 /// A device's limits on textures.
@@ -70,8 +70,8 @@ pub enum TextureFormat {
     Rgba8Unorm,
     Bgra8Unorm,
     Rg16Sint,
+    Rg32Sint,
     Rgba16Sint,
-    Rgba32Sint,
     Rgba32Float,
 }
 
@@ -125,7 +125,7 @@ impl TextureLayout {
     /// # Errors
     /// [`TextureLayoutError`] if the transport exceeds the device's limits.
     pub fn new(transport: &Transport, limits: TextureLimits) -> Result<Self, TextureLayoutError> {
-        use TextureFormat::{Rg16Sint, Rgba16Sint, Rgba32Float, Rgba32Sint};
+        use TextureFormat::{Rg16Sint, Rg32Sint, Rgba16Sint, Rgba32Float};
         let (geometry, tiles) = (&transport.geometry, &transport.tiles);
         let Geometry { camera, light, .. } = *geometry;
         let is_factored = tiles.iter().any(|tile| !tile.coefficients.is_dark());
@@ -153,8 +153,11 @@ impl TextureLayout {
             let slots = geometry.window.area() as u64;
             check_limit("slots in a window", slots, MAX_SLOTS as u64)?;
         }
-        let codes = tiles.iter().map(|tile| tile.functions.codes.len() as u64);
-        let (fold, fold_layers) = fold(codes.sum(), limits)?;
+        let entries = tiles.iter().map(|tile| tile.functions.entries.len() as u64);
+        let entries = entries.sum();
+        let (fold, fold_layers) = fold(entries, limits)?;
+        // A single texel of zeros stands for no functions.
+        let functions = if entries == 0 { TEXEL } else { camera };
 
         let flat = TextureDescriptor::flat;
         // A single texel where there are no layers.
@@ -174,7 +177,7 @@ impl TextureLayout {
                 flat("origins", Rg16Sint, camera),
                 flat("steps", Rgba32Float, Extent { width, height }),
                 flat("light", Rgba32Float, light),
-                flat("tiles", Rgba32Sint, grid),
+                flat("functions", Rg32Sint, functions),
             ],
         })
     }
@@ -231,7 +234,7 @@ fn fold(need: u64, limits: TextureLimits) -> Result<(Extent, u32), TextureLayout
     let side = u64::from(MAX_FOLD_SIDE.min(limits.max_side));
     // The shader counts texels in an i32.
     let limit = (side * side * u64::from(limits.max_layers)).min(i32::MAX as u64);
-    check_limit("transport values in each channel", need, limit)?;
+    check_limit("direct transport values", need, limit)?;
     let width = side.min(need).max(1);
     let rows = need.div_ceil(width).max(1);
     let layers = rows.div_ceil(side);

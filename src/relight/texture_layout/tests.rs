@@ -1,7 +1,9 @@
 //! Textures checked texel by texel against the rules that the shaders read them by.
 
 use super::*;
-use crate::transport::{Basis, CameraPixel, Correspondence, Tile, Window};
+use crate::transport::{
+    Basis, CameraPixel, Correspondence, FunctionCodes, Tile, Window, end_pixel, entry_slot,
+};
 
 const WEBGL2_MINIMUM: TextureLimits = TextureLimits {
     max_side: 2048,
@@ -20,6 +22,14 @@ fn geometry(camera: (u32, u32), window: u32) -> Geometry {
     }
 }
 
+/// The slots of a pixel that have codes: none of every fifth pixel.
+fn slots(pixel: CameraPixel, area: usize) -> impl Iterator<Item = usize> {
+    let first = (pixel.x % 5) as usize;
+    (first..area)
+        .step_by(7)
+        .skip(if first == 4 { area } else { 0 })
+}
+
 /// Codes that name their pixel and slot, or their pixel, channel and quad. Every third tile has no functions, every
 /// fourth no coefficients.
 fn transport(geometry: Geometry, rank: usize) -> Transport {
@@ -28,10 +38,14 @@ fn transport(geometry: Geometry, rank: usize) -> Transport {
         let mut tile = Tile::dark(rect);
         tile.functions.step = [1.0, 2.0, rect.x as f32];
         if i % 3 != 2 {
-            let codes = rect
-                .pixels()
-                .flat_map(|p| (0..area).map(move |s| [p.x as i16, p.y as i16, s as i16, 0]));
-            tile.functions.codes = codes.collect();
+            let entries = &mut tile.functions.entries;
+            for pixel in rect.pixels() {
+                let first = entries.len();
+                for s in slots(pixel, area) {
+                    entries.push([pixel.x as i16, pixel.y as i16, s as i16 + 1, s as i16]);
+                }
+                end_pixel(entries, first);
+            }
         }
         if i % 4 != 3 && rank > 0 {
             let plane = Tile::plane(rect);
@@ -56,15 +70,23 @@ fn transport(geometry: Geometry, rank: usize) -> Transport {
 
 #[test]
 fn each_code_is_where_the_shader_reads_it() {
-    // 150 * 141 * 225 texels fill more than one layer.
-    for (camera, window) in [((150, 141), 15), ((37, 23), 3), ((8, 1), 1)] {
+    // In the first case the texels fill more than one layer.
+    let small = TextureLimits {
+        max_side: 160,
+        max_layers: 32,
+    };
+    for (camera, window, limits) in [
+        ((150, 141), 15, small),
+        ((37, 23), 3, WEBGL2_MINIMUM),
+        ((8, 1), 1, WEBGL2_MINIMUM),
+    ] {
         let geometry = geometry(camera, window);
         let transport = transport(geometry, 0);
-        let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
+        let layout = TextureLayout::new(&transport, limits).unwrap();
         let TextureDescriptor { extent, layers, .. } = layout.textures[binding::CODES];
         let mut texture: Vec<[i16; 4]> = Vec::new();
         layout
-            .for_each_code_region(&transport, |region| {
+            .for_each_code_region(&transport, &mut |region| {
                 let [column, row, layer] = region.origin;
                 let before = layer as usize * extent.area();
                 assert_eq!(texture.len(), before + (row * extent.width) as usize);
@@ -75,8 +97,19 @@ fn each_code_is_where_the_shader_reads_it() {
             })
             .unwrap();
         assert_eq!(texture.len(), extent.area() * layers.unwrap() as usize);
+        assert_eq!(layers > Some(1), limits.max_side == 160);
+        let mut ranges = vec![[0u32; 2]; geometry.camera.area()];
+        let Ok(()) = layout.for_each_function_region(&transport, &mut |region| {
+            assert_eq!(layout.textures[binding::FUNCTIONS].extent, geometry.camera);
+            let [left, top, layer] = region.origin;
+            assert_eq!((region.binding, layer), (binding::FUNCTIONS, 0));
+            let texels: &[[u32; 2]] = bytemuck::cast_slice(region.texels);
+            for ((x, y), range) in region.extent.cells().zip(texels) {
+                ranges[((top + y) * camera.0 + left + x) as usize] = *range;
+            }
+            Ok::<_, std::convert::Infallible>(())
+        });
         let origins = layout.origin_texels();
-        let tiles = layout.tile_texels(&transport);
         let steps = layout.step_texels(&transport);
         for y in 0..camera.1 {
             for x in 0..camera.0 {
@@ -84,21 +117,42 @@ fn each_code_is_where_the_shader_reads_it() {
                 let origin = geometry.window_origin(CameraPixel { x, y });
                 assert_eq!((u, v), (origin.u, origin.v));
                 let tile = (y / 16 * camera.0.div_ceil(16) + x / 16) as usize;
-                assert_eq!(steps[tiles.len() + tile][2], (x / 16 * 16) as f32);
-                let [first, left, top, width] = tiles[tile];
+                let tiles = transport.tiles.len();
+                assert_eq!(steps[tiles + tile][2], (x / 16 * 16) as f32);
+                let pixel = CameraPixel { x, y };
+                let [first, end] = ranges[(y * camera.0 + x) as usize];
                 if transport.tiles[tile].functions.is_dark() {
-                    assert_eq!(first, -1);
+                    assert_eq!(first, end);
                     continue;
                 }
-                let pixel = (y as i32 - top) * width + (x as i32 - left);
-                let first = first + pixel * geometry.window.area() as i32;
-                for s in 0..geometry.window.area() {
-                    let code = texture[first as usize + s];
-                    assert_eq!(code, [x as i16, y as i16, s as i16, 0]);
+                let found = texture[first as usize..end as usize]
+                    .iter()
+                    .map(|entry| ([entry[0], entry[1], entry[2]], entry_slot(entry)));
+                let (x, y) = (x as i16, y as i16);
+                let mut want: Vec<_> = slots(pixel, geometry.window.area())
+                    .map(|s| ([x, y, s as i16 + 1], s))
+                    .collect();
+                if want.is_empty() {
+                    want.push(([0; 3], 0));
                 }
+                assert!(found.eq(want), "{x}, {y}");
             }
         }
     }
+}
+
+#[test]
+fn photographs_without_functions_have_a_single_texel_for_them() {
+    let mut transport = transport(geometry((37, 23), 3), 4);
+    for tile in &mut transport.tiles {
+        tile.functions = FunctionCodes::dark(tile.rect());
+    }
+    let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
+    for binding in [binding::FUNCTIONS, binding::CODES] {
+        assert_eq!(layout.textures[binding].extent, TEXEL);
+    }
+    let written = layout.for_each_function_region(&transport, &mut |_| Err(()));
+    assert_eq!(written, Ok(()));
 }
 
 #[test]
@@ -112,7 +166,7 @@ fn each_coefficient_is_where_the_shader_reads_it() {
         let TextureDescriptor { extent, layers, .. } = layout.textures[binding::COEFFICIENTS];
         assert_eq!((extent, layers), (geometry.camera, Some(3 * quads)));
         let mut found = 0;
-        let Ok(()) = layout.for_each_coefficient_region(&transport, |region| {
+        let Ok(()) = layout.for_each_coefficient_region(&transport, &mut |region| {
             let (channel, quad) = (region.origin[2] / quads, region.origin[2] % quads);
             let texels: &[[i16; 4]] = bytemuck::cast_slice(region.texels);
             assert!(channel < 3 && texels.len() == region.extent.area());
@@ -180,11 +234,13 @@ fn photographs_beyond_the_limits_are_errors() {
         max_side: 64,
         max_layers: 2,
     };
+    let direct = transport(geometry((64, 64), 15), 0);
+    let values = direct.tiles.iter().map(|tile| tile.functions.entries.len());
     assert_eq!(
-        error((64, 64), 3, 0, small),
+        error((64, 64), 15, 0, small),
         exceeds(
-            "transport values in each channel",
-            11 * 256 * 9,
+            "direct transport values",
+            values.sum::<usize>() as u64,
             2 * 64 * 64
         )
     );

@@ -20,6 +20,9 @@ pub struct TextureRegion<'a> {
     pub texels: &'a [u8],
 }
 
+/// Writes a region; one function for all textures, as modules are downloaded.
+pub(super) type WriteRegion<'a, E> = dyn FnMut(TextureRegion<'_>) -> Result<(), E> + 'a;
+
 impl TextureLayout {
     /// Calls `write` with all regions that do not depend on the light and are not zero.
     ///
@@ -30,14 +33,14 @@ impl TextureLayout {
         transport: &Transport,
         mut write: impl FnMut(TextureRegion<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        self.for_each_coefficient_region(transport, &mut write)?;
-        self.for_each_code_region(transport, &mut write)?;
-        let (origins, tiles) = (self.origin_texels(), self.tile_texels(transport));
-        let steps = self.step_texels(transport);
-        let textures: [(usize, &[u8]); 3] = [
+        let write: &mut WriteRegion<'_, E> = &mut write;
+        self.for_each_coefficient_region(transport, write)?;
+        self.for_each_code_region(transport, write)?;
+        self.for_each_function_region(transport, write)?;
+        let (origins, steps) = (self.origin_texels(), self.step_texels(transport));
+        let textures: [(usize, &[u8]); 2] = [
             (binding::ORIGINS, bytemuck::cast_slice(&origins)),
             (binding::STEPS, bytemuck::cast_slice(&steps)),
-            (binding::TILES, bytemuck::cast_slice(&tiles)),
         ];
         for (binding, texels) in textures {
             write(TextureRegion {
@@ -53,7 +56,7 @@ impl TextureLayout {
     pub(super) fn for_each_coefficient_region<E>(
         &self,
         transport: &Transport,
-        mut write: impl FnMut(TextureRegion<'_>) -> Result<(), E>,
+        write: &mut WriteRegion<'_, E>,
     ) -> Result<(), E> {
         for Tile { coefficients, .. } in &transport.tiles {
             let TileRect { x, y, extent } = coefficients.rect;
@@ -73,11 +76,11 @@ impl TextureLayout {
     pub(super) fn for_each_code_region<E>(
         &self,
         transport: &Transport,
-        mut write: impl FnMut(TextureRegion<'_>) -> Result<(), E>,
+        write: &mut WriteRegion<'_, E>,
     ) -> Result<(), E> {
         let TextureDescriptor { extent, layers, .. } = self.textures[binding::CODES];
         let Extent { width, height } = extent;
-        let mut tiles = transport.tiles.iter().map(|tile| &tile.functions.codes);
+        let mut tiles = transport.tiles.iter().map(|tile| &tile.functions.entries);
         let mut source: &[TexelCodes] = &[];
         let mut texels = Vec::new();
         for layer in 0..layers.unwrap_or(1) {
@@ -88,7 +91,7 @@ impl TextureLayout {
                 while texels.len() < need {
                     if source.is_empty() {
                         match tiles.next() {
-                            Some(codes) => source = codes,
+                            Some(entries) => source = entries,
                             // Texels past the last code are never read.
                             None => texels.resize(need, [0; 4]),
                         }
@@ -108,6 +111,33 @@ impl TextureLayout {
         Ok(())
     }
 
+    pub(super) fn for_each_function_region<E>(
+        &self,
+        transport: &Transport,
+        write: &mut WriteRegion<'_, E>,
+    ) -> Result<(), E> {
+        let mut next = 0;
+        for Tile { functions, .. } in &transport.tiles {
+            if functions.is_dark() {
+                continue;
+            }
+            let TileRect { x, y, extent } = functions.rect;
+            let mut texels = Vec::with_capacity(extent.area());
+            for entries in functions.pixels() {
+                let first = next;
+                next += entries.len() as i32; // `TextureLayout::new` bounds the sum
+                texels.push([first, next]);
+            }
+            write(TextureRegion {
+                binding: binding::FUNCTIONS,
+                origin: [x, y, 0],
+                extent,
+                texels: bytemuck::cast_slice(&texels),
+            })?;
+        }
+        Ok(())
+    }
+
     pub(super) fn origin_texels(&self) -> Vec<[i16; 2]> {
         let Geometry {
             camera,
@@ -117,30 +147,25 @@ impl TextureLayout {
         } = self.geometry;
         // All windows off the light plane are dark alike; clamped, their origins fit 16 bits.
         let clamp = |at: i32, side: u32| at.clamp(-(window.side() as i32), side as i32) as i16;
-        let origin = |(x, y)| {
-            let LightElement { u, v } = self.geometry.window_origin(CameraPixel { x, y });
-            [clamp(u, light.width), clamp(v, light.height)]
-        };
-        camera.cells().map(origin).collect()
-    }
-
-    pub(super) fn tile_texels(&self, transport: &Transport) -> Vec<[i32; 4]> {
-        let mut next = 0;
-        let texel = |tile: &Tile| {
-            let TileRect { x, y, extent } = tile.rect();
-            let codes = tile.functions.codes.len() as i32;
-            let first = if codes == 0 { -1 } else { next };
-            next += codes;
-            [first, x as i32, y as i32, extent.width as i32]
-        };
-        transport.tiles.iter().map(texel).collect()
+        let mut texels = Vec::with_capacity(camera.area());
+        for y in 0..camera.height {
+            for x in 0..camera.width {
+                let LightElement { u, v } = self.geometry.window_origin(CameraPixel { x, y });
+                texels.push([clamp(u, light.width), clamp(v, light.height)]);
+            }
+        }
+        texels
     }
 
     pub(super) fn step_texels(&self, transport: &Transport) -> Vec<[f32; 4]> {
-        let texel = |[r, g, b]: [f32; 3]| [r, g, b, 0.0];
         let tiles = &transport.tiles;
-        let coefficients = tiles.iter().map(|tile| tile.coefficients.step);
-        let functions = tiles.iter().map(|tile| tile.functions.step);
-        coefficients.chain(functions).map(texel).collect()
+        let mut texels = vec![[0.0; 4]; 2 * tiles.len()];
+        for (i, tile) in tiles.iter().enumerate() {
+            let steps = [tile.coefficients.step, tile.functions.step];
+            for (part, [r, g, b]) in steps.into_iter().enumerate() {
+                texels[part * tiles.len() + i] = [r, g, b, 0.0];
+            }
+        }
+        texels
     }
 }

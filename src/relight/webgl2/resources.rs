@@ -15,7 +15,7 @@ fn texel_format(format: TextureFormat) -> [u32; 3] {
     match format {
         TextureFormat::Rg16Sint => [Gl::RG16I, Gl::RG_INTEGER, Gl::SHORT],
         TextureFormat::Rgba16Sint => [Gl::RGBA16I, Gl::RGBA_INTEGER, Gl::SHORT],
-        TextureFormat::Rgba32Sint => [Gl::RGBA32I, Gl::RGBA_INTEGER, Gl::INT],
+        TextureFormat::Rg32Sint => [Gl::RG32I, Gl::RG_INTEGER, Gl::INT],
         TextureFormat::Rgba32Float => [Gl::RGBA32F, Gl::RGBA, Gl::FLOAT],
         // Only canvases of WebGPU have the other order.
         TextureFormat::Rgba8Unorm | TextureFormat::Bgra8Unorm => {

@@ -380,7 +380,7 @@ fn name(format: TextureFormat) -> &'static str {
         TextureFormat::Bgra8Unorm => "bgra8unorm",
         TextureFormat::Rg16Sint => "rg16sint",
         TextureFormat::Rgba16Sint => "rgba16sint",
-        TextureFormat::Rgba32Sint => "rgba32sint",
+        TextureFormat::Rg32Sint => "rg32sint",
         TextureFormat::Rgba32Float => "rgba32float",
     }
 }

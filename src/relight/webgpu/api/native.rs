@@ -309,7 +309,7 @@ impl From<TextureFormat> for wgpu::TextureFormat {
             TextureFormat::Bgra8Unorm => Self::Bgra8Unorm,
             TextureFormat::Rg16Sint => Self::Rg16Sint,
             TextureFormat::Rgba16Sint => Self::Rgba16Sint,
-            TextureFormat::Rgba32Sint => Self::Rgba32Sint,
+            TextureFormat::Rg32Sint => Self::Rg32Sint,
             TextureFormat::Rgba32Float => Self::Rgba32Float,
         }
     }
