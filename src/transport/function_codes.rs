@@ -60,8 +60,7 @@ impl FunctionCodes {
 
     /// Rounds functions, `[pixel, slot]` with `area` slots a pixel, to codes. Values that are not finite become zero.
     pub(crate) fn quantise(rect: TileRect, functions: &[[f32; CHANNELS]], area: usize) -> Self {
-        let mut peaks = ChannelPeaks::default();
-        functions.iter().for_each(|value| peaks.add(value));
+        let peaks = ChannelPeaks::of(functions);
         let mut codes = Self::dark(rect);
         if codes.set_step(peaks) {
             for function in functions.chunks_exact(area) {

@@ -7,6 +7,17 @@ use super::geometry::CHANNELS;
 pub(crate) struct ChannelPeaks([f32; CHANNELS]);
 
 impl ChannelPeaks {
+    /// Of all values.
+    pub fn of(values: &[[f32; CHANNELS]]) -> Self {
+        // A local variable, which stays in registers.
+        let mut peaks = Self::default();
+        for value in values {
+            peaks.add(value);
+        }
+        peaks
+    }
+
+    #[inline(always)]
     pub fn add(&mut self, value: &[f32; CHANNELS]) {
         for c in 0..CHANNELS {
             if value[c].is_finite() {

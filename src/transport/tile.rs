@@ -46,8 +46,7 @@ impl CoefficientCodes {
         rank: usize,
         mut codes: Vec<TexelCodes>,
     ) -> Self {
-        let mut peaks = ChannelPeaks::default();
-        coefficients.iter().for_each(|value| peaks.add(value));
+        let peaks = ChannelPeaks::of(coefficients);
         let Some(step) = peaks.steps(i16::MAX.into()).filter(|_| rank > 0) else {
             return Self::dark(rect);
         };
