@@ -4,11 +4,8 @@ import type { Backend } from '../engine/wasm-exports.js';
 import type { SharedPhoto } from '../photo/photo-library.js';
 import type { BackendPreferences, Renderer } from '../renderers/types.js';
 import type { Deferred } from '../shared/promises.js';
-import { QualityController } from './quality-controller.js';
 
 export class ActiveBackend {
-  /** For this renderer alone: frame times of other renderers say nothing about it. */
-  readonly qualityController = new QualityController();
   hasDrawn = false;
   /** Why the backend stopped working; `null` while it works. */
   lossReason: string | null = null;

@@ -332,7 +332,7 @@ export class PhotoSession {
     this.#isFullQualityRequested = false;
     if (!active || !this.settings) throw notLoaded();
     const { light, output } = this.settings;
-    const quality = isFullQuality ? 1 : active.qualityController.quality;
+    const quality = isFullQuality ? 1 : active.renderer.qualityController.quality;
     this.#scheduler.frameStarted();
     try {
       const startMs = this.ports.now();
@@ -364,7 +364,8 @@ export class PhotoSession {
 
   /** Measures a frame of an animation for the choice of the next one's quality. */
   #measure(active: ActiveBackend, startMs: number, frame: ReturnType<Renderer['render']>): void {
-    const record = () => active.qualityController.recordFrame(startMs, this.ports.now());
+    const { qualityController } = active.renderer;
+    const record = () => qualityController.recordFrame(startMs, this.ports.now());
     if (frame instanceof Promise) frame.then(record, () => {});
     // A graphics device still works on the frame, which delays the browser's next one.
     else this.ports.nextFrame(record);

@@ -4,6 +4,7 @@ import type { Backend } from '../engine/wasm-exports.js';
 import type { PhotoUser } from '../photo/photo-library.js';
 import type { LoadedPhotograph } from '../photo/photograph.js';
 import { RefCounted } from '../photo/ref-counted.js';
+import { QualityController } from '../renderers/quality-controller.js';
 import { withBackends, withExposure } from '../renderers/settings-fakes.js';
 import type { Renderer } from '../renderers/types.js';
 import { PhotoError } from '../shared/errors.js';
@@ -101,6 +102,7 @@ export function fakeSession() {
           const renderer: Renderer = {
             kernel: 'fake',
             gamut: options.gamut,
+            qualityController: new QualityController(),
             canvas: {} as HTMLCanvasElement,
             render: ({ name }, _output, quality) => {
               if (isLostAtFrame) throw new PhotoError('backend-lost', 'the device is gone.');

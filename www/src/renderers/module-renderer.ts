@@ -7,6 +7,7 @@ import type { ImageLight } from '../lights/light-setting.js';
 import type { LoadedPhotograph } from '../photo/photograph.js';
 import { toPhotoError } from '../shared/errors.js';
 import type { DeviceLease } from './gpu/devices.js';
+import { QualityController } from './quality-controller.js';
 import type { Renderer } from './types.js';
 
 /** A renderer with a module's relighter. Its `free` frees the relighter and releases the lease of a device. */
@@ -25,6 +26,7 @@ export function createModuleRenderer(
     canvas,
     kernel,
     gamut,
+    qualityController: new QualityController(),
     render(setting, output, quality) {
       const transform = createOutputTransform(module, output, gamut);
       try {

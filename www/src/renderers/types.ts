@@ -5,6 +5,7 @@ import type { Backend, Freeable, Gamut } from '../engine/wasm-exports.js';
 import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LoadedPhotograph } from '../photo/photograph.js';
+import type { QualityController } from './quality-controller.js';
 
 /** Which backends may draw, and in which colours. */
 export interface BackendPreferences {
@@ -22,6 +23,8 @@ export interface Renderer extends Freeable {
   /** The gamut that the canvas really has. */
   readonly gamut: Gamut;
   readonly warning?: string;
+  /** For this renderer alone: frame times of other renderers say nothing about it. */
+  readonly qualityController: QualityController;
   /**
    * Draws one frame with a share of the components (`quality`, 0 to 1). Call it again only after the last promise has
    * settled. If the light is unavailable, the last available one is used and `AppliedLightStatus` has the error. Throws or

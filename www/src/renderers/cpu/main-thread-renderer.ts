@@ -4,6 +4,7 @@ import type { CpuModule, Gamut } from '../../engine/wasm-exports.js';
 import type { LoadedPhotograph } from '../../photo/photograph.js';
 import { photoReleased } from '../../shared/errors.js';
 import { createModuleRenderer } from '../module-renderer.js';
+import { QualityController } from '../quality-controller.js';
 import type { Renderer } from '../types.js';
 
 export async function createMainThreadRenderer(
@@ -38,6 +39,7 @@ export async function createMainThreadRenderer(
     kernel: module.cpuKernel(),
     gamut,
     warning,
+    qualityController: new QualityController(),
     render: (...frame) =>
       renderer ? renderer.render(...frame) : start().then((started) => started.render(...frame)),
     free() {

@@ -4,6 +4,7 @@ import type { CpuModule, Gamut } from '../../engine/wasm-exports.js';
 import { LightCache } from '../../lights/light-cache.js';
 import type { LoadedPhotograph } from '../../photo/photograph.js';
 import { hasCode, messageOf, PhotoError, photoReleased } from '../../shared/errors.js';
+import { QualityController } from '../quality-controller.js';
 import type { Renderer } from '../types.js';
 import type { WorkerPool } from './worker-pool.js';
 
@@ -37,6 +38,7 @@ export async function createWorkerRenderer(
     canvas,
     kernel,
     gamut,
+    qualityController: new QualityController(),
     async render(setting, output, quality) {
       checkNotFreed();
       try {
