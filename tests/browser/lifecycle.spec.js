@@ -14,8 +14,6 @@ import { glassBytes, nativePicture } from './test-photos.js';
 /** @param {import('./page-helpers.js').ElementEvent[]} photoEvents @param {string} type */
 const count = (photoEvents, type) => photoEvents.filter((event) => event.type === type).length;
 
-const WASM_PAGE_BYTES = 1 << 16;
-
 test.describe('the module', () => {
   test('can be imported without a DOM, as on a server', async () => {
     // The type checker does not follow a variable into the bundle.
@@ -197,12 +195,17 @@ test.describe('an element', () => {
       );
     // Enough for the memory of the modules to reach its peak.
     await cycle(100);
-    const before = await usage();
+    let before = await usage();
     await cycle(200);
-    const after = await usage();
+    let after = await usage();
+    // How loads overlap may raise the peak once more; memory that leaks grows in every round.
+    for (let round = 1; round < 3 && after.wasm > before.wasm; round += 1) {
+      before = after;
+      await cycle(200);
+      after = await usage();
+    }
     note(`${JSON.stringify(before)} → ${JSON.stringify(after)}`);
-    // Where allocations fall decides on a page or two; each element that leaks takes kilobytes.
-    expect(after.wasm - before.wasm, 'WebAssembly').toBeLessThanOrEqual(2 * WASM_PAGE_BYTES);
+    expect(after.wasm).toBe(before.wasm);
     expect(after.workers).toBe(before.workers);
     expect(after.nodes - before.nodes, 'nodes').toBeLessThan(200);
     expect(after.listeners - before.listeners, 'listeners').toBeLessThan(200);
