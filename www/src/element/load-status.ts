@@ -1,6 +1,7 @@
 /** How far the current load is, as `complete`, `error`, `ready` and `:state()` report it. */
 
 import type { PhotoError } from '../shared/errors.js';
+import { Deferred } from '../shared/promises.js';
 
 /** The names of the states that CSS selects with `:state()`. */
 export type LoadPhase = 'loading' | 'ready' | 'error';
@@ -9,10 +10,7 @@ export class LoadStatus<T extends HTMLElement> {
   /** `null` before a load starts. */
   phase: LoadPhase | null = null;
   error: PhotoError | null = null;
-  /** Resolves once the whole photograph is drawn, and rejects with `error`. Another load has another promise. */
-  ready!: Promise<T>;
-  #resolve!: (host: T) => void;
-  #reject!: (error: PhotoError) => void;
+  #ready!: Deferred<T>;
   #isSettled = true;
   readonly #states: CustomStateSet | undefined;
 
@@ -21,13 +19,18 @@ export class LoadStatus<T extends HTMLElement> {
     this.set(null);
   }
 
+  /** Resolves once the whole photograph is drawn, and rejects with `error`. Another load has another promise. */
+  get ready(): Promise<T> {
+    return this.#ready.promise;
+  }
+
   /** `error` belongs to the phase of that name. */
   set(phase: LoadPhase | null, error: PhotoError | null = null): void {
     if (this.#isSettled) this.#createPromise();
     this.phase = phase;
     this.error = error;
-    if (phase === 'ready') this.#resolve(this.host);
-    if (error) this.#reject(error);
+    if (phase === 'ready') this.#ready.resolve(this.host);
+    if (error) this.#ready.reject(error);
     this.#isSettled = phase === 'ready' || error !== null;
     try {
       this.#states?.clear();
@@ -38,11 +41,8 @@ export class LoadStatus<T extends HTMLElement> {
   }
 
   #createPromise(): void {
-    this.ready = new Promise((resolve, reject) => {
-      this.#resolve = resolve;
-      this.#reject = reject;
-    });
+    this.#ready = new Deferred();
     // The `error` event reports the error; a page need not use the promise.
-    this.ready.catch(() => {});
+    this.#ready.promise.catch(() => {});
   }
 }

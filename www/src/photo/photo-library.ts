@@ -4,7 +4,7 @@
  * first; their elements keep a resting picture, and open them again when they come near.
  */
 
-import { withTimeout } from '../shared/promises.js';
+import { Deferred, withTimeout } from '../shared/promises.js';
 import type { LoadOptions } from './load-options.js';
 import { LoadQueue, OUT_OF_VIEW, type Placement, type QueuedLoad } from './load-queue.js';
 import type { LoadedPhotograph } from './photograph.js';
@@ -138,18 +138,13 @@ class LibraryEntry implements QueuedLoad {
   photo: SharedPhoto | null = null;
   readonly #users = new Set<PhotoUser>();
   readonly #abort = new AbortController();
-  #resolve: (photo: SharedPhoto) => void = () => {};
-  #reject: (error: unknown) => void = () => {};
-  readonly #opened = new Promise<SharedPhoto>((resolve, reject) => {
-    this.#resolve = resolve;
-    this.#reject = reject;
-  });
+  readonly #opened = new Deferred<SharedPhoto>();
 
   constructor(
     private readonly load: (options: LoadOptions) => Promise<LoadedPhotograph>,
     private readonly events: EntryEvents,
   ) {
-    this.#opened.catch(() => {});
+    this.#opened.promise.catch(() => {});
   }
 
   get placement(): Placement {
@@ -171,7 +166,7 @@ class LibraryEntry implements QueuedLoad {
   async join(user: PhotoUser, signal: AbortSignal): Promise<SharedPhoto> {
     this.#users.add(user);
     signal.addEventListener('abort', () => this.#leave(user));
-    const photo = await withTimeout(this.#opened, { signal });
+    const photo = await withTimeout(this.#opened.promise, { signal });
     signal.throwIfAborted();
     photo.retain();
     return photo;
@@ -208,10 +203,10 @@ class LibraryEntry implements QueuedLoad {
         return;
       }
       this.photo = new RefCounted(photograph);
-      this.#resolve(this.photo);
+      this.#opened.resolve(this.photo);
       this.events.loaded(photograph.info.decodedBytes);
     } catch (thrown) {
-      this.#reject(thrown);
+      this.#opened.reject(thrown);
       this.events.ended();
     }
   }

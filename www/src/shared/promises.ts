@@ -9,10 +9,12 @@ export async function allSettledOrThrow<T>(promises: readonly Promise<T>[]): Pro
   });
 }
 
-export class Deferred {
-  resolve = (): void => {};
-  readonly promise = new Promise<void>((resolve) => {
+export class Deferred<T = void> {
+  resolve: (value: T) => void = () => {};
+  reject: (error: unknown) => void = () => {};
+  readonly promise = new Promise<T>((resolve, reject) => {
     this.resolve = resolve;
+    this.reject = reject;
   });
 }
 
