@@ -110,13 +110,9 @@ impl PartialFunctions {
         if codes.set_step(peaks) {
             // Of a pixel without values there is an entry too.
             codes.entries = budget.try_with_capacity(values + pixels)?;
-            let mut first = 0;
             self.for_each_value(pixels, area, budget, &mut |value| match value {
                 Some((slot, value)) => codes.push(slot, value),
-                None => {
-                    end_pixel(&mut codes.entries, first);
-                    first = codes.entries.len();
-                }
+                None => end_pixel(&mut codes.entries),
             })?;
             codes.entries.shrink_to_fit();
         }

@@ -27,13 +27,11 @@ pub fn entries_by_pixel(entries: &[FunctionEntry]) -> impl Iterator<Item = &[Fun
     entries.split_inclusive(|entry| entry[CHANNELS] & LAST_ENTRY != 0)
 }
 
-/// Marks the end of a pixel whose entries are those from number `first` on. A pixel without entries gets one of zeros.
-pub(crate) fn end_pixel(entries: &mut Vec<FunctionEntry>, first: usize) {
-    if entries.len() == first {
-        entries.push([0; CHANNELS + 1]);
-    }
-    if let Some(last) = entries.last_mut() {
-        last[CHANNELS] |= LAST_ENTRY;
+/// Marks the end of a pixel, whose entries follow those of ended pixels. A pixel without entries gets one of zeros.
+pub(crate) fn end_pixel(entries: &mut Vec<FunctionEntry>) {
+    match entries.last_mut() {
+        Some(last) if last[CHANNELS] & LAST_ENTRY == 0 => last[CHANNELS] |= LAST_ENTRY,
+        _ => entries.push([0, 0, 0, LAST_ENTRY]),
     }
 }
 
@@ -64,11 +62,10 @@ impl FunctionCodes {
         let mut codes = Self::dark(rect);
         if codes.set_step(peaks) {
             for function in functions.chunks_exact(area) {
-                let first = codes.entries.len();
                 for (slot, value) in function.iter().enumerate() {
                     codes.push(slot, value);
                 }
-                end_pixel(&mut codes.entries, first);
+                end_pixel(&mut codes.entries);
             }
         }
         codes

@@ -12,8 +12,6 @@ use crate::transport::{CHANNELS, FunctionEntry, end_pixel};
 pub struct ScanFunctions {
     has_half_floats: bool,
     step: f32,
-    /// The first entry of the pixel to which slots are added.
-    first: usize,
     /// As in [`FunctionCodes`](crate::transport::FunctionCodes), in the chunk's order and with its numbers: Y, Co and Cg
     /// in steps, or the bits of three half floats.
     pub entries: Vec<FunctionEntry>,
@@ -33,7 +31,6 @@ impl ScanFunctions {
         Ok(Self {
             has_half_floats: scan.coding == ScanCoding::DirectHalves,
             step: scan.step,
-            first: 0,
             entries: budget.try_with_capacity(max_entries(scan, pixels, tokens))?,
         })
     }
@@ -50,8 +47,7 @@ impl ScanFunctions {
     /// Ends the next pixel.
     #[inline(never)] // as `push`
     pub fn end_pixel(&mut self) {
-        end_pixel(&mut self.entries, self.first);
-        self.first = self.entries.len();
+        end_pixel(&mut self.entries);
     }
 
     /// The value of an entry: red, green, blue.

@@ -40,11 +40,10 @@ fn transport(geometry: Geometry, rank: usize) -> Transport {
         if i % 3 != 2 {
             let entries = &mut tile.functions.entries;
             for pixel in rect.pixels() {
-                let first = entries.len();
                 for s in slots(pixel, area) {
                     entries.push([pixel.x as i16, pixel.y as i16, s as i16 + 1, s as i16]);
                 }
-                end_pixel(entries, first);
+                end_pixel(entries);
             }
         }
         if i % 4 != 3 && rank > 0 {
