@@ -14,6 +14,7 @@
 //! | [`recover`] | measurements | light transport functions | |
 //! | [`transport`] | – | the matrix in memory, shared by the others | |
 //! | [`format`] | a transport | an `.ltm` file, and back | |
+//! | [`export`] | a capture | an `.ltm` file, by the modules above | |
 //! | [`relight`] | a transport and a light | a picture | |
 //! | [`study`] | known transport | accuracy figures and tables | `study` |
 //!
@@ -24,6 +25,7 @@ pub mod calibrate;
 pub mod capture;
 #[cfg(all(feature = "cli", not(target_arch = "wasm32")))]
 pub mod cli;
+pub mod export;
 pub mod format;
 pub mod job_executor;
 mod linalg;

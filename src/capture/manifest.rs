@@ -79,7 +79,7 @@ pub struct ManifestCamera {
 }
 
 /// A pattern and its photograph.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Shot {
     /// 8-bit grey or RGB PNG of the light plane's size.
     pub pattern: String,
@@ -129,7 +129,7 @@ impl ManifestLight {
     pub fn emission(&self) -> [f64; 256] {
         let Some(table) = &self.response else {
             let gamma = self.gamma.unwrap_or(1.0);
-            return std::array::from_fn(|code| (code as f64 / 255.0).powf(gamma));
+            return std::array::from_fn(|code| libm::pow(code as f64 / 255.0, gamma));
         };
         let full = interpolate(table, 255.0);
         std::array::from_fn(|code| interpolate(table, code as f64) / full)

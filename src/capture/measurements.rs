@@ -3,12 +3,14 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use super::camera_row_set::CameraRowSet;
 use super::noise_model::NoiseModel;
 use crate::transport::{CHANNELS, CameraPixel, Correspondence, Extent, TileRect};
 
 /// The emission of each light element during one shot, `[M]`, row by row.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Pattern {
     /// One plane for all channels.
     Grey(Vec<f32>),

@@ -9,7 +9,7 @@
 
 mod camera_row_set;
 mod error;
-#[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
+#[cfg(feature = "capture")]
 mod folder;
 mod group_ids;
 mod manifest;
@@ -19,8 +19,10 @@ mod noise_model;
 
 pub use camera_row_set::CameraRowSet;
 pub use error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
+#[cfg(feature = "capture")]
+pub use folder::{CaptureFiles, CaptureFolder, DarkFrame, DiskFiles, PhotographRowReader};
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
-pub use folder::{CaptureFolder, DarkFrame, GroundTruth, PhotographRowReader, RELIT_FULL_SCALE};
+pub use folder::{GroundTruth, RELIT_FULL_SCALE};
 pub(crate) use group_ids::{group_count, group_ids};
 pub use manifest::{GrayCodeShot, Manifest, ManifestCamera, ManifestLight, Shot};
 pub use measurements::{LinearPhoto, Measurements, Pattern};

@@ -1,6 +1,6 @@
 //! Noise model of the measurements, and its floor, estimated from the dark frame.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::transport::CHANNELS;
 
@@ -14,7 +14,7 @@ const MAX_NOISE_SIGMAS: f64 = 4.0;
 /// A sample `y` at relative exposure `e` has variance `gain·y/e + floor/e²`. The subtracted dark frame has noise of
 /// variance `floor` as well, which is not included: it adds the same constant to a pixel in all shots. Subtraction
 /// cancels the fixed pattern of the sensor.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NoiseModel {
     /// Variance per unit of measurement at exposure 1: 1 / electrons at measurement 1.
     pub gain: [f64; CHANNELS],

@@ -65,6 +65,9 @@ fn recovery_remedy(error: &RecoverError) -> Option<&'static str> {
             "check that each is listed with the pattern it shows, check \"correspondence\" in \
              capture.json, and the exposure"
         }
+        RecoverError::IndistinctPhotographs => {
+            "check that each of \"shots\" names its own photo, and that the light was on"
+        }
         RecoverError::Overexposed => {
             "photograph with less exposure, or add shots with less (\"exposure\" in capture.json)"
         }

@@ -7,7 +7,7 @@
 /// noise disturbs the centred equations. Every constant offset disturbs the mean as well, and averaging does not lower
 /// it: light from beyond the window, the dark frame's own noise, a black level that drifts. The second term is
 /// therefore weighted by ω².
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(transparent)]
 pub struct CommonModeWeight(f64);
 

@@ -30,6 +30,9 @@ pub enum RecoverError {
         /// Their patterns, as indices into the measurements' patterns.
         pattern_indices: Vec<usize>,
     },
+    /// The photographs are alike.
+    #[error("photographs do not differ from pattern to pattern by more than their noise")]
+    IndistinctPhotographs,
     /// More than half of the pixels that were sampled are saturated in some photograph.
     #[error("too many pixels are saturated in too many photographs")]
     Overexposed,

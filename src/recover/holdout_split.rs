@@ -1,5 +1,7 @@
 //! Divides the patterns into training patterns, which recoveries use, and held-out ones, which choose between recoveries.
 
+use serde::{Deserialize, Serialize};
+
 use super::sampling::MIN_PATTERNS;
 use crate::capture::{self, Pattern};
 use crate::transport::CHANNELS;
@@ -8,7 +10,7 @@ use crate::transport::CHANNELS;
 const HELD_OUT_EVERY: usize = 10;
 
 /// A division of the patterns, by their indices in the measurements.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct HoldoutSplit {
     /// All patterns.
     pub all: Vec<usize>,

@@ -102,7 +102,8 @@ impl HoldoutValidation {
     /// Estimated SNR of the recovery; `None` without signal.
     pub fn snr(&self) -> Option<Decibels> {
         let error = self.error(self.residual);
-        (error > 0.0 && self.signal > 0.0).then(|| Decibels(10.0 * (self.signal / error).log10()))
+        (error > 0.0 && self.signal > 0.0)
+            .then(|| Decibels(10.0 * libm::log10(self.signal / error)))
     }
 
     /// The recovered squares.
@@ -116,7 +117,7 @@ impl HoldoutValidation {
         let before = self.error(self.residual);
         // An error in the variance of the noise is in both residuals and cancels.
         let after = before + self.residual_variance(functions) - self.residual;
-        Decibels(10.0 * (after.max(f64::MIN_POSITIVE) / before.max(f64::MIN_POSITIVE)).log10())
+        Decibels(10.0 * libm::log10(after.max(f64::MIN_POSITIVE) / before.max(f64::MIN_POSITIVE)))
     }
 
     /// Error of functions by the variance of their residuals.

@@ -7,6 +7,8 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use super::bpdn::{
     BpdnConstraint, Homotopy, ResidualTolerance, SensingOperator, SparsityBasis, interior_point,
 };
@@ -27,7 +29,7 @@ const CACHE_SIDE: i32 = 16;
 const MAX_EXCESS_RESIDUAL: f64 = 1e-6;
 
 /// The problem that is solved for each pixel and channel.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) enum PixelwiseMethod {
     /// Case (a).
     LeastSquares,
@@ -35,7 +37,7 @@ pub(super) enum PixelwiseMethod {
     Denoising(SparsityBasis, ResidualTolerance),
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct PixelwiseRecovery {
     pub geometry: Geometry,
     pub common_mode: CommonModeWeight,

@@ -1,5 +1,7 @@
 //! Recovery of a light transport matrix, tile by tile, by any of the methods.
 
+use serde::{Deserialize, Serialize};
+
 use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
 use super::holdout_split::HoldoutSplit;
@@ -24,16 +26,19 @@ pub struct RecoverySettings {
 }
 
 /// A recovery that is ready to run. All that depends on the measurements as a whole has been learned or chosen; tiles
-/// can then be recovered one by one, in any order.
-#[derive(Debug)]
+/// can then be recovered one by one, in any order. Serialised, without its validation, it recovers the same tiles in
+/// another process.
+#[derive(Debug, Serialize, Deserialize)]
 pub struct PreparedRecovery {
     geometry: Geometry,
     split: HoldoutSplit,
     solver: TileSolver,
+    /// Not needed to recover tiles elsewhere.
+    #[serde(skip)]
     holdout_validation: Option<HoldoutValidation>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 enum TileSolver {
     Learned(Box<LearnedRecovery>),
     Pixelwise(PixelwiseRecovery),

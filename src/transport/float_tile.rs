@@ -1,10 +1,12 @@
 //! Tiles as real numbers: `τ_n = Σ_k c_nk v_k + d_n`, coefficients over a basis that all tiles share, and direct
 //! functions.
 
+use serde::{Deserialize, Serialize};
+
 use super::geometry::{CHANNELS, Geometry, TileRect};
 
 /// The basis functions `v_k` of a factored transport, `S` values each.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Basis {
     /// `v_k` as `[component, slot]`, the most important first.
     pub kernels: Vec<Vec<f32>>,

@@ -16,7 +16,7 @@ pub const MAX_SIDE: u32 = 1 << 15;
 pub const MAX_WINDOW: u32 = 63;
 
 /// Width and height of a grid, in its cells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Extent {
     /// Columns.
     pub width: u32,
@@ -111,7 +111,7 @@ impl Correspondence {
 }
 
 /// A square window of `side x side` light elements, side odd.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Window {
     side: u32,
 }
@@ -188,7 +188,7 @@ impl TileRect {
 }
 
 /// The grids, windows and tiles of a transport; everything except its values.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Geometry {
     /// The camera grid, `N` pixels.
     pub camera: Extent,

@@ -44,7 +44,7 @@ impl SnrAccumulator {
 
     /// The SNR, finite if the error is zero.
     pub(crate) fn finite_snr(&self) -> Decibels {
-        Decibels(10.0 * (self.signal / self.error.max(f64::MIN_POSITIVE)).log10())
+        Decibels(10.0 * libm::log10(self.signal / self.error.max(f64::MIN_POSITIVE)))
     }
 }
 

@@ -64,7 +64,8 @@ impl Decoder {
         let (Some(transport), Some(index)) = (self.0.preview()?, self.0.index()) else {
             return Ok(None);
         };
-        Ok(Some(Photo::new(transport, &index.metadata)))
+        let metadata = index.metadata.text().to_owned();
+        Ok(Some(Photo::with_metadata(transport, metadata)))
     }
 
     /// The photograph, once the file is complete.
@@ -73,6 +74,6 @@ impl Decoder {
     /// A code that begins with `format-`: `format-truncated` if the file is not complete.
     pub fn finish(self) -> Result<Photo, CodedError> {
         let (transport, metadata) = self.0.finish()?;
-        Ok(Photo::new(transport, &metadata))
+        Ok(Photo::with_metadata(transport, metadata.text().to_owned()))
     }
 }

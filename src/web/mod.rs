@@ -1,6 +1,7 @@
 //! The WebAssembly surface: thin wrappers of [`format`](crate::format) and [`relight`](crate::relight) for JavaScript.
 //!
-//! Each feature is a module that browsers load when they need it: the decoder, and the backends CPU, WebGL2 and WebGPU.
+//! Each feature is a module that browsers load when they need it: the decoder, the recovery, and the backends CPU, WebGL2
+//! and WebGPU.
 //! Each module has its own memory, so a photograph is decoded in one and transferred to others ([`transfer`]). Every
 //! failure is thrown as a JavaScript `Error` with a `code` ([`CodedError`]).
 
@@ -13,6 +14,8 @@ mod error;
 mod graphics_device;
 mod photo;
 mod photo_transfer;
+#[cfg(feature = "recovery")]
+mod recovery;
 #[cfg(feature = "cpu")]
 mod row_range_relighter;
 /// What every module with a backend has.
@@ -33,5 +36,9 @@ pub use error::CodedError;
 #[cfg(any(feature = "webgl2", feature = "webgpu"))]
 pub use graphics_device::GraphicsDevice;
 pub use photo::Photo;
+#[cfg(feature = "recovery")]
+pub use recovery::{
+    MeasurementBuilder, MeasurementInput, RecoveredTransport, Recovery, TileRecovery,
+};
 #[cfg(feature = "cpu")]
 pub use row_range_relighter::{RowRangeRelighter, cpu_kernel};

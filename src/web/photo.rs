@@ -11,7 +11,7 @@ use crate::transport::{Geometry, Tile, Transport};
 #[wasm_bindgen]
 pub struct Photo {
     transport: Arc<Transport>,
-    #[cfg(feature = "decoder")]
+    #[cfg(any(feature = "decoder", feature = "recovery"))]
     metadata: String,
 }
 
@@ -60,7 +60,7 @@ impl Photo {
         let transport = photo_transfer::unpack_transport(geometry, basis)?;
         Ok(Self {
             transport: Arc::new(transport),
-            #[cfg(feature = "decoder")]
+            #[cfg(any(feature = "decoder", feature = "recovery"))]
             metadata: String::new(),
         })
     }
@@ -85,17 +85,18 @@ impl Photo {
 }
 
 /// The sending side.
-#[cfg(feature = "decoder")]
+#[cfg(any(feature = "decoder", feature = "recovery"))]
 impl Photo {
-    pub(super) fn new(transport: Transport, metadata: &crate::format::MetadataText) -> Self {
+    /// `metadata` is text, normally a JSON object.
+    pub(super) fn with_metadata(transport: Transport, metadata: String) -> Self {
         Self {
             transport: Arc::new(transport),
-            metadata: metadata.text().to_owned(),
+            metadata,
         }
     }
 }
 
-#[cfg(feature = "decoder")]
+#[cfg(any(feature = "decoder", feature = "recovery"))]
 #[wasm_bindgen]
 impl Photo {
     /// Columns of the picture.

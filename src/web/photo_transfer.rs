@@ -22,7 +22,7 @@ pub fn corrupt() -> CodedError {
 }
 
 /// Grids, window, tile side and correspondence, as `unpack_transport` reads them.
-#[cfg(feature = "decoder")]
+#[cfg(any(feature = "decoder", feature = "recovery"))]
 pub fn pack_geometry(geometry: &Geometry) -> Vec<f64> {
     let sides = geometry.sides().into_iter().flatten().map(f64::from);
     let affine = geometry.correspondence.affine.into_iter().flatten();

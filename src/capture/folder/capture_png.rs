@@ -4,12 +4,11 @@
 //! hundreds can be read in parallel without one of them in memory whole.
 
 use std::fmt::Display;
-use std::fs::File;
-use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::io::{BufReader, ErrorKind};
 
 use png::{BitDepth, ColorType, Transformations};
 
+use super::files::CaptureFiles;
 use crate::capture::error::{CaptureError, CaptureErrorKind};
 use crate::capture::measurements::Pattern;
 use crate::transport::{CHANNELS, Extent};
@@ -17,21 +16,22 @@ use crate::transport::{CHANNELS, Extent};
 /// Bytes read from a file at a time.
 const READ_BYTES: usize = 1 << 16;
 
-type PngReader = png::Reader<BufReader<ReopeningFile>>;
-
 /// A PNG and what the manifest says of it.
-pub(super) struct CapturePng {
-    path: PathBuf,
+pub(super) struct CapturePng<'a, F> {
+    files: &'a F,
+    /// Its name in the manifest.
+    name: &'a str,
     /// The size it must have.
     extent: Extent,
     /// The field of the manifest that names it, for messages.
     field: Option<String>,
 }
 
-impl CapturePng {
-    pub fn new(path: PathBuf, extent: Extent, field: Option<String>) -> Self {
+impl<'a, F: CaptureFiles> CapturePng<'a, F> {
+    pub fn new(files: &'a F, name: &'a str, extent: Extent, field: Option<String>) -> Self {
         Self {
-            path,
+            files,
+            name,
             extent,
             field,
         }
@@ -69,7 +69,7 @@ impl CapturePng {
     }
 
     /// Opens a 16-bit photograph to be read row by row.
-    pub fn open_rgb16(self) -> Result<Rgb16RowReader, CaptureError> {
+    pub fn open_rgb16(self) -> Result<Rgb16RowReader<'a, F>, CaptureError> {
         let reader = self.open(Transformations::IDENTITY)?;
         let info = reader.info();
         let found = (info.color_type, info.bit_depth);
@@ -82,8 +82,11 @@ impl CapturePng {
         Ok(Rgb16RowReader { reader, file: self })
     }
 
-    fn open(&self, transformations: Transformations) -> Result<PngReader, CaptureError> {
-        let file = ReopeningFile::open(&self.path).map_err(|e| match e.kind() {
+    fn open(
+        &self,
+        transformations: Transformations,
+    ) -> Result<png::Reader<BufReader<F::File>>, CaptureError> {
+        let file = self.files.open(self.name).map_err(|e| match e.kind() {
             ErrorKind::NotFound => self.error(CaptureErrorKind::Missing),
             _ => self.error(CaptureErrorKind::Io(e)),
         })?;
@@ -105,7 +108,7 @@ impl CapturePng {
 
     fn error(&self, problem: CaptureErrorKind) -> CaptureError {
         CaptureError {
-            path: self.path.clone(),
+            path: self.files.path(self.name),
             field: self.field.clone(),
             problem,
         }
@@ -125,12 +128,12 @@ fn sample_type((color, depth): (ColorType, BitDepth)) -> String {
 }
 
 /// A 16-bit RGB photograph that is read row by row from the top.
-pub(super) struct Rgb16RowReader {
-    file: CapturePng,
-    reader: PngReader,
+pub(super) struct Rgb16RowReader<'a, F: CaptureFiles> {
+    file: CapturePng<'a, F>,
+    reader: png::Reader<BufReader<F::File>>,
 }
 
-impl Rgb16RowReader {
+impl<F: CaptureFiles> Rgb16RowReader<'_, F> {
     /// The codes of the next row; `None` after the last.
     pub fn next(&mut self) -> Result<Option<impl Iterator<Item = [u16; CHANNELS]>>, CaptureError> {
         let row = self.reader.next_row();
@@ -148,44 +151,5 @@ impl Rgb16RowReader {
     pub fn finish(mut self) -> Result<(), CaptureError> {
         let finished = self.reader.finish();
         finished.map_err(|e| self.file.unreadable(e))
-    }
-}
-
-/// A file that is open only during a read: some systems allow a process no more than 256 open files.
-struct ReopeningFile {
-    path: PathBuf,
-    position: u64,
-    length: u64,
-}
-
-impl ReopeningFile {
-    fn open(path: &Path) -> io::Result<Self> {
-        Ok(Self {
-            path: path.to_owned(),
-            position: 0,
-            length: File::open(path)?.metadata()?.len(),
-        })
-    }
-}
-
-impl Read for ReopeningFile {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let mut file = File::open(&self.path)?;
-        file.seek(SeekFrom::Start(self.position))?;
-        let count = file.read(buffer)?;
-        self.position += count as u64;
-        Ok(count)
-    }
-}
-
-impl Seek for ReopeningFile {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        let position = match to {
-            SeekFrom::Start(position) => Some(position),
-            SeekFrom::Current(by) => self.position.checked_add_signed(by),
-            SeekFrom::End(by) => self.length.checked_add_signed(by),
-        };
-        self.position = position.ok_or(ErrorKind::InvalidInput)?;
-        Ok(self.position)
     }
 }

@@ -1,15 +1,22 @@
-//! A capture folder on disk.
+//! A capture folder, on disk or in other files.
 //!
 //! The manifest is checked when the folder is opened; patterns and photographs are read one by one, so that callers may
 //! read them in parallel.
 
 mod capture_png;
+mod disk_files;
+mod files;
 mod photograph_row_reader;
+#[cfg(not(target_arch = "wasm32"))]
 mod truth;
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
+pub use self::disk_files::DiskFiles;
+pub use self::files::CaptureFiles;
 pub use self::photograph_row_reader::{DarkFrame, PhotographRowReader};
+#[cfg(not(target_arch = "wasm32"))]
 pub use self::truth::{GroundTruth, RELIT_FULL_SCALE};
 
 use self::capture_png::CapturePng;
@@ -23,8 +30,8 @@ use crate::transport::{CHANNELS, Correspondence};
 
 /// A capture folder with its checked manifest.
 #[derive(Debug)]
-pub struct CaptureFolder {
-    root: PathBuf,
+pub struct CaptureFolder<F = DiskFiles> {
+    files: F,
     manifest: Manifest,
     emission: [f64; 256],
 }
@@ -46,13 +53,37 @@ impl CaptureFolder {
             let problem = CaptureErrorKind::NotACapture(problem);
             return Err(CaptureError::new(root, problem));
         }
-        let text = std::fs::read_to_string(&path)
+        let root = root.to_owned();
+        Self::from_files(DiskFiles { root })
+    }
+
+    /// The known transport, if the folder has any.
+    ///
+    /// # Errors
+    /// If its files cannot be read or have the wrong shape.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn truth(&self) -> Result<Option<GroundTruth>, CaptureError> {
+        GroundTruth::open(&self.files.root.join("truth"), &self.manifest)
+    }
+}
+
+impl<F: CaptureFiles> CaptureFolder<F> {
+    /// Reads the manifest of a folder with these files.
+    ///
+    /// # Errors
+    /// If there is no valid `capture.json`.
+    pub fn from_files(files: F) -> Result<Self, CaptureError> {
+        let path = files.path(MANIFEST_NAME);
+        let mut text = String::new();
+        files
+            .open(MANIFEST_NAME)
+            .and_then(|mut file| file.read_to_string(&mut text))
             .map_err(|e| CaptureError::new(&path, CaptureErrorKind::Io(e)))?;
         // Some editors write a byte order mark, which is not JSON.
         let json = text.strip_prefix('\u{feff}').unwrap_or(&text);
         let manifest = Manifest::parse(json, &path)?;
         Ok(Self {
-            root: root.to_owned(),
+            files,
             emission: manifest.light.emission(),
             manifest,
         })
@@ -65,7 +96,7 @@ impl CaptureFolder {
 
     /// Path of the manifest.
     pub fn manifest_path(&self) -> PathBuf {
-        self.root.join(MANIFEST_NAME)
+        self.files.path(MANIFEST_NAME)
     }
 
     /// Names and paths of all files that recovery from `shots` reads.
@@ -78,16 +109,8 @@ impl CaptureFolder {
         if manifest.correspondence.is_none() {
             names.extend(manifest.graycode.iter().map(|shot| shot.photo.as_str()));
         }
-        let path = |name| (name, self.root.join(name));
+        let path = |name| (name, self.files.path(name));
         names.into_iter().map(path).collect()
-    }
-
-    /// The known transport, if the folder has any.
-    ///
-    /// # Errors
-    /// If its files cannot be read or have the wrong shape.
-    pub fn truth(&self) -> Result<Option<GroundTruth>, CaptureError> {
-        GroundTruth::open(&self.root.join("truth"), &self.manifest)
     }
 
     /// Reads `rows` of the Gray code photographs.
@@ -154,8 +177,8 @@ impl CaptureFolder {
         let light = match &self.manifest.dark {
             None => vec![[0.0; CHANNELS]; camera.extent().area()],
             Some(name) => {
-                let (path, field) = (self.root.join(name), Some("dark".to_owned()));
-                let file = CapturePng::new(path, camera.extent(), field);
+                let field = Some("dark".to_owned());
+                let file = CapturePng::new(&self.files, name, camera.extent(), field);
                 let codes = file.read_rgb16()?.into_iter();
                 let linear = |code| camera.linear(code, 1.0);
                 codes.map(|codes| codes.map(linear)).collect()
@@ -173,9 +196,9 @@ impl CaptureFolder {
     pub fn open_flood<'a>(
         &'a self,
         dark: &'a DarkFrame,
-    ) -> Result<Option<PhotographRowReader<'a>>, CaptureError> {
+    ) -> Result<Option<PhotographRowReader<'a, F>>, CaptureError> {
         let flood = self.manifest.flood.as_ref();
-        let open = |name: &String| self.open_photo(name, "flood".to_owned(), 1.0, dark);
+        let open = |name: &'a String| self.open_photo(name, "flood".to_owned(), 1.0, dark);
         flood.map(open).transpose()
     }
 
@@ -190,7 +213,7 @@ impl CaptureFolder {
         &'a self,
         i: usize,
         dark: &'a DarkFrame,
-    ) -> Result<PhotographRowReader<'a>, CaptureError> {
+    ) -> Result<PhotographRowReader<'a, F>, CaptureError> {
         let field = format!("shots[{i}].photo");
         let name = &self.manifest.shots[i].photo;
         self.open_photo(name, field, self.exposure(i), dark)
@@ -204,9 +227,9 @@ impl CaptureFolder {
     /// # Panics
     /// If there is no such shot.
     pub fn read_pattern(&self, i: usize) -> Result<Pattern, CaptureError> {
-        let path = self.root.join(&self.manifest.shots[i].pattern);
+        let name = &self.manifest.shots[i].pattern;
         let (light, field) = (self.manifest.light.extent(), format!("shots[{i}].pattern"));
-        CapturePng::new(path, light, Some(field)).read_pattern(&self.emission)
+        CapturePng::new(&self.files, name, light, Some(field)).read_pattern(&self.emission)
     }
 
     /// Measurements of `shots` without any camera rows yet. Their noise has only its floor.
@@ -237,13 +260,13 @@ impl CaptureFolder {
 
     fn open_photo<'a>(
         &'a self,
-        name: &str,
+        name: &'a str,
         field: String,
         exposure: f64,
         dark: &'a DarkFrame,
-    ) -> Result<PhotographRowReader<'a>, CaptureError> {
+    ) -> Result<PhotographRowReader<'a, F>, CaptureError> {
         let camera = &self.manifest.camera;
-        let file = CapturePng::new(self.root.join(name), camera.extent(), Some(field));
+        let file = CapturePng::new(&self.files, name, camera.extent(), Some(field));
         Ok(PhotographRowReader {
             camera,
             dark,

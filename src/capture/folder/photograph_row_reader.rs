@@ -1,6 +1,8 @@
 //! One photograph as measurements, read row by row.
 
 use super::capture_png::Rgb16RowReader;
+use super::disk_files::DiskFiles;
+use super::files::CaptureFiles;
 use crate::capture::camera_row_set::CameraRowSet;
 use crate::capture::error::CaptureError;
 use crate::capture::manifest::ManifestCamera;
@@ -18,16 +20,16 @@ pub struct DarkFrame {
 }
 
 /// Reads the camera rows of one photograph once, from the top down.
-pub struct PhotographRowReader<'a> {
+pub struct PhotographRowReader<'a, F: CaptureFiles = DiskFiles> {
     pub(super) camera: &'a ManifestCamera,
     pub(super) dark: &'a DarkFrame,
     pub(super) exposure: f64,
-    pub(super) codes: Rgb16RowReader,
+    pub(super) codes: Rgb16RowReader<'a, F>,
     pub(super) next_row: u32,
     pub(super) saturated_samples: usize,
 }
 
-impl PhotographRowReader<'_> {
+impl<F: CaptureFiles> PhotographRowReader<'_, F> {
     /// Appends those of `rows` that were not read before to `photo`, as measurements minus the dark frame, NaN where
     /// saturated. Skips the rows between them.
     ///

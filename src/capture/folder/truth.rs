@@ -4,12 +4,13 @@
 
 use std::fs::File;
 use std::io::{self, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use half::f16;
 use npyz::NpyFile;
 
 use super::capture_png::CapturePng;
+use super::disk_files::DiskFiles;
 use crate::capture::error::{CaptureError, CaptureErrorKind};
 use crate::capture::manifest::Manifest;
 use crate::capture::measurements::Pattern;
@@ -21,7 +22,7 @@ pub const RELIT_FULL_SCALE: f64 = 0.9 * 65535.0;
 /// Known transport, and pictures under lights that recovery does not use.
 #[derive(Debug)]
 pub struct GroundTruth {
-    root: PathBuf,
+    files: DiskFiles,
     emission: [f64; 256],
     /// Camera grid.
     pub camera: Extent,
@@ -62,7 +63,9 @@ impl GroundTruth {
             window.origin(LightPosition { u, v })
         };
         Ok(Some(Self {
-            root: root.to_owned(),
+            files: DiskFiles {
+                root: root.to_owned(),
+            },
             emission: manifest.light.emission(),
             camera,
             light_plane: manifest.light.extent(),
@@ -88,9 +91,9 @@ impl GroundTruth {
     /// # Errors
     /// If the folder cannot be read.
     pub fn lights(&self) -> Result<Vec<String>, CaptureError> {
-        let io = |e| CaptureError::new(&self.root, CaptureErrorKind::Io(e));
+        let io = |e| CaptureError::new(&self.files.root, CaptureErrorKind::Io(e));
         let mut names = Vec::new();
-        for entry in std::fs::read_dir(&self.root).map_err(io)? {
+        for entry in std::fs::read_dir(&self.files.root).map_err(io)? {
             let name = entry.map_err(io)?.file_name();
             let light = name.to_str().and_then(|n| n.strip_prefix("light_"));
             if let Some(name) = light.and_then(|n| n.strip_suffix(".png")) {
@@ -106,8 +109,8 @@ impl GroundTruth {
     /// # Errors
     /// If its picture cannot be read.
     pub fn light(&self, name: &str) -> Result<Pattern, CaptureError> {
-        let path = self.root.join(format!("light_{name}.png"));
-        CapturePng::new(path, self.light_plane, None).read_pattern(&self.emission)
+        let name = format!("light_{name}.png");
+        CapturePng::new(&self.files, &name, self.light_plane, None).read_pattern(&self.emission)
     }
 
     /// The true picture under light `name`, `[N]`, in units of the measurement.
@@ -115,8 +118,8 @@ impl GroundTruth {
     /// # Errors
     /// If it cannot be read.
     pub fn relit(&self, name: &str) -> Result<Vec<[f64; CHANNELS]>, CaptureError> {
-        let path = self.root.join(format!("relit_{name}.png"));
-        let file = CapturePng::new(path, self.camera, None);
+        let name = format!("relit_{name}.png");
+        let file = CapturePng::new(&self.files, &name, self.camera, None);
         let codes = file.read_rgb16()?.into_iter();
         let linear = |code| f64::from(code) / RELIT_FULL_SCALE;
         Ok(codes.map(|codes| codes.map(linear)).collect())

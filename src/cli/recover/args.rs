@@ -5,20 +5,14 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use crate::cli::value_parsers::{ByteCount, parse_number};
-use crate::format::{DistortionMetric, EncodingTarget, HEADER_BYTES};
+use crate::export::FileQuality;
+use crate::format::HEADER_BYTES;
 use crate::recover::{Method, SparsityBasis};
 use crate::transport::{Decibels, Window};
 
 /// Enough for about ten megapixels under 80 patterns. A constant, not a share of the machine's memory, so that the same
 /// command writes the same bytes on every machine.
 const DEFAULT_MEMORY: &str = "4G";
-
-/// Default loss of SNR by the file, as hold-out validation estimates it. Validation recovers from fewer patterns, and
-/// so with slightly more noise.
-const DEFAULT_LOSS: Decibels = Decibels(0.5);
-/// Default SNR of the file relative to the recovered transport without hold-out validation. With so few patterns the
-/// transport is noisy.
-const DEFAULT_SNR: Decibels = Decibels(32.0);
 
 /// Recover the light transport of an object from a folder of photographs
 #[derive(Debug, Args)]
@@ -71,17 +65,13 @@ impl RecoverArgs {
         }
     }
 
-    /// The quality or size asked for, or the default quality, which needs a distortion metric.
-    pub fn encoding_target<'a>(
-        &self,
-        metric: Option<&'a dyn DistortionMetric>,
-    ) -> EncodingTarget<'a> {
-        match (self.quality, self.max_bytes, metric) {
-            (Some(snr), ..) => EncodingTarget::Snr(Decibels(f64::from(snr))),
-            (_, Some(max_bytes), _) => EncodingTarget::Bytes(max_bytes.0),
-            _ if self.lossless => EncodingTarget::Lossless,
-            (.., Some(metric)) => EncodingTarget::Loss(DEFAULT_LOSS, metric),
-            (.., None) => EncodingTarget::Snr(DEFAULT_SNR),
+    /// The quality or size asked for.
+    pub fn quality(&self) -> FileQuality {
+        match (self.quality, self.max_bytes) {
+            (Some(snr), _) => FileQuality::Snr(Decibels(f64::from(snr))),
+            (_, Some(max_bytes)) => FileQuality::MaxBytes(max_bytes.0),
+            _ if self.lossless => FileQuality::Lossless,
+            _ => FileQuality::ByNoise,
         }
     }
 }

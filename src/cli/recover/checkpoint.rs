@@ -7,7 +7,7 @@
 //! |---|---|
 //! | `u32::MAX` | the [`CheckpointKey`] as JSON; the first record |
 //! | `u32::MAX - 1` | the [fingerprint](super::checkpoint_key) of the prepared recovery; the second record |
-//! | index of a tile | the [tile](super::tile_record); in the order of completion |
+//! | index of a tile | the [tile](crate::export::encode_tile); in the order of completion |
 //!
 //! When the process ends, only the last record can be incomplete; it is then ignored.
 
@@ -150,7 +150,7 @@ impl Checkpoint {
         }
     }
 
-    /// Appends tile `i` with `content`, encoded by [`tile_record`](super::tile_record).
+    /// Appends tile `i` with `content`, encoded by [`encode_tile`](crate::export::encode_tile).
     pub fn add(&mut self, i: usize, content: &[u8]) -> Result<()> {
         self.tiles[i] = Some(self.append(i as u32, content)?);
         self.delete_on_drop = false;

@@ -11,15 +11,15 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::args::RecoverArgs;
-use super::memory_plan::MemoryPlan;
 use crate::capture::CaptureFolder;
 use crate::cli::process_resources::{Interrupted, InterruptibleCores};
+use crate::export::MemoryPlan;
 use crate::job_executor::Executor;
 use crate::recover::{HoldoutValidation, PreparedRecovery};
 use crate::transport::Window;
 
 /// Name and version of this program.
-pub const PROGRAM: &str = concat!("ltm-export ", env!("CARGO_PKG_VERSION"));
+const PROGRAM: &str = concat!("ltm-export ", env!("CARGO_PKG_VERSION"));
 
 /// Everything that determines the recovered tiles.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,37 +1,27 @@
 //! One recovery: from the photographs to the file.
 
+use std::io::ErrorKind;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use anyhow::{Context, Error, Result, bail};
+use anyhow::{Context, Error, Result};
 use rayon::prelude::*;
 
 use super::args::RecoverArgs;
 use super::checkpoint::{Checkpoint, lock};
-use super::checkpoint_key::{CheckpointKey, PROGRAM, recovery_fingerprint};
-use super::encode::encode_file;
-use super::memory_plan::MemoryPlan;
+use super::checkpoint_key::{CheckpointKey, recovery_fingerprint};
+use super::messages;
 use super::report::RecoverReport;
-use super::{shot_selection, tile_record};
-use crate::capture::{CaptureFolder, DarkFrame, Measurements, group_count, group_ids};
+use crate::capture::{CaptureFolder, DarkFrame, Measurements};
 use crate::cli::measurement_reader::{MeasurementReader, read_patterns};
 use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process_resources::{InterruptibleCores, peak_rss_bytes};
 use crate::cli::progress;
-use crate::format::{CaptureMetadata, Metadata};
+use crate::export::{self, MemoryPlan, PreparedExport};
+use crate::format::{EncodedFile, FormatError, Metadata};
 use crate::job_executor::{Cancelled, Executor};
-use crate::recover::{
-    HoldoutValidation, MIN_PATTERNS, PreparedRecovery, RecoverError, RecoverySettings,
-    TailEstimate, WindowSizeEstimate,
-};
-use crate::transport::{Basis, Decibels, Window};
-
-/// SNR on held-out patterns below which the photographs are probably at fault.
-const MIN_PLAUSIBLE_SNR: Decibels = Decibels(13.0);
-
-/// Unit of light transport in the file's metadata.
-const UNITS: &str =
-    "camera value where camera.black is 0 and camera.white is 1, per light element at full code";
+use crate::recover::{MIN_PATTERNS, PreparedRecovery, RecoverError, TailEstimate};
+use crate::transport::Basis;
 
 pub struct RecoverJob<'a> {
     pub start: Instant,
@@ -75,36 +65,37 @@ impl RecoverJob<'_> {
         saturated: usize,
         checkpoint: &Mutex<Checkpoint>,
     ) -> Result<RecoverReport> {
-        shot_selection::warn_of_saturation(saturated, &measurements);
-        let (window, tail_fraction) = self.choose_window(&measurements)?;
-        let method = self.args.method();
-        let recovery = self.prepare(&measurements, RecoverySettings { method, window })?;
+        messages::warn_of_saturation(saturated, &measurements);
+        let prepared = self.prepare(&measurements)?;
+        let recovery = &prepared.recovery;
+        let (method, window) = (self.args.method(), recovery.geometry().window);
         let rank = recovery.basis().map(Basis::rank);
-        let encoders = self.plan.tiles_encoded_at_once(window, rank.unwrap_or(0))?;
-        lock(checkpoint).set_fingerprint(recovery_fingerprint(&recovery))?;
+        let encoders = self.plan.tiles_encoded_at_once(window, rank.unwrap_or(0));
+        let encoders = encoders.map_err(messages::too_little_memory)?;
+        lock(checkpoint).set_fingerprint(recovery_fingerprint(recovery))?;
         let noise = measurements.noise;
         let overexposed =
-            self.recover_tiles(measurements, dark, &recovery, checkpoint, saturated > 0)?;
-        let listed = &self.folder.manifest().shots;
-        let patterns = self.shots.iter().map(|&i| &listed[i].pattern);
-        let patterns = group_count(&group_ids(patterns));
-        let metadata = self.metadata(patterns);
-        let encode = || encode_file(self.args, checkpoint, &recovery, metadata, self.cores);
+            self.recover_tiles(measurements, dark, recovery, checkpoint, saturated > 0)?;
+        let metadata = export::metadata(self.folder.manifest(), self.shots, method);
+        let patterns = metadata.capture.patterns;
+        let encode = || self.encode(recovery, checkpoint, metadata);
         let file = thread_pool(encoders)?.install(encode)?;
         let output = OutputFile::create(&self.args.output, &LTM)?;
         let file_bytes = output.finish(|out| Ok(file.write(out)?))?;
-        let validation = recovery.holdout_validation();
         Ok(RecoverReport {
             seconds: self.start.elapsed().as_secs_f64(),
             peak_rss_bytes: peak_rss_bytes(),
             method,
             basis: method.basis(),
             window: window.side(),
-            leak: tail_fraction,
+            leak: match prepared.band {
+                Some(TailEstimate::Bounded { tail_fraction }) => Some(tail_fraction),
+                _ => None,
+            },
             rank,
             patterns,
             photographs: self.shots.len(),
-            expected_snr_db: validation.and_then(HoldoutValidation::snr),
+            expected_snr_db: prepared.expected_snr(),
             file_snr_db: file.snr(),
             common_mode: recovery.common_mode(),
             noise,
@@ -115,58 +106,15 @@ impl RecoverJob<'_> {
         })
     }
 
-    /// The window given or estimated; if estimated, with the share of light from outside the window.
-    fn choose_window(&self, measurements: &Measurements) -> Result<(Window, Option<f64>)> {
-        if let Some(window) = self.args.window {
-            return Ok((window, None));
-        }
-        let estimate = WindowSizeEstimate::from_measurements(measurements, self.cores);
-        let WindowSizeEstimate { window, band } = estimate.map_err(|e| self.recover_error(e))?;
-        let side = window.side();
-        match band {
-            TailEstimate::Bounded { tail_fraction } => {
-                return Ok((window, Some(tail_fraction)));
-            }
-            TailEstimate::Unbounded => eprintln!(
-                "warning: the band is at least as wide as the largest window tried, {side}x{side} light \
-                 elements; a larger one can be given by --window"
-            ),
-            TailEstimate::Undetermined => eprintln!(
-                "warning: the photographs do not show how wide the band is; a window of {side}x{side} \
-                 light elements is used, another can be given by --window"
-            ),
-        }
-        Ok((window, None))
-    }
-
-    /// Learns or chooses what the method needs. Refuses photographs without a signal.
-    fn prepare(
-        &self,
-        measurements: &Measurements,
-        settings: RecoverySettings,
-    ) -> Result<PreparedRecovery> {
+    /// Chooses the window, and learns or chooses what the method needs.
+    fn prepare(&self, measurements: &Measurements) -> Result<PreparedExport> {
         let spinner = progress::spinner("learning");
-        let recovery = PreparedRecovery::prepare(measurements, settings, self.cores);
+        let (method, window) = (self.args.method(), self.args.window);
+        let prepared = export::prepare(measurements, method, window, self.cores);
         drop(spinner);
-        let recovery = recovery.map_err(|error| self.recover_error(error))?;
-        let Some(validation) = recovery.holdout_validation() else {
-            return Ok(recovery);
-        };
-        if !validation.has_signal() {
-            bail!(
-                "{}: photographs do not differ from pattern to pattern by more than their noise; check \
-                 that each of \"shots\" names its own photo, and that the light was on",
-                self.folder.manifest_path().display()
-            );
-        }
-        if let Some(snr) = validation.snr().filter(|snr| *snr < MIN_PLAUSIBLE_SNR) {
-            eprintln!(
-                "warning: the SNR on held-out patterns is only {snr}; check that the photographs are \
-                 linear, that the light was steady and that the correspondence is right. With few \
-                 patterns, or another method than learned, it may not get better"
-            );
-        }
-        Ok(recovery)
+        let prepared = prepared.map_err(|error| self.recover_error(error))?;
+        messages::warn_of_preparation(&prepared);
+        Ok(prepared)
     }
 
     /// Recovers the tiles that the checkpoint lacks, strip by strip. Returns the number of overexposed pixels, which is
@@ -201,7 +149,7 @@ impl RecoverJob<'_> {
                     self.cores.check_cancelled()?;
                     let tile = recovery.tile(&measurements, rect);
                     let record =
-                        tile_record::encode(&tile).context("a tile cannot be compressed")?;
+                        export::encode_tile(&tile).context("a tile cannot be compressed")?;
                     lock(checkpoint).add(i, &record)?;
                     bar.inc(1);
                 }
@@ -224,21 +172,28 @@ impl RecoverJob<'_> {
         Ok(overexposed)
     }
 
-    fn metadata(&self, patterns: usize) -> Metadata {
-        let manifest = self.folder.manifest();
-        Metadata {
-            title: manifest.title.clone(),
-            creator: manifest.creator.clone(),
-            rights: manifest.rights.clone(),
-            capture: CaptureMetadata {
-                patterns,
-                photographs: self.shots.len(),
-            },
-            writer: PROGRAM.to_owned(),
-            method: self.args.method().name().to_owned(),
-            units: UNITS.to_owned(),
-            shots_used: self.shots.to_vec(),
-        }
+    /// Encodes the tiles in `checkpoint`. An interruption is reported as [`Cancelled`].
+    fn encode(
+        &self,
+        recovery: &PreparedRecovery,
+        checkpoint: &Mutex<Checkpoint>,
+        metadata: Metadata,
+    ) -> Result<EncodedFile> {
+        let _spinner = progress::spinner("compressing");
+        let record = |i| lock(checkpoint).read(i);
+        let quality = self.args.quality();
+        let file = export::encode_file(recovery, &record, metadata, quality, self.cores);
+        file.map_err(|error| {
+            let output = self.args.output.display();
+            match error {
+                FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
+                FormatError::TooLarge { .. } => Error::new(error).context(format!(
+                    "{output}: cannot be written; the recovered tiles are kept: give the same command \
+                     with --resume and a larger --max-bytes, or without --max-bytes"
+                )),
+                other => Error::new(other).context(output.to_string()),
+            }
+        })
     }
 
     /// Names the capture, or the shots, that an error of the recovery is about.
@@ -247,7 +202,10 @@ impl RecoverJob<'_> {
             RecoverError::Cancelled(cancelled) => cancelled.into(),
             RecoverError::MismatchedPatterns { pattern_indices } => {
                 let shots = pattern_indices.iter().map(|&l| self.shots[l]);
-                shot_selection::mismatched_shots(self.folder, shots)
+                messages::mismatched_shots(self.folder, shots)
+            }
+            RecoverError::IndistinctPhotographs => {
+                Error::new(error).context(self.folder.manifest_path().display().to_string())
             }
             other => Error::new(other).context(self.args.capture.display().to_string()),
         }

@@ -1,17 +1,13 @@
 //! `ltm-export recover`: a capture folder to an `.ltm` file.
 //!
 //! [`job`] reads the photographs, prepares a recovery, recovers its tiles into a [`checkpoint`] and encodes them.
-//! [`memory_plan`] keeps all of it within `--memory`.
 
 mod args;
 mod checkpoint;
 mod checkpoint_key;
-mod encode;
 mod job;
-mod memory_plan;
+mod messages;
 mod report;
-mod shot_selection;
-mod tile_record;
 
 use std::time::Instant;
 
@@ -20,12 +16,12 @@ use anyhow::{Context, Result, bail};
 pub use self::args::RecoverArgs;
 
 use self::job::{RecoverJob, thread_pool};
-use self::memory_plan::MemoryPlan;
 use super::output_file::{LTM, OutputFile};
 use super::process_resources::InterruptibleCores;
 use super::report::print_json;
 use super::value_parsers::UsageError;
 use crate::capture::CaptureFolder;
+use crate::export::{MemoryPlan, select_shots};
 use crate::recover::{MIN_PATTERNS, RecoverError, WindowSizeEstimate};
 
 pub fn run(args: &RecoverArgs) -> Result<()> {
@@ -38,18 +34,22 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     drop(OutputFile::create(&args.output, &LTM)?);
     let folder = CaptureFolder::open(&args.capture)?;
     let manifest = folder.manifest();
-    shot_selection::warn_of_unknown_fields(&folder);
-    let shots = shot_selection::choose_shots(&manifest.shots, args.patterns)?;
+    messages::warn_of_unknown_fields(&folder);
+    let shots = select_shots(&manifest.shots, args.patterns.map(|k| k as usize))
+        .map_err(messages::too_few_shots)?;
     if shots.len() < MIN_PATTERNS {
         let manifest = folder.manifest_path().display().to_string();
         return Err(RecoverError::TooFewPatterns(shots.len())).context(manifest);
     }
     let method = args.method();
     let max_window = args.window.unwrap_or(WindowSizeEstimate::MAX_WINDOW);
-    let (limit, threads) = (args.memory, rayon::current_num_threads());
-    let plan = MemoryPlan::new(limit, manifest, shots.len(), method, max_window, threads)?;
+    let (limit, threads) = (args.memory.0, rayon::current_num_threads());
+    let extents = (manifest.camera.extent(), manifest.light.extent());
+    let plan = MemoryPlan::new(limit, extents, shots.len(), method, max_window, threads)
+        .map_err(messages::too_little_memory)?;
     if let Some(window) = args.window {
-        plan.tiles_encoded_at_once(window, method.max_rank(window))?;
+        let encoders = plan.tiles_encoded_at_once(window, method.max_rank(window));
+        encoders.map_err(messages::too_little_memory)?;
     }
     let job = RecoverJob {
         start,
@@ -59,7 +59,7 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         plan: &plan,
         cores: &cores,
     };
-    let report = thread_pool(plan.tiles_at_once)?.install(|| job.run())?;
+    let report = thread_pool(plan.tiles_at_once())?.install(|| job.run())?;
     match args.json {
         true => print_json(&report),
         false => report.print(args, manifest),

@@ -28,10 +28,10 @@ impl QuantisedBasis {
         let mut quantised = Self::default();
         for (function, step) in functions.iter().zip(steps) {
             let peak = function.iter().fold(0.0f32, |peak, v| peak.max(v.abs()));
-            let finest = (f32::from(i16::MAX) / peak.max(1e-6)).log2().floor();
-            let wanted = (-step.log2()).ceil();
+            let finest = libm::log2f(f32::from(i16::MAX) / peak.max(1e-6)).floor();
+            let wanted = (-libm::log2f(*step)).ceil();
             let exponent = wanted.min(finest).clamp(0.0, f32::from(MAX_EXPONENT));
-            let scale = exponent.exp2();
+            let scale = libm::exp2f(exponent);
             quantised.exponents.push(exponent as u8);
             let codes = function.iter().map(|v| (v * scale).round() as i16);
             quantised.codes.extend(codes); // `as` saturates

@@ -23,7 +23,7 @@ pub fn content_bytes(values: usize) -> usize {
 pub fn step_for(peak: f32) -> f32 {
     // Half precision ends at 65504; a few binades remain for other tiles.
     match peak.is_normal() {
-        true => (peak.log2().ceil() - 14.0).clamp(-120.0, 100.0).exp2(),
+        true => libm::exp2f((libm::log2f(peak).ceil() - 14.0).clamp(-120.0, 100.0)),
         false => 1.0,
     }
 }

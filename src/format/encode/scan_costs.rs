@@ -98,7 +98,7 @@ impl RateDistortionModel {
             let all: f64 = counts.iter().sum();
             // Sign and mantissa bits follow a token.
             std::array::from_fn::<f64, 256, _>(|token| {
-                (all / counts[token].max(1.0)).log2() + (token % 16) as f64
+                libm::log2(all / counts[token].max(1.0)) + (token % 16) as f64
             })
         });
         let mut sums = vec![RateDistortion::default(); count];

@@ -54,7 +54,10 @@ impl Iterate {
                 let coefficients = operator.coefficients(&x);
                 let total: f64 = coefficients.iter().map(|c| c.abs()).sum();
                 let mu = total / (2 * coefficients.len() + x.len() + 1) as f64;
-                let t: Vec<f64> = coefficients.iter().map(|c| mu + mu.hypot(*c)).collect();
+                let t: Vec<f64> = coefficients
+                    .iter()
+                    .map(|c| mu + libm::hypot(mu, *c))
+                    .collect();
                 return Some(Self {
                     s: coefficients.iter().zip(&t).map(|(c, t)| c / t).collect(),
                     t,

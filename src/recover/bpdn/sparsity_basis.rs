@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 /// φ, in which a light transport function has few large coefficients. The command line shows the variants' descriptions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(
     all(feature = "cli", not(target_arch = "wasm32")),
     derive(clap::ValueEnum)
@@ -42,7 +42,7 @@ impl SparsityBasis {
                 for (i, row) in basis.chunks_exact_mut(side).enumerate() {
                     let norm = (if i == 0 { 1.0 } else { 2.0 } / side as f64).sqrt();
                     for (j, b) in row.iter_mut().enumerate() {
-                        *b = norm * (PI * i as f64 * (j as f64 + 0.5) / side as f64).cos();
+                        *b = norm * libm::cos(PI * i as f64 * (j as f64 + 0.5) / side as f64);
                     }
                 }
             }

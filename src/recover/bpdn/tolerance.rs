@@ -5,6 +5,8 @@
 //! so that ε² = L σ² smooths too much. d depends on patterns, scene and basis. Therefore `ε² = share · L σ²` with a
 //! share that is chosen on held-out patterns.
 
+use serde::{Deserialize, Serialize};
+
 use crate::recover::sampling::mean;
 
 /// Iterations of the reweighted least-squares fit.
@@ -13,7 +15,7 @@ const REWEIGHTINGS: usize = 4;
 const MIN_EXPECTED_VARIANCE_SHARE: f64 = 0.1;
 
 /// The noise model and the share that determine ε.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResidualTolerance {
     /// Noise variance for each unit of the measurement.
     pub gain: f64,

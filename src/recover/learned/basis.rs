@@ -5,6 +5,8 @@
 //! element in f32, which is as exact as the measurements, so that a block of responses stays in vector registers while a
 //! pattern is read once.
 
+use serde::{Deserialize, Serialize};
+
 use crate::capture::Measurements;
 use crate::linalg::vectorise;
 use crate::transport::{Basis, Geometry, LightElement};
@@ -13,7 +15,7 @@ use crate::transport::{Basis, Geometry, LightElement};
 const MIN_BLOCK_WIDTH: usize = 8;
 
 /// An orthonormal basis of functions on the window, and the mean light transport function.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct LearnedBasis {
     pub functions: Basis,
     /// `[element, stride]`: basis functions, the mean function, zeros.

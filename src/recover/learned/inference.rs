@@ -4,6 +4,8 @@
 //! coefficients f ẑ, `[pixel, component]` with a value for each channel. ẑ is the posterior mean under the pixel prior
 //! or, if the model has a neighbour prior, under the mixture of both, moved by the non-negativity penalty.
 
+use serde::{Deserialize, Serialize};
+
 use super::basis::LearnedBasis;
 use super::equations::{MinReliableBrightness, ObservationEquations, with_margin};
 use super::neighbour_prior::NeighbourPrior;
@@ -18,7 +20,7 @@ use crate::recover::prediction;
 use crate::transport::{CHANNELS, FloatTile, Geometry, TileRect, TileTransportFunctions};
 
 /// Everything that training learns.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct LearnedModel {
     pub geometry: Geometry,
     pub basis: LearnedBasis,

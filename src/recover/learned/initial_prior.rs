@@ -29,7 +29,7 @@ const SMOOTHING_SIGMA: f64 = 1.0;
 /// Smooths a function on the window, `[side²]`, by a Gaussian and scales it to sum 1.
 pub(super) fn smooth(function: &[f64], side: usize) -> Vec<f64> {
     let radius = (3.0 * SMOOTHING_SIGMA).ceil() as i64;
-    let tap = |d: i64| (-0.5 * (d as f64 / SMOOTHING_SIGMA).powi(2)).exp();
+    let tap = |d: i64| libm::exp(-0.5 * (d as f64 / SMOOTHING_SIGMA).powi(2));
     let norm: f64 = (-radius..=radius).map(tap).sum();
     // Along one axis, `[side, side]`.
     let blur = (0..side * side).map(|i| match (i / side).abs_diff(i % side) as i64 {
@@ -54,8 +54,8 @@ pub(super) fn initial_prior(
     let covariance = executor.map(area, |s| {
         let (v, u) = ((s / side) as f64, (s % side) as f64);
         let row = (0..area).map(|t| {
-            let distance = (v - (t / side) as f64).hypot(u - (t % side) as f64);
-            RELATIVE_VARIANCE * mean[s] * mean[t] * (-distance / CORRELATION_LENGTH).exp()
+            let distance = libm::hypot(v - (t / side) as f64, u - (t % side) as f64);
+            RELATIVE_VARIANCE * mean[s] * mean[t] * libm::exp(-distance / CORRELATION_LENGTH)
         });
         row.collect::<Vec<f64>>()
     });
@@ -70,7 +70,7 @@ pub(super) fn initial_prior(
     // Cosines of rising frequency times h are near the eigenvectors.
     let frequencies = (0..).flat_map(|sum| (0..=sum).map(move |v| (v, sum - v)));
     let cosine = |f: usize, x: usize| {
-        (std::f64::consts::PI * f as f64 * (x as f64 + 0.5) / side as f64).cos()
+        libm::cos(std::f64::consts::PI * f as f64 * (x as f64 + 0.5) / side as f64)
     };
     let mut functions: Vec<f64> = Vec::with_capacity(rank * area);
     for (fv, fu) in frequencies.take(rank) {

@@ -33,6 +33,8 @@ mod prior;
 mod tests;
 mod training;
 
+use serde::{Deserialize, Serialize};
+
 use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
 use super::holdout_split::HoldoutSplit;
@@ -49,7 +51,7 @@ pub(super) use posterior_means::NEIGHBOURHOOD_RADIUS as MAX_HALO;
 pub(super) use training::{max_rank, preparation_bytes};
 
 /// The learned model and, where blending pays, non-negative least squares.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct LearnedRecovery {
     model: LearnedModel,
     /// `None` where blending with least squares does not pay over the whole picture.

@@ -21,6 +21,8 @@
 //!
 //! [`neighbour_regression`]: super::neighbour_regression
 
+use serde::{Deserialize, Serialize};
+
 use super::equations::PHASES;
 use super::neighbour_regression::{RegressionSums, add_products, solve_regressions};
 use super::posterior::{PosteriorSolver, PriorPrecision};
@@ -49,7 +51,7 @@ fn class(region: &PosteriorMeans<'_>, location: PixelObservationPosition) -> usi
     region.equations.observations[location.index].phase * CHANNELS + location.channel
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct NeighbourPrior {
     rank: usize,
     /// w, `[phase, channel][predictor, r]`, first the constant.
@@ -195,9 +197,9 @@ impl NeighbourPrior {
         let index = location.index;
         let mean = self.predict(means, location);
         let log_evidence = solver.infer(means.equations, index, noise, &self.precision, &mean);
-        let prior_log_odds = (self.mixing_share / (1.0 - self.mixing_share)).ln();
+        let prior_log_odds = libm::log(self.mixing_share / (1.0 - self.mixing_share));
         let log_odds = prior_log_odds + log_evidence - means.log_evidence[index];
-        (1.0 / (1.0 + (-log_odds).exp()), mean)
+        (1.0 / (1.0 + libm::exp(-log_odds)), mean)
     }
 
     fn expectation(

@@ -12,6 +12,8 @@
 //! suffice. A penalty instead of a constraint, because a combination of few basis functions cannot be zero over most of
 //! a window.
 
+use serde::{Deserialize, Serialize};
+
 use crate::linalg::{self, add_scaled, dot};
 
 /// Negative light that costs as much as one standard deviation of the posterior, as a share of the mean function's
@@ -23,7 +25,7 @@ const MAX_STEPS: usize = 5;
 const MIN_RELATIVE_GRADIENT: f64 = 1e-6;
 
 /// The penalty's weight, and the basis by light element.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct NonNegativityPenalty {
     rank: usize,
     /// V, `[element, r]`.

@@ -8,6 +8,8 @@
 //! ln p(y) = −½ ((f²/σ²)‖Bm‖² − (2f/σ²) mᵀBᵀy − dᵀKd + ln|K| + ln|C|) + constant,   d = ẑ − m
 //! ```
 
+use serde::{Deserialize, Serialize};
+
 use super::equations::ObservationEquations;
 use crate::linalg::{self, add_scaled, dot};
 
@@ -15,7 +17,7 @@ use crate::linalg::{self, add_scaled, dot};
 const MIN_VARIANCE_SHARE: f64 = 1e-9;
 
 /// The inverse of a prior's covariance.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct PriorPrecision {
     /// C⁻¹, `[r, r]`.
     matrix: Vec<f64>,

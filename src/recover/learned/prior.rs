@@ -8,6 +8,8 @@
 //!
 //! The noise factor, E‖y − f B z‖² over its expected value, absorbs what the basis cannot represent.
 
+use serde::{Deserialize, Serialize};
+
 use super::equations::{MinReliableBrightness, ObservationEquations, PHASES};
 use super::posterior::{PosteriorSolver, PriorPrecision};
 use crate::job_executor::Executor;
@@ -19,7 +21,7 @@ const FULL_WINDOW_RATIO: usize = 4;
 const POOLED_MEAN_WEIGHT: f64 = 20.0;
 const MIN_NOISE_FACTOR: f64 = 0.1;
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Prior {
     pub rank: usize,
     /// m, `[PHASES][r]`.

@@ -6,16 +6,15 @@
 
 use std::ops::Range;
 
-use anyhow::{Result, ensure};
+use thiserror::Error;
 
-use crate::capture::{CameraRowSet, Manifest};
-use crate::cli::value_parsers::ByteCount;
+use crate::capture::CameraRowSet;
 use crate::recover::Method;
 use crate::transport::{CHANNELS, Extent, Geometry, Window};
 
 /// Camera pixels along a side of a tile in the file. Larger tiles than those of the recovery compress better; these are
 /// still small enough to load only the visible ones.
-pub const FILE_TILE_SIDE: u32 = 128;
+pub(super) const FILE_TILE_SIDE: u32 = 128;
 /// Camera pixels along a side of a recovered tile.
 const TILE_SIDE: u32 = Geometry::DEFAULT_TILE_SIDE;
 /// All channels of one camera pixel or light element.
@@ -32,6 +31,16 @@ const ENCODED_VALUE_BYTES: u64 = 60;
 /// Choosing the quantisation step of the file.
 const RATE_CONTROL_BYTES: u64 = 64 << 20;
 
+/// A memory limit that is too low for a capture, in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("a memory limit of {limit} bytes is too little for this capture; it takes at least {min}")]
+pub struct TooLittleMemory {
+    /// The limit.
+    pub limit: u64,
+    /// The lowest limit that is enough.
+    pub min: u64,
+}
+
 /// How the memory limit is used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryPlan {
@@ -41,24 +50,26 @@ pub struct MemoryPlan {
     row_bytes: u64,
     camera: Extent,
     /// Number of tiles recovered at once.
-    pub tiles_at_once: usize,
+    tiles_at_once: usize,
     threads: usize,
-    limit: ByteCount,
+    limit: u64,
     fixed_bytes: u64,
 }
 
 impl MemoryPlan {
-    /// A plan for recovery by `method` from `shots` photographs on at most `threads` threads. Fails if `limit` is too
-    /// low for one tile.
+    /// A plan for recovery by `method` in `window` from `shots` photographs on at most `threads` threads, within
+    /// `limit` bytes.
+    ///
+    /// # Errors
+    /// If the limit is too low for one tile.
     pub fn new(
-        limit: ByteCount,
-        manifest: &Manifest,
+        limit: u64,
+        (camera, light): (Extent, Extent),
         shots: usize,
         method: Method,
         window: Window,
         threads: usize,
-    ) -> Result<Self> {
-        let (camera, light) = (manifest.camera.extent(), manifest.light.extent());
+    ) -> Result<Self, TooLittleMemory> {
         let photographs = shots as u64;
         let width = u64::from(camera.width);
         let fixed_bytes = PROGRAM_BYTES
@@ -83,7 +94,7 @@ impl MemoryPlan {
         let min_rows = (TILE_SIDE + 2 * method.max_halo()).min(camera.height);
         let min_bytes = plan.row_bytes * u64::from(min_rows);
         plan.ensure_limit(fixed_bytes + tile + min_bytes)?;
-        let free = limit.0 - fixed_bytes;
+        let free = limit - fixed_bytes;
         let all = plan.row_bytes * u64::from(camera.height);
         plan.photograph_bytes = match all <= free - tile {
             true => all,
@@ -94,26 +105,36 @@ impl MemoryPlan {
     }
 
     /// Number of tiles of the file encoded at once, after the photographs are unloaded, for `rank` components and
-    /// functions of `window`. The encoded file is not included. Fails if the limit is too low for one tile.
-    pub fn tiles_encoded_at_once(&self, window: Window, rank: usize) -> Result<usize> {
+    /// functions of `window`. The encoded file is not included.
+    ///
+    /// # Errors
+    /// If the limit is too low for one tile.
+    pub fn tiles_encoded_at_once(
+        &self,
+        window: Window,
+        rank: usize,
+    ) -> Result<usize, TooLittleMemory> {
         let pixels = self.camera.area() as u64;
         let value = ENCODED_VALUE_BYTES * (window.area() + rank) as u64;
         let tile = value * pixels.min(u64::from(FILE_TILE_SIDE).pow(2));
         let fixed = PROGRAM_BYTES + RATE_CONTROL_BYTES.min(value * pixels);
         self.ensure_limit(fixed + tile)?;
-        Ok(self.threads.min(((self.limit.0 - fixed) / tile) as usize))
+        Ok(self.threads.min(((self.limit - fixed) / tile) as usize))
     }
 
-    fn ensure_limit(&self, min_bytes: u64) -> Result<()> {
-        let megabytes = min_bytes.div_ceil(1 << 20);
-        ensure!(
-            self.limit.0 >= min_bytes,
-            "--memory {} is too little for this capture; it takes at least --memory {megabytes}M",
-            self.limit,
-        );
-        Ok(())
+    fn ensure_limit(&self, min: u64) -> Result<(), TooLittleMemory> {
+        match self.limit {
+            limit if limit < min => Err(TooLittleMemory { limit, min }),
+            _ => Ok(()),
+        }
     }
 
+    /// Number of tiles to recover at once.
+    pub fn tiles_at_once(&self) -> usize {
+        self.tiles_at_once
+    }
+
+    /// Number of tiles of the recovery.
     pub fn tiles(&self) -> usize {
         (self.tile_rows() * self.camera.width.div_ceil(TILE_SIDE)) as usize
     }
@@ -122,6 +143,7 @@ impl MemoryPlan {
         self.camera.height.div_ceil(TILE_SIDE)
     }
 
+    /// Whether all photographs fit in memory.
     pub fn fits_photographs(&self) -> bool {
         self.max_rows() >= self.camera.height
     }
@@ -169,7 +191,7 @@ impl MemoryPlan {
     pub fn gray_code_rows(&self, photographs: usize) -> CameraRowSet {
         // The samples of a pixel and its decoded position.
         let pixel = photographs as u64 * PIXEL_BYTES + 64;
-        let max_rows = (self.limit.0 - self.fixed_bytes) / (pixel * u64::from(self.camera.width));
+        let max_rows = (self.limit - self.fixed_bytes) / (pixel * u64::from(self.camera.width));
         let interval = u64::from(self.camera.height).div_ceil(max_rows.max(1));
         let rows = (0..self.camera.height).step_by(interval as usize);
         CameraRowSet::from_strips(rows.map(|y| y..y + 1))
@@ -185,15 +207,10 @@ impl MemoryPlan {
 mod tests {
     use super::*;
 
-    fn plan(megabytes: u64, threads: usize) -> Result<MemoryPlan> {
-        let manifest = Manifest::parse(
-            r#"{"version": 1, "light": {"width": 64, "height": 64, "gamma": 2},
-                "camera": {"width": 500, "height": 300, "black": 0, "white": 60000},
-                "shots": [{"pattern": "a.png", "photo": "b.png"}]}"#,
-            std::path::Path::new("capture.json"),
-        );
-        let (limit, window) = (ByteCount(megabytes << 20), Window::new(9).unwrap());
-        MemoryPlan::new(limit, &manifest.unwrap(), 80, Method::Nnls, window, threads)
+    fn plan(megabytes: u64, threads: usize) -> Result<MemoryPlan, TooLittleMemory> {
+        let extents = (Extent::new(500, 300), Extent::new(64, 64));
+        let window = Window::new(9).unwrap();
+        MemoryPlan::new(megabytes << 20, extents, 80, Method::Nnls, window, threads)
     }
 
     #[test]
@@ -236,10 +253,9 @@ mod tests {
 
     #[test]
     fn too_little_memory_is_refused_with_the_minimum() {
-        let message = plan(30, 2).unwrap_err().to_string();
-        let words: Vec<&str> = message.split(' ').collect();
-        let min = words.last().unwrap().trim_end_matches('M').parse().unwrap();
-        assert!(message.contains("at least --memory"), "{message}");
+        let TooLittleMemory { limit, min } = plan(30, 2).unwrap_err();
+        assert_eq!(limit, 30 << 20);
+        let min = min.div_ceil(1 << 20);
         assert!(plan(min, 2).is_ok());
         assert!(plan(min - 1, 2).is_err());
     }

@@ -1,4 +1,4 @@
-//! A recovered tile in a checkpoint: half-precision floats `x / step` with a power of two as step, split into planes of
+//! A recovered tile between recovery and encoding, in a checkpoint or a browser's memory: half-precision floats `x / step` with a power of two as step, split into planes of
 //! low and high bytes and compressed by zstd.
 //!
 //! Eleven bits are finer than any `.ltm` file but a lossless one, and fast to write.
@@ -9,13 +9,17 @@ use half::f16;
 
 use crate::transport::{CHANNELS, FloatTile, TileRect};
 
-/// Level of zstd: the fastest, as a checkpoint is read once and then deleted.
+/// Level of zstd: the fastest, as a record is read a few times and then deleted.
 const ZSTD_LEVEL: i32 = 1;
 /// Bytes before the values: whether the tile is direct or factored, and the step.
 const HEAD_BYTES: usize = 5;
 const DIRECT: u8 = 1;
 const FACTORED: u8 = 2;
 
+/// The record of a tile.
+///
+/// # Errors
+/// If memory is missing.
 pub fn encode(tile: &FloatTile) -> io::Result<Vec<u8>> {
     let (kind, values) = match tile.functions.is_empty() {
         true => (FACTORED, &tile.coefficients),
@@ -24,7 +28,7 @@ pub fn encode(tile: &FloatTile) -> io::Result<Vec<u8>> {
     let values = values.as_flattened();
     let finite = values.iter().filter(|v| v.is_finite());
     let peak = finite.fold(f32::MIN_POSITIVE, |peak, v| peak.max(v.abs()));
-    let step = (peak.log2().ceil() - 15.0).clamp(-120.0, 110.0).exp2();
+    let step = libm::exp2f((libm::log2f(peak).ceil() - 15.0).clamp(-120.0, 110.0));
     let halves = values.iter().map(|value| {
         let value = if value.is_finite() { value / step } else { 0.0 };
         let [low, high] = f16::from_f32(value).to_le_bytes();
@@ -39,6 +43,9 @@ pub fn encode(tile: &FloatTile) -> io::Result<Vec<u8>> {
 }
 
 /// Decodes the tile at `rect`: `rank` coefficients or `area` elements a pixel and channel.
+///
+/// # Errors
+/// If the record is not one of such a tile.
 pub fn decode(rect: TileRect, rank: usize, area: usize, record: &[u8]) -> io::Result<FloatTile> {
     let damaged = || io::Error::from(ErrorKind::InvalidData);
     let (&[kind, a, b, c, d], frame) = record

@@ -1,0 +1,124 @@
+//! Encodes recovered tiles as an `.ltm` file.
+
+use std::io::{self, ErrorKind};
+use std::ops::Range;
+
+use super::memory_plan::FILE_TILE_SIDE;
+use super::tile_record;
+use crate::format::{
+    DistortionMetric, EncodedFile, EncoderInput, EncodingTarget, FormatError, Metadata,
+};
+use crate::job_executor::Executor;
+use crate::recover::{HoldoutValidation, PreparedRecovery};
+use crate::transport::{Basis, Decibels, FloatTile, Geometry, TileTransportFunctions};
+
+/// Default loss of SNR by the file, as hold-out validation estimates it. Validation recovers from fewer patterns, and
+/// so with slightly more noise.
+const DEFAULT_LOSS: Decibels = Decibels(0.5);
+/// Default SNR of the file relative to the recovered transport without hold-out validation. With so few patterns the
+/// transport is noisy.
+const DEFAULT_SNR: Decibels = Decibels(32.0);
+
+/// The quality of a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum FileQuality {
+    /// As much as the noise of the photographs justifies.
+    #[default]
+    ByNoise,
+    /// This SNR of the file relative to the recovered transport.
+    Snr(Decibels),
+    /// The best file of at most so many bytes.
+    MaxBytes(u64),
+    /// Eleven bits of every value, for archives.
+    Lossless,
+}
+
+impl FileQuality {
+    fn target(self, metric: Option<&HoldoutValidation>) -> EncodingTarget<'_> {
+        match (self, metric) {
+            (Self::ByNoise, Some(metric)) => EncodingTarget::Loss(DEFAULT_LOSS, metric),
+            (Self::ByNoise, None) => EncodingTarget::Snr(DEFAULT_SNR),
+            (Self::Snr(snr), _) => EncodingTarget::Snr(snr),
+            (Self::MaxBytes(bytes), _) => EncodingTarget::Bytes(bytes),
+            (Self::Lossless, _) => EncodingTarget::Lossless,
+        }
+    }
+}
+
+/// The loss of SNR on held-out patterns.
+impl DistortionMetric for HoldoutValidation {
+    fn tiles(&self) -> Vec<FloatTile> {
+        self.tiles().cloned().collect()
+    }
+
+    fn loss(&self, functions: &[TileTransportFunctions]) -> Decibels {
+        self.loss(functions)
+    }
+}
+
+/// Encodes the tiles of `recovery`; `record` gives that of a tile, as [`encode_tile`](super::encode_tile) made it.
+///
+/// # Errors
+/// Those of [`EncodedFile::new`]. A record that cannot be read is [`FormatError::Source`], and so is cancellation, as
+/// [`ErrorKind::Interrupted`].
+pub fn encode_file(
+    recovery: &PreparedRecovery,
+    record: &(dyn Fn(usize) -> io::Result<Vec<u8>> + Sync),
+    metadata: Metadata,
+    quality: FileQuality,
+    executor: &impl Executor,
+) -> Result<EncodedFile, FormatError> {
+    let tile = |i| match executor.is_cancelled() {
+        true => Err(ErrorKind::Interrupted.into()),
+        false => file_tile(recovery, record, i),
+    };
+    let source = EncoderInput {
+        geometry: file_geometry(recovery),
+        basis: recovery.basis(),
+        tile: &tile,
+        metadata,
+        extensions: Vec::new(),
+    };
+    EncodedFile::new(
+        source,
+        quality.target(recovery.holdout_validation()),
+        executor,
+    )
+}
+
+/// The geometry of the file, whose tiles are larger than those of `recovery`.
+pub fn file_geometry(recovery: &PreparedRecovery) -> Geometry {
+    Geometry {
+        tile_side: FILE_TILE_SIDE,
+        ..*recovery.geometry()
+    }
+}
+
+/// A tile of the file, from the records of those of `recovery`.
+///
+/// # Errors
+/// If a record cannot be read or is damaged.
+pub fn file_tile(
+    recovery: &PreparedRecovery,
+    record: &dyn Fn(usize) -> io::Result<Vec<u8>>,
+    index: usize,
+) -> io::Result<FloatTile> {
+    let recovered = recovery.geometry();
+    let rank = recovery.basis().map_or(0, Basis::rank);
+    let area = recovered.window.area();
+    let rect = file_geometry(recovery).tile(index);
+    let mut tile = FloatTile::dark(rect);
+    let columns = tile_indices(rect.x, rect.extent.width, recovered.tile_side);
+    let rows = tile_indices(rect.y, rect.extent.height, recovered.tile_side);
+    for (x, y) in columns.flat_map(|x| rows.clone().map(move |y| (x, y))) {
+        let i = (y * recovered.tile_grid().width + x) as usize;
+        let part = tile_record::decode(recovered.tile(i), rank, area, &record(i)?)?;
+        tile.insert(&part);
+    }
+    Ok(tile)
+}
+
+/// Columns or rows of the recovered tiles that cover `length` pixels from `start`.
+fn tile_indices(start: u32, length: u32, side: u32) -> Range<u32> {
+    start / side..(start + length).div_ceil(side)
+}

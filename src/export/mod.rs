@@ -1,0 +1,21 @@
+//! From a capture to an `.ltm` file: the steps that the command line and the browser share.
+//!
+//! [`select_shots`] holds some shots out; [`prepare`] chooses the window and prepares the recovery; the tiles are
+//! recovered one by one into [records](encode_tile), from which [`encode_file`] makes the file. [`MemoryPlan`] keeps
+//! all of it within a limit. Reading, threads and progress are the caller's.
+
+mod encoding;
+mod memory_plan;
+mod metadata;
+mod preparation;
+mod shot_selection;
+mod tile_record;
+
+pub use encoding::{FileQuality, encode_file, file_geometry, file_tile};
+pub use memory_plan::{MemoryPlan, TooLittleMemory};
+pub use metadata::metadata;
+pub use preparation::{
+    MIN_PLAUSIBLE_SNR, PreparedExport, has_implausible_saturation, prepare, saturated_percent,
+};
+pub use shot_selection::{TooFewShots, select_shots};
+pub use tile_record::{decode as decode_tile, encode as encode_tile};

@@ -1,0 +1,71 @@
+//! Chooses the window, prepares the recovery, and checks that the photographs show light transport at all.
+
+use crate::capture::Measurements;
+use crate::job_executor::Executor;
+use crate::recover::{
+    HoldoutValidation, Method, PreparedRecovery, RecoverError, RecoverySettings, TailEstimate,
+    WindowSizeEstimate,
+};
+use crate::transport::{CHANNELS, Decibels, Window};
+
+/// SNR on held-out patterns below which the photographs are probably at fault.
+pub const MIN_PLAUSIBLE_SNR: Decibels = Decibels(13.0);
+
+/// Percentage of saturated samples above which an error in the calibration is likelier than highlights.
+const MAX_SATURATED_PERCENT: f64 = 2.0;
+
+/// A recovery that is ready to run.
+#[derive(Debug)]
+pub struct PreparedExport {
+    /// The recovery.
+    pub recovery: PreparedRecovery,
+    /// How wide the band is, if the window was estimated.
+    pub band: Option<TailEstimate>,
+}
+
+impl PreparedExport {
+    /// The SNR of the recovered transport, estimated on held-out patterns.
+    pub fn expected_snr(&self) -> Option<Decibels> {
+        let validation = self.recovery.holdout_validation();
+        validation.and_then(HoldoutValidation::snr)
+    }
+}
+
+/// Percentage of the samples that are saturated.
+pub fn saturated_percent(saturated: usize, measurements: &Measurements) -> f64 {
+    let samples = measurements.photos.len() * measurements.camera.area() * CHANNELS;
+    100.0 * saturated as f64 / samples as f64
+}
+
+/// Whether so many samples are saturated that the white level or the exposure is probably wrong.
+pub fn has_implausible_saturation(saturated: usize, measurements: &Measurements) -> bool {
+    // Of several exposures the longest are meant to saturate.
+    let full_scale = &measurements.full_scale;
+    let has_one_exposure = full_scale.iter().all(|value| *value == full_scale[0]);
+    has_one_exposure && saturated_percent(saturated, measurements) > MAX_SATURATED_PERCENT
+}
+
+/// Prepares a recovery by `method`, in `window` or in one that is estimated.
+///
+/// # Errors
+/// Those of [`PreparedRecovery::prepare`], and [`RecoverError::IndistinctPhotographs`].
+pub fn prepare(
+    measurements: &Measurements,
+    method: Method,
+    window: Option<Window>,
+    executor: &impl Executor,
+) -> Result<PreparedExport, RecoverError> {
+    let (window, band) = match window {
+        Some(window) => (window, None),
+        None => {
+            let estimate = WindowSizeEstimate::from_measurements(measurements, executor)?;
+            (estimate.window, Some(estimate.band))
+        }
+    };
+    let settings = RecoverySettings { method, window };
+    let recovery = PreparedRecovery::prepare(measurements, settings, executor)?;
+    match recovery.holdout_validation() {
+        Some(validation) if !validation.has_signal() => Err(RecoverError::IndistinctPhotographs),
+        _ => Ok(PreparedExport { recovery, band }),
+    }
+}

@@ -1,0 +1,18 @@
+//! Recovery for JavaScript: the module `recovery`, which pages load only to recover.
+//!
+//! [`MeasurementInput`] reads a capture folder; [`MeasurementBuilder`] takes patterns and photographs that the page has
+//! in memory. A [`Recovery`] prepares, recovers tiles and encodes; other workers recover tiles for it by
+//! [`TileRecovery`]. [`RecoveredTransport`] is what a page shows of the result. Every call runs to its end: a page cancels by ending the worker.
+
+mod capture_files;
+mod error;
+mod measurement_input;
+mod progress;
+mod recovered;
+mod recovery_job;
+mod tile_recovery;
+
+pub use measurement_input::{MeasurementBuilder, MeasurementInput};
+pub use recovered::RecoveredTransport;
+pub use recovery_job::Recovery;
+pub use tile_recovery::TileRecovery;
